@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""Opens everything under an output folder with the libraries that others use (numpy, laspy; pye57 and PDAL where
+installed) and checks that points, classes and extra fields are what result.json says. Usage: check_outputs.py OUT"""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+CLASSES = {2: "floor", 64: "fixed", 65: "robot link", 66: "attachment", 69: "uncertain"}
+KINDS = {0: 64, 1: 65, 2: 66, 3: 2, 255: 69}
+problems = []
+seen = []
+
+
+def check(holds, what):
+    if not holds:
+        problems.append(what)
+
+
+def check_masks(out, result):
+    """Masks have one entry a point, and point into the robots and links of the result."""
+    counts = dict.fromkeys(KINDS, 0)
+    for scan in result["labels"]["scans"]:
+        kind, robot, link = (np.load(out / scan[k], mmap_mode="r") for k in ("kind", "robot", "link"))
+        name = scan["scan"]
+        check((kind.dtype, robot.dtype, link.dtype) == (np.uint8, np.int16, np.int16), f"{name}: wrong types")
+        check(kind.shape == robot.shape == link.shape == (scan["n_points"],), f"{name}: lengths differ")
+        check(set(np.unique(kind).tolist()) <= set(KINDS), f"{name}: unknown kind")
+        moving = (kind == 1) | (kind == 2)
+        check(bool((robot[~moving] == -1).all()), f"{name}: robot number on a point that does not move")
+        check(bool((robot[moving] >= 0).all()), f"{name}: moving point without robot")
+        for index in np.unique(robot[moving]).tolist():
+            check(0 <= index < len(result["robots"]), f"{name}: robot {index} is not in the result")
+            if 0 <= index < len(result["robots"]):
+                links = link[robot == index]
+                n_links = len(result["robots"][index]["links"])
+                check(links.min() >= 0 and links.max() < n_links, f"{name}: link outside robot {index}")
+        for value in KINDS:
+            counts[value] += int((kind == value).sum())
+        seen.append(f"mask {name}: {len(kind)} points")
+    table = json.loads((out / result["labels"]["table"]).read_text())
+    check([r["id"] for r in table["robots"]] == [r["id"] for r in result["robots"]], "table and result differ")
+    return counts
+
+
+def check_robots(result):
+    for robot in result["robots"]:
+        check(set(robot["joints"]) == set(robot["sigma"]), f"{robot['id']}: joints without sigma")
+        norm = math.sqrt(sum(q * q for q in robot["base_pose"]["quat_wxyz"]))
+        check(abs(norm - 1) < 1e-9, f"{robot['id']}: quaternion is not of unit length")
+        check(robot["verdict"] in ("trusted", "doubtful", "refused"), f"{robot['id']}: unknown verdict")
+        check(robot["base_link"] == robot["links"][0], f"{robot['id']}: base link is not the first")
+
+
+def check_cloud(path):
+    """A labelled LAS or LAZ file; returns how many points there are of each class."""
+    import laspy
+
+    with laspy.open(path) as file:
+        header = file.header
+        cloud = file.read()
+    check((header.version.major, header.version.minor) == (1, 4), f"{path}: not LAS 1.4")
+    check(header.point_format.id in (6, 7), f"{path}: point format {header.point_format.id}")
+    check(len(cloud.points) == header.point_count, f"{path}: header counts {header.point_count}")
+    extra = list(header.point_format.extra_dimension_names)
+    check(extra == ["RobotId", "LinkId"], f"{path}: extra fields {extra}")
+    if len(cloud.points) == 0:
+        return {}
+    xyz = cloud.xyz
+    step = header.scales.max() * 1.01
+    check(bool((abs(xyz.min(axis=0) - header.mins) < step).all()), f"{path}: smallest corner is wrong")
+    check(bool((abs(xyz.max(axis=0) - header.maxs) < step).all()), f"{path}: largest corner is wrong")
+    check(int(header.number_of_points_by_return[0]) == header.point_count, f"{path}: points by return")
+    classes = np.asarray(cloud.classification)
+    check(set(np.unique(classes).tolist()) <= set(CLASSES), f"{path}: unknown class")
+    moving = (classes == 65) | (classes == 66)
+    robot, link = np.asarray(cloud["RobotId"]), np.asarray(cloud["LinkId"])
+    check(bool(((robot > 0) == moving).all()), f"{path}: RobotId and class differ")
+    check(bool(((link > 0) == moving).all()), f"{path}: LinkId and class differ")
+    return {int(c): int((classes == c).sum()) for c in np.unique(classes)}
+
+
+def check_clouds(out, folder, counts):
+    files = sorted(p for p in (out / folder).glob("*.la[sz]"))
+    total = {}
+    for path in files:
+        for value, n in check_cloud(path).items():
+            total[value] = total.get(value, 0) + n
+    if files:
+        seen.append(f"{folder}: {len(files)} files, {sum(total.values())} points, by class {dict(sorted(total.items()))}")
+    for kind, n in counts.items():
+        # Points that were dropped have an entry in the mask, but no place in a cloud.
+        n_cloud = total.get(KINDS[kind], 0)
+        whole = n_cloud == n if kind != 255 else n_cloud <= n
+        check(not files or whole, f"{folder}: {n_cloud} points of kind {kind}, mask has {n}")
+
+
+def check_e57(out):
+    files = sorted(out.rglob("*.e57"))
+    try:
+        import pye57
+    except ImportError:
+        if files:
+            seen.append("E57 not checked: no pye57")
+        return
+    for path in files:
+        file = pye57.E57(str(path))
+        for i in range(file.scan_count):
+            header = file.get_header(i)
+            if header.point_count == 0:
+                continue
+            # The crate under pye57 gives valid points only, moved to the world; raw ones keep their pixel.
+            raw = file.read_scan_raw(i)
+            check(len(raw["cartesianX"]) == header.point_count, f"{path}: scan {i} is short")
+            valid = raw["cartesianInvalidState"] == 0
+            world = file.read_scan(i, intensity=True, row_column=True)
+            check(len(world["cartesianX"]) == int(valid.sum()), f"{path}: scan {i}: valid points differ")
+            local = np.stack([raw[f"cartesian{c}"][valid] for c in "XYZ"], axis=1)
+            moved = local @ header.rotation_matrix.T + header.translation
+            got = np.stack([world[f"cartesian{c}"] for c in "XYZ"], axis=1)
+            check(bool(np.allclose(moved, got, atol=1e-5)), f"{path}: scan {i}: pose is not applied as written")
+        seen.append(f"{path.name}: {file.scan_count} scans")
+
+
+def check_pdal(out):
+    try:
+        import pdal
+    except ImportError:
+        seen.append("PDAL not checked: not installed")
+        return
+    files = sorted((out / "tiles").glob("*.la[sz]")) + sorted((out / "clouds").glob("*.la[sz]"))
+    for path in files:
+        stages = [{"type": "readers.las", "filename": str(path), "use_eb_vlr": True}]
+        pipeline = pdal.Pipeline(json.dumps(stages))
+        n = pipeline.execute()
+        fields = pipeline.arrays[0].dtype.names if n else ()
+        check(n == 0 or {"RobotId", "LinkId", "Classification"} <= set(fields), f"{path}: PDAL sees {fields}")
+    seen.append(f"PDAL: {len(files)} files")
+
+
+def main():
+    out = Path(sys.argv[1])
+    result = json.loads((out / "result.json").read_text(), parse_constant=lambda c: problems.append(f"result has {c}"))
+    check(result["schema"] == "stillpoint.result/1", "unknown schema")
+    check_robots(result)
+    counts = check_masks(out, result)
+    check_clouds(out, "tiles", counts)
+    check_clouds(out, "clouds", counts)
+    check_e57(out)
+    check_pdal(out)
+    left = [str(p) for p in out.rglob("*.part")]
+    check(not left, f"half-written files are left: {left}")
+    print("\n".join(seen))
+    for problem in problems:
+        print(f"WRONG: {problem}", file=sys.stderr)
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

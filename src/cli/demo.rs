@@ -1,0 +1,17 @@
+//! `demo`: nothing in; a virtual cell, what was found in it, and how that compares with the truth, out.
+
+use super::flags::{Common, DemoFlags};
+use super::say::Say;
+use crate::{demo, exit};
+use contract::Result;
+
+pub(super) fn demo(flags: &DemoFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let outcome = demo::run(flags.out.as_deref(), &means, &engine)?;
+    for warning in &outcome.warnings {
+        say.warning(warning);
+    }
+    say.result(&outcome.summary);
+    Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+}

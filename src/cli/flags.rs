@@ -1,0 +1,172 @@
+//! Commands and flags, as `clap` knows them. Their names are fixed: people and scripts rely on them.
+
+use super::say::LogFormat;
+use crate::engine::Engine;
+use crate::job::{Given, Means};
+use crate::progress::{Mode, Progress};
+use clap::{Args, Parser, Subcommand};
+use contract::Result;
+use std::path::PathBuf;
+
+/// Finds the robots in laser scans of a plant, in which posture they stand, and splits the cloud into what moves and
+/// what stands still.
+#[derive(Debug, Parser)]
+#[command(name = "stillpoint", version, subcommand_required = true, arg_required_else_help = true)]
+pub(super) struct Line {
+    #[command(subcommand)]
+    pub(super) command: Command,
+    #[command(flatten)]
+    pub(super) common: Common,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// A virtual robot cell: build, scan, run, compare with truth, report
+    Demo(DemoFlags),
+    /// What is in these scans, and what will be worse for what they lack
+    Inspect(InspectFlags),
+    /// The main job: scans and a robot library in, postures and masks out
+    Run(RunFlags),
+    /// Virtual scanner: a scene file in, scans and their truth out
+    Simulate(SimulateFlags),
+    /// About robot libraries
+    #[command(subcommand)]
+    Robots(RobotsCommand),
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum RobotsCommand {
+    /// Check a robot library
+    Lint(LintFlags),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DemoFlags {
+    /// Keep scene, scans, robots and results here (else in a temporary folder that is removed)
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct InspectFlags {
+    /// Scan files: E57, PTX, LAS, LAZ
+    #[arg(required = true, value_name = "INPUT")]
+    pub(super) inputs: Vec<PathBuf>,
+    /// Answer in JSON
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct RunFlags {
+    /// Scan files: E57, PTX, LAS, LAZ
+    #[arg(required = true, value_name = "INPUT")]
+    pub(super) inputs: Vec<PathBuf>,
+    /// Robot library: a folder of folders, each with robot.urdf and its meshes
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: PathBuf,
+    /// Where results go
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SimulateFlags {
+    /// Scene file (TOML)
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// Where scans and truth go
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Robot library that the scene's robots are taken from
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct LintFlags {
+    /// Robot library
+    #[arg(value_name = "DIR")]
+    pub(super) dir: PathBuf,
+    /// Answer in JSON
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Flags of all commands.
+#[derive(Debug, Args)]
+pub(super) struct Common {
+    /// Upper bound of resident memory, for example 4GiB
+    #[arg(long, global = true, value_name = "SIZE")]
+    memory: Option<String>,
+    /// Worker threads (else one a core)
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+    /// Scanner poses, for formats that carry none (TOML or JSON)
+    #[arg(long, global = true, value_name = "FILE")]
+    scanners: Option<PathBuf>,
+    /// Settings (TOML)
+    #[arg(long, global = true, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// One setting, for example fit.beam=150; goes before the file
+    #[arg(long, global = true, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// How progress is shown (else a bar on a terminal, lines elsewhere)
+    #[arg(long, global = true, value_enum, value_name = "HOW")]
+    progress: Option<Mode>,
+    /// How warnings and errors are written
+    #[arg(long, global = true, value_enum, value_name = "HOW", default_value = "text")]
+    pub(super) log_format: LogFormat,
+}
+
+impl Common {
+    /// Defaults, configuration and flags, put together and checked.
+    pub(super) fn means(&self) -> Result<Means> {
+        Means::of(&Given {
+            memory: self.memory.clone(),
+            threads: self.threads,
+            config: self.config.clone(),
+            set: self.set.clone(),
+        })
+    }
+
+    /// The scanners' file: the flag, else that of the configuration.
+    pub(super) fn scanners(&self, means: &Means) -> Option<PathBuf> {
+        self.scanners.clone().or_else(|| means.scanners.clone())
+    }
+
+    /// An engine that shows progress and listens to Ctrl-C. Call once.
+    pub(super) fn engine(&self, means: &Means) -> Result<Engine> {
+        let mut engine = Engine::new(means.n_threads);
+        engine.channel_bytes = means.channel_bytes();
+        engine.progress = Progress::new(self.progress.unwrap_or_else(Mode::fitting));
+        engine.cancel.on_ctrl_c()?;
+        // Libraries that use rayon by themselves keep to the same number; a pool made earlier (tests) is kept.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();
+        Ok(engine)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn flags_are_consistent() {
+        Line::command().debug_assert();
+    }
+
+    #[test]
+    fn common_flags_stand_anywhere() {
+        for args in [
+            "stillpoint --threads 2 run a.e57 b.ptx --robots r --out o",
+            "stillpoint run a.e57 b.ptx --robots r --out o --threads 2",
+        ] {
+            let line = Line::try_parse_from(args.split(' ')).expect("parses");
+            assert_eq!(line.common.threads, Some(2));
+            let Command::Run(run) = line.command else { panic!("{args}") };
+            assert_eq!(run.inputs.len(), 2);
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! `inspect`: inputs in; what is in them, and what will be worse for what they lack, out.
+
+use super::flags::{Common, InspectFlags};
+use super::say::Say;
+use crate::exit;
+use contract::{Error, Kind, Result};
+use ingest::Scanners;
+
+pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    let scanners = common.scanners(&means).map(|path| Scanners::read(&path));
+    let sources = ingest::open(&flags.inputs, scanners.transpose()?.as_ref(), &means.settings.ingest)?;
+    let descriptions = ingest::describe(&sources);
+    if flags.json {
+        let all = serde_json::json!({
+            "schema": "stillpoint.inspect/1",
+            "inputs": descriptions,
+            "warnings": sources.warnings,
+        });
+        let text = serde_json::to_string_pretty(&all)
+            .map_err(|e| Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e))?;
+        say.result(&text);
+    } else {
+        let texts: Vec<String> = descriptions.iter().map(ToString::to_string).collect();
+        say.result(&texts.join("\n"));
+        for warning in &sources.warnings {
+            say.warning(warning);
+        }
+    }
+    Ok(exit::OK)
+}

@@ -1,0 +1,41 @@
+//! The command line: words of a person in, an exit code out. Results go to standard output, everything else to
+//! standard error.
+
+mod demo;
+mod flags;
+mod inspect;
+mod robots;
+mod run;
+mod say;
+mod simulate;
+
+use crate::exit;
+use clap::Parser;
+use flags::{Command, Line, RobotsCommand};
+use say::Say;
+use std::ffi::OsString;
+
+/// Runs the program with these arguments, program name first; gives the exit code.
+#[must_use]
+pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
+    let line = match Line::try_parse_from(args) {
+        Ok(line) => line,
+        Err(error) => {
+            // Help and version are errors to clap, but no failures. A closed pipe is none either.
+            let _ = error.print();
+            return if error.use_stderr() { exit::code(contract::Kind::Usage) } else { exit::OK };
+        }
+    };
+    let say = Say::new(line.common.log_format);
+    let done = match &line.command {
+        Command::Demo(flags) => demo::demo(flags, &line.common, &say),
+        Command::Inspect(flags) => inspect::inspect(flags, &line.common, &say),
+        Command::Run(flags) => run::run(flags, &line.common, &say),
+        Command::Simulate(flags) => simulate::simulate(flags, &line.common, &say),
+        Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, &say),
+    };
+    done.unwrap_or_else(|error| {
+        say.error(&error);
+        exit::code(error.kind())
+    })
+}

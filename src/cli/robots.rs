@@ -1,0 +1,62 @@
+//! `robots lint`: a library in; what is wrong with it, in words or JSON, out.
+
+use super::flags::LintFlags;
+use super::say::Say;
+use crate::exit;
+use contract::{Error, Kind, Result};
+use robot::{Finding, Library, Severity};
+
+/// Exit code 4 where a model cannot be used, else 0.
+pub(super) fn lint(flags: &LintFlags, say: &Say) -> Result<u8> {
+    let findings = Library::lint(&flags.dir);
+    let count = |s: Severity| findings.iter().filter(|f| f.severity == s).count();
+    let [errors, warnings, notes] = [Severity::Error, Severity::Warning, Severity::Note].map(count);
+    if flags.json {
+        let list: Vec<_> = findings.iter().map(json).collect();
+        let all = serde_json::json!({
+            "schema": "stillpoint.lint/1",
+            "library": flags.dir.display().to_string(),
+            "errors": errors, "warnings": warnings, "notes": notes,
+            "findings": list,
+        });
+        let text = serde_json::to_string_pretty(&all)
+            .map_err(|e| Error::new(Kind::Bug, "findings cannot be written as JSON").because(e))?;
+        say.result(&text);
+    } else {
+        let mut text: String = findings.iter().map(|f| words(f) + "\n").collect();
+        text += &format!("{errors} errors, {warnings} warnings, {notes} notes\n");
+        say.result(&text);
+    }
+    Ok(if errors > 0 { exit::code(Kind::BadInput) } else { exit::OK })
+}
+
+fn word(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+        Severity::Note => "note",
+    }
+}
+
+fn words(finding: &Finding) -> String {
+    let mut text = word(finding.severity).to_owned();
+    for part in [&finding.model, &finding.place, &finding.what] {
+        if !part.is_empty() {
+            text += &format!(": {part}");
+        }
+    }
+    if !finding.way_out.is_empty() {
+        text += &format!("; {}", finding.way_out);
+    }
+    text
+}
+
+fn json(finding: &Finding) -> serde_json::Value {
+    serde_json::json!({
+        "model": finding.model,
+        "severity": word(finding.severity),
+        "what": finding.what,
+        "place": finding.place,
+        "way_out": finding.way_out,
+    })
+}

@@ -1,0 +1,35 @@
+//! `simulate`: a scene in; scans and truth out.
+
+use super::flags::{Common, SimulateFlags};
+use super::say::Say;
+use crate::exit;
+use crate::scanning::{Formats, read_scene, scan_scene};
+use contract::{Error, Kind, Result};
+use robot::Library;
+
+pub(super) fn simulate(flags: &SimulateFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let scene = read_scene(&flags.scene)?;
+    let models = match &flags.robots {
+        Some(dir) => {
+            let mut settings = means.settings.robot.clone();
+            settings.clouds = false;
+            Library::load(dir, &settings)?.models
+        }
+        None if scene.robots.is_empty() => Vec::new(),
+        None => {
+            return Err(Error::new(Kind::Usage, "the scene has robots, but no library was given")
+                .hint("add --robots DIR"));
+        }
+    };
+    let truth = scan_scene(&scene, &models, &flags.out, Formats::ALL, &engine)?;
+    let n_points: u64 = truth.scans.iter().map(|s| s.n_points).sum();
+    say.result(&format!(
+        "{} scans, {n_points} points, {} robots, written to {}",
+        truth.scans.len(),
+        truth.robots.len(),
+        flags.out.display()
+    ));
+    Ok(exit::OK)
+}

@@ -1,0 +1,234 @@
+//! A result and the truth of its scene in; how far they agree, robot by robot and point by point, out.
+
+use contract::{Error, Kind, PointKind, Result};
+use export::{ResultFile, RobotEntry};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use simulate::{TrueRobot, Truth};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A found robot farther than this from a true one is not it, metres.
+const SAME_PLACE: f64 = 0.5;
+
+/// How far a result agrees with the truth.
+#[derive(Debug, Clone)]
+pub struct Agreement {
+    /// One for each true robot, in the order of the truth.
+    pub robots: Vec<RobotAgreement>,
+    /// Found robots that no true one explains.
+    pub n_invented: usize,
+    /// Points: moving and said to be, moving and not said to be, not moving but said to be, the rest.
+    pub moving: [u64; 4],
+    /// Points of links: with the right robot and link, all that are true links, all that are said to be links.
+    pub links: [u64; 3],
+    /// Points that truly stand still, and those of them that are lost to moving.
+    pub fixed: [u64; 2],
+}
+
+/// One robot.
+#[derive(Debug, Clone)]
+pub struct RobotAgreement {
+    /// Name in the scene.
+    pub name: String,
+    /// True model.
+    pub model: String,
+    /// What was found at its place.
+    pub found: Option<Found>,
+}
+
+/// What was found at a true robot's place.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Its model, which may be the wrong one.
+    pub model: String,
+    /// Its verdict.
+    pub verdict: String,
+    /// Error of the base: metres, radians.
+    pub base: [f64; 2],
+    /// Name, error (radians or metres; turns of 360° taken out), stated standard deviation, whether it is said to be
+    /// determined by the points.
+    pub joints: Vec<(String, f64, f64, bool)>,
+}
+
+impl Agreement {
+    /// Compares `OUT/result.json` and its masks with the truth beside the scans; the result must be of `scans.e57`.
+    pub fn of(out: &Path, truth_dir: &Path) -> Result<Self> {
+        let truth = Truth::from_json(&read_text(&truth_dir.join("truth.json"))?)?;
+        let result: ResultFile = serde_json::from_str(&read_text(&out.join("result.json"))?)
+            .map_err(|e| Error::bad_input("the result is no result").because(e))?;
+        let mut taken = vec![None; result.robots.len()];
+        let robots = truth.robots.iter().enumerate().map(|(t, robot)| match_robot(t, robot, &result.robots, &mut taken));
+        let robots: Vec<RobotAgreement> = robots.collect();
+        let n_invented = taken.iter().filter(|t| t.is_none()).count();
+        let mut agreement = Self { robots, n_invented, moving: [0; 4], links: [0; 3], fixed: [0; 2] };
+        for (i, scan) in result.labels.scans.iter().enumerate() {
+            let ours = Triple::read(out, [&scan.kind, &scan.robot, &scan.link])?;
+            let name = |what: &str| format!("labels/{i}.{what}.npy");
+            let theirs = Triple::read(truth_dir, [&name("kind"), &name("robot"), &name("link")])?;
+            agreement.count(&ours, &theirs, &taken)?;
+        }
+        Ok(agreement)
+    }
+
+    fn count(&mut self, ours: &Triple, theirs: &Triple, taken: &[Option<usize>]) -> Result<()> {
+        if ours.kind.len() != theirs.kind.len() {
+            let what = format!("masks have {} entries, the truth {}", ours.kind.len(), theirs.kind.len());
+            return Err(Error::new(Kind::Bug, what));
+        }
+        let moves = |k: u8| k == PointKind::Link as u8 || k == PointKind::Attachment as u8;
+        for i in 0..ours.kind.len() {
+            let (own, real) = (moves(ours.kind[i]), moves(theirs.kind[i]));
+            self.moving[match (real, own) {
+                (true, true) => 0,
+                (true, false) => 1,
+                (false, true) => 2,
+                (false, false) => 3,
+            }] += 1;
+            self.fixed[0] += u64::from(!real);
+            self.fixed[1] += u64::from(!real && own);
+            let (link, real_link) = (PointKind::Link as u8 == ours.kind[i], PointKind::Link as u8 == theirs.kind[i]);
+            self.links[1] += u64::from(real_link);
+            self.links[2] += u64::from(link);
+            if link && real_link {
+                let robot = usize::try_from(ours.robot[i]).ok().and_then(|r| taken.get(r).copied().flatten());
+                let same = robot == usize::try_from(theirs.robot[i]).ok() && ours.link[i] == theirs.link[i];
+                self.links[0] += u64::from(same);
+            }
+        }
+        Ok(())
+    }
+
+    /// Balance of precision and recall of "moves", 0..1.
+    #[must_use]
+    pub fn f1(&self) -> f64 {
+        let [hit, missed, invented, _] = self.moving.map(|n| n as f64);
+        if hit == 0.0 { 0.0 } else { 2.0 * hit / (2.0 * hit + missed + invented) }
+    }
+
+    /// Largest error of a joint that is said to be determined, degrees (metres × 57 for prismatic ones are left out).
+    #[must_use]
+    pub fn worst_joint_deg(&self) -> f64 {
+        let found = self.robots.iter().filter_map(|r| r.found.as_ref());
+        found.flat_map(|f| &f.joints).filter(|j| j.3).map(|j| j.1.abs().to_degrees()).fold(0.0, f64::max)
+    }
+
+    /// A table for people.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut text = String::new();
+        for robot in &self.robots {
+            let Some(found) = &robot.found else {
+                let _ = writeln!(text, "{:<12} {:<26} NOT FOUND", robot.name, robot.model);
+                continue;
+            };
+            let right = if found.model == robot.model { "right model" } else { "WRONG MODEL" };
+            let _ = writeln!(
+                text,
+                "{:<12} {:<26} {right}, {}, base off by {:.2} mm and {:.3}°",
+                robot.name,
+                found.model,
+                found.verdict,
+                found.base[0] * 1e3,
+                found.base[1].to_degrees()
+            );
+            for (name, error, sigma, determined) in &found.joints {
+                let note = if *determined { "" } else { "  (not determined by the points)" };
+                let _ = writeln!(
+                    text,
+                    "             {name:<26} error {:>8.4}°  stated ± {:.4}°{note}",
+                    error.to_degrees(),
+                    sigma.to_degrees()
+                );
+            }
+        }
+        let share = |a: u64, b: u64| a as f64 / b.max(1) as f64;
+        let [hit, missed, invented, _] = self.moving;
+        let _ = writeln!(
+            text,
+            "moving/fixed: F1 {:.4}, precision {:.4}, recall {:.4}; fixed points lost {:.4} %",
+            self.f1(),
+            share(hit, hit + invented),
+            share(hit, hit + missed),
+            100.0 * share(self.fixed[1], self.fixed[0])
+        );
+        let _ = writeln!(
+            text,
+            "links: {:.2} % of the points said to be links are the right robot's right link; {:.2} % of the true ones found",
+            100.0 * share(self.links[0], self.links[2]),
+            100.0 * share(self.links[0], self.links[1])
+        );
+        if self.n_invented > 0 {
+            let _ = writeln!(text, "{} robot(s) INVENTED", self.n_invented);
+        }
+        text
+    }
+}
+
+/// The found robot nearest to a true one; notes at `taken` whose it is.
+fn match_robot(at: usize, truth: &TrueRobot, found: &[RobotEntry], taken: &mut [Option<usize>]) -> RobotAgreement {
+    let place = Vector3::from(truth.base_pose.xyz);
+    let near = found
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| taken[*i].is_none())
+        .map(|(i, r)| (i, (Vector3::from(r.base_pose.xyz) - place).norm()))
+        .filter(|(_, d)| *d < SAME_PLACE)
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    let found = near.map(|(i, distance)| {
+        taken[i] = Some(at);
+        let robot = &found[i];
+        let turn = rotation(truth.base_pose.quat_wxyz).angle_to(&rotation(robot.base_pose.quat_wxyz));
+        let joints = robot.joints.0.iter().filter_map(|(name, value)| {
+            let truth = truth.joints.get(name)?;
+            let pick = |all: &[(String, Option<f64>)]| all.iter().find(|s| s.0 == *name).and_then(|s| s.1);
+            let sigma = pick(&robot.sigma.0).unwrap_or(f64::INFINITY);
+            let determined = robot.determined.0.iter().any(|d| d.0 == *name && d.1);
+            let turns = ((value - truth) / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+            Some((name.clone(), value - truth - turns, sigma, determined))
+        });
+        Found {
+            model: robot.model.clone(),
+            verdict: robot.verdict.clone(),
+            base: [distance, turn],
+            joints: joints.collect(),
+        }
+    });
+    RobotAgreement { name: truth.name.clone(), model: truth.model.clone(), found }
+}
+
+fn rotation(wxyz: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]))
+}
+
+/// Labels of one mask.
+struct Triple {
+    kind: Vec<u8>,
+    robot: Vec<i16>,
+    link: Vec<i16>,
+}
+
+impl Triple {
+    fn read(dir: &Path, names: [&str; 3]) -> Result<Self> {
+        let wide = |bytes: Vec<u8>| bytes.as_chunks::<2>().0.iter().map(|c| i16::from_le_bytes(*c)).collect();
+        Ok(Self {
+            kind: npy(&dir.join(names[0]))?,
+            robot: wide(npy(&dir.join(names[1]))?),
+            link: wide(npy(&dir.join(names[2]))?),
+        })
+    }
+}
+
+/// The bytes of a one-dimensional `.npy` of ours, behind its header.
+fn npy(path: &Path) -> Result<Vec<u8>> {
+    let mut bytes = std::fs::read(path).map_err(|e| Error::from(e).at(path.display()))?;
+    if bytes.len() < 10 || &bytes[..6] != b"\x93NUMPY" {
+        return Err(Error::bad_input("this is no NumPy array").at(path.display()));
+    }
+    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    bytes.drain(..header.min(bytes.len()));
+    Ok(bytes)
+}
+
+fn read_text(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|e| Error::from(e).at(path.display()))
+}

@@ -1,0 +1,172 @@
+//! The engine: steps in, threads, order, memory bounds, errors and cancellation around them. Knows no geometry.
+//!
+//! | promise | how |
+//! | --- | --- |
+//! | order in is order out | results wait in a window; the holder of the next one never waits |
+//! | memory is bounded | windows by bytes; an oversized item travels alone; one item a worker besides |
+//! | the answer does not depend on workers or memory | folds run in order on one thread |
+//! | the error reported is the first by position | later items are skipped only once an earlier one has failed |
+//! | a panic in a step ends the run as `Kind::Bug` | caught per item |
+//! | dropping a flow stops its source | the consumer's end tells the producers when it goes, all the way up |
+
+mod cancel;
+mod edge;
+mod flow;
+mod guard;
+#[cfg(test)]
+mod tests;
+
+use crate::progress::{Amount, Progress};
+use contract::{Error, Kind, Result, Weigh};
+use flow::Pass;
+use guard::guarded;
+use rayon::prelude::*;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+pub use cancel::Cancel;
+pub use flow::Flow;
+
+/// Default of [`Engine::channel_bytes`]: a few dozen strips or tiles, far more than it takes to keep workers busy.
+pub const CHANNEL_BYTES: usize = 32 << 20;
+
+/// Runs steps. Threads are started for a pass and joined before it returns.
+pub struct Engine {
+    /// Threads of each map, and of [`Engine::fan_out`].
+    pub n_workers: usize,
+    /// What each channel between two steps of a pass may keep, bytes.
+    pub channel_bytes: usize,
+    /// Ends the run early.
+    pub cancel: Cancel,
+    /// Told how far the run is.
+    pub progress: Progress,
+    pool: OnceLock<rayon::ThreadPool>,
+}
+
+/// Name and size of a pass or fan-out, for progress.
+#[derive(Debug, Clone, Default)]
+pub struct Task {
+    name: String,
+    total: Amount,
+}
+
+impl Task {
+    /// A task of unknown size.
+    #[must_use]
+    pub fn new(name: impl Into<String>) -> Self {
+        Self { name: name.into(), total: Amount::default() }
+    }
+
+    /// Says how much it has to do; zero means not known.
+    #[must_use]
+    pub fn of(mut self, total: Amount) -> Self {
+        self.total = total;
+        self
+    }
+}
+
+impl From<&str> for Task {
+    fn from(name: &str) -> Self {
+        Self::new(name)
+    }
+}
+
+impl Engine {
+    /// An engine of `n_workers` threads a step (at least one), silent, with default channels.
+    #[must_use]
+    pub fn new(n_workers: usize) -> Self {
+        Self {
+            n_workers: n_workers.max(1),
+            channel_bytes: CHANNEL_BYTES,
+            cancel: Cancel::new(),
+            progress: Progress::silent(),
+            pool: OnceLock::new(),
+        }
+    }
+
+    /// Runs one pass: a source, some maps, one fold or sink.
+    ///
+    /// `source` is read on a thread of its own; its errors take part in the order of errors.
+    pub fn pass<'env, T, S, Out>(
+        &self,
+        task: impl Into<Task>,
+        source: S,
+        plan: impl for<'scope> FnOnce(Flow<'scope, 'env, T>) -> Result<Out>,
+    ) -> Result<Out>
+    where
+        T: Weigh + Send + 'env,
+        S: Iterator<Item = Result<T>> + Send + 'env,
+    {
+        self.cancel.check()?;
+        let task = task.into();
+        let stage = self.progress.stage(&task.name, task.total);
+        let out = std::thread::scope(|scope| {
+            let pass = Pass {
+                scope,
+                name: task.name.as_str().into(),
+                n_workers: self.n_workers,
+                channel_bytes: self.channel_bytes,
+                cancel: self.cancel.clone(),
+            };
+            guarded(&task.name, 0, || plan(Flow::source(pass, source, stage.clone())))
+        });
+        stage.finish();
+        out
+    }
+
+    /// Does `f` to each item on a pool of `n_workers` threads; results in the order of the items, the first error by
+    /// position. `f` may use rayon in its turn, but must not wait for a channel.
+    pub fn fan_out<T, U>(
+        &self,
+        task: impl Into<Task>,
+        items: Vec<T>,
+        f: impl Fn(T) -> Result<U> + Sync,
+    ) -> Result<Vec<U>>
+    where
+        T: Send,
+        U: Send,
+    {
+        let mut task = task.into();
+        task.total.items = items.len() as u64;
+        let stage = self.progress.stage(&task.name, task.total);
+        // Items after a failed one are skipped, since an earlier error decides.
+        let failed = AtomicUsize::new(usize::MAX);
+        let one = |(at, item): (usize, T)| {
+            if at > failed.load(Ordering::SeqCst) {
+                return None;
+            }
+            let out = match self.cancel.check() {
+                Ok(()) => guarded(&task.name, at as u64, || f(item)),
+                Err(cancelled) => Err(cancelled),
+            };
+            match &out {
+                Ok(_) => stage.add(1, 0, 0),
+                Err(_) => {
+                    failed.fetch_min(at, Ordering::SeqCst);
+                }
+            }
+            Some(out)
+        };
+        let all: Vec<Option<Result<U>>> = self
+            .pool()?
+            .install(|| items.into_par_iter().enumerate().with_max_len(1).map(one).collect());
+        stage.finish();
+        // A skipped item stands after an error, and `collect` stops at that.
+        all.into_iter()
+            .map(|out| out.unwrap_or_else(|| Err(Error::new(Kind::Bug, "an item was skipped"))))
+            .collect()
+    }
+
+    /// The pool of [`Engine::fan_out`], for steps that use rayon by themselves.
+    pub fn pool(&self) -> Result<&rayon::ThreadPool> {
+        if let Some(pool) = self.pool.get() {
+            return Ok(pool);
+        }
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.n_workers)
+            .thread_name(|i| format!("task {i}"))
+            .build()
+            .map_err(|e| Error::new(Kind::Io, "threads could not be started").because(e))?;
+        Ok(self.pool.get_or_init(|| pool))
+    }
+}

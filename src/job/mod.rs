@@ -1,0 +1,277 @@
+//! A job: flags and configuration in, everything that a run needs to know out, checked once.
+
+mod memory;
+mod room;
+mod settings;
+mod value;
+
+pub use memory::{memory_bytes, memory_words};
+pub use room::Room;
+pub use settings::Settings;
+
+use crate::engine::CHANNEL_BYTES;
+use contract::{Error, Kind, Result};
+use std::path::{Path, PathBuf};
+
+/// Memory of a run where none is asked for, bytes: half of a small office machine.
+pub const MEMORY_BYTES: u64 = 4 << 30;
+/// Least memory that a run is tried with, bytes: program, library of robots and one strip a worker.
+pub const LEAST_MEMORY_BYTES: u64 = 256 << 20;
+/// What program and robot library take, bytes, before any point is read.
+const PROGRAM_BYTES: u64 = 160 << 20;
+/// Longest configuration that is read, bytes: a thousand times what all settings take.
+const MAX_CONFIG_BYTES: u64 = 4 << 20;
+
+/// What is to be done, with which means.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Scan files, in the order of the command line.
+    pub inputs: Vec<PathBuf>,
+    /// Folder of the robot library.
+    pub robots: PathBuf,
+    /// Scanner poses for formats that carry none.
+    pub scanners: Option<PathBuf>,
+    /// Where results go.
+    pub out: PathBuf,
+    /// How much, in which way.
+    pub means: Means,
+}
+
+impl Job {
+    /// Prepares the output folder.
+    ///
+    /// # Errors
+    /// A path that is a file, or that the system refuses.
+    pub fn room(&self) -> Result<Room> {
+        Room::prepare(&self.out)
+    }
+}
+
+/// Means and settings of any command.
+#[derive(Debug, Clone)]
+pub struct Means {
+    /// Upper bound of resident memory, bytes.
+    pub memory_bytes: u64,
+    /// Worker threads.
+    pub n_threads: usize,
+    /// Scanner poses named by the configuration.
+    pub scanners: Option<PathBuf>,
+    /// Tunables of all stages.
+    pub settings: Settings,
+}
+
+/// What a run came to, for the command line.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Outcome {
+    /// What people read at the end, on standard output.
+    pub summary: String,
+    /// Said on standard error; they are in the result as well.
+    pub warnings: Vec<String>,
+    /// Something was skipped or refused, as the result says: exit code 3.
+    pub partial: bool,
+}
+
+/// Means as flags give them; `None` where a flag is missing.
+#[derive(Debug, Clone, Default)]
+pub struct Given {
+    /// `--memory`.
+    pub memory: Option<String>,
+    /// `--threads`.
+    pub threads: Option<usize>,
+    /// `--config`.
+    pub config: Option<PathBuf>,
+    /// `--set`, in order.
+    pub set: Vec<String>,
+}
+
+impl Means {
+    /// Defaults, then the configuration file, then `--set`, then the other flags.
+    ///
+    /// # Errors
+    /// A key that does not exist, a value of another kind: usage; a configuration that cannot be read: as it is.
+    pub fn of(given: &Given) -> Result<Self> {
+        let mut means = Self {
+            memory_bytes: MEMORY_BYTES,
+            n_threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            scanners: None,
+            settings: Settings::default(),
+        };
+        if let Some(path) = &given.config {
+            means.read(path).map_err(|e| e.at(path.display()))?;
+        }
+        for pair in &given.set {
+            let (key, value) = pair.split_once('=').ok_or_else(|| {
+                usage(format!("--set takes key=value, got \"{pair}\"")).hint("for example fit.beam=150")
+            })?;
+            means.set(key.trim(), &parsed(value.trim())).map_err(|e| e.at("--set"))?;
+        }
+        if let Some(memory) = &given.memory {
+            means.memory_bytes = memory_bytes(memory).map_err(|e| e.at("--memory"))?;
+        }
+        if let Some(threads) = given.threads {
+            means.n_threads = threads;
+        }
+        means.checked()
+    }
+
+    /// What the points that wait for their tiles may keep, bytes: half of what the program itself leaves. The other
+    /// half is for channels, workers, and vectors that grow by copying.
+    #[must_use]
+    pub fn ingest_bytes(&self) -> usize {
+        let free = self.memory_bytes.saturating_sub(PROGRAM_BYTES) / 2;
+        usize::try_from(free).unwrap_or(usize::MAX)
+    }
+
+    /// What mapped pages of the store may keep resident, bytes.
+    #[must_use]
+    pub fn store_bytes(&self) -> usize {
+        usize::try_from(self.memory_bytes / 8).unwrap_or(usize::MAX)
+    }
+
+    /// What each channel of a pass may keep, bytes: small beside the whole, and never more than is of use.
+    #[must_use]
+    pub fn channel_bytes(&self) -> usize {
+        usize::try_from(self.memory_bytes / 128).unwrap_or(usize::MAX).clamp(1 << 20, CHANNEL_BYTES)
+    }
+
+    fn checked(self) -> Result<Self> {
+        if self.n_threads == 0 || self.n_threads > 1024 {
+            return Err(usage(format!("threads must lie within 1..1024, got \"{}\"", self.n_threads)));
+        }
+        if self.memory_bytes < LEAST_MEMORY_BYTES {
+            let (least, got) = (memory_words(LEAST_MEMORY_BYTES), memory_words(self.memory_bytes));
+            return Err(Error::new(Kind::OverBudget, format!("a run takes {least} at least, got \"{got}\""))
+                .hint("raise --memory"));
+        }
+        Ok(self)
+    }
+
+    fn read(&mut self, path: &Path) -> Result<()> {
+        let len = std::fs::metadata(path).map_err(|e| unreadable(e, path))?.len();
+        if len > MAX_CONFIG_BYTES {
+            return Err(usage(format!("a configuration is not that long: \"{len}\" bytes")));
+        }
+        let text = std::fs::read_to_string(path).map_err(|e| unreadable(e, path))?;
+        let table: toml::Table = text
+            .parse()
+            .map_err(|e: toml::de::Error| usage("this is not TOML").because(e.message().to_owned()).at(line(&text, &e)))?;
+        for (key, value) in &table {
+            match value {
+                toml::Value::Table(room) => {
+                    for (field, value) in room {
+                        self.set(&format!("{key}.{field}"), value)?;
+                    }
+                }
+                value => self.set(key, value)?,
+            }
+        }
+        // A path in a configuration is meant from where the configuration lies.
+        if let (Some(scanners), Some(dir)) = (&self.scanners, path.parent()) {
+            self.scanners = Some(dir.join(scanners));
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, key: &str, value: &toml::Value) -> Result<()> {
+        let text = value.as_str();
+        match key {
+            "memory" => {
+                let bytes = value.as_integer().and_then(|v| u64::try_from(v).ok());
+                self.memory_bytes = match (bytes, text) {
+                    (Some(bytes), _) => bytes,
+                    (None, Some(text)) => memory_bytes(text)?,
+                    _ => return Err(usage(format!("memory is a size such as 4GiB, got \"{value}\""))),
+                };
+            }
+            "threads" => {
+                let n = value.as_integer().and_then(|v| usize::try_from(v).ok());
+                self.n_threads =
+                    n.ok_or_else(|| usage(format!("threads is a number, got \"{value}\"")))?;
+            }
+            "scanners" => {
+                let path = text.ok_or_else(|| usage(format!("scanners is a path, got \"{value}\"")))?;
+                self.scanners = Some(PathBuf::from(path));
+            }
+            _ => self.settings.set(key, value)?,
+        }
+        Ok(())
+    }
+}
+
+/// A value on the command line: TOML where it is, else a word.
+fn parsed(text: &str) -> toml::Value {
+    let table = format!("v = {text}").parse::<toml::Table>();
+    table.ok().and_then(|mut t| t.remove("v")).unwrap_or_else(|| toml::Value::String(text.into()))
+}
+
+fn line(text: &str, error: &toml::de::Error) -> String {
+    let start = error.span().map_or(0, |s| s.start).min(text.len());
+    format!("line {}", text.as_bytes()[..start].iter().filter(|b| **b == b'\n').count() + 1)
+}
+
+fn usage(what: impl Into<String>) -> Error {
+    Error::new(Kind::Usage, what)
+}
+
+fn unreadable(cause: std::io::Error, path: &Path) -> Error {
+    let kind = if path.exists() { Kind::Io } else { Kind::Usage };
+    Error::new(kind, "the configuration cannot be read").because(cause)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(set: &[&str]) -> Result<Means> {
+        let set = set.iter().map(ToString::to_string).collect();
+        Means::of(&Given { set, ..Given::default() })
+    }
+
+    #[test]
+    fn flags_beat_set_and_set_beats_the_file() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("plant.toml");
+        let text = "memory = \"8GiB\"\nthreads = 3\nscanners = \"s.toml\"\n[fit]\nbeam = 77\nthin = 1\n";
+        std::fs::write(&path, text).expect("writes");
+        let given = Given {
+            memory: Some("1 GiB".into()),
+            threads: None,
+            config: Some(path),
+            set: vec!["fit.beam=99".into(), "fit.plane_sigma=[0.1, 2]".into()],
+        };
+        let means = Means::of(&given).expect("reads");
+        assert_eq!((means.memory_bytes, means.n_threads), (1 << 30, 3));
+        assert_eq!((means.settings.fit.beam, means.settings.fit.thin), (99, 1.0));
+        assert_eq!(means.settings.fit.plane_sigma, [0.1, 2.0]);
+        assert_eq!(means.scanners, Some(dir.path().join("s.toml")));
+    }
+
+    #[test]
+    fn what_is_not_known_is_refused_by_name() {
+        for (set, says) in [
+            ("fit.bean=3", "\"fit.bean\""),
+            ("colour=3", "\"colour\""),
+            ("fit.beam=many", "\"many\""),
+            ("fit.beam=-1", "\"-1\""),
+            ("fit.thin=nan", "\"nan\""),
+            ("beam", "\"beam\""),
+            ("threads=0", "\"0\""),
+        ] {
+            let error = with(&[set]).expect_err(set);
+            assert_eq!(error.kind(), Kind::Usage, "{set}");
+            assert!(error.to_string().contains(says), "{error}");
+        }
+        assert_eq!(with(&["memory=1MiB"]).expect_err("small").kind(), Kind::OverBudget);
+        assert!(with(&["fit.bean=3"]).expect_err("typo").to_string().contains("beam"));
+    }
+
+    #[test]
+    fn a_broken_configuration_names_its_line() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("plant.toml");
+        std::fs::write(&path, "threads = 2\n[fit\n").expect("writes");
+        let given = Given { config: Some(path), ..Given::default() };
+        let error = Means::of(&given).expect_err("broken").to_string();
+        assert!(error.contains("plant.toml: line 2: this is not TOML"), "{error}");
+    }
+}

@@ -1,0 +1,137 @@
+//! Settings of all stages, nested; a key such as `fit.beam` and a value in, the changed setting out. A key that no
+//! stage has is refused. `tests/house.rs` holds this list against the stages' own.
+
+use super::value::{Value, assign};
+use contract::{Error, Kind, Result};
+
+/// Names the settings that can be set, room by room.
+macro_rules! settings {
+    ($($room:ident: $kind:path { $($field:ident),* $(,)? })*) => {
+        /// Tunables of all stages.
+        #[derive(Debug, Clone, Default)]
+        pub struct Settings {
+            $(
+                #[doc = concat!("Tunables of `", stringify!($kind), "`.")]
+                pub $room: $kind,
+            )*
+        }
+
+        impl Settings {
+            /// Sets one of them, by its name `room.field`.
+            ///
+            /// # Errors
+            /// No such name, or a value of another kind.
+            pub fn set(&mut self, key: &str, value: &toml::Value) -> Result<()> {
+                $($(
+                    if key == concat!(stringify!($room), ".", stringify!($field)) {
+                        return assign(&mut self.$room.$field, key, value);
+                    }
+                )*)*
+                Err(unknown(key))
+            }
+
+            /// All of them with their values, in the order of rooms and fields: the record of a run.
+            #[must_use]
+            pub fn all(&self) -> Vec<(&'static str, toml::Value)> {
+                vec![$($((
+                    concat!(stringify!($room), ".", stringify!($field)),
+                    self.$room.$field.write(),
+                )),*),*]
+            }
+        }
+    };
+}
+
+settings! {
+    ingest: ingest::Settings {
+        strip_points, max_xml_bytes, max_scanners_bytes, sample_points, max_laz_chunk_bytes,
+        max_range, max_native_rms, min_step, max_step,
+    }
+    robot: robot::Settings {
+        clouds, spacing, max_samples, max_mesh_bytes,
+    }
+    lattice: lattice::Settings {
+        noise, noise_growth, angular_noise, noise_limit, max_incidence, max_grazing, window,
+        max_window_pixels, normal_tolerance, max_normal_tolerance, flatness, min_patch_points,
+        min_level_area, min_level_width, min_patch_area, min_patch_width, level_tilt, voxel,
+        surface_voxel, surface_noise,
+    }
+    view: lattice::ViewSettings {
+        beams_per_cell, min_cell, empty_window,
+    }
+    floor: floor::Settings {
+        max_tilt, max_patch_tilt, max_step, level_tolerance, level_bend, max_level_tolerance,
+        min_area, min_raised_area, raised_share, max_waviness, height_cell, min_cell_points,
+        ghost_share, min_stand_area, floor_band, max_stands, stand_gap,
+    }
+    cluster: cluster::Settings {
+        gap, clearance, slack, min_points,
+    }
+    identify: identify::Settings {
+        n_coarse, n_fine, keep_coarse, keep_middle, max_places, bases_per_place, place_radius,
+        min_score, max_tilt,
+    }
+    region: identify::RegionSettings {
+        join_gap, margin, min_height, min_extent, min_points, min_seed, max_extent, overlap,
+    }
+    fit: fit::Settings {
+        beam, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
+        max_points, floor_band, min_noise, plane_sigma, determined_sigma, min_score,
+        max_violation,
+    }
+    segment: segment::Settings {
+        sigma_range, sigma_cad, min_gate, max_gate, floor_band, floor_depth, foot_band, reach,
+        hand_reach,
+    }
+    merge: merge::Settings {
+        contact, hold, cut, min_voxels,
+    }
+}
+
+fn unknown(key: &str) -> Error {
+    let error = Error::new(Kind::Usage, format!("there is no setting \"{key}\""));
+    let all = Settings::default().all();
+    let nearest = all.iter().map(|(name, _)| (distance(key, name), *name)).min();
+    let room = key.split('.').next().unwrap_or(key);
+    let of_room: Vec<&str> =
+        all.iter().map(|(name, _)| *name).filter(|n| n.split('.').next() == Some(room)).collect();
+    match nearest {
+        Some((d, name)) if d <= 3 => error.hint(format!("did you mean {name}")),
+        _ if !of_room.is_empty() => error.hint(format!("there are {}", of_room.join(", "))),
+        _ => error.hint("a setting is called stage.name, for example fit.beam"),
+    }
+}
+
+/// Edits that make one word of the other.
+fn distance(a: &str, b: &str) -> usize {
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.bytes().enumerate() {
+        let mut corner = std::mem::replace(&mut row[0], i + 1);
+        for (j, y) in b.bytes().enumerate() {
+            let swap = corner + usize::from(x != y);
+            corner = row[j + 1];
+            row[j + 1] = swap.min(corner + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_setting_can_be_set_to_what_it_is() {
+        let mut settings = Settings::default();
+        let all = settings.all();
+        for (key, value) in &all {
+            settings.set(key, value).expect(key);
+        }
+        assert!(settings.all() == all);
+    }
+
+    #[test]
+    fn typing_errors_find_their_setting() {
+        assert_eq!((distance("fit.bean", "fit.beam"), distance("", "abc")), (1, 3));
+    }
+}

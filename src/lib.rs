@@ -1,0 +1,20 @@
+//! How a run goes: plan, engine, store, command line, configuration, progress. Scans and a robot library in, postures
+//! and masks out. Knows no geometry: what is done stands in `stages/`.
+
+pub mod atomic;
+pub mod cli;
+pub mod compare;
+pub mod demo;
+pub mod engine;
+pub mod exit;
+pub mod job;
+mod labelling;
+mod library;
+mod masks;
+pub mod plan;
+pub mod progress;
+mod report;
+pub mod scanning;
+mod search;
+pub mod store;
+mod surfaces;

@@ -1,0 +1,113 @@
+//! Strips with labels in, in the order of each file; one triple of label arrays a mask out, an entry for every point
+//! that the file does not itself flag as invalid.
+
+use crate::labelling::MaskCount;
+use contract::{Error, Kind, Label, Mask, PointKind, Result, Strip};
+use export::MaskWriter;
+use std::path::{Path, PathBuf};
+
+/// Writes the masks of all inputs.
+pub(crate) struct Masks {
+    out: PathBuf,
+    masks: Vec<Mask>,
+    open: Vec<Option<Open>>,
+    counts: Vec<MaskCount>,
+}
+
+/// A mask that is being written. Strips of several scans of one LAS file share a mask, and their places interleave
+/// within one piece of the file: labels wait in a window until a strip begins behind all of them.
+struct Open {
+    writer: MaskWriter,
+    /// Labels of the places from `writer.len()` on; what no strip named stays uncertain.
+    window: Vec<Label>,
+    n_named: u64,
+}
+
+impl Masks {
+    pub(crate) fn new(out: &Path, masks: &[Mask]) -> Self {
+        Self {
+            out: out.to_path_buf(),
+            masks: masks.to_vec(),
+            open: masks.iter().map(|_| None).collect(),
+            counts: vec![MaskCount::default(); masks.len()],
+        }
+    }
+
+    /// Takes the labels of a strip's points.
+    pub(crate) fn add(&mut self, strip: &Strip, labels: &[Label]) -> Result<()> {
+        let at = strip.mask.0 as usize;
+        let slot = &mut self.open[at];
+        let open = match slot {
+            Some(open) => open,
+            None => slot.insert(Open::create(&self.out, &self.masks[at])?),
+        };
+        let count = &mut self.counts[at];
+        count.n_moving += labels
+            .iter()
+            .filter(|l| matches!(l.kind, PointKind::Link | PointKind::Attachment))
+            .count() as u64;
+        open.add(strip, labels)
+    }
+
+    /// Finishes all masks; what the file states beyond the last point is uncertain.
+    pub(crate) fn finish(self) -> Result<Vec<MaskCount>> {
+        let Self { out, masks, open, mut counts } = self;
+        for ((mask, open), count) in masks.iter().zip(open).zip(&mut counts) {
+            let mut open = match open {
+                Some(open) => open,
+                None => Open::create(&out, mask)?,
+            };
+            open.flush(u64::MAX)?;
+            let missing = mask.n_points.unwrap_or(0).saturating_sub(open.writer.len());
+            open.pad(missing)?;
+            count.n_points = open.writer.len();
+            count.n_dropped = count.n_points - open.n_named;
+            open.writer.finish()?;
+        }
+        Ok(counts)
+    }
+}
+
+/// Labels that are padded at a time.
+const PAD: usize = 1 << 16;
+
+impl Open {
+    fn create(out: &Path, mask: &Mask) -> Result<Self> {
+        Ok(Self { writer: MaskWriter::create(out, mask.id)?, window: Vec::new(), n_named: 0 })
+    }
+
+    fn add(&mut self, strip: &Strip, labels: &[Label]) -> Result<()> {
+        if strip.first_place >= self.writer.len() + self.window.len() as u64 {
+            self.flush(strip.first_place)?;
+        }
+        let Some(start) = strip.first_place.checked_sub(self.writer.len()) else {
+            return Err(Error::new(Kind::Bug, "a strip came after its places were written"));
+        };
+        for (place, label) in strip.place.iter().zip(labels) {
+            let at = start as usize + *place as usize;
+            if at >= self.window.len() {
+                self.window.resize(at + 1, Label::UNCERTAIN);
+            }
+            self.window[at] = *label;
+        }
+        self.n_named += labels.len() as u64;
+        Ok(())
+    }
+
+    /// Writes the window, and uncertain labels up to `place`.
+    fn flush(&mut self, place: u64) -> Result<()> {
+        self.writer.push(&self.window)?;
+        self.window.clear();
+        if place == u64::MAX { Ok(()) } else { self.pad(place.saturating_sub(self.writer.len())) }
+    }
+
+    fn pad(&mut self, mut n: u64) -> Result<()> {
+        let uncertain = [Label::UNCERTAIN; PAD];
+        while n > 0 {
+            let some = n.min(PAD as u64) as usize;
+            self.writer.push(&uncertain[..some])?;
+            n -= some as u64;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,54 @@
+//! The whole way of the data on one page: a job in, everything found and written, its outcome out. Nothing else
+//! decides order.
+
+use crate::engine::{Engine, Task};
+use crate::job::{Job, Outcome};
+use crate::labelling::Labelling;
+use crate::library;
+use crate::report::Report;
+use crate::search::Search;
+use crate::store::{Scatter, Store};
+use crate::surfaces::{Gather, Surfaces};
+use contract::Result;
+use ingest::{Scanners, Want};
+
+/// Does the main job.
+pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
+    let settings = &job.means.settings;
+    let room = job.room()?;
+    let library = library::load(&job.robots, &settings.robot, engine)?;
+    let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+    let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
+    let scans = &sources.scans;
+
+    // First pass: every point once, from the files into the lattice tiles of the store.
+    let scatter = Scatter::new(scans);
+    let mut sink = Store::create(room.store(), scans, job.means.ingest_bytes())?;
+    for input in &sources.inputs {
+        let task = Task::new("ingest").of(crate::report::amount(&sources, input.id));
+        let strips = sources.strips(input.id, Want::Coordinates)?;
+        engine.pass(task, strips, |f| f.map(&scatter).for_each(|s| sink.add(&s)))?;
+    }
+    let store = sink.finish(engine, job.means.store_bytes())?;
+
+    // On the tiles: local planes and occupied space, joined over tiles and scans; from here on nothing is as large as
+    // the cloud.
+    let (surfaces, gather) = (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
+    let ground = engine.pass(crate::report::tiles("surfaces", &store), store.tiles(), |f| f.map(&surfaces).fold(&gather))?;
+    let clusters = cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
+    let regions = identify::regions(&clusters, &settings.region);
+
+    // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
+    let search = Search::new(&library.models, scans, &store, &ground, settings);
+    let fits = engine.fan_out("fit", regions, |region| search.region(&region))?;
+    let fits = fit::choose(fits.into_iter().flatten().collect(), &library.models);
+
+    // Tiles near robots once more: which points are links, which hang on them.
+    let labelling = Labelling::new(&fits, &library.models, &sources, (&store, &ground.surfaces.floor), settings);
+    let near = labelling.near_robots(&store, engine)?;
+
+    // Second pass: every point once more, in the order of its file, to label and to write.
+    let written = labelling.write(&near, &room, engine)?;
+    Report { job, engine, sources: &sources, library: &library, fits: &fits, clusters: &clusters, written: &written }
+        .finish(&room)
+}

@@ -1,0 +1,392 @@
+//! Progress: what stages have done in, bars, lines or JSON on standard error out; and one report a stage for the
+//! result. The only place that owns a clock.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{IsTerminal, Write};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Mode {
+    /// A moving bar, for a terminal.
+    Bar,
+    /// A line every few seconds and at the end of each stage, for a log.
+    Plain,
+    /// The same as JSON, one object a line, for programs.
+    Json,
+    /// Nothing.
+    None,
+}
+
+impl Mode {
+    /// What suits standard error: a bar on a terminal, else plain lines.
+    #[must_use]
+    pub fn fitting() -> Self {
+        if std::io::stderr().is_terminal() { Self::Bar } else { Self::Plain }
+    }
+}
+
+/// Time between two lines of a stage: a log of an hour stays readable.
+const LINE_EVERY: Duration = Duration::from_secs(5);
+/// Time between two JSON objects of a stage: often enough for a display.
+const JSON_EVERY: Duration = Duration::from_secs(1);
+/// Time between two pictures of a bar.
+const BAR_EVERY: Duration = Duration::from_millis(120);
+
+/// Items, points and bytes; as a total, zero means not known.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Amount {
+    /// Number of items (strips, tiles, candidates).
+    pub items: u64,
+    /// Number of points.
+    pub points: u64,
+    /// Bytes.
+    pub bytes: u64,
+}
+
+impl Amount {
+    /// So many items.
+    #[must_use]
+    pub fn items(items: u64) -> Self {
+        Self { items, ..Self::default() }
+    }
+
+    /// So many points.
+    #[must_use]
+    pub fn points(points: u64) -> Self {
+        Self { points, ..Self::default() }
+    }
+
+    /// Share of `total` that is done, 0..1, by the first of points, bytes, items whose total is known.
+    #[must_use]
+    pub fn share(&self, total: &Self) -> Option<f64> {
+        [(self.points, total.points), (self.bytes, total.bytes), (self.items, total.items)]
+            .into_iter()
+            .find(|(_, of)| *of > 0)
+            .map(|(done, of)| (done as f64 / of as f64).min(1.0))
+    }
+}
+
+/// What a stage did, for `result.json`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageReport {
+    /// Name of the stage.
+    pub name: String,
+    /// Wall-clock time, seconds.
+    pub seconds: f64,
+    /// Items that passed.
+    pub n_items: u64,
+    /// Points that passed.
+    pub n_points: u64,
+    /// Bytes that passed.
+    pub bytes: u64,
+}
+
+/// Where progress is told; clones share it.
+#[derive(Clone)]
+pub struct Progress(Arc<Inner>);
+
+struct Inner {
+    mode: Mode,
+    out: Mutex<Box<dyn Write + Send>>,
+    reports: Mutex<Vec<StageReport>>,
+    bars: indicatif::MultiProgress,
+}
+
+/// A stage at work; clones share it.
+#[derive(Clone)]
+pub struct Stage(Arc<Running>);
+
+struct Running {
+    progress: Progress,
+    name: String,
+    total: Amount,
+    start: Instant,
+    done: [AtomicU64; 3],
+    /// Milliseconds since `start` at which the next line is due.
+    next_line: AtomicU64,
+    bar: Option<ProgressBar>,
+    finished: Mutex<bool>,
+}
+
+impl Progress {
+    /// Shows progress on standard error.
+    #[must_use]
+    pub fn new(mode: Mode) -> Self {
+        Self::to(mode, Box::new(std::io::stderr()))
+    }
+
+    /// Shows nothing; reports are kept all the same.
+    #[must_use]
+    pub fn silent() -> Self {
+        Self::new(Mode::None)
+    }
+
+    /// Writes lines to `out`; bars always go to standard error.
+    #[must_use]
+    pub fn to(mode: Mode, out: Box<dyn Write + Send>) -> Self {
+        let target = match mode {
+            Mode::Bar => ProgressDrawTarget::stderr(),
+            _ => ProgressDrawTarget::hidden(),
+        };
+        Self(Arc::new(Inner {
+            mode,
+            out: Mutex::new(out),
+            reports: Mutex::new(Vec::new()),
+            bars: indicatif::MultiProgress::with_draw_target(target),
+        }))
+    }
+
+    /// Begins a stage; zero in `total` means not known. It ends with [`Stage::finish`], or when its last clone goes.
+    #[must_use]
+    pub fn stage(&self, name: &str, total: Amount) -> Stage {
+        let bar = (self.0.mode == Mode::Bar).then(|| self.bar(name, &total));
+        Stage(Arc::new(Running {
+            progress: self.clone(),
+            name: name.to_owned(),
+            total,
+            start: Instant::now(),
+            done: Default::default(),
+            next_line: AtomicU64::new(self.every().as_millis() as u64),
+            bar,
+            finished: Mutex::new(false),
+        }))
+    }
+
+    /// What each finished stage did, in the order of their ends.
+    #[must_use]
+    pub fn reports(&self) -> Vec<StageReport> {
+        self.0.reports.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Says a line on standard error without spoiling a bar.
+    pub fn say(&self, line: &str) {
+        self.0.bars.suspend(|| self.line(line));
+    }
+
+    fn every(&self) -> Duration {
+        match self.0.mode {
+            Mode::Json => JSON_EVERY,
+            Mode::Bar => BAR_EVERY,
+            Mode::Plain | Mode::None => LINE_EVERY,
+        }
+    }
+
+    fn bar(&self, name: &str, total: &Amount) -> ProgressBar {
+        let known = total.share(total).is_some();
+        let bar = if known { ProgressBar::new(1000) } else { ProgressBar::new_spinner() };
+        let template = if known {
+            "{prefix:>12} [{bar:30}] {msg}"
+        } else {
+            "{prefix:>12} {spinner} {msg}"
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        let bar = self.0.bars.add(bar);
+        bar.set_prefix(name.to_owned());
+        bar
+    }
+
+    /// A line that cannot be written is no reason to end a run.
+    fn line(&self, line: &str) {
+        let mut out = self.0.out.lock().unwrap_or_else(PoisonError::into_inner);
+        let _ = writeln!(out, "{line}");
+    }
+}
+
+impl Stage {
+    /// Adds what has been done.
+    pub fn add(&self, items: u64, points: u64, bytes: u64) {
+        let run = &self.0;
+        for (counter, more) in run.done.iter().zip([items, points, bytes]) {
+            counter.fetch_add(more, Ordering::Relaxed);
+        }
+        if run.progress.0.mode == Mode::None {
+            return;
+        }
+        let now = run.start.elapsed();
+        let due = run.next_line.load(Ordering::Relaxed);
+        if (now.as_millis() as u64) < due {
+            return;
+        }
+        let next = (now + run.progress.every()).as_millis() as u64;
+        // Only one thread speaks for this moment.
+        if run.next_line.compare_exchange(due, next, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
+            run.show(now.as_secs_f64(), false);
+        }
+    }
+
+    /// Ends the stage: its report is kept, a last line is shown. A second call does nothing.
+    pub fn finish(&self) {
+        self.0.finish();
+    }
+}
+
+impl Running {
+    fn done(&self) -> Amount {
+        let [items, points, bytes] = [0, 1, 2].map(|i| self.done[i].load(Ordering::Relaxed));
+        Amount { items, points, bytes }
+    }
+
+    fn finish(&self) {
+        let mut finished = self.finished.lock().unwrap_or_else(PoisonError::into_inner);
+        if std::mem::replace(&mut *finished, true) {
+            return;
+        }
+        let (done, seconds) = (self.done(), self.start.elapsed().as_secs_f64());
+        self.show(seconds, true);
+        let report = StageReport {
+            name: self.name.clone(),
+            seconds,
+            n_items: done.items,
+            n_points: done.points,
+            bytes: done.bytes,
+        };
+        let reports = &self.progress.0.reports;
+        reports.lock().unwrap_or_else(PoisonError::into_inner).push(report);
+    }
+
+    fn show(&self, seconds: f64, last: bool) {
+        let done = self.done();
+        match (self.progress.0.mode, &self.bar) {
+            (Mode::None, _) => {}
+            (Mode::Json, _) => self.progress.line(&json(&self.name, &done, &self.total, seconds, last)),
+            (_, Some(bar)) => {
+                let share = done.share(&self.total).unwrap_or(0.0);
+                bar.set_position((share * 1000.0) as u64);
+                bar.tick();
+                let message = words(&done, &self.total, seconds, last);
+                if last { bar.finish_with_message(message) } else { bar.set_message(message) }
+            }
+            (_, None) => {
+                let words = words(&done, &self.total, seconds, last);
+                self.progress.line(&format!("{}: {words}", self.name));
+            }
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+/// Seconds to go at the rate so far.
+fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
+    let share = done.share(total).filter(|s| *s > 0.0)?;
+    Some(seconds * (1.0 - share) / share)
+}
+
+fn words(done: &Amount, total: &Amount, seconds: f64, last: bool) -> String {
+    let mut words = Vec::new();
+    if let Some(share) = done.share(total) {
+        words.push(format!("{:.0} %", 100.0 * share));
+    }
+    let rate = |n: u64| n as f64 / seconds.max(1e-3);
+    if done.points > 0 {
+        words.push(format!("{} points", short(done.points as f64)));
+        words.push(format!("{} points/s", short(rate(done.points))));
+    } else {
+        words.push(format!("{} items", done.items));
+    }
+    if done.bytes > 0 {
+        words.push(format!("{}B/s", short(rate(done.bytes))));
+    }
+    match eta(done, total, seconds) {
+        _ if last => words.push(format!("done in {seconds:.1} s")),
+        Some(eta) => words.push(format!("{eta:.0} s to go")),
+        None => words.push(format!("{seconds:.0} s")),
+    }
+    words.join(", ")
+}
+
+fn json(name: &str, done: &Amount, total: &Amount, seconds: f64, last: bool) -> String {
+    let known = |n: u64| (n > 0).then_some(n);
+    let rate = done.points as f64 / seconds.max(1e-3);
+    serde_json::json!({
+        "event": if last { "stage_end" } else { "progress" },
+        "stage": name,
+        "seconds": seconds,
+        "items": done.items, "items_total": known(total.items),
+        "points": done.points, "points_total": known(total.points),
+        "bytes": done.bytes, "bytes_total": known(total.bytes),
+        "points_per_second": rate,
+        "share": done.share(total),
+        "eta_seconds": if last { Some(0.0) } else { eta(done, total, seconds) },
+    })
+    .to_string()
+}
+
+/// A number with three digits and a decimal prefix.
+fn short(value: f64) -> String {
+    let (scaled, prefix) = match value {
+        v if v >= 1e9 => (v / 1e9, " G"),
+        v if v >= 1e6 => (v / 1e6, " M"),
+        v if v >= 1e3 => (v / 1e3, " k"),
+        v => return format!("{v:.0} "),
+    };
+    format!("{scaled:.*}{prefix}", if scaled < 10.0 { 2 } else { usize::from(scaled < 100.0) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Clone, Default)]
+    struct Page(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Page {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.lock().expect("not poisoned").extend_from_slice(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn told(mode: Mode) -> (String, Vec<StageReport>) {
+        let page = Page::default();
+        let progress = Progress::to(mode, Box::new(page.clone()));
+        let stage = progress.stage("read", Amount::points(2000));
+        for _ in 0..1000 {
+            stage.add(1, 2, 24);
+        }
+        drop(stage);
+        let bytes = page.0.lock().expect("not poisoned").clone();
+        (String::from_utf8(bytes).expect("text"), progress.reports())
+    }
+
+    #[test]
+    fn a_short_stage_is_one_line_and_one_report() {
+        let (text, reports) = told(Mode::Plain);
+        assert_eq!(text.lines().count(), 1, "{text}");
+        assert!(text.starts_with("read: 100 %, 2.00 k points"), "{text}");
+        assert_eq!((reports[0].n_items, reports[0].n_points, reports[0].bytes), (1000, 2000, 24000));
+        assert_eq!(told(Mode::None).0, "");
+        assert_eq!(told(Mode::None).1.len(), 1);
+    }
+
+    #[test]
+    fn json_lines_are_json() {
+        let (text, _) = told(Mode::Json);
+        let last: serde_json::Value =
+            serde_json::from_str(text.lines().last().expect("a line")).expect("JSON");
+        assert_eq!(last["event"], "stage_end");
+        assert_eq!(last["points"], 2000);
+        assert_eq!(last["items_total"], serde_json::Value::Null);
+    }
+
+    #[test]
+    fn rate_and_time_to_go() {
+        let (done, total) = (Amount::points(25), Amount::points(100));
+        assert_eq!(eta(&done, &total, 10.0), Some(30.0));
+        assert_eq!(eta(&Amount::default(), &total, 10.0), None);
+        assert_eq!(short(35_200_000.0), "35.2 M");
+    }
+}

@@ -1,0 +1,173 @@
+//! What a run came to in; `result.json`, the legend of the masks and a summary for people out.
+
+use crate::engine::{Engine, Task};
+use crate::job::{Job, Outcome, Room};
+use crate::labelling::Done;
+use crate::progress::Amount;
+use crate::store::Store;
+use contract::{Cluster, Fit, Format, Input, InputId, Result, Verdict};
+use export::{InputEntry, Labels, ResultFile, RobotEntry, SCHEMA, ScanLabels, StageEntry, write_table};
+use ingest::Sources;
+use robot::{Library, Model, Role};
+use std::fmt::Write as _;
+use std::fs::File;
+
+/// Everything that the result tells.
+pub(crate) struct Report<'a> {
+    pub(crate) job: &'a Job,
+    pub(crate) engine: &'a Engine,
+    pub(crate) sources: &'a Sources,
+    pub(crate) library: &'a Library,
+    pub(crate) fits: &'a [Fit],
+    pub(crate) clusters: &'a [Cluster],
+    pub(crate) written: &'a Done,
+}
+
+impl Report<'_> {
+    /// Writes the legend and the result, last of all files.
+    pub(crate) fn finish(&self, room: &Room) -> Result<Outcome> {
+        let robots: Vec<RobotEntry> = self.fits.iter().enumerate().map(|(i, f)| self.robot(i, f)).collect();
+        write_table(room.out(), &robots)?;
+        let warnings = self.warnings();
+        let masks = self.sources.masks.iter().zip(&self.written.masks);
+        let labels = Labels {
+            table: "labels/table.json".into(),
+            scans: masks.map(|(mask, count)| ScanLabels::new(mask, count.n_points)).collect(),
+        };
+        let digests = self.engine.fan_out("digest", self.sources.inputs.iter().collect(), digest)?;
+        let result = ResultFile {
+            schema: SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            robots,
+            labels,
+            inputs: self.sources.inputs.iter().zip(digests).map(|(i, d)| self.input(i, d)).collect(),
+            stages: self.stages(),
+            warnings: warnings.clone(),
+        };
+        result.write(room.out())?;
+        Ok(Outcome { summary: self.summary(room), warnings, partial: false })
+    }
+
+    fn robot(&self, index: usize, fit: &Fit) -> RobotEntry {
+        let model = &self.library.models[fit.model];
+        let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
+        let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+        let poses = model.poses(&posture);
+        let tip = tip(model).map(|l| (names[l].clone(), fit.world_from_base * poses[l]));
+        RobotEntry::new(index, fit, &names, tip)
+    }
+
+    fn input(&self, input: &Input, digest: String) -> InputEntry {
+        let scans: Vec<_> = self.sources.scans.iter().filter(|s| s.input == input.id).collect();
+        let counts = self.sources.masks.iter().zip(&self.written.masks).filter(|(m, _)| m.input == input.id);
+        let (n_points, n_dropped) =
+            counts.fold((0, 0), |sum, (_, c)| (sum.0 + c.n_points, sum.1 + c.n_dropped));
+        InputEntry {
+            path: input.path.display().to_string(),
+            format: format_word(input.format).into(),
+            n_bytes: input.n_bytes,
+            digest,
+            n_scans: scans.len() as u32,
+            n_points,
+            n_dropped,
+            notes: scans.iter().flat_map(|s| &s.notes).cloned().collect(),
+        }
+    }
+
+    /// Counts of each stage; no times, so that the same input gives the same bytes.
+    fn stages(&self) -> Vec<StageEntry> {
+        let n_points = self.written.masks.iter().map(|m| m.n_points).sum();
+        let entry = |name: &str, n_in: u64, n_out: u64| StageEntry { name: name.into(), n_in, n_out };
+        vec![
+            entry("ingest", self.sources.inputs.len() as u64, n_points),
+            entry("cluster", n_points, self.clusters.len() as u64),
+            entry("fit", self.clusters.len() as u64, self.fits.len() as u64),
+            entry("label", n_points, self.written.masks.iter().map(|m| m.n_moving).sum()),
+        ]
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut out = self.sources.warnings.clone();
+        for finding in &self.library.findings {
+            if finding.severity == robot::Severity::Error {
+                out.push(format!("robot model '{}' is left out: {}: {}", finding.model, finding.place, finding.what));
+            }
+        }
+        for scan in self.sources.scans.iter().filter(|s| !s.has_beams()) {
+            out.push(format!("scan '{}': its scanner's position is not known: no proof of free space from it", scan.name));
+        }
+        out
+    }
+
+    fn summary(&self, room: &Room) -> String {
+        let mut text = String::new();
+        let _ = writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.sources.scans.len());
+        for (i, fit) in self.fits.iter().enumerate() {
+            let p = fit.world_from_base.translation.vector;
+            let _ = writeln!(
+                text,
+                "  R{} {} at ({:.3}, {:.3}, {:.3}) m: {}, score {:.2}, rms {:.1} mm",
+                i + 1,
+                fit.model_name,
+                p.x,
+                p.y,
+                p.z,
+                fit.verdict.word(),
+                fit.score,
+                fit.rms * 1e3
+            );
+            for joint in &fit.joints {
+                let sigma = if joint.determined { format!("± {:.3}°", joint.sigma.to_degrees()) } else { "not determined".into() };
+                let _ = writeln!(text, "     {:<24} {:>9.3}° {sigma}", joint.name, joint.value.to_degrees());
+            }
+            for reason in &fit.reasons {
+                let _ = writeln!(text, "     {}: {reason}", if fit.verdict == Verdict::Trusted { "note" } else { "why" });
+            }
+        }
+        let n: u64 = self.written.masks.iter().map(|m| m.n_points).sum();
+        let moving: u64 = self.written.masks.iter().map(|m| m.n_moving).sum();
+        let _ = writeln!(text, "{n} points labelled, {moving} of them moving");
+        let _ = writeln!(
+            text,
+            "result in {} ({} spatial tiles, {} pictures; {} worker(s))",
+            room.out().join("result.json").display(),
+            self.written.clouds.tiles.len(),
+            self.written.pictures.len(),
+            self.job.means.n_threads
+        );
+        text
+    }
+}
+
+/// The last link of the main chain.
+fn tip(model: &Model) -> Option<usize> {
+    (0..model.links.len()).rev().find(|&l| model.links[l].role == Role::Main)
+}
+
+/// Points that an input states, or its bytes, for progress.
+pub(crate) fn amount(sources: &Sources, input: InputId) -> Amount {
+    let stated = sources.masks.iter().filter(|m| m.input == input).map(|m| m.n_points.unwrap_or(0));
+    Amount { items: 0, points: stated.sum(), bytes: 0 }
+}
+
+/// A task over all tiles of a store.
+pub(crate) fn tiles(name: &str, store: &Store) -> Task {
+    Task::new(name).of(Amount { items: store.entries().len() as u64, points: store.n_points(), bytes: 0 })
+}
+
+/// Digest of an input's bytes.
+fn digest(input: &Input) -> Result<String> {
+    let failed = |e: std::io::Error| contract::Error::from(e).at(input.path.display());
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(&input.path).map_err(failed)?).map_err(failed)?;
+    Ok(format!("blake3:{}", hasher.finalize().to_hex()))
+}
+
+fn format_word(format: Format) -> &'static str {
+    match format {
+        Format::E57 => "e57",
+        Format::Ptx => "ptx",
+        Format::Las => "las",
+        Format::Laz => "laz",
+    }
+}

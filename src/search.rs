@@ -1,0 +1,113 @@
+//! A region in, the fits of all models in it out: reads the tiles that the region's views need, and sends every model
+//! of the library through base search and fit.
+
+use crate::job::Settings;
+use crate::store::Store;
+use crate::surfaces::Ground;
+use contract::{Fit, InstallationPlane, Region, Result, Scan, View};
+use fit::{Prepared, Scene};
+use identify::BaseSearch;
+use lattice::ViewBuilder;
+use rayon::prelude::*;
+use robot::Model;
+use std::sync::OnceLock;
+
+/// Everything that the search of a region reads.
+pub(crate) struct Search<'a> {
+    models: &'a [Model],
+    scans: &'a [Scan],
+    store: &'a Store,
+    ground: &'a Ground,
+    settings: &'a Settings,
+    /// Made when the first region asks for it.
+    prepared: Vec<OnceLock<Prepared<'a>>>,
+}
+
+/// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
+const MAX_SPACING: f64 = 0.05;
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(
+        models: &'a [Model],
+        scans: &'a [Scan],
+        store: &'a Store,
+        ground: &'a Ground,
+        settings: &'a Settings,
+    ) -> Self {
+        let prepared = models.iter().map(|_| OnceLock::new()).collect();
+        Self { models, scans, store, ground, settings, prepared }
+    }
+
+    /// Fits of all models in one region, whatever their verdict.
+    pub(crate) fn region(&self, region: &Region) -> Result<Vec<Fit>> {
+        let views: Vec<View> =
+            self.scans.par_iter().filter_map(|scan| self.view(scan, region).transpose()).collect::<Result<_>>()?;
+        let planes = self.planes(region);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit);
+        let fits: Vec<Vec<Fit>> =
+            (0..self.models.len()).into_par_iter().map(|model| self.model(model, &scene, &planes)).collect();
+        Ok(fits.into_iter().flatten().collect())
+    }
+
+    /// One scan's view of the region; `None` where it sees nothing of it.
+    fn view(&self, scan: &Scan, region: &Region) -> Result<Option<View>> {
+        let extent = self.ground.extents[scan.id.0 as usize];
+        if extent.is_none() {
+            return Ok(None);
+        }
+        if let Some(lattice) = &scan.lattice {
+            let near = distance(scan, region);
+            if near * lattice.row_step.max(lattice.col_step) > MAX_SPACING {
+                return Ok(None);
+            }
+        }
+        let mut builder = ViewBuilder::new(scan, region, extent, &self.settings.view);
+        for (i, entry) in self.store.entries().iter().enumerate() {
+            if builder.wants(entry.at) {
+                builder.add(&self.store.tile(i)?);
+            }
+        }
+        let view = builder.finish();
+        Ok((!view.points.is_empty() || !view.images.is_empty()).then_some(view))
+    }
+
+    /// Planes that a robot of this region may stand on; the region's own bottom where none is known.
+    fn planes(&self, region: &Region) -> Vec<InstallationPlane> {
+        let low = region.origin.coords + geometry::Vector::from(region.bounds.min);
+        let high = region.origin.coords + geometry::Vector::from(region.bounds.max);
+        let world = geometry::Aabb { min: low.into(), max: high.into() };
+        self.ground
+            .surfaces
+            .floor
+            .planes
+            .iter()
+            .filter(|p| p.bounds.grown(0.3).touches(&world))
+            .cloned()
+            .collect()
+    }
+
+    fn model(&self, index: usize, scene: &Scene<'_>, planes: &[InstallationPlane]) -> Vec<Fit> {
+        let model = &self.models[index];
+        let settings = self.settings;
+        let Some(search) =
+            BaseSearch::new((index, model), scene.region, scene.views, &scene.evidence, &settings.identify)
+        else {
+            return Vec::new();
+        };
+        let candidates = search.run(planes);
+        if candidates.is_empty() {
+            return Vec::new();
+        }
+        let prepared = self.prepared[index].get_or_init(|| Prepared::new(index, model));
+        candidates.iter().filter_map(|c| fit::fit(c, prepared, scene, &settings.fit)).collect()
+    }
+}
+
+/// Distance from a scan's scanner to the nearest point of a region, metres.
+fn distance(scan: &Scan, region: &Region) -> f64 {
+    let scanner = scan.world_from_scan.translation.vector - region.origin.coords;
+    (0..3)
+        .map(|i| (region.bounds.min[i] - scanner[i]).max(scanner[i] - region.bounds.max[i]).max(0.0).powi(2))
+        .sum::<f64>()
+        .sqrt()
+}

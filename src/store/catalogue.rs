@@ -1,0 +1,194 @@
+//! The catalogue: entries of all tiles in, a checked file out, and back.
+//!
+//! A header of 64 bytes (magic 8, version u32, zero u32, length of the archive u64, its BLAKE3 32, zeros), then an
+//! `rkyv` archive of exactly that length, and nothing more: `rkyv` may read trailing bytes as another answer.
+
+use super::encode::layout;
+use super::io_error;
+use crate::atomic;
+use contract::{Error, Result, ScanId, TileAt};
+use geometry::Aabb;
+use rkyv::{Archive, Deserialize, Serialize};
+use std::path::Path;
+
+/// Length of the header of both files, bytes.
+pub(super) const HEADER_BYTES: u64 = 64;
+/// Tiles and their arrays begin at multiples of this, bytes: a cache line, and more than any cast needs.
+pub(super) const ALIGN: u64 = 64;
+/// Grows with any change of either file.
+const VERSION: u32 = 1;
+const CATALOGUE_MAGIC: &[u8; 8] = b"STILLCAT";
+const TILES_MAGIC: &[u8; 8] = b"STILLTIL";
+
+/// What the catalogue says of one tile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TileEntry {
+    /// Where it lies.
+    pub at: TileAt,
+    /// Number of points.
+    pub n_points: u64,
+    /// Smallest place in the mask of its points.
+    pub first_place: u64,
+    /// Bounds of its points in the world, metres.
+    pub bounds: Aabb,
+    /// Where its bytes begin in the tile file.
+    pub(super) offset: u64,
+    /// CRC-32C of its bytes.
+    pub(super) checksum: u32,
+}
+
+/// A [`TileEntry`] in the archive.
+#[derive(Archive, Serialize, Deserialize)]
+struct Row {
+    at: [u32; 3],
+    checksum: u32,
+    n_points: u64,
+    first_place: u64,
+    offset: u64,
+    bounds: [[f64; 3]; 2],
+}
+
+/// All of the archive.
+#[derive(Archive, Serialize, Deserialize)]
+struct Rows {
+    /// Length of the tile file.
+    n_tile_bytes: u64,
+    rows: Vec<Row>,
+}
+
+/// The header of the tile file.
+pub(super) fn tiles_header() -> [u8; HEADER_BYTES as usize] {
+    let mut header = [0; HEADER_BYTES as usize];
+    header[..8].copy_from_slice(TILES_MAGIC);
+    header[8..12].copy_from_slice(&VERSION.to_le_bytes());
+    header
+}
+
+/// Writes the catalogue of a tile file that is `n_tile_bytes` long.
+pub(super) fn write(path: &Path, entries: &[TileEntry], n_tile_bytes: u64) -> Result<()> {
+    let rows = entries.iter().map(|e| Row {
+        at: [e.at.scan.0, e.at.row, e.at.col],
+        checksum: e.checksum,
+        n_points: e.n_points,
+        first_place: e.first_place,
+        offset: e.offset,
+        bounds: [e.bounds.min, e.bounds.max],
+    });
+    let rows = Rows { n_tile_bytes, rows: rows.collect() };
+    let archive = rkyv::to_bytes::<rkyv::rancor::Error>(&rows)
+        .map_err(|e| Error::new(contract::Kind::Bug, "the catalogue cannot be archived").because(e))?;
+    let mut bytes = Vec::with_capacity(HEADER_BYTES as usize + archive.len());
+    bytes.extend_from_slice(CATALOGUE_MAGIC);
+    bytes.extend_from_slice(&VERSION.to_le_bytes());
+    bytes.extend_from_slice(&[0; 4]);
+    bytes.extend_from_slice(&(archive.len() as u64).to_le_bytes());
+    bytes.extend_from_slice(blake3::hash(&archive).as_bytes());
+    bytes.resize(HEADER_BYTES as usize, 0);
+    bytes.extend_from_slice(&archive);
+    atomic::write(path, &bytes)
+}
+
+/// Reads and checks a catalogue; gives the entries and the length of the tile file.
+pub(super) fn read(path: &Path) -> Result<(Vec<TileEntry>, u64)> {
+    let bytes =
+        std::fs::read(path).map_err(|e| io_error(path, "the catalogue cannot be read", e))?;
+    parse(&bytes).map_err(|e| e.at(path.display()))
+}
+
+fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
+    let torn = |what: &str| Err(broken(what));
+    let Some((header, archive)) = bytes.split_at_checked(HEADER_BYTES as usize) else {
+        return torn("the catalogue is shorter than its header");
+    };
+    if header[..8] != *CATALOGUE_MAGIC {
+        return torn("this is no catalogue of a store");
+    }
+    if header[8..16] != (u64::from(VERSION)).to_le_bytes() {
+        return torn("the catalogue has another version");
+    }
+    if header[16..24] != (archive.len() as u64).to_le_bytes() {
+        return torn("the catalogue is torn: its length is not what it says");
+    }
+    if header[24..56] != *blake3::hash(archive).as_bytes() || header[56..] != [0; 8] {
+        return torn("the catalogue is damaged: its digest is not what it says");
+    }
+    let mut aligned = rkyv::util::AlignedVec::<64>::with_capacity(archive.len());
+    aligned.extend_from_slice(archive);
+    let rows = rkyv::from_bytes::<Rows, rkyv::rancor::Error>(&aligned)
+        .map_err(|e| broken("the catalogue is damaged").because(e))?;
+    let mut end = HEADER_BYTES;
+    let mut entries: Vec<TileEntry> = Vec::with_capacity(rows.rows.len());
+    for row in &rows.rows {
+        let [scan, tile_row, col] = row.at;
+        let at = TileAt { scan: ScanId(scan), row: tile_row, col };
+        let sorted = entries.last().is_none_or(|e| (e.at, e.first_place) < (at, row.first_place));
+        if row.offset != end || !sorted || row.n_points > rows.n_tile_bytes {
+            return torn("the catalogue contradicts itself");
+        }
+        end += layout(row.n_points)[3];
+        entries.push(TileEntry {
+            at,
+            n_points: row.n_points,
+            first_place: row.first_place,
+            bounds: Aabb { min: row.bounds[0], max: row.bounds[1] },
+            offset: row.offset,
+            checksum: row.checksum,
+        });
+    }
+    if end != rows.n_tile_bytes {
+        return torn("the catalogue contradicts itself");
+    }
+    Ok((entries, end))
+}
+
+/// An error about a store that cannot be used.
+pub(super) fn broken(what: impl Into<String>) -> Error {
+    Error::bad_input(what).hint("remove the store; it is made again from the scans")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries() -> Vec<TileEntry> {
+        let mut offset = HEADER_BYTES;
+        (0..5)
+            .map(|i| {
+                let entry = TileEntry {
+                    at: TileAt { scan: ScanId(i / 2), row: 3, col: i },
+                    n_points: u64::from(i) * 100,
+                    first_place: 7,
+                    bounds: Aabb::of([[1.0, 2.0, f64::from(i)]]),
+                    offset,
+                    checksum: 9 + i,
+                };
+                offset += layout(entry.n_points)[3];
+                entry
+            })
+            .collect()
+    }
+
+    fn file() -> Vec<u8> {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("catalogue");
+        let entries = entries();
+        let end = entries[4].offset + layout(400)[3];
+        write(&path, &entries, end).expect("writes");
+        assert!(read(&path).expect("reads") == (entries, end));
+        std::fs::read(path).expect("a file")
+    }
+
+    #[test]
+    fn every_torn_or_flipped_catalogue_is_refused() {
+        let bytes = file();
+        for n in 0..bytes.len() {
+            assert!(parse(&bytes[..n]).is_err(), "{n} bytes");
+        }
+        assert!(parse(&[bytes.as_slice(), &[0; 16]].concat()).is_err(), "trailing zeros");
+        for i in 0..bytes.len() * 8 {
+            let mut flipped = bytes.clone();
+            flipped[i / 8] ^= 1 << (i % 8);
+            assert!(parse(&flipped).is_err(), "bit {i}");
+        }
+    }
+}

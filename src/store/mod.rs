@@ -1,0 +1,124 @@
+//! The store: strips in, tiles on disk, tiles out again in any order. A folder with two files: the catalogue, and the
+//! tiles, memory-mapped. Knows no geometry beyond bounds.
+
+mod catalogue;
+mod encode;
+mod map;
+mod record;
+mod scatter;
+mod sink;
+mod spill;
+#[cfg(test)]
+mod tests;
+
+use catalogue::broken;
+use contract::{Error, Kind, Result, Scan, Tile, TileAt, Weigh};
+use geometry::Aabb;
+use map::FileMap;
+use std::ops::Range;
+use std::path::Path;
+
+pub use catalogue::TileEntry;
+pub use scatter::{Scatter, Scattered};
+pub use sink::{TILE_POINTS, TileSink};
+
+/// Name of the catalogue in the folder of a store.
+const CATALOGUE: &str = "catalogue.rkyv";
+/// Name of the file of all tiles.
+const TILES: &str = "tiles.bin";
+
+/// A store that is whole: tiles by place, in the order of [`TileAt`], whatever way they came in.
+pub struct Store {
+    entries: Vec<TileEntry>,
+    map: FileMap,
+}
+
+impl Store {
+    /// Begins a store in `dir` for strips of `scans` (all of a run, in their order); it keeps about `budget_bytes` in
+    /// memory while it is filled.
+    pub fn create(dir: &Path, scans: &[Scan], budget_bytes: usize) -> Result<TileSink> {
+        TileSink::new(dir, scans, budget_bytes)
+    }
+
+    /// Opens a whole store. Mapped pages are given back to the system each time `resident_bytes` have been read.
+    pub fn open(dir: &Path, resident_bytes: usize) -> Result<Self> {
+        let (entries, n_tile_bytes) = catalogue::read(&dir.join(CATALOGUE))?;
+        let path = dir.join(TILES);
+        let map = FileMap::open(&path, resident_bytes)?;
+        let bytes = map.bytes();
+        if bytes.len() as u64 != n_tile_bytes || !bytes.starts_with(&catalogue::tiles_header()) {
+            return Err(broken("the tiles are not those of the catalogue").at(path.display()));
+        }
+        Ok(Self { entries, map })
+    }
+
+    /// What is known of each tile without reading it, sorted by [`TileAt`], then by place. Entries at the same
+    /// [`TileAt`] are parts of one tile that would be too large.
+    #[must_use]
+    pub fn entries(&self) -> &[TileEntry] {
+        &self.entries
+    }
+
+    /// Number of points of all tiles.
+    #[must_use]
+    pub fn n_points(&self) -> u64 {
+        self.entries.iter().map(|e| e.n_points).sum()
+    }
+
+    /// Tile `i` of [`Store::entries`], copied out and checked.
+    ///
+    /// # Panics
+    /// Where there is no such entry.
+    pub fn tile(&self, i: usize) -> Result<Tile> {
+        let entry = &self.entries[i];
+        let (start, n) = (entry.offset as usize, encode::layout(entry.n_points)[3] as usize);
+        let bytes = &self.map.bytes()[start..start + n];
+        if crc32c::crc32c(bytes) != entry.checksum {
+            let at = entry.at;
+            return Err(broken("the tile is damaged: its checksum is not what it should be")
+                .at(format!("store, scan {}, tile {} {}", at.scan.0, at.row, at.col)));
+        }
+        let tile = encode::decode(entry, bytes);
+        self.map.has_read(n);
+        Ok(tile)
+    }
+
+    /// Indices of the tile at `at`: none where it holds no point, mostly one, several where it has parts.
+    #[must_use]
+    pub fn find(&self, at: TileAt) -> Range<usize> {
+        let start = self.entries.partition_point(|e| e.at < at);
+        start..start + self.entries[start..].partition_point(|e| e.at == at)
+    }
+
+    /// Indices of the tiles whose bounds touch `bounds` (world, metres), ascending.
+    #[must_use]
+    pub fn touching(&self, bounds: &Aabb) -> Vec<usize> {
+        (0..self.entries.len()).filter(|&i| self.entries[i].bounds.touches(bounds)).collect()
+    }
+
+    /// All tiles in order: a source for a pass.
+    pub fn tiles(&self) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
+        (0..self.entries.len()).map(|i| self.tile(i))
+    }
+
+    /// These tiles in the given order: a source for a pass.
+    pub fn tiles_of(&self, indices: Vec<usize>) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
+        indices.into_iter().map(|i| self.tile(i))
+    }
+}
+
+impl Weigh for TileEntry {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>()
+    }
+
+    fn n_points(&self) -> u64 {
+        self.n_points
+    }
+}
+
+/// An error of the system about a file of ours.
+fn io_error(path: &Path, what: &str, cause: std::io::Error) -> Error {
+    let error = Error::new(Kind::Io, what).because(cause).at(path.display());
+    error.hint("check that the folder exists, is writable, and that the disk is not full")
+}

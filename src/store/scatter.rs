@@ -1,0 +1,158 @@
+//! Strips in, the same points grouped by tile out: the parallel half of filling the store.
+
+use super::record::Record;
+use contract::{Lattice, Map, Pixel, Result, Scan, ScanId, Strip, TILE_SIDE, Tile, Weigh};
+use geometry::direction::spherical;
+
+/// Finds tile and pixel of each point. Remembers nothing; run it as a map before a [`super::TileSink`].
+pub struct Scatter {
+    lattices: Vec<Option<Lattice>>,
+}
+
+/// Points of one strip, grouped by tile.
+pub struct Scattered {
+    pub(super) scan: ScanId,
+    pub(super) runs: Vec<Run>,
+    pub(super) records: Vec<Record>,
+}
+
+/// Consecutive records of one tile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Run {
+    /// Row and column of the tile.
+    pub(super) tile: [u32; 2],
+    /// Number of records.
+    pub(super) n: usize,
+}
+
+/// A strip with shorter runs than this, on average, is worth sorting: one look-up a run costs as much as about
+/// sixteen copies.
+const SHORT_RUN: usize = 16;
+
+impl Scatter {
+    /// For strips of these scans (all scans of a run, in their order).
+    #[must_use]
+    pub fn new(scans: &[Scan]) -> Self {
+        Self { lattices: scans.iter().map(|s| s.lattice).collect() }
+    }
+}
+
+impl Map for Scatter {
+    type In = Strip;
+    type Out = Scattered;
+    type Scratch = ();
+
+    fn apply(&self, strip: Strip, (): &mut ()) -> Result<Scattered> {
+        let lattice = self.lattices.get(strip.scan.0 as usize).copied().flatten();
+        let (runs, records) = match lattice {
+            Some(lattice) => records(&strip, |points, pixels| lattice_pixels(&lattice, points, pixels)),
+            None => records(&strip, ground_pixels),
+        };
+        if runs.len() * SHORT_RUN > records.len() {
+            let (runs, records) = grouped(&runs, &records);
+            return Ok(Scattered { scan: strip.scan, runs, records });
+        }
+        Ok(Scattered { scan: strip.scan, runs, records })
+    }
+}
+
+impl Weigh for Scattered {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>() + self.runs.len() * size_of::<Run>() + self.records.len() * Record::BYTES
+    }
+
+    fn n_points(&self) -> u64 {
+        self.records.len() as u64
+    }
+}
+
+/// Points whose pixels are found together: small enough for the first-level cache, long enough for vector loops.
+const BLOCK: usize = 64;
+
+/// Pixels of a block of points: the same as [`Lattice::pixel`] gives one by one.
+#[inline]
+fn lattice_pixels(lattice: &Lattice, points: &[[f32; 3]], pixels: &mut [Pixel; BLOCK]) {
+    if lattice.lattice_from_scan != nalgebra::UnitQuaternion::identity() || points.len() < BLOCK {
+        for (p, pixel) in points.iter().zip(pixels) {
+            *pixel = lattice.pixel(*p).0;
+        }
+        return;
+    }
+    // One loop a step, so that each becomes vector instructions.
+    let (mut azimuth, mut elevation) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+    for (i, p) in points.iter().enumerate().take(BLOCK) {
+        (azimuth[i], elevation[i], _) = spherical(*p);
+    }
+    let (mut row, mut col) = ([0.0_f64; BLOCK], [0.0_f64; BLOCK]);
+    for i in 0..BLOCK {
+        row[i] = (f64::from(elevation[i]) - lattice.first_elevation) / lattice.row_step;
+        col[i] = (f64::from(azimuth[i]) - lattice.first_azimuth) / lattice.col_step;
+    }
+    for i in 0..BLOCK {
+        pixels[i] = lattice.nearest(row[i], col[i]);
+    }
+}
+
+/// The ground cells of points of a scan without lattice: row from y, column from x.
+fn ground_pixels(points: &[[f32; 3]], pixels: &mut [Pixel; BLOCK]) {
+    let offset = Tile::GROUND_OFFSET * i64::from(TILE_SIDE);
+    // Saturating, so that no coordinate panics; ingest has dropped what is not a place on a site.
+    let cell = |v: f32| ((v / Tile::GROUND_CELL).floor() as i64).saturating_add(offset).max(0) as u32;
+    for (p, pixel) in points.iter().zip(pixels) {
+        *pixel = Pixel { row: cell(p[1]), col: cell(p[0]) };
+    }
+}
+
+#[inline]
+fn records(
+    strip: &Strip,
+    find: impl Fn(&[[f32; 3]], &mut [Pixel; BLOCK]),
+) -> (Vec<Run>, Vec<Record>) {
+    let mut runs: Vec<Run> = Vec::new();
+    let mut last = [u32::MAX; 2];
+    let mut start = 0;
+    let mut records: Vec<Record> = Vec::with_capacity(strip.len());
+    let mut pixels = [Pixel { row: 0, col: 0 }; BLOCK];
+    for (points, places) in strip.xyz.chunks(BLOCK).zip(strip.place.chunks(BLOCK)) {
+        find(points, &mut pixels);
+        for (at, pixel) in pixels.iter().take(points.len()).enumerate() {
+            let tile = [pixel.row / TILE_SIDE, pixel.col / TILE_SIDE];
+            if tile != last {
+                let n = records.len() + at - start;
+                if n > 0 {
+                    runs.push(Run { tile: last, n });
+                }
+                (last, start) = (tile, records.len() + at);
+            }
+        }
+        records.extend(points.iter().zip(places).zip(&pixels).map(|((p, place), pixel)| {
+            let within = (pixel.row % TILE_SIDE) * TILE_SIDE + pixel.col % TILE_SIDE;
+            Record::new(*p, strip.first_place + u64::from(*place), within as u16)
+        }));
+    }
+    if records.len() > start {
+        runs.push(Run { tile: last, n: records.len() - start });
+    }
+    (runs, records)
+}
+
+/// Joins runs of the same tile, keeping their order within it.
+fn grouped(runs: &[Run], records: &[Record]) -> (Vec<Run>, Vec<Record>) {
+    let mut order: Vec<([u32; 2], usize, usize)> = Vec::with_capacity(runs.len());
+    let mut start = 0;
+    for run in runs {
+        order.push((run.tile, start, run.n));
+        start += run.n;
+    }
+    order.sort_unstable();
+    let mut joined: Vec<Run> = Vec::new();
+    let mut out = Vec::with_capacity(records.len());
+    for (tile, start, n) in order {
+        out.extend_from_slice(&records[start..start + n]);
+        match joined.last_mut() {
+            Some(run) if run.tile == tile => run.n += n,
+            _ => joined.push(Run { tile, n }),
+        }
+    }
+    (joined, out)
+}

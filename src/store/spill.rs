@@ -1,0 +1,58 @@
+//! Records in, segments of a spill file out, and back. The file has no name in the folder once it is open (where the
+//! system can do that), so that nothing is left behind when the program is killed.
+
+use super::io_error;
+use super::record::Record;
+use bytemuck::Zeroable;
+use contract::Result;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Consecutive records in the spill file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Segment {
+    offset: u64,
+    n: usize,
+}
+
+/// The spill file of one sink.
+pub(super) struct Spill {
+    dir: PathBuf,
+    file: File,
+    len: u64,
+}
+
+impl Spill {
+    pub(super) fn create(dir: &Path) -> Result<Self> {
+        let file = tempfile::tempfile_in(dir)
+            .map_err(|e| io_error(dir, "a spill file cannot be made", e))?;
+        Ok(Self { dir: dir.to_owned(), file, len: 0 })
+    }
+
+    /// Bytes written.
+    pub(super) fn len(&self) -> u64 {
+        self.len
+    }
+
+    pub(super) fn write(&mut self, records: &[Record]) -> Result<Segment> {
+        let bytes: &[u8] = bytemuck::cast_slice(records);
+        self.file
+            .write_all(bytes)
+            .map_err(|e| io_error(&self.dir, "the spill file cannot be written", e))?;
+        let segment = Segment { offset: self.len, n: records.len() };
+        self.len += bytes.len() as u64;
+        Ok(segment)
+    }
+
+    /// Appends a segment to `records`. No more writing after the first reading.
+    pub(super) fn read(&mut self, segment: &Segment, records: &mut Vec<Record>) -> Result<()> {
+        let start = records.len();
+        records.resize(start + segment.n, Record::zeroed());
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut records[start..]);
+        self.file
+            .seek(SeekFrom::Start(segment.offset))
+            .and_then(|_| self.file.read_exact(bytes))
+            .map_err(|e| io_error(&self.dir, "the spill file cannot be read", e))
+    }
+}

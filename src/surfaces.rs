@@ -1,0 +1,104 @@
+//! Tiles in; what the scans cover, floor and occupied space out: the lattice stage's map and the floor stage's fold,
+//! joined so that one pass over the tiles serves both.
+
+use contract::{Fold, Map, Result, Scan, ScanId, Tile, TileSummary, Weigh};
+use lattice::{Extent, Summarise};
+
+/// The map: a tile's summary, and which rows and columns of its scan it covers.
+pub(crate) struct Surfaces(Summarise);
+
+/// What one tile leaves behind.
+pub(crate) struct Surface {
+    scan: ScanId,
+    extent: Option<Extent>,
+    summary: TileSummary,
+}
+
+/// The fold.
+pub(crate) struct Gather {
+    find: floor::Find,
+    n_scans: usize,
+}
+
+/// What all tiles leave behind.
+pub(crate) struct Ground {
+    /// Floor, planes and occupied space.
+    pub(crate) surfaces: floor::Ground,
+    /// For each scan: the rows and columns of its lattice that it covers.
+    pub(crate) extents: Vec<Option<Extent>>,
+}
+
+impl Surfaces {
+    pub(crate) fn new(scans: &[Scan], settings: &lattice::Settings) -> Self {
+        Self(Summarise::new(scans, settings))
+    }
+}
+
+impl Gather {
+    pub(crate) fn new(scans: &[Scan], settings: &floor::Settings) -> Self {
+        Self { find: floor::Find::new(scans, settings), n_scans: scans.len() }
+    }
+}
+
+impl Map for Surfaces {
+    type In = Tile;
+    type Out = Surface;
+    type Scratch = lattice::Scratch;
+
+    fn apply(&self, tile: Tile, scratch: &mut Self::Scratch) -> Result<Surface> {
+        let scan = tile.at.scan;
+        let extent = (0..tile.len()).map(|i| tile.pixel_at(i)).fold(None, |sum: Option<Extent>, p| {
+            let own = [p.row, p.row, p.col, p.col];
+            Some(sum.map_or(own, |s| union(s, own)))
+        });
+        Ok(Surface { scan, extent, summary: self.0.apply(tile, scratch)? })
+    }
+}
+
+impl Fold for Gather {
+    type In = Surface;
+    type Sum = (floor::Sum, Vec<Option<Extent>>);
+    type Out = Ground;
+
+    fn empty(&self) -> Self::Sum {
+        (self.find.empty(), vec![None; self.n_scans])
+    }
+
+    fn add(&self, sum: &mut Self::Sum, item: Surface) -> Result<()> {
+        let slot = &mut sum.1[item.scan.0 as usize];
+        *slot = join(*slot, item.extent);
+        self.find.add(&mut sum.0, item.summary)
+    }
+
+    fn join(&self, earlier: &mut Self::Sum, later: Self::Sum) -> Result<()> {
+        for (slot, extent) in earlier.1.iter_mut().zip(later.1) {
+            *slot = join(*slot, extent);
+        }
+        self.find.join(&mut earlier.0, later.0)
+    }
+
+    fn finish(&self, sum: Self::Sum) -> Result<Ground> {
+        Ok(Ground { surfaces: self.find.finish(sum.0)?, extents: sum.1 })
+    }
+}
+
+fn union(a: Extent, b: Extent) -> Extent {
+    [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])]
+}
+
+fn join(a: Option<Extent>, b: Option<Extent>) -> Option<Extent> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(union(a, b)),
+        (a, b) => a.or(b),
+    }
+}
+
+impl Weigh for Surface {
+    fn weight_bytes(&self) -> usize {
+        self.summary.weight_bytes()
+    }
+
+    fn n_points(&self) -> u64 {
+        self.summary.n_points
+    }
+}

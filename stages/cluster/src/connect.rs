@@ -1,0 +1,112 @@
+//! Sorted voxels in, the number of the connected set of each out. Rows are cut into runs and runs of near rows
+//! joined, so that the work grows with the number of voxels only.
+
+use crate::Counted;
+
+/// Consecutive voxels of one row, gaps bridged.
+struct Run {
+    first: i32,
+    last: i32,
+}
+
+/// A row of voxels along x.
+struct Row {
+    z: i32,
+    y: i32,
+    runs: std::ops::Range<usize>,
+}
+
+/// Number of the set of each voxel: 0, 1, … in the order of the sets' first voxels. Two voxels belong together if
+/// they differ by at most `gap + 1` along each axis. `voxels` must be sorted by (z, y, x).
+pub(crate) fn connect(voxels: &[Counted], gap: i32) -> Vec<u32> {
+    let reach = gap.saturating_add(1);
+    let (rows, runs, run_of) = cut(voxels, reach);
+    let mut parent: Vec<u32> = (0..runs.len() as u32).collect();
+    for dz in -reach..=0 {
+        for dy in -reach..=reach {
+            // Rows before this one only; each pair of rows is met once.
+            if (dz, dy) < (0, 0) {
+                join_rows(&rows, &runs, (dz, dy), reach, &mut parent);
+            }
+        }
+    }
+    let mut number = vec![u32::MAX; runs.len()];
+    let mut n = 0;
+    run_of
+        .iter()
+        .map(|&run| {
+            let root = find(&mut parent, run) as usize;
+            if number[root] == u32::MAX {
+                number[root] = n;
+                n += 1;
+            }
+            number[root]
+        })
+        .collect()
+}
+
+fn cut(voxels: &[Counted], reach: i32) -> (Vec<Row>, Vec<Run>, Vec<u32>) {
+    let (mut rows, mut runs): (Vec<Row>, Vec<Run>) = (Vec::new(), Vec::new());
+    let mut run_of = Vec::with_capacity(voxels.len());
+    for &([x, y, z], _) in voxels {
+        let same_row = rows.last().is_some_and(|r| r.z == z && r.y == y);
+        if !same_row {
+            rows.push(Row {
+                z,
+                y,
+                runs: runs.len()..runs.len(),
+            });
+        }
+        match runs.last_mut() {
+            Some(run) if same_row && x.saturating_sub(run.last) <= reach => run.last = x,
+            _ => {
+                runs.push(Run { first: x, last: x });
+                if let Some(row) = rows.last_mut() {
+                    row.runs.end = runs.len();
+                }
+            }
+        }
+        run_of.push(runs.len() as u32 - 1);
+    }
+    (rows, runs, run_of)
+}
+
+/// Joins runs of each row with those of the row that lies `(dz, dy)` from it.
+fn join_rows(rows: &[Row], runs: &[Run], (dz, dy): (i32, i32), reach: i32, parent: &mut [u32]) {
+    // Both walk through the sorted rows once.
+    let mut other = 0;
+    for row in rows {
+        let wanted = (row.z.saturating_add(dz), row.y.saturating_add(dy));
+        while other < rows.len() && (rows[other].z, rows[other].y) < wanted {
+            other += 1;
+        }
+        if other == rows.len() {
+            break;
+        }
+        if (rows[other].z, rows[other].y) != wanted {
+            continue;
+        }
+        let (mut i, mut j) = (row.runs.start, rows[other].runs.start);
+        while i < row.runs.end && j < rows[other].runs.end {
+            let (a, b) = (&runs[i], &runs[j]);
+            if a.first <= b.last.saturating_add(reach) && b.first <= a.last.saturating_add(reach) {
+                join(parent, i as u32, j as u32);
+            }
+            if a.last < b.last { i += 1 } else { j += 1 }
+        }
+    }
+}
+
+fn find(parent: &mut [u32], mut at: u32) -> u32 {
+    while parent[at as usize] != at {
+        let up = parent[parent[at as usize] as usize];
+        parent[at as usize] = up;
+        at = up;
+    }
+    at
+}
+
+fn join(parent: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (find(parent, a), find(parent, b));
+    parent[a.max(b) as usize] = a.min(b);
+}

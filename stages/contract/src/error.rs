@@ -1,0 +1,123 @@
+//! Errors by what a caller can do about them; one type for all rooms, since a stage's errors only travel up.
+
+use std::fmt;
+
+/// What a caller can do about an error. As many kinds as there are reactions; each has an exit code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Kind {
+    /// The input is broken or contradicts itself: mend or replace it. Exit code 4.
+    BadInput,
+    /// The input may be right, but is of a kind that is not read: convert it. Exit code 4.
+    Unsupported,
+    /// The machine refused: disk, permission, network share. Exit code 1.
+    Io,
+    /// A limit (memory, disk) would be broken: raise it or take less input. Exit code 5.
+    OverBudget,
+    /// Flags or settings contradict one another. Exit code 2.
+    Usage,
+    /// Somebody pressed Ctrl-C. Exit code 130.
+    Cancelled,
+    /// Ours: please report it. Exit code 1.
+    Bug,
+}
+
+/// A result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What went wrong, where, why.
+///
+/// Messages are half sentences: lower case, no full stop, the offending value in quotes, last.
+#[derive(Debug)]
+pub struct Error(Box<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    kind: Kind,
+    what: String,
+    place: Option<String>,
+    hint: Option<String>,
+    source: Option<Box<dyn std::error::Error + Send + Sync>>,
+}
+
+impl Error {
+    /// An error of `kind`; `what` is a half sentence.
+    pub fn new(kind: Kind, what: impl Into<String>) -> Self {
+        Self(Box::new(Inner { kind, what: what.into(), place: None, hint: None, source: None }))
+    }
+
+    /// Broken input.
+    pub fn bad_input(what: impl Into<String>) -> Self {
+        Self::new(Kind::BadInput, what)
+    }
+
+    /// Keeps the cause.
+    #[must_use]
+    pub fn because(mut self, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        self.0.source = Some(source.into());
+        self
+    }
+
+    /// Says where; the innermost place wins, an outer one is put before it.
+    #[must_use]
+    pub fn at(mut self, place: impl fmt::Display) -> Self {
+        self.0.place = Some(match self.0.place.take() {
+            None => place.to_string(),
+            Some(inner) => format!("{place}: {inner}"),
+        });
+        self
+    }
+
+    /// Says the way out.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.0.hint = Some(hint.into());
+        self
+    }
+
+    /// What a caller can do about it.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        self.0.kind
+    }
+
+    /// Where it happened, if known.
+    #[must_use]
+    pub fn place(&self) -> Option<&str> {
+        self.0.place.as_deref()
+    }
+
+    /// The way out, if known.
+    #[must_use]
+    pub fn way_out(&self) -> Option<&str> {
+        self.0.hint.as_deref()
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(place) = &self.0.place {
+            write!(f, "{place}: ")?;
+        }
+        f.write_str(&self.0.what)?;
+        if let Some(source) = &self.0.source {
+            write!(f, " ({source})")?;
+        }
+        if let Some(hint) = &self.0.hint {
+            write!(f, "; {hint}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.0.source.as_ref().map(|s| &**s as &(dyn std::error::Error + 'static))
+    }
+}
+
+impl From<std::io::Error> for Error {
+    fn from(source: std::io::Error) -> Self {
+        Self::new(Kind::Io, "the system refused").because(source)
+    }
+}

@@ -1,0 +1,100 @@
+//! A fit: which robot, where, in which posture, and how far to trust it.
+
+use geometry::Pose;
+
+/// How far a fit may be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Verdict {
+    /// Wrong, or not this robot: not used for labels.
+    Refused,
+    /// May be right: a person should look.
+    Doubtful,
+    /// Right as far as the points can tell.
+    Trusted,
+}
+
+impl Verdict {
+    /// As in `result.json`.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Trusted => "trusted",
+            Self::Doubtful => "doubtful",
+            Self::Refused => "refused",
+        }
+    }
+}
+
+/// One joint of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointFit {
+    /// As in the URDF.
+    pub name: String,
+    /// Radians, or metres for prismatic joints.
+    pub value: f64,
+    /// Standard deviation, same unit; infinite where the points do not determine it.
+    pub sigma: f64,
+    /// Whether the points determine it.
+    pub determined: bool,
+}
+
+/// What the scans say of one link at the fitted posture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkEvidence {
+    /// As in the URDF.
+    pub name: String,
+    /// Share of its outer surface that some beam could judge, 0..1.
+    pub seen: f64,
+    /// Of the judged: share with a beam ending on it.
+    pub matched: f64,
+    /// Of the judged: share that a beam went through.
+    pub violated: f64,
+    /// Number of points within the gate.
+    pub n_points: usize,
+    /// RMS distance of those points, metres.
+    pub rms: f64,
+}
+
+/// The best other explanation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunnerUp {
+    /// Its model.
+    pub model: String,
+    /// Its score, on the scale of [`Fit::score`].
+    pub score: f64,
+    /// Whether it is the same model in another posture.
+    pub same_model: bool,
+}
+
+/// A robot found in the scans.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// Index into the library.
+    pub model: usize,
+    /// Name in the library.
+    pub model_name: String,
+    /// World from base link (the root of the URDF's tree), metres.
+    pub world_from_base: Pose,
+    /// Standard deviations of the base: x, y, z (metres), rotations about x, y, z (radians), world axes at the base.
+    pub base_sigma: [f64; 6],
+    /// Free joints, in the order of the model.
+    pub joints: Vec<JointFit>,
+    /// Covariance of (base twist 6, free joints), row-major, (6+n)².
+    pub covariance: Vec<f64>,
+    /// Share explained less share contradicted, −1.5..1.
+    pub score: f64,
+    /// Surface explained less 1.5 × surface contradicted, m²: compares models of different size.
+    pub explained: f64,
+    /// RMS distance of the points of the robot from its surface, metres.
+    pub rms: f64,
+    /// One for each link of the model, in its order.
+    pub links: Vec<LinkEvidence>,
+    /// The best other explanation, if any came near.
+    pub runner_up: Option<RunnerUp>,
+    /// Other models that fit as well where the points can tell.
+    pub alike: Vec<String>,
+    /// How far to trust it.
+    pub verdict: Verdict,
+    /// Why, in words; empty only for a plain `Trusted`.
+    pub reasons: Vec<String>,
+}

@@ -1,0 +1,37 @@
+//! Labels: what a point belongs to.
+
+/// What kind of thing a point belongs to; the numbers are those of `labels/N.kind.npy`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum PointKind {
+    /// Stands still.
+    Fixed = 0,
+    /// A robot's link, its foot too.
+    Link = 1,
+    /// Attachment, effector or carried part.
+    Attachment = 2,
+    /// Floor.
+    Floor = 3,
+    /// In doubt, dropped or never seen: counts as fixed for planning.
+    Uncertain = 255,
+}
+
+/// The label of one point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Label {
+    /// What kind of thing.
+    pub kind: PointKind,
+    /// Index into the result's robots, −1 for none.
+    pub robot: i16,
+    /// Index into that robot's links, −1 for none.
+    pub link: i16,
+}
+
+impl Label {
+    /// Stands still.
+    pub const FIXED: Self = Self { kind: PointKind::Fixed, robot: -1, link: -1 };
+    /// Floor.
+    pub const FLOOR: Self = Self { kind: PointKind::Floor, robot: -1, link: -1 };
+    /// In doubt.
+    pub const UNCERTAIN: Self = Self { kind: PointKind::Uncertain, robot: -1, link: -1 };
+}

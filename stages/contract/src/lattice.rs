@@ -1,0 +1,144 @@
+//! The angular raster of a scan: direction in, row and column out, and back.
+
+use geometry::direction::{spherical, unit};
+use nalgebra::UnitQuaternion;
+
+/// A regular raster of elevation (rows, upwards) and azimuth (columns, counter-clockwise) about the axis of the
+/// lattice frame, covering the whole sphere; only the pixels that a scan fills exist in tiles.
+///
+/// A file's native rows and columns choose its steps and phase where they are regular to 0.3 pixels; otherwise the
+/// steps come from the directions of the points. A pixel may then hold two returns or none: consumers must not rely
+/// on one each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// Turns the scan frame so that the scanner's spin axis is z (identity for most scanners).
+    pub lattice_from_scan: UnitQuaternion<f64>,
+    /// Elevation step between rows, radians.
+    pub row_step: f64,
+    /// Azimuth step between columns, radians; a whole number of columns make a turn.
+    pub col_step: f64,
+    /// Elevation of the middle of row 0, radians, at or below −π/2 + `row_step`.
+    pub first_elevation: f64,
+    /// Azimuth of the middle of column 0, radians, at or below −π + `col_step`.
+    pub first_azimuth: f64,
+    /// Number of rows.
+    pub n_rows: u32,
+    /// Number of columns of a full turn.
+    pub n_cols: u32,
+}
+
+/// A pixel of a lattice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Pixel {
+    /// From the lowest elevation up.
+    pub row: u32,
+    /// Counter-clockwise.
+    pub col: u32,
+}
+
+impl Lattice {
+    /// A lattice with these steps; columns are rounded so that a whole number makes a turn, and the phase is such
+    /// that a pixel's middle lies at (`elevation`, `azimuth`).
+    #[must_use]
+    pub fn new(row_step: f64, col_step: f64, elevation: f64, azimuth: f64) -> Self {
+        use std::f64::consts::{FRAC_PI_2, PI, TAU};
+        let n_cols = (TAU / col_step).round().max(1.0);
+        let col_step = TAU / n_cols;
+        let first_elevation = elevation - ((elevation + FRAC_PI_2) / row_step).floor() * row_step;
+        let first_azimuth = azimuth - ((azimuth + PI) / col_step).floor() * col_step;
+        let n_rows = ((FRAC_PI_2 - first_elevation) / row_step).floor().max(0.0) + 2.0;
+        Self {
+            lattice_from_scan: UnitQuaternion::identity(),
+            row_step,
+            col_step,
+            first_elevation: first_elevation - row_step,
+            first_azimuth,
+            n_rows: n_rows as u32 + 1,
+            n_cols: n_cols as u32,
+        }
+    }
+
+    /// The pixel and range (metres) of a point in the scan frame.
+    #[inline]
+    #[must_use]
+    pub fn pixel(&self, scan: [f32; 3]) -> (Pixel, f32) {
+        let (row, col, range) = self.place(scan);
+        (self.nearest(row, col), range)
+    }
+
+    /// The pixel nearest to a place (see [`Lattice::place`]); columns are wrapped, rows clamped.
+    #[inline]
+    #[must_use]
+    pub fn nearest(&self, row: f64, col: f64) -> Pixel {
+        let row = nearest(row).clamp(0, i64::from(self.n_rows) - 1);
+        let n_cols = i64::from(self.n_cols);
+        let mut col = nearest(col);
+        // Nearly always inside already: a division for each point would cost more than all the rest.
+        if col < 0 || col >= n_cols {
+            col = col.rem_euclid(n_cols);
+        }
+        Pixel { row: row as u32, col: col as u32 }
+    }
+
+    /// Row, column (fractions; column not wrapped) and range (metres) of a point in the scan frame.
+    #[inline]
+    #[must_use]
+    pub fn place(&self, scan: [f32; 3]) -> (f64, f64, f32) {
+        let p = if self.lattice_from_scan == UnitQuaternion::identity() {
+            scan
+        } else {
+            let q = self.lattice_from_scan * nalgebra::Vector3::from(scan.map(f64::from));
+            [q.x as f32, q.y as f32, q.z as f32]
+        };
+        let (azimuth, elevation, range) = spherical(p);
+        (
+            (f64::from(elevation) - self.first_elevation) / self.row_step,
+            (f64::from(azimuth) - self.first_azimuth) / self.col_step,
+            range,
+        )
+    }
+
+    /// Unit direction of the middle of a pixel, scan frame.
+    #[must_use]
+    pub fn direction(&self, pixel: Pixel) -> [f64; 3] {
+        let lattice = unit(
+            self.first_azimuth + f64::from(pixel.col) * self.col_step,
+            self.first_elevation + f64::from(pixel.row) * self.row_step,
+        );
+        let scan = self.lattice_from_scan.inverse() * nalgebra::Vector3::from(lattice);
+        [scan.x, scan.y, scan.z]
+    }
+}
+
+/// `floor(value + ½)`, without the call into the mathematics library that `f64::floor` is on a plain x86-64.
+#[inline]
+fn nearest(value: f64) -> i64 {
+    let value = value + 0.5;
+    let truncated = value as i64;
+    truncated - i64::from(value < truncated as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_direction_has_its_pixel() {
+        let lattice = Lattice::new(0.01, 0.007, 0.003, 0.1);
+        for row in 0..lattice.n_rows {
+            let elevation = lattice.first_elevation + f64::from(row) * lattice.row_step;
+            if elevation.abs() > std::f64::consts::FRAC_PI_2 - 0.01 {
+                continue;
+            }
+            for col in 0..lattice.n_cols {
+                let at = Pixel { row, col };
+                let d = lattice.direction(at).map(|v| (v * 7.0) as f32);
+                assert_eq!(lattice.pixel(d).0, at);
+            }
+        }
+        for up in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [-1.0, -1e-9, 0.0]] {
+            let (at, _) = lattice.pixel(up);
+            assert!(at.row < lattice.n_rows && at.col < lattice.n_cols);
+        }
+    }
+}

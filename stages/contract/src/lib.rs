@@ -1,0 +1,29 @@
+//! The types that stages share: scan, lattice, strip, tile, planes, cluster, candidate, fit, label, errors, and
+//! the two shapes of a step. Types only: how to compute them is in `geometry` or in the stage that makes them.
+#![forbid(unsafe_code)]
+
+mod candidate;
+mod error;
+mod fit;
+mod label;
+mod lattice;
+mod residual;
+mod scan;
+mod step;
+mod strip;
+mod surface;
+mod tile;
+mod view;
+
+pub use candidate::{Candidate, Cluster, Voxel};
+pub use error::{Error, Kind, Result};
+pub use fit::{Fit, JointFit, LinkEvidence, RunnerUp, Verdict};
+pub use label::{Label, PointKind};
+pub use lattice::{Lattice, Pixel};
+pub use residual::{LinkAt, RESIDUAL_EDGE, ResidualVoxel, TileLabels};
+pub use scan::{Format, Input, InputId, Mask, MaskId, Scan, ScanId};
+pub use step::{Fold, Map, Weigh};
+pub use strip::{Attributes, Strip};
+pub use surface::{Floor, FloorLevel, InstallationPlane, Occupancy, PlanePatch, TileSummary};
+pub use tile::{TILE_SIDE, Tile, TileAt};
+pub use view::{Region, View, ViewPoint};

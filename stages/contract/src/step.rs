@@ -1,0 +1,72 @@
+//! The two shapes of a step. The engine owns threads, order, budget and errors, so that a step stays one screen.
+
+use crate::Result;
+
+/// How many bytes an item keeps in memory: channels are bounded by it.
+pub trait Weigh {
+    /// Bytes kept, roughly.
+    fn weight_bytes(&self) -> usize;
+    /// Points in it, for progress; 0 where it holds none.
+    fn n_points(&self) -> u64 {
+        0
+    }
+}
+
+impl Weigh for () {
+    fn weight_bytes(&self) -> usize {
+        0
+    }
+}
+
+impl<T: Weigh> Weigh for Option<T> {
+    fn weight_bytes(&self) -> usize {
+        self.as_ref().map_or(0, T::weight_bytes)
+    }
+
+    fn n_points(&self) -> u64 {
+        self.as_ref().map_or(0, T::n_points)
+    }
+}
+
+impl<A: Weigh, B: Weigh> Weigh for (A, B) {
+    fn weight_bytes(&self) -> usize {
+        self.0.weight_bytes() + self.1.weight_bytes()
+    }
+
+    fn n_points(&self) -> u64 {
+        self.0.n_points()
+    }
+}
+
+/// One item in, one item out; remembers nothing.
+pub trait Map: Sync {
+    /// What comes in.
+    type In: Send;
+    /// What goes out.
+    type Out: Send;
+    /// Memory that one worker reuses from item to item; must not change the answer.
+    type Scratch: Default;
+    /// Makes one item of one item.
+    fn apply(&self, item: Self::In, scratch: &mut Self::Scratch) -> Result<Self::Out>;
+}
+
+/// Many items in, one answer out.
+///
+/// # Law
+/// Cut the stream anywhere, fold both halves, join in order: the answer is the same.
+pub trait Fold {
+    /// What comes in.
+    type In: Send;
+    /// What is kept while items come in.
+    type Sum: Send;
+    /// What goes out.
+    type Out;
+    /// The sum of no items.
+    fn empty(&self) -> Self::Sum;
+    /// Adds one item.
+    fn add(&self, sum: &mut Self::Sum, item: Self::In) -> Result<()>;
+    /// Joins the sum of later items to that of earlier ones.
+    fn join(&self, earlier: &mut Self::Sum, later: Self::Sum) -> Result<()>;
+    /// Makes the answer.
+    fn finish(&self, sum: Self::Sum) -> Result<Self::Out>;
+}

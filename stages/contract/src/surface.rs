@@ -1,0 +1,177 @@
+//! Planes and occupied space: what floor and cluster need, small enough to keep for a whole plant.
+
+use crate::{ScanId, Weigh};
+use geometry::{Aabb, Moments, Plane};
+
+/// A planar region of one tile, in the world frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanePatch {
+    /// Who saw it.
+    pub scan: ScanId,
+    /// Least-squares plane; its normal points to the scanner (or up, where there is none).
+    pub plane: Plane,
+    /// Moments of its points: patches are joined by joining these.
+    pub moments: Moments,
+    /// RMS distance of its points from the plane, metres.
+    pub rms: f64,
+    /// Bounds of its points, metres.
+    pub bounds: Aabb,
+    /// Area covered by its points, m² (from solid angle, range and incidence; not from its outline).
+    pub area: f64,
+    /// Ground cells (0.25 m, index = floor(x/0.25), floor(y/0.25)) that its points touch, sorted, with the number of
+    /// points and the sum of their z (metres) in each; only for nearly horizontal patches.
+    pub ground: Vec<([i32; 2], u32, f64)>,
+}
+
+/// Occupied voxels with the number of points in each: sorted by (z, y, x), each voxel once.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Occupancy {
+    /// Edge of a voxel, metres. Voxel `[i, j, k]` spans `[i·edge, (i+1)·edge)` along x, and so on, in the world.
+    pub edge: f64,
+    /// Voxel and points in it.
+    pub voxels: Vec<([i32; 3], u32)>,
+}
+
+impl Occupancy {
+    /// Adds the points of `other`, voxel by voxel; both must have the same edge unless one is empty.
+    pub fn merge(&mut self, other: Self) {
+        if self.voxels.is_empty() {
+            *self = other;
+            return;
+        }
+        debug_assert!(other.voxels.is_empty() || self.edge == other.edge, "voxels of two sizes");
+        let key = |v: &([i32; 3], u32)| (v.0[2], v.0[1], v.0[0]);
+        let mine = std::mem::take(&mut self.voxels);
+        let mut out = Vec::with_capacity(mine.len().max(other.voxels.len()));
+        let (mut a, mut b) = (mine.into_iter().peekable(), other.voxels.into_iter().peekable());
+        while let (Some(x), Some(y)) = (a.peek(), b.peek()) {
+            match key(x).cmp(&key(y)) {
+                std::cmp::Ordering::Less => out.extend(a.next()),
+                std::cmp::Ordering::Greater => out.extend(b.next()),
+                std::cmp::Ordering::Equal => {
+                    out.push((x.0, x.1.saturating_add(y.1)));
+                    a.next();
+                    b.next();
+                }
+            }
+        }
+        out.extend(a);
+        out.extend(b);
+        self.voxels = out;
+    }
+}
+
+/// What one tile leaves behind for floor and cluster.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TileSummary {
+    /// Number of points.
+    pub n_points: u64,
+    /// Points taken for veils (mixed pixels between a near edge and what lies behind).
+    pub n_veils: u64,
+    /// Planar regions, largest first.
+    pub patches: Vec<PlanePatch>,
+    /// Occupied space, veils left out.
+    pub occupancy: Occupancy,
+}
+
+impl Weigh for TileSummary {
+    fn weight_bytes(&self) -> usize {
+        let ground: usize = self.patches.iter().map(|p| p.ground.len() * 24).sum();
+        size_of::<Self>()
+            + self.patches.len() * size_of::<PlanePatch>()
+            + ground
+            + self.occupancy.voxels.len() * 16
+    }
+}
+
+/// One level of the floor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FloorLevel {
+    /// Mean plane, normal up.
+    pub plane: Plane,
+    /// RMS of its cells' heights about the mean plane, metres (waviness).
+    pub waviness: f64,
+    /// Area, m².
+    pub area: f64,
+    /// Edge of a cell of the height map, metres.
+    pub cell: f64,
+    /// Cells of the ground (index = floor(x/cell), floor(y/cell)) and the floor's height in each, metres; sorted.
+    pub heights: Vec<([i32; 2], f64)>,
+}
+
+impl FloorLevel {
+    /// Height of the floor at a place, metres: bilinear between the heights at cell middles, the mean plane where
+    /// they are missing. `None` farther than two cells from any known cell.
+    #[must_use]
+    pub fn height(&self, x: f64, y: f64) -> Option<f64> {
+        let (u, v) = (x / self.cell - 0.5, y / self.cell - 0.5);
+        let (i, j) = (u.floor(), v.floor());
+        let (fu, fv) = (u - i, v - j);
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (di, dj, w) in [
+            (0, 0, (1.0 - fu) * (1.0 - fv)),
+            (1, 0, fu * (1.0 - fv)),
+            (0, 1, (1.0 - fu) * fv),
+            (1, 1, fu * fv),
+        ] {
+            if let Some(h) = self.cell_height([i as i32 + di, j as i32 + dj]) {
+                sum += (w + 1e-6) * h;
+                weight += w + 1e-6;
+            }
+        }
+        if weight > 0.0 {
+            return Some(sum / weight);
+        }
+        let near = (-2..=2).any(|di| {
+            (-2..=2).any(|dj| self.cell_height([i as i32 + di, j as i32 + dj]).is_some())
+        });
+        near.then(|| self.mean_height(x, y))
+    }
+
+    /// Height of the mean plane at a place, metres.
+    #[must_use]
+    pub fn mean_height(&self, x: f64, y: f64) -> f64 {
+        let n = self.plane.normal;
+        (self.plane.offset - n.x * x - n.y * y) / n.z
+    }
+
+    fn cell_height(&self, at: [i32; 2]) -> Option<f64> {
+        self.heights.binary_search_by_key(&at, |c| c.0).ok().map(|i| self.heights[i].1)
+    }
+}
+
+/// A horizontal plane that a robot may stand on: a floor level, or a stand, pedestal or table top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InstallationPlane {
+    /// Normal up (away from the body that carries it).
+    pub plane: Plane,
+    /// Bounds of its points, metres.
+    pub bounds: Aabb,
+    /// Area covered by points, m².
+    pub area: f64,
+    /// Whether it is a floor level.
+    pub is_floor: bool,
+}
+
+/// The floor of the plant: its levels, largest first, and the smaller planes that something may stand on.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Floor {
+    /// Largest first; none where nothing like a floor was found.
+    pub levels: Vec<FloorLevel>,
+    /// Floor levels and stand-sized horizontal planes, by height then area.
+    pub planes: Vec<InstallationPlane>,
+}
+
+impl Floor {
+    /// Height above the floor level that lies nearest below or at `p` (by at most `slack` metres above `p`); `None`
+    /// where no level is known.
+    #[must_use]
+    pub fn height_above(&self, p: [f64; 3], slack: f64) -> Option<f64> {
+        self.levels
+            .iter()
+            .filter_map(|level| level.height(p[0], p[1]))
+            .map(|h| p[2] - h)
+            .filter(|h| *h >= -slack)
+            .min_by(f64::total_cmp)
+    }
+}

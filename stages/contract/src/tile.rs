@@ -1,0 +1,75 @@
+//! A tile: the points of a rectangle of one lattice; the unit of disk layout, of parallel work, of reuse.
+
+use crate::{Pixel, ScanId, Weigh};
+use geometry::Aabb;
+
+/// Pixels along each side of a tile.
+pub const TILE_SIDE: u32 = 256;
+
+/// Which rectangle of which scan. For a scan without lattice: which square of the ground, 256 × 256 cells of 0.05 m
+/// about the scan's origin, row from y, column from x, both offset by 2²⁰ tiles so that they stay positive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TileAt {
+    /// Whose lattice.
+    pub scan: ScanId,
+    /// Row of the tile: pixel row / 256.
+    pub row: u32,
+    /// Column of the tile: pixel column / 256.
+    pub col: u32,
+}
+
+/// All points of one tile, sorted by pixel, then by place in the mask.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tile {
+    /// Where it lies.
+    pub at: TileAt,
+    /// Smallest place in the mask of the points here.
+    pub first_place: u64,
+    /// Place in the mask of each point, less `first_place`.
+    pub place: Vec<u32>,
+    /// Pixel within the tile: row·256 + column.
+    pub pixel: Vec<u16>,
+    /// Scan frame, metres.
+    pub xyz: Vec<[f32; 3]>,
+    /// Bounds of the points in the world, metres.
+    pub bounds: Aabb,
+}
+
+impl Tile {
+    /// Edge of a ground cell of a scan without lattice, metres.
+    pub const GROUND_CELL: f32 = 0.05;
+    /// Offset of ground tiles, so that their row and column stay positive.
+    pub const GROUND_OFFSET: i64 = 1 << 20;
+
+    /// Number of points.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.xyz.len()
+    }
+
+    /// Holds no point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.xyz.is_empty()
+    }
+
+    /// Pixel of the whole lattice of point `i`.
+    #[must_use]
+    pub fn pixel_at(&self, i: usize) -> Pixel {
+        let pixel = u32::from(self.pixel[i]);
+        Pixel {
+            row: self.at.row * TILE_SIDE + pixel / TILE_SIDE,
+            col: self.at.col * TILE_SIDE + pixel % TILE_SIDE,
+        }
+    }
+}
+
+impl Weigh for Tile {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>() + self.xyz.len() * 12 + self.place.len() * 4 + self.pixel.len() * 2
+    }
+
+    fn n_points(&self) -> u64 {
+        self.len() as u64
+    }
+}

@@ -1,0 +1,39 @@
+//! What the scans saw of a region: depth images and points about a local origin; what a fit reads.
+
+use crate::{MaskId, ScanId};
+use geometry::{Aabb, DepthImage, Point};
+
+/// A piece of the world with a local frame: world axes, shifted to `origin`, so that f32 is exact enough.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Region {
+    /// Origin of the local frame in the world, metres.
+    pub origin: Point,
+    /// Bounds in the local frame, metres.
+    pub bounds: Aabb,
+}
+
+/// A measured point inside a region.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewPoint {
+    /// Local frame, metres.
+    pub xyz: [f32; 3],
+    /// Place in the mask.
+    pub place: u64,
+}
+
+/// One scan's view of a region.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// Whose view.
+    pub scan: ScanId,
+    /// The mask of its points.
+    pub mask: MaskId,
+    /// Where the scanner stands in the local frame; `None` where unknown, and then `images` is empty.
+    pub scanner: Option<Point>,
+    /// Angle between neighbouring beams, radians; 0 where unknown.
+    pub beam_step: f64,
+    /// Depth images that together cover the region.
+    pub images: Vec<DepthImage>,
+    /// The scan's points inside the region's bounds, sorted by place.
+    pub points: Vec<ViewPoint>,
+}

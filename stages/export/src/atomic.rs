@@ -1,0 +1,128 @@
+//! Files that exist whole or not at all: bytes in; a temporary name until the end, then a sync and a rename.
+
+use contract::{Error, Kind, Result};
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Ending of a file that is not yet whole.
+pub(crate) const PART: &str = "part";
+
+/// A file that takes its own name only when it is committed; dropped before, it is removed.
+#[derive(Debug)]
+pub struct AtomicFile {
+    file: Option<File>,
+    part: PathBuf,
+    path: PathBuf,
+}
+
+impl AtomicFile {
+    /// Opens `<path>.part` for writing and reading; its folder is made where it is missing.
+    pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
+        let path = path.into();
+        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder)
+                .map_err(|e| refused("folder cannot be made", folder, e))?;
+        }
+        let part = part_of(&path);
+        let file = OpenOptions::new()
+            .create(true)
+            .read(true)
+            .write(true)
+            .truncate(true)
+            .open(&part)
+            .map_err(|e| refused("file cannot be made", &part, e))?;
+        Ok(Self {
+            file: Some(file),
+            part,
+            path,
+        })
+    }
+
+    /// The name that it will have.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Brings the bytes to disk, then gives the file its name, replacing what had it.
+    pub fn commit(mut self) -> Result<()> {
+        let file = self.file.take().expect("taken only here and on drop");
+        let done = file
+            .sync_all()
+            .and_then(|()| std::fs::rename(&self.part, &self.path));
+        done.map_err(|e| refused("file cannot be finished", &self.path, e))?;
+        // The new name itself must survive a power cut; where folders cannot be opened (Windows) it does anyway.
+        if let Some(folder) = self.path.parent().and_then(|f| File::open(f).ok()) {
+            let _ = folder.sync_all();
+        }
+        Ok(())
+    }
+
+    fn file(&mut self) -> &mut File {
+        self.file.as_mut().expect("taken only by commit and drop")
+    }
+}
+
+/// Writes a whole file at once.
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(bytes)
+        .map_err(|e| refused("file cannot be written", path, e))?;
+    file.commit()
+}
+
+/// An error of the system about a file.
+pub(crate) fn refused(what: &str, path: &Path, source: std::io::Error) -> Error {
+    let full = source.kind() == std::io::ErrorKind::StorageFull;
+    let error = Error::new(if full { Kind::OverBudget } else { Kind::Io }, what)
+        .because(source)
+        .at(path.display());
+    if full {
+        error.hint("make room on the disk, or choose another --out")
+    } else {
+        error
+    }
+}
+
+/// The name of a file while it is not yet whole.
+pub(crate) fn part_of(path: &Path) -> PathBuf {
+    let mut name = path
+        .file_name()
+        .map(std::ffi::OsStr::to_os_string)
+        .unwrap_or_default();
+    name.push(".");
+    name.push(PART);
+    path.with_file_name(name)
+}
+
+impl Drop for AtomicFile {
+    fn drop(&mut self) {
+        if self.file.take().is_some() {
+            // Nothing more can be done about a leftover that refuses to go; it never had a final name.
+            let _ = std::fs::remove_file(&self.part);
+        }
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.file().write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file().flush()
+    }
+}
+
+impl Read for AtomicFile {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        self.file().read(bytes)
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.file().seek(to)
+    }
+}

@@ -1,0 +1,33 @@
+//! The plant in, files out: masks, result, clouds, scans, pictures. The only writer of formats; decides nothing.
+//!
+//! Every file is written under a temporary name, synced, and gets its own name only when it is whole.
+#![forbid(unsafe_code)]
+
+mod atomic;
+mod canvas;
+mod clouds;
+mod e57;
+mod las;
+mod mask;
+mod npy;
+mod plan_picture;
+mod record;
+mod result;
+mod robot_picture;
+mod table;
+
+pub use atomic::AtomicFile;
+pub use canvas::{Canvas, Rgb, link_color, robot_color};
+pub use clouds::{Clouds, CloudsSettings, Written};
+pub use e57::{E57Scans, GridPoint, GridScan};
+pub use las::{LasSummary, LasWriter};
+pub use mask::{MaskFiles, MaskWriter};
+pub use npy::{Element, NpyWriter};
+pub use plan_picture::PlanPicture;
+pub use record::{LasPoint, LasSettings, Quantum, RawVlr, class_of};
+pub use result::{
+    BasePose, BaseSigma, InputEntry, Labels, LinkEntry, Places, ResultFile, RobotEntry,
+    RunnerUpEntry, SCHEMA, ScanLabels, StageEntry, TipPose,
+};
+pub use robot_picture::RobotPicture;
+pub use table::write_table;

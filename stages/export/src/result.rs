@@ -1,0 +1,341 @@
+//! `result.json`: what was found, how sure that is, and from what; schema `stillpoint.result/1`, which grows by
+//! adding fields. Numbers that are not finite are written as null.
+
+use crate::atomic;
+use crate::mask::MaskFiles;
+use contract::{Error, Fit, Kind, Mask, Result};
+use geometry::Pose;
+use serde::de::{MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::marker::PhantomData;
+use std::path::Path;
+
+/// Name and version of the schema.
+pub const SCHEMA: &str = "stillpoint.result/1";
+
+/// The whole file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResultFile {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// Robots; their places here are the numbers in the masks.
+    pub robots: Vec<RobotEntry>,
+    /// Where the masks are.
+    pub labels: Labels,
+    /// What was read.
+    pub inputs: Vec<InputEntry>,
+    /// What was done.
+    pub stages: Vec<StageEntry>,
+    /// What a person should know, in words.
+    pub warnings: Vec<String>,
+}
+
+/// One robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RobotEntry {
+    /// `R1`, `R2` …
+    pub id: String,
+    /// Name in the library.
+    pub model: String,
+    /// Name of the link that `base_pose` places.
+    pub base_link: String,
+    /// World from base link.
+    pub base_pose: BasePose,
+    /// Its standard deviation.
+    pub base_sigma: BaseSigma,
+    /// Value of each joint, radians or metres, in the order of the model.
+    pub joints: Places<f64>,
+    /// Standard deviation of each joint, same unit; null where the points do not determine it.
+    pub sigma: Places<Option<f64>>,
+    /// Whether the points determine each joint.
+    #[serde(default)]
+    pub determined: Places<bool>,
+    /// Names of the links; their places here are the numbers in the masks.
+    pub links: Vec<String>,
+    /// `trusted`, `doubtful` or `refused`.
+    pub verdict: String,
+    /// Share explained less share contradicted.
+    pub score: Option<f64>,
+    /// RMS distance of its points from its surface, metres.
+    #[serde(default)]
+    pub rms: Option<f64>,
+    /// Why not plainly trusted, in words.
+    #[serde(default)]
+    pub reasons: Vec<String>,
+    /// The best other explanation.
+    #[serde(default)]
+    pub runner_up: Option<RunnerUpEntry>,
+    /// Models that fit as well where the points can tell.
+    #[serde(default)]
+    pub alike: Vec<String>,
+    /// Where the tip of the main chain is.
+    #[serde(default)]
+    pub tip: Option<TipPose>,
+    /// What the scans say of each link.
+    #[serde(default)]
+    pub evidence: Vec<LinkEntry>,
+}
+
+/// A pose, to world from link.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BasePose {
+    /// Position, metres.
+    pub xyz: [f64; 3],
+    /// Rotation, unit quaternion.
+    pub quat_wxyz: [f64; 4],
+}
+
+impl From<&Pose> for BasePose {
+    fn from(pose: &Pose) -> Self {
+        let (p, q) = (pose.translation, pose.rotation);
+        // One of the two quaternions of a rotation: the same rotation gives the same text.
+        let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+        Self {
+            xyz: [p.x, p.y, p.z],
+            quat_wxyz: [q.w, q.i, q.j, q.k].map(|v| sign * v + 0.0),
+        }
+    }
+}
+
+/// Standard deviations of a base.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BaseSigma {
+    /// World axes, metres.
+    pub xyz: [Option<f64>; 3],
+    /// About world axes, radians.
+    pub rotation: [Option<f64>; 3],
+}
+
+/// Pose of the last link of the main chain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TipPose {
+    /// Name of the link.
+    pub link: String,
+    /// World from that link.
+    pub pose: BasePose,
+}
+
+/// What the scans say of a link.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LinkEntry {
+    /// Name of the link.
+    pub link: String,
+    /// Share of its surface that some beam could judge.
+    pub seen: Option<f64>,
+    /// Of the judged, share with a beam ending on it.
+    pub matched: Option<f64>,
+    /// Of the judged, share that a beam went through.
+    pub violated: Option<f64>,
+    /// Points within the gate.
+    pub n_points: usize,
+    /// RMS distance of those, metres.
+    pub rms: Option<f64>,
+}
+
+/// The best other explanation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunnerUpEntry {
+    /// Its model.
+    pub model: String,
+    /// Its score.
+    pub score: Option<f64>,
+    /// Whether it is the same model in another posture.
+    pub same_model: bool,
+}
+
+/// Where the masks are.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Labels {
+    /// The legend.
+    pub table: String,
+    /// One for each mask.
+    pub scans: Vec<ScanLabels>,
+}
+
+/// The files of one mask, relative to `result.json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ScanLabels {
+    /// Name of the scan, or of the LAS file.
+    pub scan: String,
+    /// Index into `inputs`.
+    pub input: u32,
+    /// Entries in each file.
+    pub n_points: u64,
+    /// Kinds, u8.
+    pub kind: String,
+    /// Robots, i16.
+    pub robot: String,
+    /// Links, i16.
+    pub link: String,
+}
+
+/// An input as it was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputEntry {
+    /// As given.
+    pub path: String,
+    /// `e57`, `ptx`, `las` or `laz`.
+    pub format: String,
+    /// Length, bytes.
+    pub n_bytes: u64,
+    /// Digest of the bytes, with its method, such as `blake3:…`; empty where none was taken.
+    pub digest: String,
+    /// Scans in it.
+    pub n_scans: u32,
+    /// Points that the file does not flag as invalid.
+    pub n_points: u64,
+    /// Of those, points that were dropped (not finite).
+    pub n_dropped: u64,
+    /// What is missing in it and what is worse for that.
+    pub notes: Vec<String>,
+}
+
+/// A stage as it ran. Holds nothing that differs from run to run, such as times.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StageEntry {
+    /// Its name.
+    pub name: String,
+    /// Items that went in.
+    pub n_in: u64,
+    /// Items that came out.
+    pub n_out: u64,
+}
+
+impl RobotEntry {
+    /// The entry of the robot with this index; names of the model's links in their order.
+    #[must_use]
+    pub fn new(index: usize, fit: &Fit, links: &[String], tip: Option<(String, Pose)>) -> Self {
+        let sigma = |range: usize| finite(fit.base_sigma[range]);
+        let named = |value: fn(&contract::JointFit) -> f64| {
+            fit.joints.iter().map(move |j| (j.name.clone(), value(j)))
+        };
+        Self {
+            id: format!("R{}", index + 1),
+            model: fit.model_name.clone(),
+            base_link: links.first().cloned().unwrap_or_default(),
+            base_pose: (&fit.world_from_base).into(),
+            base_sigma: BaseSigma {
+                xyz: [0, 1, 2].map(sigma),
+                rotation: [3, 4, 5].map(sigma),
+            },
+            joints: Places(named(|j| j.value).collect()),
+            sigma: Places(
+                named(|j| j.sigma)
+                    .map(|(name, s)| (name, finite(s)))
+                    .collect(),
+            ),
+            determined: Places(
+                fit.joints
+                    .iter()
+                    .map(|j| (j.name.clone(), j.determined))
+                    .collect(),
+            ),
+            links: links.to_vec(),
+            verdict: fit.verdict.word().into(),
+            score: finite(fit.score),
+            rms: finite(fit.rms),
+            reasons: fit.reasons.clone(),
+            runner_up: fit.runner_up.as_ref().map(|r| RunnerUpEntry {
+                model: r.model.clone(),
+                score: finite(r.score),
+                same_model: r.same_model,
+            }),
+            alike: fit.alike.clone(),
+            tip: tip.map(|(link, pose)| TipPose {
+                link,
+                pose: (&pose).into(),
+            }),
+            evidence: fit.links.iter().map(LinkEntry::from).collect(),
+        }
+    }
+}
+
+impl From<&contract::LinkEvidence> for LinkEntry {
+    fn from(e: &contract::LinkEvidence) -> Self {
+        Self {
+            link: e.name.clone(),
+            seen: finite(e.seen),
+            matched: finite(e.matched),
+            violated: finite(e.violated),
+            n_points: e.n_points,
+            rms: finite(e.rms),
+        }
+    }
+}
+
+impl ScanLabels {
+    /// The entry of a mask with so many entries.
+    #[must_use]
+    pub fn new(mask: &Mask, n_points: u64) -> Self {
+        let MaskFiles { kind, robot, link } = MaskFiles::of(mask.id);
+        Self {
+            scan: mask.name.clone(),
+            input: mask.input.0,
+            n_points,
+            kind,
+            robot,
+            link,
+        }
+    }
+}
+
+impl ResultFile {
+    /// Writes `result.json` under the output folder: the last file of a run, so that its presence says that all the
+    /// others are whole.
+    pub fn write(&self, out: &Path) -> Result<()> {
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|e| Error::new(Kind::Bug, "result does not serialize").because(e))?;
+        atomic::write(&out.join("result.json"), (text + "\n").as_bytes())
+    }
+}
+
+/// The number, if it is one.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+/// A JSON object whose names keep their order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Places<T>(pub Vec<(String, T)>);
+
+impl<T> Default for Places<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T: Serialize> Serialize for Places<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (name, value) in &self.0 {
+            map.serialize_entry(name, value)?;
+        }
+        map.end()
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Places<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct InOrder<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for InOrder<T> {
+            type Value = Places<T>;
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("an object")
+            }
+            fn visit_map<A: MapAccess<'de>>(
+                self,
+                mut map: A,
+            ) -> std::result::Result<Places<T>, A::Error> {
+                let mut out = Vec::new();
+                while let Some(entry) = map.next_entry()? {
+                    out.push(entry);
+                }
+                Ok(Places(out))
+            }
+        }
+        deserializer.deserialize_map(InOrder(PhantomData))
+    }
+}

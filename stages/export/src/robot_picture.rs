@@ -1,0 +1,297 @@
+//! One robot from four sides: its fitted posture and the labelled points about it in; a picture of points by link
+//! with the posture's outline over them out. An outline beside its points is a wrong posture, at a glance.
+
+use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, link_color};
+use contract::{Label, PointKind};
+use geometry::depth::{Rows, rows, transform};
+use geometry::{Aabb, Point, Pose, Vector};
+use robot::Model;
+
+/// Edge of one view, pixels.
+const SIDE: usize = 560;
+/// Room about the robot, metres.
+const AROUND: f64 = 0.25;
+/// A step in depth that is an outline, metres.
+const STEP: f32 = 0.04;
+/// A turn of the surface that is an edge: cosine of 40°.
+const TURN: f32 = 0.766;
+
+/// Gathers points of one robot; bounded by the size of its views.
+pub struct RobotPicture {
+    robot: i16,
+    bounds: Aabb,
+    links: Vec<String>,
+    views: Vec<View>,
+}
+
+struct View {
+    name: &'static str,
+    /// Right and down in pixels, away from the eye in metres.
+    view_from_world: Rows,
+    /// Points are given about it, so that f32 is exact enough.
+    origin: Point,
+    points: Vec<(f32, Rgb)>,
+    outline: Vec<bool>,
+}
+
+/// What of the posture shows in a pixel.
+#[derive(Clone, Copy)]
+struct Shown {
+    depth: f32,
+    link: u16,
+    normal: [f32; 3],
+}
+
+const NOTHING: Shown = Shown {
+    depth: f32::INFINITY,
+    link: u16::MAX,
+    normal: [0.0; 3],
+};
+
+impl RobotPicture {
+    /// The views of the robot with this index in the labels, its links standing at `world_from_link`.
+    #[must_use]
+    pub fn new(robot: i16, model: &Model, world_from_link: &[Pose]) -> Self {
+        let mut bounds = Aabb::EMPTY;
+        for (link, pose) in model.links.iter().zip(world_from_link) {
+            for corner in link.bounds.corners() {
+                let p = pose * Point::from(corner);
+                if !link.bounds.is_empty() {
+                    bounds.add([p.x, p.y, p.z]);
+                }
+            }
+        }
+        let shown = if bounds.is_empty() {
+            Aabb {
+                min: [0.0; 3],
+                max: [1.0; 3],
+            }
+        } else {
+            bounds
+        };
+        let views = [
+            ("front", 0.0, 0.0),
+            ("side", 90.0, 0.0),
+            ("top", -90.0, 90.0),
+            ("oblique", 40.0, 30.0),
+        ];
+        let mut views: Vec<View> = views
+            .map(|(name, turn, tilt): (_, f64, f64)| View::new(name, turn, tilt, &shown))
+            .into();
+        for view in &mut views {
+            view.outline(model, world_from_link);
+        }
+        let links = model.links.iter().map(|link| link.name.clone()).collect();
+        Self {
+            robot,
+            bounds: shown.grown(AROUND),
+            links,
+            views,
+        }
+    }
+
+    /// Adds a labelled point of the world; points away from the robot are passed over.
+    #[inline]
+    pub fn add(&mut self, world: [f64; 3], label: Label) {
+        if !self.bounds.contains(world) {
+            return;
+        }
+        let (color, is_ours) = self.color(label);
+        for view in &mut self.views {
+            view.splat(world, color, is_ours);
+        }
+    }
+
+    /// Draws the four views with a legend; `title` says model and verdict.
+    #[must_use]
+    pub fn draw(&self, title: &str) -> Canvas {
+        let n_rows = self.links.len().div_ceil(4);
+        let mut canvas = Canvas::new(2 * SIDE + 6, 2 * SIDE + 46 + 14 * n_rows);
+        canvas.text(8, 10, 2, INK, title);
+        for (i, view) in self.views.iter().enumerate() {
+            let (x, y) = (
+                (i % 2 * (SIDE + 6)) as i64,
+                (36 + i / 2 * (SIDE + 4)) as i64,
+            );
+            canvas.paste(x, y, &view.draw());
+        }
+        for (i, name) in self.links.iter().enumerate() {
+            let (x, y) = (
+                (8 + i % 4 * (SIDE / 2)) as i64,
+                (2 * SIDE + 46 + 14 * (i / 4)) as i64,
+            );
+            canvas.fill(x, y - 1, 10, 10, link_color(i));
+            let short: String = name.chars().take(28).collect();
+            canvas.text(x + 14, y, 1, INK, &short);
+        }
+        canvas
+    }
+
+    fn color(&self, label: Label) -> (Rgb, bool) {
+        let link = usize::try_from(label.link).unwrap_or(0);
+        match label.kind {
+            PointKind::Link if label.robot == self.robot => (link_color(link), true),
+            PointKind::Attachment if label.robot == self.robot => {
+                (blend(link_color(link), INK, 0.45), true)
+            }
+            PointKind::Link | PointKind::Attachment => ([214, 204, 224], false),
+            PointKind::Uncertain => ([244, 214, 130], false),
+            PointKind::Fixed => ([205, 208, 212], false),
+            PointKind::Floor => ([232, 234, 230], false),
+        }
+    }
+}
+
+impl View {
+    /// A view from the front (+x), turned by `turn` degrees about z and tilted by `tilt` degrees from above.
+    fn new(name: &'static str, turn: f64, tilt: f64, bounds: &Aabb) -> Self {
+        let (st, ct) = turn.to_radians().sin_cos();
+        let (sp, cp) = tilt.to_radians().sin_cos();
+        let away = -Vector::new(ct * cp, st * cp, sp);
+        let right = Vector::new(-st, ct, 0.0);
+        let down = away.cross(&right);
+        let axes =
+            nalgebra::Matrix3::from_rows(&[right.transpose(), down.transpose(), away.transpose()]);
+        let half = bounds
+            .corners()
+            .into_iter()
+            .map(|c| axes * (Point::from(c) - bounds.center()));
+        let half = half.map(|v| v.x.abs().max(v.y.abs())).fold(0.1, f64::max) + 0.6 * AROUND;
+        let scale = SIDE as f64 / (2.0 * half);
+        let rotation = nalgebra::UnitQuaternion::from_matrix(&axes);
+        let mut view_from_world = rows(&Pose::from_parts(Default::default(), rotation));
+        for row in view_from_world.iter_mut().take(2) {
+            row.iter_mut().for_each(|v| *v *= scale as f32);
+            row[3] = 0.5 * SIDE as f32;
+        }
+        Self {
+            name,
+            view_from_world,
+            origin: bounds.center(),
+            points: vec![(f32::INFINITY, WHITE); SIDE * SIDE],
+            outline: vec![false; SIDE * SIDE],
+        }
+    }
+
+    fn splat(&mut self, world: [f64; 3], color: Rgb, is_ours: bool) {
+        let local = [0, 1, 2].map(|i| (world[i] - self.origin[i]) as f32);
+        let [u, v, mut depth] = transform(&self.view_from_world, local);
+        if !(u >= 0.0 && v >= 0.0 && u < SIDE as f32 && v < SIDE as f32) {
+            return;
+        }
+        // Fixed things before the robot must not hide it.
+        depth += if is_ours { 0.0 } else { 1e3 };
+        // Two pixels wide, so that a scan's spacing does not look like paper.
+        for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let (x, y) = (
+                (u as usize + x).min(SIDE - 1),
+                (v as usize + y).min(SIDE - 1),
+            );
+            let pixel = &mut self.points[y * SIDE + x];
+            // Equal depths go to the smaller colour: the order of points must not show.
+            if (depth, color) < (pixel.0, pixel.1) {
+                *pixel = (depth, color);
+            }
+        }
+    }
+
+    /// Draws the posture into a depth buffer and keeps its edges.
+    fn outline(&mut self, model: &Model, world_from_link: &[Pose]) {
+        let mut shown = vec![NOTHING; SIDE * SIDE];
+        let local_from_world = Pose::from_parts((-self.origin.coords).into(), Default::default());
+        for (index, (link, pose)) in model.links.iter().zip(world_from_link).enumerate() {
+            let local_from_link = rows(&(local_from_world * pose));
+            let corner = |i: u32| {
+                let p = link
+                    .mesh
+                    .vertices
+                    .get(i as usize)
+                    .copied()
+                    .unwrap_or_default();
+                let local = transform(&local_from_link, p);
+                (local, transform(&self.view_from_world, local))
+            };
+            for triangle in &link.mesh.triangles {
+                let [(a, p), (b, q), (c, r)] = triangle.map(corner);
+                fill_triangle(&mut shown, [p, q, r], normal(a, b, c), index as u16);
+            }
+        }
+        for v in 1..SIDE {
+            for u in 1..SIDE {
+                let here = &shown[v * SIDE + u];
+                let edge = |other: &Shown| is_edge(here, other);
+                self.outline[v * SIDE + u] =
+                    edge(&shown[v * SIDE + u - 1]) || edge(&shown[(v - 1) * SIDE + u]);
+            }
+        }
+    }
+
+    fn draw(&self) -> Canvas {
+        let mut canvas = Canvas::new(SIDE, SIDE);
+        for (i, (depth, color)) in self.points.iter().enumerate() {
+            let (x, y) = ((i % SIDE) as i64, (i / SIDE) as i64);
+            let mut color = *color;
+            if *depth < f32::INFINITY && self.outline[i] {
+                color = blend(color, INK, 0.75);
+            } else if self.outline[i] {
+                color = [90, 94, 102];
+            }
+            canvas.set(x, y, color);
+        }
+        canvas.text(8, 8, 1, INK, self.name);
+        canvas
+    }
+}
+
+fn is_edge(a: &Shown, b: &Shown) -> bool {
+    if a.link != b.link {
+        return true;
+    }
+    let turned = a.normal[0] * b.normal[0] + a.normal[1] * b.normal[1] + a.normal[2] * b.normal[2];
+    a.link != u16::MAX && ((a.depth - b.depth).abs() > STEP || turned.abs() < TURN)
+}
+
+fn normal(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3] {
+    let (u, v) = (
+        Vector::from([0, 1, 2].map(|i| f64::from(b[i] - a[i]))),
+        [0, 1, 2].map(|i| f64::from(c[i] - a[i])),
+    );
+    let n = u.cross(&Vector::from(v));
+    let n = n.try_normalize(1e-15).unwrap_or_else(Vector::zeros);
+    [n.x as f32, n.y as f32, n.z as f32]
+}
+
+/// Fills the pixels whose middle lies inside a triangle (pixels right and down, depth), the nearest surface winning.
+fn fill_triangle(shown: &mut [Shown], corners: [[f32; 3]; 3], normal: [f32; 3], link: u16) {
+    let [a, b, c] = corners;
+    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    if area == 0.0 || !area.is_finite() {
+        return;
+    }
+    let range = |i: usize| {
+        let low = a[i].min(b[i]).min(c[i]).floor().clamp(0.0, SIDE as f32) as usize;
+        let high = a[i].max(b[i]).max(c[i]).ceil().clamp(0.0, SIDE as f32) as usize;
+        low..high
+    };
+    for v in range(1) {
+        for u in range(0) {
+            let p = [u as f32 + 0.5, v as f32 + 0.5];
+            let side = |m: [f32; 3], n: [f32; 3]| {
+                (n[0] - m[0]) * (p[1] - m[1]) - (n[1] - m[1]) * (p[0] - m[0])
+            };
+            let (x, y, z) = (side(b, c) / area, side(c, a) / area, side(a, b) / area);
+            if x < 0.0 || y < 0.0 || z < 0.0 {
+                continue;
+            }
+            let depth = x * a[2] + y * b[2] + z * c[2];
+            let pixel = &mut shown[v * SIDE + u];
+            if depth < pixel.depth {
+                *pixel = Shown {
+                    depth,
+                    link,
+                    normal,
+                };
+            }
+        }
+    }
+}

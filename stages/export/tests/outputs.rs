@@ -1,0 +1,522 @@
+//! Writes a small output folder of every kind of file, reads it back with the crates that others use, and has
+//! `scripts/check_outputs.py` look at it with laspy, pye57 and PDAL where Python has them.
+#![allow(clippy::print_stderr)]
+
+use contract::{
+    Fit, InputId, JointFit, Label, LinkEvidence, Mask, MaskId, PointKind, RunnerUp, Verdict,
+};
+use export::*;
+use geometry::{Aabb, Point, Pose, Vector};
+use robot::{CadCloud, Link, Mesh, Model, Role};
+use std::path::{Path, PathBuf};
+
+fn folder(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("folder");
+    path
+}
+
+const N: usize = 20_000;
+
+fn label(i: usize) -> Label {
+    match i % 10 {
+        0..3 => Label::FLOOR,
+        3..6 => Label::FIXED,
+        6 | 7 => Label {
+            kind: PointKind::Link,
+            robot: 0,
+            link: (i / 10 % 3) as i16,
+        },
+        8 => Label {
+            kind: PointKind::Attachment,
+            robot: 1,
+            link: 2,
+        },
+        _ => Label::UNCERTAIN,
+    }
+}
+
+fn point(i: usize) -> LasPoint {
+    let turn = i as f64 * 0.37;
+    LasPoint {
+        xyz: [
+            400_000.0 + 15.0 * turn.sin(),
+            5_000_000.0 + 12.0 * turn.cos(),
+            100.0 + (i % 300) as f64 * 0.01,
+        ],
+        intensity: (i * 7 % 65536) as u16,
+        color: [(i % 65536) as u16, 2, 65535],
+        gps_time: i as f64 * 0.001,
+        source_id: (i % 4) as u16 + 1,
+        ..LasPoint::default()
+    }
+    .labelled(label(i))
+}
+
+fn clouds(out: &Path, n: usize, [compress, with_color]: [bool; 2], memory: usize) -> Written {
+    let around = Aabb {
+        min: [399_985.0, 4_999_988.0, 100.0],
+        max: [400_015.0, 5_000_012.0, 103.0],
+    };
+    let las = LasSettings {
+        compress,
+        with_color,
+        ..LasSettings::new(Quantum::around(&around))
+    };
+    let settings = CloudsSettings {
+        memory,
+        ..CloudsSettings::new(las)
+    };
+    let mut clouds = Clouds::create(out, settings).expect("create");
+    for i in 0..n {
+        clouds.push(&point(i), label(i).kind).expect("push");
+    }
+    clouds.finish().expect("finish")
+}
+
+fn read(path: &Path) -> (las::Header, Vec<las::Point>) {
+    let mut reader = las::Reader::from_path(path).expect("opens");
+    let points = reader
+        .read_all()
+        .expect("reads")
+        .points()
+        .map(|p| p.expect("decodes"))
+        .collect();
+    (reader.header().clone(), points)
+}
+
+#[test]
+fn tiles_hold_every_point_once_whatever_the_memory_and_compression() {
+    let mut seen: Option<Vec<(i64, u8, Vec<u8>)>> = None;
+    let variants = [
+        (false, false, 1 << 20),
+        (false, false, 4000),
+        (true, false, 4000),
+        (true, true, 1 << 20),
+    ];
+    for (k, (compress, with_color, memory)) in variants.into_iter().enumerate() {
+        let out = folder(&format!("tiles_{k}"));
+        let written = clouds(&out, N, [compress, with_color], memory);
+        assert!(written.tiles.len() > 6);
+        let mut all = Vec::new();
+        for tile in &written.tiles {
+            let (header, points) = read(&tile.path);
+            assert_eq!(header.number_of_points(), tile.n_points);
+            assert_eq!(points.len() as u64, tile.n_points);
+            let bounds = header.bounds();
+            assert!((bounds.min.x - tile.bounds.min[0]).abs() < 1e-9);
+            for p in &points {
+                assert!(tile.bounds.grown(1e-6).contains([p.x, p.y, p.z]));
+                assert_eq!(p.color.is_some(), with_color);
+                let i = (p.gps_time.expect("has time") * 1000.0).round() as i64;
+                let truth = point(i as usize);
+                assert!((p.x - truth.xyz[0]).abs() < 6e-5 && (p.z - truth.xyz[2]).abs() < 6e-5);
+                assert_eq!(
+                    (p.intensity, p.point_source_id),
+                    (truth.intensity, truth.source_id)
+                );
+                all.push((i, u8::from(p.classification), p.extra_bytes.clone()));
+            }
+        }
+        all.sort();
+        assert_eq!(all.len(), N);
+        assert!(
+            all.iter()
+                .enumerate()
+                .all(|(i, p)| p.0 == i as i64 && p.1 == class_of(label(i).kind))
+        );
+        assert_eq!(all[6].2, [1, 0, 1, 0]);
+        assert_eq!(all[3].2, [0, 0, 0, 0]);
+        assert_eq!(seen.get_or_insert_with(|| all.clone()), &all);
+        let names: Vec<_> = std::fs::read_dir(out.join("tiles"))
+            .expect("folder")
+            .flatten()
+            .collect();
+        assert_eq!(
+            names.len(),
+            written.tiles.len(),
+            "nothing half-written is left"
+        );
+        let (robots, fixed) = (
+            written.robots.expect("asked"),
+            written.fixed.expect("asked"),
+        );
+        assert_eq!(robots.n_points + fixed.n_points, N as u64);
+        assert_eq!(read(&robots.path).1.len(), N * 3 / 10);
+    }
+}
+
+#[test]
+fn a_dropped_file_leaves_nothing_and_an_empty_cloud_is_whole() {
+    let out = folder("dropped");
+    let path = out.join("a.las");
+    let settings = LasSettings::new(Quantum {
+        scale: [1e-4; 3],
+        offset: [0.0; 3],
+    });
+    let mut writer = LasWriter::create(&path, settings.clone()).expect("create");
+    writer.push(&LasPoint::default()).expect("push");
+    let far = LasPoint {
+        xyz: [1e9, 0.0, 0.0],
+        ..LasPoint::default()
+    };
+    let error = writer.push(&far).expect_err("too far for i32");
+    assert!(error.to_string().contains("a.las"), "{error}");
+    drop(writer);
+    assert_eq!(std::fs::read_dir(&out).expect("folder").count(), 0);
+    for compress in [false, true] {
+        let settings = LasSettings {
+            compress,
+            ..settings.clone()
+        };
+        LasWriter::create(&path, settings)
+            .expect("create")
+            .finish()
+            .expect("finish");
+        assert!(read(&path).1.is_empty());
+    }
+}
+
+#[test]
+fn e57_scans_come_back_with_pose_and_raster() {
+    let path = folder("e57").join("scans.e57");
+    write_e57(&path);
+    let mut reader = e57::E57Reader::from_file(&path).expect("opens");
+    let clouds = reader.pointclouds();
+    assert_eq!(clouds.len(), 3);
+    assert_eq!(clouds[1].name.as_deref(), Some("scan_1"));
+    let transform = clouds[1].transform.clone().expect("pose");
+    assert!(
+        (transform.translation.x - 2.5).abs() < 1e-12
+            && (transform.rotation.z - 0.3_f64.sin()).abs() < 1e-12
+    );
+    assert_eq!(clouds[2].records, 0);
+    let raw: Vec<_> = reader
+        .pointcloud_raw(&clouds[1])
+        .expect("reads")
+        .map(|p| p.expect("reads"))
+        .collect();
+    assert_eq!(raw.len(), 300 * 211);
+    let invalid = raw
+        .iter()
+        .filter(|v| v[3] == e57::RecordValue::Integer(2))
+        .count();
+    assert_eq!(invalid, (0..300 * 211).filter(|i| i % 17 == 0).count());
+    assert_eq!(
+        raw[212][4..6],
+        [e57::RecordValue::Integer(1), e57::RecordValue::Integer(1)]
+    );
+    assert_eq!(raw[212][0], e57::RecordValue::Single(212.0 * 0.001));
+    let first = std::fs::read(&path).expect("reads");
+    write_e57(&path);
+    assert!(
+        first == std::fs::read(&path).expect("reads"),
+        "the same scene gives the same bytes"
+    );
+}
+
+fn write_e57(path: &Path) {
+    let mut scans = E57Scans::create(path).expect("create");
+    for k in 0..3_u32 {
+        let turn = Vector::z() * 0.6 * f64::from(k);
+        let scan = GridScan {
+            name: format!("scan_{k}"),
+            world_from_scan: Pose::new(Vector::new(2.5 * f64::from(k), 1.0, 1.5), turn),
+            n_rows: 300,
+            n_cols: 211,
+        };
+        let n = if k == 2 { 0 } else { 300 * 211_u32 };
+        let points = (0..n).map(|i| {
+            let xyz = (i % 17 != 0).then_some([i as f32 * 0.001, 1.0, (i % 50) as f32]);
+            Ok(GridPoint {
+                xyz,
+                row: i / 211,
+                col: i % 211,
+                intensity: (i % 60_000) as u16,
+            })
+        });
+        assert_eq!(scans.add(&scan, points).expect("add"), u64::from(n));
+    }
+    scans.finish().expect("finish");
+}
+
+fn fit() -> Fit {
+    let joint = |name: &str, value, sigma: f64| JointFit {
+        name: name.into(),
+        value,
+        sigma,
+        determined: sigma.is_finite(),
+    };
+    Fit {
+        model: 0,
+        model_name: "box".into(),
+        world_from_base: Pose::new(
+            Vector::new(400_001.0, 5_000_002.0, 100.0),
+            Vector::z() * 0.5,
+        ),
+        base_sigma: [1e-4, 1e-4, 1e-4, 1e-5, f64::NAN, 1e-5],
+        joints: vec![
+            joint("z_turn", 0.25, 1e-4),
+            joint("a_lift", -1.0, f64::INFINITY),
+        ],
+        covariance: Vec::new(),
+        score: 0.97,
+        explained: 2.0,
+        rms: 0.002,
+        links: vec![LinkEvidence {
+            name: "base".into(),
+            seen: 0.6,
+            matched: 0.9,
+            violated: 0.0,
+            n_points: 900,
+            rms: f64::NAN,
+        }],
+        runner_up: Some(RunnerUp {
+            model: "other".into(),
+            score: 0.2,
+            same_model: false,
+        }),
+        alike: vec!["box_long".into()],
+        verdict: Verdict::Doubtful,
+        reasons: vec!["joint is not determined: \"a_lift\"".into()],
+    }
+}
+
+fn sample(out: &Path) {
+    let written = clouds(out, N - 5, [false, false], 1 << 20);
+    let mask = Mask {
+        id: MaskId(0),
+        input: InputId(0),
+        name: "plant.las".into(),
+        n_points: Some(N as u64),
+    };
+    let mut writer = MaskWriter::create(out, mask.id).expect("create");
+    let labels: Vec<Label> = (0..N - 5).map(label).collect();
+    for piece in labels.chunks(777) {
+        writer.push(piece).expect("push");
+    }
+    writer.skip_to(N as u64).expect("dropped points");
+    let n_points = writer.finish().expect("finish");
+    let links = ["base", "arm", "hand"].map(String::from);
+    let robots: Vec<_> = (0..2)
+        .map(|i| RobotEntry::new(i, &fit(), &links, Some(("hand".into(), Pose::identity()))))
+        .collect();
+    write_table(out, &robots).expect("table");
+    write_e57(&out.join("scans.e57"));
+    let result = ResultFile {
+        schema: SCHEMA.into(),
+        version: "0.1.0".into(),
+        robots,
+        labels: Labels {
+            table: "labels/table.json".into(),
+            scans: vec![ScanLabels::new(&mask, n_points)],
+        },
+        inputs: vec![InputEntry {
+            path: "plant.las".into(),
+            format: "las".into(),
+            n_bytes: 1,
+            digest: String::new(),
+            n_scans: 1,
+            n_points,
+            n_dropped: 5,
+            notes: Vec::new(),
+        }],
+        stages: vec![StageEntry {
+            name: "segment".into(),
+            n_in: 1,
+            n_out: written.tiles.len() as u64,
+        }],
+        warnings: Vec::new(),
+    };
+    result.write(out).expect("result");
+}
+
+#[test]
+fn the_result_comes_back_as_written_and_python_reads_it_all() {
+    let out = folder("sample");
+    sample(&out);
+    let text = std::fs::read_to_string(out.join("result.json")).expect("reads");
+    assert!(!text.contains("NaN") && !text.contains("inf"));
+    let back: ResultFile = serde_json::from_str(&text).expect("parses");
+    assert_eq!(back.robots[1].id, "R2");
+    assert_eq!(
+        back.robots[0].joints.0[0].0, "z_turn",
+        "joints keep the order of the model"
+    );
+    assert_eq!(back.robots[0].sigma.0[1], ("a_lift".into(), None));
+    assert_eq!(back.robots[0].base_sigma.rotation[1], None);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scripts/check_outputs.py");
+    let python = std::env::var_os("PYTHON").unwrap_or_else(|| "python3".into());
+    let has_laspy = std::process::Command::new(&python)
+        .args(["-c", "import laspy, numpy"])
+        .output();
+    if !has_laspy.is_ok_and(|o| o.status.success()) {
+        eprintln!("skipped: no python3 with laspy and numpy");
+        return;
+    }
+    let checked = std::process::Command::new(&python)
+        .arg(script)
+        .arg(&out)
+        .output()
+        .expect("runs");
+    let said = String::from_utf8_lossy(&checked.stdout).into_owned()
+        + &String::from_utf8_lossy(&checked.stderr);
+    assert!(checked.status.success(), "{said}");
+    eprintln!("{said}");
+}
+
+/// A box mesh, wound outward.
+fn brick(min: [f32; 3], max: [f32; 3]) -> Mesh {
+    let pick = |n: usize, i: usize| if n >> i & 1 == 1 { max[i] } else { min[i] };
+    let vertices = (0..8)
+        .map(|n| [pick(n, 0), pick(n, 1), pick(n, 2)])
+        .collect();
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = quads
+        .iter()
+        .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+        .collect();
+    Mesh {
+        vertices,
+        triangles,
+    }
+}
+
+#[test]
+fn pictures_show_robots_where_they_stand() {
+    let link = |name: &str, min: [f32; 3], max: [f32; 3]| Link {
+        name: name.into(),
+        role: Role::Main,
+        parent_joint: None,
+        mesh: brick(min, max),
+        cad: CadCloud::default(),
+        bounds: Aabb {
+            min: min.map(f64::from),
+            max: max.map(f64::from),
+        },
+    };
+    let model = Model {
+        name: "box".into(),
+        links: vec![
+            link("base", [-0.2, -0.2, 0.0], [0.2, 0.2, 0.5]),
+            link("arm", [-0.08, -0.08, 0.0], [0.08, 0.08, 0.9]),
+        ],
+        joints: Vec::new(),
+        free: Vec::new(),
+        loops: Vec::new(),
+        main_chain: Vec::new(),
+        symmetries: Vec::new(),
+        mesh_sigmas: Vec::new(),
+    };
+    let base = Pose::translation(400_003.0, 5_000_002.0, 100.0);
+    let poses = [
+        base,
+        base * Pose::new(Vector::new(0.0, 0.0, 0.52), Vector::y() * 0.8),
+    ];
+    let mut views = RobotPicture::new(0, &model, &poses);
+    let bounds = Aabb {
+        min: [399_995.0, 4_999_995.0, 100.0],
+        max: [400_012.0, 5_000_009.0, 103.0],
+    };
+    let mut plan = PlanPicture::new(&bounds);
+    let mut add = |world: [f64; 3], label: Label| {
+        plan.add(world, label);
+        views.add(world, label);
+    };
+    for i in 0..170 * 140 {
+        let p = [
+            399_995.0 + f64::from(i % 170) * 0.1,
+            4_999_995.0 + f64::from(i / 170) * 0.1,
+            100.0,
+        ];
+        add(p, Label::FLOOR);
+    }
+    for i in 0..3000 {
+        add(
+            [
+                400_001.0 + f64::from(i % 100) * 0.03,
+                5_000_003.0,
+                100.0 + f64::from(i / 100) * 0.05,
+            ],
+            Label::FIXED,
+        );
+    }
+    for (index, (pose, link)) in poses.iter().zip(&model.links).enumerate() {
+        let (min, size) = (link.bounds.min, link.bounds.size());
+        for i in 0..40_000 {
+            let (u, v) = (f64::from(i % 200) / 200.0, f64::from(i / 200) / 200.0);
+            let walls = [[1.0, u, v], [u, 1.0, v], [u, v, 1.0], [0.0, u, v]];
+            let f = walls[(i % 4) as usize];
+            let p = pose * Point::from([0, 1, 2].map(|k| min[k] + f[k] * size[k]));
+            add(
+                [p.x, p.y, p.z],
+                Label {
+                    kind: PointKind::Link,
+                    robot: 0,
+                    link: index as i16,
+                },
+            );
+        }
+    }
+    let out = folder("pictures");
+    let plan = plan.draw(
+        "plant.las",
+        &[("R1".into(), [400_003.0, 5_000_002.0])],
+        &[("scan_01".into(), [400_007.0, 5_000_004.0])],
+    );
+    plan.write(&out.join("plan.png")).expect("writes");
+    let views = views.draw("R1 box trusted");
+    views.write(&out.join("R1.png")).expect("writes");
+    let read = png::Decoder::new(std::io::BufReader::new(
+        std::fs::File::open(out.join("R1.png")).expect("opens"),
+    ));
+    let info = read.read_info().expect("reads");
+    assert_eq!(
+        (info.info().width as usize, info.info().height as usize),
+        (views.width(), views.height())
+    );
+}
+
+#[test]
+#[ignore = "measures: run with --release -- --ignored --nocapture"]
+fn how_fast_clouds_and_scans_are_written() {
+    let out = folder("speed");
+    let n = 3_000_000;
+    for compress in [false, true] {
+        let start = std::time::Instant::now();
+        clouds(&out, n, [compress, false], 64 << 20);
+        eprintln!(
+            "clouds, compressed {compress}: {:.2} M points/s",
+            n as f64 / 1e6 / start.elapsed().as_secs_f64()
+        );
+    }
+    let start = std::time::Instant::now();
+    let mut scans = E57Scans::create(out.join("speed.e57")).expect("create");
+    let scan = GridScan {
+        name: "s".into(),
+        world_from_scan: Pose::identity(),
+        n_rows: 1000,
+        n_cols: 3000,
+    };
+    let points = (0..3_000_000_u32).map(|i| {
+        let xyz = Some([i as f32 * 1e-3, 2.0, 3.0]);
+        Ok(GridPoint {
+            xyz,
+            row: i % 1000,
+            col: i / 1000,
+            intensity: 7,
+        })
+    });
+    scans.add(&scan, points).expect("add");
+    scans.finish().expect("finish");
+    eprintln!("e57: {:.2} M points/s", 3.0 / start.elapsed().as_secs_f64());
+    std::fs::remove_dir_all(out).expect("cleared");
+}

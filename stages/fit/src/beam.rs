@@ -1,0 +1,234 @@
+//! Base poses in; out come postures that the beams allow, best first: a beam search along the joints, in which every
+//! local maximum of every sweep competes with all others (fit.md §4d, §4e).
+
+use geometry::{Pose, Probe};
+
+use crate::{Prepared, Scene, Settings};
+
+/// A base pose (local frame) and a posture of which the first joints are set.
+#[derive(Debug, Clone)]
+pub(crate) struct Hypothesis {
+    pub(crate) local_from_base: Pose,
+    pub(crate) posture: Vec<f64>,
+    /// Sum over placed links of √area · mean sample score.
+    pub(crate) score: f64,
+}
+
+/// The search for one model's posture.
+pub(crate) struct Beam<'a> {
+    pub(crate) prepared: &'a Prepared<'a>,
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) settings: &'a Settings,
+}
+
+impl Beam<'_> {
+    /// The best hypotheses over all joints, best first.
+    pub(crate) fn run(&self, bases: &[Pose]) -> Vec<Hypothesis> {
+        let home = self.prepared.model.home();
+        let tolerance = self.settings.search_tolerance as f32;
+        let mut beam: Vec<Hypothesis> = bases
+            .iter()
+            .map(|base| {
+                let mut h =
+                    Hypothesis { local_from_base: *base, posture: home.clone(), score: 0.0 };
+                h.score = self.score(&h, &self.prepared.fixed, tolerance);
+                h
+            })
+            .collect();
+        for free in 0..home.len() {
+            if self.prepared.placed_by[free].is_empty() {
+                continue;
+            }
+            let mut next: Vec<Hypothesis> =
+                beam.iter().flat_map(|h| self.extend(h, free, tolerance)).collect();
+            self.keep_best(&mut next, free);
+            for h in &mut next {
+                self.settle(h, free);
+            }
+            sort(&mut next);
+            beam = next;
+        }
+        beam
+    }
+
+    /// Weighted score of some links.
+    pub(crate) fn score(&self, h: &Hypothesis, links: &[usize], tolerance: f32) -> f64 {
+        let poses = self.prepared.model.poses(&h.posture);
+        links
+            .iter()
+            .map(|&l| {
+                let probe = self.probe(l, &(h.local_from_base * poses[l]), tolerance);
+                self.prepared.links[l].weight * f64::from(probe.mean())
+            })
+            .sum()
+    }
+
+    fn probe(&self, link: usize, pose: &Pose, tolerance: f32) -> Probe {
+        let (points, normals) = self.prepared.samples(link, self.settings.n_search);
+        self.scene.evidence.probe(points, normals, pose, tolerance)
+    }
+
+    /// All local maxima of a sweep of one joint, each with the score of what it places added.
+    fn extend(&self, h: &Hypothesis, free: usize, tolerance: f32) -> Vec<Hypothesis> {
+        let links = &self.prepared.placed_by[free];
+        let (low, span, n) = self.sweep(free);
+        let mut trial = h.clone();
+        let scores: Vec<f64> = (0..=n)
+            .map(|k| {
+                trial.posture[free] = low + span * k as f64 / n as f64;
+                self.score(&trial, links, tolerance)
+            })
+            .collect();
+        let mut out = Vec::new();
+        for k in 0..=n {
+            let left = k == 0 || scores[k] > scores[k - 1];
+            let right = k == n || scores[k] >= scores[k + 1];
+            if left && right {
+                let mut next = h.clone();
+                next.posture[free] = low + span * k as f64 / n as f64;
+                next.score += scores[k];
+                out.push(next);
+            }
+        }
+        out
+    }
+
+    /// Start, span and number of steps of a joint's sweep: an arc step moves its samples by the tolerance at most.
+    fn sweep(&self, free: usize) -> (f64, f64, usize) {
+        let [low, high] = self.prepared.model.limits(free);
+        let joint = &self.prepared.model.joints[self.prepared.model.free[free]];
+        let tolerance = self.settings.search_tolerance;
+        let (span, step) = if joint.kind == robot::JointKind::Prismatic {
+            (high - low, tolerance / 2.0)
+        } else {
+            let arc = tolerance / self.prepared.lever[free];
+            ((high - low).min(std::f64::consts::TAU), arc.clamp(0.01, self.settings.max_step))
+        };
+        (low, span, (span / step).ceil().max(1.0) as usize)
+    }
+
+    /// Sorts, drops near twins, and cuts to the beam's width.
+    fn keep_best(&self, beam: &mut Vec<Hypothesis>, upto: usize) {
+        sort(beam);
+        let mut kept: Vec<Hypothesis> = Vec::with_capacity(self.settings.beam);
+        for h in beam.drain(..) {
+            if kept.len() == self.settings.beam {
+                break;
+            }
+            if !kept.iter().any(|k| self.alike(k, &h, upto, 1.2)) {
+                kept.push(h);
+            }
+        }
+        *beam = kept;
+    }
+
+    /// Whether two hypotheses agree to within `steps` sweep steps in all joints set, and in the base.
+    pub(crate) fn alike(&self, a: &Hypothesis, b: &Hypothesis, upto: usize, steps: f64) -> bool {
+        let tolerance = self.settings.search_tolerance;
+        let shift = (a.local_from_base.translation.vector - b.local_from_base.translation.vector).norm();
+        let turn = a.local_from_base.rotation.angle_to(&b.local_from_base.rotation);
+        shift < 0.5 * tolerance
+            && turn < 0.03
+            && (0..=upto).all(|j| {
+                let (_, span, n) = self.sweep(j);
+                (a.posture[j] - b.posture[j]).abs() <= steps * span / n as f64
+            })
+    }
+
+    /// Shakes base and joints set so far, one by one, in halving steps, while the score of all placed links rises:
+    /// errors of a parent must not pile up in its children.
+    fn settle(&self, h: &mut Hypothesis, upto: usize) {
+        let mut links = self.prepared.fixed.clone();
+        for j in 0..=upto {
+            links.extend(&self.prepared.placed_by[j]);
+        }
+        let tolerance = (0.7 * self.settings.search_tolerance) as f32;
+        let mut top = self.score(h, &links, tolerance);
+        for step in [0.5, 0.25] {
+            for j in (0..=upto).rev() {
+                let (_, span, n) = self.sweep(j);
+                let d = step * span / n as f64;
+                let limits = self.prepared.model.limits(j);
+                self.climb(h, &links, tolerance, &mut top, |h, sign| {
+                    h.posture[j] = (h.posture[j] + sign * d).clamp(limits[0], limits[1]);
+                });
+            }
+            let shift = 0.4 * step * self.settings.search_tolerance;
+            for axis in 0..3 {
+                self.climb(h, &links, tolerance, &mut top, |h, sign| {
+                    if axis < 2 {
+                        h.local_from_base.translation.vector[axis] += sign * shift;
+                    } else {
+                        let turn = nalgebra::UnitQuaternion::from_axis_angle(
+                            &nalgebra::Vector3::z_axis(),
+                            sign * step * 0.03,
+                        );
+                        h.local_from_base.rotation = turn * h.local_from_base.rotation;
+                    }
+                });
+            }
+        }
+        h.score = top;
+    }
+
+    fn climb(
+        &self,
+        h: &mut Hypothesis,
+        links: &[usize],
+        tolerance: f32,
+        top: &mut f64,
+        shake: impl Fn(&mut Hypothesis, f64),
+    ) {
+        for sign in [1.0, -1.0] {
+            let mut trial = h.clone();
+            shake(&mut trial, sign);
+            let score = self.score(&trial, links, tolerance);
+            if score > *top {
+                *top = score;
+                *h = trial;
+                return;
+            }
+        }
+    }
+
+    /// Other values of each joint alone that score nearly as well as the posture's or better, as new hypotheses:
+    /// a joint whose link nearly hides in its parent may have been caught at the wrong maximum.
+    pub(crate) fn alternatives(&self, h: &Hypothesis) -> Vec<Hypothesis> {
+        let tolerance = (0.6 * self.settings.search_tolerance) as f32;
+        let all: Vec<usize> =
+            (0..self.prepared.model.links.len()).filter(|&l| self.prepared.links[l].weight > 0.0).collect();
+        let own = self.score(h, &all, tolerance);
+        let mut out = Vec::new();
+        for free in 0..h.posture.len() {
+            if self.prepared.placed_by[free].is_empty() {
+                continue;
+            }
+            let (low, span, n) = self.sweep(free);
+            let mut trial = h.clone();
+            let scores: Vec<f64> = (0..=n)
+                .map(|k| {
+                    trial.posture[free] = low + span * k as f64 / n as f64;
+                    self.score(&trial, &all, tolerance)
+                })
+                .collect();
+            for k in 0..=n {
+                let value = low + span * k as f64 / n as f64;
+                let peak = (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1]);
+                let far = (value - h.posture[free]).abs() > 2.5 * span / n as f64;
+                if peak && far && scores[k] > own - 0.15 * own.abs() {
+                    let mut next = h.clone();
+                    next.posture[free] = value;
+                    next.score = scores[k];
+                    out.push(next);
+                }
+            }
+        }
+        sort(&mut out);
+        out.truncate(self.settings.n_polish);
+        out
+    }
+}
+
+pub(crate) fn sort(beam: &mut [Hypothesis]) {
+    beam.sort_by(|a, b| b.score.total_cmp(&a.score));
+}

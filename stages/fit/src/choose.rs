@@ -1,0 +1,89 @@
+//! Fits of all candidates in; out come those that can stand together: at most one for each body of points.
+
+use contract::{Fit, RunnerUp, Verdict};
+use geometry::{Aabb, Point};
+use robot::Model;
+
+/// Two fits compete where this share of the smaller one's box is shared.
+const OVERLAP: f64 = 0.25;
+/// Bases nearer than this compete whatever their boxes, metres.
+const SAME_BASE: f64 = 0.35;
+/// A model that explains this share of what the best explains, as well, is alike.
+const ALIKE: f64 = 0.97;
+/// A model of another kind that explains this share of the best makes the best doubtful.
+const RIVAL: f64 = 0.90;
+
+/// Chooses among the fits, best explained first; the losers become runners-up of the winners.
+#[must_use]
+pub fn choose(mut fits: Vec<Fit>, models: &[Model]) -> Vec<Fit> {
+    fits.sort_by(|a, b| b.explained.total_cmp(&a.explained).then_with(|| a.model.cmp(&b.model)));
+    let mut chosen: Vec<(Fit, Aabb)> = Vec::new();
+    for fit in fits {
+        let bounds = bounds(&fit, models);
+        let winner = chosen.iter_mut().find(|(w, b)| compete(w, b, &fit, &bounds));
+        match winner {
+            Some((winner, _)) => lose(winner, &fit),
+            None => chosen.push((fit, bounds)),
+        }
+    }
+    let mut out: Vec<Fit> = chosen.into_iter().map(|c| c.0).collect();
+    out.retain(|f| f.verdict != Verdict::Refused);
+    // Named from the south-west on, so that ids do not depend on scores.
+    out.sort_by(|a, b| {
+        let (p, q) = (a.world_from_base.translation.vector, b.world_from_base.translation.vector);
+        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y))
+    });
+    out
+}
+
+/// Box of all links in the world.
+fn bounds(fit: &Fit, models: &[Model]) -> Aabb {
+    let model = &models[fit.model];
+    let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    let mut out = Aabb::EMPTY;
+    for (link, pose) in model.links.iter().zip(model.poses(&posture)) {
+        if link.bounds.is_empty() {
+            continue;
+        }
+        for corner in link.bounds.corners() {
+            out.add((fit.world_from_base * pose * Point::from(corner)).coords.into());
+        }
+    }
+    out
+}
+
+fn compete(a: &Fit, a_box: &Aabb, b: &Fit, b_box: &Aabb) -> bool {
+    let apart = (a.world_from_base.translation.vector - b.world_from_base.translation.vector).norm();
+    if apart < SAME_BASE {
+        return true;
+    }
+    let volume = |x: &Aabb| x.size().iter().product::<f64>();
+    let shared = Aabb {
+        min: [0, 1, 2].map(|i| a_box.min[i].max(b_box.min[i])),
+        max: [0, 1, 2].map(|i| a_box.max[i].min(b_box.max[i])),
+    };
+    let smaller = volume(a_box).min(volume(b_box));
+    smaller > 0.0 && volume(&shared) > OVERLAP * smaller
+}
+
+/// Notes the loser at the winner: as alike, as runner-up, as a reason for doubt.
+fn lose(winner: &mut Fit, loser: &Fit) {
+    let share = loser.explained / winner.explained;
+    let score = share * winner.score;
+    if winner.runner_up.as_ref().is_none_or(|r| r.score < score) {
+        winner.runner_up = Some(RunnerUp {
+            model: loser.model_name.clone(),
+            score,
+            same_model: loser.model == winner.model,
+        });
+    }
+    if loser.model == winner.model || loser.verdict == Verdict::Refused {
+        return;
+    }
+    if share > ALIKE {
+        winner.alike.push(loser.model_name.clone());
+    } else if share > RIVAL && winner.verdict == Verdict::Trusted {
+        winner.verdict = Verdict::Doubtful;
+        winner.reasons.push(format!("model '{}' explains the points nearly as well", loser.model_name));
+    }
+}

@@ -1,0 +1,22 @@
+//! A candidate in, a fit out: which posture, where exactly, how sure.
+//!
+//! The way: beam search over the joints on the depth images (`beam`), joint Gauss–Newton over base and all joints on
+//! the points (`refine`), evidence and covariance (`evidence`, `refine`), verdict in words (`verdict`), and the choice
+//! among candidates that claim the same points (`choose`). Method and maths: fit.md §4d–§4g.
+#![forbid(unsafe_code)]
+
+mod beam;
+mod choose;
+mod judge;
+mod prepared;
+mod refine;
+mod scene;
+mod settings;
+mod solve;
+mod verdict;
+
+pub use choose::choose;
+pub use prepared::Prepared;
+pub use scene::Scene;
+pub use settings::Settings;
+pub use solve::fit;

@@ -1,0 +1,340 @@
+//! A posture near the truth and points in; out come base and all joints at the least robust point-to-plane error,
+//! with their covariance (fit.md §4g).
+//!
+//! Residual of a point q (base frame) at the facet (x, n) of a link: `r = n·(q − x)`. A joint moves the facet with
+//! the twist (v, w), so `∂r/∂θ = −(n·v + w·(q × n))`: exact, since x and n both move. The base moves the point's
+//! image the other way. Sums run in the order of the points: the same bits on any machine with IEEE arithmetic.
+
+use geometry::{Pose, Vector, robust};
+use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
+use robot::JointKind;
+
+use crate::beam::Hypothesis;
+use crate::scene::Measured;
+use crate::{Prepared, Scene, Settings};
+
+/// One round of the schedule.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Round {
+    /// Scale of the robust kernel and gate on the distance, metres.
+    pub(crate) gate: f64,
+    /// Whether each link weighs the same (square root of its points) or by its points.
+    pub(crate) balanced: bool,
+}
+
+/// From a beam solution: gates as in fit.md §4g, ending where the fine field takes over.
+pub(crate) const COARSE_ROUNDS: [Round; 9] = [
+    Round { gate: 0.120, balanced: true },
+    Round { gate: 0.120, balanced: true },
+    Round { gate: 0.090, balanced: true },
+    Round { gate: 0.065, balanced: true },
+    Round { gate: 0.050, balanced: true },
+    Round { gate: 0.040, balanced: true },
+    Round { gate: 0.030, balanced: true },
+    Round { gate: 0.025, balanced: true },
+    Round { gate: 0.020, balanced: true },
+];
+
+/// The last rounds, on all points.
+pub(crate) const FINE_ROUNDS: [Round; 7] = [
+    Round { gate: 0.025, balanced: true },
+    Round { gate: 0.018, balanced: true },
+    Round { gate: 0.014, balanced: false },
+    Round { gate: 0.011, balanced: false },
+    Round { gate: 0.010, balanced: false },
+    Round { gate: 0.010, balanced: false },
+    Round { gate: 0.010, balanced: false },
+];
+
+/// Distance from which the coarse field answers, metres: just inside the fine field's reach.
+const FINE_REACH: f64 = 0.026;
+
+/// Sums of one link's part of the normal equations.
+struct Sums {
+    h: DMatrix<f64>,
+    g: DVector<f64>,
+    n: usize,
+    weight: f64,
+    rr: f64,
+}
+
+/// What a refinement ends with.
+#[derive(Debug, Clone)]
+pub(crate) struct Refined {
+    pub(crate) hypothesis: Hypothesis,
+    /// Covariance of base twist (local axes at the base: translation, rotation) and joints, from clusters of points.
+    pub(crate) covariance: DMatrix<f64>,
+    /// Points within the gate, for each link.
+    pub(crate) n_points: Vec<usize>,
+    /// RMS distance of those points, metres, for each link.
+    pub(crate) link_rms: Vec<f64>,
+    /// Robust standard deviation of all residuals, metres.
+    pub(crate) noise: f64,
+}
+
+/// The refinement of one model in one scene.
+pub(crate) struct Refine<'a> {
+    pub(crate) prepared: &'a Prepared<'a>,
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) settings: &'a Settings,
+    /// Prior of the base: it stands on this plane (local frame pose of a frame with z = normal).
+    pub(crate) prior: Option<Pose>,
+}
+
+/// A point with the facet of the model that is nearest to it, base frame.
+struct Match {
+    link: usize,
+    /// Point, base frame.
+    q: Vector,
+    /// Normal, base frame.
+    n: Vector,
+    r: f64,
+    view: u16,
+}
+
+impl Refine<'_> {
+    /// Runs the rounds on the points with these indices (all where `None`).
+    pub(crate) fn run(&self, start: &Hypothesis, points: &[u32], rounds: &[Round]) -> Hypothesis {
+        let mut h = start.clone();
+        for round in rounds {
+            let sums = self.sums(&h, points, round.gate);
+            let Some(step) = self.step(&h, &sums, round) else { break };
+            self.apply(&mut h, &step);
+        }
+        h
+    }
+
+    /// Matches of the points within the gate, in their order.
+    fn matches(&self, h: &Hypothesis, points: &[u32], gate: f64) -> Vec<Match> {
+        let poses = self.prepared.model.poses(&h.posture);
+        let base_from_local = h.local_from_base.inverse();
+        let links: Vec<(usize, geometry::depth::Rows)> = (0..poses.len())
+            .filter(|&l| self.prepared.links[l].weight > 0.0)
+            .map(|l| (l, geometry::depth::rows(&(poses[l].inverse() * base_from_local))))
+            .collect();
+        let scanners: Vec<_> =
+            (0..self.scene.views.len()).map(|v| self.scene.scanner(v as u16)).collect();
+        points
+            .iter()
+            .filter_map(|&i| {
+                let m = &self.scene.points[i as usize];
+                let (link, p, n, distance) = self.nearest(m, &links, gate)?;
+                if distance > gate {
+                    return None;
+                }
+                let pose = &poses[link];
+                let n = pose.rotation * n;
+                let q = base_from_local * geometry::Point::from(m.p.map(f64::from));
+                let x = pose * geometry::Point::from(p.map(f64::from));
+                // A facet that faces away from the scanner cannot have given this point.
+                if let Some(scanner) = &scanners[usize::from(m.view)] {
+                    let ray = (base_from_local * scanner) - q;
+                    if n.dot(&ray) <= 0.05 * ray.norm() {
+                        return None;
+                    }
+                }
+                Some(Match { link, q: q.coords, n, r: n.dot(&(q - x)), view: m.view })
+            })
+            .collect()
+    }
+
+    /// The nearest facet over all links: link, position and normal in its frame, distance.
+    #[inline]
+    fn nearest(
+        &self,
+        m: &Measured,
+        links: &[(usize, geometry::depth::Rows)],
+        gate: f64,
+    ) -> Option<(usize, [f32; 3], Vector, f64)> {
+        let mut best: Option<(usize, usize, f32)> = None;
+        for (l, link_from_local) in links {
+            let p = geometry::depth::transform(link_from_local, m.p);
+            let link = &self.prepared.links[*l];
+            let found = if gate < FINE_REACH { link.fine.nearest(p) } else { link.coarse.nearest(p) };
+            let Some(at) = found else { continue };
+            let s = self.prepared.model.links[*l].cad.points[at];
+            let d2 = (0..3).map(|i| (s[i] - p[i]) * (s[i] - p[i])).sum::<f32>();
+            if best.is_none_or(|b| d2 < b.2) {
+                best = Some((*l, at, d2));
+            }
+        }
+        let (link, at, d2) = best?;
+        let cad = &self.prepared.model.links[link].cad;
+        let n = Vector::from(cad.normals[at].map(f64::from));
+        Some((link, cad.points[at], n, f64::from(d2).sqrt()))
+    }
+
+    /// Derivative of a match's residual by base twist (translation, rotation about the base's origin; base axes) and
+    /// by each joint.
+    fn row(&self, m: &Match, twists: &[[f64; 6]], out: &mut [f64]) {
+        let qxn = m.q.cross(&m.n);
+        for i in 0..3 {
+            out[i] = -m.n[i];
+            out[3 + i] = -qxn[i];
+        }
+        for (j, t) in twists.iter().enumerate() {
+            let v = m.n.x * t[0] + m.n.y * t[1] + m.n.z * t[2];
+            let w = qxn.x * t[3] + qxn.y * t[4] + qxn.z * t[5];
+            out[6 + j] = -(v + w);
+        }
+    }
+
+    /// Normal equations by link.
+    fn sums(&self, h: &Hypothesis, points: &[u32], gate: f64) -> Vec<Sums> {
+        let kinematics = self.prepared.model.kinematics(&h.posture);
+        let n = 6 + h.posture.len();
+        let mut sums: Vec<Sums> = (0..self.prepared.links.len())
+            .map(|_| Sums { h: DMatrix::zeros(n, n), g: DVector::zeros(n), n: 0, weight: 0.0, rr: 0.0 })
+            .collect();
+        let mut row = vec![0.0; n];
+        for m in self.matches(h, points, gate) {
+            let w = robust::tukey(m.r, gate);
+            self.row(&m, &kinematics.twists[m.link], &mut row);
+            let s = &mut sums[m.link];
+            s.n += 1;
+            s.weight += w;
+            s.rr += w * m.r * m.r;
+            for a in 0..n {
+                if row[a] == 0.0 {
+                    continue;
+                }
+                let wa = w * row[a];
+                s.g[a] += wa * m.r;
+                for b in a..n {
+                    s.h[(b, a)] += wa * row[b];
+                }
+            }
+        }
+        for s in &mut sums {
+            s.h.fill_upper_triangle_with_lower_triangle();
+        }
+        sums
+    }
+
+    /// Solves for the next step; `None` where the points say nothing.
+    fn step(&self, h: &Hypothesis, sums: &[Sums], round: &Round) -> Option<DVector<f64>> {
+        let n = 6 + h.posture.len();
+        let (mut hessian, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let total: f64 = sums.iter().map(|s| s.n as f64).sum();
+        let n_links = sums.iter().filter(|s| s.n > 0).count() as f64;
+        if total < 30.0 {
+            return None;
+        }
+        for s in sums.iter().filter(|s| s.n > 0) {
+            // Balanced: as if each link had the same √count, the sum over links unchanged in size.
+            let factor = if round.balanced { (total / n_links / s.n as f64).sqrt() } else { 1.0 };
+            hessian += &s.h * factor;
+            gradient += &s.g * factor;
+        }
+        let sigma = (round.gate / 3.0).max(self.settings.min_noise);
+        hessian /= sigma * sigma;
+        gradient /= sigma * sigma;
+        self.add_priors(h, &mut hessian, &mut gradient);
+        let delta = hessian.cholesky()?.solve(&-gradient);
+        // A step beyond half a radian or half a metre has left the linear range: shorten it.
+        let longest = delta.amax();
+        Some(if longest > 0.5 { delta * (0.5 / longest) } else { delta })
+    }
+
+    /// Joint limits, installation plane, and a weak pull to stay where the points say nothing.
+    fn add_priors(&self, h: &Hypothesis, hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
+        const STAY: f64 = 1.0 / (0.7 * 0.7); // 40° or 0.7 m, one sigma per step
+        const LIMIT_SIGMA: f64 = 0.0087; // 0.5°: hard stops have play
+        for a in 0..hessian.nrows() {
+            hessian[(a, a)] += STAY;
+        }
+        for (j, q) in h.posture.iter().enumerate() {
+            let [low, high] = self.prepared.model.limits(j);
+            let continuous =
+                self.prepared.model.joints[self.prepared.model.free[j]].kind == JointKind::Continuous;
+            let over = if continuous { 0.0 } else { (q - high).max(0.0) + (q - low).min(0.0) };
+            if over != 0.0 {
+                let w = 1.0 / (LIMIT_SIGMA * LIMIT_SIGMA);
+                hessian[(6 + j, 6 + j)] += w;
+                gradient[6 + j] += w * over;
+            }
+        }
+        if let Some(prior) = &self.prior {
+            // Height over the plane and tilt against it, of the base as it stands, in base axes.
+            let plane_from_base = prior.inverse() * h.local_from_base;
+            let up = plane_from_base.rotation.inverse() * Vector::z();
+            let [ws, wt] = self.settings.plane_sigma.map(|s| 1.0 / (s * s));
+            let height = plane_from_base.translation.z;
+            for a in 0..3 {
+                gradient[a] += ws * height * up[a];
+                for b in 0..3 {
+                    hessian[(a, b)] += ws * up[a] * up[b];
+                }
+            }
+            // Tilt: the plane's normal in base axes is `up`; a small rotation w of the base changes it by −w × up.
+            let tilt = Vector::z().cross(&up);
+            for a in 0..2 {
+                gradient[3 + a] += -wt * tilt[a];
+                hessian[(3 + a, 3 + a)] += wt;
+            }
+        }
+    }
+
+    fn apply(&self, h: &mut Hypothesis, step: &DVector<f64>) {
+        let shift = Vector::new(step[0], step[1], step[2]);
+        let turn = UnitQuaternion::from_scaled_axis(Vector::new(step[3], step[4], step[5]));
+        h.local_from_base *= Pose::from_parts(Translation3::from(shift), turn);
+        for (j, q) in h.posture.iter_mut().enumerate() {
+            *q += step[6 + j];
+        }
+    }
+
+    /// Covariance and residuals at the end: the sandwich over clusters (view, link, normal octant), which stays
+    /// honest when errors of points are alike (fit.md §6.7).
+    pub(crate) fn finish(&self, h: Hypothesis, points: &[u32], gate: f64) -> Refined {
+        let n = 6 + h.posture.len();
+        let kinematics = self.prepared.model.kinematics(&h.posture);
+        let matches = self.matches(&h, points, gate);
+        let mut residuals: Vec<f64> = matches.iter().map(|m| m.r.abs()).collect();
+        let noise = robust::median(&mut residuals).map_or(gate, |m| 1.4826 * m);
+        let sigma = noise.max(self.settings.min_noise);
+        let n_links = self.prepared.links.len();
+        let mut hessian: DMatrix<f64> = DMatrix::zeros(n, n);
+        let n_clusters = self.scene.views.len() * n_links * 8;
+        let mut clusters: Vec<Option<DVector<f64>>> = vec![None; n_clusters];
+        let (mut n_points, mut rr) = (vec![0_usize; n_links], vec![0.0; n_links]);
+        let mut row = vec![0.0; n];
+        for m in &matches {
+            n_points[m.link] += 1;
+            rr[m.link] += m.r * m.r;
+            let w = robust::tukey(m.r, gate) / (sigma * sigma);
+            self.row(m, &kinematics.twists[m.link], &mut row);
+            let octant = (0..3).map(|i| usize::from(m.n[i] > 0.0) << i).sum::<usize>();
+            let at = (usize::from(m.view) * n_links + m.link) * 8 + octant;
+            let g = clusters[at].get_or_insert_with(|| DVector::zeros(n));
+            for a in 0..n {
+                g[a] += w * m.r * row[a];
+                for b in 0..n {
+                    hessian[(a, b)] += w * row[a] * row[b];
+                }
+            }
+        }
+        let mut ignored = DVector::zeros(n);
+        self.add_priors(&h, &mut hessian, &mut ignored);
+        let covariance = sandwich(&hessian, &clusters);
+        let link_rms = (0..n_links).map(|l| (rr[l] / n_points[l].max(1) as f64).sqrt()).collect();
+        Refined { hypothesis: h, covariance, n_points, link_rms, noise }
+    }
+}
+
+/// `H⁻¹ (Σ g gᵀ) H⁻¹ · C/(C−1)` plus `H⁻¹`: clusters that happen to cancel must not promise more than the points can.
+fn sandwich(hessian: &DMatrix<f64>, clusters: &[Option<DVector<f64>>]) -> DMatrix<f64> {
+    let n = hessian.nrows();
+    let inverse = hessian
+        .clone()
+        .cholesky()
+        .map_or_else(|| DMatrix::identity(n, n) * 1e3, |c| c.inverse());
+    let mut meat = DMatrix::zeros(n, n);
+    let mut count = 0.0_f64;
+    for g in clusters.iter().flatten() {
+        meat += g * g.transpose();
+        count += 1.0;
+    }
+    let factor = if count > 1.0 { count / (count - 1.0) } else { 1.0 };
+    &inverse * meat * &inverse * factor + &inverse
+}

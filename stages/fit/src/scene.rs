@@ -1,0 +1,99 @@
+//! The views of a region in; out comes what fits of any model read: the evidence, and thinned points with their scans.
+
+use contract::{InstallationPlane, Region, View};
+use geometry::evidence::Cloud;
+use geometry::{Evidence, Plane, Point, Pose, Vector};
+use nalgebra::{Translation3, UnitQuaternion};
+
+use crate::Settings;
+
+/// A measured point, local frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Measured {
+    pub(crate) p: [f32; 3],
+    /// Index of its view.
+    pub(crate) view: u16,
+}
+
+/// Everything measured in a region, ready for fitting.
+#[derive(Debug)]
+pub struct Scene<'a> {
+    /// The region.
+    pub region: &'a Region,
+    /// Views of it.
+    pub views: &'a [View],
+    /// What beams and points say.
+    pub evidence: Evidence<'a>,
+    /// All points that are not on a floor.
+    pub(crate) points: Vec<Measured>,
+    /// Indices into `points`, one a grid cell and view.
+    pub(crate) thin: Vec<u32>,
+}
+
+/// Resolution and reach of a cloud without beams, metres.
+const CLOUD: (f32, f32) = (0.02, 0.10);
+
+impl<'a> Scene<'a> {
+    /// Gathers the points above the planes (given in the world) and thins them.
+    #[must_use]
+    pub fn new(
+        region: &'a Region,
+        views: &'a [View],
+        floors: &[InstallationPlane],
+        settings: &Settings,
+    ) -> Self {
+        let planes: Vec<Plane> = floors
+            .iter()
+            .filter(|p| p.is_floor)
+            .map(|p| Plane {
+                normal: p.plane.normal,
+                offset: p.plane.offset - p.plane.normal.dot(&region.origin.coords),
+            })
+            .collect();
+        let on_floor = |p: [f32; 3]| {
+            let q = Vector::from(p.map(f64::from));
+            planes.iter().any(|plane| plane.distance(&q).abs() < settings.floor_band)
+        };
+        let mut points = Vec::new();
+        for (view, v) in views.iter().enumerate() {
+            points.extend(
+                v.points
+                    .iter()
+                    .filter(|p| !on_floor(p.xyz))
+                    .map(|p| Measured { p: p.xyz, view: view as u16 }),
+            );
+        }
+        let thin = thin(&points, settings.thin as f32);
+        let images = views.iter().flat_map(|v| &v.images).collect::<Vec<_>>();
+        let cloud = images.is_empty().then(|| {
+            let few = thin.iter().map(|&i| points[i as usize].p).collect();
+            Cloud::new(few, CLOUD.0, CLOUD.1)
+        });
+        Self { region, views, evidence: Evidence { images, cloud }, points, thin }
+    }
+
+    /// World from the region's local frame.
+    #[must_use]
+    pub fn world_from_local(&self) -> Pose {
+        Pose::from_parts(Translation3::from(self.region.origin.coords), UnitQuaternion::identity())
+    }
+
+    /// Where the scanner of a view stands, local frame; `None` where unknown.
+    pub(crate) fn scanner(&self, view: u16) -> Option<Point> {
+        self.views[usize::from(view)].scanner
+    }
+}
+
+/// The first point of each grid cell and view, in the order of the points.
+fn thin(points: &[Measured], edge: f32) -> Vec<u32> {
+    let key = |m: &Measured| {
+        let c = m.p.map(|v| (v / edge).floor() as i32);
+        (m.view, c)
+    };
+    let mut keyed: Vec<_> = points.iter().enumerate().map(|(i, m)| (key(m), i as u32)).collect();
+    keyed.sort_unstable();
+    keyed.dedup_by_key(|k| k.0);
+    let mut out: Vec<u32> = keyed.into_iter().map(|k| k.1).collect();
+    out.sort_unstable();
+    out
+}

@@ -1,0 +1,60 @@
+//! What is tuned in the fit, with unit and reason.
+
+/// Tunables of search, refinement and verdict.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Hypotheses kept at each joint of the beam. fit.md §6.5: 150 lost none of 60.
+    pub beam: usize,
+    /// Samples of a link in the beam: the mean of 100 is known to 0.05, less than hypotheses differ by.
+    pub n_search: usize,
+    /// Samples of a link in the final judgement.
+    pub n_judge: usize,
+    /// Tolerance of the beam, metres: what a parent may be off before its child no longer scores.
+    pub search_tolerance: f64,
+    /// Largest step of a joint sweep, radians.
+    pub max_step: f64,
+    /// Finished hypotheses that are refined.
+    pub n_refine: usize,
+    /// Refined hypotheses that are polished on all points and judged.
+    pub n_polish: usize,
+    /// Edge of the grid that thins points for refinement, metres.
+    pub thin: f64,
+    /// Most points in the last iterations of the refinement.
+    pub max_points: usize,
+    /// Points nearer than this to the installation plane are not the robot's, metres (3σ of 2 mm noise and more).
+    pub floor_band: f64,
+    /// Range noise that is assumed at least, metres, one sigma.
+    pub min_noise: f64,
+    /// Standard deviation of the base about the installation plane, metres and radians: feet are shimmed and floors
+    /// wavy.
+    pub plane_sigma: [f64; 2],
+    /// A joint is determined by the points if its standard deviation is below this, radians (metres × 1/m for
+    /// prismatic joints).
+    pub determined_sigma: f64,
+    /// Lowest score that is reported at all.
+    pub min_score: f64,
+    /// Highest share of seen-through samples over all links that is reported at all.
+    pub max_violation: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            beam: 120,
+            n_search: 100,
+            n_judge: 400,
+            search_tolerance: 0.045,
+            max_step: 0.05,
+            n_refine: 10,
+            n_polish: 3,
+            thin: 0.012,
+            max_points: 60_000,
+            floor_band: 0.008,
+            min_noise: 0.0015,
+            plane_sigma: [0.004, 0.006],
+            determined_sigma: 0.006,
+            min_score: 0.30,
+            max_violation: 0.20,
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! One candidate in, one fit out: search, refine, judge; or nothing, where no posture explains what was measured.
+
+use contract::{Candidate, Fit, JointFit, RunnerUp, Verdict};
+use geometry::Pose;
+use nalgebra::{Rotation3, Translation3, UnitQuaternion};
+
+use crate::beam::{Beam, Hypothesis};
+use crate::judge::{Judgement, evidence, judge};
+use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Refined};
+use crate::{Prepared, Scene, Settings, verdict};
+
+/// Largest distance of a judged point, metres: what is left after a fit should be noise.
+const JUDGE_TOLERANCE: (f64, f64) = (0.012, 0.04);
+/// Gate of the last rounds in multiples of the noise found, and its bounds, metres.
+const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
+
+/// Fits the candidate's model in the scene; `None` where nothing comes near.
+#[must_use]
+pub fn fit(
+    candidate: &Candidate,
+    prepared: &Prepared<'_>,
+    scene: &Scene<'_>,
+    settings: &Settings,
+) -> Option<Fit> {
+    let local_from_world = scene.world_from_local().inverse();
+    let bases: Vec<Pose> = candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
+    let beam = Beam { prepared, scene, settings };
+    let found = beam.run(&bases);
+    let refine =
+        Refine { prepared, scene, settings, prior: Some(prior(candidate, &local_from_world, prepared)) };
+    let refined = rough(&beam, &refine, found, settings);
+    let mut polished: Vec<(Refined, Judgement)> = Vec::new();
+    for h in refined.iter().take(settings.n_polish) {
+        polished.push(polish(&refine, h));
+    }
+    if let Some((best, _)) = polished.first() {
+        for h in beam.alternatives(&best.hypothesis) {
+            let h = refine.run(&h, &scene.thin, &COARSE_ROUNDS[3..]);
+            polished.push(polish(&refine, &h));
+        }
+    }
+    polished.sort_by(|a, b| b.1.explained.total_cmp(&a.1.explained));
+    let (best, judgement) = polished.first()?;
+    if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
+        return None;
+    }
+    let runner_up = polished[1..].iter().find(|(r, _)| differs(&r.hypothesis, &best.hypothesis));
+    Some(report(prepared, scene, settings, best, judgement, runner_up))
+}
+
+/// Coarse rounds for the best of the beam; near twins are dropped.
+fn rough(beam: &Beam<'_>, refine: &Refine<'_>, found: Vec<Hypothesis>, settings: &Settings) -> Vec<Hypothesis> {
+    let mut out: Vec<(Hypothesis, f64)> = Vec::new();
+    let last = found.first().map_or(0, |h| h.posture.len().saturating_sub(1));
+    for h in found.into_iter().take(settings.n_refine) {
+        let h = refine.run(&h, &refine.scene.thin, &COARSE_ROUNDS);
+        if out.iter().any(|(k, _)| beam.alike(k, &h, last, 0.7)) {
+            continue;
+        }
+        let judgement = judge(refine.prepared, refine.scene, settings, &h, 0.03);
+        out.push((h, judgement.explained));
+    }
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out.into_iter().map(|(h, _)| h).collect()
+}
+
+/// Fine rounds on all points, with the gate that the noise asks for; then the judgement.
+fn polish(refine: &Refine<'_>, h: &Hypothesis) -> (Refined, Judgement) {
+    let scene = refine.scene;
+    let stride = (scene.points.len() / refine.settings.max_points).max(1);
+    let all: Vec<u32> = (0..scene.points.len() as u32).step_by(stride).collect();
+    let h = refine.run(h, &all, &FINE_ROUNDS[..3]);
+    let first = refine.finish(h, &all, 0.022);
+    let gate = (LAST_GATE.0 * first.noise).clamp(LAST_GATE.1, LAST_GATE.2);
+    let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| crate::refine::Round { gate, ..*r }).collect();
+    let h = refine.run(&first.hypothesis, &all, &rounds);
+    let done = refine.finish(h, &all, gate);
+    let tolerance = (4.0 * done.noise).clamp(JUDGE_TOLERANCE.0, JUDGE_TOLERANCE.1);
+    let judgement = judge(refine.prepared, scene, refine.settings, &done.hypothesis, tolerance);
+    (done, judgement)
+}
+
+/// Whether two postures are different answers (more than 2° in some joint, or 3 cm at the base).
+fn differs(a: &Hypothesis, b: &Hypothesis) -> bool {
+    let shift = (a.local_from_base.translation.vector - b.local_from_base.translation.vector).norm();
+    shift > 0.03 || a.posture.iter().zip(&b.posture).any(|(x, y)| (x - y).abs() > 0.035)
+}
+
+/// Frame on the installation plane with z along its normal, at the height of the base's origin.
+fn prior(candidate: &Candidate, local_from_world: &Pose, prepared: &Prepared<'_>) -> Pose {
+    // The candidate's bases already stand on the plane: the first one tells the height of the origin above it.
+    let base = candidate.bases.first().map_or_else(Pose::identity, |b| local_from_world * b.0);
+    let n = candidate.plane.plane.normal;
+    let tilt = Rotation3::rotation_between(&geometry::Vector::z(), &n).unwrap_or_else(Rotation3::identity);
+    let _ = prepared;
+    Pose::from_parts(
+        Translation3::from(base.translation.vector),
+        UnitQuaternion::from_rotation_matrix(&tilt),
+    )
+}
+
+fn report(
+    prepared: &Prepared<'_>,
+    scene: &Scene<'_>,
+    settings: &Settings,
+    best: &Refined,
+    judgement: &Judgement,
+    runner_up: Option<&(Refined, Judgement)>,
+) -> Fit {
+    let model = prepared.model;
+    let h = &best.hypothesis;
+    let n = 6 + h.posture.len();
+    let sigma = |i: usize| best.covariance[(i, i)].max(0.0).sqrt();
+    let joints = (0..h.posture.len())
+        .map(|j| {
+            let determined = sigma(6 + j) < settings.determined_sigma;
+            JointFit {
+                name: model.joints[model.free[j]].name.clone(),
+                value: h.posture[j],
+                sigma: sigma(6 + j),
+                determined,
+            }
+        })
+        .collect();
+    let total: usize = best.n_points.iter().sum();
+    let rms = (best
+        .n_points
+        .iter()
+        .zip(&best.link_rms)
+        .map(|(n, r)| *n as f64 * r * r)
+        .sum::<f64>()
+        / total.max(1) as f64)
+        .sqrt();
+    let mut fit = Fit {
+        model: prepared.index,
+        model_name: model.name.clone(),
+        world_from_base: scene.world_from_local() * h.local_from_base,
+        base_sigma: std::array::from_fn(sigma),
+        joints,
+        covariance: (0..n * n).map(|i| best.covariance[(i / n, i % n)]).collect(),
+        score: judgement.score,
+        explained: judgement.explained,
+        rms,
+        links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
+        runner_up: runner_up.map(|(_, j)| RunnerUp {
+            model: model.name.clone(),
+            score: j.explained / judgement.explained * judgement.score,
+            same_model: true,
+        }),
+        alike: Vec::new(),
+        verdict: Verdict::Doubtful,
+        reasons: Vec::new(),
+    };
+    verdict::pass(&mut fit, prepared, scene, judgement);
+    fit
+}

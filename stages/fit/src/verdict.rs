@@ -1,0 +1,83 @@
+//! Evidence of a fit in; verdict and reasons in words out (fit.md §4l).
+
+use contract::{Fit, Verdict};
+
+use crate::judge::Judgement;
+use crate::{Prepared, Scene};
+
+/// Share of seen-through samples on one link up to which a fit may be trusted, and from which it is refused.
+const LINK_VIOLATION: (f64, f64) = (0.06, 0.30);
+/// Share of seen-through samples over all links, likewise.
+const VIOLATION: (f64, f64) = (0.03, 0.15);
+/// Score below which a fit is not trusted, and below which it is refused.
+const SCORE: (f64, f64) = (0.60, 0.35);
+/// Smallest share of the surface that must have been judged.
+const SEEN: f64 = 0.12;
+/// Fewest points on the links that a joint moves.
+const JOINT_POINTS: usize = 60;
+/// A runner-up that scores more than this share of the best makes it doubtful.
+const RIVAL: f64 = 0.93;
+
+/// Sets verdict and reasons from what stands in the fit and the judgement.
+pub(crate) fn pass(fit: &mut Fit, prepared: &Prepared<'_>, scene: &Scene<'_>, judgement: &Judgement) {
+    let mut doubts = Vec::new();
+    let mut refusals = Vec::new();
+    grade(judgement.score < SCORE.1, judgement.score < SCORE.0, &mut refusals, &mut doubts, || {
+        format!("score {:.2}", judgement.score)
+    });
+    let v = judgement.violation;
+    grade(v > VIOLATION.1, v > VIOLATION.0, &mut refusals, &mut doubts, || {
+        format!("beams went through {:.0} % of the judged surface", v * 100.0)
+    });
+    for link in fit.links.iter().filter(|l| l.seen > 0.02) {
+        let v = link.violated;
+        grade(v > LINK_VIOLATION.1, v > LINK_VIOLATION.0, &mut refusals, &mut doubts, || {
+            format!("beams went through {:.0} % of link '{}'", v * 100.0, link.name)
+        });
+    }
+    if !scene.evidence.has_beams() {
+        doubts.push("no scanner position is known, so nothing proves free space".into());
+    }
+    if judgement.seen < SEEN {
+        doubts.push(format!("only {:.0} % of the surface was seen", judgement.seen * 100.0));
+    }
+    for (j, joint) in fit.joints.iter().enumerate() {
+        let n: usize = carried(prepared, j).map(|l| fit.links[l].n_points).sum();
+        if n < JOINT_POINTS {
+            doubts.push(format!("only {n} points on what joint '{}' moves", joint.name));
+        } else if !joint.determined {
+            doubts.push(format!("the points do not determine joint '{}'", joint.name));
+        }
+    }
+    if let Some(rival) = &fit.runner_up {
+        if rival.score > RIVAL * fit.score {
+            doubts.push("another posture explains the points nearly as well".into());
+        }
+    }
+    fit.verdict = match (refusals.is_empty(), doubts.is_empty()) {
+        (false, _) => Verdict::Refused,
+        (true, false) => Verdict::Doubtful,
+        (true, true) => Verdict::Trusted,
+    };
+    fit.reasons = refusals;
+    fit.reasons.extend(doubts);
+}
+
+fn grade(
+    refuse: bool,
+    doubt: bool,
+    refusals: &mut Vec<String>,
+    doubts: &mut Vec<String>,
+    say: impl Fn() -> String,
+) {
+    if refuse {
+        refusals.push(say());
+    } else if doubt {
+        doubts.push(say());
+    }
+}
+
+/// Links placed by a joint or by one after it.
+fn carried<'a>(prepared: &'a Prepared<'_>, joint: usize) -> impl Iterator<Item = usize> + 'a {
+    prepared.placed_by[joint..].iter().flatten().copied()
+}

@@ -1,0 +1,76 @@
+//! Occupancy and ground cells in, what lies above and below a surface out.
+
+use crate::pieces::{GROUND, Node};
+use contract::Occupancy;
+
+/// Share of a surface's cells with occupied space in bands below and above it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Around {
+    /// Anything deeper than [`NEAR`].
+    pub(crate) below: f64,
+    /// Between [`NEAR`] and [`TALL`] below.
+    pub(crate) near_below: f64,
+    /// Between [`NEAR`] and [`TALL`] above.
+    pub(crate) near_above: f64,
+    /// Anything higher than [`NEAR`].
+    pub(crate) above: f64,
+}
+
+/// Where surroundings begin, metres from the surface: beyond noise and waviness.
+const NEAR: f64 = 0.15;
+/// How far a person's space reaches, metres.
+const TALL: f64 = 1.5;
+/// Fewest points of a voxel that count: one stray point is nothing.
+const MIN_POINTS: u32 = 3;
+
+/// Voxels by ground cell: ready to be asked about many surfaces.
+#[derive(Debug)]
+pub(crate) struct Columns {
+    /// Ground cell and height of the voxel's middle, sorted.
+    voxels: Vec<([i32; 2], f32)>,
+}
+
+impl Columns {
+    /// Sorts the voxels by ground cell.
+    pub(crate) fn new(occupancy: &Occupancy) -> Self {
+        let middle = |i: i32| (f64::from(i) + 0.5) * occupancy.edge;
+        let mut voxels: Vec<([i32; 2], f32)> = occupancy
+            .voxels
+            .iter()
+            .filter(|v| v.1 >= MIN_POINTS)
+            .map(|(v, _)| {
+                let cell = [v[0], v[1]].map(|i| (middle(i) / GROUND).floor() as i32);
+                (cell, middle(v[2]) as f32)
+            })
+            .collect();
+        voxels.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        voxels.dedup();
+        Self { voxels }
+    }
+
+    /// What lies around a surface.
+    pub(crate) fn around(&self, nodes: &[Node]) -> Around {
+        let mut n = [0_u32; 4];
+        for node in nodes {
+            let from = self.voxels.partition_point(|v| v.0 < node.cell);
+            let mut seen = [false; 4];
+            for v in self.voxels[from..].iter().take_while(|v| v.0 == node.cell) {
+                let up = f64::from(v.1) - node.z;
+                seen[0] |= up < -NEAR;
+                seen[1] |= up < -NEAR && up > -TALL;
+                seen[2] |= up > NEAR && up < TALL;
+                seen[3] |= up > NEAR;
+            }
+            for k in 0..4 {
+                n[k] += u32::from(seen[k]);
+            }
+        }
+        let share = |k: usize| f64::from(n[k]) / nodes.len().max(1) as f64;
+        Around {
+            below: share(0),
+            near_below: share(1),
+            near_above: share(2),
+            above: share(3),
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! The fold: summaries in, floor and occupancy out.
+
+use crate::Settings;
+use crate::column::Columns;
+use crate::levels::{describe, levels};
+use crate::pieces::pieces;
+use crate::stands::stands;
+use contract::{
+    Floor, Fold, InstallationPlane, Occupancy, PlanePatch, Result, Scan, ScanId, TileSummary,
+};
+use geometry::{Aabb, Vector};
+
+/// Finds floor and installation planes in the summaries of all tiles.
+#[derive(Debug, Clone)]
+pub struct Find {
+    scanners: Vec<(ScanId, Option<Vector>)>,
+    settings: Settings,
+}
+
+/// What is kept while summaries come in.
+#[derive(Debug, Clone, Default)]
+pub struct Sum {
+    n_points: u64,
+    n_veils: u64,
+    patches: Vec<PlanePatch>,
+    /// Each at least twice the size of the next, so that all of them are merged in n·log n.
+    occupancies: Vec<Occupancy>,
+}
+
+/// What the whole leaves behind.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Ground {
+    /// Levels and installation planes.
+    pub floor: Floor,
+    /// Occupied space over all scans, floor and walls included.
+    pub occupancy: Occupancy,
+    /// Number of points.
+    pub n_points: u64,
+    /// Points taken for veils.
+    pub n_veils: u64,
+}
+
+impl Find {
+    /// For summaries of tiles of these scans.
+    #[must_use]
+    pub fn new(scans: &[Scan], settings: &Settings) -> Self {
+        let mut scanners: Vec<_> = scans
+            .iter()
+            .map(|s| {
+                (
+                    s.id,
+                    s.has_beams()
+                        .then_some(s.world_from_scan.translation.vector),
+                )
+            })
+            .collect();
+        scanners.sort_by_key(|s| s.0);
+        Self {
+            scanners,
+            settings: *settings,
+        }
+    }
+}
+
+impl Sum {
+    fn push(&mut self, occupancy: Occupancy) {
+        if occupancy.voxels.is_empty() {
+            return;
+        }
+        self.occupancies.push(occupancy);
+        while let [.., earlier, later] = self.occupancies.as_slice() {
+            if earlier.voxels.len() >= 2 * later.voxels.len() {
+                break;
+            }
+            self.fuse();
+        }
+    }
+
+    /// Merges the last two.
+    fn fuse(&mut self) {
+        if let (Some(later), Some(earlier)) = (self.occupancies.pop(), self.occupancies.last_mut())
+        {
+            earlier.merge(later);
+        }
+    }
+}
+
+impl Fold for Find {
+    type In = TileSummary;
+    type Sum = Sum;
+    type Out = Ground;
+
+    fn empty(&self) -> Sum {
+        Sum::default()
+    }
+
+    fn add(&self, sum: &mut Sum, item: TileSummary) -> Result<()> {
+        sum.n_points += item.n_points;
+        sum.n_veils += item.n_veils;
+        // Walls and slopes are of no use here, and a plant has many.
+        sum.patches.extend(
+            item.patches
+                .into_iter()
+                .filter(|p| faces_up(p, &self.settings)),
+        );
+        sum.push(item.occupancy);
+        Ok(())
+    }
+
+    fn join(&self, earlier: &mut Sum, later: Sum) -> Result<()> {
+        earlier.n_points += later.n_points;
+        earlier.n_veils += later.n_veils;
+        earlier.patches.extend(later.patches);
+        for occupancy in later.occupancies {
+            earlier.push(occupancy);
+        }
+        Ok(())
+    }
+
+    fn finish(&self, mut sum: Sum) -> Result<Ground> {
+        while sum.occupancies.len() > 1 {
+            sum.fuse();
+        }
+        let occupancy = sum.occupancies.pop().unwrap_or_default();
+        let floor = search(&sum.patches, &occupancy, &self.scanners, &self.settings);
+        Ok(Ground {
+            floor,
+            occupancy,
+            n_points: sum.n_points,
+            n_veils: sum.n_veils,
+        })
+    }
+}
+
+/// Nearly horizontal and seen from above. Where the scanner is unknown, normals point up and only what lies
+/// around tells a ceiling.
+fn faces_up(patch: &PlanePatch, settings: &Settings) -> bool {
+    patch.plane.normal.z >= settings.max_patch_tilt.cos()
+}
+
+/// Floor and installation planes from patches (in the order of their tiles) and occupied space.
+#[must_use]
+pub fn find(
+    patches: &[PlanePatch],
+    occupancy: &Occupancy,
+    scans: &[Scan],
+    settings: &Settings,
+) -> Floor {
+    search(
+        patches,
+        occupancy,
+        &Find::new(scans, settings).scanners,
+        settings,
+    )
+}
+
+fn search(
+    patches: &[PlanePatch],
+    occupancy: &Occupancy,
+    scanners: &[(ScanId, Option<Vector>)],
+    settings: &Settings,
+) -> Floor {
+    let wanted = |p: &PlanePatch| faces_up(p, settings);
+    let columns = Columns::new(occupancy);
+    let pieces = pieces(patches, wanted, settings);
+    let found = levels(pieces, patches, &columns, scanners, settings);
+    let levels: Vec<_> = found
+        .iter()
+        .map(|level| describe(level, settings))
+        .collect();
+    let mut planes = stands(patches, wanted, (&found, &levels), scanners, settings);
+    planes.extend(found.iter().map(|level| InstallationPlane {
+        plane: level.plane,
+        bounds: Aabb::of(level.nodes.iter().map(|n| n.place().into())),
+        area: level.area(),
+        is_floor: true,
+    }));
+    let middle = |p: &InstallationPlane| {
+        let at = p.bounds.center();
+        crate::pieces::height(&p.plane, at.x, at.y)
+    };
+    planes.sort_by(|a, b| {
+        middle(a)
+            .total_cmp(&middle(b))
+            .then(b.area.total_cmp(&a.area))
+    });
+    Floor { levels, planes }
+}

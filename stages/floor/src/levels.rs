@@ -1,0 +1,252 @@
+//! Pieces of level surface in, floor levels out: what is large, low and seen from above.
+
+use crate::Settings;
+use crate::column::Columns;
+use crate::pieces::{GROUND, Node, Piece, fit, height};
+use contract::{FloorLevel, PlanePatch, ScanId};
+use geometry::{Plane, Vector};
+
+/// Ceilings, where nobody knows the scanner: at most this share has something above.
+const CEILING_ABOVE: f64 = 0.1;
+/// … and at least this share something below.
+const CEILING_BELOW: f64 = 0.3;
+/// Share of cells with something close above from which nobody can stand there: a slab under another.
+const COVERED: f64 = 0.6;
+/// Half-width of the window around a ghost's beam in which the level above must have been seen, cells.
+const NEAR_CELL: i32 = 1;
+
+/// Pieces at one height.
+#[derive(Debug, Clone)]
+pub(crate) struct Level {
+    /// Cells of all its pieces, sorted by cell.
+    pub(crate) nodes: Vec<Node>,
+    /// Patches it is made of, ascending.
+    pub(crate) patches: Vec<usize>,
+    /// Mean plane, normal up.
+    pub(crate) plane: Plane,
+    /// RMS of heights about it, metres.
+    pub(crate) waviness: f64,
+    /// Area of its largest piece, m².
+    pub(crate) largest: f64,
+}
+
+/// Where scanners stand: `None` where unknown; sorted by scan.
+pub(crate) type Scanners = [(ScanId, Option<Vector>)];
+
+/// Position of a scanner, if known.
+pub(crate) fn scanner(scanners: &Scanners, id: ScanId) -> Option<Vector> {
+    scanners
+        .binary_search_by_key(&id, |s| s.0)
+        .ok()
+        .and_then(|i| scanners[i].1)
+}
+
+impl Level {
+    fn new(piece: Piece) -> Option<Self> {
+        let (plane, waviness) = fit(&piece.nodes)?;
+        let largest = piece.area();
+        Some(Self {
+            nodes: piece.nodes,
+            patches: piece.patches,
+            plane,
+            waviness,
+            largest,
+        })
+    }
+
+    /// Area of its cells, m².
+    pub(crate) fn area(&self) -> f64 {
+        self.nodes.len() as f64 * GROUND * GROUND
+    }
+
+    /// Whether `piece` continues this level; `far` is the distance between them, metres.
+    fn continues(&self, piece: &Piece, settings: &Settings) -> bool {
+        let mut off: Vec<f64> = piece
+            .nodes
+            .iter()
+            .map(|n| {
+                let p = n.place();
+                p.z - height(&self.plane, p.x, p.y)
+            })
+            .collect();
+        let off = geometry::robust::median(&mut off)
+            .unwrap_or(f64::INFINITY)
+            .abs();
+        let tolerance = settings.level_tolerance.max(2.5 * self.waviness);
+        let bend = settings.level_bend * self.distance(piece);
+        off <= (tolerance + bend).min(settings.max_level_tolerance)
+    }
+
+    /// Horizontal gap between the bounds of both, metres.
+    fn distance(&self, piece: &Piece) -> f64 {
+        let bounds = |nodes: &[Node]| geometry::Aabb::of(nodes.iter().map(|n| n.place().into()));
+        let (a, b) = (bounds(&self.nodes), bounds(&piece.nodes));
+        let gap = |i: usize| (a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0);
+        gap(0).hypot(gap(1))
+    }
+
+    fn join(&mut self, piece: Piece) {
+        // Small pieces do not move the plane enough to pay for a fit each.
+        let refit = piece.nodes.len() * 20 >= self.nodes.len();
+        self.nodes.extend(piece.nodes);
+        self.nodes
+            .sort_by(|a, b| a.cell.cmp(&b.cell).then(a.z.total_cmp(&b.z)));
+        self.patches.extend(piece.patches);
+        self.patches.sort_unstable();
+        self.patches.dedup();
+        if let (true, Some((plane, waviness))) = (refit, fit(&self.nodes)) {
+            self.plane = plane;
+            self.waviness = waviness;
+        }
+    }
+
+    /// Share of its points that were seen through `upper`, a level above it.
+    pub(crate) fn ghost_share(
+        &self,
+        upper: &Self,
+        patches: &[PlanePatch],
+        scanners: &Scanners,
+    ) -> f64 {
+        let (mut through, mut all) = (0.0, 0.0);
+        for patch in self.patches.iter().map(|&i| &patches[i]) {
+            let weight = patch.moments.n;
+            all += weight;
+            if let Some(from) = scanner(scanners, patch.scan) {
+                through += weight * seen_through(patch, from, upper);
+            }
+        }
+        if all > 0.0 { through / all } else { 0.0 }
+    }
+
+    fn covers(&self, x: f64, y: f64) -> bool {
+        let cell = [x, y].map(|v| (v / GROUND).floor() as i32);
+        (-NEAR_CELL..=NEAR_CELL).any(|d| {
+            let low = [cell[0].saturating_add(d), cell[1].saturating_sub(NEAR_CELL)];
+            let high = cell[1].saturating_add(NEAR_CELL);
+            let at = self.nodes.partition_point(|n| n.cell < low);
+            self.nodes
+                .get(at)
+                .is_some_and(|n| n.cell[0] == low[0] && n.cell[1] <= high)
+        })
+    }
+}
+
+/// Share of a patch's cells that the scanner at `from` saw through `upper`.
+pub(crate) fn seen_through(patch: &PlanePatch, from: Vector, upper: &Level) -> f64 {
+    let mut n = 0;
+    for &(cell, count, sum) in &patch.ground {
+        let p = Node {
+            cell,
+            z: sum / f64::from(count.max(1)),
+            n: count,
+        }
+        .place();
+        let (above, below) = (upper.plane.distance(&from), upper.plane.distance(&p));
+        if above > 0.0 && below < -0.1 {
+            let t = above / (above - below);
+            let q = from + (p - from) * t;
+            n += usize::from(upper.covers(q.x, q.y));
+        }
+    }
+    n as f64 / patch.ground.len().max(1) as f64
+}
+
+/// Gathers pieces into levels and keeps those that are floor, largest first.
+pub(crate) fn levels(
+    pieces: Vec<Piece>,
+    patches: &[PlanePatch],
+    columns: &Columns,
+    scanners: &Scanners,
+    settings: &Settings,
+) -> Vec<Level> {
+    let mut groups: Vec<Level> = Vec::new();
+    for piece in pieces {
+        match groups
+            .iter_mut()
+            .find(|group| group.continues(&piece, settings))
+        {
+            Some(group) => group.join(piece),
+            // Crumbs may join a level, but found none: what is one cell large is no floor.
+            None if piece.nodes.len() > 1 => groups.extend(Level::new(piece)),
+            None => {}
+        }
+    }
+    groups.retain(|g| {
+        g.area() >= settings.min_area
+            && g.plane.normal.z >= settings.max_tilt.cos()
+            && g.waviness <= settings.max_waviness
+    });
+    groups.sort_by_key(|group| std::cmp::Reverse(group.nodes.len()));
+    let mut out: Vec<Level> = Vec::new();
+    for group in groups {
+        let ghost = out
+            .iter()
+            .any(|upper| group.ghost_share(upper, patches, scanners) > settings.ghost_share);
+        if !ghost && can_stand(&group, patches, columns, scanners, settings) {
+            out.push(group);
+        }
+    }
+    out
+}
+
+/// Whether a level is floor by what lies above and below it.
+fn can_stand(
+    level: &Level,
+    patches: &[PlanePatch],
+    columns: &Columns,
+    scanners: &Scanners,
+    settings: &Settings,
+) -> bool {
+    let around = columns.around(&level.nodes);
+    let known: f64 = weight(level, patches, |p| scanner(scanners, p.scan).is_some());
+    let all: f64 = weight(level, patches, |_| true);
+    if 2.0 * known < all {
+        // Which side was seen is unknown: a ceiling has nothing above, or a slab with the next storey's floor.
+        let ceiling = around.above < CEILING_ABOVE && around.below > CEILING_BELOW;
+        if ceiling || around.near_above > COVERED {
+            return false;
+        }
+    }
+    around.near_below < settings.raised_share || level.largest >= settings.min_raised_area
+}
+
+fn weight(level: &Level, patches: &[PlanePatch], wanted: impl Fn(&PlanePatch) -> bool) -> f64 {
+    level
+        .patches
+        .iter()
+        .map(|&i| &patches[i])
+        .filter(|p| wanted(p))
+        .map(|p| p.moments.n)
+        .sum()
+}
+
+/// The level as others see it: mean plane and height map.
+pub(crate) fn describe(level: &Level, settings: &Settings) -> FloorLevel {
+    let cell = settings.height_cell;
+    let mut offs: Vec<([i32; 2], f64)> = level
+        .nodes
+        .iter()
+        .map(|n| {
+            let p = n.place();
+            let at = [p.x, p.y].map(|v| (v / cell).floor() as i32);
+            (at, p.z - height(&level.plane, p.x, p.y))
+        })
+        .collect();
+    offs.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let heights = offs
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(|same| {
+            // The median of a cell: a plate that was joined to the floor must not lift it.
+            let off = 0.5 * (same[(same.len() - 1) / 2].1 + same[same.len() / 2].1);
+            let [x, y] = same[0].0.map(|i| (f64::from(i) + 0.5) * cell);
+            (same[0].0, height(&level.plane, x, y) + off)
+        })
+        .collect();
+    FloorLevel {
+        plane: level.plane,
+        waviness: level.waviness,
+        area: level.area(),
+        cell,
+        heights,
+    }
+}

@@ -1,0 +1,65 @@
+//! What can be tuned when planes become floor: plain numbers, each with its unit and reason.
+
+/// Settings of the floor stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Largest tilt of a floor level or installation plane, radians: 3° (fit.md §4a).
+    pub max_tilt: f64,
+    /// Largest tilt of a single patch that may be part of one, radians: small patches know their normal badly.
+    pub max_patch_tilt: f64,
+    /// Step in height between neighbouring ground cells that is still one surface, metres: a floor tilted by 3°
+    /// steps 19 mm across the diagonal of a cell.
+    pub max_step: f64,
+    /// Difference of height at which two separate pieces are one level, metres: scans are registered to a centimetre.
+    pub level_tolerance: f64,
+    /// What a level may bend from one piece to the next, metres a metre of distance between them: 0.2°.
+    pub level_bend: f64,
+    /// Largest difference of height of two pieces of one level, whatever their distance, metres.
+    pub max_level_tolerance: f64,
+    /// Least area of a floor level, m²: more than a table or a car roof.
+    pub min_area: f64,
+    /// Least area in one piece of a level with something below it, m²: a mezzanine, not tables in a row.
+    pub min_raised_area: f64,
+    /// Share of a level's cells with something below from which it counts as raised.
+    pub raised_share: f64,
+    /// Largest waviness of a level, RMS, metres.
+    pub max_waviness: f64,
+    /// Edge of a cell of the height map, metres: follows waves of some metres, averages noise.
+    pub height_cell: f64,
+    /// Fewest points of a ground cell that say its height.
+    pub min_cell_points: u32,
+    /// Share of beams through a level above from which a surface is its mirror image.
+    pub ghost_share: f64,
+    /// Least visible area of an installation plane, m²: the ring around a robot's foot.
+    pub min_stand_area: f64,
+    /// Distance from the floor below which a plane is the floor itself, metres.
+    pub floor_band: f64,
+    /// Most installation planes that are kept beside floor levels: the largest.
+    pub max_stands: usize,
+    /// Gap between patches of one installation plane, metres: what a foot or a cable hides.
+    pub stand_gap: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            max_tilt: 3_f64.to_radians(),
+            max_patch_tilt: 5_f64.to_radians(),
+            max_step: 0.025,
+            level_tolerance: 0.025,
+            level_bend: 0.0035,
+            max_level_tolerance: 0.06,
+            min_area: 3.0,
+            min_raised_area: 10.0,
+            raised_share: 0.25,
+            max_waviness: 0.06,
+            height_cell: 1.0,
+            min_cell_points: 4,
+            ghost_share: 0.5,
+            min_stand_area: 0.02,
+            floor_band: 0.012,
+            max_stands: 512,
+            stand_gap: 0.3,
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Horizontal patches in, installation planes out: what is not floor, but large enough for something to stand on.
+
+use crate::Settings;
+use crate::levels::{Level, Scanners, scanner, seen_through};
+use crate::pieces::upward;
+use crate::union::Union;
+use contract::{FloorLevel, InstallationPlane, PlanePatch, ScanId};
+use geometry::{Aabb, Moments, Plane, Vector};
+
+/// Least distance between planes of patches that is never told apart, metres: two scans of one plate.
+const SAME_HEIGHT: f64 = 0.005;
+/// How badly a small patch knows its tilt, radians: 1°.
+const TILT_ERROR: f64 = 0.0175;
+
+/// Joins the patches for which `wanted` holds into planes; the largest ones, by height, then area.
+pub(crate) fn stands(
+    patches: &[PlanePatch],
+    wanted: impl Fn(&PlanePatch) -> bool,
+    floor: (&[Level], &[FloorLevel]),
+    scanners: &Scanners,
+    settings: &Settings,
+) -> Vec<InstallationPlane> {
+    let mut chosen: Vec<&PlanePatch> = patches
+        .iter()
+        .filter(|p| {
+            wanted(p)
+                && !is_floor(p, floor.1, settings)
+                && !is_ghost(p, floor.0, scanners, settings)
+        })
+        .collect();
+    chosen.sort_by(|a, b| a.bounds.min[0].total_cmp(&b.bounds.min[0]));
+    let mut union = Union::new(chosen.len());
+    for (i, a) in chosen.iter().enumerate() {
+        for (j, b) in chosen.iter().enumerate().skip(i + 1) {
+            if b.bounds.min[0] > a.bounds.max[0] + settings.stand_gap {
+                break;
+            }
+            if one_plane(a, b, settings) {
+                union.join(i, j);
+            }
+        }
+    }
+    let mut groups: Vec<(usize, usize)> = (0..chosen.len()).map(|i| (union.find(i), i)).collect();
+    groups.sort_unstable();
+    let mut out: Vec<InstallationPlane> = groups
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter_map(|group| {
+            let members: Vec<&PlanePatch> = group.iter().map(|g| chosen[g.1]).collect();
+            plane_of(&members, settings)
+        })
+        .collect();
+    out.sort_by(|a, b| b.area.total_cmp(&a.area));
+    out.truncate(settings.max_stands);
+    out
+}
+
+/// Whether a patch lies on a floor level.
+fn is_floor(patch: &PlanePatch, levels: &[FloorLevel], settings: &Settings) -> bool {
+    let p = patch.moments.mean();
+    levels.iter().any(|level| {
+        level.height(p.x, p.y).is_some_and(|h| {
+            // A large patch close to the floor is the floor of a scan that is registered a little higher.
+            let band = if patch.area > 1.0 {
+                2.5 * settings.floor_band
+            } else {
+                settings.floor_band
+            };
+            (p.z - h).abs() <= band.max(1.5 * patch.rms)
+        })
+    })
+}
+
+/// Whether a patch was seen through a floor level: a mirror image.
+fn is_ghost(
+    patch: &PlanePatch,
+    levels: &[Level],
+    scanners: &Scanners,
+    settings: &Settings,
+) -> bool {
+    scanner(scanners, patch.scan).is_some_and(|from| {
+        levels
+            .iter()
+            .any(|level| seen_through(patch, from, level) > settings.ghost_share)
+    })
+}
+
+/// Whether two patches are parts of one plane.
+fn one_plane(a: &PlanePatch, b: &PlanePatch, settings: &Settings) -> bool {
+    // Heights differ little, so the gap is asked for in plan only.
+    let gap = |i: usize| (a.bounds.min[i] - b.bounds.max[i]).max(b.bounds.min[i] - a.bounds.max[i]);
+    if gap(0).max(gap(1)) > settings.stand_gap {
+        return false;
+    }
+    let (p, q) = (a.moments.mean(), b.moments.mean());
+    let step = |plane: &Plane, at: Vector| plane.distance(&at).abs();
+    let far = (p - q).norm();
+    let limit = SAME_HEIGHT + 1.5 * (a.rms + b.rms) / 2.0;
+    // The larger patch knows its tilt better: its plane is asked first and must hold.
+    let (large, small) = if a.area >= b.area { (a, q) } else { (b, p) };
+    let reach = large.area.sqrt().max(0.05);
+    step(&large.plane, small) <= limit + TILT_ERROR * (far - reach).max(0.0) * 0.25
+}
+
+/// Joined plane of patches, each weighted by its area; `None` if it is small or tilted.
+fn plane_of(members: &[&PlanePatch], settings: &Settings) -> Option<InstallationPlane> {
+    let mut moments = Moments::new(members.first()?.moments.mean());
+    let mut bounds = Aabb::EMPTY;
+    for patch in members {
+        let mut part = patch.moments;
+        let weight = patch.area / part.n.max(1.0);
+        part.n *= weight;
+        part.sum *= weight;
+        part.outer *= weight;
+        moments.join(&part);
+        bounds = bounds.union(&patch.bounds);
+    }
+    let area = best_scan(members);
+    // `plane()` asks for three points; weights are areas, so scale them up to count as points.
+    let scale = 1e4;
+    moments.n *= scale;
+    moments.sum *= scale;
+    moments.outer *= scale;
+    let plane = match moments.plane() {
+        Some(fit) if fit.spread[1] >= 4.0 * fit.rms => {
+            if fit.plane.normal.z < 0.0 {
+                fit.plane.flipped()
+            } else {
+                fit.plane
+            }
+        }
+        _ => upward(&moments),
+    };
+    let level = plane.normal.z >= settings.max_tilt.cos();
+    (level && area >= settings.min_stand_area).then_some(InstallationPlane {
+        plane,
+        bounds,
+        area,
+        is_floor: false,
+    })
+}
+
+/// Area that the scan sees that sees most of it: scans see the same area again.
+fn best_scan(members: &[&PlanePatch]) -> f64 {
+    let mut areas: Vec<(ScanId, f64)> = members.iter().map(|p| (p.scan, p.area)).collect();
+    areas.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    areas
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(|scan| scan.iter().map(|a| a.1).sum::<f64>())
+        .fold(0.0, f64::max)
+}

@@ -1,0 +1,397 @@
+//! Depth images: the points of one scan inside a region, as its scanner saw them. Points in; out comes, for any
+//! surface sample, whether a beam ended on it, went through it, or never got there.
+//!
+//! A depth image is a pinhole raster towards the region (no trigonometry per look-up), with a pyramid above it.
+//! Each cell keeps the nearest and the farthest hit, so that a silhouette does not average robot and background.
+
+use crate::Pose;
+
+/// What a cell without a hit means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Empty {
+    /// Beams went there and none came back: free space, or dark or shiny matter.
+    NoReturn,
+    /// No beam went there, or nobody knows.
+    Unknown,
+}
+
+/// A pinhole raster with nearest and farthest range per cell, and coarser levels above it.
+#[derive(Debug, Clone)]
+pub struct DepthImage {
+    camera_from_local: Pose,
+    /// Cells of level 0 per unit tangent.
+    focal: f32,
+    levels: Vec<Level>,
+}
+
+#[derive(Debug, Clone)]
+struct Level {
+    width: usize,
+    height: usize,
+    /// `[near, far]` in metres; NaN unknown, +∞ no return. Row-major.
+    cells: Vec<[f32; 2]>,
+    /// Smallest `near` of a cell and its eight neighbours: at a silhouette the beams of one cell may all have missed
+    /// a body that those of its neighbour hit.
+    around: Vec<f32>,
+}
+
+/// `a_from_b` as three rows of four f32, for inner loops.
+pub type Rows = [[f32; 4]; 3];
+
+/// A pose as three rows of four f32.
+#[must_use]
+pub fn rows(pose: &Pose) -> Rows {
+    let m = pose.to_homogeneous();
+    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)] as f32))
+}
+
+/// Applies [`Rows`] to a point.
+#[inline]
+#[must_use]
+pub fn transform(m: &Rows, p: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2] + m[r][3])
+}
+
+/// Applies the rotation of [`Rows`] to a direction.
+#[inline]
+#[must_use]
+pub fn rotate(m: &Rows, p: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2])
+}
+
+/// Weight of a beam that did not come back, against one that hit something behind: black paint and glancing
+/// steel swallow beams too.
+pub const NO_RETURN_WEIGHT: f32 = 0.3;
+/// Cosine below which a surface is too oblique to be expected in the scan.
+pub const MIN_FACING: f32 = 0.15;
+
+impl DepthImage {
+    /// An empty raster of `2·half_tangent·focal` cells a side, looking along +z of the camera frame.
+    #[must_use]
+    pub fn new(camera_from_local: Pose, half_tangent: f64, focal: f64) -> Self {
+        let side = ((2.0 * half_tangent * focal).ceil().clamp(1.0, 8192.0)) as usize;
+        let cells = vec![[f32::NAN; 2]; side * side];
+        let level = Level { width: side, height: side, cells, around: Vec::new() };
+        Self { camera_from_local, focal: focal as f32, levels: vec![level] }
+    }
+
+    /// Where the scanner stands, in the local frame.
+    #[must_use]
+    pub fn scanner(&self) -> crate::Point {
+        self.camera_from_local.inverse() * crate::Point::origin()
+    }
+
+    /// Camera frame from local frame; the camera looks along its +z.
+    #[must_use]
+    pub fn camera_from_local(&self) -> &Pose {
+        &self.camera_from_local
+    }
+
+    /// Cells of level 0 per unit tangent.
+    #[must_use]
+    pub fn focal(&self) -> f32 {
+        self.focal
+    }
+
+    /// Adds a hit given in the camera frame. Outside the raster it is passed over.
+    #[inline]
+    pub fn splat(&mut self, camera: [f32; 3]) {
+        let focal = self.focal;
+        let level = &mut self.levels[0];
+        if let Some((at, range)) = level.find(focal, camera) {
+            let cell = &mut level.cells[at];
+            // `min`/`max` of f32 pass NaN over, which is what an empty cell needs.
+            *cell = [cell[0].min(range), cell[1].max(range)];
+        }
+    }
+
+    /// Says for each cell that is empty with all its neighbours within `window` cells what that means (given the
+    /// direction in the camera frame, z = 1), and builds the coarser levels. Call once, after the last splat.
+    pub fn finish(&mut self, window: i32, mut empty: impl FnMut([f32; 3]) -> Empty) {
+        let focal = self.focal;
+        self.levels.truncate(1);
+        let base = &mut self.levels[0];
+        let (cx, cy) = (0.5 * base.width as f32, 0.5 * base.height as f32);
+        let open = base.open_cells(window);
+        for (at, _) in open.iter().enumerate().filter(|(_, open)| **open) {
+            let (u, v) = ((at % base.width) as f32 + 0.5, (at / base.width) as f32 + 0.5);
+            if empty([(u - cx) / focal, (v - cy) / focal, 1.0]) == Empty::NoReturn {
+                base.cells[at] = [f32::INFINITY; 2];
+            }
+        }
+        while self.levels[self.levels.len() - 1].width > 8 && self.levels.len() < 8 {
+            let next = self.levels[self.levels.len() - 1].halved();
+            self.levels.push(next);
+        }
+        self.levels.iter_mut().for_each(Level::look_around);
+    }
+
+    /// What the beams found at a camera-frame point, in a cell about `footprint` metres wide; `None` outside the
+    /// raster or where nothing is known.
+    #[inline]
+    #[must_use]
+    pub fn look(&self, camera: [f32; 3], footprint: f32) -> Option<Look> {
+        if camera[2] <= 0.0 {
+            return None;
+        }
+        let cells = footprint * self.focal / camera[2];
+        // floor(log2) by the exponent bits; below one cell is level 0.
+        let level = ((cells.max(1.0).to_bits() >> 23) as usize - 127).min(self.levels.len() - 1);
+        let scale = 1.0 / (1u32 << level) as f32;
+        let base = &self.levels[0];
+        let inverse = self.focal / camera[2];
+        let u = camera[0] * inverse + 0.5 * base.width as f32;
+        let v = camera[1] * inverse + 0.5 * base.height as f32;
+        if !(u >= 0.0 && v >= 0.0 && u < base.width as f32 && v < base.height as f32) {
+            return None;
+        }
+        let l = &self.levels[level];
+        let at = (v * scale) as usize * l.width + (u * scale) as usize;
+        let [near, far] = l.cells[at];
+        if near.is_nan() {
+            return None;
+        }
+        let range = (camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]).sqrt();
+        Some(Look { near, far, around: l.around[at], range })
+    }
+}
+
+/// What the beams found in the direction of a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Nearest hit in the cell, metres; infinite where beams went and none came back.
+    pub near: f32,
+    /// Farthest hit in the cell, metres.
+    pub far: f32,
+    /// Nearest hit in the cell and its eight neighbours, metres.
+    pub around: f32,
+    /// Range of the point itself, metres.
+    pub range: f32,
+}
+
+impl Level {
+    #[inline]
+    fn find(&self, focal: f32, p: [f32; 3]) -> Option<(usize, f32)> {
+        if p[2] <= 1e-3 {
+            return None;
+        }
+        let inverse = focal / p[2];
+        let u = p[0] * inverse + 0.5 * self.width as f32;
+        let v = p[1] * inverse + 0.5 * self.height as f32;
+        let inside = u >= 0.0 && v >= 0.0 && u < self.width as f32 && v < self.height as f32;
+        let range = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+        inside.then(|| (v as usize * self.width + u as usize, range))
+    }
+
+    /// Cells that are empty with all their neighbours within `window` cells: a separable running maximum.
+    fn open_cells(&self, window: i32) -> Vec<bool> {
+        let w = usize::try_from(window).unwrap_or(0);
+        let hit: Vec<bool> = self.cells.iter().map(|c| !c[0].is_nan()).collect();
+        let mut near_hit = vec![false; hit.len()];
+        for v in 0..self.height {
+            let row = &hit[v * self.width..(v + 1) * self.width];
+            for u in 0..self.width {
+                near_hit[v * self.width + u] =
+                    row[u.saturating_sub(w)..(u + w + 1).min(self.width)].contains(&true);
+            }
+        }
+        (0..hit.len())
+            .map(|at| {
+                let (u, v) = (at % self.width, at / self.width);
+                !(v.saturating_sub(w)..(v + w + 1).min(self.height)).any(|v| near_hit[v * self.width + u])
+            })
+            .collect()
+    }
+
+    fn halved(&self) -> Self {
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let mut cells = vec![[f32::NAN; 2]; width * height];
+        for v in 0..self.height {
+            for u in 0..self.width {
+                let from = self.cells[v * self.width + u];
+                let to = &mut cells[(v / 2) * width + u / 2];
+                // No return must not hide a hit from `far`; it stays only where the whole cell is empty.
+                to[0] = to[0].min(from[0]);
+                to[1] = match (to[1].is_finite(), from[1].is_finite()) {
+                    (true, false) => to[1],
+                    (false, true) => from[1],
+                    _ => to[1].max(from[1]),
+                };
+            }
+        }
+        Self { width, height, cells, around: Vec::new() }
+    }
+
+    /// Fills `around`.
+    fn look_around(&mut self) {
+        let mut across = vec![f32::NAN; self.cells.len()];
+        for (row, out) in self.cells.chunks(self.width).zip(across.chunks_mut(self.width)) {
+            for u in 0..row.len() {
+                let near = &row[u.saturating_sub(1)..(u + 2).min(row.len())];
+                // `min` passes NaN over: unknown neighbours say nothing.
+                out[u] = near.iter().fold(f32::NAN, |a, c| a.min(c[0]));
+            }
+        }
+        self.around = vec![f32::NAN; across.len()];
+        for v in 0..self.height {
+            for w in v.saturating_sub(1)..(v + 2).min(self.height) {
+                for u in 0..self.width {
+                    let to = &mut self.around[v * self.width + u];
+                    *to = to.min(across[w * self.width + u]);
+                }
+            }
+        }
+    }
+}
+
+/// What the beams say about a set of surface samples at one pose.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Probe {
+    /// Sum over samples of: −β·violation, or match in 0..1, or −γ where hidden.
+    pub score: f32,
+    /// Number of samples.
+    pub n: u32,
+    /// Samples that some beam could judge (on the surface or seen through).
+    pub n_seen: u32,
+    /// Samples with a beam ending on them, within the tolerance.
+    pub n_on: u32,
+    /// Samples that a beam passed through by more than twice the tolerance.
+    pub n_through: u32,
+}
+
+impl Probe {
+    /// Mean score of a sample, in −β..1; 0 for none.
+    #[must_use]
+    pub fn mean(&self) -> f32 {
+        if self.n == 0 { 0.0 } else { self.score / self.n as f32 }
+    }
+
+    /// Adds the counts of `other`.
+    pub fn join(&mut self, other: &Self) {
+        self.score += other.score;
+        self.n += other.n;
+        self.n_seen += other.n_seen;
+        self.n_on += other.n_on;
+        self.n_through += other.n_through;
+    }
+
+    /// Share of judged samples that a beam passed through.
+    #[must_use]
+    pub fn violation(&self) -> f32 {
+        self.n_through as f32 / self.n_seen.max(1) as f32
+    }
+
+    /// Share of samples that could be judged.
+    #[must_use]
+    pub fn seen(&self) -> f32 {
+        self.n_seen as f32 / self.n.max(1) as f32
+    }
+}
+
+/// Price of a sample seen through, against one on the surface (fit.md §4d).
+pub const SEEN_THROUGH_PRICE: f32 = 1.5;
+/// Price of a sample that no scan could judge: small, so that hiding is not rewarded (fit.md §4d).
+pub const HIDDEN_PRICE: f32 = 0.1;
+
+/// Judges surface samples (`points` with outward `normals`, in the frame of a body) with the body at
+/// `local_from_body`: one beam through a sample in any scan outweighs any match in another (fit.md §4d).
+#[must_use]
+pub fn probe(
+    images: &[&DepthImage],
+    points: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    local_from_body: &Pose,
+    tolerance: f32,
+) -> Probe {
+    let body_from_local = local_from_body.inverse();
+    let cameras: Vec<(Rows, [f32; 3])> = images
+        .iter()
+        .map(|image| {
+            let scanner = body_from_local * image.scanner();
+            (
+                rows(&(image.camera_from_local * local_from_body)),
+                [scanner.x as f32, scanner.y as f32, scanner.z as f32],
+            )
+        })
+        .collect();
+    let mut out = Probe { n: points.len() as u32, ..Probe::default() };
+    for (p, n) in points.iter().zip(normals) {
+        let (mut through, mut on) = (0.0_f32, 0.0_f32);
+        for (image, (camera_from_body, scanner)) in images.iter().zip(&cameras) {
+            let ray = [scanner[0] - p[0], scanner[1] - p[1], scanner[2] - p[2]];
+            let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
+            // A beam through a body enters by a front face: back faces tell nothing new.
+            if along <= 0.0 {
+                continue;
+            }
+            let far = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
+            if along * along < MIN_FACING * MIN_FACING * far {
+                continue;
+            }
+            let Some(look) = image.look(transform(camera_from_body, *p), 0.5 * tolerance) else {
+                continue;
+            };
+            let ahead = look.around - look.range;
+            if ahead > tolerance {
+                let v = if ahead == f32::INFINITY {
+                    NO_RETURN_WEIGHT
+                } else {
+                    ((ahead - tolerance) / tolerance).min(1.0)
+                };
+                through = through.max(v);
+            } else {
+                let off = (look.near - look.range).abs().min((look.far - look.range).abs());
+                on = on.max(1.0 - off / tolerance);
+            }
+        }
+        if through > 0.0 {
+            out.score -= SEEN_THROUGH_PRICE * through;
+            out.n_seen += 1;
+            out.n_through += u32::from(through >= 1.0);
+        } else if on > 0.0 {
+            out.score += on;
+            out.n_seen += 1;
+            out.n_on += 1;
+        } else {
+            out.score -= HIDDEN_PRICE;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vector;
+
+    /// A wall at z = 5 in front of the camera, with a 1 m plate at z = 3.
+    fn image() -> DepthImage {
+        let mut image = DepthImage::new(Pose::identity(), 0.5, 200.0);
+        for i in -250..250 {
+            for j in -250..250 {
+                let (x, y) = (i as f32 * 0.002, j as f32 * 0.002);
+                let z = if x.abs() < 0.16 && y.abs() < 0.16 { 3.0 } else { 5.0 };
+                image.splat([x * z, y * z, z]);
+            }
+        }
+        image.finish(2, |_| Empty::Unknown);
+        image
+    }
+
+    #[test]
+    fn three_answers() {
+        let image = image();
+        let (points, normals) = (vec![[0.0, 0.0, 0.0]; 1], vec![[0.0, 0.0, -1.0]; 1]);
+        let at = |z: f64| {
+            let pose = Pose::from_parts(Vector::new(0.0, 0.0, z).into(), Default::default());
+            probe(&[&image], &points, &normals, &pose, 0.04)
+        };
+        let on = at(3.0);
+        assert_eq!((on.n_on, on.n_through), (1, 0));
+        assert!(on.score > 0.95);
+        let through = at(2.5);
+        assert_eq!((through.n_on, through.n_through), (0, 1));
+        let hidden = at(3.5);
+        assert_eq!((hidden.n_seen, hidden.n_on), (0, 0));
+    }
+}

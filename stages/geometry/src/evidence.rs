@@ -1,0 +1,81 @@
+//! Evidence for a body at a pose: the depth images of scans with beams, and the bare points of scans without.
+//! Surface samples in; a [`Probe`] out. The one place where "is it there?" is answered.
+
+use crate::depth::{Probe, probe};
+use crate::{DepthImage, NearestField, Pose};
+
+/// Everything that was measured in a region.
+#[derive(Debug, Clone, Default)]
+pub struct Evidence<'a> {
+    /// Images of the scans whose scanner is known.
+    pub images: Vec<&'a DepthImage>,
+    /// Points of the scans whose scanner is not known.
+    pub cloud: Option<Cloud>,
+}
+
+/// Points without beams: they can say "something is here", never "nothing is here".
+#[derive(Debug, Clone)]
+pub struct Cloud {
+    points: Vec<[f32; 3]>,
+    field: NearestField,
+}
+
+impl Cloud {
+    /// A cloud that knows its surroundings up to `reach` metres, to about `edge` metres.
+    #[must_use]
+    pub fn new(points: Vec<[f32; 3]>, edge: f32, reach: f32) -> Self {
+        let field = NearestField::new(&points, edge, reach);
+        Self { points, field }
+    }
+}
+
+/// Price of a surface sample without a point near it, where no beam can say whether it is hidden: half of the outer
+/// surface of a body is usually seen from somewhere, so absence must cost something.
+const ABSENT_PRICE: f32 = 0.4;
+
+impl Evidence<'_> {
+    /// Judges surface samples (`points` with outward `normals`, frame of the body) with the body at
+    /// `local_from_body`, to within `tolerance` metres.
+    #[must_use]
+    pub fn probe(
+        &self,
+        points: &[[f32; 3]],
+        normals: &[[f32; 3]],
+        local_from_body: &Pose,
+        tolerance: f32,
+    ) -> Probe {
+        match &self.cloud {
+            Some(cloud) if self.images.is_empty() => cloud.probe(points, local_from_body, tolerance),
+            _ => probe(&self.images, points, normals, local_from_body, tolerance),
+        }
+    }
+
+    /// Whether anything here can prove that space is free.
+    #[must_use]
+    pub fn has_beams(&self) -> bool {
+        !self.images.is_empty()
+    }
+}
+
+impl Cloud {
+    fn probe(&self, points: &[[f32; 3]], local_from_body: &Pose, tolerance: f32) -> Probe {
+        let m = crate::depth::rows(local_from_body);
+        let mut out = Probe { n: points.len() as u32, ..Probe::default() };
+        for p in points {
+            let q = crate::depth::transform(&m, *p);
+            let near = self.field.nearest(q).map(|i| {
+                let a = self.points[i];
+                (0..3).map(|k| (a[k] - q[k]) * (a[k] - q[k])).sum::<f32>().sqrt()
+            });
+            match near {
+                Some(d) if d < tolerance => {
+                    out.score += 1.0 - d / tolerance;
+                    out.n_seen += 1;
+                    out.n_on += 1;
+                }
+                _ => out.score -= ABSENT_PRICE,
+            }
+        }
+        out
+    }
+}

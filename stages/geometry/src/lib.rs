@@ -1,0 +1,26 @@
+//! Mathematics on slices: poses, planes, directions, depth images, robust kernels.
+//!
+//! Numbers in, numbers out. Knows no files, no threads, no scans; doubt is an `Option`, never an error.
+#![forbid(unsafe_code)]
+
+pub mod aabb;
+pub mod depth;
+pub mod direction;
+pub mod evidence;
+pub mod field;
+pub mod narrow;
+pub mod plane;
+pub mod robust;
+
+pub use aabb::Aabb;
+pub use depth::{DepthImage, Probe};
+pub use evidence::Evidence;
+pub use field::NearestField;
+pub use plane::{Moments, Plane};
+
+/// A rigid motion `a_from_b`: takes coordinates in frame `b` to frame `a`, metres.
+pub type Pose = nalgebra::Isometry3<f64>;
+/// A position, metres.
+pub type Point = nalgebra::Point3<f64>;
+/// A displacement or direction, metres or unit length.
+pub type Vector = nalgebra::Vector3<f64>;

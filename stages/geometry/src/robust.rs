@@ -1,0 +1,36 @@
+//! Robust kernels: residual and scale in, weight out.
+
+/// Tukey's biweight: `(1 − (r/c)²)²` inside `c`, zero outside. Redescending: an outlier has no pull at all.
+#[inline]
+#[must_use]
+pub fn tukey(residual: f64, scale: f64) -> f64 {
+    let u = residual / scale;
+    let v = 1.0 - u * u;
+    if v <= 0.0 { 0.0 } else { v * v }
+}
+
+/// Huber's weight: 1 inside `scale`, `scale/|r|` outside.
+#[inline]
+#[must_use]
+pub fn huber(residual: f64, scale: f64) -> f64 {
+    let r = residual.abs();
+    if r <= scale { 1.0 } else { scale / r }
+}
+
+/// Geman–McClure weight `c²/(c + r²)²` with `c = scale²`, as KISS-ICP uses it; 1 at zero.
+#[inline]
+#[must_use]
+pub fn geman_mcclure(residual: f64, scale: f64) -> f64 {
+    let c = scale * scale;
+    let d = c + residual * residual;
+    c * c / (d * d)
+}
+
+/// Median by selection, reordering `values`; `None` for none. NaN sorts last.
+pub fn median(values: &mut [f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let at = values.len() / 2;
+    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
+}

@@ -1,0 +1,381 @@
+//! One model and one region in; out come the base poses that the beams allow, grouped by place, best first.
+//!
+//! Pose space is (x, y, yaw) on each plane that lies under something; coarse to fine, each level keeping the best.
+//! From the second level on the first moving link is swept over its joint and counts too, because many a box looks
+//! like a foot, but few look like a foot with a carousel on it.
+
+use contract::{Candidate, InstallationPlane, Region, View};
+use geometry::{Evidence, Plane, Point, Pose, Vector};
+use nalgebra::{Rotation3, Translation3, Unit, UnitQuaternion};
+use robot::Model;
+
+/// What is tuned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Samples of the base link at the coarse level.
+    pub n_coarse: usize,
+    /// Samples of a link at finer levels.
+    pub n_fine: usize,
+    /// Base poses that survive the coarse level.
+    pub keep_coarse: usize,
+    /// Base poses that survive the middle level.
+    pub keep_middle: usize,
+    /// Places (bases farther apart than `place_radius`) that go on to the fit.
+    pub max_places: usize,
+    /// Base poses that go on to the fit for each place.
+    pub bases_per_place: usize,
+    /// Bases nearer than this are at the same place, metres.
+    pub place_radius: f64,
+    /// Lowest mean sample score of base and first link that is worth a fit.
+    pub min_score: f64,
+    /// Largest tilt of an installation plane against the vertical, radians.
+    pub max_tilt: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            n_coarse: 80,
+            n_fine: 160,
+            keep_coarse: 160,
+            keep_middle: 60,
+            max_places: 5,
+            bases_per_place: 12,
+            place_radius: 0.30,
+            min_score: 0.05,
+            max_tilt: 0.15,
+        }
+    }
+}
+
+/// The search for one model's base in one region.
+#[derive(Debug)]
+pub struct BaseSearch<'a> {
+    model: &'a Model,
+    index: usize,
+    region: &'a Region,
+    views: &'a [View],
+    evidence: &'a Evidence<'a>,
+    settings: &'a Settings,
+    /// Farthest sample of the base from its upright axis, metres.
+    radius: f64,
+    /// Height of the base's lowest sample in the root's frame, metres.
+    foot: f64,
+    /// The link that stands on the plane, and its pose in the root's frame.
+    base: usize,
+    root_from_base: Pose,
+    /// The first joint that moves something with a surface, and the link that it moves.
+    first: Option<(usize, usize)>,
+}
+
+/// A base pose under test.
+#[derive(Debug, Clone, Copy)]
+struct Trial {
+    x: f64,
+    y: f64,
+    yaw: f64,
+    plane: usize,
+    score: f64,
+}
+
+impl<'a> BaseSearch<'a> {
+    /// Prepares the search; `None` for a model without a base surface, or one that is only a tool.
+    #[must_use]
+    pub fn new(
+        (index, model): (usize, &'a Model),
+        region: &'a Region,
+        views: &'a [View],
+        evidence: &'a Evidence<'a>,
+        settings: &'a Settings,
+    ) -> Option<Self> {
+        let base = base_link(model)?;
+        if model.is_tool() {
+            return None;
+        }
+        let root_from_base = model.poses(&model.home())[base];
+        let rooted = model.links[base].cad.points.iter().map(|p| root_from_base * Point::from(p.map(f64::from)));
+        let (mut radius, mut foot) = (0.0_f64, f64::INFINITY);
+        for p in rooted {
+            radius = radius.max(p.x.hypot(p.y));
+            foot = foot.min(p.z);
+        }
+        let first = first_moving(model);
+        Some(Self { model, index, region, views, evidence, settings, radius, foot, base, root_from_base, first })
+    }
+
+    /// The candidates: one for each place, best first.
+    #[must_use]
+    pub fn run(&self, planes: &[InstallationPlane]) -> Vec<Candidate> {
+        let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
+        let mut trials = Vec::new();
+        for (at, plane) in planes.iter().enumerate() {
+            if plane.plane.normal.z >= self.settings.max_tilt.cos() {
+                self.coarse(at, plane, &local[at], &mut trials);
+            }
+        }
+        let step = self.coarse_step();
+        let yaw_step = coarse_yaw();
+        best(&mut trials, self.settings.keep_coarse, step * 0.9, yaw_step * 0.9);
+        let trials = self.finer(&local, &trials, step / 2.0, yaw_step / 2.0, self.settings.keep_middle);
+        let trials = self.finer(
+            &local,
+            &trials,
+            step / 4.0,
+            yaw_step / 5.0,
+            self.settings.max_places * self.settings.bases_per_place * 2,
+        );
+        self.group(planes, &local, &trials)
+    }
+
+    fn to_local(&self, plane: &Plane) -> Plane {
+        Plane {
+            normal: plane.normal,
+            offset: plane.offset - plane.normal.dot(&self.region.origin.coords),
+        }
+    }
+
+    /// Spacing of the coarse grid: small enough that the true place lies within the tolerance.
+    fn coarse_step(&self) -> f64 {
+        (self.radius * 0.35).clamp(0.04, 0.10)
+    }
+
+    /// Every place on the plane that has points about it, every yaw.
+    fn coarse(&self, at: usize, plane: &InstallationPlane, local: &Plane, out: &mut Vec<Trial>) {
+        let step = self.coarse_step();
+        let tolerance = (step * 1.3) as f32;
+        let cells = self.occupied(plane, local, step);
+        let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
+        let cad = prefix(self.model, self.base, self.settings.n_coarse);
+        for (x, y) in cells {
+            for k in 0..n {
+                let yaw = k as f64 * coarse_yaw();
+                let pose = self.pose(local, x, y, yaw) * self.root_from_base;
+                let score = f64::from(self.evidence.probe(cad.0, cad.1, &pose, tolerance).mean());
+                if score > 0.0 {
+                    out.push(Trial { x, y, yaw, plane: at, score });
+                }
+            }
+        }
+    }
+
+    /// Places on the plane with points above it within the base's radius, in rows.
+    fn occupied(&self, plane: &InstallationPlane, local: &Plane, step: f64) -> Vec<(f64, f64)> {
+        let reach = self.region.bounds;
+        let grow = self.radius.max(0.1);
+        let shift = |v: f64, i: usize| v - self.region.origin[i];
+        let low: [f64; 2] =
+            std::array::from_fn(|i| reach.min[i].max(shift(plane.bounds.min[i], i) - grow));
+        let high: [f64; 2] =
+            std::array::from_fn(|i| reach.max[i].min(shift(plane.bounds.max[i], i) + grow));
+        if low[0] >= high[0] || low[1] >= high[1] {
+            return Vec::new();
+        }
+        let n: [usize; 2] = std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
+        let mut count = vec![0_u32; n[0] * n[1]];
+        for p in self.views.iter().flat_map(|v| &v.points) {
+            let q = Vector::from(p.xyz.map(f64::from));
+            let height = local.distance(&q);
+            if !(0.03..1.2).contains(&height) {
+                continue;
+            }
+            let i = ((q.x - low[0]) / step).round();
+            let j = ((q.y - low[1]) / step).round();
+            if i >= 0.0 && j >= 0.0 && (i as usize) < n[0] && (j as usize) < n[1] {
+                count[j as usize * n[0] + i as usize] += 1;
+            }
+        }
+        // A base's middle is empty: what counts is points within half its radius on most sides.
+        let r = ((self.radius * 0.8) / step).ceil() as isize;
+        let mut out = Vec::new();
+        for j in 0..n[1] as isize {
+            for i in 0..n[0] as isize {
+                let filled = |di: isize, dj: isize| {
+                    let (a, b) = (i + di, j + dj);
+                    a >= 0
+                        && b >= 0
+                        && (a as usize) < n[0]
+                        && (b as usize) < n[1]
+                        && count[b as usize * n[0] + a as usize] > 2
+                };
+                let near = (-r..=r)
+                    .flat_map(|dj| (-r..=r).map(move |di| (di, dj)))
+                    .filter(|(di, dj)| di * di + dj * dj <= r * r && filled(*di, *dj))
+                    .count();
+                if near >= 3 {
+                    out.push((low[0] + i as f64 * step, low[1] + j as f64 * step));
+                }
+            }
+        }
+        out
+    }
+
+    /// Tries the neighbours of each trial on a grid of half the spacing, with base and first link.
+    fn finer(
+        &self,
+        planes: &[Plane],
+        trials: &[Trial],
+        step: f64,
+        yaw_step: f64,
+        keep: usize,
+    ) -> Vec<Trial> {
+        let tolerance = (step * 1.5).clamp(0.025, 0.08) as f32;
+        let mut out = Vec::with_capacity(trials.len() * 27);
+        for trial in trials {
+            for n in 0..27_i32 {
+                let (i, j, k) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+                let mut next = *trial;
+                next.x += f64::from(i) * step;
+                next.y += f64::from(j) * step;
+                next.yaw += f64::from(k) * yaw_step;
+                next.score = self.score_base(&planes[next.plane], &next, tolerance);
+                out.push(next);
+            }
+        }
+        best(&mut out, keep * 2, step * 0.6, yaw_step * 0.6);
+        for trial in &mut out {
+            trial.score = self.score_with_first(&planes[trial.plane], trial, tolerance);
+        }
+        best(&mut out, keep, step * 0.6, yaw_step * 0.6);
+        out
+    }
+
+    fn score_base(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> f64 {
+        let cad = prefix(self.model, self.base, self.settings.n_fine);
+        let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
+        f64::from(self.evidence.probe(cad.0, cad.1, &pose, tolerance).mean())
+    }
+
+    /// Area-weighted mean score of the base and of the first moving link at its best joint value.
+    fn score_with_first(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> f64 {
+        let own = self.score_base(plane, trial, tolerance);
+        let Some((free, link)) = self.first else { return own };
+        let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
+        let cad = prefix(self.model, link, self.settings.n_coarse);
+        let limits = self.model.limits(free);
+        let span = (limits[1] - limits[0]).min(std::f64::consts::TAU);
+        let n = (span / 0.14).ceil().max(1.0);
+        let mut posture = self.model.home();
+        let mut top = f64::NEG_INFINITY;
+        for k in 0..=n as usize {
+            posture[free] = limits[0] + span * k as f64 / n;
+            let pose = local_from_base * self.model.poses(&posture)[link];
+            let probe = self.evidence.probe(cad.0, cad.1, &pose, tolerance * 1.5);
+            top = top.max(f64::from(probe.mean()));
+        }
+        let weight = |l: usize| f64::from(self.model.links[l].cad.area).sqrt();
+        (weight(self.base) * own + weight(link) * top) / (weight(self.base) + weight(link))
+    }
+
+    /// The base standing on the plane at a place, turned by `yaw` about the plane's normal.
+    fn pose(&self, plane: &Plane, x: f64, y: f64, yaw: f64) -> Pose {
+        let n = plane.normal;
+        let z = (plane.offset - n.x * x - n.y * y) / n.z;
+        let tilt = Rotation3::rotation_between(&Vector::z(), &n).unwrap_or_else(Rotation3::identity);
+        let turn = Rotation3::from_axis_angle(&Unit::new_normalize(n), yaw);
+        let rotation = UnitQuaternion::from_rotation_matrix(&(turn * tilt));
+        let foot = Point::new(x, y, z).coords - n * self.foot;
+        Pose::from_parts(Translation3::from(foot), rotation)
+    }
+
+    fn group(&self, planes: &[InstallationPlane], local: &[Plane], trials: &[Trial]) -> Vec<Candidate> {
+        let mut places: Vec<Vec<&Trial>> = Vec::new();
+        for trial in trials.iter().filter(|t| t.score >= self.settings.min_score) {
+            let radius = self.settings.place_radius;
+            let same = places.iter().position(|p| {
+                let head = p[0];
+                let high = (local[head.plane].offset - local[trial.plane].offset).abs();
+                (head.x - trial.x).hypot(head.y - trial.y) < radius && high < radius
+            });
+            match same {
+                Some(at) if places[at].len() < self.settings.bases_per_place => {
+                    places[at].push(trial);
+                }
+                Some(_) => {}
+                None if places.len() < self.settings.max_places => places.push(vec![trial]),
+                None => {}
+            }
+        }
+        let world_from_local =
+            Pose::from_parts(Translation3::from(self.region.origin.coords), UnitQuaternion::identity());
+        let world = {
+            let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] + self.region.origin[i]);
+            geometry::Aabb { min: shift(self.region.bounds.min), max: shift(self.region.bounds.max) }
+        };
+        places
+            .iter()
+            .map(|place| Candidate {
+                model: self.index,
+                bounds: world,
+                plane: planes[place[0].plane].clone(),
+                bases: place
+                    .iter()
+                    .map(|t| {
+                        let pose = self.pose(&local[t.plane], t.x, t.y, t.yaw);
+                        (world_from_local * pose, t.score)
+                    })
+                    .collect(),
+                group: 0,
+            })
+            .collect()
+    }
+}
+
+fn coarse_yaw() -> f64 {
+    std::f64::consts::TAU / 24.0
+}
+
+/// The first link in tree order that has a surface and hangs rigidly on the root.
+fn base_link(model: &Model) -> Option<usize> {
+    (0..model.links.len()).find(|&l| {
+        let mut at = l;
+        let mut fixed = true;
+        while let Some(j) = model.links[at].parent_joint {
+            fixed &= model.joints[j].kind == robot::JointKind::Fixed;
+            at = model.joints[j].parent;
+        }
+        fixed && !model.links[l].cad.points.is_empty()
+    })
+}
+
+/// The first free joint and the first link with a surface that it carries directly.
+fn first_moving(model: &Model) -> Option<(usize, usize)> {
+    let joint = *model.free.first()?;
+    let child = model.joints[joint].child;
+    (!model.links[child].cad.points.is_empty()).then_some((0, child))
+}
+
+/// The first `n` samples of a link.
+fn prefix(model: &Model, link: usize, n: usize) -> (&[[f32; 3]], &[[f32; 3]]) {
+    let cad = &model.links[link].cad;
+    let n = n.min(cad.points.len());
+    (&cad.points[..n], &cad.normals[..n])
+}
+
+/// Sorts best first and keeps up to `keep` that differ from every better one by a step in place or yaw.
+fn best(trials: &mut Vec<Trial>, keep: usize, step: f64, yaw_step: f64) {
+    trials.sort_by(|a, b| {
+        b.score
+            .total_cmp(&a.score)
+            .then(a.plane.cmp(&b.plane))
+            .then(a.x.total_cmp(&b.x))
+            .then(a.y.total_cmp(&b.y))
+            .then(a.yaw.total_cmp(&b.yaw))
+    });
+    let mut kept: Vec<Trial> = Vec::new();
+    for trial in trials.iter() {
+        if kept.len() == keep {
+            break;
+        }
+        let twin = kept.iter().any(|k| {
+            let turn = (k.yaw - trial.yaw).rem_euclid(std::f64::consts::TAU);
+            k.plane == trial.plane
+                && (k.x - trial.x).abs() < step
+                && (k.y - trial.y).abs() < step
+                && turn.min(std::f64::consts::TAU - turn) < yaw_step
+        });
+        if !twin {
+            kept.push(*trial);
+        }
+    }
+    *trials = kept;
+}

@@ -1,0 +1,10 @@
+//! Clusters, planes and a library of models in; candidates out: where each model's foot may stand, and how turned.
+//!
+//! The search needs no clean cluster: it asks the beams, on the planes that something may stand on (fit.md §4a, c′).
+#![forbid(unsafe_code)]
+
+mod base;
+mod sites;
+
+pub use base::{BaseSearch, Settings};
+pub use sites::{RegionSettings, regions};

@@ -1,0 +1,106 @@
+//! Clusters in; out come the regions of the world that are worth a search: groups of clusters that may be parts of
+//! one thing, not too small to be a robot.
+
+use contract::{Cluster, Region};
+use geometry::{Aabb, Point};
+
+/// What is tuned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionSettings {
+    /// Clusters whose boxes come this near (metres) are one region: a thin arm may be cut from its body by shadow.
+    pub join_gap: f64,
+    /// How far a region reaches beyond its clusters, metres.
+    pub margin: f64,
+    /// Smallest height of a region, metres: no robot folds lower.
+    pub min_height: f64,
+    /// Smallest larger edge of a region, metres.
+    pub min_extent: f64,
+    /// Fewest points of a region.
+    pub min_points: u64,
+    /// A cluster smaller than this (metres, larger edge) joins a region but does not found one.
+    pub min_seed: f64,
+    /// Largest edge of a region on the ground, metres; larger ones are cut into overlapping squares.
+    pub max_extent: f64,
+    /// How far such squares overlap, metres: the reach of a large robot.
+    pub overlap: f64,
+}
+
+impl Default for RegionSettings {
+    fn default() -> Self {
+        Self {
+            join_gap: 0.15,
+            margin: 0.4,
+            min_height: 0.25,
+            min_extent: 0.3,
+            min_points: 300,
+            min_seed: 0.2,
+            max_extent: 12.0,
+            overlap: 3.0,
+        }
+    }
+}
+
+/// The regions worth a search, by size of what founds them, largest first.
+#[must_use]
+pub fn regions(clusters: &[Cluster], settings: &RegionSettings) -> Vec<Region> {
+    let mut groups: Vec<(Aabb, u64)> = Vec::new();
+    for cluster in clusters {
+        let size = cluster.bounds.size();
+        if size.iter().fold(0.0_f64, |a, b| a.max(*b)) < settings.min_seed {
+            continue;
+        }
+        let (mut bounds, mut n_points) = (cluster.bounds, cluster.n_points);
+        // Growing may bring the group near another one: repeat until nothing joins.
+        while let Some(at) =
+            groups.iter().position(|(b, _)| b.grown(settings.join_gap).touches(&bounds))
+        {
+            let (b, n) = groups.remove(at);
+            bounds = bounds.union(&b);
+            n_points += n;
+        }
+        groups.push((bounds, n_points));
+    }
+    groups.retain(|(b, n)| {
+        let size = b.size();
+        *n >= settings.min_points
+            && size[2] >= settings.min_height
+            && size.iter().fold(0.0_f64, |a, v| a.max(*v)) >= settings.min_extent
+    });
+    groups.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.min[0].total_cmp(&b.0.min[0])));
+    groups.iter().flat_map(|(b, _)| cut(b, settings)).map(|b| local(&b, settings.margin)).collect()
+}
+
+/// Squares of at most `max_extent` that overlap and cover the box.
+fn cut(bounds: &Aabb, settings: &RegionSettings) -> Vec<Aabb> {
+    let spans = |i: usize| -> Vec<(f64, f64)> {
+        let (low, high) = (bounds.min[i], bounds.max[i]);
+        if high - low <= settings.max_extent {
+            return vec![(low, high)];
+        }
+        let step = settings.max_extent - settings.overlap;
+        let n = ((high - low - settings.overlap) / step).ceil().max(1.0);
+        (0..n as usize)
+            .map(|k| low + k as f64 * step)
+            .map(|a| (a, (a + settings.max_extent).min(high)))
+            .collect()
+    };
+    let mut out = Vec::new();
+    for (x0, x1) in spans(0) {
+        for (y0, y1) in spans(1) {
+            out.push(Aabb {
+                min: [x0, y0, bounds.min[2]],
+                max: [x1, y1, bounds.max[2]],
+            });
+        }
+    }
+    out
+}
+
+fn local(bounds: &Aabb, margin: f64) -> Region {
+    let grown = bounds.grown(margin);
+    let c = grown.center();
+    // Whole centimetres keep the origin short to write and exact to add.
+    let origin = Point::from([0, 1, 2].map(|i| (c[i] * 100.0).round() / 100.0));
+    let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
+    Region { origin, bounds: Aabb { min: shift(grown.min), max: shift(grown.max) } }
+}

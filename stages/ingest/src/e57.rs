@@ -1,0 +1,205 @@
+//! E57 (ASTM E2807) files in; scans and their points out. The description is parsed by the crate `e57`, points are
+//! decoded here.
+
+mod packets;
+mod pages;
+mod points;
+mod scan;
+mod stream;
+mod strips;
+
+use crate::Settings;
+use crate::reader::{MaskSeed, RawStrips, Reader, Sampled, ScanSeed, Want};
+use ::e57::E57Reader;
+use contract::{Error, Format, Kind, Result};
+use pages::{PAGE, Pages};
+use scan::E57Scan;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// Bytes of the file's header.
+const HEADER: usize = 48;
+
+/// An open E57 file.
+struct E57File {
+    path: PathBuf,
+    settings: Settings,
+    masks: Vec<MaskSeed>,
+    scans: Vec<ScanSeed>,
+    files: Vec<E57Scan>,
+    facts: Vec<(String, String)>,
+}
+
+/// Opens an E57 file: header, description and the first points of each scan are read and checked.
+pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> {
+    check_header(&mut Pages::open(path)?, settings)?;
+    let reader = E57Reader::new(BufReader::new(File::open(path)?)).map_err(describe)?;
+    let mut file = E57File {
+        path: path.to_path_buf(),
+        settings: settings.clone(),
+        masks: Vec::new(),
+        scans: Vec::new(),
+        files: Vec::new(),
+        facts: facts(&reader),
+    };
+    for (n, cloud) in reader.pointclouds().iter().enumerate() {
+        let name = match cloud.name.as_deref().map(str::trim) {
+            Some(name) if !name.is_empty() => name.to_string(),
+            _ => format!("scan {}", n + 1),
+        };
+        let (scan, mut seed) = E57Scan::new(path, cloud, &name, settings)
+            .map_err(|e| e.at(format!("scan \"{name}\"")))?;
+        seed.mask = n;
+        file.facts.push((format!("scan {} fields", n + 1), fields(cloud)));
+        file.masks.push(scan.mask(&name));
+        file.scans.push(seed);
+        file.files.push(scan);
+    }
+    Ok(Box::new(file))
+}
+
+impl Reader for E57File {
+    fn format(&self) -> Format {
+        Format::E57
+    }
+
+    fn masks(&self) -> &[MaskSeed] {
+        &self.masks
+    }
+
+    fn scans(&self) -> &[ScanSeed] {
+        &self.scans
+    }
+
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+        strips::sample(self, &self.files[scan], n)
+            .map_err(|e| e.at(format!("scan \"{}\"", self.scans[scan].name)))
+    }
+
+    fn strips(&self, want: Want) -> Result<RawStrips<'_>> {
+        Ok(Box::new(strips::Strips::new(self, want)))
+    }
+
+    fn facts(&self) -> Vec<(String, String)> {
+        self.facts.clone()
+    }
+}
+
+/// Checks the header before anything is sized by it.
+fn check_header(pages: &mut Pages, settings: &Settings) -> Result<()> {
+    let header: [u8; HEADER] = pages.read(0, HEADER)?.try_into().expect("as long as asked");
+    let number =
+        |from: usize| u64::from_le_bytes(*header[from..].first_chunk().expect("within the header"));
+    let place = "page 0";
+    if !header.starts_with(b"ASTM-E57") {
+        return Err(Error::bad_input("file does not begin as E57 files do").at(place));
+    }
+    let version = u32::from_le_bytes(*header[8..].first_chunk().expect("within the header"));
+    if version != 1 {
+        return Err(Error::new(
+            Kind::Unsupported,
+            format!("version of E57 is not read, \"{version}\""),
+        )
+        .at(place));
+    }
+    if number(40) != PAGE {
+        return Err(Error::new(
+            Kind::Unsupported,
+            format!("page size is not {PAGE} bytes, but \"{}\"", number(40)),
+        )
+        .at(place));
+    }
+    if number(16) > pages.len_on_disk() {
+        return Err(Error::bad_input(format!(
+            "file is truncated: {} bytes of the announced \"{}\"",
+            pages.len_on_disk(),
+            number(16)
+        ))
+        .at(place)
+        .hint("copy the file again"));
+    }
+    let (offset, len) = (number(24), number(32));
+    let start = pages.logical(offset).map_err(|e| e.at(place))?;
+    if len > settings.max_xml_bytes || start.checked_add(len).is_none_or(|end| end > pages.len()) {
+        return Err(Error::bad_input(format!(
+            "description of the file reaches outside it, bytes \"{len}\""
+        ))
+        .at(place));
+    }
+    // Every page of the description is checked here, so that an error names it.
+    for page in Pages::page(start)..=Pages::page(start + len.max(1) - 1) {
+        pages.read(page * (PAGE - 4), 1).map_err(|e| e.at("description"))?;
+    }
+    Ok(())
+}
+
+/// An error of the crate that parses descriptions, in our words.
+fn describe(e: ::e57::Error) -> Error {
+    let (kind, what) = match &e {
+        ::e57::Error::NotImplemented { .. } => {
+            (Kind::Unsupported, "description of the file holds what is not read")
+        }
+        ::e57::Error::Internal { .. } => {
+            (Kind::BadInput, "description of the file confuses its reader")
+        }
+        _ => (Kind::BadInput, "description of the file is broken"),
+    };
+    Error::new(kind, what).because(e).hint("export the file anew")
+}
+
+/// What the file says of itself.
+fn facts(reader: &E57Reader<BufReader<File>>) -> Vec<(String, String)> {
+    let header = reader.header();
+    let clouds = reader.pointclouds();
+    let mut facts = vec![
+        ("version".into(), format!("E57 {}.{}", header.major, header.minor)),
+        ("records".into(), clouds.iter().map(|c| u128::from(c.records)).sum::<u128>().to_string()),
+    ];
+    if let Some(library) = reader.library_version() {
+        facts.push(("written by".into(), library.into()));
+    }
+    if let Some(system) = reader.coordinate_metadata().filter(|s| !s.is_empty()) {
+        facts.push(("coordinate system".into(), system.into()));
+    }
+    let n_images = reader.images().len();
+    if n_images > 0 {
+        facts.push(("images, not read".into(), n_images.to_string()));
+    }
+    for extension in reader.extensions() {
+        facts.push((
+            "extension, not read".into(),
+            format!("{} {}", extension.namespace, extension.url),
+        ));
+    }
+    facts
+}
+
+/// What one scan holds, in words.
+fn fields(cloud: &::e57::PointCloud) -> String {
+    let mut words = vec![format!("{} records", cloud.records)];
+    let flags = [
+        (cloud.has_cartesian(), "Cartesian"),
+        (cloud.has_spherical(), "spherical"),
+        (cloud.has_row_column(), "rows and columns"),
+        (cloud.has_intensity(), "intensity"),
+        (cloud.has_color(), "colour"),
+        (cloud.has_return(), "several returns"),
+        (cloud.transform.is_some(), "pose"),
+    ];
+    words.extend(flags.iter().filter(|(has, _)| *has).map(|(_, word)| (*word).to_string()));
+    let sensor: Vec<&str> = [&cloud.sensor_vendor, &cloud.sensor_model]
+        .into_iter()
+        .flatten()
+        .map(String::as_str)
+        .collect();
+    if !sensor.is_empty() {
+        words.push(format!("sensor {}", sensor.join(" ")));
+    }
+    words.join(", ")
+}
+
+#[cfg(test)]
+mod own_tests;
+#[cfg(test)]
+mod tests;

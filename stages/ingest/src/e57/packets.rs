@@ -1,0 +1,225 @@
+//! Pages of one scan's section in, columns of numbers out, record by record in step over all fields. Knows that
+//! counts may lie: what the packets hold must be what the scan announces.
+
+use super::pages::Pages;
+use super::stream::Stream;
+use contract::{Error, Kind, Result};
+use e57::Record;
+
+/// Bytes of the header of a section.
+const SECTION_HEADER: u64 = 32;
+/// Largest run-ahead of one field before another, bytes. Writers fill packets of 64 KiB with all fields in step.
+const MAX_AHEAD: usize = 16 << 20;
+/// Records that may take no bits at all: a scan whose every field is constant has a handful of points.
+const MAX_CONSTANT: u64 = 65_536;
+
+/// The packets of one scan, and what of them was not decoded yet.
+pub(super) struct Packets {
+    pages: Pages,
+    /// Place of the next packet, without checksums.
+    at: u64,
+    /// End of the section, without checksums.
+    end: u64,
+    /// One a field, in the order of the prototype.
+    streams: Vec<Stream>,
+    /// Records not handed out yet.
+    n_left: u64,
+    /// Records announced.
+    n_records: u64,
+}
+
+impl Packets {
+    /// Opens the section at `file_offset` (on disk). `wanted[i]` tells whether field `i` will be decoded.
+    pub(super) fn open(
+        mut pages: Pages,
+        file_offset: u64,
+        n_records: u64,
+        prototype: &[Record],
+        wanted: &[bool],
+    ) -> Result<Self> {
+        let streams = prototype
+            .iter()
+            .zip(wanted)
+            .map(|(record, wanted)| {
+                Stream::new(&record.data_type, *wanted)
+                    .map_err(|e| e.at(format!("field {:?}", record.name)))
+            })
+            .collect::<Result<Vec<_>>>()?;
+        if n_records == 0 {
+            // Nothing to read; writers leave any offset here.
+            return Ok(Self { pages, at: 0, end: 0, streams, n_left: 0, n_records });
+        }
+        let start = pages.logical(file_offset)?;
+        let header: [u8; SECTION_HEADER as usize] =
+            pages.read(start, SECTION_HEADER as usize)?.try_into().expect("as long as asked");
+        let number = |from: usize| {
+            u64::from_le_bytes(*header[from..].first_chunk().expect("within the header"))
+        };
+        if header[0] != 1 {
+            return Err(Error::bad_input(format!(
+                "no points where the scan says they are: section of kind \"{}\"",
+                header[0]
+            ))
+            .at(format!("page {}", Pages::page(start))));
+        }
+        let end = start.checked_add(number(8)).filter(|end| *end <= pages.len());
+        let at = pages.logical(number(16))?;
+        let Some(end) = end.filter(|end| at >= start + SECTION_HEADER && at <= *end) else {
+            return Err(Error::bad_input(format!(
+                "length of the points' section reaches outside the file, \"{}\"",
+                number(8)
+            ))
+            .at(format!("page {}", Pages::page(start))));
+        };
+        let packets = Self { pages, at, end, streams, n_left: n_records, n_records };
+        packets.check_count()?;
+        Ok(packets)
+    }
+
+    /// Refuses a count that the section's bytes cannot hold, before anything is sized by it.
+    fn check_count(&self) -> Result<()> {
+        let bits: u128 = self.streams.iter().map(|s| u128::from(s.bits())).sum();
+        let held = u128::from(self.end - self.at) * 8;
+        if bits * u128::from(self.n_records) > held || (bits == 0 && self.n_records > MAX_CONSTANT)
+        {
+            return Err(Error::bad_input(format!(
+                "the points' section of {} bytes cannot hold the announced number of points, \"{}\"",
+                self.end - self.at,
+                self.n_records
+            ))
+            .hint("the file is truncated or its header lies: export it anew"));
+        }
+        Ok(())
+    }
+
+    /// Number of records that can be decoded now, at least one and at most `most`; none at the end, which is checked
+    /// to be where it was announced.
+    pub(super) fn ready(&mut self, most: usize) -> Result<usize> {
+        if self.n_left == 0 {
+            return self.check_end().map(|()| 0);
+        }
+        loop {
+            let held = self.streams.iter().filter_map(Stream::available).min().unwrap_or(u64::MAX);
+            if held > 0 {
+                return Ok(held.min(self.n_left).min(most as u64) as usize);
+            }
+            if !self.feed()? {
+                return Err(Error::bad_input(format!(
+                    "scan ends after {} of its announced points, \"{}\"",
+                    self.n_records - self.n_left,
+                    self.n_records
+                ))
+                .hint("the file is truncated or its header lies: export it anew"));
+            }
+        }
+    }
+
+    /// Numbers of field `field` of the next `n` records, `n` as [`Self::ready`] says.
+    pub(super) fn numbers(&mut self, field: usize, n: usize, out: &mut Vec<f64>) {
+        self.streams[field].numbers(n, out);
+    }
+
+    /// As [`Self::numbers`], whole numbers.
+    pub(super) fn integers(&mut self, field: usize, n: usize, out: &mut Vec<i64>) {
+        self.streams[field].integers(n, out);
+    }
+
+    /// Goes on by `n` records; fields where `read` is false were not decoded and are left out.
+    pub(super) fn advance(&mut self, n: usize, read: &[bool]) {
+        for (stream, read) in self.streams.iter_mut().zip(read) {
+            if !read {
+                stream.skip(n);
+            }
+        }
+        self.n_left -= n as u64;
+    }
+
+    /// Appends the next data packet to the streams; false at the end of the section.
+    fn feed(&mut self) -> Result<bool> {
+        while self.at < self.end {
+            let at = self.at;
+            let place = || format!("page {}", Pages::page(at));
+            let header: [u8; 4] = self.pages.read(at, 4)?.try_into().expect("as long as asked");
+            let len = usize::from(u16::from_le_bytes([header[2], header[3]])) + 1;
+            if len % 4 != 0 || self.end - at < len as u64 {
+                return Err(Error::bad_input(format!(
+                    "a packet has an impossible length, \"{len}\""
+                ))
+                .at(place()));
+            }
+            self.at += len as u64;
+            match header[0] {
+                0 | 2 => {}
+                1 => {
+                    let packet = self.pages.read(at, len)?;
+                    split(packet, &mut self.streams).map_err(|e| e.at(place()))?;
+                    return self.check_ahead().map(|()| true);
+                }
+                kind => {
+                    return Err(Error::bad_input(format!(
+                        "a packet is of unknown kind, \"{kind}\""
+                    ))
+                    .at(place()));
+                }
+            }
+        }
+        Ok(false)
+    }
+
+    /// Refuses fields that run away from one another: memory must not grow with the file.
+    fn check_ahead(&self) -> Result<()> {
+        if self.streams.iter().any(|s| s.weight_bytes() > MAX_AHEAD) {
+            return Err(Error::new(
+                Kind::Unsupported,
+                format!(
+                    "one field lies farther from the others than is read, bytes \"{MAX_AHEAD}\""
+                ),
+            )
+            .at(format!("page {}", Pages::page(self.at)))
+            .hint("export the file anew"));
+        }
+        Ok(())
+    }
+
+    /// Refuses points beyond the announced ones.
+    fn check_end(&mut self) -> Result<()> {
+        let spent = loop {
+            if !self.streams.iter().all(Stream::is_spent) {
+                break false;
+            }
+            if !self.feed()? {
+                break true;
+            }
+        };
+        if spent {
+            return Ok(());
+        }
+        Err(Error::bad_input(format!(
+            "scan holds more points than it announces, \"{}\"",
+            self.n_records
+        ))
+        .at(format!("page {}", Pages::page(self.at.saturating_sub(1))))
+        .hint("the header lies: export the file anew"))
+    }
+}
+
+/// Hands the parts of a data packet to the streams.
+fn split(packet: &[u8], streams: &mut [Stream]) -> Result<()> {
+    let n_streams = packet.get(4..6).map_or(0, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
+    if n_streams != streams.len() {
+        return Err(Error::bad_input(format!(
+            "a packet does not have the {} fields of the scan, but \"{n_streams}\"",
+            streams.len()
+        )));
+    }
+    let short = || Error::bad_input("a packet is shorter than its parts");
+    let (lengths, mut rest) =
+        packet.get(6..).and_then(|p| p.split_at_checked(2 * n_streams)).ok_or_else(short)?;
+    for (stream, len) in streams.iter_mut().zip(lengths.as_chunks::<2>().0) {
+        let (part, after) =
+            rest.split_at_checked(usize::from(u16::from_le_bytes(*len))).ok_or_else(short)?;
+        stream.append(part);
+        rest = after;
+    }
+    Ok(())
+}

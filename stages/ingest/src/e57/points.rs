@@ -1,0 +1,161 @@
+//! Packets of one scan in, blocks of points in the file's frame out.
+
+use super::packets::Packets;
+use super::pages::Pages;
+use super::scan::{Channel, Coordinates, E57Scan};
+use contract::Result;
+
+/// Which fields are decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// Coordinates and whether they are valid.
+    Coordinates,
+    /// Rows and columns too.
+    Native,
+    /// Intensity and colour too.
+    Attributes,
+}
+
+/// The points of one scan, a block of records at a time.
+pub(super) struct Points {
+    packets: Packets,
+    coordinates: Option<Coordinates>,
+    state: Option<usize>,
+    native: Option<[usize; 2]>,
+    intensity: Option<Channel>,
+    color: Option<[Channel; 3]>,
+    /// One a field: whether it is decoded.
+    read: Vec<bool>,
+    /// Columns of the block.
+    axes: [Vec<f64>; 3],
+    states: Vec<i64>,
+    rows_cols: [Vec<i64>; 2],
+    levels: [Vec<u16>; 4],
+    scratch: Vec<f64>,
+}
+
+impl Points {
+    /// At the first point of a scan.
+    pub(super) fn open(scan: &E57Scan, pages: Pages, wanted: Wanted) -> Result<Self> {
+        let native = scan.native.filter(|_| wanted == Wanted::Native);
+        let intensity = scan.intensity.filter(|_| wanted == Wanted::Attributes);
+        let color = scan.color.filter(|_| wanted == Wanted::Attributes);
+        let mut read = vec![false; scan.prototype.len()];
+        let axes = match scan.coordinates {
+            None => None,
+            Some(Coordinates::Cartesian(fields) | Coordinates::Spherical(fields)) => Some(fields),
+        };
+        let channels = intensity.iter().chain(color.iter().flatten()).map(|c| c.field);
+        for field in axes
+            .into_iter()
+            .flatten()
+            .chain(scan.state)
+            .chain(native.into_iter().flatten())
+            .chain(channels)
+        {
+            read[field] = true;
+        }
+        let packets =
+            Packets::open(pages, scan.file_offset, scan.n_records, &scan.prototype, &read)?;
+        Ok(Self {
+            packets,
+            coordinates: scan.coordinates,
+            state: scan.state,
+            native,
+            intensity,
+            color,
+            read,
+            axes: Default::default(),
+            states: Vec::new(),
+            rows_cols: Default::default(),
+            levels: Default::default(),
+            scratch: Vec::new(),
+        })
+    }
+
+    /// Decodes the next records, at most `most`; their number, zero only at the checked end.
+    pub(super) fn next_block(&mut self, most: usize) -> Result<usize> {
+        let n = self.packets.ready(most)?;
+        if n == 0 {
+            return Ok(0);
+        }
+        if let Some(Coordinates::Cartesian(fields) | Coordinates::Spherical(fields)) =
+            self.coordinates
+        {
+            for (field, axis) in fields.into_iter().zip(&mut self.axes) {
+                self.packets.numbers(field, n, axis);
+            }
+        }
+        if let Some(Coordinates::Spherical(_)) = self.coordinates {
+            self.convert_spherical();
+        }
+        if let Some(field) = self.state {
+            self.packets.integers(field, n, &mut self.states);
+        }
+        for (field, column) in self.native.into_iter().flatten().zip(&mut self.rows_cols) {
+            self.packets.integers(field, n, column);
+        }
+        let color = self.color.map_or([None; 3], |c| c.map(Some));
+        let channels = [self.intensity, color[0], color[1], color[2]];
+        for (channel, levels) in channels.into_iter().zip(&mut self.levels) {
+            let Some(channel) = channel else { continue };
+            self.packets.numbers(channel.field, n, &mut self.scratch);
+            levels.clear();
+            // `as` cuts at both ends, and no number becomes 0.
+            levels.extend(
+                self.scratch.iter().map(|v| ((v - channel.min) * channel.scale).round() as u16),
+            );
+        }
+        self.packets.advance(n, &self.read);
+        Ok(n)
+    }
+
+    /// Range, azimuth, elevation of the block to x, y, z.
+    fn convert_spherical(&mut self) {
+        let [xs, ys, zs] = &mut self.axes;
+        for ((x, y), z) in xs.iter_mut().zip(ys).zip(zs) {
+            let (range, (sa, ca), (se, ce)) = (*x, y.sin_cos(), z.sin_cos());
+            (*x, *y, *z) = (range * ce * ca, range * ce * sa, range * se);
+        }
+    }
+
+    /// Columns x, y, z of the block, file's frame, metres.
+    pub(super) fn axes(&self) -> &[Vec<f64>; 3] {
+        &self.axes
+    }
+
+    /// Whether no point of this scan can be flagged as invalid.
+    pub(super) fn all_valid(&self) -> bool {
+        self.state.is_none()
+    }
+
+    /// Whether the file takes point `i` of the block for valid.
+    #[inline]
+    pub(super) fn is_valid(&self, i: usize) -> bool {
+        self.state.is_none() || self.states[i] == 0
+    }
+
+    /// Point `i` of the block, file's frame, metres.
+    #[inline]
+    pub(super) fn xyz(&self, i: usize) -> [f64; 3] {
+        [self.axes[0][i], self.axes[1][i], self.axes[2][i]]
+    }
+
+    /// Row and column of point `i` of the block; `None` where the file has none or negative ones.
+    pub(super) fn native(&self, i: usize) -> Option<[u32; 2]> {
+        self.native?;
+        let [rows, cols] = &self.rows_cols;
+        Some([u32::try_from(rows[i]).ok()?, u32::try_from(cols[i]).ok()?])
+    }
+
+    /// Intensities of the block; empty where the file has none.
+    pub(super) fn intensity(&self) -> &[u16] {
+        &self.levels[0]
+    }
+
+    /// Colours of point `i` of the block, where the file has them.
+    pub(super) fn color(&self, i: usize) -> Option<[u16; 3]> {
+        self.color?;
+        Some([self.levels[1][i], self.levels[2][i], self.levels[3][i]])
+    }
+}

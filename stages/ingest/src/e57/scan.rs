@@ -1,0 +1,297 @@
+//! The description of one scan in an E57 file in; which fields hold what, and the scan's seed, out.
+
+use super::pages::Pages;
+use super::points::{Points, Wanted};
+use crate::Settings;
+use crate::frame::{self, Frame};
+use crate::reader::{MaskSeed, ScanSeed};
+use contract::{Error, Kind, Result};
+use e57::{PointCloud, Record, RecordDataType, RecordName, RecordValue};
+use geometry::{Aabb, Point, Pose};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use std::path::Path;
+
+/// Points that the scanner's reach is judged by.
+const N_JUDGED: usize = 64;
+/// Records among which those points are looked for.
+const N_JUDGED_RECORDS: u64 = 65_536;
+
+/// Which fields hold the coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Coordinates {
+    /// x, y, z.
+    Cartesian([usize; 3]),
+    /// Range, azimuth, elevation.
+    Spherical([usize; 3]),
+}
+
+/// A field whose values are brought to 0..65535.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Channel {
+    /// Index of the field.
+    pub(super) field: usize,
+    /// Value that becomes 0.
+    pub(super) min: f64,
+    /// 65535 over the span of values.
+    pub(super) scale: f64,
+}
+
+/// One scan of the file.
+#[derive(Debug, Clone)]
+pub(super) struct E57Scan {
+    /// Place of its points on disk.
+    pub(super) file_offset: u64,
+    /// Announced records.
+    pub(super) n_records: u64,
+    /// Fields of a record.
+    pub(super) prototype: Vec<Record>,
+    /// `None` for a scan without points that names no coordinates.
+    pub(super) coordinates: Option<Coordinates>,
+    /// Field that flags coordinates as invalid.
+    pub(super) state: Option<usize>,
+    /// Fields of row and column.
+    pub(super) native: Option<[usize; 2]>,
+    /// Field of the intensity.
+    pub(super) intensity: Option<Channel>,
+    /// Fields of the colour.
+    pub(super) color: Option<[Channel; 3]>,
+    /// From the file's coordinates to the scan frame.
+    pub(super) frame: Frame,
+}
+
+impl E57Scan {
+    /// Reads the description, and a few points to judge whether the origin can be the scanner.
+    pub(super) fn new(
+        path: &Path,
+        cloud: &PointCloud,
+        name: &str,
+        settings: &Settings,
+    ) -> Result<(Self, ScanSeed)> {
+        let mut notes = Vec::new();
+        let pose = pose(cloud)?;
+        let mut scan = Self::fields(cloud)?;
+        if scan.coordinates.is_none() && scan.n_records > 0 {
+            return Err(Error::new(
+                Kind::Unsupported,
+                "scan has neither Cartesian nor spherical coordinates",
+            ));
+        }
+        scan.channels(cloud, &mut notes);
+        let bounds = bounds(cloud);
+        let first = scan.first_points(path, settings)?;
+        scan.frame = scan.judge(cloud, pose, bounds.as_ref(), &first, &mut notes);
+        if scan.n_records == 0 {
+            notes.push("scan has no points".into());
+        } else if scan.native.is_none() && scan.frame.scanner_known {
+            notes.push(
+                "no rows and columns: the raster is rebuilt from the directions of the points"
+                    .into(),
+            );
+        }
+        let stated_bounds = bounds
+            .map(|b| Aabb::of(b.corners().map(|corner| (pose * Point::from(corner)).coords.into())))
+            .filter(|b| b.min.iter().chain(&b.max).all(|v| v.is_finite()));
+        let seed = ScanSeed {
+            name: name.into(),
+            mask: 0,
+            source_id: None,
+            world_from_scan: scan.frame.world_from_scan,
+            scanner_known: scan.frame.scanner_known,
+            stated_bounds,
+            stated_points: scan.n_valid(),
+            notes,
+        };
+        Ok((scan, seed))
+    }
+
+    /// The mask of this scan.
+    pub(super) fn mask(&self, name: &str) -> MaskSeed {
+        MaskSeed { name: name.into(), n_points: self.n_valid() }
+    }
+
+    /// Number of points that the file does not flag as invalid, where that is known without reading them.
+    fn n_valid(&self) -> Option<u64> {
+        match self.state.map(|field| &self.prototype[field].data_type) {
+            None | Some(RecordDataType::Integer { min: 0, max: 0 }) => Some(self.n_records),
+            Some(_) => (self.n_records == 0).then_some(0),
+        }
+    }
+
+    /// Finds the fields.
+    fn fields(cloud: &PointCloud) -> Result<Self> {
+        let find = |name: RecordName| cloud.prototype.iter().position(|r| r.name == name);
+        let three = |names: [RecordName; 3]| -> Option<[usize; 3]> {
+            let [a, b, c] = names.map(find);
+            Some([a?, b?, c?])
+        };
+        for (n, record) in cloud.prototype.iter().enumerate() {
+            if find(record.name.clone()) != Some(n) {
+                return Err(Error::bad_input(format!(
+                    "scan names a field twice, \"{:?}\"",
+                    record.name
+                )));
+            }
+        }
+        let cartesian =
+            three([RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ]);
+        let spherical = three([
+            RecordName::SphericalRange,
+            RecordName::SphericalAzimuth,
+            RecordName::SphericalElevation,
+        ]);
+        let (coordinates, state) = match (cartesian, spherical) {
+            (Some(xyz), _) => {
+                (Some(Coordinates::Cartesian(xyz)), RecordName::CartesianInvalidState)
+            }
+            (None, Some(rae)) => {
+                (Some(Coordinates::Spherical(rae)), RecordName::SphericalInvalidState)
+            }
+            (None, None) => (None, RecordName::CartesianInvalidState),
+        };
+        Ok(Self {
+            file_offset: cloud.file_offset,
+            n_records: cloud.records,
+            prototype: cloud.prototype.clone(),
+            coordinates,
+            state: find(state),
+            native: find(RecordName::RowIndex)
+                .zip(find(RecordName::ColumnIndex))
+                .map(|(row, col)| [row, col]),
+            intensity: None,
+            color: None,
+            frame: Frame::of_scanner(Pose::identity()),
+        })
+    }
+
+    /// Finds intensity and colour and what their values span.
+    fn channels(&mut self, cloud: &PointCloud, notes: &mut Vec<String>) {
+        let channel = |name: RecordName, limits: Option<[&Option<RecordValue>; 2]>| {
+            let field = cloud.prototype.iter().position(|r| r.name == name)?;
+            let data_type = &cloud.prototype[field].data_type;
+            let span = limits
+                .and_then(|[min, max]| {
+                    let value = |v: &Option<RecordValue>| v.as_ref()?.to_f64(data_type).ok();
+                    Some([value(min)?, value(max)?])
+                })
+                .filter(is_span)
+                .or_else(|| type_span(data_type).filter(is_span));
+            let [min, max] = span.unwrap_or([0.0, 1.0]);
+            Some((Channel { field, min, scale: 65_535.0 / (max - min) }, span.is_some()))
+        };
+        let limits = cloud.intensity_limits.as_ref().map(|l| [&l.intensity_min, &l.intensity_max]);
+        let intensity = channel(RecordName::Intensity, limits);
+        if intensity.is_some_and(|(_, spanned)| !spanned) {
+            notes.push(
+                "intensity has no stated limits: taken as 0 to 1, values outside are cut".into(),
+            );
+        }
+        self.intensity = intensity.map(|(channel, _)| channel);
+        let limits = cloud.color_limits.as_ref();
+        let red = channel(RecordName::ColorRed, limits.map(|l| [&l.red_min, &l.red_max]));
+        let green = channel(RecordName::ColorGreen, limits.map(|l| [&l.green_min, &l.green_max]));
+        let blue = channel(RecordName::ColorBlue, limits.map(|l| [&l.blue_min, &l.blue_max]));
+        self.color = match (red, green, blue) {
+            (Some((red, _)), Some((green, _)), Some((blue, _))) => Some([red, green, blue]),
+            _ => None,
+        };
+    }
+
+    /// The first valid points, file's frame.
+    fn first_points(&self, path: &Path, settings: &Settings) -> Result<Vec<[f64; 3]>> {
+        let mut out = Vec::new();
+        if self.n_records == 0 {
+            return Ok(out);
+        }
+        let mut points = Points::open(self, Pages::open(path)?, Wanted::Coordinates)?;
+        let mut n_seen = 0;
+        while out.len() < N_JUDGED && n_seen < N_JUDGED_RECORDS {
+            let n = points.next_block(settings.strip_points.min(4096))?;
+            if n == 0 {
+                break;
+            }
+            n_seen += n as u64;
+            let valid = (0..n).filter(|i| points.is_valid(*i)).map(|i| points.xyz(i));
+            let finite = valid.filter(|p| p.iter().all(|v| v.is_finite()));
+            out.extend(finite.take(N_JUDGED - out.len()));
+        }
+        Ok(out)
+    }
+
+    /// The scan frame: the file's own where its origin can be the scanner, else one about the points.
+    fn judge(
+        &self,
+        cloud: &PointCloud,
+        pose: Pose,
+        bounds: Option<&Aabb>,
+        first: &[[f64; 3]],
+        notes: &mut Vec<String>,
+    ) -> Frame {
+        let spherical = matches!(self.coordinates, Some(Coordinates::Spherical(_)));
+        let claimed =
+            spherical || self.native.is_some() || cloud.transform.is_some() || self.n_records == 0;
+        if claimed && frame::within_reach(first) {
+            if !spherical && self.native.is_none() && self.n_records > 0 && pose == Pose::identity()
+            {
+                notes.push(
+                    "the pose is the identity and there are no rows and columns: were the scan merged from several, \
+                     its free-space evidence would be wrong"
+                        .into(),
+                );
+            }
+            return Frame::of_scanner(pose);
+        }
+        notes.push(
+            if claimed {
+                "points lie farther from the scan's origin than any scanner reaches: the scanner is not known, \
+                 so there is no free-space evidence"
+            } else {
+                "no pose, no rows and columns: it may be merged from several scans, so the scanner is not known \
+                 and there is no free-space evidence"
+            }
+            .into(),
+        );
+        Frame::about(pose, frame::near(bounds, first))
+    }
+}
+
+/// World from the file's frame of a scan; identity where the file states none.
+fn pose(cloud: &PointCloud) -> Result<Pose> {
+    let Some(t) = &cloud.transform else { return Ok(Pose::identity()) };
+    let translation = Vector3::new(t.translation.x, t.translation.y, t.translation.z);
+    if !translation.iter().all(|v| v.is_finite()) {
+        return Err(Error::bad_input(format!(
+            "translation of the pose is no number, \"{translation:?}\""
+        )));
+    }
+    let rotation: UnitQuaternion<f64> =
+        frame::rotation([t.rotation.w, t.rotation.x, t.rotation.y, t.rotation.z])?;
+    Ok(Pose::from_parts(Translation3::from(translation), rotation))
+}
+
+/// Stated bounds in the file's frame, where they are sane.
+fn bounds(cloud: &PointCloud) -> Option<Aabb> {
+    let b = cloud.get_cartesian_bounds()?;
+    let bounds = Aabb { min: [b.x_min?, b.y_min?, b.z_min?], max: [b.x_max?, b.y_max?, b.z_max?] };
+    // Writers that do not know them write the largest number there is.
+    let sane = bounds.min.iter().chain(&bounds.max).all(|v| v.abs() < 1e9);
+    (sane && !bounds.is_empty()).then_some(bounds)
+}
+
+/// Whether these are limits of something.
+fn is_span(span: &[f64; 2]) -> bool {
+    span.iter().all(|v| v.is_finite()) && span[1] > span[0]
+}
+
+/// What a field can hold, where its type says it.
+fn type_span(data_type: &RecordDataType) -> Option<[f64; 2]> {
+    match *data_type {
+        RecordDataType::Single { min, max } => Some([f64::from(min?), f64::from(max?)]),
+        RecordDataType::Double { min, max } => Some([min?, max?]),
+        RecordDataType::Integer { min, max } => {
+            (min > i64::MIN && max < i64::MAX).then_some([min as f64, max as f64])
+        }
+        RecordDataType::ScaledInteger { min, max, scale, offset } => {
+            Some([min as f64 * scale + offset, max as f64 * scale + offset])
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! Blocks of points of all scans of an E57 file in, strips in its order out.
+
+use super::E57File;
+use super::pages::Pages;
+use super::points::{Points, Wanted};
+use super::scan::E57Scan;
+use crate::Settings;
+use crate::reader::{RawStrip, Sampled, Want};
+use contract::{Attributes, Result};
+use geometry::Point;
+
+/// Records decoded at once: their columns (3 × 8 bytes each) stay in the second-level cache.
+const BLOCK: usize = 8192;
+/// Records of a scan that a sample is spread over: a tenth of a second of decoding.
+const N_SAMPLED_FROM: u64 = 4_000_000;
+/// Runs of a sample.
+const N_RUNS: u64 = 4;
+
+/// Most places that a strip spans, so that they fit 32 bits; only reached where thousands of millions of points in a
+/// row are broken.
+const MAX_SPAN: u64 = 1 << 31;
+
+/// Strips of one file.
+pub(super) struct Strips<'a> {
+    file: &'a E57File,
+    want: Want,
+    /// Scan being read, and its points once open.
+    scan: usize,
+    points: Option<Points>,
+    /// Place in the mask of the next valid point.
+    place: u64,
+    /// Place after the last point that was not dropped.
+    named: u64,
+    done: bool,
+}
+
+impl<'a> Strips<'a> {
+    /// At the first point of the file.
+    pub(super) fn new(file: &'a E57File, want: Want) -> Self {
+        Self { file, want, scan: 0, points: None, place: 0, named: 0, done: false }
+    }
+
+    /// The next strip; `None` after the last scan.
+    fn read(&mut self) -> Result<Option<RawStrip>> {
+        while let Some(scan) = self.file.files.get(self.scan) {
+            let at = self.scan;
+            let strip = self
+                .read_scan(scan)
+                .map_err(|e| e.at(format!("scan \"{}\"", self.file.scans[at].name)))?;
+            if strip.is_some() {
+                return Ok(strip);
+            }
+            (self.scan, self.points, self.place, self.named) = (at + 1, None, 0, 0);
+        }
+        Ok(None)
+    }
+
+    /// The next strip of this scan; `None` at its checked end.
+    fn read_scan(&mut self, scan: &E57Scan) -> Result<Option<RawStrip>> {
+        let points = match &mut self.points {
+            Some(points) => points,
+            none => {
+                let wanted = match self.want {
+                    Want::Coordinates => Wanted::Coordinates,
+                    Want::Everything => Wanted::Attributes,
+                };
+                none.insert(Points::open(scan, Pages::open(&self.file.path)?, wanted)?)
+            }
+        };
+        let settings = &self.file.settings;
+        let mut strip = Filling {
+            settings,
+            scan,
+            strip: RawStrip {
+                scan: self.scan,
+                first_place: self.place,
+                place: Vec::new(),
+                xyz: Vec::new(),
+                attributes: (self.want == Want::Everything).then(Attributes::default),
+            },
+            place: self.place,
+        };
+        while strip.strip.xyz.len() < settings.strip_points && strip.span() < MAX_SPAN {
+            let most = BLOCK.min(settings.strip_points - strip.strip.xyz.len());
+            let n = points.next_block(most)?;
+            if n == 0 {
+                break;
+            }
+            strip.add(points, n);
+        }
+        let Filling { strip, place, .. } = strip;
+        self.place = place;
+        if let Some(last) = strip.place.last() {
+            self.named = strip.first_place + u64::from(*last) + 1;
+            return Ok(Some(strip));
+        }
+        // At the end. Where nobody knows how long the mask is, and its last points were dropped, a strip without
+        // points says it.
+        let told = self.file.masks[self.scan].n_points.is_some() || self.named == place;
+        self.named = place;
+        Ok((!told).then_some(RawStrip { first_place: place, ..strip }))
+    }
+}
+
+impl Iterator for Strips<'_> {
+    type Item = Result<RawStrip>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.done {
+            return None;
+        }
+        let strip = self.read().transpose();
+        self.done = !matches!(strip, Some(Ok(_)));
+        strip
+    }
+}
+
+/// A strip while it fills.
+struct Filling<'a> {
+    settings: &'a Settings,
+    scan: &'a E57Scan,
+    strip: RawStrip,
+    /// Place in the mask of the next valid point.
+    place: u64,
+}
+
+impl Filling<'_> {
+    /// Adds a block of `n` records.
+    fn add(&mut self, points: &Points, n: usize) {
+        let far = self.settings.max_range;
+        if points.all_valid()
+            && self.strip.attributes.is_none()
+            && let Some(shift) = self.scan.frame.shift_only()
+        {
+            let [x, y, z] = points.axes();
+            let near = |axis: &[f64], shift: f64| axis.iter().all(|v| (v - shift).abs() <= far);
+            if near(x, shift[0]) && near(y, shift[1]) && near(z, shift[2]) {
+                return self.add_plain(points, shift);
+            }
+        }
+        self.strip.place.reserve(n);
+        self.strip.xyz.reserve(n);
+        for i in 0..n {
+            if !points.is_valid(i) {
+                continue;
+            }
+            let p = self.scan.frame.scan_from_file(points.xyz(i));
+            if p.iter().all(|v| v.abs() <= far) {
+                self.push_place();
+                self.strip.xyz.push(p.map(|v| v as f32));
+                self.push_attributes(points, i, p);
+            }
+            self.place += 1;
+        }
+    }
+
+    /// Adds a block whose every point is good.
+    fn add_plain(&mut self, points: &Points, shift: [f64; 3]) {
+        let [x, y, z] = points.axes();
+        let xyz = x.iter().zip(y).zip(z);
+        self.strip.xyz.extend(xyz.map(|((x, y), z)| {
+            [(x - shift[0]) as f32, (y - shift[1]) as f32, (z - shift[2]) as f32]
+        }));
+        if self.strip.place.is_empty() {
+            self.strip.first_place = self.place;
+        }
+        let first = (self.place - self.strip.first_place) as u32;
+        self.strip.place.extend(first..first + x.len() as u32);
+        self.place += x.len() as u64;
+    }
+
+    /// Places from the first point to the next.
+    fn span(&self) -> u64 {
+        if self.strip.place.is_empty() { 0 } else { self.place - self.strip.first_place }
+    }
+
+    /// Adds the next place.
+    fn push_place(&mut self) {
+        if self.strip.place.is_empty() {
+            self.strip.first_place = self.place;
+        }
+        self.strip.place.push((self.place - self.strip.first_place) as u32);
+    }
+
+    /// Adds intensity, colour and world coordinates of point `i` of the block.
+    fn push_attributes(&mut self, points: &Points, i: usize, p: [f64; 3]) {
+        let Some(attributes) = &mut self.strip.attributes else { return };
+        attributes.world.push((self.scan.frame.world_from_scan * Point::from(p)).coords.into());
+        attributes.intensity.extend(points.intensity().get(i));
+        attributes.color.extend(points.color(i));
+    }
+}
+
+/// Up to `n` valid points of a scan in a few runs.
+pub(super) fn sample(file: &E57File, scan: &E57Scan, n: usize) -> Result<Vec<Sampled>> {
+    let mut out = Vec::new();
+    if scan.n_records == 0 || n == 0 {
+        return Ok(out);
+    }
+    let mut points = Points::open(scan, Pages::open(&file.path)?, Wanted::Native)?;
+    let spread = scan.n_records.min(N_SAMPLED_FROM);
+    let mut seen = 0;
+    while out.len() < n {
+        let n_block = points.next_block(BLOCK)?;
+        if n_block == 0 {
+            break;
+        }
+        // How many the runs begun so far may hold: run k begins at k/N_RUNS of the records.
+        let run = (seen * N_RUNS / spread + 1).min(N_RUNS) as usize;
+        let most = n * run / N_RUNS as usize;
+        for i in 0..n_block {
+            let p = scan.frame.scan_from_file(points.xyz(i));
+            if out.len() < most
+                && points.is_valid(i)
+                && p.iter().all(|v| v.abs() <= file.settings.max_range)
+            {
+                out.push(Sampled { xyz: p.map(|v| v as f32), native: points.native(i) });
+            }
+        }
+        seen += n_block as u64;
+    }
+    Ok(out)
+}

@@ -1,0 +1,89 @@
+//! The first bytes of a file in; which point format it is out, or a refusal that says what to do instead.
+
+use contract::{Error, Format, Kind, Result};
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+/// Enough for the first lines of a text format.
+const HEAD_BYTES: u64 = 512;
+/// Bit of the point format of a LAS header that marks compressed points.
+const COMPRESSED: u8 = 0b1100_0000;
+/// Where the point format stands in a LAS header.
+const POINT_FORMAT_AT: usize = 104;
+
+/// Tells the format by the first bytes; the suffix only makes the refusal clearer.
+pub(crate) fn detect(path: &Path) -> Result<Format> {
+    let mut head = Vec::new();
+    File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    let suffix = path
+        .extension()
+        .map_or_else(String::new, |s| s.to_string_lossy().to_lowercase());
+    if head.is_empty() {
+        return Err(Error::bad_input("the file is empty"));
+    }
+    if head.starts_with(b"ASTM-E57") {
+        return Ok(Format::E57);
+    }
+    if head.starts_with(b"LASF") {
+        let compressed = head
+            .get(POINT_FORMAT_AT)
+            .is_some_and(|f| f & COMPRESSED != 0);
+        return Ok(if compressed { Format::Laz } else { Format::Las });
+    }
+    if is_ptx(&head) || (suffix == "ptx" && is_text(&head)) {
+        return Ok(Format::Ptx);
+    }
+    Err(refusal(&head, &suffix))
+}
+
+/// Two lines of one whole number, then one of three numbers.
+fn is_ptx(head: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(head);
+    let mut lines = text
+        .lines()
+        .map(|l| l.split_whitespace().collect::<Vec<_>>());
+    let mut whole = || {
+        lines
+            .next()
+            .is_some_and(|w| w.len() == 1 && w[0].parse::<u64>().is_ok())
+    };
+    whole()
+        && whole()
+        && lines
+            .next()
+            .is_some_and(|w| w.len() == 3 && w.iter().all(|v| v.parse::<f64>().is_ok()))
+}
+
+fn is_text(head: &[u8]) -> bool {
+    head.iter()
+        .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
+}
+
+fn refusal(head: &[u8], suffix: &str) -> Error {
+    const WAY: &str = "export the scans as E57, one scan a scanner position";
+    let named = |what: &str| Error::new(Kind::Unsupported, format!("{what} is not read")).hint(WAY);
+    if let "e57" | "las" | "laz" | "ptx" = suffix {
+        return Error::bad_input(format!(
+            "the name ends in \"{suffix}\", but the content is something else"
+        ))
+        .at("byte 0")
+        .hint("the file is damaged or misnamed; copy or export it again");
+    }
+    let start = |magic: &[u8]| head.starts_with(magic);
+    match suffix {
+        _ if start(b"ply") => named("PLY"),
+        _ if start(b"# .PCD") || start(b"VERSION") => named("PCD"),
+        _ if start(b"PK\x03\x04") || start(b"\x1f\x8b") || start(b"7z\xbc\xaf") => {
+            Error::new(Kind::Unsupported, "an archive is not read").hint("unpack it")
+        }
+        "fls" | "lsproj" => named("FARO's own format"),
+        "zfs" | "zfprj" => named("Z+F's own format"),
+        "rcp" | "rcs" => named("ReCap's own format"),
+        "rdbx" | "rxp" => named("RIEGL's own format"),
+        "lgs" | "lgsx" => named("Leica's own format"),
+        "pts" | "xyz" | "txt" | "csv" | "asc" => named("text without scanner positions"),
+        _ if is_text(head) => named("this text"),
+        _ => named("this format"),
+    }
+}

@@ -1,0 +1,136 @@
+//! From the coordinates of a file to the scan frame: the stated pose and a few points in, a frame out whose
+//! coordinates stay small, and whose origin is the scanner where that can be true.
+
+use contract::{Error, Result};
+use geometry::{Aabb, Point, Pose};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
+
+/// Farthest that a terrestrial scanner stands from what it measured, metres. Long-range scanners of quarries reach
+/// 2 to 6 km, those of plants 0.4 km; map coordinates (easting, northing) are tens of kilometres at the least.
+const FARTHEST_SCANNER: f64 = 8.0e3;
+
+/// How a file's coordinates become those of the scan frame.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Frame {
+    /// Turns the file's coordinates first; only where the scanner is not known and the file states a turn.
+    rotation: Option<UnitQuaternion<f64>>,
+    /// Subtracted then, metres.
+    shift: [f64; 3],
+    /// Pose of the scan frame.
+    pub(crate) world_from_scan: Pose,
+    /// Whether the origin of the scan frame is the scanner.
+    pub(crate) scanner_known: bool,
+}
+
+impl Frame {
+    /// The file's own frame, with the scanner at its origin.
+    pub(crate) fn of_scanner(world_from_scan: Pose) -> Self {
+        Self { rotation: None, shift: [0.0; 3], world_from_scan, scanner_known: true }
+    }
+
+    /// World axes about a whole metre near `near` (a point in the file's frame), for points whose scanner is not known.
+    pub(crate) fn about(world_from_file: Pose, near: [f64; 3]) -> Self {
+        let origin = (world_from_file * Point::from(near)).coords.map(f64::round);
+        let turned = world_from_file.rotation.angle() > 0.0;
+        Self {
+            rotation: turned.then_some(world_from_file.rotation),
+            shift: (origin - world_from_file.translation.vector).into(),
+            world_from_scan: Pose::from_parts(
+                Translation3::from(origin),
+                UnitQuaternion::identity(),
+            ),
+            scanner_known: false,
+        }
+    }
+
+    /// A point of the file in the scan frame, metres.
+    #[inline]
+    pub(crate) fn scan_from_file(&self, p: [f64; 3]) -> [f64; 3] {
+        let p = match &self.rotation {
+            None => p,
+            Some(rotation) => (rotation * Vector3::from(p)).into(),
+        };
+        [p[0] - self.shift[0], p[1] - self.shift[1], p[2] - self.shift[2]]
+    }
+
+    /// Whether the scan frame differs from the file's by a shift alone; then the shift, metres.
+    #[inline]
+    pub(crate) fn shift_only(&self) -> Option<[f64; 3]> {
+        self.rotation.is_none().then_some(self.shift)
+    }
+}
+
+/// Whether a scanner at the origin can have measured these points (file's frame): half of them within its reach.
+pub(crate) fn within_reach(points: &[[f64; 3]]) -> bool {
+    let near = points.iter().filter(|p| Vector3::from(**p).norm() <= FARTHEST_SCANNER).count();
+    2 * near >= points.len()
+}
+
+/// A place near points in the file's frame: the middle of the stated bounds, else the middle one of the points.
+pub(crate) fn near(bounds: Option<&Aabb>, points: &[[f64; 3]]) -> [f64; 3] {
+    let mut middle = [0.0; 3];
+    if points.is_empty() {
+        return bounds.map_or(middle, |b| b.center().coords.into());
+    }
+    for axis in 0..3 {
+        let mut along: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+        along.sort_by(f64::total_cmp);
+        middle[axis] = along[along.len() / 2];
+    }
+    match bounds {
+        Some(b) if b.grown(1.0).contains(middle) => b.center().coords.into(),
+        _ => middle,
+    }
+}
+
+/// A rotation from a stated quaternion; refused where it is none, brought to unit length where it nearly is.
+pub(crate) fn rotation(wxyz: [f64; 4]) -> Result<UnitQuaternion<f64>> {
+    let q = Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+    let norm = q.norm();
+    // Files carry 6 to 17 digits; beyond one in a thousand it is not rounding.
+    if !norm.is_finite() || (norm - 1.0).abs() > 1e-3 {
+        return Err(Error::bad_input(format!(
+            "rotation of the pose is not a unit quaternion, its length is \"{norm}\""
+        ))
+        .hint("mend the pose in the software that wrote the file"));
+    }
+    Ok(UnitQuaternion::from_quaternion(q))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_keep_their_place_in_the_world() {
+        let pose =
+            Pose::new(Vector3::new(400_000.0, 5_600_000.0, 100.0), Vector3::new(0.1, -0.2, 0.7));
+        let p = [312.25, -41.5, 7.0];
+        let world = pose * Point::from(p);
+        for frame in [Frame::of_scanner(pose), Frame::about(pose, [300.0, -40.0, 5.0])] {
+            let back = frame.world_from_scan * Point::from(frame.scan_from_file(p));
+            assert!((back - world).norm() < 1e-8, "{back} {world}");
+        }
+        let about = Frame::about(pose, [300.0, -40.0, 5.0]);
+        assert!(Vector3::from(about.scan_from_file(p)).norm() < 20.0);
+        assert_eq!(about.world_from_scan.rotation, UnitQuaternion::identity());
+    }
+
+    #[test]
+    fn map_coordinates_are_not_a_scanner_frame() {
+        assert!(within_reach(&[[3.0, 4.0, 0.0], [900.0, 0.0, 0.0], [1e9, 0.0, 0.0]]));
+        assert!(!within_reach(&[[637_012.24, 849_028.31, 431.66]]));
+        assert_eq!(
+            near(None, &[[1e30, 0.0, 0.0], [5.0, 6.0, 7.0], [4.0, 6.0, 7.0]]),
+            [5.0, 6.0, 7.0]
+        );
+    }
+
+    #[test]
+    fn no_rotation_is_refused() {
+        assert!(rotation([0.0; 4]).is_err());
+        assert!(rotation([f64::NAN, 0.0, 0.0, 0.0]).is_err());
+        assert!(rotation([2.0, 0.0, 0.0, 0.0]).is_err());
+        assert!(rotation([1.0 + 1e-5, 0.0, 0.0, 0.0]).is_ok());
+    }
+}

@@ -1,0 +1,257 @@
+//! The bytes of a LAS or LAZ file in; its header out, checked against the length of the file.
+
+use crate::las_record::Layout;
+use contract::{Error, Kind, Result};
+use geometry::Aabb;
+use std::io::Cursor;
+
+/// What the header and the variable length records say, checked.
+#[derive(Debug, Clone)]
+pub(crate) struct LasHeader {
+    /// Minor version of LAS 1.x.
+    pub(crate) minor: u8,
+    /// Point format, 0..=10.
+    pub(crate) format: u8,
+    /// Whether points are compressed (LAZ).
+    pub(crate) compressed: bool,
+    /// Length of one record, bytes.
+    pub(crate) record_len: usize,
+    /// Number of records.
+    pub(crate) n_points: u64,
+    /// Metres (or whatever the file's unit is) of one count.
+    pub(crate) scale: [f64; 3],
+    /// Added after scaling.
+    pub(crate) offset: [f64; 3],
+    /// Stated bounds, where they are finite and in order.
+    pub(crate) bounds: Option<Aabb>,
+    /// Where points start, bytes from the start of the file.
+    pub(crate) points_at: usize,
+    /// Payload of the record of LASzip, where there is one.
+    pub(crate) laszip: Option<(usize, usize)>,
+    /// Whether the file is a COPC (octree order).
+    pub(crate) copc: bool,
+    /// Program that wrote it.
+    pub(crate) software: String,
+    /// What is odd, in words.
+    pub(crate) notes: Vec<String>,
+}
+
+/// Length of the header of a variable length record, bytes.
+const VLR_HEADER: usize = 54;
+/// Bits of the point format that LASzip sets to mark compressed points.
+const COMPRESSED_BITS: u8 = 0b1100_0000;
+
+impl LasHeader {
+    /// Reads and checks.
+    pub(crate) fn read(data: &[u8]) -> Result<Self> {
+        let raw = las::raw::Header::read_from(Cursor::new(data)).map_err(|cause| {
+            Error::bad_input("the header cannot be read")
+                .because(cause)
+                .at("header")
+        })?;
+        let (major, minor) = (raw.version.major, raw.version.minor);
+        if major != 1 || minor > 4 {
+            return Err(Error::new(
+                Kind::Unsupported,
+                format!("LAS of version \"{major}.{minor}\""),
+            )
+            .at("header")
+            .hint("versions 1.0 to 1.4 are read; convert it"));
+        }
+        let format = raw.point_data_record_format & !COMPRESSED_BITS;
+        let Some(layout) = Layout::of(format) else {
+            return Err(
+                Error::new(Kind::Unsupported, format!("point format \"{format}\""))
+                    .at("header")
+                    .hint("formats 0 to 10 are read; convert it"),
+            );
+        };
+        let record_len = usize::from(raw.point_data_record_length);
+        if record_len < layout.len {
+            return Err(Error::bad_input(format!(
+                "records of point format {format} need {} bytes, stated are \"{record_len}\"",
+                layout.len
+            ))
+            .at("header"));
+        }
+        let mut header = Self {
+            minor,
+            format,
+            compressed: raw.point_data_record_format & COMPRESSED_BITS != 0,
+            record_len,
+            n_points: 0,
+            scale: [raw.x_scale_factor, raw.y_scale_factor, raw.z_scale_factor],
+            offset: [raw.x_offset, raw.y_offset, raw.z_offset],
+            bounds: stated_bounds(&raw),
+            points_at: raw.offset_to_point_data as usize,
+            laszip: None,
+            copc: false,
+            software: text(&raw.generating_software),
+            notes: Vec::new(),
+        };
+        header.check_numbers()?;
+        header.check_lengths(&raw, data.len())?;
+        header.walk_records(&raw, data)?;
+        header.n_points = header.count(&raw, data.len())?;
+        if header.n_points > 0 && header.bounds.is_none() {
+            header
+                .notes
+                .push("the stated bounds make no sense and are not used".into());
+        }
+        Ok(header)
+    }
+
+    fn check_numbers(&self) -> Result<()> {
+        for axis in 0..3 {
+            let (scale, offset) = (self.scale[axis], self.offset[axis]);
+            if !scale.is_finite() || scale == 0.0 {
+                return Err(Error::bad_input(format!(
+                    "the scale of {} must be finite and not zero, it is \"{scale}\"",
+                    ["x", "y", "z"][axis]
+                ))
+                .at("header"));
+            }
+            if !offset.is_finite() {
+                return Err(Error::bad_input(format!(
+                    "the offset of {} must be finite, it is \"{offset}\"",
+                    ["x", "y", "z"][axis]
+                ))
+                .at("header"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_lengths(&self, raw: &las::raw::Header, n_bytes: usize) -> Result<()> {
+        let least = raw.version.header_size();
+        if raw.header_size < least {
+            return Err(Error::bad_input(format!(
+                "a header of version 1.{} has {least} bytes, stated are \"{}\"",
+                self.minor, raw.header_size
+            ))
+            .at("header"));
+        }
+        if self.points_at < usize::from(raw.header_size) || self.points_at > n_bytes {
+            return Err(Error::bad_input(format!(
+                "points would start outside the file of {n_bytes} bytes, at byte \"{}\"",
+                self.points_at
+            ))
+            .at("header")
+            .hint("the file is truncated or damaged; copy or export it again"));
+        }
+        Ok(())
+    }
+
+    /// Finds the records that matter among the variable length records; each is checked to lie before the points.
+    fn walk_records(&mut self, raw: &las::raw::Header, data: &[u8]) -> Result<()> {
+        let mut at = usize::from(raw.header_size);
+        for i in 0..raw.number_of_variable_length_records {
+            let end = at + VLR_HEADER;
+            if end > self.points_at {
+                self.notes.push(format!(
+                    "{} variable length records are stated, {i} are there",
+                    raw.number_of_variable_length_records
+                ));
+                break;
+            }
+            let n_payload = usize::from(u16::from_le_bytes([data[at + 20], data[at + 21]]));
+            if end + n_payload > self.points_at {
+                return Err(Error::bad_input(format!(
+                    "variable length record {i} reaches into the points, its length is \"{n_payload}\""
+                ))
+                .at(format!("byte {at}")));
+            }
+            let user = text(&data[at + 2..at + 18]);
+            let id = u16::from_le_bytes([data[at + 18], data[at + 19]]);
+            match (user.as_str(), id) {
+                (laz::LazVlr::USER_ID, laz::LazVlr::RECORD_ID) => {
+                    self.laszip = Some((end, n_payload))
+                }
+                ("copc", 1) => self.copc = true,
+                _ => {}
+            }
+            at = end + n_payload;
+        }
+        if self.compressed && self.laszip.is_none() {
+            return Err(Error::bad_input(
+                "points are marked as compressed, but the LASzip record is missing",
+            )
+            .at("variable length records"));
+        }
+        Ok(())
+    }
+
+    /// Number of points: the count that agrees with the bytes present, where a file states two that differ.
+    fn count(&mut self, raw: &las::raw::Header, n_bytes: usize) -> Result<u64> {
+        let old = u64::from(raw.number_of_point_records);
+        let new = raw
+            .large_file
+            .map_or(old, |large| large.number_of_point_records);
+        let room = (self.points_end(raw, n_bytes) - self.points_at) as u64;
+        // A compressed point takes at least something: the arithmetic coder spends a thousandth of a bit at best,
+        // so a count can only be checked against the chunk table; see `laz`.
+        let fits = |n: u64| {
+            self.compressed
+                || n.checked_mul(self.record_len as u64)
+                    .is_some_and(|b| b <= room)
+        };
+        let n = if new == 0 { old } else { new };
+        if old != 0 && new != 0 && old != new {
+            self.notes
+                .push(format!("the header states both {old} and {new} points"));
+            if !fits(new) && fits(old) {
+                return Ok(old);
+            }
+        }
+        if fits(n) {
+            return Ok(n);
+        }
+        let there = room / self.record_len as u64;
+        Err(Error::bad_input(format!(
+            "only {there} points are in the file, stated are \"{n}\""
+        ))
+        .at(format!("byte {n_bytes}"))
+        .hint("the file is truncated; copy or export it again"))
+    }
+
+    /// Where points end at the latest: before records that follow them, where the header says where these start.
+    fn points_end(&self, raw: &las::raw::Header, n_bytes: usize) -> usize {
+        let extended = raw
+            .evlr
+            .filter(|e| e.number_of_evlrs > 0)
+            .map(|e| e.start_of_first_evlr);
+        [raw.start_of_waveform_data_packet_record, extended]
+            .into_iter()
+            .flatten()
+            .filter_map(|at| usize::try_from(at).ok())
+            .filter(|at| *at >= self.points_at && *at <= n_bytes)
+            .min()
+            .unwrap_or(n_bytes)
+    }
+}
+
+fn stated_bounds(raw: &las::raw::Header) -> Option<Aabb> {
+    let (min, max) = (
+        [raw.min_x, raw.min_y, raw.min_z],
+        [raw.max_x, raw.max_y, raw.max_z],
+    );
+    let sane = (0..3).all(|a| min[a].is_finite() && max[a].is_finite() && min[a] <= max[a]);
+    sane.then(|| Aabb::of([min, max]))
+}
+
+/// Text of a field that is padded with zeros; other bytes than ASCII become `?`.
+fn text(field: &[u8]) -> String {
+    field
+        .iter()
+        .take_while(|b| **b != 0)
+        .map(|b| {
+            if b.is_ascii_graphic() || *b == b' ' {
+                char::from(*b)
+            } else {
+                '?'
+            }
+        })
+        .collect::<String>()
+        .trim_end()
+        .to_owned()
+}

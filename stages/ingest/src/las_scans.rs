@@ -1,0 +1,316 @@
+//! The records of a LAS or LAZ file and the scanners known for it in; its scans out: which source id belongs to
+//! which scanner, and where the origin lies when no scanner is known.
+
+use crate::las::Records;
+use crate::las_header::LasHeader;
+use crate::las_record::Layout;
+use crate::reader::ScanSeed;
+use crate::settings::Settings;
+use contract::{Error, Kind, Result};
+use geometry::{Aabb, Pose};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A scanner that stands for the points of a LAS or LAZ file, or for those of one source id in it.
+#[derive(Debug, Clone)]
+pub(crate) struct LasScanner {
+    /// Its points; `None` for the whole file.
+    pub(crate) source_id: Option<u16>,
+    /// Name for people.
+    pub(crate) name: Option<String>,
+    /// World from scan.
+    pub(crate) pose: Pose,
+    /// Whether it may be of another file: then it is left out where none of its points are seen.
+    pub(crate) may_be_elsewhere: bool,
+}
+
+/// The scans of one file.
+pub(crate) struct Found {
+    pub(crate) scans: Vec<ScanSeed>,
+    /// Scan of each source id, or empty where there is only one scan.
+    pub(crate) scan_of_source: Vec<u16>,
+    /// First and last place at which each scan was seen.
+    pub(crate) extents: Vec<(u64, u64)>,
+    /// Whether all points looked at lie inside the stated bounds.
+    pub(crate) bounds_hold: bool,
+}
+
+/// What is worse without scanner.
+pub(crate) const NO_SCANNER: &str = "the scanner's position is not known: no free-space evidence, so postures are less \
+     certain and wrong ones harder to refuse; give it with --scanners";
+
+/// Up to this many records, all source ids are looked at; beyond, only windows of them.
+const CENSUS_ALL: u64 = 20_000_000;
+/// Number of windows, and records in each.
+const CENSUS_WINDOWS: u64 = 512;
+const CENSUS_RECORDS: usize = 512;
+/// A scanner farther than this from the middle of its points is probably given in another frame, metres.
+const FAR_SCANNER: f64 = 2_000.0;
+
+/// What a look at the file shows.
+#[derive(Default)]
+struct Census {
+    /// First and last place of each source id.
+    ids: BTreeMap<u16, (u64, u64)>,
+    /// Whether every record was looked at.
+    complete: bool,
+}
+
+/// Finds the scans of a file.
+pub(crate) fn find(
+    path: &Path,
+    records: &Records,
+    scanners: &[LasScanner],
+    settings: &Settings,
+) -> Result<Found> {
+    let header = &records.header;
+    let look = look(records)?;
+    let whole = (0, header.n_points.saturating_sub(1));
+    let stem = path
+        .file_stem()
+        .map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let mut notes = header.notes.clone();
+    if look.bounds_wrong() && header.bounds.is_some() {
+        let (outside, n) = (look.outside, look.points.len());
+        notes.push(format!(
+            "the stated bounds are wrong: {outside} of {n} points looked at lie outside"
+        ));
+    }
+    let seed = |name: String, source_id: Option<u16>, pose: Option<Pose>| ScanSeed {
+        name,
+        mask: 0,
+        source_id,
+        world_from_scan: pose
+            .unwrap_or_else(|| Pose::translation(look.origin[0], look.origin[1], look.origin[2])),
+        scanner_known: pose.is_some(),
+        stated_bounds: header.bounds.filter(|_| !look.bounds_wrong()),
+        stated_points: None,
+        notes: notes.clone(),
+    };
+    let mut found = Found {
+        scans: Vec::new(),
+        scan_of_source: Vec::new(),
+        extents: Vec::new(),
+        bounds_hold: look.outside == 0 && header.bounds.is_some(),
+    };
+    if let Some(only) = scanners.iter().find(|s| s.source_id.is_none()) {
+        let mut scan = seed(only.name.clone().unwrap_or(stem), None, Some(only.pose));
+        scan.stated_points = Some(header.n_points);
+        found.scans.push(scan);
+        found.extents.push(whole);
+    } else if scanners.is_empty() {
+        let mut scan = seed(stem, None, None);
+        scan.stated_points = Some(header.n_points);
+        found.scans.push(scan);
+        found.extents.push(whole);
+    } else {
+        let census = census(records)?;
+        by_source_id(&mut found, scanners, &census, whole, &stem, seed);
+    }
+    for scan in &mut found.scans {
+        let far = look.far_from(scan.world_from_scan.translation.vector, settings.max_range);
+        if far > 0 && !scan.scanner_known {
+            scan.notes.push(format!(
+                "{far} of {} points looked at lie more than {} km from the middle: such points are dropped",
+                look.points.len(),
+                settings.max_range / 1000.0
+            ));
+        }
+        if scan.scanner_known {
+            check_distance(scan, look.middle, settings)?;
+        } else {
+            scan.notes.push(NO_SCANNER.into());
+        }
+    }
+    Ok(found)
+}
+
+fn by_source_id(
+    found: &mut Found,
+    scanners: &[LasScanner],
+    census: &Census,
+    whole: (u64, u64),
+    stem: &str,
+    seed: impl Fn(String, Option<u16>, Option<Pose>) -> ScanSeed,
+) {
+    /// Stands for "no scanner" until the number of the scan for the rest is known.
+    const NONE: u16 = u16::MAX;
+    let mut scan_of_source = vec![NONE; 1 << 16];
+    for scanner in scanners {
+        let Some(id) = scanner.source_id else {
+            continue;
+        };
+        let seen = census.ids.get(&id);
+        if seen.is_none() && (census.complete || scanner.may_be_elsewhere) {
+            continue;
+        }
+        scan_of_source[usize::from(id)] = found.scans.len() as u16;
+        let name = scanner
+            .name
+            .clone()
+            .unwrap_or_else(|| format!("{stem} {id}"));
+        found.scans.push(seed(name, Some(id), Some(scanner.pose)));
+        // Windows may miss its first and last points; a look between those seen is enough for a sample.
+        found.extents.push(seen.copied().unwrap_or(whole));
+    }
+    let rest = census
+        .ids
+        .keys()
+        .any(|id| scan_of_source[usize::from(*id)] == NONE);
+    if rest || !census.complete || found.scans.is_empty() {
+        let number = found.scans.len() as u16;
+        scan_of_source
+            .iter_mut()
+            .filter(|s| **s == NONE)
+            .for_each(|s| *s = number);
+        found.scans.push(seed(format!("{stem} (rest)"), None, None));
+        found.extents.push(whole);
+    }
+    found.scan_of_source = scan_of_source;
+}
+
+fn check_distance(
+    scan: &mut ScanSeed,
+    middle: Option<[f64; 3]>,
+    settings: &Settings,
+) -> Result<()> {
+    let Some(middle) = middle else { return Ok(()) };
+    let distance =
+        (nalgebra::Vector3::from(middle) - scan.world_from_scan.translation.vector).norm();
+    if distance > settings.max_range {
+        return Err(Error::new(
+            Kind::Usage,
+            format!(
+                "the scanner \"{}\" lies {distance:.0} m from its points",
+                scan.name
+            ),
+        )
+        .hint("give its position in the same frame as the points"));
+    }
+    if distance > FAR_SCANNER {
+        scan.notes.push(format!(
+            "the scanner lies {distance:.0} m from the middle of the points: is its position in their frame?"
+        ));
+    }
+    Ok(())
+}
+
+/// The stated bounds with some slack: writers round them, or leave a tenth of a unit out.
+pub(crate) fn grown(bounds: &Aabb, header: &LasHeader) -> Aabb {
+    let size = bounds.size();
+    let scale = header.scale.iter().fold(0.0_f64, |a, s| a.max(s.abs()));
+    bounds.grown(0.01 * size[0].max(size[1]).max(size[2]) + 2.0 * scale)
+}
+
+/// What a few records say of the place of all.
+struct Look {
+    /// World coordinates, metres.
+    points: Vec<[f64; 3]>,
+    /// How many of them lie outside the stated bounds.
+    outside: usize,
+    /// Their median.
+    middle: Option<[f64; 3]>,
+    /// Where to put the origin if no scanner is known: whole metres near the middle.
+    origin: [f64; 3],
+}
+
+impl Look {
+    fn bounds_wrong(&self) -> bool {
+        self.outside * 2 > self.points.len()
+    }
+
+    fn far_from(&self, origin: nalgebra::Vector3<f64>, max_range: f64) -> usize {
+        let far = |p: &[f64; 3]| (0..3).any(|a| (p[a] - origin[a]).abs() > max_range);
+        self.points.iter().filter(|p| far(p)).count()
+    }
+}
+
+fn look(records: &Records) -> Result<Look> {
+    const WINDOWS: u64 = 8;
+    const IN_WINDOW: usize = 256;
+    let header = &records.header;
+    let mut points = Vec::new();
+    let mut starts = Vec::new();
+    for window in 0..WINDOWS {
+        let first = header.n_points * window / WINDOWS;
+        if header.n_points == 0 || starts.contains(&records.start(first)) {
+            continue;
+        }
+        starts.push(records.start(first));
+        let (_, run) = records.run(first, IN_WINDOW)?;
+        let world = run
+            .chunks_exact(header.record_len)
+            .map(|r| world(r, header));
+        points.extend(world.filter(|p| p.iter().all(|v| v.is_finite())));
+    }
+    let bounds = header.bounds.as_ref().map(|b| grown(b, header));
+    let outside = points
+        .iter()
+        .filter(|p| !bounds.as_ref().is_some_and(|b| b.contains(**p)))
+        .count();
+    let middle = (!points.is_empty()).then(|| {
+        [0, 1, 2].map(|a| {
+            let mut values: Vec<f64> = points.iter().map(|p| p[a]).collect();
+            values.sort_by(f64::total_cmp);
+            values[values.len() / 2]
+        })
+    });
+    let mut look = Look {
+        points,
+        outside,
+        middle,
+        origin: [0.0; 3],
+    };
+    let stated = header.bounds.filter(|_| !look.bounds_wrong()).map(|b| {
+        let center = b.center();
+        [center.x, center.y, center.z]
+    });
+    look.origin = stated.or(middle).unwrap_or_default().map(f64::round);
+    Ok(look)
+}
+
+fn world(record: &[u8], header: &LasHeader) -> [f64; 3] {
+    [0, 1, 2].map(|a| {
+        let at = 4 * a;
+        let count =
+            i32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]);
+        f64::from(count) * header.scale[a] + header.offset[a]
+    })
+}
+
+/// Looks at the source ids: of all records where there are few, else of windows.
+fn census(records: &Records) -> Result<Census> {
+    let header = &records.header;
+    let layout = Layout::of(header.format).expect("the header was checked");
+    let mut census = Census::default();
+    let mut add = |first: u64, run: &[u8]| {
+        for (i, record) in run.chunks_exact(header.record_len).enumerate() {
+            let place = first + i as u64;
+            let extent = census
+                .ids
+                .entry(layout.source_id(record))
+                .or_insert((place, place));
+            *extent = (extent.0.min(place), extent.1.max(place));
+        }
+    };
+    let stream = records.laz.as_ref().is_some_and(|l| l.pieces.is_empty());
+    // Compressed records cost forty times as much to look at.
+    let all = if header.compressed {
+        CENSUS_ALL / 40
+    } else {
+        CENSUS_ALL
+    };
+    if header.n_points <= all || stream {
+        let n = usize::try_from(header.n_points.min(all)).expect("at most twenty million");
+        let (first, run) = records.run(0, n)?;
+        add(first, &run);
+        census.complete = header.n_points <= all;
+        return Ok(census);
+    }
+    for window in 0..CENSUS_WINDOWS {
+        let (first, run) =
+            records.run(header.n_points * window / CENSUS_WINDOWS, CENSUS_RECORDS)?;
+        add(first, &run);
+    }
+    Ok(census)
+}

@@ -1,0 +1,32 @@
+//! Files in, strips out: the only reader of point formats. Knows how files are read, and nothing of what is in them.
+#![deny(unsafe_code)]
+
+#[cfg(test)]
+mod check;
+mod e57;
+mod format;
+mod frame;
+mod inspect;
+mod las;
+mod las_header;
+mod las_record;
+mod las_scans;
+mod laz;
+mod map;
+mod ptx;
+mod raster;
+mod raster_free;
+mod raster_native;
+mod reader;
+mod scanners;
+mod settings;
+mod sources;
+mod text;
+
+pub use inspect::{
+    BoundsText, Description, Fact, LatticeText, PoseText, ScanDescription, describe,
+};
+pub use reader::Want;
+pub use scanners::{Scanner, Scanners};
+pub use settings::Settings;
+pub use sources::{Sources, Strips, open};

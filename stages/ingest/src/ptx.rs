@@ -1,0 +1,113 @@
+//! PTX (gridded text) files in; scans and their points out. A block a scan: columns, rows, four lines of the
+//! scanner's pose, the same as a 4 × 4 matrix, then a line a pixel, column by column.
+
+mod blocks;
+mod strips;
+#[cfg(test)]
+mod tests;
+
+use crate::Settings;
+use crate::frame::Frame;
+use crate::reader::{MaskSeed, RawStrips, Reader, Sampled, ScanSeed, Want};
+use contract::{Format, Result};
+use std::path::{Path, PathBuf};
+
+/// One scan of the file.
+#[derive(Debug, Clone)]
+struct Block {
+    /// Pixels of a column.
+    n_rows: u64,
+    /// Lines of points.
+    n_lines: u64,
+    /// Numbers of a line.
+    n_columns: usize,
+    /// Lines that are not `0 0 0`.
+    n_valid: u64,
+    /// Byte where the points begin, and the number of the line before.
+    points_at: (u64, u64),
+    /// From the file's coordinates to the scan frame.
+    frame: Frame,
+}
+
+/// An open PTX file.
+struct PtxFile {
+    path: PathBuf,
+    settings: Settings,
+    masks: Vec<MaskSeed>,
+    scans: Vec<ScanSeed>,
+    blocks: Vec<Block>,
+}
+
+/// Opens a PTX file. All lines are counted: only so can the scans after the first be found.
+pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> {
+    let mut file = PtxFile {
+        path: path.to_path_buf(),
+        settings: settings.clone(),
+        masks: Vec::new(),
+        scans: Vec::new(),
+        blocks: Vec::new(),
+    };
+    for (block, notes) in blocks::find(path)? {
+        let name = format!("scan {}", file.blocks.len() + 1);
+        file.masks.push(MaskSeed { name: name.clone(), n_points: Some(block.n_valid) });
+        file.scans.push(ScanSeed {
+            name,
+            mask: file.blocks.len(),
+            source_id: None,
+            world_from_scan: block.frame.world_from_scan,
+            scanner_known: block.frame.scanner_known,
+            stated_bounds: None,
+            stated_points: Some(block.n_valid),
+            notes,
+        });
+        file.blocks.push(block);
+    }
+    Ok(Box::new(file))
+}
+
+impl Reader for PtxFile {
+    fn format(&self) -> Format {
+        Format::Ptx
+    }
+
+    fn masks(&self) -> &[MaskSeed] {
+        &self.masks
+    }
+
+    fn scans(&self) -> &[ScanSeed] {
+        &self.scans
+    }
+
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+        strips::sample(self, scan, n)
+    }
+
+    fn strips(&self, want: Want) -> Result<RawStrips<'_>> {
+        Ok(Box::new(strips::Strips::new(self, want)))
+    }
+
+    fn facts(&self) -> Vec<(String, String)> {
+        let mut facts = vec![
+            ("version".into(), "PTX".into()),
+            ("records".into(), self.blocks.iter().map(|b| b.n_lines).sum::<u64>().to_string()),
+        ];
+        for (n, block) in self.blocks.iter().enumerate() {
+            let holds = match block.n_columns {
+                4 => ", intensity",
+                6 => ", colour",
+                7 => ", intensity, colour",
+                _ => "",
+            };
+            facts.push((
+                format!("scan {} fields", n + 1),
+                format!(
+                    "{} records, {} columns of {} rows, Cartesian{holds}, pose",
+                    block.n_lines,
+                    block.n_lines.checked_div(block.n_rows).unwrap_or(0),
+                    block.n_rows
+                ),
+            ));
+        }
+        facts
+    }
+}

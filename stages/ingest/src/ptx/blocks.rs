@@ -1,0 +1,216 @@
+//! A PTX file in; its blocks out: where each begins, its pose, how many lines hold a point. No point is kept.
+
+use super::Block;
+use crate::frame::{self, Frame};
+use crate::text::{Lines, numbers};
+use contract::{Error, Result};
+use geometry::Pose;
+use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use std::path::Path;
+
+/// Points that the scanner's reach is judged by.
+const N_JUDGED: usize = 64;
+/// Fewest bytes of a line of points: three digits, two spaces, an end (the last may lack it).
+const MIN_LINE: u64 = 6;
+/// How far a matrix may be from a rotation: files carry 4 to 6 digits.
+const RIGID: f64 = 1e-3;
+/// How far the stated scanner position may be from the matrix, metres, before it is mentioned.
+const SAME_POSITION: f64 = 1e-3;
+
+/// All blocks of the file, in its order, with what is missing in each.
+pub(super) fn find(path: &Path) -> Result<Vec<(Block, Vec<String>)>> {
+    let n_bytes = std::fs::metadata(path)?.len();
+    let mut lines = Lines::open(path, 0, 0)?;
+    let mut out = Vec::new();
+    while lines.advance()? {
+        out.push(block(&mut lines, n_bytes)?);
+    }
+    if out.is_empty() {
+        return Err(Error::bad_input(format!("file holds no scan, bytes \"{n_bytes}\"")));
+    }
+    Ok(out)
+}
+
+/// One block, from the line with its columns to its last point.
+fn block(lines: &mut Lines, n_bytes: u64) -> Result<(Block, Vec<String>)> {
+    let mut notes = Vec::new();
+    let n_cols = count(lines).map_err(|e| {
+        if lines.number() == 1 {
+            e
+        } else {
+            e.hint("the scan before may hold more points than it announces")
+        }
+    })?;
+    next(lines)?;
+    let n_rows = count(lines)?;
+    let n_lines =
+        n_rows.checked_mul(n_cols).filter(|n| *n <= (n_bytes - lines.end() + 1) / MIN_LINE);
+    let Some(n_lines) = n_lines else {
+        return Err(lines
+            .error(format!(
+                "file is too short for the announced columns and rows, \"{n_cols} x {n_rows}\""
+            ))
+            .hint("the file is truncated or its header lies: export it anew"));
+    };
+    let pose = pose(lines, &mut notes)?;
+    let points_at = (lines.end(), lines.number());
+    let (mut n_valid, mut n_columns) = (0, 0);
+    let mut first = Vec::new();
+    for n in 0..n_lines {
+        if !lines.advance()? {
+            return Err(lines
+                .error(format!("scan ends after {n} of its announced points, \"{n_lines}\""))
+                .hint("the file is truncated or its header lies: export it anew"));
+        }
+        if n == 0 {
+            n_columns = columns(lines)?;
+        }
+        if is_no_return(lines.line()) {
+            continue;
+        }
+        n_valid += 1;
+        if first.len() < N_JUDGED {
+            let mut p = [f64::NAN; 3];
+            // What is no number is refused when points are read; here it is only left out.
+            if numbers(lines.line(), &mut p).is_ok() && p.iter().all(|v| v.is_finite()) {
+                first.push(p);
+            }
+        }
+    }
+    let frame = if frame::within_reach(&first) {
+        Frame::of_scanner(pose)
+    } else {
+        notes.push(
+            "points lie farther from the scan's origin than any scanner reaches: the scanner is not known, so there \
+             is no free-space evidence"
+                .into(),
+        );
+        Frame::about(pose, frame::near(None, &first))
+    };
+    if n_valid == 0 {
+        notes.push("scan has no points".into());
+    }
+    Ok((Block { n_rows, n_lines, n_columns, n_valid, points_at, frame }, notes))
+}
+
+/// Goes to the next line of a header.
+fn next(lines: &mut Lines) -> Result<()> {
+    if lines.advance()? {
+        return Ok(());
+    }
+    Err(lines
+        .error("file ends within the header of a scan")
+        .hint("the file is truncated: copy it again"))
+}
+
+/// A line with one count.
+fn count(lines: &Lines) -> Result<u64> {
+    let [value] = lines.exactly()?;
+    if value < 0.0 || value.fract() != 0.0 || value > 1e12 {
+        return Err(lines.error(format!("number of columns or rows is no count, \"{value}\"")));
+    }
+    Ok(value as u64)
+}
+
+/// Scanner position, axes and matrix. Only the matrix counts; that the position differs is mentioned.
+fn pose(lines: &mut Lines, notes: &mut Vec<String>) -> Result<Pose> {
+    next(lines)?;
+    let position = Vector3::from(lines.exactly::<3>()?);
+    for _axis in 0..3 {
+        next(lines)?;
+        lines.exactly::<3>()?;
+    }
+    let mut rows = [[0.0; 4]; 4];
+    for row in &mut rows {
+        next(lines)?;
+        *row = lines.exactly()?;
+    }
+    let pose = rigid(rows).map_err(|e| e.at(format!("line {}", lines.number())))?;
+    if (pose.translation.vector - position).norm() > SAME_POSITION {
+        notes.push(format!(
+            "the stated scanner position differs from the matrix by {:.3} m: the matrix is used",
+            (pose.translation.vector - position).norm()
+        ));
+    }
+    Ok(pose)
+}
+
+/// World from the file's frame. PTX multiplies row vectors from the left: the first three rows are the axes of the
+/// scanner in the world, the last its position.
+fn rigid(rows: [[f64; 4]; 4]) -> Result<Pose> {
+    let axes = Matrix3::from_fn(|i, j| rows[j][i]);
+    let position = Vector3::new(rows[3][0], rows[3][1], rows[3][2]);
+    let way_out = "export the scans again without scaling, shearing or mirroring them";
+    if !axes.iter().chain(position.iter()).all(|v| v.is_finite()) {
+        return Err(Error::bad_input("matrix of the pose holds what is no number").hint(way_out));
+    }
+    let last = [rows[0][3], rows[1][3], rows[2][3], rows[3][3] - 1.0];
+    if last.iter().any(|v| v.abs() > RIGID) {
+        return Err(
+            Error::bad_input("last column of the pose's matrix is not \"0 0 0 1\"").hint(way_out)
+        );
+    }
+    let scale = axes.determinant().cbrt();
+    let residual = (axes.transpose() * axes - Matrix3::identity()).amax();
+    if residual > 2.0 * RIGID || scale < 0.0 {
+        let sheared =
+            (axes.transpose() * axes - Matrix3::identity() * scale * scale).amax() > 2.0 * RIGID;
+        let what = match (scale > 0.0, sheared) {
+            (false, _) => format!(
+                "matrix of the pose mirrors or flattens, its determinant is \"{}\"",
+                scale.powi(3)
+            ),
+            (true, true) => {
+                format!("matrix of the pose is no rotation, it is off by \"{residual}\"")
+            }
+            (true, false) => format!("matrix of the pose scales, by \"{scale}\""),
+        };
+        return Err(Error::bad_input(what).hint(way_out));
+    }
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_eps(
+        &axes,
+        1e-15,
+        100,
+        Rotation3::from_matrix_unchecked(axes),
+    ));
+    Ok(Pose::from_parts(Translation3::from(position), rotation))
+}
+
+/// How many numbers a line of points has in this block.
+fn columns(lines: &Lines) -> Result<usize> {
+    match numbers(lines.line(), &mut [0.0; 7]) {
+        Ok(n @ (3 | 4 | 6 | 7)) => Ok(n),
+        Ok(n) => {
+            Err(lines.error(format!("line of a point must hold 3, 4, 6 or 7 numbers, not \"{n}\"")))
+        }
+        Err(word) => Err(lines
+            .error(format!("not a number, \"{word}\""))
+            .hint("numbers need a decimal point, not a comma")),
+    }
+}
+
+/// Whether a line is that of a beam without return, `0 0 0 …`: the file's way to flag it.
+pub(super) fn is_no_return(line: &[u8]) -> bool {
+    let mut n_zeros = 0;
+    let mut within = false;
+    let mut digits = 0;
+    for byte in line {
+        match byte {
+            b'0' => (within, digits) = (true, digits + 1),
+            b'.' | b'-' | b'+' => within = true,
+            b' ' | b'\t' | b'\r' if within => {
+                if digits == 0 {
+                    return false;
+                }
+                (n_zeros, within, digits) = (n_zeros + 1, false, 0);
+                if n_zeros == 3 {
+                    return true;
+                }
+            }
+            b' ' | b'\t' => {}
+            // `0e0` is a zero too, but no program writes it: it is then a point at the scanner.
+            _ => return false,
+        }
+    }
+    n_zeros == 2 && digits > 0
+}

@@ -1,0 +1,182 @@
+//! Lines of all blocks of a PTX file in, strips in its order out.
+
+use super::{Block, PtxFile, blocks};
+use crate::reader::{RawStrip, Sampled, Want};
+use crate::text::{Lines, numbers};
+use contract::{Attributes, Result};
+use geometry::Point;
+
+/// Lines of a scan that a sample is spread over: half a second of parsing.
+const N_SAMPLED_FROM: u64 = 2_000_000;
+/// Runs of a sample.
+const N_RUNS: u64 = 4;
+/// Most places that a strip spans, so that they fit 32 bits.
+const MAX_SPAN: u64 = 1 << 31;
+
+/// Points of one block, a line at a time.
+struct Points<'a> {
+    block: &'a Block,
+    lines: Lines,
+    /// Lines read.
+    n_read: u64,
+    /// Numbers of the current line.
+    values: [f64; 7],
+}
+
+impl<'a> Points<'a> {
+    /// Before the first point of a block.
+    fn open(file: &PtxFile, block: &'a Block) -> Result<Self> {
+        let (byte, line) = block.points_at;
+        Ok(Self { block, lines: Lines::open(&file.path, byte, line)?, n_read: 0, values: [0.0; 7] })
+    }
+
+    /// Goes to the next line that the file does not flag as a beam without return; false after the block's last.
+    /// Only the first `n_wanted` numbers are parsed.
+    fn advance(&mut self, n_wanted: usize) -> Result<bool> {
+        while self.n_read < self.block.n_lines {
+            if !self.lines.advance()? {
+                return Err(self.lines.error("file became shorter while it was read"));
+            }
+            self.n_read += 1;
+            if blocks::is_no_return(self.lines.line()) {
+                continue;
+            }
+            let n = numbers(self.lines.line(), &mut self.values[..n_wanted]).map_err(|word| {
+                self.lines
+                    .error(format!("not a number, \"{word}\""))
+                    .hint("numbers need a decimal point, not a comma")
+            })?;
+            if n != self.block.n_columns {
+                return Err(self.lines.error(format!(
+                    "line holds not {} numbers as the scan's first, but \"{n}\"",
+                    self.block.n_columns
+                )));
+            }
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    /// The current point in the scan frame, metres; `None` where it is broken.
+    fn xyz(&self, max_range: f64) -> Option<[f64; 3]> {
+        let p = self.block.frame.scan_from_file([self.values[0], self.values[1], self.values[2]]);
+        p.iter().all(|v| v.abs() <= max_range).then_some(p)
+    }
+
+    /// Column-major: row and column of the current point.
+    fn native(&self) -> Option<[u32; 2]> {
+        let at = self.n_read - 1;
+        let rows = self.block.n_rows;
+        Some([u32::try_from(at % rows).ok()?, u32::try_from(at / rows).ok()?])
+    }
+}
+
+/// Strips of one file.
+pub(super) struct Strips<'a> {
+    file: &'a PtxFile,
+    want: Want,
+    /// Scan being read, and its points once open.
+    scan: usize,
+    points: Option<Points<'a>>,
+    /// Place in the mask of the next valid point.
+    place: u64,
+    done: bool,
+}
+
+impl<'a> Strips<'a> {
+    /// At the first point of the file.
+    pub(super) fn new(file: &'a PtxFile, want: Want) -> Self {
+        Self { file, want, scan: 0, points: None, place: 0, done: false }
+    }
+
+    /// The next strip that holds a point; `None` after the last scan.
+    fn read(&mut self) -> Result<Option<RawStrip>> {
+        while let Some(block) = self.file.blocks.get(self.scan) {
+            let strip = self.read_block(block)?;
+            if strip.is_some() {
+                return Ok(strip);
+            }
+            (self.scan, self.points, self.place) = (self.scan + 1, None, 0);
+        }
+        Ok(None)
+    }
+
+    /// The next strip of this block; `None` at its end.
+    fn read_block(&mut self, block: &'a Block) -> Result<Option<RawStrip>> {
+        let points = match &mut self.points {
+            Some(points) => points,
+            none => none.insert(Points::open(self.file, block)?),
+        };
+        let settings = &self.file.settings;
+        let mut strip = RawStrip {
+            scan: self.scan,
+            first_place: self.place,
+            place: Vec::new(),
+            xyz: Vec::new(),
+            attributes: (self.want == Want::Everything).then(Attributes::default),
+        };
+        let n_wanted = if self.want == Want::Everything { 7 } else { 3 };
+        while strip.xyz.len() < settings.strip_points
+            && (strip.xyz.is_empty() || self.place - strip.first_place < MAX_SPAN)
+            && points.advance(n_wanted)?
+        {
+            if let Some(p) = points.xyz(settings.max_range) {
+                if strip.place.is_empty() {
+                    strip.first_place = self.place;
+                }
+                strip.place.push((self.place - strip.first_place) as u32);
+                strip.xyz.push(p.map(|v| v as f32));
+                if let Some(attributes) = &mut strip.attributes {
+                    push(attributes, points, p);
+                }
+            }
+            self.place += 1;
+        }
+        Ok((!strip.xyz.is_empty()).then_some(strip))
+    }
+}
+
+impl Iterator for Strips<'_> {
+    type Item = Result<RawStrip>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.done {
+            return None;
+        }
+        let strip = self.read().transpose();
+        self.done = !matches!(strip, Some(Ok(_)));
+        strip
+    }
+}
+
+/// Adds what the current line says of its point beside the coordinates.
+fn push(attributes: &mut Attributes, points: &Points<'_>, p: [f64; 3]) {
+    attributes.world.push((points.block.frame.world_from_scan * Point::from(p)).coords.into());
+    // `as` cuts at both ends, and no number becomes 0. Intensity is 0..1, colour 0..255.
+    if let 4 | 7 = points.block.n_columns {
+        attributes.intensity.push((points.values[3] * 65_535.0).round() as u16);
+    }
+    if let n @ (6 | 7) = points.block.n_columns {
+        attributes
+            .color
+            .push([n - 3, n - 2, n - 1].map(|i| (points.values[i] * 257.0).round() as u16));
+    }
+}
+
+/// Up to `n` valid points of a scan in a few runs.
+pub(super) fn sample(file: &PtxFile, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+    let mut out = Vec::new();
+    let block = &file.blocks[scan];
+    let spread = block.n_lines.clamp(1, N_SAMPLED_FROM);
+    let mut points = Points::open(file, block)?;
+    while out.len() < n && points.advance(3)? {
+        // How many the runs begun so far may hold: run k begins at k/N_RUNS of the lines.
+        let run = ((points.n_read - 1) * N_RUNS / spread + 1).min(N_RUNS) as usize;
+        if out.len() < n * run / N_RUNS as usize
+            && let Some(p) = points.xyz(file.settings.max_range)
+        {
+            out.push(Sampled { xyz: p.map(|v| v as f32), native: points.native() });
+        }
+    }
+    Ok(out)
+}

@@ -1,0 +1,140 @@
+//! A sample of a scan's points in; the angular raster that suits it out: from native rows and columns where they are
+//! regular, else from the directions of the points. Never finer than about one point a pixel.
+
+use crate::raster_free;
+use crate::raster_native;
+use crate::reader::Sampled;
+use crate::settings::Settings;
+use contract::Lattice;
+use nalgebra::{UnitQuaternion, Vector3};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+/// Where the steps of a lattice come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Steps {
+    /// Native rows and columns: they map to pixels one to one.
+    Native,
+    /// Native rows and columns, but they are not regular: a pixel may hold two returns or none.
+    Irregular,
+    /// The directions of the points.
+    Directions,
+    /// There is no lattice.
+    None,
+}
+
+/// A lattice, and where its steps come from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Raster {
+    pub(crate) lattice: Lattice,
+    pub(crate) steps: Steps,
+}
+
+/// Fewer points than this tell nothing about a raster.
+const MIN_POINTS: usize = 64;
+/// Native rows and columns worse than this are not used at all, pixels RMS.
+const MAX_IRREGULAR: f64 = 2.5;
+
+/// The raster of a scan from a sample of it, as runs of neighbours in the order of the file; `n_total` is the number
+/// of points of the scan. `None` where there are too few points to tell.
+pub(crate) fn estimate(
+    sample: &[Sampled],
+    n_total: Option<u64>,
+    settings: &Settings,
+) -> Option<Raster> {
+    let sample: Vec<Sampled> = sample
+        .iter()
+        .copied()
+        .filter(|s| s.xyz.iter().any(|v| *v != 0.0))
+        .collect();
+    if sample.len() < MIN_POINTS {
+        return None;
+    }
+    let native = raster_native::fit(&sample);
+    if let Some(native) = native.filter(|n| n.rms < MAX_IRREGULAR) {
+        let regular = native.rms < settings.max_native_rms;
+        let steps = if regular {
+            Steps::Native
+        } else {
+            Steps::Irregular
+        };
+        return Some(Raster {
+            lattice: lattice(&native.grid, settings),
+            steps,
+        });
+    }
+    let grid = raster_free::fit(&sample, n_total)?;
+    Some(Raster {
+        lattice: lattice(&grid, settings),
+        steps: Steps::Directions,
+    })
+}
+
+/// Steps and one pixel's middle, about one axis; radians.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Grid {
+    pub(crate) axis: Axis,
+    pub(crate) row_step: f64,
+    pub(crate) col_step: f64,
+    pub(crate) elevation: f64,
+    pub(crate) azimuth: f64,
+}
+
+fn lattice(grid: &Grid, settings: &Settings) -> Lattice {
+    let clamp = |step: f64| step.abs().clamp(settings.min_step, settings.max_step);
+    let mut lattice = Lattice::new(
+        clamp(grid.row_step),
+        clamp(grid.col_step),
+        grid.elevation,
+        wrap(grid.azimuth),
+    );
+    lattice.lattice_from_scan = grid.axis.lattice_from_scan();
+    lattice
+}
+
+/// Which axis of the scan frame the scanner spins about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Axis {
+    /// The usual one first: it is preferred where several fit.
+    pub(crate) const ALL: [Self; 3] = [Self::Z, Self::Y, Self::X];
+
+    /// Turns this axis into z.
+    pub(crate) fn lattice_from_scan(self) -> UnitQuaternion<f64> {
+        match self {
+            Self::Z => UnitQuaternion::identity(),
+            Self::Y => UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2),
+            Self::X => UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -FRAC_PI_2),
+        }
+    }
+
+    /// Azimuth and elevation about this axis, radians.
+    pub(crate) fn angles(self, p: [f32; 3]) -> [f64; 2] {
+        let [x, y, z] = p.map(f64::from);
+        let [x, y, z] = match self {
+            Self::Z => [x, y, z],
+            Self::Y => [x, -z, y],
+            Self::X => [-z, y, x],
+        };
+        [y.atan2(x), z.atan2(x.hypot(y))]
+    }
+}
+
+/// An angle in [−π, π).
+pub(crate) fn wrap(angle: f64) -> f64 {
+    (angle + PI).rem_euclid(TAU) - PI
+}
+
+/// The middle one, or the upper of two.
+pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+#[path = "raster_tests.rs"]
+mod tests;

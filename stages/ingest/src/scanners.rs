@@ -1,0 +1,177 @@
+//! The file of `--scanners` in (TOML or JSON); scanner poses out, world from scan, each checked.
+
+use crate::settings::Settings;
+use contract::{Error, Kind, Result};
+use geometry::Pose;
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use serde::Deserialize;
+use std::io::Read as _;
+use std::path::Path;
+
+/// A scanner whose pose the user knows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scanner {
+    /// LAS point source id of its points.
+    pub point_source_id: Option<u16>,
+    /// Name of its scan, or of its file without suffix.
+    pub name: Option<String>,
+    /// World from scan, metres.
+    pub world_from_scan: Pose,
+}
+
+/// The poses of scanners, for formats that carry none.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Scanners {
+    /// In the order of the file.
+    pub entries: Vec<Scanner>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileText {
+    scanner: Vec<EntryText>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EntryText {
+    point_source_id: Option<u16>,
+    name: Option<String>,
+    position: [f64; 3],
+    quaternion_wxyz: Option<[f64; 4]>,
+}
+
+impl Scanners {
+    /// Reads a file: JSON if it starts with `{`, else TOML.
+    ///
+    /// # Errors
+    /// What cannot be read, is unknown, not finite, or stated twice is refused, with its place.
+    pub fn read(path: &Path) -> Result<Self> {
+        let most = Settings::default().max_scanners_bytes;
+        let mut text = String::new();
+        let read =
+            std::fs::File::open(path).and_then(|f| f.take(most + 1).read_to_string(&mut text));
+        match read {
+            Err(cause) if cause.kind() == std::io::ErrorKind::InvalidData => {
+                return Err(Error::bad_input("the file is not text").at(path.display()));
+            }
+            Err(cause) => return Err(Error::from(cause).at(path.display())),
+            Ok(n) if n as u64 > most => {
+                return Err(Error::bad_input(format!("more than {most} bytes")).at(path.display()));
+            }
+            Ok(_) => {}
+        }
+        Self::parse(&text).map_err(|e| e.at(path.display()))
+    }
+
+    /// Reads the text of such a file.
+    ///
+    /// # Errors
+    /// As [`Scanners::read`].
+    pub fn parse(text: &str) -> Result<Self> {
+        const HINT: &str =
+            "an entry has position, and may have name, point_source_id and quaternion_wxyz";
+        let file: FileText = if text.trim_start().starts_with('{') {
+            serde_json::from_str(text)
+                .map_err(|e| Error::bad_input("wrong JSON").because(e).hint(HINT))?
+        } else {
+            toml::from_str(text)
+                .map_err(|e| Error::bad_input("wrong TOML").because(e).hint(HINT))?
+        };
+        let mut entries: Vec<Scanner> = Vec::new();
+        for (i, entry) in file.scanner.into_iter().enumerate() {
+            let entry = entry
+                .check()
+                .map_err(|e| e.at(format!("scanner {}", i + 1)))?;
+            let twin =
+                |e: &Scanner| e.point_source_id == entry.point_source_id && e.name == entry.name;
+            if let Some(twin) = entries.iter().position(twin) {
+                return Err(Error::new(
+                    Kind::BadInput,
+                    format!(
+                        "has the same name and point_source_id as scanner \"{}\"",
+                        twin + 1
+                    ),
+                )
+                .at(format!("scanner {}", i + 1)));
+            }
+            entries.push(entry);
+        }
+        Ok(Self { entries })
+    }
+}
+
+impl EntryText {
+    fn check(self) -> Result<Scanner> {
+        if let Some(bad) = self.position.iter().find(|v| !v.is_finite()) {
+            return Err(Error::bad_input(format!(
+                "position must be finite, not \"{bad}\""
+            )));
+        }
+        let turn = match self.quaternion_wxyz {
+            None => UnitQuaternion::identity(),
+            Some(q) => {
+                let [w, x, y, z] = q;
+                let norm = (w * w + x * x + y * y + z * z).sqrt();
+                if !norm.is_finite() || norm < 1e-6 {
+                    return Err(Error::bad_input(format!(
+                        "quaternion_wxyz is no rotation: \"{q:?}\""
+                    )));
+                }
+                UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+            }
+        };
+        let [x, y, z] = self.position;
+        Ok(Scanner {
+            point_source_id: self.point_source_id,
+            name: self.name,
+            world_from_scan: Pose::from_parts(Translation3::new(x, y, z), turn),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn toml_and_json_say_the_same() {
+        let toml = "[[scanner]]\npoint_source_id = 1\nname = 'a'\nposition = [4.9, 1, 1.5]\n\
+                    quaternion_wxyz = [0.876, 0, 0, 0.482]\n[[scanner]]\nposition = [0, 0, 0.0]\n";
+        let json = r#"{"scanner": [{"point_source_id": 1, "name": "a", "position": [4.9, 1, 1.5],
+                       "quaternion_wxyz": [0.876, 0, 0, 0.482]}, {"position": [0, 0, 0]}]}"#;
+        let (a, b) = (
+            Scanners::parse(toml).unwrap(),
+            Scanners::parse(json).unwrap(),
+        );
+        assert_eq!(a, b);
+        assert_eq!(a.entries.len(), 2);
+        assert!((a.entries[0].world_from_scan.rotation.norm() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn wrong_entries_are_named() {
+        for (text, word) in [
+            ("[[scanner]]\nposition = [0, 0, nan]", "finite"),
+            (
+                "[[scanner]]\nposition = [0, 0, 0]\nquaternion_wxyz = [0, 0, 0, 0]",
+                "rotation",
+            ),
+            ("[[scanner]]\nposition = [0, 0, 0]\npose = 1", "pose"),
+            ("[[scanner]]\nposition = [0, 0]", "TOML"),
+            (
+                "[[scanner]]\nposition = [0,0,0]\npoint_source_id = 70000",
+                "TOML",
+            ),
+            (
+                "[[scanner]]\nposition = [0,0,0]\n[[scanner]]\nposition = [0,0,0]",
+                "same name",
+            ),
+            ("{", "JSON"),
+            ("", "scanner"),
+        ] {
+            let error = Scanners::parse(text).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+}

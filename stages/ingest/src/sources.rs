@@ -1,0 +1,325 @@
+//! Paths in; open inputs out, numbered over all of them: inputs, masks, scans with their lattices, and the strips of
+//! each input on request.
+
+use crate::format::detect;
+use crate::las::Las;
+use crate::las_scans::LasScanner;
+use crate::raster::{self, Steps};
+use crate::reader::{RawStrip, Reader, Sampled, ScanSeed, Want};
+use crate::scanners::{Scanner, Scanners};
+use crate::settings::Settings;
+use contract::{Error, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip};
+use geometry::Pose;
+use std::path::{Path, PathBuf};
+
+/// Strips of one input, in its order.
+pub type Strips<'a> = Box<dyn Iterator<Item = Result<Strip>> + Send + 'a>;
+
+/// Open inputs: headers read and checked, points not yet.
+pub struct Sources {
+    /// In the order of the command line.
+    pub inputs: Vec<Input>,
+    /// In the order of the inputs.
+    pub masks: Vec<Mask>,
+    /// In the order of the inputs.
+    pub scans: Vec<Scan>,
+    /// What is odd about inputs and scanners, in words.
+    pub warnings: Vec<String>,
+    pub(crate) files: Vec<File>,
+}
+
+/// One open file.
+pub(crate) struct File {
+    pub(crate) reader: Box<dyn Reader>,
+    first_scan: u32,
+    first_mask: u32,
+    /// For each scan whose pose the user replaced: its new scan frame from that of the file.
+    moved: Vec<Option<Pose>>,
+    /// For each scan: whether its scanner's position is known.
+    pub(crate) known: Vec<bool>,
+    /// For each scan: where the steps of its lattice come from.
+    pub(crate) steps: Vec<Steps>,
+}
+
+/// Opens inputs: finds out what each is, reads and checks its header, and makes the lattices of scans whose scanner
+/// is known from a sample of their points.
+///
+/// # Errors
+/// The first input, in their order, that is broken or not read at all; the place starts with its path.
+pub fn open(
+    paths: &[PathBuf],
+    scanners: Option<&Scanners>,
+    settings: &Settings,
+) -> Result<Sources> {
+    let mut sources = Sources {
+        inputs: Vec::new(),
+        masks: Vec::new(),
+        scans: Vec::new(),
+        warnings: Vec::new(),
+        files: Vec::new(),
+    };
+    if paths.is_empty() {
+        return Err(
+            Error::new(Kind::Usage, "no input was given").hint("name at least one scan file")
+        );
+    }
+    let none = Scanners::default();
+    let mut poses = Poses::new(scanners.unwrap_or(&none), paths);
+    for path in paths {
+        sources
+            .add(path, &mut poses, settings)
+            .map_err(|e| e.at(path.display()))?;
+    }
+    sources.warnings.extend(poses.unused());
+    Ok(sources)
+}
+
+impl Sources {
+    /// The points of an input, in its order; with everything that the file says of them, or coordinates only.
+    ///
+    /// # Errors
+    /// An input that does not exist. Errors of the iterator name file and place; it ends after the first.
+    pub fn strips(&self, input: InputId, want: Want) -> Result<Strips<'_>> {
+        let at = input.0 as usize;
+        let (Some(file), Some(known)) = (self.files.get(at), self.inputs.get(at)) else {
+            return Err(Error::new(Kind::Bug, format!("there is no input \"{at}\"")));
+        };
+        let path = &known.path;
+        let strips = file.reader.strips(want).map_err(|e| e.at(path.display()))?;
+        Ok(Box::new(strips.map(move |strip| match strip {
+            Ok(raw) => Ok(file.number(raw)),
+            Err(error) => Err(error.at(path.display())),
+        })))
+    }
+
+    fn add(&mut self, path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<()> {
+        let meta = std::fs::metadata(path)?;
+        if meta.is_dir() {
+            return Err(
+                Error::new(Kind::Usage, "this is a folder").hint("name the scan files in it")
+            );
+        }
+        let reader = open_file(path, poses, settings)?;
+        let id = InputId(self.inputs.len() as u32);
+        let (first_scan, first_mask) = (self.scans.len() as u32, self.masks.len() as u32);
+        self.inputs.push(Input {
+            id,
+            path: path.to_owned(),
+            format: reader.format(),
+            n_bytes: meta.len(),
+        });
+        for (i, mask) in reader.masks().iter().enumerate() {
+            self.masks.push(Mask {
+                id: MaskId(first_mask + i as u32),
+                input: id,
+                name: mask.name.clone(),
+                n_points: mask.n_points,
+            });
+        }
+        let mut file = File {
+            reader,
+            first_scan,
+            first_mask,
+            moved: Vec::new(),
+            known: Vec::new(),
+            steps: Vec::new(),
+        };
+        for i in 0..file.reader.scans().len() {
+            let mut scan = self.scan(id, &mut file, i, poses);
+            let (lattice, steps) = file.lattice(i, &mut scan, settings)?;
+            scan.lattice = lattice;
+            file.steps.push(steps);
+            self.scans.push(scan);
+        }
+        self.files.push(file);
+        Ok(())
+    }
+
+    /// A scan of a file, without its lattice.
+    fn scan(&self, input: InputId, file: &mut File, i: usize, poses: &mut Poses<'_>) -> Scan {
+        let seed = &file.reader.scans()[i];
+        let mut scan = Scan {
+            id: ScanId(file.first_scan + i as u32),
+            input,
+            mask: MaskId(file.first_mask + seed.mask as u32),
+            name: seed.name.clone(),
+            source_id: seed.source_id,
+            world_from_scan: seed.world_from_scan,
+            lattice: None,
+            stated_bounds: seed.stated_bounds,
+            stated_points: seed.stated_points,
+            notes: seed.notes.clone(),
+        };
+        let replaced = match file.reader.format() {
+            Format::Las | Format::Laz => None,
+            Format::E57 | Format::Ptx => poses.by_scan_name(&seed.name),
+        };
+        file.moved
+            .push(replaced.map(|pose| pose.inverse() * seed.world_from_scan));
+        if let Some(pose) = replaced {
+            scan.world_from_scan = pose;
+            scan.notes
+                .push("the scanner's position is that of --scanners, not of the file".into());
+        }
+        scan
+    }
+}
+
+impl File {
+    fn number(&self, mut raw: RawStrip) -> Strip {
+        let seed: &ScanSeed = &self.reader.scans()[raw.scan];
+        if let Some(new_from_file) = &self.moved[raw.scan] {
+            raw.xyz
+                .iter_mut()
+                .for_each(|p| *p = moved(new_from_file, *p));
+        }
+        Strip {
+            scan: ScanId(self.first_scan + raw.scan as u32),
+            mask: MaskId(self.first_mask + seed.mask as u32),
+            first_place: raw.first_place,
+            place: raw.place,
+            xyz: raw.xyz,
+            attributes: raw.attributes,
+        }
+    }
+
+    fn lattice(
+        &mut self,
+        i: usize,
+        scan: &mut Scan,
+        settings: &Settings,
+    ) -> Result<(Option<contract::Lattice>, Steps)> {
+        let known = self.reader.scans()[i].scanner_known || self.moved[i].is_some();
+        self.known.push(known);
+        if !known || scan.stated_points == Some(0) {
+            return Ok((None, Steps::None));
+        }
+        let mut sample: Vec<Sampled> = self.reader.sample(i, settings.sample_points)?;
+        if let Some(new_from_file) = &self.moved[i] {
+            sample
+                .iter_mut()
+                .for_each(|s| s.xyz = moved(new_from_file, s.xyz));
+        }
+        let Some(raster) = raster::estimate(&sample, scan.stated_points, settings) else {
+            if !sample.is_empty() {
+                scan.notes.push(
+                    "too few points to tell the raster: no free-space evidence from this scan"
+                        .into(),
+                );
+            }
+            return Ok((None, Steps::None));
+        };
+        Ok((Some(raster.lattice), raster.steps))
+    }
+}
+
+fn moved(pose: &Pose, p: [f32; 3]) -> [f32; 3] {
+    let q = pose * nalgebra::Point3::from(p.map(f64::from));
+    [q.x as f32, q.y as f32, q.z as f32]
+}
+
+fn open_file(path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<Box<dyn Reader>> {
+    match detect(path)? {
+        Format::E57 => crate::e57::open(path, settings),
+        Format::Ptx => crate::ptx::open(path, settings),
+        Format::Las | Format::Laz => Ok(Box::new(Las::open(path, &poses.of_las(path), settings)?)),
+    }
+}
+
+/// The scanners that the user gave, and which of them were of use.
+struct Poses<'a> {
+    entries: &'a [Scanner],
+    used: Vec<bool>,
+    /// Names of the inputs without suffix.
+    stems: Vec<String>,
+    /// Whether there are several inputs, so that an entry may be meant for another one.
+    several: bool,
+}
+
+impl<'a> Poses<'a> {
+    fn new(scanners: &'a Scanners, paths: &[PathBuf]) -> Self {
+        Self {
+            entries: &scanners.entries,
+            used: vec![false; scanners.entries.len()],
+            stems: paths.iter().map(|p| stem(p)).collect(),
+            several: paths.len() > 1,
+        }
+    }
+
+    fn by_scan_name(&mut self, name: &str) -> Option<Pose> {
+        let at = self
+            .entries
+            .iter()
+            .position(|e| e.name.as_deref() == Some(name))?;
+        self.used[at] = true;
+        Some(self.entries[at].world_from_scan)
+    }
+
+    /// The scanners of a LAS or LAZ file: entries of its name; else those with a source id whose name is not that of
+    /// another input; else the only entry there is.
+    fn of_las(&mut self, path: &Path) -> Vec<LasScanner> {
+        let stem = stem(path);
+        let named = |e: &Scanner| e.name.as_deref() == Some(stem.as_str());
+        let for_another = |e: &Scanner| e.name.as_ref().is_some_and(|n| self.stems.contains(n));
+        let by_id = |e: &Scanner| e.point_source_id.is_some() && !for_another(e);
+        let only =
+            |e: &Scanner| self.entries.len() == 1 && e.point_source_id.is_none() && !for_another(e);
+        let whole = |e: &Scanner| named(e) && e.point_source_id.is_none();
+        let chosen: Vec<usize> = match self.entries.iter().position(whole) {
+            Some(at) => vec![at],
+            None => {
+                let fits =
+                    |e: &Scanner| (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e);
+                (0..self.entries.len())
+                    .filter(|i| fits(&self.entries[*i]))
+                    .collect()
+            }
+        };
+        let mut scanners: Vec<LasScanner> = Vec::new();
+        for at in chosen {
+            let entry = &self.entries[at];
+            self.used[at] = true;
+            // An entry of this file's name goes before one that only shares the id.
+            let twin = scanners
+                .iter()
+                .position(|s| s.source_id == entry.point_source_id);
+            let scanner = LasScanner {
+                source_id: entry.point_source_id,
+                name: entry.name.clone(),
+                pose: entry.world_from_scan,
+                may_be_elsewhere: self.several && !named(entry),
+            };
+            match twin {
+                Some(twin) if named(entry) => scanners[twin] = scanner,
+                Some(_) => {}
+                None => scanners.push(scanner),
+            }
+        }
+        scanners
+    }
+
+    fn unused(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for (i, entry) in self
+            .entries
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !self.used[*i])
+        {
+            let id = entry
+                .point_source_id
+                .map_or_else(String::new, |id| format!(", point_source_id {id}"));
+            let name = entry.name.as_deref().unwrap_or("no name");
+            warnings.push(format!(
+                "scanner {} ({name}{id}) of --scanners matches no scan and no file",
+                i + 1
+            ));
+        }
+        warnings
+    }
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .map_or_else(String::new, |s| s.to_string_lossy().into_owned())
+}

@@ -1,0 +1,21 @@
+//! Tiles in, surfaces out: veils, normals, planar patches and occupied space of one tile at a time. Knows nothing
+//! of other tiles; what spans them is joined by floor and cluster.
+#![forbid(unsafe_code)]
+
+mod links;
+mod noise;
+mod normals;
+mod occupied;
+mod patch;
+mod raster;
+mod regions;
+mod settings;
+mod summarise;
+mod view;
+mod voxels;
+
+pub use normals::normals;
+pub use raster::veils;
+pub use settings::Settings;
+pub use summarise::{Scratch, Summarise};
+pub use view::{Extent, ViewBuilder, ViewSettings};

@@ -1,0 +1,202 @@
+//! A raster in, its links out: which neighbouring pixels see one surface, and which pixels see none (veils).
+
+use crate::Settings;
+use crate::raster::{NONE, PIXELS, Raster, SIDE};
+
+/// Towards lower columns.
+pub(crate) const LEFT: usize = 0;
+/// Towards higher columns.
+pub(crate) const RIGHT: usize = 1;
+/// Towards lower rows.
+pub(crate) const DOWN: usize = 2;
+/// Towards higher rows.
+pub(crate) const UP: usize = 3;
+/// The neighbour is there, but sees another surface.
+pub(crate) const BROKEN: u8 = 0x80;
+/// How far a neighbour is searched, pixels: rebuilt rasters leave gaps of up to two.
+const REACH: usize = 3;
+/// Share of a step in range that may be missing in the next step of one grazing surface: directions are not
+/// exactly regular. At an edge before a flat background the whole step is missing.
+const UNEVEN: f32 = 0.4;
+/// Cells of a piece of surface below which it may be a veil.
+const MIN_PIECE: usize = 4;
+
+/// Index of the neighbour of `at` in `direction`, `by` pixels away; must lie inside.
+#[inline]
+pub(crate) fn step(at: usize, direction: usize, by: usize) -> usize {
+    match direction {
+        LEFT => at - by,
+        RIGHT => at + by,
+        DOWN => at - by * SIDE,
+        _ => at + by * SIDE,
+    }
+}
+
+/// The neighbour of `at` on the same surface in `direction`, if any.
+#[inline]
+pub(crate) fn linked(raster: &Raster, at: usize, direction: usize) -> Option<usize> {
+    let link = raster.links[at][direction];
+    (link != 0 && link & BROKEN == 0).then(|| step(at, direction, usize::from(link)))
+}
+
+/// Limits for links of one raster.
+struct Rule {
+    incidence: f32,
+    grazing: f32,
+}
+
+/// Links each pixel with its next neighbours along row and column: 0 for none, the distance in pixels for one on
+/// the same surface, the same with [`BROKEN`] for one on another surface.
+pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
+    raster.links.clear();
+    raster.links.resize(PIXELS, [0; 4]);
+    raster.bridged.clear();
+    raster.bridged.resize(PIXELS, false);
+    let rule = Rule {
+        incidence: settings.max_incidence.tan() as f32,
+        grazing: settings.max_grazing.tan() as f32,
+    };
+    for row in 0..SIDE {
+        for col in 0..SIDE {
+            let at = row * SIDE + col;
+            if raster.xyzr[at][3] == 0.0 {
+                continue;
+            }
+            let angle = raster.col_step[row];
+            link_one(
+                raster,
+                &rule,
+                (at, RIGHT, LEFT),
+                angle,
+                (col, SIDE - 1 - col),
+            );
+            let angle = raster.row_step;
+            link_one(raster, &rule, (at, UP, DOWN), angle, (row, SIDE - 1 - row));
+        }
+    }
+}
+
+/// Links `at` forwards; `room` is the number of pixels behind and before it inside the tile.
+#[inline]
+fn link_one(
+    raster: &mut Raster,
+    rule: &Rule,
+    (at, forth, back): (usize, usize, usize),
+    angle: f32,
+    room: (usize, usize),
+) {
+    let range = raster.xyzr[at][3];
+    for by in 1..=REACH.min(room.1) {
+        let other = step(at, forth, by);
+        let there = raster.xyzr[other][3];
+        if there == 0.0 {
+            continue;
+        }
+        let mean = 0.5 * (range + there);
+        let difference = (range - there).abs();
+        let sigma = raster.noise.sigma(mean);
+        let across = mean * angle * by as f32;
+        // A surface seen at this incidence cannot step more than that (fit.md §2.1).
+        let mut joined = difference <= across * rule.incidence + 4.243 * sigma;
+        if !joined && difference <= across * rule.grazing && room.0 >= by && room.1 >= 2 * by {
+            let before = raster.xyzr[step(at, back, by)][3];
+            let after = raster.xyzr[step(other, forth, by)][3];
+            joined = continues([before, range, there, after], difference, sigma);
+        }
+        let value = if joined { by as u8 } else { by as u8 | BROKEN };
+        raster.links[at][forth] = value;
+        raster.links[other][back] = value;
+        if joined {
+            for between in 1..by {
+                raster.bridged[step(at, forth, between)] = true;
+            }
+        }
+        return;
+    }
+}
+
+/// Whether four neighbouring ranges lie on one plane seen at a grazing angle: the inverse range of a plane is
+/// straight along a line of the raster.
+#[inline]
+fn continues(ranges: [f32; 4], difference: f32, sigma: f32) -> bool {
+    let [a, b, c, d] = ranges;
+    if a == 0.0 || d == 0.0 {
+        return false;
+    }
+    let limit = 7.35 * sigma + UNEVEN * difference;
+    let [va, vb, vc, vd] = [1.0 / a, 1.0 / b, 1.0 / c, 1.0 / d];
+    (va + vc - 2.0 * vb).abs() * b * b <= limit && (vb + vd - 2.0 * vc).abs() * c * c <= limit
+}
+
+/// Lists the veils of `raster`: pixels whose opposite neighbours along a row or a column both see another surface,
+/// one nearer and one farther, and small torn pieces between a near and a far surface.
+///
+/// A pixel nearer than both neighbours is a wire, one farther than both a slit: real matter, never a veil.
+pub(crate) fn veils(raster: &mut Raster) {
+    let mut out = std::mem::take(&mut raster.veils);
+    out.clear();
+    for at in 0..PIXELS {
+        if raster.point[at] == NONE {
+            continue;
+        }
+        let links = raster.links[at];
+        if links.iter().all(|l| l & BROKEN == 0) {
+            continue;
+        }
+        let torn = between(raster, at, LEFT, RIGHT) || between(raster, at, DOWN, UP);
+        if torn || (is_small(raster, at) && near_and_far(raster, at)) {
+            out.push(at as u16);
+        }
+    }
+    raster.veils = out;
+}
+
+/// Whether the neighbours to both sides see other surfaces, one nearer and one farther.
+#[inline]
+fn between(raster: &Raster, at: usize, back: usize, forth: usize) -> bool {
+    let (b, f) = (raster.links[at][back], raster.links[at][forth]);
+    if b & BROKEN == 0 || f & BROKEN == 0 {
+        return false;
+    }
+    let range = raster.xyzr[at][3];
+    let one = raster.xyzr[step(at, back, usize::from(b & !BROKEN))][3];
+    let other = raster.xyzr[step(at, forth, usize::from(f & !BROKEN))][3];
+    (one < range) != (other < range)
+}
+
+/// Whether the linked piece around `at` has fewer than [`MIN_PIECE`] pixels.
+fn is_small(raster: &Raster, at: usize) -> bool {
+    let mut piece = [at; MIN_PIECE];
+    let (mut n, mut next) = (1, 0);
+    while next < n {
+        for direction in 0..4 {
+            let Some(other) = linked(raster, piece[next], direction) else {
+                continue;
+            };
+            if !piece[..n].contains(&other) {
+                piece[n] = other;
+                n += 1;
+                if n == MIN_PIECE {
+                    return false;
+                }
+            }
+        }
+        next += 1;
+    }
+    true
+}
+
+/// Whether broken links lead from `at` to something nearer and to something farther.
+fn near_and_far(raster: &Raster, at: usize) -> bool {
+    let range = raster.xyzr[at][3];
+    let (mut near, mut far) = (false, false);
+    for direction in 0..4 {
+        let link = raster.links[at][direction];
+        if link & BROKEN != 0 {
+            let other = raster.xyzr[step(at, direction, usize::from(link & !BROKEN))][3];
+            near |= other < range;
+            far |= other > range;
+        }
+    }
+    near && far
+}

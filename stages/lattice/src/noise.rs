@@ -1,0 +1,90 @@
+//! Ranges of a raster in, range noise out: what the scanner promises, or more where the tile itself shows more.
+
+use crate::Settings;
+use crate::raster::SIDE;
+
+/// Bins of range, an octave each: noise of depth cameras grows with the square of the range.
+const N_BINS: usize = 16;
+/// Exponent bits of 2⁻⁴ m, where the first bin begins.
+const FIRST_EXPONENT: u32 = 127 - 4;
+/// Fewest samples of a bin that speak for themselves.
+const MIN_SAMPLES: usize = 48;
+/// Quantile of |second difference| that is taken: low, since edges and clutter only enlarge the rest.
+const QUANTILE: f64 = 0.3;
+/// That quantile of |x| for a normal distribution of unit deviation.
+const QUANTILE_OF_NORMAL: f32 = 0.3853;
+
+/// Standard deviation of ranges as a function of range.
+#[derive(Debug, Default)]
+pub(crate) struct Noise {
+    base: f32,
+    growth: f32,
+    /// Times more than expected, for each octave of range.
+    factor: [f32; N_BINS],
+    samples: Vec<Vec<f32>>,
+}
+
+#[inline]
+fn bin(range: f32) -> usize {
+    ((range.to_bits() >> 23).saturating_sub(FIRST_EXPONENT) as usize).min(N_BINS - 1)
+}
+
+impl Noise {
+    /// Standard deviation of a range, metres.
+    #[inline]
+    pub(crate) fn sigma(&self, range: f32) -> f32 {
+        (self.base + self.growth * range) * self.factor[bin(range)]
+    }
+
+    /// Measures the noise from second differences of the inverse range along rows: a plane has next to none,
+    /// at any incidence.
+    pub(crate) fn measure(&mut self, xyzr: &[[f32; 4]], settings: &Settings) {
+        self.base = settings.noise as f32;
+        self.growth = settings.noise_growth as f32;
+        self.factor = [1.0; N_BINS];
+        self.samples.resize(N_BINS, Vec::new());
+        // Where the raster is finer than the data, direct neighbours are missing: look one further.
+        for step in [1, 2] {
+            self.samples.iter_mut().for_each(Vec::clear);
+            self.sample(xyzr, step);
+            if self.samples.iter().map(Vec::len).sum::<usize>() >= MIN_SAMPLES {
+                break;
+            }
+        }
+        let limit = settings.noise_limit as f32;
+        let factors: Vec<Option<f32>> = self
+            .samples
+            .iter_mut()
+            .map(|samples| {
+                (samples.len() >= MIN_SAMPLES).then(|| {
+                    let at = (samples.len() as f64 * QUANTILE) as usize;
+                    let value = *samples.select_nth_unstable_by(at, f32::total_cmp).1;
+                    (value / QUANTILE_OF_NORMAL).clamp(1.0, limit)
+                })
+            })
+            .collect();
+        for b in 0..N_BINS {
+            // A bin without enough samples takes the word of the nearest one that has.
+            let nearest = (0..N_BINS)
+                .filter(|&o| factors[o].is_some())
+                .min_by_key(|&o| (o.abs_diff(b), o))
+                .and_then(|o| factors[o]);
+            self.factor[b] = nearest.unwrap_or(1.0);
+        }
+    }
+
+    fn sample(&mut self, xyzr: &[[f32; 4]], step: usize) {
+        // Every third row and column pair: thousands of samples a tile, at a small share of the work.
+        for row in (0..SIDE).step_by(3) {
+            let line = &xyzr[row * SIDE..(row + 1) * SIDE];
+            for col in (step..SIDE - step).step_by(2) {
+                let (a, b, c) = (line[col - step][3], line[col][3], line[col + step][3]);
+                if a > 0.0 && b > 0.0 && c > 0.0 {
+                    let second = 1.0 / a + 1.0 / c - 2.0 / b;
+                    let expected = (self.base + self.growth * b) * 6_f32.sqrt();
+                    self.samples[bin(b)].push(second.abs() * b * b / expected);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! A linked raster in, normals out: cross products of differences between window means, O(1) a pixel for any
+//! window by summed-area tables.
+
+use crate::Settings;
+use crate::links::{BROKEN, linked};
+use crate::raster::{PIXELS, Raster, SIDE};
+use crate::{Scratch, voxels};
+use contract::{Scan, Tile};
+
+/// Ten units a millimetre: window sums are exact integers modulo 2³², and a window never holds 200 km.
+const UNIT: f32 = 1e4;
+/// Longest reach that is told apart, pixels.
+const MOST_REACH: u8 = 127;
+/// Columns of the summed-area table: one more than pixels.
+const WIDE: usize = SIDE + 1;
+
+/// Normals of one tile and the windows they come from; buffers are reused.
+#[derive(Debug, Default)]
+pub(crate) struct Normals {
+    /// Unit normal towards the scanner, scan frame; zero where there is none.
+    pub(crate) normal: Vec<[f32; 3]>,
+    /// Expected error of a normal, radians; 0 where there is no normal.
+    pub(crate) error: Vec<f32>,
+    /// Half windows along columns and rows, pixels.
+    pub(crate) half: Vec<u8>,
+    /// Steps to the next border of a surface.
+    reach: Vec<u8>,
+    /// Sums over all pixels below and left: x, y, z, n.
+    table: Vec<[i32; 4]>,
+}
+
+impl Normals {
+    /// Computes the normals of `raster`.
+    pub(crate) fn fill(&mut self, raster: &Raster, settings: &Settings) {
+        self.measure_reach(raster);
+        self.sum(raster);
+        self.normal.clear();
+        self.normal.resize(PIXELS, [0.0; 3]);
+        self.error.clear();
+        self.error.resize(PIXELS, 0.0);
+        self.half.clear();
+        self.half.resize(PIXELS, 0);
+        for row in 0..SIDE {
+            for col in 0..SIDE {
+                let at = row * SIDE + col;
+                if raster.holds(at) && self.reach[at] > 0 {
+                    self.compute(raster, row, col, settings);
+                }
+            }
+        }
+        self.borrow_at_borders(raster);
+    }
+
+    /// Chessboard distance of each pixel to the next broken link or unbridged gap.
+    fn measure_reach(&mut self, raster: &Raster) {
+        self.reach.clear();
+        self.reach.extend((0..PIXELS).map(|at| {
+            let whole = if raster.holds(at) {
+                raster.links[at].iter().all(|l| l & BROKEN == 0)
+            } else {
+                raster.bridged[at]
+            };
+            if whole { MOST_REACH } else { 0 }
+        }));
+        let reach = &mut self.reach;
+        for row in 0..SIDE {
+            for col in 0..SIDE {
+                let at = row * SIDE + col;
+                let mut least = reach[at];
+                if col > 0 {
+                    least = least.min(reach[at - 1] + 1);
+                }
+                if row > 0 {
+                    least = least.min(reach[at - SIDE] + 1);
+                    if col > 0 {
+                        least = least.min(reach[at - SIDE - 1] + 1);
+                    }
+                    if col + 1 < SIDE {
+                        least = least.min(reach[at - SIDE + 1] + 1);
+                    }
+                }
+                reach[at] = least;
+            }
+        }
+        for row in (0..SIDE).rev() {
+            for col in (0..SIDE).rev() {
+                let at = row * SIDE + col;
+                let mut least = reach[at];
+                if col + 1 < SIDE {
+                    least = least.min(reach[at + 1] + 1);
+                }
+                if row + 1 < SIDE {
+                    least = least.min(reach[at + SIDE] + 1);
+                    if col > 0 {
+                        least = least.min(reach[at + SIDE - 1] + 1);
+                    }
+                    if col + 1 < SIDE {
+                        least = least.min(reach[at + SIDE + 1] + 1);
+                    }
+                }
+                reach[at] = least;
+            }
+        }
+    }
+
+    fn sum(&mut self, raster: &Raster) {
+        self.table.clear();
+        self.table.resize(WIDE * WIDE, [0; 4]);
+        for row in 0..SIDE {
+            let mut line = [0_i32; 4];
+            let (below, here) = self.table.split_at_mut((row + 1) * WIDE);
+            let below = &below[row * WIDE + 1..];
+            let from = &raster.xyzr[row * SIDE..(row + 1) * SIDE];
+            for ((p, to), low) in from.iter().zip(&mut here[1..WIDE]).zip(below) {
+                // Empty pixels are all zero; `as` saturates beyond 200 km.
+                let n = i32::from(p[3] > 0.0);
+                let q = [
+                    (p[0] * UNIT) as i32,
+                    (p[1] * UNIT) as i32,
+                    (p[2] * UNIT) as i32,
+                    n,
+                ];
+                for i in 0..4 {
+                    line[i] = line[i].wrapping_add(q[i]);
+                    to[i] = line[i].wrapping_add(low[i]);
+                }
+            }
+        }
+    }
+
+    /// Mean of the points of a window about `centre` ([`UNIT`]s), from the table's entries at its corners: low
+    /// left, low right, high left, high right. `None` where it is empty.
+    #[inline]
+    fn mean(corners: [[i32; 4]; 4], centre: [i32; 3]) -> Option<[f32; 3]> {
+        let [a, b, c, d] = corners;
+        let s: [i32; 4] = std::array::from_fn(|i| {
+            d[i].wrapping_sub(b[i])
+                .wrapping_sub(c[i])
+                .wrapping_add(a[i])
+        });
+        let n = s[3];
+        if n <= 0 {
+            return None;
+        }
+        let scale = 1.0 / n as f32;
+        Some(std::array::from_fn(|i| {
+            s[i].wrapping_sub(n.wrapping_mul(centre[i])) as f32 * scale
+        }))
+    }
+
+    #[inline]
+    fn compute(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
+        let at = row * SIDE + col;
+        let [x, y, z, range] = raster.xyzr[at];
+        let sigma = raster.noise.sigma(range);
+        let window = (settings.window as f32).max(6.0 * sigma) / range;
+        let reach = usize::from(self.reach[at]);
+        let most = settings.max_window_pixels.max(1) as f32;
+        let pixels =
+            |step: f32, most: f32| ((window / step + 0.5).min(most) as usize).clamp(1, reach);
+        // Columns draw together towards the poles: there a window of the same width holds more of them.
+        let squeeze = raster.row_step / raster.col_step[row].min(raster.row_step);
+        let (h, v) = (
+            pixels(raster.col_step[row], most * squeeze),
+            pixels(raster.row_step, most),
+        );
+        let (r0, r1) = (row.saturating_sub(v), (row + v + 1).min(SIDE));
+        let (c0, c1) = (col.saturating_sub(h), (col + h + 1).min(SIDE));
+        // The halves share the middle line, so that neither is empty at the tile's border.
+        let t = |r: usize, c: usize| self.table[r * WIDE + c];
+        let [low0, low1, high0, high1] = [t(r0, c0), t(r0, c1), t(r1, c0), t(r1, c1)];
+        let centre = [x, y, z].map(|v| (v * UNIT) as i32);
+        let means = (
+            Self::mean([low0, t(r0, col + 1), high0, t(r1, col + 1)], centre),
+            Self::mean([t(r0, col), low1, t(r1, col), high1], centre),
+            Self::mean([low0, low1, t(row + 1, c0), t(row + 1, c1)], centre),
+            Self::mean([t(row, c0), t(row, c1), high0, high1], centre),
+        );
+        let (Some(left), Some(right), Some(low), Some(high)) = means else {
+            return;
+        };
+        let a: [f32; 3] = std::array::from_fn(|i| right[i] - left[i]);
+        let b: [f32; 3] = std::array::from_fn(|i| high[i] - low[i]);
+        let n = [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ];
+        let length2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+        if length2 <= 1e-6 {
+            return;
+        }
+        let towards = n[0] * x + n[1] * y + n[2] * z;
+        let scale = if towards > 0.0 { -1.0 } else { 1.0 } / length2.sqrt();
+        self.normal[at] = n.map(|v| v * scale);
+        // Two half windows of h·(2v+1) points, about h steps apart; the narrower direction rules.
+        let spacing = range * (raster.col_step[row] * h as f32).min(raster.row_step * v as f32);
+        let n_half = (h.min(v) * (2 * h.max(v) + 1)) as f32;
+        self.error[at] = sigma * (2.0 / n_half).sqrt() / spacing.max(1e-6);
+        self.half[at] = h.min(v) as u8;
+    }
+
+    /// Border pixels take the normal of a linked neighbour whose tangent plane they lie on.
+    fn borrow_at_borders(&mut self, raster: &Raster) {
+        for at in 0..PIXELS {
+            if !raster.holds(at) || self.reach[at] > 0 {
+                continue;
+            }
+            let [x, y, z, range] = raster.xyzr[at];
+            let limit = 3.0 * raster.noise.sigma(range) + 1e-3;
+            let mut best: Option<(f32, usize)> = None;
+            for direction in 0..4 {
+                let Some(other) = linked(raster, at, direction) else {
+                    continue;
+                };
+                // Neighbours at the border themselves have nothing of their own to lend.
+                let other = match self.reach[other] {
+                    0 => linked(raster, other, direction).filter(|&o| self.reach[o] > 0),
+                    _ => Some(other),
+                };
+                let Some(other) = other.filter(|&o| self.error[o] > 0.0) else {
+                    continue;
+                };
+                let (n, q) = (self.normal[other], raster.xyzr[other]);
+                let off = (n[0] * (x - q[0]) + n[1] * (y - q[1]) + n[2] * (z - q[2])).abs();
+                if off <= limit && best.is_none_or(|b| off < b.0) {
+                    best = Some((off, other));
+                }
+            }
+            if let Some((_, other)) = best {
+                self.normal[at] = self.normal[other];
+                self.error[at] = self.error[other];
+                self.half[at] = 1;
+            }
+        }
+    }
+}
+
+/// Unit normals of a tile's points, in the order of its points, in the scan frame (as its coordinates are), towards
+/// the scanner. Where the scanner is unknown, the sign is such that the largest component of the normal is positive,
+/// so horizontal surfaces point up as long as the scan frame does. `None` for veils and where no surface was found.
+#[must_use]
+pub fn normals(tile: &Tile, scan: &Scan, settings: &Settings) -> Vec<Option<[f32; 3]>> {
+    let mut scratch = Scratch::default();
+    let Some(lattice) = &scan.lattice else {
+        return voxels::normals(tile, &mut scratch.surface, settings);
+    };
+    scratch.raster.fill(tile, lattice, settings);
+    scratch.normals.fill(&scratch.raster, settings);
+    let (raster, normals) = (&scratch.raster, &scratch.normals);
+    tile.pixel
+        .iter()
+        .zip(&tile.xyz)
+        .map(|(pixel, p)| {
+            let at = usize::from(*pixel);
+            if !raster.holds(at) || normals.error[at] == 0.0 {
+                return None;
+            }
+            // A second return of the pixel only shares the normal if it lies on the same tangent plane.
+            let (n, q) = (normals.normal[at], raster.xyzr[at]);
+            let off = n[0] * (p[0] - q[0]) + n[1] * (p[1] - q[1]) + n[2] * (p[2] - q[2]);
+            (off.abs() <= 3.0 * raster.noise.sigma(q[3]) + 1e-3).then_some(n)
+        })
+        .collect()
+}

@@ -1,0 +1,116 @@
+//! A tile in, a dense raster out: nearest return of each pixel, its range, its links to neighbours, its veils.
+
+use crate::Settings;
+use crate::links;
+use crate::noise::Noise;
+use contract::{Lattice, TILE_SIDE, Tile};
+
+/// Pixels along a side.
+pub(crate) const SIDE: usize = TILE_SIDE as usize;
+/// Pixels of a tile.
+pub(crate) const PIXELS: usize = SIDE * SIDE;
+/// A pixel without a return.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// The dense raster of one tile; buffers are reused from tile to tile.
+#[derive(Debug, Default)]
+pub(crate) struct Raster {
+    /// Index of the nearest return in the tile's points, [`NONE`] where the pixel is empty or a veil.
+    pub(crate) point: Vec<u32>,
+    /// Scan frame and range, metres; range 0 where the pixel is empty.
+    pub(crate) xyzr: Vec<[f32; 4]>,
+    /// Links to the left, right, lower and upper neighbour, see [`links`].
+    pub(crate) links: Vec<[u8; 4]>,
+    /// Empty pixels that a link leads across.
+    pub(crate) bridged: Vec<bool>,
+    /// Noise of this tile.
+    pub(crate) noise: Noise,
+    /// Angle between rows, radians.
+    pub(crate) row_step: f32,
+    /// Angle between columns on the sphere, radians, for each row of the tile.
+    pub(crate) col_step: Vec<f32>,
+    /// Veils, in ascending order of their pixel.
+    pub(crate) veils: Vec<u16>,
+}
+
+impl Raster {
+    /// Fills the raster with the nearest returns of `tile`, links them, and takes the veils out.
+    pub(crate) fn fill(&mut self, tile: &Tile, lattice: &Lattice, settings: &Settings) {
+        self.point.clear();
+        self.point.resize(PIXELS, NONE);
+        self.xyzr.clear();
+        self.xyzr.resize(PIXELS, [0.0; 4]);
+        for (i, (pixel, p)) in tile.pixel.iter().zip(&tile.xyz).enumerate() {
+            let at = usize::from(*pixel);
+            let range = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+            let old = self.xyzr[at][3];
+            // A return at the scanner itself has no direction: it is no surface.
+            if range > 1e-3 && (old == 0.0 || range < old) {
+                self.point[at] = i as u32;
+                self.xyzr[at] = [p[0], p[1], p[2], range];
+            }
+        }
+        self.row_step = lattice.row_step as f32;
+        self.col_step.clear();
+        self.col_step.extend((0..TILE_SIDE).map(|row| {
+            let row = f64::from(tile.at.row * TILE_SIDE + row);
+            let elevation = lattice.first_elevation + row * lattice.row_step;
+            (lattice.col_step * elevation.cos().max(0.01)) as f32
+        }));
+        self.noise.measure(&self.xyzr, settings);
+        links::link(self, settings);
+        self.take_veils();
+    }
+
+    /// Finds the veils and empties their pixels.
+    fn take_veils(&mut self) {
+        links::veils(self);
+        let veils = std::mem::take(&mut self.veils);
+        for &at in &veils {
+            self.point[usize::from(at)] = NONE;
+            self.xyzr[usize::from(at)] = [0.0; 4];
+        }
+        self.veils = veils;
+    }
+
+    /// Whether pixel `at` holds a return that is no veil.
+    #[inline]
+    pub(crate) fn holds(&self, at: usize) -> bool {
+        self.point[at] != NONE
+    }
+}
+
+/// Which points of `tile` are veils (mixed pixels between a near edge and what lies behind), in the order of the
+/// tile's points. All `false` where the scan has no lattice: then nobody can tell.
+#[must_use]
+pub fn veils(tile: &Tile, scan: &contract::Scan, settings: &Settings) -> Vec<bool> {
+    let mut out = vec![false; tile.len()];
+    let Some(lattice) = &scan.lattice else {
+        return out;
+    };
+    let mut raster = Raster::default();
+    raster.fill(tile, lattice, settings);
+    raster.flag_veils(tile, &mut out);
+    out
+}
+
+impl Raster {
+    /// Sets the flag of each veil point of the tile that filled this raster.
+    pub(crate) fn flag_veils(&self, tile: &Tile, flags: &mut [bool]) {
+        // Points and veils are both sorted by pixel; of several returns in a pixel only the nearest was judged.
+        let mut at = 0;
+        for &pixel in &self.veils {
+            while at < tile.len() && tile.pixel[at] < pixel {
+                at += 1;
+            }
+            let first = at;
+            while at < tile.len() && tile.pixel[at] == pixel {
+                at += 1;
+            }
+            let range = |i: usize| tile.xyz[i].map(|v| v * v).iter().sum::<f32>();
+            if let Some(nearest) = (first..at).min_by(|a, b| range(*a).total_cmp(&range(*b))) {
+                flags[nearest] = true;
+            }
+        }
+    }
+}

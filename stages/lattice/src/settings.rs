@@ -1,0 +1,73 @@
+//! What can be tuned when a tile is read as surfaces: plain numbers, each with its unit and reason.
+
+/// Settings of the lattice stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Range noise at the scanner, metres: a common terrestrial scanner on matt surfaces.
+    pub noise: f64,
+    /// Growth of the range noise with range, metres a metre.
+    pub noise_growth: f64,
+    /// Noise of a beam's direction, radians: 19 seconds of arc, as data sheets say.
+    pub angular_noise: f64,
+    /// How many times more noise than expected is believed where the tile shows it (depth cameras).
+    pub noise_limit: f64,
+    /// Incidence up to which neighbours are one surface whatever lies around them, radians: 80°.
+    pub max_incidence: f64,
+    /// Incidence up to which neighbours are one surface if the next ones continue it, radians: 88°.
+    pub max_grazing: f64,
+    /// Half the window of a normal, metres: several steps of the raster at working range, less than a pipe.
+    pub window: f64,
+    /// Largest half window, pixels: keeps near surfaces cheap and local.
+    pub max_window_pixels: u32,
+    /// Least angle between normals of one plane that is tolerated, radians: 6°.
+    pub normal_tolerance: f64,
+    /// Largest angle between normals of one plane that is tolerated, radians, where normals are noisy: 14°.
+    pub max_normal_tolerance: f64,
+    /// What a flat surface may deviate beside noise, metres.
+    pub flatness: f64,
+    /// Fewest points of a patch: enough for three parameters and their errors.
+    pub min_patch_points: usize,
+    /// Least area of a horizontal patch, m²: a piece of the ring around a robot's foot.
+    pub min_level_area: f64,
+    /// Least width of a horizontal patch, metres.
+    pub min_level_width: f64,
+    /// Least area of any other patch, m².
+    pub min_patch_area: f64,
+    /// Least width of any other patch, metres: wider than the flat strip on a pipe of 50 mm radius.
+    pub min_patch_width: f64,
+    /// Tilt up to which a patch counts as nearly horizontal, radians: 6°, twice what a floor may have.
+    pub level_tilt: f64,
+    /// Edge of an occupancy voxel, metres: finer than the gap between a robot and its fence.
+    pub voxel: f64,
+    /// Edge of the voxels that stand in for a lattice where the scanner is unknown, metres.
+    pub surface_voxel: f64,
+    /// Noise of a surface where the scanner is unknown, metres: registered scans of several positions.
+    pub surface_noise: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            noise: 0.002,
+            noise_growth: 1e-4,
+            angular_noise: 9e-5,
+            noise_limit: 12.0,
+            max_incidence: 80_f64.to_radians(),
+            max_grazing: 88_f64.to_radians(),
+            window: 0.015,
+            max_window_pixels: 16,
+            normal_tolerance: 6_f64.to_radians(),
+            max_normal_tolerance: 14_f64.to_radians(),
+            flatness: 0.001,
+            min_patch_points: 24,
+            min_level_area: 0.0015,
+            min_level_width: 0.015,
+            min_patch_area: 0.01,
+            min_patch_width: 0.04,
+            level_tilt: 6_f64.to_radians(),
+            voxel: 0.05,
+            surface_voxel: 0.10,
+            surface_noise: 0.006,
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Tiles of one scan in; out comes the scan's view of a region: depth images towards it, and its points inside.
+
+use contract::{Lattice, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, View, ViewPoint};
+use geometry::depth::{Empty, rows, transform};
+use geometry::{DepthImage, Point, Pose, Vector};
+use nalgebra::{Rotation3, Translation3, UnitQuaternion};
+
+/// What is tuned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewSettings {
+    /// Width of a depth image's cell in beams: below about 1.3 a regular scan leaves holes.
+    pub beams_per_cell: f64,
+    /// Smallest cell at the region's near side, metres: finer shows nothing that the search can use.
+    pub min_cell: f64,
+    /// Half-width (cells) of the window that must be empty around a cell before it counts as "no return".
+    pub empty_window: i32,
+}
+
+impl Default for ViewSettings {
+    fn default() -> Self {
+        Self { beams_per_cell: 1.5, min_cell: 0.003, empty_window: 2 }
+    }
+}
+
+/// Widest half tangent of a single image: beyond, a pinhole stretches too much, and the faces of a cube serve.
+const MAX_HALF_TANGENT: f64 = 1.6;
+
+/// Rows and columns of a lattice that a scan covers: `[first row, last row, first column, last column]`.
+pub type Extent = [u32; 4];
+
+/// Gathers one scan's view of a region, tile by tile, in any order.
+#[derive(Debug)]
+pub struct ViewBuilder {
+    view: View,
+    local_from_scan: Pose,
+    lattice: Option<Lattice>,
+    extent: Option<Extent>,
+    bounds: geometry::Aabb,
+    /// Unit direction to the region's middle (scan frame) and the angle that it subtends about it, radians.
+    cone: Option<(Vector, f64)>,
+    empty_window: i32,
+}
+
+impl ViewBuilder {
+    /// An empty view of `region` from `scan`; `extent` is what the scan covers of its lattice, if known.
+    #[must_use]
+    pub fn new(scan: &Scan, region: &Region, extent: Option<Extent>, settings: &ViewSettings) -> Self {
+        let local_from_world = Pose::from_parts(
+            Translation3::from(-region.origin.coords),
+            UnitQuaternion::identity(),
+        );
+        let local_from_scan = local_from_world * scan.world_from_scan;
+        let scanner = scan.lattice.map(|_| local_from_scan * Point::origin());
+        let beam_step = scan.lattice.map_or(0.0, |l| l.row_step.max(l.col_step));
+        let images = scanner
+            .map_or_else(Vec::new, |s| cameras(&s, region, beam_step, settings));
+        let cone = scanner.map(|s| cone(&s, region, &local_from_scan));
+        let view =
+            View { scan: scan.id, mask: scan.mask, scanner, beam_step, images, points: Vec::new() };
+        Self {
+            view,
+            local_from_scan,
+            lattice: scan.lattice,
+            extent,
+            bounds: region.bounds,
+            cone,
+            empty_window: settings.empty_window,
+        }
+    }
+
+    /// Whether the tile can hold anything that this view needs: for a scan with beams, everything in the cone of
+    /// the region, before and behind it.
+    #[must_use]
+    pub fn wants(&self, at: TileAt) -> bool {
+        if at.scan != self.view.scan {
+            return false;
+        }
+        let (Some(lattice), Some((axis, angle))) = (&self.lattice, &self.cone) else {
+            return self.wants_ground(at);
+        };
+        let corner = |dr: u32, dc: u32| {
+            let row = (at.row * TILE_SIDE + dr).min(lattice.n_rows - 1);
+            let col = (at.col * TILE_SIDE + dc).min(lattice.n_cols - 1);
+            Vector::from(lattice.direction(Pixel { row, col }))
+        };
+        let middle = corner(TILE_SIDE / 2, TILE_SIDE / 2);
+        let radius = [(0, 0), (0, TILE_SIDE), (TILE_SIDE, 0), (TILE_SIDE, TILE_SIDE)]
+            .into_iter()
+            .map(|(dr, dc)| corner(dr, dc).angle(&middle))
+            .fold(0.0, f64::max);
+        // A tile near the pole bulges beyond its corners; its half height covers that.
+        let radius = radius.max(f64::from(TILE_SIDE) * 0.5 * lattice.row_step);
+        middle.angle(axis) <= radius + angle
+    }
+
+    fn wants_ground(&self, at: TileAt) -> bool {
+        let side = f64::from(Tile::GROUND_CELL) * f64::from(TILE_SIDE);
+        let low = |i: u32| (i64::from(i) - Tile::GROUND_OFFSET) as f64 * side;
+        let t = self.local_from_scan.translation;
+        let (x, y) = (low(at.col) + t.x, low(at.row) + t.y);
+        x <= self.bounds.max[0]
+            && x + side >= self.bounds.min[0]
+            && y <= self.bounds.max[1]
+            && y + side >= self.bounds.min[1]
+    }
+
+    /// Adds the points of a tile.
+    pub fn add(&mut self, tile: &Tile) {
+        let local_from_scan = rows(&self.local_from_scan);
+        let cameras: Vec<_> = self
+            .view
+            .images
+            .iter()
+            .map(|image| rows(&(image.camera_from_local() * self.local_from_scan)))
+            .collect();
+        for (i, p) in tile.xyz.iter().enumerate() {
+            for (image, camera_from_scan) in self.view.images.iter_mut().zip(&cameras) {
+                image.splat(transform(camera_from_scan, *p));
+            }
+            let local = transform(&local_from_scan, *p);
+            if self.bounds.contains(local.map(f64::from)) {
+                let place = tile.first_place + u64::from(tile.place[i]);
+                self.view.points.push(ViewPoint { xyz: local, place });
+            }
+        }
+    }
+
+    /// The view, with its empty cells judged and its points in the order of their places.
+    #[must_use]
+    pub fn finish(mut self) -> View {
+        self.view.points.sort_unstable_by_key(|p| p.place);
+        let scan_from_local = self.local_from_scan.inverse();
+        for image in &mut self.view.images {
+            let scan_from_camera =
+                rows(&(scan_from_local * image.camera_from_local().inverse()));
+            let (lattice, extent) = (self.lattice, self.extent);
+            let covered = move |camera: [f32; 3]| {
+                let (Some(lattice), Some([r0, r1, c0, c1])) = (lattice, extent) else {
+                    return false;
+                };
+                let d = geometry::depth::rotate(&scan_from_camera, camera);
+                let pixel = lattice.pixel(d).0;
+                (r0..=r1).contains(&pixel.row) && (c0..=c1).contains(&pixel.col)
+            };
+            image.finish(self.empty_window, |direction| {
+                if covered(direction) { Empty::NoReturn } else { Empty::Unknown }
+            });
+        }
+        self.view
+    }
+}
+
+/// Direction to the region's middle in the scan frame, and the largest angle from it to a corner.
+fn cone(scanner: &Point, region: &Region, local_from_scan: &Pose) -> (Vector, f64) {
+    let to = region.bounds.center() - scanner;
+    if region.bounds.grown(0.05).contains(scanner.coords.into()) || to.norm() < 1e-6 {
+        return (Vector::z(), std::f64::consts::PI);
+    }
+    let angle = region
+        .bounds
+        .corners()
+        .iter()
+        .map(|c| (Point::from(*c) - scanner).angle(&to))
+        .fold(0.0, f64::max);
+    // Seen from close by, the cone of the corners may miss an edge's middle: beyond 60° take everything.
+    let angle = if angle > std::f64::consts::FRAC_PI_3 { std::f64::consts::PI } else { angle };
+    (local_from_scan.rotation.inverse() * to.normalize(), angle)
+}
+
+/// The images that together cover the region: one towards its middle, or the faces of a cube.
+fn cameras(
+    scanner: &Point,
+    region: &Region,
+    beam_step: f64,
+    settings: &ViewSettings,
+) -> Vec<DepthImage> {
+    let to = region.bounds.center() - scanner;
+    let near = (0..3)
+        .map(|i| {
+            let outside = (region.bounds.min[i] - scanner[i]).max(scanner[i] - region.bounds.max[i]);
+            outside.max(0.0).powi(2)
+        })
+        .sum::<f64>()
+        .sqrt()
+        .max(0.3);
+    let focal = (1.0 / (settings.beams_per_cell * beam_step.max(1e-5))).min(near / settings.min_cell);
+    if to.norm() > 1e-6 {
+        let camera_from_local = look_at(scanner, &to);
+        let mut half = 0.0_f64;
+        for corner in region.bounds.corners() {
+            let c = camera_from_local * Point::from(corner);
+            half = if c.z > 1e-3 { half.max((c.x / c.z).abs()).max((c.y / c.z).abs()) } else { 9.9 };
+        }
+        if half <= MAX_HALF_TANGENT {
+            return vec![DepthImage::new(camera_from_local, half * 1.02, focal)];
+        }
+    }
+    let axes = [Vector::x(), Vector::y(), Vector::z()];
+    axes.iter()
+        .flat_map(|a| [*a, -a])
+        .filter(|a| {
+            // The face sees the region only if some corner lies before its widened pyramid.
+            let camera_from_local = look_at(scanner, a);
+            let inside = region.bounds.grown(0.05).contains(scanner.coords.into());
+            inside
+                || region.bounds.corners().iter().any(|c| (camera_from_local * Point::from(*c)).z > 0.0)
+        })
+        .map(|a| DepthImage::new(look_at(scanner, &a), 1.0, focal))
+        .collect()
+}
+
+/// Camera frame at the scanner with +z along `to`.
+fn look_at(scanner: &Point, to: &Vector) -> Pose {
+    let up = if to.normalize().z.abs() > 0.95 { Vector::x() } else { Vector::z() };
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::look_at_lh(to, &up));
+    Pose::from_parts(Translation3::identity(), rotation)
+        * Pose::from_parts(Translation3::from(-scanner.coords), UnitQuaternion::identity())
+}

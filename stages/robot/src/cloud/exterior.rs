@@ -1,0 +1,137 @@
+//! A link's mesh and a place on it in; out: which side of the surface the world is on, if any. Vendors' meshes hold
+//! motors and bolts that no scanner sees, and faces that are turned the wrong way.
+
+use super::Sample;
+use crate::model::Mesh;
+use nalgebra::Vector3;
+use parry3d::bounding_volume::Aabb;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
+
+/// Rays over a hemisphere.
+const N_RAYS: usize = 24;
+/// Rays after which a clear case is decided: they are spread over the hemisphere as the whole set is.
+const N_FIRST: usize = 4;
+/// Escaping rays that make a place visible: a single one may slip through a crack between badly joined triangles.
+const N_ESCAPES: usize = 2;
+/// Start of a ray above the surface, metres: above rounding, below any real gap.
+const LIFT: f32 = 1e-4;
+
+/// The side of a triangle, by the order of its corners.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    Front,
+    Back,
+}
+
+/// A mesh that rays can be cast at.
+pub(super) struct Shell {
+    bvh: Bvh,
+    /// First corner and two edges.
+    triangles: Vec<[Vector3<f32>; 3]>,
+    rays: [Vector3<f32>; N_RAYS],
+}
+
+impl Shell {
+    pub(super) fn new(mesh: &Mesh) -> Self {
+        let corners = |t: &[u32; 3]| super::corners(mesh, t);
+        let boxes: Vec<Aabb> = (mesh.triangles.iter().map(corners))
+            .map(|[a, b, c]| {
+                let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
+                Aabb::new(low.into(), high.into())
+            })
+            .collect();
+        Self {
+            bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
+            triangles: mesh.triangles.iter().map(corners).map(|[a, b, c]| [a, b - a, c - a]).collect(),
+            rays: hemisphere(),
+        }
+    }
+
+    /// The side from which more rays escape, if enough do from either.
+    pub(super) fn side(&self, sample: &Sample) -> Option<Side> {
+        let (mut front, mut back) = (0, 0);
+        for (n_cast, ray) in self.rays.iter().enumerate() {
+            if n_cast == N_FIRST && front.max(back) >= N_ESCAPES && front.min(back) == 0 {
+                break;
+            }
+            front += usize::from(self.escapes(sample.at, sample.normal, ray));
+            back += usize::from(self.escapes(sample.at, -sample.normal, ray));
+        }
+        if front.max(back) < N_ESCAPES {
+            None
+        } else if front >= back {
+            Some(Side::Front)
+        } else {
+            Some(Side::Back)
+        }
+    }
+
+    /// Whether a ray of the hemisphere about `normal` leaves the mesh for good.
+    fn escapes(&self, at: Vector3<f32>, normal: Vector3<f32>, ray: &Vector3<f32>) -> bool {
+        let helper = if normal.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+        let e = normal.cross(&helper).normalize();
+        let f = normal.cross(&e);
+        let direction = e * ray.x + f * ray.y + normal * ray.z;
+        let origin = at + normal * LIFT;
+        // A direction along an axis would divide by zero.
+        let inverse = direction.map(|v| if v.abs() < 1e-12 { 1e12 } else { 1.0 / v });
+        let mut hit = false;
+        self.bvh.traverse(|node: &BvhNode| {
+            if !crosses(node, &origin, &inverse) {
+                return TraversalAction::Prune;
+            }
+            match node.leaf_data() {
+                Some(leaf) if hits(&self.triangles[leaf as usize], &origin, &direction) => {
+                    hit = true;
+                    TraversalAction::EarlyExit
+                }
+                _ => TraversalAction::Continue,
+            }
+        });
+        !hit
+    }
+}
+
+fn crosses(node: &BvhNode, origin: &Vector3<f32>, inverse: &Vector3<f32>) -> bool {
+    let (low, high) = (node.mins(), node.maxs());
+    let (low, high) = ([low.x, low.y, low.z], [high.x, high.y, high.z]);
+    let (mut enter, mut leave) = (0.0_f32, f32::INFINITY);
+    for k in 0..3 {
+        let (a, b) = ((low[k] - origin[k]) * inverse[k], (high[k] - origin[k]) * inverse[k]);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    // A flat box must not vanish by rounding.
+    enter <= leave * 1.000_001 + 1e-7
+}
+
+/// Möller and Trumbore, both sides.
+fn hits([a, e, f]: &[Vector3<f32>; 3], origin: &Vector3<f32>, direction: &Vector3<f32>) -> bool {
+    let p = direction.cross(f);
+    let det = e.dot(&p);
+    if det == 0.0 {
+        return false;
+    }
+    let inverse = 1.0 / det;
+    let t = origin - a;
+    let u = t.dot(&p) * inverse;
+    if !(-1e-5..=1.000_01).contains(&u) {
+        return false;
+    }
+    let q = t.cross(e);
+    let v = direction.dot(&q) * inverse;
+    v >= -1e-5 && u + v <= 1.000_01 && f.dot(&q) * inverse > 0.0
+}
+
+/// Directions over the half space of +z, away from grazing, in an order whose first part is spread too.
+fn hemisphere() -> [Vector3<f32>; N_RAYS] {
+    std::array::from_fn(|k| {
+        // Every sixth of a spiral first, then the rest.
+        let n_rounds = N_RAYS / N_FIRST;
+        let at = (k % N_FIRST) * n_rounds + k / N_FIRST;
+        let z = 1.0 - 0.92 * (at as f64 + 0.5) / N_RAYS as f64;
+        let angle = 2.399_963_229_728_653 * at as f64 + 0.3; // golden angle
+        let flat = (1.0 - z * z).sqrt();
+        Vector3::new((flat * angle.cos()) as f32, (flat * angle.sin()) as f32, z as f32)
+    })
+}

@@ -1,0 +1,144 @@
+//! A link's mesh in; samples of its outer surface with outward normals out, in an order whose prefixes are even.
+
+mod exterior;
+mod spread;
+
+use crate::model::{CadCloud, Mesh};
+use exterior::{Shell, Side};
+use nalgebra::Vector3;
+
+/// Candidates for each sample that is kept: with fewer the spread gets holes, with more it only costs time.
+const N_CANDIDATES: f64 = 2.5;
+/// Edge of the cells whose candidates are judged together, metres: parts smaller than this hide nothing that a
+/// scanner resolves.
+const JUDGED_CELL: f32 = 0.012;
+/// Depth of such a cell along the normal, metres: a sheet of metal has two sides in two cells.
+const JUDGED_DEPTH: f32 = 0.003;
+
+/// A place on the surface.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    at: Vector3<f32>,
+    normal: Vector3<f32>,
+}
+
+/// SplitMix64: small, even, and the same on every machine.
+#[derive(Debug, Clone, Copy)]
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// In [0, 1).
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// In [0, n).
+    fn below(&mut self, n: usize) -> usize {
+        ((u128::from(self.next()) * n as u128) >> 64) as usize
+    }
+}
+
+/// Samples a mesh at about `spacing` metres, with at most `max_samples`.
+pub(crate) fn sample(mesh: &Mesh, spacing: f64, max_samples: usize) -> CadCloud {
+    let areas: Vec<f64> = mesh.triangles.iter().map(|t| area(mesh, t)).collect();
+    let whole: f64 = areas.iter().sum();
+    if whole <= 0.0 || !whole.is_finite() || spacing <= 0.0 || max_samples == 0 {
+        return CadCloud::default();
+    }
+    let n_wanted = (whole / (spacing * spacing)).min(max_samples as f64 * 1.5).max(400.0);
+    let mut random = Random(mesh.triangles.len() as u64);
+    let candidates = candidates(mesh, &areas, whole, (n_wanted * N_CANDIDATES) as usize, &mut random);
+    let n_candidates = candidates.len();
+    let outer = outer(mesh, candidates);
+    let area = whole * outer.len() as f64 / n_candidates.max(1) as f64;
+    let fine = spacing.max((area / max_samples as f64).sqrt());
+    let mut samples = spread::spread(outer, area, fine, &mut random);
+    samples.truncate(max_samples);
+    CadCloud {
+        spacing: (area / samples.len().max(1) as f64).sqrt() as f32,
+        points: samples.iter().map(|s| s.at.into()).collect(),
+        normals: samples.iter().map(|s| s.normal.into()).collect(),
+        area: area as f32,
+    }
+}
+
+fn corners(mesh: &Mesh, triangle: &[u32; 3]) -> [Vector3<f32>; 3] {
+    triangle.map(|i| mesh.vertices[i as usize].into())
+}
+
+fn area(mesh: &Mesh, triangle: &[u32; 3]) -> f64 {
+    let [a, b, c] = corners(mesh, triangle).map(|p| p.cast::<f64>());
+    0.5 * (b - a).cross(&(c - a)).norm()
+}
+
+/// About `n` places, each standing for the same area: one in each step of the summed area, low-discrepancy within
+/// large triangles.
+fn candidates(mesh: &Mesh, areas: &[f64], whole: f64, n: usize, random: &mut Random) -> Vec<Sample> {
+    let step = whole / n as f64;
+    let mut out = Vec::with_capacity(n + 1);
+    let mut next = step * random.unit();
+    let mut sum = 0.0;
+    for (triangle, area) in mesh.triangles.iter().zip(areas) {
+        sum += area;
+        if next >= sum {
+            continue;
+        }
+        let [a, b, c] = corners(mesh, triangle);
+        let Some(normal) = (b - a).cast::<f64>().cross(&(c - a).cast()).try_normalize(0.0) else { continue };
+        // The R2 sequence (plastic number) from a random start.
+        let (mut u, mut v) = (random.unit(), random.unit());
+        while next < sum {
+            let (s, t) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            out.push(Sample { at: a + (b - a) * s as f32 + (c - a) * t as f32, normal: normal.cast() });
+            u = (u + 0.754_877_666_246_693).fract();
+            v = (v + 0.569_840_290_998_053).fract();
+            next += step;
+        }
+    }
+    out
+}
+
+/// Which candidates are judged together: their cell, the way they face, and their depth along it.
+fn key(sample: &Sample) -> (u8, [i32; 4]) {
+    let n = sample.normal;
+    let axis = n.iamax();
+    let facing = (2 * axis + usize::from(n[axis] < 0.0)) as u8;
+    let cell = [0, 1, 2].map(|k| (sample.at[k] / JUDGED_CELL).floor() as i32);
+    (facing, [cell[0], cell[1], cell[2], (n.dot(&sample.at) / JUDGED_DEPTH).floor() as i32])
+}
+
+/// The candidates on the outer surface, their normals turned outward.
+fn outer(mesh: &Mesh, candidates: Vec<Sample>) -> Vec<Sample> {
+    let shell = Shell::new(mesh);
+    let mut order: Vec<(_, u32)> = candidates.iter().map(key).zip(0..).collect();
+    order.sort_unstable();
+    let mut sides = vec![None; candidates.len()];
+    for group in order.chunk_by(|a, b| a.0 == b.0) {
+        let judge = |at: u32| shell.side(&candidates[at as usize]);
+        let (first, last) = (group[0].1, group[group.len() - 1].1);
+        let side = judge(first);
+        if first == last || side == judge(last) {
+            for (_, at) in group {
+                sides[*at as usize] = side;
+            }
+        } else {
+            for (_, at) in group {
+                sides[*at as usize] = judge(*at);
+            }
+        }
+    }
+    (candidates.into_iter().zip(sides))
+        .filter_map(|(sample, side)| match side? {
+            Side::Front => Some(sample),
+            Side::Back => Some(Sample { at: sample.at, normal: -sample.normal }),
+        })
+        .collect()
+}

@@ -1,0 +1,103 @@
+//! Candidates in; a subset out whose members keep their distance, in an order in which every prefix does so too: darts
+//! thrown with a radius that shrinks.
+
+use super::{Random, Sample};
+
+/// Radius of a dart in terms of the spacing: with this one there are as many
+/// samples as squares of the spacing.
+const RADIUS: f64 = 0.68;
+/// The first radius leaves room for about this many samples.
+const N_COARSEST: f64 = 12.0;
+/// Each radius is this part of the one before: half the area.
+const SHRINK: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Darts thrown for each sample that fits at a radius.
+const N_DARTS: f64 = 6.0;
+
+pub(super) fn spread(candidates: Vec<Sample>, area: f64, spacing: f64, random: &mut Random) -> Vec<Sample> {
+    let mut waiting = candidates;
+    for at in (1..waiting.len()).rev() {
+        waiting.swap(at, random.below(at + 1));
+    }
+    let mut out: Vec<Sample> = Vec::new();
+    let last = RADIUS * spacing;
+    let mut radius = (RADIUS * (area / N_COARSEST).sqrt()).max(last);
+    loop {
+        let n_fit = area / (radius * radius);
+        let n_darts = if radius > last { (n_fit * N_DARTS) as usize } else { waiting.len() };
+        throw(&mut out, &mut waiting, n_darts, radius as f32);
+        if radius <= last || waiting.is_empty() {
+            return out;
+        }
+        radius = (radius * SHRINK).max(last);
+    }
+}
+
+/// Moves those of the first `n_darts` that keep their distance from `waiting` to `out`.
+fn throw(out: &mut Vec<Sample>, waiting: &mut Vec<Sample>, n_darts: usize, radius: f32) {
+    let mut grid = Grid::new(radius, out.len() + waiting.len().min(n_darts));
+    for sample in out.iter() {
+        grid.add(sample);
+    }
+    let mut at = 0;
+    waiting.retain(|sample| {
+        at += 1;
+        if at > n_darts || grid.is_taken(sample) {
+            return true;
+        }
+        grid.add(sample);
+        out.push(*sample);
+        false
+    });
+}
+
+/// Samples by cell, chained through a table; two cells in one slot cost time, not truth.
+struct Grid {
+    radius: f32,
+    first: Vec<u32>,
+    next: Vec<u32>,
+    samples: Vec<Sample>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Grid {
+    fn new(radius: f32, n: usize) -> Self {
+        let n_slots = (2 * n).next_power_of_two().max(64);
+        Self { radius, first: vec![NONE; n_slots], next: Vec::new(), samples: Vec::new() }
+    }
+
+    fn cell(&self, sample: &Sample) -> [i32; 3] {
+        [0, 1, 2].map(|k| (sample.at[k] / self.radius).floor() as i32)
+    }
+
+    fn slot(&self, cell: [i32; 3]) -> usize {
+        let mix = |v: i32, prime: u64| u64::from(v as u32).wrapping_mul(prime);
+        let h = mix(cell[0], 0x9e37_79b9_7f4a_7c15) ^ mix(cell[1], 0xc2b2_ae3d_27d4_eb4f) ^ mix(cell[2], 0x1656_67b1_9e37_79f9);
+        ((h ^ (h >> 29)) as usize) & (self.first.len() - 1)
+    }
+
+    fn add(&mut self, sample: &Sample) {
+        let slot = self.slot(self.cell(sample));
+        self.next.push(self.first[slot]);
+        self.first[slot] = self.samples.len() as u32;
+        self.samples.push(*sample);
+    }
+
+    /// A sample that faces the same half of the world is nearer than the radius. The other side of a sheet is another
+    /// surface.
+    fn is_taken(&self, sample: &Sample) -> bool {
+        let [x, y, z] = self.cell(sample);
+        let limit = self.radius * self.radius;
+        for n in 0..27 {
+            let mut at = self.first[self.slot([x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1])];
+            while at != NONE {
+                let other = &self.samples[at as usize];
+                if (other.at - sample.at).norm_squared() < limit && other.normal.dot(&sample.normal) > 0.0 {
+                    return true;
+                }
+                at = self.next[at as usize];
+            }
+        }
+        false
+    }
+}

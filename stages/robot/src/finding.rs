@@ -1,0 +1,78 @@
+//! Findings: what is wrong with a library or worth knowing, for people.
+
+use contract::{Error, Kind};
+use std::fmt::Display;
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Worth knowing.
+    Note,
+    /// The model loads, but not as its author meant it.
+    Warning,
+    /// The model cannot be loaded.
+    Error,
+}
+
+/// Something to say about a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    /// Name of the model; empty for the library itself.
+    pub model: String,
+    /// How bad it is.
+    pub severity: Severity,
+    /// What was found, a half sentence.
+    pub what: String,
+    /// File and element.
+    pub place: String,
+    /// The way out; empty where nothing need be done.
+    pub way_out: String,
+}
+
+/// Findings of one model while it is read.
+#[derive(Debug, Default)]
+pub(crate) struct Findings {
+    model: String,
+    pub(crate) list: Vec<Finding>,
+}
+
+impl Findings {
+    pub(crate) fn new(model: &str) -> Self {
+        Self { model: model.to_owned(), list: Vec::new() }
+    }
+
+    fn add(&mut self, severity: Severity, place: &dyn Display, what: String, way_out: &str) {
+        let (place, way_out) = (place.to_string(), way_out.to_owned());
+        let finding = Finding { model: self.model.clone(), severity, what, place, way_out };
+        if !self.list.contains(&finding) {
+            self.list.push(finding);
+        }
+    }
+
+    pub(crate) fn note(&mut self, place: impl Display, what: impl Into<String>, way_out: &str) {
+        self.add(Severity::Note, &place, what.into(), way_out);
+    }
+
+    pub(crate) fn warn(&mut self, place: impl Display, what: impl Into<String>, way_out: &str) {
+        self.add(Severity::Warning, &place, what.into(), way_out);
+    }
+
+    pub(crate) fn fail(&mut self, place: impl Display, what: impl Into<String>, way_out: &str) {
+        self.add(Severity::Error, &place, what.into(), way_out);
+    }
+
+    pub(crate) fn failed(&self) -> bool {
+        self.list.iter().any(|f| f.severity == Severity::Error)
+    }
+
+    /// The first finding that keeps the model from loading, as an error.
+    pub(crate) fn first_error(&self) -> Error {
+        match self.list.iter().find(|f| f.severity == Severity::Error) {
+            Some(f) => {
+                let error = Error::bad_input(f.what.clone()).at(&f.place).at(&self.model);
+                if f.way_out.is_empty() { error } else { error.hint(f.way_out.clone()) }
+            }
+            None => Error::new(Kind::Bug, "a model failed to load without a finding").at(&self.model),
+        }
+    }
+}

@@ -1,0 +1,275 @@
+//! A posture in; poses of all links out, and how they move with each free joint.
+
+use crate::loops::ClosedLoop;
+use crate::model::{Joint, JointKind, Kinematics, Model, Motion};
+use geometry::{Point, Pose, Vector};
+use nalgebra::{Translation3, UnitQuaternion};
+use std::f64::consts::PI;
+
+/// Fewer free joints in the main chain than this make a gripper or gun, not a robot: the smallest palletisers have four.
+const MIN_ROBOT_JOINTS: usize = 3;
+
+impl Joint {
+    /// Pose of the child link in the parent link's frame at a value of the joint.
+    #[must_use]
+    pub fn parent_from_child(&self, value: f64) -> Pose {
+        match self.kind {
+            JointKind::Fixed => self.parent_from_joint,
+            JointKind::Prismatic => {
+                let shift = Translation3::from(self.axis.into_inner() * value);
+                self.parent_from_joint * Pose::from_parts(shift, UnitQuaternion::identity())
+            }
+            JointKind::Revolute | JointKind::Continuous => {
+                self.parent_from_joint * UnitQuaternion::from_axis_angle(&self.axis, value)
+            }
+        }
+    }
+}
+
+/// A model with the values of its joints, some of them perhaps not yet set.
+pub(crate) struct Placing<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) posture: Vec<f64>,
+    pub(crate) values: Vec<f64>,
+}
+
+impl<'a> Placing<'a> {
+    /// Sets free and mimic joints; loops are open.
+    pub(crate) fn open(model: &'a Model, posture: &[f64]) -> Self {
+        let mut placing = Self { model, posture: posture.to_vec(), values: vec![0.0; model.joints.len()] };
+        placing.set_followers();
+        placing
+    }
+
+    fn set_followers(&mut self) {
+        for (value, joint) in self.values.iter_mut().zip(&self.model.joints) {
+            match joint.motion {
+                Motion::Free(free) => *value = self.posture[free],
+                Motion::Mimic { free, multiplier, offset } => *value = multiplier * self.posture[free] + offset,
+                Motion::Loop(_) | Motion::Fixed => {}
+            }
+        }
+    }
+
+    /// All values, loops closed as far as they close.
+    pub(crate) fn closed(model: &'a Model, posture: &[f64]) -> Self {
+        let mut placing = Self::open(model, posture);
+        for closed_loop in &model.loops {
+            closed_loop.solve(&mut placing);
+        }
+        placing
+    }
+
+    /// Another posture, with all loops solved that come before `until`.
+    pub(crate) fn move_to(&mut self, posture: Vec<f64>, until: &ClosedLoop) {
+        self.posture = posture;
+        self.set_followers();
+        for closed_loop in self.model.loops.iter().take_while(|l| !std::ptr::eq(*l, until)) {
+            closed_loop.solve(self);
+        }
+    }
+
+    /// Base from link.
+    fn pose(&self, link: usize) -> Pose {
+        let mut pose = Pose::identity();
+        let mut at = link;
+        while let Some(j) = self.model.links[at].parent_joint {
+            let joint = &self.model.joints[j];
+            pose = joint.parent_from_child(self.values[j]) * pose;
+            at = joint.parent;
+        }
+        pose
+    }
+
+    /// A point of a link, base frame.
+    pub(crate) fn point(&self, link: usize, point: &Point) -> Point {
+        self.pose(link) * point
+    }
+
+    /// Origin and direction of a joint's axis, base frame.
+    pub(crate) fn axis(&self, joint: usize) -> (Point, Vector) {
+        let j = &self.model.joints[joint];
+        let base_from_joint = self.pose(j.parent) * j.parent_from_joint;
+        (base_from_joint.translation.vector.into(), base_from_joint * j.axis.into_inner())
+    }
+
+    /// The link that carries a joint, and the joint's origin in its frame.
+    pub(crate) fn carrier(&self, joint: usize) -> (usize, Point) {
+        let j = &self.model.joints[joint];
+        (j.parent, j.parent_from_joint.translation.vector.into())
+    }
+
+    pub(crate) fn turns(&self, joint: usize) -> bool {
+        matches!(self.model.joints[joint].kind, JointKind::Revolute | JointKind::Continuous)
+    }
+
+    /// Velocity of the point `p` (base frame) of a link for a unit rate of one joint.
+    pub(crate) fn moves(&self, joint: usize, link: usize, p: &Point) -> Vector {
+        if !self.model.hangs_on(link, joint) {
+            return Vector::zeros();
+        }
+        let (origin, axis) = self.axis(joint);
+        match self.model.joints[joint].kind {
+            JointKind::Fixed => Vector::zeros(),
+            JointKind::Prismatic => axis,
+            JointKind::Revolute | JointKind::Continuous => axis.cross(&(p - origin)),
+        }
+    }
+
+    /// Velocity of the point `p` (base frame) of a link for these rates of all joints.
+    pub(crate) fn velocity(&self, link: usize, p: &Point, rates: &[f64]) -> Vector {
+        let mut velocity = Vector::zeros();
+        let mut at = link;
+        while let Some(j) = self.model.links[at].parent_joint {
+            if rates[j] != 0.0 {
+                velocity += self.moves(j, link, p) * rates[j];
+            }
+            at = self.model.joints[j].parent;
+        }
+        velocity
+    }
+
+    fn poses(&self) -> Vec<Pose> {
+        let mut poses: Vec<Pose> = Vec::with_capacity(self.model.links.len());
+        for link in &self.model.links {
+            poses.push(match link.parent_joint {
+                Some(j) => {
+                    let joint = &self.model.joints[j];
+                    poses[joint.parent] * joint.parent_from_child(self.values[j])
+                }
+                None => Pose::identity(),
+            });
+        }
+        poses
+    }
+
+    /// Rate of each joint for a unit rate of one free joint.
+    fn rates(&self, free: usize) -> Vec<f64> {
+        let mut rates: Vec<f64> = (self.model.joints.iter())
+            .map(|joint| match joint.motion {
+                Motion::Free(f) if f == free => 1.0,
+                Motion::Mimic { free: f, multiplier, .. } if f == free => multiplier,
+                _ => 0.0,
+            })
+            .collect();
+        for closed_loop in &self.model.loops {
+            let passive = closed_loop.rates(self, &rates);
+            for (&joint, rate) in closed_loop.passive.iter().zip(passive) {
+                rates[joint] = rate;
+            }
+        }
+        rates
+    }
+}
+
+impl Model {
+    /// Number of free joints: the length of a posture.
+    #[must_use]
+    pub fn n_free(&self) -> usize {
+        self.free.len()
+    }
+
+    /// Pose of each link, base from link, at a posture.
+    ///
+    /// # Panics
+    /// If `posture` has not one value for each free joint.
+    #[must_use]
+    pub fn poses(&self, posture: &[f64]) -> Vec<Pose> {
+        assert_eq!(posture.len(), self.free.len(), "a posture has one value for each free joint");
+        Placing::closed(self, posture).poses()
+    }
+
+    /// Poses and twists of all links at a posture.
+    ///
+    /// # Panics
+    /// If `posture` has not one value for each free joint.
+    #[must_use]
+    pub fn kinematics(&self, posture: &[f64]) -> Kinematics {
+        assert_eq!(posture.len(), self.free.len(), "a posture has one value for each free joint");
+        let placing = Placing::closed(self, posture);
+        let base_from_link = placing.poses();
+        let rates: Vec<Vec<f64>> = (0..self.free.len()).map(|free| placing.rates(free)).collect();
+        let mut twists: Vec<Vec<[f64; 6]>> = Vec::with_capacity(self.links.len());
+        for link in &self.links {
+            let Some(j) = link.parent_joint else {
+                twists.push(vec![[0.0; 6]; self.free.len()]);
+                continue;
+            };
+            let joint = &self.joints[j];
+            let mut row = twists[joint.parent].clone();
+            let base_from_joint = base_from_link[joint.parent] * joint.parent_from_joint;
+            let unit = unit_twist(joint, &base_from_joint);
+            for (twist, rates) in row.iter_mut().zip(&rates) {
+                for (t, u) in twist.iter_mut().zip(unit) {
+                    *t += u * rates[j];
+                }
+            }
+            twists.push(row);
+        }
+        Kinematics { base_from_link, twists }
+    }
+
+    /// Value of each joint at a posture, in the order of `joints`: radians or metres; fixed joints zero.
+    #[must_use]
+    pub fn joint_values(&self, posture: &[f64]) -> Vec<f64> {
+        Placing::closed(self, posture).values
+    }
+
+    /// The largest opening of the closed loops at a posture, metres; zero for a robot without loops.
+    #[must_use]
+    pub fn loop_gap(&self, posture: &[f64]) -> f64 {
+        let placing = Placing::closed(self, posture);
+        self.loops.iter().map(|l| l.gap(&placing)).fold(0.0, f64::max)
+    }
+
+    /// Zero, moved inside the limits.
+    #[must_use]
+    pub fn home(&self) -> Vec<f64> {
+        (0..self.free.len()).map(|free| self.limits(free)).map(|[lower, upper]| 0.0_f64.clamp(lower, upper)).collect()
+    }
+
+    /// Lower and upper limit of a free joint, radians or metres; ±π for continuous joints.
+    #[must_use]
+    pub fn limits(&self, free: usize) -> [f64; 2] {
+        self.joints[self.free[free]].limits.unwrap_or([-PI, PI])
+    }
+
+    /// A gripper or gun rather than a robot: fewer than three free joints in the main chain.
+    #[must_use]
+    pub fn is_tool(&self) -> bool {
+        let free = |j: &&usize| matches!(self.joints[**j].motion, Motion::Free(_));
+        self.main_chain.iter().filter(free).count() < MIN_ROBOT_JOINTS
+    }
+
+    /// Index of the link of that name.
+    #[must_use]
+    pub fn link(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|l| l.name == name)
+    }
+
+    /// Whether a joint lies between the root and a link.
+    #[must_use]
+    pub fn hangs_on(&self, link: usize, joint: usize) -> bool {
+        let mut at = link;
+        while let Some(j) = self.links[at].parent_joint {
+            if j == joint {
+                return true;
+            }
+            at = self.joints[j].parent;
+        }
+        false
+    }
+}
+
+/// Twist `[v, w]` in the base frame for a unit rate.
+fn unit_twist(joint: &Joint, base_from_joint: &Pose) -> [f64; 6] {
+    let axis = base_from_joint * joint.axis.into_inner();
+    match joint.kind {
+        JointKind::Fixed => [0.0; 6],
+        JointKind::Prismatic => [axis.x, axis.y, axis.z, 0.0, 0.0, 0.0],
+        JointKind::Revolute | JointKind::Continuous => {
+            let v = base_from_joint.translation.vector.cross(&axis);
+            [v.x, v.y, v.z, axis.x, axis.y, axis.z]
+        }
+    }
+}

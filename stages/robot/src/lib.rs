@@ -1,0 +1,23 @@
+//! Robots as models: URDF, meshes, chains and loops in; kinematics and CAD clouds out. Knows no scans.
+#![forbid(unsafe_code)]
+
+mod chain;
+mod close;
+mod cloud;
+mod finding;
+mod kinematics;
+mod library;
+mod load;
+mod loops;
+mod mesh;
+mod model;
+mod resolve;
+mod sheet;
+mod tree;
+mod urdf;
+
+pub use finding::{Finding, Severity};
+pub use library::Library;
+pub use load::Settings;
+pub use loops::{ClosedLoop, Closure, Form};
+pub use model::{CadCloud, Joint, JointKind, Kinematics, Link, Mesh, Model, Motion, Role, Symmetry};

@@ -1,0 +1,136 @@
+//! A folder of models in; models and findings out.
+
+use crate::finding::{Finding, Findings, Severity};
+use crate::load::{Settings, load, urdfs};
+use crate::model::Model;
+use contract::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// All models that a run may find.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Library {
+    /// Sorted by name.
+    pub models: Vec<Model>,
+    /// What is wrong or worth knowing, in order of the models' names.
+    pub findings: Vec<Finding>,
+}
+
+impl Library {
+    /// Loads all models of a library; those that cannot be loaded are left out and explained in `findings`.
+    ///
+    /// # Errors
+    /// If the folder cannot be read, or no model is left.
+    pub fn load(dir: &Path, settings: &Settings) -> Result<Self> {
+        let (folders, mut library) = Self::open(dir)?;
+        for folder in &folders {
+            library.add(Self::load_folder(dir, folder, settings));
+        }
+        library.checked(dir)
+    }
+
+    /// Everything wrong with a library, and what is worth knowing; a library that cannot be opened is one finding.
+    #[must_use]
+    pub fn lint(dir: &Path) -> Vec<Finding> {
+        let settings = Settings::without_clouds();
+        let fail = |error: &Error| {
+            let mut findings = Findings::new("");
+            findings.fail(dir.display(), error.to_string(), "");
+            findings.list
+        };
+        let (folders, mut library) = match Self::open(dir) {
+            Ok(opened) => opened,
+            Err(error) => return fail(&error),
+        };
+        for folder in &folders {
+            library.add(Self::load_folder(dir, folder, &settings));
+        }
+        if folders.is_empty() {
+            library.findings.extend(fail(&empty(dir)));
+        }
+        library.findings
+    }
+
+    /// The folders that hold models, sorted by name, and a library without models that says what was passed over:
+    /// for loading in parallel with [`Library::load_folder`], [`Library::add`] and [`Library::checked`].
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn open(dir: &Path) -> Result<(Vec<PathBuf>, Self)> {
+        let at = |e: std::io::Error| Error::from(e).at(dir.display()).hint("give the folder of the robot library");
+        let mut folders = Vec::new();
+        for entry in std::fs::read_dir(dir).map_err(at)? {
+            let path = entry.map_err(at)?.path();
+            if path.is_dir() {
+                folders.push(path);
+            }
+        }
+        folders.sort();
+        let mut passed = Findings::new("");
+        folders.retain(|folder| {
+            let name = name(folder);
+            if name.starts_with(['_', '.']) {
+                passed.note(folder.display(), "is passed over for its name", "");
+                return false;
+            }
+            let holds = folder.join("robot.toml").is_file() || !urdfs(folder).is_empty();
+            if !holds {
+                passed.note(folder.display(), "is passed over, it has no robot.urdf", "");
+            }
+            holds
+        });
+        if urdfs(dir).len() == 1 && folders.is_empty() {
+            passed.note(dir.display(), "is a model, not a library", "give the folder above it");
+        }
+        Ok((folders, Self { models: Vec::new(), findings: passed.list }))
+    }
+
+    /// Loads the model of one folder of the library.
+    #[must_use]
+    pub fn load_folder(dir: &Path, folder: &Path, settings: &Settings) -> (Option<Model>, Vec<Finding>) {
+        let name = name(folder);
+        let mut findings = Findings::new(&name);
+        let model = load(folder, &name, Some(dir), settings, &mut findings);
+        (model, findings.list)
+    }
+
+    /// Adds a model; in the order of the folders, whatever order they were loaded in.
+    pub fn add(&mut self, (model, findings): (Option<Model>, Vec<Finding>)) {
+        self.models.extend(model);
+        self.findings.extend(findings);
+    }
+
+    /// The library, if it holds a model.
+    ///
+    /// # Errors
+    /// If it holds none: with the reasons.
+    pub fn checked(self, dir: &Path) -> Result<Self> {
+        if !self.models.is_empty() {
+            return Ok(self);
+        }
+        let Some(first) = self.findings.iter().find(|f| f.severity == Severity::Error) else {
+            return Err(empty(dir));
+        };
+        let n = self.findings.iter().filter(|f| f.severity == Severity::Error).count();
+        let what = format!(
+            "no model of the library could be loaded, {n} error(s), the first: {}: {}: {}",
+            first.model, first.place, first.what
+        );
+        Err(Error::bad_input(what).at(dir.display()).hint("`stillpoint robots lint` explains all of them"))
+    }
+
+    /// Index of the model of that name.
+    #[must_use]
+    pub fn model(&self, name: &str) -> Option<usize> {
+        self.models.iter().position(|m| m.name == name)
+    }
+}
+
+fn name(folder: &Path) -> String {
+    folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+}
+
+fn empty(dir: &Path) -> Error {
+    Error::bad_input("the library holds no robot")
+        .at(dir.display())
+        .hint("a library is a folder of folders, each with a robot.urdf and its meshes")
+}

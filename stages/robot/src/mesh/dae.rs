@@ -1,0 +1,322 @@
+//! COLLADA text in, triangles out in the scene's frame, metres: node transforms and `<unit>` applied, `<up_axis>` not,
+//! as the viewers do for which robot makers draw their meshes.
+
+use super::Soup;
+use nalgebra::{Matrix4, Rotation3, Unit, Vector3};
+use roxmltree::{Document, Node, ParsingOptions};
+use std::collections::HashMap;
+
+/// Nodes in one another; real files have below ten.
+const MAX_DEPTH: usize = 64;
+/// Nodes walked in all, since an instance may hold instances.
+const MAX_VISITS: usize = 100_000;
+/// Elements and texts of one file.
+const MAX_NODES: u32 = 4_000_000;
+
+pub(super) fn read(text: &str) -> Result<Soup, String> {
+    let text = text.trim_start_matches('\u{feff}');
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(text, options).map_err(|e| format!("not well-formed XML ({e})"))?;
+    let root = document.root_element();
+    if root.tag_name().name() != "COLLADA" {
+        return Err(format!("not a COLLADA file, opens with \"{}\"", root.tag_name().name()));
+    }
+    let mut scene = Scene::new(root)?;
+    let roots = scene.roots(root);
+    for node in &roots {
+        scene.node(*node, Matrix4::identity(), 0)?;
+    }
+    if roots.is_empty() {
+        scene.soup.note("there is no scene; all geometries are taken as they are");
+        let geometries = scene.all_geometries(root);
+        for geometry in geometries {
+            scene.geometry(geometry, &Matrix4::identity())?;
+        }
+    }
+    let unit = scene.unit;
+    let mut soup = scene.soup;
+    for p in &mut soup.vertices {
+        *p = p.map(|v| v * unit);
+    }
+    Ok(soup)
+}
+
+struct Scene<'a, 'i> {
+    by_id: HashMap<&'a str, Node<'a, 'i>>,
+    unit: f64,
+    soup: Soup,
+    n_visits: usize,
+}
+
+fn element<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
+    node.children().find(|n| n.tag_name().name() == tag)
+}
+
+fn local<'a>(node: Node<'a, '_>, attribute: &str) -> Option<&'a str> {
+    node.attribute(attribute)?.strip_prefix('#')
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>, String> {
+    (text.split_ascii_whitespace())
+        .map(|w| w.parse().map_err(|_| format!("not a number \"{}\"", w.chars().take(30).collect::<String>())))
+        .collect()
+}
+
+fn index_list(text: &str) -> Result<Vec<usize>, String> {
+    (text.split_ascii_whitespace())
+        .map(|w| w.parse().map_err(|_| format!("not an index \"{}\"", w.chars().take(30).collect::<String>())))
+        .collect()
+}
+
+impl<'a, 'i> Scene<'a, 'i> {
+    fn new(root: Node<'a, 'i>) -> Result<Self, String> {
+        let mut by_id = HashMap::new();
+        for node in root.descendants() {
+            if let Some(id) = node.attribute("id") {
+                by_id.entry(id).or_insert(node);
+            }
+        }
+        let unit = match element(root, "asset").and_then(|a| element(a, "unit")).and_then(|u| u.attribute("meter")) {
+            Some(text) => text.trim().parse().ok().filter(|u: &f64| u.is_finite() && *u > 0.0)
+                .ok_or_else(|| format!("the unit is no length \"{text}\""))?,
+            None => 1.0,
+        };
+        Ok(Self { by_id, unit, soup: Soup::default(), n_visits: 0 })
+    }
+
+    /// The element of that id in a mesh, else anywhere: real files give the same ids to each geometry.
+    fn within(&self, mesh: Node<'a, 'i>, id: &str) -> Option<Node<'a, 'i>> {
+        mesh.children().find(|n| n.attribute("id") == Some(id)).or_else(|| self.by_id.get(id).copied())
+    }
+
+    /// Nodes of the scene that the file shows; else of its first.
+    fn roots(&self, root: Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
+        let shown = element(root, "scene")
+            .and_then(|s| element(s, "instance_visual_scene"))
+            .and_then(|s| self.by_id.get(local(s, "url")?).copied());
+        let first = || element(root, "library_visual_scenes").and_then(|l| element(l, "visual_scene"));
+        let Some(scene) = shown.or_else(first) else { return Vec::new() };
+        scene.children().filter(|n| n.tag_name().name() == "node").collect()
+    }
+
+    fn all_geometries(&self, root: Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
+        root.descendants().filter(|n| n.tag_name().name() == "geometry").collect()
+    }
+
+    fn node(&mut self, node: Node<'a, 'i>, scene_from_parent: Matrix4<f64>, depth: usize) -> Result<(), String> {
+        self.n_visits += 1;
+        if depth > MAX_DEPTH || self.n_visits > MAX_VISITS {
+            return Err("nodes lie in one another too deeply, or in a circle".to_owned());
+        }
+        let mut scene_from_node = scene_from_parent;
+        for part in node.children().filter(Node::is_element) {
+            if let Some(step) = transform(part)? {
+                scene_from_node *= step;
+            }
+        }
+        for part in node.children().filter(Node::is_element) {
+            let target = || local(part, "url").and_then(|id| self.by_id.get(id).copied());
+            match part.tag_name().name() {
+                "node" => self.node(part, scene_from_node, depth + 1)?,
+                "instance_node" => match target() {
+                    Some(other) => self.node(other, scene_from_node, depth + 1)?,
+                    None => self.soup.note("an instance of a node outside the file is passed over"),
+                },
+                "instance_geometry" => match target() {
+                    Some(geometry) => self.geometry(geometry, &scene_from_node)?,
+                    None => self.soup.note("an instance of a geometry outside the file is passed over"),
+                },
+                "instance_controller" => self.soup.note("a skinned geometry is passed over"),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn geometry(&mut self, geometry: Node<'a, 'i>, scene_from_node: &Matrix4<f64>) -> Result<(), String> {
+        let Some(mesh) = element(geometry, "mesh") else {
+            self.soup.note("a geometry that is no mesh is passed over");
+            return Ok(());
+        };
+        // A mirror turns triangles inside out: turn them back.
+        let mirrored = scene_from_node.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
+        let mut placed: Vec<(&str, usize, usize)> = Vec::new();
+        for part in mesh.children().filter(Node::is_element) {
+            let tag = part.tag_name().name();
+            match tag {
+                "triangles" | "polylist" | "polygons" | "tristrips" | "trifans" => {}
+                "lines" | "linestrips" => {
+                    self.soup.note("lines are passed over");
+                    continue;
+                }
+                _ => continue,
+            }
+            let Some(layout) = self.layout(mesh, part)? else { continue };
+            let (first, n) = match placed.iter().find(|(id, ..)| *id == layout.source) {
+                Some(&(_, first, n)) => (first, n),
+                None => {
+                    let (first, n) = self.positions(mesh, layout.source, scene_from_node)?;
+                    placed.push((layout.source, first, n));
+                    (first, n)
+                }
+            };
+            let from = self.soup.triangles.len();
+            self.faces(part, &layout, first, n)?;
+            if mirrored {
+                for t in &mut self.soup.triangles[from..] {
+                    t.swap(1, 2);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Where the index of a corner's position stands among the indices of one corner.
+    fn layout(&self, mesh: Node<'a, 'i>, part: Node<'a, 'i>) -> Result<Option<Layout<'a>>, String> {
+        let mut stride = 0;
+        let mut position = None;
+        for input in part.children().filter(|n| n.tag_name().name() == "input") {
+            let offset: usize = input.attribute("offset").map_or(Ok(0), str::parse)
+                .map_err(|_| "an input's offset is no number".to_owned())?;
+            if offset > 255 {
+                return Err("an input's offset is out of reach".to_owned());
+            }
+            stride = stride.max(offset + 1);
+            let id = local(input, "source");
+            match input.attribute("semantic") {
+                Some("POSITION") => position = id.map(|id| (id, offset)),
+                Some("VERTEX") => {
+                    position = id
+                        .and_then(|id| self.within(mesh, id))
+                        .and_then(|v| v.children().find(|i| i.attribute("semantic") == Some("POSITION")))
+                        .and_then(|i| local(i, "source"))
+                        .map(|id| (id, offset));
+                }
+                _ => {}
+            }
+        }
+        match position {
+            Some((source, offset)) => Ok(Some(Layout { source, offset, stride })),
+            None if part.children().any(|n| n.tag_name().name() == "p") => {
+                Err("triangles name no positions".to_owned())
+            }
+            None => Ok(None),
+        }
+    }
+
+    /// Adds the positions of a source in the scene's frame: index of the first, and how many.
+    fn positions(
+        &mut self,
+        mesh: Node<'a, 'i>,
+        id: &str,
+        scene_from_node: &Matrix4<f64>,
+    ) -> Result<(usize, usize), String> {
+        let source = self.within(mesh, id).ok_or_else(|| format!("a source is missing \"{id}\""))?;
+        let array = element(source, "float_array").ok_or_else(|| format!("a source has no numbers \"{id}\""))?;
+        let accessor = element(source, "technique_common").and_then(|t| element(t, "accessor"));
+        let stride = accessor.and_then(|a| a.attribute("stride")).map_or(Ok(3), str::parse::<usize>)
+            .map_err(|_| "a stride is no number".to_owned())?;
+        let offset = accessor.and_then(|a| a.attribute("offset")).map_or(Ok(0), str::parse::<usize>)
+            .map_err(|_| "an offset is no number".to_owned())?;
+        if stride < 3 {
+            return Err(format!("positions need three numbers each \"{stride}\""));
+        }
+        let values = numbers(&all_text(array))?;
+        if let Some(claimed) = array.attribute("count").and_then(|c| c.parse::<usize>().ok())
+            && claimed > values.len()
+        {
+            return Err(format!("a list claims {claimed} numbers and holds {}", values.len()));
+        }
+        let first = self.soup.vertices.len();
+        for p in values.get(offset..).unwrap_or_default().chunks_exact(stride) {
+            let p = scene_from_node.transform_point(&geometry::Point::new(p[0], p[1], p[2]));
+            self.soup.add_vertex([p.x, p.y, p.z])?;
+        }
+        Ok((first, self.soup.vertices.len() - first))
+    }
+
+    fn faces(&mut self, part: Node<'a, 'i>, layout: &Layout, first: usize, n: usize) -> Result<(), String> {
+        let tag = part.tag_name().name();
+        let mut sizes = match element(part, "vcount").filter(|_| tag == "polylist") {
+            Some(vcount) => Some(index_list(&all_text(vcount))?.into_iter()),
+            None => None,
+        };
+        // A polygon with holes keeps its outline in <ph><p>.
+        let lists = part.children().flat_map(|c| match c.tag_name().name() {
+            "p" => Some(c),
+            "ph" => element(c, "p"),
+            _ => None,
+        });
+        for list in lists {
+            let indices = index_list(&all_text(list))?;
+            let mut corners = Vec::with_capacity(indices.len() / layout.stride);
+            for corner in indices.chunks_exact(layout.stride) {
+                let at = corner[layout.offset];
+                if at >= n {
+                    return Err(format!("a corner is not among the {n} positions \"{at}\""));
+                }
+                corners.push((first + at) as u32);
+            }
+            match (tag, &mut sizes) {
+                ("polylist", Some(sizes)) => {
+                    let mut rest = corners.as_slice();
+                    for size in sizes.by_ref() {
+                        if size > rest.len() {
+                            return Err("a polygon has fewer corners than it counts".to_owned());
+                        }
+                        super::primitive::fan(&mut self.soup, &rest[..size])?;
+                        rest = &rest[size..];
+                    }
+                }
+                ("polygons" | "trifans", _) => super::primitive::fan(&mut self.soup, &corners)?,
+                ("tristrips", _) => {
+                    for (k, t) in corners.windows(3).enumerate() {
+                        self.soup.add_triangle(if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] })?;
+                    }
+                }
+                _ => {
+                    for t in corners.chunks_exact(3) {
+                        self.soup.add_triangle([t[0], t[1], t[2]])?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+struct Layout<'a> {
+    source: &'a str,
+    offset: usize,
+    stride: usize,
+}
+
+/// The text of an element; comments cut it into pieces.
+fn all_text(node: Node) -> String {
+    node.children().filter(Node::is_text).filter_map(|n| n.text()).collect::<Vec<_>>().join(" ")
+}
+
+/// The step of a transform element; `None` for any other.
+fn transform(part: Node) -> Result<Option<Matrix4<f64>>, String> {
+    let tag = part.tag_name().name();
+    let n = match tag {
+        "matrix" => 16,
+        "rotate" => 4,
+        "translate" | "scale" => 3,
+        "lookat" | "skew" => return Err(format!("a transform that is not read \"{tag}\"")),
+        _ => return Ok(None),
+    };
+    let v = numbers(&all_text(part))?;
+    if v.len() != n || v.iter().any(|v| !v.is_finite()) {
+        return Err(format!("<{tag}> needs {n} finite numbers"));
+    }
+    Ok(Some(match tag {
+        "matrix" => Matrix4::from_row_slice(&v),
+        "translate" => Matrix4::new_translation(&Vector3::new(v[0], v[1], v[2])),
+        "scale" => Matrix4::new_nonuniform_scaling(&Vector3::new(v[0], v[1], v[2])),
+        _ => match Unit::try_new(Vector3::new(v[0], v[1], v[2]), 1e-12) {
+            Some(axis) => Rotation3::from_axis_angle(&axis, v[3].to_radians()).to_homogeneous(),
+            None => Matrix4::identity(),
+        },
+    }))
+}

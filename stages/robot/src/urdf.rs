@@ -1,0 +1,323 @@
+//! URDF text in, links and joints as written out. Cleans the text first (numbers, doubles, what we do not use), since
+//! the parser skips words that are no numbers, stops at a second material, and recurses as deep as the file says.
+
+use crate::finding::Findings;
+use geometry::{Pose, Vector};
+use nalgebra::{Translation3, UnitQuaternion};
+use roxmltree::{Document, Node, ParsingOptions};
+use std::fmt::Write as _;
+
+/// A URDF is text about a few dozen links; real ones stay below 1 MiB.
+pub(crate) const MAX_URDF_BYTES: u64 = 16 << 20;
+/// Elements, attributes' owners and texts of one file: a hundred times the largest met.
+const MAX_NODES: u32 = 400_000;
+
+/// Links and joints as one file has them, unchecked against one another.
+#[derive(Debug, Default, Clone)]
+pub(crate) struct Description {
+    pub(crate) links: Vec<RawLink>,
+    pub(crate) joints: Vec<RawJoint>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct RawLink {
+    pub(crate) name: String,
+    pub(crate) visuals: Vec<Body>,
+    pub(crate) collisions: Vec<Body>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Body {
+    pub(crate) link_from_body: Pose,
+    pub(crate) shape: Shape,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum Shape {
+    Box([f64; 3]),
+    Cylinder { radius: f64, length: f64 },
+    Capsule { radius: f64, length: f64 },
+    Sphere(f64),
+    Mesh { path: String, scale: [f64; 3] },
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct RawJoint {
+    pub(crate) name: String,
+    pub(crate) kind: urdf_rs::JointType,
+    pub(crate) parent: String,
+    pub(crate) child: String,
+    pub(crate) parent_from_joint: Pose,
+    pub(crate) axis: [f64; 3],
+    /// As written; `None` where the element is missing.
+    pub(crate) limits: Option<[f64; 2]>,
+    /// Joint, multiplier, offset.
+    pub(crate) mimic: Option<(String, f64, f64)>,
+}
+
+/// Reads a description; what is wrong goes to `findings`.
+pub(crate) fn read(text: &str, file: &str, findings: &mut Findings) -> Option<Description> {
+    let text = text.trim_start_matches('\u{feff}');
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    let document = match Document::parse_with_options(text, options) {
+        Ok(document) => document,
+        Err(error) => {
+            findings.fail(file, format!("not well-formed XML ({error})"), "mend the file");
+            return None;
+        }
+    };
+    let root = document.root_element();
+    if root.tag_name().name() != "robot" {
+        let what = format!("a URDF opens with <robot>, this file with \"{}\"", root.tag_name().name());
+        findings.fail(file, what, "give a URDF file");
+        return None;
+    }
+    if is_xacro(root) {
+        findings.fail(file, "this is xacro, not URDF", "expand it first: xacro in.xacro > robot.urdf");
+        return None;
+    }
+    let clean = Cleaner { file, findings }.robot(root)?;
+    match urdf_rs::read_from_string(&clean) {
+        Ok(robot) => Some(describe(&robot, &document)),
+        Err(error) => {
+            findings.fail(file, format!("not a URDF ({error})"), "mend the file");
+            None
+        }
+    }
+}
+
+fn is_xacro(root: Node) -> bool {
+    let xacro = |uri: Option<&str>| uri.is_some_and(|u| u.contains("xacro"));
+    root.descendants().any(|n| {
+        xacro(n.tag_name().namespace())
+            || (matches!(n.tag_name().name(), "link" | "joint")
+                && n.attribute("name").is_some_and(|v| v.contains("${")))
+    })
+}
+
+/// Writes the part of a URDF that we use, and only that.
+struct Cleaner<'a> {
+    file: &'a str,
+    findings: &'a mut Findings,
+}
+
+/// How many numbers an attribute holds.
+fn numbers_of(attribute: &str) -> Option<usize> {
+    match attribute {
+        "xyz" | "rpy" | "scale" | "size" => Some(3),
+        "quat_xyzw" => Some(4),
+        "radius" | "length" | "lower" | "upper" | "multiplier" | "offset" => Some(1),
+        _ => None,
+    }
+}
+
+impl Cleaner<'_> {
+    fn robot(&mut self, root: Node) -> Option<String> {
+        let mut out = String::from("<robot name=\"robot\"");
+        if let Some(version) = root.attribute("version") {
+            attribute(&mut out, "version", version);
+        }
+        out.push('>');
+        let mut right = true;
+        for node in root.children().filter(Node::is_element) {
+            match node.tag_name().name() {
+                "link" => right &= self.link(node, &mut out),
+                "joint" => right &= self.joint(node, &mut out),
+                _ => {}
+            }
+        }
+        out.push_str("</robot>");
+        right.then_some(out)
+    }
+
+    fn place(&self, node: Node) -> String {
+        let line = node.document().text_pos_at(node.range().start).row;
+        format!("{}:{line}: {}", self.file, node.tag_name().name())
+    }
+
+    fn link(&mut self, node: Node, out: &mut String) -> bool {
+        let mut right = self.open(node, &["name"], &[], out, true);
+        for body in node.children().filter(|n| matches!(n.tag_name().name(), "visual" | "collision")) {
+            right &= self.body(body, out);
+        }
+        out.push_str("</link>");
+        right
+    }
+
+    fn body(&mut self, node: Node, out: &mut String) -> bool {
+        let tag = node.tag_name().name();
+        let Some(geometry) = self.only(node, "geometry") else {
+            self.findings.warn(self.place(node), "has no geometry and is passed over", "remove it or complete it");
+            return true;
+        };
+        let Some(shape) = geometry.children().find(Node::is_element) else {
+            self.findings.warn(self.place(node), "has an empty geometry and is passed over", "remove it or complete it");
+            return true;
+        };
+        let (needs, may): (&[&str], &[&str]) = match shape.tag_name().name() {
+            "mesh" => (&["filename"], &["scale"]),
+            "box" => (&["size"], &[]),
+            "cylinder" | "capsule" => (&["radius", "length"], &[]),
+            "sphere" => (&["radius"], &[]),
+            other => {
+                let what = format!("a shape that is not known is passed over \"{other}\"");
+                self.findings.warn(self.place(node), what, "use mesh, box, cylinder, capsule or sphere");
+                return true;
+            }
+        };
+        let _ = write!(out, "<{tag}>");
+        let mut right = true;
+        if let Some(origin) = self.only(node, "origin") {
+            right &= self.open(origin, &[], &["xyz", "rpy", "quat_xyzw"], out, false);
+        }
+        out.push_str("<geometry>");
+        right &= self.open(shape, needs, may, out, false);
+        let _ = write!(out, "</geometry></{tag}>");
+        right
+    }
+
+    fn joint(&mut self, node: Node, out: &mut String) -> bool {
+        let mut right = self.open(node, &["name", "type"], &[], out, true);
+        let kind = node.attribute("type").unwrap_or_default();
+        if !matches!(kind, "revolute" | "continuous" | "prismatic" | "fixed" | "floating" | "planar" | "spherical") {
+            let what = format!("a joint type that is not known \"{kind}\"");
+            self.findings.fail(self.place(node), what, "use revolute, continuous, prismatic or fixed");
+            right = false;
+        }
+        let parts: [(&str, &[&str], &[&str]); 6] = [
+            ("origin", &[], &["xyz", "rpy", "quat_xyzw"]),
+            ("parent", &["link"], &[]),
+            ("child", &["link"], &[]),
+            ("axis", &["xyz"], &[]),
+            ("limit", &[], &["lower", "upper"]),
+            ("mimic", &["joint"], &["multiplier", "offset"]),
+        ];
+        for (tag, needs, may) in parts {
+            match self.only(node, tag) {
+                // An axis on a fixed joint says nothing; some files write nonsense there.
+                Some(_) if kind == "fixed" && matches!(tag, "axis" | "limit" | "mimic") => {}
+                Some(part) => right &= self.open(part, needs, may, out, false),
+                None if matches!(tag, "parent" | "child") => {
+                    self.findings.fail(self.place(node), format!("has no <{tag}>"), "complete the joint");
+                    right = false;
+                }
+                None => {}
+            }
+        }
+        out.push_str("</joint>");
+        right
+    }
+
+    /// The child of that name; a second one is passed over with a warning.
+    fn only<'n, 'i>(&mut self, node: Node<'n, 'i>, tag: &str) -> Option<Node<'n, 'i>> {
+        let mut found = node.children().filter(|n| n.tag_name().name() == tag);
+        let first = found.next();
+        if found.next().is_some() {
+            self.findings.warn(self.place(node), format!("has more than one <{tag}>; the first counts"), "keep one");
+        }
+        first
+    }
+
+    /// Writes an element with the attributes named, after checking their numbers.
+    fn open(&mut self, node: Node, needs: &[&str], may: &[&str], out: &mut String, has_children: bool) -> bool {
+        let mut right = true;
+        let _ = write!(out, "<{}", node.tag_name().name());
+        for &name in needs.iter().chain(may) {
+            let Some(value) = node.attribute(name) else {
+                if needs.contains(&name) {
+                    let what = format!("has no attribute \"{name}\"");
+                    self.findings.fail(self.place(node), what, "complete the element");
+                    right = false;
+                }
+                continue;
+            };
+            if let Some(n) = numbers_of(name) {
+                right &= self.numbers(node, name, value, n);
+            }
+            attribute(out, name, value);
+        }
+        if node.tag_name().name() == "limit" {
+            // The parser wants a velocity; we do not use it.
+            attribute(out, "velocity", "0");
+        }
+        out.push_str(if has_children { ">" } else { "/>" });
+        right
+    }
+
+    fn numbers(&mut self, node: Node, name: &str, value: &str, n: usize) -> bool {
+        let words = value.split_whitespace();
+        let right = words.clone().count() == n && words.clone().all(|w| w.parse().is_ok_and(f64::is_finite));
+        if !right {
+            let what = format!("{name} must be {n} finite number(s) \"{}\"", shortened(value));
+            self.findings.fail(self.place(node), what, "write numbers with spaces between them");
+        }
+        right
+    }
+}
+
+fn shortened(value: &str) -> String {
+    value.chars().take(60).collect()
+}
+
+fn attribute(out: &mut String, name: &str, value: &str) {
+    let _ = write!(out, " {name}=\"");
+    for c in value.trim().chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&apos;"),
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+}
+
+fn pose(origin: &urdf_rs::Pose) -> Pose {
+    let [r, p, y] = *origin.rpy;
+    Pose::from_parts(Translation3::from(Vector::from(*origin.xyz)), UnitQuaternion::from_euler_angles(r, p, y))
+}
+
+fn body(geometry: &urdf_rs::Geometry, origin: &urdf_rs::Pose) -> Body {
+    use urdf_rs::Geometry as G;
+    let shape = match geometry {
+        G::Box { size } => Shape::Box(**size),
+        G::Cylinder { radius, length } => Shape::Cylinder { radius: *radius, length: *length },
+        G::Capsule { radius, length } => Shape::Capsule { radius: *radius, length: *length },
+        G::Sphere { radius } => Shape::Sphere(*radius),
+        G::Mesh { filename, scale } => {
+            Shape::Mesh { path: filename.clone(), scale: scale.map_or([1.0; 3], |s| *s) }
+        }
+    };
+    Body { link_from_body: pose(origin), shape }
+}
+
+fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
+    // The parser cannot tell a missing limit from one of zero.
+    let limited: Vec<bool> = (document.root_element().children())
+        .filter(|n| n.tag_name().name() == "joint")
+        .map(|n| n.children().any(|c| c.tag_name().name() == "limit"))
+        .collect();
+    let links = (robot.links.iter())
+        .map(|link| RawLink {
+            name: link.name.clone(),
+            visuals: link.visual.iter().map(|v| body(&v.geometry, &v.origin)).collect(),
+            collisions: link.collision.iter().map(|c| body(&c.geometry, &c.origin)).collect(),
+        })
+        .collect();
+    let joints = (robot.joints.iter().zip(limited))
+        .map(|(joint, has_limits)| RawJoint {
+            name: joint.name.clone(),
+            kind: joint.joint_type.clone(),
+            parent: joint.parent.link.clone(),
+            child: joint.child.link.clone(),
+            parent_from_joint: pose(&joint.origin),
+            axis: *joint.axis.xyz,
+            limits: has_limits.then_some([joint.limit.lower, joint.limit.upper]),
+            mimic: (joint.mimic.as_ref())
+                .map(|m| (m.joint.clone(), m.multiplier.unwrap_or(1.0), m.offset.unwrap_or(0.0))),
+        })
+        .collect();
+    Description { links, joints }
+}

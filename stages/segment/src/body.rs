@@ -1,0 +1,226 @@
+//! Robots as they stand: fits and models in; posed links with their fields, gates and boxes out.
+
+use crate::Settings;
+use crate::field::{FIELD_REACH, Field};
+use contract::{Fit, Verdict};
+use geometry::{Aabb, Point, Pose, Vector};
+use nalgebra::{DMatrix, DVector};
+use robot::{Kinematics, Model};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Samples of a link by which its uncertainty is judged: a share of the surface is enough for one figure a link.
+const N_SPREAD: usize = 64;
+/// A joint that the points do not determine is believed to this, radians or metres: its link was placed by search.
+const OPEN_SIGMA: f64 = 0.01;
+
+/// One link as it stands.
+pub(crate) struct Link {
+    /// Index into the model's links.
+    pub(crate) index: u16,
+    pub(crate) world_from_link: Pose,
+    pub(crate) field: Arc<Field>,
+    /// Bounds of the mesh in the link's frame, metres.
+    pub(crate) bounds: Aabb,
+    /// How far around its bounds points are looked at, metres.
+    pub(crate) reach: f64,
+    /// Distance at which a point still belongs to it, metres.
+    pub(crate) gate: f32,
+}
+
+/// One robot as it stands.
+pub(crate) struct Body {
+    /// Index into the fits.
+    pub(crate) robot: u16,
+    /// World bounds of everything that is looked at, metres.
+    pub(crate) region: Aabb,
+    pub(crate) links: Vec<Link>,
+}
+
+/// The fits that are used for labels; fields are shared between fits of one model.
+pub(crate) fn bodies(fits: &[Fit], models: &[Model], settings: &Settings) -> Vec<Body> {
+    let mut fields: BTreeMap<usize, Vec<Option<Arc<Field>>>> = BTreeMap::new();
+    let mut out = Vec::new();
+    for (robot, fit) in fits.iter().enumerate() {
+        // Labels hold a robot as i16.
+        let (Ok(robot), Some(model)) = (i16::try_from(robot), models.get(fit.model)) else {
+            continue;
+        };
+        let robot = robot.unsigned_abs();
+        if fit.verdict == Verdict::Refused || fit.joints.len() != model.free.len() {
+            continue;
+        }
+        let fields = fields.entry(fit.model).or_insert_with(|| {
+            model
+                .links
+                .iter()
+                .map(|l| Field::new(&l.cad).map(Arc::new))
+                .collect()
+        });
+        let links = posed(fit, model, fields, settings);
+        let region = links
+            .iter()
+            .fold(Aabb::EMPTY, |all, link| all.union(&link.region()));
+        if !region.is_empty() {
+            out.push(Body {
+                robot,
+                region,
+                links,
+            });
+        }
+    }
+    out
+}
+
+fn posed(
+    fit: &Fit,
+    model: &Model,
+    fields: &[Option<Arc<Field>>],
+    settings: &Settings,
+) -> Vec<Link> {
+    let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
+    let Kinematics {
+        base_from_link,
+        twists,
+    } = model.kinematics(&posture);
+    let covariance = covariance(fit);
+    let hands = hands(model);
+    let mut out = Vec::new();
+    for (index, field) in fields.iter().enumerate() {
+        let (Some(field), Ok(at)) = (field, u16::try_from(index)) else {
+            continue;
+        };
+        let spread = spread(
+            fit,
+            field,
+            &base_from_link[index],
+            &twists[index],
+            &covariance,
+        );
+        let stated = model
+            .mesh_sigmas
+            .iter()
+            .find(|entry| entry.0 == index)
+            .map(|entry| entry.1);
+        let mesh = stated.unwrap_or(settings.sigma_cad);
+        let sigma = (settings.sigma_range.powi(2) + mesh * mesh + spread * spread).sqrt();
+        out.push(Link {
+            index: at,
+            world_from_link: fit.world_from_base * base_from_link[index],
+            field: Arc::clone(field),
+            bounds: model.links[index].bounds,
+            reach: if hands[index] {
+                settings.hand_reach
+            } else {
+                settings.reach
+            },
+            gate: (3.0 * sigma).clamp(settings.min_gate, settings.max_gate) as f32,
+        });
+    }
+    out
+}
+
+/// Which links have no other link with a body beyond them: there the tool and the workpiece are.
+fn hands(model: &Model) -> Vec<bool> {
+    let mut hands: Vec<bool> = model
+        .links
+        .iter()
+        .map(|link| !link.cad.points.is_empty())
+        .collect();
+    for joint in model.joints.iter().rev() {
+        let mut beyond = Some(joint.child);
+        // A body anywhere below takes the part of hand away from all that carry it.
+        if !model.links[joint.child].cad.points.is_empty() {
+            while let Some(carrier) = beyond.and_then(|link| model.links[link].parent_joint) {
+                let parent = model.joints[carrier].parent;
+                hands[parent] = false;
+                beyond = Some(parent);
+            }
+        }
+    }
+    // A lone base is no hand: nothing is carried by what does not move.
+    if let Some(root) = hands.first_mut() {
+        *root = false;
+    }
+    hands
+}
+
+/// RMS over the link's samples of their uncertainty across the surface, metres.
+fn spread(
+    fit: &Fit,
+    field: &Field,
+    base_from_link: &Pose,
+    twists: &[[f64; 6]],
+    covariance: &DMatrix<f64>,
+) -> f64 {
+    let step = field.len() / N_SPREAD + 1;
+    let (mut sum, mut n) = (0.0, 0.0);
+    for (p, normal) in field.samples(step) {
+        let p = base_from_link * Point::from(p.map(f64::from));
+        let normal = base_from_link * Vector::from(normal.map(f64::from));
+        // The base moves about its own origin along world axes.
+        let (arm, across) = (
+            fit.world_from_base.rotation * p.coords,
+            fit.world_from_base.rotation * normal,
+        );
+        let turn = arm.cross(&across);
+        let mut lever = vec![across.x, across.y, across.z, turn.x, turn.y, turn.z];
+        lever.extend(twists.iter().map(|t| {
+            let (v, w) = (Vector::new(t[0], t[1], t[2]), Vector::new(t[3], t[4], t[5]));
+            normal.dot(&(v + w.cross(&p.coords)))
+        }));
+        let lever = DVector::from_vec(lever);
+        sum += lever.dot(&(covariance * &lever)).max(0.0);
+        n += 1.0;
+    }
+    if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
+}
+
+/// Covariance of base and joints; of the standard deviations alone where the fit gives no whole one or a joint is
+/// open: that errs on the wide side, and the gate's upper limit holds it.
+fn covariance(fit: &Fit) -> DMatrix<f64> {
+    let n = 6 + fit.joints.len();
+    let is_whole = fit.covariance.len() == n * n && fit.covariance.iter().all(|v| v.is_finite());
+    if is_whole && fit.joints.iter().all(|joint| joint.determined) {
+        return DMatrix::from_row_slice(n, n, &fit.covariance);
+    }
+    let sigmas = fit
+        .base_sigma
+        .iter()
+        .copied()
+        .chain(fit.joints.iter().map(|joint| joint.sigma));
+    let variances = sigmas.map(|s| {
+        if s.is_finite() {
+            s.min(OPEN_SIGMA)
+        } else {
+            OPEN_SIGMA
+        }
+        .powi(2)
+    });
+    DMatrix::from_diagonal(&DVector::from_iterator(n, variances))
+}
+
+impl Link {
+    /// World bounds of what is looked at, metres.
+    pub(crate) fn region(&self) -> Aabb {
+        let corners = self
+            .bounds
+            .grown(self.reach.max(f64::from(FIELD_REACH)))
+            .corners();
+        Aabb::of(corners.map(|c| {
+            let p = self.world_from_link * Point::from(c);
+            [p.x, p.y, p.z]
+        }))
+    }
+}
+
+/// Distance of a point from a box in its own frame, metres; zero inside.
+#[inline]
+pub(crate) fn box_distance(min: [f32; 3], max: [f32; 3], p: [f32; 3]) -> f32 {
+    let mut square = 0.0;
+    for i in 0..3 {
+        let d = (min[i] - p[i]).max(p[i] - max[i]).max(0.0);
+        square += d * d;
+    }
+    square.sqrt()
+}

@@ -1,0 +1,273 @@
+//! A link's CAD cloud as a grid: a place in the link's frame in, distance to the nearest surface and its normal out.
+
+use robot::CadCloud;
+
+/// Smallest edge of a cell, metres: with samples every 5 mm a cell holds about sixteen.
+const MIN_EDGE: f32 = 0.02;
+/// How far around the link the grid reaches, metres: beyond it a point is simply far.
+pub(crate) const FIELD_REACH: f32 = 0.16;
+/// Most cells of a grid; a larger link gets larger cells.
+const MAX_CELLS: f32 = 2.0e6;
+
+/// Samples sorted into cells, and for each cell how far it is from the surface.
+pub(crate) struct Field {
+    min: [f32; 3],
+    size: [usize; 3],
+    edge: f32,
+    /// Samples of cell `i` are `starts[i]..starts[i + 1]`.
+    starts: Vec<u32>,
+    points: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    /// Distance of the cell's middle from the nearest sample, metres.
+    far: Vec<f32>,
+    /// Distance along the surface to the next sample that still counts as none, metres.
+    tangent: f32,
+}
+
+/// The nearest place on a surface.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Near {
+    /// Metres; across the surface where the point lies over it.
+    pub(crate) distance: f32,
+    /// Outward unit normal there, link frame.
+    pub(crate) normal: [f32; 3],
+}
+
+impl Field {
+    /// The field of a CAD cloud; `None` for a link without a body.
+    pub(crate) fn new(cad: &CadCloud) -> Option<Self> {
+        let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for p in &cad.points {
+            for i in 0..3 {
+                min[i] = min[i].min(p[i]);
+                max[i] = max[i].max(p[i]);
+            }
+        }
+        if cad.points.is_empty() || !(0..3).all(|i| min[i].is_finite() && max[i].is_finite()) {
+            return None;
+        }
+        let span = [0, 1, 2].map(|i| max[i] - min[i] + 2.0 * FIELD_REACH);
+        let edge = MIN_EDGE
+            .max(1.5 * cad.spacing)
+            .max((span[0] * span[1] * span[2] / MAX_CELLS).cbrt());
+        let size = span.map(|s| (s / edge).ceil().max(1.0) as usize);
+        let mut field = Self {
+            min: min.map(|v| v - FIELD_REACH),
+            size,
+            edge,
+            starts: vec![0; size[0] * size[1] * size[2] + 1],
+            points: Vec::new(),
+            normals: Vec::new(),
+            far: Vec::new(),
+            tangent: 0.75 * cad.spacing + 0.001,
+        };
+        field.fill(cad);
+        field.spread();
+        Some(field)
+    }
+
+    /// Sorts the samples into their cells.
+    fn fill(&mut self, cad: &CadCloud) {
+        let cells: Vec<usize> = cad
+            .points
+            .iter()
+            .map(|p| self.index(self.cell(*p)))
+            .collect();
+        for &cell in &cells {
+            self.starts[cell + 1] += 1;
+        }
+        for i in 1..self.starts.len() {
+            self.starts[i] += self.starts[i - 1];
+        }
+        let mut next = self.starts.clone();
+        self.points = vec![[0.0; 3]; cells.len()];
+        self.normals = vec![[0.0; 3]; cells.len()];
+        for (i, &cell) in cells.iter().enumerate() {
+            let at = next[cell] as usize;
+            next[cell] += 1;
+            self.points[at] = cad.points[i];
+            self.normals[at] = cad.normals[i];
+        }
+    }
+
+    /// Spreads to every cell the sample nearest to its middle, by sweeps over neighbours.
+    fn spread(&mut self) {
+        let n = self.starts.len() - 1;
+        let mut nearest = vec![u32::MAX; n];
+        let mut far = vec![f32::INFINITY; n];
+        for cell in 0..n {
+            if self.starts[cell] < self.starts[cell + 1] {
+                nearest[cell] = self.starts[cell];
+                far[cell] = length(minus(
+                    self.middle(cell),
+                    self.points[self.starts[cell] as usize],
+                ));
+            }
+        }
+        // Two rounds there and back carry the nearest sample around every corner of a solid body.
+        for round in 0..4 {
+            for step in 0..n {
+                let cell = if round % 2 == 0 { step } else { n - 1 - step };
+                self.relax(cell, round % 2 == 0, &mut nearest, &mut far);
+            }
+        }
+        self.far = far;
+    }
+
+    fn relax(&self, cell: usize, forward: bool, nearest: &mut [u32], far: &mut [f32]) {
+        let at = self.coordinates(cell).map(|v| v as i64);
+        let middle = self.middle(cell);
+        for (n, offset) in (0..27).map(|n| (n, [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1])) {
+            // The half of the neighbours that this sweep has already visited.
+            if n == 13 || (n < 13) != forward {
+                continue;
+            }
+            let Some(other) = self.neighbour(at, offset) else {
+                continue;
+            };
+            if nearest[other] == u32::MAX {
+                continue;
+            }
+            let distance = length(minus(middle, self.points[nearest[other] as usize]));
+            if distance < far[cell] {
+                far[cell] = distance;
+                nearest[cell] = nearest[other];
+            }
+        }
+    }
+
+    /// The nearest place on the surface, where it is within a cell's edge; else `Err` of the rough distance, metres,
+    /// infinite outside the grid.
+    pub(crate) fn near(&self, p: [f32; 3]) -> Result<Near, f32> {
+        let inside = (0..3).all(|i| {
+            let v = p[i] - self.min[i];
+            v >= 0.0 && v < self.size[i] as f32 * self.edge
+        });
+        if !inside {
+            return Err(f32::INFINITY);
+        }
+        let cell = self.cell(p);
+        let rough = self.far[self.index(cell)];
+        // A cell's middle is at most 0.87 edges from `p`; farther than two edges there is nothing near.
+        if rough > 2.0 * self.edge {
+            return Err(rough);
+        }
+        let at = cell.map(|v| v as i64);
+        let mut best = (f32::INFINITY, 0);
+        for offset in (0..9).map(|n| [0, n % 3 - 1, n / 3 - 1]) {
+            let (y, z) = (at[1] + offset[1], at[2] + offset[2]);
+            if y < 0 || z < 0 || y >= self.size[1] as i64 || z >= self.size[2] as i64 {
+                continue;
+            }
+            // Cells along x are neighbours in memory: three of them are one run of samples.
+            let row = (z as usize * self.size[1] + y as usize) * self.size[0];
+            let first = row + cell[0].saturating_sub(1);
+            let last = row + (cell[0] + 1).min(self.size[0] - 1);
+            for i in self.starts[first] as usize..self.starts[last + 1] as usize {
+                let d = minus(p, self.points[i]);
+                let n = self.normals[i];
+                let across = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+                let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let along = (square - across * across).max(0.0).sqrt();
+                let over = (along - self.tangent).max(0.0);
+                let metric = across * across + over * over;
+                if metric < best.0 {
+                    best = (metric, i);
+                }
+            }
+        }
+        if best.0.is_finite() {
+            Ok(Near {
+                distance: best.0.sqrt(),
+                normal: self.normals[best.1],
+            })
+        } else {
+            Err(rough)
+        }
+    }
+
+    /// Every `step`-th sample and its normal.
+    pub(crate) fn samples(&self, step: usize) -> impl Iterator<Item = ([f32; 3], [f32; 3])> + '_ {
+        self.points
+            .iter()
+            .copied()
+            .zip(self.normals.iter().copied())
+            .step_by(step.max(1))
+    }
+
+    /// Number of samples.
+    pub(crate) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    fn cell(&self, p: [f32; 3]) -> [usize; 3] {
+        [0, 1, 2].map(|i| (((p[i] - self.min[i]) / self.edge) as usize).min(self.size[i] - 1))
+    }
+
+    fn index(&self, cell: [usize; 3]) -> usize {
+        (cell[2] * self.size[1] + cell[1]) * self.size[0] + cell[0]
+    }
+
+    fn coordinates(&self, index: usize) -> [usize; 3] {
+        let row = index / self.size[0];
+        [index % self.size[0], row % self.size[1], row / self.size[1]]
+    }
+
+    fn middle(&self, index: usize) -> [f32; 3] {
+        let at = self.coordinates(index);
+        [0, 1, 2].map(|i| self.min[i] + (at[i] as f32 + 0.5) * self.edge)
+    }
+
+    fn neighbour(&self, at: [i64; 3], offset: [i64; 3]) -> Option<usize> {
+        let to = [0, 1, 2].map(|i| at[i] + offset[i]);
+        let inside = (0..3).all(|i| to[i] >= 0 && to[i] < self.size[i] as i64);
+        inside.then(|| self.index(to.map(|v| v as usize)))
+    }
+}
+
+fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn length(v: [f32; 3]) -> f32 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples every 5 mm on a square of 0.4 m at z = 0, normal up.
+    fn plate() -> CadCloud {
+        let at = |i: i32| i as f32 * 0.005 - 0.2;
+        let points: Vec<_> = (0..81 * 81)
+            .map(|n| [at(n % 81), at(n / 81), 0.0])
+            .collect();
+        CadCloud {
+            normals: vec![[0.0, 0.0, 1.0]; points.len()],
+            points,
+            spacing: 0.005,
+            area: 0.16,
+        }
+    }
+
+    #[test]
+    fn distance_is_across_the_surface_and_grows_past_its_edge() {
+        let field = Field::new(&plate()).expect("has samples");
+        let near = field.near([0.0512, 0.0833, 0.007]).expect("near");
+        assert!((near.distance - 0.007).abs() < 1e-5);
+        let beside = field.near([0.22, 0.0, 0.0]).expect("near");
+        assert!(
+            (beside.distance - 0.0155).abs() < 0.002,
+            "{}",
+            beside.distance
+        );
+        let rough = field.near([0.0, 0.0, 0.1]).expect_err("far");
+        assert!((rough - 0.1).abs() < 0.03, "{rough}");
+        assert_eq!(
+            field.near([0.0, 0.0, 1.0]).expect_err("outside"),
+            f32::INFINITY
+        );
+        assert!(Field::new(&CadCloud::default()).is_none());
+    }
+}

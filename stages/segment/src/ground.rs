@@ -1,0 +1,214 @@
+//! The floor as dense rasters: a place in, height above the floor and the default label out, in constant time.
+
+use crate::Settings;
+use contract::{Floor, FloorLevel, Label};
+use geometry::narrow::{floor_i32, local_f32};
+
+/// Largest dense raster, cells: 4 km² at 0.5 m. A level with stray cells farther apart is looked up by search.
+const MAX_CELLS: i64 = 1 << 24;
+
+/// The floor, prepared for a look-up at every point of the plant.
+#[derive(Debug, Clone)]
+pub struct Ground {
+    levels: Vec<Level>,
+    band: f64,
+    depth: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Level {
+    Dense(Raster),
+    Sparse(FloorLevel),
+}
+
+/// Heights at cell middles; cells without one but near known ones hold the mean plane, others NaN.
+#[derive(Debug, Clone)]
+struct Raster {
+    cell: f64,
+    min: [i32; 2],
+    width: usize,
+    heights: Vec<f32>,
+    /// Subtracted from heights, metres, so that f32 is exact far above sea level.
+    base: f64,
+}
+
+impl Ground {
+    /// The floor as found, with the bands of `settings`.
+    #[must_use]
+    pub fn new(floor: &Floor, settings: &Settings) -> Self {
+        let levels = floor
+            .levels
+            .iter()
+            .filter(|level| !level.heights.is_empty());
+        Self {
+            levels: levels
+                .map(|level| {
+                    Raster::new(level).map_or_else(|| Level::Sparse(level.clone()), Level::Dense)
+                })
+                .collect(),
+            band: settings.floor_band,
+            depth: settings.floor_depth,
+        }
+    }
+
+    /// Height above the floor level that lies nearest below (or at most `floor_depth` above) a place in the world,
+    /// metres; `None` where no level is near.
+    #[inline]
+    #[must_use]
+    pub fn height_above(&self, world: [f64; 3]) -> Option<f64> {
+        let mut best: Option<f64> = None;
+        for level in &self.levels {
+            let floor = match level {
+                Level::Dense(raster) => raster.height(world[0], world[1]),
+                Level::Sparse(level) => level.height(world[0], world[1]),
+            };
+            if let Some(above) = floor.map(|h| world[2] - h).filter(|h| *h >= -self.depth) {
+                best = Some(best.map_or(above, |b| b.min(above)));
+            }
+        }
+        best
+    }
+
+    /// Whether a place in the world lies on the floor.
+    #[inline]
+    #[must_use]
+    pub fn is_floor(&self, world: [f64; 3]) -> bool {
+        self.height_above(world).is_some_and(|h| h <= self.band)
+    }
+
+    /// The label that a point has by its place alone: floor or fixed.
+    #[inline]
+    #[must_use]
+    pub fn label(&self, world: [f64; 3]) -> Label {
+        if self.is_floor(world) {
+            Label::FLOOR
+        } else {
+            Label::FIXED
+        }
+    }
+}
+
+impl Raster {
+    /// The dense form of a level; `None` where it would be too large.
+    fn new(level: &FloorLevel) -> Option<Self> {
+        let cells = || level.heights.iter().map(|entry| entry.0);
+        // Two cells of margin: that far the mean plane stands in, as `FloorLevel::height` says.
+        let low = |axis: usize| Some(i64::from(cells().map(|c| c[axis]).min()?) - 2);
+        let high = |axis: usize| Some(i64::from(cells().map(|c| c[axis]).max()?) + 2);
+        let (width, depth) = (high(0)? - low(0)? + 1, high(1)? - low(1)? + 1);
+        if width.saturating_mul(depth) > MAX_CELLS {
+            return None;
+        }
+        let min = [i32::try_from(low(0)?).ok()?, i32::try_from(low(1)?).ok()?];
+        let (width, depth) = (width as usize, depth as usize);
+        let base = level.heights[0].1;
+        let mut heights = vec![f32::NAN; width * depth];
+        let at = |c: [i32; 2]| ((c[0] - min[0]) as usize, (c[1] - min[1]) as usize);
+        for (cell, _) in &level.heights {
+            let (u, v) = at(*cell);
+            for (dv, du) in (0..25).map(|n| (n / 5, n % 5)) {
+                let (u, v) = (u + du - 2, v + dv - 2);
+                let (x, y) = (i64::from(min[0]) + u as i64, i64::from(min[1]) + v as i64);
+                let mean =
+                    level.mean_height((x as f64 + 0.5) * level.cell, (y as f64 + 0.5) * level.cell);
+                heights[v * width + u] = local_f32(mean - base);
+            }
+        }
+        for (cell, height) in &level.heights {
+            let (u, v) = at(*cell);
+            heights[v * width + u] = local_f32(height - base);
+        }
+        Some(Self {
+            cell: level.cell,
+            min,
+            width,
+            heights,
+            base,
+        })
+    }
+
+    /// Bilinear height between cell middles, metres.
+    #[inline]
+    fn height(&self, x: f64, y: f64) -> Option<f64> {
+        let (u, v) = (x / self.cell - 0.5, y / self.cell - 0.5);
+        let (i, j) = (floor_i32(u), floor_i32(v));
+        let (fu, fv) = (u - f64::from(i), v - f64::from(j));
+        let (i, j) = (
+            i64::from(i) - i64::from(self.min[0]),
+            i64::from(j) - i64::from(self.min[1]),
+        );
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (di, dj, w) in [
+            (0, 0, (1.0 - fu) * (1.0 - fv)),
+            (1, 0, fu * (1.0 - fv)),
+            (0, 1, (1.0 - fu) * fv),
+            (1, 1, fu * fv),
+        ] {
+            let (i, j) = (i + di, j + dj);
+            if i < 0 || j < 0 || i >= self.width as i64 {
+                continue;
+            }
+            let Some(&h) = self.heights.get(j as usize * self.width + i as usize) else {
+                continue;
+            };
+            if !h.is_nan() {
+                sum += (w + 1e-6) * f64::from(h);
+                weight += w + 1e-6;
+            }
+        }
+        (weight > 0.0).then(|| sum / weight + self.base)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::{Plane, Vector};
+
+    #[test]
+    fn wavy_floor_is_floor_and_what_stands_on_it_is_not() {
+        let cell = 0.25;
+        let wave = |x: f64, y: f64| 100.0 + 0.01 * (x * 0.8).sin() + 0.01 * y;
+        let mut heights = Vec::new();
+        for i in -20..20 {
+            for j in -20..20 {
+                if (i, j) != (3, 3) {
+                    heights.push((
+                        [i, j],
+                        wave((f64::from(i) + 0.5) * cell, (f64::from(j) + 0.5) * cell),
+                    ));
+                }
+            }
+        }
+        let normal = Vector::new(0.0, -0.01, 1.0).normalize();
+        let plane = Plane {
+            normal,
+            offset: normal.z * 100.0,
+        };
+        let level = FloorLevel {
+            plane,
+            waviness: 0.007,
+            area: 100.0,
+            cell,
+            heights,
+        };
+        let floor = Floor {
+            levels: vec![level],
+            planes: Vec::new(),
+        };
+        let ground = Ground::new(&floor, &Settings::default());
+        for (x, y) in [(0.1, 0.2), (-3.3, 4.1), (4.2, -4.4)] {
+            let z = wave(x, y);
+            assert_eq!(ground.label([x, y, z + 0.004]), Label::FLOOR);
+            assert_eq!(ground.label([x, y, z - 0.01]), Label::FLOOR);
+            assert_eq!(ground.label([x, y, z + 0.03]), Label::FIXED);
+            assert_eq!(ground.label([x, y, z - 1.0]), Label::FIXED);
+            let (dense, sparse) = (
+                ground.height_above([x, y, z]),
+                floor.height_above([x, y, z], 0.03),
+            );
+            assert!((dense.expect("near") - sparse.expect("near")).abs() < 1e-3);
+        }
+        assert_eq!(ground.height_above([50.0, 0.0, 100.0]), None);
+    }
+}

@@ -1,0 +1,353 @@
+//! The step itself: one tile in, its labels near robots and its residual voxels out.
+
+use crate::body::{Body, bodies, box_distance};
+use crate::raster::Raster;
+use crate::{Ground, Settings};
+use contract::{
+    Fit, Floor, Label, LinkAt, Map, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Scan, Tile,
+    TileLabels,
+};
+use geometry::depth::{Rows, rotate, rows, transform};
+use geometry::narrow::floor_i32;
+use geometry::{Aabb, Point, Pose};
+use robot::Model;
+
+/// A surface turned by more than this (cosine of 70°) from the link's is something else …
+const MIN_AGREEMENT: f32 = 0.35;
+/// … unless it lies closer than this, metres: at edges normals are smeared.
+const NEAR_ENOUGH: f32 = 0.003;
+/// A region ends here: points this near its border, metres, may go on outside.
+const BORDER: f32 = 0.03;
+/// Below this height, metres, what is not floor stands on it.
+const GROUNDED: f64 = 0.06;
+/// Of the eight neighbours, how many on a link pull a doubtful point onto it.
+const PULL: usize = 4;
+
+/// Labels the points of tiles near fitted robots.
+pub struct Segment {
+    bodies: Vec<Body>,
+    ground: Ground,
+    scans: Vec<Scan>,
+    settings: Settings,
+}
+
+/// Memory reused from tile to tile.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    raster: Raster,
+    found: Vec<Found>,
+}
+
+/// What one point is before its neighbours are asked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Found {
+    /// Away from robots, or floor.
+    Default,
+    /// Within the gate of a link.
+    Link(Touch),
+    /// Between one gate and two.
+    Doubt(Touch),
+    /// Near a robot, but none of its links.
+    Residual(Touch),
+    /// Hangs between a link's edge and what lies behind.
+    Veil,
+}
+
+/// The nearest link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Touch {
+    link: LinkAt,
+    /// Metres; infinite beyond the field.
+    distance: f32,
+    at_border: bool,
+    grounded: bool,
+}
+
+/// A link as one tile sees it.
+struct Seen<'a> {
+    at: LinkAt,
+    link: &'a crate::body::Link,
+    link_from_scan: Rows,
+    min: [f32; 3],
+    max: [f32; 3],
+}
+
+impl Segment {
+    /// Labels for these fits (the robots of the result, in its order; refused ones give none). `scans` in the order
+    /// of their numbers.
+    #[must_use]
+    pub fn new(
+        fits: &[Fit],
+        models: &[Model],
+        floor: &Floor,
+        scans: &[Scan],
+        settings: Settings,
+    ) -> Self {
+        Self {
+            bodies: bodies(fits, models, &settings),
+            ground: Ground::new(floor, &settings),
+            scans: scans.to_vec(),
+            settings,
+        }
+    }
+
+    /// World bounds of each robot's region, metres: only tiles that touch one need to be segmented.
+    #[must_use]
+    pub fn regions(&self) -> Vec<Aabb> {
+        self.bodies.iter().map(|body| body.region).collect()
+    }
+
+    /// The floor, for the default label of every point.
+    #[must_use]
+    pub fn ground(&self) -> &Ground {
+        &self.ground
+    }
+
+    /// The links whose surroundings a tile may touch.
+    fn seen<'a>(&'a self, tile: &Tile, world_from_scan: &Pose) -> Vec<Seen<'a>> {
+        let mut out = Vec::new();
+        for body in self
+            .bodies
+            .iter()
+            .filter(|body| body.region.touches(&tile.bounds))
+        {
+            for link in body
+                .links
+                .iter()
+                .filter(|link| link.region().touches(&tile.bounds))
+            {
+                out.push(Seen {
+                    at: LinkAt {
+                        robot: body.robot,
+                        link: link.index,
+                    },
+                    link,
+                    link_from_scan: rows(&(link.world_from_link.inverse() * world_from_scan)),
+                    min: link.bounds.min.map(|v| v as f32),
+                    max: link.bounds.max.map(|v| v as f32),
+                });
+            }
+        }
+        out
+    }
+
+    /// What point `i` is by itself.
+    fn judge(
+        &self,
+        seen: &[Seen],
+        p: [f32; 3],
+        world: [f64; 3],
+        normal: impl Fn() -> Option<[f32; 3]>,
+    ) -> Found {
+        let mut inset = f32::NEG_INFINITY;
+        let mut best: Option<(f32, &Seen, f32, [f32; 3])> = None;
+        let mut rough = (f32::INFINITY, f32::INFINITY, None::<&Seen>);
+        for s in seen {
+            let q = transform(&s.link_from_scan, p);
+            let outside = box_distance(s.min, s.max, q);
+            inset = inset.max(s.link.reach as f32 - outside);
+            let distance = match s.link.field.near(q) {
+                Ok(near) => {
+                    let gates = near.distance / s.link.gate;
+                    if best.is_none_or(|b| gates < b.0) {
+                        best = Some((gates, s, near.distance, near.normal));
+                    }
+                    near.distance
+                }
+                Err(distance) => distance,
+            };
+            // Far from every field the box decides which link is the nearest.
+            if (distance, outside) < (rough.0, rough.1) || rough.2.is_none() {
+                rough = (distance, outside, Some(s));
+            }
+        }
+        let Some(nearest) = rough.2.filter(|_| inset > 0.0) else {
+            return Found::Default;
+        };
+        let height = self.ground.height_above(world);
+        let touch = |at: LinkAt, distance: f32| Touch {
+            link: at,
+            distance,
+            at_border: inset < BORDER,
+            grounded: height.is_some_and(|h| h < GROUNDED),
+        };
+        let is_floor = height.is_some_and(|h| h <= self.settings.floor_band);
+        if let Some((gates, s, distance, surface)) = best.filter(|b| b.0 <= 2.0) {
+            let found = touch(s.at, distance);
+            if height.is_some_and(|h| h <= self.settings.foot_band)
+                && !self.on_side(s, surface, distance)
+            {
+                return Found::Default;
+            }
+            let agrees = distance <= NEAR_ENOUGH
+                || normal().is_none_or(|n| {
+                    let n = rotate(&s.link_from_scan, n);
+                    (n[0] * surface[0] + n[1] * surface[1] + n[2] * surface[2]).abs()
+                        >= MIN_AGREEMENT
+                });
+            if gates <= 1.0 && agrees {
+                return Found::Link(found);
+            }
+            if !is_floor && agrees {
+                return Found::Doubt(found);
+            }
+        }
+        if is_floor {
+            Found::Default
+        } else {
+            Found::Residual(touch(nearest.at, rough.0))
+        }
+    }
+
+    /// Whether a point close to the floor lies on the upright side of a link, well inside its gate.
+    fn on_side(&self, s: &Seen, surface: [f32; 3], distance: f32) -> bool {
+        let up = s.link.world_from_link.rotation.inverse() * geometry::Vector::z();
+        let rise = surface[0] * up.x as f32 + surface[1] * up.y as f32 + surface[2] * up.z as f32;
+        rise.abs() < 0.5 && distance <= 0.5 * s.link.gate
+    }
+
+    /// Doubtful points and veils, by what their neighbours are.
+    fn settle(&self, tile: &Tile, raster: Option<&Raster>, found: &mut [Found]) {
+        let Some(raster) = raster else {
+            // Without neighbours a doubt stays one; merge sees it by its voxel.
+            for f in found.iter_mut() {
+                if let Found::Doubt(touch) = *f {
+                    *f = Found::Residual(touch);
+                }
+            }
+            return;
+        };
+        let first = found.to_vec();
+        for i in 0..first.len() {
+            let (touch, is_doubt) = match first[i] {
+                Found::Doubt(touch) => (touch, true),
+                Found::Residual(touch) => (touch, false),
+                _ => continue,
+            };
+            let (mut n_joined, mut n_link) = (0, 0);
+            for by in (0..25).filter(|n| *n != 12).map(|n| [n / 5 - 2, n % 5 - 2]) {
+                let Some(other) = raster.beside(tile, i, by) else {
+                    continue;
+                };
+                if let Found::Link(at) = first[other] {
+                    n_link += 1;
+                    let inner = by[0].abs() <= 1 && by[1].abs() <= 1;
+                    n_joined += usize::from(
+                        inner && at.link == touch.link && raster.connected(i, other, 1),
+                    );
+                }
+            }
+            found[i] = match (is_doubt, n_link > 0 && raster.is_veil(tile, i)) {
+                (true, false) if n_joined >= PULL => Found::Link(touch),
+                (_, true) => Found::Veil,
+                _ => Found::Residual(touch),
+            };
+        }
+    }
+}
+
+impl Map for Segment {
+    type In = Tile;
+    type Out = TileLabels;
+    type Scratch = Scratch;
+
+    fn apply(&self, tile: Tile, scratch: &mut Scratch) -> Result<TileLabels> {
+        let empty = TileLabels {
+            at: tile.at,
+            mask: contract::MaskId(0),
+            labels: Vec::new(),
+            residuals: Vec::new(),
+            voxels: Vec::new(),
+        };
+        let Some(scan) = self.scans.get(tile.at.scan.0 as usize) else {
+            return Ok(empty);
+        };
+        let empty = TileLabels {
+            mask: scan.mask,
+            ..empty
+        };
+        let seen = self.seen(&tile, &scan.world_from_scan);
+        if seen.is_empty() {
+            return Ok(empty);
+        }
+        let raster = scan.lattice.as_ref().map(|lattice| {
+            scratch
+                .raster
+                .fill(&tile, lattice, self.settings.sigma_range);
+            &scratch.raster
+        });
+        let regions: Vec<&Aabb> = self.bodies.iter().map(|body| &body.region).collect();
+        scratch.found.clear();
+        for (i, p) in tile.xyz.iter().enumerate() {
+            let world = world(&scan.world_from_scan, *p);
+            let found = if regions.iter().any(|region| region.contains(world)) {
+                self.judge(&seen, *p, world, || raster.and_then(|r| r.normal(&tile, i)))
+            } else {
+                Found::Default
+            };
+            scratch.found.push(found);
+        }
+        self.settle(&tile, raster, &mut scratch.found);
+        Ok(gather(&tile, &scan.world_from_scan, &scratch.found, empty))
+    }
+}
+
+/// Turns what was found into lists sorted by place and by voxel.
+fn gather(tile: &Tile, world_from_scan: &Pose, found: &[Found], mut out: TileLabels) -> TileLabels {
+    for (i, found) in found.iter().enumerate() {
+        let place = tile.first_place + u64::from(tile.place[i]);
+        let (touch, on_link) = match *found {
+            Found::Link(touch) => (touch, true),
+            Found::Residual(touch) | Found::Doubt(touch) => (touch, false),
+            Found::Veil => {
+                out.labels.push((place, Label::UNCERTAIN));
+                continue;
+            }
+            Found::Default => continue,
+        };
+        let voxel = world(world_from_scan, tile.xyz[i]).map(|v| floor_i32(v / RESIDUAL_EDGE));
+        if on_link {
+            let (robot, link) = (touch.link.robot as i16, touch.link.link as i16);
+            out.labels.push((
+                place,
+                Label {
+                    kind: PointKind::Link,
+                    robot,
+                    link,
+                },
+            ));
+        } else {
+            out.residuals.push((place, voxel));
+        }
+        let entry = ResidualVoxel {
+            voxel,
+            n_residual: u32::from(!on_link),
+            n_link: u32::from(on_link),
+            nearest: touch.link,
+            distance: touch.distance,
+            at_border: touch.at_border && !on_link,
+            grounded: touch.grounded && !on_link,
+        };
+        match out.voxels.last_mut() {
+            Some(last) if last.voxel == voxel => last.join(&entry),
+            _ => out.voxels.push(entry),
+        }
+    }
+    out.labels.sort_unstable_by_key(|entry| entry.0);
+    out.residuals.sort_unstable_by_key(|entry| entry.0);
+    out.voxels.sort_by_key(|entry| entry.voxel);
+    out.voxels.dedup_by(|later, kept| {
+        let same = later.voxel == kept.voxel;
+        if same {
+            kept.join(later);
+        }
+        same
+    });
+    out
+}
+
+#[inline]
+fn world(world_from_scan: &Pose, p: [f32; 3]) -> [f64; 3] {
+    let w = world_from_scan * Point::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
+    [w.x, w.y, w.z]
+}

@@ -1,0 +1,309 @@
+//! A scanner and what stands around it in; beams with range, truth and flags, column by column, out.
+
+use crate::beams::{Beams, Hit};
+use crate::columns::{Return, ScanFrame, SimColumns};
+use crate::random::Random;
+use crate::scene::{Mixed, Scanner};
+use crate::world::Surface;
+use contract::Result;
+use geometry::{Pose, Vector};
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Beams whose parts differ by more than this are said to be mixed, metres.
+const MIXED_SPREAD: f64 = 0.03;
+/// A neighbour farther than this from the plane of a beam's triangle shows an edge, metres.
+const EDGE: f64 = 0.004;
+/// Ring of the outer sub-beams as a share of the beam's radius: halves the beam's area.
+const RING: f64 = 0.707;
+/// Range at which half of the light is lost, metres.
+const HALF_LIGHT: f64 = 25.0;
+/// Below this reflectance a surface counts as black.
+const BLACK: f32 = 0.15;
+
+/// A scanner with all that does not change from beam to beam.
+pub(crate) struct Station {
+    pub(crate) frame: ScanFrame,
+    scanner: Scanner,
+    /// True pose within the scene.
+    scene_from_scan: Pose,
+    /// Keys of the beams' random numbers.
+    keys: [u64; 2],
+    /// Sine and cosine of each row's elevation.
+    rows: Vec<[f64; 2]>,
+}
+
+impl Station {
+    pub(crate) fn new(scanner: &Scanner, keys: [u64; 2], origin: [f64; 3]) -> Result<Self> {
+        let shifted = |mut pose: Pose| {
+            pose.translation.vector += Vector::from(origin);
+            pose
+        };
+        let scene_from_scan = scanner.world_from_scan()?;
+        let raster = scanner.raster.clone();
+        let n_rows = raster.n_rows();
+        let rows = (0..n_rows)
+            .map(|r| raster.elevation(r).sin_cos())
+            .map(|(s, c)| [s, c])
+            .collect();
+        let frame = ScanFrame {
+            name: scanner.name.clone(),
+            world_from_scan: shifted(scanner.stated_world_from_scan()?),
+            true_world_from_scan: shifted(scene_from_scan),
+            n_rows,
+            n_cols: raster.n_cols(),
+            raster,
+        };
+        Ok(Self {
+            frame,
+            scanner: scanner.clone(),
+            scene_from_scan,
+            keys,
+            rows,
+        })
+    }
+
+    /// Beams of the columns `cols`; see [`crate::Simulator::columns`].
+    pub(crate) fn columns(
+        &self,
+        beams: &Beams,
+        surfaces: &[Surface],
+        cols: Range<u32>,
+    ) -> SimColumns {
+        let n_rows = self.rows.len();
+        let cols = cols.start.min(self.frame.n_cols)..cols.end.min(self.frame.n_cols);
+        let mut out = SimColumns::with_capacity(cols.start, self.frame.n_rows, cols.len() * n_rows);
+        // Three columns at a time: an edge is seen by comparing a beam with its four neighbours.
+        let look = self.scanner.mixed.is_some();
+        let mut before = if look {
+            self.cast_column(beams, self.left_of(cols.start))
+        } else {
+            Vec::new()
+        };
+        let mut here = self.cast_column(beams, Some(cols.start).filter(|_| !cols.is_empty()));
+        for col in cols.clone() {
+            let after_col = if look {
+                self.right_of(col)
+            } else {
+                Some(col + 1).filter(|c| *c < cols.end)
+            };
+            let after = self.cast_column(beams, after_col);
+            for row in 0..n_rows {
+                let neighbours = [
+                    before.get(row),
+                    after.get(row),
+                    row.checked_sub(1).and_then(|r| here.get(r)),
+                    here.get(row + 1),
+                ];
+                let stated = self.stated(row, col);
+                let answer = self.measure(beams, surfaces, (row, col), &here[row], neighbours);
+                out.push(answer, &stated);
+            }
+            before = std::mem::replace(&mut here, after);
+        }
+        out
+    }
+
+    fn is_full_turn(&self) -> bool {
+        self.frame.raster.azimuth_deg[1] - self.frame.raster.azimuth_deg[0] >= 360.0
+    }
+
+    fn left_of(&self, col: u32) -> Option<u32> {
+        let last = self.frame.n_cols.checked_sub(1)?;
+        if col > 0 {
+            Some(col - 1)
+        } else {
+            self.is_full_turn().then_some(last)
+        }
+    }
+
+    fn right_of(&self, col: u32) -> Option<u32> {
+        if col + 1 < self.frame.n_cols {
+            Some(col + 1)
+        } else {
+            self.is_full_turn().then_some(0)
+        }
+    }
+
+    /// Direction that the file states for a beam, scan frame.
+    fn stated(&self, row: usize, col: u32) -> Vector {
+        let (sin, cos) = self.frame.raster.azimuth(col).sin_cos();
+        let [rise, flat] = self.rows[row];
+        Vector::new(flat * cos, flat * sin, rise)
+    }
+
+    fn random(&self, row: usize, col: u32, purpose: u64) -> Random {
+        Random::keyed(&[
+            self.keys[0],
+            self.keys[1],
+            row as u64,
+            u64::from(col),
+            purpose,
+        ])
+    }
+
+    /// Thin beams along the middle of each pixel of a column; empty for no column.
+    fn cast_column(&self, beams: &Beams, col: Option<u32>) -> Vec<Beam> {
+        let Some(col) = col else { return Vec::new() };
+        let origin = self.scene_from_scan.translation.vector;
+        (0..self.rows.len())
+            .map(|row| {
+                let mut along = self.scene_from_scan.rotation * self.stated(row, col);
+                if self.scanner.jitter > 0.0 {
+                    let [a, b] = self.random(row, col, 1).normals();
+                    let (u, v) = across(&along);
+                    along = (along + (u * a + v * b) * self.scanner.jitter).normalize();
+                }
+                Beam {
+                    along,
+                    hit: beams.cast(&origin, &along, self.scanner.max_range),
+                }
+            })
+            .collect()
+    }
+
+    fn measure(
+        &self,
+        beams: &Beams,
+        surfaces: &[Surface],
+        (row, col): (usize, u32),
+        beam: &Beam,
+        neighbours: [Option<&Beam>; 4],
+    ) -> Option<Return> {
+        let (hit, range, is_mixed) = match &self.scanner.mixed {
+            Some(mixed) if self.is_edge(beams, surfaces, beam, neighbours) => {
+                self.mix(beams, mixed, (row, col), beam, neighbours)?
+            }
+            _ => {
+                let hit = beam.hit?;
+                (hit, hit.range, false)
+            }
+        };
+        if hit.range < self.scanner.min_range {
+            return None;
+        }
+        let surface = &surfaces[hit.surface as usize];
+        let cosine = beams.cosine(hit.triangle, &beam.along);
+        let mut random = self.random(row, col, 0);
+        let lost = self.scanner.dropouts
+            + if surface.reflectance < BLACK {
+                self.scanner.dark_dropouts * (1.0 - cosine)
+            } else {
+                0.0
+            };
+        if random.unit() < lost {
+            return None;
+        }
+        let sigma = self.scanner.noise + self.scanner.noise_per_metre * range;
+        let noise = if sigma > 0.0 {
+            sigma * random.normals()[0]
+        } else {
+            0.0
+        };
+        let measured = range + noise + self.scanner.range_bias;
+        let light = f64::from(surface.reflectance) * (0.15 + 0.85 * cosine);
+        let fade = 1.0 / (1.0 + (range / HALF_LIGHT).powi(2));
+        let intensity = (light * fade) as f32;
+        (measured > 0.0).then_some(Return {
+            range: measured,
+            intensity,
+            label: surface.label,
+            is_mixed,
+        })
+    }
+
+    /// Whether a neighbour sees something that the plane under this beam does not explain.
+    fn is_edge(
+        &self,
+        beams: &Beams,
+        surfaces: &[Surface],
+        beam: &Beam,
+        neighbours: [Option<&Beam>; 4],
+    ) -> bool {
+        let origin = self.scene_from_scan.translation.vector;
+        let thin = |b: &Beam| b.hit.is_some_and(|h| surfaces[h.surface as usize].is_thin);
+        thin(beam)
+            || neighbours
+                .into_iter()
+                .flatten()
+                .any(|other| match (&beam.hit, &other.hit) {
+                    (None, None) => false,
+                    (Some(a), Some(b)) => {
+                        thin(other)
+                            || (a.triangle != b.triangle
+                                && (beams.plane_range(a.triangle, &origin, &other.along) - b.range)
+                                    .abs()
+                                    > EDGE)
+                    }
+                    _ => true,
+                })
+    }
+
+    /// What a wide beam measures: its thin parts are grouped by range, the strongest group wins (the nearest of
+    /// equals), and its mean is the range. Returns the part nearest to that mean, the mean, and whether it is mixed.
+    fn mix(
+        &self,
+        beams: &Beams,
+        mixed: &Mixed,
+        (row, col): (usize, u32),
+        beam: &Beam,
+        neighbours: [Option<&Beam>; 4],
+    ) -> Option<(Hit, f64, bool)> {
+        let origin = self.scene_from_scan.translation.vector;
+        let seen = |b: &Beam| b.hit.map(|h| h.range);
+        let near = seen(beam).or_else(|| {
+            neighbours
+                .into_iter()
+                .flatten()
+                .filter_map(seen)
+                .min_by(f64::total_cmp)
+        })?;
+        let radius = (mixed.radius + mixed.divergence * near) * RING / near.max(0.1);
+        let (u, v) = across(&beam.along);
+        let phase = self.random(row, col, 2).unit();
+        let ring = mixed.sub_beams.saturating_sub(1);
+        let mut parts: Vec<Hit> = beam.hit.into_iter().collect();
+        for k in 0..ring {
+            let (sin, cos) = (TAU * (f64::from(k) + phase) / f64::from(ring)).sin_cos();
+            let along = (beam.along + (u * cos + v * sin) * radius).normalize();
+            parts.extend(beams.cast(&origin, &along, self.scanner.max_range));
+        }
+        parts.sort_by(|a, b| a.range.total_cmp(&b.range));
+        let mut best = 0..0;
+        let mut from = 0;
+        for to in 1..=parts.len() {
+            if to == parts.len() || parts[to].range - parts[to - 1].range > mixed.depth {
+                if to - from > best.len() {
+                    best = from..to;
+                }
+                from = to;
+            }
+        }
+        // A beam of which more than half comes back from nowhere is too weak to be noticed.
+        if 2 * best.len() < (ring + 1) as usize && beam.hit.is_none() {
+            return None;
+        }
+        let group = &parts[best];
+        let mean = group.iter().map(|h| h.range).sum::<f64>() / group.len().max(1) as f64;
+        let nearest = group
+            .iter()
+            .min_by(|a, b| (a.range - mean).abs().total_cmp(&(b.range - mean).abs()))?;
+        let spread = group[group.len() - 1].range - group[0].range;
+        Some((*nearest, mean, spread > MIXED_SPREAD))
+    }
+}
+
+/// A thin beam in the scene.
+struct Beam {
+    along: Vector,
+    hit: Option<Hit>,
+}
+
+/// Two unit vectors across a unit vector, the first one level where that is possible.
+fn across(along: &Vector) -> (Vector, Vector) {
+    let u = Vector::z()
+        .cross(along)
+        .try_normalize(1e-6)
+        .unwrap_or_else(Vector::x);
+    (u, along.cross(&u))
+}

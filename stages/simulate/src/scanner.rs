@@ -1,0 +1,199 @@
+//! What a scanner is: its place, raster, range and errors. Numbers in a scene file in; directions of beams out.
+
+use contract::{Error, Result};
+use geometry::{Pose, Vector};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+/// A terrestrial laser scanner on its tripod.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Scanner {
+    /// Name of the scan.
+    pub name: String,
+    /// Where it stands, metres.
+    pub position: [f64; 3],
+    /// Roll, pitch, yaw, degrees; passed over where a quaternion is given.
+    pub rpy_deg: [f64; 3],
+    /// World from scan.
+    pub quaternion_wxyz: Option<[f64; 4]>,
+    /// The angular raster.
+    pub raster: Raster,
+    /// Nearest range that is measured, metres.
+    pub min_range: f64,
+    /// Farthest range that is measured, metres.
+    pub max_range: f64,
+    /// Standard deviation of a range, metres.
+    pub noise: f64,
+    /// Grows the standard deviation with range, metres a metre.
+    pub noise_per_metre: f64,
+    /// Standard deviation of the true direction about the stated one, on each axis, radians.
+    pub jitter: f64,
+    /// Added to every range, metres.
+    pub range_bias: f64,
+    /// Share of beams that come back to nobody, 0..1.
+    pub dropouts: f64,
+    /// Share of beams lost on a black surface that is seen edge-on, 0..1; less when seen straight, none on bright ones.
+    pub dark_dropouts: f64,
+    /// Beams have a width: what they measure at edges. None: infinitely thin beams.
+    pub mixed: Option<Mixed>,
+    /// Error of the stated pose.
+    pub registration: Registration,
+}
+
+impl Default for Scanner {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            position: [0.0, 0.0, 1.6],
+            rpy_deg: [0.0; 3],
+            quaternion_wxyz: None,
+            raster: Raster::default(),
+            min_range: 0.3,
+            max_range: 80.0,
+            noise: 0.002,
+            noise_per_metre: 0.0,
+            jitter: 0.0,
+            range_bias: 0.0,
+            dropouts: 0.0,
+            dark_dropouts: 0.0,
+            mixed: None,
+            registration: Registration::default(),
+        }
+    }
+}
+
+/// Directions of beams: rows of elevation upwards, columns of azimuth counter-clockwise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Raster {
+    /// Lowest and highest elevation, degrees.
+    pub elevation_deg: [f64; 2],
+    /// First azimuth and, exclusive, the last one, degrees.
+    pub azimuth_deg: [f64; 2],
+    /// Angle between neighbours, degrees; passed over where `n_beams` is given.
+    pub step_deg: f64,
+    /// About how many beams are wanted: sets the step.
+    pub n_beams: Option<u64>,
+}
+
+impl Default for Raster {
+    fn default() -> Self {
+        Self {
+            elevation_deg: [-60.0, 90.0],
+            azimuth_deg: [-180.0, 180.0],
+            step_deg: 0.1,
+            n_beams: None,
+        }
+    }
+}
+
+impl Raster {
+    /// Angle between neighbours, degrees: a whole number of columns fills the azimuth range.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        let width = self.azimuth_deg[1] - self.azimuth_deg[0];
+        let height = self.elevation_deg[1] - self.elevation_deg[0];
+        let step = match self.n_beams {
+            Some(n) => (width * height / n.max(1) as f64).sqrt(),
+            None => self.step_deg,
+        };
+        width / (width / step).round().max(1.0)
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn n_rows(&self) -> u32 {
+        // A hair above, so that a range that holds a whole number of steps keeps its last row.
+        (((self.elevation_deg[1] - self.elevation_deg[0]) / self.step() + 1e-6).floor() as u32) + 1
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn n_cols(&self) -> u32 {
+        ((self.azimuth_deg[1] - self.azimuth_deg[0]) / self.step())
+            .round()
+            .max(1.0) as u32
+    }
+
+    /// Elevation of a row's middle, radians.
+    #[must_use]
+    pub fn elevation(&self, row: u32) -> f64 {
+        (self.elevation_deg[0] + f64::from(row) * self.step()).to_radians()
+    }
+
+    /// Azimuth of a column's middle, radians.
+    #[must_use]
+    pub fn azimuth(&self, col: u32) -> f64 {
+        (self.azimuth_deg[0] + f64::from(col) * self.step()).to_radians()
+    }
+}
+
+/// A beam's width and how its parts are joined.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Mixed {
+    /// Thin beams that stand for one wide beam: its middle and the rest on a ring; cast only where a neighbouring
+    /// beam sees something else.
+    pub sub_beams: u32,
+    /// Radius of the beam where it leaves, metres.
+    pub radius: f64,
+    /// Growth of the radius, metres a metre.
+    pub divergence: f64,
+    /// Parts nearer to one another than this are averaged into one range, farther ones compete, metres.
+    pub depth: f64,
+}
+
+impl Default for Mixed {
+    fn default() -> Self {
+        Self {
+            sub_beams: 5,
+            radius: 0.0011,
+            divergence: 0.000_15,
+            depth: 0.6,
+        }
+    }
+}
+
+/// What the stated pose of a scan differs by from its true one.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Registration {
+    /// Shift in the scan frame, metres.
+    pub xyz: [f64; 3],
+    /// Roll, pitch, yaw, degrees.
+    pub rpy_deg: [f64; 3],
+}
+
+impl Scanner {
+    /// World from scan as it really is, without the scene's origin.
+    ///
+    /// # Errors
+    /// `BadInput` for a quaternion that is not of about unit length.
+    pub fn world_from_scan(&self) -> Result<Pose> {
+        let turn = match self.quaternion_wxyz {
+            None => return Ok(crate::scene::pose(self.position, self.rpy_deg)),
+            Some([w, x, y, z]) => Quaternion::new(w, x, y, z),
+        };
+        // 1 % off is more than any rounding of a file, less than a mistake.
+        if (turn.norm() - 1.0).abs() < 0.01 {
+            let at = Translation3::from(Vector::from(self.position));
+            Ok(Pose::from_parts(at, UnitQuaternion::from_quaternion(turn)))
+        } else {
+            Err(Error::bad_input(format!(
+                "quaternion is not of unit length: \"{}\"",
+                turn.norm()
+            ))
+            .at(&self.name))
+        }
+    }
+
+    /// World from scan as the files will state it, without the scene's origin.
+    ///
+    /// # Errors
+    /// As [`Scanner::world_from_scan`].
+    pub fn stated_world_from_scan(&self) -> Result<Pose> {
+        let error = crate::scene::pose(self.registration.xyz, self.registration.rpy_deg);
+        Ok(self.world_from_scan()? * error)
+    }
+}

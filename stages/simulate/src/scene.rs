@@ -1,0 +1,435 @@
+//! A scene file in (TOML); a checked description of hall, robots and scanners out. Opens no files: models are named.
+
+use contract::{Error, Result};
+use geometry::{Pose, Vector};
+use nalgebra::{Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+pub use crate::scanner::{Mixed, Raster, Registration, Scanner};
+
+/// Everything that the virtual scanner needs. Metres, degrees where a name says so, world frame z up.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Seed of all noise.
+    #[serde(default)]
+    pub seed: u64,
+    /// Added to every coordinate that leaves the simulator in the world frame (large map coordinates), metres.
+    #[serde(default)]
+    pub origin: [f64; 3],
+    /// The building; none: nothing but the floor below and the sky above.
+    #[serde(default)]
+    pub hall: Option<Hall>,
+    /// The ground; none: no ground.
+    #[serde(default)]
+    pub floor: Option<Floor>,
+    /// Boxes.
+    #[serde(default, rename = "box")]
+    pub boxes: Vec<Cuboid>,
+    /// Upright cylinders or I-beams.
+    #[serde(default, rename = "column")]
+    pub columns: Vec<Column>,
+    /// Fences.
+    #[serde(default, rename = "fence")]
+    pub fences: Vec<Fence>,
+    /// Roller conveyors.
+    #[serde(default, rename = "conveyor")]
+    pub conveyors: Vec<Furniture>,
+    /// Work benches.
+    #[serde(default, rename = "bench")]
+    pub benches: Vec<Furniture>,
+    /// Stands and pedestals that a robot may be bolted to.
+    #[serde(default, rename = "stand")]
+    pub stands: Vec<Stand>,
+    /// Tubes and hoses, fixed or hung on robots.
+    #[serde(default, rename = "hose")]
+    pub hoses: Vec<Hose>,
+    /// Boxes carried by robots.
+    #[serde(default, rename = "carried")]
+    pub carried: Vec<Carried>,
+    /// Robots; their order is that of the truth.
+    #[serde(default, rename = "robot")]
+    pub robots: Vec<RobotPlace>,
+    /// Scanners; their order is that of the scans.
+    #[serde(default, rename = "scanner")]
+    pub scanners: Vec<Scanner>,
+}
+
+/// The building, its middle at the world's origin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hall {
+    /// Length, width, height, metres.
+    pub size: [f64; 3],
+    /// Whether it has walls.
+    #[serde(default = "yes")]
+    pub walls: bool,
+    /// Whether it has a ceiling.
+    #[serde(default = "yes")]
+    pub ceiling: bool,
+}
+
+/// The ground: z = tilt + waves, over the hall's area or `size`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Floor {
+    /// Length and width, metres; the hall's where left out, 20 × 20 without a hall.
+    #[serde(default)]
+    pub size: Option<[f64; 2]>,
+    /// Slope along x and y, degrees.
+    #[serde(default)]
+    pub tilt_deg: [f64; 2],
+    /// Height of the waves above their mean, metres.
+    #[serde(default)]
+    pub wave_amplitude: f64,
+    /// Length of the waves, metres.
+    #[serde(default = "wave_length")]
+    pub wave_length: f64,
+    /// Raised rectangles of floor.
+    #[serde(default, rename = "level")]
+    pub levels: Vec<Level>,
+}
+
+/// A raised rectangle of floor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Level {
+    /// Smallest corner, metres.
+    pub min: [f64; 2],
+    /// Largest corner, metres.
+    pub max: [f64; 2],
+    /// Height above the ground, metres.
+    pub height: f64,
+}
+
+/// A box, resting anywhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cuboid {
+    /// For people.
+    #[serde(default)]
+    pub name: String,
+    /// Middle, metres.
+    pub xyz: [f64; 3],
+    /// Full size, metres.
+    pub size: [f64; 3],
+    /// Roll, pitch, yaw, degrees.
+    #[serde(default)]
+    pub rpy_deg: [f64; 3],
+    /// How much light it sends back, 0..1.
+    #[serde(default = "grey")]
+    pub reflectance: f64,
+}
+
+/// An upright column on the ground.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Column {
+    /// For people.
+    #[serde(default)]
+    pub name: String,
+    /// Place on the ground, metres.
+    pub xy: [f64; 2],
+    /// Half its width, metres.
+    pub radius: f64,
+    /// Height above the ground, metres.
+    pub height: f64,
+    /// Round, or an I-beam.
+    #[serde(default)]
+    pub section: Section,
+}
+
+/// Cross-section of a column.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Section {
+    /// A cylinder.
+    #[default]
+    Round,
+    /// Two flanges and a web.
+    IBeam,
+}
+
+/// A straight fence on the ground.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fence {
+    /// For people.
+    #[serde(default)]
+    pub name: String,
+    /// One end, metres.
+    pub from: [f64; 2],
+    /// Other end, metres.
+    pub to: [f64; 2],
+    /// Height above the ground, metres.
+    #[serde(default = "fence_height")]
+    pub height: f64,
+    /// What is between the posts.
+    #[serde(default)]
+    pub filling: Filling,
+}
+
+/// What is between the posts of a fence.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Filling {
+    /// Welded wires of 4 mm, 50 mm apart.
+    #[default]
+    Wires,
+    /// A closed sheet.
+    Panel,
+}
+
+/// A conveyor or bench on the ground.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Furniture {
+    /// For people.
+    #[serde(default)]
+    pub name: String,
+    /// Place of its middle on the ground, metres.
+    pub xy: [f64; 2],
+    /// Turn about z, degrees.
+    #[serde(default)]
+    pub yaw_deg: f64,
+    /// Length, width, height, metres.
+    pub size: [f64; 3],
+}
+
+/// A stand on the ground.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stand {
+    /// For people.
+    #[serde(default)]
+    pub name: String,
+    /// Place of its middle on the ground, metres.
+    pub xy: [f64; 2],
+    /// Turn about z, degrees.
+    #[serde(default)]
+    pub yaw_deg: f64,
+    /// Height of its top in the world (not above the ground: the top is level), metres.
+    pub top: f64,
+    /// Side of its top plate, metres.
+    pub side: f64,
+    /// What it looks like.
+    #[serde(default)]
+    pub shape: StandShape,
+}
+
+/// What a stand looks like.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StandShape {
+    /// A column between two plates.
+    #[default]
+    Pedestal,
+    /// A table of four legs.
+    Table,
+    /// A solid block.
+    Plinth,
+}
+
+/// A point that moves with a robot's link, or stands in the world.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Anchor {
+    /// Name of the robot; none: the world.
+    #[serde(default)]
+    pub robot: Option<String>,
+    /// Name of its link; none: its root.
+    #[serde(default)]
+    pub link: Option<String>,
+    /// In the link's frame, or in the world, metres.
+    pub xyz: [f64; 3],
+}
+
+/// A hose that hangs from anchor to anchor. It belongs to the first robot of which it is fixed to a link other than the
+/// root; without one it stands still and is fixed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hose {
+    /// For people.
+    #[serde(default)]
+    pub name: String,
+    /// Where it is held, at least two.
+    pub anchors: Vec<Anchor>,
+    /// Half its thickness, metres.
+    pub radius: f64,
+    /// Depth of each hanging arc as a share of the distance between its ends.
+    #[serde(default = "sag")]
+    pub sag: f64,
+}
+
+/// A box held by a robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Carried {
+    /// For people.
+    #[serde(default)]
+    pub name: String,
+    /// Name of the robot.
+    pub robot: String,
+    /// Name of the link that holds it.
+    pub link: String,
+    /// Middle in the link's frame, metres.
+    pub xyz: [f64; 3],
+    /// Roll, pitch, yaw in the link's frame, degrees.
+    #[serde(default)]
+    pub rpy_deg: [f64; 3],
+    /// Full size, metres.
+    pub size: [f64; 3],
+}
+
+/// A robot and how it stands.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotPlace {
+    /// Its name in the scene.
+    pub name: String,
+    /// Its folder in the library.
+    pub model: String,
+    /// Origin of the root link in the world, metres.
+    pub xyz: [f64; 3],
+    /// Roll, pitch, yaw of the root link, degrees.
+    #[serde(default)]
+    pub rpy_deg: [f64; 3],
+    /// Value of each free joint by name, radians or metres; the model's home value where left out.
+    #[serde(default)]
+    pub posture: BTreeMap<String, f64>,
+    /// A tool that no URDF describes.
+    #[serde(default)]
+    pub tool: Option<Tool>,
+}
+
+impl RobotPlace {
+    /// World from root link, without the scene's origin.
+    #[must_use]
+    pub fn world_from_base(&self) -> Pose {
+        pose(self.xyz, self.rpy_deg)
+    }
+}
+
+/// A tool that no URDF describes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tool {
+    /// The link that carries it.
+    pub link: String,
+    /// What it looks like.
+    pub shape: ToolShape,
+    /// Place in the link's frame; the tool points along +z of the turned frame, metres.
+    #[serde(default)]
+    pub xyz: [f64; 3],
+    /// Roll, pitch, yaw in the link's frame, degrees.
+    #[serde(default)]
+    pub rpy_deg: [f64; 3],
+    /// Its length, metres.
+    #[serde(default = "tool_length")]
+    pub length: f64,
+}
+
+/// What a tool looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ToolShape {
+    /// A body with two fingers.
+    Gripper,
+    /// A frame with suction cups.
+    Cups,
+    /// A bent welding torch.
+    Torch,
+}
+
+impl Scene {
+    /// Reads a scene file's text.
+    ///
+    /// # Errors
+    /// `BadInput` where the text is no scene: unknown names, missing values, numbers out of range.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        let scene: Self = toml::from_str(text).map_err(|e| {
+            Error::bad_input("scene cannot be read")
+                .because(e)
+                .hint("the words of a scene are in stages/simulate/README.md")
+        })?;
+        crate::check::check(&scene)?;
+        Ok(scene)
+    }
+
+    /// The scene as text that [`Scene::from_toml`] reads back.
+    ///
+    /// # Errors
+    /// `Bug` where the scene cannot be written.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string(self)
+            .map_err(|e| Error::new(contract::Kind::Bug, "scene cannot be written").because(e))
+    }
+
+    /// Height of the ground at a place, metres, without the scene's origin; 0 without a floor.
+    #[must_use]
+    pub fn ground(&self, x: f64, y: f64) -> f64 {
+        let Some(floor) = &self.floor else { return 0.0 };
+        let inside = |l: &&Level| x >= l.min[0] && x <= l.max[0] && y >= l.min[1] && y <= l.max[1];
+        let raised = floor
+            .levels
+            .iter()
+            .filter(inside)
+            .map(|l| l.height)
+            .fold(0.0, f64::max);
+        raised + floor.base_height(x, y)
+    }
+
+    /// Length and width of the ground, metres.
+    #[must_use]
+    pub fn ground_size(&self) -> [f64; 2] {
+        let hall = self.hall.as_ref().map(|h| [h.size[0], h.size[1]]);
+        self.floor
+            .as_ref()
+            .and_then(|f| f.size)
+            .or(hall)
+            .unwrap_or([20.0, 20.0])
+    }
+}
+
+impl Floor {
+    /// Height of the lowest level at a place, metres: tilt and two crossing waves.
+    #[must_use]
+    pub fn base_height(&self, x: f64, y: f64) -> f64 {
+        let tilt = self.tilt_deg.map(|a| a.to_radians().tan());
+        let k = std::f64::consts::TAU / self.wave_length;
+        // The second wave is shorter and turned, so that the pattern does not repeat along the axes.
+        let waves = 0.6 * (k * x).sin() * (k * y + 0.7).cos()
+            + 0.4 * (1.37 * k * (0.8 * x - 0.6 * y)).sin();
+        tilt[0] * x + tilt[1] * y + self.wave_amplitude * waves
+    }
+}
+
+/// A pose from a position (metres) and roll, pitch, yaw about fixed x, y, z (degrees).
+#[must_use]
+pub fn pose(xyz: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
+    let [r, p, y] = rpy_deg.map(f64::to_radians);
+    Pose::from_parts(
+        Translation3::from(Vector::from(xyz)),
+        UnitQuaternion::from_euler_angles(r, p, y),
+    )
+}
+
+fn yes() -> bool {
+    true
+}
+fn wave_length() -> f64 {
+    5.0
+}
+fn grey() -> f64 {
+    0.5
+}
+fn fence_height() -> f64 {
+    2.0
+}
+fn sag() -> f64 {
+    0.15
+}
+fn tool_length() -> f64 {
+    0.25
+}

@@ -1,0 +1,133 @@
+//! A scene and robot models in; scans with truth out.
+
+use crate::beams::Beams;
+use crate::columns::{ScanFrame, SimColumns, SimScan};
+use crate::scan::Station;
+use crate::scene::Scene;
+use crate::truth::{SCHEMA, TrueRobot, TrueScan, Truth};
+use crate::world::{Surface, World};
+use contract::Result;
+use geometry::{Pose, Vector};
+use robot::Model;
+use std::ops::Range;
+
+/// A scene ready to be scanned.
+pub struct Simulator {
+    beams: Beams,
+    surfaces: Vec<Surface>,
+    n_triangles: usize,
+    stations: Vec<Station>,
+    robots: Vec<TrueRobot>,
+}
+
+impl Simulator {
+    /// Builds everything that stands in the scene; `models` are the models that its robots name.
+    ///
+    /// # Errors
+    /// `BadInput` where the scene names a model, link or joint that does not exist, or a number means nothing.
+    pub fn new(scene: &Scene, models: &[Model]) -> Result<Self> {
+        crate::check::check(scene)?;
+        let world = World::new(scene, models)?;
+        let robots = true_robots(scene, models, &world);
+        let stations = scene
+            .scanners
+            .iter()
+            .enumerate()
+            .map(|(i, s)| Station::new(s, [scene.seed, i as u64], scene.origin))
+            .collect::<Result<Vec<_>>>()?;
+        let beams = Beams::new(&world.triangles, &world.surface_of);
+        Ok(Self {
+            beams,
+            surfaces: world.surfaces,
+            n_triangles: world.triangles.len(),
+            stations,
+            robots,
+        })
+    }
+
+    /// Number of scanners.
+    #[must_use]
+    pub fn n_scans(&self) -> usize {
+        self.stations.len()
+    }
+
+    /// Number of triangles in the scene.
+    #[must_use]
+    pub fn n_triangles(&self) -> usize {
+        self.n_triangles
+    }
+
+    /// What a file says about a scan before its points.
+    ///
+    /// # Panics
+    /// If the scene has no scanner with this index.
+    #[must_use]
+    pub fn frame(&self, scanner: usize) -> &ScanFrame {
+        &self.stations[scanner].frame
+    }
+
+    /// Beams of some columns of one scan.
+    ///
+    /// # Law
+    /// A function of scene, scanner and column only: however the columns are split and in whatever order they are
+    /// asked for, the beams are the same. Each call casts one more column on either side, so ask for 16 or more.
+    ///
+    /// # Panics
+    /// If the scene has no scanner with this index.
+    #[must_use]
+    pub fn columns(&self, scanner: usize, cols: Range<u32>) -> SimColumns {
+        self.stations[scanner].columns(&self.beams, &self.surfaces, cols)
+    }
+
+    /// A whole scan.
+    ///
+    /// # Panics
+    /// If the scene has no scanner with this index.
+    #[must_use]
+    pub fn scan(&self, scanner: usize) -> SimScan {
+        let frame = self.frame(scanner).clone();
+        let columns = self.columns(scanner, 0..frame.n_cols);
+        SimScan { frame, columns }
+    }
+
+    /// The truth; the numbers of points of its scans are 0 until the caller has counted them.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        let scans = self.stations.iter().map(|s| TrueScan {
+            name: s.frame.name.clone(),
+            pose: (&s.frame.true_world_from_scan).into(),
+            stated_pose: (&s.frame.world_from_scan).into(),
+            n_beams: u64::from(s.frame.n_rows) * u64::from(s.frame.n_cols),
+            n_points: 0,
+        });
+        Truth {
+            schema: SCHEMA.into(),
+            robots: self.robots.clone(),
+            scans: scans.collect(),
+        }
+    }
+}
+
+fn true_robots(scene: &Scene, models: &[Model], world: &World) -> Vec<TrueRobot> {
+    scene
+        .robots
+        .iter()
+        .zip(&world.robots)
+        .map(|(place, placed)| {
+            let model = &models[placed.model];
+            let mut base: Pose = placed.world_from_link[0];
+            base.translation.vector += Vector::from(scene.origin);
+            let joints = model.free.iter().zip(&placed.posture);
+            TrueRobot {
+                name: place.name.clone(),
+                model: model.name.clone(),
+                base_link: model.links[0].name.clone(),
+                base_pose: (&base).into(),
+                joints: joints
+                    .map(|(&j, v)| (model.joints[j].name.clone(), *v))
+                    .collect(),
+                links: model.links.iter().map(|l| l.name.clone()).collect(),
+            }
+        })
+        .collect()
+}

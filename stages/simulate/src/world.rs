@@ -1,0 +1,342 @@
+//! A scene and robot models in; triangles with their labels, ready for beams, out.
+
+use crate::scene::{Anchor, RobotPlace, Scene, pose};
+use crate::solid::{Solid, cuboid};
+use crate::{attach, hall};
+use contract::{Error, Label, PointKind, Result};
+use geometry::{Point, Pose};
+use glam::Vec3A;
+use robot::{Mesh, Model, Role};
+
+/// What all triangles of one body share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Surface {
+    /// What a point on it belongs to.
+    pub(crate) label: Label,
+    /// How much light it sends back, 0..1.
+    pub(crate) reflectance: f32,
+    /// Thinner than the distance of beams: a beam may touch it where its neighbours do not.
+    pub(crate) is_thin: bool,
+}
+
+/// A robot of the scene with everything placed.
+#[derive(Debug, Clone)]
+pub(crate) struct PlacedRobot {
+    /// Index into the models given.
+    pub(crate) model: usize,
+    /// One value for each free joint.
+    pub(crate) posture: Vec<f64>,
+    /// World (without the scene's origin) from link.
+    pub(crate) world_from_link: Vec<Pose>,
+}
+
+/// Triangles in scene coordinates, each with the index of its surface.
+#[derive(Debug, Default)]
+pub(crate) struct World {
+    pub(crate) triangles: Vec<[Vec3A; 3]>,
+    pub(crate) surface_of: Vec<u32>,
+    pub(crate) surfaces: Vec<Surface>,
+    pub(crate) robots: Vec<PlacedRobot>,
+}
+
+/// Painted steel and concrete.
+const GREY: f32 = 0.5;
+/// Black rubber.
+const BLACK: f32 = 0.06;
+/// Robot paint.
+const PAINT: f32 = 0.7;
+
+impl World {
+    pub(crate) fn new(scene: &Scene, models: &[Model]) -> Result<Self> {
+        let mut out = Self::default();
+        out.add_hall(scene);
+        for (index, place) in scene.robots.iter().enumerate() {
+            out.add_robot(index, place, models)
+                .map_err(|e| e.at(format!("robot \"{}\"", place.name)))?;
+        }
+        out.add_attachments(scene, models)?;
+        Ok(out)
+    }
+
+    fn add(&mut self, surface: Surface, solid: &Solid) {
+        self.add_mesh(surface, &solid.vertices, &solid.triangles);
+    }
+
+    fn add_mesh(&mut self, surface: Surface, vertices: &[Point], triangles: &[[u32; 3]]) {
+        let at = self.surfaces.len() as u32;
+        self.surfaces.push(surface);
+        for t in triangles {
+            let corners = t.map(|i| vertices[i as usize]);
+            let triangle = corners.map(|p| Vec3A::new(p.x as f32, p.y as f32, p.z as f32));
+            // Triangles without area have no plane to meet.
+            if (triangle[1] - triangle[0])
+                .cross(triangle[2] - triangle[0])
+                .length_squared()
+                > 0.0
+            {
+                self.triangles.push(triangle);
+                self.surface_of.push(at);
+            }
+        }
+    }
+
+    fn add_hall(&mut self, scene: &Scene) {
+        let fixed = Surface {
+            label: Label::FIXED,
+            reflectance: GREY,
+            is_thin: false,
+        };
+        let (ground, faces) = hall::ground(scene);
+        let lowest = ground.vertices.iter().map(|p| p.z).fold(0.0, f64::min);
+        self.add(
+            Surface {
+                label: Label::FLOOR,
+                ..fixed
+            },
+            &ground,
+        );
+        self.add(fixed, &faces);
+        if let Some(building) = &scene.hall {
+            self.add(
+                Surface {
+                    reflectance: 0.8,
+                    ..fixed
+                },
+                &hall::building(building, lowest),
+            );
+        }
+        for b in &scene.boxes {
+            let surface = Surface {
+                reflectance: b.reflectance as f32,
+                ..fixed
+            };
+            self.add(
+                surface,
+                &cuboid(b.size, 0.002).posed(&pose(b.xyz, b.rpy_deg)),
+            );
+        }
+        let z = |xy: [f64; 2]| scene.ground(xy[0], xy[1]);
+        for c in &scene.columns {
+            self.add(fixed, &hall::column(c, z(c.xy)));
+        }
+        for f in &scene.fences {
+            let (posts, wires) = hall::fence(f, |x, y| scene.ground(x, y));
+            self.add(fixed, &posts);
+            self.add(
+                Surface {
+                    is_thin: true,
+                    ..fixed
+                },
+                &wires,
+            );
+        }
+        for f in &scene.conveyors {
+            self.add(fixed, &hall::conveyor(f, z(f.xy)));
+        }
+        for f in &scene.benches {
+            self.add(fixed, &hall::bench(f, z(f.xy)));
+        }
+        for s in &scene.stands {
+            self.add(fixed, &hall::stand(s, z(s.xy)));
+        }
+    }
+
+    fn add_robot(&mut self, index: usize, place: &RobotPlace, models: &[Model]) -> Result<()> {
+        let at = models
+            .iter()
+            .position(|m| m.name == place.model)
+            .ok_or_else(|| {
+                Error::bad_input(format!(
+                    "no model of the library has this name: \"{}\"",
+                    place.model
+                ))
+            })?;
+        let model = &models[at];
+        let posture = posture_of(place, model)?;
+        let world_from_base = place.world_from_base();
+        let poses: Vec<Pose> = model
+            .poses(&posture)
+            .iter()
+            .map(|p| world_from_base * p)
+            .collect();
+        for (link, part) in model.links.iter().enumerate() {
+            let kind = if part.role == Role::Effector {
+                PointKind::Attachment
+            } else {
+                PointKind::Link
+            };
+            let label = Label {
+                kind,
+                robot: index_i16(index)?,
+                link: index_i16(link)?,
+            };
+            let vertices = place_mesh(&part.mesh, &poses[link]);
+            let surface = Surface {
+                label,
+                reflectance: PAINT,
+                is_thin: false,
+            };
+            self.add_mesh(surface, &vertices, &part.mesh.triangles);
+        }
+        self.robots.push(PlacedRobot {
+            model: at,
+            posture,
+            world_from_link: poses,
+        });
+        Ok(())
+    }
+
+    fn add_attachments(&mut self, scene: &Scene, models: &[Model]) -> Result<()> {
+        for (index, place) in scene.robots.iter().enumerate() {
+            if let Some(tool) = &place.tool {
+                let link = self.link_pose(scene, models, &place.name, Some(&tool.link))?;
+                let body = attach::tool(tool).posed(&(link * pose(tool.xyz, tool.rpy_deg)));
+                self.add(attachment(index, GREY)?, &body);
+            }
+        }
+        for part in &scene.carried {
+            let link = self.link_pose(scene, models, &part.robot, Some(&part.link))?;
+            let index = robot_index(scene, &part.robot)?;
+            let body = cuboid(part.size, 0.002).posed(&(link * pose(part.xyz, part.rpy_deg)));
+            self.add(attachment(index, GREY)?, &body);
+        }
+        for hose in &scene.hoses {
+            let held = hose
+                .anchors
+                .iter()
+                .map(|a| self.anchor(scene, models, a))
+                .collect::<Result<Vec<_>>>();
+            let held = held.map_err(|e| e.at(format!("hose \"{}\"", hose.name)))?;
+            // A hose that is held by the foot only stands still.
+            let moves = |a: &&Anchor| {
+                a.link
+                    .as_ref()
+                    .is_some_and(|link| !self.is_root(scene, models, a, link))
+            };
+            let owner = hose
+                .anchors
+                .iter()
+                .find(moves)
+                .and_then(|a| a.robot.as_ref());
+            let surface = match owner {
+                Some(name) => attachment(robot_index(scene, name)?, BLACK)?,
+                None => Surface {
+                    label: Label::FIXED,
+                    reflectance: BLACK,
+                    is_thin: false,
+                },
+            };
+            self.add(surface, &attach::hose(hose, &held));
+        }
+        Ok(())
+    }
+
+    fn anchor(&self, scene: &Scene, models: &[Model], anchor: &Anchor) -> Result<Point> {
+        let xyz = Point::from(anchor.xyz);
+        match &anchor.robot {
+            None => Ok(xyz),
+            Some(robot) => Ok(self.link_pose(scene, models, robot, anchor.link.as_deref())? * xyz),
+        }
+    }
+
+    fn is_root(&self, scene: &Scene, models: &[Model], anchor: &Anchor, link: &str) -> bool {
+        let index = anchor
+            .robot
+            .as_ref()
+            .and_then(|name| robot_index(scene, name).ok());
+        index.is_none_or(|i| models[self.robots[i].model].links[0].name == link)
+    }
+
+    fn link_pose(
+        &self,
+        scene: &Scene,
+        models: &[Model],
+        robot: &str,
+        link: Option<&str>,
+    ) -> Result<Pose> {
+        let placed = &self.robots[robot_index(scene, robot)?];
+        let model = &models[placed.model];
+        let Some(link) = link else {
+            return Ok(placed.world_from_link[0]);
+        };
+        let at = model
+            .links
+            .iter()
+            .position(|l| l.name == link)
+            .ok_or_else(|| {
+                let names: Vec<&str> = model.links.iter().map(|l| l.name.as_str()).collect();
+                Error::bad_input(format!(
+                    "model \"{}\" has no such link: \"{link}\"",
+                    model.name
+                ))
+                .at(format!("robot \"{robot}\""))
+                .hint(format!("its links are {}", names.join(", ")))
+            })?;
+        Ok(placed.world_from_link[at])
+    }
+}
+
+fn attachment(robot: usize, reflectance: f32) -> Result<Surface> {
+    let label = Label {
+        kind: PointKind::Attachment,
+        robot: index_i16(robot)?,
+        link: -1,
+    };
+    Ok(Surface {
+        label,
+        reflectance,
+        is_thin: false,
+    })
+}
+
+fn index_i16(index: usize) -> Result<i16> {
+    i16::try_from(index).map_err(|_| {
+        Error::new(
+            contract::Kind::Unsupported,
+            format!("labels count to 32767: \"{index}\""),
+        )
+    })
+}
+
+fn robot_index(scene: &Scene, name: &str) -> Result<usize> {
+    scene
+        .robots
+        .iter()
+        .position(|r| r.name == name)
+        .ok_or_else(|| Error::bad_input(format!("no robot has this name: \"{name}\"")))
+}
+
+fn place_mesh(mesh: &Mesh, pose: &Pose) -> Vec<Point> {
+    mesh.vertices
+        .iter()
+        .map(|v| pose * Point::new(v[0].into(), v[1].into(), v[2].into()))
+        .collect()
+}
+
+/// The posture of a robot of the scene: named values, and the model's home for the rest.
+///
+/// # Errors
+/// `BadInput` for a name that is no free joint of the model.
+fn posture_of(place: &RobotPlace, model: &Model) -> Result<Vec<f64>> {
+    let mut posture = model.home();
+    for (name, value) in &place.posture {
+        let free = model
+            .free
+            .iter()
+            .position(|&j| model.joints[j].name == *name)
+            .ok_or_else(|| {
+                let names: Vec<&str> = model
+                    .free
+                    .iter()
+                    .map(|&j| model.joints[j].name.as_str())
+                    .collect();
+                Error::bad_input(format!(
+                    "model \"{}\" has no such free joint: \"{name}\"",
+                    model.name
+                ))
+                .hint(format!("its free joints are {}", names.join(", ")))
+            })?;
+        posture[free] = *value;
+    }
+    Ok(posture)
+}

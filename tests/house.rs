@@ -1,0 +1,228 @@
+//! The rules of the house that no compiler holds: who may import whom, what stages keep away from, how files begin.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Rooms that others may import.
+const SHARED: [&str; 3] = ["geometry", "contract", "robot"];
+/// Rooms that may touch the disk: the reader of points, the reader of robots, the writer of results.
+const MAY_READ: [&str; 3] = ["ingest", "robot", "export"];
+/// Files that may hold unsafe code: memory maps.
+const MAY_BE_UNSAFE: [&str; 2] = ["src/store/map.rs", "stages/ingest/src/map.rs"];
+/// Longest file, lines: 400 is the aim, 450 the end.
+const MAX_LINES: usize = 450;
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn entries(dir: &Path) -> Vec<PathBuf> {
+    let Ok(list) = fs::read_dir(dir) else { return Vec::new() };
+    let mut paths: Vec<PathBuf> = list.map(|e| e.expect("an entry").path()).collect();
+    paths.sort();
+    paths
+}
+
+fn stages() -> Vec<String> {
+    let folders = entries(&root().join("stages"));
+    let stages = folders.iter().filter(|p| p.join("Cargo.toml").is_file());
+    stages.map(|p| p.file_name().expect("a name").to_string_lossy().into_owned()).collect()
+}
+
+/// All Rust files below `dir`, as path from the root and text.
+fn rust_files(dir: &str) -> Vec<(String, String)> {
+    let mut files = Vec::new();
+    let mut folders = vec![root().join(dir)];
+    while let Some(folder) = folders.pop() {
+        for path in entries(&folder) {
+            if path.is_dir() && path.file_name().is_some_and(|n| n != "target") {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let name = path.strip_prefix(root()).expect("below the root");
+                let text = fs::read_to_string(&path).expect("text");
+                files.push((name.to_string_lossy().replace('\\', "/"), text));
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+fn all_files() -> Vec<(String, String)> {
+    ["src", "stages", "tests", "benches"].into_iter().flat_map(rust_files).collect()
+}
+
+/// The text without comments, and without what is compiled for tests only.
+fn code(name: &str, text: &str) -> String {
+    let file = name.rsplit('/').next().unwrap_or(name);
+    if name.starts_with("tests/") || name.contains("/tests/") || name.contains("/examples/") || name.contains("/benches/") {
+        return String::new();
+    }
+    if file == "tests.rs" || file == "build.rs" || is_test_module(name) {
+        return String::new();
+    }
+    // By custom the tests stand at the end of a file.
+    let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    let lines = text[..end].lines().map(|l| l.split("//").next().unwrap_or(l));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Whether a file is a module that its parent compiles for tests only.
+fn is_test_module(name: &str) -> bool {
+    let path = root().join(name);
+    let (Some(dir), Some(stem)) = (path.parent(), path.file_stem()) else { return false };
+    let declared = format!("#[cfg(test)]\nmod {};", stem.to_string_lossy());
+    let above = dir.with_extension("rs");
+    [dir.join("lib.rs"), dir.join("mod.rs"), above]
+        .iter()
+        .any(|parent| fs::read_to_string(parent).is_ok_and(|text| text.contains(&declared)))
+}
+
+fn room(name: &str) -> &str {
+    name.split('/').nth(1).unwrap_or(name)
+}
+
+fn report(faults: &[String]) {
+    assert!(faults.is_empty(), "\n{}\n", faults.join("\n"));
+}
+
+#[test]
+fn stages_import_only_what_is_shared() {
+    let stages = stages();
+    assert!(stages.len() >= 13, "{stages:?}");
+    let mut faults = Vec::new();
+    for stage in &stages {
+        let manifest = root().join("stages").join(stage).join("Cargo.toml");
+        let manifest: toml::Table =
+            fs::read_to_string(manifest).expect("text").parse().expect("TOML");
+        let allowed: &[&str] = match stage.as_str() {
+            "geometry" => &[],
+            "contract" => &["geometry"],
+            "robot" => &["geometry", "contract"],
+            _ => &SHARED,
+        };
+        for table in ["dependencies", "build-dependencies"] {
+            let names = manifest.get(table).and_then(|t| t.as_table());
+            for name in names.into_iter().flat_map(|t| t.keys()) {
+                if stages.contains(name) && !allowed.contains(&name.as_str()) {
+                    faults.push(format!("{stage} may not depend on {name}"));
+                }
+            }
+        }
+    }
+    report(&faults);
+}
+
+#[test]
+fn files_open_with_a_sentence_and_stay_short() {
+    let mut faults = Vec::new();
+    for (name, text) in all_files() {
+        if !text.starts_with("//! ") {
+            faults.push(format!("{name} does not open with what comes in and what goes out"));
+        }
+        let n = text.lines().count();
+        if n > MAX_LINES {
+            faults.push(format!("{name} has {n} lines"));
+        }
+    }
+    report(&faults);
+}
+
+#[test]
+fn stages_start_no_threads_and_read_no_clocks() {
+    let mut faults = Vec::new();
+    for (name, text) in rust_files("stages") {
+        let code = code(&name, &text);
+        let mut forbidden = vec![
+            "std::thread", "std::time", "std::env", "println!", "print!(", "eprint!(", "dbg!(",
+            "tracing::", "std::process", "std::net",
+        ];
+        if !MAY_READ.contains(&room(&name)) {
+            forbidden.push("std::fs");
+        }
+        for word in forbidden {
+            if code.contains(word) {
+                faults.push(format!("{name} uses {word}"));
+            }
+        }
+    }
+    report(&faults);
+}
+
+#[test]
+fn only_src_prints_and_only_by_its_writers() {
+    let mut faults = Vec::new();
+    for (name, text) in rust_files("src") {
+        for word in ["println!", "print!(", "eprintln!", "eprint!(", "dbg!("] {
+            if code(&name, &text).contains(word) {
+                faults.push(format!("{name} uses {word}"));
+            }
+        }
+    }
+    report(&faults);
+}
+
+#[test]
+fn unsafe_code_stands_where_it_is_named() {
+    let mut faults = Vec::new();
+    for (name, text) in all_files() {
+        let is_used = ["unsafe {", "unsafe fn", "unsafe impl"].iter().any(|w| code(&name, &text).contains(w));
+        if is_used && !MAY_BE_UNSAFE.contains(&name.as_str()) {
+            faults.push(format!("{name} holds unsafe code"));
+        }
+    }
+    report(&faults);
+}
+
+#[test]
+fn every_stage_is_in_the_table_of_stages() {
+    let table = fs::read_to_string(root().join("stages/README.md")).unwrap_or_default();
+    let missing = stages().into_iter().filter(|s| !table.contains(&format!("`{s}`")));
+    report(&missing.map(|s| format!("stages/README.md does not name `{s}`")).collect::<Vec<_>>());
+}
+
+/// Settings of a stage that nobody can set, by room and name: made by the program, not by people.
+const NOT_FOR_PEOPLE: [&str; 2] = ["export::CloudsSettings", "export::LasSettings"];
+
+#[test]
+fn every_setting_of_a_stage_can_be_set() {
+    let job = fs::read_to_string(root().join("src/job/settings.rs")).expect("text");
+    let words: BTreeSet<&str> =
+        job.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty()).collect();
+    let mut faults = Vec::new();
+    for (name, text) in rust_files("stages") {
+        for part in text.split("\npub struct ").skip(1) {
+            let kind = part.split([' ', '<', '(', ';']).next().unwrap_or_default();
+            let path = format!("{}::{kind}", room(&name));
+            if !kind.ends_with("Settings") || NOT_FOR_PEOPLE.contains(&path.as_str()) {
+                continue;
+            }
+            if !job.contains(&format!("{path} {{")) {
+                faults.push(format!("src/job/settings.rs does not hold {path}"));
+                continue;
+            }
+            let body = part.split("\n}").next().unwrap_or_default();
+            for line in body.lines().filter_map(|l| l.strip_prefix("    pub ")) {
+                let field = line.split(':').next().unwrap_or_default();
+                if !words.contains(field) {
+                    faults.push(format!("{path}: {field} cannot be set"));
+                }
+            }
+        }
+    }
+    report(&faults);
+}
+
+#[test]
+fn nothing_of_a_workplace_is_in_the_house() {
+    // Put together so that this file does not find itself.
+    let words = [concat!("/wo", "rk/"), concat!("/ho", "me/"), concat!("/ro", "ot/")];
+    let mut faults = Vec::new();
+    for (name, text) in all_files() {
+        for word in words.iter().filter(|w| text.contains(**w)) {
+            faults.push(format!("{name} names {word}"));
+        }
+    }
+    report(&faults);
+}
