@@ -61,11 +61,11 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
 /// Writes the demo's robot library.
 pub fn write_robots(dir: &Path) -> Result<()> {
     for file in simulate::demo_robots::files() {
-        let path = dir.join(&file.path);
+        let path = dir.join(&file.0);
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(|e| Error::from(e).at(folder.display()))?;
         }
-        atomic::write(&path, &file.bytes)?;
+        atomic::write(&path, &file.1)?;
     }
     Ok(())
 }

@@ -1,11 +1,14 @@
 //! Progress: what stages have done in, bars, lines or JSON on standard error out; and one report a stage for the
 //! result. The only place that owns a clock.
 
+mod words;
+
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use words::{json, words};
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -24,7 +27,11 @@ impl Mode {
     /// What suits standard error: a bar on a terminal, else plain lines.
     #[must_use]
     pub fn fitting() -> Self {
-        if std::io::stderr().is_terminal() { Self::Bar } else { Self::Plain }
+        if std::io::stderr().is_terminal() {
+            Self::Bar
+        } else {
+            Self::Plain
+        }
     }
 }
 
@@ -50,22 +57,32 @@ impl Amount {
     /// So many items.
     #[must_use]
     pub fn items(items: u64) -> Self {
-        Self { items, ..Self::default() }
+        Self {
+            items,
+            ..Self::default()
+        }
     }
 
     /// So many points.
     #[must_use]
     pub fn points(points: u64) -> Self {
-        Self { points, ..Self::default() }
+        Self {
+            points,
+            ..Self::default()
+        }
     }
 
     /// Share of `total` that is done, 0..1, by the first of points, bytes, items whose total is known.
     #[must_use]
     pub fn share(&self, total: &Self) -> Option<f64> {
-        [(self.points, total.points), (self.bytes, total.bytes), (self.items, total.items)]
-            .into_iter()
-            .find(|(_, of)| *of > 0)
-            .map(|(done, of)| (done as f64 / of as f64).min(1.0))
+        [
+            (self.points, total.points),
+            (self.bytes, total.bytes),
+            (self.items, total.items),
+        ]
+        .into_iter()
+        .find(|(_, of)| *of > 0)
+        .map(|(done, of)| (done as f64 / of as f64).min(1.0))
     }
 }
 
@@ -158,7 +175,11 @@ impl Progress {
     /// What each finished stage did, in the order of their ends.
     #[must_use]
     pub fn reports(&self) -> Vec<StageReport> {
-        self.0.reports.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.0
+            .reports
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     /// Says a line on standard error without spoiling a bar.
@@ -176,7 +197,11 @@ impl Progress {
 
     fn bar(&self, name: &str, total: &Amount) -> ProgressBar {
         let known = total.share(total).is_some();
-        let bar = if known { ProgressBar::new(1000) } else { ProgressBar::new_spinner() };
+        let bar = if known {
+            ProgressBar::new(1000)
+        } else {
+            ProgressBar::new_spinner()
+        };
         let template = if known {
             "{prefix:>12} [{bar:30}] {msg}"
         } else {
@@ -214,7 +239,11 @@ impl Stage {
         }
         let next = (now + run.progress.every()).as_millis() as u64;
         // Only one thread speaks for this moment.
-        if run.next_line.compare_exchange(due, next, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
+        if run
+            .next_line
+            .compare_exchange(due, next, Ordering::Relaxed, Ordering::Relaxed)
+            .is_ok()
+        {
             run.show(now.as_secs_f64(), false);
         }
     }
@@ -228,7 +257,11 @@ impl Stage {
 impl Running {
     fn done(&self) -> Amount {
         let [items, points, bytes] = [0, 1, 2].map(|i| self.done[i].load(Ordering::Relaxed));
-        Amount { items, points, bytes }
+        Amount {
+            items,
+            points,
+            bytes,
+        }
     }
 
     fn finish(&self) {
@@ -246,20 +279,30 @@ impl Running {
             bytes: done.bytes,
         };
         let reports = &self.progress.0.reports;
-        reports.lock().unwrap_or_else(PoisonError::into_inner).push(report);
+        reports
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(report);
     }
 
     fn show(&self, seconds: f64, last: bool) {
         let done = self.done();
         match (self.progress.0.mode, &self.bar) {
             (Mode::None, _) => {}
-            (Mode::Json, _) => self.progress.line(&json(&self.name, &done, &self.total, seconds, last)),
+            (Mode::Json, _) => {
+                self.progress
+                    .line(&json(&self.name, &done, &self.total, seconds, last))
+            }
             (_, Some(bar)) => {
                 let share = done.share(&self.total).unwrap_or(0.0);
                 bar.set_position((share * 1000.0) as u64);
                 bar.tick();
                 let message = words(&done, &self.total, seconds, last);
-                if last { bar.finish_with_message(message) } else { bar.set_message(message) }
+                if last {
+                    bar.finish_with_message(message)
+                } else {
+                    bar.set_message(message)
+                }
             }
             (_, None) => {
                 let words = words(&done, &self.total, seconds, last);
@@ -275,63 +318,6 @@ impl Drop for Running {
     }
 }
 
-/// Seconds to go at the rate so far.
-fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
-    let share = done.share(total).filter(|s| *s > 0.0)?;
-    Some(seconds * (1.0 - share) / share)
-}
-
-fn words(done: &Amount, total: &Amount, seconds: f64, last: bool) -> String {
-    let mut words = Vec::new();
-    if let Some(share) = done.share(total) {
-        words.push(format!("{:.0} %", 100.0 * share));
-    }
-    let rate = |n: u64| n as f64 / seconds.max(1e-3);
-    if done.points > 0 {
-        words.push(format!("{} points", short(done.points as f64)));
-        words.push(format!("{} points/s", short(rate(done.points))));
-    } else {
-        words.push(format!("{} items", done.items));
-    }
-    if done.bytes > 0 {
-        words.push(format!("{}B/s", short(rate(done.bytes))));
-    }
-    match eta(done, total, seconds) {
-        _ if last => words.push(format!("done in {seconds:.1} s")),
-        Some(eta) => words.push(format!("{eta:.0} s to go")),
-        None => words.push(format!("{seconds:.0} s")),
-    }
-    words.join(", ")
-}
-
-fn json(name: &str, done: &Amount, total: &Amount, seconds: f64, last: bool) -> String {
-    let known = |n: u64| (n > 0).then_some(n);
-    let rate = done.points as f64 / seconds.max(1e-3);
-    serde_json::json!({
-        "event": if last { "stage_end" } else { "progress" },
-        "stage": name,
-        "seconds": seconds,
-        "items": done.items, "items_total": known(total.items),
-        "points": done.points, "points_total": known(total.points),
-        "bytes": done.bytes, "bytes_total": known(total.bytes),
-        "points_per_second": rate,
-        "share": done.share(total),
-        "eta_seconds": if last { Some(0.0) } else { eta(done, total, seconds) },
-    })
-    .to_string()
-}
-
-/// A number with three digits and a decimal prefix.
-fn short(value: f64) -> String {
-    let (scaled, prefix) = match value {
-        v if v >= 1e9 => (v / 1e9, " G"),
-        v if v >= 1e6 => (v / 1e6, " M"),
-        v if v >= 1e3 => (v / 1e3, " k"),
-        v => return format!("{v:.0} "),
-    };
-    format!("{scaled:.*}{prefix}", if scaled < 10.0 { 2 } else { usize::from(scaled < 100.0) })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -341,7 +327,10 @@ mod tests {
 
     impl Write for Page {
         fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            self.0.lock().expect("not poisoned").extend_from_slice(bytes);
+            self.0
+                .lock()
+                .expect("not poisoned")
+                .extend_from_slice(bytes);
             Ok(bytes.len())
         }
 
@@ -367,7 +356,10 @@ mod tests {
         let (text, reports) = told(Mode::Plain);
         assert_eq!(text.lines().count(), 1, "{text}");
         assert!(text.starts_with("read: 100 %, 2.00 k points"), "{text}");
-        assert_eq!((reports[0].n_items, reports[0].n_points, reports[0].bytes), (1000, 2000, 24000));
+        assert_eq!(
+            (reports[0].n_items, reports[0].n_points, reports[0].bytes),
+            (1000, 2000, 24000)
+        );
         assert_eq!(told(Mode::None).0, "");
         assert_eq!(told(Mode::None).1.len(), 1);
     }
@@ -380,13 +372,5 @@ mod tests {
         assert_eq!(last["event"], "stage_end");
         assert_eq!(last["points"], 2000);
         assert_eq!(last["items_total"], serde_json::Value::Null);
-    }
-
-    #[test]
-    fn rate_and_time_to_go() {
-        let (done, total) = (Amount::points(25), Amount::points(100));
-        assert_eq!(eta(&done, &total, 10.0), Some(30.0));
-        assert_eq!(eta(&Amount::default(), &total, 10.0), None);
-        assert_eq!(short(35_200_000.0), "35.2 M");
     }
 }

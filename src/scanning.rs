@@ -13,7 +13,9 @@ use crate::atomic;
 use crate::engine::{Engine, Task};
 use crate::progress::Amount;
 use contract::{Error, Kind, Label, Map, MaskId, Result, Weigh};
-use export::{E57Scans, GridPoint, GridScan, LasPoint, LasSettings, LasWriter, MaskWriter, Quantum};
+use export::{
+    E57Scans, GridPoint, GridScan, LasPoint, LasSettings, LasWriter, MaskWriter, Quantum,
+};
 use geometry::{Aabb, Pose};
 use robot::Model;
 use simulate::{ScanFrame, Scene, SimColumns, Simulator, Truth};
@@ -34,7 +36,10 @@ pub struct Formats {
 
 impl Formats {
     /// Both.
-    pub const ALL: Self = Self { e57: true, las: true };
+    pub const ALL: Self = Self {
+        e57: true,
+        las: true,
+    };
 }
 
 /// Scans a scene into `out`; returns the truth with its counts.
@@ -47,9 +52,8 @@ pub fn scan_scene(
 ) -> Result<Truth> {
     let simulator = Simulator::new(scene, models)?;
     let mut truth = simulator.truth();
-    let folder = |path: &Path| {
-        std::fs::create_dir_all(path).map_err(|e| Error::from(e).at(path.display()))
-    };
+    let folder =
+        |path: &Path| std::fs::create_dir_all(path).map_err(|e| Error::from(e).at(path.display()));
     let truth_dir = out.join("truth");
     folder(&truth_dir.join("labels"))?;
     folder(&truth_dir.join("las/labels"))?;
@@ -71,7 +75,10 @@ struct Files {
 
 impl Files {
     fn create(simulator: &Simulator, out: &Path, formats: Formats) -> Result<Self> {
-        let e57 = formats.e57.then(|| E57Scans::create(out.join("scans.e57"))).transpose()?;
+        let e57 = formats
+            .e57
+            .then(|| E57Scans::create(out.join("scans.e57")))
+            .transpose()?;
         let las = formats.las.then(|| -> Result<_> {
             let frames = (0..simulator.n_scans()).map(|i| simulator.frame(i));
             let near = Aabb::of(frames.map(|f| f.world_from_scan.translation.vector.into()));
@@ -80,28 +87,48 @@ impl Files {
             let mask = MaskWriter::create(&out.join("truth/las"), MaskId(0))?;
             Ok((LasWriter::create(out.join("scans.las"), settings)?, mask))
         });
-        Ok(Self { e57, las: las.transpose()? })
+        Ok(Self {
+            e57,
+            las: las.transpose()?,
+        })
     }
 
     /// Casts and writes one scan; returns its number of points.
-    fn scan(&mut self, simulator: &Simulator, i: usize, truth: &Path, engine: &Engine) -> Result<u64> {
+    fn scan(
+        &mut self,
+        simulator: &Simulator,
+        i: usize,
+        truth: &Path,
+        engine: &Engine,
+    ) -> Result<u64> {
         let frame = simulator.frame(i);
-        let cast = Cast { simulator, scanner: i };
+        let cast = Cast {
+            simulator,
+            scanner: i,
+        };
         let n_rows = frame.n_rows;
         let source = (0..frame.n_cols).step_by(COLUMNS as usize).map(|from| {
-            Ok(Columns { range: from..(from + COLUMNS).min(frame.n_cols), n_rows })
+            Ok(Columns {
+                range: from..(from + COLUMNS).min(frame.n_cols),
+                n_rows,
+            })
         });
         let n_beams = u64::from(frame.n_rows) * u64::from(frame.n_cols);
         let task = Task::new(format!("scan {}", frame.name)).of(Amount::points(n_beams));
         let mut mask = MaskWriter::create(truth, MaskId(i as u32))?;
         let source_id = u16::try_from(i + 1).map_err(|_| {
-            Error::bad_input(format!("LAS knows 65535 scanners at most, this is \"{}\"", i + 1))
+            Error::bad_input(format!(
+                "LAS knows 65535 scanners at most, this is \"{}\"",
+                i + 1
+            ))
         })?;
         engine.pass(task, source, |flow| {
-            let seen = flow.map(&cast).items().map(|seen| {
+            let mut seen = flow.map(&cast).items().map(|seen| {
                 let seen = seen?.0;
-                let labels: Vec<Label> =
-                    (0..seen.len()).filter(|&k| seen.hit[k]).map(|k| seen.label[k]).collect();
+                let labels: Vec<Label> = (0..seen.len())
+                    .filter(|&k| seen.hit[k])
+                    .map(|k| seen.label[k])
+                    .collect();
                 mask.push(&labels)?;
                 if let Some((las, las_mask)) = &mut self.las {
                     las_mask.push(&labels)?;
@@ -111,7 +138,7 @@ impl Files {
             });
             match &mut self.e57 {
                 Some(e57) => e57.add(&grid(frame), Points::new(seen)).map(drop),
-                None => seen.map(|s| s.map(drop)).collect(),
+                None => seen.try_for_each(|s| s.map(drop)),
             }
         })?;
         mask.finish()
@@ -142,7 +169,12 @@ fn intensity(share: f32) -> u16 {
     (share.clamp(0.0, 1.0) * f32::from(u16::MAX)).round() as u16
 }
 
-fn write_las(las: &mut LasWriter, seen: &SimColumns, world_from_scan: &Pose, id: u16) -> Result<()> {
+fn write_las(
+    las: &mut LasWriter,
+    seen: &SimColumns,
+    world_from_scan: &Pose,
+    id: u16,
+) -> Result<()> {
     for k in (0..seen.len()).filter(|&k| seen.hit[k]) {
         let world = world_from_scan * nalgebra::Point3::from(seen.xyz[k]);
         las.push(&LasPoint {
@@ -208,7 +240,11 @@ struct Points<I> {
 
 impl<I> Points<I> {
     fn new(columns: I) -> Self {
-        Self { columns, seen: SimColumns::default(), at: 0 }
+        Self {
+            columns,
+            seen: SimColumns::default(),
+            at: 0,
+        }
     }
 }
 
@@ -226,7 +262,12 @@ impl<I: Iterator<Item = Result<SimColumns>>> Iterator for Points<I> {
         self.at += 1;
         let (row, col) = self.seen.pixel(k);
         let xyz = self.seen.hit[k].then(|| self.seen.xyz[k].map(|v| v as f32));
-        Some(Ok(GridPoint { xyz, row, col, intensity: intensity(self.seen.intensity[k]) }))
+        Some(Ok(GridPoint {
+            xyz,
+            row,
+            col,
+            intensity: intensity(self.seen.intensity[k]),
+        }))
     }
 }
 
@@ -254,7 +295,10 @@ pub fn read_scene(path: &Path) -> Result<Scene> {
     let at = |e: Error| e.at(path.display());
     let len = std::fs::metadata(path).map_err(|e| at(e.into()))?.len();
     if len > MAX_BYTES {
-        return Err(at(Error::new(Kind::BadInput, format!("a scene is not that long: \"{len}\" bytes"))));
+        return Err(at(Error::new(
+            Kind::BadInput,
+            format!("a scene is not that long: \"{len}\" bytes"),
+        )));
     }
     let text = std::fs::read_to_string(path).map_err(|e| at(e.into()))?;
     Scene::from_toml(&text).map_err(at)

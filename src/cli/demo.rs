@@ -13,5 +13,9 @@ pub(super) fn demo(flags: &DemoFlags, common: &Common, say: &Say) -> Result<u8> 
         say.warning(warning);
     }
     say.result(&outcome.summary);
-    Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+    Ok(if outcome.partial {
+        exit::PARTIAL
+    } else {
+        exit::OK
+    })
 }

@@ -1,6 +1,6 @@
 //! `inspect`: inputs in; what is in them, and what will be worse for what they lack, out.
 
-use super::flags::{Common, InspectFlags};
+use super::flags::{Common, InspectFlags, present};
 use super::say::Say;
 use crate::exit;
 use contract::{Error, Kind, Result};
@@ -8,8 +8,13 @@ use ingest::Scanners;
 
 pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
+    present(&flags.inputs)?;
     let scanners = common.scanners(&means).map(|path| Scanners::read(&path));
-    let sources = ingest::open(&flags.inputs, scanners.transpose()?.as_ref(), &means.settings.ingest)?;
+    let sources = ingest::open(
+        &flags.inputs,
+        scanners.transpose()?.as_ref(),
+        &means.settings.ingest,
+    )?;
     let descriptions = ingest::describe(&sources);
     if flags.json {
         let all = serde_json::json!({
@@ -17,8 +22,9 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
             "inputs": descriptions,
             "warnings": sources.warnings,
         });
-        let text = serde_json::to_string_pretty(&all)
-            .map_err(|e| Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e))?;
+        let text = serde_json::to_string_pretty(&all).map_err(|e| {
+            Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e)
+        })?;
         say.result(&text);
     } else {
         let texts: Vec<String> = descriptions.iter().map(ToString::to_string).collect();

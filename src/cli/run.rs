@@ -1,12 +1,13 @@
 //! `run`: flags in, the main job done.
 
-use super::flags::{Common, RunFlags};
+use super::flags::{Common, RunFlags, present};
 use super::say::Say;
 use crate::{exit, job::Job, plan};
 use contract::Result;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
+    present(&flags.inputs)?;
     let engine = common.engine(&means)?;
     let job = Job {
         inputs: flags.inputs.clone(),
@@ -20,5 +21,9 @@ pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
         say.warning(warning);
     }
     say.result(&outcome.summary);
-    Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+    Ok(if outcome.partial {
+        exit::PARTIAL
+    } else {
+        exit::OK
+    })
 }

@@ -13,14 +13,17 @@ pub(super) fn simulate(flags: &SimulateFlags, common: &Common, say: &Say) -> Res
     let scene = read_scene(&flags.scene)?;
     let models = match &flags.robots {
         Some(dir) => {
-            let mut settings = means.settings.robot.clone();
+            let mut settings = means.settings.robot;
             settings.clouds = false;
             Library::load(dir, &settings)?.models
         }
         None if scene.robots.is_empty() => Vec::new(),
         None => {
-            return Err(Error::new(Kind::Usage, "the scene has robots, but no library was given")
-                .hint("add --robots DIR"));
+            return Err(Error::new(
+                Kind::Usage,
+                "the scene has robots, but no library was given",
+            )
+            .hint("add --robots DIR"));
         }
     };
     let truth = scan_scene(&scene, &models, &flags.out, Formats::ALL, &engine)?;

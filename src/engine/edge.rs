@@ -86,7 +86,11 @@ impl<T> Put<T> {
             && at != state.next
             && state.bytes + weight > self.0.cap_bytes
         {
-            state = self.0.room.wait(state).unwrap_or_else(PoisonError::into_inner);
+            state = self
+                .0
+                .room
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
         }
         if state.gone || at > state.failed {
             drop(state);
@@ -149,9 +153,16 @@ impl<T> Take<T> {
                 }
                 state.failed = at;
                 state.next += 1;
-                return Some((at, Err(Error::new(Kind::Bug, format!("item {at} was lost")))));
+                return Some((
+                    at,
+                    Err(Error::new(Kind::Bug, format!("item {at} was lost"))),
+                ));
             }
-            state = self.0.ready.wait(state).unwrap_or_else(PoisonError::into_inner);
+            state = self
+                .0
+                .ready
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
         }
     }
 

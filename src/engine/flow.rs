@@ -36,7 +36,9 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
         let spare = put.clone();
         let spawned = Builder::new()
             .name(format!("{name} source"))
-            .spawn_scoped(pass.scope, move || read(source, &put, &name, &cancel, &stage));
+            .spawn_scoped(pass.scope, move || {
+                read(source, &put, &name, &cancel, &stage)
+            });
         if let Err(e) = spawned {
             refuse(&spare, e);
         }
@@ -57,13 +59,18 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
             let (name, cancel) = (Arc::clone(&self.pass.name), self.pass.cancel.clone());
             let spawned = Builder::new()
                 .name(format!("{name} {i}"))
-                .spawn_scoped(self.pass.scope, move || work(stage, &my_take, &my_put, &name, &cancel));
+                .spawn_scoped(self.pass.scope, move || {
+                    work(stage, &my_take, &my_put, &name, &cancel)
+                });
             // Fewer workers than asked for is slower, none is an end.
             if let (0, Err(e)) = (i, spawned) {
                 refuse(&put, e);
             }
         }
-        Flow { pass: self.pass, take: out }
+        Flow {
+            pass: self.pass,
+            take: out,
+        }
     }
 
     /// Folds all items, in order, into one answer.
@@ -121,7 +128,9 @@ fn read<T: Weigh>(
                 None => return,
             }
         };
-        let (bytes, points) = item.as_ref().map_or((0, 0), |i| (i.weight_bytes(), i.n_points()));
+        let (bytes, points) = item
+            .as_ref()
+            .map_or((0, 0), |i| (i.weight_bytes(), i.n_points()));
         let failed = item.is_err();
         if put.put(at, item, bytes) == Onward::Stop || failed {
             return;

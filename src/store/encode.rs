@@ -35,11 +35,17 @@ impl Weigh for Encoded {
 
 impl Encode {
     pub(super) fn new(scans: &[Scan]) -> Self {
-        Self { world_from_scan: scans.iter().map(|s| s.world_from_scan).collect() }
+        Self {
+            world_from_scan: scans.iter().map(|s| s.world_from_scan).collect(),
+        }
     }
 
     fn bounds(&self, scan: u32, records: &[Record]) -> Aabb {
-        let world_from_scan = self.world_from_scan.get(scan as usize).copied().unwrap_or_default();
+        let world_from_scan = self
+            .world_from_scan
+            .get(scan as usize)
+            .copied()
+            .unwrap_or_default();
         let r = world_from_scan.rotation.to_rotation_matrix();
         let (m, t) = (r.matrix(), world_from_scan.translation.vector);
         let mut bounds = Aabb::EMPTY;

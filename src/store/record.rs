@@ -21,7 +21,12 @@ impl Record {
     /// `place` must lie below 2⁴⁸ (281 000 billion points: no mask is that long).
     #[inline]
     pub(super) fn new(xyz: [f32; 3], place: u64, pixel: u16) -> Self {
-        Self { xyz, place_low: place as u32, place_high: (place >> 32) as u16, pixel }
+        Self {
+            xyz,
+            place_low: place as u32,
+            place_high: (place >> 32) as u16,
+            pixel,
+        }
     }
 
     /// Place in the mask.

@@ -79,7 +79,8 @@ pub struct Fit {
     pub base_sigma: [f64; 6],
     /// Free joints, in the order of the model.
     pub joints: Vec<JointFit>,
-    /// Covariance of (base twist 6, free joints), row-major, (6+n)².
+    /// Covariance of (base twist: translation, rotation about the base's origin, world axes; free joints), row-major,
+    /// (6+n)².
     pub covariance: Vec<f64>,
     /// Share explained less share contradicted, −1.5..1.
     pub score: f64,

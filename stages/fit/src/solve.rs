@@ -2,7 +2,7 @@
 
 use contract::{Candidate, Fit, JointFit, RunnerUp, Verdict};
 use geometry::Pose;
-use nalgebra::{Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{DMatrix, Rotation3, Translation3, UnitQuaternion};
 
 use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, evidence, judge};
@@ -99,6 +99,16 @@ fn prior(candidate: &Candidate, local_from_world: &Pose, prepared: &Prepared<'_>
     )
 }
 
+/// The covariance with the base's twist turned from base axes to world axes.
+fn in_world_axes(covariance: &DMatrix<f64>, local_from_base: &Pose) -> DMatrix<f64> {
+    let turn = local_from_base.rotation.to_rotation_matrix();
+    let mut world_from_base = DMatrix::identity(covariance.nrows(), covariance.ncols());
+    for block in [0, 3] {
+        world_from_base.fixed_view_mut::<3, 3>(block, block).copy_from(turn.matrix());
+    }
+    &world_from_base * covariance * world_from_base.transpose()
+}
+
 fn report(
     prepared: &Prepared<'_>,
     scene: &Scene<'_>,
@@ -110,7 +120,8 @@ fn report(
     let model = prepared.model;
     let h = &best.hypothesis;
     let n = 6 + h.posture.len();
-    let sigma = |i: usize| best.covariance[(i, i)].max(0.0).sqrt();
+    let covariance = in_world_axes(&best.covariance, &h.local_from_base);
+    let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     let joints = (0..h.posture.len())
         .map(|j| {
             let determined = sigma(6 + j) < settings.determined_sigma;
@@ -137,7 +148,7 @@ fn report(
         world_from_base: scene.world_from_local() * h.local_from_base,
         base_sigma: std::array::from_fn(sigma),
         joints,
-        covariance: (0..n * n).map(|i| best.covariance[(i / n, i % n)]).collect(),
+        covariance: (0..n * n).map(|i| covariance[(i / n, i % n)]).collect(),
         score: judgement.score,
         explained: judgement.explained,
         rms,

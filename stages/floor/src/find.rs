@@ -163,12 +163,21 @@ fn search(
     let wanted = |p: &PlanePatch| faces_up(p, settings);
     let columns = Columns::new(occupancy);
     let pieces = pieces(patches, wanted, settings);
-    let found = levels(pieces, patches, &columns, scanners, settings);
+    let crate::levels::Levels {
+        floor: found,
+        ceilings,
+    } = levels(pieces, patches, &columns, scanners, settings);
     let levels: Vec<_> = found
         .iter()
         .map(|level| describe(level, settings))
         .collect();
-    let mut planes = stands(patches, wanted, (&found, &levels), scanners, settings);
+    let may_carry: Vec<PlanePatch> = patches
+        .iter()
+        .enumerate()
+        .filter(|(i, p)| wanted(p) && ceilings.binary_search(i).is_err())
+        .map(|(_, p)| p.clone())
+        .collect();
+    let mut planes = stands(&may_carry, (&found, &levels), scanners, settings);
     planes.extend(found.iter().map(|level| InstallationPlane {
         plane: level.plane,
         bounds: Aabb::of(level.nodes.iter().map(|n| n.place().into())),

@@ -1,7 +1,7 @@
 //! Pieces of level surface in, floor levels out: what is large, low and seen from above.
 
 use crate::Settings;
-use crate::column::Columns;
+use crate::column::{Around, Columns};
 use crate::pieces::{GROUND, Node, Piece, fit, height};
 use contract::{FloorLevel, PlanePatch, ScanId};
 use geometry::{Plane, Vector};
@@ -151,14 +151,23 @@ pub(crate) fn seen_through(patch: &PlanePatch, from: Vector, upper: &Level) -> f
     n as f64 / patch.ground.len().max(1) as f64
 }
 
-/// Gathers pieces into levels and keeps those that are floor, largest first.
+/// What the pieces are.
+#[derive(Debug, Default)]
+pub(crate) struct Levels {
+    /// Floor, largest first.
+    pub(crate) floor: Vec<Level>,
+    /// Patches of ceilings, ascending: their scanner is unknown, and nothing can stand on them.
+    pub(crate) ceilings: Vec<usize>,
+}
+
+/// Gathers pieces into levels and tells which are floor.
 pub(crate) fn levels(
     pieces: Vec<Piece>,
     patches: &[PlanePatch],
     columns: &Columns,
     scanners: &Scanners,
     settings: &Settings,
-) -> Vec<Level> {
+) -> Levels {
     let mut groups: Vec<Level> = Vec::new();
     for piece in pieces {
         match groups
@@ -173,41 +182,41 @@ pub(crate) fn levels(
     }
     groups.retain(|g| {
         g.area() >= settings.min_area
-            && g.plane.normal.z >= settings.max_tilt.cos()
+            && g.plane.normal.z >= settings.max_floor_tilt.cos()
             && g.waviness <= settings.max_waviness
     });
     groups.sort_by_key(|group| std::cmp::Reverse(group.nodes.len()));
-    let mut out: Vec<Level> = Vec::new();
+    let mut out = Levels::default();
     for group in groups {
         let ghost = out
+            .floor
             .iter()
             .any(|upper| group.ghost_share(upper, patches, scanners) > settings.ghost_share);
-        if !ghost && can_stand(&group, patches, columns, scanners, settings) {
-            out.push(group);
+        if ghost {
+            continue;
+        }
+        let around = columns.around(&group.nodes);
+        if is_ceiling(&group, around, patches, scanners) {
+            out.ceilings.extend(group.patches);
+        } else if around.near_below < settings.raised_share
+            || group.largest >= settings.min_raised_area
+        {
+            out.floor.push(group);
         }
     }
+    out.ceilings.sort_unstable();
     out
 }
 
-/// Whether a level is floor by what lies above and below it.
-fn can_stand(
-    level: &Level,
-    patches: &[PlanePatch],
-    columns: &Columns,
-    scanners: &Scanners,
-    settings: &Settings,
-) -> bool {
-    let around = columns.around(&level.nodes);
-    let known: f64 = weight(level, patches, |p| scanner(scanners, p.scan).is_some());
-    let all: f64 = weight(level, patches, |_| true);
-    if 2.0 * known < all {
-        // Which side was seen is unknown: a ceiling has nothing above, or a slab with the next storey's floor.
-        let ceiling = around.above < CEILING_ABOVE && around.below > CEILING_BELOW;
-        if ceiling || around.near_above > COVERED {
-            return false;
-        }
+/// Whether a level was seen from below, by what lies around it; where the scanner is known, its side is.
+fn is_ceiling(level: &Level, around: Around, patches: &[PlanePatch], scanners: &Scanners) -> bool {
+    let known = weight(level, patches, |p| scanner(scanners, p.scan).is_some());
+    if 2.0 * known >= weight(level, patches, |_| true) {
+        return false;
     }
-    around.near_below < settings.raised_share || level.largest >= settings.min_raised_area
+    // A ceiling has nothing above, or, as a slab, the next storey's floor close above.
+    let bare = around.above < CEILING_ABOVE && around.below > CEILING_BELOW;
+    bare || around.near_above > COVERED
 }
 
 fn weight(level: &Level, patches: &[PlanePatch], wanted: impl Fn(&PlanePatch) -> bool) -> f64 {

@@ -3,12 +3,14 @@
 /// Settings of the floor stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Largest tilt of a floor level or installation plane, radians: 3° (fit.md §4a).
+    /// Largest tilt of an installation plane that is not floor, radians: 3° (fit.md §4a).
     pub max_tilt: f64,
+    /// Largest tilt of a floor level, radians: 5°, since scanners on carts are not levelled.
+    pub max_floor_tilt: f64,
     /// Largest tilt of a single patch that may be part of one, radians: small patches know their normal badly.
     pub max_patch_tilt: f64,
-    /// Step in height between neighbouring ground cells that is still one surface, metres: a floor tilted by 3°
-    /// steps 19 mm across the diagonal of a cell.
+    /// Step in height between neighbouring ground cells that is still one surface, metres: a floor tilted by 5°
+    /// steps 31 mm across the diagonal of a cell.
     pub max_step: f64,
     /// Difference of height at which two separate pieces are one level, metres: scans are registered to a centimetre.
     pub level_tolerance: f64,
@@ -44,8 +46,9 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             max_tilt: 3_f64.to_radians(),
-            max_patch_tilt: 5_f64.to_radians(),
-            max_step: 0.025,
+            max_floor_tilt: 5_f64.to_radians(),
+            max_patch_tilt: 7_f64.to_radians(),
+            max_step: 0.032,
             level_tolerance: 0.025,
             level_bend: 0.0035,
             max_level_tolerance: 0.06,

@@ -12,21 +12,16 @@ const SAME_HEIGHT: f64 = 0.005;
 /// How badly a small patch knows its tilt, radians: 1°.
 const TILT_ERROR: f64 = 0.0175;
 
-/// Joins the patches for which `wanted` holds into planes; the largest ones, by height, then area.
+/// Joins patches that face up into planes; the largest ones, largest first.
 pub(crate) fn stands(
     patches: &[PlanePatch],
-    wanted: impl Fn(&PlanePatch) -> bool,
     floor: (&[Level], &[FloorLevel]),
     scanners: &Scanners,
     settings: &Settings,
 ) -> Vec<InstallationPlane> {
     let mut chosen: Vec<&PlanePatch> = patches
         .iter()
-        .filter(|p| {
-            wanted(p)
-                && !is_floor(p, floor.1, settings)
-                && !is_ghost(p, floor.0, scanners, settings)
-        })
+        .filter(|p| !is_floor(p, floor.1, settings) && !is_ghost(p, floor.0, scanners, settings))
         .collect();
     chosen.sort_by(|a, b| a.bounds.min[0].total_cmp(&b.bounds.min[0]));
     let mut union = Union::new(chosen.len());

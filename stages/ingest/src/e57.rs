@@ -81,6 +81,10 @@ impl Reader for E57File {
         Ok(Box::new(strips::Strips::new(self, want)))
     }
 
+    fn has_color(&self) -> bool {
+        self.files.iter().any(|scan| scan.color.is_some())
+    }
+
     fn facts(&self) -> Vec<(String, String)> {
         self.facts.clone()
     }

@@ -133,6 +133,15 @@ impl Reader for Las {
         }
     }
 
+    fn has_color(&self) -> bool {
+        self.decoder.has_color()
+    }
+
+    fn quantum(&self) -> Option<([f64; 3], [f64; 3])> {
+        let header = &self.records.header;
+        Some((header.scale, header.offset))
+    }
+
     fn masks(&self) -> &[MaskSeed] {
         &self.masks
     }

@@ -169,6 +169,11 @@ pub(crate) struct Decoder {
 }
 
 impl Decoder {
+    /// Whether records have colour.
+    pub(crate) fn has_color(&self) -> bool {
+        self.layout.color.is_some()
+    }
+
     /// For the scans of a file with these poses; `scan_of_source` tells the scan of each source id (65,536 entries),
     /// or is empty where there is only one scan.
     pub(crate) fn new(
@@ -229,7 +234,7 @@ impl Decoder {
                 continue;
             };
             let place = first + i as u64;
-            let strip = strips[scan].get_or_insert_with(|| empty_strip(scan, place, 0, want));
+            let strip = strips[scan].get_or_insert_with(|| self.empty(scan, place, 0, want));
             // The range of a strip is that of one block of records, far below 2³².
             strip.place.push((place - strip.first_place) as u32);
             strip.xyz.push(xyz);
@@ -244,7 +249,7 @@ impl Decoder {
 
     fn decode_one(&self, records: &[u8], first: u64, want: Want) -> Option<RawStrip> {
         let frame = &self.frames[0];
-        let mut strip = empty_strip(0, first, records.len() / self.record_len, want);
+        let mut strip = self.empty(0, first, records.len() / self.record_len, want);
         for (i, record) in records.chunks_exact(self.record_len).enumerate() {
             let Some(xyz) = self.local(record, frame) else {
                 continue;
@@ -261,6 +266,25 @@ impl Decoder {
             strip.place.iter_mut().for_each(|p| *p -= shift);
         }
         Some(strip)
+    }
+
+    /// A strip with room for `n` points.
+    fn empty(&self, scan: usize, first_place: u64, n: usize, want: Want) -> RawStrip {
+        let attributes = (want == Want::Everything).then(|| Attributes {
+            world: Vec::with_capacity(n),
+            intensity: Vec::with_capacity(n),
+            color: Vec::with_capacity(if self.layout.color.is_some() { n } else { 0 }),
+            gps_time: Vec::with_capacity(if self.layout.gps_time.is_some() { n } else { 0 }),
+            classification: Vec::with_capacity(n),
+            source_id: Vec::with_capacity(n),
+        });
+        RawStrip {
+            scan,
+            first_place,
+            place: Vec::with_capacity(n),
+            xyz: Vec::with_capacity(n),
+            attributes,
+        }
     }
 
     /// Scan frame, or nothing where the point is withheld or not to be believed.
@@ -300,15 +324,5 @@ impl Decoder {
             bytes.copy_from_slice(&record[at..at + 8]);
             to.gps_time.push(f64::from_le_bytes(bytes));
         }
-    }
-}
-
-fn empty_strip(scan: usize, first_place: u64, capacity: usize, want: Want) -> RawStrip {
-    RawStrip {
-        scan,
-        first_place,
-        place: Vec::with_capacity(capacity),
-        xyz: Vec::with_capacity(capacity),
-        attributes: (want == Want::Everything).then(Attributes::default),
     }
 }

@@ -86,6 +86,11 @@ impl Reader for PtxFile {
         Ok(Box::new(strips::Strips::new(self, want)))
     }
 
+    fn has_color(&self) -> bool {
+        // x y z, then intensity, then red green blue.
+        self.blocks.iter().any(|block| block.n_columns >= 6)
+    }
+
     fn facts(&self) -> Vec<(String, String)> {
         let mut facts = vec![
             ("version".into(), "PTX".into()),

@@ -1,4 +1,5 @@
 //! Tests of the lattice estimate on synthetic scans.
+#![allow(clippy::unwrap_used)] // tests may panic
 
 use super::*;
 use geometry::direction::unit;

@@ -82,6 +82,12 @@ pub(crate) trait Reader: Send + Sync {
     fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>>;
     /// All valid points in file order. Ends with an error, never with a silent end, where the file is broken.
     fn strips(&self, want: Want) -> Result<RawStrips<'_>>;
+    /// Whether points have colour.
+    fn has_color(&self) -> bool;
+    /// Scale and offset of its coordinates, metres, where they are whole multiples of a step (LAS).
+    fn quantum(&self) -> Option<([f64; 3], [f64; 3])> {
+        None
+    }
     /// What the file says of itself, as `(name, value)` pairs for `inspect`.
     fn facts(&self) -> Vec<(String, String)>;
 }

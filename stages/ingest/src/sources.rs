@@ -92,6 +92,18 @@ impl Sources {
         })))
     }
 
+    /// Scale and offset of the first LAS input's coordinates, metres.
+    #[must_use]
+    pub fn las_quantum(&self) -> Option<([f64; 3], [f64; 3])> {
+        self.files.iter().find_map(|file| file.reader.quantum())
+    }
+
+    /// Whether any input has colour.
+    #[must_use]
+    pub fn has_color(&self) -> bool {
+        self.files.iter().any(|file| file.reader.has_color())
+    }
+
     fn add(&mut self, path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<()> {
         let meta = std::fs::metadata(path)?;
         if meta.is_dir() {

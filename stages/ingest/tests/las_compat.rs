@@ -1,5 +1,6 @@
 //! Every LAS and LAZ file of public test suites: read in full, with the count and bounds that laspy 2.7 gives, or
 //! refused by name. The files are not part of the repository; without them these tests say that they were skipped.
+#![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use ingest::{Settings, Sources, Want, open};
 use std::path::{Path, PathBuf};

@@ -36,33 +36,33 @@ impl Noise {
         (self.base + self.growth * range) * self.factor[bin(range)]
     }
 
-    /// Measures the noise from second differences of the inverse range along rows: a plane has next to none,
-    /// at any incidence.
+    /// Measures the noise from second differences of the inverse range along rows and along columns: a plane has
+    /// next to none, at any incidence. The larger of both counts, since some scanners err by the line.
     pub(crate) fn measure(&mut self, xyzr: &[[f32; 4]], settings: &Settings) {
         self.base = settings.noise as f32;
         self.growth = settings.noise_growth as f32;
         self.factor = [1.0; N_BINS];
         self.samples.resize(N_BINS, Vec::new());
-        // Where the raster is finer than the data, direct neighbours are missing: look one further.
-        for step in [1, 2] {
-            self.samples.iter_mut().for_each(Vec::clear);
-            self.sample(xyzr, step);
-            if self.samples.iter().map(Vec::len).sum::<usize>() >= MIN_SAMPLES {
-                break;
-            }
-        }
         let limit = settings.noise_limit as f32;
-        let factors: Vec<Option<f32>> = self
-            .samples
-            .iter_mut()
-            .map(|samples| {
-                (samples.len() >= MIN_SAMPLES).then(|| {
+        let mut factors = [None; N_BINS];
+        for along in [1, SIDE] {
+            // Where the raster is finer than the data, direct neighbours are missing: look one further.
+            for step in [1, 2] {
+                self.samples.iter_mut().for_each(Vec::clear);
+                self.sample(xyzr, step, along);
+                if self.samples.iter().map(Vec::len).sum::<usize>() >= MIN_SAMPLES {
+                    break;
+                }
+            }
+            for (samples, factor) in self.samples.iter_mut().zip(&mut factors) {
+                if samples.len() >= MIN_SAMPLES {
                     let at = (samples.len() as f64 * QUANTILE) as usize;
                     let value = *samples.select_nth_unstable_by(at, f32::total_cmp).1;
-                    (value / QUANTILE_OF_NORMAL).clamp(1.0, limit)
-                })
-            })
-            .collect();
+                    let value = (value / QUANTILE_OF_NORMAL).clamp(1.0, limit);
+                    *factor = Some(factor.map_or(value, |f: f32| f.max(value)));
+                }
+            }
+        }
         for b in 0..N_BINS {
             // A bin without enough samples takes the word of the nearest one that has.
             let nearest = (0..N_BINS)
@@ -73,12 +73,15 @@ impl Noise {
         }
     }
 
-    fn sample(&mut self, xyzr: &[[f32; 4]], step: usize) {
-        // Every third row and column pair: thousands of samples a tile, at a small share of the work.
-        for row in (0..SIDE).step_by(3) {
-            let line = &xyzr[row * SIDE..(row + 1) * SIDE];
-            for col in (step..SIDE - step).step_by(2) {
-                let (a, b, c) = (line[col - step][3], line[col][3], line[col + step][3]);
+    /// Gathers second differences over neighbours `step` pixels apart, `along` rows (1) or columns (one row).
+    fn sample(&mut self, xyzr: &[[f32; 4]], step: usize, along: usize) {
+        // Every sixth pixel: thousands of samples a tile, at a small share of the work.
+        let by = step * along;
+        let (rows, cols) = if along == 1 { (0, step) } else { (step, 0) };
+        for row in (rows..SIDE - rows).step_by(3) {
+            for col in (cols..SIDE - cols).step_by(2) {
+                let at = row * SIDE + col;
+                let (a, b, c) = (xyzr[at - by][3], xyzr[at][3], xyzr[at + by][3]);
                 if a > 0.0 && b > 0.0 && c > 0.0 {
                     let second = 1.0 / a + 1.0 / c - 2.0 / b;
                     let expected = (self.base + self.growth * b) * 6_f32.sqrt();

@@ -35,7 +35,7 @@ pub struct Settings {
     pub min_patch_area: f64,
     /// Least width of any other patch, metres: wider than the flat strip on a pipe of 50 mm radius.
     pub min_patch_width: f64,
-    /// Tilt up to which a patch counts as nearly horizontal, radians: 6°, twice what a floor may have.
+    /// Tilt up to which a patch counts as nearly horizontal, radians: 8°, more than a floor may have.
     pub level_tilt: f64,
     /// Edge of an occupancy voxel, metres: finer than the gap between a robot and its fence.
     pub voxel: f64,
@@ -64,7 +64,7 @@ impl Default for Settings {
             min_level_width: 0.015,
             min_patch_area: 0.01,
             min_patch_width: 0.04,
-            level_tilt: 6_f64.to_radians(),
+            level_tilt: 8_f64.to_radians(),
             voxel: 0.05,
             surface_voxel: 0.10,
             surface_noise: 0.006,

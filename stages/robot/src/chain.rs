@@ -25,21 +25,34 @@ pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) ->
         let name = name.as_ref()?;
         let at = tree.links.iter().position(|l| l.name == *name);
         if at.is_none() {
-            findings.fail("robot.toml: main_chain", format!("no such link \"{name}\""), "mend the name");
+            findings.fail(
+                "robot.toml: main_chain",
+                format!("no such link \"{name}\""),
+                "mend the name",
+            );
         }
         at
     };
     let root = find(&sheet.main_chain.root).unwrap_or(0);
     if let Some(tip) = find(&sheet.main_chain.tip) {
         return path(tree, root, tip).unwrap_or_else(|| {
-            findings.fail("robot.toml: main_chain", "the tip does not hang on the root", "name two links of one chain");
+            findings.fail(
+                "robot.toml: main_chain",
+                "the tip does not hang on the root",
+                "name two links of one chain",
+            );
             Vec::new()
         });
     }
     let mut best = (0, 0, Vec::new());
     for tip in 0..tree.links.len() {
-        let Some(joints) = path(tree, root, tip) else { continue };
-        let n_free = joints.iter().filter(|&&j| matches!(tree.joints[j].motion, Motion::Free(_))).count();
+        let Some(joints) = path(tree, root, tip) else {
+            continue;
+        };
+        let n_free = joints
+            .iter()
+            .filter(|&&j| matches!(tree.joints[j].motion, Motion::Free(_)))
+            .count();
         if (n_free, joints.len()) > (best.0, best.1) {
             best = (n_free, joints.len(), joints);
         }
@@ -48,15 +61,29 @@ pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) ->
 }
 
 /// Sets the role of each link.
-pub(crate) fn set_roles(tree: &mut Tree, main_chain: &[usize], sheet: &Sheet, findings: &mut Findings) {
+pub(crate) fn set_roles(
+    tree: &mut Tree,
+    main_chain: &[usize],
+    sheet: &Sheet,
+    findings: &mut Findings,
+) {
     let moving = |tree: &Tree, j: usize| tree.joints[j].motion != Motion::Fixed;
-    let last = main_chain.iter().rev().copied().find(|&j| moving(tree, j)).map(|j| tree.joints[j].child);
+    let last = main_chain
+        .iter()
+        .rev()
+        .copied()
+        .find(|&j| moving(tree, j))
+        .map(|j| tree.joints[j].child);
     let on_chain: Vec<usize> = main_chain.iter().map(|&j| tree.joints[j].child).collect();
     let mut named = vec![false; tree.links.len()];
     for name in sheet.effector.links.iter().chain(&sheet.effector.root) {
         match tree.links.iter().position(|l| l.name == *name) {
             Some(at) => named[at] = true,
-            None => findings.fail("robot.toml: effector", format!("no such link \"{name}\""), "mend the name"),
+            None => findings.fail(
+                "robot.toml: effector",
+                format!("no such link \"{name}\""),
+                "mend the name",
+            ),
         }
     }
     // Links come after their parents, so that each inherits what its parent is.
@@ -68,7 +95,10 @@ pub(crate) fn set_roles(tree: &mut Tree, main_chain: &[usize], sheet: &Sheet, fi
             let parent = tree.joints[j].parent;
             beyond[at] = beyond[parent] || Some(parent) == last;
             tool[at] = tool[parent];
-            let follows = matches!(tree.joints[j].motion, Motion::Loop(_) | Motion::Mimic { .. });
+            let follows = matches!(
+                tree.joints[j].motion,
+                Motion::Loop(_) | Motion::Mimic { .. }
+            );
             followed[at] = !on_chain.contains(&at) && (followed[parent] || follows);
         }
         tool[at] |= sheet.effector.root.as_ref() == Some(&tree.links[at].name);

@@ -13,17 +13,27 @@ const N_TRIES: u32 = 9;
 const SEEN_GAP: f64 = 1e-4;
 
 /// Finds the loops of all sub chains and gives them to the model.
-pub(crate) fn close(model: &mut Model, sub_chains: &[SubChain], findings: &mut Findings) -> Option<()> {
+pub(crate) fn close(
+    model: &mut Model,
+    sub_chains: &[SubChain],
+    findings: &mut Findings,
+) -> Option<()> {
     let mut loops = Vec::new();
     let mut words = Vec::new();
     for (at, sub_chain) in sub_chains.iter().enumerate() {
         let place = place(sub_chain);
-        let passive: Vec<usize> =
-            (0..model.joints.len()).filter(|&j| model.joints[j].motion == Motion::Loop(at)).collect();
+        let passive: Vec<usize> = (0..model.joints.len())
+            .filter(|&j| model.joints[j].motion == Motion::Loop(at))
+            .collect();
         let pins = pins(model, sub_chain, &place, findings)?;
         for (passive, closures) in split(model, &passive, pins, &place, findings)? {
             words.push(sub_chain.kind);
-            loops.push(ClosedLoop { name: sub_chain.name.clone(), passive, closures, form: Form::General });
+            loops.push(ClosedLoop {
+                name: sub_chain.name.clone(),
+                passive,
+                closures,
+                form: Form::General,
+            });
         }
     }
     for (closed_loop, word) in loops.iter_mut().zip(words) {
@@ -44,13 +54,22 @@ pub(crate) fn place(sub_chain: &SubChain) -> String {
     format!("robot.toml: sub_chain {}", sub_chain.name)
 }
 
-fn pins(model: &Model, sub_chain: &SubChain, place: &str, findings: &mut Findings) -> Option<Vec<Closure>> {
+fn pins(
+    model: &Model,
+    sub_chain: &SubChain,
+    place: &str,
+    findings: &mut Findings,
+) -> Option<Vec<Closure>> {
     let mut pins = Vec::new();
     for pin in &sub_chain.closures {
         let mut link = |name: &str| {
             let at = model.link(name);
             if at.is_none() {
-                findings.fail(place, format!("a closure names no link \"{name}\""), "mend the name");
+                findings.fail(
+                    place,
+                    format!("a closure names no link \"{name}\""),
+                    "mend the name",
+                );
             }
             at
         };
@@ -71,7 +90,9 @@ fn pins(model: &Model, sub_chain: &SubChain, place: &str, findings: &mut Finding
 
 /// Passive joints that one side of a pin hangs on and the other does not.
 fn between(model: &Model, passive: &[usize], pin: &Closure) -> Vec<usize> {
-    (passive.iter().copied()).filter(|&j| model.hangs_on(pin.link_a, j) != model.hangs_on(pin.link_b, j)).collect()
+    (passive.iter().copied())
+        .filter(|&j| model.hangs_on(pin.link_a, j) != model.hangs_on(pin.link_b, j))
+        .collect()
 }
 
 /// Parts that share no passive joint.
@@ -86,7 +107,11 @@ fn split(
     for pin in pins {
         let mut joints = between(model, passive, &pin);
         if joints.is_empty() {
-            findings.fail(place, "no passive joint lies between the ends of a closure", "name the passive joints");
+            findings.fail(
+                place,
+                "no passive joint lies between the ends of a closure",
+                "name the passive joints",
+            );
             return None;
         }
         let mut closures = vec![pin];
@@ -107,8 +132,15 @@ fn split(
     }
     for &joint in passive {
         if !parts.iter().any(|(joints, _)| joints.contains(&joint)) {
-            let what = format!("no closure determines the passive joint \"{}\"", model.joints[joint].name);
-            findings.fail(place, what, "add its closure, or leave the joint out of passive");
+            let what = format!(
+                "no closure determines the passive joint \"{}\"",
+                model.joints[joint].name
+            );
+            findings.fail(
+                place,
+                what,
+                "add its closure, or leave the joint out of passive",
+            );
             return None;
         }
     }
@@ -117,12 +149,24 @@ fn split(
 }
 
 /// Sets the form of a loop, and turns its pin so that side a is that of the first passive joint.
-fn shape(model: &Model, closed_loop: &mut ClosedLoop, word: LoopWord, findings: &mut Findings) -> Option<()> {
+fn shape(
+    model: &Model,
+    closed_loop: &mut ClosedLoop,
+    word: LoopWord,
+    findings: &mut Findings,
+) -> Option<()> {
     let place = format!("robot.toml: sub_chain {}", closed_loop.name);
     let (n_passive, n_pins) = (closed_loop.passive.len(), closed_loop.closures.len());
     if n_passive > 2 * n_pins {
-        let what = format!("{n_pins} pin(s) determine {} joints, but {n_passive} are passive", 2 * n_pins);
-        findings.fail(&place, what, "leave out of passive what moves by itself or mimics");
+        let what = format!(
+            "{n_pins} pin(s) determine {} joints, but {n_passive} are passive",
+            2 * n_pins
+        );
+        findings.fail(
+            &place,
+            what,
+            "leave out of passive what moves by itself or mimics",
+        );
         return None;
     }
     let mut found = Form::General;
@@ -147,10 +191,18 @@ fn shape(model: &Model, closed_loop: &mut ClosedLoop, word: LoopWord, findings: 
     };
     if !fits {
         let what = format!("the passive joints do not make the kind of loop named \"{word:?}\"");
-        findings.fail(&place, what, "see stages/robot/README.md, or write kind = \"auto\"");
+        findings.fail(
+            &place,
+            what,
+            "see stages/robot/README.md, or write kind = \"auto\"",
+        );
         return None;
     }
-    closed_loop.form = if word == LoopWord::General { Form::General } else { found };
+    closed_loop.form = if word == LoopWord::General {
+        Form::General
+    } else {
+        found
+    };
     Some(())
 }
 
@@ -169,7 +221,9 @@ fn single(model: &Model, passive: &[usize], pin: &Closure) -> Form {
             match (serial, turns(k)) {
                 (true, true) if parallel => Form::RrrSerial { mode },
                 (true, false) if square => Form::Rpr { mode },
-                (false, true) if parallel && model.hangs_on(pin.link_b, k) => Form::RrrBranched { mode },
+                (false, true) if parallel && model.hangs_on(pin.link_b, k) => {
+                    Form::RrrBranched { mode }
+                }
                 _ => Form::General,
             }
         }
@@ -178,19 +232,31 @@ fn single(model: &Model, passive: &[usize], pin: &Closure) -> Form {
 }
 
 /// Loops with those first on which others hang.
-fn ordered(model: &Model, loops: Vec<ClosedLoop>, findings: &mut Findings) -> Option<Vec<ClosedLoop>> {
+fn ordered(
+    model: &Model,
+    loops: Vec<ClosedLoop>,
+    findings: &mut Findings,
+) -> Option<Vec<ClosedLoop>> {
     let needs = |a: &ClosedLoop, b: &ClosedLoop| {
-        (a.closures.iter().flat_map(|pin| [pin.link_a, pin.link_b]))
-            .any(|link| b.passive.iter().any(|&j| !a.passive.contains(&j) && model.hangs_on(link, j)))
+        (a.closures.iter().flat_map(|pin| [pin.link_a, pin.link_b])).any(|link| {
+            b.passive
+                .iter()
+                .any(|&j| !a.passive.contains(&j) && model.hangs_on(link, j))
+        })
     };
     let mut waiting = loops;
     let mut done: Vec<ClosedLoop> = Vec::new();
     while !waiting.is_empty() {
-        let ready = (0..waiting.len())
-            .find(|&at| !(0..waiting.len()).any(|other| other != at && needs(&waiting[at], &waiting[other])));
+        let ready = (0..waiting.len()).find(|&at| {
+            !(0..waiting.len()).any(|other| other != at && needs(&waiting[at], &waiting[other]))
+        });
         let Some(at) = ready else {
             let what = "loops hang on one another in a circle";
-            findings.fail("robot.toml: sub_chain", what, "write their closures into one sub_chain");
+            findings.fail(
+                "robot.toml: sub_chain",
+                what,
+                "write their closures into one sub_chain",
+            );
             return None;
         };
         done.push(waiting.remove(at));
@@ -211,11 +277,17 @@ fn set_modes(model: &mut Model, findings: &mut Findings) {
         let found = model.loops[at].mode_at_zero(&placing);
         if found.is_none() {
             let place = format!("robot.toml: sub_chain {}", model.loops[at].name);
-            findings.warn(place, "is stretched out at the zero posture, so its assembly mode is a guess", "");
+            findings.warn(
+                place,
+                "is stretched out at the zero posture, so its assembly mode is a guess",
+                "",
+            );
         }
         let sign = found.unwrap_or(1.0);
         match &mut model.loops[at].form {
-            Form::RrrSerial { mode } | Form::RrrBranched { mode } | Form::Rpr { mode } => *mode = sign,
+            Form::RrrSerial { mode } | Form::RrrBranched { mode } | Form::Rpr { mode } => {
+                *mode = sign
+            }
             Form::Rr | Form::General => {}
         }
     }
@@ -237,7 +309,8 @@ fn try_range(model: &Model, findings: &mut Findings) {
             for &joint in model.loops.iter().flat_map(|l| &l.passive) {
                 let value = placing.values[joint];
                 // A driver's own limits are often rounded: one hundredth is no news.
-                let outside = |[lower, upper]: [f64; 2]| value < lower - 0.01 || value > upper + 0.01;
+                let outside =
+                    |[lower, upper]: [f64; 2]| value < lower - 0.01 || value > upper + 0.01;
                 beyond[joint] |= model.joints[joint].limits.is_some_and(outside);
             }
         }
@@ -249,8 +322,17 @@ fn try_range(model: &Model, findings: &mut Findings) {
             findings.warn(place, what, "check its points and the limits of its driver");
         }
     }
-    for (joint, _) in model.joints.iter().zip(&beyond).filter(|(j, b)| **b && j.kind != JointKind::Continuous) {
+    for (joint, _) in model
+        .joints
+        .iter()
+        .zip(&beyond)
+        .filter(|(j, b)| **b && j.kind != JointKind::Continuous)
+    {
         let what = "the loop takes this joint beyond its limits";
-        findings.note(format!("joint {}", joint.name), what, "check the limits, or leave it: they are not enforced");
+        findings.note(
+            format!("joint {}", joint.name),
+            what,
+            "check the limits, or leave it: they are not enforced",
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! Robots as models: URDF, meshes, chains and loops in; kinematics and CAD clouds out. Knows no scans.
 #![forbid(unsafe_code)]
 
+mod bodies;
 mod chain;
 mod close;
 mod cloud;
@@ -11,6 +12,8 @@ mod load;
 mod loops;
 mod mesh;
 mod model;
+mod notes;
+mod reading;
 mod resolve;
 mod sheet;
 mod tree;
@@ -20,4 +23,6 @@ pub use finding::{Finding, Severity};
 pub use library::Library;
 pub use load::Settings;
 pub use loops::{ClosedLoop, Closure, Form};
-pub use model::{CadCloud, Joint, JointKind, Kinematics, Link, Mesh, Model, Motion, Role, Symmetry};
+pub use model::{
+    CadCloud, Joint, JointKind, Kinematics, Link, Mesh, Model, Motion, Role, Symmetry,
+};

@@ -1,17 +1,17 @@
 //! A model's folder in, a model out: its URDF and `robot.toml`, sub chains, meshes, CAD clouds.
 
+use crate::bodies::Bodies;
 use crate::finding::{Finding, Findings};
-use crate::model::{JointKind, Model, Symmetry};
+use crate::model::Model;
+use crate::notes::{named_passive, note_links};
+use crate::reading::{file_name, read_text};
 use crate::resolve::Roots;
 use crate::sheet::{MAX_SHEET_BYTES, Sheet, SubChain};
 use crate::tree::Tree;
-use crate::urdf::{Body, Description, MAX_URDF_BYTES, Shape};
-use crate::{chain, close, cloud, mesh, tree, urdf};
+use crate::urdf::{Description, MAX_URDF_BYTES};
+use crate::{chain, close, cloud, tree, urdf};
 use contract::{Error, Result};
-use geometry::{Aabb, Vector};
-use nalgebra::Unit;
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// What to load, and how finely.
@@ -29,7 +29,12 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { clouds: true, spacing: 0.005, max_samples: 60_000, max_mesh_bytes: 256 << 20 }
+        Self {
+            clouds: true,
+            spacing: 0.005,
+            max_samples: 60_000,
+            max_mesh_bytes: 256 << 20,
+        }
     }
 }
 
@@ -37,12 +42,12 @@ impl Settings {
     /// Meshes and kinematics only.
     #[must_use]
     pub fn without_clouds() -> Self {
-        Self { clouds: false, ..Self::default() }
+        Self {
+            clouds: false,
+            ..Self::default()
+        }
     }
 }
-
-/// A link larger than this is drawn in millimetres, metres.
-const LARGEST_LINK: f64 = 30.0;
 
 impl Model {
     /// Loads one model from its folder; beside it what is worth knowing.
@@ -50,7 +55,9 @@ impl Model {
     /// # Errors
     /// The first finding that keeps it from loading.
     pub fn load(folder: &Path, settings: &Settings) -> Result<(Self, Vec<Finding>)> {
-        let name = folder.file_name().map_or_else(|| "robot".to_owned(), |n| n.to_string_lossy().into_owned());
+        let name = folder
+            .file_name()
+            .map_or_else(|| "robot".to_owned(), |n| n.to_string_lossy().into_owned());
         let mut findings = Findings::new(&name);
         match load(folder, &name, folder.parent(), settings, &mut findings) {
             Some(model) => Ok((model, findings.list)),
@@ -64,9 +71,16 @@ impl Model {
     /// The first finding that keeps it from loading.
     pub fn load_urdf(path: &Path, name: &str, settings: &Settings) -> Result<(Self, Vec<Finding>)> {
         let mut findings = Findings::new(name);
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = path
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
         let roots = Roots::new(folder, None).map_err(|e| Error::from(e).at(folder.display()))?;
-        let loader = Loader { name, roots, settings };
+        let loader = Loader {
+            name,
+            roots,
+            settings,
+        };
         match loader.load(path, &Sheet::default(), &mut findings) {
             Some(model) => Ok((model, findings.list)),
             None => Err(findings.first_error()),
@@ -86,7 +100,11 @@ pub(crate) fn load(
     let roots = match Roots::new(folder, library) {
         Ok(roots) => roots,
         Err(error) => {
-            findings.fail(folder.display(), format!("cannot be opened ({error})"), "check the path");
+            findings.fail(
+                folder.display(),
+                format!("cannot be opened ({error})"),
+                "check the path",
+            );
             return None;
         }
     };
@@ -95,13 +113,22 @@ pub(crate) fn load(
         Some(written) => match roots.find(written) {
             Ok(found) => found.path,
             Err(what) => {
-                findings.fail("robot.toml: urdf", format!("{what} \"{written}\""), "mend the name");
+                findings.fail(
+                    "robot.toml: urdf",
+                    format!("{what} \"{written}\""),
+                    "mend the name",
+                );
                 return None;
             }
         },
         None => find_urdf(folder, findings)?,
     };
-    Loader { name, roots, settings }.load(&path, &sheet, findings)
+    Loader {
+        name,
+        roots,
+        settings,
+    }
+    .load(&path, &sheet, findings)
 }
 
 fn read_sheet(folder: &Path, findings: &mut Findings) -> Option<Sheet> {
@@ -113,7 +140,10 @@ fn read_sheet(folder: &Path, findings: &mut Findings) -> Option<Sheet> {
     match toml::from_str(&text) {
         Ok(sheet) => Some(sheet),
         Err(error) => {
-            let what = format!("cannot be read ({})", error.to_string().trim().replace('\n', " "));
+            let what = format!(
+                "cannot be read ({})",
+                error.to_string().trim().replace('\n', " ")
+            );
             findings.fail("robot.toml", what, "see stages/robot/README.md");
             None
         }
@@ -129,16 +159,28 @@ pub(crate) fn find_urdf(folder: &Path, findings: &mut Findings) -> Option<PathBu
     match &urdfs(folder)[..] {
         [only] => {
             let name = file_name(only);
-            findings.note(folder.display(), format!("has no robot.urdf; taken instead is \"{name}\""), "");
+            findings.note(
+                folder.display(),
+                format!("has no robot.urdf; taken instead is \"{name}\""),
+                "",
+            );
             Some(only.clone())
         }
         [] => {
-            findings.fail(folder.display(), "has no robot.urdf", "put the robot's URDF there");
+            findings.fail(
+                folder.display(),
+                "has no robot.urdf",
+                "put the robot's URDF there",
+            );
             None
         }
         several => {
             let what = format!("has no robot.urdf, but {} other URDF files", several.len());
-            findings.fail(folder.display(), what, "name the right one robot.urdf, or in robot.toml");
+            findings.fail(
+                folder.display(),
+                what,
+                "name the right one robot.urdf, or in robot.toml",
+            );
             None
         }
     }
@@ -146,40 +188,18 @@ pub(crate) fn find_urdf(folder: &Path, findings: &mut Findings) -> Option<PathBu
 
 /// URDF files of a folder, sorted.
 pub(crate) fn urdfs(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return Vec::new();
+    };
     let mut paths: Vec<PathBuf> = (entries.filter_map(|e| e.ok().map(|e| e.path())))
-        .filter(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf")) && p.is_file())
+        .filter(|p| {
+            p.extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("urdf"))
+                && p.is_file()
+        })
         .collect();
     paths.sort();
     paths
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
-}
-
-/// Reads a regular file of at most `limit` bytes.
-fn read_bytes(path: &Path, limit: u64) -> std::result::Result<Vec<u8>, String> {
-    let open = || {
-        let file = std::fs::File::open(path)?;
-        let len = file.metadata()?.len();
-        let mut bytes = Vec::new();
-        if len <= limit {
-            file.take(limit + 1).read_to_end(&mut bytes)?;
-        }
-        Ok::<_, std::io::Error>((len.max(bytes.len() as u64), bytes))
-    };
-    match open() {
-        Ok((len, bytes)) if len <= limit => Ok(bytes),
-        Ok((len, _)) => Err(format!("is larger than the limit of {limit} bytes \"{len}\"")),
-        Err(error) => Err(format!("cannot be read ({error})")),
-    }
-}
-
-fn read_text(path: &Path, limit: u64, place: &str, findings: &mut Findings) -> Option<String> {
-    let text = read_bytes(path, limit)
-        .and_then(|bytes| String::from_utf8(bytes).map_err(|e| format!("is not UTF-8 ({e})")));
-    text.map_err(|what| findings.fail(place, what, "mend or replace the file")).ok()
 }
 
 struct Loader<'a> {
@@ -210,9 +230,22 @@ impl Loader<'_> {
         let mut tree = tree::build(&description, &passive, &file, findings)?;
         let main_chain = chain::main_chain(&tree, sheet, findings);
         chain::set_roles(&mut tree, &main_chain, sheet, findings);
-        let mut model = Model { name: self.name.to_owned(), main_chain, ..Model::default() };
-        self.bodies(&mut tree, &file, findings);
-        Tree { links: model.links, joints: model.joints, free: model.free, .. } = tree;
+        let mut model = Model {
+            name: self.name.to_owned(),
+            main_chain,
+            ..Model::default()
+        };
+        let bodies = Bodies {
+            roots: &self.roots,
+            settings: self.settings,
+        };
+        bodies.read(&mut tree, &file, findings);
+        Tree {
+            links: model.links,
+            joints: model.joints,
+            free: model.free,
+            ..
+        } = tree;
         close::close(&mut model, &sheet.sub_chain, findings)?;
         note_links(&mut model, sheet, findings);
         if findings.failed() {
@@ -220,7 +253,8 @@ impl Loader<'_> {
         }
         if self.settings.clouds {
             for link in &mut model.links {
-                link.cad = cloud::sample(&link.mesh, self.settings.spacing, self.settings.max_samples);
+                link.cad =
+                    cloud::sample(&link.mesh, self.settings.spacing, self.settings.max_samples);
             }
         }
         Some(model)
@@ -233,7 +267,9 @@ impl Loader<'_> {
         sub_chain: &SubChain,
         findings: &mut Findings,
     ) -> Option<Vec<String>> {
-        let Some(written) = &sub_chain.urdf else { return Some(Vec::new()) };
+        let Some(written) = &sub_chain.urdf else {
+            return Some(Vec::new());
+        };
         let added = self.sub_urdf(description, sub_chain, written, findings)?;
         let moving = (added.joints.iter())
             .filter(|j| j.kind != urdf_rs::JointType::Fixed)
@@ -259,22 +295,42 @@ impl Loader<'_> {
         let text = read_text(&found.ok()?.path, MAX_URDF_BYTES, written, findings)?;
         let mut sub = urdf::read(&text, written, findings)?;
         let children: BTreeSet<String> = sub.joints.iter().map(|j| j.child.clone()).collect();
-        let roots: Vec<String> =
-            sub.links.iter().map(|l| l.name.clone()).filter(|name| !children.contains(name)).collect();
+        let roots: Vec<String> = sub
+            .links
+            .iter()
+            .map(|l| l.name.clone())
+            .filter(|name| !children.contains(name))
+            .collect();
         let [root] = &roots[..] else {
-            findings.fail(written, format!("a URDF has one root link, this one has {}", roots.len()), "join the parts");
+            findings.fail(
+                written,
+                format!("a URDF has one root link, this one has {}", roots.len()),
+                "join the parts",
+            );
             return None;
         };
         let attach = sub_chain.root.as_ref().unwrap_or(root);
         let in_main = |name: &str| main.links.iter().any(|l| l.name == name);
         if !in_main(attach) {
             let what = format!("its root is no link of the main URDF \"{attach}\"");
-            findings.fail(&place, what, "set root to the link that the sub chain stands on");
+            findings.fail(
+                &place,
+                what,
+                "set root to the link that the sub chain stands on",
+            );
             return None;
         }
-        if let Some(link) = sub.links.iter().find(|l| l.name != *root && in_main(&l.name)) {
+        if let Some(link) = sub
+            .links
+            .iter()
+            .find(|l| l.name != *root && in_main(&l.name))
+        {
             let what = format!("a link is in the main URDF too \"{}\"", link.name);
-            findings.fail(&place, what, "keep it in one; a whole robot with open pins goes into urdf = at the top");
+            findings.fail(
+                &place,
+                what,
+                "keep it in one; a whole robot with open pins goes into urdf = at the top",
+            );
             return None;
         }
         for joint in sub.joints.iter_mut().filter(|j| j.parent == *root) {
@@ -282,154 +338,5 @@ impl Loader<'_> {
         }
         sub.links.retain(|l| l.name != *root);
         Some(sub)
-    }
-
-    /// Reads the meshes of all links.
-    fn bodies(&self, tree: &mut Tree, file: &str, findings: &mut Findings) {
-        let mut any = false;
-        for (link, raw) in tree.links.iter_mut().zip(&tree.raw_links) {
-            let place = format!("{file}: link {}", link.name);
-            for body in &raw.visuals {
-                self.body(&mut link.mesh, body, &place, findings);
-            }
-            if link.mesh.triangles.is_empty() && !raw.collisions.is_empty() {
-                for body in &raw.collisions {
-                    self.body(&mut link.mesh, body, &place, findings);
-                }
-                if !link.mesh.triangles.is_empty() {
-                    let what = "has no visual; its collision mesh stands in and may be a hull";
-                    findings.warn(&place, what, "add a visual");
-                }
-            }
-            if link.mesh.triangles.is_empty() && !(raw.visuals.is_empty() && raw.collisions.is_empty()) {
-                findings.warn(&place, "has no surface", "mend its visual");
-            }
-            any |= !link.mesh.triangles.is_empty();
-            link.bounds = Aabb::of(link.mesh.vertices.iter().map(|p| p.map(f64::from)));
-            let size = link.bounds.size().into_iter().fold(0.0, f64::max);
-            if size > LARGEST_LINK {
-                let what = format!("is larger than any robot's link, metres \"{size:.1}\"");
-                findings.warn(&place, what, "if it is drawn in millimetres add scale=\"0.001 0.001 0.001\"");
-            }
-        }
-        if !any {
-            findings.fail(file, "no link has a surface, so no scan can show it", "add meshes");
-        }
-    }
-
-    fn body(&self, into: &mut crate::Mesh, body: &Body, place: &str, findings: &mut Findings) {
-        use mesh::primitive;
-        let positive = |sizes: &[f64]| sizes.iter().all(|s| *s > 0.0);
-        let (soup, scale) = match &body.shape {
-            Shape::Box(size) if positive(size) => (primitive::cuboid(*size), [1.0; 3]),
-            Shape::Cylinder { radius, length } if positive(&[*radius, *length]) => {
-                (primitive::cylinder(*radius, *length), [1.0; 3])
-            }
-            Shape::Capsule { radius, length } if positive(&[*radius, *length]) => {
-                (primitive::capsule(*radius, *length), [1.0; 3])
-            }
-            Shape::Sphere(radius) if positive(&[*radius]) => (primitive::sphere(*radius), [1.0; 3]),
-            Shape::Mesh { path, scale } if scale.iter().all(|s| *s != 0.0) => {
-                let Some(soup) = self.mesh(path, place, findings) else { return };
-                (soup, *scale)
-            }
-            _ => {
-                findings.warn(place, "has a body without extent, which is passed over", "give sizes above zero");
-                return;
-            }
-        };
-        let n_broken = mesh::append(into, &soup, &body.link_from_body, scale);
-        if n_broken > 0 {
-            findings.warn(place, format!("triangles with corners that are no numbers were left out \"{n_broken}\""), "");
-        }
-    }
-
-    fn mesh(&self, written: &str, place: &str, findings: &mut Findings) -> Option<mesh::Soup> {
-        let found = match self.roots.find(written) {
-            Ok(found) => found,
-            Err(what) => {
-                findings.warn(place, format!("{what} \"{written}\""), "put the mesh there, or mend its path");
-                return None;
-            }
-        };
-        let place = format!("{place}: {written}");
-        if found.other_case {
-            let name = file_name(&found.path);
-            findings.warn(&place, format!("is there in another case only \"{name}\""), "mend the path");
-        }
-        let extension = found.path.extension().map_or_else(String::new, |e| e.to_string_lossy().into_owned());
-        let soup = read_bytes(&found.path, self.settings.max_mesh_bytes)
-            .and_then(|bytes| mesh::read(&bytes, &extension));
-        match soup {
-            Ok(soup) => {
-                for note in &soup.notes {
-                    findings.note(&place, *note, "");
-                }
-                Some(soup)
-            }
-            Err(what) => {
-                findings.warn(&place, what, "mend or replace the mesh");
-                None
-            }
-        }
-    }
-}
-
-/// The joints that the loops of a sub chain set: those named, else the `moving` ones of its own URDF.
-fn named_passive(
-    description: &Description,
-    sub_chain: &SubChain,
-    moving: Vec<String>,
-    findings: &mut Findings,
-) -> Option<Vec<String>> {
-    let place = close::place(sub_chain);
-    let named = match &sub_chain.passive {
-        Some(named) => named.clone(),
-        None if sub_chain.closures.is_empty() => Vec::new(),
-        None if sub_chain.urdf.is_some() => moving,
-        None => {
-            findings.fail(&place, "does not say which joints its loop sets", "add passive = [..]");
-            return None;
-        }
-    };
-    for name in &named {
-        if !description.joints.iter().any(|j| j.name == *name && j.kind != urdf_rs::JointType::Fixed) {
-            findings.fail(&place, format!("a passive joint is not there or is fixed \"{name}\""), "mend the name");
-            return None;
-        }
-    }
-    Some(named)
-}
-
-/// Takes over what the sheet says of single links.
-fn note_links(model: &mut Model, sheet: &Sheet, findings: &mut Findings) {
-    for note in &sheet.link {
-        let place = format!("robot.toml: link {}", note.name);
-        let Some(link) = model.link(&note.name) else {
-            findings.fail(&place, "no such link", "mend the name");
-            continue;
-        };
-        if let Some(turn) = &note.symmetry {
-            match Unit::try_new(Vector::from(turn.axis), 1e-9) {
-                Some(axis) if turn.through.iter().all(|v| v.is_finite()) => {
-                    model.symmetries.push(Symmetry { link, axis, through: turn.through.into(), order: turn.order });
-                }
-                _ => findings.fail(&place, "its symmetry has no axis", "give a direction such as [0, 0, 1]"),
-            }
-        }
-        if let Some(sigma) = note.mesh_sigma {
-            if sigma.is_finite() && sigma >= 0.0 {
-                model.mesh_sigmas.push((link, sigma));
-            } else {
-                findings.fail(&place, format!("mesh_sigma is no length \"{sigma}\""), "write metres");
-            }
-        }
-        if let Some(text) = &note.note {
-            findings.note(&place, text.clone(), "");
-        }
-    }
-    let n_moving = model.joints.iter().filter(|j| j.kind != JointKind::Fixed).count();
-    if model.free.is_empty() && n_moving == 0 {
-        findings.warn("", "no joint moves: this is a thing, not a robot", "");
     }
 }

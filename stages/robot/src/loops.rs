@@ -76,7 +76,9 @@ fn turn(from: &Vector, to: &Vector, n: &Vector) -> f64 {
 /// `v`, seen along `n`, turned about it, of unit length.
 fn turned(v: &Vector, n: &Vector, angle: f64) -> Vector {
     let v = across(*v, n);
-    (v * angle.cos() + n.cross(&v) * angle.sin()).try_normalize(1e-15).unwrap_or_else(Vector::zeros)
+    (v * angle.cos() + n.cross(&v) * angle.sin())
+        .try_normalize(1e-15)
+        .unwrap_or_else(Vector::zeros)
 }
 
 impl ClosedLoop {
@@ -114,7 +116,9 @@ impl ClosedLoop {
         if a < 1e-12 {
             return;
         }
-        let root = (b * b - a * (start.norm_squared() - target.norm_squared())).max(0.0).sqrt();
+        let root = (b * b - a * (start.norm_squared() - target.norm_squared()))
+            .max(0.0)
+            .sqrt();
         let s = (mode * root - b) / a;
         placing.values[slide] = s;
         placing.values[j] = turn(&(start + along * s), &target, &axis);
@@ -160,7 +164,9 @@ impl ClosedLoop {
                     break;
                 }
                 let svd = jacobian.svd(true, true);
-                let Ok(down) = svd.solve(&residual, 1e-9) else { break };
+                let Ok(down) = svd.solve(&residual, 1e-9) else {
+                    break;
+                };
                 // A step of half a radian is as far as the linear picture holds.
                 x -= &down * (0.5 / down.amax()).min(1.0);
             }
@@ -178,11 +184,15 @@ impl ClosedLoop {
         let mut residual = DVector::zeros(n * self.closures.len());
         let mut jacobian = DMatrix::zeros(n * self.closures.len(), self.passive.len());
         for (c, pin) in self.closures.iter().enumerate() {
-            let (a, b) = (placing.point(pin.link_a, &pin.point_a), placing.point(pin.link_b, &pin.point_b));
+            let (a, b) = (
+                placing.point(pin.link_a, &pin.point_a),
+                placing.point(pin.link_b, &pin.point_b),
+            );
             for (r, row) in rows.iter().enumerate() {
                 residual[c * n + r] = row.dot(&(a - b));
                 for (column, &joint) in self.passive.iter().enumerate() {
-                    let moves = placing.moves(joint, pin.link_a, &a) - placing.moves(joint, pin.link_b, &b);
+                    let moves =
+                        placing.moves(joint, pin.link_a, &a) - placing.moves(joint, pin.link_b, &b);
                     jacobian[(c * n + r, column)] = row.dot(&moves);
                 }
             }
@@ -192,10 +202,16 @@ impl ClosedLoop {
 
     /// Directions in which the pins must meet: two across the axes of a planar loop, else three.
     fn directions(&self, placing: &Placing) -> Vec<Vector> {
-        let mut axes = (self.passive.iter()).filter(|&&j| placing.turns(j)).map(|&j| placing.axis(j).1);
+        let mut axes = (self.passive.iter())
+            .filter(|&&j| placing.turns(j))
+            .map(|&j| placing.axis(j).1);
         match axes.next() {
             Some(n) if axes.all(|m| m.cross(&n).norm() < 1e-6) => {
-                let helper = if n.x.abs() < 0.7 { Vector::x() } else { Vector::y() };
+                let helper = if n.x.abs() < 0.7 {
+                    Vector::x()
+                } else {
+                    Vector::y()
+                };
                 let e = n.cross(&helper).normalize();
                 vec![e, n.cross(&e)]
             }
@@ -207,8 +223,12 @@ impl ClosedLoop {
     pub(crate) fn gap(&self, placing: &Placing) -> f64 {
         let rows = self.directions(placing);
         let apart = |pin: &Closure| {
-            let gap = placing.point(pin.link_a, &pin.point_a) - placing.point(pin.link_b, &pin.point_b);
-            rows.iter().map(|row| row.dot(&gap).powi(2)).sum::<f64>().sqrt()
+            let gap =
+                placing.point(pin.link_a, &pin.point_a) - placing.point(pin.link_b, &pin.point_b);
+            rows.iter()
+                .map(|row| row.dot(&gap).powi(2))
+                .sum::<f64>()
+                .sqrt()
         };
         self.closures.iter().map(apart).fold(0.0, f64::max)
     }
@@ -222,7 +242,10 @@ impl ClosedLoop {
             Form::Rr => vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b))],
             // Out of reach all is in line and only points at the other end.
             Form::RrrSerial { .. } | Form::Rpr { .. } if open => {
-                vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b)), 0.0]
+                vec![
+                    self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b)),
+                    0.0,
+                ]
             }
             Form::RrrBranched { .. } if open => {
                 let ends = [self.passive[1], self.passive[0]].map(|j| placing.carrier(j));
@@ -241,8 +264,12 @@ impl ClosedLoop {
         let (_, jacobian) = self.equations(placing);
         let mut known = DVector::zeros(jacobian.nrows());
         for (c, pin) in self.closures.iter().enumerate() {
-            let (a, b) = (placing.point(pin.link_a, &pin.point_a), placing.point(pin.link_b, &pin.point_b));
-            let moves = placing.velocity(pin.link_a, &a, rates) - placing.velocity(pin.link_b, &b, rates);
+            let (a, b) = (
+                placing.point(pin.link_a, &pin.point_a),
+                placing.point(pin.link_b, &pin.point_b),
+            );
+            let moves =
+                placing.velocity(pin.link_a, &a, rates) - placing.velocity(pin.link_b, &b, rates);
             for (r, row) in rows.iter().enumerate() {
                 known[c * rows.len() + r] = row.dot(&moves);
             }
@@ -254,7 +281,13 @@ impl ClosedLoop {
     }
 
     /// Rate of the passive revolute joint `which` that keeps pointing at a point of a link.
-    fn aim_rate(&self, placing: &Placing, rates: &[f64], which: usize, target: (usize, &Point)) -> f64 {
+    fn aim_rate(
+        &self,
+        placing: &Placing,
+        rates: &[f64],
+        which: usize,
+        target: (usize, &Point),
+    ) -> f64 {
         let j = self.passive[which];
         let (origin, axis) = placing.axis(j);
         let (carrier, _) = placing.carrier(j);
@@ -264,7 +297,8 @@ impl ClosedLoop {
             return 0.0;
         }
         // Seen from the carrier: the target's own way less that of the carrier at the same place.
-        let moves = placing.velocity(target.0, &target_at, rates) - placing.velocity(carrier, &target_at, rates);
+        let moves = placing.velocity(target.0, &target_at, rates)
+            - placing.velocity(carrier, &target_at, rates);
         axis.dot(&d.cross(&moves)) / d.norm_squared()
     }
 

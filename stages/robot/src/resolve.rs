@@ -21,7 +21,10 @@ pub(crate) struct Found {
 
 impl Roots {
     pub(crate) fn new(model: &Path, library: Option<&Path>) -> std::io::Result<Self> {
-        Ok(Self { model: model.canonicalize()?, library: library.map(Path::canonicalize).transpose()? })
+        Ok(Self {
+            model: model.canonicalize()?,
+            library: library.map(Path::canonicalize).transpose()?,
+        })
     }
 
     /// The file that `written` means, or what is wrong with it in words.
@@ -30,11 +33,17 @@ impl Roots {
         let mut outside = false;
         for other_case in [false, true] {
             for (root, rest) in &candidates {
-                let joined = if other_case { any_case(root, rest) } else { Some(root.join(rest)) };
+                let joined = if other_case {
+                    any_case(root, rest)
+                } else {
+                    Some(root.join(rest))
+                };
                 let Some(path) = joined else {
                     continue;
                 };
-                let Ok(path) = path.canonicalize() else { continue };
+                let Ok(path) = path.canonicalize() else {
+                    continue;
+                };
                 if !path.is_file() {
                     continue;
                 }
@@ -52,15 +61,24 @@ impl Roots {
     }
 
     fn holds(&self, path: &Path) -> bool {
-        path.starts_with(&self.model) || self.library.as_ref().is_some_and(|root| path.starts_with(root))
+        path.starts_with(&self.model)
+            || self
+                .library
+                .as_ref()
+                .is_some_and(|root| path.starts_with(root))
     }
 
     /// Folders and relative paths to try, in order.
     fn candidates(&self, written: &str) -> Result<Vec<(PathBuf, PathBuf)>, String> {
         let slashed = written.trim().replace('\\', "/");
         let mut out = Vec::new();
-        if let Some(rest) = slashed.strip_prefix("package://").or_else(|| slashed.strip_prefix("model://")) {
-            let (package, inner) = rest.split_once('/').ok_or("the path names a package but no file")?;
+        if let Some(rest) = slashed
+            .strip_prefix("package://")
+            .or_else(|| slashed.strip_prefix("model://"))
+        {
+            let (package, inner) = rest
+                .split_once('/')
+                .ok_or("the path names a package but no file")?;
             out.push((self.model.clone(), PathBuf::from(inner)));
             let with_package = PathBuf::from(package).join(inner);
             if let Some(library) = &self.library {
@@ -74,14 +92,21 @@ impl Roots {
             if rest.contains("$(") {
                 return Err("the path is xacro, not expanded".to_owned());
             }
-            let root = if rest.starts_with('/') { PathBuf::from("/") } else { self.model.clone() };
+            let root = if rest.starts_with('/') {
+                PathBuf::from("/")
+            } else {
+                self.model.clone()
+            };
             out.push((root, PathBuf::from(rest.trim_start_matches('/'))));
         } else if slashed.contains("://") {
             return Err("the path is an address on a network, and nothing is fetched".to_owned());
         } else if slashed.is_empty() {
             return Err("the path is empty".to_owned());
         } else if slashed.starts_with('/') {
-            out.push((PathBuf::from("/"), PathBuf::from(slashed.trim_start_matches('/'))));
+            out.push((
+                PathBuf::from("/"),
+                PathBuf::from(slashed.trim_start_matches('/')),
+            ));
         } else {
             out.push((self.model.clone(), PathBuf::from(slashed)));
         }
@@ -91,12 +116,13 @@ impl Roots {
 
 /// `root/rest` with each part matched in any case; the first in order of name where several do.
 fn any_case(root: &Path, rest: &Path) -> Option<PathBuf> {
-    if root.parent().is_none() {
-        return None; // an absolute path is taken as written: the rest of the disk is not searched
-    }
+    // An absolute path is taken as written: the rest of the disk is not searched.
+    root.parent()?;
     let mut at = root.to_path_buf();
     for part in rest.components() {
-        let Component::Normal(part) = part else { return None };
+        let Component::Normal(part) = part else {
+            return None;
+        };
         let wanted = part.to_str()?.to_lowercase();
         let mut names: Vec<_> = std::fs::read_dir(&at)
             .ok()?

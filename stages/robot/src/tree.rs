@@ -30,7 +30,10 @@ pub(crate) fn build(
     let before = findings.list.len();
     let by_name = names(description, file, findings);
     check_joints(description, passive, &by_name, file, findings);
-    if findings.list[before..].iter().any(|f| f.severity == crate::Severity::Error) {
+    if findings.list[before..]
+        .iter()
+        .any(|f| f.severity == crate::Severity::Error)
+    {
         return None;
     }
     let mut children: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
@@ -38,33 +41,66 @@ pub(crate) fn build(
     for (at, joint) in description.joints.iter().enumerate() {
         children.entry(&joint.parent).or_default().push(at);
         if !carried.insert(&joint.child) {
-            let what = format!("is carried by more than one joint; a URDF is a tree \"{}\"", joint.child);
-            findings.fail(format!("{file}: link"), what, "describe the loop in robot.toml");
+            let what = format!(
+                "is carried by more than one joint; a URDF is a tree \"{}\"",
+                joint.child
+            );
+            findings.fail(
+                format!("{file}: link"),
+                what,
+                "describe the loop in robot.toml",
+            );
             return None;
         }
     }
-    let mut roots = description.links.iter().filter(|l| !carried.contains(l.name.as_str()));
+    let mut roots = description
+        .links
+        .iter()
+        .filter(|l| !carried.contains(l.name.as_str()));
     let (Some(root), None) = (roots.next(), roots.next()) else {
-        let n = description.links.iter().filter(|l| !carried.contains(l.name.as_str())).count();
-        findings.fail(file, format!("a URDF has one root link, this one has {n}"), "join the parts, or break the circle");
+        let n = description
+            .links
+            .iter()
+            .filter(|l| !carried.contains(l.name.as_str()))
+            .count();
+        findings.fail(
+            file,
+            format!("a URDF has one root link, this one has {n}"),
+            "join the parts, or break the circle",
+        );
         return None;
     };
     let mut tree = Tree::default();
     tree.grow(description, &children, by_name[root.name.as_str()]);
     if tree.links.len() != description.links.len() {
-        findings.fail(file, "joints run in a circle", "describe the loop in robot.toml");
+        findings.fail(
+            file,
+            "joints run in a circle",
+            "describe the loop in robot.toml",
+        );
         return None;
     }
     tree.set_motions(description, passive, file, findings)?;
     Some(tree)
 }
 
-fn names<'a>(description: &'a Description, file: &str, findings: &mut Findings) -> BTreeMap<&'a str, usize> {
+fn names<'a>(
+    description: &'a Description,
+    file: &str,
+    findings: &mut Findings,
+) -> BTreeMap<&'a str, usize> {
     if description.links.is_empty() {
         findings.fail(file, "has no links", "give a URDF with links");
     }
     if description.links.len() > MAX_LINKS {
-        findings.fail(file, format!("has more links than a robot \"{}\"", description.links.len()), "");
+        findings.fail(
+            file,
+            format!(
+                "has more links than a robot \"{}\"",
+                description.links.len()
+            ),
+            "",
+        );
     }
     let mut by_name = BTreeMap::new();
     for (at, link) in description.links.iter().enumerate() {
@@ -72,13 +108,21 @@ fn names<'a>(description: &'a Description, file: &str, findings: &mut Findings) 
             findings.fail(format!("{file}: link"), "has an empty name", "name it");
         }
         if by_name.insert(link.name.as_str(), at).is_some() {
-            findings.fail(format!("{file}: link"), format!("is there twice \"{}\"", link.name), "rename one");
+            findings.fail(
+                format!("{file}: link"),
+                format!("is there twice \"{}\"", link.name),
+                "rename one",
+            );
         }
     }
     let mut seen = BTreeSet::new();
     for joint in &description.joints {
         if !seen.insert(joint.name.as_str()) {
-            findings.fail(format!("{file}: joint"), format!("is there twice \"{}\"", joint.name), "rename one");
+            findings.fail(
+                format!("{file}: joint"),
+                format!("is there twice \"{}\"", joint.name),
+                "rename one",
+            );
         }
     }
     by_name
@@ -96,31 +140,55 @@ fn check_joints(
         let place = format!("{file}: joint {}", joint.name);
         for (end, name) in [("parent", &joint.parent), ("child", &joint.child)] {
             if !links.contains_key(name.as_str()) {
-                findings.fail(&place, format!("its {end} is no link \"{name}\""), "add the link, or mend the name");
+                findings.fail(
+                    &place,
+                    format!("its {end} is no link \"{name}\""),
+                    "add the link, or mend the name",
+                );
             }
         }
         if matches!(joint.kind, T::Floating | T::Planar | T::Spherical) {
-            let what = format!("a joint type that is not followed \"{:?}\"", joint.kind).to_lowercase();
+            let what =
+                format!("a joint type that is not followed \"{:?}\"", joint.kind).to_lowercase();
             findings.fail(&place, what, "use revolute, continuous, prismatic or fixed");
         }
         let moving = joint.kind != T::Fixed;
         if moving && Vector::from(joint.axis).norm() < 1e-9 {
-            findings.fail(&place, "its axis has no direction", "give an axis such as \"0 0 1\"");
+            findings.fail(
+                &place,
+                "its axis has no direction",
+                "give an axis such as \"0 0 1\"",
+            );
         }
         let follows = joint.mimic.is_some() || passive.contains_key(&joint.name);
         if joint.limits.is_none() && matches!(joint.kind, T::Revolute | T::Prismatic) && !follows {
             if joint.kind == T::Prismatic {
-                findings.fail(&place, "a prismatic joint without limits", "add <limit lower=.. upper=../>");
+                findings.fail(
+                    &place,
+                    "a prismatic joint without limits",
+                    "add <limit lower=.. upper=../>",
+                );
             } else {
-                findings.warn(&place, "a revolute joint without limits is taken as continuous", "add a <limit>");
+                findings.warn(
+                    &place,
+                    "a revolute joint without limits is taken as continuous",
+                    "add a <limit>",
+                );
             }
         }
-        if let Some([lower, upper]) = joint.limits.filter(|_| matches!(joint.kind, T::Revolute | T::Prismatic)) {
+        if let Some([lower, upper]) = joint
+            .limits
+            .filter(|_| matches!(joint.kind, T::Revolute | T::Prismatic))
+        {
             if lower > upper {
                 let what = format!("its lower limit is above the upper \"{lower} > {upper}\"");
                 findings.fail(&place, what, "swap them");
             } else if lower == upper && !follows {
-                findings.warn(&place, format!("its limits leave no way to move \"{lower}\""), "make it fixed");
+                findings.warn(
+                    &place,
+                    format!("its limits leave no way to move \"{lower}\""),
+                    "make it fixed",
+                );
             } else if joint.kind == T::Revolute && upper - lower > 100.0 {
                 findings.warn(&place, "its limits look like degrees", "write radians");
             }
@@ -130,12 +198,18 @@ fn check_joints(
 
 impl Tree {
     /// Depth first in the order of the file, so that a serial chain stays together.
-    fn grow(&mut self, description: &Description, children: &BTreeMap<&str, Vec<usize>>, root: usize) {
+    fn grow(
+        &mut self,
+        description: &Description,
+        children: &BTreeMap<&str, Vec<usize>>,
+        root: usize,
+    ) {
         let mut stack = vec![(root, None::<(usize, usize)>)];
         while let Some((raw, via)) = stack.pop() {
             let at = self.links.len();
             let parent_joint = via.map(|(joint, parent)| {
-                self.joints.push(plain_joint(&description.joints[joint], parent, at));
+                self.joints
+                    .push(plain_joint(&description.joints[joint], parent, at));
                 self.joints.len() - 1
             });
             let raw_link = &description.links[raw];
@@ -148,7 +222,12 @@ impl Tree {
                 bounds: Aabb::EMPTY,
             });
             self.raw_links.push(raw_link.clone());
-            for &joint in children.get(raw_link.name.as_str()).into_iter().flatten().rev() {
+            for &joint in children
+                .get(raw_link.name.as_str())
+                .into_iter()
+                .flatten()
+                .rev()
+            {
                 let child = &description.joints[joint].child;
                 if let Some(raw_child) = description.links.iter().position(|l| l.name == *child) {
                     stack.push((raw_child, Some((joint, at))));
@@ -164,7 +243,11 @@ impl Tree {
         file: &str,
         findings: &mut Findings,
     ) -> Option<()> {
-        let raw: BTreeMap<&str, &RawJoint> = description.joints.iter().map(|j| (j.name.as_str(), j)).collect();
+        let raw: BTreeMap<&str, &RawJoint> = description
+            .joints
+            .iter()
+            .map(|j| (j.name.as_str(), j))
+            .collect();
         let mut free_of: BTreeMap<&str, usize> = BTreeMap::new();
         for (at, joint) in self.joints.iter_mut().enumerate() {
             let written = raw[joint.name.as_str()];
@@ -182,12 +265,21 @@ impl Tree {
         }
         for joint in &mut self.joints {
             let written = raw[joint.name.as_str()];
-            if joint.motion != Motion::Fixed || joint.kind == JointKind::Fixed || written.mimic.is_none() {
+            if joint.motion != Motion::Fixed
+                || joint.kind == JointKind::Fixed
+                || written.mimic.is_none()
+            {
                 continue;
             }
             let place = format!("{file}: joint {}", joint.name);
             match follow(written, &raw, &free_of) {
-                Ok((free, multiplier, offset)) => joint.motion = Motion::Mimic { free, multiplier, offset },
+                Ok((free, multiplier, offset)) => {
+                    joint.motion = Motion::Mimic {
+                        free,
+                        multiplier,
+                        offset,
+                    }
+                }
                 Err(what) => {
                     findings.fail(place, what, "let it mimic a joint that moves by itself");
                     return None;
@@ -207,9 +299,15 @@ fn plain_joint(raw: &RawJoint, parent: usize, child: usize) -> Joint {
         T::Prismatic => JointKind::Prismatic,
         _ => JointKind::Fixed,
     };
-    let limits = raw.limits.filter(|_| matches!(kind, JointKind::Revolute | JointKind::Prismatic));
+    let limits = raw
+        .limits
+        .filter(|_| matches!(kind, JointKind::Revolute | JointKind::Prismatic));
     let axis = Unit::try_new(Vector::from(raw.axis), 1e-9).unwrap_or(Vector::x_axis());
-    let axis = if kind == JointKind::Fixed { Vector::x_axis() } else { axis };
+    let axis = if kind == JointKind::Fixed {
+        Vector::x_axis()
+    } else {
+        axis
+    };
     Joint {
         name: raw.name.clone(),
         kind,
@@ -232,7 +330,10 @@ fn follow(
     let mut at = joint;
     for _ in 0..=raw.len() {
         let Some((target, m, o)) = &at.mimic else {
-            return Err(format!("mimics a joint that a loop sets or that does not move \"{}\"", at.name));
+            return Err(format!(
+                "mimics a joint that a loop sets or that does not move \"{}\"",
+                at.name
+            ));
         };
         offset += multiplier * o;
         multiplier *= m;

@@ -58,22 +58,36 @@ pub(crate) struct RawJoint {
 /// Reads a description; what is wrong goes to `findings`.
 pub(crate) fn read(text: &str, file: &str, findings: &mut Findings) -> Option<Description> {
     let text = text.trim_start_matches('\u{feff}');
-    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    let options = ParsingOptions {
+        nodes_limit: MAX_NODES,
+        ..ParsingOptions::default()
+    };
     let document = match Document::parse_with_options(text, options) {
         Ok(document) => document,
         Err(error) => {
-            findings.fail(file, format!("not well-formed XML ({error})"), "mend the file");
+            findings.fail(
+                file,
+                format!("not well-formed XML ({error})"),
+                "mend the file",
+            );
             return None;
         }
     };
     let root = document.root_element();
     if root.tag_name().name() != "robot" {
-        let what = format!("a URDF opens with <robot>, this file with \"{}\"", root.tag_name().name());
+        let what = format!(
+            "a URDF opens with <robot>, this file with \"{}\"",
+            root.tag_name().name()
+        );
         findings.fail(file, what, "give a URDF file");
         return None;
     }
     if is_xacro(root) {
-        findings.fail(file, "this is xacro, not URDF", "expand it first: xacro in.xacro > robot.urdf");
+        findings.fail(
+            file,
+            "this is xacro, not URDF",
+            "expand it first: xacro in.xacro > robot.urdf",
+        );
         return None;
     }
     let clean = Cleaner { file, findings }.robot(root)?;
@@ -137,7 +151,10 @@ impl Cleaner<'_> {
 
     fn link(&mut self, node: Node, out: &mut String) -> bool {
         let mut right = self.open(node, &["name"], &[], out, true);
-        for body in node.children().filter(|n| matches!(n.tag_name().name(), "visual" | "collision")) {
+        for body in node
+            .children()
+            .filter(|n| matches!(n.tag_name().name(), "visual" | "collision"))
+        {
             right &= self.body(body, out);
         }
         out.push_str("</link>");
@@ -147,11 +164,19 @@ impl Cleaner<'_> {
     fn body(&mut self, node: Node, out: &mut String) -> bool {
         let tag = node.tag_name().name();
         let Some(geometry) = self.only(node, "geometry") else {
-            self.findings.warn(self.place(node), "has no geometry and is passed over", "remove it or complete it");
+            self.findings.warn(
+                self.place(node),
+                "has no geometry and is passed over",
+                "remove it or complete it",
+            );
             return true;
         };
         let Some(shape) = geometry.children().find(Node::is_element) else {
-            self.findings.warn(self.place(node), "has an empty geometry and is passed over", "remove it or complete it");
+            self.findings.warn(
+                self.place(node),
+                "has an empty geometry and is passed over",
+                "remove it or complete it",
+            );
             return true;
         };
         let (needs, may): (&[&str], &[&str]) = match shape.tag_name().name() {
@@ -161,7 +186,11 @@ impl Cleaner<'_> {
             "sphere" => (&["radius"], &[]),
             other => {
                 let what = format!("a shape that is not known is passed over \"{other}\"");
-                self.findings.warn(self.place(node), what, "use mesh, box, cylinder, capsule or sphere");
+                self.findings.warn(
+                    self.place(node),
+                    what,
+                    "use mesh, box, cylinder, capsule or sphere",
+                );
                 return true;
             }
         };
@@ -179,9 +208,16 @@ impl Cleaner<'_> {
     fn joint(&mut self, node: Node, out: &mut String) -> bool {
         let mut right = self.open(node, &["name", "type"], &[], out, true);
         let kind = node.attribute("type").unwrap_or_default();
-        if !matches!(kind, "revolute" | "continuous" | "prismatic" | "fixed" | "floating" | "planar" | "spherical") {
+        if !matches!(
+            kind,
+            "revolute" | "continuous" | "prismatic" | "fixed" | "floating" | "planar" | "spherical"
+        ) {
             let what = format!("a joint type that is not known \"{kind}\"");
-            self.findings.fail(self.place(node), what, "use revolute, continuous, prismatic or fixed");
+            self.findings.fail(
+                self.place(node),
+                what,
+                "use revolute, continuous, prismatic or fixed",
+            );
             right = false;
         }
         let parts: [(&str, &[&str], &[&str]); 6] = [
@@ -198,7 +234,11 @@ impl Cleaner<'_> {
                 Some(_) if kind == "fixed" && matches!(tag, "axis" | "limit" | "mimic") => {}
                 Some(part) => right &= self.open(part, needs, may, out, false),
                 None if matches!(tag, "parent" | "child") => {
-                    self.findings.fail(self.place(node), format!("has no <{tag}>"), "complete the joint");
+                    self.findings.fail(
+                        self.place(node),
+                        format!("has no <{tag}>"),
+                        "complete the joint",
+                    );
                     right = false;
                 }
                 None => {}
@@ -213,20 +253,32 @@ impl Cleaner<'_> {
         let mut found = node.children().filter(|n| n.tag_name().name() == tag);
         let first = found.next();
         if found.next().is_some() {
-            self.findings.warn(self.place(node), format!("has more than one <{tag}>; the first counts"), "keep one");
+            self.findings.warn(
+                self.place(node),
+                format!("has more than one <{tag}>; the first counts"),
+                "keep one",
+            );
         }
         first
     }
 
     /// Writes an element with the attributes named, after checking their numbers.
-    fn open(&mut self, node: Node, needs: &[&str], may: &[&str], out: &mut String, has_children: bool) -> bool {
+    fn open(
+        &mut self,
+        node: Node,
+        needs: &[&str],
+        may: &[&str],
+        out: &mut String,
+        has_children: bool,
+    ) -> bool {
         let mut right = true;
         let _ = write!(out, "<{}", node.tag_name().name());
         for &name in needs.iter().chain(may) {
             let Some(value) = node.attribute(name) else {
                 if needs.contains(&name) {
                     let what = format!("has no attribute \"{name}\"");
-                    self.findings.fail(self.place(node), what, "complete the element");
+                    self.findings
+                        .fail(self.place(node), what, "complete the element");
                     right = false;
                 }
                 continue;
@@ -246,10 +298,18 @@ impl Cleaner<'_> {
 
     fn numbers(&mut self, node: Node, name: &str, value: &str, n: usize) -> bool {
         let words = value.split_whitespace();
-        let right = words.clone().count() == n && words.clone().all(|w| w.parse().is_ok_and(f64::is_finite));
+        let right = words.clone().count() == n
+            && words.clone().all(|w| w.parse().is_ok_and(f64::is_finite));
         if !right {
-            let what = format!("{name} must be {n} finite number(s) \"{}\"", shortened(value));
-            self.findings.fail(self.place(node), what, "write numbers with spaces between them");
+            let what = format!(
+                "{name} must be {n} finite number(s) \"{}\"",
+                shortened(value)
+            );
+            self.findings.fail(
+                self.place(node),
+                what,
+                "write numbers with spaces between them",
+            );
         }
         right
     }
@@ -276,21 +336,34 @@ fn attribute(out: &mut String, name: &str, value: &str) {
 
 fn pose(origin: &urdf_rs::Pose) -> Pose {
     let [r, p, y] = *origin.rpy;
-    Pose::from_parts(Translation3::from(Vector::from(*origin.xyz)), UnitQuaternion::from_euler_angles(r, p, y))
+    Pose::from_parts(
+        Translation3::from(Vector::from(*origin.xyz)),
+        UnitQuaternion::from_euler_angles(r, p, y),
+    )
 }
 
 fn body(geometry: &urdf_rs::Geometry, origin: &urdf_rs::Pose) -> Body {
     use urdf_rs::Geometry as G;
     let shape = match geometry {
         G::Box { size } => Shape::Box(**size),
-        G::Cylinder { radius, length } => Shape::Cylinder { radius: *radius, length: *length },
-        G::Capsule { radius, length } => Shape::Capsule { radius: *radius, length: *length },
+        G::Cylinder { radius, length } => Shape::Cylinder {
+            radius: *radius,
+            length: *length,
+        },
+        G::Capsule { radius, length } => Shape::Capsule {
+            radius: *radius,
+            length: *length,
+        },
         G::Sphere { radius } => Shape::Sphere(*radius),
-        G::Mesh { filename, scale } => {
-            Shape::Mesh { path: filename.clone(), scale: scale.map_or([1.0; 3], |s| *s) }
-        }
+        G::Mesh { filename, scale } => Shape::Mesh {
+            path: filename.clone(),
+            scale: scale.map_or([1.0; 3], |s| *s),
+        },
     };
-    Body { link_from_body: pose(origin), shape }
+    Body {
+        link_from_body: pose(origin),
+        shape,
+    }
 }
 
 fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
@@ -302,8 +375,16 @@ fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
     let links = (robot.links.iter())
         .map(|link| RawLink {
             name: link.name.clone(),
-            visuals: link.visual.iter().map(|v| body(&v.geometry, &v.origin)).collect(),
-            collisions: link.collision.iter().map(|c| body(&c.geometry, &c.origin)).collect(),
+            visuals: link
+                .visual
+                .iter()
+                .map(|v| body(&v.geometry, &v.origin))
+                .collect(),
+            collisions: link
+                .collision
+                .iter()
+                .map(|c| body(&c.geometry, &c.origin))
+                .collect(),
         })
         .collect();
     let joints = (robot.joints.iter().zip(limited))
@@ -315,8 +396,13 @@ fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
             parent_from_joint: pose(&joint.origin),
             axis: *joint.axis.xyz,
             limits: has_limits.then_some([joint.limit.lower, joint.limit.upper]),
-            mimic: (joint.mimic.as_ref())
-                .map(|m| (m.joint.clone(), m.multiplier.unwrap_or(1.0), m.offset.unwrap_or(0.0))),
+            mimic: (joint.mimic.as_ref()).map(|m| {
+                (
+                    m.joint.clone(),
+                    m.multiplier.unwrap_or(1.0),
+                    m.offset.unwrap_or(0.0),
+                )
+            }),
         })
         .collect();
     Description { links, joints }

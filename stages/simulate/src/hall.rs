@@ -1,13 +1,15 @@
 //! Descriptions of hall furniture in; bodies standing on the ground out.
 
-use crate::scene::{Column, Fence, Filling, Furniture, Hall, Scene, Section, Stand, StandShape};
+use crate::scene::{
+    Column, Fence, Filling, Floor, Furniture, Hall, Scene, Section, Stand, StandShape,
+};
 use crate::solid::{Solid, bolts, cuboid, disc, lathe, prism, tube};
 use geometry::Point;
 
 /// Thickness of walls and ceiling, metres: outside faces are never seen.
 const WALL: f64 = 0.2;
-/// Side of a ground cell, metres: facets of a 5 mm wave of 5 m length stay within 0.1 mm of it.
-const GROUND_CELL: f64 = 0.2;
+/// How far the facets of the ground may be from its waves, metres: a tenth of a scanner's noise.
+const FACET: f64 = 0.0002;
 /// Most cells along one side of the ground: 2 million triangles.
 const MAX_CELLS: f64 = 1000.0;
 /// Thickness of a fence wire, metres.
@@ -45,13 +47,19 @@ pub(crate) fn building(hall: &Hall, lowest: f64) -> Solid {
     out
 }
 
+/// Side of a ground cell, metres: as wide as the waves allow.
+fn ground_cell(floor: &Floor) -> f64 {
+    // A chord of length c is c²·curvature/8 from its arc; the shorter of the two waves counts.
+    let curvature =
+        floor.wave_amplitude * (1.37 * std::f64::consts::TAU / floor.wave_length).powi(2);
+    (8.0 * FACET / curvature.max(1e-9))
+        .sqrt()
+        .clamp(0.1, 2.0 * MAX_CELLS)
+}
+
 /// A surface over a rectangle, `height` above each place.
-fn sheet(min: [f64; 2], max: [f64; 2], height: impl Fn(f64, f64) -> f64) -> Solid {
-    let cells = [0, 1].map(|i| {
-        ((max[i] - min[i]) / GROUND_CELL)
-            .ceil()
-            .clamp(1.0, MAX_CELLS) as usize
-    });
+fn sheet(cell: f64, min: [f64; 2], max: [f64; 2], height: impl Fn(f64, f64) -> f64) -> Solid {
+    let cells = [0, 1].map(|i| ((max[i] - min[i]) / cell).ceil().clamp(1.0, MAX_CELLS) as usize);
     let mut out = Solid::default();
     for j in 0..=cells[1] {
         for i in 0..=cells[0] {
@@ -77,18 +85,21 @@ pub(crate) fn ground(scene: &Scene) -> (Solid, Solid) {
     let Some(floor) = &scene.floor else {
         return (Solid::default(), faces);
     };
+    let cell = ground_cell(floor);
     let [x, y] = scene.ground_size().map(|s| 0.5 * s);
-    let mut out = sheet([-x, -y], [x, y], |x, y| floor.base_height(x, y));
+    let mut out = sheet(cell, [-x, -y], [x, y], |x, y| floor.base_height(x, y));
     for level in &floor.levels {
         let (a, b) = (level.min, level.max);
-        out.add(&sheet(a, b, |x, y| level.height + floor.base_height(x, y)));
+        out.add(&sheet(cell, a, b, |x, y| {
+            level.height + floor.base_height(x, y)
+        }));
         for (p, q) in [
             ([a[0], a[1]], [b[0], a[1]]),
             ([b[0], a[1]], [b[0], b[1]]),
             ([b[0], b[1]], [a[0], b[1]]),
             ([a[0], b[1]], [a[0], a[1]]),
         ] {
-            faces.add(&step_face(p, q, level.height, |x, y| {
+            faces.add(&step_face(cell, (p, q), level.height, |x, y| {
                 floor.base_height(x, y)
             }));
         }
@@ -97,8 +108,13 @@ pub(crate) fn ground(scene: &Scene) -> (Solid, Solid) {
 }
 
 /// The upright face of a step from `p` to `q`.
-fn step_face(p: [f64; 2], q: [f64; 2], height: f64, base: impl Fn(f64, f64) -> f64) -> Solid {
-    let n = ((q[0] - p[0]).hypot(q[1] - p[1]) / GROUND_CELL)
+fn step_face(
+    cell: f64,
+    (p, q): ([f64; 2], [f64; 2]),
+    height: f64,
+    base: impl Fn(f64, f64) -> f64,
+) -> Solid {
+    let n = ((q[0] - p[0]).hypot(q[1] - p[1]) / cell)
         .ceil()
         .clamp(1.0, MAX_CELLS) as usize;
     let mut out = Solid::default();

@@ -7,6 +7,7 @@ use crate::scene::{Mixed, Scanner};
 use crate::world::Surface;
 use contract::Result;
 use geometry::{Pose, Vector};
+use nalgebra::Matrix3;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -25,12 +26,16 @@ const BLACK: f32 = 0.15;
 pub(crate) struct Station {
     pub(crate) frame: ScanFrame,
     scanner: Scanner,
-    /// True pose within the scene.
-    scene_from_scan: Pose,
+    /// Where it stands within the scene, metres.
+    origin: Vector,
+    /// How it is turned within the scene.
+    scene_from_scan: Matrix3<f64>,
     /// Keys of the beams' random numbers.
     keys: [u64; 2],
     /// Sine and cosine of each row's elevation.
     rows: Vec<[f64; 2]>,
+    /// Sine and cosine of each column's azimuth.
+    cols: Vec<[f64; 2]>,
 }
 
 impl Station {
@@ -42,10 +47,13 @@ impl Station {
         let scene_from_scan = scanner.world_from_scan()?;
         let raster = scanner.raster.clone();
         let n_rows = raster.n_rows();
-        let rows = (0..n_rows)
-            .map(|r| raster.elevation(r).sin_cos())
-            .map(|(s, c)| [s, c])
-            .collect();
+        let table = |n: u32, angle: &dyn Fn(u32) -> f64| -> Vec<[f64; 2]> {
+            (0..n)
+                .map(|i| <[f64; 2]>::from(angle(i).sin_cos()))
+                .collect()
+        };
+        let rows = table(n_rows, &|row| raster.elevation(row));
+        let cols = table(raster.n_cols(), &|col| raster.azimuth(col));
         let frame = ScanFrame {
             name: scanner.name.clone(),
             world_from_scan: shifted(scanner.stated_world_from_scan()?),
@@ -57,9 +65,11 @@ impl Station {
         Ok(Self {
             frame,
             scanner: scanner.clone(),
-            scene_from_scan,
+            origin: scene_from_scan.translation.vector,
+            scene_from_scan: scene_from_scan.rotation.to_rotation_matrix().into_inner(),
             keys,
             rows,
+            cols,
         })
     }
 
@@ -127,7 +137,7 @@ impl Station {
 
     /// Direction that the file states for a beam, scan frame.
     fn stated(&self, row: usize, col: u32) -> Vector {
-        let (sin, cos) = self.frame.raster.azimuth(col).sin_cos();
+        let [sin, cos] = self.cols[col as usize];
         let [rise, flat] = self.rows[row];
         Vector::new(flat * cos, flat * sin, rise)
     }
@@ -145,10 +155,10 @@ impl Station {
     /// Thin beams along the middle of each pixel of a column; empty for no column.
     fn cast_column(&self, beams: &Beams, col: Option<u32>) -> Vec<Beam> {
         let Some(col) = col else { return Vec::new() };
-        let origin = self.scene_from_scan.translation.vector;
+        let origin = self.origin;
         (0..self.rows.len())
             .map(|row| {
-                let mut along = self.scene_from_scan.rotation * self.stated(row, col);
+                let mut along = self.scene_from_scan * self.stated(row, col);
                 if self.scanner.jitter > 0.0 {
                     let [a, b] = self.random(row, col, 1).normals();
                     let (u, v) = across(&along);
@@ -220,7 +230,7 @@ impl Station {
         beam: &Beam,
         neighbours: [Option<&Beam>; 4],
     ) -> bool {
-        let origin = self.scene_from_scan.translation.vector;
+        let origin = self.origin;
         let thin = |b: &Beam| b.hit.is_some_and(|h| surfaces[h.surface as usize].is_thin);
         thin(beam)
             || neighbours
@@ -249,7 +259,7 @@ impl Station {
         beam: &Beam,
         neighbours: [Option<&Beam>; 4],
     ) -> Option<(Hit, f64, bool)> {
-        let origin = self.scene_from_scan.translation.vector;
+        let origin = self.origin;
         let seen = |b: &Beam| b.hit.map(|h| h.range);
         let near = seen(beam).or_else(|| {
             neighbours

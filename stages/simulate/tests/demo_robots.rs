@@ -42,7 +42,7 @@ fn every_robot_loads_without_complaint_and_has_its_joints() {
             let n = link.mesh.triangles.len();
             eprintln!("{} {} {:?} {n}", model.name, link.name, link.role);
             assert!(
-                (400..10_000).contains(&n),
+                (400..12_000).contains(&n),
                 "{} {}: {n} triangles",
                 model.name,
                 link.name

@@ -9,7 +9,7 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
 
 /// Rays over a hemisphere.
 const N_RAYS: usize = 24;
-/// Rays after which a clear case is decided: they are spread over the hemisphere as the whole set is.
+/// Rays between two looks at whether the case is clear: each such set is spread over the hemisphere as the whole is.
 const N_FIRST: usize = 4;
 /// Escaping rays that make a place visible: a single one may slip through a crack between badly joined triangles.
 const N_ESCAPES: usize = 2;
@@ -42,16 +42,21 @@ impl Shell {
             .collect();
         Self {
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
-            triangles: mesh.triangles.iter().map(corners).map(|[a, b, c]| [a, b - a, c - a]).collect(),
+            triangles: mesh
+                .triangles
+                .iter()
+                .map(corners)
+                .map(|[a, b, c]| [a, b - a, c - a])
+                .collect(),
             rays: hemisphere(),
         }
     }
 
-    /// The side from which more rays escape, if enough do from either.
+    /// The side from which more rays escape, if enough do from either; clear cases end early.
     pub(super) fn side(&self, sample: &Sample) -> Option<Side> {
         let (mut front, mut back) = (0, 0);
         for (n_cast, ray) in self.rays.iter().enumerate() {
-            if n_cast == N_FIRST && front.max(back) >= N_ESCAPES && front.min(back) == 0 {
+            if n_cast % N_FIRST == 0 && is_clear(n_cast, front, back) {
                 break;
             }
             front += usize::from(self.escapes(sample.at, sample.normal, ray));
@@ -68,7 +73,11 @@ impl Shell {
 
     /// Whether a ray of the hemisphere about `normal` leaves the mesh for good.
     fn escapes(&self, at: Vector3<f32>, normal: Vector3<f32>, ray: &Vector3<f32>) -> bool {
-        let helper = if normal.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+        let helper = if normal.x.abs() < 0.7 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
         let e = normal.cross(&helper).normalize();
         let f = normal.cross(&e);
         let direction = e * ray.x + f * ray.y + normal * ray.z;
@@ -92,12 +101,22 @@ impl Shell {
     }
 }
 
+/// Whether more rays would not change the answer, or only for a place that hardly any beam can reach.
+fn is_clear(n_cast: usize, front: usize, back: usize) -> bool {
+    let one_sided = front.max(back) >= N_ESCAPES && front.min(back) == 0;
+    let hidden = n_cast >= N_RAYS / 2 && front + back == 0;
+    one_sided || hidden || front.abs_diff(back) > N_ESCAPES
+}
+
 fn crosses(node: &BvhNode, origin: &Vector3<f32>, inverse: &Vector3<f32>) -> bool {
     let (low, high) = (node.mins(), node.maxs());
     let (low, high) = ([low.x, low.y, low.z], [high.x, high.y, high.z]);
     let (mut enter, mut leave) = (0.0_f32, f32::INFINITY);
     for k in 0..3 {
-        let (a, b) = ((low[k] - origin[k]) * inverse[k], (high[k] - origin[k]) * inverse[k]);
+        let (a, b) = (
+            (low[k] - origin[k]) * inverse[k],
+            (high[k] - origin[k]) * inverse[k],
+        );
         enter = enter.max(a.min(b));
         leave = leave.min(a.max(b));
     }
@@ -132,6 +151,10 @@ fn hemisphere() -> [Vector3<f32>; N_RAYS] {
         let z = 1.0 - 0.92 * (at as f64 + 0.5) / N_RAYS as f64;
         let angle = 2.399_963_229_728_653 * at as f64 + 0.3; // golden angle
         let flat = (1.0 - z * z).sqrt();
-        Vector3::new((flat * angle.cos()) as f32, (flat * angle.sin()) as f32, z as f32)
+        Vector3::new(
+            (flat * angle.cos()) as f32,
+            (flat * angle.sin()) as f32,
+            z as f32,
+        )
     })
 }

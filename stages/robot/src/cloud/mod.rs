@@ -11,9 +11,9 @@ use nalgebra::Vector3;
 const N_CANDIDATES: f64 = 2.5;
 /// Edge of the cells whose candidates are judged together, metres: parts smaller than this hide nothing that a
 /// scanner resolves.
-const JUDGED_CELL: f32 = 0.012;
-/// Depth of such a cell along the normal, metres: a sheet of metal has two sides in two cells.
-const JUDGED_DEPTH: f32 = 0.003;
+const JUDGED_CELL: f32 = 0.015;
+/// Depth of such a cell along the normal, metres: the two sides of a sheet of metal are judged apart.
+const JUDGED_DEPTH: f32 = 0.004;
 
 /// A place on the surface.
 #[derive(Debug, Clone, Copy)]
@@ -53,9 +53,17 @@ pub(crate) fn sample(mesh: &Mesh, spacing: f64, max_samples: usize) -> CadCloud 
     if whole <= 0.0 || !whole.is_finite() || spacing <= 0.0 || max_samples == 0 {
         return CadCloud::default();
     }
-    let n_wanted = (whole / (spacing * spacing)).min(max_samples as f64 * 1.5).max(400.0);
+    let n_wanted = (whole / (spacing * spacing))
+        .min(max_samples as f64 * 1.5)
+        .max(400.0);
     let mut random = Random(mesh.triangles.len() as u64);
-    let candidates = candidates(mesh, &areas, whole, (n_wanted * N_CANDIDATES) as usize, &mut random);
+    let candidates = candidates(
+        mesh,
+        &areas,
+        whole,
+        (n_wanted * N_CANDIDATES) as usize,
+        &mut random,
+    );
     let n_candidates = candidates.len();
     let outer = outer(mesh, candidates);
     let area = whole * outer.len() as f64 / n_candidates.max(1) as f64;
@@ -81,7 +89,13 @@ fn area(mesh: &Mesh, triangle: &[u32; 3]) -> f64 {
 
 /// About `n` places, each standing for the same area: one in each step of the summed area, low-discrepancy within
 /// large triangles.
-fn candidates(mesh: &Mesh, areas: &[f64], whole: f64, n: usize, random: &mut Random) -> Vec<Sample> {
+fn candidates(
+    mesh: &Mesh,
+    areas: &[f64],
+    whole: f64,
+    n: usize,
+    random: &mut Random,
+) -> Vec<Sample> {
     let step = whole / n as f64;
     let mut out = Vec::with_capacity(n + 1);
     let mut next = step * random.unit();
@@ -92,12 +106,25 @@ fn candidates(mesh: &Mesh, areas: &[f64], whole: f64, n: usize, random: &mut Ran
             continue;
         }
         let [a, b, c] = corners(mesh, triangle);
-        let Some(normal) = (b - a).cast::<f64>().cross(&(c - a).cast()).try_normalize(0.0) else { continue };
+        let Some(normal) = (b - a)
+            .cast::<f64>()
+            .cross(&(c - a).cast())
+            .try_normalize(0.0)
+        else {
+            continue;
+        };
         // The R2 sequence (plastic number) from a random start.
         let (mut u, mut v) = (random.unit(), random.unit());
         while next < sum {
-            let (s, t) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-            out.push(Sample { at: a + (b - a) * s as f32 + (c - a) * t as f32, normal: normal.cast() });
+            let (s, t) = if u + v > 1.0 {
+                (1.0 - u, 1.0 - v)
+            } else {
+                (u, v)
+            };
+            out.push(Sample {
+                at: a + (b - a) * s as f32 + (c - a) * t as f32,
+                normal: normal.cast(),
+            });
             u = (u + 0.754_877_666_246_693).fract();
             v = (v + 0.569_840_290_998_053).fract();
             next += step;
@@ -111,8 +138,11 @@ fn key(sample: &Sample) -> (u8, [i32; 4]) {
     let n = sample.normal;
     let axis = n.iamax();
     let facing = (2 * axis + usize::from(n[axis] < 0.0)) as u8;
-    let cell = [0, 1, 2].map(|k| (sample.at[k] / JUDGED_CELL).floor() as i32);
-    (facing, [cell[0], cell[1], cell[2], (n.dot(&sample.at) / JUDGED_DEPTH).floor() as i32])
+    let cell = sample.at.map(|v| (v / JUDGED_CELL).floor());
+    // From the middle of the cell, where a small turn of the normal matters little.
+    let depth = n.dot(&(sample.at - cell.map(|v| (v + 0.5) * JUDGED_CELL)));
+    let [x, y, z] = [0, 1, 2].map(|k| cell[k] as i32);
+    (facing, [x, y, z, (depth / JUDGED_DEPTH).round() as i32])
 }
 
 /// The candidates on the outer surface, their normals turned outward.
@@ -138,7 +168,10 @@ fn outer(mesh: &Mesh, candidates: Vec<Sample>) -> Vec<Sample> {
     (candidates.into_iter().zip(sides))
         .filter_map(|(sample, side)| match side? {
             Side::Front => Some(sample),
-            Side::Back => Some(Sample { at: sample.at, normal: -sample.normal }),
+            Side::Back => Some(Sample {
+                at: sample.at,
+                normal: -sample.normal,
+            }),
         })
         .collect()
 }

@@ -13,7 +13,12 @@ const SHRINK: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Darts thrown for each sample that fits at a radius.
 const N_DARTS: f64 = 6.0;
 
-pub(super) fn spread(candidates: Vec<Sample>, area: f64, spacing: f64, random: &mut Random) -> Vec<Sample> {
+pub(super) fn spread(
+    candidates: Vec<Sample>,
+    area: f64,
+    spacing: f64,
+    random: &mut Random,
+) -> Vec<Sample> {
     let mut waiting = candidates;
     for at in (1..waiting.len()).rev() {
         waiting.swap(at, random.below(at + 1));
@@ -23,7 +28,11 @@ pub(super) fn spread(candidates: Vec<Sample>, area: f64, spacing: f64, random: &
     let mut radius = (RADIUS * (area / N_COARSEST).sqrt()).max(last);
     loop {
         let n_fit = area / (radius * radius);
-        let n_darts = if radius > last { (n_fit * N_DARTS) as usize } else { waiting.len() };
+        let n_darts = if radius > last {
+            (n_fit * N_DARTS) as usize
+        } else {
+            waiting.len()
+        };
         throw(&mut out, &mut waiting, n_darts, radius as f32);
         if radius <= last || waiting.is_empty() {
             return out;
@@ -63,21 +72,29 @@ const NONE: u32 = u32::MAX;
 impl Grid {
     fn new(radius: f32, n: usize) -> Self {
         let n_slots = (2 * n).next_power_of_two().max(64);
-        Self { radius, first: vec![NONE; n_slots], next: Vec::new(), samples: Vec::new() }
+        Self {
+            radius,
+            first: vec![NONE; n_slots],
+            next: Vec::new(),
+            samples: Vec::new(),
+        }
     }
 
-    fn cell(&self, sample: &Sample) -> [i32; 3] {
-        [0, 1, 2].map(|k| (sample.at[k] / self.radius).floor() as i32)
+    /// Cells are two radii wide, so that a ball of one radius touches two along each axis.
+    fn cell(&self, sample: &Sample, shift: f32) -> [i32; 3] {
+        [0, 1, 2].map(|k| (sample.at[k] / (2.0 * self.radius) + shift).floor() as i32)
     }
 
     fn slot(&self, cell: [i32; 3]) -> usize {
         let mix = |v: i32, prime: u64| u64::from(v as u32).wrapping_mul(prime);
-        let h = mix(cell[0], 0x9e37_79b9_7f4a_7c15) ^ mix(cell[1], 0xc2b2_ae3d_27d4_eb4f) ^ mix(cell[2], 0x1656_67b1_9e37_79f9);
+        let h = mix(cell[0], 0x9e37_79b9_7f4a_7c15)
+            ^ mix(cell[1], 0xc2b2_ae3d_27d4_eb4f)
+            ^ mix(cell[2], 0x1656_67b1_9e37_79f9);
         ((h ^ (h >> 29)) as usize) & (self.first.len() - 1)
     }
 
     fn add(&mut self, sample: &Sample) {
-        let slot = self.slot(self.cell(sample));
+        let slot = self.slot(self.cell(sample, 0.0));
         self.next.push(self.first[slot]);
         self.first[slot] = self.samples.len() as u32;
         self.samples.push(*sample);
@@ -86,13 +103,15 @@ impl Grid {
     /// A sample that faces the same half of the world is nearer than the radius. The other side of a sheet is another
     /// surface.
     fn is_taken(&self, sample: &Sample) -> bool {
-        let [x, y, z] = self.cell(sample);
+        let [x, y, z] = self.cell(sample, -0.5);
         let limit = self.radius * self.radius;
-        for n in 0..27 {
-            let mut at = self.first[self.slot([x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1])];
+        for n in 0..8 {
+            let mut at = self.first[self.slot([x + (n & 1), y + (n >> 1 & 1), z + (n >> 2)])];
             while at != NONE {
                 let other = &self.samples[at as usize];
-                if (other.at - sample.at).norm_squared() < limit && other.normal.dot(&sample.normal) > 0.0 {
+                if (other.at - sample.at).norm_squared() < limit
+                    && other.normal.dot(&sample.normal) > 0.0
+                {
                     return true;
                 }
                 at = self.next[at as usize];

@@ -15,11 +15,18 @@ const MAX_NODES: u32 = 4_000_000;
 
 pub(super) fn read(text: &str) -> Result<Soup, String> {
     let text = text.trim_start_matches('\u{feff}');
-    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options).map_err(|e| format!("not well-formed XML ({e})"))?;
+    let options = ParsingOptions {
+        nodes_limit: MAX_NODES,
+        ..ParsingOptions::default()
+    };
+    let document = Document::parse_with_options(text, options)
+        .map_err(|e| format!("not well-formed XML ({e})"))?;
     let root = document.root_element();
     if root.tag_name().name() != "COLLADA" {
-        return Err(format!("not a COLLADA file, opens with \"{}\"", root.tag_name().name()));
+        return Err(format!(
+            "not a COLLADA file, opens with \"{}\"",
+            root.tag_name().name()
+        ));
     }
     let mut scene = Scene::new(root)?;
     let roots = scene.roots(root);
@@ -27,7 +34,9 @@ pub(super) fn read(text: &str) -> Result<Soup, String> {
         scene.node(*node, Matrix4::identity(), 0)?;
     }
     if roots.is_empty() {
-        scene.soup.note("there is no scene; all geometries are taken as they are");
+        scene
+            .soup
+            .note("there is no scene; all geometries are taken as they are");
         let geometries = scene.all_geometries(root);
         for geometry in geometries {
             scene.geometry(geometry, &Matrix4::identity())?;
@@ -58,13 +67,27 @@ fn local<'a>(node: Node<'a, '_>, attribute: &str) -> Option<&'a str> {
 
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
     (text.split_ascii_whitespace())
-        .map(|w| w.parse().map_err(|_| format!("not a number \"{}\"", w.chars().take(30).collect::<String>())))
+        .map(|w| {
+            w.parse().map_err(|_| {
+                format!(
+                    "not a number \"{}\"",
+                    w.chars().take(30).collect::<String>()
+                )
+            })
+        })
         .collect()
 }
 
 fn index_list(text: &str) -> Result<Vec<usize>, String> {
     (text.split_ascii_whitespace())
-        .map(|w| w.parse().map_err(|_| format!("not an index \"{}\"", w.chars().take(30).collect::<String>())))
+        .map(|w| {
+            w.parse().map_err(|_| {
+                format!(
+                    "not an index \"{}\"",
+                    w.chars().take(30).collect::<String>()
+                )
+            })
+        })
         .collect()
 }
 
@@ -76,17 +99,31 @@ impl<'a, 'i> Scene<'a, 'i> {
                 by_id.entry(id).or_insert(node);
             }
         }
-        let unit = match element(root, "asset").and_then(|a| element(a, "unit")).and_then(|u| u.attribute("meter")) {
-            Some(text) => text.trim().parse().ok().filter(|u: &f64| u.is_finite() && *u > 0.0)
+        let unit = match element(root, "asset")
+            .and_then(|a| element(a, "unit"))
+            .and_then(|u| u.attribute("meter"))
+        {
+            Some(text) => text
+                .trim()
+                .parse()
+                .ok()
+                .filter(|u: &f64| u.is_finite() && *u > 0.0)
                 .ok_or_else(|| format!("the unit is no length \"{text}\""))?,
             None => 1.0,
         };
-        Ok(Self { by_id, unit, soup: Soup::default(), n_visits: 0 })
+        Ok(Self {
+            by_id,
+            unit,
+            soup: Soup::default(),
+            n_visits: 0,
+        })
     }
 
     /// The element of that id in a mesh, else anywhere: real files give the same ids to each geometry.
     fn within(&self, mesh: Node<'a, 'i>, id: &str) -> Option<Node<'a, 'i>> {
-        mesh.children().find(|n| n.attribute("id") == Some(id)).or_else(|| self.by_id.get(id).copied())
+        mesh.children()
+            .find(|n| n.attribute("id") == Some(id))
+            .or_else(|| self.by_id.get(id).copied())
     }
 
     /// Nodes of the scene that the file shows; else of its first.
@@ -94,16 +131,29 @@ impl<'a, 'i> Scene<'a, 'i> {
         let shown = element(root, "scene")
             .and_then(|s| element(s, "instance_visual_scene"))
             .and_then(|s| self.by_id.get(local(s, "url")?).copied());
-        let first = || element(root, "library_visual_scenes").and_then(|l| element(l, "visual_scene"));
-        let Some(scene) = shown.or_else(first) else { return Vec::new() };
-        scene.children().filter(|n| n.tag_name().name() == "node").collect()
+        let first =
+            || element(root, "library_visual_scenes").and_then(|l| element(l, "visual_scene"));
+        let Some(scene) = shown.or_else(first) else {
+            return Vec::new();
+        };
+        scene
+            .children()
+            .filter(|n| n.tag_name().name() == "node")
+            .collect()
     }
 
     fn all_geometries(&self, root: Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
-        root.descendants().filter(|n| n.tag_name().name() == "geometry").collect()
+        root.descendants()
+            .filter(|n| n.tag_name().name() == "geometry")
+            .collect()
     }
 
-    fn node(&mut self, node: Node<'a, 'i>, scene_from_parent: Matrix4<f64>, depth: usize) -> Result<(), String> {
+    fn node(
+        &mut self,
+        node: Node<'a, 'i>,
+        scene_from_parent: Matrix4<f64>,
+        depth: usize,
+    ) -> Result<(), String> {
         self.n_visits += 1;
         if depth > MAX_DEPTH || self.n_visits > MAX_VISITS {
             return Err("nodes lie in one another too deeply, or in a circle".to_owned());
@@ -120,11 +170,15 @@ impl<'a, 'i> Scene<'a, 'i> {
                 "node" => self.node(part, scene_from_node, depth + 1)?,
                 "instance_node" => match target() {
                     Some(other) => self.node(other, scene_from_node, depth + 1)?,
-                    None => self.soup.note("an instance of a node outside the file is passed over"),
+                    None => self
+                        .soup
+                        .note("an instance of a node outside the file is passed over"),
                 },
                 "instance_geometry" => match target() {
                     Some(geometry) => self.geometry(geometry, &scene_from_node)?,
-                    None => self.soup.note("an instance of a geometry outside the file is passed over"),
+                    None => self
+                        .soup
+                        .note("an instance of a geometry outside the file is passed over"),
                 },
                 "instance_controller" => self.soup.note("a skinned geometry is passed over"),
                 _ => {}
@@ -133,7 +187,11 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    fn geometry(&mut self, geometry: Node<'a, 'i>, scene_from_node: &Matrix4<f64>) -> Result<(), String> {
+    fn geometry(
+        &mut self,
+        geometry: Node<'a, 'i>,
+        scene_from_node: &Matrix4<f64>,
+    ) -> Result<(), String> {
         let Some(mesh) = element(geometry, "mesh") else {
             self.soup.note("a geometry that is no mesh is passed over");
             return Ok(());
@@ -151,7 +209,9 @@ impl<'a, 'i> Scene<'a, 'i> {
                 }
                 _ => continue,
             }
-            let Some(layout) = self.layout(mesh, part)? else { continue };
+            let Some(layout) = self.layout(mesh, part)? else {
+                continue;
+            };
             let (first, n) = match placed.iter().find(|(id, ..)| *id == layout.source) {
                 Some(&(_, first, n)) => (first, n),
                 None => {
@@ -176,7 +236,9 @@ impl<'a, 'i> Scene<'a, 'i> {
         let mut stride = 0;
         let mut position = None;
         for input in part.children().filter(|n| n.tag_name().name() == "input") {
-            let offset: usize = input.attribute("offset").map_or(Ok(0), str::parse)
+            let offset: usize = input
+                .attribute("offset")
+                .map_or(Ok(0), str::parse)
                 .map_err(|_| "an input's offset is no number".to_owned())?;
             if offset > 255 {
                 return Err("an input's offset is out of reach".to_owned());
@@ -188,7 +250,10 @@ impl<'a, 'i> Scene<'a, 'i> {
                 Some("VERTEX") => {
                     position = id
                         .and_then(|id| self.within(mesh, id))
-                        .and_then(|v| v.children().find(|i| i.attribute("semantic") == Some("POSITION")))
+                        .and_then(|v| {
+                            v.children()
+                                .find(|i| i.attribute("semantic") == Some("POSITION"))
+                        })
                         .and_then(|i| local(i, "source"))
                         .map(|id| (id, offset));
                 }
@@ -196,7 +261,11 @@ impl<'a, 'i> Scene<'a, 'i> {
             }
         }
         match position {
-            Some((source, offset)) => Ok(Some(Layout { source, offset, stride })),
+            Some((source, offset)) => Ok(Some(Layout {
+                source,
+                offset,
+                stride,
+            })),
             None if part.children().any(|n| n.tag_name().name() == "p") => {
                 Err("triangles name no positions".to_owned())
             }
@@ -211,31 +280,53 @@ impl<'a, 'i> Scene<'a, 'i> {
         id: &str,
         scene_from_node: &Matrix4<f64>,
     ) -> Result<(usize, usize), String> {
-        let source = self.within(mesh, id).ok_or_else(|| format!("a source is missing \"{id}\""))?;
-        let array = element(source, "float_array").ok_or_else(|| format!("a source has no numbers \"{id}\""))?;
+        let source = self
+            .within(mesh, id)
+            .ok_or_else(|| format!("a source is missing \"{id}\""))?;
+        let array = element(source, "float_array")
+            .ok_or_else(|| format!("a source has no numbers \"{id}\""))?;
         let accessor = element(source, "technique_common").and_then(|t| element(t, "accessor"));
-        let stride = accessor.and_then(|a| a.attribute("stride")).map_or(Ok(3), str::parse::<usize>)
+        let stride = accessor
+            .and_then(|a| a.attribute("stride"))
+            .map_or(Ok(3), str::parse::<usize>)
             .map_err(|_| "a stride is no number".to_owned())?;
-        let offset = accessor.and_then(|a| a.attribute("offset")).map_or(Ok(0), str::parse::<usize>)
+        let offset = accessor
+            .and_then(|a| a.attribute("offset"))
+            .map_or(Ok(0), str::parse::<usize>)
             .map_err(|_| "an offset is no number".to_owned())?;
         if stride < 3 {
             return Err(format!("positions need three numbers each \"{stride}\""));
         }
         let values = numbers(&all_text(array))?;
-        if let Some(claimed) = array.attribute("count").and_then(|c| c.parse::<usize>().ok())
+        if let Some(claimed) = array
+            .attribute("count")
+            .and_then(|c| c.parse::<usize>().ok())
             && claimed > values.len()
         {
-            return Err(format!("a list claims {claimed} numbers and holds {}", values.len()));
+            return Err(format!(
+                "a list claims {claimed} numbers and holds {}",
+                values.len()
+            ));
         }
         let first = self.soup.vertices.len();
-        for p in values.get(offset..).unwrap_or_default().chunks_exact(stride) {
+        for p in values
+            .get(offset..)
+            .unwrap_or_default()
+            .chunks_exact(stride)
+        {
             let p = scene_from_node.transform_point(&geometry::Point::new(p[0], p[1], p[2]));
             self.soup.add_vertex([p.x, p.y, p.z])?;
         }
         Ok((first, self.soup.vertices.len() - first))
     }
 
-    fn faces(&mut self, part: Node<'a, 'i>, layout: &Layout, first: usize, n: usize) -> Result<(), String> {
+    fn faces(
+        &mut self,
+        part: Node<'a, 'i>,
+        layout: &Layout,
+        first: usize,
+        n: usize,
+    ) -> Result<(), String> {
         let tag = part.tag_name().name();
         let mut sizes = match element(part, "vcount").filter(|_| tag == "polylist") {
             Some(vcount) => Some(index_list(&all_text(vcount))?.into_iter()),
@@ -271,7 +362,11 @@ impl<'a, 'i> Scene<'a, 'i> {
                 ("polygons" | "trifans", _) => super::primitive::fan(&mut self.soup, &corners)?,
                 ("tristrips", _) => {
                     for (k, t) in corners.windows(3).enumerate() {
-                        self.soup.add_triangle(if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] })?;
+                        self.soup.add_triangle(if k % 2 == 0 {
+                            [t[0], t[1], t[2]]
+                        } else {
+                            [t[1], t[0], t[2]]
+                        })?;
                     }
                 }
                 _ => {
@@ -293,7 +388,11 @@ struct Layout<'a> {
 
 /// The text of an element; comments cut it into pieces.
 fn all_text(node: Node) -> String {
-    node.children().filter(Node::is_text).filter_map(|n| n.text()).collect::<Vec<_>>().join(" ")
+    node.children()
+        .filter(Node::is_text)
+        .filter_map(|n| n.text())
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// The step of a transform element; `None` for any other.

@@ -31,7 +31,9 @@ impl Soup {
 
     fn add_triangle(&mut self, corners: [u32; 3]) -> Result<(), String> {
         if self.triangles.len() >= MAX_TRIANGLES {
-            return Err(format!("more triangles than a link can have \"{MAX_TRIANGLES}\""));
+            return Err(format!(
+                "more triangles than a link can have \"{MAX_TRIANGLES}\""
+            ));
         }
         self.triangles.push(corners);
         Ok(())
@@ -50,9 +52,15 @@ pub(crate) fn read(bytes: &[u8], extension: &str) -> Result<Soup, String> {
         "stl" => stl::read(bytes),
         "obj" => obj::read(text(bytes)?),
         "dae" => dae::read(text(bytes)?),
-        other => Err(format!("a mesh format that is not read; convert it to STL, OBJ or DAE \"{other}\"")),
+        other => Err(format!(
+            "a mesh format that is not read; convert it to STL, OBJ or DAE \"{other}\""
+        )),
     }?;
-    if soup.triangles.is_empty() { Err("the file has no triangles".to_owned()) } else { Ok(soup) }
+    if soup.triangles.is_empty() {
+        Err("the file has no triangles".to_owned())
+    } else {
+        Ok(soup)
+    }
 }
 
 fn text(bytes: &[u8]) -> Result<&str, String> {
@@ -61,10 +69,16 @@ fn text(bytes: &[u8]) -> Result<&str, String> {
 
 /// Adds a soup to a link's mesh: scaled, placed, equal corners joined, triangles without area left out.
 /// Gives the number of triangles left out because a corner is no finite number.
-pub(crate) fn append(mesh: &mut Mesh, soup: &Soup, link_from_body: &Pose, scale: [f64; 3]) -> usize {
+pub(crate) fn append(
+    mesh: &mut Mesh,
+    soup: &Soup,
+    link_from_body: &Pose,
+    scale: [f64; 3],
+) -> usize {
     let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(soup.vertices.len());
     let place = |p: [f64; 3]| {
-        let p = link_from_body * geometry::Point::from([p[0] * scale[0], p[1] * scale[1], p[2] * scale[2]]);
+        let p = link_from_body
+            * geometry::Point::from([p[0] * scale[0], p[1] * scale[1], p[2] * scale[2]]);
         // Adding zero makes −0 into 0, so that both are one corner.
         [p.x, p.y, p.z].map(|v| local_f32(v) + 0.0)
     };

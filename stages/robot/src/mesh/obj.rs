@@ -12,7 +12,10 @@ pub(super) fn read(text: &str) -> Result<Soup, String> {
             Some("v") => {
                 let mut p = [0.0; 3];
                 for v in &mut p {
-                    *v = words.next().and_then(|w| w.parse().ok()).ok_or_else(|| at("a vertex needs three numbers"))?;
+                    *v = words
+                        .next()
+                        .and_then(|w| w.parse().ok())
+                        .ok_or_else(|| at("a vertex needs three numbers"))?;
                 }
                 soup.add_vertex(p)?;
             }

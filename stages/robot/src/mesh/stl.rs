@@ -13,7 +13,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, String> {
         return binary(bytes);
     }
     let head = &bytes[..bytes.len().min(4096)];
-    let is_text = bytes.trim_ascii_start().starts_with(b"solid") && head.is_ascii() && !head.contains(&0);
+    let is_text =
+        bytes.trim_ascii_start().starts_with(b"solid") && head.is_ascii() && !head.contains(&0);
     if is_text {
         return ascii(super::text(bytes)?);
     }
@@ -27,7 +28,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, String> {
         }
         (Some(n), _) => {
             let n_present = (bytes.len() - HEADER_BYTES) / RECORD_BYTES;
-            Err(format!("the header counts {n} triangles, the file holds {n_present}"))
+            Err(format!(
+                "the header counts {n} triangles, the file holds {n_present}"
+            ))
         }
         _ => Err("too short for an STL file".to_owned()),
     }
@@ -68,7 +71,11 @@ fn ascii(text: &str) -> Result<Soup, String> {
             }
             Some("endloop") => {
                 if corners.len() != 3 {
-                    return Err(format!("line {}: a facet of {} corners", line_at + 1, corners.len()));
+                    return Err(format!(
+                        "line {}: a facet of {} corners",
+                        line_at + 1,
+                        corners.len()
+                    ));
                 }
                 soup.add_triangle([corners[0], corners[1], corners[2]])?;
                 corners.clear();

@@ -1,5 +1,11 @@
 //! What the tests share: the folder of real robots, and models written for one test.
-#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::print_stderr)]
+#![allow(
+    dead_code,
+    missing_docs,
+    unreachable_pub,
+    clippy::unwrap_used,
+    clippy::print_stderr
+)]
 
 use robot::{Finding, Model, Settings, Severity};
 use std::fs;
@@ -7,7 +13,9 @@ use std::path::{Path, PathBuf};
 
 /// The shared files, if this machine has them.
 pub fn shared(part: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(part);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../../shared")
+        .join(part);
     if path.exists() {
         Some(path)
     } else {
@@ -82,7 +90,10 @@ impl Dice {
 
     /// In [0, 1).
     pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
@@ -98,7 +109,9 @@ impl Dice {
 
 /// A link with a box, and a joint's text.
 pub fn link(name: &str) -> String {
-    format!("<link name='{name}'><visual><geometry><box size='0.1 0.1 0.1'/></geometry></visual></link>")
+    format!(
+        "<link name='{name}'><visual><geometry><box size='0.1 0.1 0.1'/></geometry></visual></link>"
+    )
 }
 
 pub fn joint(name: &str, kind: &str, parent: &str, child: &str, xyz: &str, rest: &str) -> String {
@@ -115,7 +128,14 @@ pub fn arm(n: usize) -> String {
     let mut text = link("l0");
     for k in 1..=n {
         text += &link(&format!("l{k}"));
-        text += &joint(&format!("j{k}"), "revolute", &format!("l{}", k - 1), &format!("l{k}"), "0 0 1", LIMIT);
+        text += &joint(
+            &format!("j{k}"),
+            "revolute",
+            &format!("l{}", k - 1),
+            &format!("l{k}"),
+            "0 0 1",
+            LIMIT,
+        );
     }
     text
 }

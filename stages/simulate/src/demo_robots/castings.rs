@@ -97,7 +97,7 @@ pub(super) fn motor(radius: f64, length: f64) -> Solid {
         [0.75 * radius, 0.1 * length],
         [radius, 0.12 * length],
     ];
-    let fins = 6;
+    let fins = 4;
     for k in 0..fins {
         let z = length * (0.2 + 0.45 * k as f64 / f64::from(fins));
         let step = length * 0.45 / f64::from(fins);

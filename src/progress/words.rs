@@ -1,0 +1,81 @@
+//! How far a stage is, in; words for people, or JSON for programs, out.
+
+use super::Amount;
+
+/// Seconds to go at the rate so far.
+fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
+    let share = done.share(total).filter(|s| *s > 0.0)?;
+    Some(seconds * (1.0 - share) / share)
+}
+
+pub(super) fn words(done: &Amount, total: &Amount, seconds: f64, last: bool) -> String {
+    let mut words = Vec::new();
+    if let Some(share) = done.share(total) {
+        words.push(format!("{:.0} %", 100.0 * share));
+    }
+    let rate = |n: u64| n as f64 / seconds.max(1e-3);
+    if done.points > 0 {
+        words.push(format!("{} points", short(done.points as f64)));
+        words.push(format!("{} points/s", short(rate(done.points))));
+    } else {
+        words.push(format!("{} items", done.items));
+    }
+    // Where no total is known, bytes are those of items in memory, which say nothing to people.
+    if total.bytes > 0 {
+        words.push(format!("{}B/s", short(rate(done.bytes))));
+    }
+    match eta(done, total, seconds) {
+        _ if last => words.push(format!("done in {seconds:.1} s")),
+        Some(eta) => words.push(format!("{eta:.0} s to go")),
+        None => words.push(format!("{seconds:.0} s")),
+    }
+    words.join(", ")
+}
+
+pub(super) fn json(name: &str, done: &Amount, total: &Amount, seconds: f64, last: bool) -> String {
+    let known = |n: u64| (n > 0).then_some(n);
+    let rate = done.points as f64 / seconds.max(1e-3);
+    serde_json::json!({
+        "event": if last { "stage_end" } else { "progress" },
+        "stage": name,
+        "seconds": seconds,
+        "items": done.items, "items_total": known(total.items),
+        "points": done.points, "points_total": known(total.points),
+        "bytes": done.bytes, "bytes_total": known(total.bytes),
+        "points_per_second": rate,
+        "share": done.share(total),
+        "eta_seconds": if last { Some(0.0) } else { eta(done, total, seconds) },
+    })
+    .to_string()
+}
+
+/// A number with three digits and a decimal prefix.
+fn short(value: f64) -> String {
+    let (scaled, prefix) = match value {
+        v if v >= 1e9 => (v / 1e9, " G"),
+        v if v >= 1e6 => (v / 1e6, " M"),
+        v if v >= 1e3 => (v / 1e3, " k"),
+        v => return format!("{v:.0} "),
+    };
+    format!(
+        "{scaled:.*}{prefix}",
+        if scaled < 10.0 {
+            2
+        } else {
+            usize::from(scaled < 100.0)
+        }
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rate_and_time_to_go() {
+        let (done, total) = (Amount::points(25), Amount::points(100));
+        assert_eq!(eta(&done, &total, 10.0), Some(30.0));
+        assert_eq!(eta(&Amount::default(), &total, 10.0), None);
+        assert_eq!(short(35_200_000.0), "35.2 M");
+    }
+}

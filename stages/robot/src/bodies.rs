@@ -1,0 +1,142 @@
+//! The bodies of a description in, the meshes of its links out; what cannot be read is a finding, not an end.
+
+use crate::finding::Findings;
+use crate::load::Settings;
+use crate::mesh;
+use crate::reading::{file_name, read_bytes};
+use crate::resolve::Roots;
+use crate::tree::Tree;
+use crate::urdf::{Body, Shape};
+use geometry::Aabb;
+
+/// A link larger than this is drawn in millimetres, metres.
+const LARGEST_LINK: f64 = 30.0;
+
+/// Where meshes lie, and how large they may be.
+pub(crate) struct Bodies<'a> {
+    pub(crate) roots: &'a Roots,
+    pub(crate) settings: &'a Settings,
+}
+
+impl Bodies<'_> {
+    /// Reads the meshes of all links.
+    pub(crate) fn read(&self, tree: &mut Tree, file: &str, findings: &mut Findings) {
+        let mut any = false;
+        for (link, raw) in tree.links.iter_mut().zip(&tree.raw_links) {
+            let place = format!("{file}: link {}", link.name);
+            for body in &raw.visuals {
+                self.body(&mut link.mesh, body, &place, findings);
+            }
+            if link.mesh.triangles.is_empty() && !raw.collisions.is_empty() {
+                for body in &raw.collisions {
+                    self.body(&mut link.mesh, body, &place, findings);
+                }
+                if !link.mesh.triangles.is_empty() {
+                    let what = "has no visual; its collision mesh stands in and may be a hull";
+                    findings.warn(&place, what, "add a visual");
+                }
+            }
+            if link.mesh.triangles.is_empty()
+                && !(raw.visuals.is_empty() && raw.collisions.is_empty())
+            {
+                findings.warn(&place, "has no surface", "mend its visual");
+            }
+            any |= !link.mesh.triangles.is_empty();
+            link.bounds = Aabb::of(link.mesh.vertices.iter().map(|p| p.map(f64::from)));
+            let size = link.bounds.size().into_iter().fold(0.0, f64::max);
+            if size > LARGEST_LINK {
+                let what = format!("is larger than any robot's link, metres \"{size:.1}\"");
+                findings.warn(
+                    &place,
+                    what,
+                    "if it is drawn in millimetres add scale=\"0.001 0.001 0.001\"",
+                );
+            }
+        }
+        if !any {
+            findings.fail(
+                file,
+                "no link has a surface, so no scan can show it",
+                "add meshes",
+            );
+        }
+    }
+
+    fn body(&self, into: &mut crate::Mesh, body: &Body, place: &str, findings: &mut Findings) {
+        use mesh::primitive;
+        let positive = |sizes: &[f64]| sizes.iter().all(|s| *s > 0.0);
+        let (soup, scale) = match &body.shape {
+            Shape::Box(size) if positive(size) => (primitive::cuboid(*size), [1.0; 3]),
+            Shape::Cylinder { radius, length } if positive(&[*radius, *length]) => {
+                (primitive::cylinder(*radius, *length), [1.0; 3])
+            }
+            Shape::Capsule { radius, length } if positive(&[*radius, *length]) => {
+                (primitive::capsule(*radius, *length), [1.0; 3])
+            }
+            Shape::Sphere(radius) if positive(&[*radius]) => (primitive::sphere(*radius), [1.0; 3]),
+            Shape::Mesh { path, scale } if scale.iter().all(|s| *s != 0.0) => {
+                let Some(soup) = self.mesh(path, place, findings) else {
+                    return;
+                };
+                (soup, *scale)
+            }
+            _ => {
+                findings.warn(
+                    place,
+                    "has a body without extent, which is passed over",
+                    "give sizes above zero",
+                );
+                return;
+            }
+        };
+        let n_broken = mesh::append(into, &soup, &body.link_from_body, scale);
+        if n_broken > 0 {
+            findings.warn(
+                place,
+                format!("triangles with corners that are no numbers were left out \"{n_broken}\""),
+                "",
+            );
+        }
+    }
+
+    fn mesh(&self, written: &str, place: &str, findings: &mut Findings) -> Option<mesh::Soup> {
+        let found = match self.roots.find(written) {
+            Ok(found) => found,
+            Err(what) => {
+                findings.warn(
+                    place,
+                    format!("{what} \"{written}\""),
+                    "put the mesh there, or mend its path",
+                );
+                return None;
+            }
+        };
+        let place = format!("{place}: {written}");
+        if found.other_case {
+            let name = file_name(&found.path);
+            findings.warn(
+                &place,
+                format!("is there in another case only \"{name}\""),
+                "mend the path",
+            );
+        }
+        let extension = found
+            .path
+            .extension()
+            .map_or_else(String::new, |e| e.to_string_lossy().into_owned());
+        let soup = read_bytes(&found.path, self.settings.max_mesh_bytes)
+            .and_then(|bytes| mesh::read(&bytes, &extension));
+        match soup {
+            Ok(soup) => {
+                for note in &soup.notes {
+                    findings.note(&place, *note, "");
+                }
+                Some(soup)
+            }
+            Err(what) => {
+                findings.warn(&place, what, "mend or replace the mesh");
+                None
+            }
+        }
+    }
+}

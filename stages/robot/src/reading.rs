@@ -1,0 +1,42 @@
+//! A path in, the bytes of a regular file out, never more than its limit.
+
+use crate::finding::Findings;
+use std::io::Read as _;
+use std::path::Path;
+
+pub(crate) fn file_name(path: &Path) -> String {
+    path.file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+}
+
+/// Reads a regular file of at most `limit` bytes.
+pub(crate) fn read_bytes(path: &Path, limit: u64) -> std::result::Result<Vec<u8>, String> {
+    let open = || {
+        let file = std::fs::File::open(path)?;
+        let len = file.metadata()?.len();
+        let mut bytes = Vec::new();
+        if len <= limit {
+            file.take(limit + 1).read_to_end(&mut bytes)?;
+        }
+        Ok::<_, std::io::Error>((len.max(bytes.len() as u64), bytes))
+    };
+    match open() {
+        Ok((len, bytes)) if len <= limit => Ok(bytes),
+        Ok((len, _)) => Err(format!(
+            "is larger than the limit of {limit} bytes \"{len}\""
+        )),
+        Err(error) => Err(format!("cannot be read ({error})")),
+    }
+}
+
+pub(crate) fn read_text(
+    path: &Path,
+    limit: u64,
+    place: &str,
+    findings: &mut Findings,
+) -> Option<String> {
+    let text = read_bytes(path, limit)
+        .and_then(|bytes| String::from_utf8(bytes).map_err(|e| format!("is not UTF-8 ({e})")));
+    text.map_err(|what| findings.fail(place, what, "mend or replace the file"))
+        .ok()
+}

@@ -1,0 +1,138 @@
+//! The program from outside: exit codes, what goes to standard output and what to standard error.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn stillpoint(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_stillpoint"))
+        .args(args)
+        .output()
+        .expect("the program starts")
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().expect("a code, no signal")
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn help_and_version_are_no_failures() {
+    let help = stillpoint(&["--help"]);
+    assert_eq!(code(&help), 0);
+    let text = String::from_utf8_lossy(&help.stdout).into_owned();
+    for command in ["demo", "inspect", "run", "simulate", "robots"] {
+        assert!(text.contains(command), "{command}");
+    }
+    assert_eq!(code(&stillpoint(&["--version"])), 0);
+}
+
+#[test]
+fn usage_is_two() {
+    for args in [
+        &["frobnicate"][..],
+        &["run", "a.e57"],
+        &["inspect", "a.e57", "--set", "fit.bean=3"],
+        &["inspect", "a.e57", "--config", "no/such.toml"],
+        &["inspect", "a.e57", "--threads", "0"],
+        &["inspect", "a.e57", "--memory", "much"],
+        &["inspect", "no/such/scan.e57"],
+    ] {
+        let output = stillpoint(args);
+        assert_eq!(code(&output), 2, "{args:?}: {}", err(&output));
+        assert!(output.stdout.is_empty(), "{args:?}");
+    }
+    assert_eq!(
+        code(&stillpoint(&["inspect", "a.e57", "--memory", "1MiB"])),
+        5
+    );
+}
+
+#[test]
+fn bad_input_is_four_and_names_the_file() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("noise.e57");
+    std::fs::write(&path, [7; 5000]).expect("writes");
+    let path = path.to_string_lossy().into_owned();
+    let output = stillpoint(&["inspect", &path]);
+    assert_eq!(code(&output), 4, "{}", err(&output));
+    assert!(
+        err(&output).starts_with(&format!("error: {path}: ")),
+        "{}",
+        err(&output)
+    );
+    let output = stillpoint(&["inspect", &path, "--log-format", "json"]);
+    let error: serde_json::Value = serde_json::from_str(err(&output).trim()).expect("JSON");
+    assert_eq!((error["level"].as_str(), code(&output)), (Some("error"), 4));
+}
+
+#[test]
+fn an_empty_library_is_explained() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().to_string_lossy().into_owned();
+    let output = stillpoint(&["robots", "lint", &path, "--json"]);
+    assert_eq!(code(&output), 4);
+    let all: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(all["schema"], "stillpoint.lint/1");
+    assert!(all["errors"].as_u64() > Some(0), "{all}");
+}
+
+/// A bare room with one scanner: scans, poses and truth come out whole, the same for any number of threads.
+#[test]
+fn a_scene_becomes_scans_with_truth() {
+    const SCENE: &str = r#"
+        seed = 5
+        [floor]
+        [[box]]
+        name = "crate"
+        xyz = [2.0, 0.0, 0.5]
+        size = [1.0, 1.0, 1.0]
+        [[scanner]]
+        name = "alone"
+        position = [0.0, 0.0, 1.6]
+        raster = { elevation_deg = [-60.0, 90.0], azimuth_deg = [-180.0, 180.0], step_deg = 1.0 }
+        min_range = 0.3
+        max_range = 80.0
+        noise = 0.002
+    "#;
+    let dir = tempfile::tempdir().expect("a folder");
+    let scene = dir.path().join("scene.toml");
+    std::fs::write(&scene, SCENE).expect("writes");
+    let scan = |name: &str, threads: &str| {
+        let out = dir.path().join(name);
+        let (scene, text) = (scene.to_string_lossy(), out.to_string_lossy().into_owned());
+        let output = stillpoint(&["simulate", &scene, "--out", &text, "--threads", threads]);
+        assert_eq!(code(&output), 0, "{}", err(&output));
+        out
+    };
+    let (one, three) = (scan("one", "1"), scan("three", "3"));
+    let same = |file: &str| {
+        let read = |out: &Path| std::fs::read(out.join(file)).expect(file);
+        assert!(read(&one) == read(&three), "{file}");
+        read(&one)
+    };
+    for file in [
+        "scans.e57",
+        "scans.las",
+        "scanners.toml",
+        "truth/labels/0.kind.npy",
+    ] {
+        assert!(!same(file).is_empty());
+    }
+    let truth: serde_json::Value = serde_json::from_slice(&same("truth/truth.json")).expect("JSON");
+    let n = truth["scans"][0]["n_points"].as_u64().expect("a count");
+    assert!(n > 10_000, "{n}");
+
+    let path = |file: &str| one.join(file).to_string_lossy().into_owned();
+    let (e57, las, scanners) = (path("scans.e57"), path("scans.las"), path("scanners.toml"));
+    let output = stillpoint(&["inspect", &e57, &las, "--scanners", &scanners, "--json"]);
+    assert_eq!(code(&output), 0, "{}", err(&output));
+    let all: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    for i in 0..2 {
+        assert_eq!(all["inputs"][i]["scans"][0]["scanner_known"], true, "{all}");
+    }
+    // An E57 file states its beams; how many came back is known once it is read.
+    assert_eq!(all["inputs"][1]["n_points"].as_u64(), Some(n), "{all}");
+}
