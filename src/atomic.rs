@@ -56,15 +56,12 @@ impl Write for AtomicFile {
 /// Writes all of a small file.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
-    file.write_all(bytes)
-        .map_err(|e| failed(path, "the file cannot be written", e))?;
+    file.write_all(bytes).map_err(|e| failed(path, "the file cannot be written", e))?;
     file.commit()
 }
 
 fn folder(path: &Path) -> &Path {
-    path.parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."))
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Temporary files are private; an output is for everybody who may read the folder.
@@ -111,11 +108,6 @@ mod tests {
         write(&path, b"two").expect("replaces");
         assert_eq!(std::fs::read(&path).expect("a file"), b"two");
         assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 1);
-        assert_eq!(
-            write(&dir.path().join("no/such"), b"")
-                .expect_err("fails")
-                .kind(),
-            Kind::Io
-        );
+        assert_eq!(write(&dir.path().join("no/such"), b"").expect_err("fails").kind(), Kind::Io);
     }
 }

@@ -57,10 +57,15 @@ impl Agreement {
         let result: ResultFile = serde_json::from_str(&read_text(&out.join("result.json"))?)
             .map_err(|e| Error::bad_input("the result is no result").because(e))?;
         let mut taken = vec![None; result.robots.len()];
-        let robots = truth.robots.iter().enumerate().map(|(t, robot)| match_robot(t, robot, &result.robots, &mut taken));
+        let robots = truth
+            .robots
+            .iter()
+            .enumerate()
+            .map(|(t, robot)| match_robot(t, robot, &result.robots, &mut taken));
         let robots: Vec<RobotAgreement> = robots.collect();
         let n_invented = taken.iter().filter(|t| t.is_none()).count();
-        let mut agreement = Self { robots, n_invented, moving: [0; 4], links: [0; 3], fixed: [0; 2] };
+        let mut agreement =
+            Self { robots, n_invented, moving: [0; 4], links: [0; 3], fixed: [0; 2] };
         for (i, scan) in result.labels.scans.iter().enumerate() {
             let ours = Triple::read(out, [&scan.kind, &scan.robot, &scan.link])?;
             let name = |what: &str| format!("labels/{i}.{what}.npy");
@@ -72,7 +77,8 @@ impl Agreement {
 
     fn count(&mut self, ours: &Triple, theirs: &Triple, taken: &[Option<usize>]) -> Result<()> {
         if ours.kind.len() != theirs.kind.len() {
-            let what = format!("masks have {} entries, the truth {}", ours.kind.len(), theirs.kind.len());
+            let what =
+                format!("masks have {} entries, the truth {}", ours.kind.len(), theirs.kind.len());
             return Err(Error::new(Kind::Bug, what));
         }
         let moves = |k: u8| k == PointKind::Link as u8 || k == PointKind::Attachment as u8;
@@ -86,12 +92,16 @@ impl Agreement {
             }] += 1;
             self.fixed[0] += u64::from(!real);
             self.fixed[1] += u64::from(!real && own);
-            let (link, real_link) = (PointKind::Link as u8 == ours.kind[i], PointKind::Link as u8 == theirs.kind[i]);
+            let (link, real_link) =
+                (PointKind::Link as u8 == ours.kind[i], PointKind::Link as u8 == theirs.kind[i]);
             self.links[1] += u64::from(real_link);
             self.links[2] += u64::from(link);
             if link && real_link {
-                let robot = usize::try_from(ours.robot[i]).ok().and_then(|r| taken.get(r).copied().flatten());
-                let same = robot == usize::try_from(theirs.robot[i]).ok() && ours.link[i] == theirs.link[i];
+                let robot = usize::try_from(ours.robot[i])
+                    .ok()
+                    .and_then(|r| taken.get(r).copied().flatten());
+                let same = robot == usize::try_from(theirs.robot[i]).ok()
+                    && ours.link[i] == theirs.link[i];
                 self.links[0] += u64::from(same);
             }
         }
@@ -109,7 +119,11 @@ impl Agreement {
     #[must_use]
     pub fn worst_joint_deg(&self) -> f64 {
         let found = self.robots.iter().filter_map(|r| r.found.as_ref());
-        found.flat_map(|f| &f.joints).filter(|j| j.3).map(|j| j.1.abs().to_degrees()).fold(0.0, f64::max)
+        found
+            .flat_map(|f| &f.joints)
+            .filter(|j| j.3)
+            .map(|j| j.1.abs().to_degrees())
+            .fold(0.0, f64::max)
     }
 
     /// A table for people.
@@ -165,7 +179,12 @@ impl Agreement {
 }
 
 /// The found robot nearest to a true one; notes at `taken` whose it is.
-fn match_robot(at: usize, truth: &TrueRobot, found: &[RobotEntry], taken: &mut [Option<usize>]) -> RobotAgreement {
+fn match_robot(
+    at: usize,
+    truth: &TrueRobot,
+    found: &[RobotEntry],
+    taken: &mut [Option<usize>],
+) -> RobotAgreement {
     let place = Vector3::from(truth.base_pose.xyz);
     let near = found
         .iter()
@@ -177,10 +196,12 @@ fn match_robot(at: usize, truth: &TrueRobot, found: &[RobotEntry], taken: &mut [
     let found = near.map(|(i, distance)| {
         taken[i] = Some(at);
         let robot = &found[i];
-        let turn = rotation(truth.base_pose.quat_wxyz).angle_to(&rotation(robot.base_pose.quat_wxyz));
+        let turn =
+            rotation(truth.base_pose.quat_wxyz).angle_to(&rotation(robot.base_pose.quat_wxyz));
         let joints = robot.joints.0.iter().filter_map(|(name, value)| {
             let truth = truth.joints.get(name)?;
-            let pick = |all: &[(String, Option<f64>)]| all.iter().find(|s| s.0 == *name).and_then(|s| s.1);
+            let pick =
+                |all: &[(String, Option<f64>)]| all.iter().find(|s| s.0 == *name).and_then(|s| s.1);
             let sigma = pick(&robot.sigma.0).unwrap_or(f64::INFINITY);
             let determined = robot.determined.0.iter().any(|d| d.0 == *name && d.1);
             let turns = ((value - truth) / std::f64::consts::TAU).round() * std::f64::consts::TAU;
@@ -209,7 +230,9 @@ struct Triple {
 
 impl Triple {
     fn read(dir: &Path, names: [&str; 3]) -> Result<Self> {
-        let wide = |bytes: Vec<u8>| bytes.as_chunks::<2>().0.iter().map(|c| i16::from_le_bytes(*c)).collect();
+        let wide = |bytes: Vec<u8>| {
+            bytes.as_chunks::<2>().0.iter().map(|c| i16::from_le_bytes(*c)).collect()
+        };
         Ok(Self {
             kind: npy(&dir.join(names[0]))?,
             robot: wide(npy(&dir.join(names[1]))?),

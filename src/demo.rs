@@ -48,7 +48,10 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
         summary,
         "{n_points} points; scanned in {scanned:.1} s, main job in {seconds:.1} s: {:.2} M points/s{}",
         n_points as f64 / seconds / 1e6,
-        peak_memory().map_or_else(String::new, |b| format!(", peak memory {:.0} MiB", b as f64 / f64::from(1 << 20)))
+        peak_memory().map_or_else(String::new, |b| format!(
+            ", peak memory {:.0} MiB",
+            b as f64 / f64::from(1 << 20)
+        ))
     );
     if out.is_some() {
         let _ = writeln!(summary, "everything is in {}; look at result/pictures", dir.display());

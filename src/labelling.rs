@@ -7,10 +7,10 @@
 use crate::engine::{Engine, Task};
 use crate::job::{Room, Settings};
 use crate::store::Store;
-use contract::{
-    Fit, Floor, Fold, InputId, Label, Map, Result, Scan, Strip, TileLabels, Weigh,
+use contract::{Fit, Floor, Fold, InputId, Label, Map, Result, Scan, Strip, TileLabels, Weigh};
+use export::{
+    Clouds, CloudsSettings, LasPoint, LasSettings, PlanPicture, Quantum, RobotPicture, Written,
 };
-use export::{Clouds, CloudsSettings, LasPoint, LasSettings, PlanPicture, Quantum, RobotPicture, Written};
 use geometry::{Aabb, Point};
 use ingest::{Sources, Want};
 use merge::Attach;
@@ -105,8 +105,7 @@ impl<'a> Labelling<'a> {
         let mut masks = Masks::new(out, &self.sources.masks);
         let mut robots: Vec<RobotPicture> = self.robot_pictures();
         let mut pictures = Vec::new();
-        let label =
-            LabelStrip { near, ground: self.segment.ground(), scans: &self.sources.scans };
+        let label = LabelStrip { near, ground: self.segment.ground(), scans: &self.sources.scans };
         for input in &self.sources.inputs {
             let mut plan = PlanPicture::new(&self.bounds_of(input.id));
             let task = Task::new("write").of(crate::report::amount(self.sources, input.id));
@@ -157,7 +156,12 @@ impl<'a> Labelling<'a> {
             .collect()
     }
 
-    fn draw_plan(&self, plan: &PlanPicture, input: InputId, out: &std::path::Path) -> Result<String> {
+    fn draw_plan(
+        &self,
+        plan: &PlanPicture,
+        input: InputId,
+        out: &std::path::Path,
+    ) -> Result<String> {
         let robots: Vec<_> = self
             .fits
             .iter()
@@ -172,7 +176,9 @@ impl<'a> Labelling<'a> {
             .scans
             .iter()
             .filter(|s| s.input == input && s.has_beams())
-            .map(|s| (s.name.clone(), [s.world_from_scan.translation.x, s.world_from_scan.translation.y]))
+            .map(|s| {
+                (s.name.clone(), [s.world_from_scan.translation.x, s.world_from_scan.translation.y])
+            })
             .collect();
         let path = &self.sources.inputs[input.0 as usize].path;
         let title = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());

@@ -8,8 +8,8 @@ use std::path::Path;
 /// Loads all models; those that cannot be loaded are explained in the library's findings.
 pub(crate) fn load(dir: &Path, settings: &Settings, engine: &Engine) -> Result<Library> {
     let (folders, mut library) = Library::open(dir)?;
-    let loaded =
-        engine.fan_out("robots", folders, |folder| Ok(Library::load_folder(dir, &folder, settings)))?;
+    let loaded = engine
+        .fan_out("robots", folders, |folder| Ok(Library::load_folder(dir, &folder, settings)))?;
     for model in loaded {
         library.add(model);
     }

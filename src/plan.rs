@@ -33,9 +33,13 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
 
     // On the tiles: local planes and occupied space, joined over tiles and scans; from here on nothing is as large as
     // the cloud.
-    let (surfaces, gather) = (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
-    let ground = engine.pass(crate::report::tiles("surfaces", &store), store.tiles(), |f| f.map(&surfaces).fold(&gather))?;
-    let clusters = cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
+    let (surfaces, gather) =
+        (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
+    let ground = engine.pass(crate::report::tiles("surfaces", &store), store.tiles(), |f| {
+        f.map(&surfaces).fold(&gather)
+    })?;
+    let clusters =
+        cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
     let regions = identify::regions(&clusters, &settings.region);
 
     // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
@@ -44,11 +48,25 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let fits = fit::choose(fits.into_iter().flatten().collect(), &library.models);
 
     // Tiles near robots once more: which points are links, which hang on them.
-    let labelling = Labelling::new(&fits, &library.models, &sources, (&store, &ground.surfaces.floor), settings);
+    let labelling = Labelling::new(
+        &fits,
+        &library.models,
+        &sources,
+        (&store, &ground.surfaces.floor),
+        settings,
+    );
     let near = labelling.near_robots(&store, engine)?;
 
     // Second pass: every point once more, in the order of its file, to label and to write.
     let written = labelling.write(&near, &room, engine)?;
-    Report { job, engine, sources: &sources, library: &library, fits: &fits, clusters: &clusters, written: &written }
-        .finish(&room)
+    Report {
+        job,
+        engine,
+        sources: &sources,
+        library: &library,
+        fits: &fits,
+        clusters: &clusters,
+        written: &written,
+    }
+    .finish(&room)
 }

@@ -27,11 +27,7 @@ impl Mode {
     /// What suits standard error: a bar on a terminal, else plain lines.
     #[must_use]
     pub fn fitting() -> Self {
-        if std::io::stderr().is_terminal() {
-            Self::Bar
-        } else {
-            Self::Plain
-        }
+        if std::io::stderr().is_terminal() { Self::Bar } else { Self::Plain }
     }
 }
 
@@ -57,32 +53,22 @@ impl Amount {
     /// So many items.
     #[must_use]
     pub fn items(items: u64) -> Self {
-        Self {
-            items,
-            ..Self::default()
-        }
+        Self { items, ..Self::default() }
     }
 
     /// So many points.
     #[must_use]
     pub fn points(points: u64) -> Self {
-        Self {
-            points,
-            ..Self::default()
-        }
+        Self { points, ..Self::default() }
     }
 
     /// Share of `total` that is done, 0..1, by the first of points, bytes, items whose total is known.
     #[must_use]
     pub fn share(&self, total: &Self) -> Option<f64> {
-        [
-            (self.points, total.points),
-            (self.bytes, total.bytes),
-            (self.items, total.items),
-        ]
-        .into_iter()
-        .find(|(_, of)| *of > 0)
-        .map(|(done, of)| (done as f64 / of as f64).min(1.0))
+        [(self.points, total.points), (self.bytes, total.bytes), (self.items, total.items)]
+            .into_iter()
+            .find(|(_, of)| *of > 0)
+            .map(|(done, of)| (done as f64 / of as f64).min(1.0))
     }
 }
 
@@ -175,11 +161,7 @@ impl Progress {
     /// What each finished stage did, in the order of their ends.
     #[must_use]
     pub fn reports(&self) -> Vec<StageReport> {
-        self.0
-            .reports
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
+        self.0.reports.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Says a line on standard error without spoiling a bar.
@@ -197,16 +179,9 @@ impl Progress {
 
     fn bar(&self, name: &str, total: &Amount) -> ProgressBar {
         let known = total.share(total).is_some();
-        let bar = if known {
-            ProgressBar::new(1000)
-        } else {
-            ProgressBar::new_spinner()
-        };
-        let template = if known {
-            "{prefix:>12} [{bar:30}] {msg}"
-        } else {
-            "{prefix:>12} {spinner} {msg}"
-        };
+        let bar = if known { ProgressBar::new(1000) } else { ProgressBar::new_spinner() };
+        let template =
+            if known { "{prefix:>12} [{bar:30}] {msg}" } else { "{prefix:>12} {spinner} {msg}" };
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("=> "));
         }
@@ -239,11 +214,7 @@ impl Stage {
         }
         let next = (now + run.progress.every()).as_millis() as u64;
         // Only one thread speaks for this moment.
-        if run
-            .next_line
-            .compare_exchange(due, next, Ordering::Relaxed, Ordering::Relaxed)
-            .is_ok()
-        {
+        if run.next_line.compare_exchange(due, next, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
             run.show(now.as_secs_f64(), false);
         }
     }
@@ -257,11 +228,7 @@ impl Stage {
 impl Running {
     fn done(&self) -> Amount {
         let [items, points, bytes] = [0, 1, 2].map(|i| self.done[i].load(Ordering::Relaxed));
-        Amount {
-            items,
-            points,
-            bytes,
-        }
+        Amount { items, points, bytes }
     }
 
     fn finish(&self) {
@@ -279,10 +246,7 @@ impl Running {
             bytes: done.bytes,
         };
         let reports = &self.progress.0.reports;
-        reports
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .push(report);
+        reports.lock().unwrap_or_else(PoisonError::into_inner).push(report);
     }
 
     fn show(&self, seconds: f64, last: bool) {
@@ -290,19 +254,14 @@ impl Running {
         match (self.progress.0.mode, &self.bar) {
             (Mode::None, _) => {}
             (Mode::Json, _) => {
-                self.progress
-                    .line(&json(&self.name, &done, &self.total, seconds, last))
+                self.progress.line(&json(&self.name, &done, &self.total, seconds, last))
             }
             (_, Some(bar)) => {
                 let share = done.share(&self.total).unwrap_or(0.0);
                 bar.set_position((share * 1000.0) as u64);
                 bar.tick();
                 let message = words(&done, &self.total, seconds, last);
-                if last {
-                    bar.finish_with_message(message)
-                } else {
-                    bar.set_message(message)
-                }
+                if last { bar.finish_with_message(message) } else { bar.set_message(message) }
             }
             (_, None) => {
                 let words = words(&done, &self.total, seconds, last);
@@ -327,10 +286,7 @@ mod tests {
 
     impl Write for Page {
         fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            self.0
-                .lock()
-                .expect("not poisoned")
-                .extend_from_slice(bytes);
+            self.0.lock().expect("not poisoned").extend_from_slice(bytes);
             Ok(bytes.len())
         }
 

@@ -6,7 +6,9 @@ use crate::labelling::Done;
 use crate::progress::Amount;
 use crate::store::Store;
 use contract::{Cluster, Fit, Format, Input, InputId, Result, Verdict};
-use export::{InputEntry, Labels, ResultFile, RobotEntry, SCHEMA, ScanLabels, StageEntry, write_table};
+use export::{
+    InputEntry, Labels, ResultFile, RobotEntry, SCHEMA, ScanLabels, StageEntry, write_table,
+};
 use ingest::Sources;
 use robot::{Library, Model, Role};
 use std::fmt::Write as _;
@@ -26,7 +28,8 @@ pub(crate) struct Report<'a> {
 impl Report<'_> {
     /// Writes the legend and the result, last of all files.
     pub(crate) fn finish(&self, room: &Room) -> Result<Outcome> {
-        let robots: Vec<RobotEntry> = self.fits.iter().enumerate().map(|(i, f)| self.robot(i, f)).collect();
+        let robots: Vec<RobotEntry> =
+            self.fits.iter().enumerate().map(|(i, f)| self.robot(i, f)).collect();
         write_table(room.out(), &robots)?;
         let warnings = self.warnings();
         let masks = self.sources.masks.iter().zip(&self.written.masks);
@@ -34,13 +37,20 @@ impl Report<'_> {
             table: "labels/table.json".into(),
             scans: masks.map(|(mask, count)| ScanLabels::new(mask, count.n_points)).collect(),
         };
-        let digests = self.engine.fan_out("digest", self.sources.inputs.iter().collect(), digest)?;
+        let digests =
+            self.engine.fan_out("digest", self.sources.inputs.iter().collect(), digest)?;
         let result = ResultFile {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             robots,
             labels,
-            inputs: self.sources.inputs.iter().zip(digests).map(|(i, d)| self.input(i, d)).collect(),
+            inputs: self
+                .sources
+                .inputs
+                .iter()
+                .zip(digests)
+                .map(|(i, d)| self.input(i, d))
+                .collect(),
             stages: self.stages(),
             warnings: warnings.clone(),
         };
@@ -59,7 +69,8 @@ impl Report<'_> {
 
     fn input(&self, input: &Input, digest: String) -> InputEntry {
         let scans: Vec<_> = self.sources.scans.iter().filter(|s| s.input == input.id).collect();
-        let counts = self.sources.masks.iter().zip(&self.written.masks).filter(|(m, _)| m.input == input.id);
+        let counts =
+            self.sources.masks.iter().zip(&self.written.masks).filter(|(m, _)| m.input == input.id);
         let (n_points, n_dropped) =
             counts.fold((0, 0), |sum, (_, c)| (sum.0 + c.n_points, sum.1 + c.n_dropped));
         InputEntry {
@@ -77,7 +88,8 @@ impl Report<'_> {
     /// Counts of each stage; no times, so that the same input gives the same bytes.
     fn stages(&self) -> Vec<StageEntry> {
         let n_points = self.written.masks.iter().map(|m| m.n_points).sum();
-        let entry = |name: &str, n_in: u64, n_out: u64| StageEntry { name: name.into(), n_in, n_out };
+        let entry =
+            |name: &str, n_in: u64, n_out: u64| StageEntry { name: name.into(), n_in, n_out };
         vec![
             entry("ingest", self.sources.inputs.len() as u64, n_points),
             entry("cluster", n_points, self.clusters.len() as u64),
@@ -90,18 +102,25 @@ impl Report<'_> {
         let mut out = self.sources.warnings.clone();
         for finding in &self.library.findings {
             if finding.severity == robot::Severity::Error {
-                out.push(format!("robot model '{}' is left out: {}: {}", finding.model, finding.place, finding.what));
+                out.push(format!(
+                    "robot model '{}' is left out: {}: {}",
+                    finding.model, finding.place, finding.what
+                ));
             }
         }
         for scan in self.sources.scans.iter().filter(|s| !s.has_beams()) {
-            out.push(format!("scan '{}': its scanner's position is not known: no proof of free space from it", scan.name));
+            out.push(format!(
+                "scan '{}': its scanner's position is not known: no proof of free space from it",
+                scan.name
+            ));
         }
         out
     }
 
     fn summary(&self, room: &Room) -> String {
         let mut text = String::new();
-        let _ = writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.sources.scans.len());
+        let _ =
+            writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.sources.scans.len());
         for (i, fit) in self.fits.iter().enumerate() {
             let p = fit.world_from_base.translation.vector;
             let _ = writeln!(
@@ -117,11 +136,24 @@ impl Report<'_> {
                 fit.rms * 1e3
             );
             for joint in &fit.joints {
-                let sigma = if joint.determined { format!("± {:.3}°", joint.sigma.to_degrees()) } else { "not determined".into() };
-                let _ = writeln!(text, "     {:<24} {:>9.3}° {sigma}", joint.name, joint.value.to_degrees());
+                let sigma = if joint.determined {
+                    format!("± {:.3}°", joint.sigma.to_degrees())
+                } else {
+                    "not determined".into()
+                };
+                let _ = writeln!(
+                    text,
+                    "     {:<24} {:>9.3}° {sigma}",
+                    joint.name,
+                    joint.value.to_degrees()
+                );
             }
             for reason in &fit.reasons {
-                let _ = writeln!(text, "     {}: {reason}", if fit.verdict == Verdict::Trusted { "note" } else { "why" });
+                let _ = writeln!(
+                    text,
+                    "     {}: {reason}",
+                    if fit.verdict == Verdict::Trusted { "note" } else { "why" }
+                );
             }
         }
         let n: u64 = self.written.masks.iter().map(|m| m.n_points).sum();
@@ -152,7 +184,11 @@ pub(crate) fn amount(sources: &Sources, input: InputId) -> Amount {
 
 /// A task over all tiles of a store.
 pub(crate) fn tiles(name: &str, store: &Store) -> Task {
-    Task::new(name).of(Amount { items: store.entries().len() as u64, points: store.n_points(), bytes: 0 })
+    Task::new(name).of(Amount {
+        items: store.entries().len() as u64,
+        points: store.n_points(),
+        bytes: 0,
+    })
 }
 
 /// Digest of an input's bytes.

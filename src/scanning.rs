@@ -36,10 +36,7 @@ pub struct Formats {
 
 impl Formats {
     /// Both.
-    pub const ALL: Self = Self {
-        e57: true,
-        las: true,
-    };
+    pub const ALL: Self = Self { e57: true, las: true };
 }
 
 /// Scans a scene into `out`; returns the truth with its counts.
@@ -75,10 +72,7 @@ struct Files {
 
 impl Files {
     fn create(simulator: &Simulator, out: &Path, formats: Formats) -> Result<Self> {
-        let e57 = formats
-            .e57
-            .then(|| E57Scans::create(out.join("scans.e57")))
-            .transpose()?;
+        let e57 = formats.e57.then(|| E57Scans::create(out.join("scans.e57"))).transpose()?;
         let las = formats.las.then(|| -> Result<_> {
             let frames = (0..simulator.n_scans()).map(|i| simulator.frame(i));
             let near = Aabb::of(frames.map(|f| f.world_from_scan.translation.vector.into()));
@@ -87,10 +81,7 @@ impl Files {
             let mask = MaskWriter::create(&out.join("truth/las"), MaskId(0))?;
             Ok((LasWriter::create(out.join("scans.las"), settings)?, mask))
         });
-        Ok(Self {
-            e57,
-            las: las.transpose()?,
-        })
+        Ok(Self { e57, las: las.transpose()? })
     }
 
     /// Casts and writes one scan; returns its number of points.
@@ -102,33 +93,22 @@ impl Files {
         engine: &Engine,
     ) -> Result<u64> {
         let frame = simulator.frame(i);
-        let cast = Cast {
-            simulator,
-            scanner: i,
-        };
+        let cast = Cast { simulator, scanner: i };
         let n_rows = frame.n_rows;
-        let source = (0..frame.n_cols).step_by(COLUMNS as usize).map(|from| {
-            Ok(Columns {
-                range: from..(from + COLUMNS).min(frame.n_cols),
-                n_rows,
-            })
-        });
+        let source = (0..frame.n_cols)
+            .step_by(COLUMNS as usize)
+            .map(|from| Ok(Columns { range: from..(from + COLUMNS).min(frame.n_cols), n_rows }));
         let n_beams = u64::from(frame.n_rows) * u64::from(frame.n_cols);
         let task = Task::new(format!("scan {}", frame.name)).of(Amount::points(n_beams));
         let mut mask = MaskWriter::create(truth, MaskId(i as u32))?;
         let source_id = u16::try_from(i + 1).map_err(|_| {
-            Error::bad_input(format!(
-                "LAS knows 65535 scanners at most, this is \"{}\"",
-                i + 1
-            ))
+            Error::bad_input(format!("LAS knows 65535 scanners at most, this is \"{}\"", i + 1))
         })?;
         engine.pass(task, source, |flow| {
             let mut seen = flow.map(&cast).items().map(|seen| {
                 let seen = seen?.0;
-                let labels: Vec<Label> = (0..seen.len())
-                    .filter(|&k| seen.hit[k])
-                    .map(|k| seen.label[k])
-                    .collect();
+                let labels: Vec<Label> =
+                    (0..seen.len()).filter(|&k| seen.hit[k]).map(|k| seen.label[k]).collect();
                 mask.push(&labels)?;
                 if let Some((las, las_mask)) = &mut self.las {
                     las_mask.push(&labels)?;
@@ -240,11 +220,7 @@ struct Points<I> {
 
 impl<I> Points<I> {
     fn new(columns: I) -> Self {
-        Self {
-            columns,
-            seen: SimColumns::default(),
-            at: 0,
-        }
+        Self { columns, seen: SimColumns::default(), at: 0 }
     }
 }
 
@@ -262,12 +238,7 @@ impl<I: Iterator<Item = Result<SimColumns>>> Iterator for Points<I> {
         self.at += 1;
         let (row, col) = self.seen.pixel(k);
         let xyz = self.seen.hit[k].then(|| self.seen.xyz[k].map(|v| v as f32));
-        Some(Ok(GridPoint {
-            xyz,
-            row,
-            col,
-            intensity: intensity(self.seen.intensity[k]),
-        }))
+        Some(Ok(GridPoint { xyz, row, col, intensity: intensity(self.seen.intensity[k]) }))
     }
 }
 

@@ -40,12 +40,17 @@ impl<'a> Search<'a> {
 
     /// Fits of all models in one region, whatever their verdict.
     pub(crate) fn region(&self, region: &Region) -> Result<Vec<Fit>> {
-        let views: Vec<View> =
-            self.scans.par_iter().filter_map(|scan| self.view(scan, region).transpose()).collect::<Result<_>>()?;
+        let views: Vec<View> = self
+            .scans
+            .par_iter()
+            .filter_map(|scan| self.view(scan, region).transpose())
+            .collect::<Result<_>>()?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit);
-        let fits: Vec<Vec<Fit>> =
-            (0..self.models.len()).into_par_iter().map(|model| self.model(model, &scene, &planes)).collect();
+        let fits: Vec<Vec<Fit>> = (0..self.models.len())
+            .into_par_iter()
+            .map(|model| self.model(model, &scene, &planes))
+            .collect();
         Ok(fits.into_iter().flatten().collect())
     }
 
@@ -89,9 +94,13 @@ impl<'a> Search<'a> {
     fn model(&self, index: usize, scene: &Scene<'_>, planes: &[InstallationPlane]) -> Vec<Fit> {
         let model = &self.models[index];
         let settings = self.settings;
-        let Some(search) =
-            BaseSearch::new((index, model), scene.region, scene.views, &scene.evidence, &settings.identify)
-        else {
+        let Some(search) = BaseSearch::new(
+            (index, model),
+            scene.region,
+            scene.views,
+            &scene.evidence,
+            &settings.identify,
+        ) else {
             return Vec::new();
         };
         let candidates = search.run(planes);
@@ -107,7 +116,12 @@ impl<'a> Search<'a> {
 fn distance(scan: &Scan, region: &Region) -> f64 {
     let scanner = scan.world_from_scan.translation.vector - region.origin.coords;
     (0..3)
-        .map(|i| (region.bounds.min[i] - scanner[i]).max(scanner[i] - region.bounds.max[i]).max(0.0).powi(2))
+        .map(|i| {
+            (region.bounds.min[i] - scanner[i])
+                .max(scanner[i] - region.bounds.max[i])
+                .max(0.0)
+                .powi(2)
+        })
         .sum::<f64>()
         .sqrt()
 }

@@ -47,10 +47,11 @@ impl Map for Surfaces {
 
     fn apply(&self, tile: Tile, scratch: &mut Self::Scratch) -> Result<Surface> {
         let scan = tile.at.scan;
-        let extent = (0..tile.len()).map(|i| tile.pixel_at(i)).fold(None, |sum: Option<Extent>, p| {
-            let own = [p.row, p.row, p.col, p.col];
-            Some(sum.map_or(own, |s| union(s, own)))
-        });
+        let extent =
+            (0..tile.len()).map(|i| tile.pixel_at(i)).fold(None, |sum: Option<Extent>, p| {
+                let own = [p.row, p.row, p.col, p.col];
+                Some(sum.map_or(own, |s| union(s, own)))
+            });
         Ok(Surface { scan, extent, summary: self.0.apply(tile, scratch)? })
     }
 }

@@ -4,10 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn stillpoint(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_stillpoint"))
-        .args(args)
-        .output()
-        .expect("the program starts")
+    Command::new(env!("CARGO_BIN_EXE_stillpoint")).args(args).output().expect("the program starts")
 }
 
 fn code(output: &Output) -> i32 {
@@ -44,10 +41,7 @@ fn usage_is_two() {
         assert_eq!(code(&output), 2, "{args:?}: {}", err(&output));
         assert!(output.stdout.is_empty(), "{args:?}");
     }
-    assert_eq!(
-        code(&stillpoint(&["inspect", "a.e57", "--memory", "1MiB"])),
-        5
-    );
+    assert_eq!(code(&stillpoint(&["inspect", "a.e57", "--memory", "1MiB"])), 5);
 }
 
 #[test]
@@ -58,11 +52,7 @@ fn bad_input_is_four_and_names_the_file() {
     let path = path.to_string_lossy().into_owned();
     let output = stillpoint(&["inspect", &path]);
     assert_eq!(code(&output), 4, "{}", err(&output));
-    assert!(
-        err(&output).starts_with(&format!("error: {path}: ")),
-        "{}",
-        err(&output)
-    );
+    assert!(err(&output).starts_with(&format!("error: {path}: ")), "{}", err(&output));
     let output = stillpoint(&["inspect", &path, "--log-format", "json"]);
     let error: serde_json::Value = serde_json::from_str(err(&output).trim()).expect("JSON");
     assert_eq!((error["level"].as_str(), code(&output)), (Some("error"), 4));
@@ -113,12 +103,7 @@ fn a_scene_becomes_scans_with_truth() {
         assert!(read(&one) == read(&three), "{file}");
         read(&one)
     };
-    for file in [
-        "scans.e57",
-        "scans.las",
-        "scanners.toml",
-        "truth/labels/0.kind.npy",
-    ] {
+    for file in ["scans.e57", "scans.las", "scanners.toml", "truth/labels/0.kind.npy"] {
         assert!(!same(file).is_empty());
     }
     let truth: serde_json::Value = serde_json::from_slice(&same("truth/truth.json")).expect("JSON");

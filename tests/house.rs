@@ -33,14 +33,7 @@ fn entries(dir: &Path) -> Vec<PathBuf> {
 fn stages() -> Vec<String> {
     let folders = entries(&root().join("stages"));
     let stages = folders.iter().filter(|p| p.join("Cargo.toml").is_file());
-    stages
-        .map(|p| {
-            p.file_name()
-                .expect("a name")
-                .to_string_lossy()
-                .into_owned()
-        })
-        .collect()
+    stages.map(|p| p.file_name().expect("a name").to_string_lossy().into_owned()).collect()
 }
 
 /// All Rust files below `dir`, as path from the root and text.
@@ -63,10 +56,7 @@ fn rust_files(dir: &str) -> Vec<(String, String)> {
 }
 
 fn all_files() -> Vec<(String, String)> {
-    ["src", "stages", "tests", "benches"]
-        .into_iter()
-        .flat_map(rust_files)
-        .collect()
+    ["src", "stages", "tests", "benches"].into_iter().flat_map(rust_files).collect()
 }
 
 /// The text without comments, and without what is compiled for tests only.
@@ -84,9 +74,7 @@ fn code(name: &str, text: &str) -> String {
     }
     // By custom the tests stand at the end of a file.
     let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
-    let lines = text[..end]
-        .lines()
-        .map(|l| l.split("//").next().unwrap_or(l));
+    let lines = text[..end].lines().map(|l| l.split("//").next().unwrap_or(l));
     lines.collect::<Vec<_>>().join("\n")
 }
 
@@ -118,10 +106,8 @@ fn stages_import_only_what_is_shared() {
     let mut faults = Vec::new();
     for stage in &stages {
         let manifest = root().join("stages").join(stage).join("Cargo.toml");
-        let manifest: toml::Table = fs::read_to_string(manifest)
-            .expect("text")
-            .parse()
-            .expect("TOML");
+        let manifest: toml::Table =
+            fs::read_to_string(manifest).expect("text").parse().expect("TOML");
         let allowed: &[&str] = match stage.as_str() {
             "geometry" => &[],
             "contract" => &["geometry"],
@@ -145,9 +131,7 @@ fn files_open_with_a_sentence_and_stay_short() {
     let mut faults = Vec::new();
     for (name, text) in all_files() {
         if !text.starts_with("//! ") {
-            faults.push(format!(
-                "{name} does not open with what comes in and what goes out"
-            ));
+            faults.push(format!("{name} does not open with what comes in and what goes out"));
         }
         let n = text.lines().count();
         let is_test = name.contains("tests/") || name.ends_with("/tests.rs");
@@ -207,9 +191,8 @@ fn only_src_prints_and_only_by_its_writers() {
 fn unsafe_code_stands_where_it_is_named() {
     let mut faults = Vec::new();
     for (name, text) in all_files() {
-        let is_used = ["unsafe {", "unsafe fn", "unsafe impl"]
-            .iter()
-            .any(|w| code(&name, &text).contains(w));
+        let is_used =
+            ["unsafe {", "unsafe fn", "unsafe impl"].iter().any(|w| code(&name, &text).contains(w));
         if is_used && !MAY_BE_UNSAFE.contains(&name.as_str()) {
             faults.push(format!("{name} holds unsafe code"));
         }
@@ -220,14 +203,8 @@ fn unsafe_code_stands_where_it_is_named() {
 #[test]
 fn every_stage_is_in_the_table_of_stages() {
     let table = fs::read_to_string(root().join("stages/README.md")).unwrap_or_default();
-    let missing = stages()
-        .into_iter()
-        .filter(|s| !table.contains(&format!("`{s}`")));
-    report(
-        &missing
-            .map(|s| format!("stages/README.md does not name `{s}`"))
-            .collect::<Vec<_>>(),
-    );
+    let missing = stages().into_iter().filter(|s| !table.contains(&format!("| {s} |")));
+    report(&missing.map(|s| format!("stages/README.md does not name `{s}`")).collect::<Vec<_>>());
 }
 
 /// Settings of a stage that nobody can set, by room and name: made by the program, not by people.
@@ -236,10 +213,8 @@ const NOT_FOR_PEOPLE: [&str; 2] = ["export::CloudsSettings", "export::LasSetting
 #[test]
 fn every_setting_of_a_stage_can_be_set() {
     let job = fs::read_to_string(root().join("src/job/settings.rs")).expect("text");
-    let words: BTreeSet<&str> = job
-        .split(|c: char| !c.is_alphanumeric() && c != '_')
-        .filter(|w| !w.is_empty())
-        .collect();
+    let words: BTreeSet<&str> =
+        job.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty()).collect();
     let mut faults = Vec::new();
     for (name, text) in rust_files("stages") {
         for part in text.split("\npub struct ").skip(1) {
@@ -267,11 +242,7 @@ fn every_setting_of_a_stage_can_be_set() {
 #[test]
 fn nothing_of_a_workplace_is_in_the_house() {
     // Put together so that this file does not find itself.
-    let words = [
-        concat!("/wo", "rk/"),
-        concat!("/ho", "me/"),
-        concat!("/ro", "ot/"),
-    ];
+    let words = [concat!("/wo", "rk/"), concat!("/ho", "me/"), concat!("/ro", "ot/")];
     let mut faults = Vec::new();
     for (name, text) in all_files() {
         for word in words.iter().filter(|w| text.contains(**w)) {

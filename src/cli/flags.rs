@@ -11,12 +11,7 @@ use std::path::PathBuf;
 /// Finds the robots in laser scans of a plant, in which posture they stand, and splits the cloud into what moves and
 /// what stands still.
 #[derive(Debug, Parser)]
-#[command(
-    name = "stillpoint",
-    version,
-    subcommand_required = true,
-    arg_required_else_help = true
-)]
+#[command(name = "stillpoint", version, subcommand_required = true, arg_required_else_help = true)]
 pub(super) struct Line {
     #[command(subcommand)]
     pub(super) command: Command,
@@ -120,13 +115,7 @@ pub(super) struct Common {
     #[arg(long, global = true, value_enum, value_name = "HOW")]
     progress: Option<Mode>,
     /// How warnings and errors are written
-    #[arg(
-        long,
-        global = true,
-        value_enum,
-        value_name = "HOW",
-        default_value = "text"
-    )]
+    #[arg(long, global = true, value_enum, value_name = "HOW", default_value = "text")]
     pub(super) log_format: LogFormat,
 }
 
@@ -153,9 +142,7 @@ impl Common {
         engine.progress = Progress::new(self.progress.unwrap_or_else(Mode::fitting));
         engine.cancel.on_ctrl_c()?;
         // Libraries that use rayon by themselves keep to the same number; a pool made earlier (tests) is kept.
-        let _ = rayon::ThreadPoolBuilder::new()
-            .num_threads(means.n_threads)
-            .build_global();
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();
         Ok(engine)
     }
 }
@@ -186,9 +173,7 @@ mod tests {
         ] {
             let line = Line::try_parse_from(args.split(' ')).expect("parses");
             assert_eq!(line.common.threads, Some(2));
-            let Command::Run(run) = line.command else {
-                panic!("{args}")
-            };
+            let Command::Run(run) = line.command else { panic!("{args}") };
             assert_eq!(run.inputs.len(), 2);
         }
     }

@@ -10,11 +10,8 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
     let means = common.means()?;
     present(&flags.inputs)?;
     let scanners = common.scanners(&means).map(|path| Scanners::read(&path));
-    let sources = ingest::open(
-        &flags.inputs,
-        scanners.transpose()?.as_ref(),
-        &means.settings.ingest,
-    )?;
+    let sources =
+        ingest::open(&flags.inputs, scanners.transpose()?.as_ref(), &means.settings.ingest)?;
     let descriptions = ingest::describe(&sources);
     if flags.json {
         let all = serde_json::json!({

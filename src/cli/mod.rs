@@ -23,11 +23,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             // Help and version are errors to clap, but no failures. A closed pipe is none either.
             let _ = error.print();
-            return if error.use_stderr() {
-                exit::code(contract::Kind::Usage)
-            } else {
-                exit::OK
-            };
+            return if error.use_stderr() { exit::code(contract::Kind::Usage) } else { exit::OK };
         }
     };
     let say = Say::new(line.common.log_format);

@@ -27,11 +27,7 @@ pub(super) fn lint(flags: &LintFlags, say: &Say) -> Result<u8> {
         text += &format!("{errors} errors, {warnings} warnings, {notes} notes\n");
         say.result(&text);
     }
-    Ok(if errors > 0 {
-        exit::code(Kind::BadInput)
-    } else {
-        exit::OK
-    })
+    Ok(if errors > 0 { exit::code(Kind::BadInput) } else { exit::OK })
 }
 
 fn word(severity: Severity) -> &'static str {

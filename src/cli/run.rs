@@ -21,9 +21,5 @@ pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
         say.warning(warning);
     }
     say.result(&outcome.summary);
-    Ok(if outcome.partial {
-        exit::PARTIAL
-    } else {
-        exit::OK
-    })
+    Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
 }

@@ -19,11 +19,8 @@ pub(super) fn simulate(flags: &SimulateFlags, common: &Common, say: &Say) -> Res
         }
         None if scene.robots.is_empty() => Vec::new(),
         None => {
-            return Err(Error::new(
-                Kind::Usage,
-                "the scene has robots, but no library was given",
-            )
-            .hint("add --robots DIR"));
+            return Err(Error::new(Kind::Usage, "the scene has robots, but no library was given")
+                .hint("add --robots DIR"));
         }
     };
     let truth = scan_scene(&scene, &models, &flags.out, Formats::ALL, &engine)?;

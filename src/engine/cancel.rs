@@ -31,11 +31,7 @@ impl Cancel {
 
     /// An error once the run is to end.
     pub fn check(&self) -> Result<()> {
-        if self.is_set() {
-            Err(Self::error())
-        } else {
-            Ok(())
-        }
+        if self.is_set() { Err(Self::error()) } else { Ok(()) }
     }
 
     /// Ctrl-C sets the flag; a second Ctrl-C ends the program at once. Outputs are written under temporary names, so

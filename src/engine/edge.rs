@@ -4,6 +4,7 @@
 //! that the window cannot lock up; everybody else waits while the window is full. It therefore keeps at most
 //! `cap_bytes` and one more item. An item heavier than the window travels alone.
 
+use crate::progress::Stage;
 use contract::{Error, Kind, Result};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -46,7 +47,13 @@ impl<T> Edge<T> {
 pub(super) struct Put<T>(Arc<Edge<T>>);
 
 /// The consumer's end; when the last clone of its `Arc` is dropped, producers are told to stop.
-pub(super) struct Take<T>(Arc<Edge<T>>);
+pub(super) struct Take<T> {
+    edge: Arc<Edge<T>>,
+    tally: Option<(Stage, Measure<T>)>,
+}
+
+/// Points and bytes of an item.
+pub(super) type Measure<T> = fn(&T) -> (u64, u64);
 
 /// A new edge that keeps about `cap_bytes`.
 pub(super) fn edge<T>(cap_bytes: usize) -> (Put<T>, Take<T>) {
@@ -64,7 +71,7 @@ pub(super) fn edge<T>(cap_bytes: usize) -> (Put<T>, Take<T>) {
         ready: Condvar::new(),
         cap_bytes,
     });
-    (Put(Arc::clone(&edge)), Take(edge))
+    (Put(Arc::clone(&edge)), Take { edge, tally: None })
 }
 
 /// Whether a producer should go on.
@@ -86,11 +93,7 @@ impl<T> Put<T> {
             && at != state.next
             && state.bytes + weight > self.0.cap_bytes
         {
-            state = self
-                .0
-                .room
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
+            state = self.0.room.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         if state.gone || at > state.failed {
             drop(state);
@@ -128,9 +131,23 @@ impl<T> Drop for Put<T> {
 }
 
 impl<T> Take<T> {
+    /// Tells `stage` of each item that is taken: what only waits in the window is not done.
+    pub(super) fn tally(&mut self, stage: Stage, measure: Measure<T>) {
+        self.tally = Some((stage, measure));
+    }
+
     /// The next item with its position, waiting for it; `None` after the last one or a failed one.
     pub(super) fn take(&self) -> Option<(u64, Result<T>)> {
-        let mut state = self.0.lock();
+        let taken = self.next();
+        if let (Some((stage, measure)), Some((_, Ok(item)))) = (&self.tally, &taken) {
+            let (points, bytes) = measure(item);
+            stage.add(1, points, bytes);
+        }
+        taken
+    }
+
+    fn next(&self) -> Option<(u64, Result<T>)> {
+        let mut state = self.edge.lock();
         loop {
             if state.gone || state.next > state.failed {
                 return None;
@@ -141,9 +158,9 @@ impl<T> Take<T> {
                 state.next += 1;
                 state.bytes -= weight;
                 // The next item may already be there: another consumer may have it.
-                self.0.room.notify_all();
+                self.edge.room.notify_all();
                 if matches!(state.window.front(), Some(Some(_))) {
-                    self.0.ready.notify_one();
+                    self.edge.ready.notify_one();
                 }
                 return Some((at, item));
             }
@@ -153,28 +170,21 @@ impl<T> Take<T> {
                 }
                 state.failed = at;
                 state.next += 1;
-                return Some((
-                    at,
-                    Err(Error::new(Kind::Bug, format!("item {at} was lost"))),
-                ));
+                return Some((at, Err(Error::new(Kind::Bug, format!("item {at} was lost")))));
             }
-            state = self
-                .0
-                .ready
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
+            state = self.edge.ready.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
     /// Takes nothing more: producers stop, what waits is dropped.
     pub(super) fn stop(&self) {
-        let mut state = self.0.lock();
+        let mut state = self.edge.lock();
         state.gone = true;
         state.bytes = 0;
         let dropped = std::mem::take(&mut state.window);
         drop(state);
-        self.0.room.notify_all();
-        self.0.ready.notify_all();
+        self.edge.room.notify_all();
+        self.edge.ready.notify_all();
         drop(dropped);
     }
 }

@@ -31,14 +31,13 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
         S: Iterator<Item = Result<T>> + Send + 'env,
         T: Weigh,
     {
-        let (put, take) = edge(pass.channel_bytes);
+        let (put, mut take) = edge(pass.channel_bytes);
+        take.tally(stage, |item: &T| (item.n_points(), item.weight_bytes() as u64));
         let (name, cancel) = (Arc::clone(&pass.name), pass.cancel.clone());
         let spare = put.clone();
         let spawned = Builder::new()
             .name(format!("{name} source"))
-            .spawn_scoped(pass.scope, move || {
-                read(source, &put, &name, &cancel, &stage)
-            });
+            .spawn_scoped(pass.scope, move || read(source, &put, &name, &cancel));
         if let Err(e) = spawned {
             refuse(&spare, e);
         }
@@ -67,10 +66,7 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
                 refuse(&put, e);
             }
         }
-        Flow {
-            pass: self.pass,
-            take: out,
-        }
+        Flow { pass: self.pass, take: out }
     }
 
     /// Folds all items, in order, into one answer.
@@ -117,7 +113,6 @@ fn read<T: Weigh>(
     put: &Put<T>,
     name: &str,
     cancel: &Cancel,
-    stage: &Stage,
 ) {
     for at in 0.. {
         let item = if cancel.is_set() {
@@ -128,14 +123,11 @@ fn read<T: Weigh>(
                 None => return,
             }
         };
-        let (bytes, points) = item
-            .as_ref()
-            .map_or((0, 0), |i| (i.weight_bytes(), i.n_points()));
+        let bytes = item.as_ref().map_or(0, Weigh::weight_bytes);
         let failed = item.is_err();
         if put.put(at, item, bytes) == Onward::Stop || failed {
             return;
         }
-        stage.add(1, points, bytes as u64);
     }
 }
 

@@ -54,10 +54,7 @@ impl Task {
     /// A task of unknown size.
     #[must_use]
     pub fn new(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            total: Amount::default(),
-        }
+        Self { name: name.into(), total: Amount::default() }
     }
 
     /// Says how much it has to do; zero means not known.
@@ -111,9 +108,7 @@ impl Engine {
                 channel_bytes: self.channel_bytes,
                 cancel: self.cancel.clone(),
             };
-            guarded(&task.name, 0, || {
-                plan(Flow::source(pass, source, stage.clone()))
-            })
+            guarded(&task.name, 0, || plan(Flow::source(pass, source, stage.clone())))
         });
         stage.finish();
         out
@@ -152,14 +147,9 @@ impl Engine {
             }
             Some(out)
         };
-        let all: Vec<Option<Result<U>>> = self.pool()?.install(|| {
-            items
-                .into_par_iter()
-                .enumerate()
-                .with_max_len(1)
-                .map(one)
-                .collect()
-        });
+        let all: Vec<Option<Result<U>>> = self
+            .pool()?
+            .install(|| items.into_par_iter().enumerate().with_max_len(1).map(one).collect());
         stage.finish();
         // A skipped item stands after an error, and `collect` stops at that.
         all.into_iter()

@@ -24,11 +24,7 @@ impl Heavy {
     fn new(value: u64, bytes: usize, live: &Arc<Live>) -> Self {
         let now = live.now.fetch_add(bytes as i64, Ordering::SeqCst) + bytes as i64;
         live.peak.fetch_max(now, Ordering::SeqCst);
-        Self {
-            value,
-            bytes,
-            live: Arc::clone(live),
-        }
+        Self { value, bytes, live: Arc::clone(live) }
     }
 }
 
@@ -123,14 +119,9 @@ fn order_and_answer_for_any_workers_and_memory() {
     for n_workers in 1..=8 {
         for channel_bytes in [1, 200, 1 << 20] {
             let got = engine(n_workers, channel_bytes)
-                .pass("test", numbers(300), |f| {
-                    f.map(&first).map(&second).fold(&Digest)
-                })
+                .pass("test", numbers(300), |f| f.map(&first).map(&second).fold(&Digest))
                 .expect("no error");
-            assert!(
-                got == expected,
-                "{n_workers} workers, {channel_bytes} bytes"
-            );
+            assert!(got == expected, "{n_workers} workers, {channel_bytes} bytes");
         }
     }
 }
@@ -153,27 +144,17 @@ fn sink_sees_items_in_order() {
 #[test]
 fn first_error_by_position() {
     // The later error comes up in the earlier step, and both often come out of order.
-    let first = Work {
-        fails: vec![130, 90, 91],
-        panics: vec![],
-    };
-    let second = Work {
-        fails: vec![40 * 3, 170 * 3],
-        panics: vec![],
-    };
+    let first = Work { fails: vec![130, 90, 91], panics: vec![] };
+    let second = Work { fails: vec![40 * 3, 170 * 3], panics: vec![] };
     for round in 0..20 {
         let error = engine(1 + round % 8, 100)
-            .pass("test", numbers(200), |f| {
-                f.map(&first).map(&second).fold(&Digest)
-            })
+            .pass("test", numbers(200), |f| f.map(&first).map(&second).fold(&Digest))
             .expect_err("fails");
         assert_eq!(error.to_string(), "page 120 is torn", "round {round}");
     }
     let broken = numbers(20).chain(std::iter::once(Err(Error::bad_input("torn source"))));
     let error = engine(3, 100)
-        .pass("test", broken.chain(numbers(5)), |f| {
-            f.map(&first).fold(&Digest)
-        })
+        .pass("test", broken.chain(numbers(5)), |f| f.map(&first).fold(&Digest))
         .expect_err("fails");
     assert_eq!(error.to_string(), "torn source");
 }
@@ -181,37 +162,18 @@ fn first_error_by_position() {
 #[test]
 fn a_panic_ends_the_run_as_a_bug() {
     for n_workers in [1, 4] {
-        let work = Work {
-            fails: vec![],
-            panics: vec![17],
-        };
+        let work = Work { fails: vec![], panics: vec![17] };
         let error = engine(n_workers, 100)
-            .pass("label", numbers(1_000_000_000), |f| {
-                f.map(&work).fold(&Digest)
-            })
+            .pass("label", numbers(1_000_000_000), |f| f.map(&work).fold(&Digest))
             .expect_err("panics");
         assert_eq!(error.kind(), Kind::Bug);
-        assert!(
-            error
-                .to_string()
-                .contains("label, item 17: a step panicked: item 17 is unlucky")
-        );
+        assert!(error.to_string().contains("label, item 17: a step panicked: item 17 is unlucky"));
     }
-    let source = (0..10).map(|i| {
-        if i == 3 {
-            panic!("source fell")
-        } else {
-            Ok(Number(i))
-        }
-    });
-    let error = engine(2, 100)
-        .pass("read", source, |f| f.fold(&Digest))
-        .expect_err("panics");
+    let source = (0..10).map(|i| if i == 3 { panic!("source fell") } else { Ok(Number(i)) });
+    let error = engine(2, 100).pass("read", source, |f| f.fold(&Digest)).expect_err("panics");
     assert_eq!(error.kind(), Kind::Bug);
     let error = engine(2, 100)
-        .pass("write", numbers(1_000_000_000), |f| {
-            f.for_each(|_| panic!("sink fell"))
-        })
+        .pass("write", numbers(1_000_000_000), |f| f.for_each(|_| panic!("sink fell")))
         .expect_err("panics");
     assert_eq!(error.kind(), Kind::Bug);
 }
@@ -243,9 +205,7 @@ fn dropping_a_flow_stops_an_endless_source() {
     // A sink that has enough stops it as well.
     let source = Endless(Arc::clone(&dropped));
     let error = engine(3, 100)
-        .pass("test", source, |f| {
-            f.map(&work).for_each(|_| Err(Error::bad_input("enough")))
-        })
+        .pass("test", source, |f| f.map(&work).for_each(|_| Err(Error::bad_input("enough"))))
         .expect_err("enough");
     assert_eq!(error.to_string(), "enough");
 }
@@ -267,9 +227,7 @@ fn cancellation_ends_a_run() {
         })
         .expect_err("cancelled");
     assert_eq!((error.kind(), n), (Kind::Cancelled, 50));
-    let error = engine
-        .fan_out("test", vec![1, 2], Ok)
-        .expect_err("cancelled");
+    let error = engine.fan_out("test", vec![1, 2], Ok).expect_err("cancelled");
     assert_eq!(error.kind(), Kind::Cancelled);
 }
 
@@ -316,9 +274,7 @@ fn memory_is_bounded_by_bytes() {
 fn an_oversized_item_travels_alone() {
     let live = Arc::new(Live::default());
     let source = (0..50).map(|i| Ok(Heavy::new(i, 1 << 20, &live)));
-    engine(2, 1)
-        .pass("test", source, |f| f.map(&Copy).for_each(|_| Ok(())))
-        .expect("no error");
+    engine(2, 1).pass("test", source, |f| f.map(&Copy).for_each(|_| Ok(()))).expect("no error");
     let peak = live.peak.load(Ordering::SeqCst) >> 20;
     assert!(peak <= 8, "{peak} MiB alive");
 }
@@ -338,35 +294,23 @@ fn fan_out_keeps_order_and_finds_the_first_error() {
             let error = engine
                 .fan_out("fit", (0..100).collect(), |i: u64| {
                     sleep(Duration::from_micros(mix(i) % 300));
-                    if i % 30 == 29 {
-                        Err(Error::bad_input(format!("{i}")))
-                    } else {
-                        Ok(())
-                    }
+                    if i % 30 == 29 { Err(Error::bad_input(format!("{i}"))) } else { Ok(()) }
                 })
                 .expect_err("fails");
             assert_eq!(error.to_string(), "29");
         }
         let error = engine
-            .fan_out("fit", vec![0, 1, 2], |i: u64| {
-                if i == 1 { panic!("fell") } else { Ok(i) }
-            })
+            .fan_out("fit", vec![0, 1, 2], |i: u64| if i == 1 { panic!("fell") } else { Ok(i) })
             .expect_err("panics");
         assert_eq!(error.kind(), Kind::Bug);
-        assert!(
-            error
-                .to_string()
-                .contains("fit, item 1: a step panicked: fell")
-        );
+        assert!(error.to_string().contains("fit, item 1: a step panicked: fell"));
     }
 }
 
 #[test]
 fn fan_out_may_use_rayon_inside() {
     let sums = engine(1, 1000)
-        .fan_out("fit", vec![10_u64, 20], |n| {
-            Ok((0..n).into_par_iter().sum::<u64>())
-        })
+        .fan_out("fit", vec![10_u64, 20], |n| Ok((0..n).into_par_iter().sum::<u64>()))
         .expect("no error");
     assert_eq!(sums, [45, 190]);
 }
@@ -374,18 +318,9 @@ fn fan_out_may_use_rayon_inside() {
 #[test]
 fn progress_counts_what_came_from_the_source() {
     let engine = engine(2, 1000);
-    engine
-        .pass("read", numbers(70), |f| f.for_each(|_| Ok(())))
-        .expect("no error");
+    engine.pass("read", numbers(70), |f| f.for_each(|_| Ok(()))).expect("no error");
     engine.fan_out("fit", vec![(); 5], Ok).expect("no error");
     let reports = engine.progress.reports();
-    assert_eq!(
-        (
-            reports[0].name.as_str(),
-            reports[0].n_items,
-            reports[0].bytes
-        ),
-        ("read", 70, 560)
-    );
+    assert_eq!((reports[0].name.as_str(), reports[0].n_items, reports[0].bytes), ("read", 70, 560));
     assert_eq!((reports[1].name.as_str(), reports[1].n_items), ("fit", 5));
 }

@@ -18,9 +18,7 @@ const UNITS: [(&str, u64); 9] = [
 /// Bytes of a size such as `4GiB`, `1.5 GB`, `512M` (binary, as most tools read it) or `1000000`.
 pub fn memory_bytes(text: &str) -> Result<u64> {
     let text = text.trim();
-    let split = text
-        .find(|c: char| c.is_ascii_alphabetic())
-        .unwrap_or(text.len());
+    let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
     let (number, unit) = (text[..split].trim(), text[split..].trim());
     let factor = match unit.to_ascii_lowercase().as_str() {
         "" => Some(1),
@@ -28,19 +26,14 @@ pub fn memory_bytes(text: &str) -> Result<u64> {
         "m" => Some(1 << 20),
         "g" => Some(1 << 30),
         "t" => Some(1 << 40),
-        _ => UNITS
-            .iter()
-            .find(|(name, _)| name.eq_ignore_ascii_case(unit))
-            .map(|(_, n)| *n),
+        _ => UNITS.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|(_, n)| *n),
     };
     let number: Option<f64> = number.parse().ok();
     let bytes = number.zip(factor).map(|(n, f)| n * f as f64);
     match bytes {
         Some(bytes) if (0.0..9e18).contains(&bytes) => Ok(bytes as u64),
-        _ => Err(
-            Error::new(Kind::Usage, format!("this is no size: \"{text}\""))
-                .hint("write for example 4GiB"),
-        ),
+        _ => Err(Error::new(Kind::Usage, format!("this is no size: \"{text}\""))
+            .hint("write for example 4GiB")),
     }
 }
 
@@ -70,9 +63,7 @@ mod tests {
         ] {
             assert_eq!(memory_bytes(text).expect(text), bytes);
         }
-        for text in [
-            "", "GiB", "4 GiBs", "-1GiB", "1e30TiB", "nanGiB", "4 4 GiB", "infGiB",
-        ] {
+        for text in ["", "GiB", "4 GiBs", "-1GiB", "1e30TiB", "nanGiB", "4 4 GiB", "infGiB"] {
             assert!(memory_bytes(text).is_err(), "{text}");
         }
         assert_eq!(memory_words(4 << 30), "4 GiB");

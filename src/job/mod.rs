@@ -104,9 +104,7 @@ impl Means {
                 usage(format!("--set takes key=value, got \"{pair}\""))
                     .hint("for example fit.beam=150")
             })?;
-            means
-                .set(key.trim(), &parsed(value.trim()))
-                .map_err(|e| e.at("--set"))?;
+            means.set(key.trim(), &parsed(value.trim())).map_err(|e| e.at("--set"))?;
         }
         if let Some(memory) = &given.memory {
             means.memory_bytes = memory_bytes(memory).map_err(|e| e.at("--memory"))?;
@@ -134,9 +132,7 @@ impl Means {
     /// What each channel of a pass may keep, bytes: small beside the whole, and never more than is of use.
     #[must_use]
     pub fn channel_bytes(&self) -> usize {
-        usize::try_from(self.memory_bytes / 128)
-            .unwrap_or(usize::MAX)
-            .clamp(1 << 20, CHANNEL_BYTES)
+        usize::try_from(self.memory_bytes / 128).unwrap_or(usize::MAX).clamp(1 << 20, CHANNEL_BYTES)
     }
 
     fn checked(self) -> Result<Self> {
@@ -147,10 +143,7 @@ impl Means {
             )));
         }
         if self.memory_bytes < LEAST_MEMORY_BYTES {
-            let (least, got) = (
-                memory_words(LEAST_MEMORY_BYTES),
-                memory_words(self.memory_bytes),
-            );
+            let (least, got) = (memory_words(LEAST_MEMORY_BYTES), memory_words(self.memory_bytes));
             return Err(Error::new(
                 Kind::OverBudget,
                 format!("a run takes {least} at least, got \"{got}\""),
@@ -161,19 +154,13 @@ impl Means {
     }
 
     fn read(&mut self, path: &Path) -> Result<()> {
-        let len = std::fs::metadata(path)
-            .map_err(|e| unreadable(e, path))?
-            .len();
+        let len = std::fs::metadata(path).map_err(|e| unreadable(e, path))?.len();
         if len > MAX_CONFIG_BYTES {
-            return Err(usage(format!(
-                "a configuration is not that long: \"{len}\" bytes"
-            )));
+            return Err(usage(format!("a configuration is not that long: \"{len}\" bytes")));
         }
         let text = std::fs::read_to_string(path).map_err(|e| unreadable(e, path))?;
         let table: toml::Table = text.parse().map_err(|e: toml::de::Error| {
-            usage("this is not TOML")
-                .because(e.message().to_owned())
-                .at(line(&text, &e))
+            usage("this is not TOML").because(e.message().to_owned()).at(line(&text, &e))
         })?;
         for (key, value) in &table {
             match value {
@@ -226,22 +213,12 @@ impl Means {
 /// A value on the command line: TOML where it is, else a word.
 fn parsed(text: &str) -> toml::Value {
     let table = format!("v = {text}").parse::<toml::Table>();
-    table
-        .ok()
-        .and_then(|mut t| t.remove("v"))
-        .unwrap_or_else(|| toml::Value::String(text.into()))
+    table.ok().and_then(|mut t| t.remove("v")).unwrap_or_else(|| toml::Value::String(text.into()))
 }
 
 fn line(text: &str, error: &toml::de::Error) -> String {
     let start = error.span().map_or(0, |s| s.start).min(text.len());
-    format!(
-        "line {}",
-        text.as_bytes()[..start]
-            .iter()
-            .filter(|b| **b == b'\n')
-            .count()
-            + 1
-    )
+    format!("line {}", text.as_bytes()[..start].iter().filter(|b| **b == b'\n').count() + 1)
 }
 
 fn usage(what: impl Into<String>) -> Error {
@@ -259,10 +236,7 @@ mod tests {
 
     fn with(set: &[&str]) -> Result<Means> {
         let set = set.iter().map(ToString::to_string).collect();
-        Means::of(&Given {
-            set,
-            ..Given::default()
-        })
+        Means::of(&Given { set, ..Given::default() })
     }
 
     #[test]
@@ -280,10 +254,7 @@ mod tests {
         };
         let means = Means::of(&given).expect("reads");
         assert_eq!((means.memory_bytes, means.n_threads), (1 << 30, 3));
-        assert_eq!(
-            (means.settings.fit.beam, means.settings.fit.thin),
-            (99, 1.0)
-        );
+        assert_eq!((means.settings.fit.beam, means.settings.fit.thin), (99, 1.0));
         assert_eq!(means.settings.fit.plane_sigma, [0.1, 2.0]);
         assert_eq!(means.scanners, Some(dir.path().join("s.toml")));
     }
@@ -303,16 +274,8 @@ mod tests {
             assert_eq!(error.kind(), Kind::Usage, "{set}");
             assert!(error.to_string().contains(says), "{error}");
         }
-        assert_eq!(
-            with(&["memory=1MiB"]).expect_err("small").kind(),
-            Kind::OverBudget
-        );
-        assert!(
-            with(&["fit.bean=3"])
-                .expect_err("typo")
-                .to_string()
-                .contains("beam")
-        );
+        assert_eq!(with(&["memory=1MiB"]).expect_err("small").kind(), Kind::OverBudget);
+        assert!(with(&["fit.bean=3"]).expect_err("typo").to_string().contains("beam"));
     }
 
     #[test]
@@ -320,14 +283,8 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("plant.toml");
         std::fs::write(&path, "threads = 2\n[fit\n").expect("writes");
-        let given = Given {
-            config: Some(path),
-            ..Given::default()
-        };
+        let given = Given { config: Some(path), ..Given::default() };
         let error = Means::of(&given).expect_err("broken").to_string();
-        assert!(
-            error.contains("plant.toml: line 2: this is not TOML"),
-            "{error}"
-        );
+        assert!(error.contains("plant.toml: line 2: this is not TOML"), "{error}");
     }
 }

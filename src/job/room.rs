@@ -20,9 +20,7 @@ impl Room {
         let at = |e: std::io::Error| Error::from(e).at(out.display());
         if out.exists() && !out.is_dir() {
             let what = "the output path is a file, not a folder";
-            return Err(Error::new(Kind::Usage, what)
-                .at(out.display())
-                .hint("give another --out"));
+            return Err(Error::new(Kind::Usage, what).at(out.display()).hint("give another --out"));
         }
         let store = out.join("store");
         std::fs::create_dir_all(&store).map_err(at)?;
@@ -30,10 +28,7 @@ impl Room {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(at(e)),
             _ => {}
         }
-        Ok(Self {
-            out: out.to_path_buf(),
-            store,
-        })
+        Ok(Self { out: out.to_path_buf(), store })
     }
 
     /// Where results go.

@@ -91,16 +91,10 @@ settings! {
 fn unknown(key: &str) -> Error {
     let error = Error::new(Kind::Usage, format!("there is no setting \"{key}\""));
     let all = Settings::default().all();
-    let nearest = all
-        .iter()
-        .map(|(name, _)| (distance(key, name), *name))
-        .min();
+    let nearest = all.iter().map(|(name, _)| (distance(key, name), *name)).min();
     let room = key.split('.').next().unwrap_or(key);
-    let of_room: Vec<&str> = all
-        .iter()
-        .map(|(name, _)| *name)
-        .filter(|n| n.split('.').next() == Some(room))
-        .collect();
+    let of_room: Vec<&str> =
+        all.iter().map(|(name, _)| *name).filter(|n| n.split('.').next() == Some(room)).collect();
     match nearest {
         Some((d, name)) if d <= 3 => error.hint(format!("did you mean {name}")),
         _ if !of_room.is_empty() => error.hint(format!("there are {}", of_room.join(", "))),
@@ -138,9 +132,6 @@ mod tests {
 
     #[test]
     fn typing_errors_find_their_setting() {
-        assert_eq!(
-            (distance("fit.bean", "fit.beam"), distance("", "abc")),
-            (1, 3)
-        );
+        assert_eq!((distance("fit.bean", "fit.beam"), distance("", "abc")), (1, 3));
     }
 }

@@ -35,9 +35,7 @@ impl Value for f64 {
         "a number".into()
     }
     fn read(value: &Toml) -> Option<Self> {
-        let number = value
-            .as_float()
-            .or_else(|| value.as_integer().map(|v| v as f64));
+        let number = value.as_float().or_else(|| value.as_integer().map(|v| v as f64));
         number.filter(|v| v.is_finite())
     }
     fn write(&self) -> Toml {
@@ -87,11 +85,7 @@ impl<T: Value, const N: usize> Value for [T; N] {
         format!("a list of {N}, each {}", T::kind())
     }
     fn read(value: &Toml) -> Option<Self> {
-        let list: Vec<T> = value
-            .as_array()?
-            .iter()
-            .map(T::read)
-            .collect::<Option<_>>()?;
+        let list: Vec<T> = value.as_array()?.iter().map(T::read).collect::<Option<_>>()?;
         list.try_into().ok()
     }
     fn write(&self) -> Toml {
@@ -108,8 +102,7 @@ impl<T: Value> Value for Option<T> {
         T::read(value).map(Some)
     }
     fn write(&self) -> Toml {
-        self.as_ref()
-            .map_or_else(|| Toml::String("none".into()), T::write)
+        self.as_ref().map_or_else(|| Toml::String("none".into()), T::write)
     }
 }
 
@@ -117,10 +110,7 @@ impl<T: Value> Value for Option<T> {
 pub(super) fn assign<T: Value>(to: &mut T, key: &str, value: &Toml) -> Result<()> {
     *to = T::read(value).ok_or_else(|| {
         let given = value.as_str().map_or_else(|| value.to_string(), Into::into);
-        Error::new(
-            Kind::Usage,
-            format!("{key} is {}, got \"{given}\"", T::kind()),
-        )
+        Error::new(Kind::Usage, format!("{key} is {}, got \"{given}\"", T::kind()))
     })?;
     Ok(())
 }

@@ -57,14 +57,7 @@ fn short(value: f64) -> String {
         v if v >= 1e3 => (v / 1e3, " k"),
         v => return format!("{v:.0} "),
     };
-    format!(
-        "{scaled:.*}{prefix}",
-        if scaled < 10.0 {
-            2
-        } else {
-            usize::from(scaled < 100.0)
-        }
-    )
+    format!("{scaled:.*}{prefix}", if scaled < 10.0 { 2 } else { usize::from(scaled < 100.0) })
 }
 
 #[cfg(test)]

@@ -74,10 +74,7 @@ pub(super) fn write(path: &Path, entries: &[TileEntry], n_tile_bytes: u64) -> Re
         offset: e.offset,
         bounds: [e.bounds.min, e.bounds.max],
     });
-    let rows = Rows {
-        n_tile_bytes,
-        rows: rows.collect(),
-    };
+    let rows = Rows { n_tile_bytes, rows: rows.collect() };
     let archive = rkyv::to_bytes::<rkyv::rancor::Error>(&rows).map_err(|e| {
         Error::new(contract::Kind::Bug, "the catalogue cannot be archived").because(e)
     })?;
@@ -124,14 +121,8 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
     let mut entries: Vec<TileEntry> = Vec::with_capacity(rows.rows.len());
     for row in &rows.rows {
         let [scan, tile_row, col] = row.at;
-        let at = TileAt {
-            scan: ScanId(scan),
-            row: tile_row,
-            col,
-        };
-        let sorted = entries
-            .last()
-            .is_none_or(|e| (e.at, e.first_place) < (at, row.first_place));
+        let at = TileAt { scan: ScanId(scan), row: tile_row, col };
+        let sorted = entries.last().is_none_or(|e| (e.at, e.first_place) < (at, row.first_place));
         if row.offset != end || !sorted || row.n_points > rows.n_tile_bytes {
             return torn("the catalogue contradicts itself");
         }
@@ -140,10 +131,7 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
             at,
             n_points: row.n_points,
             first_place: row.first_place,
-            bounds: Aabb {
-                min: row.bounds[0],
-                max: row.bounds[1],
-            },
+            bounds: Aabb { min: row.bounds[0], max: row.bounds[1] },
             offset: row.offset,
             checksum: row.checksum,
         });
@@ -168,11 +156,7 @@ mod tests {
         (0..5)
             .map(|i| {
                 let entry = TileEntry {
-                    at: TileAt {
-                        scan: ScanId(i / 2),
-                        row: 3,
-                        col: i,
-                    },
+                    at: TileAt { scan: ScanId(i / 2), row: 3, col: i },
                     n_points: u64::from(i) * 100,
                     first_place: 7,
                     bounds: Aabb::of([[1.0, 2.0, f64::from(i)]]),
@@ -201,10 +185,7 @@ mod tests {
         for n in 0..bytes.len() {
             assert!(parse(&bytes[..n]).is_err(), "{n} bytes");
         }
-        assert!(
-            parse(&[bytes.as_slice(), &[0; 16]].concat()).is_err(),
-            "trailing zeros"
-        );
+        assert!(parse(&[bytes.as_slice(), &[0; 16]].concat()).is_err(), "trailing zeros");
         for i in 0..bytes.len() * 8 {
             let mut flipped = bytes.clone();
             flipped[i / 8] ^= 1 << (i % 8);

@@ -4,7 +4,7 @@
 //! place), pixel (u16).
 
 use super::catalogue::{ALIGN, TileEntry};
-use super::record::{Record, sorted};
+use super::record::{PixelOrder, Record};
 use super::sink::Part;
 use contract::{Map, Result, Scan, Tile, Weigh};
 use geometry::{Aabb, Pose};
@@ -35,50 +35,51 @@ impl Weigh for Encoded {
 
 impl Encode {
     pub(super) fn new(scans: &[Scan]) -> Self {
-        Self {
-            world_from_scan: scans.iter().map(|s| s.world_from_scan).collect(),
-        }
+        Self { world_from_scan: scans.iter().map(|s| s.world_from_scan).collect() }
     }
 
     fn bounds(&self, scan: u32, records: &[Record]) -> Aabb {
-        let world_from_scan = self
-            .world_from_scan
-            .get(scan as usize)
-            .copied()
-            .unwrap_or_default();
+        let world_from_scan = self.world_from_scan.get(scan as usize).copied().unwrap_or_default();
         let r = world_from_scan.rotation.to_rotation_matrix();
         let (m, t) = (r.matrix(), world_from_scan.translation.vector);
-        let mut bounds = Aabb::EMPTY;
+        // Plain comparisons: `f64::min` would spend most of the time on NaN, which no point is.
+        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for record in records {
             let p = record.xyz.map(f64::from);
-            bounds.add(std::array::from_fn(|i| {
-                m[(i, 0)] * p[0] + m[(i, 1)] * p[1] + m[(i, 2)] * p[2] + t[i]
-            }));
+            for i in 0..3 {
+                let v = m[(i, 0)] * p[0] + m[(i, 1)] * p[1] + m[(i, 2)] * p[2] + t[i];
+                min[i] = if v < min[i] { v } else { min[i] };
+                max[i] = if v > max[i] { v } else { max[i] };
+            }
         }
-        bounds
+        Aabb { min, max }
     }
 }
 
 impl Map for Encode {
     type In = Part;
     type Out = Encoded;
-    type Scratch = ();
+    type Scratch = PixelOrder;
 
-    fn apply(&self, part: Part, (): &mut ()) -> Result<Encoded> {
-        let bounds = self.bounds(part.at.scan.0, &part.records);
-        let first_place = part.records.iter().map(Record::place).min().unwrap_or(0);
-        let records = sorted(part.records);
+    fn apply(&self, part: Part, order: &mut PixelOrder) -> Result<Encoded> {
+        let mut records = part.records;
+        if !records.is_sorted_by_key(Record::place) {
+            records.sort_unstable_by_key(Record::place);
+        }
+        let bounds = self.bounds(part.at.scan.0, &records);
+        let first_place = records.first().map_or(0, Record::place);
         let n = records.len();
         let [xyz_at, place_at, pixel_at, end] = layout(n as u64).map(|v| v as usize);
         let mut bytes = vec![0; end];
-        for (to, r) in bytes[xyz_at..place_at].chunks_exact_mut(12).zip(&records) {
-            to.copy_from_slice(bytemuck::bytes_of(&r.xyz));
-        }
-        for (to, r) in bytes[place_at..pixel_at].chunks_exact_mut(4).zip(&records) {
-            to.copy_from_slice(&((r.place() - first_place) as u32).to_le_bytes());
-        }
-        for (to, r) in bytes[pixel_at..end].chunks_exact_mut(2).zip(&records) {
-            to.copy_from_slice(&r.pixel.to_le_bytes());
+        let (xyz, rest) = bytes[xyz_at..].split_at_mut(place_at);
+        let (place, pixel) = rest.split_at_mut(pixel_at - place_at);
+        order.begin(&records);
+        for r in &records {
+            let at = order.next(r);
+            xyz[12 * at..12 * at + 12].copy_from_slice(bytemuck::bytes_of(&r.xyz));
+            let less = (r.place() - first_place) as u32;
+            place[4 * at..4 * at + 4].copy_from_slice(&less.to_le_bytes());
+            pixel[2 * at..2 * at + 2].copy_from_slice(&r.pixel.to_le_bytes());
         }
         let entry = TileEntry {
             at: part.at,

@@ -1,8 +1,5 @@
 //! A file of ours in, its bytes in memory out. The only unsafe code of `src`.
-#![allow(
-    unsafe_code,
-    reason = "a memory map is unsafe by its nature; it is gathered here"
-)]
+#![allow(unsafe_code, reason = "a memory map is unsafe by its nature; it is gathered here")]
 
 use super::io_error;
 use contract::Result;
@@ -26,11 +23,7 @@ impl FileMap {
         // nobody but us has reason to change it while it is mapped.
         let map = unsafe { Mmap::map(&file) };
         let map = map.map_err(|e| io_error(path, "the tiles cannot be mapped", e))?;
-        Ok(Self {
-            map,
-            resident_bytes,
-            read_bytes: AtomicUsize::new(0),
-        })
+        Ok(Self { map, resident_bytes, read_bytes: AtomicUsize::new(0) })
     }
 
     pub(super) fn bytes(&self) -> &[u8] {
@@ -46,10 +39,7 @@ impl FileMap {
         #[cfg(unix)]
         {
             // SAFETY: the map is shared and read-only: a dropped page is read again from the file, same bytes.
-            let advised = unsafe {
-                self.map
-                    .unchecked_advise(memmap2::UncheckedAdvice::DontNeed)
-            };
+            let advised = unsafe { self.map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
             // Advice only: where the system does not take it, the pages stay until it needs them.
             let _ = advised;
         }

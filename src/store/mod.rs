@@ -71,19 +71,12 @@ impl Store {
     /// Where there is no such entry.
     pub fn tile(&self, i: usize) -> Result<Tile> {
         let entry = &self.entries[i];
-        let (start, n) = (
-            entry.offset as usize,
-            encode::layout(entry.n_points)[3] as usize,
-        );
+        let (start, n) = (entry.offset as usize, encode::layout(entry.n_points)[3] as usize);
         let bytes = &self.map.bytes()[start..start + n];
         if crc32c::crc32c(bytes) != entry.checksum {
             let at = entry.at;
-            return Err(
-                broken("the tile is damaged: its checksum is not what it should be").at(format!(
-                    "store, scan {}, tile {} {}",
-                    at.scan.0, at.row, at.col
-                )),
-            );
+            return Err(broken("the tile is damaged: its checksum is not what it should be")
+                .at(format!("store, scan {}, tile {} {}", at.scan.0, at.row, at.col)));
         }
         let tile = encode::decode(entry, bytes);
         self.map.has_read(n);
@@ -100,9 +93,7 @@ impl Store {
     /// Indices of the tiles whose bounds touch `bounds` (world, metres), ascending.
     #[must_use]
     pub fn touching(&self, bounds: &Aabb) -> Vec<usize> {
-        (0..self.entries.len())
-            .filter(|&i| self.entries[i].bounds.touches(bounds))
-            .collect()
+        (0..self.entries.len()).filter(|&i| self.entries[i].bounds.touches(bounds)).collect()
     }
 
     /// All tiles in order: a source for a pass.

@@ -21,12 +21,7 @@ impl Record {
     /// `place` must lie below 2⁴⁸ (281 000 billion points: no mask is that long).
     #[inline]
     pub(super) fn new(xyz: [f32; 3], place: u64, pixel: u16) -> Self {
-        Self {
-            xyz,
-            place_low: place as u32,
-            place_high: (place >> 32) as u16,
-            pixel,
-        }
+        Self { xyz, place_low: place as u32, place_high: (place >> 32) as u16, pixel }
     }
 
     /// Place in the mask.
@@ -36,29 +31,38 @@ impl Record {
     }
 }
 
-/// Sorts by pixel, then by place: a counting sort over pixels, since places mostly ascend already.
-pub(super) fn sorted(mut records: Vec<Record>) -> Vec<Record> {
-    if !records.is_sorted_by_key(Record::place) {
-        records.sort_unstable_by_key(Record::place);
+/// Where each record of a tile goes when they are sorted by pixel: a counting sort, which keeps the order that they
+/// have already (that of places).
+pub(super) struct PixelOrder {
+    next: Vec<u32>,
+}
+
+impl Default for PixelOrder {
+    fn default() -> Self {
+        Self { next: vec![0; 1 << 16] }
     }
-    if records.is_sorted_by_key(|r| r.pixel) {
-        return records;
+}
+
+impl PixelOrder {
+    /// Counts the records of one tile.
+    pub(super) fn begin(&mut self, records: &[Record]) {
+        self.next.fill(0);
+        for r in records {
+            self.next[usize::from(r.pixel)] += 1;
+        }
+        let mut sum = 0;
+        for n in &mut self.next {
+            sum += std::mem::replace(n, sum);
+        }
     }
-    let mut next = vec![0_u32; 1 << 16];
-    for r in &records {
-        next[usize::from(r.pixel)] += 1;
-    }
-    let mut sum = 0;
-    for n in &mut next {
-        sum += std::mem::replace(n, sum);
-    }
-    let mut out = vec![Record::zeroed(); records.len()];
-    for r in &records {
-        let at = &mut next[usize::from(r.pixel)];
-        out[*at as usize] = *r;
+
+    /// The place of the next record; to be asked once for each, in their order.
+    #[inline]
+    pub(super) fn next(&mut self, record: &Record) -> usize {
+        let at = &mut self.next[usize::from(record.pixel)];
         *at += 1;
+        *at as usize - 1
     }
-    out
 }
 
 #[cfg(test)]
@@ -67,7 +71,7 @@ mod tests {
 
     #[test]
     fn counting_sort_equals_a_sort_by_key() {
-        let mut records: Vec<Record> = (0..5000_u64)
+        let records: Vec<Record> = (0..5000_u64)
             .map(|i| {
                 let x = i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 20;
                 Record::new([x as f32, 0.0, 1.0], i << 21, (x % 700) as u16)
@@ -75,8 +79,14 @@ mod tests {
             .collect();
         let mut expected = records.clone();
         expected.sort_by_key(|r| (r.pixel, r.place()));
-        assert!(sorted(records.clone()) == expected);
-        records.reverse();
-        assert!(sorted(records) == expected);
+        let mut order = PixelOrder::default();
+        for _ in 0..2 {
+            let mut sorted = vec![Record::zeroed(); records.len()];
+            order.begin(&records);
+            for r in &records {
+                sorted[order.next(r)] = *r;
+            }
+            assert!(sorted == expected);
+        }
     }
 }

@@ -33,9 +33,7 @@ impl Scatter {
     /// For strips of these scans (all scans of a run, in their order).
     #[must_use]
     pub fn new(scans: &[Scan]) -> Self {
-        Self {
-            lattices: scans.iter().map(|s| s.lattice).collect(),
-        }
+        Self { lattices: scans.iter().map(|s| s.lattice).collect() }
     }
 }
 
@@ -47,24 +45,16 @@ impl Map for Scatter {
     fn apply(&self, strip: Strip, (): &mut ()) -> Result<Scattered> {
         let lattice = self.lattices.get(strip.scan.0 as usize).copied().flatten();
         let (runs, records) = match lattice {
-            Some(lattice) => records(&strip, |points, pixels| {
-                lattice_pixels(&lattice, points, pixels)
-            }),
+            Some(lattice) => {
+                records(&strip, |points, pixels| lattice_pixels(&lattice, points, pixels))
+            }
             None => records(&strip, ground_pixels),
         };
         if runs.len() * SHORT_RUN > records.len() {
             let (runs, records) = grouped(&runs, &records);
-            return Ok(Scattered {
-                scan: strip.scan,
-                runs,
-                records,
-            });
+            return Ok(Scattered { scan: strip.scan, runs, records });
         }
-        Ok(Scattered {
-            scan: strip.scan,
-            runs,
-            records,
-        })
+        Ok(Scattered { scan: strip.scan, runs, records })
     }
 }
 
@@ -109,16 +99,10 @@ fn lattice_pixels(lattice: &Lattice, points: &[[f32; 3]], pixels: &mut [Pixel; B
 fn ground_pixels(points: &[[f32; 3]], pixels: &mut [Pixel; BLOCK]) {
     let offset = Tile::GROUND_OFFSET * i64::from(TILE_SIDE);
     // Saturating, so that no coordinate panics; ingest has dropped what is not a place on a site.
-    let cell = |v: f32| {
-        ((v / Tile::GROUND_CELL).floor() as i64)
-            .saturating_add(offset)
-            .max(0) as u32
-    };
+    let cell =
+        |v: f32| ((v / Tile::GROUND_CELL).floor() as i64).saturating_add(offset).max(0) as u32;
     for (p, pixel) in points.iter().zip(pixels) {
-        *pixel = Pixel {
-            row: cell(p[1]),
-            col: cell(p[0]),
-        };
+        *pixel = Pixel { row: cell(p[1]), col: cell(p[0]) };
     }
 }
 
@@ -144,22 +128,13 @@ fn records(
                 (last, start) = (tile, records.len() + at);
             }
         }
-        records.extend(
-            points
-                .iter()
-                .zip(places)
-                .zip(&pixels)
-                .map(|((p, place), pixel)| {
-                    let within = (pixel.row % TILE_SIDE) * TILE_SIDE + pixel.col % TILE_SIDE;
-                    Record::new(*p, strip.first_place + u64::from(*place), within as u16)
-                }),
-        );
+        records.extend(points.iter().zip(places).zip(&pixels).map(|((p, place), pixel)| {
+            let within = (pixel.row % TILE_SIDE) * TILE_SIDE + pixel.col % TILE_SIDE;
+            Record::new(*p, strip.first_place + u64::from(*place), within as u16)
+        }));
     }
     if records.len() > start {
-        runs.push(Run {
-            tile: last,
-            n: records.len() - start,
-        });
+        runs.push(Run { tile: last, n: records.len() - start });
     }
     (runs, records)
 }

@@ -92,20 +92,12 @@ impl TileSink {
             start += run.n;
         }
         self.n_points += strip.records.len() as u64;
-        if self.bytes > self.budget_bytes {
-            self.spill_half()
-        } else {
-            Ok(())
-        }
+        if self.bytes > self.budget_bytes { self.spill_half() } else { Ok(()) }
     }
 
     fn place(&mut self, scan: u32, tile: [u32; 2]) -> usize {
         *self.places.entry((scan, tile)).or_insert_with(|| {
-            let at = TileAt {
-                scan: contract::ScanId(scan),
-                row: tile[0],
-                col: tile[1],
-            };
+            let at = TileAt { scan: contract::ScanId(scan), row: tile[0], col: tile[1] };
             self.buffers.push(Buffer {
                 at,
                 records: Vec::new(),
@@ -124,9 +116,8 @@ impl TileSink {
             self.spill = Some(Spill::create(&self.dir)?);
         }
         let spill = self.spill.as_mut().expect("just made");
-        let mut order: Vec<usize> = (0..self.buffers.len())
-            .filter(|&i| !self.buffers[i].records.is_empty())
-            .collect();
+        let mut order: Vec<usize> =
+            (0..self.buffers.len()).filter(|&i| !self.buffers[i].records.is_empty()).collect();
         order.sort_by_key(|&i| std::cmp::Reverse(self.buffers[i].records.len()));
         for i in order {
             if self.bytes * 2 <= self.budget_bytes {
@@ -142,14 +133,7 @@ impl TileSink {
 
     /// Writes all tiles and the catalogue, and opens the store. `open_bytes` as in [`Store::open`].
     pub fn finish(self, engine: &Engine, open_bytes: usize) -> Result<Store> {
-        let Self {
-            dir,
-            encode,
-            mut buffers,
-            spill,
-            n_points,
-            ..
-        } = self;
+        let Self { dir, encode, mut buffers, spill, n_points, .. } = self;
         buffers.sort_by_key(|b| b.at);
         let task = Task::new("store").of(Amount::points(n_points));
         let path = dir.join(TILES);
@@ -158,11 +142,7 @@ impl TileSink {
         file.write_all(&catalogue::tiles_header()).map_err(failed)?;
         let mut offset = catalogue::HEADER_BYTES;
         let mut entries: Vec<TileEntry> = Vec::new();
-        let parts = Parts {
-            buffers: buffers.into_iter(),
-            spill,
-            current: None,
-        };
+        let parts = Parts { buffers: buffers.into_iter(), spill, current: None };
         engine.pass(task, parts, |flow| {
             flow.map(&encode).for_each(|Encoded { mut entry, bytes }| {
                 entry.offset = offset;
@@ -246,20 +226,9 @@ impl Parts {
     }
 
     fn begin(buffer: Buffer, spill: &mut Option<Spill>) -> Result<Current> {
-        let Buffer {
-            at,
-            records,
-            segments,
-            ascending,
-            n_points,
-            ..
-        } = buffer;
-        let mut current = Current {
-            at,
-            segments: segments.into_iter(),
-            last: records,
-            ahead: Vec::new(),
-        };
+        let Buffer { at, records, segments, ascending, n_points, .. } = buffer;
+        let mut current =
+            Current { at, segments: segments.into_iter(), last: records, ahead: Vec::new() };
         if !ascending && n_points > TILE_POINTS {
             // Rare: points out of order, and too many. Their order decides where parts are cut.
             current.fill(usize::MAX, spill)?;
@@ -294,10 +263,7 @@ impl Current {
         let mut n = self.ahead.len().min(TILE_POINTS);
         let span = |r: &[Record]| {
             let places = || r.iter().map(Record::place);
-            places()
-                .max()
-                .zip(places().min())
-                .map_or(0, |(max, min)| max - min)
+            places().max().zip(places().min()).map_or(0, |(max, min)| max - min)
         };
         if span(&self.ahead[..n]) > u64::from(u32::MAX) {
             self.ahead.sort_unstable_by_key(Record::place);

@@ -27,11 +27,7 @@ impl Spill {
     pub(super) fn create(dir: &Path) -> Result<Self> {
         let file = tempfile::tempfile_in(dir)
             .map_err(|e| io_error(dir, "a spill file cannot be made", e))?;
-        Ok(Self {
-            dir: dir.to_owned(),
-            file,
-            len: 0,
-        })
+        Ok(Self { dir: dir.to_owned(), file, len: 0 })
     }
 
     /// Bytes written.
@@ -44,10 +40,7 @@ impl Spill {
         self.file
             .write_all(bytes)
             .map_err(|e| io_error(&self.dir, "the spill file cannot be written", e))?;
-        let segment = Segment {
-            offset: self.len,
-            n: records.len(),
-        };
+        let segment = Segment { offset: self.len, n: records.len() };
         self.len += bytes.len() as u64;
         Ok(segment)
     }

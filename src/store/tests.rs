@@ -31,11 +31,7 @@ fn scan(id: u32, lattice: Option<Lattice>) -> Scan {
 fn scans() -> Vec<Scan> {
     let mut turned = Lattice::new(0.003, 0.002, 0.1, 0.2);
     turned.lattice_from_scan = nalgebra::UnitQuaternion::from_euler_angles(1.2, 0.1, 0.0);
-    vec![
-        scan(0, Some(Lattice::new(0.004, 0.003, 0.0, 0.0))),
-        scan(1, Some(turned)),
-        scan(2, None),
-    ]
+    vec![scan(0, Some(Lattice::new(0.004, 0.003, 0.0, 0.0))), scan(1, Some(turned)), scan(2, None)]
 }
 
 /// A room, scanned in rows or shuffled; every seventh place is a gap.
@@ -43,17 +39,10 @@ fn strip(scan: u32, from: usize, to: usize) -> Strip {
     let xyz = (from..to)
         .map(|i| {
             let i = i as u64;
-            let a = if scan == 1 {
-                noise(i)
-            } else {
-                (i / 200) as f32 / 300.0
-            } * std::f32::consts::TAU;
-            let e = if scan == 1 {
-                noise(i + 7_000_000)
-            } else {
-                (i % 200) as f32 / 200.0
-            } * 2.0
-                - 1.0;
+            let a =
+                if scan == 1 { noise(i) } else { (i / 200) as f32 / 300.0 } * std::f32::consts::TAU;
+            let e =
+                if scan == 1 { noise(i + 7_000_000) } else { (i % 200) as f32 / 200.0 } * 2.0 - 1.0;
             let r = 3.0 + noise(i + 99_000_000);
             [r * e.cos() * a.cos(), r * e.cos() * a.sin(), r * e.sin()]
         })
@@ -63,9 +52,7 @@ fn strip(scan: u32, from: usize, to: usize) -> Strip {
         scan: ScanId(scan),
         mask: MaskId(scan),
         first_place: place(from),
-        place: (from..to)
-            .map(|i| (place(i) - place(from)) as u32)
-            .collect(),
+        place: (from..to).map(|i| (place(i) - place(from)) as u32).collect(),
         xyz,
         attributes: None,
     }
@@ -83,18 +70,14 @@ fn build(dir: &Path, strips: Vec<Strip>, budget_bytes: usize, n_workers: usize) 
     let mut sink = Store::create(dir, &scans, budget_bytes).expect("begins");
     let scatter = Scatter::new(&scans);
     engine
-        .pass("read", strips.into_iter().map(Ok), |f| {
-            f.map(&scatter).for_each(|s| sink.add(&s))
-        })
+        .pass("read", strips.into_iter().map(Ok), |f| f.map(&scatter).for_each(|s| sink.add(&s)))
         .expect("fills");
     let spilled = sink.spilled_bytes();
     (sink.finish(&engine, 1 << 16).expect("finishes"), spilled)
 }
 
 fn files(dir: &Path) -> Vec<Vec<u8>> {
-    [CATALOGUE, TILES]
-        .map(|name| std::fs::read(dir.join(name)).expect("a file"))
-        .into()
+    [CATALOGUE, TILES].map(|name| std::fs::read(dir.join(name)).expect("a file")).into()
 }
 
 #[test]
@@ -103,11 +86,9 @@ fn strips_spill_and_threads_do_not_change_a_byte() {
     let (store, spilled) = build(first.path(), strips(7000), usize::MAX, 1);
     assert_eq!((store.n_points(), spilled), (3 * SCAN_POINTS as u64, 0));
     let expected = files(first.path());
-    for (n, budget, n_workers, reversed) in [
-        (500, 300_000, 2, false),
-        (7000, 1, 4, false),
-        (333, 1_000_000, 1, true),
-    ] {
+    for (n, budget, n_workers, reversed) in
+        [(500, 300_000, 2, false), (7000, 1, 4, false), (333, 1_000_000, 1, true)]
+    {
         let dir = tempfile::tempdir().expect("a folder");
         let mut strips = strips(n);
         if reversed {
@@ -115,10 +96,7 @@ fn strips_spill_and_threads_do_not_change_a_byte() {
         }
         let (_, spilled) = build(dir.path(), strips, budget, n_workers);
         assert!(spilled > 0);
-        assert!(
-            files(dir.path()) == expected,
-            "{n} points a strip, {budget} bytes"
-        );
+        assert!(files(dir.path()) == expected, "{n} points a strip, {budget} bytes");
         // No temporary file is left.
         assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 2);
     }
@@ -142,10 +120,7 @@ fn every_point_is_in_its_tile_with_its_place() {
         assert!(keys.is_sorted());
         for k in 0..tile.len() {
             let place = (tile.first_place + u64::from(tile.place[k])) as u32;
-            let at = wholes[s]
-                .place
-                .binary_search(&place)
-                .expect("a place of the input");
+            let at = wholes[s].place.binary_search(&place).expect("a place of the input");
             assert!(wholes[s].xyz[at] == tile.xyz[k]);
             let world =
                 scans[s].world_from_scan * nalgebra::Point3::from(tile.xyz[k].map(f64::from));
@@ -156,25 +131,11 @@ fn every_point_is_in_its_tile_with_its_place() {
         }
     }
     assert_eq!(seen, [SCAN_POINTS; 3]);
-    let nowhere = TileAt {
-        scan: ScanId(9),
-        row: 0,
-        col: 0,
-    };
+    let nowhere = TileAt { scan: ScanId(9), row: 0, col: 0 };
     assert!(store.find(nowhere).is_empty());
-    let all = Aabb {
-        min: [-100.0; 3],
-        max: [100.0; 3],
-    };
+    let all = Aabb { min: [-100.0; 3], max: [100.0; 3] };
     assert_eq!(store.touching(&all).len(), store.entries().len());
-    assert!(
-        store
-            .touching(&Aabb {
-                min: [50.0; 3],
-                max: [60.0; 3]
-            })
-            .is_empty()
-    );
+    assert!(store.touching(&Aabb { min: [50.0; 3], max: [60.0; 3] }).is_empty());
 }
 
 #[test]
@@ -187,10 +148,7 @@ fn ground_squares_of_a_scan_without_lattice() {
         for k in 0..tile.len() {
             let at = tile.pixel_at(k);
             let cell = |v: f32| ((v / Tile::GROUND_CELL).floor() as i64 + offset) as u32;
-            assert_eq!(
-                (at.row, at.col),
-                (cell(tile.xyz[k][1]), cell(tile.xyz[k][0]))
-            );
+            assert_eq!((at.row, at.col), (cell(tile.xyz[k][1]), cell(tile.xyz[k][0])));
         }
     }
 }
@@ -209,10 +167,8 @@ fn a_crowded_tile_comes_in_parts() {
     // One far place: no tile may span 2³² places.
     let mut far = crowd(0, 1);
     far.first_place = 1 << 33;
-    let mut strips: Vec<Strip> = (0..n)
-        .step_by(1 << 16)
-        .map(|i| crowd(i, (i + (1 << 16)).min(n)))
-        .collect();
+    let mut strips: Vec<Strip> =
+        (0..n).step_by(1 << 16).map(|i| crowd(i, (i + (1 << 16)).min(n))).collect();
     strips.push(far);
     let mut expected = Vec::new();
     for (budget, reversed) in [(usize::MAX, false), (1 << 20, false), (10 << 20, true)] {
@@ -221,19 +177,8 @@ fn a_crowded_tile_comes_in_parts() {
             strips.reverse();
         }
         let (store, _) = build(dir.path(), strips.clone(), budget, 2);
-        let sizes: Vec<_> = store
-            .entries()
-            .iter()
-            .map(|e| (e.n_points, e.first_place))
-            .collect();
-        assert_eq!(
-            sizes,
-            [
-                (TILE_POINTS as u64, 0),
-                (1000, TILE_POINTS as u64),
-                (1, 1 << 33)
-            ]
-        );
+        let sizes: Vec<_> = store.entries().iter().map(|e| (e.n_points, e.first_place)).collect();
+        assert_eq!(sizes, [(TILE_POINTS as u64, 0), (1000, TILE_POINTS as u64), (1, 1 << 33)]);
         assert_eq!(store.find(store.entries()[0].at), 0..3);
         let files = files(dir.path());
         if expected.is_empty() {
@@ -250,20 +195,12 @@ fn damage_is_named() {
     let (store, _) = build(dir.path(), strips(9000), usize::MAX, 1);
     drop(store);
     let tiles = dir.path().join(TILES);
-    let mut file = std::fs::OpenOptions::new()
-        .write(true)
-        .open(&tiles)
-        .expect("a file");
-    file.seek(SeekFrom::Start(1000))
-        .and_then(|_| file.write_all(&[0xab]))
-        .expect("writes");
+    let mut file = std::fs::OpenOptions::new().write(true).open(&tiles).expect("a file");
+    file.seek(SeekFrom::Start(1000)).and_then(|_| file.write_all(&[0xab])).expect("writes");
     let store = Store::open(dir.path(), 1 << 20).expect("opens");
     let error = store.tile(0).expect_err("damaged");
     assert_eq!(error.kind(), Kind::BadInput);
-    assert!(
-        error.to_string().starts_with("store, scan 0, tile"),
-        "{error}"
-    );
+    assert!(error.to_string().starts_with("store, scan 0, tile"), "{error}");
     assert!(store.tile(1).is_ok());
     drop(store);
     file.set_len(5000).expect("cuts");

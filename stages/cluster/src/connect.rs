@@ -51,11 +51,7 @@ fn cut(voxels: &[Counted], reach: i32) -> (Vec<Row>, Vec<Run>, Vec<u32>) {
     for &([x, y, z], _) in voxels {
         let same_row = rows.last().is_some_and(|r| r.z == z && r.y == y);
         if !same_row {
-            rows.push(Row {
-                z,
-                y,
-                runs: runs.len()..runs.len(),
-            });
+            rows.push(Row { z, y, runs: runs.len()..runs.len() });
         }
         match runs.last_mut() {
             Some(run) if same_row && x.saturating_sub(run.last) <= reach => run.last = x,

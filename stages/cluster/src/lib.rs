@@ -22,12 +22,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            gap: 1,
-            clearance: 0.012,
-            slack: 0.15,
-            min_points: 10,
-        }
+        Self { gap: 1, clearance: 0.012, slack: 0.15, min_points: 10 }
     }
 }
 

@@ -7,10 +7,7 @@ use geometry::{Plane, Vector};
 fn occupancy(mut voxels: Vec<Voxel>) -> Occupancy {
     voxels.sort_by_key(|v| (v[2], v[1], v[0]));
     voxels.dedup();
-    Occupancy {
-        edge: 0.05,
-        voxels: voxels.into_iter().map(|v| (v, 20)).collect(),
-    }
+    Occupancy { edge: 0.05, voxels: voxels.into_iter().map(|v| (v, 20)).collect() }
 }
 
 fn cube(at: Voxel, side: i32) -> Vec<Voxel> {
@@ -30,21 +27,9 @@ fn floor(height: impl Fn(f64, f64) -> f64) -> Floor {
             heights.push(([i, j], height(f64::from(i) + 0.5, f64::from(j) + 0.5)));
         }
     }
-    let plane = Plane {
-        normal: Vector::z(),
-        offset: 0.0,
-    };
-    let level = FloorLevel {
-        plane,
-        waviness: 0.005,
-        area: 400.0,
-        cell: 1.0,
-        heights,
-    };
-    Floor {
-        levels: vec![level],
-        planes: Vec::new(),
-    }
+    let plane = Plane { normal: Vector::z(), offset: 0.0 };
+    let level = FloorLevel { plane, waviness: 0.005, area: 400.0, cell: 1.0, heights };
+    Floor { levels: vec![level], planes: Vec::new() }
 }
 
 /// Sets by comparing every pair: slow, but nobody doubts it.
@@ -73,26 +58,20 @@ fn by_pairs(voxels: &[Counted], reach: i32) -> Vec<usize> {
 fn sets_are_those_of_all_pairs() {
     let mut state = 7_u64;
     let mut random = |n: u64| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((state >> 33) % n) as i32
     };
     for (round, gap) in [(0, 0), (1, 1), (2, 2), (3, 1), (4, 0)] {
         let spread = [9, 14, 20, 12, 7][round];
-        let voxels = (0..150)
-            .map(|_| [random(spread) - 4, random(spread), random(spread) - 9])
-            .collect();
+        let voxels =
+            (0..150).map(|_| [random(spread) - 4, random(spread), random(spread) - 9]).collect();
         let occupancy = occupancy(voxels);
         let got = connect::connect(&occupancy.voxels, gap);
         let expected = by_pairs(&occupancy.voxels, gap + 1);
         for i in 0..got.len() {
             for j in 0..i {
-                assert_eq!(
-                    got[i] == got[j],
-                    expected[i] == expected[j],
-                    "round {round}: {i} {j}"
-                );
+                assert_eq!(got[i] == got[j], expected[i] == expected[j], "round {round}: {i} {j}");
             }
         }
     }
@@ -114,12 +93,7 @@ fn two_boxes_on_a_wavy_floor_are_two_clusters_and_the_floor_is_none() {
     voxels.extend(cube([20, 20, -30], 6));
     voxels.push([20, 33, 6]);
     let got = split(&occupancy(voxels), &floor(wave), &Settings::default());
-    assert_eq!(
-        got.len(),
-        2,
-        "{:?}",
-        got.iter().map(|c| c.bounds).collect::<Vec<_>>()
-    );
+    assert_eq!(got.len(), 2, "{:?}", got.iter().map(|c| c.bounds).collect::<Vec<_>>());
     assert!(got[0].n_points > got[1].n_points && got[0].id == 0 && got[1].id == 1);
     assert!(got[0].voxels.contains(&[20, 33, 6]));
     assert!(got[0].voxels.len() >= 12 * 12 * 10 && got[1].voxels.len() >= 8 * 8 * 6);
@@ -131,21 +105,7 @@ fn two_boxes_on_a_wavy_floor_are_two_clusters_and_the_floor_is_none() {
 
 #[test]
 fn without_floor_everything_is_kept_and_nothing_gives_nothing() {
-    let got = split(
-        &occupancy(cube([-3, -3, -3], 5)),
-        &Floor::default(),
-        &Settings::default(),
-    );
-    assert_eq!(
-        (got.len(), got[0].voxels.len(), got[0].n_points),
-        (1, 125, 2500)
-    );
-    assert!(
-        split(
-            &Occupancy::default(),
-            &floor(|_, _| 0.0),
-            &Settings::default()
-        )
-        .is_empty()
-    );
+    let got = split(&occupancy(cube([-3, -3, -3], 5)), &Floor::default(), &Settings::default());
+    assert_eq!((got.len(), got[0].voxels.len(), got[0].n_points), (1, 125, 2500));
+    assert!(split(&Occupancy::default(), &floor(|_, _| 0.0), &Settings::default()).is_empty());
 }

@@ -40,7 +40,8 @@ impl ResidualVoxel {
     pub fn join(&mut self, other: &Self) {
         self.n_residual = self.n_residual.saturating_add(other.n_residual);
         self.n_link = self.n_link.saturating_add(other.n_link);
-        let closer = other.distance.total_cmp(&self.distance).then(other.nearest.cmp(&self.nearest));
+        let closer =
+            other.distance.total_cmp(&self.distance).then(other.nearest.cmp(&self.nearest));
         if closer.is_lt() {
             self.distance = other.distance;
             self.nearest = other.nearest;

@@ -32,11 +32,7 @@ impl AtomicFile {
             .truncate(true)
             .open(&part)
             .map_err(|e| refused("file cannot be made", &part, e))?;
-        Ok(Self {
-            file: Some(file),
-            part,
-            path,
-        })
+        Ok(Self { file: Some(file), part, path })
     }
 
     /// The name that it will have.
@@ -48,9 +44,7 @@ impl AtomicFile {
     /// Brings the bytes to disk, then gives the file its name, replacing what had it.
     pub fn commit(mut self) -> Result<()> {
         let file = self.file.take().expect("taken only here and on drop");
-        let done = file
-            .sync_all()
-            .and_then(|()| std::fs::rename(&self.part, &self.path));
+        let done = file.sync_all().and_then(|()| std::fs::rename(&self.part, &self.path));
         done.map_err(|e| refused("file cannot be finished", &self.path, e))?;
         // The new name itself must survive a power cut; where folders cannot be opened (Windows) it does anyway.
         if let Some(folder) = self.path.parent().and_then(|f| File::open(f).ok()) {
@@ -67,8 +61,7 @@ impl AtomicFile {
 /// Writes a whole file at once.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
-    file.write_all(bytes)
-        .map_err(|e| refused("file cannot be written", path, e))?;
+    file.write_all(bytes).map_err(|e| refused("file cannot be written", path, e))?;
     file.commit()
 }
 
@@ -78,19 +71,12 @@ pub(crate) fn refused(what: &str, path: &Path, source: std::io::Error) -> Error 
     let error = Error::new(if full { Kind::OverBudget } else { Kind::Io }, what)
         .because(source)
         .at(path.display());
-    if full {
-        error.hint("make room on the disk, or choose another --out")
-    } else {
-        error
-    }
+    if full { error.hint("make room on the disk, or choose another --out") } else { error }
 }
 
 /// The name of a file while it is not yet whole.
 pub(crate) fn part_of(path: &Path) -> PathBuf {
-    let mut name = path
-        .file_name()
-        .map(std::ffi::OsStr::to_os_string)
-        .unwrap_or_default();
+    let mut name = path.file_name().map(std::ffi::OsStr::to_os_string).unwrap_or_default();
     name.push(".");
     name.push(PART);
     path.with_file_name(name)

@@ -48,11 +48,7 @@ impl Canvas {
     /// White paper.
     #[must_use]
     pub fn new(width: usize, height: usize) -> Self {
-        Self {
-            width,
-            height,
-            pixels: vec![WHITE; width * height],
-        }
+        Self { width, height, pixels: vec![WHITE; width * height] }
     }
 
     /// Width, pixels.
@@ -97,22 +93,13 @@ impl Canvas {
     /// Writes words, `size` times 8 pixels high, on a white ground; what the font lacks becomes a question mark.
     pub fn text(&mut self, x: i64, y: i64, size: i64, color: Rgb, words: &str) {
         let n = words.chars().count() as i64;
-        self.fill(
-            x - size,
-            y - size,
-            n * 8 * size + 2 * size,
-            10 * size,
-            WHITE,
-        );
+        self.fill(x - size, y - size, n * 8 * size + 2 * size, 10 * size, WHITE);
         for (i, letter) in words.chars().enumerate() {
-            let glyph = [
-                &font8x8::BASIC_FONTS.get(letter),
-                &font8x8::LATIN_FONTS.get(letter),
-            ]
-            .into_iter()
-            .find_map(|g| *g)
-            .or_else(|| font8x8::BASIC_FONTS.get('?'))
-            .unwrap_or_default();
+            let glyph = [&font8x8::BASIC_FONTS.get(letter), &font8x8::LATIN_FONTS.get(letter)]
+                .into_iter()
+                .find_map(|g| *g)
+                .or_else(|| font8x8::BASIC_FONTS.get('?'))
+                .unwrap_or_default();
             for (v, row) in glyph.iter().enumerate() {
                 for u in (0..8).filter(|u| row >> u & 1 == 1) {
                     self.fill(
@@ -131,11 +118,7 @@ impl Canvas {
     pub fn paste(&mut self, x: i64, y: i64, other: &Self) {
         for v in 0..other.height {
             for u in 0..other.width {
-                self.set(
-                    x + u as i64,
-                    y + v as i64,
-                    other.pixels[v * other.width + u],
-                );
+                self.set(x + u as i64, y + v as i64, other.pixels[v * other.width + u]);
             }
         }
     }
@@ -143,18 +126,14 @@ impl Canvas {
     /// Writes a PNG.
     pub fn write(&self, path: &Path) -> Result<()> {
         let failed = |e: png::EncodingError| {
-            Error::new(Kind::Bug, "picture does not encode")
-                .because(e)
-                .at(path.display())
+            Error::new(Kind::Bug, "picture does not encode").because(e).at(path.display())
         };
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header().map_err(failed)?;
-        writer
-            .write_image_data(self.pixels.as_flattened())
-            .map_err(failed)?;
+        writer.write_image_data(self.pixels.as_flattened()).map_err(failed)?;
         writer.finish().map_err(failed)?;
         atomic::write(path, &bytes)
     }

@@ -30,12 +30,7 @@ impl CloudsSettings {
     /// Tiles of 10 m and clouds apart, with 64 MiB of waiting records.
     #[must_use]
     pub fn new(las: LasSettings) -> Self {
-        Self {
-            las,
-            tile_edge: Some(10.0),
-            apart: true,
-            memory: 64 << 20,
-        }
+        Self { las, tile_edge: Some(10.0), apart: true, memory: 64 << 20 }
     }
 }
 
@@ -95,51 +90,28 @@ impl Clouds {
     #[inline]
     pub fn push(&mut self, point: &LasPoint, kind: PointKind) -> Result<()> {
         let moves = matches!(kind, PointKind::Link | PointKind::Attachment);
-        if let Some(cloud) = if moves {
-            &mut self.robots
-        } else {
-            &mut self.fixed
-        } {
+        if let Some(cloud) = if moves { &mut self.robots } else { &mut self.fixed } {
             cloud.push(point)?;
         }
         let Some(edge) = self.settings.tile_edge else {
             return Ok(());
         };
-        let at = [
-            floor_i32(point.xyz[1] / edge),
-            floor_i32(point.xyz[0] / edge),
-        ];
+        let at = [floor_i32(point.xyz[1] / edge), floor_i32(point.xyz[0] / edge)];
         let spool = self.tiles.entry(at).or_insert_with(|| {
-            let ending = if self.settings.las.compress {
-                "laz"
-            } else {
-                "las"
-            };
+            let ending = if self.settings.las.compress { "laz" } else { "las" };
             Spool::new(self.out.join(format!("tiles/{}_{}.{ending}", at[1], at[0])))
         });
         let before = spool.records.len();
-        encode(
-            point,
-            &self.settings.las,
-            &mut spool.extent,
-            &mut spool.records,
-        )
-        .map_err(|e| e.at(spool.path.display()))?;
+        encode(point, &self.settings.las, &mut spool.extent, &mut spool.records)
+            .map_err(|e| e.at(spool.path.display()))?;
         self.waiting += spool.records.len() - before;
-        if self.waiting >= self.settings.memory {
-            self.relieve()
-        } else {
-            Ok(())
-        }
+        if self.waiting >= self.settings.memory { self.relieve() } else { Ok(()) }
     }
 
     /// Appends the fullest tiles to their files until half of the memory is free.
     fn relieve(&mut self) -> Result<()> {
-        let mut fullest: Vec<([i32; 2], usize)> = self
-            .tiles
-            .iter()
-            .map(|(at, s)| (*at, s.records.len()))
-            .collect();
+        let mut fullest: Vec<([i32; 2], usize)> =
+            self.tiles.iter().map(|(at, s)| (*at, s.records.len())).collect();
         fullest.sort_by_key(|(at, n)| (std::cmp::Reverse(*n), *at));
         for (at, _) in fullest {
             if self.waiting <= self.settings.memory / 2 {
@@ -157,24 +129,14 @@ impl Clouds {
 
     /// Finishes all files.
     pub fn finish(self) -> Result<Written> {
-        let Self {
-            settings,
-            tiles,
-            robots,
-            fixed,
-            ..
-        } = self;
+        let Self { settings, tiles, robots, fixed, .. } = self;
         let robots = robots.map(LasWriter::finish).transpose()?;
         let fixed = fixed.map(LasWriter::finish).transpose()?;
         let mut written = Vec::new();
         for (_, spool) in tiles {
             written.push(spool.finish(&settings.las)?);
         }
-        Ok(Written {
-            tiles: written,
-            robots,
-            fixed,
-        })
+        Ok(Written { tiles: written, robots, fixed })
     }
 }
 
@@ -191,13 +153,7 @@ struct Spool {
 impl Spool {
     fn new(path: PathBuf) -> Self {
         let part = part_of(&path.with_extension("records"));
-        Self {
-            path,
-            part,
-            records: Vec::new(),
-            extent: Extent::default(),
-            is_begun: false,
-        }
+        Self { path, part, records: Vec::new(), extent: Extent::default(), is_begun: false }
     }
 
     fn append(&mut self, las: &LasSettings) -> Result<()> {
@@ -212,8 +168,7 @@ impl Spool {
         };
         let mut file = options.open(&self.part).map_err(failed)?;
         if begin && !las.compress {
-            file.write_all(&head(las, &Extent::default())?)
-                .map_err(failed)?;
+            file.write_all(&head(las, &Extent::default())?).map_err(failed)?;
         }
         file.write_all(&self.records).map_err(failed)?;
         self.records.clear();
@@ -223,25 +178,18 @@ impl Spool {
 
     fn finish(mut self, las: &LasSettings) -> Result<LasSummary> {
         self.append(las)?;
-        if las.compress {
-            self.compress(las)
-        } else {
-            self.seal(las)
-        }
+        if las.compress { self.compress(las) } else { self.seal(las) }
     }
 
     /// Writes the header and gives the file its name.
     fn seal(&self, las: &LasSettings) -> Result<LasSummary> {
         let head = head(las, &self.extent)?;
-        let sealed = OpenOptions::new()
-            .write(true)
-            .open(&self.part)
-            .and_then(|mut file| {
-                file.seek(SeekFrom::Start(0))?;
-                file.write_all(&head)?;
-                file.sync_all()?;
-                std::fs::rename(&self.part, &self.path)
-            });
+        let sealed = OpenOptions::new().write(true).open(&self.part).and_then(|mut file| {
+            file.seek(SeekFrom::Start(0))?;
+            file.write_all(&head)?;
+            file.sync_all()?;
+            std::fs::rename(&self.part, &self.path)
+        });
         sealed.map_err(|e| refused("tile cannot be finished", &self.path, e))?;
         Ok(LasSummary {
             path: self.path.clone(),

@@ -56,12 +56,7 @@ impl E57Scans {
             &guid(&path.file_name().unwrap_or_default().to_string_lossy(), 0),
         )
         .map_err(|e| failed(e, &path))?;
-        Ok(Self {
-            writer,
-            file,
-            path,
-            n_scans: 0,
-        })
+        Ok(Self { writer, file, path, n_scans: 0 })
     }
 
     /// Appends a scan; points are taken one by one, in any order. Returns how many were written.
@@ -76,25 +71,13 @@ impl E57Scans {
             .writer
             .add_pointcloud(&guid(&scan.name, self.n_scans as u64), prototype(scan))
             .map_err(failed)?;
-        let (p, q) = (
-            scan.world_from_scan.translation,
-            scan.world_from_scan.rotation,
-        );
+        let (p, q) = (scan.world_from_scan.translation, scan.world_from_scan.rotation);
         cloud.set_name(Some(scan.name.clone()));
         cloud.set_sensor_vendor(Some("stillpoint".into()));
         cloud.set_sensor_model(Some("virtual scanner".into()));
         cloud.set_transform(Some(Transform {
-            rotation: Quaternion {
-                w: q.w,
-                x: q.i,
-                y: q.j,
-                z: q.k,
-            },
-            translation: Translation {
-                x: p.x,
-                y: p.y,
-                z: p.z,
-            },
+            rotation: Quaternion { w: q.w, x: q.i, y: q.j, z: q.k },
+            translation: Translation { x: p.x, y: p.y, z: p.z },
         }));
         cloud.set_intensity_limits(Some(IntensityLimits {
             intensity_min: Some(RecordValue::Integer(0)),
@@ -132,27 +115,18 @@ impl E57Scans {
 
     /// Writes the index and gives the file its name.
     pub fn finish(self) -> Result<()> {
-        let Self {
-            mut writer,
-            file,
-            path,
-            ..
-        } = self;
+        let Self { mut writer, file, path, .. } = self;
         writer.finalize().map_err(|e| failed(e, &path))?;
         drop(writer);
         let file = Arc::into_inner(file).and_then(|file| file.into_inner().ok());
         let mut file = file.expect("the writer held the only other handle, and is gone");
-        file.settle()
-            .map_err(|e| refused("scans cannot be finished", &path, e))?;
+        file.settle().map_err(|e| refused("scans cannot be finished", &path, e))?;
         file.file.commit()
     }
 }
 
 fn prototype(scan: &GridScan) -> Vec<Record> {
-    let single = RecordDataType::Single {
-        min: None,
-        max: None,
-    };
+    let single = RecordDataType::Single { min: None, max: None };
     let integer = |max: i64| RecordDataType::Integer { min: 0, max };
     let last = |n: u32| i64::from(n.max(1)) - 1;
     [
@@ -170,9 +144,7 @@ fn prototype(scan: &GridScan) -> Vec<Record> {
 }
 
 fn failed(e: e57::Error, path: &Path) -> Error {
-    Error::new(Kind::Io, "e57 file cannot be written")
-        .because(e)
-        .at(path.display())
+    Error::new(Kind::Io, "e57 file cannot be written").because(e).at(path.display())
 }
 
 /// An identifier made of a name and a number (128 bits of FNV-1a): unique in the file, the same every time.
@@ -182,14 +154,7 @@ fn guid(name: &str, number: u64) -> String {
         hash = (hash ^ u128::from(byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b);
     }
     let h = format!("{hash:032x}");
-    format!(
-        "{{{}-{}-{}-{}-{}}}",
-        &h[..8],
-        &h[8..12],
-        &h[12..16],
-        &h[16..20],
-        &h[20..]
-    )
+    format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
 }
 
 /// Bytes gathered before they go to the file: the crate writes pages of 1 KiB, with a look at the position of each.
@@ -209,13 +174,7 @@ struct Straight {
 
 impl Straight {
     fn new(file: AtomicFile) -> Self {
-        Self {
-            file,
-            at: 0,
-            end: 0,
-            gathered: Vec::with_capacity(GATHER),
-            from: 0,
-        }
+        Self { file, at: 0, end: 0, gathered: Vec::with_capacity(GATHER), from: 0 }
     }
 
     fn settle(&mut self) -> std::io::Result<()> {

@@ -47,8 +47,7 @@ impl LasWriter {
         let path = path.into();
         let mut file = BufWriter::with_capacity(GATHER, AtomicFile::create(&path)?);
         let head = head(&settings, &Extent::default())?;
-        file.write_all(&head)
-            .map_err(|e| refused("cloud cannot be written", &path, e))?;
+        file.write_all(&head).map_err(|e| refused("cloud cannot be written", &path, e))?;
         let sink = if settings.compress {
             let compressor =
                 LasZipCompressor::new(file, laz_vlr(&settings)).map_err(|e| ours(e, &path))?;
@@ -70,11 +69,7 @@ impl LasWriter {
     pub fn push(&mut self, point: &LasPoint) -> Result<()> {
         encode(point, &self.settings, &mut self.extent, &mut self.gathered)
             .map_err(|e| e.at(self.path.display()))?;
-        if self.gathered.len() >= GATHER {
-            self.flush()
-        } else {
-            Ok(())
-        }
+        if self.gathered.len() >= GATHER { self.flush() } else { Ok(()) }
     }
 
     /// Appends encoded records, whose extent is added by [`Self::widen`].
@@ -100,13 +95,7 @@ impl LasWriter {
     /// Writes counts and bounds, and gives the file its name.
     pub fn finish(mut self) -> Result<LasSummary> {
         self.flush()?;
-        let Self {
-            sink,
-            settings,
-            extent,
-            path,
-            ..
-        } = self;
+        let Self { sink, settings, extent, path, .. } = self;
         let failed = |e| refused("cloud cannot be finished", &path, e);
         let mut file = match sink {
             Sink::Plain(file) => file,
@@ -116,17 +105,9 @@ impl LasWriter {
             }
         };
         let head = head(&settings, &extent)?;
-        file.seek(SeekFrom::Start(0))
-            .and_then(|_| file.write_all(&head))
-            .map_err(failed)?;
-        file.into_inner()
-            .map_err(|e| failed(e.into_error()))?
-            .commit()?;
-        Ok(LasSummary {
-            path,
-            n_points: extent.n,
-            bounds: bounds(&settings, &extent),
-        })
+        file.seek(SeekFrom::Start(0)).and_then(|_| file.write_all(&head)).map_err(failed)?;
+        file.into_inner().map_err(|e| failed(e.into_error()))?.commit()?;
+        Ok(LasSummary { path, n_points: extent.n, bounds: bounds(&settings, &extent) })
     }
 }
 
@@ -138,22 +119,14 @@ pub(crate) fn bounds(settings: &LasSettings, extent: &Extent) -> Aabb {
     let q = &settings.quantum;
     let metres =
         |steps: [i32; 3]| [0, 1, 2].map(|i| f64::from(steps[i]) * q.scale[i] + q.offset[i]);
-    Aabb {
-        min: metres(extent.min),
-        max: metres(extent.max),
-    }
+    Aabb { min: metres(extent.min), max: metres(extent.max) }
 }
 
 /// Everything before the first point: header and variable length records. Its length does not depend on `extent`.
 pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     let mut records = Vec::new();
     for vlr in &settings.vlrs {
-        records.push(vlr_of(
-            &vlr.user_id,
-            vlr.record_id,
-            &vlr.description,
-            vlr.data.clone(),
-        )?);
+        records.push(vlr_of(&vlr.user_id, vlr.record_id, &vlr.description, vlr.data.clone())?);
     }
     if settings.with_labels {
         records.push(vlr_of("LASF_Spec", 4, "RobotId and LinkId", extra_bytes())?);
@@ -161,37 +134,21 @@ pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     if settings.compress {
         let mut data = Vec::new();
         laz_vlr(settings).write_to(&mut data)?;
-        records.push(vlr_of(
-            LazVlr::USER_ID,
-            LazVlr::RECORD_ID,
-            LazVlr::DESCRIPTION,
-            data,
-        )?);
+        records.push(vlr_of(LazVlr::USER_ID, LazVlr::RECORD_ID, LazVlr::DESCRIPTION, data)?);
     }
     let mut tail = Vec::new();
     for record in &records {
         record.write_to(&mut tail).map_err(bug)?;
     }
     let q = &settings.quantum;
-    let bounds = if extent.n > 0 {
-        bounds(settings, extent)
-    } else {
-        Aabb {
-            min: [0.0; 3],
-            max: [0.0; 3],
-        }
-    };
+    let bounds =
+        if extent.n > 0 { bounds(settings, extent) } else { Aabb { min: [0.0; 3], max: [0.0; 3] } };
     let version = las::Version::new(1, 4);
     let header_size = version.header_size();
     let mut by_return = [0; 15];
     by_return[0] = extent.n;
     let header = raw::Header {
-        global_encoding: WKT
-            | if settings.standard_gps_time {
-                STANDARD_TIME
-            } else {
-                0
-            },
+        global_encoding: WKT | if settings.standard_gps_time { STANDARD_TIME } else { 0 },
         version,
         system_identifier: text("EXTRACTION"),
         generating_software: text(concat!("stillpoint ", env!("CARGO_PKG_VERSION"))),
@@ -245,10 +202,7 @@ fn vlr_of(user_id: &str, record_id: u16, description: &str, data: Vec<u8>) -> Re
 fn extra_bytes() -> Vec<u8> {
     const UNSIGNED_SHORT: u8 = 3;
     let mut out = Vec::new();
-    for (name, what) in [
-        ("RobotId", "robot + 1, 0 for none"),
-        ("LinkId", "link + 1, 0 for none"),
-    ] {
+    for (name, what) in [("RobotId", "robot + 1, 0 for none"), ("LinkId", "link + 1, 0 for none")] {
         let start = out.len();
         out.extend([0, 0, UNSIGNED_SHORT, 0]);
         out.extend(text::<32>(name));
@@ -284,7 +238,5 @@ fn bug(e: las::Error) -> Error {
 }
 
 fn ours(e: laz::LasZipError, path: &Path) -> Error {
-    Error::new(Kind::Bug, "laz compressor does not start")
-        .because(e)
-        .at(path.display())
+    Error::new(Kind::Bug, "laz compressor does not start").because(e).at(path.display())
 }

@@ -20,11 +20,7 @@ impl MaskFiles {
     #[must_use]
     pub fn of(mask: MaskId) -> Self {
         let name = |what: &str| format!("labels/{}.{what}.npy", mask.0);
-        Self {
-            kind: name("kind"),
-            robot: name("robot"),
-            link: name("link"),
-        }
+        Self { kind: name("kind"), robot: name("robot"), link: name("link") }
     }
 }
 
@@ -70,12 +66,9 @@ impl MaskWriter {
         const STEP: u64 = 1 << 16;
         while self.len() < place {
             let n = (place - self.len()).min(STEP) as usize;
-            self.kind
-                .push(std::iter::repeat_n(Label::UNCERTAIN.kind as u8, n))?;
-            self.robot
-                .push(std::iter::repeat_n(Label::UNCERTAIN.robot, n))?;
-            self.link
-                .push(std::iter::repeat_n(Label::UNCERTAIN.link, n))?;
+            self.kind.push(std::iter::repeat_n(Label::UNCERTAIN.kind as u8, n))?;
+            self.robot.push(std::iter::repeat_n(Label::UNCERTAIN.robot, n))?;
+            self.link.push(std::iter::repeat_n(Label::UNCERTAIN.link, n))?;
         }
         Ok(())
     }

@@ -46,13 +46,7 @@ impl<T: Element> NpyWriter<T> {
         let mut file = BufWriter::with_capacity(1 << 18, AtomicFile::create(&path)?);
         file.write_all(&header::<T>(0))
             .map_err(|e| refused("array cannot be written", &path, e))?;
-        Ok(Self {
-            file,
-            path,
-            bytes: Vec::new(),
-            n: 0,
-            element: std::marker::PhantomData,
-        })
+        Ok(Self { file, path, bytes: Vec::new(), n: 0, element: std::marker::PhantomData })
     }
 
     /// Appends values.
@@ -81,9 +75,7 @@ impl<T: Element> NpyWriter<T> {
 
     /// Writes the length and gives the file its name. Returns the number of values.
     pub fn finish(self) -> Result<u64> {
-        let Self {
-            mut file, path, n, ..
-        } = self;
+        let Self { mut file, path, n, .. } = self;
         file.seek(SeekFrom::Start(0))
             .and_then(|_| file.write_all(&header::<T>(n)))
             .map_err(|e| refused("array cannot be finished", &path, e))?;
@@ -100,11 +92,7 @@ fn header<T: Element>(n: u64) -> Vec<u8> {
     let mut out = b"\x93NUMPY\x01\x00".to_vec();
     out.extend(((HEADER - 10) as u16).to_le_bytes());
     out.extend(
-        format!(
-            "{{'descr': '{}', 'fortran_order': False, 'shape': ({n},), }}",
-            T::DESCR
-        )
-        .bytes(),
+        format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({n},), }}", T::DESCR).bytes(),
     );
     out.resize(HEADER - 1, b' ');
     out.push(b'\n');

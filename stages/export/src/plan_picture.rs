@@ -40,14 +40,7 @@ impl PlanPicture {
     pub fn new(bounds: &Aabb) -> Self {
         let known = !bounds.is_empty()
             && (0..2).all(|i| bounds.min[i].is_finite() && bounds.max[i].is_finite());
-        let bounds = if known {
-            *bounds
-        } else {
-            Aabb {
-                min: [0.0; 3],
-                max: [1.0; 3],
-            }
-        };
+        let bounds = if known { *bounds } else { Aabb { min: [0.0; 3], max: [1.0; 3] } };
         let size = bounds.size();
         let cell = MIN_CELL.max(size[0].max(size[1]) / MAX_SIDE);
         let [width, height] = [0, 1].map(|i| ((size[i] / cell).floor() as usize).max(1) + 1);
@@ -73,11 +66,7 @@ impl PlanPicture {
             PointKind::Uncertain => &mut cell.n_uncertain,
             PointKind::Link | PointKind::Attachment => {
                 let robot = u16::try_from(i32::from(label.robot) + 1).unwrap_or(0);
-                cell.robot = if cell.robot == 0 {
-                    robot
-                } else {
-                    cell.robot.min(robot)
-                };
+                cell.robot = if cell.robot == 0 { robot } else { cell.robot.min(robot) };
                 &mut cell.n_moving
             }
         };
@@ -109,10 +98,8 @@ impl PlanPicture {
     ) -> Canvas {
         let zoom = (MIN_PIXELS / self.width.max(self.height)).clamp(1, 8) as i64;
         let (w, h) = (self.width as i64 * zoom, self.height as i64 * zoom);
-        let mut canvas = Canvas::new(
-            (w.max(420) + 2 * MARGIN) as usize,
-            (h + 3 * MARGIN + 40) as usize,
-        );
+        let mut canvas =
+            Canvas::new((w.max(420) + 2 * MARGIN) as usize, (h + 3 * MARGIN + 40) as usize);
         let full = self.full();
         for v in 0..self.height {
             for u in 0..self.width {
@@ -124,10 +111,7 @@ impl PlanPicture {
         }
         let place = |p: &[f64; 2]| {
             let x = MARGIN + ((p[0] - self.min[0]) / self.cell * zoom as f64) as i64;
-            (
-                x,
-                2 * MARGIN + h - 1 - ((p[1] - self.min[1]) / self.cell * zoom as f64) as i64,
-            )
+            (x, 2 * MARGIN + h - 1 - ((p[1] - self.min[1]) / self.cell * zoom as f64) as i64)
         };
         for (name, at) in scanners {
             let (x, y) = place(at);
@@ -172,12 +156,8 @@ impl PlanPicture {
 
     /// Points in a well filled cell: the 98th percentile of those that hold any standing point.
     fn full(&self) -> f64 {
-        let mut counts: Vec<u32> = self
-            .cells
-            .iter()
-            .map(|c| c.n_fixed + c.n_uncertain)
-            .filter(|n| *n > 0)
-            .collect();
+        let mut counts: Vec<u32> =
+            self.cells.iter().map(|c| c.n_fixed + c.n_uncertain).filter(|n| *n > 0).collect();
         if counts.is_empty() {
             return 1.0;
         }

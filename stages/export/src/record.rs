@@ -8,21 +8,14 @@ pub(crate) const CLASSES: [(PointKind, u8, &str); 5] = [
     (PointKind::Floor, 2, "floor"),
     (PointKind::Fixed, 64, "fixed"),
     (PointKind::Link, 65, "robot link"),
-    (
-        PointKind::Attachment,
-        66,
-        "attachment, effector or carried part",
-    ),
+    (PointKind::Attachment, 66, "attachment, effector or carried part"),
     (PointKind::Uncertain, 69, "uncertain, counts as fixed"),
 ];
 
 /// The LAS class of a kind of point.
 #[must_use]
 pub fn class_of(kind: PointKind) -> u8 {
-    CLASSES
-        .iter()
-        .find(|entry| entry.0 == kind)
-        .map_or(1, |entry| entry.1)
+    CLASSES.iter().find(|entry| entry.0 == kind).map_or(1, |entry| entry.1)
 }
 
 /// Scale and offset of LAS coordinates.
@@ -42,16 +35,9 @@ impl Quantum {
         let middle = bounds.center();
         let offset = [0, 1, 2].map(|i| {
             let at: f64 = middle[i];
-            if at.is_finite() {
-                (at / 1000.0).trunc() * 1000.0
-            } else {
-                0.0
-            }
+            if at.is_finite() { (at / 1000.0).trunc() * 1000.0 } else { 0.0 }
         });
-        Self {
-            scale: [1e-4; 3],
-            offset,
-        }
+        Self { scale: [1e-4; 3], offset }
     }
 
     fn step(&self, axis: usize, value: f64) -> Option<i32> {
@@ -164,11 +150,7 @@ pub(crate) struct Extent {
 
 impl Default for Extent {
     fn default() -> Self {
-        Self {
-            n: 0,
-            min: [i32::MAX; 3],
-            max: [i32::MIN; 3],
-        }
+        Self { n: 0, min: [i32::MAX; 3], max: [i32::MIN; 3] }
     }
 }
 
@@ -218,9 +200,6 @@ pub(crate) fn encode(
 
 #[cold]
 fn too_far(xyz: [f64; 3]) -> Error {
-    Error::new(
-        Kind::BadInput,
-        format!("point does not fit into LAS coordinates: \"{xyz:?}\""),
-    )
-    .hint("choose a larger scale or an offset near the points")
+    Error::new(Kind::BadInput, format!("point does not fit into LAS coordinates: \"{xyz:?}\""))
+        .hint("choose a larger scale or an offset near the points")
 }

@@ -93,10 +93,7 @@ impl From<&Pose> for BasePose {
         let (p, q) = (pose.translation, pose.rotation);
         // One of the two quaternions of a rotation: the same rotation gives the same text.
         let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-        Self {
-            xyz: [p.x, p.y, p.z],
-            quat_wxyz: [q.w, q.i, q.j, q.k].map(|v| sign * v + 0.0),
-        }
+        Self { xyz: [p.x, p.y, p.z], quat_wxyz: [q.w, q.i, q.j, q.k].map(|v| sign * v + 0.0) }
     }
 }
 
@@ -217,22 +214,10 @@ impl RobotEntry {
             model: fit.model_name.clone(),
             base_link: links.first().cloned().unwrap_or_default(),
             base_pose: (&fit.world_from_base).into(),
-            base_sigma: BaseSigma {
-                xyz: [0, 1, 2].map(sigma),
-                rotation: [3, 4, 5].map(sigma),
-            },
+            base_sigma: BaseSigma { xyz: [0, 1, 2].map(sigma), rotation: [3, 4, 5].map(sigma) },
             joints: Places(named(|j| j.value).collect()),
-            sigma: Places(
-                named(|j| j.sigma)
-                    .map(|(name, s)| (name, finite(s)))
-                    .collect(),
-            ),
-            determined: Places(
-                fit.joints
-                    .iter()
-                    .map(|j| (j.name.clone(), j.determined))
-                    .collect(),
-            ),
+            sigma: Places(named(|j| j.sigma).map(|(name, s)| (name, finite(s))).collect()),
+            determined: Places(fit.joints.iter().map(|j| (j.name.clone(), j.determined)).collect()),
             links: links.to_vec(),
             verdict: fit.verdict.word().into(),
             score: finite(fit.score),
@@ -244,10 +229,7 @@ impl RobotEntry {
                 same_model: r.same_model,
             }),
             alike: fit.alike.clone(),
-            tip: tip.map(|(link, pose)| TipPose {
-                link,
-                pose: (&pose).into(),
-            }),
+            tip: tip.map(|(link, pose)| TipPose { link, pose: (&pose).into() }),
             evidence: fit.links.iter().map(LinkEntry::from).collect(),
         }
     }
@@ -271,14 +253,7 @@ impl ScanLabels {
     #[must_use]
     pub fn new(mask: &Mask, n_points: u64) -> Self {
         let MaskFiles { kind, robot, link } = MaskFiles::of(mask.id);
-        Self {
-            scan: mask.name.clone(),
-            input: mask.input.0,
-            n_points,
-            kind,
-            robot,
-            link,
-        }
+        Self { scan: mask.name.clone(), input: mask.input.0, n_points, kind, robot, link }
     }
 }
 

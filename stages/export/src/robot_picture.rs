@@ -42,11 +42,7 @@ struct Shown {
     normal: [f32; 3],
 }
 
-const NOTHING: Shown = Shown {
-    depth: f32::INFINITY,
-    link: u16::MAX,
-    normal: [0.0; 3],
-};
+const NOTHING: Shown = Shown { depth: f32::INFINITY, link: u16::MAX, normal: [0.0; 3] };
 
 impl RobotPicture {
     /// The views of the robot with this index in the labels, its links standing at `world_from_link`.
@@ -61,14 +57,7 @@ impl RobotPicture {
                 }
             }
         }
-        let shown = if bounds.is_empty() {
-            Aabb {
-                min: [0.0; 3],
-                max: [1.0; 3],
-            }
-        } else {
-            bounds
-        };
+        let shown = if bounds.is_empty() { Aabb { min: [0.0; 3], max: [1.0; 3] } } else { bounds };
         let views = [
             ("front", 0.0, 0.0),
             ("side", 90.0, 0.0),
@@ -82,12 +71,7 @@ impl RobotPicture {
             view.outline(model, world_from_link);
         }
         let links = model.links.iter().map(|link| link.name.clone()).collect();
-        Self {
-            robot,
-            bounds: shown.grown(AROUND),
-            links,
-            views,
-        }
+        Self { robot, bounds: shown.grown(AROUND), links, views }
     }
 
     /// Adds a labelled point of the world; points away from the robot are passed over.
@@ -109,17 +93,11 @@ impl RobotPicture {
         let mut canvas = Canvas::new(2 * SIDE + 6, 2 * SIDE + 46 + 14 * n_rows);
         canvas.text(8, 10, 2, INK, title);
         for (i, view) in self.views.iter().enumerate() {
-            let (x, y) = (
-                (i % 2 * (SIDE + 6)) as i64,
-                (36 + i / 2 * (SIDE + 4)) as i64,
-            );
+            let (x, y) = ((i % 2 * (SIDE + 6)) as i64, (36 + i / 2 * (SIDE + 4)) as i64);
             canvas.paste(x, y, &view.draw());
         }
         for (i, name) in self.links.iter().enumerate() {
-            let (x, y) = (
-                (8 + i % 4 * (SIDE / 2)) as i64,
-                (2 * SIDE + 46 + 14 * (i / 4)) as i64,
-            );
+            let (x, y) = ((8 + i % 4 * (SIDE / 2)) as i64, (2 * SIDE + 46 + 14 * (i / 4)) as i64);
             canvas.fill(x, y - 1, 10, 10, link_color(i));
             let short: String = name.chars().take(28).collect();
             canvas.text(x + 14, y, 1, INK, &short);
@@ -152,10 +130,7 @@ impl View {
         let down = away.cross(&right);
         let axes =
             nalgebra::Matrix3::from_rows(&[right.transpose(), down.transpose(), away.transpose()]);
-        let half = bounds
-            .corners()
-            .into_iter()
-            .map(|c| axes * (Point::from(c) - bounds.center()));
+        let half = bounds.corners().into_iter().map(|c| axes * (Point::from(c) - bounds.center()));
         let half = half.map(|v| v.x.abs().max(v.y.abs())).fold(0.1, f64::max) + 0.6 * AROUND;
         let scale = SIDE as f64 / (2.0 * half);
         let rotation = nalgebra::UnitQuaternion::from_matrix(&axes);
@@ -183,10 +158,7 @@ impl View {
         depth += if is_ours { 0.0 } else { 1e3 };
         // Two pixels wide, so that a scan's spacing does not look like paper.
         for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let (x, y) = (
-                (u as usize + x).min(SIDE - 1),
-                (v as usize + y).min(SIDE - 1),
-            );
+            let (x, y) = ((u as usize + x).min(SIDE - 1), (v as usize + y).min(SIDE - 1));
             let pixel = &mut self.points[y * SIDE + x];
             // Equal depths go to the smaller colour: the order of points must not show.
             if (depth, color) < (pixel.0, pixel.1) {
@@ -202,12 +174,7 @@ impl View {
         for (index, (link, pose)) in model.links.iter().zip(world_from_link).enumerate() {
             let local_from_link = rows(&(local_from_world * pose));
             let corner = |i: u32| {
-                let p = link
-                    .mesh
-                    .vertices
-                    .get(i as usize)
-                    .copied()
-                    .unwrap_or_default();
+                let p = link.mesh.vertices.get(i as usize).copied().unwrap_or_default();
                 let local = transform(&local_from_link, p);
                 (local, transform(&self.view_from_world, local))
             };
@@ -286,11 +253,7 @@ fn fill_triangle(shown: &mut [Shown], corners: [[f32; 3]; 3], normal: [f32; 3], 
             let depth = x * a[2] + y * b[2] + z * c[2];
             let pixel = &mut shown[v * SIDE + u];
             if depth < pixel.depth {
-                *pixel = Shown {
-                    depth,
-                    link,
-                    normal,
-                };
+                *pixel = Shown { depth, link, normal };
             }
         }
     }

@@ -16,19 +16,15 @@ pub fn write_table(out: &Path, robots: &[RobotEntry]) -> Result<()> {
         (PointKind::Floor, "floor"),
         (PointKind::Uncertain, "uncertain"),
     ];
-    let kinds: Vec<_> = kinds
-        .iter()
-        .map(|(kind, name)| json!({"value": *kind as u8, "name": name}))
-        .collect();
+    let kinds: Vec<_> =
+        kinds.iter().map(|(kind, name)| json!({"value": *kind as u8, "name": name})).collect();
     let robots: Vec<_> = robots
         .iter()
         .enumerate()
         .map(|(i, r)| json!({"value": i, "id": r.id, "model": r.model, "links": r.links}))
         .collect();
-    let classes: Vec<_> = CLASSES
-        .iter()
-        .map(|(_, value, name)| json!({"value": value, "name": name}))
-        .collect();
+    let classes: Vec<_> =
+        CLASSES.iter().map(|(_, value, name)| json!({"value": value, "name": name})).collect();
     let table = json!({
         "schema": "stillpoint.labels/1",
         "kinds": kinds,

@@ -23,16 +23,8 @@ fn label(i: usize) -> Label {
     match i % 10 {
         0..3 => Label::FLOOR,
         3..6 => Label::FIXED,
-        6 | 7 => Label {
-            kind: PointKind::Link,
-            robot: 0,
-            link: (i / 10 % 3) as i16,
-        },
-        8 => Label {
-            kind: PointKind::Attachment,
-            robot: 1,
-            link: 2,
-        },
+        6 | 7 => Label { kind: PointKind::Link, robot: 0, link: (i / 10 % 3) as i16 },
+        8 => Label { kind: PointKind::Attachment, robot: 1, link: 2 },
         _ => Label::UNCERTAIN,
     }
 }
@@ -55,19 +47,10 @@ fn point(i: usize) -> LasPoint {
 }
 
 fn clouds(out: &Path, n: usize, [compress, with_color]: [bool; 2], memory: usize) -> Written {
-    let around = Aabb {
-        min: [399_985.0, 4_999_988.0, 100.0],
-        max: [400_015.0, 5_000_012.0, 103.0],
-    };
-    let las = LasSettings {
-        compress,
-        with_color,
-        ..LasSettings::new(Quantum::around(&around))
-    };
-    let settings = CloudsSettings {
-        memory,
-        ..CloudsSettings::new(las)
-    };
+    let around =
+        Aabb { min: [399_985.0, 4_999_988.0, 100.0], max: [400_015.0, 5_000_012.0, 103.0] };
+    let las = LasSettings { compress, with_color, ..LasSettings::new(Quantum::around(&around)) };
+    let settings = CloudsSettings { memory, ..CloudsSettings::new(las) };
     let mut clouds = Clouds::create(out, settings).expect("create");
     for i in 0..n {
         clouds.push(&point(i), label(i).kind).expect("push");
@@ -77,24 +60,15 @@ fn clouds(out: &Path, n: usize, [compress, with_color]: [bool; 2], memory: usize
 
 fn read(path: &Path) -> (las::Header, Vec<las::Point>) {
     let mut reader = las::Reader::from_path(path).expect("opens");
-    let points = reader
-        .read_all()
-        .expect("reads")
-        .points()
-        .map(|p| p.expect("decodes"))
-        .collect();
+    let points = reader.read_all().expect("reads").points().map(|p| p.expect("decodes")).collect();
     (reader.header().clone(), points)
 }
 
 #[test]
 fn tiles_hold_every_point_once_whatever_the_memory_and_compression() {
     let mut seen: Option<Vec<(i64, u8, Vec<u8>)>> = None;
-    let variants = [
-        (false, false, 1 << 20),
-        (false, false, 4000),
-        (true, false, 4000),
-        (true, true, 1 << 20),
-    ];
+    let variants =
+        [(false, false, 1 << 20), (false, false, 4000), (true, false, 4000), (true, true, 1 << 20)];
     for (k, (compress, with_color, memory)) in variants.into_iter().enumerate() {
         let out = folder(&format!("tiles_{k}"));
         let written = clouds(&out, N, [compress, with_color], memory);
@@ -112,36 +86,22 @@ fn tiles_hold_every_point_once_whatever_the_memory_and_compression() {
                 let i = (p.gps_time.expect("has time") * 1000.0).round() as i64;
                 let truth = point(i as usize);
                 assert!((p.x - truth.xyz[0]).abs() < 6e-5 && (p.z - truth.xyz[2]).abs() < 6e-5);
-                assert_eq!(
-                    (p.intensity, p.point_source_id),
-                    (truth.intensity, truth.source_id)
-                );
+                assert_eq!((p.intensity, p.point_source_id), (truth.intensity, truth.source_id));
                 all.push((i, u8::from(p.classification), p.extra_bytes.clone()));
             }
         }
         all.sort();
         assert_eq!(all.len(), N);
         assert!(
-            all.iter()
-                .enumerate()
-                .all(|(i, p)| p.0 == i as i64 && p.1 == class_of(label(i).kind))
+            all.iter().enumerate().all(|(i, p)| p.0 == i as i64 && p.1 == class_of(label(i).kind))
         );
         assert_eq!(all[6].2, [1, 0, 1, 0]);
         assert_eq!(all[3].2, [0, 0, 0, 0]);
         assert_eq!(seen.get_or_insert_with(|| all.clone()), &all);
-        let names: Vec<_> = std::fs::read_dir(out.join("tiles"))
-            .expect("folder")
-            .flatten()
-            .collect();
-        assert_eq!(
-            names.len(),
-            written.tiles.len(),
-            "nothing half-written is left"
-        );
-        let (robots, fixed) = (
-            written.robots.expect("asked"),
-            written.fixed.expect("asked"),
-        );
+        let names: Vec<_> =
+            std::fs::read_dir(out.join("tiles")).expect("folder").flatten().collect();
+        assert_eq!(names.len(), written.tiles.len(), "nothing half-written is left");
+        let (robots, fixed) = (written.robots.expect("asked"), written.fixed.expect("asked"));
         assert_eq!(robots.n_points + fixed.n_points, N as u64);
         assert_eq!(read(&robots.path).1.len(), N * 3 / 10);
     }
@@ -151,29 +111,17 @@ fn tiles_hold_every_point_once_whatever_the_memory_and_compression() {
 fn a_dropped_file_leaves_nothing_and_an_empty_cloud_is_whole() {
     let out = folder("dropped");
     let path = out.join("a.las");
-    let settings = LasSettings::new(Quantum {
-        scale: [1e-4; 3],
-        offset: [0.0; 3],
-    });
+    let settings = LasSettings::new(Quantum { scale: [1e-4; 3], offset: [0.0; 3] });
     let mut writer = LasWriter::create(&path, settings.clone()).expect("create");
     writer.push(&LasPoint::default()).expect("push");
-    let far = LasPoint {
-        xyz: [1e9, 0.0, 0.0],
-        ..LasPoint::default()
-    };
+    let far = LasPoint { xyz: [1e9, 0.0, 0.0], ..LasPoint::default() };
     let error = writer.push(&far).expect_err("too far for i32");
     assert!(error.to_string().contains("a.las"), "{error}");
     drop(writer);
     assert_eq!(std::fs::read_dir(&out).expect("folder").count(), 0);
     for compress in [false, true] {
-        let settings = LasSettings {
-            compress,
-            ..settings.clone()
-        };
-        LasWriter::create(&path, settings)
-            .expect("create")
-            .finish()
-            .expect("finish");
+        let settings = LasSettings { compress, ..settings.clone() };
+        LasWriter::create(&path, settings).expect("create").finish().expect("finish");
         assert!(read(&path).1.is_empty());
     }
 }
@@ -192,28 +140,16 @@ fn e57_scans_come_back_with_pose_and_raster() {
             && (transform.rotation.z - 0.3_f64.sin()).abs() < 1e-12
     );
     assert_eq!(clouds[2].records, 0);
-    let raw: Vec<_> = reader
-        .pointcloud_raw(&clouds[1])
-        .expect("reads")
-        .map(|p| p.expect("reads"))
-        .collect();
+    let raw: Vec<_> =
+        reader.pointcloud_raw(&clouds[1]).expect("reads").map(|p| p.expect("reads")).collect();
     assert_eq!(raw.len(), 300 * 211);
-    let invalid = raw
-        .iter()
-        .filter(|v| v[3] == e57::RecordValue::Integer(2))
-        .count();
+    let invalid = raw.iter().filter(|v| v[3] == e57::RecordValue::Integer(2)).count();
     assert_eq!(invalid, (0..300 * 211).filter(|i| i % 17 == 0).count());
-    assert_eq!(
-        raw[212][4..6],
-        [e57::RecordValue::Integer(1), e57::RecordValue::Integer(1)]
-    );
+    assert_eq!(raw[212][4..6], [e57::RecordValue::Integer(1), e57::RecordValue::Integer(1)]);
     assert_eq!(raw[212][0], e57::RecordValue::Single(212.0 * 0.001));
     let first = std::fs::read(&path).expect("reads");
     write_e57(&path);
-    assert!(
-        first == std::fs::read(&path).expect("reads"),
-        "the same scene gives the same bytes"
-    );
+    assert!(first == std::fs::read(&path).expect("reads"), "the same scene gives the same bytes");
 }
 
 fn write_e57(path: &Path) {
@@ -229,12 +165,7 @@ fn write_e57(path: &Path) {
         let n = if k == 2 { 0 } else { 300 * 211_u32 };
         let points = (0..n).map(|i| {
             let xyz = (i % 17 != 0).then_some([i as f32 * 0.001, 1.0, (i % 50) as f32]);
-            Ok(GridPoint {
-                xyz,
-                row: i / 211,
-                col: i % 211,
-                intensity: (i % 60_000) as u16,
-            })
+            Ok(GridPoint { xyz, row: i / 211, col: i % 211, intensity: (i % 60_000) as u16 })
         });
         assert_eq!(scans.add(&scan, points).expect("add"), u64::from(n));
     }
@@ -251,15 +182,9 @@ fn fit() -> Fit {
     Fit {
         model: 0,
         model_name: "box".into(),
-        world_from_base: Pose::new(
-            Vector::new(400_001.0, 5_000_002.0, 100.0),
-            Vector::z() * 0.5,
-        ),
+        world_from_base: Pose::new(Vector::new(400_001.0, 5_000_002.0, 100.0), Vector::z() * 0.5),
         base_sigma: [1e-4, 1e-4, 1e-4, 1e-5, f64::NAN, 1e-5],
-        joints: vec![
-            joint("z_turn", 0.25, 1e-4),
-            joint("a_lift", -1.0, f64::INFINITY),
-        ],
+        joints: vec![joint("z_turn", 0.25, 1e-4), joint("a_lift", -1.0, f64::INFINITY)],
         covariance: Vec::new(),
         score: 0.97,
         explained: 2.0,
@@ -272,11 +197,7 @@ fn fit() -> Fit {
             n_points: 900,
             rms: f64::NAN,
         }],
-        runner_up: Some(RunnerUp {
-            model: "other".into(),
-            score: 0.2,
-            same_model: false,
-        }),
+        runner_up: Some(RunnerUp { model: "other".into(), score: 0.2, same_model: false }),
         alike: vec!["box_long".into()],
         verdict: Verdict::Doubtful,
         reasons: vec!["joint is not determined: \"a_lift\"".into()],
@@ -340,26 +261,18 @@ fn the_result_comes_back_as_written_and_python_reads_it_all() {
     assert!(!text.contains("NaN") && !text.contains("inf"));
     let back: ResultFile = serde_json::from_str(&text).expect("parses");
     assert_eq!(back.robots[1].id, "R2");
-    assert_eq!(
-        back.robots[0].joints.0[0].0, "z_turn",
-        "joints keep the order of the model"
-    );
+    assert_eq!(back.robots[0].joints.0[0].0, "z_turn", "joints keep the order of the model");
     assert_eq!(back.robots[0].sigma.0[1], ("a_lift".into(), None));
     assert_eq!(back.robots[0].base_sigma.rotation[1], None);
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scripts/check_outputs.py");
     let python = std::env::var_os("PYTHON").unwrap_or_else(|| "python3".into());
-    let has_laspy = std::process::Command::new(&python)
-        .args(["-c", "import laspy, numpy"])
-        .output();
+    let has_laspy =
+        std::process::Command::new(&python).args(["-c", "import laspy, numpy"]).output();
     if !has_laspy.is_ok_and(|o| o.status.success()) {
         eprintln!("skipped: no python3 with laspy and numpy");
         return;
     }
-    let checked = std::process::Command::new(&python)
-        .arg(script)
-        .arg(&out)
-        .output()
-        .expect("runs");
+    let checked = std::process::Command::new(&python).arg(script).arg(&out).output().expect("runs");
     let said = String::from_utf8_lossy(&checked.stdout).into_owned()
         + &String::from_utf8_lossy(&checked.stderr);
     assert!(checked.status.success(), "{said}");
@@ -369,25 +282,11 @@ fn the_result_comes_back_as_written_and_python_reads_it_all() {
 /// A box mesh, wound outward.
 fn brick(min: [f32; 3], max: [f32; 3]) -> Mesh {
     let pick = |n: usize, i: usize| if n >> i & 1 == 1 { max[i] } else { min[i] };
-    let vertices = (0..8)
-        .map(|n| [pick(n, 0), pick(n, 1), pick(n, 2)])
-        .collect();
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-        .collect();
-    Mesh {
-        vertices,
-        triangles,
-    }
+    let vertices = (0..8).map(|n| [pick(n, 0), pick(n, 1), pick(n, 2)]).collect();
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    Mesh { vertices, triangles }
 }
 
 #[test]
@@ -398,10 +297,7 @@ fn pictures_show_robots_where_they_stand() {
         parent_joint: None,
         mesh: brick(min, max),
         cad: CadCloud::default(),
-        bounds: Aabb {
-            min: min.map(f64::from),
-            max: max.map(f64::from),
-        },
+        bounds: Aabb { min: min.map(f64::from), max: max.map(f64::from) },
     };
     let model = Model {
         name: "box".into(),
@@ -417,35 +313,23 @@ fn pictures_show_robots_where_they_stand() {
         mesh_sigmas: Vec::new(),
     };
     let base = Pose::translation(400_003.0, 5_000_002.0, 100.0);
-    let poses = [
-        base,
-        base * Pose::new(Vector::new(0.0, 0.0, 0.52), Vector::y() * 0.8),
-    ];
+    let poses = [base, base * Pose::new(Vector::new(0.0, 0.0, 0.52), Vector::y() * 0.8)];
     let mut views = RobotPicture::new(0, &model, &poses);
-    let bounds = Aabb {
-        min: [399_995.0, 4_999_995.0, 100.0],
-        max: [400_012.0, 5_000_009.0, 103.0],
-    };
+    let bounds =
+        Aabb { min: [399_995.0, 4_999_995.0, 100.0], max: [400_012.0, 5_000_009.0, 103.0] };
     let mut plan = PlanPicture::new(&bounds);
     let mut add = |world: [f64; 3], label: Label| {
         plan.add(world, label);
         views.add(world, label);
     };
     for i in 0..170 * 140 {
-        let p = [
-            399_995.0 + f64::from(i % 170) * 0.1,
-            4_999_995.0 + f64::from(i / 170) * 0.1,
-            100.0,
-        ];
+        let p =
+            [399_995.0 + f64::from(i % 170) * 0.1, 4_999_995.0 + f64::from(i / 170) * 0.1, 100.0];
         add(p, Label::FLOOR);
     }
     for i in 0..3000 {
         add(
-            [
-                400_001.0 + f64::from(i % 100) * 0.03,
-                5_000_003.0,
-                100.0 + f64::from(i / 100) * 0.05,
-            ],
+            [400_001.0 + f64::from(i % 100) * 0.03, 5_000_003.0, 100.0 + f64::from(i / 100) * 0.05],
             Label::FIXED,
         );
     }
@@ -456,14 +340,7 @@ fn pictures_show_robots_where_they_stand() {
             let walls = [[1.0, u, v], [u, 1.0, v], [u, v, 1.0], [0.0, u, v]];
             let f = walls[(i % 4) as usize];
             let p = pose * Point::from([0, 1, 2].map(|k| min[k] + f[k] * size[k]));
-            add(
-                [p.x, p.y, p.z],
-                Label {
-                    kind: PointKind::Link,
-                    robot: 0,
-                    link: index as i16,
-                },
-            );
+            add([p.x, p.y, p.z], Label { kind: PointKind::Link, robot: 0, link: index as i16 });
         }
     }
     let out = folder("pictures");
@@ -508,12 +385,7 @@ fn how_fast_clouds_and_scans_are_written() {
     };
     let points = (0..3_000_000_u32).map(|i| {
         let xyz = Some([i as f32 * 1e-3, 2.0, 3.0]);
-        Ok(GridPoint {
-            xyz,
-            row: i % 1000,
-            col: i / 1000,
-            intensity: 7,
-        })
+        Ok(GridPoint { xyz, row: i % 1000, col: i / 1000, intensity: 7 })
     });
     scans.add(&scan, points).expect("add");
     scans.finish().expect("finish");

@@ -125,7 +125,8 @@ impl Beam<'_> {
     /// Whether two hypotheses agree to within `steps` sweep steps in all joints set, and in the base.
     pub(crate) fn alike(&self, a: &Hypothesis, b: &Hypothesis, upto: usize, steps: f64) -> bool {
         let tolerance = self.settings.search_tolerance;
-        let shift = (a.local_from_base.translation.vector - b.local_from_base.translation.vector).norm();
+        let shift =
+            (a.local_from_base.translation.vector - b.local_from_base.translation.vector).norm();
         let turn = a.local_from_base.rotation.angle_to(&b.local_from_base.rotation);
         shift < 0.5 * tolerance
             && turn < 0.03
@@ -195,8 +196,9 @@ impl Beam<'_> {
     /// a joint whose link nearly hides in its parent may have been caught at the wrong maximum.
     pub(crate) fn alternatives(&self, h: &Hypothesis) -> Vec<Hypothesis> {
         let tolerance = (0.6 * self.settings.search_tolerance) as f32;
-        let all: Vec<usize> =
-            (0..self.prepared.model.links.len()).filter(|&l| self.prepared.links[l].weight > 0.0).collect();
+        let all: Vec<usize> = (0..self.prepared.model.links.len())
+            .filter(|&l| self.prepared.links[l].weight > 0.0)
+            .collect();
         let own = self.score(h, &all, tolerance);
         let mut out = Vec::new();
         for free in 0..h.posture.len() {
@@ -213,7 +215,8 @@ impl Beam<'_> {
                 .collect();
             for k in 0..=n {
                 let value = low + span * k as f64 / n as f64;
-                let peak = (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1]);
+                let peak =
+                    (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1]);
                 let far = (value - h.posture[free]).abs() > 2.5 * span / n as f64;
                 if peak && far && scores[k] > own - 0.15 * own.abs() {
                     let mut next = h.clone();

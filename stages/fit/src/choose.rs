@@ -53,7 +53,8 @@ fn bounds(fit: &Fit, models: &[Model]) -> Aabb {
 }
 
 fn compete(a: &Fit, a_box: &Aabb, b: &Fit, b_box: &Aabb) -> bool {
-    let apart = (a.world_from_base.translation.vector - b.world_from_base.translation.vector).norm();
+    let apart =
+        (a.world_from_base.translation.vector - b.world_from_base.translation.vector).norm();
     if apart < SAME_BASE {
         return true;
     }
@@ -84,6 +85,8 @@ fn lose(winner: &mut Fit, loser: &Fit) {
         winner.alike.push(loser.model_name.clone());
     } else if share > RIVAL && winner.verdict == Verdict::Trusted {
         winner.verdict = Verdict::Doubtful;
-        winner.reasons.push(format!("model '{}' explains the points nearly as well", loser.model_name));
+        winner
+            .reasons
+            .push(format!("model '{}' explains the points nearly as well", loser.model_name));
     }
 }

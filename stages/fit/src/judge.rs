@@ -50,7 +50,11 @@ pub(crate) fn judge(
         let hidden = f64::from(probe.n - probe.n_seen);
         // Hidden samples vote for nothing here: take their small price back.
         let net = f64::from(probe.score)
-            + if scene.evidence.has_beams() { f64::from(geometry::depth::HIDDEN_PRICE) * hidden } else { 0.0 };
+            + if scene.evidence.has_beams() {
+                f64::from(geometry::depth::HIDDEN_PRICE) * hidden
+            } else {
+                0.0
+            };
         out.explained += each * net;
         judged += each * f64::from(probe.n_seen);
         through += each * f64::from(probe.n_through);

@@ -16,6 +16,8 @@ pub struct Prepared<'a> {
     pub(crate) placed_by: Vec<Vec<usize>>,
     /// Links with a surface that no free joint moves.
     pub(crate) fixed: Vec<usize>,
+    /// No part of the robot gets farther from the base's origin, metres.
+    pub(crate) reach: f64,
     /// For each free joint: distance of the samples it places from its axis, 95th percentile, metres (1 for
     /// prismatic joints, so that steps are in metres).
     pub(crate) lever: Vec<f64>,
@@ -68,7 +70,7 @@ impl<'a> Prepared<'a> {
             }
         }
         let lever = (0..n_free).map(|j| lever(model, j, &placed_by[j])).collect();
-        Self { model, index, links, placed_by, fixed, lever }
+        Self { model, index, links, placed_by, fixed, reach: reach(model), lever }
     }
 
     /// The first `n` samples and normals of a link.
@@ -92,6 +94,27 @@ fn dependencies(model: &Model) -> Vec<Vec<bool>> {
         .iter()
         .map(|link| link.iter().map(|t| t.iter().any(|v| v.abs() > 1e-9)).collect())
         .collect()
+}
+
+/// Sum of the distances from joint to joint along the longest way, and the size of what hangs at its end.
+fn reach(model: &Model) -> f64 {
+    let mut so_far = vec![0.0_f64; model.links.len()];
+    let mut longest = 0.0_f64;
+    for (l, link) in model.links.iter().enumerate() {
+        if let Some(j) = link.parent_joint {
+            let joint = &model.joints[j];
+            let stroke = match (joint.kind, joint.limits) {
+                (robot::JointKind::Prismatic, Some(limits)) => limits[0].abs().max(limits[1].abs()),
+                _ => 0.0,
+            };
+            so_far[l] =
+                so_far[joint.parent] + joint.parent_from_joint.translation.vector.norm() + stroke;
+        }
+        let size =
+            link.cad.points.iter().take(500).map(|p| f64::from(p[0].hypot(p[1]).hypot(p[2])));
+        longest = longest.max(so_far[l] + size.fold(0.0, f64::max));
+    }
+    longest
 }
 
 fn lever(model: &Model, free: usize, links: &[usize]) -> f64 {

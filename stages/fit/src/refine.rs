@@ -104,14 +104,60 @@ impl Refine<'_> {
         h
     }
 
+    /// Of `points`, at most `cap` for each link that is nearest to them, evenly picked, and as many again of those that
+    /// lie near the robot but within no link's field: the large links must not outvote the wrist. Sorted.
+    pub(crate) fn stratified(
+        &self,
+        h: &Hypothesis,
+        points: impl Iterator<Item = u32>,
+        gate: f64,
+        cap: usize,
+    ) -> Vec<u32> {
+        let links = self.link_frames(h);
+        let mut strata: Vec<Vec<u32>> = vec![Vec::new(); self.prepared.links.len() + 1];
+        let grown: Vec<_> = links
+            .iter()
+            .map(|(l, _)| self.prepared.model.links[*l].bounds.grown(gate.max(0.05) * 1.7))
+            .collect();
+        for i in points {
+            let m = &self.scene.points[i as usize];
+            let near = links.iter().zip(&grown).any(|((_, frame), bounds)| {
+                bounds.contains(geometry::depth::transform(frame, m.p).map(f64::from))
+            });
+            if !near {
+                continue;
+            }
+            match self.nearest(m, &links, gate) {
+                Some((link, _, _, distance)) if distance <= gate => strata[link].push(i),
+                _ if gate > FINE_REACH => strata[self.prepared.links.len()].push(i),
+                _ => {}
+            }
+        }
+        let mut out = Vec::new();
+        for stratum in strata {
+            let n = stratum.len();
+            let kept = n.min(cap);
+            out.extend((0..kept).map(|k| stratum[k * n / kept]));
+        }
+        out.sort_unstable();
+        out
+    }
+
+    /// Links with a surface, and their frames from the local frame.
+    fn link_frames(&self, h: &Hypothesis) -> Vec<(usize, geometry::depth::Rows)> {
+        let base_from_local = h.local_from_base.inverse();
+        let poses = self.prepared.model.poses(&h.posture);
+        (0..poses.len())
+            .filter(|&l| self.prepared.links[l].weight > 0.0)
+            .map(|l| (l, geometry::depth::rows(&(poses[l].inverse() * base_from_local))))
+            .collect()
+    }
+
     /// Matches of the points within the gate, in their order.
     fn matches(&self, h: &Hypothesis, points: &[u32], gate: f64) -> Vec<Match> {
         let poses = self.prepared.model.poses(&h.posture);
         let base_from_local = h.local_from_base.inverse();
-        let links: Vec<(usize, geometry::depth::Rows)> = (0..poses.len())
-            .filter(|&l| self.prepared.links[l].weight > 0.0)
-            .map(|l| (l, geometry::depth::rows(&(poses[l].inverse() * base_from_local))))
-            .collect();
+        let links = self.link_frames(h);
         let scanners: Vec<_> =
             (0..self.scene.views.len()).map(|v| self.scene.scanner(v as u16)).collect();
         points
@@ -150,7 +196,8 @@ impl Refine<'_> {
         for (l, link_from_local) in links {
             let p = geometry::depth::transform(link_from_local, m.p);
             let link = &self.prepared.links[*l];
-            let found = if gate < FINE_REACH { link.fine.nearest(p) } else { link.coarse.nearest(p) };
+            let found =
+                if gate < FINE_REACH { link.fine.nearest(p) } else { link.coarse.nearest(p) };
             let Some(at) = found else { continue };
             let s = self.prepared.model.links[*l].cad.points[at];
             let d2 = (0..3).map(|i| (s[i] - p[i]) * (s[i] - p[i])).sum::<f32>();
@@ -184,7 +231,13 @@ impl Refine<'_> {
         let kinematics = self.prepared.model.kinematics(&h.posture);
         let n = 6 + h.posture.len();
         let mut sums: Vec<Sums> = (0..self.prepared.links.len())
-            .map(|_| Sums { h: DMatrix::zeros(n, n), g: DVector::zeros(n), n: 0, weight: 0.0, rr: 0.0 })
+            .map(|_| Sums {
+                h: DMatrix::zeros(n, n),
+                g: DVector::zeros(n),
+                n: 0,
+                weight: 0.0,
+                rr: 0.0,
+            })
             .collect();
         let mut row = vec![0.0; n];
         for m in self.matches(h, points, gate) {
@@ -245,8 +298,8 @@ impl Refine<'_> {
         }
         for (j, q) in h.posture.iter().enumerate() {
             let [low, high] = self.prepared.model.limits(j);
-            let continuous =
-                self.prepared.model.joints[self.prepared.model.free[j]].kind == JointKind::Continuous;
+            let continuous = self.prepared.model.joints[self.prepared.model.free[j]].kind
+                == JointKind::Continuous;
             let over = if continuous { 0.0 } else { (q - high).max(0.0) + (q - low).min(0.0) };
             if over != 0.0 {
                 let w = 1.0 / (LIMIT_SIGMA * LIMIT_SIGMA);
@@ -325,10 +378,8 @@ impl Refine<'_> {
 /// `H⁻¹ (Σ g gᵀ) H⁻¹ · C/(C−1)` plus `H⁻¹`: clusters that happen to cancel must not promise more than the points can.
 fn sandwich(hessian: &DMatrix<f64>, clusters: &[Option<DVector<f64>>]) -> DMatrix<f64> {
     let n = hessian.nrows();
-    let inverse = hessian
-        .clone()
-        .cholesky()
-        .map_or_else(|| DMatrix::identity(n, n) * 1e3, |c| c.inverse());
+    let inverse =
+        hessian.clone().cholesky().map_or_else(|| DMatrix::identity(n, n) * 1e3, |c| c.inverse());
     let mut meat = DMatrix::zeros(n, n);
     let mut count = 0.0_f64;
     for g in clusters.iter().flatten() {

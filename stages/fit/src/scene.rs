@@ -3,7 +3,7 @@
 use contract::{InstallationPlane, Region, View};
 use geometry::evidence::Cloud;
 use geometry::{Evidence, Plane, Point, Pose, Vector};
-use nalgebra::{Translation3, UnitQuaternion};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use crate::Settings;
 
@@ -70,6 +70,14 @@ impl<'a> Scene<'a> {
             Cloud::new(few, CLOUD.0, CLOUD.1)
         });
         Self { region, views, evidence: Evidence { images, cloud }, points, thin }
+    }
+
+    /// Thinned points, and all points, within `reach` metres of a place.
+    pub(crate) fn within(&self, place: &Point, reach: f64) -> [Vec<u32>; 2] {
+        let (c, r2) = (place.coords.cast::<f32>(), (reach * reach) as f32);
+        let near = |i: &u32| (Vector3::from(self.points[*i as usize].p) - c).norm_squared() < r2;
+        let all = (0..self.points.len() as u32).filter(near).collect();
+        [self.thin.iter().copied().filter(near).collect(), all]
     }
 
     /// World from the region's local frame.

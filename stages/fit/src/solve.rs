@@ -1,18 +1,26 @@
 //! One candidate in, one fit out: search, refine, judge; or nothing, where no posture explains what was measured.
 
 use contract::{Candidate, Fit, JointFit, RunnerUp, Verdict};
-use geometry::Pose;
+use geometry::{Point, Pose};
 use nalgebra::{DMatrix, Rotation3, Translation3, UnitQuaternion};
 
 use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, evidence, judge};
-use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Refined};
+use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Refined, Round};
 use crate::{Prepared, Scene, Settings, verdict};
 
 /// Largest distance of a judged point, metres: what is left after a fit should be noise.
 const JUDGE_TOLERANCE: (f64, f64) = (0.012, 0.04);
 /// Gate of the last rounds in multiples of the noise found, and its bounds, metres.
 const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
+
+/// How far beyond its reach points may still be the robot's, metres: an error of the base.
+const NEAR_MARGIN: f64 = 0.15;
+/// Points of a link in the coarse rounds: enough to hold its pose to a millimetre.
+const COARSE_CAP: usize = 600;
+/// Distance from the roughly placed links within which points take part in the fine rounds, metres: just inside the
+/// reach of the fine field.
+const FINE_GATE: f64 = 0.0255;
 
 /// Fits the candidate's model in the scene; `None` where nothing comes near.
 #[must_use]
@@ -23,20 +31,27 @@ pub fn fit(
     settings: &Settings,
 ) -> Option<Fit> {
     let local_from_world = scene.world_from_local().inverse();
-    let bases: Vec<Pose> = candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
+    let bases: Vec<Pose> =
+        candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
     let beam = Beam { prepared, scene, settings };
     let found = beam.run(&bases);
-    let refine =
-        Refine { prepared, scene, settings, prior: Some(prior(candidate, &local_from_world, prepared)) };
-    let refined = rough(&beam, &refine, found, settings);
+    let refine = Refine {
+        prepared,
+        scene,
+        settings,
+        prior: Some(prior(candidate, &local_from_world, prepared)),
+    };
+    let base = bases.first().map_or_else(Point::origin, |b| Point::from(b.translation.vector));
+    let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
+    let refined = rough(&beam, &refine, found, &near);
     let mut polished: Vec<(Refined, Judgement)> = Vec::new();
     for h in refined.iter().take(settings.n_polish) {
-        polished.push(polish(&refine, h));
+        polished.push(polish(&refine, h, &all));
     }
     if let Some((best, _)) = polished.first() {
         for h in beam.alternatives(&best.hypothesis) {
-            let h = refine.run(&h, &scene.thin, &COARSE_ROUNDS[3..]);
-            polished.push(polish(&refine, &h));
+            let h = roughly(&refine, &h, &near, &COARSE_ROUNDS[3..]);
+            polished.push(polish(&refine, &h, &all));
         }
     }
     polished.sort_by(|a, b| b.1.explained.total_cmp(&a.1.explained));
@@ -44,16 +59,22 @@ pub fn fit(
     if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
         return None;
     }
-    let runner_up = polished[1..].iter().find(|(r, _)| differs(&r.hypothesis, &best.hypothesis));
+    let runner_up = polished[1..].iter().find(|(r, _)| differs(r, best, settings));
     Some(report(prepared, scene, settings, best, judgement, runner_up))
 }
 
 /// Coarse rounds for the best of the beam; near twins are dropped.
-fn rough(beam: &Beam<'_>, refine: &Refine<'_>, found: Vec<Hypothesis>, settings: &Settings) -> Vec<Hypothesis> {
+fn rough(
+    beam: &Beam<'_>,
+    refine: &Refine<'_>,
+    found: Vec<Hypothesis>,
+    near: &[u32],
+) -> Vec<Hypothesis> {
+    let settings = refine.settings;
     let mut out: Vec<(Hypothesis, f64)> = Vec::new();
     let last = found.first().map_or(0, |h| h.posture.len().saturating_sub(1));
     for h in found.into_iter().take(settings.n_refine) {
-        let h = refine.run(&h, &refine.scene.thin, &COARSE_ROUNDS);
+        let h = roughly(refine, &h, near, &COARSE_ROUNDS);
         if out.iter().any(|(k, _)| beam.alike(k, &h, last, 0.7)) {
             continue;
         }
@@ -64,15 +85,21 @@ fn rough(beam: &Beam<'_>, refine: &Refine<'_>, found: Vec<Hypothesis>, settings:
     out.into_iter().map(|(h, _)| h).collect()
 }
 
+/// Coarse rounds on few points of each link.
+fn roughly(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], rounds: &[Round]) -> Hypothesis {
+    let few = refine.stratified(h, near.iter().copied(), rounds[0].gate, COARSE_CAP);
+    refine.run(h, &few, rounds)
+}
+
 /// Fine rounds on all points, with the gate that the noise asks for; then the judgement.
-fn polish(refine: &Refine<'_>, h: &Hypothesis) -> (Refined, Judgement) {
+fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> (Refined, Judgement) {
     let scene = refine.scene;
-    let stride = (scene.points.len() / refine.settings.max_points).max(1);
-    let all: Vec<u32> = (0..scene.points.len() as u32).step_by(stride).collect();
+    let cap = refine.settings.max_points / refine.prepared.model.links.len().max(1);
+    let all = refine.stratified(h, near.iter().copied(), FINE_GATE, cap.max(2000));
     let h = refine.run(h, &all, &FINE_ROUNDS[..3]);
     let first = refine.finish(h, &all, 0.022);
     let gate = (LAST_GATE.0 * first.noise).clamp(LAST_GATE.1, LAST_GATE.2);
-    let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| crate::refine::Round { gate, ..*r }).collect();
+    let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect();
     let h = refine.run(&first.hypothesis, &all, &rounds);
     let done = refine.finish(h, &all, gate);
     let tolerance = (4.0 * done.noise).clamp(JUDGE_TOLERANCE.0, JUDGE_TOLERANCE.1);
@@ -80,10 +107,19 @@ fn polish(refine: &Refine<'_>, h: &Hypothesis) -> (Refined, Judgement) {
     (done, judgement)
 }
 
-/// Whether two postures are different answers (more than 2° in some joint, or 3 cm at the base).
-fn differs(a: &Hypothesis, b: &Hypothesis) -> bool {
-    let shift = (a.local_from_base.translation.vector - b.local_from_base.translation.vector).norm();
-    shift > 0.03 || a.posture.iter().zip(&b.posture).any(|(x, y)| (x - y).abs() > 0.035)
+/// Whether two postures are different answers: more than 2° (whole turns apart) in a joint that the points determine,
+/// or 3 cm at the base.
+fn differs(a: &Refined, b: &Refined, settings: &Settings) -> bool {
+    let (p, q) = (&a.hypothesis, &b.hypothesis);
+    let shift =
+        (p.local_from_base.translation.vector - q.local_from_base.translation.vector).norm();
+    let sure =
+        |r: &Refined, j: usize| r.covariance[(6 + j, 6 + j)] < settings.determined_sigma.powi(2);
+    shift > 0.03
+        || (0..p.posture.len()).any(|j| {
+            let turn = (p.posture[j] - q.posture[j]).rem_euclid(std::f64::consts::TAU);
+            sure(a, j) && sure(b, j) && turn.min(std::f64::consts::TAU - turn) > 0.035
+        })
 }
 
 /// Frame on the installation plane with z along its normal, at the height of the base's origin.
@@ -91,7 +127,8 @@ fn prior(candidate: &Candidate, local_from_world: &Pose, prepared: &Prepared<'_>
     // The candidate's bases already stand on the plane: the first one tells the height of the origin above it.
     let base = candidate.bases.first().map_or_else(Pose::identity, |b| local_from_world * b.0);
     let n = candidate.plane.plane.normal;
-    let tilt = Rotation3::rotation_between(&geometry::Vector::z(), &n).unwrap_or_else(Rotation3::identity);
+    let tilt =
+        Rotation3::rotation_between(&geometry::Vector::z(), &n).unwrap_or_else(Rotation3::identity);
     let _ = prepared;
     Pose::from_parts(
         Translation3::from(base.translation.vector),
@@ -134,14 +171,10 @@ fn report(
         })
         .collect();
     let total: usize = best.n_points.iter().sum();
-    let rms = (best
-        .n_points
-        .iter()
-        .zip(&best.link_rms)
-        .map(|(n, r)| *n as f64 * r * r)
-        .sum::<f64>()
-        / total.max(1) as f64)
-        .sqrt();
+    let rms =
+        (best.n_points.iter().zip(&best.link_rms).map(|(n, r)| *n as f64 * r * r).sum::<f64>()
+            / total.max(1) as f64)
+            .sqrt();
     let mut fit = Fit {
         model: prepared.index,
         model_name: model.name.clone(),

@@ -19,7 +19,12 @@ const JOINT_POINTS: usize = 60;
 const RIVAL: f64 = 0.93;
 
 /// Sets verdict and reasons from what stands in the fit and the judgement.
-pub(crate) fn pass(fit: &mut Fit, prepared: &Prepared<'_>, scene: &Scene<'_>, judgement: &Judgement) {
+pub(crate) fn pass(
+    fit: &mut Fit,
+    prepared: &Prepared<'_>,
+    scene: &Scene<'_>,
+    judgement: &Judgement,
+) {
     let mut doubts = Vec::new();
     let mut refusals = Vec::new();
     grade(judgement.score < SCORE.1, judgement.score < SCORE.0, &mut refusals, &mut doubts, || {

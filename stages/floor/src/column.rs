@@ -66,11 +66,6 @@ impl Columns {
             }
         }
         let share = |k: usize| f64::from(n[k]) / nodes.len().max(1) as f64;
-        Around {
-            below: share(0),
-            near_below: share(1),
-            near_above: share(2),
-            above: share(3),
-        }
+        Around { below: share(0), near_below: share(1), near_above: share(2), above: share(3) }
     }
 }

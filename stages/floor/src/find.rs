@@ -46,19 +46,10 @@ impl Find {
     pub fn new(scans: &[Scan], settings: &Settings) -> Self {
         let mut scanners: Vec<_> = scans
             .iter()
-            .map(|s| {
-                (
-                    s.id,
-                    s.has_beams()
-                        .then_some(s.world_from_scan.translation.vector),
-                )
-            })
+            .map(|s| (s.id, s.has_beams().then_some(s.world_from_scan.translation.vector)))
             .collect();
         scanners.sort_by_key(|s| s.0);
-        Self {
-            scanners,
-            settings: *settings,
-        }
+        Self { scanners, settings: *settings }
     }
 }
 
@@ -98,11 +89,7 @@ impl Fold for Find {
         sum.n_points += item.n_points;
         sum.n_veils += item.n_veils;
         // Walls and slopes are of no use here, and a plant has many.
-        sum.patches.extend(
-            item.patches
-                .into_iter()
-                .filter(|p| faces_up(p, &self.settings)),
-        );
+        sum.patches.extend(item.patches.into_iter().filter(|p| faces_up(p, &self.settings)));
         sum.push(item.occupancy);
         Ok(())
     }
@@ -123,12 +110,7 @@ impl Fold for Find {
         }
         let occupancy = sum.occupancies.pop().unwrap_or_default();
         let floor = search(&sum.patches, &occupancy, &self.scanners, &self.settings);
-        Ok(Ground {
-            floor,
-            occupancy,
-            n_points: sum.n_points,
-            n_veils: sum.n_veils,
-        })
+        Ok(Ground { floor, occupancy, n_points: sum.n_points, n_veils: sum.n_veils })
     }
 }
 
@@ -146,12 +128,7 @@ pub fn find(
     scans: &[Scan],
     settings: &Settings,
 ) -> Floor {
-    search(
-        patches,
-        occupancy,
-        &Find::new(scans, settings).scanners,
-        settings,
-    )
+    search(patches, occupancy, &Find::new(scans, settings).scanners, settings)
 }
 
 fn search(
@@ -163,14 +140,9 @@ fn search(
     let wanted = |p: &PlanePatch| faces_up(p, settings);
     let columns = Columns::new(occupancy);
     let pieces = pieces(patches, wanted, settings);
-    let crate::levels::Levels {
-        floor: found,
-        ceilings,
-    } = levels(pieces, patches, &columns, scanners, settings);
-    let levels: Vec<_> = found
-        .iter()
-        .map(|level| describe(level, settings))
-        .collect();
+    let crate::levels::Levels { floor: found, ceilings } =
+        levels(pieces, patches, &columns, scanners, settings);
+    let levels: Vec<_> = found.iter().map(|level| describe(level, settings)).collect();
     let may_carry: Vec<PlanePatch> = patches
         .iter()
         .enumerate()
@@ -188,10 +160,6 @@ fn search(
         let at = p.bounds.center();
         crate::pieces::height(&p.plane, at.x, at.y)
     };
-    planes.sort_by(|a, b| {
-        middle(a)
-            .total_cmp(&middle(b))
-            .then(b.area.total_cmp(&a.area))
-    });
+    planes.sort_by(|a, b| middle(a).total_cmp(&middle(b)).then(b.area.total_cmp(&a.area)));
     Floor { levels, planes }
 }

@@ -35,23 +35,14 @@ pub(crate) type Scanners = [(ScanId, Option<Vector>)];
 
 /// Position of a scanner, if known.
 pub(crate) fn scanner(scanners: &Scanners, id: ScanId) -> Option<Vector> {
-    scanners
-        .binary_search_by_key(&id, |s| s.0)
-        .ok()
-        .and_then(|i| scanners[i].1)
+    scanners.binary_search_by_key(&id, |s| s.0).ok().and_then(|i| scanners[i].1)
 }
 
 impl Level {
     fn new(piece: Piece) -> Option<Self> {
         let (plane, waviness) = fit(&piece.nodes)?;
         let largest = piece.area();
-        Some(Self {
-            nodes: piece.nodes,
-            patches: piece.patches,
-            plane,
-            waviness,
-            largest,
-        })
+        Some(Self { nodes: piece.nodes, patches: piece.patches, plane, waviness, largest })
     }
 
     /// Area of its cells, m².
@@ -69,9 +60,7 @@ impl Level {
                 p.z - height(&self.plane, p.x, p.y)
             })
             .collect();
-        let off = geometry::robust::median(&mut off)
-            .unwrap_or(f64::INFINITY)
-            .abs();
+        let off = geometry::robust::median(&mut off).unwrap_or(f64::INFINITY).abs();
         let tolerance = settings.level_tolerance.max(2.5 * self.waviness);
         let bend = settings.level_bend * self.distance(piece);
         off <= (tolerance + bend).min(settings.max_level_tolerance)
@@ -89,8 +78,7 @@ impl Level {
         // Small pieces do not move the plane enough to pay for a fit each.
         let refit = piece.nodes.len() * 20 >= self.nodes.len();
         self.nodes.extend(piece.nodes);
-        self.nodes
-            .sort_by(|a, b| a.cell.cmp(&b.cell).then(a.z.total_cmp(&b.z)));
+        self.nodes.sort_by(|a, b| a.cell.cmp(&b.cell).then(a.z.total_cmp(&b.z)));
         self.patches.extend(piece.patches);
         self.patches.sort_unstable();
         self.patches.dedup();
@@ -124,9 +112,7 @@ impl Level {
             let low = [cell[0].saturating_add(d), cell[1].saturating_sub(NEAR_CELL)];
             let high = cell[1].saturating_add(NEAR_CELL);
             let at = self.nodes.partition_point(|n| n.cell < low);
-            self.nodes
-                .get(at)
-                .is_some_and(|n| n.cell[0] == low[0] && n.cell[1] <= high)
+            self.nodes.get(at).is_some_and(|n| n.cell[0] == low[0] && n.cell[1] <= high)
         })
     }
 }
@@ -135,12 +121,7 @@ impl Level {
 pub(crate) fn seen_through(patch: &PlanePatch, from: Vector, upper: &Level) -> f64 {
     let mut n = 0;
     for &(cell, count, sum) in &patch.ground {
-        let p = Node {
-            cell,
-            z: sum / f64::from(count.max(1)),
-            n: count,
-        }
-        .place();
+        let p = Node { cell, z: sum / f64::from(count.max(1)), n: count }.place();
         let (above, below) = (upper.plane.distance(&from), upper.plane.distance(&p));
         if above > 0.0 && below < -0.1 {
             let t = above / (above - below);
@@ -170,10 +151,7 @@ pub(crate) fn levels(
 ) -> Levels {
     let mut groups: Vec<Level> = Vec::new();
     for piece in pieces {
-        match groups
-            .iter_mut()
-            .find(|group| group.continues(&piece, settings))
-        {
+        match groups.iter_mut().find(|group| group.continues(&piece, settings)) {
             Some(group) => group.join(piece),
             // Crumbs may join a level, but found none: what is one cell large is no floor.
             None if piece.nodes.len() > 1 => groups.extend(Level::new(piece)),
@@ -220,13 +198,7 @@ fn is_ceiling(level: &Level, around: Around, patches: &[PlanePatch], scanners: &
 }
 
 fn weight(level: &Level, patches: &[PlanePatch], wanted: impl Fn(&PlanePatch) -> bool) -> f64 {
-    level
-        .patches
-        .iter()
-        .map(|&i| &patches[i])
-        .filter(|p| wanted(p))
-        .map(|p| p.moments.n)
-        .sum()
+    level.patches.iter().map(|&i| &patches[i]).filter(|p| wanted(p)).map(|p| p.moments.n).sum()
 }
 
 /// The level as others see it: mean plane and height map.
@@ -251,11 +223,5 @@ pub(crate) fn describe(level: &Level, settings: &Settings) -> FloorLevel {
             (same[0].0, height(&level.plane, x, y) + off)
         })
         .collect();
-    FloorLevel {
-        plane: level.plane,
-        waviness: level.waviness,
-        area: level.area(),
-        cell,
-        heights,
-    }
+    FloorLevel { plane: level.plane, waviness: level.waviness, area: level.area(), cell, heights }
 }

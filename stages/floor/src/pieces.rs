@@ -63,20 +63,11 @@ pub(crate) fn pieces(
             p.ground
                 .iter()
                 .filter(|g| g.1 >= settings.min_cell_points)
-                .map(|&(cell, n, sum)| Entry {
-                    cell,
-                    z: sum / f64::from(n),
-                    n,
-                    patch,
-                }),
+                .map(|&(cell, n, sum)| Entry { cell, z: sum / f64::from(n), n, patch }),
         );
     }
-    entries.sort_by(|a, b| {
-        a.cell
-            .cmp(&b.cell)
-            .then(a.z.total_cmp(&b.z))
-            .then(a.patch.cmp(&b.patch))
-    });
+    entries
+        .sort_by(|a, b| a.cell.cmp(&b.cell).then(a.z.total_cmp(&b.z)).then(a.patch.cmp(&b.patch)));
     let (nodes, node_of) = merge_heights(&entries, settings);
     let mut union = Union::new(nodes.len());
     join_cells(&nodes, &mut union, settings);
@@ -90,15 +81,9 @@ fn merge_heights(entries: &[Entry], settings: &Settings) -> (Vec<Node>, Vec<usiz
     let mut node_of = Vec::with_capacity(entries.len());
     let mut sum = 0.0;
     for e in entries {
-        let same = nodes
-            .last()
-            .is_some_and(|n| n.cell == e.cell && e.z - n.z <= settings.max_step);
+        let same = nodes.last().is_some_and(|n| n.cell == e.cell && e.z - n.z <= settings.max_step);
         if !same {
-            nodes.push(Node {
-                cell: e.cell,
-                z: e.z,
-                n: 0,
-            });
+            nodes.push(Node { cell: e.cell, z: e.z, n: 0 });
             sum = 0.0;
         }
         if let Some(node) = nodes.last_mut() {
@@ -115,16 +100,10 @@ fn merge_heights(entries: &[Entry], settings: &Settings) -> (Vec<Node>, Vec<usiz
 fn join_cells(nodes: &[Node], union: &mut Union, settings: &Settings) {
     for (i, node) in nodes.iter().enumerate() {
         for [dx, dy] in [[0, 1], [1, -1], [1, 0], [1, 1]] {
-            let cell = [
-                node.cell[0].saturating_add(dx),
-                node.cell[1].saturating_add(dy),
-            ];
+            let cell = [node.cell[0].saturating_add(dx), node.cell[1].saturating_add(dy)];
             let from = nodes.partition_point(|n| n.cell < cell);
-            for (j, other) in nodes
-                .iter()
-                .enumerate()
-                .skip(from)
-                .take_while(|(_, n)| n.cell == cell)
+            for (j, other) in
+                nodes.iter().enumerate().skip(from).take_while(|(_, n)| n.cell == cell)
             {
                 if (other.z - node.z).abs() <= settings.max_step {
                     union.join(i, j);
@@ -153,10 +132,7 @@ fn collect(nodes: &[Node], entries: &[Entry], node_of: &[usize], union: &mut Uni
         let root = union.find(i);
         if number[root] == usize::MAX {
             number[root] = out.len();
-            out.push(Piece {
-                nodes: Vec::new(),
-                patches: Vec::new(),
-            });
+            out.push(Piece { nodes: Vec::new(), patches: Vec::new() });
         }
         out[number[root]].nodes.push(*node);
     }
@@ -180,10 +156,7 @@ pub(crate) fn fit(nodes: &[Node]) -> Option<(Plane, f64)> {
     nodes.iter().for_each(|n| moments.add(&n.place()));
     let mut plane = upward(&moments);
     let rms = |plane: &Plane| {
-        let sum: f64 = nodes
-            .iter()
-            .map(|n| plane.distance(&n.place()).powi(2))
-            .sum();
+        let sum: f64 = nodes.iter().map(|n| plane.distance(&n.place()).powi(2)).sum();
         (sum / nodes.len() as f64).sqrt()
     };
     let limit = 2.5 * rms(&plane).max(0.002);
@@ -201,17 +174,10 @@ pub(crate) fn fit(nodes: &[Node]) -> Option<(Plane, f64)> {
 
 /// Least-squares plane with normal up; horizontal through the mean where the points have no width.
 pub(crate) fn upward(moments: &Moments) -> Plane {
-    let flat = Plane {
-        normal: Vector::z(),
-        offset: moments.mean().z,
-    };
+    let flat = Plane { normal: Vector::z(), offset: moments.mean().z };
     match moments.plane() {
         Some(fit) if fit.spread[1] >= 0.5 * GROUND && fit.plane.normal.z.abs() > 0.5 => {
-            if fit.plane.normal.z < 0.0 {
-                fit.plane.flipped()
-            } else {
-                fit.plane
-            }
+            if fit.plane.normal.z < 0.0 { fit.plane.flipped() } else { fit.plane }
         }
         _ => flat,
     }

@@ -55,11 +55,8 @@ fn is_floor(patch: &PlanePatch, levels: &[FloorLevel], settings: &Settings) -> b
     levels.iter().any(|level| {
         level.height(p.x, p.y).is_some_and(|h| {
             // A large patch close to the floor is the floor of a scan that is registered a little higher.
-            let band = if patch.area > 1.0 {
-                2.5 * settings.floor_band
-            } else {
-                settings.floor_band
-            };
+            let band =
+                if patch.area > 1.0 { 2.5 * settings.floor_band } else { settings.floor_band };
             (p.z - h).abs() <= band.max(1.5 * patch.rms)
         })
     })
@@ -73,9 +70,7 @@ fn is_ghost(
     settings: &Settings,
 ) -> bool {
     scanner(scanners, patch.scan).is_some_and(|from| {
-        levels
-            .iter()
-            .any(|level| seen_through(patch, from, level) > settings.ghost_share)
+        levels.iter().any(|level| seen_through(patch, from, level) > settings.ghost_share)
     })
 }
 

@@ -10,9 +10,7 @@ pub(crate) struct Union {
 impl Union {
     /// `n` sets of one member each.
     pub(crate) fn new(n: usize) -> Self {
-        Self {
-            parent: (0..n as u32).collect(),
-        }
+        Self { parent: (0..n as u32).collect() }
     }
 
     /// Smallest member of the set that holds `i`.

@@ -198,7 +198,8 @@ impl Level {
         (0..hit.len())
             .map(|at| {
                 let (u, v) = (at % self.width, at / self.width);
-                !(v.saturating_sub(w)..(v + w + 1).min(self.height)).any(|v| near_hit[v * self.width + u])
+                !(v.saturating_sub(w)..(v + w + 1).min(self.height))
+                    .any(|v| near_hit[v * self.width + u])
             })
             .collect()
     }

@@ -45,7 +45,9 @@ impl Evidence<'_> {
         tolerance: f32,
     ) -> Probe {
         match &self.cloud {
-            Some(cloud) if self.images.is_empty() => cloud.probe(points, local_from_body, tolerance),
+            Some(cloud) if self.images.is_empty() => {
+                cloud.probe(points, local_from_body, tolerance)
+            }
             _ => probe(&self.images, points, normals, local_from_body, tolerance),
         }
     }

@@ -21,7 +21,8 @@ impl NearestField {
         if bounds.is_empty() {
             return Self::default();
         }
-        let margin = f64::from(reach + edge);
+        // One voxel more than the reach, so that what is within reach has all its neighbours.
+        let margin = f64::from(reach + 2.0 * edge);
         let bounds = bounds.grown(margin);
         let size = bounds.size().map(|s| (s / f64::from(edge)).ceil() as usize + 1);
         let mut field = Self {
@@ -48,7 +49,6 @@ impl NearestField {
                 self.cells[at] = i as u32 + 1;
             }
         }
-        ring.sort_unstable();
         let reach2 = reach * reach;
         let mut next = Vec::new();
         while !ring.is_empty() {
@@ -71,20 +71,15 @@ impl NearestField {
                     next.push(neighbour);
                 }
             }
-            next.sort_unstable();
-            next.dedup();
             std::mem::swap(&mut ring, &mut next);
             next.clear();
         }
     }
 
-    fn around(&self, at: usize) -> impl Iterator<Item = usize> + use<> {
-        let [w, h, d] = self.size;
-        let (x, y, z) = (at % w, at / w % h, at / (w * h));
-        (0..27).filter(|n| *n != 13).filter_map(move |n| {
-            let (x, y, z) = ((x + n % 3).checked_sub(1)?, (y + n / 3 % 3).checked_sub(1)?, (z + n / 9).checked_sub(1)?);
-            (x < w && y < h && z < d).then_some((z * h + y) * w + x)
-        })
+    /// The six neighbours across faces. The border of the grid lies beyond reach and is never left.
+    fn around(&self, at: usize) -> [usize; 6] {
+        let (row, slab) = (self.size[0], self.size[0] * self.size[1]);
+        [at - 1, at + 1, at - row, at + row, at - slab, at + slab]
     }
 
     fn middle(&self, at: usize, edge: f32) -> [f32; 3] {
@@ -146,7 +141,8 @@ mod tests {
         let mut n_near = 0;
         for _ in 0..5000 {
             let p = [random() * 0.5 - 0.05, random() * 0.5 - 0.05, random() * 0.5 - 0.25];
-            let exact = points.iter().map(|q| distance2(p, *q)).fold(f32::INFINITY, f32::min).sqrt();
+            let exact =
+                points.iter().map(|q| distance2(p, *q)).fold(f32::INFINITY, f32::min).sqrt();
             match field.nearest(p) {
                 Some(i) => {
                     n_near += 1;

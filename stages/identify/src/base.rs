@@ -93,14 +93,30 @@ impl<'a> BaseSearch<'a> {
             return None;
         }
         let root_from_base = model.poses(&model.home())[base];
-        let rooted = model.links[base].cad.points.iter().map(|p| root_from_base * Point::from(p.map(f64::from)));
+        let rooted = model.links[base]
+            .cad
+            .points
+            .iter()
+            .map(|p| root_from_base * Point::from(p.map(f64::from)));
         let (mut radius, mut foot) = (0.0_f64, f64::INFINITY);
         for p in rooted {
             radius = radius.max(p.x.hypot(p.y));
             foot = foot.min(p.z);
         }
         let first = first_moving(model);
-        Some(Self { model, index, region, views, evidence, settings, radius, foot, base, root_from_base, first })
+        Some(Self {
+            model,
+            index,
+            region,
+            views,
+            evidence,
+            settings,
+            radius,
+            foot,
+            base,
+            root_from_base,
+            first,
+        })
     }
 
     /// The candidates: one for each place, best first.
@@ -116,7 +132,8 @@ impl<'a> BaseSearch<'a> {
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
         best(&mut trials, self.settings.keep_coarse, step * 0.9, yaw_step * 0.9);
-        let trials = self.finer(&local, &trials, step / 2.0, yaw_step / 2.0, self.settings.keep_middle);
+        let trials =
+            self.finer(&local, &trials, step / 2.0, yaw_step / 2.0, self.settings.keep_middle);
         let trials = self.finer(
             &local,
             &trials,
@@ -170,7 +187,8 @@ impl<'a> BaseSearch<'a> {
         if low[0] >= high[0] || low[1] >= high[1] {
             return Vec::new();
         }
-        let n: [usize; 2] = std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
+        let n: [usize; 2] =
+            std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
         let mut count = vec![0_u32; n[0] * n[1]];
         for p in self.views.iter().flat_map(|v| &v.points) {
             let q = Vector::from(p.xyz.map(f64::from));
@@ -270,14 +288,20 @@ impl<'a> BaseSearch<'a> {
     fn pose(&self, plane: &Plane, x: f64, y: f64, yaw: f64) -> Pose {
         let n = plane.normal;
         let z = (plane.offset - n.x * x - n.y * y) / n.z;
-        let tilt = Rotation3::rotation_between(&Vector::z(), &n).unwrap_or_else(Rotation3::identity);
+        let tilt =
+            Rotation3::rotation_between(&Vector::z(), &n).unwrap_or_else(Rotation3::identity);
         let turn = Rotation3::from_axis_angle(&Unit::new_normalize(n), yaw);
         let rotation = UnitQuaternion::from_rotation_matrix(&(turn * tilt));
         let foot = Point::new(x, y, z).coords - n * self.foot;
         Pose::from_parts(Translation3::from(foot), rotation)
     }
 
-    fn group(&self, planes: &[InstallationPlane], local: &[Plane], trials: &[Trial]) -> Vec<Candidate> {
+    fn group(
+        &self,
+        planes: &[InstallationPlane],
+        local: &[Plane],
+        trials: &[Trial],
+    ) -> Vec<Candidate> {
         let mut places: Vec<Vec<&Trial>> = Vec::new();
         for trial in trials.iter().filter(|t| t.score >= self.settings.min_score) {
             let radius = self.settings.place_radius;
@@ -295,11 +319,16 @@ impl<'a> BaseSearch<'a> {
                 None => {}
             }
         }
-        let world_from_local =
-            Pose::from_parts(Translation3::from(self.region.origin.coords), UnitQuaternion::identity());
+        let world_from_local = Pose::from_parts(
+            Translation3::from(self.region.origin.coords),
+            UnitQuaternion::identity(),
+        );
         let world = {
             let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] + self.region.origin[i]);
-            geometry::Aabb { min: shift(self.region.bounds.min), max: shift(self.region.bounds.max) }
+            geometry::Aabb {
+                min: shift(self.region.bounds.min),
+                max: shift(self.region.bounds.max),
+            }
         };
         places
             .iter()

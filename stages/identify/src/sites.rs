@@ -87,10 +87,7 @@ fn cut(bounds: &Aabb, settings: &RegionSettings) -> Vec<Aabb> {
     let mut out = Vec::new();
     for (x0, x1) in spans(0) {
         for (y0, y1) in spans(1) {
-            out.push(Aabb {
-                min: [x0, y0, bounds.min[2]],
-                max: [x1, y1, bounds.max[2]],
-            });
+            out.push(Aabb { min: [x0, y0, bounds.min[2]], max: [x1, y1, bounds.max[2]] });
         }
     }
     out

@@ -16,9 +16,7 @@ const POINT_FORMAT_AT: usize = 104;
 pub(crate) fn detect(path: &Path) -> Result<Format> {
     let mut head = Vec::new();
     File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
-    let suffix = path
-        .extension()
-        .map_or_else(String::new, |s| s.to_string_lossy().to_lowercase());
+    let suffix = path.extension().map_or_else(String::new, |s| s.to_string_lossy().to_lowercase());
     if head.is_empty() {
         return Err(Error::bad_input("the file is empty"));
     }
@@ -26,9 +24,7 @@ pub(crate) fn detect(path: &Path) -> Result<Format> {
         return Ok(Format::E57);
     }
     if head.starts_with(b"LASF") {
-        let compressed = head
-            .get(POINT_FORMAT_AT)
-            .is_some_and(|f| f & COMPRESSED != 0);
+        let compressed = head.get(POINT_FORMAT_AT).is_some_and(|f| f & COMPRESSED != 0);
         return Ok(if compressed { Format::Laz } else { Format::Las });
     }
     if is_ptx(&head) || (suffix == "ptx" && is_text(&head)) {
@@ -40,24 +36,15 @@ pub(crate) fn detect(path: &Path) -> Result<Format> {
 /// Two lines of one whole number, then one of three numbers.
 fn is_ptx(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
-    let mut lines = text
-        .lines()
-        .map(|l| l.split_whitespace().collect::<Vec<_>>());
-    let mut whole = || {
-        lines
-            .next()
-            .is_some_and(|w| w.len() == 1 && w[0].parse::<u64>().is_ok())
-    };
+    let mut lines = text.lines().map(|l| l.split_whitespace().collect::<Vec<_>>());
+    let mut whole = || lines.next().is_some_and(|w| w.len() == 1 && w[0].parse::<u64>().is_ok());
     whole()
         && whole()
-        && lines
-            .next()
-            .is_some_and(|w| w.len() == 3 && w.iter().all(|v| v.parse::<f64>().is_ok()))
+        && lines.next().is_some_and(|w| w.len() == 3 && w.iter().all(|v| v.parse::<f64>().is_ok()))
 }
 
 fn is_text(head: &[u8]) -> bool {
-    head.iter()
-        .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
+    head.iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
 }
 
 fn refusal(head: &[u8], suffix: &str) -> Error {

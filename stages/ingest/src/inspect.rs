@@ -95,12 +95,7 @@ pub struct BoundsText {
 /// Describes each input, in their order.
 #[must_use]
 pub fn describe(sources: &Sources) -> Vec<Description> {
-    sources
-        .inputs
-        .iter()
-        .enumerate()
-        .map(|(i, input)| description(sources, i, input))
-        .collect()
+    sources.inputs.iter().enumerate().map(|(i, input)| description(sources, i, input)).collect()
 }
 
 fn description(sources: &Sources, at: usize, input: &Input) -> Description {
@@ -115,16 +110,9 @@ fn description(sources: &Sources, at: usize, input: &Input) -> Description {
         path: input.path.display().to_string(),
         format: word(input.format),
         n_bytes: input.n_bytes,
-        facts: file
-            .reader
-            .facts()
-            .into_iter()
-            .map(|(name, value)| Fact { name, value })
-            .collect(),
+        facts: file.reader.facts().into_iter().map(|(name, value)| Fact { name, value }).collect(),
         n_points: masks.map(|m| m.n_points).sum(),
-        scans: scans
-            .map(|(scan, (steps, known))| scan_description(scan, *steps, *known))
-            .collect(),
+        scans: scans.map(|(scan, (steps, known))| scan_description(scan, *steps, *known)).collect(),
     }
 }
 
@@ -181,17 +169,11 @@ fn axis(lattice: &contract::Lattice) -> &'static str {
 
 fn pose_text(pose: &Pose) -> PoseText {
     let (t, q) = (pose.translation.vector, pose.rotation);
-    PoseText {
-        xyz: [t.x, t.y, t.z],
-        quat_wxyz: [q.w, q.i, q.j, q.k],
-    }
+    PoseText { xyz: [t.x, t.y, t.z], quat_wxyz: [q.w, q.i, q.j, q.k] }
 }
 
 fn bounds_text(bounds: &Aabb) -> BoundsText {
-    BoundsText {
-        min: bounds.min,
-        max: bounds.max,
-    }
+    BoundsText { min: bounds.min, max: bounds.max }
 }
 
 fn metres(v: &[f64; 3]) -> String {
@@ -241,15 +223,8 @@ impl fmt::Display for ScanDescription {
             )?;
         }
         if let Some(bounds) = &self.stated_bounds {
-            writeln!(
-                f,
-                "    bounds: {} to {}",
-                metres(&bounds.min),
-                metres(&bounds.max)
-            )?;
+            writeln!(f, "    bounds: {} to {}", metres(&bounds.min), metres(&bounds.max))?;
         }
-        self.notes
-            .iter()
-            .try_for_each(|note| writeln!(f, "    note: {note}"))
+        self.notes.iter().try_for_each(|note| writeln!(f, "    note: {note}"))
     }
 }

@@ -33,11 +33,7 @@ impl Records {
     pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Self> {
         let map = map(path)?;
         let header = LasHeader::read(&map)?;
-        let laz = if header.compressed {
-            Some(Laz::read(&map, &header, settings)?)
-        } else {
-            None
-        };
+        let laz = if header.compressed { Some(Laz::read(&map, &header, settings)?) } else { None };
         Ok(Self { map, header, laz })
     }
 
@@ -51,9 +47,7 @@ impl Records {
         if laz.pieces.is_empty() {
             return Ok((0, Cow::Owned(laz.stream(&self.map)?.next(n)?)));
         }
-        let mut at = laz
-            .pieces
-            .partition_point(|p| p.first + p.n_points <= first);
+        let mut at = laz.pieces.partition_point(|p| p.first + p.n_points <= first);
         let start = laz.pieces.get(at).map_or(first, |p| p.first);
         let mut records = Vec::new();
         let mut left = n;
@@ -68,9 +62,7 @@ impl Records {
     /// Where [`Records::run`] would start.
     pub(crate) fn start(&self, first: u64) -> u64 {
         let Some(laz) = &self.laz else { return first };
-        let at = laz
-            .pieces
-            .partition_point(|p| p.first + p.n_points <= first);
+        let at = laz.pieces.partition_point(|p| p.first + p.n_points <= first);
         laz.pieces.get(at).map_or(0, |p| p.first)
     }
 
@@ -100,20 +92,11 @@ impl Las {
         let records = Records::open(path, settings)?;
         let found = las_scans::find(path, &records, scanners, settings)?;
         let poses: Vec<_> = found.scans.iter().map(|s| s.world_from_scan).collect();
-        let decoder = Decoder::new(
-            &records.header,
-            &poses,
-            found.scan_of_source,
-            settings.max_range,
-        );
-        let name = path
-            .file_name()
-            .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let decoder =
+            Decoder::new(&records.header, &poses, found.scan_of_source, settings.max_range);
+        let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         Ok(Self {
-            masks: vec![MaskSeed {
-                name,
-                n_points: Some(records.header.n_points),
-            }],
+            masks: vec![MaskSeed { name, n_points: Some(records.header.n_points) }],
             scans: found.scans,
             extents: found.extents,
             bounds_hold: found.bounds_hold,
@@ -126,11 +109,7 @@ impl Las {
 
 impl Reader for Las {
     fn format(&self) -> Format {
-        if self.records.header.compressed {
-            Format::Laz
-        } else {
-            Format::Las
-        }
+        if self.records.header.compressed { Format::Laz } else { Format::Las }
     }
 
     fn has_color(&self) -> bool {
@@ -173,12 +152,7 @@ impl Reader for Las {
             let (place, records) = self.records.run(from, length)?;
             for strip in self.decoder.decode(&records, place, Want::Coordinates) {
                 if strip.scan == scan {
-                    sample.extend(
-                        strip
-                            .xyz
-                            .into_iter()
-                            .map(|xyz| Sampled { xyz, native: None }),
-                    );
+                    sample.extend(strip.xyz.into_iter().map(|xyz| Sampled { xyz, native: None }));
                 }
             }
         }
@@ -222,15 +196,9 @@ impl Reader for Las {
             ("software", header.software.clone()),
         ];
         if header.copc {
-            facts.push((
-                "order",
-                "octree (COPC), not the order of measurement".into(),
-            ));
+            facts.push(("order", "octree (COPC), not the order of measurement".into()));
         }
-        facts
-            .into_iter()
-            .map(|(name, value)| (name.to_owned(), value))
-            .collect()
+        facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 }
 
@@ -257,9 +225,7 @@ impl<'a> Strips<'a> {
         if self.place >= n_points {
             return Ok(false);
         }
-        let n = usize::try_from(n_points - self.place)
-            .unwrap_or(usize::MAX)
-            .min(las.strip_points);
+        let n = usize::try_from(n_points - self.place).unwrap_or(usize::MAX).min(las.strip_points);
         self.records = match &las.records.laz {
             None => Cow::Borrowed(las.records.mapped(self.place, n)),
             Some(laz) if laz.pieces.is_empty() => {
@@ -267,11 +233,7 @@ impl<'a> Strips<'a> {
                     self.stream = Some(laz.stream(&las.records.map)?);
                 }
                 let stream = self.stream.as_mut().expect("made above");
-                Cow::Owned(
-                    stream
-                        .next(n)
-                        .map_err(|e| e.at(format!("point {}", self.place)))?,
-                )
+                Cow::Owned(stream.next(n).map_err(|e| e.at(format!("point {}", self.place)))?)
             }
             Some(laz) => {
                 let group = self.group(laz);

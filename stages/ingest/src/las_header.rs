@@ -45,9 +45,7 @@ impl LasHeader {
     /// Reads and checks.
     pub(crate) fn read(data: &[u8]) -> Result<Self> {
         let raw = las::raw::Header::read_from(Cursor::new(data)).map_err(|cause| {
-            Error::bad_input("the header cannot be read")
-                .because(cause)
-                .at("header")
+            Error::bad_input("the header cannot be read").because(cause).at("header")
         })?;
         let (major, minor) = (raw.version.major, raw.version.minor);
         if major != 1 || minor > 4 {
@@ -60,11 +58,9 @@ impl LasHeader {
         }
         let format = raw.point_data_record_format & !COMPRESSED_BITS;
         let Some(layout) = Layout::of(format) else {
-            return Err(
-                Error::new(Kind::Unsupported, format!("point format \"{format}\""))
-                    .at("header")
-                    .hint("formats 0 to 10 are read; convert it"),
-            );
+            return Err(Error::new(Kind::Unsupported, format!("point format \"{format}\""))
+                .at("header")
+                .hint("formats 0 to 10 are read; convert it"));
         };
         let record_len = usize::from(raw.point_data_record_length);
         if record_len < layout.len {
@@ -94,9 +90,7 @@ impl LasHeader {
         header.walk_records(&raw, data)?;
         header.n_points = header.count(&raw, data.len())?;
         if header.n_points > 0 && header.bounds.is_none() {
-            header
-                .notes
-                .push("the stated bounds make no sense and are not used".into());
+            header.notes.push("the stated bounds make no sense and are not used".into());
         }
         Ok(header)
     }
@@ -184,21 +178,16 @@ impl LasHeader {
     /// Number of points: the count that agrees with the bytes present, where a file states two that differ.
     fn count(&mut self, raw: &las::raw::Header, n_bytes: usize) -> Result<u64> {
         let old = u64::from(raw.number_of_point_records);
-        let new = raw
-            .large_file
-            .map_or(old, |large| large.number_of_point_records);
+        let new = raw.large_file.map_or(old, |large| large.number_of_point_records);
         let room = (self.points_end(raw, n_bytes) - self.points_at) as u64;
         // A compressed point takes at least something: the arithmetic coder spends a thousandth of a bit at best,
         // so a count can only be checked against the chunk table; see `laz`.
         let fits = |n: u64| {
-            self.compressed
-                || n.checked_mul(self.record_len as u64)
-                    .is_some_and(|b| b <= room)
+            self.compressed || n.checked_mul(self.record_len as u64).is_some_and(|b| b <= room)
         };
         let n = if new == 0 { old } else { new };
         if old != 0 && new != 0 && old != new {
-            self.notes
-                .push(format!("the header states both {old} and {new} points"));
+            self.notes.push(format!("the header states both {old} and {new} points"));
             if !fits(new) && fits(old) {
                 return Ok(old);
             }
@@ -207,19 +196,14 @@ impl LasHeader {
             return Ok(n);
         }
         let there = room / self.record_len as u64;
-        Err(Error::bad_input(format!(
-            "only {there} points are in the file, stated are \"{n}\""
-        ))
-        .at(format!("byte {n_bytes}"))
-        .hint("the file is truncated; copy or export it again"))
+        Err(Error::bad_input(format!("only {there} points are in the file, stated are \"{n}\""))
+            .at(format!("byte {n_bytes}"))
+            .hint("the file is truncated; copy or export it again"))
     }
 
     /// Where points end at the latest: before records that follow them, where the header says where these start.
     fn points_end(&self, raw: &las::raw::Header, n_bytes: usize) -> usize {
-        let extended = raw
-            .evlr
-            .filter(|e| e.number_of_evlrs > 0)
-            .map(|e| e.start_of_first_evlr);
+        let extended = raw.evlr.filter(|e| e.number_of_evlrs > 0).map(|e| e.start_of_first_evlr);
         [raw.start_of_waveform_data_packet_record, extended]
             .into_iter()
             .flatten()
@@ -231,10 +215,7 @@ impl LasHeader {
 }
 
 fn stated_bounds(raw: &las::raw::Header) -> Option<Aabb> {
-    let (min, max) = (
-        [raw.min_x, raw.min_y, raw.min_z],
-        [raw.max_x, raw.max_y, raw.max_z],
-    );
+    let (min, max) = ([raw.min_x, raw.min_y, raw.min_z], [raw.max_x, raw.max_y, raw.max_z]);
     let sane = (0..3).all(|a| min[a].is_finite() && max[a].is_finite() && min[a] <= max[a]);
     sane.then(|| Aabb::of([min, max]))
 }
@@ -244,13 +225,7 @@ fn text(field: &[u8]) -> String {
     field
         .iter()
         .take_while(|b| **b != 0)
-        .map(|b| {
-            if b.is_ascii_graphic() || *b == b' ' {
-                char::from(*b)
-            } else {
-                '?'
-            }
-        })
+        .map(|b| if b.is_ascii_graphic() || *b == b' ' { char::from(*b) } else { '?' })
         .collect::<String>()
         .trim_end()
         .to_owned()

@@ -21,72 +21,17 @@ pub(crate) struct Layout {
 
 /// LAS 1.4 R15, tables 7 to 17.
 const LAYOUTS: [Layout; 11] = [
-    Layout {
-        len: 20,
-        modern: false,
-        gps_time: None,
-        color: None,
-    },
-    Layout {
-        len: 28,
-        modern: false,
-        gps_time: Some(20),
-        color: None,
-    },
-    Layout {
-        len: 26,
-        modern: false,
-        gps_time: None,
-        color: Some(20),
-    },
-    Layout {
-        len: 34,
-        modern: false,
-        gps_time: Some(20),
-        color: Some(28),
-    },
-    Layout {
-        len: 57,
-        modern: false,
-        gps_time: Some(20),
-        color: None,
-    },
-    Layout {
-        len: 63,
-        modern: false,
-        gps_time: Some(20),
-        color: Some(28),
-    },
-    Layout {
-        len: 30,
-        modern: true,
-        gps_time: Some(22),
-        color: None,
-    },
-    Layout {
-        len: 36,
-        modern: true,
-        gps_time: Some(22),
-        color: Some(30),
-    },
-    Layout {
-        len: 38,
-        modern: true,
-        gps_time: Some(22),
-        color: Some(30),
-    },
-    Layout {
-        len: 59,
-        modern: true,
-        gps_time: Some(22),
-        color: None,
-    },
-    Layout {
-        len: 67,
-        modern: true,
-        gps_time: Some(22),
-        color: Some(30),
-    },
+    Layout { len: 20, modern: false, gps_time: None, color: None },
+    Layout { len: 28, modern: false, gps_time: Some(20), color: None },
+    Layout { len: 26, modern: false, gps_time: None, color: Some(20) },
+    Layout { len: 34, modern: false, gps_time: Some(20), color: Some(28) },
+    Layout { len: 57, modern: false, gps_time: Some(20), color: None },
+    Layout { len: 63, modern: false, gps_time: Some(20), color: Some(28) },
+    Layout { len: 30, modern: true, gps_time: Some(22), color: None },
+    Layout { len: 36, modern: true, gps_time: Some(22), color: Some(30) },
+    Layout { len: 38, modern: true, gps_time: Some(22), color: Some(30) },
+    Layout { len: 59, modern: true, gps_time: Some(22), color: None },
+    Layout { len: 67, modern: true, gps_time: Some(22), color: Some(30) },
 ];
 
 /// Intensity lies at the same place in all formats.
@@ -101,11 +46,7 @@ impl Layout {
     /// Whether the file marks the point as not to be used.
     #[inline]
     pub(crate) fn withheld(self, record: &[u8]) -> bool {
-        if self.modern {
-            record[15] & 0b100 != 0
-        } else {
-            record[15] & 0b1000_0000 != 0
-        }
+        if self.modern { record[15] & 0b100 != 0 } else { record[15] & 0b1000_0000 != 0 }
     }
 
     /// Point source id.
@@ -117,11 +58,7 @@ impl Layout {
     /// Class.
     #[inline]
     fn classification(self, record: &[u8]) -> u8 {
-        if self.modern {
-            record[16]
-        } else {
-            record[15] & 0b1_1111
-        }
+        if self.modern { record[16] } else { record[15] & 0b1_1111 }
     }
 }
 
@@ -132,12 +69,7 @@ fn u16_at(record: &[u8], at: usize) -> u16 {
 
 #[inline]
 fn i32_at(record: &[u8], at: usize) -> f64 {
-    f64::from(i32::from_le_bytes([
-        record[at],
-        record[at + 1],
-        record[at + 2],
-        record[at + 3],
-    ]))
+    f64::from(i32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]))
 }
 
 /// The counts of a record.
@@ -191,11 +123,7 @@ impl Decoder {
                 let t = turn * from;
                 let m = [0, 1, 2].map(|i| [0, 1, 2].map(|j| turn[(i, j)] * header.scale[j]));
                 let diagonal = world_from_scan.rotation == nalgebra::UnitQuaternion::identity();
-                Frame {
-                    m,
-                    t: [t.x, t.y, t.z],
-                    diagonal,
-                }
+                Frame { m, t: [t.x, t.y, t.z], diagonal }
             })
             .collect();
         Self {
@@ -292,11 +220,7 @@ impl Decoder {
     fn local(&self, record: &[u8], frame: &Frame) -> Option<[f32; 3]> {
         let (c, m, t) = (counts(record), &frame.m, &frame.t);
         let p = if frame.diagonal {
-            [
-                c[0] * m[0][0] + t[0],
-                c[1] * m[1][1] + t[1],
-                c[2] * m[2][2] + t[2],
-            ]
+            [c[0] * m[0][0] + t[0], c[1] * m[1][1] + t[1], c[2] * m[2][2] + t[2]]
         } else {
             [0, 1, 2].map(|i| c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i])
         };
@@ -313,11 +237,7 @@ impl Decoder {
         to.classification.push(self.layout.classification(record));
         to.source_id.push(self.layout.source_id(record));
         if let Some(at) = self.layout.color {
-            to.color.push([
-                u16_at(record, at),
-                u16_at(record, at + 2),
-                u16_at(record, at + 4),
-            ]);
+            to.color.push([u16_at(record, at), u16_at(record, at + 2), u16_at(record, at + 4)]);
         }
         if let Some(at) = self.layout.gps_time {
             let mut bytes = [0; 8];

@@ -66,9 +66,7 @@ pub(crate) fn find(
     let header = &records.header;
     let look = look(records)?;
     let whole = (0, header.n_points.saturating_sub(1));
-    let stem = path
-        .file_stem()
-        .map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     let mut notes = header.notes.clone();
     if look.bounds_wrong() && header.bounds.is_some() {
         let (outside, n) = (look.outside, look.points.len());
@@ -145,24 +143,15 @@ fn by_source_id(
             continue;
         }
         scan_of_source[usize::from(id)] = found.scans.len() as u16;
-        let name = scanner
-            .name
-            .clone()
-            .unwrap_or_else(|| format!("{stem} {id}"));
+        let name = scanner.name.clone().unwrap_or_else(|| format!("{stem} {id}"));
         found.scans.push(seed(name, Some(id), Some(scanner.pose)));
         // Windows may miss its first and last points; a look between those seen is enough for a sample.
         found.extents.push(seen.copied().unwrap_or(whole));
     }
-    let rest = census
-        .ids
-        .keys()
-        .any(|id| scan_of_source[usize::from(*id)] == NONE);
+    let rest = census.ids.keys().any(|id| scan_of_source[usize::from(*id)] == NONE);
     if rest || !census.complete || found.scans.is_empty() {
         let number = found.scans.len() as u16;
-        scan_of_source
-            .iter_mut()
-            .filter(|s| **s == NONE)
-            .for_each(|s| *s = number);
+        scan_of_source.iter_mut().filter(|s| **s == NONE).for_each(|s| *s = number);
         found.scans.push(seed(format!("{stem} (rest)"), None, None));
         found.extents.push(whole);
     }
@@ -180,10 +169,7 @@ fn check_distance(
     if distance > settings.max_range {
         return Err(Error::new(
             Kind::Usage,
-            format!(
-                "the scanner \"{}\" lies {distance:.0} m from its points",
-                scan.name
-            ),
+            format!("the scanner \"{}\" lies {distance:.0} m from its points", scan.name),
         )
         .hint("give its position in the same frame as the points"));
     }
@@ -238,16 +224,12 @@ fn look(records: &Records) -> Result<Look> {
         }
         starts.push(records.start(first));
         let (_, run) = records.run(first, IN_WINDOW)?;
-        let world = run
-            .chunks_exact(header.record_len)
-            .map(|r| world(r, header));
+        let world = run.chunks_exact(header.record_len).map(|r| world(r, header));
         points.extend(world.filter(|p| p.iter().all(|v| v.is_finite())));
     }
     let bounds = header.bounds.as_ref().map(|b| grown(b, header));
-    let outside = points
-        .iter()
-        .filter(|p| !bounds.as_ref().is_some_and(|b| b.contains(**p)))
-        .count();
+    let outside =
+        points.iter().filter(|p| !bounds.as_ref().is_some_and(|b| b.contains(**p))).count();
     let middle = (!points.is_empty()).then(|| {
         [0, 1, 2].map(|a| {
             let mut values: Vec<f64> = points.iter().map(|p| p[a]).collect();
@@ -255,12 +237,7 @@ fn look(records: &Records) -> Result<Look> {
             values[values.len() / 2]
         })
     });
-    let mut look = Look {
-        points,
-        outside,
-        middle,
-        origin: [0.0; 3],
-    };
+    let mut look = Look { points, outside, middle, origin: [0.0; 3] };
     let stated = header.bounds.filter(|_| !look.bounds_wrong()).map(|b| {
         let center = b.center();
         [center.x, center.y, center.z]
@@ -286,20 +263,13 @@ fn census(records: &Records) -> Result<Census> {
     let mut add = |first: u64, run: &[u8]| {
         for (i, record) in run.chunks_exact(header.record_len).enumerate() {
             let place = first + i as u64;
-            let extent = census
-                .ids
-                .entry(layout.source_id(record))
-                .or_insert((place, place));
+            let extent = census.ids.entry(layout.source_id(record)).or_insert((place, place));
             *extent = (extent.0.min(place), extent.1.max(place));
         }
     };
     let stream = records.laz.as_ref().is_some_and(|l| l.pieces.is_empty());
     // Compressed records cost forty times as much to look at.
-    let all = if header.compressed {
-        CENSUS_ALL / 40
-    } else {
-        CENSUS_ALL
-    };
+    let all = if header.compressed { CENSUS_ALL / 40 } else { CENSUS_ALL };
     if header.n_points <= all || stream {
         let n = usize::try_from(header.n_points.min(all)).expect("at most twenty million");
         let (first, run) = records.run(0, n)?;

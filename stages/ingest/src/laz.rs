@@ -53,9 +53,7 @@ fn damaged(what: impl Into<String>) -> Error {
 impl Laz {
     /// Reads and checks the LASzip record and the table of pieces.
     pub(crate) fn read(data: &[u8], header: &LasHeader, settings: &Settings) -> Result<Self> {
-        let (at, n) = header
-            .laszip
-            .ok_or_else(|| damaged("the LASzip record is missing"))?;
+        let (at, n) = header.laszip.ok_or_else(|| damaged("the LASzip record is missing"))?;
         let (vlr, compressor) =
             read_vlr(&data[at..at + n], header).map_err(|e| e.at("LASzip record"))?;
         let mut laz = Self {
@@ -80,11 +78,9 @@ impl Laz {
         if most.saturating_mul(laz.record_len as u64) <= settings.max_laz_chunk_bytes {
             laz.pieces = pieces;
         } else if laz.layered || laz.vlr.uses_variable_size_chunks() {
-            return Err(
-                Error::new(Kind::OverBudget, format!("a chunk has \"{most}\" points"))
-                    .at("chunk table")
-                    .hint("compress the file again with the usual chunk size of 50000 points"),
-            );
+            return Err(Error::new(Kind::OverBudget, format!("a chunk has \"{most}\" points"))
+                .at("chunk table")
+                .hint("compress the file again with the usual chunk size of 50000 points"));
         }
         Ok(laz)
     }
@@ -103,9 +99,7 @@ impl Laz {
         let header = data
             .get(table_at..table_at + 8)
             .ok_or_else(|| damaged("the chunk table lies outside the file"))?;
-        let n = u64::from(u32::from_le_bytes([
-            header[4], header[5], header[6], header[7],
-        ]));
+        let n = u64::from(u32::from_le_bytes([header[4], header[5], header[6], header[7]]));
         // Each chunk starts with one uncompressed record, so that many fit at most.
         let most = ((table_at - start) / self.record_len) as u64;
         if n > most {
@@ -123,9 +117,8 @@ impl Laz {
         }
         let mut source = Cursor::new(data);
         source.set_position(table_at as u64);
-        let table = guarded("reading the chunk table", || {
-            ChunkTable::read(&mut &mut source, varying)
-        })?;
+        let table =
+            guarded("reading the chunk table", || ChunkTable::read(&mut &mut source, varying))?;
         let entries = table.as_ref().iter().map(|e| {
             let point_count = if varying { e.point_count } else { size };
             ChunkTableEntry { point_count, ..*e }
@@ -156,12 +149,7 @@ impl Laz {
                     "{n_bytes} bytes of chunk {i} cannot hold \"{n_points}\" points"
                 )));
             }
-            pieces.push(Piece {
-                at,
-                n_bytes,
-                first,
-                n_points,
-            });
+            pieces.push(Piece { at, n_bytes, first, n_points });
             at += n_bytes;
             first += n_points;
         }
@@ -188,10 +176,7 @@ impl Laz {
 
     /// Decompresses the first `n` points of a piece.
     pub(crate) fn head(&self, data: &[u8], piece: &Piece, n: usize) -> Result<Vec<u8>> {
-        let part = Piece {
-            n_points: piece.n_points.min(n as u64),
-            ..*piece
-        };
+        let part = Piece { n_points: piece.n_points.min(n as u64), ..*piece };
         self.pieces(data, &[part], Want::Everything)
     }
 
@@ -207,10 +192,7 @@ impl Laz {
         let compressed = &data[first.at..last.at + last.n_bytes];
         let table: Vec<_> = pieces
             .iter()
-            .map(|p| ChunkTableEntry {
-                point_count: p.n_points,
-                byte_count: p.n_bytes as u64,
-            })
+            .map(|p| ChunkTableEntry { point_count: p.n_points, byte_count: p.n_bytes as u64 })
             .collect();
         let n_points: u64 = pieces.iter().map(|p| p.n_points).sum();
         let mut records = vec![0; n_points as usize * self.record_len];
@@ -249,12 +231,7 @@ impl Laz {
             )));
         }
         let number = |at: usize| {
-            u64::from(u32::from_le_bytes([
-                bytes[at],
-                bytes[at + 1],
-                bytes[at + 2],
-                bytes[at + 3],
-            ]))
+            u64::from(u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
         };
         let n_points = number(self.record_len);
         if n_points < piece.n_points {
@@ -263,9 +240,7 @@ impl Laz {
                 piece.n_points
             )));
         }
-        let total: u64 = (0..n_layers)
-            .map(|i| number(self.record_len + 4 + 4 * i))
-            .sum();
+        let total: u64 = (0..n_layers).map(|i| number(self.record_len + 4 + 4 * i)).sum();
         if total > (bytes.len() - head) as u64 {
             return Err(damaged(format!(
                 "its layers would have \"{total}\" bytes, there are {}",
@@ -280,13 +255,8 @@ impl Laz {
         let mut source = Cursor::new(data);
         source.set_position(self.points_at as u64);
         let vlr = self.vlr.clone();
-        let inner = guarded("starting the decoder", || {
-            LasZipDecompressor::new(source, vlr)
-        })?;
-        Ok(Stream {
-            inner,
-            record_len: self.record_len,
-        })
+        let inner = guarded("starting the decoder", || LasZipDecompressor::new(source, vlr))?;
+        Ok(Stream { inner, record_len: self.record_len })
     }
 }
 
@@ -341,28 +311,20 @@ fn selection(want: Want) -> DecompressionSelection {
 fn read_vlr(payload: &[u8], header: &LasHeader) -> Result<(LazVlr, CompressorType)> {
     let mut payload = payload.to_vec();
     if payload.len() < 34 {
-        return Err(damaged(format!(
-            "34 bytes are needed, there are \"{}\"",
-            payload.len()
-        )));
+        return Err(damaged(format!("34 bytes are needed, there are \"{}\"", payload.len())));
     }
     let compressor = match u16::from_le_bytes([payload[0], payload[1]]) {
         1 => CompressorType::PointWise,
         2 => CompressorType::PointWiseChunked,
         3 => CompressorType::LayeredChunked,
         other => {
-            return Err(
-                Error::new(Kind::Unsupported, format!("compressor type \"{other}\""))
-                    .hint("types 1 to 3 are known; decompress the file to LAS"),
-            );
+            return Err(Error::new(Kind::Unsupported, format!("compressor type \"{other}\""))
+                .hint("types 1 to 3 are known; decompress the file to LAS"));
         }
     };
     let n_items = usize::from(u16::from_le_bytes([payload[32], payload[33]]));
     if payload.len() < 34 + 6 * n_items {
-        return Err(damaged(format!(
-            "{} bytes cannot hold \"{n_items}\" items",
-            payload.len()
-        )));
+        return Err(damaged(format!("{} bytes cannot hold \"{n_items}\" items", payload.len())));
     }
     if compressor == CompressorType::PointWise {
         // LASzip 1 leaves the chunk size zero, which the decoder takes for chunks of varying size.
@@ -384,9 +346,7 @@ fn read_vlr(payload: &[u8], header: &LasHeader) -> Result<(LazVlr, CompressorTyp
     let layered = compressor == CompressorType::LayeredChunked;
     let fits = vlr.items().len() == expected.len()
         && vlr.items().iter().zip(&expected).all(|(a, b)| same(a, b))
-        && expected
-            .first()
-            .is_some_and(|i| (i.version() > 2) == layered);
+        && expected.first().is_some_and(|i| (i.version() > 2) == layered);
     if !fits {
         return Err(damaged(format!(
             "its items do not fit records of point format \"{}\"",

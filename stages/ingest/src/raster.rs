@@ -41,32 +41,19 @@ pub(crate) fn estimate(
     n_total: Option<u64>,
     settings: &Settings,
 ) -> Option<Raster> {
-    let sample: Vec<Sampled> = sample
-        .iter()
-        .copied()
-        .filter(|s| s.xyz.iter().any(|v| *v != 0.0))
-        .collect();
+    let sample: Vec<Sampled> =
+        sample.iter().copied().filter(|s| s.xyz.iter().any(|v| *v != 0.0)).collect();
     if sample.len() < MIN_POINTS {
         return None;
     }
     let native = raster_native::fit(&sample);
     if let Some(native) = native.filter(|n| n.rms < MAX_IRREGULAR) {
         let regular = native.rms < settings.max_native_rms;
-        let steps = if regular {
-            Steps::Native
-        } else {
-            Steps::Irregular
-        };
-        return Some(Raster {
-            lattice: lattice(&native.grid, settings),
-            steps,
-        });
+        let steps = if regular { Steps::Native } else { Steps::Irregular };
+        return Some(Raster { lattice: lattice(&native.grid, settings), steps });
     }
     let grid = raster_free::fit(&sample, n_total)?;
-    Some(Raster {
-        lattice: lattice(&grid, settings),
-        steps: Steps::Directions,
-    })
+    Some(Raster { lattice: lattice(&grid, settings), steps: Steps::Directions })
 }
 
 /// Steps and one pixel's middle, about one axis; radians.

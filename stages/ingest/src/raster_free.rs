@@ -48,22 +48,13 @@ pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<Grid> {
 /// The same step both ways.
 fn square(angles: &[[f64; 2]], step: f64) -> Grid {
     let [azimuth, elevation] = angles[angles.len() / 2];
-    Grid {
-        axis: Axis::Z,
-        row_step: step,
-        col_step: step,
-        elevation,
-        azimuth,
-    }
+    Grid { axis: Axis::Z, row_step: step, col_step: step, elevation, azimuth }
 }
 
 /// Angles between points that follow one another, radians.
 fn consecutive(sample: &[Sampled]) -> Vec<f64> {
     let unit = |s: &Sampled| nalgebra::Vector3::from(s.xyz.map(f64::from)).normalize();
-    sample
-        .windows(2)
-        .map(|w| (unit(&w[1]) - unit(&w[0])).norm())
-        .collect()
+    sample.windows(2).map(|w| (unit(&w[1]) - unit(&w[0])).norm()).collect()
 }
 
 /// How points follow one another about one axis.
@@ -95,29 +86,15 @@ impl Lines {
         let across = if upright { &up } else { &round };
         let share =
             across.iter().filter(|b| **b < ALONG).count() as f64 / across.len().max(1) as f64;
-        Self {
-            axis,
-            angles,
-            upright,
-            share,
-            bend: bends[usize::from(!upright)],
-        }
+        Self { axis, angles, upright, share, bend: bends[usize::from(!upright)] }
     }
 
     /// Steps along and across the lines, and the phase where it is sharp.
     fn grid(&self, guess: f64) -> Grid {
         let (u, v) = if self.upright { (1, 0) } else { (0, 1) };
-        let flat: Vec<[f64; 2]> = self
-            .angles
-            .iter()
-            .copied()
-            .filter(|a| a[1].abs() < STEEP)
-            .collect();
-        let angles = if flat.len() * 2 > self.angles.len() {
-            &flat
-        } else {
-            &self.angles
-        };
+        let flat: Vec<[f64; 2]> =
+            self.angles.iter().copied().filter(|a| a[1].abs() < STEEP).collect();
+        let angles = if flat.len() * 2 > self.angles.len() { &flat } else { &self.angles };
         let steps: Vec<f64> = angles
             .windows(2)
             .filter(|w| wrap(w[1][v] - w[0][v]).abs() < 2.0 * guess / w[0][1].cos().max(0.2))
@@ -139,13 +116,7 @@ impl Lines {
         } else {
             (across, across_phase, along, along_phase)
         };
-        Grid {
-            axis: self.axis,
-            row_step,
-            col_step,
-            elevation,
-            azimuth,
-        }
+        Grid { axis: self.axis, row_step, col_step, elevation, azimuth }
     }
 }
 
@@ -154,10 +125,8 @@ impl Lines {
 fn across(angles: &[[f64; 2]], u: usize, v: usize, along: f64) -> Option<f64> {
     /// Lines farther apart than this many steps along the line are not neighbours.
     const FAR: f64 = 12.0;
-    let mut cells: Vec<(i64, f64)> = angles
-        .iter()
-        .map(|a| ((a[u] / along).floor() as i64, a[v]))
-        .collect();
+    let mut cells: Vec<(i64, f64)> =
+        angles.iter().map(|a| ((a[u] / along).floor() as i64, a[v])).collect();
     cells.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let gaps: Vec<f64> = cells
         .windows(2)
@@ -166,9 +135,7 @@ fn across(angles: &[[f64; 2]], u: usize, v: usize, along: f64) -> Option<f64> {
         .filter(|gap| *gap < FAR * along)
         .collect();
     // Points of one line that share a cell differ by jitter only, which must not pass for the spacing.
-    (gaps.len() * 10 > angles.len())
-        .then(|| mode(&gaps, 0.15 * along, FAR * along))
-        .flatten()
+    (gaps.len() * 10 > angles.len()).then(|| mode(&gaps, 0.15 * along, FAR * along)).flatten()
 }
 
 /// The most frequent value in a range, on a scale of ratios: the median of the values about the fullest bin.
@@ -183,11 +150,8 @@ fn mode(values: &[f64], min: f64, max: f64) -> Option<f64> {
     let smooth = |i: usize| bins[i - 1] + 2 * bins[i] + bins[i + 1];
     let fullest = (1..=n_bins).max_by_key(|i| (smooth(*i), std::cmp::Reverse(*i)))?;
     let middle = min * RATIO.powf(fullest as f64 - 0.5);
-    let mut near: Vec<f64> = values
-        .iter()
-        .copied()
-        .filter(|v| (0.85..1.18).contains(&(v / middle)))
-        .collect();
+    let mut near: Vec<f64> =
+        values.iter().copied().filter(|v| (0.85..1.18).contains(&(v / middle))).collect();
     median(&mut near)
 }
 
@@ -208,10 +172,8 @@ fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
             .map(|a| ((a[0] / edge).floor() as i64, (a[1] / edge).floor() as i64))
             .collect();
         cells.sort_unstable();
-        let mut counts: Vec<usize> = cells
-            .chunk_by(|a, b| a == b)
-            .flat_map(|c| vec![c.len(); c.len()])
-            .collect();
+        let mut counts: Vec<usize> =
+            cells.chunk_by(|a, b| a == b).flat_map(|c| vec![c.len(); c.len()]).collect();
         if counts.is_empty() {
             break;
         }
@@ -238,20 +200,14 @@ fn sharpen(angles: &[[f64; 2]], axis: usize, step: f64) -> (f64, f64) {
     const SHARP: f64 = 0.55;
     let every = angles.len().div_ceil(POINTS);
     let values: Vec<f64> = angles.iter().step_by(every).map(|a| a[axis]).collect();
-    let (low, high) = values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |m, v| {
-            (m.0.min(*v), m.1.max(*v))
-        });
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |m, v| (m.0.min(*v), m.1.max(*v)));
     let phasor = |f: f64| {
         let (sum_cos, sum_sin) = values.iter().fold((0.0, 0.0), |s, v| {
             let (sin, cos) = (TAU * f * (v - low)).sin_cos();
             (s.0 + cos, s.1 + sin)
         });
-        (
-            f64::hypot(sum_cos, sum_sin) / values.len() as f64,
-            sum_sin.atan2(sum_cos),
-        )
+        (f64::hypot(sum_cos, sum_sin) / values.len() as f64, sum_sin.atan2(sum_cos))
     };
     let middle = values[values.len() / 2];
     let apart = 0.2 / (high - low).max(step);

@@ -22,10 +22,8 @@ const LEFT_OUT: f64 = 0.02;
 
 /// Fits; `None` where the sample has no native rows and columns, or too few of them.
 pub(crate) fn fit(sample: &[Sampled]) -> Option<Native> {
-    let native: Vec<([f32; 3], [u32; 2])> = sample
-        .iter()
-        .filter_map(|s| Some((s.xyz, s.native?)))
-        .collect();
+    let native: Vec<([f32; 3], [u32; 2])> =
+        sample.iter().filter_map(|s| Some((s.xyz, s.native?))).collect();
     if native.len() * 2 < sample.len() {
         return None;
     }
@@ -83,19 +81,13 @@ impl Line {
             .map(|same| {
                 // About the first one, so that a jump at ±π inside the line does no harm.
                 let mut angles: Vec<f64> = same.iter().map(|p| wrap(p.1 - same[0].1)).collect();
-                (
-                    f64::from(same[0].0),
-                    same[0].1 + median(&mut angles).unwrap_or(0.0),
-                )
+                (f64::from(same[0].0), same[0].1 + median(&mut angles).unwrap_or(0.0))
             })
             .collect();
         if lines.len() < MIN_LINES {
             return None;
         }
-        let nearest = lines
-            .windows(2)
-            .map(|w| w[1].0 - w[0].0)
-            .fold(f64::INFINITY, f64::min);
+        let nearest = lines.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min);
         let mut slopes: Vec<f64> = lines
             .windows(2)
             .filter(|w| w[1].0 - w[0].0 <= 4.0 * nearest)
@@ -115,11 +107,7 @@ impl Line {
     fn least_squares(lines: &[(f64, f64)], slope: f64) -> Option<Self> {
         let at = ((lines[0].0 + lines[lines.len() - 1].0) / 2.0).round();
         let mut offsets: Vec<f64> = lines.iter().map(|l| l.1 - slope * (l.0 - at)).collect();
-        let mut line = Self {
-            slope,
-            at,
-            angle: median(&mut offsets)?,
-        };
+        let mut line = Self { slope, at, angle: median(&mut offsets)? };
         for _ in 0..8 {
             let residual = |l: &(f64, f64)| l.1 - line.angle - line.slope * (l.0 - at);
             let mut sizes: Vec<f64> = lines.iter().map(|l| residual(l).abs()).collect();

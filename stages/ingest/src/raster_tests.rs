@@ -61,10 +61,8 @@ impl Synthetic {
                     .to_radians();
                 let range = 4.0 + 2.0 * (3.0 * a).sin() + e;
                 let d = unit(if self.clockwise { -a } else { a }, e);
-                points.push(Sampled {
-                    xyz: d.map(|v| (v * range) as f32),
-                    native: Some([row, col]),
-                });
+                points
+                    .push(Sampled { xyz: d.map(|v| (v * range) as f32), native: Some([row, col]) });
             }
         }
         points
@@ -72,10 +70,7 @@ impl Synthetic {
 }
 
 fn plain(points: &[Sampled]) -> Vec<Sampled> {
-    points
-        .iter()
-        .map(|p| Sampled { native: None, ..*p })
-        .collect()
+    points.iter().map(|p| Sampled { native: None, ..*p }).collect()
 }
 
 fn turned(points: &[Sampled], turn: &Rotation3<f64>) -> Vec<Sampled> {
@@ -83,13 +78,7 @@ fn turned(points: &[Sampled], turn: &Rotation3<f64>) -> Vec<Sampled> {
         let q = turn * Vector3::from(p.map(f64::from));
         [q.x as f32, q.y as f32, q.z as f32]
     };
-    points
-        .iter()
-        .map(|p| Sampled {
-            xyz: to(p.xyz),
-            native: p.native,
-        })
-        .collect()
+    points.iter().map(|p| Sampled { xyz: to(p.xyz), native: p.native }).collect()
 }
 
 fn of(points: &[Sampled]) -> Raster {
@@ -104,22 +93,13 @@ fn near(value: f64, degrees: f64, share: f64) -> bool {
 fn alone(points: &[Sampled], lattice: &Lattice) -> f64 {
     let mut pixels: Vec<_> = points.iter().map(|p| lattice.pixel(p.xyz).0).collect();
     pixels.sort_unstable();
-    pixels
-        .chunk_by(|a, b| a == b)
-        .filter(|c| c.len() == 1)
-        .count() as f64
-        / points.len() as f64
+    pixels.chunk_by(|a, b| a == b).filter(|c| c.len() == 1).count() as f64 / points.len() as f64
 }
 
 #[test]
 fn native_pixels_map_one_to_one() {
     for clockwise in [false, true] {
-        let points = Synthetic {
-            clockwise,
-            jitter: 0.05,
-            ..PLAIN
-        }
-        .points();
+        let points = Synthetic { clockwise, jitter: 0.05, ..PLAIN }.points();
         let raster = of(&points);
         assert_eq!(raster.steps, Steps::Native);
         assert!(
@@ -133,11 +113,7 @@ fn native_pixels_map_one_to_one() {
                 let col = p.native.unwrap()[1];
                 let n = raster.lattice.n_cols;
                 let got = raster.lattice.pixel(p.xyz).0.col;
-                if clockwise {
-                    (got + col) % n
-                } else {
-                    (got + n - col) % n
-                }
+                if clockwise { (got + col) % n } else { (got + n - col) % n }
             })
             .collect();
         assert!(cols.iter().filter(|c| **c == cols[0]).count() * 1000 > cols.len() * 999);
@@ -147,14 +123,8 @@ fn native_pixels_map_one_to_one() {
 #[test]
 fn a_horizontal_spin_axis_is_found() {
     for (axis, turn) in [
-        (
-            Axis::Y,
-            Rotation3::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2),
-        ),
-        (
-            Axis::X,
-            Rotation3::from_axis_angle(&Vector3::y_axis(), FRAC_PI_2),
-        ),
+        (Axis::Y, Rotation3::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2)),
+        (Axis::X, Rotation3::from_axis_angle(&Vector3::y_axis(), FRAC_PI_2)),
     ] {
         let points = turned(&PLAIN.points(), &turn);
         for points in [points.clone(), plain(&points)] {
@@ -202,14 +172,7 @@ fn rows_that_run_round_are_told_from_columns() {
 
 #[test]
 fn jitter_leaves_the_steps_about_right() {
-    let points = plain(
-        &Synthetic {
-            jitter: 0.25,
-            missing: 0.3,
-            ..PLAIN
-        }
-        .points(),
-    );
+    let points = plain(&Synthetic { jitter: 0.25, missing: 0.3, ..PLAIN }.points());
     let raster = of(&points);
     let area = raster.lattice.row_step * raster.lattice.col_step;
     let truth = 0.11_f64.to_radians() * 0.09_f64.to_radians();
@@ -234,11 +197,7 @@ fn shuffled_points_give_the_density() {
 
 #[test]
 fn irregular_rows_and_columns_still_give_steps() {
-    let points = Synthetic {
-        jitter: 0.8,
-        ..PLAIN
-    }
-    .points();
+    let points = Synthetic { jitter: 0.8, ..PLAIN }.points();
     let raster = of(&points);
     assert_eq!(raster.steps, Steps::Irregular);
     assert!(near(raster.lattice.row_step, 0.11, 0.01) && near(raster.lattice.col_step, 0.09, 0.01));
@@ -248,30 +207,12 @@ fn irregular_rows_and_columns_still_give_steps() {
 fn nothing_and_nonsense_have_no_raster_or_any() {
     let settings = Settings::default();
     assert!(estimate(&[], Some(0), &settings).is_none());
-    let one = vec![
-        Sampled {
-            xyz: [1.0, 2.0, 3.0],
-            native: None
-        };
-        1000
-    ];
+    let one = vec![Sampled { xyz: [1.0, 2.0, 3.0], native: None }; 1000];
     if let Some(raster) = estimate(&one, None, &settings) {
         assert!(raster.lattice.row_step >= settings.min_step);
     }
-    let zero = vec![
-        Sampled {
-            xyz: [0.0; 3],
-            native: Some([0, 0])
-        };
-        1000
-    ];
+    let zero = vec![Sampled { xyz: [0.0; 3], native: Some([0, 0]) }; 1000];
     assert!(estimate(&zero, None, &settings).is_none());
-    let up = vec![
-        Sampled {
-            xyz: [0.0, 0.0, 1.0],
-            native: Some([3, 4])
-        };
-        1000
-    ];
+    let up = vec![Sampled { xyz: [0.0, 0.0, 1.0], native: Some([3, 4]) }; 1000];
     let _ = estimate(&up, None, &settings);
 }

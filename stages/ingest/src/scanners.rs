@@ -80,18 +80,13 @@ impl Scanners {
         };
         let mut entries: Vec<Scanner> = Vec::new();
         for (i, entry) in file.scanner.into_iter().enumerate() {
-            let entry = entry
-                .check()
-                .map_err(|e| e.at(format!("scanner {}", i + 1)))?;
+            let entry = entry.check().map_err(|e| e.at(format!("scanner {}", i + 1)))?;
             let twin =
                 |e: &Scanner| e.point_source_id == entry.point_source_id && e.name == entry.name;
             if let Some(twin) = entries.iter().position(twin) {
                 return Err(Error::new(
                     Kind::BadInput,
-                    format!(
-                        "has the same name and point_source_id as scanner \"{}\"",
-                        twin + 1
-                    ),
+                    format!("has the same name and point_source_id as scanner \"{}\"", twin + 1),
                 )
                 .at(format!("scanner {}", i + 1)));
             }
@@ -104,9 +99,7 @@ impl Scanners {
 impl EntryText {
     fn check(self) -> Result<Scanner> {
         if let Some(bad) = self.position.iter().find(|v| !v.is_finite()) {
-            return Err(Error::bad_input(format!(
-                "position must be finite, not \"{bad}\""
-            )));
+            return Err(Error::bad_input(format!("position must be finite, not \"{bad}\"")));
         }
         let turn = match self.quaternion_wxyz {
             None => UnitQuaternion::identity(),
@@ -141,10 +134,7 @@ mod tests {
                     quaternion_wxyz = [0.876, 0, 0, 0.482]\n[[scanner]]\nposition = [0, 0, 0.0]\n";
         let json = r#"{"scanner": [{"point_source_id": 1, "name": "a", "position": [4.9, 1, 1.5],
                        "quaternion_wxyz": [0.876, 0, 0, 0.482]}, {"position": [0, 0, 0]}]}"#;
-        let (a, b) = (
-            Scanners::parse(toml).unwrap(),
-            Scanners::parse(json).unwrap(),
-        );
+        let (a, b) = (Scanners::parse(toml).unwrap(), Scanners::parse(json).unwrap());
         assert_eq!(a, b);
         assert_eq!(a.entries.len(), 2);
         assert!((a.entries[0].world_from_scan.rotation.norm() - 1.0).abs() < 1e-12);
@@ -154,20 +144,11 @@ mod tests {
     fn wrong_entries_are_named() {
         for (text, word) in [
             ("[[scanner]]\nposition = [0, 0, nan]", "finite"),
-            (
-                "[[scanner]]\nposition = [0, 0, 0]\nquaternion_wxyz = [0, 0, 0, 0]",
-                "rotation",
-            ),
+            ("[[scanner]]\nposition = [0, 0, 0]\nquaternion_wxyz = [0, 0, 0, 0]", "rotation"),
             ("[[scanner]]\nposition = [0, 0, 0]\npose = 1", "pose"),
             ("[[scanner]]\nposition = [0, 0]", "TOML"),
-            (
-                "[[scanner]]\nposition = [0,0,0]\npoint_source_id = 70000",
-                "TOML",
-            ),
-            (
-                "[[scanner]]\nposition = [0,0,0]\n[[scanner]]\nposition = [0,0,0]",
-                "same name",
-            ),
+            ("[[scanner]]\nposition = [0,0,0]\npoint_source_id = 70000", "TOML"),
+            ("[[scanner]]\nposition = [0,0,0]\n[[scanner]]\nposition = [0,0,0]", "same name"),
             ("{", "JSON"),
             ("", "scanner"),
         ] {

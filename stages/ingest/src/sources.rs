@@ -66,9 +66,7 @@ pub fn open(
     let none = Scanners::default();
     let mut poses = Poses::new(scanners.unwrap_or(&none), paths);
     for path in paths {
-        sources
-            .add(path, &mut poses, settings)
-            .map_err(|e| e.at(path.display()))?;
+        sources.add(path, &mut poses, settings).map_err(|e| e.at(path.display()))?;
     }
     sources.warnings.extend(poses.unused());
     Ok(sources)
@@ -166,12 +164,10 @@ impl Sources {
             Format::Las | Format::Laz => None,
             Format::E57 | Format::Ptx => poses.by_scan_name(&seed.name),
         };
-        file.moved
-            .push(replaced.map(|pose| pose.inverse() * seed.world_from_scan));
+        file.moved.push(replaced.map(|pose| pose.inverse() * seed.world_from_scan));
         if let Some(pose) = replaced {
             scan.world_from_scan = pose;
-            scan.notes
-                .push("the scanner's position is that of --scanners, not of the file".into());
+            scan.notes.push("the scanner's position is that of --scanners, not of the file".into());
         }
         scan
     }
@@ -181,9 +177,7 @@ impl File {
     fn number(&self, mut raw: RawStrip) -> Strip {
         let seed: &ScanSeed = &self.reader.scans()[raw.scan];
         if let Some(new_from_file) = &self.moved[raw.scan] {
-            raw.xyz
-                .iter_mut()
-                .for_each(|p| *p = moved(new_from_file, *p));
+            raw.xyz.iter_mut().for_each(|p| *p = moved(new_from_file, *p));
         }
         Strip {
             scan: ScanId(self.first_scan + raw.scan as u32),
@@ -208,9 +202,7 @@ impl File {
         }
         let mut sample: Vec<Sampled> = self.reader.sample(i, settings.sample_points)?;
         if let Some(new_from_file) = &self.moved[i] {
-            sample
-                .iter_mut()
-                .for_each(|s| s.xyz = moved(new_from_file, s.xyz));
+            sample.iter_mut().for_each(|s| s.xyz = moved(new_from_file, s.xyz));
         }
         let Some(raster) = raster::estimate(&sample, scan.stated_points, settings) else {
             if !sample.is_empty() {
@@ -259,10 +251,7 @@ impl<'a> Poses<'a> {
     }
 
     fn by_scan_name(&mut self, name: &str) -> Option<Pose> {
-        let at = self
-            .entries
-            .iter()
-            .position(|e| e.name.as_deref() == Some(name))?;
+        let at = self.entries.iter().position(|e| e.name.as_deref() == Some(name))?;
         self.used[at] = true;
         Some(self.entries[at].world_from_scan)
     }
@@ -282,9 +271,7 @@ impl<'a> Poses<'a> {
             None => {
                 let fits =
                     |e: &Scanner| (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e);
-                (0..self.entries.len())
-                    .filter(|i| fits(&self.entries[*i]))
-                    .collect()
+                (0..self.entries.len()).filter(|i| fits(&self.entries[*i])).collect()
             }
         };
         let mut scanners: Vec<LasScanner> = Vec::new();
@@ -292,9 +279,7 @@ impl<'a> Poses<'a> {
             let entry = &self.entries[at];
             self.used[at] = true;
             // An entry of this file's name goes before one that only shares the id.
-            let twin = scanners
-                .iter()
-                .position(|s| s.source_id == entry.point_source_id);
+            let twin = scanners.iter().position(|s| s.source_id == entry.point_source_id);
             let scanner = LasScanner {
                 source_id: entry.point_source_id,
                 name: entry.name.clone(),
@@ -312,12 +297,7 @@ impl<'a> Poses<'a> {
 
     fn unused(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        for (i, entry) in self
-            .entries
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| !self.used[*i])
-        {
+        for (i, entry) in self.entries.iter().enumerate().filter(|(i, _)| !self.used[*i]) {
             let id = entry
                 .point_source_id
                 .map_or_else(String::new, |id| format!(", point_source_id {id}"));
@@ -332,6 +312,5 @@ impl<'a> Poses<'a> {
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem()
-        .map_or_else(String::new, |s| s.to_string_lossy().into_owned())
+    path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned())
 }

@@ -126,12 +126,8 @@ struct Read {
 }
 
 fn read(sources: &Sources) -> contract::Result<Read> {
-    let mut read = Read {
-        n_points: 0,
-        end: 0,
-        min: [f64::INFINITY; 3],
-        max: [f64::NEG_INFINITY; 3],
-    };
+    let mut read =
+        Read { n_points: 0, end: 0, min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
     for input in &sources.inputs {
         for strip in sources.strips(input.id, Want::Everything)? {
             let strip = strip?;
@@ -140,10 +136,7 @@ fn read(sources: &Sources) -> contract::Result<Read> {
             assert_eq!(strip.place.len(), strip.len());
             assert!(strip.place.is_sorted());
             let first = strip.first_place + u64::from(strip.place[0]);
-            assert!(
-                first >= read.end || sources.scans.len() > 1,
-                "places go forward"
-            );
+            assert!(first >= read.end || sources.scans.len() > 1, "places go forward");
             read.end = strip.first_place + u64::from(strip.place[strip.len() - 1]) + 1;
             read.n_points += strip.len() as u64;
             let pose = sources.scans[strip.scan.0 as usize].world_from_scan;
@@ -171,10 +164,7 @@ fn valid_files_are_read_in_full() {
         assert_eq!(sources.masks.len(), 1, "{name}");
         assert_eq!(sources.masks[0].n_points, Some(*n), "{name}");
         assert_eq!(sources.scans.len(), 1, "{name}");
-        assert!(
-            !sources.scans[0].has_beams() && !sources.scans[0].notes.is_empty(),
-            "{name}"
-        );
+        assert!(!sources.scans[0].has_beams() && !sources.scans[0].notes.is_empty(), "{name}");
         let read = read(&sources).unwrap_or_else(|e| panic!("{e}"));
         if ABSURD.contains(name) {
             assert!(read.n_points < n - withheld, "{name}");
@@ -185,16 +175,8 @@ fn valid_files_are_read_in_full() {
             continue;
         }
         for a in 0..3 {
-            assert!(
-                (read.min[a] - min[a]).abs() < 1e-3,
-                "{name}: {:?} {min:?}",
-                read.min
-            );
-            assert!(
-                (read.max[a] - max[a]).abs() < 1e-3,
-                "{name}: {:?} {max:?}",
-                read.max
-            );
+            assert!((read.min[a] - min[a]).abs() < 1e-3, "{name}: {:?} {min:?}", read.min);
+            assert!((read.max[a] - max[a]).abs() < 1e-3, "{name}: {:?} {max:?}", read.max);
         }
     }
 }
@@ -206,10 +188,7 @@ fn no_file_is_forgotten() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         let known = VALID.iter().chain([&OLD_STREAM]).any(|r| r.0 == name)
             || BROKEN.iter().any(|r| r.0 == name);
-        assert!(
-            known || !(name.ends_with(".las") || name.ends_with(".laz")),
-            "{name}"
-        );
+        assert!(known || !(name.ends_with(".las") || name.ends_with(".laz")), "{name}");
     }
 }
 
@@ -217,10 +196,8 @@ fn no_file_is_forgotten() {
 fn broken_files_are_refused_by_name() {
     let Some(folder) = folder() else { return };
     for (name, words) in BROKEN {
-        let error = open(&[folder.join(name)], None, &Settings::default())
-            .err()
-            .expect(name)
-            .to_string();
+        let error =
+            open(&[folder.join(name)], None, &Settings::default()).err().expect(name).to_string();
         assert!(error.contains(name) && error.contains(words), "{error}");
     }
 }
@@ -257,10 +234,7 @@ fn damage_is_an_error_or_harmless() {
         let step = (good.len() / 24).max(1);
         // A decoder for layered points takes milliseconds to set up, and this file has many pieces.
         let dense = if name.contains("copc") { 61 } else { 7 };
-        for at in (0..good.len().min(500))
-            .step_by(dense)
-            .chain((0..good.len()).step_by(step))
-        {
+        for at in (0..good.len().min(500)).step_by(dense).chain((0..good.len()).step_by(step)) {
             let mut flipped = good.clone();
             flipped[at] ^= 1 << (at % 8);
             std::fs::write(&damaged, &flipped).unwrap();

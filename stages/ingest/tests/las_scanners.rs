@@ -16,21 +16,12 @@ fn las(points: &[([i32; 3], u16, bool)], extra: usize) -> Vec<u8> {
         number_of_point_records: points.len() as u32,
         ..Default::default()
     };
-    (
-        header.x_scale_factor,
-        header.y_scale_factor,
-        header.z_scale_factor,
-    ) = (0.001, 0.001, 0.001);
+    (header.x_scale_factor, header.y_scale_factor, header.z_scale_factor) = (0.001, 0.001, 0.001);
     header.x_offset = 1000.0;
-    let of = |a: usize| {
-        points
-            .iter()
-            .map(move |p| f64::from(p.0[a]) * 0.001 + [1000.0, 0.0, 0.0][a])
-    };
-    let (min, max) = (
-        |a| of(a).fold(f64::INFINITY, f64::min),
-        |a| of(a).fold(f64::NEG_INFINITY, f64::max),
-    );
+    let of =
+        |a: usize| points.iter().map(move |p| f64::from(p.0[a]) * 0.001 + [1000.0, 0.0, 0.0][a]);
+    let (min, max) =
+        (|a| of(a).fold(f64::INFINITY, f64::min), |a| of(a).fold(f64::NEG_INFINITY, f64::max));
     (header.min_x, header.min_y, header.min_z) = (min(0), min(1), min(2));
     (header.max_x, header.max_y, header.max_z) = (max(0), max(1), max(2));
     let mut bytes = Vec::new();
@@ -54,13 +45,7 @@ fn las(points: &[([i32; 3], u16, bool)], extra: usize) -> Vec<u8> {
 /// Points of three scanners in turns; every tenth is withheld.
 fn mixed() -> Vec<([i32; 3], u16, bool)> {
     (0..5000_i32)
-        .map(|i| {
-            (
-                [i % 97 * 100, i % 89 * 100, i % 7 * 100],
-                (i % 3) as u16,
-                i % 10 == 0,
-            )
-        })
+        .map(|i| ([i % 97 * 100, i % 89 * 100, i % 7 * 100], (i % 3) as u16, i % 10 == 0))
         .collect()
 }
 
@@ -82,12 +67,7 @@ fn counts(sources: &Sources) -> Vec<usize> {
         for strip in sources.strips(input.id, Want::Everything).unwrap() {
             let strip = strip.unwrap();
             counts[strip.scan.0 as usize] += strip.len();
-            places.extend(
-                strip
-                    .place
-                    .iter()
-                    .map(|p| strip.first_place + u64::from(*p)),
-            );
+            places.extend(strip.place.iter().map(|p| strip.first_place + u64::from(*p)));
             let pose = sources.scans[strip.scan.0 as usize].world_from_scan;
             let attributes = strip.attributes.as_ref().unwrap();
             for (i, local) in strip.xyz.iter().enumerate() {
@@ -96,10 +76,7 @@ fn counts(sources: &Sources) -> Vec<usize> {
                 let place = strip.first_place + u64::from(strip.place[i]);
                 assert_eq!(u64::from(attributes.intensity[i]), place);
                 assert_eq!(attributes.gps_time[i], place as f64);
-                assert_eq!(
-                    (attributes.classification[i], attributes.color[i]),
-                    (5, [7, 0, 0])
-                );
+                assert_eq!((attributes.classification[i], attributes.color[i]), (5, [7, 0, 0]));
             }
         }
         places.sort_unstable();
@@ -116,10 +93,7 @@ fn source_ids_go_to_their_scanners_and_the_rest_to_none() {
         "[[scanner]]\npoint_source_id = 1\nname = 'one'\nposition = [1001, 2, 3]\nquaternion_wxyz = [0.5, 0.5, -0.5, 0.5]\n\
          [[scanner]]\npoint_source_id = 2\nposition = [1004, 5, 6]\n[[scanner]]\npoint_source_id = 9\nposition = [0, 0, 0]\n",
     );
-    let settings = Settings {
-        strip_points: 700,
-        ..Settings::default()
-    };
+    let settings = Settings { strip_points: 700, ..Settings::default() };
     let sources = open(&[path], Some(&scanners), &settings).unwrap();
     let names: Vec<_> = sources.scans.iter().map(|s| s.name.as_str()).collect();
     assert_eq!(names, ["one", "hall 2", "hall (rest)"]);
@@ -137,10 +111,8 @@ fn source_ids_go_to_their_scanners_and_the_rest_to_none() {
 fn entries_find_their_file_or_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = las(&mixed(), 0);
-    let paths: Vec<_> = ["a.las", "b.las"]
-        .iter()
-        .map(|n| write(folder.path(), n, &bytes))
-        .collect();
+    let paths: Vec<_> =
+        ["a.las", "b.las"].iter().map(|n| write(folder.path(), n, &bytes)).collect();
     let poses = scanners(
         "[[scanner]]\nname = 'b'\nposition = [1007, 0, 0]\n[[scanner]]\nname = 'c'\nposition = [1, 0, 0]\n",
     );
@@ -168,14 +140,8 @@ fn entries_find_their_file_or_are_reported() {
     );
 
     let far = scanners("[[scanner]]\nposition = [50000000, 0, 0]\n");
-    let error = open(&paths[..1], Some(&far), &Settings::default())
-        .err()
-        .unwrap()
-        .to_string();
-    assert!(
-        error.contains("a.las") && error.contains("same frame"),
-        "{error}"
-    );
+    let error = open(&paths[..1], Some(&far), &Settings::default()).err().unwrap().to_string();
+    assert!(error.contains("a.las") && error.contains("same frame"), "{error}");
 }
 
 #[test]
@@ -185,11 +151,7 @@ fn lies_of_a_header_are_errors() {
     // Offset into the header, bytes to put there, words of the refusal.
     let cases: &[(usize, &[u8], &str)] = &[
         (107, &u32::MAX.to_le_bytes(), "only 5000 points"),
-        (
-            105,
-            &20_u16.to_le_bytes(),
-            "records of point format 3 need 34",
-        ),
+        (105, &20_u16.to_le_bytes(), "records of point format 3 need 34"),
         (104, &[11], "point format"),
         (104, &[3 | 0x80], "LASzip record is missing"),
         (24, &[1, 7], "LAS of version \"1.7\""),
@@ -203,14 +165,8 @@ fn lies_of_a_header_are_errors() {
         let mut bad = good.clone();
         bad[*at..at + bytes.len()].copy_from_slice(bytes);
         let path = write(folder.path(), "bad.las", &bad);
-        let error = open(&[path], None, &Settings::default())
-            .err()
-            .expect(words)
-            .to_string();
-        assert!(
-            error.contains("bad.las") && error.contains(words),
-            "{error}"
-        );
+        let error = open(&[path], None, &Settings::default()).err().expect(words).to_string();
+        assert!(error.contains("bad.las") && error.contains(words), "{error}");
     }
 }
 
@@ -220,27 +176,17 @@ fn what_is_no_scan_is_refused_by_name() {
     let settings = Settings::default();
     for (name, bytes, words) in [
         ("empty.las", &b""[..], "empty"),
-        (
-            "x.ply",
-            b"ply\nformat ascii 1.0\n",
-            "PLY is not read; export",
-        ),
+        ("x.ply", b"ply\nformat ascii 1.0\n", "PLY is not read; export"),
         ("x.las", b"nonsense", "the name ends in \"las\""),
         ("x.zip", b"PK\x03\x04", "archive"),
         ("x.rcp", b"\x00\x01", "ReCap"),
         ("cloud.xyz", b"1 2 3\n4 5 6\n", "without scanner positions"),
     ] {
         let path = write(folder.path(), name, bytes);
-        let error = open(&[path], None, &settings)
-            .err()
-            .expect(name)
-            .to_string();
+        let error = open(&[path], None, &settings).err().expect(name).to_string();
         assert!(error.contains(name) && error.contains(words), "{error}");
     }
-    let error = open(&[folder.path().to_owned()], None, &settings)
-        .err()
-        .unwrap()
-        .to_string();
+    let error = open(&[folder.path().to_owned()], None, &settings).err().unwrap().to_string();
     assert!(error.contains("folder"), "{error}");
     assert!(open(&[folder.path().join("missing.las")], None, &settings).is_err());
     assert!(open(&[], None, &settings).is_err());
@@ -255,24 +201,16 @@ fn throughput() {
         .map(|i| ([i % 9973 * 10, i % 8887 * 10, i % 701 * 10], 1, false))
         .collect();
     let path = write(folder.path(), "big.las", &las(&points, 0));
-    for text in [
-        "",
-        "[[scanner]]\nposition = [1001, 2, 3]\nquaternion_wxyz = [0.5, 0.5, -0.5, 0.5]\n",
-    ] {
+    for text in
+        ["", "[[scanner]]\nposition = [1001, 2, 3]\nquaternion_wxyz = [0.5, 0.5, -0.5, 0.5]\n"]
+    {
         let poses = (!text.is_empty()).then(|| scanners(text));
-        let sources = open(
-            std::slice::from_ref(&path),
-            poses.as_ref(),
-            &Settings::default(),
-        )
-        .unwrap();
+        let sources =
+            open(std::slice::from_ref(&path), poses.as_ref(), &Settings::default()).unwrap();
         for want in [Want::Coordinates, Want::Everything] {
             let start = std::time::Instant::now();
-            let n: usize = sources
-                .strips(sources.inputs[0].id, want)
-                .unwrap()
-                .map(|s| s.unwrap().len())
-                .sum();
+            let n: usize =
+                sources.strips(sources.inputs[0].id, want).unwrap().map(|s| s.unwrap().len()).sum();
             eprintln!(
                 "{want:?}: {:.1} M points a second",
                 n as f64 / start.elapsed().as_secs_f64() / 1e6

@@ -7,9 +7,7 @@ use ingest::{Scanners, Settings, Sources, Want, describe, open};
 use std::path::{Path, PathBuf};
 
 fn folder(name: &str) -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/scans")
-        .join(name);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scans").join(name);
     if !folder.is_dir() {
         eprintln!("skipped: no folder {name}");
         return None;
@@ -21,10 +19,7 @@ fn folder(name: &str) -> Option<PathBuf> {
 fn filling(sources: &Sources, scan: usize) -> (f64, f64) {
     let lattice: Lattice = sources.scans[scan].lattice.expect("the scanner is known");
     let mut pixels = Vec::new();
-    for strip in sources
-        .strips(sources.scans[scan].input, Want::Coordinates)
-        .unwrap()
-    {
+    for strip in sources.strips(sources.scans[scan].input, Want::Coordinates).unwrap() {
         let strip = strip.unwrap();
         if strip.scan == sources.scans[scan].id {
             pixels.extend(strip.xyz.iter().map(|p| lattice.pixel(*p).0));
@@ -61,10 +56,7 @@ fn depth_cameras_have_about_one_point_a_pixel() {
         assert!(sources.warnings.is_empty());
         let lattice = sources.scans[0].lattice.unwrap();
         let (alone, filled) = filling(&sources, 0);
-        eprintln!(
-            "{name}: {:?} alone {alone:.3} points a pixel {filled:.3}",
-            degrees(&lattice)
-        );
+        eprintln!("{name}: {:?} alone {alone:.3} points a pixel {filled:.3}", degrees(&lattice));
         assert!(filled < 1.6, "{name}: {filled}");
         assert!(
             degrees(&lattice).iter().all(|d| (0.03..1.0).contains(d)),
@@ -80,12 +72,8 @@ fn a_tilting_laser_without_rows_is_rebuilt() {
         return;
     };
     let scanners = Scanners::parse("[[scanner]]\nposition = [0, 0, 0]").unwrap();
-    let sources = open(
-        &[folder.join("pcl__room_scan1.laz")],
-        Some(&scanners),
-        &Settings::default(),
-    )
-    .unwrap();
+    let sources =
+        open(&[folder.join("pcl__room_scan1.laz")], Some(&scanners), &Settings::default()).unwrap();
     let (alone, filled) = filling(&sources, 0);
     eprintln!(
         "room: {:?} alone {alone:.3} points a pixel {filled:.3}",
@@ -93,18 +81,10 @@ fn a_tilting_laser_without_rows_is_rebuilt() {
     );
     // Each point stands twice in this file.
     assert!((1.9..2.3).contains(&filled), "{filled}");
-    let sources = open(
-        &[folder.join("lgl__indoor.laz")],
-        None,
-        &Settings::default(),
-    )
-    .unwrap();
+    let sources = open(&[folder.join("lgl__indoor.laz")], None, &Settings::default()).unwrap();
     assert!(!sources.scans[0].has_beams());
     let text = describe(&sources)[0].to_string();
-    assert!(
-        text.contains("scanner: not known") && text.contains("free-space"),
-        "{text}"
-    );
+    assert!(text.contains("scanner: not known") && text.contains("free-space"), "{text}");
 }
 
 #[test]
@@ -112,11 +92,7 @@ fn gridded_files_keep_their_grid() {
     let Some(kurt) = folder("kurt3d-corridor") else {
         return;
     };
-    for name in [
-        "kurt_2scans_cartesian.e57",
-        "kurt_2scans_spherical.e57",
-        "kurt_2scans.ptx",
-    ] {
+    for name in ["kurt_2scans_cartesian.e57", "kurt_2scans_spherical.e57", "kurt_2scans.ptx"] {
         let sources = open(&[kurt.join(name)], None, &Settings::default()).unwrap();
         assert_eq!(sources.scans.len(), 2, "{name}");
         for scan in 0..2 {
@@ -129,10 +105,7 @@ fn gridded_files_keep_their_grid() {
                 "{name}: {row} {col}"
             );
             let axis = lattice.lattice_from_scan * nalgebra::Vector3::y();
-            assert!(
-                (axis - nalgebra::Vector3::z()).norm() < 1e-9,
-                "{name}: the axis is y"
-            );
+            assert!((axis - nalgebra::Vector3::z()).norm() < 1e-9, "{name}: the axis is y");
             assert!(alone > 0.98, "{name}: {alone}");
         }
         let text = serde_json::to_string(&describe(&sources)).unwrap();
@@ -141,18 +114,11 @@ fn gridded_files_keep_their_grid() {
     let Some(pump) = folder("e57-real-pump") else {
         return;
     };
-    let sources = open(
-        &[pump.join("pumpAVisualReferenceImage.e57")],
-        None,
-        &Settings::default(),
-    )
-    .unwrap();
+    let sources =
+        open(&[pump.join("pumpAVisualReferenceImage.e57")], None, &Settings::default()).unwrap();
     let [row, col] = degrees(&sources.scans[0].lattice.unwrap());
     let (alone, filled) = filling(&sources, 0);
     eprintln!("pump: {row:.4} {col:.4} alone {alone:.4} filled {filled:.3}");
-    assert!(
-        (0.05..0.09).contains(&row) && (0.18..0.32).contains(&col),
-        "{row} {col}"
-    );
+    assert!((0.05..0.09).contains(&row) && (0.18..0.32).contains(&col), "{row} {col}");
     assert!(describe(&sources)[0].to_string().contains("irregular"));
 }

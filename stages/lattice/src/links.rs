@@ -63,13 +63,7 @@ pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
                 continue;
             }
             let angle = raster.col_step[row];
-            link_one(
-                raster,
-                &rule,
-                (at, RIGHT, LEFT),
-                angle,
-                (col, SIDE - 1 - col),
-            );
+            link_one(raster, &rule, (at, RIGHT, LEFT), angle, (col, SIDE - 1 - col));
             let angle = raster.row_step;
             link_one(raster, &rule, (at, UP, DOWN), angle, (row, SIDE - 1 - row));
         }

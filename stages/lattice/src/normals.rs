@@ -114,12 +114,7 @@ impl Normals {
             for ((p, to), low) in from.iter().zip(&mut here[1..WIDE]).zip(below) {
                 // Empty pixels are all zero; `as` saturates beyond 200 km.
                 let n = i32::from(p[3] > 0.0);
-                let q = [
-                    (p[0] * UNIT) as i32,
-                    (p[1] * UNIT) as i32,
-                    (p[2] * UNIT) as i32,
-                    n,
-                ];
+                let q = [(p[0] * UNIT) as i32, (p[1] * UNIT) as i32, (p[2] * UNIT) as i32, n];
                 for i in 0..4 {
                     line[i] = line[i].wrapping_add(q[i]);
                     to[i] = line[i].wrapping_add(low[i]);
@@ -133,19 +128,14 @@ impl Normals {
     #[inline]
     fn mean(corners: [[i32; 4]; 4], centre: [i32; 3]) -> Option<[f32; 3]> {
         let [a, b, c, d] = corners;
-        let s: [i32; 4] = std::array::from_fn(|i| {
-            d[i].wrapping_sub(b[i])
-                .wrapping_sub(c[i])
-                .wrapping_add(a[i])
-        });
+        let s: [i32; 4] =
+            std::array::from_fn(|i| d[i].wrapping_sub(b[i]).wrapping_sub(c[i]).wrapping_add(a[i]));
         let n = s[3];
         if n <= 0 {
             return None;
         }
         let scale = 1.0 / n as f32;
-        Some(std::array::from_fn(|i| {
-            s[i].wrapping_sub(n.wrapping_mul(centre[i])) as f32 * scale
-        }))
+        Some(std::array::from_fn(|i| s[i].wrapping_sub(n.wrapping_mul(centre[i])) as f32 * scale))
     }
 
     #[inline]
@@ -160,10 +150,7 @@ impl Normals {
             |step: f32, most: f32| ((window / step + 0.5).min(most) as usize).clamp(1, reach);
         // Columns draw together towards the poles: there a window of the same width holds more of them.
         let squeeze = raster.row_step / raster.col_step[row].min(raster.row_step);
-        let (h, v) = (
-            pixels(raster.col_step[row], most * squeeze),
-            pixels(raster.row_step, most),
-        );
+        let (h, v) = (pixels(raster.col_step[row], most * squeeze), pixels(raster.row_step, most));
         let (r0, r1) = (row.saturating_sub(v), (row + v + 1).min(SIDE));
         let (c0, c1) = (col.saturating_sub(h), (col + h + 1).min(SIDE));
         // The halves share the middle line, so that neither is empty at the tile's border.
@@ -181,11 +168,7 @@ impl Normals {
         };
         let a: [f32; 3] = std::array::from_fn(|i| right[i] - left[i]);
         let b: [f32; 3] = std::array::from_fn(|i| high[i] - low[i]);
-        let n = [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ];
+        let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
         let length2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
         if length2 <= 1e-6 {
             return;

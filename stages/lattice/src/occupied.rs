@@ -34,10 +34,7 @@ impl Counter {
         self.list.clear();
         let inverse = 1.0 / edge;
         let Some(first) = xyz.first() else {
-            return Occupancy {
-                edge,
-                voxels: Vec::new(),
-            };
+            return Occupancy { edge, voxels: Vec::new() };
         };
         let origin = apply(world_from_scan, *first).map(|v| floor_i32(v * inverse));
         for (i, p) in xyz.iter().enumerate() {
@@ -73,11 +70,7 @@ impl Counter {
             }
             same
         });
-        let voxels = self
-            .list
-            .iter()
-            .map(|&(key, n)| (unpack(key, origin), n))
-            .collect();
+        let voxels = self.list.iter().map(|&(key, n)| (unpack(key, origin), n)).collect();
         Occupancy { edge, voxels }
     }
 }
@@ -106,33 +99,20 @@ mod tests {
 
     #[test]
     fn every_point_is_in_its_voxel_once_and_far_from_zero() {
-        let pose = [
-            [1.0, 0.0, 0.0, 4e5],
-            [0.0, 1.0, 0.0, 5.3e6],
-            [0.0, 0.0, 1.0, -3.0],
-        ];
+        let pose = [[1.0, 0.0, 0.0, 4e5], [0.0, 1.0, 0.0, 5.3e6], [0.0, 0.0, 1.0, -3.0]];
         let xyz: Vec<[f32; 3]> = (0..5000)
-            .map(|i| {
-                [
-                    (i % 71) as f32 * 0.031,
-                    (i / 71) as f32 * -0.07,
-                    (i % 13) as f32,
-                ]
-            })
+            .map(|i| [(i % 71) as f32 * 0.031, (i / 71) as f32 * -0.07, (i % 13) as f32])
             .collect();
         let veils: Vec<bool> = (0..5000).map(|i| i % 17 == 0).collect();
         let got = Counter::default().count(&xyz, &veils, &pose, 0.05);
         let mut expected = std::collections::BTreeMap::new();
         for (p, _) in xyz.iter().zip(&veils).filter(|(_, v)| !**v) {
             let w = apply(&pose, *p);
-            *expected
-                .entry([2, 1, 0].map(|i: usize| (w[i] / 0.05).floor() as i32))
-                .or_insert(0) += 1;
+            *expected.entry([2, 1, 0].map(|i: usize| (w[i] / 0.05).floor() as i32)).or_insert(0) +=
+                1;
         }
-        let expected: Vec<([i32; 3], u32)> = expected
-            .into_iter()
-            .map(|(k, n)| ([k[2], k[1], k[0]], n))
-            .collect();
+        let expected: Vec<([i32; 3], u32)> =
+            expected.into_iter().map(|(k, n)| ([k[2], k[1], k[0]], n)).collect();
         // x·(1/edge) and x/edge may round differently at a voxel's border: allow for very few of them.
         let same = got
             .voxels
@@ -144,10 +124,7 @@ mod tests {
             })
             .count();
         assert!(same * 100 >= got.voxels.len() * 99);
-        assert_eq!(
-            got.voxels.iter().map(|v| v.1).sum::<u32>(),
-            expected.iter().map(|v| v.1).sum()
-        );
+        assert_eq!(got.voxels.iter().map(|v| v.1).sum::<u32>(), expected.iter().map(|v| v.1).sum());
         assert!(got.voxels.is_sorted_by_key(|v| (v.0[2], v.0[1], v.0[0])));
     }
 }

@@ -33,9 +33,7 @@ pub(crate) fn largest_first(patches: &mut [PlanePatch]) {
         let place = |p: &PlanePatch| p.bounds.min;
         let by_place = || {
             let (a, b) = (place(a), place(b));
-            (0..3).fold(std::cmp::Ordering::Equal, |o, i| {
-                o.then(a[i].total_cmp(&b[i]))
-            })
+            (0..3).fold(std::cmp::Ordering::Equal, |o, i| o.then(a[i].total_cmp(&b[i])))
         };
         b.area.total_cmp(&a.area).then_with(by_place)
     });
@@ -52,11 +50,7 @@ fn patch(
     let moments = in_world(&grown.moments, &scan.world_from_scan);
     let fit = moments.plane()?;
     let towards = scan.world_from_scan.rotation * Vector::from(grown.normal.map(f64::from));
-    let plane = if fit.plane.normal.dot(&towards) < 0.0 {
-        fit.plane.flipped()
-    } else {
-        fit.plane
-    };
+    let plane = if fit.plane.normal.dot(&towards) < 0.0 { fit.plane.flipped() } else { fit.plane };
     let level = is_level(&plane, settings);
     let area = area(raster, members, grown);
     let (min_area, min_width) = if level {
@@ -91,15 +85,7 @@ fn patch(
 
 /// A patch from sums alone, where there is no raster.
 pub(crate) fn from_sums(scan: ScanId, moments: Moments, plane: Plane, rms: f64) -> PlanePatch {
-    PlanePatch {
-        scan,
-        plane,
-        moments,
-        rms,
-        bounds: Aabb::EMPTY,
-        area: 0.0,
-        ground: Vec::new(),
-    }
+    PlanePatch { scan, plane, moments, rms, bounds: Aabb::EMPTY, area: 0.0, ground: Vec::new() }
 }
 
 /// Whether a plane is nearly horizontal.

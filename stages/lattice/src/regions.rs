@@ -76,9 +76,7 @@ impl Growth {
 
     fn refit(&mut self, sums: &Sums) {
         let moments = sums.moments();
-        let known = moments
-            .plane()
-            .filter(|fit| fit.spread[1] >= MIN_SLENDERNESS * fit.rms);
+        let known = moments.plane().filter(|fit| fit.spread[1] >= MIN_SLENDERNESS * fit.rms);
         let Some(fit) = known else {
             let mean = moments.mean().map(|v| v as f32);
             self.d = self.n[0] * mean.x + self.n[1] * mean.y + self.n[2] * mean.z;
@@ -100,10 +98,7 @@ struct Sums {
 
 impl Sums {
     fn new(p: [f32; 4]) -> Self {
-        Self {
-            origin: [p[0], p[1], p[2]],
-            s: [0.0; 10],
-        }
+        Self { origin: [p[0], p[1], p[2]], s: [0.0; 10] }
     }
 
     #[inline]
@@ -192,9 +187,7 @@ impl Regions {
         let mut growth = Growth {
             n,
             d: n[0] * p[0] + n[1] * p[1] + n[2] * p[2],
-            cosine: (3.0 * normals.error[seed])
-                .clamp(least, most.max(least))
-                .cos(),
+            cosine: (3.0 * normals.error[seed]).clamp(least, most.max(least)).cos(),
             angular: settings.angular_noise as f32,
             flatness: settings.flatness as f32,
         };

@@ -22,10 +22,7 @@ impl Summarise {
     pub fn new(scans: &[Scan], settings: &Settings) -> Self {
         let mut scans = scans.to_vec();
         scans.sort_by_key(|scan| scan.id);
-        Self {
-            scans,
-            settings: *settings,
-        }
+        Self { scans, settings: *settings }
     }
 }
 
@@ -46,16 +43,10 @@ impl Map for Summarise {
     type Scratch = Scratch;
 
     fn apply(&self, tile: Tile, scratch: &mut Scratch) -> Result<TileSummary> {
-        let at = self
-            .scans
-            .binary_search_by_key(&tile.at.scan, |scan| scan.id)
-            .map_err(|_| {
-                let what = format!(
-                    "a tile of a scan that was not announced: '{}'",
-                    tile.at.scan.0
-                );
-                Error::new(Kind::Bug, what)
-            })?;
+        let at = self.scans.binary_search_by_key(&tile.at.scan, |scan| scan.id).map_err(|_| {
+            let what = format!("a tile of a scan that was not announced: '{}'", tile.at.scan.0);
+            Error::new(Kind::Bug, what)
+        })?;
         let scan = &self.scans[at];
         let settings = &self.settings;
         scratch.veils.clear();
@@ -66,22 +57,13 @@ impl Map for Summarise {
             scratch.raster.flag_veils(&tile, &mut scratch.veils);
             n_veils = scratch.raster.veils.len() as u64;
             scratch.normals.fill(&scratch.raster, settings);
-            scratch
-                .regions
-                .fill(&scratch.raster, &scratch.normals, settings);
+            scratch.regions.fill(&scratch.raster, &scratch.normals, settings);
             patches(&scratch.raster, &scratch.regions, scan, settings)
         } else {
             voxels::patches(&tile, scan, &mut scratch.surface, settings)
         };
         let rows = world_rows(&scan.world_from_scan);
-        let occupancy = scratch
-            .counter
-            .count(&tile.xyz, &scratch.veils, &rows, settings.voxel);
-        Ok(TileSummary {
-            n_points: tile.len() as u64,
-            n_veils,
-            patches,
-            occupancy,
-        })
+        let occupancy = scratch.counter.count(&tile.xyz, &scratch.veils, &rows, settings.voxel);
+        Ok(TileSummary { n_points: tile.len() as u64, n_veils, patches, occupancy })
     }
 }

@@ -44,16 +44,18 @@ pub struct ViewBuilder {
 impl ViewBuilder {
     /// An empty view of `region` from `scan`; `extent` is what the scan covers of its lattice, if known.
     #[must_use]
-    pub fn new(scan: &Scan, region: &Region, extent: Option<Extent>, settings: &ViewSettings) -> Self {
-        let local_from_world = Pose::from_parts(
-            Translation3::from(-region.origin.coords),
-            UnitQuaternion::identity(),
-        );
+    pub fn new(
+        scan: &Scan,
+        region: &Region,
+        extent: Option<Extent>,
+        settings: &ViewSettings,
+    ) -> Self {
+        let local_from_world =
+            Pose::from_parts(Translation3::from(-region.origin.coords), UnitQuaternion::identity());
         let local_from_scan = local_from_world * scan.world_from_scan;
         let scanner = scan.lattice.map(|_| local_from_scan * Point::origin());
         let beam_step = scan.lattice.map_or(0.0, |l| l.row_step.max(l.col_step));
-        let images = scanner
-            .map_or_else(Vec::new, |s| cameras(&s, region, beam_step, settings));
+        let images = scanner.map_or_else(Vec::new, |s| cameras(&s, region, beam_step, settings));
         let cone = scanner.map(|s| cone(&s, region, &local_from_scan));
         let view =
             View { scan: scan.id, mask: scan.mask, scanner, beam_step, images, points: Vec::new() };
@@ -131,8 +133,7 @@ impl ViewBuilder {
         self.view.points.sort_unstable_by_key(|p| p.place);
         let scan_from_local = self.local_from_scan.inverse();
         for image in &mut self.view.images {
-            let scan_from_camera =
-                rows(&(scan_from_local * image.camera_from_local().inverse()));
+            let scan_from_camera = rows(&(scan_from_local * image.camera_from_local().inverse()));
             let (lattice, extent) = (self.lattice, self.extent);
             let covered = move |camera: [f32; 3]| {
                 let (Some(lattice), Some([r0, r1, c0, c1])) = (lattice, extent) else {
@@ -177,19 +178,22 @@ fn cameras(
     let to = region.bounds.center() - scanner;
     let near = (0..3)
         .map(|i| {
-            let outside = (region.bounds.min[i] - scanner[i]).max(scanner[i] - region.bounds.max[i]);
+            let outside =
+                (region.bounds.min[i] - scanner[i]).max(scanner[i] - region.bounds.max[i]);
             outside.max(0.0).powi(2)
         })
         .sum::<f64>()
         .sqrt()
         .max(0.3);
-    let focal = (1.0 / (settings.beams_per_cell * beam_step.max(1e-5))).min(near / settings.min_cell);
+    let focal =
+        (1.0 / (settings.beams_per_cell * beam_step.max(1e-5))).min(near / settings.min_cell);
     if to.norm() > 1e-6 {
         let camera_from_local = look_at(scanner, &to);
         let mut half = 0.0_f64;
         for corner in region.bounds.corners() {
             let c = camera_from_local * Point::from(corner);
-            half = if c.z > 1e-3 { half.max((c.x / c.z).abs()).max((c.y / c.z).abs()) } else { 9.9 };
+            half =
+                if c.z > 1e-3 { half.max((c.x / c.z).abs()).max((c.y / c.z).abs()) } else { 9.9 };
         }
         if half <= MAX_HALF_TANGENT {
             return vec![DepthImage::new(camera_from_local, half * 1.02, focal)];
@@ -203,7 +207,11 @@ fn cameras(
             let camera_from_local = look_at(scanner, a);
             let inside = region.bounds.grown(0.05).contains(scanner.coords.into());
             inside
-                || region.bounds.corners().iter().any(|c| (camera_from_local * Point::from(*c)).z > 0.0)
+                || region
+                    .bounds
+                    .corners()
+                    .iter()
+                    .any(|c| (camera_from_local * Point::from(*c)).z > 0.0)
         })
         .map(|a| DepthImage::new(look_at(scanner, &a), 1.0, focal))
         .collect()

@@ -40,11 +40,7 @@ struct Cell {
 /// The side of a plane that stands for both: largest component of the normal positive.
 fn upright(plane: Plane) -> Plane {
     let n = plane.normal;
-    if n[n.iamax()] < 0.0 {
-        plane.flipped()
-    } else {
-        plane
-    }
+    if n[n.iamax()] < 0.0 { plane.flipped() } else { plane }
 }
 
 fn pack(at: [i64; 3]) -> u64 {
@@ -60,13 +56,9 @@ impl Surface {
     fn fill(&mut self, tile: &Tile, settings: &Settings) {
         let edge = settings.surface_voxel;
         self.points.clear();
-        self.points
-            .extend(tile.xyz.iter().enumerate().map(|(i, p)| {
-                (
-                    pack(p.map(|v| geometry::narrow::floor_i32(f64::from(v) / edge).into())),
-                    i as u32,
-                )
-            }));
+        self.points.extend(tile.xyz.iter().enumerate().map(|(i, p)| {
+            (pack(p.map(|v| geometry::narrow::floor_i32(f64::from(v) / edge).into())), i as u32)
+        }));
         self.points.sort_unstable();
         self.cells.clear();
         self.of_point.clear();
@@ -138,9 +130,8 @@ impl Surface {
             next += 1;
             for &other in &around {
                 let cell = &mut self.cells[other];
-                let agrees = cell
-                    .plane
-                    .is_some_and(|p| p.normal.dot(&plane.normal).abs() >= cosine);
+                let agrees =
+                    cell.plane.is_some_and(|p| p.normal.dot(&plane.normal).abs() >= cosine);
                 if cell.region == FREE
                     && agrees
                     && plane.distance(&cell.moments.mean()).abs() <= limit
@@ -196,16 +187,11 @@ impl Surface {
         for &i in members {
             let cell = &self.cells[i];
             let box_of = |k: usize| {
-                Aabb {
-                    min: cell.bounds[0].map(f64::from),
-                    max: cell.bounds[1].map(f64::from),
-                }
-                .corners()[k]
+                Aabb { min: cell.bounds[0].map(f64::from), max: cell.bounds[1].map(f64::from) }
+                    .corners()[k]
             };
             for k in 0..8 {
-                patch
-                    .bounds
-                    .add(apply(&rows, box_of(k).map(geometry::narrow::local_f32)));
+                patch.bounds.add(apply(&rows, box_of(k).map(geometry::narrow::local_f32)));
             }
             if level {
                 let mean = scan.world_from_scan * geometry::Point::from(cell.moments.mean());
@@ -226,16 +212,10 @@ pub(crate) fn patches(
     settings: &Settings,
 ) -> Vec<PlanePatch> {
     surface.fill(tile, settings);
-    let mut seeds: Vec<usize> = (0..surface.cells.len())
-        .filter(|&i| surface.cells[i].plane.is_some())
-        .collect();
+    let mut seeds: Vec<usize> =
+        (0..surface.cells.len()).filter(|&i| surface.cells[i].plane.is_some()).collect();
     // Most points first: their planes are the best known.
-    seeds.sort_by(|&a, &b| {
-        surface.cells[b]
-            .moments
-            .n
-            .total_cmp(&surface.cells[a].moments.n)
-    });
+    seeds.sort_by(|&a, &b| surface.cells[b].moments.n.total_cmp(&surface.cells[a].moments.n));
     let (mut out, mut members) = (Vec::new(), Vec::new());
     for (number, &seed) in seeds.iter().enumerate() {
         if surface.cells[seed].region == FREE {

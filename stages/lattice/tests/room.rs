@@ -33,10 +33,8 @@ fn veils_are_found_and_surfaces_are_not_veils() {
             }
         }
     }
-    let (recall, falsely) = (
-        f64::from(found as u32) / veils as f64,
-        f64::from(wrong as u32) / clean as f64,
-    );
+    let (recall, falsely) =
+        (f64::from(found as u32) / veils as f64, f64::from(wrong as u32) / clean as f64);
     assert!(veils > 1000, "{veils}");
     assert!(
         recall >= 0.95 && falsely <= 0.001,
@@ -58,20 +56,14 @@ fn normals_of_floor_and_walls_are_within_degrees() {
             }
         }
     }
-    assert!(
-        near as f64 >= 0.95 * n as f64,
-        "{near} of {n}, without {none}"
-    );
+    assert!(near as f64 >= 0.95 * n as f64, "{near} of {n}, without {none}");
     assert!((none as f64) < 0.01 * n as f64, "{none} of {n}");
 }
 
 fn summaries(scan: &Scan, tiles: &[Truth]) -> Vec<TileSummary> {
     let stage = Summarise::new(std::slice::from_ref(scan), &Settings::default());
     let mut scratch = Scratch::default();
-    tiles
-        .iter()
-        .map(|t| stage.apply(t.tile.clone(), &mut scratch).expect("a tile"))
-        .collect()
+    tiles.iter().map(|t| stage.apply(t.tile.clone(), &mut scratch).expect("a tile")).collect()
 }
 
 #[test]
@@ -81,11 +73,7 @@ fn floor_cells_lie_on_horizontal_patches() {
     // Points of the floor that lie on an upward patch of their tile, by distance.
     let (mut on, mut all, mut edge_off) = (0, 0, 0);
     for (t, summary) in tiles.iter().zip(&got) {
-        let up: Vec<_> = summary
-            .patches
-            .iter()
-            .filter(|p| p.plane.normal.z > 0.99)
-            .collect();
+        let up: Vec<_> = summary.patches.iter().filter(|p| p.plane.normal.z > 0.99).collect();
         for i in (0..t.shape.len()).filter(|&i| t.shape[i] == FLOOR && !t.mixed[i]) {
             let w = scan.world_from_scan * geometry::Point::from(t.tile.xyz[i].map(f64::from));
             all += 1;
@@ -107,29 +95,22 @@ fn floor_cells_lie_on_horizontal_patches() {
         .filter(|p| p.plane.normal.z > 0.99 && p.bounds.max[2] < 0.3)
         .map(|p| p.area)
         .sum();
-    assert!(
-        (85.0..112.0).contains(&area),
-        "visible floor {area} m² of 108"
-    );
+    assert!((85.0..112.0).contains(&area), "visible floor {area} m² of 108");
 }
 
 #[test]
 fn pipes_are_not_planes_and_rings_are() {
     let (scan, tiles) = &*TILES;
     let got = summaries(scan, tiles);
-    let pipe: std::collections::HashSet<usize> = (0..tiles.len())
-        .filter(|&i| tiles[i].shape.contains(&PIPE))
-        .collect();
+    let pipe: std::collections::HashSet<usize> =
+        (0..tiles.len()).filter(|&i| tiles[i].shape.contains(&PIPE)).collect();
     for (i, summary) in got.iter().enumerate().filter(|(i, _)| pipe.contains(i)) {
         for p in &summary.patches {
             let c = p.bounds.center();
             let axis = 2.0 + (c.x + 5.0) / 10.5 * 0.5;
             let near = (c.y - axis).abs() < 0.07 && (c.z - 1.8).abs() < 0.07;
             let fit = p.moments.plane().expect("a patch has a plane");
-            assert!(
-                !near || fit.spread[1] * 12_f64.sqrt() <= 0.03,
-                "tile {i}: {p:?}"
-            );
+            assert!(!near || fit.spread[1] * 12_f64.sqrt() <= 0.03, "tile {i}: {p:?}");
         }
     }
     let ring: f64 = got
@@ -150,9 +131,7 @@ fn used_buffers_and_far_worlds_change_nothing() {
     let used = summaries(&scan, some);
     let stage = Summarise::new(std::slice::from_ref(&scan), &Settings::default());
     for (t, summary) in some.iter().zip(&used) {
-        let fresh = stage
-            .apply(t.tile.clone(), &mut Scratch::default())
-            .expect("a tile");
+        let fresh = stage.apply(t.tile.clone(), &mut Scratch::default()).expect("a tile");
         assert!(fresh == *summary, "{:?}", t.tile.at);
     }
     scan.world_from_scan.translation.vector += geometry::Vector::new(4e5, 5e6, 100.0);
@@ -163,13 +142,7 @@ fn used_buffers_and_far_worlds_change_nothing() {
                 (p.plane.normal - q.plane.normal).norm() < 1e-5 && (p.area - q.area).abs() < 1e-6
             );
         }
-        let sum = |s: &TileSummary| {
-            s.occupancy
-                .voxels
-                .iter()
-                .map(|v| u64::from(v.1))
-                .sum::<u64>()
-        };
+        let sum = |s: &TileSummary| s.occupancy.voxels.iter().map(|v| u64::from(v.1)).sum::<u64>();
         assert_eq!(sum(a), sum(&b));
         assert_eq!(sum(a) + a.n_veils, a.n_points);
     }
@@ -183,16 +156,12 @@ fn odd_tiles_do_no_harm() {
         *p = [[0.0; 3], [1e9, -1e9, 3.0], [1e-30; 3], *p][i % 4];
     });
     let stage = Summarise::new(std::slice::from_ref(scan), &Settings::default());
-    let got = stage
-        .apply(tile.clone(), &mut Scratch::default())
-        .expect("a tile");
+    let got = stage.apply(tile.clone(), &mut Scratch::default()).expect("a tile");
     assert_eq!(got.n_points, tile.len() as u64);
     tile.xyz.clear();
     tile.pixel.clear();
     tile.place.clear();
-    let got = stage
-        .apply(tile.clone(), &mut Scratch::default())
-        .expect("an empty tile");
+    let got = stage.apply(tile.clone(), &mut Scratch::default()).expect("an empty tile");
     assert!(got.patches.is_empty() && got.occupancy.voxels.is_empty());
     tile.at.scan = contract::ScanId(9);
     assert!(stage.apply(tile, &mut Scratch::default()).is_err());

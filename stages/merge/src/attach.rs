@@ -67,16 +67,11 @@ impl Attach {
             Some(model) if fit.verdict != Verdict::Refused => moving(model),
             _ => Vec::new(),
         });
-        Self {
-            moving: moving.collect(),
-            settings,
-        }
+        Self { moving: moving.collect(), settings }
     }
 
     fn is_moving(&self, at: LinkAt) -> bool {
-        self.moving
-            .get(usize::from(at.robot))
-            .and_then(|links| links.get(usize::from(at.link)))
+        self.moving.get(usize::from(at.robot)).and_then(|links| links.get(usize::from(at.link)))
             == Some(&true)
     }
 
@@ -105,13 +100,8 @@ impl Attach {
             }
         }
         let Some(link) = most(&mut marks) else { return };
-        let mut group = Group {
-            link,
-            n_attached: 0,
-            n_uncertain: 0,
-            n_points: 0,
-            is_cut: !fixed.is_empty(),
-        };
+        let mut group =
+            Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut: !fixed.is_empty() };
         graph.ways(&robot, &mut ways.robot);
         graph.ways(&fixed, &mut ways.fixed);
         let ours: Vec<usize> = members
@@ -151,10 +141,8 @@ impl Attach {
         for &at in ours {
             ways.ours[at] = true;
         }
-        let n = ours
-            .iter()
-            .filter(|at| graph.beside(**at).any(|(other, _)| !ways.ours[other]))
-            .count();
+        let n =
+            ours.iter().filter(|at| graph.beside(**at).any(|(other, _)| !ways.ours[other])).count();
         n as f64 * RESIDUAL_EDGE > self.settings.cut
     }
 }
@@ -190,20 +178,13 @@ impl Fold for Attach {
     fn finish(&self, mut sum: Sum) -> Result<Attached> {
         sum.settle();
         // Where a link fills a voxel, what is left in it is the link's roughness, and connects nothing.
-        let rest: Vec<ResidualVoxel> = sum
-            .voxels
-            .into_iter()
-            .filter(|v| v.n_residual > 0)
-            .collect();
+        let rest: Vec<ResidualVoxel> =
+            sum.voxels.into_iter().filter(|v| v.n_residual > 0).collect();
         let places: Vec<Voxel> = rest.iter().map(|v| v.voxel).collect();
         let graph = Graph::new(&places);
         let far = (u32::MAX, u32::MAX);
         let n = rest.len();
-        let mut ways = Ways {
-            robot: vec![far; n],
-            fixed: vec![far; n],
-            ours: vec![false; n],
-        };
+        let mut ways = Ways { robot: vec![far; n], fixed: vec![far; n], ours: vec![false; n] };
         let mut out = Attached::default();
         for members in graph.components() {
             self.decide(&graph, &rest, &members, &mut ways, &mut out);
@@ -248,10 +229,7 @@ fn most(marks: &mut [u32]) -> Option<LinkAt> {
             best = Some((run.len(), run[0]));
         }
     }
-    best.map(|(_, mark)| LinkAt {
-        robot: (mark >> 16) as u16,
-        link: (mark & 0xffff) as u16,
-    })
+    best.map(|(_, mark)| LinkAt { robot: (mark >> 16) as u16, link: (mark & 0xffff) as u16 })
 }
 
 #[cfg(test)]

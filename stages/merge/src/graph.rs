@@ -17,16 +17,9 @@ impl Graph {
     /// The graph of voxels, each once.
     pub(crate) fn new(voxels: &[Voxel]) -> Self {
         // Only looked up, never walked: its order cannot reach the answer.
-        let index: HashMap<Voxel, u32> = voxels
-            .iter()
-            .enumerate()
-            .map(|(i, v)| (*v, i as u32))
-            .collect();
-        let mut graph = Self {
-            starts: vec![0],
-            to: Vec::new(),
-            steps: Vec::new(),
-        };
+        let index: HashMap<Voxel, u32> =
+            voxels.iter().enumerate().map(|(i, v)| (*v, i as u32)).collect();
+        let mut graph = Self { starts: vec![0], to: Vec::new(), steps: Vec::new() };
         for v in voxels {
             for n in (0..27).filter(|n| *n != 13) {
                 let by = [n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1];
@@ -50,10 +43,7 @@ impl Graph {
     /// Neighbours of a voxel and the steps to them, hundredths of an edge.
     pub(crate) fn beside(&self, at: usize) -> impl Iterator<Item = (usize, u32)> + '_ {
         let range = self.starts[at]..self.starts[at + 1];
-        self.to[range.clone()]
-            .iter()
-            .map(|t| *t as usize)
-            .zip(self.steps[range].iter().copied())
+        self.to[range.clone()].iter().map(|t| *t as usize).zip(self.steps[range].iter().copied())
     }
 
     /// Connected components, each with ascending members, by their first member.

@@ -26,11 +26,6 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            contact: 0.025,
-            hold: 0.15,
-            cut: 0.3,
-            min_voxels: 3,
-        }
+        Self { contact: 0.025, hold: 0.15, cut: 0.3, min_voxels: 3 }
     }
 }

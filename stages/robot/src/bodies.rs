@@ -54,11 +54,7 @@ impl Bodies<'_> {
             }
         }
         if !any {
-            findings.fail(
-                file,
-                "no link has a surface, so no scan can show it",
-                "add meshes",
-            );
+            findings.fail(file, "no link has a surface, so no scan can show it", "add meshes");
         }
     }
 
@@ -120,10 +116,8 @@ impl Bodies<'_> {
                 "mend the path",
             );
         }
-        let extension = found
-            .path
-            .extension()
-            .map_or_else(String::new, |e| e.to_string_lossy().into_owned());
+        let extension =
+            found.path.extension().map_or_else(String::new, |e| e.to_string_lossy().into_owned());
         let soup = read_bytes(&found.path, self.settings.max_mesh_bytes)
             .and_then(|bytes| mesh::read(&bytes, &extension));
         match soup {

@@ -49,10 +49,8 @@ pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) ->
         let Some(joints) = path(tree, root, tip) else {
             continue;
         };
-        let n_free = joints
-            .iter()
-            .filter(|&&j| matches!(tree.joints[j].motion, Motion::Free(_)))
-            .count();
+        let n_free =
+            joints.iter().filter(|&&j| matches!(tree.joints[j].motion, Motion::Free(_))).count();
         if (n_free, joints.len()) > (best.0, best.1) {
             best = (n_free, joints.len(), joints);
         }
@@ -68,12 +66,8 @@ pub(crate) fn set_roles(
     findings: &mut Findings,
 ) {
     let moving = |tree: &Tree, j: usize| tree.joints[j].motion != Motion::Fixed;
-    let last = main_chain
-        .iter()
-        .rev()
-        .copied()
-        .find(|&j| moving(tree, j))
-        .map(|j| tree.joints[j].child);
+    let last =
+        main_chain.iter().rev().copied().find(|&j| moving(tree, j)).map(|j| tree.joints[j].child);
     let on_chain: Vec<usize> = main_chain.iter().map(|&j| tree.joints[j].child).collect();
     let mut named = vec![false; tree.links.len()];
     for name in sheet.effector.links.iter().chain(&sheet.effector.root) {
@@ -95,10 +89,7 @@ pub(crate) fn set_roles(
             let parent = tree.joints[j].parent;
             beyond[at] = beyond[parent] || Some(parent) == last;
             tool[at] = tool[parent];
-            let follows = matches!(
-                tree.joints[j].motion,
-                Motion::Loop(_) | Motion::Mimic { .. }
-            );
+            let follows = matches!(tree.joints[j].motion, Motion::Loop(_) | Motion::Mimic { .. });
             followed[at] = !on_chain.contains(&at) && (followed[parent] || follows);
         }
         tool[at] |= sheet.effector.root.as_ref() == Some(&tree.links[at].name);

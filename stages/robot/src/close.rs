@@ -132,15 +132,9 @@ fn split(
     }
     for &joint in passive {
         if !parts.iter().any(|(joints, _)| joints.contains(&joint)) {
-            let what = format!(
-                "no closure determines the passive joint \"{}\"",
-                model.joints[joint].name
-            );
-            findings.fail(
-                place,
-                what,
-                "add its closure, or leave the joint out of passive",
-            );
+            let what =
+                format!("no closure determines the passive joint \"{}\"", model.joints[joint].name);
+            findings.fail(place, what, "add its closure, or leave the joint out of passive");
             return None;
         }
     }
@@ -158,15 +152,9 @@ fn shape(
     let place = format!("robot.toml: sub_chain {}", closed_loop.name);
     let (n_passive, n_pins) = (closed_loop.passive.len(), closed_loop.closures.len());
     if n_passive > 2 * n_pins {
-        let what = format!(
-            "{n_pins} pin(s) determine {} joints, but {n_passive} are passive",
-            2 * n_pins
-        );
-        findings.fail(
-            &place,
-            what,
-            "leave out of passive what moves by itself or mimics",
-        );
+        let what =
+            format!("{n_pins} pin(s) determine {} joints, but {n_passive} are passive", 2 * n_pins);
+        findings.fail(&place, what, "leave out of passive what moves by itself or mimics");
         return None;
     }
     let mut found = Form::General;
@@ -191,18 +179,10 @@ fn shape(
     };
     if !fits {
         let what = format!("the passive joints do not make the kind of loop named \"{word:?}\"");
-        findings.fail(
-            &place,
-            what,
-            "see stages/robot/README.md, or write kind = \"auto\"",
-        );
+        findings.fail(&place, what, "see stages/robot/README.md, or write kind = \"auto\"");
         return None;
     }
-    closed_loop.form = if word == LoopWord::General {
-        Form::General
-    } else {
-        found
-    };
+    closed_loop.form = if word == LoopWord::General { Form::General } else { found };
     Some(())
 }
 
@@ -239,9 +219,7 @@ fn ordered(
 ) -> Option<Vec<ClosedLoop>> {
     let needs = |a: &ClosedLoop, b: &ClosedLoop| {
         (a.closures.iter().flat_map(|pin| [pin.link_a, pin.link_b])).any(|link| {
-            b.passive
-                .iter()
-                .any(|&j| !a.passive.contains(&j) && model.hangs_on(link, j))
+            b.passive.iter().any(|&j| !a.passive.contains(&j) && model.hangs_on(link, j))
         })
     };
     let mut waiting = loops;
@@ -252,11 +230,7 @@ fn ordered(
         });
         let Some(at) = ready else {
             let what = "loops hang on one another in a circle";
-            findings.fail(
-                "robot.toml: sub_chain",
-                what,
-                "write their closures into one sub_chain",
-            );
+            findings.fail("robot.toml: sub_chain", what, "write their closures into one sub_chain");
             return None;
         };
         done.push(waiting.remove(at));
@@ -322,11 +296,8 @@ fn try_range(model: &Model, findings: &mut Findings) {
             findings.warn(place, what, "check its points and the limits of its driver");
         }
     }
-    for (joint, _) in model
-        .joints
-        .iter()
-        .zip(&beyond)
-        .filter(|(j, b)| **b && j.kind != JointKind::Continuous)
+    for (joint, _) in
+        model.joints.iter().zip(&beyond).filter(|(j, b)| **b && j.kind != JointKind::Continuous)
     {
         let what = "the loop takes this joint beyond its limits";
         findings.note(

@@ -38,21 +38,12 @@ pub(crate) struct Findings {
 
 impl Findings {
     pub(crate) fn new(model: &str) -> Self {
-        Self {
-            model: model.to_owned(),
-            list: Vec::new(),
-        }
+        Self { model: model.to_owned(), list: Vec::new() }
     }
 
     fn add(&mut self, severity: Severity, place: &dyn Display, what: String, way_out: &str) {
         let (place, way_out) = (place.to_string(), way_out.to_owned());
-        let finding = Finding {
-            model: self.model.clone(),
-            severity,
-            what,
-            place,
-            way_out,
-        };
+        let finding = Finding { model: self.model.clone(), severity, what, place, way_out };
         if !self.list.contains(&finding) {
             self.list.push(finding);
         }
@@ -78,14 +69,8 @@ impl Findings {
     pub(crate) fn first_error(&self) -> Error {
         match self.list.iter().find(|f| f.severity == Severity::Error) {
             Some(f) => {
-                let error = Error::bad_input(f.what.clone())
-                    .at(&f.place)
-                    .at(&self.model);
-                if f.way_out.is_empty() {
-                    error
-                } else {
-                    error.hint(f.way_out.clone())
-                }
+                let error = Error::bad_input(f.what.clone()).at(&f.place).at(&self.model);
+                if f.way_out.is_empty() { error } else { error.hint(f.way_out.clone()) }
             }
             None => {
                 Error::new(Kind::Bug, "a model failed to load without a finding").at(&self.model)

@@ -36,11 +36,8 @@ pub(crate) struct Placing<'a> {
 impl<'a> Placing<'a> {
     /// Sets free and mimic joints; loops are open.
     pub(crate) fn open(model: &'a Model, posture: &[f64]) -> Self {
-        let mut placing = Self {
-            model,
-            posture: posture.to_vec(),
-            values: vec![0.0; model.joints.len()],
-        };
+        let mut placing =
+            Self { model, posture: posture.to_vec(), values: vec![0.0; model.joints.len()] };
         placing.set_followers();
         placing
     }
@@ -49,11 +46,9 @@ impl<'a> Placing<'a> {
         for (value, joint) in self.values.iter_mut().zip(&self.model.joints) {
             match joint.motion {
                 Motion::Free(free) => *value = self.posture[free],
-                Motion::Mimic {
-                    free,
-                    multiplier,
-                    offset,
-                } => *value = multiplier * self.posture[free] + offset,
+                Motion::Mimic { free, multiplier, offset } => {
+                    *value = multiplier * self.posture[free] + offset
+                }
                 Motion::Loop(_) | Motion::Fixed => {}
             }
         }
@@ -72,12 +67,7 @@ impl<'a> Placing<'a> {
     pub(crate) fn move_to(&mut self, posture: Vec<f64>, until: &ClosedLoop) {
         self.posture = posture;
         self.set_followers();
-        for closed_loop in self
-            .model
-            .loops
-            .iter()
-            .take_while(|l| !std::ptr::eq(*l, until))
-        {
+        for closed_loop in self.model.loops.iter().take_while(|l| !std::ptr::eq(*l, until)) {
             closed_loop.solve(self);
         }
     }
@@ -103,10 +93,7 @@ impl<'a> Placing<'a> {
     pub(crate) fn axis(&self, joint: usize) -> (Point, Vector) {
         let j = &self.model.joints[joint];
         let base_from_joint = self.pose(j.parent) * j.parent_from_joint;
-        (
-            base_from_joint.translation.vector.into(),
-            base_from_joint * j.axis.into_inner(),
-        )
+        (base_from_joint.translation.vector.into(), base_from_joint * j.axis.into_inner())
     }
 
     /// The link that carries a joint, and the joint's origin in its frame.
@@ -116,10 +103,7 @@ impl<'a> Placing<'a> {
     }
 
     pub(crate) fn turns(&self, joint: usize) -> bool {
-        matches!(
-            self.model.joints[joint].kind,
-            JointKind::Revolute | JointKind::Continuous
-        )
+        matches!(self.model.joints[joint].kind, JointKind::Revolute | JointKind::Continuous)
     }
 
     /// Velocity of the point `p` (base frame) of a link for a unit rate of one joint.
@@ -167,11 +151,7 @@ impl<'a> Placing<'a> {
         let mut rates: Vec<f64> = (self.model.joints.iter())
             .map(|joint| match joint.motion {
                 Motion::Free(f) if f == free => 1.0,
-                Motion::Mimic {
-                    free: f,
-                    multiplier,
-                    ..
-                } if f == free => multiplier,
+                Motion::Mimic { free: f, multiplier, .. } if f == free => multiplier,
                 _ => 0.0,
             })
             .collect();
@@ -198,11 +178,7 @@ impl Model {
     /// If `posture` has not one value for each free joint.
     #[must_use]
     pub fn poses(&self, posture: &[f64]) -> Vec<Pose> {
-        assert_eq!(
-            posture.len(),
-            self.free.len(),
-            "a posture has one value for each free joint"
-        );
+        assert_eq!(posture.len(), self.free.len(), "a posture has one value for each free joint");
         Placing::closed(self, posture).poses()
     }
 
@@ -212,16 +188,10 @@ impl Model {
     /// If `posture` has not one value for each free joint.
     #[must_use]
     pub fn kinematics(&self, posture: &[f64]) -> Kinematics {
-        assert_eq!(
-            posture.len(),
-            self.free.len(),
-            "a posture has one value for each free joint"
-        );
+        assert_eq!(posture.len(), self.free.len(), "a posture has one value for each free joint");
         let placing = Placing::closed(self, posture);
         let base_from_link = placing.poses();
-        let rates: Vec<Vec<f64>> = (0..self.free.len())
-            .map(|free| placing.rates(free))
-            .collect();
+        let rates: Vec<Vec<f64>> = (0..self.free.len()).map(|free| placing.rates(free)).collect();
         let mut twists: Vec<Vec<[f64; 6]>> = Vec::with_capacity(self.links.len());
         for link in &self.links {
             let Some(j) = link.parent_joint else {
@@ -239,10 +209,7 @@ impl Model {
             }
             twists.push(row);
         }
-        Kinematics {
-            base_from_link,
-            twists,
-        }
+        Kinematics { base_from_link, twists }
     }
 
     /// Value of each joint at a posture, in the order of `joints`: radians or metres; fixed joints zero.
@@ -255,10 +222,7 @@ impl Model {
     #[must_use]
     pub fn loop_gap(&self, posture: &[f64]) -> f64 {
         let placing = Placing::closed(self, posture);
-        self.loops
-            .iter()
-            .map(|l| l.gap(&placing))
-            .fold(0.0, f64::max)
+        self.loops.iter().map(|l| l.gap(&placing)).fold(0.0, f64::max)
     }
 
     /// Zero, moved inside the limits.

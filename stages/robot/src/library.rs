@@ -57,9 +57,7 @@ impl Library {
     /// If the folder cannot be read.
     pub fn open(dir: &Path) -> Result<(Vec<PathBuf>, Self)> {
         let at = |e: std::io::Error| {
-            Error::from(e)
-                .at(dir.display())
-                .hint("give the folder of the robot library")
+            Error::from(e).at(dir.display()).hint("give the folder of the robot library")
         };
         let mut folders = Vec::new();
         for entry in std::fs::read_dir(dir).map_err(at)? {
@@ -83,19 +81,9 @@ impl Library {
             holds
         });
         if urdfs(dir).len() == 1 && folders.is_empty() {
-            passed.note(
-                dir.display(),
-                "is a model, not a library",
-                "give the folder above it",
-            );
+            passed.note(dir.display(), "is a model, not a library", "give the folder above it");
         }
-        Ok((
-            folders,
-            Self {
-                models: Vec::new(),
-                findings: passed.list,
-            },
-        ))
+        Ok((folders, Self { models: Vec::new(), findings: passed.list }))
     }
 
     /// Loads the model of one folder of the library.
@@ -128,11 +116,7 @@ impl Library {
         let Some(first) = self.findings.iter().find(|f| f.severity == Severity::Error) else {
             return Err(empty(dir));
         };
-        let n = self
-            .findings
-            .iter()
-            .filter(|f| f.severity == Severity::Error)
-            .count();
+        let n = self.findings.iter().filter(|f| f.severity == Severity::Error).count();
         let what = format!(
             "no model of the library could be loaded, {n} error(s), the first: {}: {}: {}",
             first.model, first.place, first.what
@@ -150,9 +134,7 @@ impl Library {
 }
 
 fn name(folder: &Path) -> String {
-    folder
-        .file_name()
-        .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+    folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
 fn empty(dir: &Path) -> Error {

@@ -29,12 +29,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            clouds: true,
-            spacing: 0.005,
-            max_samples: 60_000,
-            max_mesh_bytes: 256 << 20,
-        }
+        Self { clouds: true, spacing: 0.005, max_samples: 60_000, max_mesh_bytes: 256 << 20 }
     }
 }
 
@@ -42,10 +37,7 @@ impl Settings {
     /// Meshes and kinematics only.
     #[must_use]
     pub fn without_clouds() -> Self {
-        Self {
-            clouds: false,
-            ..Self::default()
-        }
+        Self { clouds: false, ..Self::default() }
     }
 }
 
@@ -71,16 +63,9 @@ impl Model {
     /// The first finding that keeps it from loading.
     pub fn load_urdf(path: &Path, name: &str, settings: &Settings) -> Result<(Self, Vec<Finding>)> {
         let mut findings = Findings::new(name);
-        let folder = path
-            .parent()
-            .filter(|p| !p.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let roots = Roots::new(folder, None).map_err(|e| Error::from(e).at(folder.display()))?;
-        let loader = Loader {
-            name,
-            roots,
-            settings,
-        };
+        let loader = Loader { name, roots, settings };
         match loader.load(path, &Sheet::default(), &mut findings) {
             Some(model) => Ok((model, findings.list)),
             None => Err(findings.first_error()),
@@ -113,22 +98,13 @@ pub(crate) fn load(
         Some(written) => match roots.find(written) {
             Ok(found) => found.path,
             Err(what) => {
-                findings.fail(
-                    "robot.toml: urdf",
-                    format!("{what} \"{written}\""),
-                    "mend the name",
-                );
+                findings.fail("robot.toml: urdf", format!("{what} \"{written}\""), "mend the name");
                 return None;
             }
         },
         None => find_urdf(folder, findings)?,
     };
-    Loader {
-        name,
-        roots,
-        settings,
-    }
-    .load(&path, &sheet, findings)
+    Loader { name, roots, settings }.load(&path, &sheet, findings)
 }
 
 fn read_sheet(folder: &Path, findings: &mut Findings) -> Option<Sheet> {
@@ -140,10 +116,7 @@ fn read_sheet(folder: &Path, findings: &mut Findings) -> Option<Sheet> {
     match toml::from_str(&text) {
         Ok(sheet) => Some(sheet),
         Err(error) => {
-            let what = format!(
-                "cannot be read ({})",
-                error.to_string().trim().replace('\n', " ")
-            );
+            let what = format!("cannot be read ({})", error.to_string().trim().replace('\n', " "));
             findings.fail("robot.toml", what, "see stages/robot/README.md");
             None
         }
@@ -167,11 +140,7 @@ pub(crate) fn find_urdf(folder: &Path, findings: &mut Findings) -> Option<PathBu
             Some(only.clone())
         }
         [] => {
-            findings.fail(
-                folder.display(),
-                "has no robot.urdf",
-                "put the robot's URDF there",
-            );
+            findings.fail(folder.display(), "has no robot.urdf", "put the robot's URDF there");
             None
         }
         several => {
@@ -192,11 +161,7 @@ pub(crate) fn urdfs(folder: &Path) -> Vec<PathBuf> {
         return Vec::new();
     };
     let mut paths: Vec<PathBuf> = (entries.filter_map(|e| e.ok().map(|e| e.path())))
-        .filter(|p| {
-            p.extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("urdf"))
-                && p.is_file()
-        })
+        .filter(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf")) && p.is_file())
         .collect();
     paths.sort();
     paths
@@ -230,22 +195,10 @@ impl Loader<'_> {
         let mut tree = tree::build(&description, &passive, &file, findings)?;
         let main_chain = chain::main_chain(&tree, sheet, findings);
         chain::set_roles(&mut tree, &main_chain, sheet, findings);
-        let mut model = Model {
-            name: self.name.to_owned(),
-            main_chain,
-            ..Model::default()
-        };
-        let bodies = Bodies {
-            roots: &self.roots,
-            settings: self.settings,
-        };
+        let mut model = Model { name: self.name.to_owned(), main_chain, ..Model::default() };
+        let bodies = Bodies { roots: &self.roots, settings: self.settings };
         bodies.read(&mut tree, &file, findings);
-        Tree {
-            links: model.links,
-            joints: model.joints,
-            free: model.free,
-            ..
-        } = tree;
+        Tree { links: model.links, joints: model.joints, free: model.free, .. } = tree;
         close::close(&mut model, &sheet.sub_chain, findings)?;
         note_links(&mut model, sheet, findings);
         if findings.failed() {
@@ -313,18 +266,10 @@ impl Loader<'_> {
         let in_main = |name: &str| main.links.iter().any(|l| l.name == name);
         if !in_main(attach) {
             let what = format!("its root is no link of the main URDF \"{attach}\"");
-            findings.fail(
-                &place,
-                what,
-                "set root to the link that the sub chain stands on",
-            );
+            findings.fail(&place, what, "set root to the link that the sub chain stands on");
             return None;
         }
-        if let Some(link) = sub
-            .links
-            .iter()
-            .find(|l| l.name != *root && in_main(&l.name))
-        {
+        if let Some(link) = sub.links.iter().find(|l| l.name != *root && in_main(&l.name)) {
             let what = format!("a link is in the main URDF too \"{}\"", link.name);
             findings.fail(
                 &place,

@@ -76,9 +76,7 @@ fn turn(from: &Vector, to: &Vector, n: &Vector) -> f64 {
 /// `v`, seen along `n`, turned about it, of unit length.
 fn turned(v: &Vector, n: &Vector, angle: f64) -> Vector {
     let v = across(*v, n);
-    (v * angle.cos() + n.cross(&v) * angle.sin())
-        .try_normalize(1e-15)
-        .unwrap_or_else(Vector::zeros)
+    (v * angle.cos() + n.cross(&v) * angle.sin()).try_normalize(1e-15).unwrap_or_else(Vector::zeros)
 }
 
 impl ClosedLoop {
@@ -116,9 +114,7 @@ impl ClosedLoop {
         if a < 1e-12 {
             return;
         }
-        let root = (b * b - a * (start.norm_squared() - target.norm_squared()))
-            .max(0.0)
-            .sqrt();
+        let root = (b * b - a * (start.norm_squared() - target.norm_squared())).max(0.0).sqrt();
         let s = (mode * root - b) / a;
         placing.values[slide] = s;
         placing.values[j] = turn(&(start + along * s), &target, &axis);
@@ -184,10 +180,8 @@ impl ClosedLoop {
         let mut residual = DVector::zeros(n * self.closures.len());
         let mut jacobian = DMatrix::zeros(n * self.closures.len(), self.passive.len());
         for (c, pin) in self.closures.iter().enumerate() {
-            let (a, b) = (
-                placing.point(pin.link_a, &pin.point_a),
-                placing.point(pin.link_b, &pin.point_b),
-            );
+            let (a, b) =
+                (placing.point(pin.link_a, &pin.point_a), placing.point(pin.link_b, &pin.point_b));
             for (r, row) in rows.iter().enumerate() {
                 residual[c * n + r] = row.dot(&(a - b));
                 for (column, &joint) in self.passive.iter().enumerate() {
@@ -202,16 +196,11 @@ impl ClosedLoop {
 
     /// Directions in which the pins must meet: two across the axes of a planar loop, else three.
     fn directions(&self, placing: &Placing) -> Vec<Vector> {
-        let mut axes = (self.passive.iter())
-            .filter(|&&j| placing.turns(j))
-            .map(|&j| placing.axis(j).1);
+        let mut axes =
+            (self.passive.iter()).filter(|&&j| placing.turns(j)).map(|&j| placing.axis(j).1);
         match axes.next() {
             Some(n) if axes.all(|m| m.cross(&n).norm() < 1e-6) => {
-                let helper = if n.x.abs() < 0.7 {
-                    Vector::x()
-                } else {
-                    Vector::y()
-                };
+                let helper = if n.x.abs() < 0.7 { Vector::x() } else { Vector::y() };
                 let e = n.cross(&helper).normalize();
                 vec![e, n.cross(&e)]
             }
@@ -225,10 +214,7 @@ impl ClosedLoop {
         let apart = |pin: &Closure| {
             let gap =
                 placing.point(pin.link_a, &pin.point_a) - placing.point(pin.link_b, &pin.point_b);
-            rows.iter()
-                .map(|row| row.dot(&gap).powi(2))
-                .sum::<f64>()
-                .sqrt()
+            rows.iter().map(|row| row.dot(&gap).powi(2)).sum::<f64>().sqrt()
         };
         self.closures.iter().map(apart).fold(0.0, f64::max)
     }
@@ -242,10 +228,7 @@ impl ClosedLoop {
             Form::Rr => vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b))],
             // Out of reach all is in line and only points at the other end.
             Form::RrrSerial { .. } | Form::Rpr { .. } if open => {
-                vec![
-                    self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b)),
-                    0.0,
-                ]
+                vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b)), 0.0]
             }
             Form::RrrBranched { .. } if open => {
                 let ends = [self.passive[1], self.passive[0]].map(|j| placing.carrier(j));
@@ -264,10 +247,8 @@ impl ClosedLoop {
         let (_, jacobian) = self.equations(placing);
         let mut known = DVector::zeros(jacobian.nrows());
         for (c, pin) in self.closures.iter().enumerate() {
-            let (a, b) = (
-                placing.point(pin.link_a, &pin.point_a),
-                placing.point(pin.link_b, &pin.point_b),
-            );
+            let (a, b) =
+                (placing.point(pin.link_a, &pin.point_a), placing.point(pin.link_b, &pin.point_b));
             let moves =
                 placing.velocity(pin.link_a, &a, rates) - placing.velocity(pin.link_b, &b, rates);
             for (r, row) in rows.iter().enumerate() {

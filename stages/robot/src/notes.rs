@@ -21,11 +21,7 @@ pub(crate) fn named_passive(
         None if sub_chain.closures.is_empty() => Vec::new(),
         None if sub_chain.urdf.is_some() => moving,
         None => {
-            findings.fail(
-                &place,
-                "does not say which joints its loop sets",
-                "add passive = [..]",
-            );
+            findings.fail(&place, "does not say which joints its loop sets", "add passive = [..]");
             return None;
         }
     };
@@ -86,11 +82,7 @@ pub(crate) fn note_links(model: &mut Model, sheet: &Sheet, findings: &mut Findin
             findings.note(&place, text.clone(), "");
         }
     }
-    let n_moving = model
-        .joints
-        .iter()
-        .filter(|j| j.kind != JointKind::Fixed)
-        .count();
+    let n_moving = model.joints.iter().filter(|j| j.kind != JointKind::Fixed).count();
     if model.free.is_empty() && n_moving == 0 {
         findings.warn("", "no joint moves: this is a thing, not a robot", "");
     }

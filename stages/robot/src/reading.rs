@@ -5,8 +5,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 pub(crate) fn file_name(path: &Path) -> String {
-    path.file_name()
-        .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
 /// Reads a regular file of at most `limit` bytes.
@@ -22,9 +21,7 @@ pub(crate) fn read_bytes(path: &Path, limit: u64) -> std::result::Result<Vec<u8>
     };
     match open() {
         Ok((len, bytes)) if len <= limit => Ok(bytes),
-        Ok((len, _)) => Err(format!(
-            "is larger than the limit of {limit} bytes \"{len}\""
-        )),
+        Ok((len, _)) => Err(format!("is larger than the limit of {limit} bytes \"{len}\"")),
         Err(error) => Err(format!("cannot be read ({error})")),
     }
 }
@@ -37,6 +34,5 @@ pub(crate) fn read_text(
 ) -> Option<String> {
     let text = read_bytes(path, limit)
         .and_then(|bytes| String::from_utf8(bytes).map_err(|e| format!("is not UTF-8 ({e})")));
-    text.map_err(|what| findings.fail(place, what, "mend or replace the file"))
-        .ok()
+    text.map_err(|what| findings.fail(place, what, "mend or replace the file")).ok()
 }

@@ -33,11 +33,7 @@ impl Roots {
         let mut outside = false;
         for other_case in [false, true] {
             for (root, rest) in &candidates {
-                let joined = if other_case {
-                    any_case(root, rest)
-                } else {
-                    Some(root.join(rest))
-                };
+                let joined = if other_case { any_case(root, rest) } else { Some(root.join(rest)) };
                 let Some(path) = joined else {
                     continue;
                 };
@@ -62,23 +58,18 @@ impl Roots {
 
     fn holds(&self, path: &Path) -> bool {
         path.starts_with(&self.model)
-            || self
-                .library
-                .as_ref()
-                .is_some_and(|root| path.starts_with(root))
+            || self.library.as_ref().is_some_and(|root| path.starts_with(root))
     }
 
     /// Folders and relative paths to try, in order.
     fn candidates(&self, written: &str) -> Result<Vec<(PathBuf, PathBuf)>, String> {
         let slashed = written.trim().replace('\\', "/");
         let mut out = Vec::new();
-        if let Some(rest) = slashed
-            .strip_prefix("package://")
-            .or_else(|| slashed.strip_prefix("model://"))
+        if let Some(rest) =
+            slashed.strip_prefix("package://").or_else(|| slashed.strip_prefix("model://"))
         {
-            let (package, inner) = rest
-                .split_once('/')
-                .ok_or("the path names a package but no file")?;
+            let (package, inner) =
+                rest.split_once('/').ok_or("the path names a package but no file")?;
             out.push((self.model.clone(), PathBuf::from(inner)));
             let with_package = PathBuf::from(package).join(inner);
             if let Some(library) = &self.library {
@@ -92,21 +83,14 @@ impl Roots {
             if rest.contains("$(") {
                 return Err("the path is xacro, not expanded".to_owned());
             }
-            let root = if rest.starts_with('/') {
-                PathBuf::from("/")
-            } else {
-                self.model.clone()
-            };
+            let root = if rest.starts_with('/') { PathBuf::from("/") } else { self.model.clone() };
             out.push((root, PathBuf::from(rest.trim_start_matches('/'))));
         } else if slashed.contains("://") {
             return Err("the path is an address on a network, and nothing is fetched".to_owned());
         } else if slashed.is_empty() {
             return Err("the path is empty".to_owned());
         } else if slashed.starts_with('/') {
-            out.push((
-                PathBuf::from("/"),
-                PathBuf::from(slashed.trim_start_matches('/')),
-            ));
+            out.push((PathBuf::from("/"), PathBuf::from(slashed.trim_start_matches('/'))));
         } else {
             out.push((self.model.clone(), PathBuf::from(slashed)));
         }

@@ -30,10 +30,7 @@ pub(crate) fn build(
     let before = findings.list.len();
     let by_name = names(description, file, findings);
     check_joints(description, passive, &by_name, file, findings);
-    if findings.list[before..]
-        .iter()
-        .any(|f| f.severity == crate::Severity::Error)
-    {
+    if findings.list[before..].iter().any(|f| f.severity == crate::Severity::Error) {
         return None;
     }
     let mut children: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
@@ -41,28 +38,15 @@ pub(crate) fn build(
     for (at, joint) in description.joints.iter().enumerate() {
         children.entry(&joint.parent).or_default().push(at);
         if !carried.insert(&joint.child) {
-            let what = format!(
-                "is carried by more than one joint; a URDF is a tree \"{}\"",
-                joint.child
-            );
-            findings.fail(
-                format!("{file}: link"),
-                what,
-                "describe the loop in robot.toml",
-            );
+            let what =
+                format!("is carried by more than one joint; a URDF is a tree \"{}\"", joint.child);
+            findings.fail(format!("{file}: link"), what, "describe the loop in robot.toml");
             return None;
         }
     }
-    let mut roots = description
-        .links
-        .iter()
-        .filter(|l| !carried.contains(l.name.as_str()));
+    let mut roots = description.links.iter().filter(|l| !carried.contains(l.name.as_str()));
     let (Some(root), None) = (roots.next(), roots.next()) else {
-        let n = description
-            .links
-            .iter()
-            .filter(|l| !carried.contains(l.name.as_str()))
-            .count();
+        let n = description.links.iter().filter(|l| !carried.contains(l.name.as_str())).count();
         findings.fail(
             file,
             format!("a URDF has one root link, this one has {n}"),
@@ -73,11 +57,7 @@ pub(crate) fn build(
     let mut tree = Tree::default();
     tree.grow(description, &children, by_name[root.name.as_str()]);
     if tree.links.len() != description.links.len() {
-        findings.fail(
-            file,
-            "joints run in a circle",
-            "describe the loop in robot.toml",
-        );
+        findings.fail(file, "joints run in a circle", "describe the loop in robot.toml");
         return None;
     }
     tree.set_motions(description, passive, file, findings)?;
@@ -95,10 +75,7 @@ fn names<'a>(
     if description.links.len() > MAX_LINKS {
         findings.fail(
             file,
-            format!(
-                "has more links than a robot \"{}\"",
-                description.links.len()
-            ),
+            format!("has more links than a robot \"{}\"", description.links.len()),
             "",
         );
     }
@@ -154,11 +131,7 @@ fn check_joints(
         }
         let moving = joint.kind != T::Fixed;
         if moving && Vector::from(joint.axis).norm() < 1e-9 {
-            findings.fail(
-                &place,
-                "its axis has no direction",
-                "give an axis such as \"0 0 1\"",
-            );
+            findings.fail(&place, "its axis has no direction", "give an axis such as \"0 0 1\"");
         }
         let follows = joint.mimic.is_some() || passive.contains_key(&joint.name);
         if joint.limits.is_none() && matches!(joint.kind, T::Revolute | T::Prismatic) && !follows {
@@ -176,9 +149,8 @@ fn check_joints(
                 );
             }
         }
-        if let Some([lower, upper]) = joint
-            .limits
-            .filter(|_| matches!(joint.kind, T::Revolute | T::Prismatic))
+        if let Some([lower, upper]) =
+            joint.limits.filter(|_| matches!(joint.kind, T::Revolute | T::Prismatic))
         {
             if lower > upper {
                 let what = format!("its lower limit is above the upper \"{lower} > {upper}\"");
@@ -208,8 +180,7 @@ impl Tree {
         while let Some((raw, via)) = stack.pop() {
             let at = self.links.len();
             let parent_joint = via.map(|(joint, parent)| {
-                self.joints
-                    .push(plain_joint(&description.joints[joint], parent, at));
+                self.joints.push(plain_joint(&description.joints[joint], parent, at));
                 self.joints.len() - 1
             });
             let raw_link = &description.links[raw];
@@ -222,12 +193,7 @@ impl Tree {
                 bounds: Aabb::EMPTY,
             });
             self.raw_links.push(raw_link.clone());
-            for &joint in children
-                .get(raw_link.name.as_str())
-                .into_iter()
-                .flatten()
-                .rev()
-            {
+            for &joint in children.get(raw_link.name.as_str()).into_iter().flatten().rev() {
                 let child = &description.joints[joint].child;
                 if let Some(raw_child) = description.links.iter().position(|l| l.name == *child) {
                     stack.push((raw_child, Some((joint, at))));
@@ -243,11 +209,8 @@ impl Tree {
         file: &str,
         findings: &mut Findings,
     ) -> Option<()> {
-        let raw: BTreeMap<&str, &RawJoint> = description
-            .joints
-            .iter()
-            .map(|j| (j.name.as_str(), j))
-            .collect();
+        let raw: BTreeMap<&str, &RawJoint> =
+            description.joints.iter().map(|j| (j.name.as_str(), j)).collect();
         let mut free_of: BTreeMap<&str, usize> = BTreeMap::new();
         for (at, joint) in self.joints.iter_mut().enumerate() {
             let written = raw[joint.name.as_str()];
@@ -274,11 +237,7 @@ impl Tree {
             let place = format!("{file}: joint {}", joint.name);
             match follow(written, &raw, &free_of) {
                 Ok((free, multiplier, offset)) => {
-                    joint.motion = Motion::Mimic {
-                        free,
-                        multiplier,
-                        offset,
-                    }
+                    joint.motion = Motion::Mimic { free, multiplier, offset }
                 }
                 Err(what) => {
                     findings.fail(place, what, "let it mimic a joint that moves by itself");
@@ -299,15 +258,9 @@ fn plain_joint(raw: &RawJoint, parent: usize, child: usize) -> Joint {
         T::Prismatic => JointKind::Prismatic,
         _ => JointKind::Fixed,
     };
-    let limits = raw
-        .limits
-        .filter(|_| matches!(kind, JointKind::Revolute | JointKind::Prismatic));
+    let limits = raw.limits.filter(|_| matches!(kind, JointKind::Revolute | JointKind::Prismatic));
     let axis = Unit::try_new(Vector::from(raw.axis), 1e-9).unwrap_or(Vector::x_axis());
-    let axis = if kind == JointKind::Fixed {
-        Vector::x_axis()
-    } else {
-        axis
-    };
+    let axis = if kind == JointKind::Fixed { Vector::x_axis() } else { axis };
     Joint {
         name: raw.name.clone(),
         kind,

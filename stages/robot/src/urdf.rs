@@ -58,27 +58,18 @@ pub(crate) struct RawJoint {
 /// Reads a description; what is wrong goes to `findings`.
 pub(crate) fn read(text: &str, file: &str, findings: &mut Findings) -> Option<Description> {
     let text = text.trim_start_matches('\u{feff}');
-    let options = ParsingOptions {
-        nodes_limit: MAX_NODES,
-        ..ParsingOptions::default()
-    };
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document = match Document::parse_with_options(text, options) {
         Ok(document) => document,
         Err(error) => {
-            findings.fail(
-                file,
-                format!("not well-formed XML ({error})"),
-                "mend the file",
-            );
+            findings.fail(file, format!("not well-formed XML ({error})"), "mend the file");
             return None;
         }
     };
     let root = document.root_element();
     if root.tag_name().name() != "robot" {
-        let what = format!(
-            "a URDF opens with <robot>, this file with \"{}\"",
-            root.tag_name().name()
-        );
+        let what =
+            format!("a URDF opens with <robot>, this file with \"{}\"", root.tag_name().name());
         findings.fail(file, what, "give a URDF file");
         return None;
     }
@@ -151,9 +142,8 @@ impl Cleaner<'_> {
 
     fn link(&mut self, node: Node, out: &mut String) -> bool {
         let mut right = self.open(node, &["name"], &[], out, true);
-        for body in node
-            .children()
-            .filter(|n| matches!(n.tag_name().name(), "visual" | "collision"))
+        for body in
+            node.children().filter(|n| matches!(n.tag_name().name(), "visual" | "collision"))
         {
             right &= self.body(body, out);
         }
@@ -277,8 +267,7 @@ impl Cleaner<'_> {
             let Some(value) = node.attribute(name) else {
                 if needs.contains(&name) {
                     let what = format!("has no attribute \"{name}\"");
-                    self.findings
-                        .fail(self.place(node), what, "complete the element");
+                    self.findings.fail(self.place(node), what, "complete the element");
                     right = false;
                 }
                 continue;
@@ -301,15 +290,8 @@ impl Cleaner<'_> {
         let right = words.clone().count() == n
             && words.clone().all(|w| w.parse().is_ok_and(f64::is_finite));
         if !right {
-            let what = format!(
-                "{name} must be {n} finite number(s) \"{}\"",
-                shortened(value)
-            );
-            self.findings.fail(
-                self.place(node),
-                what,
-                "write numbers with spaces between them",
-            );
+            let what = format!("{name} must be {n} finite number(s) \"{}\"", shortened(value));
+            self.findings.fail(self.place(node), what, "write numbers with spaces between them");
         }
         right
     }
@@ -346,24 +328,14 @@ fn body(geometry: &urdf_rs::Geometry, origin: &urdf_rs::Pose) -> Body {
     use urdf_rs::Geometry as G;
     let shape = match geometry {
         G::Box { size } => Shape::Box(**size),
-        G::Cylinder { radius, length } => Shape::Cylinder {
-            radius: *radius,
-            length: *length,
-        },
-        G::Capsule { radius, length } => Shape::Capsule {
-            radius: *radius,
-            length: *length,
-        },
+        G::Cylinder { radius, length } => Shape::Cylinder { radius: *radius, length: *length },
+        G::Capsule { radius, length } => Shape::Capsule { radius: *radius, length: *length },
         G::Sphere { radius } => Shape::Sphere(*radius),
-        G::Mesh { filename, scale } => Shape::Mesh {
-            path: filename.clone(),
-            scale: scale.map_or([1.0; 3], |s| *s),
-        },
+        G::Mesh { filename, scale } => {
+            Shape::Mesh { path: filename.clone(), scale: scale.map_or([1.0; 3], |s| *s) }
+        }
     };
-    Body {
-        link_from_body: pose(origin),
-        shape,
-    }
+    Body { link_from_body: pose(origin), shape }
 }
 
 fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
@@ -375,16 +347,8 @@ fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
     let links = (robot.links.iter())
         .map(|link| RawLink {
             name: link.name.clone(),
-            visuals: link
-                .visual
-                .iter()
-                .map(|v| body(&v.geometry, &v.origin))
-                .collect(),
-            collisions: link
-                .collision
-                .iter()
-                .map(|c| body(&c.geometry, &c.origin))
-                .collect(),
+            visuals: link.visual.iter().map(|v| body(&v.geometry, &v.origin)).collect(),
+            collisions: link.collision.iter().map(|c| body(&c.geometry, &c.origin)).collect(),
         })
         .collect();
     let joints = (robot.joints.iter().zip(limited))
@@ -396,13 +360,8 @@ fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
             parent_from_joint: pose(&joint.origin),
             axis: *joint.axis.xyz,
             limits: has_limits.then_some([joint.limit.lower, joint.limit.upper]),
-            mimic: (joint.mimic.as_ref()).map(|m| {
-                (
-                    m.joint.clone(),
-                    m.multiplier.unwrap_or(1.0),
-                    m.offset.unwrap_or(0.0),
-                )
-            }),
+            mimic: (joint.mimic.as_ref())
+                .map(|m| (m.joint.clone(), m.multiplier.unwrap_or(1.0), m.offset.unwrap_or(0.0))),
         })
         .collect();
     Description { links, joints }

@@ -8,10 +8,7 @@ use common::{Folder, LIMIT, arm, joint, link, robot};
 
 fn says(folder: &Folder, words: &str) {
     let found = folder.lint();
-    assert!(
-        found.iter().any(|f| f.contains(words)),
-        "expected \"{words}\" in {found:#?}"
-    );
+    assert!(found.iter().any(|f| f.contains(words)), "expected \"{words}\" in {found:#?}");
 }
 
 #[test]
@@ -56,35 +53,22 @@ fn broken_urdfs_are_named() {
         + &link("c")
         + &joint("j", "revolute", "a", "b", "0 0 1", "<mimic joint='k'/>")
         + &joint("k", "revolute", "b", "c", "0 0 1", "<mimic joint='j'/>");
-    says(
-        &Folder::new().with("robot.urdf", robot(&mimics)),
-        "in a circle",
-    );
+    says(&Folder::new().with("robot.urdf", robot(&mimics)), "in a circle");
 }
 
 #[test]
 fn deep_nesting_does_not_overflow() {
-    let deep = format!(
-        "<robot>{}{}</robot>",
-        "<x>".repeat(100_000),
-        "</x>".repeat(100_000)
-    );
+    let deep = format!("<robot>{}{}</robot>", "<x>".repeat(100_000), "</x>".repeat(100_000));
     says(&Folder::new().with("robot.urdf", deep), "");
-    let dae = format!(
-        "<COLLADA>{}{}</COLLADA>",
-        "<node>".repeat(100_000),
-        "</node>".repeat(100_000)
-    );
+    let dae =
+        format!("<COLLADA>{}{}</COLLADA>", "<node>".repeat(100_000), "</node>".repeat(100_000));
     says(&meshed("m.dae", dae.as_bytes()), "m.dae");
 }
 
 #[test]
 fn broken_sheets_are_named() {
-    let sheet = |text: &str| {
-        Folder::new()
-            .with("robot.urdf", robot(&arm(3)))
-            .with("robot.toml", text)
-    };
+    let sheet =
+        |text: &str| Folder::new().with("robot.urdf", robot(&arm(3))).with("robot.toml", text);
     let cases = [
         ("main_chain = 3", "robot.toml"),
         ("colour = 'red'", "unknown field"),
@@ -94,10 +78,7 @@ fn broken_sheets_are_named() {
         ("[main_chain]\nroot = 'l2'\ntip = 'l1'", "does not hang"),
         ("[effector]\nlinks = ['x']", "no such link \"x\""),
         ("[[link]]\nname = 'x'", "no such link"),
-        (
-            "[[link]]\nname = 'l1'\nsymmetry = { axis = [0, 0, 0] }",
-            "no axis",
-        ),
+        ("[[link]]\nname = 'l1'\nsymmetry = { axis = [0, 0, 0] }", "no axis"),
         ("[[sub_chain]]\nurdf = 'sub.urdf'", "missing"),
         ("[[sub_chain]]\npassive = ['x']", "not there"),
         ("[[sub_chain]]\npassive = ['j1']", "no closure determines"),
@@ -131,45 +112,25 @@ fn broken_sheets_are_named() {
 fn empty_and_wrong_libraries_are_explained() {
     let dir = tempfile::tempdir().unwrap();
     let settings = Settings::without_clouds();
-    let error = Library::load(dir.path(), &settings)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("no robot") && error.contains("robot.urdf"),
-        "{error}"
-    );
-    let error = Library::load(&dir.path().join("nowhere"), &settings)
-        .unwrap_err()
-        .to_string();
+    let error = Library::load(dir.path(), &settings).unwrap_err().to_string();
+    assert!(error.contains("no robot") && error.contains("robot.urdf"), "{error}");
+    let error = Library::load(&dir.path().join("nowhere"), &settings).unwrap_err().to_string();
     assert!(error.contains("nowhere"), "{error}");
     assert!(!Library::lint(&dir.path().join("nowhere")).is_empty());
     let folder = Folder::new().with("robot.urdf", "<robot/>");
-    let error = Library::load(&folder.library(), &settings)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("model") && error.contains("no links"),
-        "{error}"
-    );
+    let error = Library::load(&folder.library(), &settings).unwrap_err().to_string();
+    assert!(error.contains("model") && error.contains("no links"), "{error}");
     assert!(Model::load(&folder.path(), &settings).is_err());
     // One wrong model does not keep the others out.
-    let folder = Folder::new()
-        .with("robot.urdf", "<robot/>")
-        .with("../good/any.urdf", robot(&arm(3)));
+    let folder =
+        Folder::new().with("robot.urdf", "<robot/>").with("../good/any.urdf", robot(&arm(3)));
     let library = Library::load(&folder.library(), &settings).unwrap();
     assert_eq!(library.models.len(), 1);
-    assert!(
-        library
-            .findings
-            .iter()
-            .any(|f| f.model == "good" && f.what.contains("taken instead"))
-    );
+    assert!(library.findings.iter().any(|f| f.model == "good" && f.what.contains("taken instead")));
 }
 
 fn meshed(path: &str, bytes: &[u8]) -> Folder {
-    Folder::new()
-        .with("robot.urdf", robot(&body(path)))
-        .with(path, bytes)
+    Folder::new().with("robot.urdf", robot(&body(path))).with(path, bytes)
 }
 
 fn body(path: &str) -> String {
@@ -217,11 +178,7 @@ fn broken_meshes_are_named() {
             b"solid x\nfacet\nouter loop\nvertex 0 0\nendloop\nendsolid".to_vec(),
             "three numbers",
         ),
-        (
-            "m.stl",
-            stl(4_000_000_000, 2, b"x"),
-            "counts 4000000000 triangles, the file holds 2",
-        ),
+        ("m.stl", stl(4_000_000_000, 2, b"x"), "counts 4000000000 triangles, the file holds 2"),
         ("m.stl", stl(0, 0, b"x"), "no triangles"),
         ("m.obj", b"v 0 0 0\nf 1 2 3".to_vec(), "not there"),
         ("m.obj", b"v 0 0 x".to_vec(), "three numbers"),
@@ -234,18 +191,11 @@ fn broken_meshes_are_named() {
             dae(&faces("0 1 2").replace("count='9'", "count='9000000000'")).into_bytes(),
             "claims",
         ),
-        (
-            "m.dae",
-            dae(&faces("0 1 2").replace("#v", "#w")).into_bytes(),
-            "no positions",
-        ),
+        ("m.dae", dae(&faces("0 1 2").replace("#v", "#w")).into_bytes(), "no positions"),
         (
             "m.dae",
             dae(&faces("0 1 2"))
-                .replace(
-                    "<instance_geometry",
-                    "<instance_node url='#n'/><instance_geometry",
-                )
+                .replace("<instance_geometry", "<instance_node url='#n'/><instance_geometry")
                 .into_bytes(),
             "in a circle",
         ),
@@ -258,48 +208,26 @@ fn broken_meshes_are_named() {
     assert_eq!(model.links[1].mesh.triangles.len(), 1);
     let (model, _) = meshed("m.stl", &stl(2, 2, b"solid by the header")).load();
     assert_eq!(model.links[1].mesh.triangles.len(), 2);
-    let (model, _) = meshed(
-        "m.obj",
-        b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1/1 2//2 3 -1",
-    )
-    .load();
-    assert_eq!(
-        (
-            model.links[1].mesh.triangles.len(),
-            model.links[1].mesh.vertices.len()
-        ),
-        (2, 4)
-    );
+    let (model, _) =
+        meshed("m.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1/1 2//2 3 -1").load();
+    assert_eq!((model.links[1].mesh.triangles.len(), model.links[1].mesh.vertices.len()), (2, 4));
 }
 
 #[test]
 fn paths_stay_inside() {
     let good = stl(2, 2, b"x");
     let at = |path: &str| Folder::new().with("robot.urdf", robot(&body(path)));
-    for path in [
-        "package://model/m.stl",
-        "package://any/m.stl",
-        "m.stl",
-        "./x/../m.stl",
-        "sub\\m.stl",
-    ] {
-        let folder = at(path)
-            .with("m.stl", &good)
-            .with("sub/m.stl", &good)
-            .with("x/y", "");
+    for path in
+        ["package://model/m.stl", "package://any/m.stl", "m.stl", "./x/../m.stl", "sub\\m.stl"]
+    {
+        let folder = at(path).with("m.stl", &good).with("sub/m.stl", &good).with("x/y", "");
         assert_eq!(folder.lint(), Vec::<String>::new(), "{path}");
     }
     let folder = at("package://other/m.stl").with("../other/m.stl", &good);
     assert_eq!(folder.lint(), Vec::<String>::new());
-    says(
-        &at("Meshes/M.STL").with("meshes/m.stl", &good),
-        "in another case",
-    );
+    says(&at("Meshes/M.STL").with("meshes/m.stl", &good), "in another case");
     says(&at("m.stl"), "missing");
-    says(
-        &at("../../outside.stl").with("../../outside.stl", &good),
-        "leads out",
-    );
+    says(&at("../../outside.stl").with("../../outside.stl", &good), "leads out");
     says(&at("http://host/m.stl"), "network");
     says(&at("file:///etc/hostname"), "link b");
     says(&at("file://$(find pkg)/m.stl"), "xacro");
@@ -322,22 +250,14 @@ fn scale_origin_and_several_visuals_add_up() {
         <visual><origin xyz='1 0 0' rpy='0 0 1.5707963267948966'/><geometry><mesh filename='m.stl' scale='0.001 0.001 0.001'/></geometry></visual>\
         <visual><origin xyz='0 0 2'/><geometry><cylinder radius='0.5' length='1'/></geometry></visual>\
         <collision><geometry><box size='9 9 9'/></geometry></collision></link>";
-    let (model, _) = Folder::new()
-        .with("robot.urdf", robot(text))
-        .with("m.stl", mesh)
-        .load();
+    let (model, _) = Folder::new().with("robot.urdf", robot(text)).with("m.stl", mesh).load();
     let bounds = model.links[0].bounds;
-    for (got, expected) in bounds
-        .min
-        .iter()
-        .chain(&bounds.max)
-        .zip([-0.5, -0.5, 0.0, 1.0, 0.5, 2.5])
+    for (got, expected) in
+        bounds.min.iter().chain(&bounds.max).zip([-0.5, -0.5, 0.0, 1.0, 0.5, 2.5])
     {
         assert!((got - expected).abs() < 1e-6, "{bounds:?}");
     }
     let only = text.replace("visual", "collision");
-    let folder = Folder::new()
-        .with("robot.urdf", robot(&only))
-        .with("m.stl", stl(1, 1, b"x"));
+    let folder = Folder::new().with("robot.urdf", robot(&only)).with("m.stl", stl(1, 1, b"x"));
     says(&folder, "no visual");
 }

@@ -10,15 +10,11 @@ fn load(text: &str) -> Model {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("robot.urdf");
     std::fs::write(&path, text).unwrap();
-    Model::load_urdf(&path, "test", &Settings::default())
-        .unwrap()
-        .0
+    Model::load_urdf(&path, "test", &Settings::default()).unwrap().0
 }
 
 fn body(shapes: &str) -> CadCloud {
-    let model = load(&format!(
-        "<robot name='r'><link name='base'>{shapes}</link></robot>"
-    ));
+    let model = load(&format!("<robot name='r'><link name='base'>{shapes}</link></robot>"));
     model.links[0].cad.clone()
 }
 
@@ -52,28 +48,14 @@ fn every_prefix_is_even() {
         // Distance from each of many places to the next sample of the prefix, and between samples.
         let spacing = (f64::from(cloud.area) / n as f64).sqrt();
         let near = |p: &[f32; 3], skip: usize| {
-            (cloud.points[..n]
-                .iter()
-                .enumerate()
-                .filter(|(k, _)| *k != skip))
-            .map(|(_, q)| (0..3).map(|k| f64::from(p[k] - q[k]).powi(2)).sum::<f64>())
-            .fold(f64::INFINITY, f64::min)
-            .sqrt()
+            (cloud.points[..n].iter().enumerate().filter(|(k, _)| *k != skip))
+                .map(|(_, q)| (0..3).map(|k| f64::from(p[k] - q[k]).powi(2)).sum::<f64>())
+                .fold(f64::INFINITY, f64::min)
+                .sqrt()
         };
-        let hole = cloud
-            .points
-            .iter()
-            .step_by(37)
-            .map(|p| near(p, usize::MAX))
-            .fold(0.0, f64::max);
-        let closest = (0..n)
-            .map(|k| near(&cloud.points[k], k))
-            .fold(f64::INFINITY, f64::min);
-        println!(
-            "{n}: hole {:.2}, closest {:.2} spacings",
-            hole / spacing,
-            closest / spacing
-        );
+        let hole = cloud.points.iter().step_by(37).map(|p| near(p, usize::MAX)).fold(0.0, f64::max);
+        let closest = (0..n).map(|k| near(&cloud.points[k], k)).fold(f64::INFINITY, f64::min);
+        println!("{n}: hole {:.2}, closest {:.2} spacings", hole / spacing, closest / spacing);
         assert!(hole < 1.9 * spacing, "{n}: {hole} {spacing}");
         assert!(closest > 0.4 * spacing, "{n}: {closest} {spacing}");
     }
@@ -90,22 +72,14 @@ fn measure(wanted: impl Fn(&str) -> bool) {
         return;
     };
     let (folders, _) = Library::open(&dir).unwrap();
-    for folder in folders
-        .iter()
-        .filter(|f| wanted(&f.file_name().unwrap().to_string_lossy()))
-    {
+    for folder in folders.iter().filter(|f| wanted(&f.file_name().unwrap().to_string_lossy())) {
         let start = Instant::now();
-        let model = Library::load_folder(&dir, folder, &Settings::default())
-            .0
-            .unwrap();
+        let model = Library::load_folder(&dir, folder, &Settings::default()).0.unwrap();
         let seconds = start.elapsed().as_secs_f64();
         let n: usize = model.links.iter().map(|l| l.cad.points.len()).sum();
         let outer: f64 = model.links.iter().map(|l| f64::from(l.cad.area)).sum();
         let whole: f64 = model.links.iter().map(|l| area(&l.mesh)).sum();
-        println!(
-            "{}: {n} samples, outer {outer:.2} of {whole:.2} m², {seconds:.2} s",
-            model.name
-        );
+        println!("{}: {n} samples, outer {outer:.2} of {whole:.2} m², {seconds:.2} s", model.name);
         assert!(outer > 0.6 * whole && outer <= 1.001 * whole);
         for link in model.links.iter().filter(|l| !l.mesh.triangles.is_empty()) {
             assert!(
@@ -113,10 +87,7 @@ fn measure(wanted: impl Fn(&str) -> bool) {
                     && link.cad.points.len() <= Settings::default().max_samples
             );
             assert!(
-                link.cad
-                    .points
-                    .iter()
-                    .all(|p| link.bounds.grown(1e-4).contains(p.map(f64::from)))
+                link.cad.points.iter().all(|p| link.bounds.grown(1e-4).contains(p.map(f64::from)))
             );
         }
     }
@@ -124,14 +95,7 @@ fn measure(wanted: impl Fn(&str) -> bool) {
 
 #[test]
 fn real_robots_have_clouds() {
-    measure(|name| {
-        [
-            "abb_irb2400_12_155",
-            "kuka_kr10_r1100_sixx",
-            "robotiq_2f_85",
-        ]
-        .contains(&name)
-    });
+    measure(|name| ["abb_irb2400_12_155", "kuka_kr10_r1100_sixx", "robotiq_2f_85"].contains(&name));
 }
 
 #[test]
@@ -143,10 +107,6 @@ fn all_real_robots_have_clouds() {
 fn area(mesh: &robot::Mesh) -> f64 {
     let corner = |i: u32| geometry::Vector::from(mesh.vertices[i as usize].map(f64::from));
     (mesh.triangles.iter())
-        .map(|t| {
-            0.5 * (corner(t[1]) - corner(t[0]))
-                .cross(&(corner(t[2]) - corner(t[0])))
-                .norm()
-        })
+        .map(|t| 0.5 * (corner(t[1]) - corner(t[0])).cross(&(corner(t[2]) - corner(t[0]))).norm())
         .sum()
 }

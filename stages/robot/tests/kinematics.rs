@@ -83,11 +83,7 @@ fn value(model: &Model, posture: &[f64], joint: &str) -> f64 {
 }
 
 fn free(model: &Model, joint: &str) -> usize {
-    model
-        .free
-        .iter()
-        .position(|&j| model.joints[j].name == joint)
-        .unwrap()
+    model.free.iter().position(|&j| model.joints[j].name == joint).unwrap()
 }
 
 /// Twists against central differences of poses, at random postures.
@@ -145,10 +141,7 @@ fn poses_agree_with_yourdfpy() {
         }
         assert!(worst < 1e-9, "{name} {link} {worst}");
     }
-    println!(
-        "{} poses, worst difference {worst:.1e}",
-        yourdfpy::POSES.len()
-    );
+    println!("{} poses, worst difference {worst:.1e}", yourdfpy::POSES.len());
 }
 
 #[test]
@@ -156,10 +149,7 @@ fn twists_are_derivatives_of_poses() {
     let Some(dir) = common::shared("robots") else {
         return;
     };
-    for model in &Library::load(&dir, &Settings::without_clouds())
-        .unwrap()
-        .models
-    {
+    for model in &Library::load(&dir, &Settings::without_clouds()).unwrap().models {
         check_twists(model, 1);
     }
     for (name, sheet) in RPR.iter().chain(RRR) {
@@ -173,10 +163,7 @@ fn loops_close_over_the_whole_range() {
         let Some(model) = looped(name, sheet) else {
             return;
         };
-        assert!(
-            model.loops.iter().all(|l| l.form != Form::General),
-            "{name}"
-        );
+        assert!(model.loops.iter().all(|l| l.form != Form::General), "{name}");
         let mut dice = Dice::new(3);
         for _ in 0..200 {
             let posture = dice.posture(&model);
@@ -196,11 +183,7 @@ fn loops_close_over_the_whole_range() {
 }
 
 fn expected_role(model: &Model, joint: usize) -> Role {
-    if model.main_chain.contains(&joint) {
-        Role::Main
-    } else {
-        Role::Sub
-    }
+    if model.main_chain.contains(&joint) { Role::Main } else { Role::Sub }
 }
 
 #[test]
@@ -210,28 +193,12 @@ fn balancers_follow_their_tables() {
             return;
         };
         let text = std::fs::read_to_string(dir.join(name).join("loops.md")).unwrap();
-        let driver = text
-            .split("Driver: `")
-            .nth(1)
-            .unwrap()
-            .split('`')
-            .next()
-            .unwrap();
+        let driver = text.split("Driver: `").nth(1).unwrap().split('`').next().unwrap();
         let model = looped(name, sheet).unwrap();
-        let spring = model
-            .loops
-            .iter()
-            .find(|l| matches!(l.form, Form::Rpr { .. }))
-            .unwrap();
+        let spring = model.loops.iter().find(|l| matches!(l.form, Form::Rpr { .. })).unwrap();
         let mut n = 0;
-        for line in text
-            .lines()
-            .filter(|l| l.starts_with("| -") || l.starts_with("| +"))
-        {
-            let row: Vec<f64> = line
-                .split('|')
-                .filter_map(|c| c.trim().parse().ok())
-                .collect();
+        for line in text.lines().filter(|l| l.starts_with("| -") || l.starts_with("| +")) {
+            let row: Vec<f64> = line.split('|').filter_map(|c| c.trim().parse().ok()).collect();
             let [q, _, phi, _, stroke, _] = row[..] else {
                 continue;
             };
@@ -283,25 +250,17 @@ fn newton_agrees_with_the_closed_forms() {
         let Some(exact) = looped(name, sheet) else {
             return;
         };
-        let sheet = sheet
-            .replace("kind = 'RPR'", "")
-            .replace("kind = 'RRR'", "");
+        let sheet = sheet.replace("kind = 'RPR'", "").replace("kind = 'RRR'", "");
         let sheet = sheet.replace("passive =", "kind = 'general'\npassive =");
         let newton = looped(name, &sheet).unwrap();
-        assert!(
-            newton.loops.iter().all(|l| l.form == Form::General),
-            "{name}"
-        );
+        assert!(newton.loops.iter().all(|l| l.form == Form::General), "{name}");
         let mut dice = Dice::new(6);
         for _ in 0..10 {
             let q = dice.posture(&exact);
             for (a, b) in exact.joint_values(&q).iter().zip(newton.joint_values(&q)) {
                 // A turn more or less is the same pose.
                 let apart = (a - b).abs() % std::f64::consts::TAU;
-                assert!(
-                    apart.min(std::f64::consts::TAU - apart) < 1e-8,
-                    "{name} {q:?} {a} {b}"
-                );
+                assert!(apart.min(std::f64::consts::TAU - apart) < 1e-8, "{name} {q:?} {a} {b}");
             }
         }
         check_twists(&newton, 7);
@@ -322,22 +281,8 @@ fn palletiser() -> Folder {
     let sub_2 = link("l1")
         + &link("triangle")
         + &link("bar_2")
-        + &joint(
-            "triangle_joint",
-            "continuous",
-            "l1",
-            "triangle",
-            "0 0 1",
-            "",
-        )
-        + &joint(
-            "bar_2_joint",
-            "continuous",
-            "triangle",
-            "bar_2",
-            "0.3 0 0",
-            "",
-        );
+        + &joint("triangle_joint", "continuous", "l1", "triangle", "0 0 1", "")
+        + &joint("bar_2_joint", "continuous", "triangle", "bar_2", "0.3 0 0", "");
     Folder::new().with("robot.urdf", robot(&text)).with("sub_1.urdf", robot(&sub)).with("sub_2.urdf", robot(&sub_2)).with(
         "robot.toml",
         "[main_chain]
@@ -370,11 +315,7 @@ fn loops_on_loops_keep_the_plate_level() {
     assert_eq!(model.links[model.link("bar_2").unwrap()].role, Role::Sub);
     for (a, b) in [(0.3, -0.4), (-0.6, 0.5), (0.9, -0.2)] {
         let pose = model.poses(&[a, b, 0.1])[plate];
-        assert!(
-            pose.rotation.angle() < 1e-9,
-            "{a} {b} {}",
-            pose.rotation.angle()
-        );
+        assert!(pose.rotation.angle() < 1e-9, "{a} {b} {}", pose.rotation.angle());
         assert!(model.loop_gap(&[a, b, 0.1]) < 1e-9);
     }
     // Random postures may stretch the bars, where the derivative has no bound: stay inside.
@@ -389,10 +330,8 @@ fn loops_on_loops_keep_the_plate_level() {
 fn a_bar_points_at_its_pin_and_says_how_far_it_misses() {
     let bar =
         link("l0") + &link("bar") + &joint("bar_joint", "revolute", "l0", "bar", "0.4 0 0", LIMIT);
-    let folder = Folder::new()
-        .with("robot.urdf", robot(&arm(2)))
-        .with("bar.urdf", robot(&bar))
-        .with(
+    let folder =
+        Folder::new().with("robot.urdf", robot(&arm(2))).with("bar.urdf", robot(&bar)).with(
             "robot.toml",
             "[[sub_chain]]
         name = 'bar'
@@ -405,15 +344,9 @@ fn a_bar_points_at_its_pin_and_says_how_far_it_misses() {
     assert!(model.loop_gap(&[0.0, 0.3]) < 1e-12);
     let q = [0.4, 0.3];
     let poses = model.poses(&q);
-    let (bar, l1) = (
-        poses[model.link("bar").unwrap()],
-        poses[model.link("l1").unwrap()],
-    );
-    let (origin, end, pin) = (
-        bar * Point::origin(),
-        bar * Point::new(0.0, 0.0, 1.0),
-        l1 * Point::new(0.4, 0.0, 0.0),
-    );
+    let (bar, l1) = (poses[model.link("bar").unwrap()], poses[model.link("l1").unwrap()]);
+    let (origin, end, pin) =
+        (bar * Point::origin(), bar * Point::new(0.0, 0.0, 1.0), l1 * Point::new(0.4, 0.0, 0.0));
     assert!((end - origin).cross(&(pin - origin)).norm() < 1e-12);
     assert!((model.loop_gap(&q) - (pin - end).norm()).abs() < 1e-12);
     check_twists(&model, 9);
@@ -436,10 +369,7 @@ fn out_of_reach_takes_the_nearest_pose() {
     let (model, findings) = folder.load();
     assert!(matches!(model.loops[0].form, Form::RrrSerial { .. }));
     assert!(model.loop_gap(&[0.0, 0.0]) < 1e-9);
-    assert!(
-        !findings.iter().any(|f| f.what.contains("stays open")),
-        "{findings:?}"
-    );
+    assert!(!findings.iter().any(|f| f.what.contains("stays open")), "{findings:?}");
     let far = Folder::new().with("robot.urdf", robot(&arm(2))).with("bars.urdf", robot(&bars)).with(
         "robot.toml",
         "[[sub_chain]]
@@ -447,17 +377,10 @@ fn out_of_reach_takes_the_nearest_pose() {
         closures = [{ link_a = 'b', xyz_a = [-0.4, 0, 0.3], link_b = 'l1', xyz_b = [0.7, 0, 0.9] }]",
     );
     let (model, findings) = far.load();
-    assert!(
-        findings.iter().any(|f| f.what.contains("stays open")),
-        "{findings:?}"
-    );
+    assert!(findings.iter().any(|f| f.what.contains("stays open")), "{findings:?}");
     let q = [0.0, 0.0];
     let distance = (0.5_f64 * 0.5 + 0.9 * 0.9).sqrt();
-    assert!(
-        (model.loop_gap(&q) - (distance - 1.0)).abs() < 1e-9,
-        "{}",
-        model.loop_gap(&q)
-    );
+    assert!((model.loop_gap(&q) - (distance - 1.0)).abs() < 1e-9, "{}", model.loop_gap(&q));
     check_twists(&model, 10);
 }
 
@@ -474,23 +397,10 @@ fn mimics_follow_without_limits() {
             "0 0 1",
             "<limit lower='0' upper='0.1'/><mimic joint='j1' multiplier='-2' offset='0.5'/>",
         )
-        + &joint(
-            "mmj",
-            "prismatic",
-            "m",
-            "mm",
-            "0 0 1",
-            "<mimic joint='mj' multiplier='0.5'/>",
-        );
+        + &joint("mmj", "prismatic", "m", "mm", "0 0 1", "<mimic joint='mj' multiplier='0.5'/>");
     let (model, _) = Folder::new().with("robot.urdf", robot(&text)).load();
     let values = model.joint_values(&[0.7]);
-    assert!(
-        (values[1] + 0.9).abs() < 1e-12 && (values[2] + 0.45).abs() < 1e-12,
-        "{values:?}"
-    );
-    assert!(matches!(
-        model.joints[2].motion,
-        Motion::Mimic { free: 0, .. }
-    ));
+    assert!((values[1] + 0.9).abs() < 1e-12 && (values[2] + 0.45).abs() < 1e-12, "{values:?}");
+    assert!(matches!(model.joints[2].motion, Motion::Mimic { free: 0, .. }));
     check_twists(&model, 11);
 }

@@ -13,10 +13,7 @@ fn every_shared_robot_loads() {
     };
     let library = Library::load(&dir, &Settings::without_clouds()).unwrap();
     assert!(
-        library
-            .findings
-            .iter()
-            .all(|f| f.severity < Severity::Warning),
+        library.findings.iter().all(|f| f.severity < Severity::Warning),
         "{:#?}",
         library.findings
     );
@@ -39,10 +36,7 @@ fn every_shared_robot_loads() {
         assert_eq!((model.name.as_str(), model.free.len()), (name, n_free));
         let n: usize = model.links.iter().map(|l| l.mesh.triangles.len()).sum();
         // Triangles without area are left out.
-        assert!(
-            n <= n_triangles && n + 20 > n_triangles,
-            "{name}: {n} of {n_triangles}"
-        );
+        assert!(n <= n_triangles && n + 20 > n_triangles, "{name}: {n} of {n_triangles}");
         assert_eq!(model.is_tool(), name == "robotiq_2f_85");
         for (free, home) in model.home().iter().enumerate() {
             let [lower, upper] = model.limits(free);
@@ -69,59 +63,23 @@ fn arms_of_depth_camera_scans_load() {
         return;
     };
     let library = Library::load(&dir, &Settings::without_clouds()).unwrap();
-    let names: Vec<_> = library
-        .models
-        .iter()
-        .map(|m| (m.name.as_str(), m.free.len()))
-        .collect();
+    let names: Vec<_> = library.models.iter().map(|m| (m.name.as_str(), m.free.len())).collect();
     assert_eq!(names, [("lbr_med7", 7), ("xarm7", 7)]);
     let path = dir.join("xarm7/xarm7.urdf");
     assert_eq!(
-        Model::load_urdf(&path, "xarm7", &Settings::without_clouds())
-            .unwrap()
-            .0,
+        Model::load_urdf(&path, "xarm7", &Settings::without_clouds()).unwrap().0,
         library.models[1]
     );
 }
 
 /// File, triangles, bounds: from the README beside the files.
 const HAZARDS: &[(&str, usize, [f64; 3], [f64; 3])] = &[
-    (
-        "kr210l150_link_6.dae",
-        11712,
-        [0.0, -0.0990, -0.0986],
-        [0.0375, 0.0988, 0.0991],
-    ),
-    (
-        "kr150_r3100_2_link_6.dae",
-        2280,
-        [1.9199, -0.0710, 2.0390],
-        [1.9650, 0.0710, 2.1810],
-    ),
-    (
-        "es200_120_link_r.stl",
-        7390,
-        [-0.1110, -0.1430, -2.2110],
-        [0.1110, 0.0810, -1.8930],
-    ),
-    (
-        "sia5d_link_u.dae",
-        1934,
-        [-0.0575, -0.0760, -0.0575],
-        [0.1450, 0.0550, 0.1150],
-    ),
-    (
-        "hc10dt_link_6_t.dae",
-        5058,
-        [-0.0510, -0.0510, -0.1700],
-        [0.0510, 0.0510, -0.0930],
-    ),
-    (
-        "robotiq_c2_joint_0_L.dae",
-        1612,
-        [0.0225, 0.0305, -0.0065],
-        [0.0683, 0.0498, 0.0287],
-    ),
+    ("kr210l150_link_6.dae", 11712, [0.0, -0.0990, -0.0986], [0.0375, 0.0988, 0.0991]),
+    ("kr150_r3100_2_link_6.dae", 2280, [1.9199, -0.0710, 2.0390], [1.9650, 0.0710, 2.1810]),
+    ("es200_120_link_r.stl", 7390, [-0.1110, -0.1430, -2.2110], [0.1110, 0.0810, -1.8930]),
+    ("sia5d_link_u.dae", 1934, [-0.0575, -0.0760, -0.0575], [0.1450, 0.0550, 0.1150]),
+    ("hc10dt_link_6_t.dae", 5058, [-0.0510, -0.0510, -0.1700], [0.0510, 0.0510, -0.0930]),
+    ("robotiq_c2_joint_0_L.dae", 1612, [0.0225, 0.0305, -0.0065], [0.0683, 0.0498, 0.0287]),
 ];
 
 #[test]
@@ -134,25 +92,14 @@ fn hazardous_meshes_have_the_expected_bounds() {
             "<link name='a'><visual><geometry><mesh filename='{file}'/></geometry></visual></link>"
         );
         let bytes = std::fs::read(dir.join(file)).unwrap();
-        let (model, _) = Folder::new()
-            .with("robot.urdf", robot(&text))
-            .with(file, bytes)
-            .load();
+        let (model, _) = Folder::new().with("robot.urdf", robot(&text)).with(file, bytes).load();
         let link = &model.links[0];
         println!("{file} {} {:?}", link.mesh.triangles.len(), link.bounds);
         let n = link.mesh.triangles.len();
         assert!(n <= *n_triangles && n + 20 > *n_triangles, "{file}: {n}");
         for k in 0..3 {
-            assert!(
-                (link.bounds.min[k] - min[k]).abs() < 1e-4,
-                "{file}: {:?}",
-                link.bounds
-            );
-            assert!(
-                (link.bounds.max[k] - max[k]).abs() < 1e-4,
-                "{file}: {:?}",
-                link.bounds
-            );
+            assert!((link.bounds.min[k] - min[k]).abs() < 1e-4, "{file}: {:?}", link.bounds);
+            assert!((link.bounds.max[k] - max[k]).abs() < 1e-4, "{file}: {:?}", link.bounds);
         }
     }
 }

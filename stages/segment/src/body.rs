@@ -51,22 +51,12 @@ pub(crate) fn bodies(fits: &[Fit], models: &[Model], settings: &Settings) -> Vec
             continue;
         }
         let fields = fields.entry(fit.model).or_insert_with(|| {
-            model
-                .links
-                .iter()
-                .map(|l| Field::new(&l.cad).map(Arc::new))
-                .collect()
+            model.links.iter().map(|l| Field::new(&l.cad).map(Arc::new)).collect()
         });
         let links = posed(fit, model, fields, settings);
-        let region = links
-            .iter()
-            .fold(Aabb::EMPTY, |all, link| all.union(&link.region()));
+        let region = links.iter().fold(Aabb::EMPTY, |all, link| all.union(&link.region()));
         if !region.is_empty() {
-            out.push(Body {
-                robot,
-                region,
-                links,
-            });
+            out.push(Body { robot, region, links });
         }
     }
     out
@@ -79,10 +69,7 @@ fn posed(
     settings: &Settings,
 ) -> Vec<Link> {
     let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
-    let Kinematics {
-        base_from_link,
-        twists,
-    } = model.kinematics(&posture);
+    let Kinematics { base_from_link, twists } = model.kinematics(&posture);
     let covariance = covariance(fit);
     let hands = hands(model);
     let mut out = Vec::new();
@@ -90,18 +77,8 @@ fn posed(
         let (Some(field), Ok(at)) = (field, u16::try_from(index)) else {
             continue;
         };
-        let spread = spread(
-            fit,
-            field,
-            &base_from_link[index],
-            &twists[index],
-            &covariance,
-        );
-        let stated = model
-            .mesh_sigmas
-            .iter()
-            .find(|entry| entry.0 == index)
-            .map(|entry| entry.1);
+        let spread = spread(fit, field, &base_from_link[index], &twists[index], &covariance);
+        let stated = model.mesh_sigmas.iter().find(|entry| entry.0 == index).map(|entry| entry.1);
         let mesh = stated.unwrap_or(settings.sigma_cad);
         let sigma = (settings.sigma_range.powi(2) + mesh * mesh + spread * spread).sqrt();
         out.push(Link {
@@ -109,11 +86,7 @@ fn posed(
             world_from_link: fit.world_from_base * base_from_link[index],
             field: Arc::clone(field),
             bounds: model.links[index].bounds,
-            reach: if hands[index] {
-                settings.hand_reach
-            } else {
-                settings.reach
-            },
+            reach: if hands[index] { settings.hand_reach } else { settings.reach },
             gate: (3.0 * sigma).clamp(settings.min_gate, settings.max_gate) as f32,
         });
     }
@@ -122,11 +95,7 @@ fn posed(
 
 /// Which links have no other link with a body beyond them: there the tool and the workpiece are.
 fn hands(model: &Model) -> Vec<bool> {
-    let mut hands: Vec<bool> = model
-        .links
-        .iter()
-        .map(|link| !link.cad.points.is_empty())
-        .collect();
+    let mut hands: Vec<bool> = model.links.iter().map(|link| !link.cad.points.is_empty()).collect();
     for joint in model.joints.iter().rev() {
         let mut beyond = Some(joint.child);
         // A body anywhere below takes the part of hand away from all that carry it.
@@ -159,10 +128,8 @@ fn spread(
         let p = base_from_link * Point::from(p.map(f64::from));
         let normal = base_from_link * Vector::from(normal.map(f64::from));
         // The base moves about its own origin along world axes.
-        let (arm, across) = (
-            fit.world_from_base.rotation * p.coords,
-            fit.world_from_base.rotation * normal,
-        );
+        let (arm, across) =
+            (fit.world_from_base.rotation * p.coords, fit.world_from_base.rotation * normal);
         let turn = arm.cross(&across);
         let mut lever = vec![across.x, across.y, across.z, turn.x, turn.y, turn.z];
         lever.extend(twists.iter().map(|t| {
@@ -184,29 +151,16 @@ fn covariance(fit: &Fit) -> DMatrix<f64> {
     if is_whole && fit.joints.iter().all(|joint| joint.determined) {
         return DMatrix::from_row_slice(n, n, &fit.covariance);
     }
-    let sigmas = fit
-        .base_sigma
-        .iter()
-        .copied()
-        .chain(fit.joints.iter().map(|joint| joint.sigma));
-    let variances = sigmas.map(|s| {
-        if s.is_finite() {
-            s.min(OPEN_SIGMA)
-        } else {
-            OPEN_SIGMA
-        }
-        .powi(2)
-    });
+    let sigmas = fit.base_sigma.iter().copied().chain(fit.joints.iter().map(|joint| joint.sigma));
+    let variances =
+        sigmas.map(|s| if s.is_finite() { s.min(OPEN_SIGMA) } else { OPEN_SIGMA }.powi(2));
     DMatrix::from_diagonal(&DVector::from_iterator(n, variances))
 }
 
 impl Link {
     /// World bounds of what is looked at, metres.
     pub(crate) fn region(&self) -> Aabb {
-        let corners = self
-            .bounds
-            .grown(self.reach.max(f64::from(FIELD_REACH)))
-            .corners();
+        let corners = self.bounds.grown(self.reach.max(f64::from(FIELD_REACH))).corners();
         Aabb::of(corners.map(|c| {
             let p = self.world_from_link * Point::from(c);
             [p.x, p.y, p.z]

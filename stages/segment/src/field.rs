@@ -47,9 +47,8 @@ impl Field {
             return None;
         }
         let span = [0, 1, 2].map(|i| max[i] - min[i] + 2.0 * FIELD_REACH);
-        let edge = MIN_EDGE
-            .max(1.5 * cad.spacing)
-            .max((span[0] * span[1] * span[2] / MAX_CELLS).cbrt());
+        let edge =
+            MIN_EDGE.max(1.5 * cad.spacing).max((span[0] * span[1] * span[2] / MAX_CELLS).cbrt());
         let size = span.map(|s| (s / edge).ceil().max(1.0) as usize);
         let mut field = Self {
             min: min.map(|v| v - FIELD_REACH),
@@ -68,11 +67,7 @@ impl Field {
 
     /// Sorts the samples into their cells.
     fn fill(&mut self, cad: &CadCloud) {
-        let cells: Vec<usize> = cad
-            .points
-            .iter()
-            .map(|p| self.index(self.cell(*p)))
-            .collect();
+        let cells: Vec<usize> = cad.points.iter().map(|p| self.index(self.cell(*p))).collect();
         for &cell in &cells {
             self.starts[cell + 1] += 1;
         }
@@ -98,10 +93,8 @@ impl Field {
         for cell in 0..n {
             if self.starts[cell] < self.starts[cell + 1] {
                 nearest[cell] = self.starts[cell];
-                far[cell] = length(minus(
-                    self.middle(cell),
-                    self.points[self.starts[cell] as usize],
-                ));
+                far[cell] =
+                    length(minus(self.middle(cell), self.points[self.starts[cell] as usize]));
             }
         }
         // Two rounds there and back carry the nearest sample around every corner of a solid body.
@@ -177,10 +170,7 @@ impl Field {
             }
         }
         if best.0.is_finite() {
-            Ok(Near {
-                distance: best.0.sqrt(),
-                normal: self.normals[best.1],
-            })
+            Ok(Near { distance: best.0.sqrt(), normal: self.normals[best.1] })
         } else {
             Err(rough)
         }
@@ -188,11 +178,7 @@ impl Field {
 
     /// Every `step`-th sample and its normal.
     pub(crate) fn samples(&self, step: usize) -> impl Iterator<Item = ([f32; 3], [f32; 3])> + '_ {
-        self.points
-            .iter()
-            .copied()
-            .zip(self.normals.iter().copied())
-            .step_by(step.max(1))
+        self.points.iter().copied().zip(self.normals.iter().copied()).step_by(step.max(1))
     }
 
     /// Number of samples.
@@ -240,9 +226,7 @@ mod tests {
     /// Samples every 5 mm on a square of 0.4 m at z = 0, normal up.
     fn plate() -> CadCloud {
         let at = |i: i32| i as f32 * 0.005 - 0.2;
-        let points: Vec<_> = (0..81 * 81)
-            .map(|n| [at(n % 81), at(n / 81), 0.0])
-            .collect();
+        let points: Vec<_> = (0..81 * 81).map(|n| [at(n % 81), at(n / 81), 0.0]).collect();
         CadCloud {
             normals: vec![[0.0, 0.0, 1.0]; points.len()],
             points,
@@ -257,17 +241,10 @@ mod tests {
         let near = field.near([0.0512, 0.0833, 0.007]).expect("near");
         assert!((near.distance - 0.007).abs() < 1e-5);
         let beside = field.near([0.22, 0.0, 0.0]).expect("near");
-        assert!(
-            (beside.distance - 0.0155).abs() < 0.002,
-            "{}",
-            beside.distance
-        );
+        assert!((beside.distance - 0.0155).abs() < 0.002, "{}", beside.distance);
         let rough = field.near([0.0, 0.0, 0.1]).expect_err("far");
         assert!((rough - 0.1).abs() < 0.03, "{rough}");
-        assert_eq!(
-            field.near([0.0, 0.0, 1.0]).expect_err("outside"),
-            f32::INFINITY
-        );
+        assert_eq!(field.near([0.0, 0.0, 1.0]).expect_err("outside"), f32::INFINITY);
         assert!(Field::new(&CadCloud::default()).is_none());
     }
 }

@@ -36,10 +36,7 @@ impl Ground {
     /// The floor as found, with the bands of `settings`.
     #[must_use]
     pub fn new(floor: &Floor, settings: &Settings) -> Self {
-        let levels = floor
-            .levels
-            .iter()
-            .filter(|level| !level.heights.is_empty());
+        let levels = floor.levels.iter().filter(|level| !level.heights.is_empty());
         Self {
             levels: levels
                 .map(|level| {
@@ -80,11 +77,7 @@ impl Ground {
     #[inline]
     #[must_use]
     pub fn label(&self, world: [f64; 3]) -> Label {
-        if self.is_floor(world) {
-            Label::FLOOR
-        } else {
-            Label::FIXED
-        }
+        if self.is_floor(world) { Label::FLOOR } else { Label::FIXED }
     }
 }
 
@@ -118,13 +111,7 @@ impl Raster {
             let (u, v) = at(*cell);
             heights[v * width + u] = local_f32(height - base);
         }
-        Some(Self {
-            cell: level.cell,
-            min,
-            width,
-            heights,
-            base,
-        })
+        Some(Self { cell: level.cell, min, width, heights, base })
     }
 
     /// Bilinear height between cell middles, metres.
@@ -133,10 +120,7 @@ impl Raster {
         let (u, v) = (x / self.cell - 0.5, y / self.cell - 0.5);
         let (i, j) = (floor_i32(u), floor_i32(v));
         let (fu, fv) = (u - f64::from(i), v - f64::from(j));
-        let (i, j) = (
-            i64::from(i) - i64::from(self.min[0]),
-            i64::from(j) - i64::from(self.min[1]),
-        );
+        let (i, j) = (i64::from(i) - i64::from(self.min[0]), i64::from(j) - i64::from(self.min[1]));
         let (mut sum, mut weight) = (0.0, 0.0);
         for (di, dj, w) in [
             (0, 0, (1.0 - fu) * (1.0 - fv)),
@@ -181,21 +165,9 @@ mod tests {
             }
         }
         let normal = Vector::new(0.0, -0.01, 1.0).normalize();
-        let plane = Plane {
-            normal,
-            offset: normal.z * 100.0,
-        };
-        let level = FloorLevel {
-            plane,
-            waviness: 0.007,
-            area: 100.0,
-            cell,
-            heights,
-        };
-        let floor = Floor {
-            levels: vec![level],
-            planes: Vec::new(),
-        };
+        let plane = Plane { normal, offset: normal.z * 100.0 };
+        let level = FloorLevel { plane, waviness: 0.007, area: 100.0, cell, heights };
+        let floor = Floor { levels: vec![level], planes: Vec::new() };
         let ground = Ground::new(&floor, &Settings::default());
         for (x, y) in [(0.1, 0.2), (-3.3, 4.1), (4.2, -4.4)] {
             let z = wave(x, y);
@@ -203,10 +175,8 @@ mod tests {
             assert_eq!(ground.label([x, y, z - 0.01]), Label::FLOOR);
             assert_eq!(ground.label([x, y, z + 0.03]), Label::FIXED);
             assert_eq!(ground.label([x, y, z - 1.0]), Label::FIXED);
-            let (dense, sparse) = (
-                ground.height_above([x, y, z]),
-                floor.height_above([x, y, z], 0.03),
-            );
+            let (dense, sparse) =
+                (ground.height_above([x, y, z]), floor.height_above([x, y, z], 0.03));
             assert!((dense.expect("near") - sparse.expect("near")).abs() < 1e-3);
         }
         assert_eq!(ground.height_above([50.0, 0.0, 100.0]), None);

@@ -28,8 +28,7 @@ impl Raster {
         self.first.resize((SIDE * SIDE) as usize, EMPTY);
         self.ranges.clear();
         for (i, p) in tile.xyz.iter().enumerate() {
-            self.ranges
-                .push((p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt());
+            self.ranges.push((p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt());
             let slot = &mut self.first[usize::from(tile.pixel[i])];
             if *slot == EMPTY {
                 *slot = i as u32;
@@ -62,10 +61,7 @@ impl Raster {
     /// Whether a point hangs between an edge and what lies behind it: along a row or column it is cut off on both
     /// sides.
     pub(crate) fn is_veil(&self, tile: &Tile, i: usize) -> bool {
-        let cut = |by: [i32; 2]| {
-            self.beside(tile, i, by)
-                .map(|other| !self.connected(i, other, 1))
-        };
+        let cut = |by: [i32; 2]| self.beside(tile, i, by).map(|other| !self.connected(i, other, 1));
         [[0, 1], [1, 0]].into_iter().any(|by| {
             match (cut(by), cut([-by[0], -by[1]])) {
                 (Some(a), Some(b)) => a && b,
@@ -90,11 +86,7 @@ impl Raster {
             Some([p[0] - q[0], p[1] - q[1], p[2] - q[2]])
         };
         let (u, v) = (across([0, pixels])?, across([pixels, 0])?);
-        let n = [
-            u[1] * v[2] - u[2] * v[1],
-            u[2] * v[0] - u[0] * v[2],
-            u[0] * v[1] - u[1] * v[0],
-        ];
+        let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
         let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
         (length > 1e-9).then(|| n.map(|c| c / length))
     }

@@ -106,21 +106,10 @@ impl Segment {
     /// The links whose surroundings a tile may touch.
     fn seen<'a>(&'a self, tile: &Tile, world_from_scan: &Pose) -> Vec<Seen<'a>> {
         let mut out = Vec::new();
-        for body in self
-            .bodies
-            .iter()
-            .filter(|body| body.region.touches(&tile.bounds))
-        {
-            for link in body
-                .links
-                .iter()
-                .filter(|link| link.region().touches(&tile.bounds))
-            {
+        for body in self.bodies.iter().filter(|body| body.region.touches(&tile.bounds)) {
+            for link in body.links.iter().filter(|link| link.region().touches(&tile.bounds)) {
                 out.push(Seen {
-                    at: LinkAt {
-                        robot: body.robot,
-                        link: link.index,
-                    },
+                    at: LinkAt { robot: body.robot, link: link.index },
                     link,
                     link_from_scan: rows(&(link.world_from_link.inverse() * world_from_scan)),
                     min: link.bounds.min.map(|v| v as f32),
@@ -192,11 +181,7 @@ impl Segment {
                 return Found::Doubt(found);
             }
         }
-        if is_floor {
-            Found::Default
-        } else {
-            Found::Residual(touch(nearest.at, rough.0))
-        }
+        if is_floor { Found::Default } else { Found::Residual(touch(nearest.at, rough.0)) }
     }
 
     /// Whether a point close to the floor lies on the upright side of a link, well inside its gate.
@@ -262,18 +247,13 @@ impl Map for Segment {
         let Some(scan) = self.scans.get(tile.at.scan.0 as usize) else {
             return Ok(empty);
         };
-        let empty = TileLabels {
-            mask: scan.mask,
-            ..empty
-        };
+        let empty = TileLabels { mask: scan.mask, ..empty };
         let seen = self.seen(&tile, &scan.world_from_scan);
         if seen.is_empty() {
             return Ok(empty);
         }
         let raster = scan.lattice.as_ref().map(|lattice| {
-            scratch
-                .raster
-                .fill(&tile, lattice, self.settings.sigma_range);
+            scratch.raster.fill(&tile, lattice, self.settings.sigma_range);
             &scratch.raster
         });
         let regions: Vec<&Aabb> = self.bodies.iter().map(|body| &body.region).collect();
@@ -308,14 +288,7 @@ fn gather(tile: &Tile, world_from_scan: &Pose, found: &[Found], mut out: TileLab
         let voxel = world(world_from_scan, tile.xyz[i]).map(|v| floor_i32(v / RESIDUAL_EDGE));
         if on_link {
             let (robot, link) = (touch.link.robot as i16, touch.link.link as i16);
-            out.labels.push((
-                place,
-                Label {
-                    kind: PointKind::Link,
-                    robot,
-                    link,
-                },
-            ));
+            out.labels.push((place, Label { kind: PointKind::Link, robot, link }));
         } else {
             out.residuals.push((place, voxel));
         }

@@ -75,12 +75,7 @@ fn link(name: &str, parent_joint: Option<usize>, middle: [f64; 3], half: [f64; 3
         role: Role::Main,
         parent_joint,
         mesh: Mesh::default(),
-        cad: CadCloud {
-            points,
-            normals,
-            spacing: 0.005,
-            area: 1.0,
-        },
+        cad: CadCloud { points, normals, spacing: 0.005, area: 1.0 },
         bounds: Aabb { min, max },
     }
 }
@@ -119,12 +114,7 @@ fn fit(world_from_base: Pose, q: f64) -> Fit {
         model_name: "box".into(),
         world_from_base,
         base_sigma: [1e-4; 6],
-        joints: vec![JointFit {
-            name: "j1".into(),
-            value: q,
-            sigma: 1e-4,
-            determined: true,
-        }],
+        joints: vec![JointFit { name: "j1".into(), value: q, sigma: 1e-4, determined: true }],
         covariance: Vec::new(),
         score: 1.0,
         explained: 1.0,
@@ -139,21 +129,10 @@ fn fit(world_from_base: Pose, q: f64) -> Fit {
 
 fn floor() -> Floor {
     let cells = (-40..40).flat_map(|i| (-40..40).map(move |j| ([i, j], 0.0)));
-    let plane = Plane {
-        normal: Vector::z(),
-        offset: 0.0,
-    };
-    let level = FloorLevel {
-        plane,
-        waviness: 0.0,
-        area: 400.0,
-        cell: 0.25,
-        heights: cells.collect(),
-    };
-    Floor {
-        levels: vec![level],
-        planes: Vec::new(),
-    }
+    let plane = Plane { normal: Vector::z(), offset: 0.0 };
+    let level =
+        FloorLevel { plane, waviness: 0.0, area: 400.0, cell: 0.25, heights: cells.collect() };
+    Floor { levels: vec![level], planes: Vec::new() }
 }
 
 fn scan(world_from_scan: Pose) -> Scan {
@@ -183,14 +162,9 @@ fn shoot(bricks: &[Brick], scan: &Scan) -> Vec<Shot> {
     let mut place = 0;
     let cast = |row: u32, col: u32| -> Option<(f64, Label)> {
         let d = scan.world_from_scan * Vector::from(lattice.direction(Pixel { row, col }));
-        let mut best = (d.z < 0.0)
-            .then(|| (-origin.z / d.z, Label::FLOOR))
-            .filter(|h| h.0 < 9.0);
+        let mut best = (d.z < 0.0).then(|| (-origin.z / d.z, Label::FLOOR)).filter(|h| h.0 < 9.0);
         for brick in bricks {
-            if let Some(range) = brick
-                .hit(origin, d)
-                .filter(|r| best.is_none_or(|b| *r < b.0))
-            {
+            if let Some(range) = brick.hit(origin, d).filter(|r| best.is_none_or(|b| *r < b.0)) {
                 best = Some((range, brick.label));
             }
         }
@@ -202,36 +176,18 @@ fn shoot(bricks: &[Brick], scan: &Scan) -> Vec<Shot> {
                 continue;
             };
             let mut truth = Some(label);
-            let behind = cast(row, col + 1)
-                .map(|h| h.0)
-                .filter(|b| (b - range).abs() > 0.05);
+            let behind = cast(row, col + 1).map(|h| h.0).filter(|b| (b - range).abs() > 0.05);
             if let Some(behind) = behind.filter(|_| uniform(&mut rng) < 0.3) {
                 range += uniform(&mut rng) * (behind - range);
                 truth = None;
             }
             range += 0.002 * normal(&mut rng);
-            let p = lattice
-                .direction(Pixel { row, col })
-                .map(|v| (v * range) as f32);
+            let p = lattice.direction(Pixel { row, col }).map(|v| (v * range) as f32);
             let (tr, tc) = (row / 256, col / 256);
             let (tile, truths) = tiles.entry((tr, tc)).or_insert_with(|| {
-                let at = TileAt {
-                    scan: ScanId(0),
-                    row: tr,
-                    col: tc,
-                };
+                let at = TileAt { scan: ScanId(0), row: tr, col: tc };
                 let (place, pixel, xyz) = (Vec::new(), Vec::new(), Vec::new());
-                (
-                    Tile {
-                        at,
-                        first_place: 0,
-                        place,
-                        pixel,
-                        xyz,
-                        bounds: Aabb::EMPTY,
-                    },
-                    Vec::new(),
-                )
+                (Tile { at, first_place: 0, place, pixel, xyz, bounds: Aabb::EMPTY }, Vec::new())
             });
             let world = scan.world_from_scan * Point::from(p.map(f64::from));
             tile.bounds.add([world.x, world.y, world.z]);
@@ -250,44 +206,19 @@ fn links_are_found_and_nothing_fixed_is_lost() {
     let q = 0.7;
     let world_from_base = at(0.5, 0.2, 0.0);
     let world_from_arm = world_from_base * model().poses(&[q])[1];
-    let on = |link: i16| Label {
-        kind: PointKind::Link,
-        robot: 0,
-        link,
-    };
+    let on = |link: i16| Label { kind: PointKind::Link, robot: 0, link };
     let bricks = [
-        Brick {
-            world_from_box: world_from_base * at(0.0, 0.0, 0.25),
-            half: BASE,
-            label: on(0),
-        },
-        Brick {
-            world_from_box: world_from_arm * at(0.0, 0.0, 0.4),
-            half: ARM,
-            label: on(1),
-        },
+        Brick { world_from_box: world_from_base * at(0.0, 0.0, 0.25), half: BASE, label: on(0) },
+        Brick { world_from_box: world_from_arm * at(0.0, 0.0, 0.4), half: ARM, label: on(1) },
         // A wall behind, and a box on the floor 4 cm from the base.
-        Brick {
-            world_from_box: at(-1.2, 0.0, 1.5),
-            half: [0.05, 3.0, 1.5],
-            label: Label::FIXED,
-        },
-        Brick {
-            world_from_box: at(0.5, 0.64, 0.2),
-            half: [0.15, 0.25, 0.2],
-            label: Label::FIXED,
-        },
+        Brick { world_from_box: at(-1.2, 0.0, 1.5), half: [0.05, 3.0, 1.5], label: Label::FIXED },
+        Brick { world_from_box: at(0.5, 0.64, 0.2), half: [0.15, 0.25, 0.2], label: Label::FIXED },
     ];
     let scan = scan(at(4.0, 1.6, 1.4) * Pose::rotation(Vector::z() * 3.5));
     let tiles = shoot(&bricks, &scan);
     let fits = [fit(world_from_base, q)];
-    let segment = Segment::new(
-        &fits,
-        &[model()],
-        &floor(),
-        std::slice::from_ref(&scan),
-        Settings::default(),
-    );
+    let segment =
+        Segment::new(&fits, &[model()], &floor(), std::slice::from_ref(&scan), Settings::default());
     let ground = Ground::new(&floor(), &Settings::default());
     let mut scratch = Scratch::default();
     let (mut hit, mut missed, mut invented, mut n_fixed) = ([0_u32; 2], [0_u32; 2], [0_u32; 2], 0);
@@ -301,9 +232,8 @@ fn links_are_found_and_nothing_fixed_is_lost() {
             let place = u64::from(tile.place[i]);
             let world = scan.world_from_scan * Point::from(xyz[i].map(f64::from));
             let found = out.labels.binary_search_by_key(&place, |l| l.0);
-            let label = found.map_or(ground.label([world.x, world.y, world.z]), |at| {
-                out.labels[at].1
-            });
+            let label =
+                found.map_or(ground.label([world.x, world.y, world.z]), |at| out.labels[at].1);
             let Some(truth) = truth else {
                 n_veils += 1;
                 veils_on_link += u32::from(label.kind == PointKind::Link);
@@ -325,10 +255,7 @@ fn links_are_found_and_nothing_fixed_is_lost() {
         }
     }
     let iou = |l: usize| f64::from(hit[l]) / f64::from(hit[l] + missed[l] + invented[l]);
-    assert!(
-        hit[0] > 3000 && hit[1] > 3000 && n_fixed > 20_000,
-        "{hit:?} {n_fixed}"
-    );
+    assert!(hit[0] > 3000 && hit[1] > 3000 && n_fixed > 20_000, "{hit:?} {n_fixed}");
     assert!(
         iou(0) > 0.97 && iou(1) > 0.97,
         "{} {} {hit:?} {missed:?} {invented:?}",
@@ -340,10 +267,7 @@ fn links_are_found_and_nothing_fixed_is_lost() {
         "{invented:?}"
     );
     assert!(f64::from(floor_right) > 0.99 * f64::from(n_floor));
-    assert!(
-        f64::from(veils_on_link) < 0.15 * f64::from(n_veils),
-        "{veils_on_link} of {n_veils}"
-    );
+    assert!(f64::from(veils_on_link) < 0.15 * f64::from(n_veils), "{veils_on_link} of {n_veils}");
 }
 
 /// Points of a real robot's own surface with 2 mm of noise, in a tile without raster.
@@ -356,49 +280,27 @@ fn points_of_a_real_robot_go_to_their_links() {
         eprintln!("skipped: no {}", folder.display());
         return;
     }
-    let model = Model::load(&folder, &robot::Settings::default())
-        .expect("loads")
-        .0;
-    let posture: Vec<f64> = model
-        .home()
-        .iter()
-        .enumerate()
-        .map(|(i, q)| q + 0.1 * i as f64)
-        .collect();
+    let model = Model::load(&folder, &robot::Settings::default()).expect("loads").0;
+    let posture: Vec<f64> =
+        model.home().iter().enumerate().map(|(i, q)| q + 0.1 * i as f64).collect();
     let world_from_base = at(2.0, 1.0, 0.0);
     let mut fit = fit(world_from_base, 0.0);
     fit.joints = (posture.iter().enumerate())
-        .map(|(i, q)| JointFit {
-            name: format!("j{i}"),
-            value: *q,
-            sigma: 1e-4,
-            determined: true,
-        })
+        .map(|(i, q)| JointFit { name: format!("j{i}"), value: *q, sigma: 1e-4, determined: true })
         .collect();
     let poses = model.poses(&posture);
-    let fields: Vec<_> = model
-        .links
-        .iter()
-        .map(|link| crate::field::Field::new(&link.cad))
-        .collect();
+    let fields: Vec<_> =
+        model.links.iter().map(|link| crate::field::Field::new(&link.cad)).collect();
     // Faces pressed together inside a joint belong to either link, and no scanner sees them.
     let is_apart = |link: usize, base: Point| {
-        let others = fields
-            .iter()
-            .zip(&poses)
-            .enumerate()
-            .filter(|(other, _)| *other != link);
+        let others = fields.iter().zip(&poses).enumerate().filter(|(other, _)| *other != link);
         others
             .filter_map(|(_, (field, pose))| Some((field.as_ref()?, pose.inverse() * base)))
             .all(|(field, p)| field.near([p.x as f32, p.y as f32, p.z as f32]).is_err())
     };
     let mut rng = 3;
     let mut truth = Vec::new();
-    let tile_at = TileAt {
-        scan: ScanId(0),
-        row: 0,
-        col: 0,
-    };
+    let tile_at = TileAt { scan: ScanId(0), row: 0, col: 0 };
     let mut tile = Tile {
         at: tile_at,
         first_place: 0,
@@ -408,12 +310,8 @@ fn points_of_a_real_robot_go_to_their_links() {
         bounds: Aabb::EMPTY,
     };
     for (link, pose) in poses.iter().enumerate() {
-        for (p, n) in model.links[link]
-            .cad
-            .points
-            .iter()
-            .zip(&model.links[link].cad.normals)
-            .take(6000)
+        for (p, n) in
+            model.links[link].cad.points.iter().zip(&model.links[link].cad.normals).take(6000)
         {
             let shift = Vector::from(n.map(f64::from)) * 0.002 * normal(&mut rng);
             let base = pose * (Point::from(p.map(f64::from)) + shift);
@@ -428,19 +326,13 @@ fn points_of_a_real_robot_go_to_their_links() {
             }
         }
     }
-    let scan = Scan {
-        lattice: None,
-        ..scan(Pose::identity())
-    };
+    let scan = Scan { lattice: None, ..scan(Pose::identity()) };
     let started = std::time::Instant::now();
     let segment = Segment::new(&[fit], &[model], &floor(), &[scan], Settings::default());
     let built = started.elapsed();
     let out = segment.apply(tile, &mut Scratch::default()).expect("maps");
-    let right = out
-        .labels
-        .iter()
-        .filter(|(place, label)| label.link == truth[*place as usize])
-        .count();
+    let right =
+        out.labels.iter().filter(|(place, label)| label.link == truth[*place as usize]).count();
     let taken = started.elapsed() - built;
     eprintln!(
         "{} points: {:.3} on a link, {:.3} on the right one; fields {built:?}, {taken:?}",

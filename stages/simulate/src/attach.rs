@@ -29,13 +29,8 @@ pub(crate) fn hose(hose: &Hose, held: &[Point]) -> Solid {
         }
     }
     let mut out = tube(&path, hose.radius, HOSE_SIDES);
-    for end in [
-        [path[0], path[1]],
-        [path[path.len() - 1], path[path.len() - 2]],
-    ] {
-        let along = (end[1] - end[0])
-            .try_normalize(1e-9)
-            .unwrap_or_else(Vector::z);
+    for end in [[path[0], path[1]], [path[path.len() - 1], path[path.len() - 2]]] {
+        let along = (end[1] - end[0]).try_normalize(1e-9).unwrap_or_else(Vector::z);
         out.add(&tube(
             &[end[0] - along * 0.01, end[0] + along * 0.04],
             1.4 * hose.radius,
@@ -50,44 +45,23 @@ pub(crate) fn tool(tool: &Tool) -> Solid {
     let l = tool.length;
     match tool.shape {
         ToolShape::Gripper => Solid::of([
-            lathe(
-                &[[0.05, 0.0], [0.05, 0.02], [0.04, 0.03], [0.04, 0.25 * l]],
-                32,
-            ),
+            lathe(&[[0.05, 0.0], [0.05, 0.02], [0.04, 0.03], [0.04, 0.25 * l]], 32),
             cuboid([0.6 * l, 0.09, 0.3 * l], 0.008).at([0.0, 0.0, 0.4 * l]),
             cuboid([0.03, 0.05, 0.5 * l], 0.004).at([-0.2 * l, 0.0, 0.75 * l]),
             cuboid([0.03, 0.05, 0.5 * l], 0.004).at([0.22 * l, 0.01, 0.75 * l]),
-            disc(0.02, 0.0, 0.12, 0.003, 20)
-                .along_y()
-                .at([0.15 * l, 0.0, 0.42 * l]),
+            disc(0.02, 0.0, 0.12, 0.003, 20).along_y().at([0.15 * l, 0.0, 0.42 * l]),
         ]),
         ToolShape::Cups => {
             let mut out = Solid::of([
-                lathe(
-                    &[[0.06, 0.0], [0.06, 0.02], [0.03, 0.04], [0.03, 0.6 * l]],
-                    32,
-                ),
+                lathe(&[[0.06, 0.0], [0.06, 0.02], [0.03, 0.04], [0.03, 0.6 * l]], 32),
                 cuboid([2.0 * l, 0.05, 0.05], 0.004).at([0.0, 0.0, 0.6 * l]),
                 cuboid([0.05, 1.4 * l, 0.05], 0.004).at([-0.5 * l, 0.0, 0.6 * l]),
                 cuboid([0.05, 1.4 * l, 0.05], 0.004).at([0.7 * l, 0.0, 0.6 * l]),
                 bolts(6, 0.05, 0.02, 0.01),
             ]);
-            for (x, y) in [
-                (-0.5, -0.6),
-                (-0.5, 0.6),
-                (0.7, -0.6),
-                (0.7, 0.6),
-                (0.1, 0.0),
-            ] {
-                let cup = lathe(
-                    &[
-                        [0.008, 0.6 * l],
-                        [0.008, 0.85 * l],
-                        [0.02, 0.9 * l],
-                        [0.03, l],
-                    ],
-                    20,
-                );
+            for (x, y) in [(-0.5, -0.6), (-0.5, 0.6), (0.7, -0.6), (0.7, 0.6), (0.1, 0.0)] {
+                let cup =
+                    lathe(&[[0.008, 0.6 * l], [0.008, 0.85 * l], [0.02, 0.9 * l], [0.03, l]], 20);
                 out.add(&cup.at([x * l, y * l, 0.0]));
             }
             out
@@ -102,10 +76,7 @@ pub(crate) fn tool(tool: &Tool) -> Solid {
             ];
             let path = neck.map(|p| Point::new(p[0] * l, p[1] * l, p[2] * l));
             Solid::of([
-                lathe(
-                    &[[0.045, 0.0], [0.045, 0.03], [0.03, 0.04], [0.03, 0.35 * l]],
-                    32,
-                ),
+                lathe(&[[0.045, 0.0], [0.045, 0.03], [0.03, 0.04], [0.03, 0.35 * l]], 32),
                 cuboid([0.07, 0.05, 0.12], 0.006).at([-0.03, 0.0, 0.15 * l]),
                 tube(&path, 0.012, 16),
                 tube(&path[3..], 0.018, 16),

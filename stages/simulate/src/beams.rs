@@ -33,39 +33,19 @@ pub(crate) struct Beams {
 impl Beams {
     /// Sorts the triangles into a tree.
     pub(crate) fn new(triangles: &[[Vec3A; 3]], surface_of: &[u32]) -> Self {
-        let plain: Vec<Triangle> = triangles
-            .iter()
-            .map(|t| Triangle {
-                v0: t[0],
-                v1: t[1],
-                v2: t[2],
-            })
-            .collect();
+        let plain: Vec<Triangle> =
+            triangles.iter().map(|t| Triangle { v0: t[0], v1: t[1], v2: t[2] }).collect();
         if plain.is_empty() {
-            return Self {
-                tree: Bvh2::default(),
-                triangles: Vec::new(),
-                surface_of: Vec::new(),
-            };
+            return Self { tree: Bvh2::default(), triangles: Vec::new(), surface_of: Vec::new() };
         }
         // Long thin triangles (fence wires, walls) are split into several boxes: they would fill the tree with air.
-        let settings = BvhBuildParams {
-            pre_split: true,
-            ..BvhBuildParams::medium_build()
-        };
+        let settings = BvhBuildParams { pre_split: true, ..BvhBuildParams::medium_build() };
         let tree = build_bvh2_from_tris(&plain, settings, &mut std::time::Duration::default());
         // In the order of the leaves: no second look-up while a beam is followed.
         let order = &tree.primitive_indices;
-        let triangles = order
-            .iter()
-            .map(|&i| RtTriangle::from(&plain[i as usize]))
-            .collect();
+        let triangles = order.iter().map(|&i| RtTriangle::from(&plain[i as usize])).collect();
         let surface_of = order.iter().map(|&i| surface_of[i as usize]).collect();
-        Self {
-            tree,
-            triangles,
-            surface_of,
-        }
+        Self { tree, triangles, surface_of }
     }
 
     /// The nearest triangle along `direction` (unit length) not farther than `max_range`.
@@ -77,8 +57,7 @@ impl Beams {
         let narrow = |v: &Vector| Vec3A::new(v.x as f32, v.y as f32, v.z as f32);
         let ray = Ray::new(narrow(origin), narrow(direction), 0.0, max_range as f32);
         let mut hit = RayHit::none();
-        self.tree
-            .ray_traverse(ray, &mut hit, |ray, id| meet(&self.triangles[id], ray));
+        self.tree.ray_traverse(ray, &mut hit, |ray, id| meet(&self.triangles[id], ray));
         if hit.primitive_id == obvhs::ray::INVALID_ID {
             return None;
         }
@@ -87,16 +66,8 @@ impl Beams {
         // Single precision finds the triangle; its plane gives the range. A grazing beam may leave the plane's
         // answer worthless, and then the single-precision one stands.
         let range = self.plane_range(triangle, origin, direction);
-        let range = if (range - single).abs() < 1e-3 {
-            range
-        } else {
-            single
-        };
-        Some(Hit {
-            range,
-            triangle,
-            surface: self.surface_of[triangle as usize],
-        })
+        let range = if (range - single).abs() < 1e-3 { range } else { single };
+        Some(Hit { range, triangle, surface: self.surface_of[triangle as usize] })
     }
 
     /// Range at which a beam meets the plane of a triangle, metres; infinite or negative where it does not.

@@ -14,10 +14,10 @@ const MAX_FENCE: f64 = 500.0;
 fn finite(what: &str, place: &str, values: &[f64], low: f64, high: f64) -> Result<()> {
     match values.iter().find(|v| !(**v >= low && **v <= high)) {
         None => Ok(()),
-        Some(v) => Err(Error::bad_input(format!(
-            "{what} must be between {low} and {high}: \"{v}\""
-        ))
-        .at(place)),
+        Some(v) => {
+            Err(Error::bad_input(format!("{what} must be between {low} and {high}: \"{v}\""))
+                .at(place))
+        }
     }
 }
 
@@ -45,13 +45,7 @@ fn hall(scene: &Scene) -> Result<()> {
         finite("size", "hall", &hall.size, 0.5, MAX_COORDINATE)?;
     }
     if let Some(floor) = &scene.floor {
-        finite(
-            "size",
-            "floor",
-            &floor.size.unwrap_or([1.0; 2]),
-            0.5,
-            2.0 * MAX_COORDINATE,
-        )?;
+        finite("size", "floor", &floor.size.unwrap_or([1.0; 2]), 0.5, 2.0 * MAX_COORDINATE)?;
         finite("tilt", "floor", &floor.tilt_deg, -20.0, 20.0)?;
         finite("wave amplitude", "floor", &[floor.wave_amplitude], 0.0, 1.0)?;
         finite("wave length", "floor", &[floor.wave_length], 0.5, 1e6)?;
@@ -77,25 +71,13 @@ fn hall(scene: &Scene) -> Result<()> {
 fn bodies(scene: &Scene) -> Result<()> {
     let at = |what: &str, name: &str| format!("{what} \"{name}\"");
     let place = |what: &str, name: &str, xyz: &[f64], size: &[f64]| -> Result<()> {
-        finite(
-            "place",
-            &at(what, name),
-            xyz,
-            -MAX_COORDINATE,
-            MAX_COORDINATE,
-        )?;
+        finite("place", &at(what, name), xyz, -MAX_COORDINATE, MAX_COORDINATE)?;
         finite("size", &at(what, name), size, 1e-4, MAX_COORDINATE)
     };
     for b in &scene.boxes {
         place("box", &b.name, &b.xyz, &b.size)?;
         finite("turn", &at("box", &b.name), &b.rpy_deg, -360.0, 360.0)?;
-        finite(
-            "reflectance",
-            &at("box", &b.name),
-            &[b.reflectance],
-            0.0,
-            1.0,
-        )?;
+        finite("reflectance", &at("box", &b.name), &[b.reflectance], 0.0, 1.0)?;
     }
     for c in &scene.columns {
         place("column", &c.name, &c.xy, &[c.radius, c.height])?;
@@ -118,13 +100,7 @@ fn bodies(scene: &Scene) -> Result<()> {
     }
     for s in &scene.stands {
         place("stand", &s.name, &s.xy, &[s.side])?;
-        finite(
-            "top",
-            &at("stand", &s.name),
-            &[s.top, s.yaw_deg],
-            -360.0,
-            360.0,
-        )?;
+        finite("top", &at("stand", &s.name), &[s.top, s.yaw_deg], -360.0, 360.0)?;
     }
     for h in &scene.hoses {
         if h.anchors.len() < 2 || h.anchors.len() > 1000 {
@@ -137,13 +113,7 @@ fn bodies(scene: &Scene) -> Result<()> {
         finite("radius", &at("hose", &h.name), &[h.radius], 0.001, 1.0)?;
         finite("sag", &at("hose", &h.name), &[h.sag], -2.0, 2.0)?;
         for a in &h.anchors {
-            finite(
-                "anchor",
-                &at("hose", &h.name),
-                &a.xyz,
-                -MAX_COORDINATE,
-                MAX_COORDINATE,
-            )?;
+            finite("anchor", &at("hose", &h.name), &a.xyz, -MAX_COORDINATE, MAX_COORDINATE)?;
         }
     }
     for c in &scene.carried {
@@ -159,13 +129,7 @@ fn robots(scene: &Scene) -> Result<()> {
         finite("place", &at, &r.xyz, -MAX_COORDINATE, MAX_COORDINATE)?;
         finite("turn", &at, &r.rpy_deg, -360.0, 360.0)?;
         for (joint, value) in &r.posture {
-            finite(
-                "value",
-                &format!("{at}, joint \"{joint}\""),
-                &[*value],
-                -1000.0,
-                1000.0,
-            )?;
+            finite("value", &format!("{at}, joint \"{joint}\""), &[*value], -1000.0, 1000.0)?;
         }
         if let Some(tool) = &r.tool {
             finite("tool length", &at, &[tool.length], 0.01, 5.0)?;
@@ -174,17 +138,13 @@ fn robots(scene: &Scene) -> Result<()> {
             return Err(Error::bad_input("two robots have the same name").at(at));
         }
     }
-    let used = scene.carried.iter().map(|c| &c.robot).chain(
-        scene
-            .hoses
-            .iter()
-            .flat_map(|h| h.anchors.iter().filter_map(|a| a.robot.as_ref())),
-    );
+    let used =
+        scene.carried.iter().map(|c| &c.robot).chain(
+            scene.hoses.iter().flat_map(|h| h.anchors.iter().filter_map(|a| a.robot.as_ref())),
+        );
     for name in used {
         if !names.contains(name.as_str()) {
-            return Err(
-                Error::bad_input(format!("no robot has this name: \"{name}\"")).at("scene"),
-            );
+            return Err(Error::bad_input(format!("no robot has this name: \"{name}\"")).at("scene"));
         }
     }
     Ok(())
@@ -192,25 +152,13 @@ fn robots(scene: &Scene) -> Result<()> {
 
 fn scanner(s: &Scanner, place: &str) -> Result<()> {
     let r = &s.raster;
-    finite(
-        "position",
-        place,
-        &s.position,
-        -MAX_COORDINATE,
-        MAX_COORDINATE,
-    )?;
+    finite("position", place, &s.position, -MAX_COORDINATE, MAX_COORDINATE)?;
     finite("turn", place, &s.rpy_deg, -360.0, 360.0)?;
     finite("elevation", place, &r.elevation_deg, -90.0, 90.0)?;
     finite("azimuth", place, &r.azimuth_deg, -360.0, 360.0)?;
     finite("step", place, &[r.step_deg], 0.001, 90.0)?;
     finite("range", place, &[s.min_range, s.max_range], 0.0, 10_000.0)?;
-    finite(
-        "noise",
-        place,
-        &[s.noise, s.noise_per_metre, s.jitter],
-        0.0,
-        1.0,
-    )?;
+    finite("noise", place, &[s.noise, s.noise_per_metre, s.jitter], 0.0, 1.0)?;
     finite("share", place, &[s.dropouts, s.dark_dropouts], 0.0, 1.0)?;
     finite("bias", place, &[s.range_bias], -10.0, 10.0)?;
     finite("registration", place, &s.registration.xyz, -10.0, 10.0)?;
@@ -222,7 +170,7 @@ fn scanner(s: &Scanner, place: &str) -> Result<()> {
     let width = r.azimuth_deg[1] - r.azimuth_deg[0];
     if r.elevation_deg[0] >= r.elevation_deg[1] || width <= 0.0 || width > 360.0 {
         return Err(
-            Error::bad_input("elevation and azimuth must grow, by a turn at most").at(place),
+            Error::bad_input("elevation and azimuth must grow, by a turn at most").at(place)
         );
     }
     if r.n_beams == Some(0) || r.n_rows() > MAX_SIDE || r.n_cols() > MAX_SIDE {

@@ -71,12 +71,7 @@ impl SimColumns {
     }
 
     pub(crate) fn push(&mut self, beam: Option<Return>, stated: &Vector) {
-        let empty = Return {
-            range: 0.0,
-            intensity: 0.0,
-            label: Label::UNCERTAIN,
-            is_mixed: false,
-        };
+        let empty = Return { range: 0.0, intensity: 0.0, label: Label::UNCERTAIN, is_mixed: false };
         let r = beam.unwrap_or(empty);
         self.hit.push(beam.is_some());
         self.range.push(r.range);

@@ -23,11 +23,7 @@ const CARTON: ([f64; 3], [f64; 3]) = ([0.0, 0.0, -0.33], [0.5, 0.35, 0.25]);
 pub fn demo_scene(seed: u64, models: &[Model]) -> Result<Scene> {
     let mut scene = Scene {
         seed,
-        hall: Some(Hall {
-            size: [12.0, 10.0, 5.0],
-            walls: true,
-            ceiling: true,
-        }),
+        hall: Some(Hall { size: [12.0, 10.0, 5.0], walls: true, ceiling: true }),
         floor: Some(Floor {
             size: None,
             tilt_deg: [0.12, -0.08],
@@ -60,25 +56,14 @@ pub fn demo_scene(seed: u64, models: &[Model]) -> Result<Scene> {
         size: CARTON.1,
     });
     scene.hoses = demo_hoses();
-    for (i, (x, y, z)) in [
-        (-5.4, 4.4, 1.9),
-        (-0.6, -3.4, 1.7),
-        (0.9, 1.3, 2.1),
-        (5.4, 0.6, 1.6),
-    ]
-    .into_iter()
-    .enumerate()
+    for (i, (x, y, z)) in [(-5.4, 4.4, 1.9), (-0.6, -3.4, 1.7), (0.9, 1.3, 2.1), (5.4, 0.6, 1.6)]
+        .into_iter()
+        .enumerate()
     {
-        let raster = Raster {
-            elevation_deg: [-60.0, 45.0],
-            step_deg: DEMO_STEP_DEG,
-            ..Raster::default()
-        };
-        let mut scanner = scanner(
-            format!("scan_{}", i + 1),
-            [x, y, z + scene.ground(x, y)],
-            raster,
-        );
+        let raster =
+            Raster { elevation_deg: [-60.0, 45.0], step_deg: DEMO_STEP_DEG, ..Raster::default() };
+        let mut scanner =
+            scanner(format!("scan_{}", i + 1), [x, y, z + scene.ground(x, y)], raster);
         scanner.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];
         scene.scanners.push(scanner);
     }
@@ -93,28 +78,14 @@ pub fn paper_scene(seed: u64, model: &Model, posture: &[f64], n_beams: u64) -> S
     let place = RobotPlace {
         name: "R1".into(),
         model: model.name.clone(),
-        posture: joints
-            .map(|(&j, v)| (model.joints[j].name.clone(), *v))
-            .collect(),
+        posture: joints.map(|(&j, v)| (model.joints[j].name.clone(), *v)).collect(),
         ..RobotPlace::default()
     };
     let scanners = (0..6).map(|k| {
         let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / 6.0).sin_cos();
-        let raster = Raster {
-            n_beams: Some(n_beams),
-            ..Raster::default()
-        };
-        let thin = scanner(
-            format!("scan_{}", k + 1),
-            [5.0 * cos, 5.0 * sin, 1.6],
-            raster,
-        );
-        Scanner {
-            mixed: None,
-            dropouts: 0.0,
-            dark_dropouts: 0.0,
-            ..thin
-        }
+        let raster = Raster { n_beams: Some(n_beams), ..Raster::default() };
+        let thin = scanner(format!("scan_{}", k + 1), [5.0 * cos, 5.0 * sin, 1.6], raster);
+        Scanner { mixed: None, dropouts: 0.0, dark_dropouts: 0.0, ..thin }
     });
     Scene {
         seed,
@@ -174,47 +145,19 @@ fn demo_spots() -> [Spot<'static>; 3] {
 }
 
 fn furnish(scene: &mut Scene) {
-    let furniture = |name: &str, xy, yaw_deg, size| Furniture {
-        name: name.into(),
-        xy,
-        yaw_deg,
-        size,
-    };
-    scene
-        .conveyors
-        .push(furniture("infeed", [3.2, -4.3], 0.0, [4.4, 0.6, 0.7]));
-    scene
-        .benches
-        .push(furniture("bench", [5.35, 3.2], 90.0, [1.6, 0.7, 0.9]));
-    let fence = |name: &str, from, to, filling| Fence {
-        name: name.into(),
-        from,
-        to,
-        height: 2.0,
-        filling,
-    };
-    scene
-        .fences
-        .push(fence("east", [0.1, 0.6], [0.1, 4.8], Filling::Wires));
-    scene
-        .fences
-        .push(fence("south", [-5.8, -1.6], [-2.8, -1.6], Filling::Wires));
-    scene
-        .fences
-        .push(fence("panel", [5.75, -1.0], [5.75, 0.2], Filling::Panel));
-    let column = |xy, radius, section| Column {
-        name: String::new(),
-        xy,
-        radius,
-        height: 5.0,
-        section,
-    };
-    scene
-        .columns
-        .push(column([-5.6, -4.6], 0.2, Section::IBeam));
-    scene
-        .columns
-        .push(column([0.0, -4.5], 0.18, Section::Round));
+    let furniture =
+        |name: &str, xy, yaw_deg, size| Furniture { name: name.into(), xy, yaw_deg, size };
+    scene.conveyors.push(furniture("infeed", [3.2, -4.3], 0.0, [4.4, 0.6, 0.7]));
+    scene.benches.push(furniture("bench", [5.35, 3.2], 90.0, [1.6, 0.7, 0.9]));
+    let fence =
+        |name: &str, from, to, filling| Fence { name: name.into(), from, to, height: 2.0, filling };
+    scene.fences.push(fence("east", [0.1, 0.6], [0.1, 4.8], Filling::Wires));
+    scene.fences.push(fence("south", [-5.8, -1.6], [-2.8, -1.6], Filling::Wires));
+    scene.fences.push(fence("panel", [5.75, -1.0], [5.75, 0.2], Filling::Panel));
+    let column =
+        |xy, radius, section| Column { name: String::new(), xy, radius, height: 5.0, section };
+    scene.columns.push(column([-5.6, -4.6], 0.2, Section::IBeam));
+    scene.columns.push(column([0.0, -4.5], 0.18, Section::Round));
     let cuboid = |name: &str, at: [f64; 2], size: [f64; 3], yaw: f64, reflectance| {
         (name.to_owned(), at, size, yaw, reflectance)
     };
@@ -241,12 +184,7 @@ fn demo_hoses() -> Vec<Hose> {
         link: Some(link.into()),
         xyz,
     };
-    let hose = |name: &str, anchors, radius, sag| Hose {
-        name: name.into(),
-        anchors,
-        radius,
-        sag,
-    };
+    let hose = |name: &str, anchors, radius, sag| Hose { name: name.into(), anchors, radius, sag };
     vec![
         hose(
             "dress pack",
@@ -282,11 +220,7 @@ fn demo_hoses() -> Vec<Hose> {
             name: "supply".into(),
             anchors: vec![
                 on("R1", "base_link", [-0.58, 0.13, 0.20]),
-                Anchor {
-                    robot: None,
-                    link: None,
-                    xyz: [-5.0, -3.4, 0.35],
-                },
+                Anchor { robot: None, link: None, xyz: [-5.0, -3.4, 0.35] },
             ],
             radius: 0.025,
             sag: 0.04,

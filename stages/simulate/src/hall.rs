@@ -38,11 +38,7 @@ pub(crate) fn building(hall: &Hall, lowest: f64) -> Solid {
         out.add(&slab([x, -y, low], [x + WALL, y, z], 0.0));
     }
     if hall.ceiling {
-        out.add(&slab(
-            [-x - WALL, -y - WALL, z],
-            [x + WALL, y + WALL, z + WALL],
-            0.0,
-        ));
+        out.add(&slab([-x - WALL, -y - WALL, z], [x + WALL, y + WALL, z + WALL], 0.0));
     }
     out
 }
@@ -52,9 +48,7 @@ fn ground_cell(floor: &Floor) -> f64 {
     // A chord of length c is c²·curvature/8 from its arc; the shorter of the two waves counts.
     let curvature =
         floor.wave_amplitude * (1.37 * std::f64::consts::TAU / floor.wave_length).powi(2);
-    (8.0 * FACET / curvature.max(1e-9))
-        .sqrt()
-        .clamp(0.1, 2.0 * MAX_CELLS)
+    (8.0 * FACET / curvature.max(1e-9)).sqrt().clamp(0.1, 2.0 * MAX_CELLS)
 }
 
 /// A surface over a rectangle, `height` above each place.
@@ -90,18 +84,14 @@ pub(crate) fn ground(scene: &Scene) -> (Solid, Solid) {
     let mut out = sheet(cell, [-x, -y], [x, y], |x, y| floor.base_height(x, y));
     for level in &floor.levels {
         let (a, b) = (level.min, level.max);
-        out.add(&sheet(cell, a, b, |x, y| {
-            level.height + floor.base_height(x, y)
-        }));
+        out.add(&sheet(cell, a, b, |x, y| level.height + floor.base_height(x, y)));
         for (p, q) in [
             ([a[0], a[1]], [b[0], a[1]]),
             ([b[0], a[1]], [b[0], b[1]]),
             ([b[0], b[1]], [a[0], b[1]]),
             ([a[0], b[1]], [a[0], a[1]]),
         ] {
-            faces.add(&step_face(cell, (p, q), level.height, |x, y| {
-                floor.base_height(x, y)
-            }));
+            faces.add(&step_face(cell, (p, q), level.height, |x, y| floor.base_height(x, y)));
         }
     }
     (out, faces)
@@ -114,9 +104,7 @@ fn step_face(
     height: f64,
     base: impl Fn(f64, f64) -> f64,
 ) -> Solid {
-    let n = ((q[0] - p[0]).hypot(q[1] - p[1]) / cell)
-        .ceil()
-        .clamp(1.0, MAX_CELLS) as usize;
+    let n = ((q[0] - p[0]).hypot(q[1] - p[1]) / cell).ceil().clamp(1.0, MAX_CELLS) as usize;
     let mut out = Solid::default();
     for i in 0..=n {
         let t = i as f64 / n as f64;
@@ -140,22 +128,9 @@ pub(crate) fn column(column: &Column, z: f64) -> Solid {
         Section::Round => disc(r, -0.05, h, 0.0, 48),
         Section::IBeam => {
             let (f, w) = (0.12 * r, 0.08 * r); // flange and web: half of what rolled sections of this size have
-            let half = [
-                [-r, -r],
-                [r, -r],
-                [r, -r + f],
-                [w, -r + f],
-                [w, r - f],
-                [r, r - f],
-                [r, r],
-            ];
-            let rest = [
-                [-r, r],
-                [-r, r - f],
-                [-w, r - f],
-                [-w, -r + f],
-                [-r, -r + f],
-            ];
+            let half =
+                [[-r, -r], [r, -r], [r, -r + f], [w, -r + f], [w, r - f], [r, r - f], [r, r]];
+            let rest = [[-r, r], [-r, r - f], [-w, r - f], [-w, -r + f], [-r, -r + f]];
             prism(&[half.as_slice(), &rest].concat(), -0.05, h, 0.0)
         }
     };
@@ -175,20 +150,13 @@ pub(crate) fn fence(fence: &Fence, ground: impl Fn(f64, f64) -> f64) -> (Solid, 
     let (mut posts, mut wires) = (Solid::default(), Solid::default());
     for k in 0..=fields {
         let s = width * k as f64;
-        let z = ground(
-            fence.from[0] + dx * s / length,
-            fence.from[1] + dy * s / length,
-        );
+        let z = ground(fence.from[0] + dx * s / length, fence.from[1] + dy * s / length);
         posts.add(&slab(
             [s - 0.03, -0.03, z - 0.02],
             [s + 0.03, 0.03, z + fence.height + 0.05],
             0.004,
         ));
-        posts.add(&slab(
-            [s - 0.08, -0.06, z - 0.01],
-            [s + 0.08, 0.06, z + 0.012],
-            0.002,
-        ));
+        posts.add(&slab([s - 0.08, -0.06, z - 0.01], [s + 0.08, 0.06, z + 0.012], 0.002));
         if k == fields {
             break;
         }
@@ -201,10 +169,7 @@ pub(crate) fn fence(fence: &Fence, ground: impl Fn(f64, f64) -> f64) -> (Solid, 
         }
     }
     let yaw = dy.atan2(dx).to_degrees();
-    let place = |s: Solid| {
-        s.turned([0.0, 0.0, yaw])
-            .at([fence.from[0], fence.from[1], 0.0])
-    };
+    let place = |s: Solid| s.turned([0.0, 0.0, yaw]).at([fence.from[0], fence.from[1], 0.0]);
     (place(posts), place(wires))
 }
 
@@ -216,19 +181,11 @@ fn wire_mesh(x: [f64; 2], z: [f64; 2]) -> Solid {
     let across = ((z[1] - z[0]) / MESH).round().max(1.0) as usize;
     for i in 1..up {
         let at = x[0] + (x[1] - x[0]) * i as f64 / up as f64;
-        out.add(&line(
-            [at, 0.5 * WIRE, z[0]],
-            [at, 0.5 * WIRE, z[1]],
-            0.5 * WIRE,
-        ));
+        out.add(&line([at, 0.5 * WIRE, z[0]], [at, 0.5 * WIRE, z[1]], 0.5 * WIRE));
     }
     for i in 1..across {
         let at = z[0] + (z[1] - z[0]) * i as f64 / across as f64;
-        out.add(&line(
-            [x[0], -0.5 * WIRE, at],
-            [x[1], -0.5 * WIRE, at],
-            0.5 * WIRE,
-        ));
+        out.add(&line([x[0], -0.5 * WIRE, at], [x[1], -0.5 * WIRE, at], 0.5 * WIRE));
     }
     for at in x {
         out.add(&line([at, 0.0, z[0] - 0.01], [at, 0.0, z[1] + 0.01], 0.01));
@@ -246,42 +203,26 @@ pub(crate) fn conveyor(f: &Furniture, z: f64) -> Solid {
     for side in [-1.0, 1.0] {
         // A C-rail, open to the inside.
         let y = side * 0.5 * w;
-        out.add(&slab(
-            [-0.5 * l, y - 0.003, h - 0.12],
-            [0.5 * l, y + 0.003, h + 0.02],
-            0.0,
-        ));
+        out.add(&slab([-0.5 * l, y - 0.003, h - 0.12], [0.5 * l, y + 0.003, h + 0.02], 0.0));
         let inner = y - side * 0.04;
-        out.add(&slab(
-            [-0.5 * l, y.min(inner), h - 0.12],
-            [0.5 * l, y.max(inner), h - 0.114],
-            0.0,
-        ));
+        out.add(&slab([-0.5 * l, y.min(inner), h - 0.12], [0.5 * l, y.max(inner), h - 0.114], 0.0));
         for k in 0..=(l / 1.5).ceil() as usize {
             let x = (-0.5 * l + 0.06) + (l - 0.12) * k as f64 / (l / 1.5).ceil().max(1.0);
-            out.add(&slab(
-                [x - 0.025, y - 0.025, -0.02],
-                [x + 0.025, y + 0.025, h - 0.11],
-                0.003,
-            ));
+            out.add(&slab([x - 0.025, y - 0.025, -0.02], [x + 0.025, y + 0.025, h - 0.11], 0.003));
             out.add(&disc(0.05, -0.01, 0.012, 0.003, 16).at([x, y, 0.0]));
         }
     }
     let rollers = (l / 0.1).floor().max(1.0) as usize;
     for k in 0..rollers {
         let x = -0.5 * l + l * (k as f64 + 0.5) / rollers as f64;
-        out.add(
-            &disc(0.025, -0.5 * w + 0.004, 0.5 * w - 0.004, 0.0, 20)
-                .along_y()
-                .at([x, 0.0, h - 0.02]),
-        );
+        out.add(&disc(0.025, -0.5 * w + 0.004, 0.5 * w - 0.004, 0.0, 20).along_y().at([
+            x,
+            0.0,
+            h - 0.02,
+        ]));
     }
     // The drive hangs below one end, so that the ends differ.
-    out.add(
-        &disc(0.08, -0.15, 0.15, 0.01, 24)
-            .along_y()
-            .at([0.5 * l - 0.5, 0.05, h - 0.25]),
-    );
+    out.add(&disc(0.08, -0.15, 0.15, 0.01, 24).along_y().at([0.5 * l - 0.5, 0.05, h - 0.25]));
     out.turned([0.0, 0.0, f.yaw_deg]).at([f.xy[0], f.xy[1], z])
 }
 
@@ -291,11 +232,7 @@ pub(crate) fn bench(f: &Furniture, z: f64) -> Solid {
     let mut out = slab([-0.5 * l, -0.5 * w, h - 0.04], [0.5 * l, 0.5 * w, h], 0.004);
     for (sx, sy) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
         let (x, y) = (sx * (0.5 * l - 0.06), sy * (0.5 * w - 0.06));
-        out.add(&slab(
-            [x - 0.03, y - 0.03, -0.02],
-            [x + 0.03, y + 0.03, h - 0.03],
-            0.003,
-        ));
+        out.add(&slab([x - 0.03, y - 0.03, -0.02], [x + 0.03, y + 0.03, h - 0.03], 0.003));
     }
     out.add(&slab(
         [-0.5 * l + 0.05, -0.5 * w + 0.05, 0.2],
@@ -307,11 +244,7 @@ pub(crate) fn bench(f: &Furniture, z: f64) -> Solid {
         [0.5 * l - 0.1, 0.5 * w - 0.08, h - 0.04],
         0.005,
     ));
-    out.add(&slab(
-        [-0.4 * l, -0.5 * w, h],
-        [-0.4 * l + 0.14, -0.5 * w + 0.2, h + 0.13],
-        0.015,
-    ));
+    out.add(&slab([-0.4 * l, -0.5 * w, h], [-0.4 * l + 0.14, -0.5 * w + 0.2, h + 0.13], 0.015));
     out.add(&disc(0.012, -0.1, 0.1, 0.0, 12).along_x().at([
         -0.4 * l + 0.07,
         -0.5 * w - 0.06,
@@ -354,15 +287,10 @@ pub(crate) fn stand(stand: &Stand, z: f64) -> Solid {
                     0.004,
                 ));
             }
-            out.add(&slab(
-                [-leg, -0.03, 0.3 * h],
-                [leg, 0.03, 0.3 * h + 0.06],
-                0.0,
-            ));
+            out.add(&slab([-leg, -0.03, 0.3 * h], [leg, 0.03, 0.3 * h + 0.06], 0.0));
             out
         }
         StandShape::Plinth => plate(s, -0.05, h),
     };
-    body.turned([0.0, 0.0, stand.yaw_deg])
-        .at([stand.xy[0], stand.xy[1], z])
+    body.turned([0.0, 0.0, stand.yaw_deg]).at([stand.xy[0], stand.xy[1], z])
 }

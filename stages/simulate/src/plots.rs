@@ -28,11 +28,7 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
     let size = [PLOT * cols as f64 + 2.0, PLOT * rows as f64 + 2.0, 7.0];
     let mut scene = Scene {
         seed,
-        hall: Some(Hall {
-            size,
-            walls: true,
-            ceiling: true,
-        }),
+        hall: Some(Hall { size, walls: true, ceiling: true }),
         floor: Some(Floor {
             size: None,
             tilt_deg: [0.05, 0.03],
@@ -43,41 +39,22 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
         ..Scene::default()
     };
     let corner = |i: usize, j: usize| {
-        [
-            1.0 + PLOT * i as f64 - 0.5 * size[0],
-            1.0 + PLOT * j as f64 - 0.5 * size[1],
-        ]
+        [1.0 + PLOT * i as f64 - 0.5 * size[0], 1.0 + PLOT * j as f64 - 0.5 * size[1]]
     };
     for n in 0..n_robots {
         let from = corner(n % cols, n / cols);
-        plot(
-            &mut scene,
-            robots[random.below(robots.len())],
-            n,
-            from,
-            &mut random,
-        )?;
+        plot(&mut scene, robots[random.below(robots.len())], n, from, &mut random)?;
     }
-    let n_scanners = (n_robots as u64)
-        .div_ceil(2)
-        .max(2)
-        .max(n_points.div_ceil(MAX_BEAMS));
+    let n_scanners = (n_robots as u64).div_ceil(2).max(2).max(n_points.div_ceil(MAX_BEAMS));
     for k in 0..n_scanners as usize {
         // Scanners stand where plots meet; robots keep away from there.
         let spot = k * ((cols + 1) * (rows + 1)) / n_scanners as usize;
         let [x, y] = corner(spot % (cols + 1), spot / (cols + 1));
-        let (x, y) = (
-            x.clamp(0.6 - 0.5 * size[0], 0.5 * size[0] - 0.6),
-            y + random.between(-0.2, 0.2),
-        );
-        let raster = Raster {
-            n_beams: Some(n_points.div_ceil(n_scanners)),
-            ..Raster::default()
-        };
+        let (x, y) =
+            (x.clamp(0.6 - 0.5 * size[0], 0.5 * size[0] - 0.6), y + random.between(-0.2, 0.2));
+        let raster = Raster { n_beams: Some(n_points.div_ceil(n_scanners)), ..Raster::default() };
         let at = [x, y, scene.ground(x, y) + random.between(1.5, 2.2)];
-        scene
-            .scanners
-            .push(scanner(format!("scan_{}", k + 1), at, raster));
+        scene.scanners.push(scanner(format!("scan_{}", k + 1), at, raster));
     }
     Ok(scene)
 }
@@ -107,11 +84,7 @@ fn plot(
         xy: [from[0] + 0.35, from[1] + 1.0],
         radius: 0.15,
         height: 6.9,
-        section: if random.unit() < 0.5 {
-            Section::Round
-        } else {
-            Section::IBeam
-        },
+        section: if random.unit() < 0.5 { Section::Round } else { Section::IBeam },
     });
     if random.unit() < 0.5 {
         let y = from[1] + 0.1;

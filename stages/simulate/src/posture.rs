@@ -29,16 +29,9 @@ impl<'a> Postures<'a> {
     #[must_use]
     pub fn new(model: &'a Model) -> Self {
         let samples = model.links.iter().map(|l| sample(&l.mesh)).collect();
-        let mut out = Self {
-            model,
-            samples,
-            joined: BTreeSet::new(),
-        };
-        out.joined = model
-            .joints
-            .iter()
-            .map(|j| (j.parent.min(j.child), j.parent.max(j.child)))
-            .collect();
+        let mut out = Self { model, samples, joined: BTreeSet::new() };
+        out.joined =
+            model.joints.iter().map(|j| (j.parent.min(j.child), j.parent.max(j.child))).collect();
         let home = out.placed(&model.poses(&model.home()));
         let touching = out.touching(&home, usize::MAX);
         out.joined.extend(touching);
@@ -71,12 +64,8 @@ impl<'a> Postures<'a> {
                     random.between(low, high)
                 })
                 .collect();
-            let poses: Vec<Pose> = self
-                .model
-                .poses(&posture)
-                .iter()
-                .map(|p| world_from_base * p)
-                .collect();
+            let poses: Vec<Pose> =
+                self.model.poses(&posture).iter().map(|p| world_from_base * p).collect();
             let placed = self.placed(&poses);
             if placed[1..].iter().flatten().all(&allowed) && self.touching(&placed, 1).is_empty() {
                 return Ok(posture);

@@ -21,9 +21,7 @@ impl Random {
     /// A generator whose sequence depends on all of `keys`, in their order, and on nothing else.
     #[must_use]
     pub fn keyed(keys: &[u64]) -> Self {
-        let state = keys
-            .iter()
-            .fold(0, |state, key| mix(state ^ key.wrapping_add(GOLDEN)));
+        let state = keys.iter().fold(0, |state, key| mix(state ^ key.wrapping_add(GOLDEN)));
         Self { state }
     }
 

@@ -48,9 +48,7 @@ impl Station {
         let raster = scanner.raster.clone();
         let n_rows = raster.n_rows();
         let table = |n: u32, angle: &dyn Fn(u32) -> f64| -> Vec<[f64; 2]> {
-            (0..n)
-                .map(|i| <[f64; 2]>::from(angle(i).sin_cos()))
-                .collect()
+            (0..n).map(|i| <[f64; 2]>::from(angle(i).sin_cos())).collect()
         };
         let rows = table(n_rows, &|row| raster.elevation(row));
         let cols = table(raster.n_cols(), &|col| raster.azimuth(col));
@@ -85,18 +83,12 @@ impl Station {
         let mut out = SimColumns::with_capacity(cols.start, self.frame.n_rows, cols.len() * n_rows);
         // Three columns at a time: an edge is seen by comparing a beam with its four neighbours.
         let look = self.scanner.mixed.is_some();
-        let mut before = if look {
-            self.cast_column(beams, self.left_of(cols.start))
-        } else {
-            Vec::new()
-        };
+        let mut before =
+            if look { self.cast_column(beams, self.left_of(cols.start)) } else { Vec::new() };
         let mut here = self.cast_column(beams, Some(cols.start).filter(|_| !cols.is_empty()));
         for col in cols.clone() {
-            let after_col = if look {
-                self.right_of(col)
-            } else {
-                Some(col + 1).filter(|c| *c < cols.end)
-            };
+            let after_col =
+                if look { self.right_of(col) } else { Some(col + 1).filter(|c| *c < cols.end) };
             let after = self.cast_column(beams, after_col);
             for row in 0..n_rows {
                 let neighbours = [
@@ -120,19 +112,11 @@ impl Station {
 
     fn left_of(&self, col: u32) -> Option<u32> {
         let last = self.frame.n_cols.checked_sub(1)?;
-        if col > 0 {
-            Some(col - 1)
-        } else {
-            self.is_full_turn().then_some(last)
-        }
+        if col > 0 { Some(col - 1) } else { self.is_full_turn().then_some(last) }
     }
 
     fn right_of(&self, col: u32) -> Option<u32> {
-        if col + 1 < self.frame.n_cols {
-            Some(col + 1)
-        } else {
-            self.is_full_turn().then_some(0)
-        }
+        if col + 1 < self.frame.n_cols { Some(col + 1) } else { self.is_full_turn().then_some(0) }
     }
 
     /// Direction that the file states for a beam, scan frame.
@@ -143,13 +127,7 @@ impl Station {
     }
 
     fn random(&self, row: usize, col: u32, purpose: u64) -> Random {
-        Random::keyed(&[
-            self.keys[0],
-            self.keys[1],
-            row as u64,
-            u64::from(col),
-            purpose,
-        ])
+        Random::keyed(&[self.keys[0], self.keys[1], row as u64, u64::from(col), purpose])
     }
 
     /// Thin beams along the middle of each pixel of a column; empty for no column.
@@ -164,10 +142,7 @@ impl Station {
                     let (u, v) = across(&along);
                     along = (along + (u * a + v * b) * self.scanner.jitter).normalize();
                 }
-                Beam {
-                    along,
-                    hit: beams.cast(&origin, &along, self.scanner.max_range),
-                }
+                Beam { along, hit: beams.cast(&origin, &along, self.scanner.max_range) }
             })
             .collect()
     }
@@ -205,11 +180,7 @@ impl Station {
             return None;
         }
         let sigma = self.scanner.noise + self.scanner.noise_per_metre * range;
-        let noise = if sigma > 0.0 {
-            sigma * random.normals()[0]
-        } else {
-            0.0
-        };
+        let noise = if sigma > 0.0 { sigma * random.normals()[0] } else { 0.0 };
         let measured = range + noise + self.scanner.range_bias;
         let light = f64::from(surface.reflectance) * (0.15 + 0.85 * cosine);
         let fade = 1.0 / (1.0 + (range / HALF_LIGHT).powi(2));
@@ -233,20 +204,17 @@ impl Station {
         let origin = self.origin;
         let thin = |b: &Beam| b.hit.is_some_and(|h| surfaces[h.surface as usize].is_thin);
         thin(beam)
-            || neighbours
-                .into_iter()
-                .flatten()
-                .any(|other| match (&beam.hit, &other.hit) {
-                    (None, None) => false,
-                    (Some(a), Some(b)) => {
-                        thin(other)
-                            || (a.triangle != b.triangle
-                                && (beams.plane_range(a.triangle, &origin, &other.along) - b.range)
-                                    .abs()
-                                    > EDGE)
-                    }
-                    _ => true,
-                })
+            || neighbours.into_iter().flatten().any(|other| match (&beam.hit, &other.hit) {
+                (None, None) => false,
+                (Some(a), Some(b)) => {
+                    thin(other)
+                        || (a.triangle != b.triangle
+                            && (beams.plane_range(a.triangle, &origin, &other.along) - b.range)
+                                .abs()
+                                > EDGE)
+                }
+                _ => true,
+            })
     }
 
     /// What a wide beam measures: its thin parts are grouped by range, the strongest group wins (the nearest of
@@ -261,13 +229,8 @@ impl Station {
     ) -> Option<(Hit, f64, bool)> {
         let origin = self.origin;
         let seen = |b: &Beam| b.hit.map(|h| h.range);
-        let near = seen(beam).or_else(|| {
-            neighbours
-                .into_iter()
-                .flatten()
-                .filter_map(seen)
-                .min_by(f64::total_cmp)
-        })?;
+        let near = seen(beam)
+            .or_else(|| neighbours.into_iter().flatten().filter_map(seen).min_by(f64::total_cmp))?;
         let radius = (mixed.radius + mixed.divergence * near) * RING / near.max(0.1);
         let (u, v) = across(&beam.along);
         let phase = self.random(row, col, 2).unit();
@@ -311,9 +274,6 @@ struct Beam {
 
 /// Two unit vectors across a unit vector, the first one level where that is possible.
 fn across(along: &Vector) -> (Vector, Vector) {
-    let u = Vector::z()
-        .cross(along)
-        .try_normalize(1e-6)
-        .unwrap_or_else(Vector::x);
+    let u = Vector::z().cross(along).try_normalize(1e-6).unwrap_or_else(Vector::x);
     (u, along.cross(&u))
 }

@@ -111,9 +111,7 @@ impl Raster {
     /// Number of columns.
     #[must_use]
     pub fn n_cols(&self) -> u32 {
-        ((self.azimuth_deg[1] - self.azimuth_deg[0]) / self.step())
-            .round()
-            .max(1.0) as u32
+        ((self.azimuth_deg[1] - self.azimuth_deg[0]) / self.step()).round().max(1.0) as u32
     }
 
     /// Elevation of a row's middle, radians.
@@ -146,12 +144,7 @@ pub struct Mixed {
 
 impl Default for Mixed {
     fn default() -> Self {
-        Self {
-            sub_beams: 5,
-            radius: 0.0011,
-            divergence: 0.000_15,
-            depth: 0.6,
-        }
+        Self { sub_beams: 5, radius: 0.0011, divergence: 0.000_15, depth: 0.6 }
     }
 }
 
@@ -180,11 +173,8 @@ impl Scanner {
             let at = Translation3::from(Vector::from(self.position));
             Ok(Pose::from_parts(at, UnitQuaternion::from_quaternion(turn)))
         } else {
-            Err(Error::bad_input(format!(
-                "quaternion is not of unit length: \"{}\"",
-                turn.norm()
-            ))
-            .at(&self.name))
+            Err(Error::bad_input(format!("quaternion is not of unit length: \"{}\"", turn.norm()))
+                .at(&self.name))
         }
     }
 

@@ -371,12 +371,7 @@ impl Scene {
     pub fn ground(&self, x: f64, y: f64) -> f64 {
         let Some(floor) = &self.floor else { return 0.0 };
         let inside = |l: &&Level| x >= l.min[0] && x <= l.max[0] && y >= l.min[1] && y <= l.max[1];
-        let raised = floor
-            .levels
-            .iter()
-            .filter(inside)
-            .map(|l| l.height)
-            .fold(0.0, f64::max);
+        let raised = floor.levels.iter().filter(inside).map(|l| l.height).fold(0.0, f64::max);
         raised + floor.base_height(x, y)
     }
 
@@ -384,11 +379,7 @@ impl Scene {
     #[must_use]
     pub fn ground_size(&self) -> [f64; 2] {
         let hall = self.hall.as_ref().map(|h| [h.size[0], h.size[1]]);
-        self.floor
-            .as_ref()
-            .and_then(|f| f.size)
-            .or(hall)
-            .unwrap_or([20.0, 20.0])
+        self.floor.as_ref().and_then(|f| f.size).or(hall).unwrap_or([20.0, 20.0])
     }
 }
 

@@ -100,11 +100,7 @@ impl Simulator {
             n_beams: u64::from(s.frame.n_rows) * u64::from(s.frame.n_cols),
             n_points: 0,
         });
-        Truth {
-            schema: SCHEMA.into(),
-            robots: self.robots.clone(),
-            scans: scans.collect(),
-        }
+        Truth { schema: SCHEMA.into(), robots: self.robots.clone(), scans: scans.collect() }
     }
 }
 
@@ -123,9 +119,7 @@ fn true_robots(scene: &Scene, models: &[Model], world: &World) -> Vec<TrueRobot>
                 model: model.name.clone(),
                 base_link: model.links[0].name.clone(),
                 base_pose: (&base).into(),
-                joints: joints
-                    .map(|(&j, v)| (model.joints[j].name.clone(), *v))
-                    .collect(),
+                joints: joints.map(|(&j, v)| (model.joints[j].name.clone(), *v)).collect(),
                 links: model.links.iter().map(|l| l.name.clone()).collect(),
             }
         })

@@ -56,9 +56,7 @@ impl Spot<'_> {
         let walls: Vec<([f64; 3], [f64; 3])> = keep_out(scene, &self.name);
         let allowed = |p: &Point| {
             let inside = (0..2).all(|i| p[i] > self.min[i] && p[i] < self.max[i]);
-            let taken = walls
-                .iter()
-                .any(|(a, b)| (0..3).all(|i| p[i] > a[i] && p[i] < b[i]));
+            let taken = walls.iter().any(|(a, b)| (0..3).all(|i| p[i] > a[i] && p[i] < b[i]));
             inside && !taken && p.z > scene.ground(p.x, p.y) - FLOOR_SLACK
         };
         let mut postures = Postures::new(model);
@@ -75,9 +73,7 @@ impl Spot<'_> {
         }
         let posture = postures.draw(random, &place.world_from_base(), allowed)?;
         let joints = model.free.iter().zip(posture);
-        place.posture = joints
-            .map(|(&j, v)| (model.joints[j].name.clone(), v))
-            .collect();
+        place.posture = joints.map(|(&j, v)| (model.joints[j].name.clone(), v)).collect();
         Ok(place)
     }
 
@@ -108,10 +104,7 @@ impl Spot<'_> {
 /// Boxes that arms must stay out of: furniture, and stands (a robot's own one up to just below its top).
 fn keep_out(scene: &Scene, own: &str) -> Vec<([f64; 3], [f64; 3])> {
     let around = |xy: [f64; 2], half: [f64; 2], low: f64, high: f64| {
-        (
-            [xy[0] - half[0], xy[1] - half[1], low],
-            [xy[0] + half[0], xy[1] + half[1], high],
-        )
+        ([xy[0] - half[0], xy[1] - half[1], low], [xy[0] + half[0], xy[1] + half[1], high])
     };
     let stands = scene.stands.iter().map(|s| {
         let slack = if s.name == own { 0.01 } else { 0.0 };
@@ -127,20 +120,8 @@ fn keep_out(scene: &Scene, own: &str) -> Vec<([f64; 3], [f64; 3])> {
     });
     let boxes = scene.boxes.iter().map(|b| {
         let half = 0.5 * b.size[0].hypot(b.size[1]);
-        around(
-            [b.xyz[0], b.xyz[1]],
-            [half; 2],
-            -1.0,
-            b.xyz[2] + 0.5 * b.size[2],
-        )
+        around([b.xyz[0], b.xyz[1]], [half; 2], -1.0, b.xyz[2] + 0.5 * b.size[2])
     });
-    let columns = scene
-        .columns
-        .iter()
-        .map(|c| around(c.xy, [1.6 * c.radius; 2], -1.0, c.height));
-    stands
-        .chain(furniture)
-        .chain(boxes)
-        .chain(columns)
-        .collect()
+    let columns = scene.columns.iter().map(|c| around(c.xy, [1.6 * c.radius; 2], -1.0, c.height));
+    stands.chain(furniture).chain(boxes).chain(columns).collect()
 }

@@ -69,11 +69,7 @@ impl World {
             let corners = t.map(|i| vertices[i as usize]);
             let triangle = corners.map(|p| Vec3A::new(p.x as f32, p.y as f32, p.z as f32));
             // Triangles without area have no plane to meet.
-            if (triangle[1] - triangle[0])
-                .cross(triangle[2] - triangle[0])
-                .length_squared()
-                > 0.0
-            {
+            if (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).length_squared() > 0.0 {
                 self.triangles.push(triangle);
                 self.surface_of.push(at);
             }
@@ -81,39 +77,17 @@ impl World {
     }
 
     fn add_hall(&mut self, scene: &Scene) {
-        let fixed = Surface {
-            label: Label::FIXED,
-            reflectance: GREY,
-            is_thin: false,
-        };
+        let fixed = Surface { label: Label::FIXED, reflectance: GREY, is_thin: false };
         let (ground, faces) = hall::ground(scene);
         let lowest = ground.vertices.iter().map(|p| p.z).fold(0.0, f64::min);
-        self.add(
-            Surface {
-                label: Label::FLOOR,
-                ..fixed
-            },
-            &ground,
-        );
+        self.add(Surface { label: Label::FLOOR, ..fixed }, &ground);
         self.add(fixed, &faces);
         if let Some(building) = &scene.hall {
-            self.add(
-                Surface {
-                    reflectance: 0.8,
-                    ..fixed
-                },
-                &hall::building(building, lowest),
-            );
+            self.add(Surface { reflectance: 0.8, ..fixed }, &hall::building(building, lowest));
         }
         for b in &scene.boxes {
-            let surface = Surface {
-                reflectance: b.reflectance as f32,
-                ..fixed
-            };
-            self.add(
-                surface,
-                &cuboid(b.size, 0.002).posed(&pose(b.xyz, b.rpy_deg)),
-            );
+            let surface = Surface { reflectance: b.reflectance as f32, ..fixed };
+            self.add(surface, &cuboid(b.size, 0.002).posed(&pose(b.xyz, b.rpy_deg)));
         }
         let z = |xy: [f64; 2]| scene.ground(xy[0], xy[1]);
         for c in &scene.columns {
@@ -122,13 +96,7 @@ impl World {
         for f in &scene.fences {
             let (posts, wires) = hall::fence(f, |x, y| scene.ground(x, y));
             self.add(fixed, &posts);
-            self.add(
-                Surface {
-                    is_thin: true,
-                    ..fixed
-                },
-                &wires,
-            );
+            self.add(Surface { is_thin: true, ..fixed }, &wires);
         }
         for f in &scene.conveyors {
             self.add(fixed, &hall::conveyor(f, z(f.xy)));
@@ -142,47 +110,22 @@ impl World {
     }
 
     fn add_robot(&mut self, index: usize, place: &RobotPlace, models: &[Model]) -> Result<()> {
-        let at = models
-            .iter()
-            .position(|m| m.name == place.model)
-            .ok_or_else(|| {
-                Error::bad_input(format!(
-                    "no model of the library has this name: \"{}\"",
-                    place.model
-                ))
-            })?;
+        let at = models.iter().position(|m| m.name == place.model).ok_or_else(|| {
+            Error::bad_input(format!("no model of the library has this name: \"{}\"", place.model))
+        })?;
         let model = &models[at];
         let posture = posture_of(place, model)?;
         let world_from_base = place.world_from_base();
-        let poses: Vec<Pose> = model
-            .poses(&posture)
-            .iter()
-            .map(|p| world_from_base * p)
-            .collect();
+        let poses: Vec<Pose> = model.poses(&posture).iter().map(|p| world_from_base * p).collect();
         for (link, part) in model.links.iter().enumerate() {
-            let kind = if part.role == Role::Effector {
-                PointKind::Attachment
-            } else {
-                PointKind::Link
-            };
-            let label = Label {
-                kind,
-                robot: index_i16(index)?,
-                link: index_i16(link)?,
-            };
+            let kind =
+                if part.role == Role::Effector { PointKind::Attachment } else { PointKind::Link };
+            let label = Label { kind, robot: index_i16(index)?, link: index_i16(link)? };
             let vertices = place_mesh(&part.mesh, &poses[link]);
-            let surface = Surface {
-                label,
-                reflectance: PAINT,
-                is_thin: false,
-            };
+            let surface = Surface { label, reflectance: PAINT, is_thin: false };
             self.add_mesh(surface, &vertices, &part.mesh.triangles);
         }
-        self.robots.push(PlacedRobot {
-            model: at,
-            posture,
-            world_from_link: poses,
-        });
+        self.robots.push(PlacedRobot { model: at, posture, world_from_link: poses });
         Ok(())
     }
 
@@ -209,22 +152,12 @@ impl World {
             let held = held.map_err(|e| e.at(format!("hose \"{}\"", hose.name)))?;
             // A hose that is held by the foot only stands still.
             let moves = |a: &&Anchor| {
-                a.link
-                    .as_ref()
-                    .is_some_and(|link| !self.is_root(scene, models, a, link))
+                a.link.as_ref().is_some_and(|link| !self.is_root(scene, models, a, link))
             };
-            let owner = hose
-                .anchors
-                .iter()
-                .find(moves)
-                .and_then(|a| a.robot.as_ref());
+            let owner = hose.anchors.iter().find(moves).and_then(|a| a.robot.as_ref());
             let surface = match owner {
                 Some(name) => attachment(robot_index(scene, name)?, BLACK)?,
-                None => Surface {
-                    label: Label::FIXED,
-                    reflectance: BLACK,
-                    is_thin: false,
-                },
+                None => Surface { label: Label::FIXED, reflectance: BLACK, is_thin: false },
             };
             self.add(surface, &attach::hose(hose, &held));
         }
@@ -240,10 +173,7 @@ impl World {
     }
 
     fn is_root(&self, scene: &Scene, models: &[Model], anchor: &Anchor, link: &str) -> bool {
-        let index = anchor
-            .robot
-            .as_ref()
-            .and_then(|name| robot_index(scene, name).ok());
+        let index = anchor.robot.as_ref().and_then(|name| robot_index(scene, name).ok());
         index.is_none_or(|i| models[self.robots[i].model].links[0].name == link)
     }
 
@@ -259,42 +189,24 @@ impl World {
         let Some(link) = link else {
             return Ok(placed.world_from_link[0]);
         };
-        let at = model
-            .links
-            .iter()
-            .position(|l| l.name == link)
-            .ok_or_else(|| {
-                let names: Vec<&str> = model.links.iter().map(|l| l.name.as_str()).collect();
-                Error::bad_input(format!(
-                    "model \"{}\" has no such link: \"{link}\"",
-                    model.name
-                ))
+        let at = model.links.iter().position(|l| l.name == link).ok_or_else(|| {
+            let names: Vec<&str> = model.links.iter().map(|l| l.name.as_str()).collect();
+            Error::bad_input(format!("model \"{}\" has no such link: \"{link}\"", model.name))
                 .at(format!("robot \"{robot}\""))
                 .hint(format!("its links are {}", names.join(", ")))
-            })?;
+        })?;
         Ok(placed.world_from_link[at])
     }
 }
 
 fn attachment(robot: usize, reflectance: f32) -> Result<Surface> {
-    let label = Label {
-        kind: PointKind::Attachment,
-        robot: index_i16(robot)?,
-        link: -1,
-    };
-    Ok(Surface {
-        label,
-        reflectance,
-        is_thin: false,
-    })
+    let label = Label { kind: PointKind::Attachment, robot: index_i16(robot)?, link: -1 };
+    Ok(Surface { label, reflectance, is_thin: false })
 }
 
 fn index_i16(index: usize) -> Result<i16> {
     i16::try_from(index).map_err(|_| {
-        Error::new(
-            contract::Kind::Unsupported,
-            format!("labels count to 32767: \"{index}\""),
-        )
+        Error::new(contract::Kind::Unsupported, format!("labels count to 32767: \"{index}\""))
     })
 }
 
@@ -307,10 +219,7 @@ fn robot_index(scene: &Scene, name: &str) -> Result<usize> {
 }
 
 fn place_mesh(mesh: &Mesh, pose: &Pose) -> Vec<Point> {
-    mesh.vertices
-        .iter()
-        .map(|v| pose * Point::new(v[0].into(), v[1].into(), v[2].into()))
-        .collect()
+    mesh.vertices.iter().map(|v| pose * Point::new(v[0].into(), v[1].into(), v[2].into())).collect()
 }
 
 /// The posture of a robot of the scene: named values, and the model's home for the rest.
@@ -320,16 +229,10 @@ fn place_mesh(mesh: &Mesh, pose: &Pose) -> Vec<Point> {
 fn posture_of(place: &RobotPlace, model: &Model) -> Result<Vec<f64>> {
     let mut posture = model.home();
     for (name, value) in &place.posture {
-        let free = model
-            .free
-            .iter()
-            .position(|&j| model.joints[j].name == *name)
-            .ok_or_else(|| {
-                let names: Vec<&str> = model
-                    .free
-                    .iter()
-                    .map(|&j| model.joints[j].name.as_str())
-                    .collect();
+        let free =
+            model.free.iter().position(|&j| model.joints[j].name == *name).ok_or_else(|| {
+                let names: Vec<&str> =
+                    model.free.iter().map(|&j| model.joints[j].name.as_str()).collect();
                 Error::bad_input(format!(
                     "model \"{}\" has no such free joint: \"{name}\"",
                     model.name

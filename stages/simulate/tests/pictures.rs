@@ -64,11 +64,7 @@ fn looking(name: &str, from: [f64; 3], at: [f64; 3], half_deg: f64) -> Scanner {
 }
 
 fn views(model: &Model, posture: &[f64], tag: &str, folder: &Path) {
-    let reach = model
-        .bounds_at(posture)
-        .size()
-        .into_iter()
-        .fold(0.0, f64::max);
+    let reach = model.bounds_at(posture).size().into_iter().fold(0.0, f64::max);
     let place = RobotPlace {
         name: "r".into(),
         model: model.name.clone(),
@@ -82,11 +78,7 @@ fn views(model: &Model, posture: &[f64], tag: &str, folder: &Path) {
     };
     let middle = model.bounds_at(posture).center();
     let from = |x: f64, y: f64, z: f64| {
-        [
-            middle.x + x * reach * 2.5,
-            middle.y + y * reach * 2.5,
-            middle.z + z * reach * 2.5,
-        ]
+        [middle.x + x * reach * 2.5, middle.y + y * reach * 2.5, middle.z + z * reach * 2.5]
     };
     let at = [middle.x, middle.y, middle.z];
     let scene = Scene {
@@ -107,11 +99,7 @@ fn views(model: &Model, posture: &[f64], tag: &str, folder: &Path) {
     };
     let simulator = Simulator::new(&scene, std::slice::from_ref(model)).unwrap();
     for k in 0..3 {
-        picture(
-            &simulator,
-            k,
-            &folder.join(format!("{}_{tag}_{k}.ppm", model.name)),
-        );
+        picture(&simulator, k, &folder.join(format!("{}_{tag}_{k}.ppm", model.name)));
     }
 }
 
@@ -158,9 +146,7 @@ fn demo_scene() {
         let from = [[5.5, -4.5, 4.6], [-0.6, -3.4, 1.7], [0.4, 4.7, 4.0]];
         let at = [[-0.5, 0.5, 0.5], [-2.8, 1.6, 1.0], [3.0, -1.5, 1.0]];
         let half = [38.0, 30.0, 30.0];
-        scene.scanners = (0..3)
-            .map(|k| looking(&k.to_string(), from[k], at[k], half[k]))
-            .collect();
+        scene.scanners = (0..3).map(|k| looking(&k.to_string(), from[k], at[k], half[k])).collect();
         let simulator = Simulator::new(&scene, &models).unwrap();
         for k in 0..3 {
             picture(&simulator, k, &folder.join(format!("scene_{seed}_{k}.ppm")));

@@ -20,32 +20,17 @@ fn flat(size: f64) -> Option<Floor> {
 }
 
 fn exact(step_deg: f64) -> Scanner {
-    let raster = Raster {
-        step_deg,
-        ..Raster::default()
-    };
-    Scanner {
-        name: "s".into(),
-        raster,
-        noise: 0.0,
-        ..Scanner::default()
-    }
+    let raster = Raster { step_deg, ..Raster::default() };
+    Scanner { name: "s".into(), raster, noise: 0.0, ..Scanner::default() }
 }
 
 fn scan(scene: &Scene) -> SimColumns {
-    Simulator::new(scene, &[common::two_boxes()])
-        .unwrap()
-        .scan(0)
-        .columns
+    Simulator::new(scene, &[common::two_boxes()]).unwrap().scan(0).columns
 }
 
 #[test]
 fn range_to_the_floor_is_exact_and_the_sky_does_not_answer() {
-    let scene = Scene {
-        floor: flat(20.0),
-        scanners: vec![exact(0.5)],
-        ..Scene::default()
-    };
+    let scene = Scene { floor: flat(20.0), scanners: vec![exact(0.5)], ..Scene::default() };
     let simulator = Simulator::new(&scene, &[]).unwrap();
     let frame = simulator.frame(0).clone();
     let columns = simulator.scan(0).columns;
@@ -81,11 +66,7 @@ fn range_to_a_column_is_that_of_a_cylinder() {
         height: 3.0,
         section: Default::default(),
     };
-    let scene = Scene {
-        columns: vec![column],
-        scanners: vec![exact(0.2)],
-        ..Scene::default()
-    };
+    let scene = Scene { columns: vec![column], scanners: vec![exact(0.2)], ..Scene::default() };
     let simulator = Simulator::new(&scene, &[]).unwrap();
     let (frame, columns) = (simulator.frame(0).clone(), simulator.scan(0).columns);
     let mut n = 0;
@@ -99,10 +80,7 @@ fn range_to_a_column_is_that_of_a_cylinder() {
         let height = 1.6 + along * d[2] / flat;
         if across < 0.25 && x > 0.0 && (0.2..2.9).contains(&height) {
             // 48 facets: 0.64 mm inside the cylinder at most, more along an oblique beam.
-            assert!(
-                columns.hit[i] && (columns.range[i] - along / flat).abs() < 0.002,
-                "{i}"
-            );
+            assert!(columns.hit[i] && (columns.range[i] - along / flat).abs() < 0.002, "{i}");
             n += 1;
         }
     }
@@ -135,11 +113,7 @@ fn busy() -> Scene {
     };
     Scene {
         seed: 5,
-        hall: Some(Hall {
-            size: [8.0, 8.0, 4.0],
-            walls: true,
-            ceiling: true,
-        }),
+        hall: Some(Hall { size: [8.0, 8.0, 4.0], walls: true, ceiling: true }),
         floor: Some(Floor {
             size: None,
             tilt_deg: [0.2, -0.1],
@@ -149,13 +123,7 @@ fn busy() -> Scene {
         }),
         robots: vec![place],
         hoses: vec![hose],
-        scanners: vec![
-            Scanner {
-                name: "first".into(),
-                ..exact(1.0)
-            },
-            scanner,
-        ],
+        scanners: vec![Scanner { name: "first".into(), ..exact(1.0) }, scanner],
         ..Scene::default()
     }
 }
@@ -168,10 +136,7 @@ fn columns_are_the_same_however_they_are_split() {
     let n_rows = whole.n_rows as usize;
     for cols in [0..1, 0..7, 100..163, 719..720, 713..5000] {
         let part = simulator.columns(1, cols.clone());
-        assert_eq!(
-            part.len(),
-            (cols.end.min(720) - cols.start) as usize * n_rows
-        );
+        assert_eq!(part.len(), (cols.end.min(720) - cols.start) as usize * n_rows);
         let from = cols.start as usize * n_rows;
         let to = from + part.len();
         assert_eq!(part.xyz, whole.xyz[from..to]);
@@ -189,10 +154,7 @@ fn columns_are_the_same_however_they_are_split() {
 #[test]
 fn labels_tell_links_hoses_floor_and_hall_apart() {
     let mut scene = busy();
-    scene.scanners = vec![Scanner {
-        mixed: Some(Mixed::default()),
-        ..exact(0.2)
-    }];
+    scene.scanners = vec![Scanner { mixed: Some(Mixed::default()), ..exact(0.2) }];
     scene.robots[0].posture.insert("turn".into(), 1.0);
     let columns = scan(&scene);
     let at = |i: usize| {
@@ -204,10 +166,8 @@ fn labels_tell_links_hoses_floor_and_hall_apart() {
         let [x, y, z] = at(i);
         let label = columns.label[i];
         let (dx, dy) = (x - 2.0, y - 1.0);
-        let (along, across) = (
-            dx * 1.0_f64.cos() + dy * 1.0_f64.sin(),
-            dy * 1.0_f64.cos() - dx * 1.0_f64.sin(),
-        );
+        let (along, across) =
+            (dx * 1.0_f64.cos() + dy * 1.0_f64.sin(), dy * 1.0_f64.cos() - dx * 1.0_f64.sin());
         let in_arm = along > -0.01 && along < 1.01 && across.abs() < 0.11 && (z - 0.5).abs() < 0.11;
         let in_foot = dx.abs() < 0.21 && dy.abs() < 0.21 && z < 0.41;
         match (label.kind, label.robot, label.link) {
@@ -239,16 +199,9 @@ fn wide_beams_hang_in_the_air_at_edges_and_nowhere_else() {
         rpy_deg: [0.0; 3],
         reflectance: 0.5,
     };
-    let far = Cuboid {
-        xyz: [3.5, 0.0, 1.6],
-        size: [0.1, 4.0, 4.0],
-        ..near.clone()
-    };
-    let mut scene = Scene {
-        boxes: vec![near, far],
-        scanners: vec![exact(0.05)],
-        ..Scene::default()
-    };
+    let far = Cuboid { xyz: [3.5, 0.0, 1.6], size: [0.1, 4.0, 4.0], ..near.clone() };
+    let mut scene =
+        Scene { boxes: vec![near, far], scanners: vec![exact(0.05)], ..Scene::default() };
     scene.scanners[0].raster.elevation_deg = [-10.0, 10.0];
     scene.scanners[0].raster.azimuth_deg = [-14.03, 14.0];
     let on_face = |columns: &SimColumns, i: usize| {
@@ -261,42 +214,27 @@ fn wide_beams_hang_in_the_air_at_edges_and_nowhere_else() {
             || ((x - 2.95).abs() < 0.0025 && z.abs() > 0.49)
     };
     let thin = scan(&scene);
-    assert!(
-        (0..thin.len())
-            .filter(|&i| thin.hit[i])
-            .all(|i| on_face(&thin, i))
-    );
+    assert!((0..thin.len()).filter(|&i| thin.hit[i]).all(|i| on_face(&thin, i)));
     scene.scanners[0].mixed = Some(Mixed::default());
     let wide = scan(&scene);
-    let floating: Vec<usize> = (0..wide.len())
-        .filter(|&i| wide.hit[i] && !on_face(&wide, i))
-        .collect();
+    let floating: Vec<usize> =
+        (0..wide.len()).filter(|&i| wide.hit[i] && !on_face(&wide, i)).collect();
     assert!(floating.len() > 200, "{}", floating.len());
     for &i in &floating {
         let [x, y, z] = wide.xyz[i];
         assert!(wide.mixed[i] && x > 2.95 && x < 3.45, "{x}");
-        let edge = (0.5 * x / 2.95 - y.abs())
-            .abs()
-            .min((0.5 * x / 2.95 - z.abs()).abs());
+        let edge = (0.5 * x / 2.95 - y.abs()).abs().min((0.5 * x / 2.95 - z.abs()).abs());
         assert!(edge < 0.003, "{edge}");
     }
     // Twice as deep as the parts may lie apart: the stronger part wins, nothing hangs in the air.
     scene.boxes[1].xyz[0] = 4.5;
     let split = scan(&scene);
-    assert!(
-        (0..split.len())
-            .filter(|&i| split.hit[i])
-            .all(|i| !split.mixed[i])
-    );
+    assert!((0..split.len()).filter(|&i| split.hit[i]).all(|i| !split.mixed[i]));
 }
 
 #[test]
 fn noise_and_dropouts_have_the_stated_size() {
-    let mut scene = Scene {
-        floor: flat(40.0),
-        scanners: vec![exact(0.25)],
-        ..Scene::default()
-    };
+    let mut scene = Scene { floor: flat(40.0), scanners: vec![exact(0.25)], ..Scene::default() };
     scene.scanners[0].raster.elevation_deg = [-60.0, -10.0];
     scene.scanners[0].noise = 0.002;
     scene.scanners[0].dropouts = 0.1;
@@ -313,10 +251,7 @@ fn noise_and_dropouts_have_the_stated_size() {
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     let sigma =
         (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
-    assert!(
-        (mean - 0.003).abs() < 2e-5 && (sigma - 0.002).abs() < 2e-5,
-        "{mean} {sigma}"
-    );
+    assert!((mean - 0.003).abs() < 2e-5 && (sigma - 0.002).abs() < 2e-5, "{mean} {sigma}");
 }
 
 #[test]
@@ -330,15 +265,9 @@ fn stated_pose_differs_from_the_true_one_by_the_registration_error() {
         frame.world_from_scan.translation.vector - frame.true_world_from_scan.translation.vector;
     assert!((shift.norm() - 0.003).abs() < 1e-9);
     let truth = simulator.truth();
-    assert_eq!(
-        truth.robots[0].base_pose.xyz,
-        [400_002.0, 5_000_001.0, 100.0]
-    );
+    assert_eq!(truth.robots[0].base_pose.xyz, [400_002.0, 5_000_001.0, 100.0]);
     assert_eq!(truth.robots[0].links, ["foot", "arm"]);
-    assert_eq!(
-        simulate::Truth::from_json(&truth.to_json().unwrap()).unwrap(),
-        truth
-    );
+    assert_eq!(simulate::Truth::from_json(&truth.to_json().unwrap()).unwrap(), truth);
 }
 
 #[test]
@@ -352,10 +281,7 @@ fn a_scene_survives_its_file_and_mistakes_are_named() {
         ("[[scanner]]\nraster = {step_deg = 0.001}", "raster"),
         ("[[scanner]]\nquaternion_wxyz = [0,0,0,0]", "quaternion"),
         ("[[scanner]]\n[[scanner]]", "same name"),
-        (
-            "[[carried]]\nrobot = \"x\"\nlink = \"y\"\nxyz = [0,0,0]\nsize = [1,1,1]",
-            "no robot",
-        ),
+        ("[[carried]]\nrobot = \"x\"\nlink = \"y\"\nxyz = [0,0,0]\nsize = [1,1,1]", "no robot"),
     ] {
         let error = Scene::from_toml(text).unwrap_err();
         assert_eq!(error.kind(), contract::Kind::BadInput);
@@ -363,10 +289,7 @@ fn a_scene_survives_its_file_and_mistakes_are_named() {
     }
     let mut wrong = scene.clone();
     wrong.robots[0].posture.insert("twist".into(), 0.0);
-    let error = Simulator::new(&wrong, &[common::two_boxes()])
-        .err()
-        .unwrap()
-        .to_string();
+    let error = Simulator::new(&wrong, &[common::two_boxes()]).err().unwrap().to_string();
     assert!(
         error.contains("robot \"r\"") && error.contains("twist") && error.contains("turn"),
         "{error}"

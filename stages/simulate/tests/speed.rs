@@ -9,12 +9,7 @@ use simulate::scene::Scanner;
 /// Time that this thread has had a processor, seconds: other programs do not count. Linux only.
 fn cpu_seconds() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
-    text.split_whitespace()
-        .next()
-        .unwrap()
-        .parse::<f64>()
-        .unwrap()
-        * 1e-9
+    text.split_whitespace().next().unwrap().parse::<f64>().unwrap() * 1e-9
 }
 
 #[test]
@@ -22,23 +17,14 @@ fn cpu_seconds() -> f64 {
 fn beams_a_second() {
     let models = library::load().models;
     let demo = simulate::demo_scene(1, &models).unwrap();
-    let model = models
-        .iter()
-        .find(|m| m.name == simulate::demo_robots::WELDER)
-        .unwrap();
+    let model = models.iter().find(|m| m.name == simulate::demo_robots::WELDER).unwrap();
     let paper = simulate::paper_scene(1, model, &model.home(), 5_000_000);
     for (name, scene) in [("demo", demo), ("paper", paper)] {
         for is_wide in [true, false] {
             let mut scene = scene.clone();
             if !is_wide {
-                scene.scanners = scene
-                    .scanners
-                    .iter()
-                    .map(|s| Scanner {
-                        mixed: None,
-                        ..s.clone()
-                    })
-                    .collect();
+                scene.scanners =
+                    scene.scanners.iter().map(|s| Scanner { mixed: None, ..s.clone() }).collect();
             }
             let start = cpu_seconds();
             let simulator = Simulator::new(&scene, &models).unwrap();

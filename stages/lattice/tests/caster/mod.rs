@@ -7,13 +7,7 @@ use geometry::{Aabb, Point, Pose, Vector};
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// z = tilt·(x, y) + wave·sin(x)·sin(y), inside bounds.
-    Ground {
-        z: f64,
-        tilt: [f64; 2],
-        wave: f64,
-        x: [f64; 2],
-        y: [f64; 2],
-    },
+    Ground { z: f64, tilt: [f64; 2], wave: f64, x: [f64; 2], y: [f64; 2] },
     /// Axis-aligned box, seen from outside or inside.
     Block { min: [f64; 3], max: [f64; 3] },
     /// Cylinder from a to b, open ends.
@@ -23,13 +17,7 @@ pub enum Shape {
 impl Shape {
     fn hit(&self, o: &Vector, d: &Vector) -> Option<f64> {
         match self {
-            Self::Ground {
-                z,
-                tilt,
-                wave,
-                x,
-                y,
-            } => {
+            Self::Ground { z, tilt, wave, x, y } => {
                 let height =
                     |p: &Vector| z + tilt[0] * p.x + tilt[1] * p.y + wave * p.x.sin() * p.y.sin();
                 let slope = d.z - tilt[0] * d.x - tilt[1] * d.y;
@@ -141,27 +129,15 @@ impl Scene {
             let a = lattice.first_azimuth + (j as f64 + dj) * lattice.col_step;
             Vector::from(geometry::direction::unit(a, e))
         };
-        let (i0, j0) = (
-            i64::from(row * TILE_SIDE) - 1,
-            i64::from(col * TILE_SIDE) - 1,
-        );
+        let (i0, j0) = (i64::from(row * TILE_SIDE) - 1, i64::from(col * TILE_SIDE) - 1);
         let world = |d: &Vector| scan.world_from_scan.rotation * d;
         let centres: Vec<(f64, usize)> = (0..side * side)
-            .map(|k| {
-                self.cast(
-                    &o,
-                    &world(&direction(i0 + k / side, j0 + k % side, 0.0, 0.0)),
-                )
-            })
+            .map(|k| self.cast(&o, &world(&direction(i0 + k / side, j0 + k % side, 0.0, 0.0))))
             .collect();
         let mut random = Random(u64::from(row) << 32 | u64::from(col));
         let mut out = Truth {
             tile: Tile {
-                at: TileAt {
-                    scan: scan.id,
-                    row,
-                    col,
-                },
+                at: TileAt { scan: scan.id, row, col },
                 first_place: 0,
                 place: Vec::new(),
                 pixel: Vec::new(),
@@ -174,10 +150,7 @@ impl Scene {
         };
         for k in 0..side * side {
             let (i, j) = (k / side, k % side);
-            let pixel = Pixel {
-                row: (i0 + i).max(0) as u32,
-                col: (j0 + j).max(0) as u32,
-            };
+            let pixel = Pixel { row: (i0 + i).max(0) as u32, col: (j0 + j).max(0) as u32 };
             if i == 0 || j == 0 || i == side - 1 || j == side - 1 {
                 continue;
             }
@@ -255,48 +228,14 @@ pub const FOOT: usize = 6;
 pub fn room(wave: f64) -> Scene {
     let whole = ([-6.0, 6.0], [-4.0, 5.0]);
     let shapes = vec![
-        Shape::Ground {
-            z: 0.0,
-            tilt: [0.01, -0.004],
-            wave,
-            x: whole.0,
-            y: whole.1,
-        },
-        Shape::Block {
-            min: [-6.0, -4.0, -1.0],
-            max: [6.0, 5.0, 3.0],
-        },
-        Shape::Pipe {
-            a: Vector::new(-5.0, 2.0, 1.8),
-            b: Vector::new(5.5, 2.5, 1.8),
-            r: 0.05,
-        },
-        Shape::Block {
-            min: [2.0, -2.0, 0.70],
-            max: [3.6, -1.2, 0.74],
-        },
-        Shape::Block {
-            min: [2.1, -1.9, -0.2],
-            max: [2.16, -1.84, 0.7],
-        },
-        Shape::Block {
-            min: [-2.3, 0.7, -0.2],
-            max: [-1.7, 1.3, 0.5],
-        },
-        Shape::Pipe {
-            a: Vector::new(-2.0, 1.0, 0.4),
-            b: Vector::new(-2.0, 1.0, 1.2),
-            r: 0.24,
-        },
-        Shape::Pipe {
-            a: Vector::new(0.5, -3.0, -0.5),
-            b: Vector::new(0.5, -3.0, 2.6),
-            r: 0.2,
-        },
+        Shape::Ground { z: 0.0, tilt: [0.01, -0.004], wave, x: whole.0, y: whole.1 },
+        Shape::Block { min: [-6.0, -4.0, -1.0], max: [6.0, 5.0, 3.0] },
+        Shape::Pipe { a: Vector::new(-5.0, 2.0, 1.8), b: Vector::new(5.5, 2.5, 1.8), r: 0.05 },
+        Shape::Block { min: [2.0, -2.0, 0.70], max: [3.6, -1.2, 0.74] },
+        Shape::Block { min: [2.1, -1.9, -0.2], max: [2.16, -1.84, 0.7] },
+        Shape::Block { min: [-2.3, 0.7, -0.2], max: [-1.7, 1.3, 0.5] },
+        Shape::Pipe { a: Vector::new(-2.0, 1.0, 0.4), b: Vector::new(-2.0, 1.0, 1.2), r: 0.24 },
+        Shape::Pipe { a: Vector::new(0.5, -3.0, -0.5), b: Vector::new(0.5, -3.0, 2.6), r: 0.2 },
     ];
-    Scene {
-        shapes,
-        noise: 0.002,
-        noise_growth: 1e-4,
-    }
+    Scene { shapes, noise: 0.002, noise_growth: 1e-4 }
 }

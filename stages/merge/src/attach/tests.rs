@@ -42,12 +42,7 @@ fn fit() -> Fit {
         model_name: "m".into(),
         world_from_base: Pose::identity(),
         base_sigma: [0.0; 6],
-        joints: vec![JointFit {
-            name: "j1".into(),
-            value: 0.0,
-            sigma: 0.0,
-            determined: true,
-        }],
+        joints: vec![JointFit { name: "j1".into(), value: 0.0, sigma: 0.0, determined: true }],
         covariance: Vec::new(),
         score: 1.0,
         explained: 1.0,
@@ -84,19 +79,11 @@ fn attached(parts: &[Vec<ResidualVoxel>]) -> Attached {
 
 #[test]
 fn a_workpiece_in_the_gripper_is_carried_whole() {
-    let piece: Vec<_> = (0..40)
-        .flat_map(|x| (0..80).map(move |z| voxel([x, 0, z], 1, z)))
-        .collect();
+    let piece: Vec<_> =
+        (0..40).flat_map(|x| (0..80).map(move |z| voxel([x, 0, z], 1, z))).collect();
     let out = attached(&[piece]);
     assert_eq!(out.voxels.len(), 40 * 80);
-    assert_eq!(
-        out.label([3, 0, 79]),
-        Label {
-            kind: PointKind::Attachment,
-            robot: 0,
-            link: 1
-        }
-    );
+    assert_eq!(out.label([3, 0, 79]), Label { kind: PointKind::Attachment, robot: 0, link: 1 });
     assert_eq!(out.label([3, 1, 79]), Label::FIXED);
 }
 
@@ -105,11 +92,7 @@ fn a_hose_to_the_floor_is_cut_and_a_touched_wall_is_not_lost() {
     let mut hose: Vec<_> = (0..60).map(|z| voxel([0, 0, z], 1, z)).collect();
     hose[59].grounded = true;
     let out = attached(&[hose]);
-    let n = out
-        .voxels
-        .iter()
-        .filter(|v| v.1.kind == PointKind::Attachment)
-        .count();
+    let n = out.voxels.iter().filter(|v| v.1.kind == PointKind::Attachment).count();
     assert_eq!(n, 8, "15 cm of it stay with the robot");
     let mut wall = Vec::new();
     for x in -30_i32..=30 {
@@ -135,13 +118,7 @@ fn what_touches_the_base_or_nothing_is_fixed() {
 #[test]
 fn a_cable_between_base_and_arm_is_shared() {
     let cable: Vec<_> = (0..12)
-        .map(|z| {
-            if z < 6 {
-                voxel([0, 0, z], 0, z)
-            } else {
-                voxel([0, 0, z], 1, 11 - z)
-            }
-        })
+        .map(|z| if z < 6 { voxel([0, 0, z], 0, z) } else { voxel([0, 0, z], 1, 11 - z) })
         .collect();
     let out = attached(&[cable]);
     assert_eq!(out.label([0, 0, 0]), Label::FIXED);
@@ -152,18 +129,14 @@ fn a_cable_between_base_and_arm_is_shared() {
 fn cut_anywhere_the_answer_is_the_same() {
     let attach = Attach::new(&[fit()], &[model()], Settings::default());
     let part = |k: i32| -> Vec<ResidualVoxel> {
-        (0..40)
-            .map(|z| voxel([(z * 7 + k) % 3, k % 2, z], 1, (z * 13 + k * 5) % 37))
-            .collect()
+        (0..40).map(|z| voxel([(z * 7 + k) % 3, k % 2, z], 1, (z * 13 + k * 5) % 37)).collect()
     };
     let parts: Vec<_> = (0..9).map(part).collect();
     let whole = attached(&parts);
     for cut in 0..=parts.len() {
         let (mut a, mut b) = (attach.empty(), attach.empty());
         for (i, part) in parts.iter().enumerate() {
-            attach
-                .add(if i < cut { &mut a } else { &mut b }, part.clone())
-                .expect("add");
+            attach.add(if i < cut { &mut a } else { &mut b }, part.clone()).expect("add");
         }
         attach.join(&mut a, b).expect("join");
         assert_eq!(attach.finish(a).expect("finish"), whole);

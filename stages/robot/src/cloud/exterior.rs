@@ -73,11 +73,7 @@ impl Shell {
 
     /// Whether a ray of the hemisphere about `normal` leaves the mesh for good.
     fn escapes(&self, at: Vector3<f32>, normal: Vector3<f32>, ray: &Vector3<f32>) -> bool {
-        let helper = if normal.x.abs() < 0.7 {
-            Vector3::x()
-        } else {
-            Vector3::y()
-        };
+        let helper = if normal.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
         let e = normal.cross(&helper).normalize();
         let f = normal.cross(&e);
         let direction = e * ray.x + f * ray.y + normal * ray.z;
@@ -113,10 +109,7 @@ fn crosses(node: &BvhNode, origin: &Vector3<f32>, inverse: &Vector3<f32>) -> boo
     let (low, high) = ([low.x, low.y, low.z], [high.x, high.y, high.z]);
     let (mut enter, mut leave) = (0.0_f32, f32::INFINITY);
     for k in 0..3 {
-        let (a, b) = (
-            (low[k] - origin[k]) * inverse[k],
-            (high[k] - origin[k]) * inverse[k],
-        );
+        let (a, b) = ((low[k] - origin[k]) * inverse[k], (high[k] - origin[k]) * inverse[k]);
         enter = enter.max(a.min(b));
         leave = leave.min(a.max(b));
     }
@@ -151,10 +144,6 @@ fn hemisphere() -> [Vector3<f32>; N_RAYS] {
         let z = 1.0 - 0.92 * (at as f64 + 0.5) / N_RAYS as f64;
         let angle = 2.399_963_229_728_653 * at as f64 + 0.3; // golden angle
         let flat = (1.0 - z * z).sqrt();
-        Vector3::new(
-            (flat * angle.cos()) as f32,
-            (flat * angle.sin()) as f32,
-            z as f32,
-        )
+        Vector3::new((flat * angle.cos()) as f32, (flat * angle.sin()) as f32, z as f32)
     })
 }

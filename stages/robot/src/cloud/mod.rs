@@ -53,17 +53,10 @@ pub(crate) fn sample(mesh: &Mesh, spacing: f64, max_samples: usize) -> CadCloud 
     if whole <= 0.0 || !whole.is_finite() || spacing <= 0.0 || max_samples == 0 {
         return CadCloud::default();
     }
-    let n_wanted = (whole / (spacing * spacing))
-        .min(max_samples as f64 * 1.5)
-        .max(400.0);
+    let n_wanted = (whole / (spacing * spacing)).min(max_samples as f64 * 1.5).max(400.0);
     let mut random = Random(mesh.triangles.len() as u64);
-    let candidates = candidates(
-        mesh,
-        &areas,
-        whole,
-        (n_wanted * N_CANDIDATES) as usize,
-        &mut random,
-    );
+    let candidates =
+        candidates(mesh, &areas, whole, (n_wanted * N_CANDIDATES) as usize, &mut random);
     let n_candidates = candidates.len();
     let outer = outer(mesh, candidates);
     let area = whole * outer.len() as f64 / n_candidates.max(1) as f64;
@@ -106,21 +99,13 @@ fn candidates(
             continue;
         }
         let [a, b, c] = corners(mesh, triangle);
-        let Some(normal) = (b - a)
-            .cast::<f64>()
-            .cross(&(c - a).cast())
-            .try_normalize(0.0)
-        else {
+        let Some(normal) = (b - a).cast::<f64>().cross(&(c - a).cast()).try_normalize(0.0) else {
             continue;
         };
         // The R2 sequence (plastic number) from a random start.
         let (mut u, mut v) = (random.unit(), random.unit());
         while next < sum {
-            let (s, t) = if u + v > 1.0 {
-                (1.0 - u, 1.0 - v)
-            } else {
-                (u, v)
-            };
+            let (s, t) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
             out.push(Sample {
                 at: a + (b - a) * s as f32 + (c - a) * t as f32,
                 normal: normal.cast(),
@@ -168,10 +153,7 @@ fn outer(mesh: &Mesh, candidates: Vec<Sample>) -> Vec<Sample> {
     (candidates.into_iter().zip(sides))
         .filter_map(|(sample, side)| match side? {
             Side::Front => Some(sample),
-            Side::Back => Some(Sample {
-                at: sample.at,
-                normal: -sample.normal,
-            }),
+            Side::Back => Some(Sample { at: sample.at, normal: -sample.normal }),
         })
         .collect()
 }

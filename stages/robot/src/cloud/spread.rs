@@ -28,11 +28,7 @@ pub(super) fn spread(
     let mut radius = (RADIUS * (area / N_COARSEST).sqrt()).max(last);
     loop {
         let n_fit = area / (radius * radius);
-        let n_darts = if radius > last {
-            (n_fit * N_DARTS) as usize
-        } else {
-            waiting.len()
-        };
+        let n_darts = if radius > last { (n_fit * N_DARTS) as usize } else { waiting.len() };
         throw(&mut out, &mut waiting, n_darts, radius as f32);
         if radius <= last || waiting.is_empty() {
             return out;
@@ -72,12 +68,7 @@ const NONE: u32 = u32::MAX;
 impl Grid {
     fn new(radius: f32, n: usize) -> Self {
         let n_slots = (2 * n).next_power_of_two().max(64);
-        Self {
-            radius,
-            first: vec![NONE; n_slots],
-            next: Vec::new(),
-            samples: Vec::new(),
-        }
+        Self { radius, first: vec![NONE; n_slots], next: Vec::new(), samples: Vec::new() }
     }
 
     /// Cells are two radii wide, so that a ball of one radius touches two along each axis.

@@ -15,18 +15,12 @@ const MAX_NODES: u32 = 4_000_000;
 
 pub(super) fn read(text: &str) -> Result<Soup, String> {
     let text = text.trim_start_matches('\u{feff}');
-    let options = ParsingOptions {
-        nodes_limit: MAX_NODES,
-        ..ParsingOptions::default()
-    };
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options)
         .map_err(|e| format!("not well-formed XML ({e})"))?;
     let root = document.root_element();
     if root.tag_name().name() != "COLLADA" {
-        return Err(format!(
-            "not a COLLADA file, opens with \"{}\"",
-            root.tag_name().name()
-        ));
+        return Err(format!("not a COLLADA file, opens with \"{}\"", root.tag_name().name()));
     }
     let mut scene = Scene::new(root)?;
     let roots = scene.roots(root);
@@ -34,9 +28,7 @@ pub(super) fn read(text: &str) -> Result<Soup, String> {
         scene.node(*node, Matrix4::identity(), 0)?;
     }
     if roots.is_empty() {
-        scene
-            .soup
-            .note("there is no scene; all geometries are taken as they are");
+        scene.soup.note("there is no scene; all geometries are taken as they are");
         let geometries = scene.all_geometries(root);
         for geometry in geometries {
             scene.geometry(geometry, &Matrix4::identity())?;
@@ -68,12 +60,8 @@ fn local<'a>(node: Node<'a, '_>, attribute: &str) -> Option<&'a str> {
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
     (text.split_ascii_whitespace())
         .map(|w| {
-            w.parse().map_err(|_| {
-                format!(
-                    "not a number \"{}\"",
-                    w.chars().take(30).collect::<String>()
-                )
-            })
+            w.parse()
+                .map_err(|_| format!("not a number \"{}\"", w.chars().take(30).collect::<String>()))
         })
         .collect()
 }
@@ -81,12 +69,8 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
 fn index_list(text: &str) -> Result<Vec<usize>, String> {
     (text.split_ascii_whitespace())
         .map(|w| {
-            w.parse().map_err(|_| {
-                format!(
-                    "not an index \"{}\"",
-                    w.chars().take(30).collect::<String>()
-                )
-            })
+            w.parse()
+                .map_err(|_| format!("not an index \"{}\"", w.chars().take(30).collect::<String>()))
         })
         .collect()
 }
@@ -111,12 +95,7 @@ impl<'a, 'i> Scene<'a, 'i> {
                 .ok_or_else(|| format!("the unit is no length \"{text}\""))?,
             None => 1.0,
         };
-        Ok(Self {
-            by_id,
-            unit,
-            soup: Soup::default(),
-            n_visits: 0,
-        })
+        Ok(Self { by_id, unit, soup: Soup::default(), n_visits: 0 })
     }
 
     /// The element of that id in a mesh, else anywhere: real files give the same ids to each geometry.
@@ -136,16 +115,11 @@ impl<'a, 'i> Scene<'a, 'i> {
         let Some(scene) = shown.or_else(first) else {
             return Vec::new();
         };
-        scene
-            .children()
-            .filter(|n| n.tag_name().name() == "node")
-            .collect()
+        scene.children().filter(|n| n.tag_name().name() == "node").collect()
     }
 
     fn all_geometries(&self, root: Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
-        root.descendants()
-            .filter(|n| n.tag_name().name() == "geometry")
-            .collect()
+        root.descendants().filter(|n| n.tag_name().name() == "geometry").collect()
     }
 
     fn node(
@@ -170,15 +144,13 @@ impl<'a, 'i> Scene<'a, 'i> {
                 "node" => self.node(part, scene_from_node, depth + 1)?,
                 "instance_node" => match target() {
                     Some(other) => self.node(other, scene_from_node, depth + 1)?,
-                    None => self
-                        .soup
-                        .note("an instance of a node outside the file is passed over"),
+                    None => self.soup.note("an instance of a node outside the file is passed over"),
                 },
                 "instance_geometry" => match target() {
                     Some(geometry) => self.geometry(geometry, &scene_from_node)?,
-                    None => self
-                        .soup
-                        .note("an instance of a geometry outside the file is passed over"),
+                    None => {
+                        self.soup.note("an instance of a geometry outside the file is passed over")
+                    }
                 },
                 "instance_controller" => self.soup.note("a skinned geometry is passed over"),
                 _ => {}
@@ -251,8 +223,7 @@ impl<'a, 'i> Scene<'a, 'i> {
                     position = id
                         .and_then(|id| self.within(mesh, id))
                         .and_then(|v| {
-                            v.children()
-                                .find(|i| i.attribute("semantic") == Some("POSITION"))
+                            v.children().find(|i| i.attribute("semantic") == Some("POSITION"))
                         })
                         .and_then(|i| local(i, "source"))
                         .map(|id| (id, offset));
@@ -261,11 +232,7 @@ impl<'a, 'i> Scene<'a, 'i> {
             }
         }
         match position {
-            Some((source, offset)) => Ok(Some(Layout {
-                source,
-                offset,
-                stride,
-            })),
+            Some((source, offset)) => Ok(Some(Layout { source, offset, stride })),
             None if part.children().any(|n| n.tag_name().name() == "p") => {
                 Err("triangles name no positions".to_owned())
             }
@@ -280,9 +247,8 @@ impl<'a, 'i> Scene<'a, 'i> {
         id: &str,
         scene_from_node: &Matrix4<f64>,
     ) -> Result<(usize, usize), String> {
-        let source = self
-            .within(mesh, id)
-            .ok_or_else(|| format!("a source is missing \"{id}\""))?;
+        let source =
+            self.within(mesh, id).ok_or_else(|| format!("a source is missing \"{id}\""))?;
         let array = element(source, "float_array")
             .ok_or_else(|| format!("a source has no numbers \"{id}\""))?;
         let accessor = element(source, "technique_common").and_then(|t| element(t, "accessor"));
@@ -298,22 +264,13 @@ impl<'a, 'i> Scene<'a, 'i> {
             return Err(format!("positions need three numbers each \"{stride}\""));
         }
         let values = numbers(&all_text(array))?;
-        if let Some(claimed) = array
-            .attribute("count")
-            .and_then(|c| c.parse::<usize>().ok())
+        if let Some(claimed) = array.attribute("count").and_then(|c| c.parse::<usize>().ok())
             && claimed > values.len()
         {
-            return Err(format!(
-                "a list claims {claimed} numbers and holds {}",
-                values.len()
-            ));
+            return Err(format!("a list claims {claimed} numbers and holds {}", values.len()));
         }
         let first = self.soup.vertices.len();
-        for p in values
-            .get(offset..)
-            .unwrap_or_default()
-            .chunks_exact(stride)
-        {
+        for p in values.get(offset..).unwrap_or_default().chunks_exact(stride) {
             let p = scene_from_node.transform_point(&geometry::Point::new(p[0], p[1], p[2]));
             self.soup.add_vertex([p.x, p.y, p.z])?;
         }
@@ -388,11 +345,7 @@ struct Layout<'a> {
 
 /// The text of an element; comments cut it into pieces.
 fn all_text(node: Node) -> String {
-    node.children()
-        .filter(Node::is_text)
-        .filter_map(|n| n.text())
-        .collect::<Vec<_>>()
-        .join(" ")
+    node.children().filter(Node::is_text).filter_map(|n| n.text()).collect::<Vec<_>>().join(" ")
 }
 
 /// The step of a transform element; `None` for any other.

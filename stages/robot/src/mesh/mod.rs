@@ -31,9 +31,7 @@ impl Soup {
 
     fn add_triangle(&mut self, corners: [u32; 3]) -> Result<(), String> {
         if self.triangles.len() >= MAX_TRIANGLES {
-            return Err(format!(
-                "more triangles than a link can have \"{MAX_TRIANGLES}\""
-            ));
+            return Err(format!("more triangles than a link can have \"{MAX_TRIANGLES}\""));
         }
         self.triangles.push(corners);
         Ok(())
@@ -56,11 +54,7 @@ pub(crate) fn read(bytes: &[u8], extension: &str) -> Result<Soup, String> {
             "a mesh format that is not read; convert it to STL, OBJ or DAE \"{other}\""
         )),
     }?;
-    if soup.triangles.is_empty() {
-        Err("the file has no triangles".to_owned())
-    } else {
-        Ok(soup)
-    }
+    if soup.triangles.is_empty() { Err("the file has no triangles".to_owned()) } else { Ok(soup) }
 }
 
 fn text(bytes: &[u8]) -> Result<&str, String> {

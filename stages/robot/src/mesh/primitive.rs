@@ -19,17 +19,10 @@ pub(crate) fn cuboid(size: [f64; 3]) -> Soup {
     let mut soup = Soup::default();
     for n in 0..8_u32 {
         let side = |axis: u32| if n >> axis & 1 == 0 { -0.5 } else { 0.5 };
-        soup.vertices
-            .push([side(0) * size[0], side(1) * size[1], side(2) * size[2]]);
+        soup.vertices.push([side(0) * size[0], side(1) * size[1], side(2) * size[2]]);
     }
-    for quad in [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ] {
+    for quad in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    {
         soup.triangles.push([quad[0], quad[1], quad[2]]);
         soup.triangles.push([quad[0], quad[2], quad[3]]);
     }
@@ -42,8 +35,7 @@ fn lathe(profile: &[(f64, f64)]) -> Soup {
     for &(radius, z) in profile {
         for k in 0..N_SIDES {
             let angle = TAU * f64::from(k) / f64::from(N_SIDES);
-            soup.vertices
-                .push([radius * angle.cos(), radius * angle.sin(), z]);
+            soup.vertices.push([radius * angle.cos(), radius * angle.sin(), z]);
         }
     }
     for ring in 0..profile.len() as u32 - 1 {
@@ -74,15 +66,8 @@ pub(crate) fn capsule(radius: f64, length: f64) -> Soup {
     let mut profile = Vec::new();
     for k in 0..=n {
         let angle = PI * (f64::from(k) / f64::from(n) - 0.5);
-        let shift = if k <= n / 2 {
-            -0.5 * length
-        } else {
-            0.5 * length
-        };
-        profile.push((
-            (radius * angle.cos()).max(0.0),
-            radius * angle.sin() + shift,
-        ));
+        let shift = if k <= n / 2 { -0.5 * length } else { 0.5 * length };
+        profile.push(((radius * angle.cos()).max(0.0), radius * angle.sin() + shift));
         if k == n / 2 && length > 0.0 {
             profile.push((radius, 0.5 * length));
         }

@@ -28,9 +28,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, String> {
         }
         (Some(n), _) => {
             let n_present = (bytes.len() - HEADER_BYTES) / RECORD_BYTES;
-            Err(format!(
-                "the header counts {n} triangles, the file holds {n_present}"
-            ))
+            Err(format!("the header counts {n} triangles, the file holds {n_present}"))
         }
         _ => Err("too short for an STL file".to_owned()),
     }

@@ -1,11 +1,5 @@
 //! What the tests share: the folder of real robots, and models written for one test.
-#![allow(
-    dead_code,
-    missing_docs,
-    unreachable_pub,
-    clippy::unwrap_used,
-    clippy::print_stderr
-)]
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::print_stderr)]
 
 use robot::{Finding, Model, Settings, Severity};
 use std::fs;
@@ -13,9 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// The shared files, if this machine has them.
 pub fn shared(part: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared")
-        .join(part);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(part);
     if path.exists() {
         Some(path)
     } else {
@@ -90,10 +82,8 @@ impl Dice {
 
     /// In [0, 1).
     pub fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 

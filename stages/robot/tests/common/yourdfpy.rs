@@ -2,12 +2,7 @@
 //! Made once: three postures a model, uniform within the limits; the rows of the matrix base from link.
 
 /// Model, link, posture by joint, upper three rows of the matrix.
-pub type Row = (
-    &'static str,
-    &'static str,
-    &'static [(&'static str, f64)],
-    [f64; 12],
-);
+pub type Row = (&'static str, &'static str, &'static [(&'static str, f64)], [f64; 12]);
 
 pub const POSES: &[Row] = &[
     (

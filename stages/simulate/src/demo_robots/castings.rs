@@ -64,9 +64,7 @@ pub(super) fn hub(at: [f64; 2], radius: f64, y: [f64; 2]) -> Solid {
     let ring = bolts(8, 0.88 * radius, y[1], size);
     let other = bolts(8, 0.88 * radius, -y[0], size).turned([180.0, 0.0, 0.0]);
     // The lathe's axis laid along +y: (x, y, z) goes to (x, z, −y), so that a hub is drawn upright with z = y.
-    Solid::of([lathe(&body, HUB_SIDES), ring, other])
-        .along_y()
-        .at([at[0], 0.0, at[1]])
+    Solid::of([lathe(&body, HUB_SIDES), ring, other]).along_y().at([at[0], 0.0, at[1]])
 }
 
 /// A section of a boom: x, middle (y, z), size (y, z), radius of its corners; metres.
@@ -83,20 +81,15 @@ pub(super) fn boom(sections: &[Section]) -> Solid {
 
 /// A casting along z through sections (z, middle (x, y), size (x, y), radius of its corners).
 pub(super) fn trunk(sections: &[Section]) -> Solid {
-    let rings: Vec<Ring> = sections
-        .iter()
-        .map(|&(z, c, s, r)| rounded([c[0], c[1], z], s, r, 8))
-        .collect();
+    let rings: Vec<Ring> =
+        sections.iter().map(|&(z, c, s, r)| rounded([c[0], c[1], z], s, r, 8)).collect();
     loft(&rings)
 }
 
 /// A motor standing on z = 0: gear neck, finned body, brake cover, and a plug box on its +x side.
 pub(super) fn motor(radius: f64, length: f64) -> Solid {
-    let mut profile = vec![
-        [0.75 * radius, 0.0],
-        [0.75 * radius, 0.1 * length],
-        [radius, 0.12 * length],
-    ];
+    let mut profile =
+        vec![[0.75 * radius, 0.0], [0.75 * radius, 0.1 * length], [radius, 0.12 * length]];
     let fins = 4;
     for k in 0..fins {
         let z = length * (0.2 + 0.45 * k as f64 / f64::from(fins));
@@ -121,9 +114,11 @@ pub(super) fn motor(radius: f64, length: f64) -> Solid {
             0.0,
             0.82 * length,
         ]),
-        disc(0.22 * radius, 0.0, 0.5 * radius, 0.02 * radius, 20)
-            .along_x()
-            .at([1.4 * radius, 0.0, 0.82 * length]),
+        disc(0.22 * radius, 0.0, 0.5 * radius, 0.02 * radius, 20).along_x().at([
+            1.4 * radius,
+            0.0,
+            0.82 * length,
+        ]),
     ])
 }
 
@@ -132,12 +127,7 @@ pub(super) fn foot(size: [f64; 2], thick: f64) -> Solid {
     let mut out = trunk(&[
         (0.0, [0.0; 2], size, 0.12 * size[0]),
         (0.8 * thick, [0.0; 2], size, 0.12 * size[0]),
-        (
-            thick,
-            [0.0; 2],
-            size.map(|s| s - 0.4 * thick),
-            0.11 * size[0],
-        ),
+        (thick, [0.0; 2], size.map(|s| s - 0.4 * thick), 0.11 * size[0]),
     ]);
     for (sx, sy) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
         let (x, y) = (sx * 0.42 * size[0], sy * 0.42 * size[1]);
@@ -153,11 +143,7 @@ pub(super) fn bar(from: [f64; 2], to: [f64; 2], y: f64, radius: f64) -> Solid {
     let along = (q - p).normalize();
     Solid::of([
         tube(&[p + along * radius, q - along * radius], radius, 28),
-        tube(
-            &[p + along * 2.0 * radius, p + along * 5.0 * radius],
-            1.25 * radius,
-            28,
-        ),
+        tube(&[p + along * 2.0 * radius, p + along * 5.0 * radius], 1.25 * radius, 28),
         hub(from, 1.9 * radius, [y - radius, y + radius]),
         hub(to, 1.7 * radius, [y - 0.9 * radius, y + 0.9 * radius]),
     ])
@@ -178,9 +164,11 @@ pub(super) fn tool_plate(radius: f64, thick: f64) -> Solid {
             0.25 * radius,
             1.1 * radius,
         ]),
-        disc(0.16 * radius, 0.0, 0.6 * radius, 0.02 * radius, 20)
-            .along_y()
-            .at([0.5 * thick, 0.7 * radius, 1.1 * radius]),
+        disc(0.16 * radius, 0.0, 0.6 * radius, 0.02 * radius, 20).along_y().at([
+            0.5 * thick,
+            0.7 * radius,
+            1.1 * radius,
+        ]),
     ])
 }
 

@@ -49,10 +49,7 @@ impl Hinge {
 
     /// A joint that slides.
     pub(super) fn slide(self) -> Self {
-        Self {
-            kind: "prismatic",
-            ..self
-        }
+        Self { kind: "prismatic", ..self }
     }
 
     /// A joint that does not move.
@@ -78,10 +75,7 @@ impl Hinge {
 
     /// A joint that follows another.
     pub(super) fn following(self, joint: &'static str, multiplier: f64) -> Self {
-        Self {
-            mimic: Some((joint, multiplier)),
-            ..self
-        }
+        Self { mimic: Some((joint, multiplier)), ..self }
     }
 }
 
@@ -117,21 +111,14 @@ impl Design {
         let mut out = Vec::new();
         let mut put =
             |path: &str, bytes: Vec<u8>| out.push((format!("{}/{path}", self.name), bytes));
-        put(
-            "robot.urdf",
-            urdf(self.name, None, &self.parts, &self.hinges).into_bytes(),
-        );
+        put("robot.urdf", urdf(self.name, None, &self.parts, &self.hinges).into_bytes());
         put("robot.toml", self.sheet().into_bytes());
         for sub in &self.sub_chains {
             let name = format!("{}_{}", self.name, sub.name);
             let text = urdf(&name, Some(sub.root), &sub.parts, &sub.hinges);
             put(&format!("sub_{}.urdf", sub.name), text.into_bytes());
         }
-        for part in self
-            .parts
-            .iter()
-            .chain(self.sub_chains.iter().flat_map(|s| &s.parts))
-        {
+        for part in self.parts.iter().chain(self.sub_chains.iter().flat_map(|s| &s.parts)) {
             if let Some(body) = &part.body {
                 put(&mesh_path(part.name), stl(part.name, body));
             }
@@ -227,10 +214,7 @@ fn stl(name: &str, body: &Solid) -> Vec<u8> {
     out.extend((body.triangles.len() as u32).to_le_bytes());
     for t in &body.triangles {
         let [a, b, c] = t.map(|i| body.vertices[i as usize]);
-        let normal = (b - a)
-            .cross(&(c - a))
-            .try_normalize(0.0)
-            .unwrap_or_default();
+        let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
         for v in [normal, a.coords, b.coords, c.coords] {
             for k in 0..3 {
                 out.extend((v[k] as f32).to_le_bytes());

@@ -35,16 +35,7 @@ pub(super) fn balancer() -> SubChain {
         disc(0.012, 0.0, 0.05, 0.002, 16).at([0.1, 0.0, 0.08]),
     ]);
     let rod = Solid::of([
-        lathe(
-            &[
-                [0.028, -0.48],
-                [0.028, -0.06],
-                [0.04, -0.055],
-                [0.04, -0.03],
-            ],
-            32,
-        )
-        .along_x(),
+        lathe(&[[0.028, -0.48], [0.028, -0.06], [0.04, -0.055], [0.04, -0.03]], 32).along_x(),
         hub([0.0, 0.0], 0.052, [-0.03, 0.03]),
     ]);
     let to_rod = Hinge::turn(
@@ -71,14 +62,8 @@ pub(super) fn balancer() -> SubChain {
         kind: "RPR",
         root: "link_1",
         parts: vec![
-            Part {
-                name: "balancer_cylinder",
-                body: Some(cylinder),
-            },
-            Part {
-                name: "balancer_rod",
-                body: Some(rod),
-            },
+            Part { name: "balancer_cylinder", body: Some(cylinder) },
+            Part { name: "balancer_rod", body: Some(rod) },
         ],
         hinges: vec![to_cylinder, to_rod.slide()],
         pin: ("balancer_rod", [0.0; 3], "link_2", ROD_PIN),
@@ -88,11 +73,7 @@ pub(super) fn balancer() -> SubChain {
 pub(super) fn parallelogram() -> SubChain {
     let lever = Solid::of([
         hub([0.0, 0.0], 0.14, [-0.035, 0.035]),
-        cheek(
-            &[([0.0, 0.0], 0.11), ([-LEVER, 0.0], 0.055)],
-            [-0.03, 0.03],
-            0.008,
-        ),
+        cheek(&[([0.0, 0.0], 0.11), ([-LEVER, 0.0], 0.055)], [-0.03, 0.03], 0.008),
         hub([-LEVER, 0.0], 0.052, [-0.034, 0.034]),
     ]);
     let dy = ROD_Y - LEVER_Y;
@@ -102,32 +83,12 @@ pub(super) fn parallelogram() -> SubChain {
         kind: "RRR",
         root: "link_2",
         parts: vec![
-            Part {
-                name: "lever",
-                body: Some(lever),
-            },
-            Part {
-                name: "rod",
-                body: Some(rod),
-            },
+            Part { name: "lever", body: Some(lever) },
+            Part { name: "rod", body: Some(rod) },
         ],
         hinges: vec![
-            Hinge::turn(
-                "joint_lever",
-                "link_2",
-                "lever",
-                [0.0, LEVER_Y, 0.0],
-                Y,
-                [-1.6, 1.6],
-            ),
-            Hinge::turn(
-                "joint_rod",
-                "lever",
-                "rod",
-                [-LEVER, dy, 0.0],
-                Y,
-                [-1.6, 1.6],
-            ),
+            Hinge::turn("joint_lever", "link_2", "lever", [0.0, LEVER_Y, 0.0], Y, [-1.6, 1.6]),
+            Hinge::turn("joint_rod", "lever", "rod", [-LEVER, dy, 0.0], Y, [-1.6, 1.6]),
         ],
         pin: ("rod", [0.0, 0.0, UPPER], "link_3", [-LEVER, ROD_Y, 0.0]),
     }

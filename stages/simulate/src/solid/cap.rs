@@ -18,14 +18,11 @@ pub(super) fn ears(polygon: &[[f64; 2]]) -> Vec<[u32; 3]> {
                 let (a, b, c) = (left[(k + n - 1) % n], left[k], left[(k + 1) % n]);
                 let area = turn(at(a), at(b), at(c));
                 let is_ear = area > 0.0
-                    && left
-                        .iter()
-                        .filter(|&&p| p != a && p != b && p != c)
-                        .all(|&p| {
-                            turn(at(a), at(b), at(p)) < 0.0
-                                || turn(at(b), at(c), at(p)) < 0.0
-                                || turn(at(c), at(a), at(p)) < 0.0
-                        });
+                    && left.iter().filter(|&&p| p != a && p != b && p != c).all(|&p| {
+                        turn(at(a), at(b), at(p)) < 0.0
+                            || turn(at(b), at(c), at(p)) < 0.0
+                            || turn(at(c), at(a), at(p)) < 0.0
+                    });
                 is_ear.then_some((k, area))
             })
             .max_by(|a, b| a.1.total_cmp(&b.1))
@@ -54,10 +51,7 @@ pub(super) fn inset(polygon: &[[f64; 2]], inset: f64) -> Vec<[f64; 2]> {
             let (u, v) = (inward(before, here), inward(here, after));
             let cos = (u[0] * v[0] + u[1] * v[1]).max(-0.8);
             let scale = inset / (1.0 + cos);
-            [
-                here[0] + (u[0] + v[0]) * scale,
-                here[1] + (u[1] + v[1]) * scale,
-            ]
+            [here[0] + (u[0] + v[0]) * scale, here[1] + (u[1] + v[1]) * scale]
         })
         .collect()
 }

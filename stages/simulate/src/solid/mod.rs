@@ -33,8 +33,7 @@ impl Solid {
     pub fn add(&mut self, other: &Self) {
         let first = self.vertices.len() as u32;
         self.vertices.extend_from_slice(&other.vertices);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
     }
 
     /// The body moved by `pose`.
@@ -81,11 +80,7 @@ impl Solid {
     #[must_use]
     pub fn mesh(&self) -> Mesh {
         Mesh {
-            vertices: self
-                .vertices
-                .iter()
-                .map(|p| [p.x as f32, p.y as f32, p.z as f32])
-                .collect(),
+            vertices: self.vertices.iter().map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect(),
             triangles: self.triangles.clone(),
         }
     }
@@ -116,9 +111,7 @@ mod tests {
                 *edges.entry((t[k], t[(k + 1) % 3])).or_default() += 1;
             }
         }
-        edges
-            .iter()
-            .all(|(&(a, b), &n)| n == 1 && edges.get(&(b, a)) == Some(&1))
+        edges.iter().all(|(&(a, b), &n)| n == 1 && edges.get(&(b, a)) == Some(&1))
     }
 
     #[test]
@@ -133,24 +126,14 @@ mod tests {
             [1.0, 2.0],
             [0.0, 2.0],
         ];
-        let path = [
-            [0.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0],
-            [0.5, 0.0, 1.5],
-            [0.5, 1.0, 1.5],
-        ]
-        .map(Point::from);
+        let path =
+            [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.0, 1.5], [0.5, 1.0, 1.5]].map(Point::from);
         let shapes = [
             ("cuboid", cuboid([1.0, 2.0, 3.0], 0.0), 6.0, 1e-9),
             ("chamfered", cuboid([1.0, 2.0, 3.0], 0.05), 6.0, 0.1),
             ("prism", prism(&u, -0.5, 0.5, 0.0), 5.0, 1e-9),
             ("prism with chamfer", prism(&u, -0.5, 0.5, 0.05), 5.0, 0.3),
-            (
-                "disc",
-                disc(1.0, 0.0, 1.0, 0.02, 64),
-                std::f64::consts::PI,
-                0.1,
-            ),
+            ("disc", disc(1.0, 0.0, 1.0, 0.02, 64), std::f64::consts::PI, 0.1),
             ("tube", tube(&path, 0.1, 24), 0.075, 0.005),
             (
                 "loft",
@@ -164,11 +147,7 @@ mod tests {
         ];
         for (name, solid, volume, slack) in shapes {
             assert!(is_closed(&solid), "{name} is not closed");
-            assert!(
-                (solid.volume() - volume).abs() < slack,
-                "{name}: {}",
-                solid.volume()
-            );
+            assert!((solid.volume() - volume).abs() < slack, "{name}: {}", solid.volume());
         }
     }
 }

@@ -18,8 +18,7 @@ pub fn loft(rings: &[Ring]) -> Solid {
     let id = |ring: usize, k: usize| (ring * n + k % n) as u32;
     for r in 1..rings.len() {
         for k in 0..n {
-            out.triangles
-                .push([id(r - 1, k), id(r - 1, k + 1), id(r, k + 1)]);
+            out.triangles.push([id(r - 1, k), id(r - 1, k + 1), id(r, k + 1)]);
             out.triangles.push([id(r - 1, k), id(r, k + 1), id(r, k)]);
         }
     }
@@ -29,8 +28,7 @@ pub fn loft(rings: &[Ring]) -> Solid {
         out.vertices.push(Point::from(middle));
         for k in 0..n {
             let (a, b) = (id(r, k), id(r, k + 1));
-            out.triangles
-                .push(if flip { [centre, b, a] } else { [centre, a, b] });
+            out.triangles.push(if flip { [centre, b, a] } else { [centre, a, b] });
         }
     }
     out
@@ -43,9 +41,8 @@ pub fn rounded(centre: [f64; 3], size: [f64; 2], radius: f64, steps: usize) -> R
     let radius = radius.min(0.499 * size[0]).min(0.499 * size[1]);
     let (hx, hy) = (0.5 * size[0] - radius, 0.5 * size[1] - radius);
     let mut out = Vec::with_capacity(4 * (steps + 1));
-    for (corner, (sx, sy)) in [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
-        .into_iter()
-        .enumerate()
+    for (corner, (sx, sy)) in
+        [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].into_iter().enumerate()
     {
         for k in 0..=steps {
             let angle = TAU * 0.25 * (corner as f64 + k as f64 / steps as f64);
@@ -134,15 +131,7 @@ pub fn disc(radius: f64, z0: f64, z1: f64, chamfer: f64, n: usize) -> Solid {
         return lathe(&[[radius, z0], [radius, z1]], n);
     }
     let c = chamfer;
-    lathe(
-        &[
-            [radius - c, z0],
-            [radius, z0 + c],
-            [radius, z1 - c],
-            [radius - c, z1],
-        ],
-        n,
-    )
+    lathe(&[[radius - c, z0], [radius, z0 + c], [radius, z1 - c], [radius - c, z1]], n)
 }
 
 /// `count` hexagonal bolt heads upright on the plane z = `z`, on a circle of `radius`; `size` is a head's diameter.
@@ -167,17 +156,12 @@ pub fn tube(path: &[Point], radius: f64, n: usize) -> Solid {
         (b - a).try_normalize(1e-12).unwrap_or_else(Vector::z)
     };
     let along = direction(0);
-    let mut side = if along.x.abs() < 0.8 {
-        along.cross(&Vector::x())
-    } else {
-        along.cross(&Vector::y())
-    };
+    let mut side =
+        if along.x.abs() < 0.8 { along.cross(&Vector::x()) } else { along.cross(&Vector::y()) };
     let mut rings: Vec<Ring> = Vec::with_capacity(path.len());
     for (i, centre) in path.iter().enumerate() {
         let along = direction(i);
-        side = (side - along * side.dot(&along))
-            .try_normalize(1e-9)
-            .unwrap_or(side);
+        side = (side - along * side.dot(&along)).try_normalize(1e-9).unwrap_or(side);
         let other = along.cross(&side);
         let ring = (0..n).map(|k| {
             let (sin, cos) = (TAU * k as f64 / n as f64).sin_cos();

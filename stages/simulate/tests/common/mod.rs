@@ -18,16 +18,8 @@ pub(crate) fn two_boxes() -> Model {
     Model {
         name: "two_boxes".into(),
         links: vec![
-            link(
-                "foot",
-                cuboid([0.4, 0.4, 0.4], 0.0).at([0.0, 0.0, 0.2]).mesh(),
-                None,
-            ),
-            link(
-                "arm",
-                cuboid([1.0, 0.2, 0.2], 0.0).at([0.5, 0.0, 0.1]).mesh(),
-                Some(0),
-            ),
+            link("foot", cuboid([0.4, 0.4, 0.4], 0.0).at([0.0, 0.0, 0.2]).mesh(), None),
+            link("arm", cuboid([1.0, 0.2, 0.2], 0.0).at([0.5, 0.0, 0.1]).mesh(), Some(0)),
         ],
         joints: vec![Joint {
             name: "turn".into(),

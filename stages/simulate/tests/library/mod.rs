@@ -11,12 +11,5 @@ pub(crate) fn load() -> Library {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, bytes).unwrap();
     }
-    Library::load(
-        dir.path(),
-        &Settings {
-            clouds: false,
-            ..Settings::default()
-        },
-    )
-    .unwrap()
+    Library::load(dir.path(), &Settings { clouds: false, ..Settings::default() }).unwrap()
 }
