@@ -75,7 +75,7 @@ settings! {
         join_gap, margin, min_height, min_extent, min_points, min_seed, max_extent, overlap,
     }
     fit: fit::Settings {
-        beam, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
+        beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
         max_points, floor_band, min_noise, plane_sigma, determined_sigma, min_score,
         max_violation,
     }

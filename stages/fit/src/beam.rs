@@ -42,10 +42,14 @@ impl Beam<'_> {
             let mut next: Vec<Hypothesis> =
                 beam.iter().flat_map(|h| self.extend(h, free, tolerance)).collect();
             self.keep_best(&mut next, free);
-            for h in &mut next {
+            for h in next.iter_mut().take(self.settings.settle) {
                 self.settle(h, free);
             }
             sort(&mut next);
+            // Not one hypothesis explains more than the beams contradict: no robot of this model stands here.
+            if next.first().is_none_or(|h| h.score <= 0.0) {
+                return Vec::new();
+            }
             beam = next;
         }
         beam
@@ -196,21 +200,20 @@ impl Beam<'_> {
     /// a joint whose link nearly hides in its parent may have been caught at the wrong maximum.
     pub(crate) fn alternatives(&self, h: &Hypothesis) -> Vec<Hypothesis> {
         let tolerance = (0.6 * self.settings.search_tolerance) as f32;
-        let all: Vec<usize> = (0..self.prepared.model.links.len())
-            .filter(|&l| self.prepared.links[l].weight > 0.0)
-            .collect();
-        let own = self.score(h, &all, tolerance);
         let mut out = Vec::new();
         for free in 0..h.posture.len() {
             if self.prepared.placed_by[free].is_empty() {
                 continue;
             }
+            // What stands before the joint does not change with it.
+            let moved: Vec<usize> = self.prepared.placed_by[free..].iter().flatten().copied().collect();
+            let own = self.score(h, &moved, tolerance);
             let (low, span, n) = self.sweep(free);
             let mut trial = h.clone();
             let scores: Vec<f64> = (0..=n)
                 .map(|k| {
                     trial.posture[free] = low + span * k as f64 / n as f64;
-                    self.score(&trial, &all, tolerance)
+                    self.score(&trial, &moved, tolerance)
                 })
                 .collect();
             for k in 0..=n {
@@ -218,10 +221,10 @@ impl Beam<'_> {
                 let peak =
                     (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1]);
                 let far = (value - h.posture[free]).abs() > 2.5 * span / n as f64;
-                if peak && far && scores[k] > own - 0.15 * own.abs() {
+                if peak && far && scores[k] > own - 0.15 * (own.abs() + h.score.abs()) {
                     let mut next = h.clone();
                     next.posture[free] = value;
-                    next.score = scores[k];
+                    next.score = h.score + scores[k] - own;
                     out.push(next);
                 }
             }

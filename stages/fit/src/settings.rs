@@ -5,6 +5,8 @@
 pub struct Settings {
     /// Hypotheses kept at each joint of the beam. fit.md §6.5: 150 lost none of 60.
     pub beam: usize,
+    /// Hypotheses that are settled (base and all joints so far shaken) at each joint, best first.
+    pub settle: usize,
     /// Samples of a link in the beam: the mean of 100 is known to 0.05, less than hypotheses differ by.
     pub n_search: usize,
     /// Samples of a link in the final judgement.
@@ -40,7 +42,8 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            beam: 120,
+            beam: 100,
+            settle: 40,
             n_search: 100,
             n_judge: 400,
             search_tolerance: 0.045,

@@ -59,8 +59,9 @@ pub fn fit(
     if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
         return None;
     }
-    let runner_up = polished[1..].iter().find(|(r, _)| differs(r, best, settings));
-    Some(report(prepared, scene, settings, best, judgement, runner_up))
+    let free = undetermined(&polished, settings);
+    let runner_up = polished[1..].iter().find(|(r, _)| differs(r, best, &free));
+    Some(report(prepared, scene, &free, best, judgement, runner_up))
 }
 
 /// Coarse rounds for the best of the beam; near twins are dropped.
@@ -107,19 +108,39 @@ fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> (Refined, Judgem
     (done, judgement)
 }
 
-/// Whether two postures are different answers: more than 2° (whole turns apart) in a joint that the points determine,
-/// or 3 cm at the base.
-fn differs(a: &Refined, b: &Refined, settings: &Settings) -> bool {
-    let (p, q) = (&a.hypothesis, &b.hypothesis);
-    let shift =
-        (p.local_from_base.translation.vector - q.local_from_base.translation.vector).norm();
-    let sure =
-        |r: &Refined, j: usize| r.covariance[(6 + j, 6 + j)] < settings.determined_sigma.powi(2);
-    shift > 0.03
-        || (0..p.posture.len()).any(|j| {
-            let turn = (p.posture[j] - q.posture[j]).rem_euclid(std::f64::consts::TAU);
-            sure(a, j) && sure(b, j) && turn.min(std::f64::consts::TAU - turn) > 0.035
-        })
+/// Share of the best's explained surface from which on another posture counts as equally good.
+const EQUAL: f64 = 0.98;
+
+/// For each joint, whether the points leave it open: by its standard deviation, or because a posture that differs in
+/// this joint and few others explains the points as well (a flange with six bolts, a wrist seen from nowhere).
+fn undetermined(polished: &[(Refined, Judgement)], settings: &Settings) -> Vec<bool> {
+    let (best, judgement) = &polished[0];
+    let n = best.hypothesis.posture.len();
+    let limit = settings.determined_sigma.powi(2);
+    let mut free: Vec<bool> = (0..n).map(|j| best.covariance[(6 + j, 6 + j)] >= limit).collect();
+    for (other, _) in polished[1..].iter().filter(|(_, k)| k.explained > EQUAL * judgement.explained) {
+        let apart: Vec<bool> = (0..n).map(|j| turn(best, other, j) > 0.035).collect();
+        // Only the tail of the chain can be open by symmetry; a flip further up is another answer.
+        let first = apart.iter().position(|a| *a).unwrap_or(n);
+        if first + 1 >= n || (first..n).all(|j| free[j] || j + 1 == n) {
+            (0..n).for_each(|j| free[j] |= apart[j]);
+        }
+    }
+    free
+}
+
+/// Difference of a joint between two postures, whole turns taken out, radians.
+fn turn(a: &Refined, b: &Refined, joint: usize) -> f64 {
+    let d = a.hypothesis.posture[joint] - b.hypothesis.posture[joint];
+    let d = d.rem_euclid(std::f64::consts::TAU);
+    d.min(std::f64::consts::TAU - d)
+}
+
+/// Whether two postures are different answers: more than 2° in a joint that the points determine, or 3 cm at the base.
+fn differs(a: &Refined, b: &Refined, free: &[bool]) -> bool {
+    let (p, q) = (&a.hypothesis.local_from_base, &b.hypothesis.local_from_base);
+    let shift = (p.translation.vector - q.translation.vector).norm();
+    shift > 0.03 || (0..free.len()).any(|j| !free[j] && turn(a, b, j) > 0.035)
 }
 
 /// Frame on the installation plane with z along its normal, at the height of the base's origin.
@@ -149,7 +170,7 @@ fn in_world_axes(covariance: &DMatrix<f64>, local_from_base: &Pose) -> DMatrix<f
 fn report(
     prepared: &Prepared<'_>,
     scene: &Scene<'_>,
-    settings: &Settings,
+    free: &[bool],
     best: &Refined,
     judgement: &Judgement,
     runner_up: Option<&(Refined, Judgement)>,
@@ -161,12 +182,11 @@ fn report(
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     let joints = (0..h.posture.len())
         .map(|j| {
-            let determined = sigma(6 + j) < settings.determined_sigma;
             JointFit {
                 name: model.joints[model.free[j]].name.clone(),
                 value: h.posture[j],
                 sigma: sigma(6 + j),
-                determined,
+                determined: !free[j],
             }
         })
         .collect();

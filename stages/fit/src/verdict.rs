@@ -27,6 +27,7 @@ pub(crate) fn pass(
 ) {
     let mut doubts = Vec::new();
     let mut refusals = Vec::new();
+    let mut notes = Vec::new();
     grade(judgement.score < SCORE.1, judgement.score < SCORE.0, &mut refusals, &mut doubts, || {
         format!("score {:.2}", judgement.score)
     });
@@ -48,16 +49,15 @@ pub(crate) fn pass(
     }
     for (j, joint) in fit.joints.iter().enumerate() {
         let n: usize = carried(prepared, j).map(|l| fit.links[l].n_points).sum();
-        if n < JOINT_POINTS {
+        if n < JOINT_POINTS && j + 1 < fit.joints.len() {
             doubts.push(format!("only {n} points on what joint '{}' moves", joint.name));
         } else if !joint.determined {
-            doubts.push(format!("the points do not determine joint '{}'", joint.name));
+            notes.push(format!("the points do not determine joint '{}'", joint.name));
         }
     }
-    if let Some(rival) = &fit.runner_up {
-        if rival.score > RIVAL * fit.score {
-            doubts.push("another posture explains the points nearly as well".into());
-        }
+    let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.score > RIVAL * fit.score);
+    if rival {
+        doubts.push("another posture explains the points nearly as well".into());
     }
     fit.verdict = match (refusals.is_empty(), doubts.is_empty()) {
         (false, _) => Verdict::Refused,
@@ -66,6 +66,7 @@ pub(crate) fn pass(
     };
     fit.reasons = refusals;
     fit.reasons.extend(doubts);
+    fit.reasons.extend(notes);
 }
 
 fn grade(

@@ -14,7 +14,7 @@ pub fn fast_atan2(y: f32, x: f32) -> f32 {
     // Minimax polynomial of atan on [0, 1], odd, seven terms.
     let mut r = 0.002_823_638_8_f32;
     r = r * s - 0.015_956_933;
-    r = r * s + 0.042_504_988;
+    r = r * s + 0.042_504_99;
     r = r * s - 0.074_890_09;
     r = r * s + 0.106_347_93;
     r = r * s - 0.142_027_37;
