@@ -206,7 +206,8 @@ impl Beam<'_> {
                 continue;
             }
             // What stands before the joint does not change with it.
-            let moved: Vec<usize> = self.prepared.placed_by[free..].iter().flatten().copied().collect();
+            let moved: Vec<usize> =
+                self.prepared.placed_by[free..].iter().flatten().copied().collect();
             let own = self.score(h, &moved, tolerance);
             let (low, span, n) = self.sweep(free);
             let mut trial = h.clone();

@@ -30,8 +30,8 @@ pub struct Settings {
     /// Standard deviation of the base about the installation plane, metres and radians: feet are shimmed and floors
     /// wavy.
     pub plane_sigma: [f64; 2],
-    /// A joint is determined by the points if its standard deviation is below this, radians (metres × 1/m for
-    /// prismatic joints).
+    /// A joint is determined by the points if its standard deviation is below this, radians or metres: 0.086°, so that
+    /// an error of 0.1° stays within what was promised.
     pub determined_sigma: f64,
     /// Lowest score that is reported at all.
     pub min_score: f64,
@@ -55,7 +55,7 @@ impl Default for Settings {
             floor_band: 0.008,
             min_noise: 0.0015,
             plane_sigma: [0.004, 0.006],
-            determined_sigma: 0.006,
+            determined_sigma: 0.0015,
             min_score: 0.30,
             max_violation: 0.20,
         }

@@ -59,9 +59,9 @@ pub fn fit(
     if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
         return None;
     }
-    let free = undetermined(&polished, settings);
+    let free = undetermined(&polished);
     let runner_up = polished[1..].iter().find(|(r, _)| differs(r, best, &free));
-    Some(report(prepared, scene, &free, best, judgement, runner_up))
+    Some(report(&refine, &free, best, judgement, runner_up))
 }
 
 /// Coarse rounds for the best of the beam; near twins are dropped.
@@ -111,14 +111,19 @@ fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> (Refined, Judgem
 /// Share of the best's explained surface from which on another posture counts as equally good.
 const EQUAL: f64 = 0.98;
 
+/// Standard deviation from which on a joint is open: any value within degrees would do, radians.
+const OPEN_SIGMA: f64 = 0.02;
+
 /// For each joint, whether the points leave it open: by its standard deviation, or because a posture that differs in
 /// this joint and few others explains the points as well (a flange with six bolts, a wrist seen from nowhere).
-fn undetermined(polished: &[(Refined, Judgement)], settings: &Settings) -> Vec<bool> {
+fn undetermined(polished: &[(Refined, Judgement)]) -> Vec<bool> {
     let (best, judgement) = &polished[0];
     let n = best.hypothesis.posture.len();
-    let limit = settings.determined_sigma.powi(2);
-    let mut free: Vec<bool> = (0..n).map(|j| best.covariance[(6 + j, 6 + j)] >= limit).collect();
-    for (other, _) in polished[1..].iter().filter(|(_, k)| k.explained > EQUAL * judgement.explained) {
+    let mut free: Vec<bool> =
+        (0..n).map(|j| best.covariance[(6 + j, 6 + j)] >= OPEN_SIGMA.powi(2)).collect();
+    for (other, _) in
+        polished[1..].iter().filter(|(_, k)| k.explained > EQUAL * judgement.explained)
+    {
         let apart: Vec<bool> = (0..n).map(|j| turn(best, other, j) > 0.035).collect();
         // Only the tail of the chain can be open by symmetry; a flip further up is another answer.
         let first = apart.iter().position(|a| *a).unwrap_or(n);
@@ -168,26 +173,24 @@ fn in_world_axes(covariance: &DMatrix<f64>, local_from_base: &Pose) -> DMatrix<f
 }
 
 fn report(
-    prepared: &Prepared<'_>,
-    scene: &Scene<'_>,
+    refine: &Refine<'_>,
     free: &[bool],
     best: &Refined,
     judgement: &Judgement,
     runner_up: Option<&(Refined, Judgement)>,
 ) -> Fit {
+    let Refine { prepared, scene, settings, .. } = *refine;
     let model = prepared.model;
     let h = &best.hypothesis;
     let n = 6 + h.posture.len();
     let covariance = in_world_axes(&best.covariance, &h.local_from_base);
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     let joints = (0..h.posture.len())
-        .map(|j| {
-            JointFit {
-                name: model.joints[model.free[j]].name.clone(),
-                value: h.posture[j],
-                sigma: sigma(6 + j),
-                determined: !free[j],
-            }
+        .map(|j| JointFit {
+            name: model.joints[model.free[j]].name.clone(),
+            value: h.posture[j],
+            sigma: sigma(6 + j),
+            determined: !free[j] && sigma(6 + j) < settings.determined_sigma,
         })
         .collect();
     let total: usize = best.n_points.iter().sum();

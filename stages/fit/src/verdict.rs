@@ -52,7 +52,12 @@ pub(crate) fn pass(
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
             doubts.push(format!("only {n} points on what joint '{}' moves", joint.name));
         } else if !joint.determined {
-            notes.push(format!("the points do not determine joint '{}'", joint.name));
+            notes.push(if joint.sigma < 0.02 {
+                let deg = joint.sigma.to_degrees();
+                format!("the points determine joint '{}' only to ± {deg:.2}°, or leave it several values", joint.name)
+            } else {
+                format!("the points do not determine joint '{}'", joint.name)
+            });
         }
     }
     let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.score > RIVAL * fit.score);
