@@ -9,7 +9,8 @@ use crate::judge::{Judgement, evidence, judge};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Refined, Round};
 use crate::{Prepared, Scene, Settings, verdict};
 
-/// Largest distance of a judged point, metres: what is left after a fit should be noise.
+/// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans' own noise, not the
+/// fit's.
 const JUDGE_TOLERANCE: (f64, f64) = (0.012, 0.04);
 /// Gate of the last rounds in multiples of the noise found, and its bounds, metres.
 const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
@@ -103,7 +104,7 @@ fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> (Refined, Judgem
     let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect();
     let h = refine.run(&first.hypothesis, &all, &rounds);
     let done = refine.finish(h, &all, gate);
-    let tolerance = (4.0 * done.noise).clamp(JUDGE_TOLERANCE.0, JUDGE_TOLERANCE.1);
+    let tolerance = (4.0 * scene.noise).clamp(JUDGE_TOLERANCE.0, JUDGE_TOLERANCE.1);
     let judgement = judge(refine.prepared, scene, refine.settings, &done.hypothesis, tolerance);
     (done, judgement)
 }

@@ -11,6 +11,13 @@ const LINK_VIOLATION: (f64, f64) = (0.06, 0.30);
 const VIOLATION: (f64, f64) = (0.03, 0.15);
 /// Score below which a fit is not trusted, and below which it is refused.
 const SCORE: (f64, f64) = (0.60, 0.35);
+/// Residual, in multiples of the scans' noise and metres beyond, from which a surface fits badly.
+const MAX_RMS: (f64, f64) = (2.5, 0.003);
+/// Residual from which a fit that leaves half of its joints open is refused whatever the noise, metres: with so blunt
+/// a measure, many a thing has room for a robot.
+const MAX_OPEN_RMS: f64 = 0.006;
+/// Standard deviation up to which a joint counts as known for that, radians: 1°.
+const KNOWN_SIGMA: f64 = 0.0175;
 /// Smallest share of the surface that must have been judged.
 const SEEN: f64 = 0.12;
 /// Fewest points on the links that a joint moves.
@@ -40,6 +47,17 @@ pub(crate) fn pass(
         grade(v > LINK_VIOLATION.1, v > LINK_VIOLATION.0, &mut refusals, &mut doubts, || {
             format!("beams went through {:.0} % of link '{}'", v * 100.0, link.name)
         });
+    }
+    let n_known = fit.joints.iter().filter(|j| j.sigma < KNOWN_SIGMA).count();
+    let is_open = 2 * n_known <= fit.joints.len();
+    if fit.rms > MAX_RMS.0 * scene.noise + MAX_RMS.1 || (is_open && fit.rms > MAX_OPEN_RMS) {
+        let words = format!(
+            "its points lie {:.0} mm off its surface, where the scans' noise is {:.0} mm",
+            fit.rms * 1e3,
+            scene.noise * 1e3
+        );
+        // A surface that fits badly and leaves the posture open may be anything.
+        if is_open { refusals.push(words) } else { doubts.push(words) }
     }
     if !scene.evidence.has_beams() {
         doubts.push("no scanner position is known, so nothing proves free space".into());
