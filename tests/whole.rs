@@ -1,0 +1,102 @@
+//! The whole way from outside: a virtual scan of a robot of our own in, the robot found and its points labelled out; and
+//! the same bytes for any number of threads.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stillpoint::compare::Agreement;
+use stillpoint::demo::write_robots;
+use stillpoint::engine::Engine;
+use stillpoint::job::{Given, Job, Means};
+use stillpoint::plan;
+use stillpoint::scanning::{Formats, scan_scene};
+
+/// Beams of each of the six scanners: about 30 mm apart at 5 m, an eighth of what a crew would take.
+const N_BEAMS: u64 = 600_000;
+/// Error of the base that so few points allow, metres.
+const BASE: f64 = 0.003;
+/// Error of a joint that is said to be determined, degrees.
+const JOINT_DEG: f64 = 0.3;
+
+/// A palletiser with its bars on a bare floor, scanned into `dir`.
+fn scene(dir: &Path) -> PathBuf {
+    let robots = dir.join("robots");
+    write_robots(&robots).expect("the library is written");
+    let library = robot::Library::load(&robots, &robot::Settings::without_clouds()).expect("loads");
+    let model =
+        &library.models[library.model(simulate::demo_robots::PALLETISER).expect("is there")];
+    let posture: Vec<f64> = (0..model.n_free())
+        .map(|j| {
+            let [low, high] = model.limits(j);
+            low + (high - low) * 0.6
+        })
+        .collect();
+    let scene = simulate::paper_scene(7, model, &posture, N_BEAMS);
+    let engine = Engine::new(2);
+    scan_scene(&scene, &library.models, &dir.join("scans"), Formats::ALL, &engine).expect("scans");
+    robots
+}
+
+fn run(input: PathBuf, scanners: Option<PathBuf>, robots: &Path, out: PathBuf, threads: usize) {
+    let given = Given { threads: Some(threads), ..Given::default() };
+    let means = Means::of(&given).expect("defaults hold");
+    let job = Job { inputs: vec![input], robots: robots.to_path_buf(), scanners, out, means };
+    plan::run(&job, &Engine::new(threads)).expect("the run ends well");
+}
+
+/// Every file below a folder but the store, by its name.
+fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut out = BTreeMap::new();
+    let mut folders = vec![dir.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let name = path.strip_prefix(dir).expect("below").to_path_buf();
+            if path.is_dir() {
+                if name != Path::new("store") {
+                    folders.push(path);
+                }
+            } else {
+                out.insert(name, std::fs::read(&path).expect("a file"));
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn the_robot_is_found_and_any_number_of_threads_gives_the_same_bytes() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let robots = scene(dir.path());
+    let input = dir.path().join("scans/scans.e57");
+    for threads in [1, 2] {
+        run(input.clone(), None, &robots, dir.path().join(format!("out{threads}")), threads);
+    }
+    let agreement =
+        Agreement::of(&dir.path().join("out2"), &dir.path().join("scans/truth")).expect("compares");
+    let found = agreement.robots[0].found.as_ref().expect("the robot is found");
+    assert_eq!(found.model, simulate::demo_robots::PALLETISER);
+    assert_eq!(agreement.n_invented, 0);
+    assert!(found.base[0] < BASE, "base off by {} m", found.base[0]);
+    assert!(agreement.worst_joint_deg() < JOINT_DEG, "{}", agreement.table());
+    assert!(agreement.f1() > 0.97, "{}", agreement.table());
+    let (one, two) = (files(&dir.path().join("out1")), files(&dir.path().join("out2")));
+    assert!(one.keys().eq(two.keys()), "the same files");
+    assert!(one.len() > 10, "{:?}", one.keys());
+    for (name, bytes) in &one {
+        assert!(two[name] == *bytes, "{} differs", name.display());
+    }
+}
+
+#[test]
+fn las_with_scanner_positions_finds_the_same_robot() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let robots = scene(dir.path());
+    let scanners = dir.path().join("scans/scanners.toml");
+    let out = dir.path().join("out");
+    run(dir.path().join("scans/scans.las"), Some(scanners), &robots, out.clone(), 2);
+    let text = std::fs::read_to_string(out.join("result.json")).expect("a result");
+    let result: export::ResultFile = serde_json::from_str(&text).expect("parses");
+    assert_eq!(result.robots.len(), 1);
+    assert_eq!(result.robots[0].model, simulate::demo_robots::PALLETISER);
+    assert_eq!(result.labels.scans.len(), 1, "one triple for the file");
+}
