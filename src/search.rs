@@ -76,19 +76,17 @@ impl<'a> Search<'a> {
         Ok((!view.points.is_empty() || !view.images.is_empty()).then_some(view))
     }
 
-    /// Planes that a robot of this region may stand on; the region's own bottom where none is known.
+    /// Planes that a robot of this region may stand on; heights guessed all over the region where the plant has no
+    /// floor to go by (a camera's view, a cut-out).
     fn planes(&self, region: &Region) -> Vec<InstallationPlane> {
         let low = region.origin.coords + geometry::Vector::from(region.bounds.min);
         let high = region.origin.coords + geometry::Vector::from(region.bounds.max);
         let world = geometry::Aabb { min: low.into(), max: high.into() };
-        self.ground
-            .surfaces
-            .floor
-            .planes
-            .iter()
-            .filter(|p| p.bounds.grown(0.3).touches(&world))
-            .cloned()
-            .collect()
+        let floor = &self.ground.surfaces.floor;
+        if floor.levels.is_empty() {
+            return identify::guessed_planes(&world);
+        }
+        floor.planes.iter().filter(|p| p.bounds.grown(0.3).touches(&world)).cloned().collect()
     }
 
     fn model(&self, index: usize, scene: &Scene<'_>, planes: &[InstallationPlane]) -> Vec<Fit> {

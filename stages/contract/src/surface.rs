@@ -147,7 +147,7 @@ pub struct InstallationPlane {
     pub plane: Plane,
     /// Bounds of its points, metres.
     pub bounds: Aabb,
-    /// Area covered by points, m².
+    /// Area covered by points, m²; 0 for a height that is only guessed.
     pub area: f64,
     /// Whether it is a floor level.
     pub is_floor: bool,

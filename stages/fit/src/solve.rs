@@ -36,12 +36,9 @@ pub fn fit(
         candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
     let beam = Beam { prepared, scene, settings };
     let found = beam.run(&bases);
-    let refine = Refine {
-        prepared,
-        scene,
-        settings,
-        prior: Some(prior(candidate, &local_from_world, prepared)),
-    };
+    let is_seen = candidate.plane.area > 0.0;
+    let prior = is_seen.then(|| prior(candidate, &local_from_world));
+    let refine = Refine { prepared, scene, settings, prior };
     let base = bases.first().map_or_else(Point::origin, |b| Point::from(b.translation.vector));
     let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
     let refined = rough(&beam, &refine, found, &near);
@@ -150,13 +147,12 @@ fn differs(a: &Refined, b: &Refined, free: &[bool]) -> bool {
 }
 
 /// Frame on the installation plane with z along its normal, at the height of the base's origin.
-fn prior(candidate: &Candidate, local_from_world: &Pose, prepared: &Prepared<'_>) -> Pose {
+fn prior(candidate: &Candidate, local_from_world: &Pose) -> Pose {
     // The candidate's bases already stand on the plane: the first one tells the height of the origin above it.
     let base = candidate.bases.first().map_or_else(Pose::identity, |b| local_from_world * b.0);
     let n = candidate.plane.plane.normal;
     let tilt =
         Rotation3::rotation_between(&geometry::Vector::z(), &n).unwrap_or_else(Rotation3::identity);
-    let _ = prepared;
     Pose::from_parts(
         Translation3::from(base.translation.vector),
         UnitQuaternion::from_rotation_matrix(&tilt),

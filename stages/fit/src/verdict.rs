@@ -11,8 +11,10 @@ const LINK_VIOLATION: (f64, f64) = (0.06, 0.30);
 const VIOLATION: (f64, f64) = (0.03, 0.15);
 /// Score below which a fit is not trusted, and below which it is refused.
 const SCORE: (f64, f64) = (0.60, 0.35);
-/// Residual, in multiples of the scans' noise and metres beyond, from which a surface fits badly.
-const MAX_RMS: (f64, f64) = (2.5, 0.003);
+/// Residual, in multiples of the scans' noise and metres beyond, from which a surface fits too poorly to be trusted …
+const POOR_RMS: (f64, f64) = (2.0, 0.0015);
+/// … and from which it fits badly.
+const BAD_RMS: (f64, f64) = (2.5, 0.003);
 /// Residual from which a fit that leaves half of its joints open is refused whatever the noise, metres: with so blunt
 /// a measure, many a thing has room for a robot.
 const MAX_OPEN_RMS: f64 = 0.006;
@@ -50,15 +52,17 @@ pub(crate) fn pass(
     }
     let n_known = fit.joints.iter().filter(|j| j.sigma < KNOWN_SIGMA).count();
     let is_open = 2 * n_known <= fit.joints.len();
-    if fit.rms > MAX_RMS.0 * scene.noise + MAX_RMS.1 || (is_open && fit.rms > MAX_OPEN_RMS) {
-        let words = format!(
+    let words = || {
+        format!(
             "its points lie {:.0} mm off its surface, where the scans' noise is {:.0} mm",
             fit.rms * 1e3,
             scene.noise * 1e3
-        );
-        // A surface that fits badly and leaves the posture open may be anything.
-        if is_open { refusals.push(words) } else { doubts.push(words) }
-    }
+        )
+    };
+    // A surface that fits badly and leaves the posture open may be anything.
+    let is_bad = fit.rms > BAD_RMS.0 * scene.noise + BAD_RMS.1 || fit.rms > MAX_OPEN_RMS;
+    let is_poor = fit.rms > POOR_RMS.0 * scene.noise + POOR_RMS.1;
+    grade(is_open && is_bad, is_poor, &mut refusals, &mut doubts, words);
     if !scene.evidence.has_beams() {
         doubts.push("no scanner position is known, so nothing proves free space".into());
     }
@@ -69,8 +73,10 @@ pub(crate) fn pass(
         let n: usize = carried(prepared, j).map(|l| fit.links[l].n_points).sum();
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
             doubts.push(format!("only {n} points on what joint '{}' moves", joint.name));
+        } else if j + 1 < fit.joints.len() && joint.sigma > KNOWN_SIGMA {
+            doubts.push(format!("the points do not determine joint '{}'", joint.name));
         } else if !joint.determined {
-            notes.push(if joint.sigma < 0.02 {
+            notes.push(if joint.sigma < KNOWN_SIGMA {
                 let deg = joint.sigma.to_degrees();
                 format!("the points determine joint '{}' only to ± {deg:.2}°, or leave it several values", joint.name)
             } else {

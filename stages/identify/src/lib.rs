@@ -7,4 +7,4 @@ mod base;
 mod sites;
 
 pub use base::{BaseSearch, Settings};
-pub use sites::{RegionSettings, regions};
+pub use sites::{RegionSettings, guessed_planes, regions};

@@ -1,8 +1,8 @@
 //! Clusters in; out come the regions of the world that are worth a search: groups of clusters that may be parts of
 //! one thing, not too small to be a robot.
 
-use contract::{Cluster, Region};
-use geometry::{Aabb, Point};
+use contract::{Cluster, InstallationPlane, Region};
+use geometry::{Aabb, Plane, Point, Vector};
 
 /// What is tuned.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,6 +68,33 @@ pub fn regions(clusters: &[Cluster], settings: &RegionSettings) -> Vec<Region> {
     });
     groups.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.min[0].total_cmp(&b.0.min[0])));
     groups.iter().flat_map(|(b, _)| cut(b, settings)).map(|b| local(&b, settings.margin)).collect()
+}
+
+/// Distance between guessed heights, metres: the base search forgives half of it.
+const GUESS_STEP: f64 = 0.06;
+/// How far below what is seen a foot may stand, metres: a camera often cuts off the lower half of a base.
+const GUESS_BELOW: f64 = 0.5;
+
+/// Level planes at all heights of a box, where no plane is known to stand on. Their area is zero: no points carry
+/// them, so that a fit does not hold on to their height.
+#[must_use]
+pub fn guessed_planes(world: &Aabb) -> Vec<InstallationPlane> {
+    let (low, high) = (world.min[2] - GUESS_BELOW, world.max[2] - 0.3);
+    let n = ((high - low) / GUESS_STEP).ceil().clamp(0.0, 100.0) as usize;
+    (0..n)
+        .map(|k| {
+            let z = low + k as f64 * GUESS_STEP;
+            InstallationPlane {
+                plane: Plane { normal: Vector::z(), offset: z },
+                bounds: Aabb {
+                    min: [world.min[0], world.min[1], z],
+                    max: [world.max[0], world.max[1], z],
+                },
+                area: 0.0,
+                is_floor: false,
+            }
+        })
+        .collect()
 }
 
 /// Squares of at most `max_extent` that overlap and cover the box.
