@@ -83,7 +83,9 @@ impl<'a> Search<'a> {
         let high = region.origin.coords + geometry::Vector::from(region.bounds.max);
         let world = geometry::Aabb { min: low.into(), max: high.into() };
         let floor = &self.ground.surfaces.floor;
-        if floor.levels.is_empty() {
+        // Without beams nothing contradicts a wrong height, and every one of them would have to be tried out.
+        let has_beams = self.scans.iter().any(Scan::has_beams);
+        if floor.levels.is_empty() && has_beams {
             return identify::guessed_planes(&world);
         }
         floor.planes.iter().filter(|p| p.bounds.grown(0.3).touches(&world)).cloned().collect()
