@@ -10,7 +10,7 @@ use contract::{
 use geometry::depth::{Rows, rotate, rows, transform};
 use geometry::narrow::floor_i32;
 use geometry::{Aabb, Point, Pose};
-use robot::Model;
+use robot::{Model, Role};
 
 /// A surface turned by more than this (cosine of 70°) from the link's is something else …
 const MIN_AGREEMENT: f32 = 0.35;
@@ -26,6 +26,8 @@ const PULL: usize = 4;
 /// Labels the points of tiles near fitted robots.
 pub struct Segment {
     bodies: Vec<Body>,
+    /// For each fit, for each link: whether it belongs to the tool.
+    effectors: Vec<Vec<bool>>,
     ground: Ground,
     scans: Vec<Scan>,
     settings: Settings,
@@ -72,6 +74,10 @@ struct Seen<'a> {
     max: [f32; 3],
 }
 
+fn effectors(model: Option<&Model>) -> Vec<bool> {
+    model.map_or_else(Vec::new, |m| m.links.iter().map(|l| l.role == Role::Effector).collect())
+}
+
 impl Segment {
     /// Labels for these fits (the robots of the result, in its order; refused ones give none). `scans` in the order
     /// of their numbers.
@@ -85,6 +91,7 @@ impl Segment {
     ) -> Self {
         Self {
             bodies: bodies(fits, models, &settings),
+            effectors: fits.iter().map(|fit| effectors(models.get(fit.model))).collect(),
             ground: Ground::new(floor, &settings),
             scans: scans.to_vec(),
             settings,
@@ -101,6 +108,17 @@ impl Segment {
     #[must_use]
     pub fn ground(&self) -> &Ground {
         &self.ground
+    }
+
+    /// A tool's link is part of an effector, not of the robot.
+    fn name_tools(&self, tile: &mut TileLabels) {
+        for (_, label) in tile.labels.iter_mut().filter(|l| l.1.kind == PointKind::Link) {
+            let links = usize::try_from(label.robot).ok().and_then(|r| self.effectors.get(r));
+            let link = usize::try_from(label.link).ok();
+            if links.zip(link).is_some_and(|(links, link)| links.get(link) == Some(&true)) {
+                label.kind = PointKind::Attachment;
+            }
+        }
     }
 
     /// The links whose surroundings a tile may touch.
@@ -268,7 +286,9 @@ impl Map for Segment {
             scratch.found.push(found);
         }
         self.settle(&tile, raster, &mut scratch.found);
-        Ok(gather(&tile, &scan.world_from_scan, &scratch.found, empty))
+        let mut out = gather(&tile, &scan.world_from_scan, &scratch.found, empty);
+        self.name_tools(&mut out);
+        Ok(out)
     }
 }
 
