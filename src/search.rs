@@ -1,6 +1,7 @@
 //! A region in, the fits of all models in it out: reads the tiles that the region's views need, and sends every model
 //! of the library through base search and fit.
 
+use crate::engine::AllThreads;
 use crate::job::Settings;
 use crate::store::Store;
 use crate::surfaces::Ground;
@@ -108,7 +109,10 @@ impl<'a> Search<'a> {
             return Vec::new();
         }
         let prepared = self.prepared[index].get_or_init(|| Prepared::new(index, model));
-        candidates.iter().filter_map(|c| fit::fit(c, prepared, scene, &settings.fit)).collect()
+        candidates
+            .iter()
+            .filter_map(|c| fit::fit(c, prepared, scene, &settings.fit, &AllThreads))
+            .collect()
     }
 }
 

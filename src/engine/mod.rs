@@ -170,3 +170,13 @@ impl Engine {
         Ok(self.pool.get_or_init(|| pool))
     }
 }
+
+/// The pieces of a step on the threads of the pool that the step runs in.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct AllThreads;
+
+impl contract::Fan for AllThreads {
+    fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
+        items.into_par_iter().map(work).collect()
+    }
+}

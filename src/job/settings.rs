@@ -76,7 +76,7 @@ settings! {
     }
     fit: fit::Settings {
         beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
-        max_points, floor_band, min_noise, plane_sigma, determined_sigma, min_score,
+        max_points, floor_band, min_noise, plane_sigma, scan_sigma, determined_sigma, min_score,
         max_violation,
     }
     segment: segment::Settings {

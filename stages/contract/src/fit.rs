@@ -3,11 +3,12 @@
 use geometry::Pose;
 
 /// How far a fit may be trusted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Verdict {
     /// Wrong, or not this robot: not used for labels.
     Refused,
     /// May be right: a person should look.
+    #[default]
     Doubtful,
     /// Right as far as the points can tell.
     Trusted,
@@ -26,7 +27,7 @@ impl Verdict {
 }
 
 /// One joint of a fit.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct JointFit {
     /// As in the URDF.
     pub name: String,
@@ -36,6 +37,8 @@ pub struct JointFit {
     pub sigma: f64,
     /// Whether the points determine it.
     pub determined: bool,
+    /// Other values within the limits, whole turns away, at which the robot stands the same.
+    pub equivalents: Vec<f64>,
 }
 
 /// What the scans say of one link at the fitted posture.
@@ -64,10 +67,34 @@ pub struct RunnerUp {
     pub score: f64,
     /// Whether it is the same model in another posture.
     pub same_model: bool,
+    /// How clearly the beams prefer the best, on the surface of the links that stand differently: about 0 for equals.
+    pub margin: f64,
+}
+
+/// How a scan differs from its stated pose near a robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScanShift {
+    /// Whose.
+    pub scan: crate::ScanId,
+    /// Shift that its points need at the robot's base, metres, world axes.
+    pub shift: [f64; 3],
+    /// Turn that they need about the scanner, radians, world axes.
+    pub turn: [f64; 3],
+    /// Its ranges are too long by this, metres.
+    pub range_bias: f64,
+}
+
+/// Another posture that explains the points as well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equal {
+    /// Free joints, in the order of the model, radians or metres.
+    pub posture: Vec<f64>,
+    /// As [`RunnerUp::margin`].
+    pub margin: f64,
 }
 
 /// A robot found in the scans.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Fit {
     /// Index into the library.
     pub model: usize,
@@ -88,10 +115,18 @@ pub struct Fit {
     pub explained: f64,
     /// RMS distance of the points of the robot from its surface, metres.
     pub rms: f64,
+    /// How far the robot's surface is off the model's, standard deviation over patches of a hand's width, metres.
+    pub surface_sigma: f64,
+    /// Standard deviation of the place of the main chain's tip in the base's frame, metres.
+    pub tip_sigma: f64,
+    /// How the scans stand to one another, as far as the points of the robot tell.
+    pub scans: Vec<ScanShift>,
     /// One for each link of the model, in its order.
     pub links: Vec<LinkEvidence>,
     /// The best other explanation, if any came near.
     pub runner_up: Option<RunnerUp>,
+    /// Other postures that explain the points as well (a symmetric link, a wrist that nobody saw), best first.
+    pub equals: Vec<Equal>,
     /// Other models that fit as well where the points can tell.
     pub alike: Vec<String>,
     /// How far to trust it.

@@ -17,12 +17,12 @@ mod view;
 
 pub use candidate::{Candidate, Cluster, Voxel};
 pub use error::{Error, Kind, Result};
-pub use fit::{Fit, JointFit, LinkEvidence, RunnerUp, Verdict};
+pub use fit::{Equal, Fit, JointFit, LinkEvidence, RunnerUp, ScanShift, Verdict};
 pub use label::{Label, PointKind};
 pub use lattice::{Lattice, Pixel};
 pub use residual::{LinkAt, RESIDUAL_EDGE, ResidualVoxel, TileLabels};
 pub use scan::{Format, Input, InputId, Mask, MaskId, Scan, ScanId};
-pub use step::{Fold, Map, Weigh};
+pub use step::{Fan, Fold, Map, OneByOne, Weigh};
 pub use strip::{Attributes, Strip};
 pub use surface::{Floor, FloorLevel, InstallationPlane, Occupancy, PlanePatch, TileSummary};
 pub use tile::{TILE_SIDE, Tile, TileAt};

@@ -1,4 +1,4 @@
-//! The two shapes of a step. The engine owns threads, order, budget and errors, so that a step stays one screen.
+//! The shapes of a step. The engine owns threads, order, budget and errors, so that a step stays one screen.
 
 use crate::Result;
 
@@ -69,4 +69,23 @@ pub trait Fold {
     fn join(&self, earlier: &mut Self::Sum, later: Self::Sum) -> Result<()>;
     /// Makes the answer.
     fn finish(&self, sum: Self::Sum) -> Result<Self::Out>;
+}
+
+/// Independent pieces of work inside one step: who calls the step says on which threads they are done.
+///
+/// # Law
+/// Results come in the order of the items, whatever the order of the work.
+pub trait Fan: Sync {
+    /// Does `work` on each item.
+    fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U>;
+}
+
+/// All pieces on the calling thread.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct OneByOne;
+
+impl Fan for OneByOne {
+    fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
+        items.into_iter().map(work).collect()
+    }
 }

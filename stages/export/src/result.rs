@@ -141,6 +141,9 @@ pub struct RunnerUpEntry {
     pub score: Option<f64>,
     /// Whether it is the same model in another posture.
     pub same_model: bool,
+    /// How clearly the beams prefer the best, on the links that stand differently: about 0 for equals, 1 for clear.
+    #[serde(default)]
+    pub margin: Option<f64>,
 }
 
 /// Where the masks are.
@@ -227,6 +230,7 @@ impl RobotEntry {
                 model: r.model.clone(),
                 score: finite(r.score),
                 same_model: r.same_model,
+                margin: finite(r.margin),
             }),
             alike: fit.alike.clone(),
             tip: tip.map(|(link, pose)| TipPose { link, pose: (&pose).into() }),

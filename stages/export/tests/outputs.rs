@@ -178,6 +178,7 @@ fn fit() -> Fit {
         value,
         sigma,
         determined: sigma.is_finite(),
+        ..JointFit::default()
     };
     Fit {
         model: 0,
@@ -197,10 +198,16 @@ fn fit() -> Fit {
             n_points: 900,
             rms: f64::NAN,
         }],
-        runner_up: Some(RunnerUp { model: "other".into(), score: 0.2, same_model: false }),
+        runner_up: Some(RunnerUp {
+            model: "other".into(),
+            score: 0.2,
+            same_model: false,
+            margin: 0.9,
+        }),
         alike: vec!["box_long".into()],
         verdict: Verdict::Doubtful,
         reasons: vec!["joint is not determined: \"a_lift\"".into()],
+        ..Fit::default()
     }
 }
 

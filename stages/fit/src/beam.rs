@@ -1,6 +1,7 @@
 //! Base poses in; out come postures that the beams allow, best first: a beam search along the joints, in which every
 //! local maximum of every sweep competes with all others (fit.md §4d, §4e).
 
+use contract::Fan;
 use geometry::{Pose, Probe};
 
 use crate::{Prepared, Scene, Settings};
@@ -23,10 +24,10 @@ pub(crate) struct Beam<'a> {
 
 impl Beam<'_> {
     /// The best hypotheses over all joints, best first.
-    pub(crate) fn run(&self, bases: &[Pose]) -> Vec<Hypothesis> {
+    pub(crate) fn run(&self, bases: &[Pose], fan: &impl Fan) -> Vec<Hypothesis> {
         let home = self.prepared.model.home();
         let tolerance = self.settings.search_tolerance as f32;
-        let mut beam: Vec<Hypothesis> = bases
+        let beam: Vec<Hypothesis> = bases
             .iter()
             .map(|base| {
                 let mut h =
@@ -35,16 +36,30 @@ impl Beam<'_> {
                 h
             })
             .collect();
-        for free in 0..home.len() {
+        self.resume(beam, 0, fan)
+    }
+
+    /// Goes on from hypotheses whose joints before `first` are set and scored.
+    pub(crate) fn resume(
+        &self,
+        mut beam: Vec<Hypothesis>,
+        first: usize,
+        fan: &impl Fan,
+    ) -> Vec<Hypothesis> {
+        let tolerance = self.settings.search_tolerance as f32;
+        for free in first..self.prepared.placed_by.len() {
             if self.prepared.placed_by[free].is_empty() {
                 continue;
             }
-            let mut next: Vec<Hypothesis> =
-                beam.iter().flat_map(|h| self.extend(h, free, tolerance)).collect();
+            let extended = fan.fan(beam, |h| self.extend(&h, free, tolerance));
+            let mut next: Vec<Hypothesis> = extended.into_iter().flatten().collect();
             self.keep_best(&mut next, free);
-            for h in next.iter_mut().take(self.settings.settle) {
-                self.settle(h, free);
-            }
+            let rest = next.split_off(self.settings.settle.min(next.len()));
+            next = fan.fan(next, |mut h| {
+                self.settle(&mut h, free);
+                h
+            });
+            next.extend(rest);
             sort(&mut next);
             // Not one hypothesis explains more than the beams contradict: no robot of this model stands here.
             if next.first().is_none_or(|h| h.score <= 0.0) {
@@ -75,30 +90,17 @@ impl Beam<'_> {
     /// All local maxima of a sweep of one joint, each with the score of what it places added.
     fn extend(&self, h: &Hypothesis, free: usize, tolerance: f32) -> Vec<Hypothesis> {
         let links = &self.prepared.placed_by[free];
-        let (low, span, n) = self.sweep(free);
-        let mut trial = h.clone();
-        let scores: Vec<f64> = (0..=n)
-            .map(|k| {
-                trial.posture[free] = low + span * k as f64 / n as f64;
-                self.score(&trial, links, tolerance)
-            })
-            .collect();
-        let mut out = Vec::new();
-        for k in 0..=n {
-            let left = k == 0 || scores[k] > scores[k - 1];
-            let right = k == n || scores[k] >= scores[k + 1];
-            if left && right {
-                let mut next = h.clone();
-                next.posture[free] = low + span * k as f64 / n as f64;
-                next.score += scores[k];
-                out.push(next);
-            }
-        }
-        out
+        let extended = |(value, score): (f64, f64)| {
+            let mut next = h.clone();
+            next.posture[free] = value;
+            next.score += score;
+            next
+        };
+        self.peaks(h, free, links, tolerance).into_iter().map(extended).collect()
     }
 
     /// Start, span and number of steps of a joint's sweep: an arc step moves its samples by the tolerance at most.
-    fn sweep(&self, free: usize) -> (f64, f64, usize) {
+    pub(crate) fn sweep(&self, free: usize) -> (f64, f64, usize) {
         let [low, high] = self.prepared.model.limits(free);
         let joint = &self.prepared.model.joints[self.prepared.model.free[free]];
         let tolerance = self.settings.search_tolerance;
@@ -196,43 +198,28 @@ impl Beam<'_> {
         }
     }
 
-    /// Other values of each joint alone that score nearly as well as the posture's or better, as new hypotheses:
-    /// a joint whose link nearly hides in its parent may have been caught at the wrong maximum.
-    pub(crate) fn alternatives(&self, h: &Hypothesis) -> Vec<Hypothesis> {
-        let tolerance = (0.6 * self.settings.search_tolerance) as f32;
-        let mut out = Vec::new();
-        for free in 0..h.posture.len() {
-            if self.prepared.placed_by[free].is_empty() {
-                continue;
-            }
-            // What stands before the joint does not change with it.
-            let moved: Vec<usize> =
-                self.prepared.placed_by[free..].iter().flatten().copied().collect();
-            let own = self.score(h, &moved, tolerance);
-            let (low, span, n) = self.sweep(free);
-            let mut trial = h.clone();
-            let scores: Vec<f64> = (0..=n)
-                .map(|k| {
-                    trial.posture[free] = low + span * k as f64 / n as f64;
-                    self.score(&trial, &moved, tolerance)
-                })
-                .collect();
-            for k in 0..=n {
-                let value = low + span * k as f64 / n as f64;
-                let peak =
-                    (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1]);
-                let far = (value - h.posture[free]).abs() > 2.5 * span / n as f64;
-                if peak && far && scores[k] > own - 0.15 * (own.abs() + h.score.abs()) {
-                    let mut next = h.clone();
-                    next.posture[free] = value;
-                    next.score = h.score + scores[k] - own;
-                    out.push(next);
-                }
-            }
-        }
-        sort(&mut out);
-        out.truncate(self.settings.n_polish);
-        out
+    /// Values of a joint at which the score of some links is a local maximum, with that score.
+    pub(crate) fn peaks(
+        &self,
+        h: &Hypothesis,
+        free: usize,
+        links: &[usize],
+        tolerance: f32,
+    ) -> Vec<(f64, f64)> {
+        let (low, span, n) = self.sweep(free);
+        let mut trial = h.clone();
+        let values: Vec<f64> = (0..=n).map(|k| low + span * k as f64 / n as f64).collect();
+        let mut score = |value: &f64| {
+            trial.posture[free] = *value;
+            self.score(&trial, links, tolerance)
+        };
+        let scores: Vec<f64> = values.iter().map(&mut score).collect();
+        (0..=n)
+            .filter(|&k| {
+                (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1])
+            })
+            .map(|k| (values[k], scores[k]))
+            .collect()
     }
 }
 

@@ -76,6 +76,7 @@ fn lose(winner: &mut Fit, loser: &Fit) {
             model: loser.model_name.clone(),
             score,
             same_model: loser.model == winner.model,
+            margin: 1.0 - share,
         });
     }
     if loser.model == winner.model || loser.verdict == Verdict::Refused {

@@ -1,7 +1,7 @@
 //! A refined fit in; out comes what the beams say of each of its links, and one score for the whole.
 
 use contract::LinkEvidence;
-use geometry::Probe;
+use geometry::{Point, Probe};
 
 use crate::beam::Hypothesis;
 use crate::{Prepared, Scene, Settings};
@@ -11,6 +11,8 @@ use crate::{Prepared, Scene, Settings};
 pub(crate) struct Judgement {
     /// One for each link.
     pub(crate) probes: Vec<Probe>,
+    /// Surface explained less 1.5 × surface contradicted, and surface judged, of each link, m².
+    pub(crate) links: Vec<[f64; 2]>,
     /// Share explained less share contradicted over the judged surface, −1.5..1.
     pub(crate) score: f64,
     /// Surface explained less 1.5 × surface contradicted, m²: compares models of different size.
@@ -32,6 +34,7 @@ pub(crate) fn judge(
     let poses = prepared.model.poses(&h.posture);
     let mut out = Judgement {
         probes: Vec::with_capacity(poses.len()),
+        links: Vec::with_capacity(poses.len()),
         score: 0.0,
         explained: 0.0,
         violation: 0.0,
@@ -42,6 +45,7 @@ pub(crate) fn judge(
         let (points, normals) = prepared.samples(l, settings.n_judge);
         if points.is_empty() {
             out.probes.push(Probe::default());
+            out.links.push([0.0; 2]);
             continue;
         }
         let probe =
@@ -59,6 +63,7 @@ pub(crate) fn judge(
         judged += each * f64::from(probe.n_seen);
         through += each * f64::from(probe.n_through);
         area += prepared.links[l].area;
+        out.links.push([each * net, each * f64::from(probe.n_seen)]);
         out.probes.push(probe);
     }
     if judged > 0.0 {
@@ -67,6 +72,33 @@ pub(crate) fn judge(
         out.seen = judged / area;
     }
     out
+}
+
+/// A link that moves less than this between two postures stands the same in both, metres: a beam's width and noise.
+const MOVED: f64 = 0.02;
+
+/// How clearly the beams prefer one posture to another: difference of the share explained on the links that stand
+/// differently, about 0 for equals, 1 for right against nothing.
+pub(crate) fn margin(
+    prepared: &Prepared<'_>,
+    best: (&Hypothesis, &Judgement),
+    other: (&Hypothesis, &Judgement),
+) -> f64 {
+    let pose = |h: &Hypothesis| {
+        let poses = prepared.model.poses(&h.posture);
+        poses.iter().map(|p| h.local_from_base * p).collect::<Vec<_>>()
+    };
+    let (a, b) = (pose(best.0), pose(other.0));
+    let (mut ahead, mut judged) = (0.0, 0.0);
+    for (l, link) in prepared.model.links.iter().enumerate().filter(|(_, l)| !l.bounds.is_empty()) {
+        let apart = |c: [f64; 3]| (a[l] * Point::from(c) - b[l] * Point::from(c)).norm();
+        if link.bounds.corners().into_iter().map(apart).fold(0.0, f64::max) > MOVED {
+            let (p, q) = (best.1.links[l], other.1.links[l]);
+            ahead += p[0] - q[0];
+            judged += p[1].max(q[1]);
+        }
+    }
+    if judged > 0.0 { ahead / judged } else { 0.0 }
 }
 
 /// What is reported of each link.

@@ -5,11 +5,15 @@
 //! among candidates that claim the same points (`choose`). Method and maths: fit.md §4d–§4g.
 #![forbid(unsafe_code)]
 
+mod adjust;
+mod alternatives;
 mod beam;
 mod choose;
 mod judge;
+mod normal;
 mod prepared;
 mod refine;
+mod report;
 mod scene;
 mod settings;
 mod solve;

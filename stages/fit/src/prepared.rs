@@ -21,6 +21,10 @@ pub struct Prepared<'a> {
     /// For each free joint: distance of the samples it places from its axis, 95th percentile, metres (1 for
     /// prismatic joints, so that steps are in metres).
     pub(crate) lever: Vec<f64>,
+    /// Number of patches over all links.
+    pub(crate) n_patches: usize,
+    /// For each patch: its group, one for each link and side.
+    pub(crate) patch_groups: Vec<u32>,
 }
 
 /// What is kept for a link.
@@ -34,6 +38,8 @@ pub(crate) struct PreparedLink {
     pub(crate) weight: f64,
     /// Outer area, m².
     pub(crate) area: f64,
+    /// Patch of each sample, counted over all links.
+    pub(crate) patches: Vec<u32>,
 }
 
 /// Coarse field: reach covers the first gate (120 mm, fit.md §6.4), voxels a fifth of it.
@@ -53,9 +59,11 @@ impl<'a> Prepared<'a> {
                 fine: NearestField::new(&link.cad.points, FINE.0, FINE.1),
                 weight: area.sqrt(),
                 area,
+                patches: Vec::new(),
             }
         });
-        let links: Vec<_> = links.collect();
+        let mut links: Vec<_> = links.collect();
+        let patch_groups = patches(model, &mut links);
         let n_free = model.free.len();
         let depends = dependencies(model);
         let mut placed_by = vec![Vec::new(); n_free];
@@ -70,7 +78,17 @@ impl<'a> Prepared<'a> {
             }
         }
         let lever = (0..n_free).map(|j| lever(model, j, &placed_by[j])).collect();
-        Self { model, index, links, placed_by, fixed, reach: reach(model), lever }
+        Self {
+            model,
+            index,
+            links,
+            placed_by,
+            fixed,
+            reach: reach(model),
+            lever,
+            n_patches: patch_groups.len(),
+            patch_groups,
+        }
     }
 
     /// The first `n` samples and normals of a link.
@@ -79,6 +97,35 @@ impl<'a> Prepared<'a> {
         let n = n.min(cad.points.len());
         (&cad.points[..n], &cad.normals[..n])
     }
+}
+
+/// Edge of a patch, metres: within it a model's error of shape is about the same (fit.md §4g: 12–15 cm).
+const PATCH: f32 = 0.13;
+
+/// Cuts the surface of each link into patches: cells of its frame, apart by the side they look to. Returns the group
+/// of each patch.
+fn patches(model: &Model, links: &mut [PreparedLink]) -> Vec<u32> {
+    let mut groups = Vec::new();
+    for (l, link) in links.iter_mut().enumerate() {
+        let cad = &model.links[l].cad;
+        let key = |i: usize| {
+            let n = cad.normals[i];
+            let side = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
+            (
+                side * 2 + usize::from(n[side] < 0.0),
+                cad.points[i].map(|v| (v / PATCH).floor() as i32),
+            )
+        };
+        let mut keys: Vec<_> = (0..cad.points.len()).map(key).collect();
+        let each = keys.clone();
+        keys.sort_unstable();
+        keys.dedup();
+        let first = groups.len();
+        let at = |k| (first + keys.partition_point(|other| other < k)) as u32;
+        link.patches = each.iter().map(at).collect();
+        groups.extend(keys.iter().map(|k| (l * 6 + k.0) as u32));
+    }
+    groups
 }
 
 /// For each link, for each free joint: whether it moves the link (at a posture where no two effects cancel).

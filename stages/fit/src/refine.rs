@@ -1,5 +1,5 @@
-//! A posture near the truth and points in; out come base and all joints at the least robust point-to-plane error,
-//! with their covariance (fit.md §4g).
+//! A posture near the truth and points in; out come base and all joints at the least robust point-to-plane error
+//! (fit.md §4g).
 //!
 //! Residual of a point q (base frame) at the facet (x, n) of a link: `r = n·(q − x)`. A joint moves the facet with
 //! the twist (v, w), so `∂r/∂θ = −(n·v + w·(q × n))`: exact, since x and n both move. The base moves the point's
@@ -10,7 +10,6 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::JointKind;
 
 use crate::beam::Hypothesis;
-use crate::scene::Measured;
 use crate::{Prepared, Scene, Settings};
 
 /// One round of the schedule.
@@ -58,20 +57,6 @@ struct Sums {
     rr: f64,
 }
 
-/// What a refinement ends with.
-#[derive(Debug, Clone)]
-pub(crate) struct Refined {
-    pub(crate) hypothesis: Hypothesis,
-    /// Covariance of base twist (local axes at the base: translation, rotation) and joints, from clusters of points.
-    pub(crate) covariance: DMatrix<f64>,
-    /// Points within the gate, for each link.
-    pub(crate) n_points: Vec<usize>,
-    /// RMS distance of those points, metres, for each link.
-    pub(crate) link_rms: Vec<f64>,
-    /// Robust standard deviation of all residuals, metres.
-    pub(crate) noise: f64,
-}
-
 /// The refinement of one model in one scene.
 pub(crate) struct Refine<'a> {
     pub(crate) prepared: &'a Prepared<'a>,
@@ -89,7 +74,6 @@ struct Match {
     /// Normal, base frame.
     n: Vector,
     r: f64,
-    view: u16,
 }
 
 impl Refine<'_> {
@@ -127,8 +111,8 @@ impl Refine<'_> {
             if !near {
                 continue;
             }
-            match self.nearest(m, &links, gate) {
-                Some((link, _, _, distance)) if distance <= gate => strata[link].push(i),
+            match self.nearest(m.p, &links, gate) {
+                Some((link, _, distance)) if distance <= gate => strata[link].push(i),
                 _ if gate > FINE_REACH => strata[self.prepared.links.len()].push(i),
                 _ => {}
             }
@@ -144,7 +128,7 @@ impl Refine<'_> {
     }
 
     /// Links with a surface, and their frames from the local frame.
-    fn link_frames(&self, h: &Hypothesis) -> Vec<(usize, geometry::depth::Rows)> {
+    pub(crate) fn link_frames(&self, h: &Hypothesis) -> Vec<(usize, geometry::depth::Rows)> {
         let base_from_local = h.local_from_base.inverse();
         let poses = self.prepared.model.poses(&h.posture);
         (0..poses.len())
@@ -164,12 +148,14 @@ impl Refine<'_> {
             .iter()
             .filter_map(|&i| {
                 let m = &self.scene.points[i as usize];
-                let (link, p, n, distance) = self.nearest(m, &links, gate)?;
+                let (link, sample, distance) = self.nearest(m.p, &links, gate)?;
                 if distance > gate {
                     return None;
                 }
                 let pose = &poses[link];
-                let n = pose.rotation * n;
+                let cad = &self.prepared.model.links[link].cad;
+                let (p, n) = (cad.points[sample], cad.normals[sample].map(f64::from));
+                let n = pose.rotation * Vector::from(n);
                 let q = base_from_local * geometry::Point::from(m.p.map(f64::from));
                 let x = pose * geometry::Point::from(p.map(f64::from));
                 // A facet that faces away from the scanner cannot have given this point.
@@ -179,22 +165,22 @@ impl Refine<'_> {
                         return None;
                     }
                 }
-                Some(Match { link, q: q.coords, n, r: n.dot(&(q - x)), view: m.view })
+                Some(Match { link, q: q.coords, n, r: n.dot(&(q - x)) })
             })
             .collect()
     }
 
-    /// The nearest facet over all links: link, position and normal in its frame, distance.
+    /// The nearest sample over all links to a point (local frame): link, sample, distance.
     #[inline]
-    fn nearest(
+    pub(crate) fn nearest(
         &self,
-        m: &Measured,
+        point: [f32; 3],
         links: &[(usize, geometry::depth::Rows)],
         gate: f64,
-    ) -> Option<(usize, [f32; 3], Vector, f64)> {
+    ) -> Option<(usize, usize, f64)> {
         let mut best: Option<(usize, usize, f32)> = None;
         for (l, link_from_local) in links {
-            let p = geometry::depth::transform(link_from_local, m.p);
+            let p = geometry::depth::transform(link_from_local, point);
             let link = &self.prepared.links[*l];
             let found =
                 if gate < FINE_REACH { link.fine.nearest(p) } else { link.coarse.nearest(p) };
@@ -205,22 +191,24 @@ impl Refine<'_> {
                 best = Some((*l, at, d2));
             }
         }
-        let (link, at, d2) = best?;
-        let cad = &self.prepared.model.links[link].cad;
-        let n = Vector::from(cad.normals[at].map(f64::from));
-        Some((link, cad.points[at], n, f64::from(d2).sqrt()))
+        best.map(|(link, at, d2)| (link, at, f64::from(d2).sqrt()))
     }
 
-    /// Derivative of a match's residual by base twist (translation, rotation about the base's origin; base axes) and
+    /// Poses of all links in the local frame.
+    pub(crate) fn local_from_links(&self, h: &Hypothesis) -> Vec<Pose> {
+        self.prepared.model.poses(&h.posture).iter().map(|p| h.local_from_base * p).collect()
+    }
+
+    /// Derivative of a residual at a point with a facet's normal (base frame) by base twist (translation, rotation about the base's origin; base axes) and
     /// by each joint.
-    fn row(&self, m: &Match, twists: &[[f64; 6]], out: &mut [f64]) {
-        let qxn = m.q.cross(&m.n);
+    pub(crate) fn row(&self, q: &Vector, n: &Vector, twists: &[[f64; 6]], out: &mut [f64]) {
+        let qxn = q.cross(n);
         for i in 0..3 {
-            out[i] = -m.n[i];
+            out[i] = -n[i];
             out[3 + i] = -qxn[i];
         }
         for (j, t) in twists.iter().enumerate() {
-            let v = m.n.x * t[0] + m.n.y * t[1] + m.n.z * t[2];
+            let v = n.x * t[0] + n.y * t[1] + n.z * t[2];
             let w = qxn.x * t[3] + qxn.y * t[4] + qxn.z * t[5];
             out[6 + j] = -(v + w);
         }
@@ -242,7 +230,7 @@ impl Refine<'_> {
         let mut row = vec![0.0; n];
         for m in self.matches(h, points, gate) {
             let w = robust::tukey(m.r, gate);
-            self.row(&m, &kinematics.twists[m.link], &mut row);
+            self.row(&m.q, &m.n, &kinematics.twists[m.link], &mut row);
             let s = &mut sums[m.link];
             s.n += 1;
             s.weight += w;
@@ -290,7 +278,12 @@ impl Refine<'_> {
     }
 
     /// Joint limits, installation plane, and a weak pull to stay where the points say nothing.
-    fn add_priors(&self, h: &Hypothesis, hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
+    pub(crate) fn add_priors(
+        &self,
+        h: &Hypothesis,
+        hessian: &mut DMatrix<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
         const STAY: f64 = 1.0 / (0.7 * 0.7); // 40° or 0.7 m, one sigma per step
         const LIMIT_SIGMA: f64 = 0.0087; // 0.5°: hard stops have play
         for a in 0..hessian.nrows() {
@@ -337,55 +330,10 @@ impl Refine<'_> {
         }
     }
 
-    /// Covariance and residuals at the end: the sandwich over clusters (view, link, normal octant), which stays
-    /// honest when errors of points are alike (fit.md §6.7).
-    pub(crate) fn finish(&self, h: Hypothesis, points: &[u32], gate: f64) -> Refined {
-        let n = 6 + h.posture.len();
-        let kinematics = self.prepared.model.kinematics(&h.posture);
-        let matches = self.matches(&h, points, gate);
-        let mut residuals: Vec<f64> = matches.iter().map(|m| m.r.abs()).collect();
-        let noise = robust::median(&mut residuals).map_or(gate, |m| 1.4826 * m);
-        let sigma = noise.max(self.settings.min_noise);
-        let n_links = self.prepared.links.len();
-        let mut hessian: DMatrix<f64> = DMatrix::zeros(n, n);
-        let n_clusters = self.scene.views.len() * n_links * 8;
-        let mut clusters: Vec<Option<DVector<f64>>> = vec![None; n_clusters];
-        let (mut n_points, mut rr) = (vec![0_usize; n_links], vec![0.0; n_links]);
-        let mut row = vec![0.0; n];
-        for m in &matches {
-            n_points[m.link] += 1;
-            rr[m.link] += m.r * m.r;
-            let w = robust::tukey(m.r, gate) / (sigma * sigma);
-            self.row(m, &kinematics.twists[m.link], &mut row);
-            let octant = (0..3).map(|i| usize::from(m.n[i] > 0.0) << i).sum::<usize>();
-            let at = (usize::from(m.view) * n_links + m.link) * 8 + octant;
-            let g = clusters[at].get_or_insert_with(|| DVector::zeros(n));
-            for a in 0..n {
-                g[a] += w * m.r * row[a];
-                for b in 0..n {
-                    hessian[(a, b)] += w * row[a] * row[b];
-                }
-            }
-        }
-        let mut ignored = DVector::zeros(n);
-        self.add_priors(&h, &mut hessian, &mut ignored);
-        let covariance = sandwich(&hessian, &clusters);
-        let link_rms = (0..n_links).map(|l| (rr[l] / n_points[l].max(1) as f64).sqrt()).collect();
-        Refined { hypothesis: h, covariance, n_points, link_rms, noise }
+    /// Robust standard deviation of the residuals within a gate, metres.
+    pub(crate) fn noise(&self, h: &Hypothesis, points: &[u32], gate: f64) -> f64 {
+        let mut residuals: Vec<f64> =
+            self.matches(h, points, gate).iter().map(|m| m.r.abs()).collect();
+        robust::median(&mut residuals).map_or(gate, |m| 1.4826 * m)
     }
-}
-
-/// `H⁻¹ (Σ g gᵀ) H⁻¹ · C/(C−1)` plus `H⁻¹`: clusters that happen to cancel must not promise more than the points can.
-fn sandwich(hessian: &DMatrix<f64>, clusters: &[Option<DVector<f64>>]) -> DMatrix<f64> {
-    let n = hessian.nrows();
-    let inverse =
-        hessian.clone().cholesky().map_or_else(|| DMatrix::identity(n, n) * 1e3, |c| c.inverse());
-    let mut meat = DMatrix::zeros(n, n);
-    let mut count = 0.0_f64;
-    for g in clusters.iter().flatten() {
-        meat += g * g.transpose();
-        count += 1.0;
-    }
-    let factor = if count > 1.0 { count / (count - 1.0) } else { 1.0 };
-    &inverse * meat * &inverse * factor + &inverse
 }

@@ -126,9 +126,10 @@ fn noise(views: &[View]) -> Option<f64> {
 
 /// The first point of each grid cell and view, in the order of the points.
 fn thin(points: &[Measured], edge: f32) -> Vec<u32> {
+    // 18 bits an axis: 3 km of 12 mm cells, folded over beyond.
+    let cell = |v: f32| u64::from((v / edge).floor() as i32 as u32 & 0x3_ffff);
     let key = |m: &Measured| {
-        let c = m.p.map(|v| (v / edge).floor() as i32);
-        (m.view, c)
+        u64::from(m.view) << 54 | cell(m.p[2]) << 36 | cell(m.p[1]) << 18 | cell(m.p[0])
     };
     let mut keyed: Vec<_> = points.iter().enumerate().map(|(i, m)| (key(m), i as u32)).collect();
     keyed.sort_unstable();

@@ -24,8 +24,8 @@ const KNOWN_SIGMA: f64 = 0.0175;
 const SEEN: f64 = 0.12;
 /// Fewest points on the links that a joint moves.
 const JOINT_POINTS: usize = 60;
-/// A runner-up that scores more than this share of the best makes it doubtful.
-const RIVAL: f64 = 0.93;
+/// A runner-up that the beams prefer less clearly than this makes the best doubtful.
+const RIVAL: f64 = 0.12;
 
 /// Sets verdict and reasons from what stands in the fit and the judgement.
 pub(crate) fn pass(
@@ -84,7 +84,7 @@ pub(crate) fn pass(
             });
         }
     }
-    let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.score > RIVAL * fit.score);
+    let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
     if rival {
         doubts.push("another posture explains the points nearly as well".into());
     }

@@ -114,16 +114,15 @@ fn fit(world_from_base: Pose, q: f64) -> Fit {
         model_name: "box".into(),
         world_from_base,
         base_sigma: [1e-4; 6],
-        joints: vec![JointFit { name: "j1".into(), value: q, sigma: 1e-4, determined: true }],
-        covariance: Vec::new(),
-        score: 1.0,
-        explained: 1.0,
-        rms: 0.002,
-        links: Vec::new(),
-        runner_up: None,
-        alike: Vec::new(),
+        joints: vec![JointFit {
+            name: "j1".into(),
+            value: q,
+            sigma: 1e-4,
+            determined: true,
+            ..JointFit::default()
+        }],
         verdict: Verdict::Trusted,
-        reasons: Vec::new(),
+        ..Fit::default()
     }
 }
 
@@ -286,7 +285,13 @@ fn points_of_a_real_robot_go_to_their_links() {
     let world_from_base = at(2.0, 1.0, 0.0);
     let mut fit = fit(world_from_base, 0.0);
     fit.joints = (posture.iter().enumerate())
-        .map(|(i, q)| JointFit { name: format!("j{i}"), value: *q, sigma: 1e-4, determined: true })
+        .map(|(i, q)| JointFit {
+            name: format!("j{i}"),
+            value: *q,
+            sigma: 1e-4,
+            determined: true,
+            ..JointFit::default()
+        })
         .collect();
     let poses = model.poses(&posture);
     let fields: Vec<_> =

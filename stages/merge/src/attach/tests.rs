@@ -42,16 +42,15 @@ fn fit() -> Fit {
         model_name: "m".into(),
         world_from_base: Pose::identity(),
         base_sigma: [0.0; 6],
-        joints: vec![JointFit { name: "j1".into(), value: 0.0, sigma: 0.0, determined: true }],
-        covariance: Vec::new(),
-        score: 1.0,
-        explained: 1.0,
-        rms: 0.0,
-        links: Vec::new(),
-        runner_up: None,
-        alike: Vec::new(),
+        joints: vec![JointFit {
+            name: "j1".into(),
+            value: 0.0,
+            sigma: 0.0,
+            determined: true,
+            ..JointFit::default()
+        }],
         verdict: Verdict::Trusted,
-        reasons: Vec::new(),
+        ..Fit::default()
     }
 }
 

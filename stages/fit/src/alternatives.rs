@@ -1,0 +1,149 @@
+//! A fitted posture in; out come other postures worth a look: other values of one joint, the flipped wrist, and a new
+//! search from the joint on from which the beams contradict the links (fit.md §4e).
+
+use contract::Fan;
+use robot::JointKind;
+use std::f64::consts::{PI, TAU};
+
+use crate::beam::{Beam, Hypothesis, sort};
+use crate::judge::Judgement;
+
+/// Share of the links' and the whole score that an alternative may lack and still be refined.
+const SHORT: f64 = 0.15;
+/// Share of a link that beams may go through before it is searched anew (fit.md §4e).
+const MAX_VIOLATED: f32 = 0.06;
+/// Share of a link's judged surface that must be met, else it is searched anew (fit.md §4e).
+const MIN_MATCHED: f32 = 0.35;
+/// Smallest share of a link's surface that must be judged for that.
+const MIN_SEEN: f32 = 0.05;
+/// Hypotheses of a new search that are refined.
+const N_AGAIN: usize = 3;
+
+impl Beam<'_> {
+    /// Other postures that score nearly as well as this one or better, best first.
+    pub(crate) fn alternatives(&self, h: &Hypothesis, fan: &impl Fan) -> Vec<Hypothesis> {
+        let joints = (0..h.posture.len()).collect();
+        let found = fan.fan(joints, |free| self.other_values(h, free));
+        let mut out: Vec<Hypothesis> = found.into_iter().flatten().collect();
+        out.extend(self.flips(h));
+        sort(&mut out);
+        out.truncate(self.settings.n_polish);
+        out
+    }
+
+    /// Other maxima of one joint alone: a joint whose link nearly hides in its parent may have been caught at the wrong
+    /// one.
+    fn other_values(&self, h: &Hypothesis, free: usize) -> Vec<Hypothesis> {
+        if self.prepared.placed_by[free].is_empty() {
+            return Vec::new();
+        }
+        let tolerance = (0.6 * self.settings.search_tolerance) as f32;
+        let moved = self.carried(free);
+        let own = self.score(h, &moved, tolerance);
+        let (_, span, n) = self.sweep(free);
+        let far = |value: f64| (value - h.posture[free]).abs() > 2.5 * span / n as f64;
+        let least = own - SHORT * (own.abs() + h.score.abs());
+        self.peaks(h, free, &moved, tolerance)
+            .into_iter()
+            .filter(|(value, score)| far(*value) && *score > least)
+            .map(|(value, score)| {
+                let mut next = h.clone();
+                next.posture[free] = value;
+                next.score = h.score + score - own;
+                next
+            })
+            .collect()
+    }
+
+    /// The other way to hold the same hand: for each three turning joints in a row the outer ones half a turn on, the
+    /// middle one mirrored about the value at which the outer axes are parallel. Within limits, where it scores well.
+    fn flips(&self, h: &Hypothesis) -> Vec<Hypothesis> {
+        let tolerance = (0.6 * self.settings.search_tolerance) as f32;
+        let mut out = Vec::new();
+        for first in 0..h.posture.len().saturating_sub(2) {
+            let Some(middle) = self.mirror(h, first) else { continue };
+            let moved = self.carried(first);
+            let own = self.score(h, &moved, tolerance);
+            let mut next = h.clone();
+            let turned = [
+                h.posture[first] + PI,
+                2.0 * middle - h.posture[first + 1],
+                h.posture[first + 2] + PI,
+            ];
+            let values: Vec<f64> =
+                (0..3).filter_map(|k| self.within_limits(first + k, turned[k])).collect();
+            if values.len() < 3 {
+                continue;
+            }
+            next.posture[first..first + 3].copy_from_slice(&values);
+            let score = self.score(&next, &moved, tolerance);
+            next.score = h.score + score - own;
+            if score > own - SHORT * (own.abs() + h.score.abs()) {
+                out.push(next);
+            }
+        }
+        out
+    }
+
+    /// Value of joint `first + 1` at which the axes of its neighbours are parallel; `None` where one of the three does
+    /// not turn or nothing is mirrored by it.
+    fn mirror(&self, h: &Hypothesis, first: usize) -> Option<f64> {
+        let model = self.prepared.model;
+        let turns = |j: usize| model.joints[model.free[j]].kind != JointKind::Prismatic;
+        if !(first..first + 3).all(turns) {
+            return None;
+        }
+        // The cosine between the outer axes is A + B cos q + C sin q: three values tell.
+        let mut posture = h.posture.clone();
+        let cosine: Vec<f64> = (0..3)
+            .map(|k| {
+                posture[first + 1] = TAU / 3.0 * f64::from(k);
+                let poses = model.poses(&posture);
+                let axis = |j: usize| {
+                    let joint = &model.joints[model.free[j]];
+                    poses[joint.child].rotation * joint.axis.into_inner()
+                };
+                axis(first).dot(&axis(first + 2))
+            })
+            .collect();
+        let b = (2.0 * cosine[0] - cosine[1] - cosine[2]) / 3.0;
+        let c = (cosine[1] - cosine[2]) / 3.0_f64.sqrt();
+        (b.hypot(c) > 0.5).then(|| c.atan2(b))
+    }
+
+    /// A value of a joint, whole turns added, within its limits.
+    fn within_limits(&self, free: usize, value: f64) -> Option<f64> {
+        let [low, high] = self.prepared.model.limits(free);
+        let value = low + (value - low).rem_euclid(TAU);
+        (value <= high).then_some(value)
+    }
+
+    /// Links placed by a joint or a later one: what stands before it does not change with it.
+    fn carried(&self, free: usize) -> Vec<usize> {
+        self.prepared.placed_by[free..].iter().flatten().copied().collect()
+    }
+
+    /// A new search from the joint before the first link that the beams contradict; nothing where they contradict none.
+    pub(crate) fn again(
+        &self,
+        h: &Hypothesis,
+        judgement: &Judgement,
+        fan: &impl Fan,
+    ) -> Vec<Hypothesis> {
+        let bad = |l: usize| {
+            let probe = &judgement.probes[l];
+            let matched = probe.n_on as f32 / probe.n_seen.max(1) as f32;
+            probe.seen() > MIN_SEEN && (probe.violation() > MAX_VIOLATED || matched < MIN_MATCHED)
+        };
+        let first_bad =
+            self.prepared.placed_by.iter().position(|links| links.iter().any(|&l| bad(l)));
+        let Some(first) = first_bad.map(|j| j.saturating_sub(1)) else { return Vec::new() };
+        let mut links = self.prepared.fixed.clone();
+        self.prepared.placed_by[..first].iter().for_each(|placed| links.extend(placed));
+        let mut start = h.clone();
+        start.score = self.score(h, &links, self.settings.search_tolerance as f32);
+        let mut found = self.resume(vec![start], first, fan);
+        found.truncate(N_AGAIN);
+        found
+    }
+}

@@ -1,0 +1,213 @@
+//! Residuals with their derivatives in; out come the normal equations of robot and scans with the offsets of the
+//! model's patches taken out in closed form, their solution, and a covariance (fit.md §4g).
+//!
+//! A patch offset `u ~ N(0, σ_u²)` common to the residuals of patch c: marginalised it gives
+//! `H −= Σ κ_c a_c a_cᵀ`, `g −= Σ κ_c a_c R_c` with `a_c = Σ w J`, `R_c = Σ w r`, `W_c = Σ w`,
+//! `κ_c = σ_u² / (1 + σ_u² W_c)`.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Unknowns of a scan: shift, turn, range bias.
+pub(crate) const N_SCAN: usize = 7;
+
+/// One residual.
+pub(crate) struct Row<'a> {
+    /// Derivatives by base twist and joints.
+    pub(crate) robot: &'a [f64],
+    /// Derivatives by the errors of its scan.
+    pub(crate) scan: [f64; N_SCAN],
+    pub(crate) view: usize,
+    pub(crate) patch: usize,
+    /// Robust weight over variance, m⁻².
+    pub(crate) weight: f64,
+    /// The residual, metres.
+    pub(crate) r: f64,
+}
+
+/// Sums over one patch.
+#[derive(Debug, Clone)]
+struct Patch {
+    /// Σ w J.
+    a: DVector<f64>,
+    /// Σ w J r.
+    g: DVector<f64>,
+    /// Σ w.
+    weight: f64,
+    /// Σ w r.
+    r: f64,
+}
+
+/// The normal equations.
+#[derive(Debug)]
+pub(crate) struct Normal {
+    n_robot: usize,
+    n: usize,
+    hessian: DMatrix<f64>,
+    gradient: DVector<f64>,
+    patches: Vec<Option<Patch>>,
+    /// Sum of w·r².
+    chi2: f64,
+    n_rows: usize,
+    sigma2: f64,
+}
+
+impl Normal {
+    pub(crate) fn new(n_robot: usize, n_views: usize, n_patches: usize) -> Self {
+        let n = n_robot + n_views * N_SCAN;
+        Self {
+            n_robot,
+            n,
+            hessian: DMatrix::zeros(n, n),
+            gradient: DVector::zeros(n),
+            patches: vec![None; n_patches],
+            chi2: 0.0,
+            n_rows: 0,
+            sigma2: 0.0,
+        }
+    }
+
+    /// Adds a residual.
+    pub(crate) fn add(&mut self, row: &Row<'_>) {
+        let (n, at) = (self.n_robot, self.n_robot + row.view * N_SCAN);
+        let patch = self.patches[row.patch].get_or_insert_with(|| Patch {
+            a: DVector::zeros(self.n),
+            g: DVector::zeros(self.n),
+            weight: 0.0,
+            r: 0.0,
+        });
+        let w = row.weight;
+        patch.weight += w;
+        patch.r += w * row.r;
+        self.chi2 += w * row.r * row.r;
+        self.n_rows += 1;
+        for (i, v) in row.robot.iter().enumerate() {
+            if *v == 0.0 {
+                continue;
+            }
+            let wv = w * v;
+            patch.a[i] += wv;
+            patch.g[i] += wv * row.r;
+            let column = &mut self.hessian.column_mut(i);
+            for k in i..n {
+                column[k] += wv * row.robot[k];
+            }
+            for k in 0..N_SCAN {
+                column[at + k] += wv * row.scan[k];
+            }
+        }
+        for (i, v) in row.scan.iter().enumerate() {
+            let wv = w * v;
+            patch.a[at + i] += wv;
+            patch.g[at + i] += wv * row.r;
+            let column = &mut self.hessian.column_mut(at + i);
+            for k in i..N_SCAN {
+                column[at + k] += wv * row.scan[k];
+            }
+        }
+    }
+
+    /// Takes the patches out. Call once, after the last residual, before the priors.
+    pub(crate) fn close(&mut self) {
+        self.hessian.fill_upper_triangle_with_lower_triangle();
+        self.sigma2 = patch_variance(self.patches.iter().flatten());
+        for patch in self.patches.iter_mut().flatten() {
+            let k = self.sigma2 / (1.0 + self.sigma2 * patch.weight);
+            if k > 0.0 {
+                self.hessian.ger(-k, &patch.a, &patch.a, 1.0);
+                patch.g.axpy(-k * patch.r, &patch.a, 1.0);
+            }
+            self.gradient += &patch.g;
+        }
+    }
+
+    pub(crate) fn add_robot_prior(&mut self, hessian: &DMatrix<f64>, gradient: &DVector<f64>) {
+        let n = self.n_robot;
+        let mut block = self.hessian.view_mut((0, 0), (n, n));
+        block += hessian;
+        let mut rows = self.gradient.rows_mut(0, n);
+        rows += gradient;
+    }
+
+    pub(crate) fn add_scan_prior(&mut self, view: usize, i: usize, value: f64, sigma: f64) {
+        let at = self.n_robot + view * N_SCAN + i;
+        let w = 1.0 / (sigma * sigma);
+        self.hessian[(at, at)] += w;
+        self.gradient[at] += w * value;
+    }
+
+    /// The step to the minimum; `None` where the points say nothing.
+    pub(crate) fn solve(&self) -> Option<DVector<f64>> {
+        if self.n_rows < MIN_ROWS {
+            return None;
+        }
+        let step = self.hessian.clone().cholesky()?.solve(&-&self.gradient);
+        let longest = step.amax();
+        // The posture was near already: a longer step has left the linear range.
+        Some(if longest > MAX_STEP { step * (MAX_STEP / longest) } else { step })
+    }
+
+    /// Standard deviation of the patches' offsets, metres.
+    pub(crate) fn patch_sigma(&self) -> f64 {
+        self.sigma2.sqrt()
+    }
+
+    /// Covariance of base twist and joints: the inverse of the normal matrix, widened in every direction in which the
+    /// residuals of whole groups of patches (`groups[patch]`) pull harder than independent errors would.
+    pub(crate) fn covariance(&self, groups: &[u32]) -> DMatrix<f64> {
+        let n_robot = self.n_robot;
+        let Some(cholesky) = self.hessian.clone().cholesky() else {
+            return DMatrix::identity(n_robot, n_robot) * 1e3;
+        };
+        // Model errors beyond what noise and patches explain, as far as the residuals show them.
+        let scale = (self.chi2 / self.n_rows.max(1) as f64).max(1.0);
+        let n_groups = groups.iter().max().map_or(0, |g| *g as usize + 1);
+        let mut pulls: Vec<Option<DVector<f64>>> = vec![None; n_groups];
+        for (patch, group) in self.patches.iter().zip(groups) {
+            let Some(patch) = patch else { continue };
+            let pull = pulls[*group as usize].get_or_insert_with(|| DVector::zeros(self.n));
+            *pull += &patch.g;
+        }
+        let l_inverse = cholesky
+            .l()
+            .solve_lower_triangular(&DMatrix::identity(self.n, self.n))
+            .unwrap_or_else(|| DMatrix::identity(self.n, self.n));
+        let mut meat: DMatrix<f64> = DMatrix::zeros(self.n, self.n);
+        let mut count = 0.0;
+        for pull in pulls.iter().flatten() {
+            let white = &l_inverse * pull;
+            meat.ger(1.0, &white, &white, 1.0);
+            count += 1.0;
+        }
+        if count > 1.0 {
+            meat *= count / (count - 1.0);
+        }
+        let mut eigen = meat.symmetric_eigen();
+        eigen.eigenvalues.iter_mut().for_each(|v| *v = v.max(scale));
+        let wide = l_inverse.transpose() * eigen.recompose() * l_inverse;
+        wide.view((0, 0), (n_robot, n_robot)).into_owned()
+    }
+}
+
+/// Fewer residuals than this do not hold a robot.
+const MIN_ROWS: usize = 30;
+/// Longest step of an adjustment, radians and metres.
+const MAX_STEP: f64 = 0.1;
+
+/// Variance of the patches' offsets, m²: that of their mean residuals beyond what noise explains, each weighted by how
+/// well it is known against an offset of a millimetre (fit.md §4g).
+fn patch_variance<'a>(patches: impl Iterator<Item = &'a Patch>) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for patch in patches.filter(|p| p.weight > 0.0) {
+        let noise2 = 1.0 / patch.weight;
+        let mean = (patch.r / patch.weight).clamp(-MAX_OFFSET, MAX_OFFSET);
+        let weight = (TYPICAL_OFFSET * TYPICAL_OFFSET + noise2).powi(-2);
+        sum += weight * (mean * mean - noise2);
+        total += weight;
+    }
+    if total > 0.0 { (sum / total).max(0.0) } else { 0.0 }
+}
+
+/// Offsets that models have, metres.
+const TYPICAL_OFFSET: f64 = 0.001;
+/// Larger mean residuals are things beside the robot, not its shape, metres.
+const MAX_OFFSET: f64 = 0.008;

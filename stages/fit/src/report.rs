@@ -1,0 +1,195 @@
+//! The adjusted posture, the others that were looked at, and what the beams say in; out comes the fit as it is reported:
+//! values with their standard deviations, which joints are open, rivals, equals, verdict.
+
+use contract::{Equal, Fit, JointFit, RunnerUp, ScanShift};
+use geometry::{Pose, Vector};
+use nalgebra::{DMatrix, DVector};
+use robot::{Model, Motion};
+use std::f64::consts::TAU;
+
+use crate::adjust::Adjusted;
+use crate::beam::Hypothesis;
+use crate::judge::{Judgement, evidence, margin};
+use crate::refine::Refine;
+use crate::solve::Polished;
+use crate::verdict;
+
+/// Margin up to which another posture counts as equally good.
+const EQUAL: f64 = 0.03;
+/// Standard deviation from which on a joint is open: any value within degrees would do, radians.
+const OPEN_SIGMA: f64 = 0.02;
+/// Joints that differ by more are different answers, radians (2°) or metres.
+const OTHER: f64 = 0.035;
+/// Bases farther apart are different answers, metres.
+const OTHER_BASE: f64 = 0.03;
+/// Most equals that are listed.
+const N_EQUALS: usize = 4;
+
+/// What is reported of the best, given the others.
+pub(crate) fn report(
+    refine: &Refine<'_>,
+    (best, judgement): &(Adjusted, Judgement),
+    others: &[Polished],
+) -> Fit {
+    let prepared = refine.prepared;
+    let model = prepared.model;
+    let h = &best.hypothesis;
+    let n = 6 + h.posture.len();
+    let mut rivals: Vec<(f64, &Polished)> = others
+        .iter()
+        .map(|other| (margin(prepared, (h, judgement), (&other.0, &other.1)), other))
+        .collect();
+    rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let open = open_joints(best, &rivals);
+    let covariance = in_world_axes(&best.covariance, &h.local_from_base);
+    let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+    let joints = (0..h.posture.len()).map(|j| {
+        let (value, equivalents) = whole_turns(model, &h.posture, j);
+        JointFit {
+            name: model.joints[model.free[j]].name.clone(),
+            value,
+            sigma: sigma(6 + j),
+            determined: !open[j] && sigma(6 + j) < refine.settings.determined_sigma,
+            equivalents,
+        }
+    });
+    let others = rivals.iter().filter(|(_, (other, _))| differs(other, h, &open));
+    let equal =
+        |(m, (other, _)): &(f64, &Polished)| Equal { posture: other.posture.clone(), margin: *m };
+    let same = rivals
+        .iter()
+        .filter(|(m, (other, _))| *m < EQUAL && (0..open.len()).any(|j| turn(other, h, j) > OTHER));
+    let mut fit = Fit {
+        model: prepared.index,
+        model_name: model.name.clone(),
+        world_from_base: refine.scene.world_from_local() * h.local_from_base,
+        base_sigma: std::array::from_fn(sigma),
+        joints: joints.collect(),
+        covariance: (0..n * n).map(|i| covariance[(i / n, i % n)]).collect(),
+        score: judgement.score,
+        explained: judgement.explained,
+        rms: rms(best),
+        surface_sigma: best.patch_sigma,
+        tip_sigma: tip_sigma(model, h, &best.covariance),
+        scans: scans(refine, best),
+        links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
+        runner_up: others.map(|rival| runner_up(model, judgement, rival)).next(),
+        equals: same.take(N_EQUALS).map(equal).collect(),
+        ..Fit::default()
+    };
+    verdict::pass(&mut fit, prepared, refine.scene, judgement);
+    fit
+}
+
+fn runner_up(model: &Model, best: &Judgement, (margin, (_, other)): &(f64, &Polished)) -> RunnerUp {
+    RunnerUp {
+        model: model.name.clone(),
+        score: other.explained / best.explained * best.score,
+        same_model: true,
+        margin: *margin,
+    }
+}
+
+/// RMS distance of all points from the surface, metres.
+fn rms(best: &Adjusted) -> f64 {
+    let total: usize = best.n_points.iter().sum();
+    let squares = best.n_points.iter().zip(&best.link_rms).map(|(n, r)| *n as f64 * r * r);
+    (squares.sum::<f64>() / total.max(1) as f64).sqrt()
+}
+
+/// What each scan is off, where a scanner is known.
+fn scans(refine: &Refine<'_>, best: &Adjusted) -> Vec<ScanShift> {
+    let views = refine.scene.views.iter().zip(&best.scans);
+    let base = best.hypothesis.local_from_base.translation.vector;
+    views
+        .filter_map(|(view, error)| {
+            let scanner = view.scanner?.coords;
+            Some(ScanShift {
+                scan: view.scan,
+                shift: (error.shift + error.turn.cross(&(base - scanner))).into(),
+                turn: error.turn.into(),
+                range_bias: error.bias,
+            })
+        })
+        .collect()
+}
+
+/// For each joint, whether the points leave it open: by its standard deviation, or because a posture that differs in
+/// this joint and few others explains the points as well (a flange with six bolts, a wrist seen from nowhere).
+fn open_joints(best: &Adjusted, rivals: &[(f64, &Polished)]) -> Vec<bool> {
+    let h = &best.hypothesis;
+    let n = h.posture.len();
+    let mut open: Vec<bool> =
+        (0..n).map(|j| best.covariance[(6 + j, 6 + j)] >= OPEN_SIGMA.powi(2)).collect();
+    for (_, (other, _)) in rivals.iter().filter(|(margin, _)| *margin < EQUAL) {
+        let apart: Vec<bool> = (0..n).map(|j| turn(h, other, j) > OTHER).collect();
+        // Only the tail of the chain can be open by symmetry; a flip further up is another answer.
+        let first = apart.iter().position(|a| *a).unwrap_or(n);
+        if first + 1 >= n || (first..n).all(|j| open[j] || j + 1 == n) {
+            (0..n).for_each(|j| open[j] |= apart[j]);
+        }
+    }
+    open
+}
+
+/// Difference of a joint between two postures, whole turns taken out, radians.
+fn turn(a: &Hypothesis, b: &Hypothesis, joint: usize) -> f64 {
+    let d = (a.posture[joint] - b.posture[joint]).rem_euclid(TAU);
+    d.min(TAU - d)
+}
+
+/// Whether two postures are different answers in what the points determine.
+fn differs(a: &Hypothesis, b: &Hypothesis, open: &[bool]) -> bool {
+    let (p, q) = (&a.local_from_base, &b.local_from_base);
+    let shift = (p.translation.vector - q.translation.vector).norm();
+    shift > OTHER_BASE || (0..open.len()).any(|j| !open[j] && turn(a, b, j) > OTHER)
+}
+
+/// The value of a joint within its limits that is nearest to zero, and the others, where a whole turn changes nothing.
+fn whole_turns(model: &Model, posture: &[f64], joint: usize) -> (f64, Vec<f64>) {
+    let value = posture[joint];
+    let index = model.free[joint];
+    let [low, high] = model.limits(joint);
+    let followed = model
+        .joints
+        .iter()
+        .any(|j| matches!(j.motion, Motion::Mimic { free, .. } if free == joint));
+    let slides = model.joints[index].kind == robot::JointKind::Prismatic;
+    if slides || followed || high - low < TAU {
+        return (value, Vec::new());
+    }
+    let first = ((low - value) / TAU).ceil() as i32;
+    let last = ((high - value) / TAU).floor() as i32;
+    let mut all: Vec<f64> = (first..=last).map(|k| value + TAU * f64::from(k)).collect();
+    all.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    if all.is_empty() {
+        return (value, all);
+    }
+    let nearest = all.remove(0);
+    (nearest, all)
+}
+
+/// Standard deviation of the tip of the main chain in the base's frame, metres.
+fn tip_sigma(model: &Model, h: &Hypothesis, covariance: &DMatrix<f64>) -> f64 {
+    let Some(link) = model.main_chain.last().map(|&j| model.joints[j].child) else { return 0.0 };
+    let kinematics = model.kinematics(&h.posture);
+    let tip = kinematics.base_from_link[link].translation.vector;
+    let n = h.posture.len();
+    let mut moves = DMatrix::zeros(3, n);
+    for (j, t) in kinematics.twists[link].iter().enumerate() {
+        let v = Vector::new(t[0], t[1], t[2]) + Vector::new(t[3], t[4], t[5]).cross(&tip);
+        moves.set_column(j, &DVector::from_column_slice(v.as_slice()));
+    }
+    let joints = covariance.view((6, 6), (n, n));
+    (&moves * joints * moves.transpose()).trace().max(0.0).sqrt()
+}
+
+/// The covariance with the base's twist turned from base axes to world axes.
+fn in_world_axes(covariance: &DMatrix<f64>, local_from_base: &Pose) -> DMatrix<f64> {
+    let turn = local_from_base.rotation.to_rotation_matrix();
+    let mut world_from_base = DMatrix::identity(covariance.nrows(), covariance.ncols());
+    for block in [0, 3] {
+        world_from_base.fixed_view_mut::<3, 3>(block, block).copy_from(turn.matrix());
+    }
+    &world_from_base * covariance * world_from_base.transpose()
+}
