@@ -2,6 +2,7 @@
 //! and masks out. Knows no geometry: what is done stands in `stages/`.
 
 pub mod atomic;
+pub mod bench;
 pub mod cli;
 pub mod compare;
 pub mod demo;

@@ -6,7 +6,7 @@ use crate::job::{Job, Outcome};
 use crate::labelling::Labelling;
 use crate::library;
 use crate::report::Report;
-use crate::search::Search;
+use crate::search::{Search, Shelf};
 use crate::store::{Scatter, Store};
 use crate::surfaces::{Gather, Surfaces};
 use contract::Result;
@@ -43,7 +43,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let regions = identify::regions(&clusters, &settings.region);
 
     // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
-    let search = Search::new(&library.models, scans, &store, &ground, settings);
+    let shelf = Shelf::new(&library.models);
+    let search = Search::new(&shelf, scans, &store, &ground, settings);
     let fits = engine.fan_out("fit", regions, |region| search.region(&region))?;
     let fits = fit::choose(fits.into_iter().flatten().collect(), &library.models);
 

@@ -13,15 +13,37 @@ use rayon::prelude::*;
 use robot::Model;
 use std::sync::OnceLock;
 
+/// A library with what fits of its models need, made when the first of them asks for it.
+pub(crate) struct Shelf<'a> {
+    models: &'a [Model],
+    prepared: Vec<OnceLock<Prepared<'a>>>,
+}
+
+impl<'a> Shelf<'a> {
+    pub(crate) fn new(models: &'a [Model]) -> Self {
+        Self { models, prepared: models.iter().map(|_| OnceLock::new()).collect() }
+    }
+
+    /// Makes all of it now.
+    pub(crate) fn prepare(&self) {
+        (0..self.models.len()).into_par_iter().for_each(|i| {
+            self.prepared(i);
+        });
+    }
+
+    /// Serial inside: a thread that waits for it never holds up its own work.
+    fn prepared(&self, index: usize) -> &Prepared<'a> {
+        self.prepared[index].get_or_init(|| Prepared::new(index, &self.models[index]))
+    }
+}
+
 /// Everything that the search of a region reads.
 pub(crate) struct Search<'a> {
-    models: &'a [Model],
+    shelf: &'a Shelf<'a>,
     scans: &'a [Scan],
     store: &'a Store,
     ground: &'a Ground,
     settings: &'a Settings,
-    /// Made when the first region asks for it.
-    prepared: Vec<OnceLock<Prepared<'a>>>,
 }
 
 /// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
@@ -29,14 +51,13 @@ const MAX_SPACING: f64 = 0.05;
 
 impl<'a> Search<'a> {
     pub(crate) fn new(
-        models: &'a [Model],
+        shelf: &'a Shelf<'a>,
         scans: &'a [Scan],
         store: &'a Store,
         ground: &'a Ground,
         settings: &'a Settings,
     ) -> Self {
-        let prepared = models.iter().map(|_| OnceLock::new()).collect();
-        Self { models, scans, store, ground, settings, prepared }
+        Self { shelf, scans, store, ground, settings }
     }
 
     /// Fits of all models in one region, whatever their verdict.
@@ -48,7 +69,7 @@ impl<'a> Search<'a> {
             .collect::<Result<_>>()?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit);
-        let fits: Vec<Vec<Fit>> = (0..self.models.len())
+        let fits: Vec<Vec<Fit>> = (0..self.shelf.models.len())
             .into_par_iter()
             .map(|model| self.model(model, &scene, &planes))
             .collect();
@@ -93,7 +114,7 @@ impl<'a> Search<'a> {
     }
 
     fn model(&self, index: usize, scene: &Scene<'_>, planes: &[InstallationPlane]) -> Vec<Fit> {
-        let model = &self.models[index];
+        let model = &self.shelf.models[index];
         let settings = self.settings;
         let Some(search) = BaseSearch::new(
             (index, model),
@@ -108,7 +129,7 @@ impl<'a> Search<'a> {
         if candidates.is_empty() {
             return Vec::new();
         }
-        let prepared = self.prepared[index].get_or_init(|| Prepared::new(index, model));
+        let prepared = self.shelf.prepared(index);
         candidates
             .iter()
             .filter_map(|c| fit::fit(c, prepared, scene, &settings.fit, &AllThreads))

@@ -29,6 +29,9 @@ pub(super) enum Command {
     Run(RunFlags),
     /// Virtual scanner: a scene file in, scans and their truth out
     Simulate(SimulateFlags),
+    /// How exact, how fast
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// About robot libraries
     #[command(subcommand)]
     Robots(RobotsCommand),
@@ -38,6 +41,46 @@ pub(super) enum Command {
 pub(super) enum RobotsCommand {
     /// Check a robot library
     Lint(LintFlags),
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum BenchCommand {
+    /// Draw cells from seeds, scan them, find the robots, compare with the truth
+    Accuracy(AccuracyFlags),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct AccuracyFlags {
+    /// Suites, by name (else all)
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(super) suite: Vec<String>,
+    /// Cases of each suite and model (else the suite's own number)
+    #[arg(long, value_name = "N")]
+    pub(super) cases: Option<usize>,
+    /// Seed of all that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Robot library (else the demo's robots)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// Only robots whose name holds one of these
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(super) model: Vec<String>,
+    /// Which models each cell is searched for
+    #[arg(long, value_enum, value_name = "WHICH", default_value = "library")]
+    pub(super) against: Against,
+    /// Where rows and tables go
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+}
+
+/// Which models a cell is searched for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Against {
+    /// The true one only
+    Same,
+    /// All of the library
+    Library,
 }
 
 #[derive(Debug, Args)]

@@ -1,6 +1,7 @@
 //! The command line: words of a person in, an exit code out. Results go to standard output, everything else to
 //! standard error.
 
+mod bench;
 mod demo;
 mod flags;
 mod inspect;
@@ -11,7 +12,7 @@ mod simulate;
 
 use crate::exit;
 use clap::Parser;
-use flags::{Command, Line, RobotsCommand};
+use flags::{BenchCommand, Command, Line, RobotsCommand};
 use say::Say;
 use std::ffi::OsString;
 
@@ -31,6 +32,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Demo(flags) => demo::demo(flags, &line.common, &say),
         Command::Inspect(flags) => inspect::inspect(flags, &line.common, &say),
         Command::Run(flags) => run::run(flags, &line.common, &say),
+        Command::Bench(BenchCommand::Accuracy(flags)) => {
+            bench::bench_accuracy(flags, &line.common, &say)
+        }
         Command::Simulate(flags) => simulate::simulate(flags, &line.common, &say),
         Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, &say),
     };

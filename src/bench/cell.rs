@@ -1,0 +1,113 @@
+//! A scene in; its scans in memory, and what the main job's own stages find in them, out.
+
+use crate::engine::Engine;
+use crate::job::Means;
+use crate::search::{Search, Shelf};
+use crate::store::{Scatter, Store};
+use crate::surfaces::{Gather, Surfaces};
+use contract::{Fit, InputId, Lattice, Map, MaskId, Result, Scan, ScanId, Strip};
+use rayon::prelude::*;
+use robot::Model;
+use simulate::{Scene, SimColumns, Simulator};
+use std::path::Path;
+use std::time::Instant;
+
+/// A cell as its scanners saw it.
+pub(super) struct Cell {
+    scans: Vec<Scan>,
+    strips: Vec<Strip>,
+    /// Points that truly lie on the robot.
+    pub(super) n_robot_points: usize,
+}
+
+/// What was found, and how long it took.
+pub(super) struct Found {
+    pub(super) fits: Vec<Fit>,
+    pub(super) n_robot_points: usize,
+    /// Seconds from tiles to fits.
+    pub(super) seconds: f64,
+}
+
+/// Columns cast at a time.
+const COLUMNS: u32 = 32;
+
+impl Cell {
+    /// Scans a scene. `models` are the true ones.
+    pub(super) fn scan(scene: &Scene, models: &[Model], engine: &Engine) -> Result<Self> {
+        let simulator = Simulator::new(scene, models)?;
+        let mut cell = Self { scans: Vec::new(), strips: Vec::new(), n_robot_points: 0 };
+        for k in 0..simulator.n_scans() {
+            let frame = simulator.frame(k);
+            let step = frame.raster.step().to_radians();
+            let (row, col) = (frame.raster.elevation(0), frame.raster.azimuth(0));
+            cell.scans.push(Scan {
+                id: ScanId(k as u32),
+                input: InputId(0),
+                mask: MaskId(k as u32),
+                name: frame.name.clone(),
+                source_id: None,
+                world_from_scan: frame.world_from_scan,
+                lattice: Some(Lattice::new(step, step, row, col)),
+                stated_bounds: None,
+                stated_points: None,
+                notes: Vec::new(),
+            });
+            let firsts: Vec<u32> = (0..frame.n_cols).step_by(COLUMNS as usize).collect();
+            let columns: Vec<SimColumns> = engine.pool()?.install(|| {
+                let cast = |c: u32| simulator.columns(k, c..(c + COLUMNS).min(frame.n_cols));
+                firsts.into_par_iter().map(cast).collect()
+            });
+            let mut place = 0;
+            for c in &columns {
+                cell.add(k, c, &mut place);
+            }
+        }
+        Ok(cell)
+    }
+
+    fn add(&mut self, scan: usize, columns: &SimColumns, place: &mut u64) {
+        let hits: Vec<usize> = (0..columns.len()).filter(|&i| columns.hit[i]).collect();
+        let n_robot = hits.iter().filter(|&&i| columns.label[i].robot >= 0).count();
+        self.n_robot_points += n_robot;
+        self.strips.push(Strip {
+            scan: ScanId(scan as u32),
+            mask: MaskId(scan as u32),
+            first_place: *place,
+            place: (0..hits.len() as u32).collect(),
+            xyz: hits.iter().map(|&i| columns.xyz[i].map(|v| v as f32)).collect(),
+            attributes: None,
+        });
+        *place += hits.len() as u64;
+    }
+
+    /// Sends the scans through the stages of the main job, from the store on; `models` are tried.
+    pub(super) fn search(
+        self,
+        models: &[Model],
+        dir: &Path,
+        (means, engine): (&Means, &Engine),
+    ) -> Result<Found> {
+        let settings = &means.settings;
+        let scans = &self.scans;
+        let scatter = Scatter::new(scans);
+        let mut sink = Store::create(dir, scans, means.ingest_bytes())?;
+        for strip in self.strips {
+            sink.add(&scatter.apply(strip, &mut ())?)?;
+        }
+        let store = sink.finish(engine, means.store_bytes())?;
+        let shelf = Shelf::new(models);
+        shelf.prepare();
+        let started = Instant::now();
+        let (surfaces, gather) =
+            (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
+        let ground = engine.pass("surfaces", store.tiles(), |f| f.map(&surfaces).fold(&gather))?;
+        let clusters =
+            cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
+        let regions = identify::regions(&clusters, &settings.region);
+        let search = Search::new(&shelf, scans, &store, &ground, settings);
+        let fits = engine.fan_out("fit", regions, |region| search.region(&region))?;
+        let fits = fit::choose(fits.into_iter().flatten().collect(), models);
+        let seconds = started.elapsed().as_secs_f64();
+        Ok(Found { fits, n_robot_points: self.n_robot_points, seconds })
+    }
+}

@@ -1,0 +1,108 @@
+//! Names of suites and a seed in; cases, each with everything that its drawing needs, out.
+
+use super::Bench;
+use contract::{Error, Kind, Result};
+use robot::Model;
+
+/// What a cell is like and how it is scanned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Condition {
+    pub(super) n_scanners: usize,
+    /// Beams of a whole sphere; fewer are cast, towards the cell only.
+    pub(super) n_beams: f64,
+    /// Range noise, metres, one sigma.
+    pub(super) noise: f64,
+    /// Registration error of each scan: metres on each axis, degrees about each; range bias, metres. One sigma.
+    pub(super) registration: [f64; 3],
+    /// Whether beams have a width.
+    pub(super) mixed: bool,
+    /// Smooth error of the model's shape, metres, about the largest.
+    pub(super) warp: f64,
+    /// Share of 0..1 of each kind of clutter being there.
+    pub(super) clutter: f64,
+    /// Height of a stand is drawn up to this, metres; 0: on the floor.
+    pub(super) stand: f64,
+}
+
+/// The protocol of the method's source (§7.2), with 5 M beams instead of 50.
+const PLAIN: Condition = Condition {
+    n_scanners: 6,
+    n_beams: 5e6,
+    noise: 0.002,
+    registration: [0.0; 3],
+    mixed: false,
+    warp: 0.0,
+    clutter: 0.0,
+    stand: 0.0,
+};
+/// Errors of a usual registration (fit.md §5, T3).
+const REGISTRATION: [f64; 3] = [0.002, 0.01, 0.001];
+
+/// One cell to be drawn.
+#[derive(Debug, Clone)]
+pub(super) struct Case {
+    pub(super) suite: &'static str,
+    pub(super) seed: u64,
+    /// Index in the library.
+    pub(super) model: usize,
+    pub(super) condition: Condition,
+}
+
+/// A suite: name, number of cases for each model, and the condition of its k-th case.
+type Suite = (&'static str, usize, fn(usize) -> Condition);
+
+/// All suites, in the order of fit.md §5.
+const SUITES: &[Suite] = &[
+    ("paper", 3, |_| Condition { n_beams: 5e7, noise: 0.0, ..PLAIN }),
+    ("models", 3, |_| PLAIN),
+    ("noise-1", 3, |_| Condition { noise: 0.001, ..PLAIN }),
+    ("noise-2", 6, |_| Condition { n_beams: 2e7, ..PLAIN }),
+    ("noise-5", 3, |_| Condition { noise: 0.005, ..PLAIN }),
+    ("noise-10", 3, |_| Condition { noise: 0.010, ..PLAIN }),
+    ("registration", 6, |_| Condition { registration: REGISTRATION, n_beams: 2e7, ..PLAIN }),
+    ("mixed", 3, |_| Condition { mixed: true, ..PLAIN }),
+    ("few", 9, |k| Condition { n_scanners: 3 - k % 3, ..PLAIN }),
+    ("clutter", 6, |_| Condition { clutter: 1.0, mixed: true, ..PLAIN }),
+    ("shape-1.5", 6, |_| Condition { warp: 0.0015, ..PLAIN }),
+    ("shape-3", 6, |_| Condition { warp: 0.003, ..PLAIN }),
+    ("all", 6, |_| Condition {
+        n_scanners: 4,
+        registration: REGISTRATION,
+        mixed: true,
+        warp: 0.003,
+        clutter: 1.0,
+        ..PLAIN
+    }),
+    ("unknown", 20, |k| Condition {
+        n_scanners: 6 - k % 5,
+        mixed: true,
+        clutter: if k % 2 == 0 { 0.0 } else { 0.7 },
+        stand: 0.6,
+        ..PLAIN
+    }),
+];
+
+/// The cases that are asked for, suite by suite, model by model.
+pub(super) fn cases(bench: &Bench, models: &[Model], chosen: &[usize]) -> Result<Vec<Case>> {
+    let names: Vec<&str> = SUITES.iter().map(|s| s.0).collect();
+    if let Some(odd) = bench.suites.iter().find(|s| !names.contains(&s.as_str())) {
+        return Err(Error::new(Kind::Usage, format!("there is no suite \"{odd}\""))
+            .hint(format!("there are {}", names.join(", "))));
+    }
+    let mut out = Vec::new();
+    for (name, n, condition) in SUITES {
+        if !bench.suites.is_empty() && !bench.suites.iter().any(|s| s == name) {
+            continue;
+        }
+        for &model in chosen {
+            // A model's cases do not change when others join the library.
+            let own =
+                models[model].name.bytes().fold(0_u64, |a, b| a.wrapping_mul(31) + u64::from(b));
+            for k in 0..bench.n_cases.unwrap_or(*n) {
+                let seed = bench.seed * 1_000_000 + own % 1000 * 1000 + k as u64;
+                out.push(Case { suite: name, seed, model, condition: condition(k) });
+            }
+        }
+    }
+    Ok(out)
+}

@@ -1,0 +1,250 @@
+//! A case in; the scene that its seed draws, with the true base and posture, out.
+
+use super::condition::{Case, Condition};
+use super::shape;
+use contract::Result;
+use geometry::{Point, Pose};
+use nalgebra::{Translation3, UnitQuaternion};
+use robot::Model;
+use simulate::random::Random;
+use simulate::scene::{
+    Anchor, Carried, Column, Cuboid, Fence, Filling, Floor, Furniture, Hose, Mixed, Raster,
+    Registration, RobotPlace, Scanner, Section, Stand, StandShape,
+};
+use simulate::{Postures, Scene};
+use std::f64::consts::TAU;
+
+/// A case, drawn.
+pub(super) struct Drawn {
+    pub(super) scene: Scene,
+    pub(super) world_from_base: Pose,
+    pub(super) posture: Vec<f64>,
+}
+
+/// Radius of the circle of scanners, metres, at least (fit.md §5); larger robots are scanned from farther away.
+const CIRCLE: f64 = 5.0;
+/// Height of a scanner, metres.
+const HEIGHT: f64 = 1.6;
+/// Elevations of a full dome of beams, degrees.
+const DOME: [f64; 2] = [-60.0, 90.0];
+/// Side of a stand, metres: room for the largest foot.
+const STAND_SIDE: f64 = 1.4;
+
+impl Drawn {
+    /// The library as it really is: the true robot's shape may differ from its model.
+    pub(super) fn models(&self, models: &[Model], case: &Case) -> Vec<Model> {
+        let mut out = models.to_vec();
+        if case.condition.warp > 0.0 {
+            shape::warp(&mut out[case.model], case.condition.warp, case.seed);
+        }
+        out
+    }
+}
+
+/// Draws a case of a model.
+pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
+    let c = &case.condition;
+    let mut random = Random::keyed(&[case.seed, 0xACC]);
+    let mut scene = Scene {
+        seed: case.seed,
+        floor: Some(Floor {
+            size: Some([24.0, 24.0]),
+            tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
+            wave_amplitude: 0.002,
+            wave_length: 5.0,
+            levels: vec![],
+        }),
+        ..Scene::default()
+    };
+    let stand =
+        if c.stand > 0.0 && random.unit() < 0.5 { random.between(0.15, c.stand) } else { 0.0 };
+    let xy = [random.between(-0.5, 0.5), random.between(-0.5, 0.5)];
+    let yaw = random.between(0.0, TAU);
+    let ground = scene.ground(xy[0], xy[1]);
+    let foot = foot(model);
+    let at = Translation3::new(xy[0], xy[1], ground + stand - foot);
+    let world_from_base = Pose::from_parts(at, UnitQuaternion::from_euler_angles(0.0, 0.0, yaw));
+    if stand > 0.0 {
+        scene.stands.push(Stand {
+            name: "stand".into(),
+            xy,
+            yaw_deg: yaw.to_degrees(),
+            top: stand,
+            side: STAND_SIDE,
+            shape: StandShape::Plinth,
+        });
+    }
+    let low = ground + stand - 0.005;
+    let posture = Postures::new(model).draw(&mut random, &world_from_base, |p| p.z > low)?;
+    scene.robots.push(RobotPlace {
+        name: "R1".into(),
+        model: model.name.clone(),
+        xyz: world_from_base.translation.vector.into(),
+        rpy_deg: [0.0, 0.0, yaw.to_degrees()],
+        posture: named(model, &posture),
+        tool: None,
+    });
+    let reach = reach(model, &world_from_base, &posture);
+    clutter(&mut scene, model, c, reach, &mut random);
+    scanners(&mut scene, c, reach, &mut random);
+    Ok(Drawn { scene, world_from_base, posture })
+}
+
+fn named(model: &Model, posture: &[f64]) -> std::collections::BTreeMap<String, f64> {
+    let names = model.free.iter().map(|&j| model.joints[j].name.clone());
+    names.zip(posture.iter().copied()).collect()
+}
+
+/// Height of the lowest sample of what stands still, metres.
+fn foot(model: &Model) -> f64 {
+    let poses = model.poses(&model.home());
+    let standing = model.links.iter().zip(&poses).filter(|(l, _)| !l.cad.points.is_empty());
+    let (link, pose) = match standing.clone().next() {
+        Some(first) => first,
+        None => return 0.0,
+    };
+    let heights = link.cad.points.iter().map(|p| (pose * Point::from(p.map(f64::from))).z);
+    heights.fold(f64::INFINITY, f64::min)
+}
+
+/// Bounds of the robot in the world: farthest from the upright through its base, and highest, metres.
+fn reach(model: &Model, world_from_base: &Pose, posture: &[f64]) -> [f64; 2] {
+    let base = world_from_base.translation.vector;
+    let mut out = [0.5_f64, 1.0];
+    for (link, pose) in model.links.iter().zip(model.poses(posture)) {
+        for p in link.cad.points.iter().step_by(20) {
+            let p = world_from_base * pose * Point::from(p.map(f64::from));
+            out = [out[0].max((p.x - base.x).hypot(p.y - base.y)), out[1].max(p.z)];
+        }
+    }
+    out
+}
+
+/// Things that stand, hang and lie around, each with the condition's chance.
+fn clutter(scene: &mut Scene, model: &Model, c: &Condition, reach: [f64; 2], random: &mut Random) {
+    let there = |random: &mut Random| random.unit() < c.clutter;
+    // Beside the robot, so far beyond its reach.
+    let around = |random: &mut Random, gap: [f64; 2]| {
+        let (a, radius) = (random.between(0.0, TAU), reach[0] + random.between(gap[0], gap[1]));
+        [radius * a.cos(), radius * a.sin()]
+    };
+    if there(random) {
+        // One straight fence in front, wires as real ones.
+        let (a, r) = (random.between(0.0, TAU), reach[0] + random.between(0.4, 0.8));
+        let corner = |t: f64| [r * a.cos() - t * a.sin(), r * a.sin() + t * a.cos()];
+        let filling = if random.unit() < 0.8 { Filling::Wires } else { Filling::Panel };
+        scene.fences.push(Fence {
+            name: "fence".into(),
+            from: corner(-2.0),
+            to: corner(2.0),
+            height: random.between(1.4, 2.2),
+            filling,
+        });
+    }
+    if there(random) {
+        let xy = around(random, [0.7, 1.0]);
+        let size = [random.between(1.0, 2.0), 0.6, random.between(0.5, 0.9)];
+        scene.conveyors.push(Furniture {
+            name: "conveyor".into(),
+            xy,
+            yaw_deg: random.between(0.0, 180.0),
+            size,
+        });
+    }
+    if there(random) {
+        let [x, y] = around(random, [0.6, 1.0]);
+        let size = [0.5, 0.6, random.between(1.0, 2.0)];
+        scene.boxes.push(Cuboid {
+            name: "cabinet".into(),
+            xyz: [x, y, 0.5 * size[2] + scene.ground(x, y)],
+            size,
+            rpy_deg: [0.0, 0.0, random.between(0.0, 90.0)],
+            reflectance: random.between(0.2, 0.9),
+        });
+        let xy = around(random, [0.6, 1.2]);
+        let height = random.between(2.0, 4.0);
+        let section = Section::Round;
+        scene.columns.push(Column { name: "post".into(), xy, radius: 0.1, height, section });
+    }
+    let links = bodies(model);
+    if there(random) && links.len() > 3 {
+        // A cable along the arm: from the second body to the last but one.
+        let hang = |l: usize| {
+            let size = model.links[l].bounds.size();
+            let middle = model.links[l].bounds.center();
+            Anchor {
+                robot: Some("R1".into()),
+                link: Some(model.links[l].name.clone()),
+                xyz: [middle.x, middle.y, middle.z + 0.5 * size[2] + 0.03],
+            }
+        };
+        for k in 1..links.len().saturating_sub(2).min(3) {
+            scene.hoses.push(Hose {
+                name: format!("hose {k}"),
+                anchors: vec![hang(links[k]), hang(links[k + 1])],
+                radius: random.between(0.015, 0.025),
+                sag: 0.1,
+            });
+        }
+    }
+    let tip = model.main_chain.last().map(|&j| model.joints[j].child);
+    if let (true, Some(tip)) = (there(random), tip) {
+        let side = (0.25 * reach[0]).clamp(0.1, 0.4);
+        scene.carried.push(Carried {
+            name: "part".into(),
+            robot: "R1".into(),
+            link: model.links[tip].name.clone(),
+            xyz: [0.05, 0.0, 0.5 * side + 0.05],
+            rpy_deg: [0.0; 3],
+            size: [side, 0.7 * side, 0.5 * side],
+        });
+    }
+}
+
+/// Links of the main chain that have a surface.
+fn bodies(model: &Model) -> Vec<usize> {
+    let first = model.main_chain.first().map(|&j| model.joints[j].parent);
+    let links = first.into_iter().chain(model.main_chain.iter().map(|&j| model.joints[j].child));
+    links.filter(|&l| !model.links[l].bounds.is_empty()).collect()
+}
+
+/// Scanners on a circle, jittered, each casting only the part of its dome that sees the cell.
+fn scanners(scene: &mut Scene, c: &Condition, reach: [f64; 2], random: &mut Random) {
+    let step_deg = (360.0 * (DOME[1] - DOME[0]) / c.n_beams).sqrt();
+    let circle = CIRCLE.max(reach[0] + 2.5);
+    let turn = random.between(0.0, TAU);
+    for k in 0..c.n_scanners {
+        let a = turn + TAU * (k as f64 + random.between(-0.2, 0.2)) / c.n_scanners as f64;
+        let radius = circle + random.between(-0.3, 0.3);
+        let (x, y) = (radius * a.cos(), radius * a.sin());
+        let z = scene.ground(x, y) + HEIGHT + random.between(-0.2, 0.2);
+        // The scanner looks at the origin along its own x axis.
+        let half = ((reach[0] + 1.3) / radius).min(0.95).asin().to_degrees();
+        let near = (radius - reach[0] - 0.6).max(1.0);
+        let up = ((reach[1] + 0.4 - z) / near).atan().to_degrees().clamp(5.0, 85.0);
+        let down = (z / near).atan().to_degrees().clamp(10.0, 60.0);
+        let yaw = (a + std::f64::consts::PI).rem_euclid(TAU).to_degrees();
+        let mut normal = |sigma: f64| random.normals()[0] * sigma;
+        let [shift, angle, bias] = c.registration;
+        let registration = Registration {
+            xyz: [normal(shift), normal(shift), normal(shift)],
+            rpy_deg: [normal(angle), normal(angle), normal(angle)],
+        };
+        scene.scanners.push(Scanner {
+            name: format!("scan_{}", k + 1),
+            position: [x, y, z],
+            rpy_deg: [0.0, 0.0, yaw],
+            raster: Raster {
+                elevation_deg: [-down, up],
+                azimuth_deg: [-half, half],
+                step_deg,
+                n_beams: None,
+            },
+            noise: c.noise,
+            range_bias: normal(bias),
+            mixed: c.mixed.then(Mixed::default),
+            registration,
+            ..Scanner::default()
+        });
+    }
+}

@@ -1,0 +1,130 @@
+//! `bench accuracy`: suites of drawn cells in; how well postures, standard deviations and verdicts hold, as tables, out.
+//!
+//! Each case is drawn from a seed, scanned in memory by the virtual scanner and sent through the same stages as the
+//! main job, from strips of points on: nothing but the scans' points and stated poses goes in. Suites and their goals
+//! follow fit.md §5.
+
+mod cell;
+mod condition;
+mod draw;
+mod score;
+mod shape;
+mod table;
+
+use crate::engine::Engine;
+use crate::job::Means;
+use crate::{atomic, demo, library};
+use cell::Cell;
+use condition::{Case, cases};
+use contract::{Error, Kind, Result};
+use robot::Model;
+use score::{Row, score};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Bench {
+    /// Names of suites; all where empty.
+    pub suites: Vec<String>,
+    /// Cases of each suite; its own number where left out.
+    pub n_cases: Option<usize>,
+    /// First seed.
+    pub seed: u64,
+    /// Robot library; the demo's robots where left out.
+    pub robots: Option<PathBuf>,
+    /// Only models whose name holds one of these; all where empty.
+    pub models: Vec<String>,
+    /// Whether each cell is searched for all models of the library, or for the right one only.
+    pub whole_library: bool,
+    /// Where rows and tables go; nowhere where left out.
+    pub out: Option<PathBuf>,
+}
+
+/// Runs the suites; returns the table.
+pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String> {
+    let temporary = tempfile::tempdir()?;
+    let robots = match &bench.robots {
+        Some(dir) => dir.clone(),
+        None => {
+            demo::write_robots(temporary.path())?;
+            temporary.path().to_path_buf()
+        }
+    };
+    let models = library::load(&robots, &means.settings.robot, engine)?.models;
+    let chosen = chosen(&models, &bench.models)?;
+    let cases = cases(bench, &models, &chosen)?;
+    let mut journal = bench.out.as_deref().map(Journal::create).transpose()?;
+    let mut rows = Vec::with_capacity(cases.len());
+    let store = tempfile::tempdir()?;
+    // What stages say of single cells would drown what is said of cases.
+    let mut quiet = Engine::new(engine.n_workers);
+    quiet.cancel = engine.cancel.clone();
+    for (i, case) in cases.iter().enumerate() {
+        engine.cancel.check()?;
+        let row = run(case, &models, bench.whole_library, (store.path(), means, &quiet));
+        let line = row.line();
+        if let Some(journal) = &mut journal {
+            journal.add(&row)?;
+        }
+        engine.progress.say(&format!("{}/{} {line}", i + 1, cases.len()));
+        rows.push(row);
+    }
+    let table = table::table(&rows);
+    if let Some(dir) = &bench.out {
+        atomic::write(&dir.join("accuracy.md"), table.as_bytes())?;
+        atomic::write(&dir.join("accuracy.csv"), table::csv(&rows).as_bytes())?;
+    }
+    Ok(table)
+}
+
+/// One case; what goes wrong in it is a row, too.
+fn run(
+    case: &Case,
+    models: &[Model],
+    whole_library: bool,
+    (store, means, engine): (&Path, &Means, &Engine),
+) -> Row {
+    let started = Instant::now();
+    let seen = draw::draw(case, &models[case.model]).and_then(|drawn| {
+        let tried = if whole_library { models } else { std::slice::from_ref(&models[case.model]) };
+        let cell = Cell::scan(&drawn.scene, &drawn.models(models, case), engine)?;
+        let found = cell.search(tried, store, (means, engine))?;
+        Ok((drawn, found))
+    });
+    match seen {
+        Ok((drawn, found)) => score(case, &models[case.model], &drawn, &found),
+        Err(error) => {
+            Row::failed(case, &models[case.model], &error, started.elapsed().as_secs_f64())
+        }
+    }
+}
+
+/// Indices of the robots whose names are asked for.
+fn chosen(models: &[Model], names: &[String]) -> Result<Vec<usize>> {
+    let wanted = |m: &Model| names.is_empty() || names.iter().any(|n| m.name.contains(n.as_str()));
+    let out: Vec<usize> =
+        (0..models.len()).filter(|&i| !models[i].is_tool() && wanted(&models[i])).collect();
+    if out.is_empty() {
+        return Err(Error::new(Kind::Usage, "no robot of the library has such a name"));
+    }
+    Ok(out)
+}
+
+/// Rows as they come, one JSON object a line: a run that is stopped has lost nothing.
+struct Journal(std::fs::File, PathBuf);
+
+impl Journal {
+    fn create(dir: &Path) -> Result<Self> {
+        let path = dir.join("accuracy.jsonl");
+        let made = std::fs::create_dir_all(dir).and_then(|()| std::fs::File::create(&path));
+        Ok(Self(made.map_err(|e| Error::from(e).at(path.display()))?, path))
+    }
+
+    fn add(&mut self, row: &Row) -> Result<()> {
+        let text = serde_json::to_string(row)
+            .map_err(|e| Error::new(Kind::Bug, "a row cannot be written").because(e))?;
+        writeln!(self.0, "{text}").map_err(|e| Error::from(e).at(self.1.display()))
+    }
+}

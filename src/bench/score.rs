@@ -1,0 +1,211 @@
+//! A drawn cell and what was found in it in; one row of figures out.
+
+use super::cell::Found;
+use super::condition::Case;
+use super::draw::Drawn;
+use contract::{Error, Fit, Verdict};
+use geometry::Point;
+use robot::{JointKind, Model};
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// A fit farther than this from the true base is not it, metres.
+const SAME_PLACE: f64 = 0.5;
+/// A joint is right within this, radians (0.3°) or metres …
+const RIGHT: f64 = 0.005_236;
+/// … or within so many of its stated standard deviations, where the fit says that the points do not determine it.
+const RIGHT_SIGMAS: f64 = 4.0;
+/// From this standard deviation on a joint is said to be open: nothing is claimed of it, radians.
+const OPEN: f64 = 0.02;
+/// The base is right within this, metres: three standard deviations of a usual registration.
+const RIGHT_BASE: f64 = 0.010;
+/// Samples of a link for the displacement of its surface.
+const N_SAMPLES: usize = 200;
+
+/// One joint of a row.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct JointRow {
+    pub(super) name: String,
+    pub(super) truth: f64,
+    /// Whole turns taken out, radians or metres.
+    pub(super) error: f64,
+    pub(super) sigma: f64,
+    pub(super) determined: bool,
+}
+
+/// One case.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct Row {
+    pub(super) suite: String,
+    pub(super) model: String,
+    pub(super) seed: u64,
+    pub(super) n_scanners: usize,
+    pub(super) n_robot_points: usize,
+    /// Why there is no result, where there is none.
+    pub(super) failed: Option<String>,
+    pub(super) found: Option<String>,
+    pub(super) verdict: String,
+    pub(super) right_model: bool,
+    /// Model, base and every joint of which something is claimed.
+    pub(super) right: bool,
+    /// Robots reported that are not there.
+    pub(super) n_invented: usize,
+    /// Which, how sure, and how far from the true robot's base.
+    pub(super) invented: Vec<String>,
+    /// Metres, radians.
+    pub(super) base: [f64; 2],
+    pub(super) joints: Vec<JointRow>,
+    /// Error of the tip in the base's frame, in the world, and the stated σ of the former, metres.
+    pub(super) tip: [f64; 3],
+    /// Displacement of the surface in the base's frame: mean and 95th percentile, metres.
+    pub(super) surface: [f64; 2],
+    pub(super) score: f64,
+    pub(super) rms: f64,
+    pub(super) margin: Option<f64>,
+    pub(super) reasons: Vec<String>,
+    pub(super) seconds: f64,
+}
+
+impl Row {
+    fn new(case: &Case, model: &Model) -> Self {
+        Self {
+            model: model.name.clone(),
+            suite: case.suite.into(),
+            seed: case.seed,
+            n_scanners: case.condition.n_scanners,
+            ..Self::default()
+        }
+    }
+
+    /// A case that could not be done.
+    pub(super) fn failed(case: &Case, model: &Model, error: &Error, seconds: f64) -> Self {
+        Self { failed: Some(error.to_string()), seconds, ..Self::new(case, model) }
+    }
+
+    /// Largest error of the joints said to be determined, radians.
+    pub(super) fn worst(&self) -> f64 {
+        self.determined().map(|j| j.error.abs()).fold(0.0, f64::max)
+    }
+
+    pub(super) fn determined(&self) -> impl Iterator<Item = &JointRow> {
+        self.joints.iter().filter(|j| j.determined)
+    }
+
+    /// For people who watch.
+    pub(super) fn line(&self) -> String {
+        let what = match (&self.failed, &self.found) {
+            (Some(why), _) => format!("failed: {why}"),
+            (None, None) => "not found".into(),
+            (None, Some(model)) => format!(
+                "{}{}{}, worst determined joint {:.3}°, base {:.2} mm, tip {:.2} mm, {:.1} s{}",
+                if self.right { "right, " } else { "WRONG, " },
+                self.verdict,
+                if self.right_model { String::new() } else { format!(" as {model}") },
+                self.worst().to_degrees(),
+                self.base[0] * 1e3,
+                self.tip[0] * 1e3,
+                self.seconds,
+                self.reasons.first().map_or_else(String::new, |r| format!(" ({r})")),
+            ),
+        };
+        let invented = if self.invented.is_empty() {
+            String::new()
+        } else {
+            format!("; invented: {}", self.invented.join(", "))
+        };
+        format!("{} {} {}: {what}{invented}", self.suite, self.model, self.seed)
+    }
+}
+
+/// The figures of a case.
+pub(super) fn score(case: &Case, model: &Model, drawn: &Drawn, found: &Found) -> Row {
+    let base = drawn.world_from_base.translation.vector;
+    let apart = |f: &Fit| (f.world_from_base.translation.vector - base).norm();
+    let here = found
+        .fits
+        .iter()
+        .filter(|f| f.verdict != Verdict::Refused && apart(f) < SAME_PLACE)
+        .min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let mut row = Row {
+        n_robot_points: found.n_robot_points,
+        n_invented: found.fits.len() - usize::from(here.is_some()),
+        seconds: found.seconds,
+        ..Row::new(case, model)
+    };
+    let others = found.fits.iter().filter(|f| here.is_none_or(|h| !std::ptr::eq(*f, h)));
+    row.invented = others
+        .map(|f| format!("{} {}, {:.2} m away", f.verdict.word(), f.model_name, apart(f)))
+        .collect();
+    let Some(fit) = here else { return row };
+    row.found = Some(fit.model_name.clone());
+    row.verdict = fit.verdict.word().into();
+    row.right_model = fit.model_name == model.name || fit.alike.contains(&model.name);
+    row.base = [apart(fit), fit.world_from_base.rotation.angle_to(&drawn.world_from_base.rotation)];
+    row.score = fit.score;
+    row.rms = fit.rms;
+    row.margin = fit.runner_up.as_ref().map(|r| r.margin);
+    row.reasons = fit.reasons.clone();
+    if fit.model_name == model.name {
+        row.joints = joints(model, fit, &drawn.posture);
+        displacements(&mut row, model, fit, drawn);
+    }
+    row.right = row.right_model
+        && row.base[0] < RIGHT_BASE
+        && (0..row.joints.len()).all(|j| is_right(&row.joints[j], j, fit, &drawn.posture));
+    row
+}
+
+fn joints(model: &Model, fit: &Fit, posture: &[f64]) -> Vec<JointRow> {
+    let each = fit.joints.iter().zip(posture).enumerate().map(|(j, (joint, truth))| {
+        let slides = model.joints[model.free[j]].kind == JointKind::Prismatic;
+        let error = joint.value - truth;
+        let turns = if slides { 0.0 } else { (error / TAU).round() * TAU };
+        JointRow {
+            name: joint.name.clone(),
+            truth: *truth,
+            error: error - turns,
+            sigma: joint.sigma,
+            determined: joint.determined,
+        }
+    });
+    each.collect()
+}
+
+/// Whether what is claimed of a joint holds.
+fn is_right(joint: &JointRow, index: usize, fit: &Fit, posture: &[f64]) -> bool {
+    let near = |e: f64| (e - (e / TAU).round() * TAU).abs() < RIGHT;
+    if near(joint.error) {
+        return true;
+    }
+    if joint.determined {
+        return false;
+    }
+    joint.sigma >= OPEN
+        || joint.error.abs() < RIGHT_SIGMAS * joint.sigma
+        || fit.equals.iter().any(|e| near(e.posture[index] - posture[index]))
+}
+
+/// Errors of the tip and of all surfaces.
+fn displacements(row: &mut Row, model: &Model, fit: &Fit, drawn: &Drawn) {
+    let fitted: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    let (ours, theirs) = (model.poses(&fitted), model.poses(&drawn.posture));
+    if let Some(tip) = model.main_chain.last().map(|&j| model.joints[j].child) {
+        let (a, b) = (
+            Point::from(ours[tip].translation.vector),
+            Point::from(theirs[tip].translation.vector),
+        );
+        let world = (fit.world_from_base * a - drawn.world_from_base * b).norm();
+        row.tip = [(a - b).norm(), world, fit.tip_sigma];
+    }
+    let mut all: Vec<f64> = Vec::new();
+    for (l, link) in model.links.iter().enumerate() {
+        all.extend(link.cad.points.iter().take(N_SAMPLES).map(|p| {
+            let p = Point::from(p.map(f64::from));
+            (ours[l] * p - theirs[l] * p).norm()
+        }));
+    }
+    all.sort_by(f64::total_cmp);
+    if !all.is_empty() {
+        row.surface = [all.iter().sum::<f64>() / all.len() as f64, all[all.len() * 95 / 100]];
+    }
+}

@@ -1,0 +1,112 @@
+//! Rows in; the table for people and the one for programs out.
+
+use super::score::Row;
+use std::fmt::Write as _;
+
+/// One line a suite: what was found, how exact it is, whether standard deviations and verdicts hold.
+pub(super) fn table(rows: &[Row]) -> String {
+    let mut out = String::from(
+        "| suite | cases | found | model | right | trusted | wrong, trusted | invented | rms ° | max ° | median worst ° \
+         | base mm | tip mm | tip, world mm | surface mm | z rms | z > 3 | s |\n",
+    );
+    out.push_str(&format!("|{}\n", " --- |".repeat(18)));
+    let mut suites: Vec<&str> = Vec::new();
+    for row in rows {
+        if !suites.contains(&row.suite.as_str()) {
+            suites.push(&row.suite);
+        }
+    }
+    for suite in suites {
+        let own: Vec<&Row> = rows.iter().filter(|r| r.suite == suite).collect();
+        line(&mut out, suite, &own);
+    }
+    line(&mut out, "**whole**", &rows.iter().collect::<Vec<_>>());
+    out.push_str(
+        "\nErrors of the joints that a fit says the points determine, over the right fits; base, tip (in the base's frame, \
+         and in the world) and 95 % of the surface: medians / largest; z: error over stated standard deviation.\n",
+    );
+    let wrong: Vec<&Row> = rows.iter().filter(|r| !r.right || r.n_invented > 0).collect();
+    if !wrong.is_empty() {
+        out.push_str("\nNot right, or with a robot too many:\n\n");
+        wrong.iter().for_each(|row| {
+            let _ = writeln!(out, "- {}", row.line());
+        });
+    }
+    out
+}
+
+fn line(out: &mut String, name: &str, rows: &[&Row]) {
+    let n = |what: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| what(r)).count();
+    let trusted = |r: &Row| r.verdict == "trusted";
+    let right: Vec<&Row> = rows.iter().copied().filter(|r| r.right).collect();
+    let errors: Vec<f64> =
+        degrees(&right, |r| r.determined().map(|j| j.error.to_degrees()).collect());
+    let z: Vec<f64> = degrees(&right, |r| r.determined().map(|j| j.error / j.sigma).collect());
+    let rms = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len().max(1) as f64).sqrt();
+    let largest = |v: &[f64]| v.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+    let millimetres = |what: &dyn Fn(&Row) -> f64| {
+        let mut v: Vec<f64> = right.iter().map(|r| what(r) * 1e3).collect();
+        format!("{:.2} / {:.2}", median(&mut v), largest(&v))
+    };
+    let mut worst: Vec<f64> = right.iter().map(|r| r.worst().to_degrees()).collect();
+    let mut seconds: Vec<f64> = rows.iter().map(|r| r.seconds).collect();
+    let share = z.iter().filter(|z| z.abs() > 3.0).count() as f64 / z.len().max(1) as f64;
+    let _ = writeln!(
+        out,
+        "| {name} | {} | {} | {} | {} | {} | {} | {} | {:.4} | {:.4} | {:.4} | {} | {} | {} | {} | {:.2} | {:.1} % | {:.1} |",
+        rows.len(),
+        n(&|r| r.found.is_some()),
+        n(&|r| r.right_model),
+        right.len(),
+        n(&|r| r.right && trusted(r)),
+        n(&|r| !r.right && trusted(r)),
+        rows.iter().map(|r| r.n_invented).sum::<usize>(),
+        rms(&errors),
+        largest(&errors),
+        median(&mut worst),
+        millimetres(&|r| r.base[0]),
+        millimetres(&|r| r.tip[0]),
+        millimetres(&|r| r.tip[1]),
+        millimetres(&|r| r.surface[1]),
+        rms(&z),
+        share * 100.0,
+        median(&mut seconds),
+    );
+}
+
+fn degrees(rows: &[&Row], each: impl Fn(&Row) -> Vec<f64>) -> Vec<f64> {
+    rows.iter().flat_map(|r| each(r)).collect()
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    geometry::robust::median(values).unwrap_or(0.0)
+}
+
+/// One line a joint.
+pub(super) fn csv(rows: &[Row]) -> String {
+    let mut out = String::from(
+        "suite,model,seed,scanners,robot_points,found,verdict,right,joint,truth,error,sigma,determined\n",
+    );
+    for row in rows {
+        let found = row.found.as_deref().unwrap_or("");
+        for j in &row.joints {
+            let _ = writeln!(
+                out,
+                "{},{},{},{},{},{found},{},{},{},{},{},{},{}",
+                row.suite,
+                row.model,
+                row.seed,
+                row.n_scanners,
+                row.n_robot_points,
+                row.verdict,
+                row.right,
+                j.name,
+                j.truth,
+                j.error,
+                j.sigma,
+                j.determined
+            );
+        }
+    }
+    out
+}
