@@ -198,7 +198,14 @@ fn displacements(row: &mut Row, model: &Model, fit: &Fit, drawn: &Drawn) {
         row.tip = [(a - b).norm(), world, fit.tip_sigma];
     }
     let mut all: Vec<f64> = Vec::new();
+    // Of a flange that may stand at several values nothing is claimed.
+    let open: Vec<bool> = fit.joints.iter().map(|j| j.sigma >= OPEN).collect();
+    let twists = model.kinematics(&fitted).twists;
     for (l, link) in model.links.iter().enumerate() {
+        let moves = |j: usize| twists[l][j].iter().any(|v| v.abs() > 1e-9);
+        if (0..open.len()).any(|j| open[j] && moves(j)) {
+            continue;
+        }
         all.extend(link.cad.points.iter().take(N_SAMPLES).map(|p| {
             let p = Point::from(p.map(f64::from));
             (ours[l] * p - theirs[l] * p).norm()

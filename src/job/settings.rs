@@ -73,6 +73,7 @@ settings! {
     }
     region: identify::RegionSettings {
         join_gap, margin, min_height, min_extent, min_points, min_seed, max_extent, overlap,
+        max_body,
     }
     fit: fit::Settings {
         beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,

@@ -17,6 +17,7 @@ mod report;
 mod scene;
 mod settings;
 mod solve;
+mod spin;
 mod verdict;
 
 pub use choose::choose;

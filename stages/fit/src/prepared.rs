@@ -21,6 +21,8 @@ pub struct Prepared<'a> {
     /// For each free joint: distance of the samples it places from its axis, 95th percentile, metres (1 for
     /// prismatic joints, so that steps are in metres).
     pub(crate) lever: Vec<f64>,
+    /// For each free joint: whether it moves nothing but the links that it places.
+    pub(crate) leaf: Vec<bool>,
     /// Number of patches over all links.
     pub(crate) n_patches: usize,
     /// For each patch: its group, one for each link and side.
@@ -77,6 +79,11 @@ impl<'a> Prepared<'a> {
                 None => fixed.push(l),
             }
         }
+        let leaf = (0..n_free).map(|j| {
+            let carried = (0..depends.len()).filter(|&l| depends[l][j]);
+            carried.filter(|&l| !model.links[l].cad.points.is_empty()).count() == placed_by[j].len()
+        });
+        let leaf = leaf.collect();
         let lever = (0..n_free).map(|j| lever(model, j, &placed_by[j])).collect();
         Self {
             model,
@@ -86,6 +93,7 @@ impl<'a> Prepared<'a> {
             fixed,
             reach: reach(model),
             lever,
+            leaf,
             n_patches: patch_groups.len(),
             patch_groups,
         }

@@ -12,6 +12,7 @@ use crate::beam::Hypothesis;
 use crate::judge::{Judgement, evidence, margin};
 use crate::refine::Refine;
 use crate::solve::Polished;
+use crate::spin::Spin;
 use crate::verdict;
 
 /// Margin up to which another posture counts as equally good.
@@ -30,6 +31,7 @@ pub(crate) fn report(
     refine: &Refine<'_>,
     (best, judgement): &(Adjusted, Judgement),
     others: &[Polished],
+    spins: &[Spin],
 ) -> Fit {
     let prepared = refine.prepared;
     let model = prepared.model;
@@ -40,7 +42,9 @@ pub(crate) fn report(
         .map(|other| (margin(prepared, (h, judgement), (&other.0, &other.1)), other))
         .collect();
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let open = open_joints(best, &rivals);
+    let mut open = open_joints(best, &rivals);
+    let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
+    several.iter().for_each(|s| open[s.joint] = true);
     let covariance = in_world_axes(&best.covariance, &h.local_from_base);
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     let joints = (0..h.posture.len()).map(|j| {
@@ -48,7 +52,8 @@ pub(crate) fn report(
         JointFit {
             name: model.joints[model.free[j]].name.clone(),
             value,
-            sigma: sigma(6 + j),
+            // The width of one of several values is not how well the joint is known.
+            sigma: if several.iter().any(|s| s.joint == j) { f64::INFINITY } else { sigma(6 + j) },
             determined: !open[j] && sigma(6 + j) < refine.settings.determined_sigma,
             equivalents,
         }
@@ -59,6 +64,13 @@ pub(crate) fn report(
     let same = rivals
         .iter()
         .filter(|(m, (other, _))| *m < EQUAL && (0..open.len()).any(|j| turn(other, h, j) > OTHER));
+    let spun = several.iter().flat_map(|s| {
+        s.values[1..].iter().map(|value| {
+            let mut posture = h.posture.clone();
+            posture[s.joint] = *value;
+            Equal { posture, margin: 0.0 }
+        })
+    });
     let mut fit = Fit {
         model: prepared.index,
         model_name: model.name.clone(),
@@ -74,7 +86,7 @@ pub(crate) fn report(
         scans: scans(refine, best),
         links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
         runner_up: others.map(|rival| runner_up(model, judgement, rival)).next(),
-        equals: same.take(N_EQUALS).map(equal).collect(),
+        equals: same.take(N_EQUALS).map(equal).chain(spun).collect(),
         ..Fit::default()
     };
     verdict::pass(&mut fit, prepared, refine.scene, judgement);

@@ -63,8 +63,22 @@ pub fn fit(
     if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
         return None;
     }
-    let best = adjust(&refine, best, &all);
-    Some(report(&refine, &best, &polished[1..]))
+    let mut best = adjust(&refine, best, &all);
+    let mut spins = refine.spins(&best.0.hypothesis, &near, scene.noise * scene.noise);
+    let better: Vec<(usize, f64)> = spins.iter().map(|s| (s.joint, s.values[0])).collect();
+    if better.iter().any(|(j, v)| is_other(best.0.hypothesis.posture[*j], *v)) {
+        let mut h = best.0.hypothesis.clone();
+        better.iter().for_each(|(j, v)| h.posture[*j] = *v);
+        best = adjust(&refine, &h, &all);
+        spins = refine.spins(&best.0.hypothesis, &near, scene.noise * scene.noise);
+    }
+    Some(report(&refine, &best, &polished[1..], &spins))
+}
+
+/// Whether a joint's value is another mode, not the same one found again: 3°.
+fn is_other(a: f64, b: f64) -> bool {
+    let d = (a - b).rem_euclid(std::f64::consts::TAU);
+    d.min(std::f64::consts::TAU - d) > 0.052
 }
 
 /// What is looked for beside a polished posture.

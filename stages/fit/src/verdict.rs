@@ -15,6 +15,9 @@ const SCORE: (f64, f64) = (0.60, 0.35);
 const POOR_RMS: (f64, f64) = (2.0, 0.0015);
 /// … and from which it fits badly.
 const BAD_RMS: (f64, f64) = (2.5, 0.003);
+/// Score below which a surface that fits too poorly is refused: furniture has room for a small arm that is nowhere
+/// quite right.
+const POOR_SCORE: f64 = 0.52;
 /// Residual from which a fit that leaves half of its joints open is refused whatever the noise, metres: with so blunt
 /// a measure, many a thing has room for a robot.
 const MAX_OPEN_RMS: f64 = 0.006;
@@ -24,6 +27,8 @@ const KNOWN_SIGMA: f64 = 0.0175;
 const SEEN: f64 = 0.12;
 /// Fewest points on the links that a joint moves.
 const JOINT_POINTS: usize = 60;
+/// Most values of a joint that are named.
+const MAX_VALUES: usize = 3;
 /// A runner-up that the beams prefer less clearly than this makes the best doubtful.
 const RIVAL: f64 = 0.12;
 
@@ -62,7 +67,8 @@ pub(crate) fn pass(
     // A surface that fits badly and leaves the posture open may be anything.
     let is_bad = fit.rms > BAD_RMS.0 * scene.noise + BAD_RMS.1 || fit.rms > MAX_OPEN_RMS;
     let is_poor = fit.rms > POOR_RMS.0 * scene.noise + POOR_RMS.1;
-    grade(is_open && is_bad, is_poor, &mut refusals, &mut doubts, words);
+    let is_wrong = is_poor && judgement.score < POOR_SCORE;
+    grade(is_wrong || is_open && is_bad, is_poor, &mut refusals, &mut doubts, words);
     if !scene.evidence.has_beams() {
         doubts.push("no scanner position is known, so nothing proves free space".into());
     }
@@ -76,12 +82,7 @@ pub(crate) fn pass(
         } else if j + 1 < fit.joints.len() && joint.sigma > KNOWN_SIGMA {
             doubts.push(format!("the points do not determine joint '{}'", joint.name));
         } else if !joint.determined {
-            notes.push(if joint.sigma < KNOWN_SIGMA {
-                let deg = joint.sigma.to_degrees();
-                format!("the points determine joint '{}' only to ± {deg:.2}°, or leave it several values", joint.name)
-            } else {
-                format!("the points do not determine joint '{}'", joint.name)
-            });
+            notes.push(undetermined(fit, j));
         }
     }
     let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
@@ -96,6 +97,27 @@ pub(crate) fn pass(
     fit.reasons = refusals;
     fit.reasons.extend(doubts);
     fit.reasons.extend(notes);
+}
+
+/// What is said of a joint that the points do not determine.
+fn undetermined(fit: &Fit, j: usize) -> String {
+    let joint = &fit.joints[j];
+    let other = |e: &contract::Equal| (e.posture[j] - joint.value).abs() > KNOWN_SIGMA;
+    let values: Vec<String> = fit
+        .equals
+        .iter()
+        .filter(|e| other(e))
+        .take(MAX_VALUES)
+        .map(|e| format!("{:.1}°", e.posture[j].to_degrees()))
+        .collect();
+    if !values.is_empty() {
+        format!("joint '{}' may as well stand at {}", joint.name, values.join(", "))
+    } else if joint.sigma < KNOWN_SIGMA {
+        let deg = joint.sigma.to_degrees();
+        format!("the points determine joint '{}' only to ± {deg:.2}°", joint.name)
+    } else {
+        format!("the points do not determine joint '{}'", joint.name)
+    }
 }
 
 fn grade(

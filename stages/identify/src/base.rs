@@ -48,6 +48,11 @@ impl Default for Settings {
     }
 }
 
+/// Ground that one robot and its furniture take, m².
+const CELL_AREA: f64 = 25.0;
+/// Most cells that a region is taken for: a square of 12 m holds so many.
+const MAX_CELLS: usize = 6;
+
 /// The search for one model's base in one region.
 #[derive(Debug)]
 pub struct BaseSearch<'a> {
@@ -131,17 +136,19 @@ impl<'a> BaseSearch<'a> {
         }
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
-        best(&mut trials, self.settings.keep_coarse, step * 0.9, yaw_step * 0.9);
-        let trials =
-            self.finer(&local, &trials, step / 2.0, yaw_step / 2.0, self.settings.keep_middle);
-        let trials = self.finer(
-            &local,
-            &trials,
-            step / 4.0,
-            yaw_step / 5.0,
-            self.settings.max_places * self.settings.bases_per_place * 2,
-        );
+        let cells = self.n_cells();
+        best(&mut trials, self.settings.keep_coarse * cells, step * 0.9, yaw_step * 0.9);
+        let keep = self.settings.keep_middle * cells;
+        let trials = self.finer(&local, &trials, step / 2.0, yaw_step / 2.0, keep);
+        let keep = self.settings.max_places * cells * self.settings.bases_per_place * 2;
+        let trials = self.finer(&local, &trials, step / 4.0, yaw_step / 5.0, keep);
         self.group(planes, &local, &trials)
+    }
+
+    /// How many robot cells the region may hold, at least one: the more, the more places must go on.
+    fn n_cells(&self) -> usize {
+        let size = self.region.bounds.size();
+        ((size[0] * size[1] / CELL_AREA).round() as usize).clamp(1, MAX_CELLS)
     }
 
     fn to_local(&self, plane: &Plane) -> Plane {
@@ -315,7 +322,9 @@ impl<'a> BaseSearch<'a> {
                     places[at].push(trial);
                 }
                 Some(_) => {}
-                None if places.len() < self.settings.max_places => places.push(vec![trial]),
+                None if places.len() < self.settings.max_places * self.n_cells() => {
+                    places.push(vec![trial])
+                }
                 None => {}
             }
         }

@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod base;
+mod bodies;
 mod sites;
 
 pub use base::{BaseSearch, Settings};

@@ -4,6 +4,8 @@
 use contract::{Cluster, InstallationPlane, Region};
 use geometry::{Aabb, Plane, Point, Vector};
 
+use crate::bodies::bodies;
+
 /// What is tuned.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegionSettings {
@@ -23,6 +25,9 @@ pub struct RegionSettings {
     pub max_extent: f64,
     /// How far such squares overlap, metres: the reach of a large robot.
     pub overlap: f64,
+    /// A cluster longer than this (metres) is structure, walls and fences and what touches them: what is flat of it is
+    /// left out, the rest taken apart.
+    pub max_body: f64,
 }
 
 impl Default for RegionSettings {
@@ -36,6 +41,7 @@ impl Default for RegionSettings {
             min_seed: 0.2,
             max_extent: 12.0,
             overlap: 3.0,
+            max_body: 6.0,
         }
     }
 }
@@ -44,12 +50,12 @@ impl Default for RegionSettings {
 #[must_use]
 pub fn regions(clusters: &[Cluster], settings: &RegionSettings) -> Vec<Region> {
     let mut groups: Vec<(Aabb, u64)> = Vec::new();
-    for cluster in clusters {
-        let size = cluster.bounds.size();
+    for (bounds, n_points) in clusters.iter().flat_map(|c| bodies(c, settings)) {
+        let size = bounds.size();
         if size.iter().fold(0.0_f64, |a, b| a.max(*b)) < settings.min_seed {
             continue;
         }
-        let (mut bounds, mut n_points) = (cluster.bounds, cluster.n_points);
+        let (mut bounds, mut n_points) = (bounds, n_points);
         // Growing may bring the group near another one: repeat until nothing joins.
         while let Some(at) =
             groups.iter().position(|(b, _)| b.grown(settings.join_gap).touches(&bounds))

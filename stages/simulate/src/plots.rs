@@ -46,9 +46,11 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
         plot(&mut scene, robots[random.below(robots.len())], n, from, &mut random)?;
     }
     let n_scanners = (n_robots as u64).div_ceil(2).max(2).max(n_points.div_ceil(MAX_BEAMS));
+    let n_spots = (cols + 1) * (rows + 1);
+    let stride = spread(n_spots);
     for k in 0..n_scanners as usize {
         // Scanners stand where plots meet; robots keep away from there.
-        let spot = k * ((cols + 1) * (rows + 1)) / n_scanners as usize;
+        let spot = (k * stride) % n_spots;
         let [x, y] = corner(spot % (cols + 1), spot / (cols + 1));
         let (x, y) =
             (x.clamp(0.6 - 0.5 * size[0], 0.5 * size[0] - 0.6), y + random.between(-0.2, 0.2));
@@ -57,6 +59,20 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
         scene.scanners.push(scanner(format!("scan_{}", k + 1), at, raster));
     }
     Ok(scene)
+}
+
+/// A stride that visits all of `n` places, near and far in turn: the one without common factor that is nearest to the
+/// golden section.
+fn spread(n: usize) -> usize {
+    let coprime = |k: &usize| {
+        let (mut a, mut b) = (n, *k);
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a == 1
+    };
+    let golden = 0.618 * n as f64;
+    (1..=n).filter(coprime).min_by_key(|k| ((*k as f64 - golden).abs() * 1e6) as u64).unwrap_or(1)
 }
 
 fn plot(

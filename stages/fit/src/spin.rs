@@ -1,0 +1,134 @@
+//! An adjusted posture in; out come the other values of its last joints at which the points fit as well or better: a
+//! flange with six bolts looks the same every 60°, and only points on its small features tell (fit.md §4e).
+
+use geometry::Point;
+use std::f64::consts::TAU;
+
+use crate::beam::Hypothesis;
+use crate::refine::Refine;
+
+/// Arc between trial values at the joint's lever, metres: finer than the features that tell them apart.
+const STEP: f64 = 0.003;
+/// Largest step, radians: 1°.
+const MAX_STEP: f64 = 0.0175;
+/// Points farther than this from everything count as if they were so far, metres.
+const CAP: f32 = 0.015;
+/// Points within this of the swept links take part, metres.
+const NEAR: f64 = 0.03;
+/// Most points of a sweep.
+const MAX_POINTS: usize = 3000;
+/// Values nearer than this to one another are one, radians: 3°.
+const APART: f64 = 0.052;
+/// Extra sum of squares, relative to the best's and in units of the noise's variance, up to which a value is as good:
+/// 3 % of the squares is less than what real castings differ by.
+const AS_GOOD: (f64, f64) = (0.03, 30.0);
+
+/// Values of one joint.
+#[derive(Debug, Clone)]
+pub(crate) struct Spin {
+    pub(crate) joint: usize,
+    /// All values at which the points fit as well as at the best one, best first.
+    pub(crate) values: Vec<f64>,
+}
+
+impl Refine<'_> {
+    /// Sweeps each joint that moves nothing but the links that it places.
+    pub(crate) fn spins(&self, h: &Hypothesis, near: &[u32], variance: f64) -> Vec<Spin> {
+        let leaves = (0..h.posture.len()).filter(|&j| self.prepared.leaf[j]);
+        leaves.filter_map(|joint| self.spin(h, near, joint, variance)).collect()
+    }
+
+    fn spin(&self, h: &Hypothesis, near: &[u32], joint: usize, variance: f64) -> Option<Spin> {
+        let moved = &self.prepared.placed_by[joint];
+        let [low, high] = self.prepared.model.limits(joint);
+        let prismatic = self.prepared.model.joints[self.prepared.model.free[joint]].kind
+            == robot::JointKind::Prismatic;
+        if prismatic || moved.is_empty() {
+            return None;
+        }
+        let span = (high - low).min(TAU);
+        let step = (STEP / self.prepared.lever[joint]).min(MAX_STEP);
+        let n = (span / step).ceil() as usize;
+        // Around the value found, so that it is one of those tried.
+        let first = if high - low > TAU { h.posture[joint] - span / 2.0 } else { low };
+        let points = self.swept(h, near, moved);
+        if points.len() < 30 {
+            return None;
+        }
+        let still = self.distances(h, &points, |l| !moved.contains(&l));
+        let mut trial = h.clone();
+        let mut cost = |value: f64| {
+            trial.posture[joint] = value;
+            let own = self.distances(&trial, &points, |l| moved.contains(&l));
+            let least = own.iter().zip(&still).map(|(a, b)| f64::from(a.min(*b)).powi(2));
+            least.sum::<f64>() / variance
+        };
+        let costs: Vec<(f64, f64)> = (0..=n)
+            .map(|k| first + span * k as f64 / n as f64)
+            .chain([h.posture[joint]])
+            .map(|value| (value, cost(value)))
+            .collect();
+        let best = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
+        let limit = best + (AS_GOOD.0 * best).max(AS_GOOD.1);
+        let mut good: Vec<(f64, f64)> = costs.into_iter().filter(|c| c.1 <= limit).collect();
+        good.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut values: Vec<f64> = Vec::new();
+        for (value, _) in good {
+            let apart = |v: &f64| {
+                let d = (value - v).rem_euclid(TAU);
+                d.min(TAU - d) > APART
+            };
+            if values.iter().all(apart) {
+                values.push(value);
+            }
+        }
+        Some(Spin { joint, values })
+    }
+
+    /// Points near the links whatever their joint's value: within their sphere about the joint's axis, thinned.
+    fn swept(&self, h: &Hypothesis, near: &[u32], moved: &[usize]) -> Vec<u32> {
+        let poses = self.local_from_links(h);
+        let spheres: Vec<(Point, f64)> = moved
+            .iter()
+            .map(|&l| {
+                let bounds = &self.prepared.model.links[l].bounds;
+                let radius = 0.5 * bounds.size().iter().map(|s| s * s).sum::<f64>().sqrt() + NEAR;
+                let middle: Point = bounds.center();
+                (poses[l] * middle, radius)
+            })
+            .collect();
+        let inside = |i: &u32| {
+            let p = Point::from(self.scene.points[*i as usize].p.map(f64::from));
+            spheres.iter().any(|(c, r)| (p - c).norm() < *r)
+        };
+        let all: Vec<u32> = near.iter().copied().filter(inside).collect();
+        let n = all.len().min(MAX_POINTS);
+        (0..n).map(|k| all[k * all.len() / n]).collect()
+    }
+
+    /// Distance of each point from the surface of the chosen links along their normals, at most the cap, metres.
+    fn distances(
+        &self,
+        h: &Hypothesis,
+        points: &[u32],
+        chosen: impl Fn(usize) -> bool,
+    ) -> Vec<f32> {
+        let frames: Vec<_> = self.link_frames(h).into_iter().filter(|(l, _)| chosen(*l)).collect();
+        let of = |&i: &u32| {
+            let p = self.scene.points[i as usize].p;
+            let mut least = CAP;
+            for (l, frame) in &frames {
+                let q = geometry::depth::transform(frame, p);
+                let Some(at) = self.prepared.links[*l].fine.nearest(q) else { continue };
+                let cad = &self.prepared.model.links[*l].cad;
+                let (x, n) = (cad.points[at], cad.normals[at]);
+                let off: f32 = (0..3).map(|k| n[k] * (q[k] - x[k])).sum();
+                let apart: f32 = (0..3).map(|k| (q[k] - x[k]).powi(2)).sum::<f32>().sqrt();
+                // Beyond the edge of a facet its plane means nothing.
+                least = least.min(if apart > 2.0 * cad.spacing + CAP { CAP } else { off.abs() });
+            }
+            least
+        };
+        points.iter().map(of).collect()
+    }
+}
