@@ -6,7 +6,7 @@ use crate::job::Settings;
 use crate::store::Store;
 use crate::surfaces::Ground;
 use contract::{Fit, InstallationPlane, Region, Result, Scan, View};
-use fit::{Prepared, Scene};
+use fit::{Method, Prepared, Scene};
 use identify::BaseSearch;
 use lattice::ViewBuilder;
 use rayon::prelude::*;
@@ -116,6 +116,15 @@ impl<'a> Search<'a> {
     fn model(&self, index: usize, scene: &Scene<'_>, planes: &[InstallationPlane]) -> Vec<Fit> {
         let model = &self.shelf.models[index];
         let settings = self.settings;
+        if settings.fit.method == Method::Paper {
+            let prepared = self.shelf.prepared(index);
+            let means = (&settings.fit, &settings.paper);
+            return if model.is_tool() {
+                Vec::new()
+            } else {
+                fit::paper::fit(prepared, scene, planes, means)
+            };
+        }
         let Some(search) = BaseSearch::new(
             (index, model),
             scene.region,

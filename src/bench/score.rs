@@ -27,6 +27,8 @@ const N_SAMPLES: usize = 200;
 pub(super) struct JointRow {
     pub(super) name: String,
     pub(super) truth: f64,
+    /// That of the sweep alone, where the method goes link after link.
+    pub(super) rough: Option<f64>,
     /// Whole turns taken out, radians or metres.
     pub(super) error: f64,
     pub(super) sigma: f64,
@@ -158,12 +160,13 @@ pub(super) fn score(case: &Case, model: &Model, drawn: &Drawn, found: &Found) ->
 fn joints(model: &Model, fit: &Fit, posture: &[f64]) -> Vec<JointRow> {
     let each = fit.joints.iter().zip(posture).enumerate().map(|(j, (joint, truth))| {
         let slides = model.joints[model.free[j]].kind == JointKind::Prismatic;
+        let whole = |e: f64| if slides { e } else { e - (e / TAU).round() * TAU };
         let error = joint.value - truth;
-        let turns = if slides { 0.0 } else { (error / TAU).round() * TAU };
         JointRow {
+            rough: fit.rough.get(j).map(|v| whole(v - truth)),
             name: joint.name.clone(),
             truth: *truth,
-            error: error - turns,
+            error: whole(error),
             sigma: joint.sigma,
             determined: joint.determined,
         }

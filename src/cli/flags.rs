@@ -154,6 +154,9 @@ pub(super) struct Common {
     /// One setting, for example fit.beam=150; goes before the file
     #[arg(long, global = true, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// How postures are found: "beam" (else), or "paper", the method of the source, link after link
+    #[arg(long, global = true, value_name = "NAME")]
+    method: Option<String>,
     /// How progress is shown (else a bar on a terminal, lines elsewhere)
     #[arg(long, global = true, value_enum, value_name = "HOW")]
     progress: Option<Mode>,
@@ -165,11 +168,12 @@ pub(super) struct Common {
 impl Common {
     /// Defaults, configuration and flags, put together and checked.
     pub(super) fn means(&self) -> Result<Means> {
+        let method = self.method.iter().map(|name| format!("fit.method={name}"));
         Means::of(&Given {
             memory: self.memory.clone(),
             threads: self.threads,
             config: self.config.clone(),
-            set: self.set.clone(),
+            set: self.set.iter().cloned().chain(method).collect(),
         })
     }
 

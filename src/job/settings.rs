@@ -76,9 +76,14 @@ settings! {
         max_body,
     }
     fit: fit::Settings {
-        beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
+        method, beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
         max_points, floor_band, min_noise, plane_sigma, scan_sigma, determined_sigma, min_score,
         max_violation,
+    }
+    paper: fit::paper::PaperSettings {
+        voxel, n_neighbours, max_edge, foot_low, foot_high, max_height, geodesic_slack, max_bases,
+        yaw_step, truncation, sparse_p, sparse_mu, sparse_rounds, sweep_step, window,
+        near_symmetric, axis_weight, axis_span, gate, n_rounds,
     }
     segment: segment::Settings {
         sigma_range, sigma_cad, min_gate, max_gate, floor_band, floor_depth, foot_band, reach,

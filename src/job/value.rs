@@ -56,6 +56,22 @@ impl Value for f32 {
     }
 }
 
+impl Value for fit::Method {
+    fn kind() -> String {
+        "\"beam\" or \"paper\"".into()
+    }
+    fn read(value: &Toml) -> Option<Self> {
+        match value.as_str()? {
+            "beam" => Some(Self::Beam),
+            "paper" => Some(Self::Paper),
+            _ => None,
+        }
+    }
+    fn write(&self) -> Toml {
+        Toml::String(if *self == Self::Beam { "beam" } else { "paper" }.into())
+    }
+}
+
 impl Value for bool {
     fn kind() -> String {
         "true or false".into()

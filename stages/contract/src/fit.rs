@@ -127,6 +127,8 @@ pub struct Fit {
     pub runner_up: Option<RunnerUp>,
     /// Other postures that explain the points as well (a symmetric link, a wrist that nobody saw), best first.
     pub equals: Vec<Equal>,
+    /// Posture after the sweeps and before the registration, where the method goes link after link; else empty.
+    pub rough: Vec<f64>,
     /// Other models that fit as well where the points can tell.
     pub alike: Vec<String>,
     /// How far to trust it.

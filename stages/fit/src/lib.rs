@@ -2,7 +2,8 @@
 //!
 //! The way: beam search over the joints on the depth images (`beam`), joint Gauss–Newton over base and all joints on
 //! the points (`refine`), evidence and covariance (`evidence`, `refine`), verdict in words (`verdict`), and the choice
-//! among candidates that claim the same points (`choose`). Method and maths: fit.md §4d–§4g.
+//! among candidates that claim the same points (`choose`). Method and maths: fit.md §4d–§4g. Beside it stands the method
+//! of the source, link after link (`paper`).
 #![forbid(unsafe_code)]
 
 mod adjust;
@@ -11,6 +12,7 @@ mod beam;
 mod choose;
 mod judge;
 mod normal;
+pub mod paper;
 mod prepared;
 mod refine;
 mod report;
@@ -23,5 +25,5 @@ mod verdict;
 pub use choose::choose;
 pub use prepared::Prepared;
 pub use scene::Scene;
-pub use settings::Settings;
+pub use settings::{Method, Settings};
 pub use solve::fit;

@@ -1,8 +1,20 @@
 //! What is tuned in the fit, with unit and reason.
 
+/// How postures are found.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Beam search over the whole chain with free space, then one adjustment of everything.
+    #[default]
+    Beam,
+    /// The source's: link after link.
+    Paper,
+}
+
 /// Tunables of search, refinement and verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
+    /// How postures are found.
+    pub method: Method,
     /// Hypotheses kept at each joint of the beam. fit.md §6.5: 150 lost none of 60.
     pub beam: usize,
     /// Hypotheses that are settled (base and all joints so far shaken) at each joint, best first.
@@ -45,6 +57,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            method: Method::Beam,
             beam: 100,
             settle: 40,
             n_search: 100,

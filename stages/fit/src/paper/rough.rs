@@ -1,0 +1,130 @@
+//! Points that may be a base, and the base's model, in; out comes where it stands, by boxes in the plane and equal
+//! steps of yaw (the source, §4).
+
+use geometry::{Plane, Point, Pose, Vector};
+use nalgebra::{Matrix2, Rotation3, Translation3, Unit, UnitQuaternion, Vector2};
+use std::f64::consts::{PI, TAU};
+
+use super::Paper;
+
+/// Eigenvalues of a footprint nearer than this ratio: its axes mean nothing (fit.md §4c).
+const SQUARE: f64 = 1.3;
+/// Yaws that are searched more finely.
+const N_FINE: usize = 4;
+/// A yaw off the boxes' axes by more than this is not tried where the boxes have axes, radians: 20°.
+const OFF_AXIS: f64 = 0.35;
+
+/// Local from base: the best yaw.
+pub(super) fn place(
+    paper: &Paper<'_>,
+    plane: &Plane,
+    points: &[Vector],
+    foot: f64,
+) -> Option<Pose> {
+    let n = plane.normal;
+    let tilt = Rotation3::rotation_between(&Vector::z(), &n).unwrap_or_else(Rotation3::identity);
+    let flat = |p: &Vector| (tilt.inverse() * p).xy();
+    let seen = Footprint::of(points.iter().map(flat))?;
+    let model = Footprint::of(paper.base_samples().iter().map(|p| p.xy()))?;
+    let pose = |yaw: f64| {
+        let turn = Rotation3::from_axis_angle(&Unit::new_normalize(Vector::z()), yaw);
+        let middle = seen.middle - (turn * model.middle.push(0.0)).xy();
+        let at = tilt * middle.push(plane.offset - foot);
+        let rotation = UnitQuaternion::from_rotation_matrix(&(tilt * turn));
+        Pose::from_parts(Translation3::from(at), rotation)
+    };
+    let cost = |yaw: f64| off(paper, &pose(yaw), points);
+    let has_axes = seen.ratio > SQUARE && model.ratio > SQUARE;
+    let on_axis = |yaw: f64| {
+        let d = (yaw - (seen.yaw - model.yaw)).rem_euclid(PI);
+        d.min(PI - d) < OFF_AXIS
+    };
+    let n_yaw = (TAU / paper.settings.yaw_step[0]).round() as usize;
+    let mut tried: Vec<(f64, f64)> = (0..n_yaw)
+        .map(|k| TAU * k as f64 / n_yaw as f64)
+        .filter(|yaw| !has_axes || on_axis(*yaw))
+        .map(|yaw| (cost(yaw), yaw))
+        .collect();
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    tried.truncate(N_FINE);
+    let steps = (paper.settings.yaw_step[0] / paper.settings.yaw_step[1]).ceil() as i32;
+    let fine = tried.iter().flat_map(|(_, yaw)| {
+        (-steps..=steps).map(move |k| yaw + f64::from(k) * paper.settings.yaw_step[1])
+    });
+    fine.map(|yaw| (cost(yaw), yaw)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, yaw)| pose(yaw))
+}
+
+/// Mean distance of the points from the base's surface, each at most the truncation, metres.
+fn off(paper: &Paper<'_>, local_from_base: &Pose, points: &[Vector]) -> f64 {
+    let truncation = paper.settings.truncation;
+    let link_from_local = (local_from_base * paper.base_pose()).inverse();
+    let sum: f64 = points
+        .iter()
+        .map(|p| {
+            let q = link_from_local * Point::from(*p);
+            paper
+                .closest(paper.base, &q)
+                .map_or(truncation, |(x, _)| (q - x).norm().min(truncation))
+        })
+        .sum();
+    sum / points.len().max(1) as f64
+}
+
+impl Paper<'_> {
+    /// Root frame from the base link.
+    pub(super) fn base_pose(&self) -> Pose {
+        self.prepared.model.poses(&self.prepared.model.home())[self.base]
+    }
+
+    /// The closest point of a link's surface, and its normal, link frame; `None` beyond the field's reach.
+    pub(super) fn closest(&self, link: usize, q: &Point) -> Option<(Point, Vector)> {
+        let p = [q.x as f32, q.y as f32, q.z as f32];
+        let fields = &self.prepared.links[link];
+        let at = fields.fine.nearest(p).or_else(|| fields.coarse.nearest(p))?;
+        let cad = &self.prepared.model.links[link].cad;
+        let (x, n) = (cad.points[at].map(f64::from), cad.normals[at].map(f64::from));
+        let (x, n) = (Point::from(x), Vector::from(n));
+        // The facet goes on beside its sample, about as far as to the next one.
+        let beside = (q - x) - n * n.dot(&(q - x));
+        let reach = f64::from(cad.spacing);
+        let beside = if beside.norm() > reach { beside * (reach / beside.norm()) } else { beside };
+        Some((x + beside, n))
+    }
+}
+
+/// Box of points in a plane along their principal axes.
+struct Footprint {
+    middle: Vector2<f64>,
+    yaw: f64,
+    /// Of the larger to the smaller eigenvalue.
+    ratio: f64,
+}
+
+impl Footprint {
+    fn of(points: impl Iterator<Item = Vector2<f64>>) -> Option<Self> {
+        let points: Vec<Vector2<f64>> = points.collect();
+        if points.len() < 3 {
+            return None;
+        }
+        let mean = points.iter().sum::<Vector2<f64>>() / points.len() as f64;
+        let spread: Matrix2<f64> = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum();
+        let eigen = spread.symmetric_eigen();
+        let major = usize::from(eigen.eigenvalues[1] > eigen.eigenvalues[0]);
+        let axes = [eigen.eigenvectors.column(major), eigen.eigenvectors.column(1 - major)];
+        let middle = axes.iter().map(|axis| {
+            let (low, high) = points
+                .iter()
+                .map(|p| axis.dot(p))
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                    (low.min(v), high.max(v))
+                });
+            axis * ((low + high) / 2.0)
+        });
+        let least = eigen.eigenvalues[1 - major].max(1e-12);
+        Some(Self {
+            middle: middle.sum(),
+            yaw: axes[0].y.atan2(axes[0].x),
+            ratio: eigen.eigenvalues[major] / least,
+        })
+    }
+}
