@@ -200,9 +200,7 @@ fn match_robot(
             rotation(truth.base_pose.quat_wxyz).angle_to(&rotation(robot.base_pose.quat_wxyz));
         let joints = robot.joints.0.iter().filter_map(|(name, value)| {
             let truth = truth.joints.get(name)?;
-            let pick =
-                |all: &[(String, Option<f64>)]| all.iter().find(|s| s.0 == *name).and_then(|s| s.1);
-            let sigma = pick(&robot.sigma.0).unwrap_or(f64::INFINITY);
+            let sigma = robot.sigma.0.iter().find(|s| s.0 == *name)?.1;
             let determined = robot.determined.0.iter().any(|d| d.0 == *name && d.1);
             let turns = ((value - truth) / std::f64::consts::TAU).round() * std::f64::consts::TAU;
             Some((name.clone(), value - truth - turns, sigma, determined))

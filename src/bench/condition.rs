@@ -98,7 +98,7 @@ pub(super) fn cases(bench: &Bench, models: &[Model], chosen: &[usize]) -> Result
             // A model's cases do not change when others join the library.
             let own =
                 models[model].name.bytes().fold(0_u64, |a, b| a.wrapping_mul(31) + u64::from(b));
-            for k in 0..bench.n_cases.unwrap_or(*n) {
+            for k in bench.first..bench.first + bench.n_cases.unwrap_or(*n) {
                 let seed = bench.seed * 1_000_000 + own % 1000 * 1000 + k as u64;
                 out.push(Case { suite: name, seed, model, condition: condition(k) });
             }

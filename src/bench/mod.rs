@@ -30,6 +30,8 @@ pub struct Bench {
     pub suites: Vec<String>,
     /// Cases of each suite; its own number where left out.
     pub n_cases: Option<usize>,
+    /// Number of the first of them.
+    pub first: usize,
     /// First seed.
     pub seed: u64,
     /// Robot library; the demo's robots where left out.

@@ -12,6 +12,7 @@ pub(super) fn bench_accuracy(flags: &AccuracyFlags, common: &Common, say: &Say) 
     let bench = Bench {
         suites: flags.suite.clone(),
         n_cases: flags.cases,
+        first: flags.first,
         seed: flags.seed,
         robots: flags.robots.clone(),
         models: flags.model.clone(),

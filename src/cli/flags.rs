@@ -57,6 +57,9 @@ pub(super) struct AccuracyFlags {
     /// Cases of each suite and model (else the suite's own number)
     #[arg(long, value_name = "N")]
     pub(super) cases: Option<usize>,
+    /// Number of the first of them, to look at single ones again
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub(super) first: usize,
     /// Seed of all that is drawn
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,

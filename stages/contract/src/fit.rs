@@ -33,7 +33,7 @@ pub struct JointFit {
     pub name: String,
     /// Radians, or metres for prismatic joints.
     pub value: f64,
-    /// Standard deviation, same unit; infinite where the points do not determine it.
+    /// Standard deviation, same unit; that of any angle, π/√3, where the points say nothing of it.
     pub sigma: f64,
     /// Whether the points determine it.
     pub determined: bool,

@@ -48,8 +48,8 @@ pub struct RobotEntry {
     pub base_sigma: BaseSigma,
     /// Value of each joint, radians or metres, in the order of the model.
     pub joints: Places<f64>,
-    /// Standard deviation of each joint, same unit; null where the points do not determine it.
-    pub sigma: Places<Option<f64>>,
+    /// Standard deviation of each joint, same unit; that of any angle, π/√3, where the points say nothing of it.
+    pub sigma: Places<f64>,
     /// Whether the points determine each joint.
     #[serde(default)]
     pub determined: Places<bool>,
@@ -68,9 +68,24 @@ pub struct RobotEntry {
     /// The best other explanation.
     #[serde(default)]
     pub runner_up: Option<RunnerUpEntry>,
+    /// Other postures that explain the points as well: a flange with six bolts, a wrist that nobody saw.
+    #[serde(default)]
+    pub equals: Vec<EqualEntry>,
+    /// Other values within the limits, whole turns away, at which the robot stands the same, by joint.
+    #[serde(default)]
+    pub equivalents: Places<Vec<f64>>,
     /// Models that fit as well where the points can tell.
     #[serde(default)]
     pub alike: Vec<String>,
+    /// How far the robot's surface is off the model's, standard deviation over patches of a hand's width, metres.
+    #[serde(default)]
+    pub surface_sigma: Option<f64>,
+    /// Standard deviation of the tip's place in the frame of the base, metres.
+    #[serde(default)]
+    pub tip_sigma: Option<f64>,
+    /// How the scans stand to one another near the robot.
+    #[serde(default)]
+    pub scans: Vec<ShiftEntry>,
     /// Where the tip of the main chain is.
     #[serde(default)]
     pub tip: Option<TipPose>,
@@ -146,6 +161,28 @@ pub struct RunnerUpEntry {
     pub margin: Option<f64>,
 }
 
+/// Another posture that explains the points as well.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EqualEntry {
+    /// Value of each joint, radians or metres.
+    pub joints: Places<f64>,
+    /// As in [`RunnerUpEntry`].
+    pub margin: Option<f64>,
+}
+
+/// How a scan is off its stated pose near a robot, as far as the robot's points tell.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ShiftEntry {
+    /// Number of the scan, in the order of the inputs.
+    pub scan: u32,
+    /// Shift that its points need at the robot's base, metres, world axes.
+    pub shift: [f64; 3],
+    /// Turn that they need about the scanner, radians, world axes.
+    pub turn: [f64; 3],
+    /// Its ranges are too long by this, metres.
+    pub range_bias: f64,
+}
+
 /// Where the masks are.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Labels {
@@ -219,7 +256,7 @@ impl RobotEntry {
             base_pose: (&fit.world_from_base).into(),
             base_sigma: BaseSigma { xyz: [0, 1, 2].map(sigma), rotation: [3, 4, 5].map(sigma) },
             joints: Places(named(|j| j.value).collect()),
-            sigma: Places(named(|j| j.sigma).map(|(name, s)| (name, finite(s))).collect()),
+            sigma: Places(named(|j| j.sigma).collect()),
             determined: Places(fit.joints.iter().map(|j| (j.name.clone(), j.determined)).collect()),
             links: links.to_vec(),
             verdict: fit.verdict.word().into(),
@@ -232,10 +269,37 @@ impl RobotEntry {
                 same_model: r.same_model,
                 margin: finite(r.margin),
             }),
+            equals: fit.equals.iter().map(|e| EqualEntry::new(fit, e)).collect(),
+            equivalents: Places(
+                fit.joints
+                    .iter()
+                    .filter(|j| !j.equivalents.is_empty())
+                    .map(|j| (j.name.clone(), j.equivalents.clone()))
+                    .collect(),
+            ),
             alike: fit.alike.clone(),
+            surface_sigma: finite(fit.surface_sigma),
+            tip_sigma: finite(fit.tip_sigma),
+            scans: fit.scans.iter().map(ShiftEntry::from).collect(),
             tip: tip.map(|(link, pose)| TipPose { link, pose: (&pose).into() }),
             evidence: fit.links.iter().map(LinkEntry::from).collect(),
         }
+    }
+}
+
+impl EqualEntry {
+    fn new(fit: &Fit, equal: &contract::Equal) -> Self {
+        let names = fit.joints.iter().map(|j| j.name.clone());
+        Self {
+            joints: Places(names.zip(equal.posture.iter().copied()).collect()),
+            margin: finite(equal.margin),
+        }
+    }
+}
+
+impl From<&contract::ScanShift> for ShiftEntry {
+    fn from(s: &contract::ScanShift) -> Self {
+        Self { scan: s.scan.0, shift: s.shift, turn: s.turn, range_bias: s.range_bias }
     }
 }
 

@@ -20,12 +20,11 @@ const MIN_SEEN: f32 = 0.05;
 const N_AGAIN: usize = 3;
 
 impl Beam<'_> {
-    /// Other postures that score nearly as well as this one or better, best first.
+    /// Other values of single joints that score nearly as well as these or better, best first.
     pub(crate) fn alternatives(&self, h: &Hypothesis, fan: &impl Fan) -> Vec<Hypothesis> {
         let joints = (0..h.posture.len()).collect();
         let found = fan.fan(joints, |free| self.other_values(h, free));
         let mut out: Vec<Hypothesis> = found.into_iter().flatten().collect();
-        out.extend(self.flips(h));
         sort(&mut out);
         out.truncate(self.settings.n_polish);
         out
@@ -57,7 +56,7 @@ impl Beam<'_> {
 
     /// The other way to hold the same hand: for each three turning joints in a row the outer ones half a turn on, the
     /// middle one mirrored about the value at which the outer axes are parallel. Within limits, where it scores well.
-    fn flips(&self, h: &Hypothesis) -> Vec<Hypothesis> {
+    pub(crate) fn flips(&self, h: &Hypothesis) -> Vec<Hypothesis> {
         let tolerance = (0.6 * self.settings.search_tolerance) as f32;
         let mut out = Vec::new();
         for first in 0..h.posture.len().saturating_sub(2) {

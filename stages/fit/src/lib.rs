@@ -11,6 +11,7 @@ mod alternatives;
 mod beam;
 mod choose;
 mod judge;
+mod noise;
 mod normal;
 pub mod paper;
 mod prepared;

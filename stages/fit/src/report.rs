@@ -11,7 +11,7 @@ use crate::adjust::Adjusted;
 use crate::beam::Hypothesis;
 use crate::judge::{Judgement, evidence, margin};
 use crate::refine::Refine;
-use crate::solve::Polished;
+use crate::solve::{Polished, Settled};
 use crate::spin::Spin;
 use crate::verdict;
 
@@ -19,6 +19,8 @@ use crate::verdict;
 const EQUAL: f64 = 0.03;
 /// Standard deviation from which on a joint is open: any value within degrees would do, radians.
 const OPEN_SIGMA: f64 = 0.02;
+/// Standard deviation of an angle of which nothing is known: any value of a whole turn, radians (π/√3).
+const ANY_ANGLE: f64 = 1.813_799_364_234_217_8;
 /// Joints that differ by more are different answers, radians (2°) or metres.
 const OTHER: f64 = 0.035;
 /// Bases farther apart are different answers, metres.
@@ -29,9 +31,9 @@ const N_EQUALS: usize = 4;
 /// What is reported of the best, given the others.
 pub(crate) fn report(
     refine: &Refine<'_>,
-    (best, judgement): &(Adjusted, Judgement),
+    (best, judgement, spins): &Settled,
     others: &[Polished],
-    spins: &[Spin],
+    near: &[u32],
 ) -> Fit {
     let prepared = refine.prepared;
     let model = prepared.model;
@@ -39,12 +41,19 @@ pub(crate) fn report(
     let n = 6 + h.posture.len();
     let mut rivals: Vec<(f64, &Polished)> = others
         .iter()
-        .map(|other| (margin(prepared, (h, judgement), (&other.0, &other.1)), other))
+        .map(|other| {
+            let by_beams = margin(prepared, (h, judgement), (&other.0, &other.1));
+            (by_beams.max(refine.worsening(h, &other.0, near)), other)
+        })
         .collect();
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut open = open_joints(best, &rivals);
+    let (mut open, mut spread) = open_joints(best, &rivals);
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
-    several.iter().for_each(|s| open[s.joint] = true);
+    for s in &several {
+        open[s.joint] = true;
+        let own = h.posture[s.joint];
+        spread[s.joint] = s.values.iter().map(|v| angle(v - own)).fold(spread[s.joint], f64::max);
+    }
     let covariance = in_world_axes(&best.covariance, &h.local_from_base);
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     let joints = (0..h.posture.len()).map(|j| {
@@ -53,7 +62,7 @@ pub(crate) fn report(
             name: model.joints[model.free[j]].name.clone(),
             value,
             // The width of one of several values is not how well the joint is known.
-            sigma: if several.iter().any(|s| s.joint == j) { f64::INFINITY } else { sigma(6 + j) },
+            sigma: sigma(6 + j).max(spread[j]).min(ANY_ANGLE),
             determined: !open[j] && sigma(6 + j) < refine.settings.determined_sigma,
             equivalents,
         }
@@ -127,26 +136,36 @@ fn scans(refine: &Refine<'_>, best: &Adjusted) -> Vec<ScanShift> {
 }
 
 /// For each joint, whether the points leave it open: by its standard deviation, or because a posture that differs in
-/// this joint and few others explains the points as well (a flange with six bolts, a wrist seen from nowhere).
-fn open_joints(best: &Adjusted, rivals: &[(f64, &Polished)]) -> Vec<bool> {
+/// this joint and few others explains the points as well (a flange with six bolts, a wrist seen from nowhere); and how
+/// far away the farthest such value is, radians.
+fn open_joints(best: &Adjusted, rivals: &[(f64, &Polished)]) -> (Vec<bool>, Vec<f64>) {
     let h = &best.hypothesis;
     let n = h.posture.len();
     let mut open: Vec<bool> =
         (0..n).map(|j| best.covariance[(6 + j, 6 + j)] >= OPEN_SIGMA.powi(2)).collect();
+    let mut spread = vec![0.0_f64; n];
     for (_, (other, _)) in rivals.iter().filter(|(margin, _)| *margin < EQUAL) {
         let apart: Vec<bool> = (0..n).map(|j| turn(h, other, j) > OTHER).collect();
         // Only the tail of the chain can be open by symmetry; a flip further up is another answer.
         let first = apart.iter().position(|a| *a).unwrap_or(n);
         if first + 1 >= n || (first..n).all(|j| open[j] || j + 1 == n) {
-            (0..n).for_each(|j| open[j] |= apart[j]);
+            for j in (0..n).filter(|&j| apart[j]) {
+                open[j] = true;
+                spread[j] = spread[j].max(turn(h, other, j));
+            }
         }
     }
-    open
+    (open, spread)
 }
 
 /// Difference of a joint between two postures, whole turns taken out, radians.
 fn turn(a: &Hypothesis, b: &Hypothesis, joint: usize) -> f64 {
-    let d = (a.posture[joint] - b.posture[joint]).rem_euclid(TAU);
+    angle(a.posture[joint] - b.posture[joint])
+}
+
+/// Size of an angle, whole turns taken out, radians.
+fn angle(d: f64) -> f64 {
+    let d = d.rem_euclid(TAU);
     d.min(TAU - d)
 }
 

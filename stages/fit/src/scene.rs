@@ -5,7 +5,7 @@ use geometry::evidence::Cloud;
 use geometry::{Evidence, Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
-use crate::Settings;
+use crate::{Settings, noise};
 
 /// A measured point, local frame.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +71,7 @@ impl<'a> Scene<'a> {
             let few = thin.iter().map(|&i| points[i as usize].p).collect();
             Cloud::new(few, CLOUD.0, CLOUD.1)
         });
-        let noise = noise(views).unwrap_or(UNKNOWN_NOISE).max(settings.min_noise);
+        let noise = noise::of(views, &points, &thin).max(settings.min_noise);
         Self { region, views, evidence: Evidence { images, cloud }, noise, points, thin }
     }
 
@@ -93,35 +93,6 @@ impl<'a> Scene<'a> {
     pub(crate) fn scanner(&self, view: u16) -> Option<Point> {
         self.views[usize::from(view)].scanner
     }
-}
-
-/// Noise that is assumed where the points do not tell (shuffled files), metres: a common scanner on dark steel.
-const UNKNOWN_NOISE: f64 = 0.003;
-/// Consecutive points nearer than this lie on one surface more often than not, metres.
-const NEIGHBOURS: f32 = 0.05;
-/// Fewer triples say nothing.
-const MIN_TRIPLES: usize = 60;
-
-/// Noise along the beams: how far the middle one of three consecutive points lies off the line through the others.
-fn noise(views: &[View]) -> Option<f64> {
-    let mut off = Vec::new();
-    for view in views {
-        let scanner = view.scanner.map(|s| s.coords.cast::<f32>());
-        for triple in view.points.windows(3).step_by((view.points.len() / 20_000).max(1)) {
-            let [a, b, c] = [0, 1, 2].map(|i| Vector3::from(triple[i].xyz));
-            let along = c - a;
-            if along.norm() > 2.0 * NEIGHBOURS || (b - a).norm() > NEIGHBOURS || along.norm() < 1e-4
-            {
-                continue;
-            }
-            let bend = b - (a + c) * 0.5;
-            let d = scanner.map_or_else(|| bend.norm(), |s| bend.dot(&(b - s).normalize()).abs());
-            // Three ranges with equal noise: the deviation has √1.5 of it.
-            off.push(f64::from(d) / 1.5_f64.sqrt());
-        }
-    }
-    let enough = off.len() >= MIN_TRIPLES;
-    geometry::robust::median(&mut off).filter(|_| enough).map(|m| 1.4826 * m)
 }
 
 /// The first point of each grid cell and view, in the order of the points.

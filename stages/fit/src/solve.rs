@@ -9,6 +9,7 @@ use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, judge};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Round};
 use crate::report::report;
+use crate::spin::Spin;
 use crate::{Prepared, Scene, Settings};
 
 /// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans' own noise, not the
@@ -63,16 +64,57 @@ pub fn fit(
     if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
         return None;
     }
-    let mut best = adjust(&refine, best, &all);
-    let mut spins = refine.spins(&best.0.hypothesis, &near, scene.noise * scene.noise);
+    let best = settle(&refine, best, (&near, &all));
+    let (best, flipped) = flip(&beam, &refine, best, (&near, &all));
+    polished.extend(flipped);
+    Some(report(&refine, &best, &polished, &near))
+}
+
+/// A posture adjusted, with the values that the points leave to its last joints.
+pub(crate) type Settled = (Adjusted, Judgement, Vec<Spin>);
+
+/// Adjusts a posture; where another value of its last joints fits the points better, that one.
+fn settle(refine: &Refine<'_>, h: &Hypothesis, (near, all): (&[u32], &[u32])) -> Settled {
+    let variance = refine.scene.noise * refine.scene.noise;
+    let (mut best, mut judgement) = adjust(refine, h, all);
+    let mut spins = refine.spins(&best.hypothesis, near, variance);
     let better: Vec<(usize, f64)> = spins.iter().map(|s| (s.joint, s.values[0])).collect();
-    if better.iter().any(|(j, v)| is_other(best.0.hypothesis.posture[*j], *v)) {
-        let mut h = best.0.hypothesis.clone();
+    if better.iter().any(|(j, v)| is_other(best.hypothesis.posture[*j], *v)) {
+        let mut h = best.hypothesis.clone();
         better.iter().for_each(|(j, v)| h.posture[*j] = *v);
-        best = adjust(&refine, &h, &all);
-        spins = refine.spins(&best.0.hypothesis, &near, scene.noise * scene.noise);
+        (best, judgement) = adjust(refine, &h, all);
+        spins = refine.spins(&best.hypothesis, near, variance);
     }
-    Some(report(&refine, &best, &polished[1..], &spins))
+    (best, judgement, spins)
+}
+
+/// Share of the surface explained that a flipped posture may lack and still be looked at closely.
+const FLIP_SHORT: f64 = 0.03;
+
+/// The best of a posture and its flips, by the points on the links that stand differently: a small wrist turned by half
+/// a turn about both of its axes differs in a bolt or two, which beams alone do not tell. And the others.
+fn flip(
+    beam: &Beam<'_>,
+    refine: &Refine<'_>,
+    mut best: Settled,
+    (near, all): (&[u32], &[u32]),
+) -> (Settled, Vec<Polished>) {
+    let mut others = Vec::new();
+    for flipped in beam.flips(&best.0.hypothesis) {
+        let h = roughly(refine, &flipped, near, &COARSE_ROUNDS[3..]);
+        let polished = polish(refine, &h, near);
+        let least = best.1.explained - FLIP_SHORT * best.1.explained.abs();
+        if polished.1.explained < least {
+            others.push(polished);
+            continue;
+        }
+        let mut other = settle(refine, &polished.0, (near, all));
+        if refine.worsening(&best.0.hypothesis, &other.0.hypothesis, near) < 0.0 {
+            std::mem::swap(&mut best, &mut other);
+        }
+        others.push((other.0.hypothesis, other.1));
+    }
+    (best, others)
 }
 
 /// Whether a joint's value is another mode, not the same one found again: 3°.

@@ -17,6 +17,8 @@ const CAP: f32 = 0.015;
 const NEAR: f64 = 0.03;
 /// Most points of a sweep.
 const MAX_POINTS: usize = 3000;
+/// Fewer points tell nothing.
+const MIN_POINTS: usize = 30;
 /// Values nearer than this to one another are one, radians: 3°.
 const APART: f64 = 0.052;
 /// Extra sum of squares, relative to the best's and in units of the noise's variance, up to which a value is as good:
@@ -52,7 +54,7 @@ impl Refine<'_> {
         // Around the value found, so that it is one of those tried.
         let first = if high - low > TAU { h.posture[joint] - span / 2.0 } else { low };
         let points = self.swept(h, near, moved);
-        if points.len() < 30 {
+        if points.len() < MIN_POINTS {
             return None;
         }
         let still = self.distances(h, &points, |l| !moved.contains(&l));
@@ -83,6 +85,24 @@ impl Refine<'_> {
             }
         }
         Some(Spin { joint, values })
+    }
+
+    /// How much worse another posture explains the points on the links that stand differently in it: the part of its
+    /// squared distances that the best one does without; about 0 for equals, negative where the other is better.
+    pub(crate) fn worsening(&self, best: &Hypothesis, other: &Hypothesis, near: &[u32]) -> f64 {
+        let moved = crate::judge::moved(self.prepared, best, other);
+        let mut points = self.swept(best, near, &moved);
+        points.extend(self.swept(other, near, &moved));
+        points.sort_unstable();
+        points.dedup();
+        if points.len() < MIN_POINTS {
+            return 0.0;
+        }
+        let squares = |h: &Hypothesis| -> f64 {
+            self.distances(h, &points, |_| true).iter().map(|d| f64::from(*d).powi(2)).sum()
+        };
+        let (a, b) = (squares(best), squares(other));
+        (b - a) / b.max(a).max(points.len() as f64 * self.scene.noise * self.scene.noise)
     }
 
     /// Points near the links whatever their joint's value: within their sphere about the joint's axis, thinned.

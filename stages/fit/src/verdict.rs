@@ -1,6 +1,7 @@
 //! Evidence of a fit in; verdict and reasons in words out (fit.md §4l).
 
 use contract::{Fit, Verdict};
+use std::f64::consts::TAU;
 
 use crate::judge::Judgement;
 use crate::{Prepared, Scene};
@@ -102,14 +103,17 @@ pub(crate) fn pass(
 /// What is said of a joint that the points do not determine.
 fn undetermined(fit: &Fit, j: usize) -> String {
     let joint = &fit.joints[j];
-    let other = |e: &contract::Equal| (e.posture[j] - joint.value).abs() > KNOWN_SIGMA;
-    let values: Vec<String> = fit
-        .equals
-        .iter()
-        .filter(|e| other(e))
-        .take(MAX_VALUES)
-        .map(|e| format!("{:.1}°", e.posture[j].to_degrees()))
-        .collect();
+    let apart = |a: f64, b: f64| {
+        let d = (a - b).rem_euclid(TAU);
+        d.min(TAU - d) > KNOWN_SIGMA
+    };
+    let mut values: Vec<f64> = Vec::new();
+    for value in fit.equals.iter().map(|e| e.posture[j]).filter(|v| apart(*v, joint.value)) {
+        if values.len() < MAX_VALUES && values.iter().all(|v| apart(*v, value)) {
+            values.push(value);
+        }
+    }
+    let values: Vec<String> = values.iter().map(|v| format!("{:.1}°", v.to_degrees())).collect();
     if !values.is_empty() {
         format!("joint '{}' may as well stand at {}", joint.name, values.join(", "))
     } else if joint.sigma < KNOWN_SIGMA {

@@ -9,43 +9,62 @@ use super::sparse::rigid;
 use crate::beam::Hypothesis;
 
 /// Most points of a registration.
-const MAX_POINTS: usize = 6000;
+const MAX_POINTS: usize = 12_000;
 /// Fewest: with fewer the rough value is kept.
 const MIN_POINTS: usize = 20;
 /// A step below this ends the iterations, radians: 1e-4°.
 const STOP: f64 = 1.7e-6;
+/// Largest step, radians or metres: a rough value is not farther off.
+const MAX_STEP: f64 = 0.03;
+/// Closest points creep along smooth links: a step is stretched as its ratio to the one before tells, at most so much.
+const MAX_STRETCH: f64 = 12.0;
 /// A normal must face the scanner by this cosine.
 const MIN_FACING: f64 = 0.15;
+
+/// A measured point that may lie on the joint's links.
+struct Near {
+    at: Point,
+    /// Its scanner, where that is known.
+    scanner: Option<Point>,
+    /// Distance from the link that carries the joint, metres.
+    parent: f64,
+}
 
 impl Paper<'_> {
     /// The joint's value after registration.
     pub(super) fn register(&self, h: &Hypothesis, joint: usize) -> f64 {
         let s = self.settings;
-        let mut value = h.posture[joint];
         let [low, high] = self.prepared.model.limits(joint);
+        let near = self.near(h, joint);
+        let mut trial = h.clone();
+        let mut before: Option<f64> = None;
         for round in 0..s.n_rounds {
             let share = round as f64 / (s.n_rounds / 2).max(1) as f64;
             let gate = (s.gate[0] * (1.0 - share)).max(s.gate[1]);
-            let mut trial = h.clone();
-            trial.posture[joint] = value;
-            let Some(step) = self.step(&trial, joint, gate) else { break };
-            value = (value + step).clamp(low, high);
+            let Some(step) = self.step(&trial, joint, (&near, gate)) else { break };
+            // Steps of a creeping iteration shrink by one ratio: their sum is known (Aitken).
+            let ratio = before.map_or(0.0, |b| step / b);
+            let creeps = (0.2..1.0).contains(&ratio);
+            let stretch = if creeps { (1.0 / (1.0 - ratio)).min(MAX_STRETCH) } else { 1.0 };
+            let taken = (step * stretch).clamp(-MAX_STEP, MAX_STEP);
+            before = (stretch == 1.0).then_some(step);
+            trial.posture[joint] = (trial.posture[joint] + taken).clamp(low, high);
             if step.abs() < STOP && gate <= s.gate[1] {
                 break;
             }
         }
-        value
+        trial.posture[joint]
     }
 
     /// How much further the joint turns (or slides) by one solution of Eq. 4.1.
-    fn step(&self, h: &Hypothesis, joint: usize, gate: f64) -> Option<f64> {
+    fn step(&self, h: &Hypothesis, joint: usize, near: (&[Near], f64)) -> Option<f64> {
         let model = self.prepared.model;
         let index = model.free[joint];
         let poses = model.poses(&h.posture);
         let parent = h.local_from_base * poses[model.joints[index].parent];
         let frame = parent * model.joints[index].parent_from_joint;
         let axis = frame.rotation * model.joints[index].axis.into_inner();
-        let (from, to) = self.pairs(h, joint, &poses, gate);
+        let (from, to) = self.pairs(h, joint, &poses, near);
         if from.len() < MIN_POINTS {
             return None;
         }
@@ -53,25 +72,9 @@ impl Paper<'_> {
             let along = from.iter().zip(&to).map(|(p, q)| axis.dot(&(q - p)));
             return Some(along.sum::<f64>() / from.len() as f64);
         }
-        // The model moves: its points are `from`. The axis' two points stay where they are.
-        let weight = self.settings.axis_weight * from.len() as f64;
-        let origin = frame.translation.vector;
+        let ends = frame.translation.vector;
         let half = axis * (0.5 * self.settings.axis_span);
-        let (mut a, mut b) = (from, to);
-        let mut weights = vec![1.0; a.len()];
-        for end in [origin - half, origin + half] {
-            a.push(end);
-            b.push(end);
-            weights.push(weight);
-        }
-        let motion = rigid(&a, &b, &weights);
-        // Swing and twist about the axis: the twist is the joint's.
-        let r = motion.rotation.to_rotation_matrix();
-        let m = r.matrix();
-        let vee = Vector::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]);
-        let sin = axis.dot(&vee) / 2.0;
-        let cos = (m.trace() - axis.dot(&(m * axis))) / 2.0;
-        Some(sin.atan2(cos))
+        Some(about_axis(&from, &to, ([ends - half, ends + half], self.settings.axis_weight)))
     }
 
     /// Closest points of the joint's links, and the measured points that they belong to, local frame; the farther half
@@ -81,55 +84,116 @@ impl Paper<'_> {
         h: &Hypothesis,
         joint: usize,
         poses: &[Pose],
-        gate: f64,
+        (near, gate): (&[Near], f64),
     ) -> (Vec<Vector>, Vec<Vector>) {
-        let moved = &self.prepared.placed_by[joint];
         let mut found: Vec<(Vector, Vector, f64)> = Vec::new();
-        for &link in moved {
+        for &link in &self.prepared.placed_by[joint] {
             let local_from_link = h.local_from_base * poses[link];
             let link_from_local = local_from_link.inverse();
             let bounds = self.prepared.model.links[link].bounds.grown(gate);
-            for m in &self.scene.points {
-                let q = Point::from(m.p.map(f64::from));
-                let in_link = link_from_local * q;
+            for m in near {
+                let in_link = link_from_local * m.at;
                 if !bounds.contains(in_link.coords.into()) {
                     continue;
                 }
                 let Some((x, n)) = self.closest(link, &in_link) else { continue };
                 let d = (in_link - x).norm();
-                if d > gate {
+                if d > gate || d > m.parent {
                     continue;
                 }
-                let faces = self.scene.scanner(m.view).is_none_or(|scanner| {
+                let faces = m.scanner.is_none_or(|scanner| {
                     let ray = link_from_local * scanner - x;
                     n.dot(&ray) > MIN_FACING * ray.norm()
                 });
-                if faces && !self.is_nearer_elsewhere(h, poses, moved, &q, d) {
-                    found.push(((local_from_link * x).coords, q.coords, d));
+                if faces {
+                    found.push(((local_from_link * x).coords, m.at.coords, d));
                 }
             }
         }
         let mut distances: Vec<f64> = found.iter().map(|f| f.2).collect();
         let limit = robust::median(&mut distances).map_or(gate, |m| (3.0 * m).max(0.005));
         found.retain(|f| f.2 <= limit);
-        let step = found.len().div_ceil(MAX_POINTS).max(1);
-        found.into_iter().step_by(step).map(|f| (f.0, f.1)).unzip()
+        found.into_iter().map(|f| (f.0, f.1)).unzip()
     }
 
-    /// Whether a link that is already placed is nearer to a point.
-    fn is_nearer_elsewhere(
-        &self,
-        h: &Hypothesis,
-        poses: &[Pose],
-        moved: &[usize],
-        q: &Point,
-        d: f64,
-    ) -> bool {
-        let carrier = moved.first().and_then(|&l| self.prepared.model.links[l].parent_joint);
-        let parent = carrier.map(|j| self.prepared.model.joints[j].parent);
-        parent.filter(|&l| self.prepared.links[l].weight > 0.0).is_some_and(|l| {
-            let at = (h.local_from_base * poses[l]).inverse() * q;
-            self.closest(l, &at).is_some_and(|(x, _)| (at - x).norm() < d)
-        })
+    /// Measured points about the joint's links where they stand now, thinned.
+    fn near(&self, h: &Hypothesis, joint: usize) -> Vec<Near> {
+        let model = self.prepared.model;
+        let poses = model.poses(&h.posture);
+        let reach = 2.0 * self.settings.gate[0];
+        let moved = &self.prepared.placed_by[joint];
+        let places = moved.iter().map(|&l| {
+            ((h.local_from_base * poses[l]).inverse(), model.links[l].bounds.grown(reach))
+        });
+        let places: Vec<_> = places.collect();
+        let inside = |q: &Point| places.iter().any(|(t, b)| b.contains((t * q).coords.into()));
+        let all: Vec<(Point, u16)> = self
+            .scene
+            .points
+            .iter()
+            .map(|m| (Point::from(m.p.map(f64::from)), m.view))
+            .filter(|(q, _)| inside(q))
+            .collect();
+        let parent = model.joints[model.free[joint]].parent;
+        let link_from_local = (h.local_from_base * poses[parent]).inverse();
+        let distance = |q: &Point| {
+            let at = link_from_local * q;
+            let known = self.prepared.links[parent].weight > 0.0;
+            let found = if known { self.closest(parent, &at) } else { None };
+            found.map_or(f64::INFINITY, |(x, _)| (at - x).norm())
+        };
+        let step = all.len().div_ceil(MAX_POINTS).max(1);
+        let thin = all.into_iter().step_by(step);
+        thin.map(|(at, view)| Near { at, scanner: self.scene.scanner(view), parent: distance(&at) })
+            .collect()
+    }
+}
+
+/// Eq. 4.1 in closed form: the turn about an axis that best brings points onto others, by the rigid motion that also
+/// keeps two points of the axis, of so much weight against all others together, and its twist about that axis. Radians.
+fn about_axis(from: &[Vector], to: &[Vector], (ends, weight): ([Vector; 2], f64)) -> f64 {
+    let each = weight * from.len() as f64;
+    let (mut a, mut b, mut weights) = (from.to_vec(), to.to_vec(), vec![1.0; from.len()]);
+    for end in ends {
+        a.push(end);
+        b.push(end);
+        weights.push(each);
+    }
+    let motion = rigid(&a, &b, &weights);
+    let r = motion.rotation.to_rotation_matrix();
+    let m = r.matrix();
+    let axis = (ends[1] - ends[0]).normalize();
+    let vee = Vector::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]);
+    let sin = axis.dot(&vee) / 2.0;
+    let cos = (m.trace() - axis.dot(&(m * axis))) / 2.0;
+    sin.atan2(cos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Rotation3, Unit};
+
+    #[test]
+    fn the_turn_about_a_known_axis_comes_out_whatever_the_points_weigh() {
+        let axis = Unit::new_normalize(Vector::new(0.3, -0.5, 0.8));
+        let origin = Vector::new(1.0, 2.0, 0.5);
+        let turn = Rotation3::from_axis_angle(&axis, 0.0345);
+        let from: Vec<Vector> = (0..50)
+            .map(|k| {
+                let k = f64::from(k);
+                origin + Vector::new((k * 0.7).sin(), (k * 1.3).cos(), (k * 0.37).sin()) * 0.3
+            })
+            .collect();
+        let to: Vec<Vector> = from.iter().map(|p| origin + turn * (p - origin)).collect();
+        let ends = [origin - axis.into_inner() * 0.25, origin + axis.into_inner() * 0.25];
+        for weight in [0.01, 0.5, 50.0] {
+            let found = about_axis(&from, &to, (ends, weight));
+            assert!((found - 0.0345).abs() < 1e-9, "{found} at weight {weight}");
+        }
+        // Points that are off along the axis do not turn it when the axis weighs enough.
+        let off: Vec<Vector> = to.iter().map(|p| p + axis.into_inner() * 0.004).collect();
+        let found = about_axis(&from, &off, (ends, 50.0));
+        assert!((found - 0.0345).abs() < 1e-4, "{found}");
     }
 }
