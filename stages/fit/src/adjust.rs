@@ -77,6 +77,9 @@ const SURFACE_NOISE: f64 = 3e-4;
 /// Where no scanner is known a point is as uncertain in every direction.
 const NO_BEAM: Vector = Vector::new(0.0, 0.0, 0.0);
 
+/// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
+const BESIDE: (f64, f64) = (1.6, 1.5);
+
 /// A point matched with the facet that it most likely lies on, local frame.
 struct Pair {
     link: usize,
@@ -161,6 +164,12 @@ impl Adjust<'_> {
             let cad = &refine.prepared.model.links[link].cad;
             let n = poses[link].rotation * Vector::from(cad.normals[sample].map(f64::from));
             let x = poses[link] * Point::from(cad.points[sample].map(f64::from));
+            let r = n.dot(&(p - x.coords));
+            // Beside the surface's edge its plane means nothing.
+            let beside = (distance * distance - r * r).max(0.0).sqrt();
+            if beside > BESIDE.0 * f64::from(cad.spacing) + BESIDE.1 * scene.noise {
+                return None;
+            }
             let facing = -n.dot(&ray);
             // A facet that faces away from the scanner cannot have given this point.
             if range > 0.0 && facing <= MIN_FACING {
@@ -172,7 +181,7 @@ impl Adjust<'_> {
             } else {
                 sigma2
             };
-            Some(Pair { link, sample, view, p, n, ray, variance, r: n.dot(&(p - x.coords)) })
+            Some(Pair { link, sample, view, p, n, ray, variance, r })
         };
         points.iter().filter_map(pair).collect()
     }

@@ -46,8 +46,12 @@ pub(crate) struct PreparedLink {
 
 /// Coarse field: reach covers the first gate (120 mm, fit.md §6.4), voxels a fifth of it.
 const COARSE: (f32, f32, usize) = (0.025, 0.15, 2500);
-/// Fine field: voxel near the sample spacing, reach of the last gates.
+/// Largest voxel and reach of the fine field, metres: the reach of the last gates.
 const FINE: (f32, f32) = (0.007, 0.032);
+/// Voxel of the fine field against the spacing of the samples: with larger ones the nearest sample is missed …
+const VOXEL: f32 = 1.4;
+/// … but no more voxels than about so many.
+const MAX_VOXELS: f64 = 5e5;
 
 impl<'a> Prepared<'a> {
     /// Prepares model `index` of the library.
@@ -58,7 +62,7 @@ impl<'a> Prepared<'a> {
             let area = f64::from(link.cad.area);
             PreparedLink {
                 coarse: NearestField::new(&link.cad.points[..n], COARSE.0, COARSE.1),
-                fine: NearestField::new(&link.cad.points, FINE.0, FINE.1),
+                fine: NearestField::new(&link.cad.points, voxel(link), FINE.1),
                 weight: area.sqrt(),
                 area,
                 patches: Vec::new(),
@@ -105,6 +109,12 @@ impl<'a> Prepared<'a> {
         let n = n.min(cad.points.len());
         (&cad.points[..n], &cad.normals[..n])
     }
+}
+
+/// Edge of a link's fine voxels, metres.
+fn voxel(link: &robot::Link) -> f32 {
+    let volume: f64 = link.bounds.grown(2.0 * f64::from(FINE.1)).size().iter().product();
+    (VOXEL * link.cad.spacing).max((volume / MAX_VOXELS).cbrt() as f32).min(FINE.0)
 }
 
 /// Edge of a patch, metres: within it a model's error of shape is about the same (fit.md §4g: 12–15 cm).

@@ -17,6 +17,8 @@ use crate::verdict;
 
 /// Margin up to which another posture counts as equally good.
 const EQUAL: f64 = 0.03;
+/// Margin up to which another value of the last joint is listed.
+const NEARLY_EQUAL: f64 = 0.12;
 /// Standard deviation from which on a joint is open: any value within degrees would do, radians.
 const OPEN_SIGMA: f64 = 0.02;
 /// Standard deviation of an angle of which nothing is known: any value of a whole turn, radians (π/√3).
@@ -67,12 +69,15 @@ pub(crate) fn report(
             equivalents,
         }
     });
-    let others = rivals.iter().filter(|(_, (other, _))| differs(other, h, &open));
+    // A flange that may stand otherwise is listed; it makes nobody doubt the robot.
+    let passed: Vec<bool> = open.iter().zip(&prepared.leaf).map(|(o, leaf)| *o || *leaf).collect();
+    let others = rivals.iter().filter(|(_, (other, _))| differs(other, h, &passed));
     let equal =
         |(m, (other, _)): &(f64, &Polished)| Equal { posture: other.posture.clone(), margin: *m };
-    let same = rivals
-        .iter()
-        .filter(|(m, (other, _))| *m < EQUAL && (0..open.len()).any(|j| turn(other, h, j) > OTHER));
+    let same = rivals.iter().filter(|(m, (other, _))| {
+        let limit = if differs(other, h, &passed) { EQUAL } else { NEARLY_EQUAL };
+        *m < limit && (0..open.len()).any(|j| turn(other, h, j) > OTHER)
+    });
     let spun = several.iter().flat_map(|s| {
         s.values[1..].iter().map(|value| {
             let mut posture = h.posture.clone();
@@ -169,11 +174,11 @@ fn angle(d: f64) -> f64 {
     d.min(TAU - d)
 }
 
-/// Whether two postures are different answers in what the points determine.
-fn differs(a: &Hypothesis, b: &Hypothesis, open: &[bool]) -> bool {
+/// Whether two postures are different answers, some joints passed over.
+fn differs(a: &Hypothesis, b: &Hypothesis, passed: &[bool]) -> bool {
     let (p, q) = (&a.local_from_base, &b.local_from_base);
     let shift = (p.translation.vector - q.translation.vector).norm();
-    shift > OTHER_BASE || (0..open.len()).any(|j| !open[j] && turn(a, b, j) > OTHER)
+    shift > OTHER_BASE || (0..passed.len()).any(|j| !passed[j] && turn(a, b, j) > OTHER)
 }
 
 /// The value of a joint within its limits that is nearest to zero, and the others, where a whole turn changes nothing.

@@ -27,7 +27,7 @@ const KNOWN_SIGMA: f64 = 0.0175;
 /// Smallest share of the surface that must have been judged.
 const SEEN: f64 = 0.12;
 /// Fewest points on the links that a joint moves.
-const JOINT_POINTS: usize = 60;
+const JOINT_POINTS: usize = 30;
 /// Most values of a joint that are named.
 const MAX_VALUES: usize = 3;
 /// A runner-up that the beams prefer less clearly than this makes the best doubtful.

@@ -5,7 +5,8 @@
 //! like a foot, but few look like a foot with a carousel on it.
 
 use contract::{Candidate, InstallationPlane, Region, View};
-use geometry::{Evidence, Plane, Point, Pose, Vector};
+use geometry::depth::HIDDEN_PRICE;
+use geometry::{Evidence, Plane, Point, Pose, Probe, Vector};
 use nalgebra::{Rotation3, Translation3, Unit, UnitQuaternion};
 use robot::Model;
 
@@ -37,7 +38,7 @@ impl Default for Settings {
         Self {
             n_coarse: 80,
             n_fine: 160,
-            keep_coarse: 160,
+            keep_coarse: 200,
             keep_middle: 60,
             max_places: 5,
             bases_per_place: 12,
@@ -52,6 +53,13 @@ impl Default for Settings {
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
 const MAX_CELLS: usize = 6;
+
+/// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw leaves room for others.
+const QUOTA: usize = 8;
+/// Radius of such a place in steps of the search.
+const PLACE_STEPS: f64 = 2.5;
+/// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten are hidden.
+const HIDDEN: f32 = 0.03;
 
 /// The search for one model's base in one region.
 #[derive(Debug)]
@@ -174,7 +182,7 @@ impl<'a> BaseSearch<'a> {
             for k in 0..n {
                 let yaw = k as f64 * coarse_yaw();
                 let pose = self.pose(local, x, y, yaw) * self.root_from_base;
-                let score = f64::from(self.evidence.probe(cad.0, cad.1, &pose, tolerance).mean());
+                let score = self.mean(&self.evidence.probe(cad.0, cad.1, &pose, tolerance));
                 if score > 0.0 {
                     out.push(Trial { x, y, yaw, plane: at, score });
                 }
@@ -267,7 +275,14 @@ impl<'a> BaseSearch<'a> {
     fn score_base(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> f64 {
         let cad = prefix(self.model, self.base, self.settings.n_fine);
         let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
-        f64::from(self.evidence.probe(cad.0, cad.1, &pose, tolerance).mean())
+        self.mean(&self.evidence.probe(cad.0, cad.1, &pose, tolerance))
+    }
+
+    /// Mean score of the samples, hidden ones at their price for a base.
+    fn mean(&self, probe: &Probe) -> f64 {
+        let back = if self.evidence.has_beams() { HIDDEN_PRICE - HIDDEN } else { 0.0 };
+        let score = probe.score + back * (probe.n - probe.n_seen) as f32;
+        f64::from(score / probe.n.max(1) as f32)
     }
 
     /// Area-weighted mean score of the base and of the first moving link at its best joint value.
@@ -285,7 +300,7 @@ impl<'a> BaseSearch<'a> {
             posture[free] = limits[0] + span * k as f64 / n;
             let pose = local_from_base * self.model.poses(&posture)[link];
             let probe = self.evidence.probe(cad.0, cad.1, &pose, tolerance * 1.5);
-            top = top.max(f64::from(probe.mean()));
+            top = top.max(self.mean(&probe));
         }
         let weight = |l: usize| f64::from(self.model.links[l].cad.area).sqrt();
         (weight(self.base) * own + weight(link) * top) / (weight(self.base) + weight(link))
@@ -403,6 +418,12 @@ fn best(trials: &mut Vec<Trial>, keep: usize, step: f64, yaw_step: f64) {
     for trial in trials.iter() {
         if kept.len() == keep {
             break;
+        }
+        let here = |k: &&Trial| {
+            k.plane == trial.plane && (k.x - trial.x).hypot(k.y - trial.y) < PLACE_STEPS * step
+        };
+        if kept.iter().filter(here).count() >= QUOTA {
+            continue;
         }
         let twin = kept.iter().any(|k| {
             let turn = (k.yaw - trial.yaw).rem_euclid(std::f64::consts::TAU);

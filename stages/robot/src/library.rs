@@ -3,7 +3,7 @@
 use crate::finding::{Finding, Findings, Severity};
 use crate::load::{Settings, load, urdfs};
 use crate::model::Model;
-use contract::{Error, Result};
+use contract::{Error, Kind, Result};
 use std::path::{Path, PathBuf};
 
 /// All models that a run may find.
@@ -57,7 +57,13 @@ impl Library {
     /// If the folder cannot be read.
     pub fn open(dir: &Path) -> Result<(Vec<PathBuf>, Self)> {
         let at = |e: std::io::Error| {
-            Error::from(e).at(dir.display()).hint("give the folder of the robot library")
+            let is_missing = e.kind() == std::io::ErrorKind::NotFound;
+            let error = if is_missing {
+                Error::new(Kind::Usage, "there is no such folder")
+            } else {
+                Error::from(e)
+            };
+            error.at(dir.display()).hint("give the folder of the robot library")
         };
         let mut folders = Vec::new();
         for entry in std::fs::read_dir(dir).map_err(at)? {

@@ -46,13 +46,20 @@ impl Random {
     }
 }
 
-/// Samples a mesh at about `spacing` metres, with at most `max_samples`.
+/// A link gets so many samples at least, as far as the least spacing allows: bolts and edges of a small wrist are what
+/// tells its pose, and a sample beside an edge has the wrong normal.
+const MIN_SAMPLES: f64 = 12_000.0;
+/// Least spacing, metres: finer than the noise of any scanner.
+const MIN_SPACING: f64 = 0.002;
+
+/// Samples a mesh at about `spacing` metres, a small one more finely, with at most `max_samples`.
 pub(crate) fn sample(mesh: &Mesh, spacing: f64, max_samples: usize) -> CadCloud {
     let areas: Vec<f64> = mesh.triangles.iter().map(|t| area(mesh, t)).collect();
     let whole: f64 = areas.iter().sum();
     if whole <= 0.0 || !whole.is_finite() || spacing <= 0.0 || max_samples == 0 {
         return CadCloud::default();
     }
+    let spacing = spacing.min((whole / MIN_SAMPLES).sqrt().max(MIN_SPACING));
     let n_wanted = (whole / (spacing * spacing)).min(max_samples as f64 * 1.5).max(400.0);
     let mut random = Random(mesh.triangles.len() as u64);
     let candidates =
