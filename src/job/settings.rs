@@ -82,7 +82,7 @@ settings! {
     }
     paper: fit::paper::PaperSettings {
         voxel, n_neighbours, max_edge, foot_low, foot_high, max_height, geodesic_slack, max_bases,
-        yaw_step, truncation, sparse_p, sparse_mu, sparse_rounds, sweep_step, window,
+        yaw_step, settle_steps, truncation, sparse_p, sparse_mu, sparse_rounds, sweep_step, window,
         near_symmetric, axis_weight, axis_span, gate, n_rounds,
     }
     segment: segment::Settings {

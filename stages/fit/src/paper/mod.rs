@@ -27,6 +27,10 @@ use lattice::Lattices;
 
 /// Stated for each joint: the source's own worst joint (Table 1), since the method gives no uncertainty.
 const SIGMA: f64 = 0.0094;
+/// Steps to each side when a base is settled.
+const N_SETTLE: i32 = 10;
+/// A fit with this score ends the search for planes.
+const GOOD_SCORE: f64 = 0.5;
 /// Tolerance of the judgement, metres.
 const JUDGE_TOLERANCE: f64 = 0.015;
 
@@ -52,7 +56,13 @@ pub fn fit(
     let lattices = Lattices::new(scene.views);
     let paper = Paper { prepared, scene, settings: own, lattices: &lattices, base };
     let mut out: Vec<Fit> = Vec::new();
+    let mut planes: Vec<&InstallationPlane> = planes.iter().collect();
+    planes.sort_by(|a, b| a.plane.offset.total_cmp(&b.plane.offset));
     for plane in planes {
+        // The lowest plane that carries the robot is its own.
+        if out.iter().any(|f: &Fit| f.score > GOOD_SCORE) {
+            break;
+        }
         let local = Plane {
             normal: plane.plane.normal,
             offset: plane.plane.offset - plane.plane.normal.dot(&scene.region.origin.coords),
@@ -87,10 +97,33 @@ impl Paper<'_> {
         let mut out = Vec::new();
         for set in sets.into_iter().take(s.max_bases) {
             let candidates: Vec<Vector> = set.iter().map(|&i| points[i]).collect();
-            let Some(start) = rough::place(self, plane, &candidates, foot) else { continue };
-            out.push(sparse::register(self, &start, &candidates));
+            let starts = rough::places(self, plane, &candidates, foot);
+            let ends = starts.iter().map(|start| self.settle_base(start, &candidates));
+            // The candidates hold points of the next link too: the base's own samples decide.
+            let judged = ends.map(|pose| (self.off_base(&pose), pose));
+            out.extend(judged.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, pose)| pose));
         }
         out
+    }
+
+    /// Sparse registration; then the place and the yaw about it at which the base's own samples lie best, in equal
+    /// steps, and registration again.
+    fn settle_base(&self, start: &Pose, candidates: &[Vector]) -> Pose {
+        let mut pose = sparse::register(self, start, candidates);
+        for [shift, turn] in self.settings.settle_steps {
+            let moves = [
+                (Vector::x() * shift, Vector::zeros()),
+                (Vector::y() * shift, Vector::zeros()),
+                (Vector::zeros(), Vector::z() * turn),
+            ];
+            for (shift, turn) in moves {
+                let step = |k: i32| pose * Pose::new(shift * f64::from(k), turn * f64::from(k));
+                let tried = (-N_SETTLE..=N_SETTLE).map(step).map(|p| (self.off_base(&p), p));
+                pose = tried.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(pose, |(_, p)| p);
+            }
+            pose = sparse::register(self, &pose, candidates);
+        }
+        pose
     }
 
     /// Samples of the base, root frame, thinned like the points.

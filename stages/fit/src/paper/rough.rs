@@ -9,23 +9,21 @@ use super::Paper;
 
 /// Eigenvalues of a footprint nearer than this ratio: its axes mean nothing (fit.md §4c).
 const SQUARE: f64 = 1.3;
-/// Yaws that are searched more finely.
-const N_FINE: usize = 4;
+/// Yaws that are searched more finely and registered …
+const N_FINE: usize = 6;
+/// … at least so far apart, radians: 20°.
+const APART: f64 = 0.35;
 /// A yaw off the boxes' axes by more than this is not tried where the boxes have axes, radians: 20°.
 const OFF_AXIS: f64 = 0.35;
 
-/// Local from base: the best yaw.
-pub(super) fn place(
-    paper: &Paper<'_>,
-    plane: &Plane,
-    points: &[Vector],
-    foot: f64,
-) -> Option<Pose> {
+/// Local from base: the best yaws, best first.
+pub(super) fn places(paper: &Paper<'_>, plane: &Plane, points: &[Vector], foot: f64) -> Vec<Pose> {
     let n = plane.normal;
     let tilt = Rotation3::rotation_between(&Vector::z(), &n).unwrap_or_else(Rotation3::identity);
     let flat = |p: &Vector| (tilt.inverse() * p).xy();
-    let seen = Footprint::of(points.iter().map(flat))?;
-    let model = Footprint::of(paper.base_samples().iter().map(|p| p.xy()))?;
+    let prints = Footprint::of(points.iter().map(flat))
+        .zip(Footprint::of(paper.base_samples().iter().map(|p| p.xy())));
+    let Some((seen, model)) = prints else { return Vec::new() };
     let pose = |yaw: f64| {
         let turn = Rotation3::from_axis_angle(&Unit::new_normalize(Vector::z()), yaw);
         let middle = seen.middle - (turn * model.middle.push(0.0)).xy();
@@ -46,12 +44,22 @@ pub(super) fn place(
         .map(|yaw| (cost(yaw), yaw))
         .collect();
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    tried.truncate(N_FINE);
+    let mut kept: Vec<f64> = Vec::new();
+    for (_, yaw) in tried {
+        let apart = |k: &f64| {
+            let d = (yaw - k).rem_euclid(TAU);
+            d.min(TAU - d) > APART
+        };
+        if kept.len() < N_FINE && kept.iter().all(apart) {
+            kept.push(yaw);
+        }
+    }
     let steps = (paper.settings.yaw_step[0] / paper.settings.yaw_step[1]).ceil() as i32;
-    let fine = tried.iter().flat_map(|(_, yaw)| {
-        (-steps..=steps).map(move |k| yaw + f64::from(k) * paper.settings.yaw_step[1])
-    });
-    fine.map(|yaw| (cost(yaw), yaw)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, yaw)| pose(yaw))
+    let finer = |yaw: f64| {
+        let fine = (-steps..=steps).map(|k| yaw + f64::from(k) * paper.settings.yaw_step[1]);
+        fine.map(|yaw| (cost(yaw), yaw)).min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    kept.into_iter().filter_map(finer).map(|(_, yaw)| pose(yaw)).collect()
 }
 
 /// Mean distance of the points from the base's surface, each at most the truncation, metres.

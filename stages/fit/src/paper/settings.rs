@@ -21,6 +21,8 @@ pub struct Settings {
     pub max_bases: usize,
     /// Step of yaw, radians, and the finer one about the best.
     pub yaw_step: [f64; 2],
+    /// Steps along the axes of a registered base, metres, and of yaw, radians, round by round.
+    pub settle_steps: [[f64; 2]; 2],
     /// Distances beyond this count as this when yaws are compared, metres: missing sides must not shift it.
     pub truncation: f64,
     /// Exponent of the sparse norm, 0..1.
@@ -58,6 +60,7 @@ impl Default for Settings {
             geodesic_slack: [1.05, 0.02],
             max_bases: 3,
             yaw_step: [0.087, 0.0175],
+            settle_steps: [[0.006, 0.05], [0.002, 0.01]],
             truncation: 0.03,
             sparse_p: 0.4,
             sparse_mu: [10.0, 1.2],

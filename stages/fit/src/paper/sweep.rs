@@ -1,6 +1,6 @@
 //! A posture whose joints before one are set in; that joint's value by a sweep in equal steps out (the source, §5).
 
-use geometry::{Point, Vector};
+use geometry::{Point, Pose, Vector};
 use robot::JointKind;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -10,7 +10,7 @@ use crate::beam::Hypothesis;
 /// Samples of a link in a sweep.
 const N_SAMPLES: usize = 120;
 /// Distances count up to this, metres: beyond, one place is as wrong as another.
-const CAP: f64 = 0.15;
+const CAP: f64 = 0.05;
 /// A sample moves off its surface if a quarter turn takes it farther than this from it, metres.
 const OFF_SURFACE: f32 = 0.012;
 
@@ -57,10 +57,20 @@ impl Paper<'_> {
     /// Mean distance of the visible samples of a joint's links from what was measured, metres.
     fn off(&self, h: &Hypothesis, joint: usize) -> f64 {
         let poses = self.prepared.model.poses(&h.posture);
+        let links = &self.prepared.placed_by[joint];
+        self.off_links(links.iter().map(|&l| (l, h.local_from_base * poses[l])), N_SAMPLES)
+    }
+
+    /// That of the base.
+    pub(super) fn off_base(&self, local_from_base: &Pose) -> f64 {
+        self.off_links([(self.base, local_from_base * self.base_pose())].into_iter(), 8 * N_SAMPLES)
+    }
+
+    /// Mean distance of the visible samples of links at poses from what was measured, metres.
+    fn off_links(&self, links: impl Iterator<Item = (usize, Pose)>, n_samples: usize) -> f64 {
         let (mut sum, mut n) = (0.0, 0_usize);
-        for &link in &self.prepared.placed_by[joint] {
-            let pose = h.local_from_base * poses[link];
-            let (points, normals) = self.prepared.samples(link, N_SAMPLES);
+        for (link, pose) in links {
+            let (points, normals) = self.prepared.samples(link, n_samples);
             for (p, normal) in points.iter().zip(normals) {
                 let at = pose * Point::from(p.map(f64::from));
                 let facing = pose.rotation * Vector::from(normal.map(f64::from));
