@@ -7,6 +7,7 @@ use crate::store::Store;
 use crate::surfaces::Ground;
 use contract::{Fit, InstallationPlane, Region, Result, Scan, View};
 use fit::{Method, Prepared, Scene};
+use geometry::Pose;
 use identify::BaseSearch;
 use lattice::ViewBuilder;
 use rayon::prelude::*;
@@ -74,6 +75,26 @@ impl<'a> Search<'a> {
             .map(|model| self.model(model, &scene, &planes))
             .collect();
         Ok(fits.into_iter().flatten().collect())
+    }
+
+    /// Where the refinement of a model alone ends from each of the starts.
+    pub(crate) fn converge(
+        &self,
+        region: &Region,
+        model: usize,
+        starts: &[(Pose, Vec<f64>)],
+    ) -> Result<Vec<(Pose, Vec<f64>)>> {
+        let views: Vec<View> = self
+            .scans
+            .iter()
+            .filter_map(|scan| self.view(scan, region).transpose())
+            .collect::<Result<_>>()?;
+        let planes = self.planes(region);
+        let settings = &self.settings.fit;
+        let scene = Scene::new(region, &views, &planes, settings);
+        let prepared = self.shelf.prepared(model);
+        let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, &scene, settings, (&s.0, &s.1));
+        Ok(starts.par_iter().map(end).collect())
     }
 
     /// One scan's view of the region; `None` where it sees nothing of it.

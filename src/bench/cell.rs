@@ -1,11 +1,12 @@
 //! A scene in; its scans in memory, and what the main job's own stages find in them, out.
 
 use crate::engine::Engine;
-use crate::job::Means;
+use crate::job::{Means, Settings};
 use crate::search::{Search, Shelf};
 use crate::store::{Scatter, Store};
 use crate::surfaces::{Gather, Surfaces};
-use contract::{Fit, InputId, Lattice, Map, MaskId, Result, Scan, ScanId, Strip};
+use contract::{Fit, InputId, Lattice, Map, MaskId, Region, Result, Scan, ScanId, Strip};
+use geometry::Pose;
 use rayon::prelude::*;
 use robot::Model;
 use simulate::{Scene, SimColumns, Simulator};
@@ -21,12 +22,18 @@ pub(super) struct Cell {
 }
 
 /// What was found, and how long it took.
+#[derive(Default)]
 pub(super) struct Found {
     pub(super) fits: Vec<Fit>,
     pub(super) n_robot_points: usize,
     /// Seconds from tiles to fits.
     pub(super) seconds: f64,
+    /// Where the refinement alone ended from each start.
+    pub(super) ends: Vec<Start>,
 }
+
+/// World from base, and a posture.
+pub(super) type Start = (Pose, Vec<f64>);
 
 /// Columns cast at a time.
 const COLUMNS: u32 = 32;
@@ -80,14 +87,14 @@ impl Cell {
         *place += hits.len() as u64;
     }
 
-    /// Sends the scans through the stages of the main job, from the store on; `models` are tried.
+    /// Sends the scans through the stages of the main job, from the store on; `models` are tried, or the first one is
+    /// refined from the starts where there are any.
     pub(super) fn search(
         self,
-        models: &[Model],
+        (models, starts): (&[Model], &[Start]),
         dir: &Path,
-        (means, engine): (&Means, &Engine),
+        (settings, means, engine): (&Settings, &Means, &Engine),
     ) -> Result<Found> {
-        let settings = &means.settings;
         let scans = &self.scans;
         let scatter = Scatter::new(scans);
         let mut sink = Store::create(dir, scans, means.ingest_bytes())?;
@@ -105,9 +112,17 @@ impl Cell {
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let regions = identify::regions(&clusters, &settings.region);
         let search = Search::new(&shelf, scans, &store, &ground, settings);
+        if let Some(start) = starts.first() {
+            let base = start.0.translation.vector;
+            let apart = |r: &Region| (r.origin.coords - base).norm();
+            let here = regions.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let ends = here.map_or(Ok(Vec::new()), |region| search.converge(region, 0, starts))?;
+            let n_robot_points = self.n_robot_points;
+            return Ok(Found { ends, n_robot_points, ..Found::default() });
+        }
         let fits = engine.fan_out("fit", regions, |region| search.region(&region))?;
         let fits = fit::choose(fits.into_iter().flatten().collect(), models);
         let seconds = started.elapsed().as_secs_f64();
-        Ok(Found { fits, n_robot_points: self.n_robot_points, seconds })
+        Ok(Found { fits, n_robot_points: self.n_robot_points, seconds, ends: Vec::new() })
     }
 }

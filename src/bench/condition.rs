@@ -2,6 +2,7 @@
 
 use super::Bench;
 use contract::{Error, Kind, Result};
+use fit::Method;
 use robot::Model;
 
 /// What a cell is like and how it is scanned.
@@ -20,6 +21,10 @@ pub(super) struct Condition {
     pub(super) warp: f64,
     /// Share of 0..1 of each kind of clutter being there.
     pub(super) clutter: f64,
+    /// How postures are found.
+    pub(super) method: Method,
+    /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0: the whole search.
+    pub(super) perturbed_deg: f64,
     /// Height of a stand is drawn up to this, metres; 0: on the floor.
     pub(super) stand: f64,
 }
@@ -34,7 +39,11 @@ const PLAIN: Condition = Condition {
     warp: 0.0,
     clutter: 0.0,
     stand: 0.0,
+    method: Method::Beam,
+    perturbed_deg: 0.0,
 };
+/// Perturbations of the basin's curve, degrees (fit.md §6.4).
+const PERTURBED_DEG: [f64; 7] = [2.0, 5.0, 8.0, 12.0, 16.0, 20.0, 30.0];
 /// Errors of a usual registration (fit.md §5, T3).
 const REGISTRATION: [f64; 3] = [0.002, 0.01, 0.001];
 
@@ -54,6 +63,7 @@ type Suite = (&'static str, usize, fn(usize) -> Condition);
 /// All suites, in the order of fit.md §5.
 const SUITES: &[Suite] = &[
     ("paper", 3, |_| Condition { n_beams: 5e7, noise: 0.0, ..PLAIN }),
+    ("source", 3, |_| Condition { n_beams: 5e7, noise: 0.0, method: Method::Paper, ..PLAIN }),
     ("models", 3, |_| PLAIN),
     ("noise-1", 3, |_| Condition { noise: 0.001, ..PLAIN }),
     ("noise-2", 6, |_| Condition { n_beams: 2e7, ..PLAIN }),
@@ -73,6 +83,8 @@ const SUITES: &[Suite] = &[
         clutter: 1.0,
         ..PLAIN
     }),
+    ("loops", 6, |_| PLAIN),
+    ("basin", 7, |k| Condition { perturbed_deg: PERTURBED_DEG[k % 7], ..PLAIN }),
     ("unknown", 20, |k| Condition {
         n_scanners: 6 - k % 5,
         mixed: true,
@@ -95,6 +107,9 @@ pub(super) fn cases(bench: &Bench, models: &[Model], chosen: &[usize]) -> Result
             continue;
         }
         for &model in chosen {
+            if *name == "loops" && models[model].loops.is_empty() {
+                continue;
+            }
             // A model's cases do not change when others join the library.
             let own =
                 models[model].name.bytes().fold(0_u64, |a, b| a.wrapping_mul(31) + u64::from(b));

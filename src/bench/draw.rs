@@ -1,9 +1,10 @@
 //! A case in; the scene that its seed draws, with the true base and posture, out.
 
+use super::cell::Start;
 use super::condition::{Case, Condition};
 use super::shape;
 use contract::Result;
-use geometry::{Point, Pose};
+use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 use simulate::random::Random;
@@ -21,6 +22,9 @@ pub(super) struct Drawn {
     pub(super) posture: Vec<f64>,
 }
 
+/// Starts of a case of the basin's curve, and how far their bases are off: metres, radians (fit.md §6.4).
+const N_STARTS: usize = 24;
+const START_BASE: (f64, f64) = (0.02, 0.0175);
 /// Radius of the circle of scanners, metres, at least (fit.md §5); larger robots are scanned from farther away.
 const CIRCLE: f64 = 5.0;
 /// Height of a scanner, metres.
@@ -88,6 +92,22 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     clutter(&mut scene, model, c, reach, &mut random);
     scanners(&mut scene, c, reach, &mut random);
     Ok(Drawn { scene, world_from_base, posture })
+}
+
+/// Starts of the refinement alone, where the case asks for it: every joint and the base off by something.
+pub(super) fn starts(case: &Case, drawn: &Drawn) -> Vec<Start> {
+    let off = case.condition.perturbed_deg.to_radians();
+    if off == 0.0 {
+        return Vec::new();
+    }
+    let mut random = Random::keyed(&[case.seed, 0xBA5]);
+    let start = |_| {
+        let posture = drawn.posture.iter().map(|q| q + random.between(-off, off)).collect();
+        let mut vector = |size: f64| Vector::from_fn(|_, _| random.between(-size, size));
+        let moved = Pose::new(vector(START_BASE.0), vector(START_BASE.1));
+        (drawn.world_from_base * moved, posture)
+    };
+    (0..N_STARTS).map(start).collect()
 }
 
 fn named(model: &Model, posture: &[f64]) -> std::collections::BTreeMap<String, f64> {

@@ -7,8 +7,10 @@
 mod cell;
 mod condition;
 mod draw;
+mod plot;
 mod score;
 mod shape;
+mod special;
 mod table;
 
 use crate::engine::Engine;
@@ -17,6 +19,7 @@ use crate::{atomic, demo, library};
 use cell::Cell;
 use condition::{Case, cases};
 use contract::{Error, Kind, Result};
+use fit::Method;
 use robot::Model;
 use score::{Row, score};
 use std::io::Write;
@@ -73,12 +76,22 @@ pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String>
         engine.progress.say(&format!("{}/{} {line}", i + 1, cases.len()));
         rows.push(row);
     }
-    let table = table::table(&rows);
+    let table = table::table(&rows) + &special::tables(&rows);
     if let Some(dir) = &bench.out {
         atomic::write(&dir.join("accuracy.md"), table.as_bytes())?;
         atomic::write(&dir.join("accuracy.csv"), table::csv(&rows).as_bytes())?;
+        atomic::write(&dir.join("accuracy.json"), json(&rows)?.as_bytes())?;
+        atomic::write(&dir.join("errors.svg"), plot::errors(&rows).as_bytes())?;
+        atomic::write(&dir.join("reliability.svg"), plot::reliability(&rows).as_bytes())?;
     }
     Ok(table)
+}
+
+/// All rows, with the version that they were measured with.
+fn json(rows: &[Row]) -> Result<String> {
+    let whole = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "rows": rows });
+    serde_json::to_string_pretty(&whole)
+        .map_err(|e| Error::new(Kind::Bug, "rows cannot be written").because(e))
 }
 
 /// One case; what goes wrong in it is a row, too.
@@ -90,9 +103,18 @@ fn run(
 ) -> Row {
     let started = Instant::now();
     let seen = draw::draw(case, &models[case.model]).and_then(|drawn| {
-        let tried = if whole_library { models } else { std::slice::from_ref(&models[case.model]) };
+        let tried = if whole_library && case.condition.perturbed_deg == 0.0 {
+            models
+        } else {
+            std::slice::from_ref(&models[case.model])
+        };
         let cell = Cell::scan(&drawn.scene, &drawn.models(models, case), engine)?;
-        let found = cell.search(tried, store, (means, engine))?;
+        let mut settings = means.settings.clone();
+        if case.condition.method != Method::default() {
+            settings.fit.method = case.condition.method;
+        }
+        let starts = draw::starts(case, &drawn);
+        let found = cell.search((tried, &starts), store, (&settings, means, engine))?;
         Ok((drawn, found))
     });
     match seen {

@@ -1,11 +1,11 @@
 //! A drawn cell and what was found in it in; one row of figures out.
 
-use super::cell::Found;
+use super::cell::{Found, Start};
 use super::condition::Case;
 use super::draw::Drawn;
 use contract::{Error, Fit, Verdict};
 use geometry::Point;
-use robot::{JointKind, Model};
+use robot::{JointKind, Model, Role};
 use serde::Serialize;
 use std::f64::consts::TAU;
 
@@ -61,6 +61,14 @@ pub(super) struct Row {
     pub(super) tip: [f64; 3],
     /// Displacement of the surface in the base's frame: mean and 95th percentile, metres.
     pub(super) surface: [f64; 2],
+    /// Largest turn and shift of a sub link in the base's frame, radians and metres; zero without such links.
+    pub(super) sub: [f64; 2],
+    /// How far its loops are open, metres.
+    pub(super) loop_gap: f64,
+    /// Of the refinement alone: how far its starts were off, degrees, how many there were, and how many came home.
+    pub(super) perturbed_deg: f64,
+    pub(super) n_starts: usize,
+    pub(super) n_home: usize,
     pub(super) score: f64,
     pub(super) rms: f64,
     pub(super) margin: Option<f64>,
@@ -93,10 +101,30 @@ impl Row {
         self.joints.iter().filter(|j| j.determined)
     }
 
+    /// The refinement alone: which starts came home. What a wrist of round parts leaves open does not count.
+    fn with_ends(mut self, case: &Case, model: &Model, drawn: &Drawn, found: &Found) -> Self {
+        let n = model.free.len();
+        let home = |(_, posture): &&Start| {
+            let off = |j: usize| {
+                let e = posture[j] - drawn.posture[j];
+                (e - (e / TAU).round() * TAU).abs()
+            };
+            (0..n.saturating_sub(1)).all(|j| off(j) < RIGHT)
+        };
+        self.perturbed_deg = case.condition.perturbed_deg;
+        self.n_starts = found.ends.len();
+        self.n_home = found.ends.iter().filter(home).count();
+        self
+    }
+
     /// For people who watch.
     pub(super) fn line(&self) -> String {
         let what = match (&self.failed, &self.found) {
             (Some(why), _) => format!("failed: {why}"),
+            _ if self.n_starts > 0 => format!(
+                "{} of {} starts, each joint off by up to {}°, come home",
+                self.n_home, self.n_starts, self.perturbed_deg
+            ),
             (None, None) => "not found".into(),
             (None, Some(model)) => format!(
                 "{}{}{}, worst determined joint {:.3}°, base {:.2} mm, tip {:.2} mm, {:.1} s{}",
@@ -138,6 +166,9 @@ pub(super) fn score(case: &Case, model: &Model, drawn: &Drawn, found: &Found) ->
     row.invented = others
         .map(|f| format!("{} {}, {:.2} m away", f.verdict.word(), f.model_name, apart(f)))
         .collect();
+    if !found.ends.is_empty() {
+        return row.with_ends(case, model, drawn, found);
+    }
     let Some(fit) = here else { return row };
     row.found = Some(fit.model_name.clone());
     row.verdict = fit.verdict.word().into();
@@ -150,6 +181,7 @@ pub(super) fn score(case: &Case, model: &Model, drawn: &Drawn, found: &Found) ->
     if fit.model_name == model.name {
         row.joints = joints(model, fit, &drawn.posture);
         displacements(&mut row, model, fit, drawn);
+        sub_links(&mut row, model, fit, drawn);
     }
     row.right = row.right_model
         && row.base[0] < RIGHT_BASE
@@ -186,6 +218,18 @@ fn is_right(joint: &JointRow, index: usize, fit: &Fit, posture: &[f64]) -> bool 
     joint.sigma >= OPEN
         || joint.error.abs() < RIGHT_SIGMAS * joint.sigma
         || fit.equals.iter().any(|e| near(e.posture[index] - posture[index]))
+}
+
+/// Errors of the links that follow through loops.
+fn sub_links(row: &mut Row, model: &Model, fit: &Fit, drawn: &Drawn) {
+    let fitted: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    row.loop_gap = model.loop_gap(&fitted);
+    let (ours, theirs) = (model.poses(&fitted), model.poses(&drawn.posture));
+    for (l, _) in model.links.iter().enumerate().filter(|(_, link)| link.role == Role::Sub) {
+        let shift = (ours[l].translation.vector - theirs[l].translation.vector).norm();
+        let turn = ours[l].rotation.angle_to(&theirs[l].rotation);
+        row.sub = [row.sub[0].max(turn), row.sub[1].max(shift)];
+    }
 }
 
 /// Errors of the tip and of all surfaces.

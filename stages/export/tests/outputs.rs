@@ -185,7 +185,7 @@ fn fit() -> Fit {
         model_name: "box".into(),
         world_from_base: Pose::new(Vector::new(400_001.0, 5_000_002.0, 100.0), Vector::z() * 0.5),
         base_sigma: [1e-4, 1e-4, 1e-4, 1e-5, f64::NAN, 1e-5],
-        joints: vec![joint("z_turn", 0.25, 1e-4), joint("a_lift", -1.0, f64::INFINITY)],
+        joints: vec![joint("z_turn", 0.25, 1e-4), joint("a_lift", -1.0, 1.8)],
         covariance: Vec::new(),
         score: 0.97,
         explained: 2.0,
@@ -269,7 +269,7 @@ fn the_result_comes_back_as_written_and_python_reads_it_all() {
     let back: ResultFile = serde_json::from_str(&text).expect("parses");
     assert_eq!(back.robots[1].id, "R2");
     assert_eq!(back.robots[0].joints.0[0].0, "z_turn", "joints keep the order of the model");
-    assert_eq!(back.robots[0].sigma.0[1], ("a_lift".into(), None));
+    assert_eq!(back.robots[0].sigma.0[1], ("a_lift".into(), 1.8));
     assert_eq!(back.robots[0].base_sigma.rotation[1], None);
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scripts/check_outputs.py");
     let python = std::env::var_os("PYTHON").unwrap_or_else(|| "python3".into());

@@ -27,4 +27,4 @@ pub use choose::choose;
 pub use prepared::Prepared;
 pub use scene::Scene;
 pub use settings::{Method, Settings};
-pub use solve::fit;
+pub use solve::{converge, fit};

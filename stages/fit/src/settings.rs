@@ -45,8 +45,8 @@ pub struct Settings {
     /// Standard deviations of a scan's errors of registration and range: shift on each axis, metres, turn about each
     /// axis, radians (0.02°), range bias, metres (fit.md §4g).
     pub scan_sigma: [f64; 3],
-    /// A joint is determined by the points if its standard deviation is below this, radians or metres: 0.086°, so that
-    /// an error of 0.1° stays within what was promised.
+    /// A joint is determined by the points if its standard deviation is below this, radians or metres: 0.043°, so that
+    /// 0.1° is more than two of them.
     pub determined_sigma: f64,
     /// Lowest score that is reported at all.
     pub min_score: f64,
@@ -72,7 +72,7 @@ impl Default for Settings {
             min_noise: 0.0015,
             plane_sigma: [0.004, 0.006],
             scan_sigma: [0.003, 0.000_35, 0.001],
-            determined_sigma: 0.0015,
+            determined_sigma: 0.000_75,
             min_score: 0.30,
             max_violation: 0.20,
         }

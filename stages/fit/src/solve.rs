@@ -70,6 +70,28 @@ pub fn fit(
     Some(report(&refine, &best, &polished, &near))
 }
 
+/// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring
+/// how near a search must come.
+#[must_use]
+pub fn converge(
+    prepared: &Prepared<'_>,
+    scene: &Scene<'_>,
+    settings: &Settings,
+    (world_from_base, posture): (&Pose, &[f64]),
+) -> (Pose, Vec<f64>) {
+    let world_from_local = scene.world_from_local();
+    let refine = Refine { prepared, scene, settings, prior: None };
+    let h = Hypothesis {
+        local_from_base: world_from_local.inverse() * world_from_base,
+        posture: posture.to_vec(),
+        score: 0.0,
+    };
+    let base = Point::from(h.local_from_base.translation.vector);
+    let [near, _] = scene.within(&base, prepared.reach + NEAR_MARGIN);
+    let (end, _) = polish(&refine, &roughly(&refine, &h, &near, &COARSE_ROUNDS), &near);
+    (world_from_local * end.local_from_base, end.posture)
+}
+
 /// A posture adjusted, with the values that the points leave to its last joints.
 pub(crate) type Settled = (Adjusted, Judgement, Vec<Spin>);
 

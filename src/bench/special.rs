@@ -1,0 +1,123 @@
+//! Rows in; tables of what is measured otherwise than by suites out: the source's Table 1, closed loops, the basin.
+
+use super::score::Row;
+use std::fmt::Write as _;
+
+/// The source's Table 1: three postures of a robot with seven joints, after the sweep and after the registration, degrees.
+const PRINTED: [[[f64; 2]; 3]; 7] = [
+    [[0.5, 0.002], [-0.3, -0.068], [-0.2, -0.022]],
+    [[-0.2, 0.014], [0.4, -0.032], [0.3, 0.014]],
+    [[-0.4, -0.058], [-0.1, -0.086], [-0.1, -0.037]],
+    [[0.3, 0.212], [0.5, 0.297], [-0.2, -0.131]],
+    [[-0.3, -0.241], [-0.8, -0.189], [-0.5, 0.010]],
+    [[0.1, -0.002], [-0.7, -0.097], [0.3, 0.139]],
+    [[0.2, 0.193], [-0.2, -0.243], [-0.6, -0.539]],
+];
+/// Postures side by side in a table.
+const N_POSTURES: usize = 3;
+
+/// All of them that the rows have something for.
+pub(super) fn tables(rows: &[Row]) -> String {
+    let mut out = table_1(rows);
+    out.push_str(&loops(rows));
+    out.push_str(&basin(rows));
+    out
+}
+
+/// Errors of each joint as the source prints them, ours beside them in the same cells.
+fn table_1(rows: &[Row]) -> String {
+    let mut out = String::new();
+    for model in models(rows, "source") {
+        let of = |suite: &str| -> Vec<&Row> {
+            let own = rows.iter().filter(|r| r.suite == suite && r.model == model);
+            own.take(N_POSTURES).collect()
+        };
+        let (source, ours) = (of("source"), of("paper"));
+        let _ = writeln!(
+            out,
+            "\nErrors in the protocol of the method's source (its Table 1), °: {model}\n"
+        );
+        out.push_str("| joint |");
+        for k in 1..=source.len() {
+            let _ = write!(out, " {k}: swept | {k}: registered | {k}: ours | {k}: printed |");
+        }
+        let _ = writeln!(out, "\n|{}", " --- |".repeat(1 + 4 * source.len()));
+        let n = source.iter().map(|r| r.joints.len()).max().unwrap_or(0);
+        for j in 0..n {
+            let name = source.iter().find_map(|r| r.joints.get(j)).map_or("", |joint| &joint.name);
+            let _ = write!(out, "| {name} |");
+            for (k, row) in source.iter().enumerate() {
+                let joint = row.joints.get(j);
+                let here = ours.iter().find(|o| o.seed == row.seed).and_then(|o| o.joints.get(j));
+                let printed = PRINTED.get(j).map(|p| p[k]);
+                let _ = write!(
+                    out,
+                    " {} | {} | {} | {} |",
+                    degrees(joint.and_then(|j| j.rough)),
+                    degrees(joint.map(|j| j.error)),
+                    degrees(here.map(|j| j.error)),
+                    printed.map_or_else(String::new, |[a, b]| format!("{a} / {b}")),
+                );
+            }
+            out.push('\n');
+        }
+    }
+    out
+}
+
+/// Links that follow through closed loops.
+fn loops(rows: &[Row]) -> String {
+    let mut out = String::new();
+    for model in models(rows, "loops") {
+        let own = || rows.iter().filter(|r| r.suite == "loops" && r.model == model && r.right);
+        if out.is_empty() {
+            out.push_str("\nLinks of closed loops, in the frame of the base, largest over the right fits:\n\n");
+            out.push_str("| model | right | turn ° | shift mm | closure m |\n| --- | --- | --- | --- | --- |\n");
+        }
+        let most = |of: &dyn Fn(&Row) -> f64| own().map(of).fold(0.0, f64::max);
+        let n = rows.iter().filter(|r| r.suite == "loops" && r.model == model).count();
+        let _ = writeln!(
+            out,
+            "| {model} | {} of {n} | {:.4} | {:.2} | {:.0e} |",
+            own().count(),
+            most(&|r| r.sub[0].to_degrees()),
+            most(&|r| r.sub[1] * 1e3),
+            most(&|r| r.loop_gap),
+        );
+    }
+    out
+}
+
+/// How near a search must come.
+fn basin(rows: &[Row]) -> String {
+    let mut steps: Vec<f64> =
+        rows.iter().filter(|r| r.n_starts > 0).map(|r| r.perturbed_deg).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.dedup();
+    let mut out = String::new();
+    if steps.is_empty() {
+        return out;
+    }
+    out.push_str("\nStarts of the refinement alone that come home (all joints but the last within 0.3°):\n\n");
+    out.push_str("| every joint off by up to, ° | starts | home |\n| --- | --- | --- |\n");
+    for step in steps {
+        let own = || rows.iter().filter(|r| r.n_starts > 0 && r.perturbed_deg == step);
+        let (n, home) = own().fold((0, 0), |(n, home), r| (n + r.n_starts, home + r.n_home));
+        let _ = writeln!(out, "| {step} | {n} | {:.0} % |", 100.0 * home as f64 / n as f64);
+    }
+    out
+}
+
+fn models(rows: &[Row], suite: &str) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for row in rows.iter().filter(|r| r.suite == suite) {
+        if !out.contains(&row.model) {
+            out.push(row.model.clone());
+        }
+    }
+    out
+}
+
+fn degrees(angle: Option<f64>) -> String {
+    angle.map_or_else(|| "–".into(), |v| format!("{:.3}", v.to_degrees()))
+}
