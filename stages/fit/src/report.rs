@@ -151,9 +151,10 @@ fn open_joints(best: &Adjusted, rivals: &[(f64, &Polished)]) -> (Vec<bool>, Vec<
     let mut spread = vec![0.0_f64; n];
     for (_, (other, _)) in rivals.iter().filter(|(margin, _)| *margin < EQUAL) {
         let apart: Vec<bool> = (0..n).map(|j| turn(h, other, j) > OTHER).collect();
-        // Only the tail of the chain can be open by symmetry; a flip further up is another answer.
+        // One joint alone, or the tail of the chain, can be open by symmetry; a flip further up is another answer.
         let first = apart.iter().position(|a| *a).unwrap_or(n);
-        if first + 1 >= n || (first..n).all(|j| open[j] || j + 1 == n) {
+        let is_alone = apart.iter().filter(|a| **a).count() == 1;
+        if is_alone || (first..n).all(|j| open[j] || j + 1 == n) {
             for j in (0..n).filter(|&j| apart[j]) {
                 open[j] = true;
                 spread[j] = spread[j].max(turn(h, other, j));

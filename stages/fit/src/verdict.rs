@@ -56,7 +56,12 @@ pub(crate) fn pass(
             format!("beams went through {:.0} % of link '{}'", v * 100.0, link.name)
         });
     }
-    let n_known = fit.joints.iter().filter(|j| j.sigma < KNOWN_SIGMA).count();
+    // A symmetric tool that may stand at several values stands the same at all of them: only what moves it counts.
+    let own_sigma = |j: usize| {
+        let n = 6 + fit.joints.len();
+        fit.covariance.get((6 + j) * (n + 1)).map_or(fit.joints[j].sigma, |v| v.max(0.0).sqrt())
+    };
+    let n_known = (0..fit.joints.len()).filter(|&j| own_sigma(j) < KNOWN_SIGMA).count();
     let is_open = 2 * n_known <= fit.joints.len();
     let words = || {
         format!(
@@ -80,7 +85,7 @@ pub(crate) fn pass(
         let n: usize = carried(prepared, j).map(|l| fit.links[l].n_points).sum();
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
             doubts.push(format!("only {n} points on what joint '{}' moves", joint.name));
-        } else if j + 1 < fit.joints.len() && joint.sigma > KNOWN_SIGMA {
+        } else if j + 1 < fit.joints.len() && own_sigma(j) > KNOWN_SIGMA {
             doubts.push(format!("the points do not determine joint '{}'", joint.name));
         } else if !joint.determined {
             notes.push(undetermined(fit, j));
