@@ -5,7 +5,7 @@ use crate::engine::AllThreads;
 use crate::job::Settings;
 use crate::store::Store;
 use crate::surfaces::Ground;
-use contract::{Fit, InstallationPlane, Region, Result, Scan, View};
+use contract::{Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
 use fit::{Method, Prepared, Scene};
 use geometry::Pose;
 use identify::BaseSearch;
@@ -70,11 +70,26 @@ impl<'a> Search<'a> {
             .collect::<Result<_>>()?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit);
-        let fits: Vec<Vec<Fit>> = (0..self.shelf.models.len())
-            .into_par_iter()
-            .map(|model| self.model(model, &scene, &planes))
-            .collect();
-        Ok(fits.into_iter().flatten().collect())
+        let on = |planes: &[InstallationPlane]| -> Vec<Fit> {
+            let models = (0..self.shelf.models.len()).into_par_iter();
+            let fits: Vec<Vec<Fit>> =
+                models.map(|model| self.model(model, &scene, planes)).collect();
+            fits.into_iter().flatten().collect()
+        };
+        let mut fits = on(&planes);
+        // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
+        let is_explained = fits.iter().any(|f| f.verdict == Verdict::Trusted);
+        if !is_explained && self.settings.fit.method != Method::Paper {
+            fits.extend(on(&self.mounts(region)));
+        }
+        Ok(fits)
+    }
+
+    /// Ceilings, walls and tilted plates about the region.
+    fn mounts(&self, region: &Region) -> Vec<InstallationPlane> {
+        let world = region.world_bounds().grown(0.3);
+        let sides = self.ground.surfaces.sides.iter();
+        floor::mounts(&sides.filter(|p| p.bounds.touches(&world)).collect::<Vec<_>>())
     }
 
     /// Where the refinement of a model alone ends from each of the starts.
@@ -122,9 +137,7 @@ impl<'a> Search<'a> {
     /// Planes that a robot of this region may stand on; heights guessed all over the region where the plant has no
     /// floor to go by (a camera's view, a cut-out).
     fn planes(&self, region: &Region) -> Vec<InstallationPlane> {
-        let low = region.origin.coords + geometry::Vector::from(region.bounds.min);
-        let high = region.origin.coords + geometry::Vector::from(region.bounds.max);
-        let world = geometry::Aabb { min: low.into(), max: high.into() };
+        let world = region.world_bounds();
         let floor = &self.ground.surfaces.floor;
         // Without beams nothing contradicts a wrong height, and every one of them would have to be tried out.
         let has_beams = self.scans.iter().any(Scan::has_beams);

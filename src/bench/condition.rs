@@ -5,6 +5,19 @@ use contract::{Error, Kind, Result};
 use fit::Method;
 use robot::Model;
 
+/// What a robot is bolted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mount {
+    /// The floor, or a stand on it.
+    Floor,
+    /// A plate overhead.
+    Ceiling,
+    /// An upright plate.
+    Wall,
+    /// A plate that leans by half a right angle at most.
+    Tilted,
+}
+
 /// What a cell is like and how it is scanned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Condition {
@@ -21,6 +34,8 @@ pub(super) struct Condition {
     pub(super) warp: f64,
     /// Share of 0..1 of each kind of clutter being there.
     pub(super) clutter: f64,
+    /// What the robot is bolted to.
+    pub(super) mount: Mount,
     /// How postures are found.
     pub(super) method: Method,
     /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0: the whole search.
@@ -39,6 +54,7 @@ const PLAIN: Condition = Condition {
     warp: 0.0,
     clutter: 0.0,
     stand: 0.0,
+    mount: Mount::Floor,
     method: Method::Beam,
     perturbed_deg: 0.0,
 };
@@ -84,6 +100,11 @@ const SUITES: &[Suite] = &[
         ..PLAIN
     }),
     ("loops", 6, |_| PLAIN),
+    ("mounts", 6, |k| Condition {
+        mount: [Mount::Ceiling, Mount::Wall, Mount::Tilted][k % 3],
+        mixed: true,
+        ..PLAIN
+    }),
     ("basin", 7, |k| Condition { perturbed_deg: PERTURBED_DEG[k % 7], ..PLAIN }),
     ("unknown", 20, |k| Condition {
         n_scanners: 6 - k % 5,

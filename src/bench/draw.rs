@@ -1,7 +1,7 @@
 //! A case in; the scene that its seed draws, with the true base and posture, out.
 
 use super::cell::Start;
-use super::condition::{Case, Condition};
+use super::condition::{Case, Condition, Mount};
 use super::shape;
 use contract::Result;
 use geometry::{Point, Pose, Vector};
@@ -31,6 +31,8 @@ const CIRCLE: f64 = 5.0;
 const HEIGHT: f64 = 1.6;
 /// Elevations of a full dome of beams, degrees.
 const DOME: [f64; 2] = [-60.0, 90.0];
+/// Side and thickness of a plate, metres: a carrier that is bolted to steelwork.
+const PLATE: [f64; 2] = [1.6, 0.08];
 /// Side of a stand, metres: room for the largest foot.
 const STAND_SIDE: f64 = 1.4;
 
@@ -67,8 +69,11 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     let ground = scene.ground(xy[0], xy[1]);
     let foot = foot(model);
     let at = Translation3::new(xy[0], xy[1], ground + stand - foot);
-    let world_from_base = Pose::from_parts(at, UnitQuaternion::from_euler_angles(0.0, 0.0, yaw));
-    if stand > 0.0 {
+    let upright = Pose::from_parts(at, UnitQuaternion::from_euler_angles(0.0, 0.0, yaw));
+    let world_from_plate = plate(&mut scene, model, c, [xy[0], xy[1], yaw], &mut random);
+    let world_from_base =
+        world_from_plate.map_or(upright, |plate| plate * Pose::translation(0.0, 0.0, -foot));
+    if stand > 0.0 && world_from_plate.is_none() {
         scene.stands.push(Stand {
             name: "stand".into(),
             xy,
@@ -79,12 +84,15 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
         });
     }
     let low = ground + stand - 0.005;
-    let posture = Postures::new(model).draw(&mut random, &world_from_base, |p| p.z > low)?;
+    let posture = Postures::new(model).draw(&mut random, &world_from_base, |p| {
+        world_from_plate
+            .map_or(p.z > low, |plate| p.z > ground + 0.1 && (plate.inverse() * p).z > -0.005)
+    })?;
     scene.robots.push(RobotPlace {
         name: "R1".into(),
         model: model.name.clone(),
         xyz: world_from_base.translation.vector.into(),
-        rpy_deg: [0.0, 0.0, yaw.to_degrees()],
+        rpy_deg: rpy_deg(&world_from_base),
         posture: named(model, &posture),
         tool: None,
     });
@@ -92,6 +100,42 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     clutter(&mut scene, model, c, reach, &mut random);
     scanners(&mut scene, c, reach, &mut random);
     Ok(Drawn { scene, world_from_base, posture })
+}
+
+/// Roll, pitch and yaw, degrees.
+fn rpy_deg(pose: &Pose) -> [f64; 3] {
+    let (roll, pitch, yaw) = pose.rotation.euler_angles();
+    [roll, pitch, yaw].map(f64::to_degrees)
+}
+
+/// A plate that the robot is bolted to, where it does not stand: the pose of its surface, z away from it.
+fn plate(
+    scene: &mut Scene,
+    model: &Model,
+    c: &Condition,
+    [x, y, yaw]: [f64; 3],
+    random: &mut Random,
+) -> Option<Pose> {
+    let size = reach(model, &Pose::identity(), &model.home());
+    let (z, lean) = match c.mount {
+        Mount::Floor => return None,
+        Mount::Ceiling => (0.6 + 1.1 * size[0].max(size[1]), 180.0),
+        Mount::Wall => (0.4 + size[0].max(size[1]) * random.between(0.7, 0.9), 90.0),
+        Mount::Tilted => (random.between(0.7, 1.0), random.between(10.0, 45.0)),
+    };
+    let heading = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw);
+    let lean = UnitQuaternion::from_euler_angles(f64::to_radians(lean), 0.0, 0.0);
+    let spin = UnitQuaternion::from_euler_angles(0.0, 0.0, random.between(0.0, TAU));
+    let surface = Pose::from_parts(Translation3::new(x, y, z), heading * lean);
+    let middle = surface * Pose::translation(0.0, 0.0, -0.5 * PLATE[1]);
+    scene.boxes.push(Cuboid {
+        name: "plate".into(),
+        xyz: middle.translation.vector.into(),
+        size: [PLATE[0], PLATE[0], PLATE[1]],
+        rpy_deg: rpy_deg(&middle),
+        reflectance: 0.5,
+    });
+    Some(surface * Pose::from_parts(Translation3::identity(), spin))
 }
 
 /// Starts of the refinement alone, where the case asks for it: every joint and the base off by something.

@@ -69,7 +69,7 @@ settings! {
     }
     identify: identify::Settings {
         n_coarse, n_fine, keep_coarse, keep_middle, max_places, bases_per_place, place_radius,
-        min_score, max_tilt,
+        min_score,
     }
     region: identify::RegionSettings {
         join_gap, margin, min_height, min_extent, min_points, min_seed, max_extent, overlap,

@@ -12,6 +12,15 @@ pub struct Region {
     pub bounds: Aabb,
 }
 
+impl Region {
+    /// Bounds in the world, metres.
+    #[must_use]
+    pub fn world_bounds(&self) -> Aabb {
+        let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] + self.origin[i]);
+        Aabb { min: shift(self.bounds.min), max: shift(self.bounds.max) }
+    }
+}
+
 /// A measured point inside a region.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewPoint {

@@ -201,10 +201,14 @@ impl Adjust<'_> {
         let mut robot = vec![0.0; n_robot];
         for pair in pairs {
             let scale = (TUKEY * (pair.variance + slack).sqrt()).min(gate);
-            let weight = robust::tukey(pair.r, scale) / pair.variance;
+            let kernel = robust::tukey(pair.r, scale);
+            let weight = kernel / pair.variance;
             if weight <= 0.0 {
                 continue;
             }
+            let u2 = (pair.r / scale).powi(2);
+            let slope = (1.0 - u2) * (1.0 - 5.0 * u2) / pair.variance;
+            let influence = [(weight * pair.r).powi(2), slope];
             let q = base_from_local * Point::from(pair.p);
             let n = base_from_local.rotation * pair.n;
             self.refine.row(&q.coords, &n, &kinematics.twists[pair.link], &mut robot);
@@ -217,6 +221,7 @@ impl Adjust<'_> {
                 view: pair.view,
                 patch: prepared.links[pair.link].patches[pair.sample] as usize,
                 weight,
+                influence,
                 r: pair.r,
             });
         }

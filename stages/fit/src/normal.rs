@@ -20,6 +20,8 @@ pub(crate) struct Row<'a> {
     pub(crate) patch: usize,
     /// Robust weight over variance, m⁻².
     pub(crate) weight: f64,
+    /// Of the robust kernel: square of its influence, and its slope, both over variance.
+    pub(crate) influence: [f64; 2],
     /// The residual, metres.
     pub(crate) r: f64,
 }
@@ -47,6 +49,8 @@ pub(crate) struct Normal {
     patches: Vec<Option<Patch>>,
     /// Sum of w·r².
     chi2: f64,
+    /// Sums of the rows' influences, of slopes over variance, and of weights.
+    kernel: [f64; 3],
     n_rows: usize,
     sigma2: f64,
 }
@@ -61,6 +65,7 @@ impl Normal {
             gradient: DVector::zeros(n),
             patches: vec![None; n_patches],
             chi2: 0.0,
+            kernel: [0.0; 3],
             n_rows: 0,
             sigma2: 0.0,
         }
@@ -79,6 +84,9 @@ impl Normal {
         patch.weight += w;
         patch.r += w * row.r;
         self.chi2 += w * row.r * row.r;
+        self.kernel[0] += row.influence[0];
+        self.kernel[1] += row.influence[1];
+        self.kernel[2] += w;
         self.n_rows += 1;
         for (i, v) in row.robot.iter().enumerate() {
             if *v == 0.0 {
@@ -183,11 +191,45 @@ impl Normal {
         }
         let mut eigen = meat.symmetric_eigen();
         eigen.eigenvalues.iter_mut().for_each(|v| *v = v.max(scale));
-        let wide = l_inverse.transpose() * eigen.recompose() * l_inverse;
+        let mut wide =
+            l_inverse.transpose() * eigen.recompose() * &l_inverse * self.kernel_factor();
+        // Errors of shape are alike all over a side of a link, and the fit takes most of that in: its residuals do not
+        // show it, so the patches' variance stands for it.
+        for push in self.pushes(groups, n_groups).into_iter().flatten() {
+            let moved = l_inverse.transpose() * (&l_inverse * push);
+            wide.ger(ALIKE * self.sigma2, &moved, &moved, 1.0);
+        }
         wide.view((0, 0), (n_robot, n_robot)).into_owned()
+    }
+
+    /// Gradient for a unit offset of all patches of each group together.
+    fn pushes(&self, groups: &[u32], n_groups: usize) -> Vec<Option<DVector<f64>>> {
+        let mut out: Vec<Option<DVector<f64>>> = vec![None; n_groups];
+        for (patch, group) in self.patches.iter().zip(groups) {
+            let Some(patch) = patch else { continue };
+            let push = out[*group as usize].get_or_insert_with(|| DVector::zeros(self.n));
+            push.axpy(1.0 / (1.0 + self.sigma2 * patch.weight), &patch.a, 1.0);
+        }
+        out
+    }
+
+    /// How much wider the kernel makes errors than its weights say: `Σψ²·Σw / (Σψ′)²`, at least 1. Where noise is not
+    /// small against the gate, points beyond it are missing on both sides.
+    fn kernel_factor(&self) -> f64 {
+        let [influence, slope, weight] = self.kernel;
+        if slope <= 0.0 {
+            1.0
+        } else {
+            (influence * weight / (slope * slope)).clamp(1.0, MAX_FACTOR)
+        }
     }
 }
 
+/// Share of the variance of patches' offsets that is common to a side of a link: castings and hulls are off by waves
+/// longer than a patch.
+const ALIKE: f64 = 0.5;
+/// Beyond this factor the kernel says nothing any more.
+const MAX_FACTOR: f64 = 4.0;
 /// Fewer residuals than this do not hold a robot.
 const MIN_ROWS: usize = 30;
 /// Longest step of an adjustment, radians and metres.

@@ -67,7 +67,7 @@ impl Default for Settings {
             n_refine: 10,
             n_polish: 3,
             thin: 0.012,
-            max_points: 60_000,
+            max_points: 150_000,
             floor_band: 0.008,
             min_noise: 0.0015,
             plane_sigma: [0.004, 0.006],

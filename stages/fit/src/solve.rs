@@ -2,7 +2,7 @@
 
 use contract::{Candidate, Fan, Fit};
 use geometry::{Point, Pose};
-use nalgebra::{Rotation3, Translation3, UnitQuaternion};
+use nalgebra::Translation3;
 
 use crate::adjust::{Adjust, Adjusted};
 use crate::beam::{Beam, Hypothesis};
@@ -160,8 +160,9 @@ fn sort(polished: &mut [Polished]) {
 /// The last word: all unknowns, those of the scans too, on all points.
 fn adjust(refine: &Refine<'_>, h: &Hypothesis, all: &[u32]) -> (Adjusted, Judgement) {
     let cap = refine.settings.max_points / refine.prepared.model.links.len().max(1);
-    let points = refine.stratified(h, all.iter().copied(), FINE_GATE, cap.max(2000));
-    let done = Adjust { refine }.run(h, &points, ADJUST_GATE);
+    let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
+    let points = refine.stratified(h, all.iter().copied(), gate, cap.max(2000));
+    let done = Adjust { refine }.run(h, &points, gate);
     let judgement = judged(refine, &done.hypothesis);
     (done, judgement)
 }
@@ -172,9 +173,9 @@ fn judged(refine: &Refine<'_>, h: &Hypothesis) -> Judgement {
     judge(refine.prepared, refine.scene, refine.settings, h, tolerance)
 }
 
-/// No point farther than this from the surface takes part in the adjustment, metres: what robots differ from their
-/// models by and more.
-const ADJUST_GATE: f64 = 0.02;
+/// No point farther than this from the surface takes part in the adjustment: in multiples of the noise, and its bounds,
+/// metres: what robots differ from their models by and more, within the reach of the fine field.
+const ADJUST_GATE: (f64, f64, f64) = (3.0, 0.02, 0.03);
 
 /// Coarse rounds for the best of the beam; near twins are dropped.
 fn rough(
@@ -228,11 +229,5 @@ fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> Polished {
 fn prior(candidate: &Candidate, local_from_world: &Pose) -> Pose {
     // The candidate's bases already stand on the plane: the first one tells the height of the origin above it.
     let base = candidate.bases.first().map_or_else(Pose::identity, |b| local_from_world * b.0);
-    let n = candidate.plane.plane.normal;
-    let tilt =
-        Rotation3::rotation_between(&geometry::Vector::z(), &n).unwrap_or_else(Rotation3::identity);
-    Pose::from_parts(
-        Translation3::from(base.translation.vector),
-        UnitQuaternion::from_rotation_matrix(&tilt),
-    )
+    Pose::from_parts(Translation3::from(base.translation.vector), candidate.plane.plane.frame())
 }

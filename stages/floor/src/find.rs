@@ -3,6 +3,7 @@
 use crate::Settings;
 use crate::column::Columns;
 use crate::levels::{describe, levels};
+use crate::mounts::MIN_PATCH;
 use crate::pieces::pieces;
 use crate::stands::stands;
 use contract::{
@@ -23,6 +24,8 @@ pub struct Sum {
     n_points: u64,
     n_veils: u64,
     patches: Vec<PlanePatch>,
+    /// Those that do not face up.
+    sides: Vec<PlanePatch>,
     /// Each at least twice the size of the next, so that all of them are merged in n·log n.
     occupancies: Vec<Occupancy>,
 }
@@ -34,6 +37,8 @@ pub struct Ground {
     pub floor: Floor,
     /// Occupied space over all scans, floor and walls included.
     pub occupancy: Occupancy,
+    /// Patches of walls, ceilings and slopes, in the order of their tiles: what [`crate::mounts`] is asked about.
+    pub sides: Vec<PlanePatch>,
     /// Number of points.
     pub n_points: u64,
     /// Points taken for veils.
@@ -88,8 +93,13 @@ impl Fold for Find {
     fn add(&self, sum: &mut Sum, item: TileSummary) -> Result<()> {
         sum.n_points += item.n_points;
         sum.n_veils += item.n_veils;
-        // Walls and slopes are of no use here, and a plant has many.
-        sum.patches.extend(item.patches.into_iter().filter(|p| faces_up(p, &self.settings)));
+        for patch in item.patches {
+            if faces_up(&patch, &self.settings) {
+                sum.patches.push(patch);
+            } else if patch.area >= MIN_PATCH {
+                sum.sides.push(PlanePatch { ground: Vec::new(), ..patch });
+            }
+        }
         sum.push(item.occupancy);
         Ok(())
     }
@@ -98,6 +108,7 @@ impl Fold for Find {
         earlier.n_points += later.n_points;
         earlier.n_veils += later.n_veils;
         earlier.patches.extend(later.patches);
+        earlier.sides.extend(later.sides);
         for occupancy in later.occupancies {
             earlier.push(occupancy);
         }
@@ -110,7 +121,8 @@ impl Fold for Find {
         }
         let occupancy = sum.occupancies.pop().unwrap_or_default();
         let floor = search(&sum.patches, &occupancy, &self.scanners, &self.settings);
-        Ok(Ground { floor, occupancy, n_points: sum.n_points, n_veils: sum.n_veils })
+        let Sum { sides, n_points, n_veils, .. } = sum;
+        Ok(Ground { floor, occupancy, sides, n_points, n_veils })
     }
 }
 

@@ -5,10 +5,12 @@
 mod column;
 mod find;
 mod levels;
+mod mounts;
 mod pieces;
 mod settings;
 mod stands;
 mod union;
 
 pub use find::{Find, Ground, Sum, find};
+pub use mounts::mounts;
 pub use settings::Settings;

@@ -2,7 +2,7 @@
 //! region can grow, split over tiles and be joined without a second look at its points.
 
 use crate::Vector;
-use nalgebra::{Matrix3, SymmetricEigen};
+use nalgebra::{Matrix3, SymmetricEigen, UnitQuaternion};
 
 /// The plane `normal · p = offset`, normal of unit length, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +19,20 @@ impl Plane {
     #[must_use]
     pub fn distance(&self, p: &Vector) -> f64 {
         self.normal.dot(p) - self.offset
+    }
+
+    /// The turn that brings z onto the normal and leaves the horizon as it is as far as can be: coordinates on the
+    /// plane are world coordinates where it is level.
+    #[must_use]
+    pub fn frame(&self) -> UnitQuaternion<f64> {
+        let up = Vector::z();
+        if self.normal.z > -0.7 {
+            UnitQuaternion::rotation_between(&up, &self.normal).unwrap_or_default()
+        } else {
+            // Hanging: half a turn about x first, since between opposite vectors no turn is the shortest.
+            let over = UnitQuaternion::from_axis_angle(&Vector::x_axis(), std::f64::consts::PI);
+            UnitQuaternion::rotation_between(&-up, &self.normal).unwrap_or_default() * over
+        }
     }
 
     /// The same plane seen from the other side.

@@ -7,7 +7,7 @@
 use contract::{Candidate, InstallationPlane, Region, View};
 use geometry::depth::HIDDEN_PRICE;
 use geometry::{Evidence, Plane, Point, Pose, Probe, Vector};
-use nalgebra::{Rotation3, Translation3, Unit, UnitQuaternion};
+use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
 /// What is tuned.
@@ -29,8 +29,6 @@ pub struct Settings {
     pub place_radius: f64,
     /// Lowest mean sample score of base and first link that is worth a fit.
     pub min_score: f64,
-    /// Largest tilt of an installation plane against the vertical, radians.
-    pub max_tilt: f64,
 }
 
 impl Default for Settings {
@@ -44,7 +42,6 @@ impl Default for Settings {
             bases_per_place: 12,
             place_radius: 0.30,
             min_score: 0.05,
-            max_tilt: 0.15,
         }
     }
 }
@@ -138,9 +135,7 @@ impl<'a> BaseSearch<'a> {
         let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
         let mut trials = Vec::new();
         for (at, plane) in planes.iter().enumerate() {
-            if plane.plane.normal.z >= self.settings.max_tilt.cos() {
-                self.coarse(at, plane, &local[at], &mut trials);
-            }
+            self.coarse(at, plane, &local[at], &mut trials);
         }
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
@@ -190,15 +185,25 @@ impl<'a> BaseSearch<'a> {
         }
     }
 
-    /// Places on the plane with points above it within the base's radius, in rows.
+    /// Places on the plane, in its own coordinates, with points above it within the base's radius, in rows.
     fn occupied(&self, plane: &InstallationPlane, local: &Plane, step: f64) -> Vec<(f64, f64)> {
-        let reach = self.region.bounds;
+        let to_plane = local.frame().inverse();
+        let span = |corners: [[f64; 3]; 8], i: usize| {
+            let along = corners.map(|c| (to_plane * Vector::from(c))[i]);
+            along
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
+        };
+        let shifted = plane.bounds.corners().map(|c| {
+            let at = Vector::from(c) - self.region.origin.coords;
+            [at.x, at.y, at.z]
+        });
+        let reach = self.region.bounds.corners();
         let grow = self.radius.max(0.1);
-        let shift = |v: f64, i: usize| v - self.region.origin[i];
         let low: [f64; 2] =
-            std::array::from_fn(|i| reach.min[i].max(shift(plane.bounds.min[i], i) - grow));
+            std::array::from_fn(|i| span(reach, i).0.max(span(shifted, i).0 - grow));
         let high: [f64; 2] =
-            std::array::from_fn(|i| reach.max[i].min(shift(plane.bounds.max[i], i) + grow));
+            std::array::from_fn(|i| span(reach, i).1.min(span(shifted, i).1 + grow));
         if low[0] >= high[0] || low[1] >= high[1] {
             return Vec::new();
         }
@@ -206,8 +211,8 @@ impl<'a> BaseSearch<'a> {
             std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
         let mut count = vec![0_u32; n[0] * n[1]];
         for p in self.views.iter().flat_map(|v| &v.points) {
-            let q = Vector::from(p.xyz.map(f64::from));
-            let height = local.distance(&q);
+            let q = to_plane * Vector::from(p.xyz.map(f64::from));
+            let height = q.z - local.offset;
             if !(0.03..1.2).contains(&height) {
                 continue;
             }
@@ -306,16 +311,12 @@ impl<'a> BaseSearch<'a> {
         (weight(self.base) * own + weight(link) * top) / (weight(self.base) + weight(link))
     }
 
-    /// The base standing on the plane at a place, turned by `yaw` about the plane's normal.
+    /// The base standing on the plane at a place (its own coordinates), turned by `yaw` about the plane's normal.
     fn pose(&self, plane: &Plane, x: f64, y: f64, yaw: f64) -> Pose {
-        let n = plane.normal;
-        let z = (plane.offset - n.x * x - n.y * y) / n.z;
-        let tilt =
-            Rotation3::rotation_between(&Vector::z(), &n).unwrap_or_else(Rotation3::identity);
-        let turn = Rotation3::from_axis_angle(&Unit::new_normalize(n), yaw);
-        let rotation = UnitQuaternion::from_rotation_matrix(&(turn * tilt));
-        let foot = Point::new(x, y, z).coords - n * self.foot;
-        Pose::from_parts(Translation3::from(foot), rotation)
+        let frame = plane.frame();
+        let foot = frame * Vector::new(x, y, plane.offset - self.foot);
+        let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), yaw);
+        Pose::from_parts(Translation3::from(foot), frame * turn)
     }
 
     fn group(
@@ -327,11 +328,9 @@ impl<'a> BaseSearch<'a> {
         let mut places: Vec<Vec<&Trial>> = Vec::new();
         for trial in trials.iter().filter(|t| t.score >= self.settings.min_score) {
             let radius = self.settings.place_radius;
-            let same = places.iter().position(|p| {
-                let head = p[0];
-                let high = (local[head.plane].offset - local[trial.plane].offset).abs();
-                (head.x - trial.x).hypot(head.y - trial.y) < radius && high < radius
-            });
+            let at = |t: &Trial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
+            let here = at(trial);
+            let same = places.iter().position(|p| (at(p[0]) - here).norm() < radius);
             match same {
                 Some(at) if places[at].len() < self.settings.bases_per_place => {
                     places[at].push(trial);
@@ -347,13 +346,7 @@ impl<'a> BaseSearch<'a> {
             Translation3::from(self.region.origin.coords),
             UnitQuaternion::identity(),
         );
-        let world = {
-            let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] + self.region.origin[i]);
-            geometry::Aabb {
-                min: shift(self.region.bounds.min),
-                max: shift(self.region.bounds.max),
-            }
-        };
+        let world = self.region.world_bounds();
         places
             .iter()
             .map(|place| Candidate {
