@@ -26,7 +26,7 @@ pub(super) struct Cell {
 pub(super) struct Found {
     pub(super) fits: Vec<Fit>,
     pub(super) n_robot_points: usize,
-    /// Seconds from tiles to fits.
+    /// Seconds from the regions and the store to fits.
     pub(super) seconds: f64,
     /// Where the refinement alone ended from each start.
     pub(super) ends: Vec<Start>,
@@ -104,7 +104,6 @@ impl Cell {
         let store = sink.finish(engine, means.store_bytes())?;
         let shelf = Shelf::new(models);
         shelf.prepare();
-        let started = Instant::now();
         let (surfaces, gather) =
             (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
         let ground = engine.pass("surfaces", store.tiles(), |f| f.map(&surfaces).fold(&gather))?;
@@ -120,6 +119,7 @@ impl Cell {
             let n_robot_points = self.n_robot_points;
             return Ok(Found { ends, n_robot_points, ..Found::default() });
         }
+        let started = Instant::now();
         let fits = engine.fan_out("fit", regions, |region| search.region(&region))?;
         let fits = fit::choose(fits.into_iter().flatten().collect(), models);
         let seconds = started.elapsed().as_secs_f64();

@@ -22,6 +22,7 @@ mod settings;
 mod solve;
 mod spin;
 mod verdict;
+mod weak;
 
 pub use choose::choose;
 pub use prepared::Prepared;

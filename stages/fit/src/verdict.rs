@@ -4,6 +4,7 @@ use contract::{Fit, Verdict};
 use std::f64::consts::TAU;
 
 use crate::judge::Judgement;
+use crate::weak::weak;
 use crate::{Prepared, Scene};
 
 /// Share of seen-through samples on one link up to which a fit may be trusted, and from which it is refused.
@@ -91,6 +92,7 @@ pub(crate) fn pass(
             notes.push(undetermined(fit, j));
         }
     }
+    notes.extend(weak(fit));
     let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
     if rival {
         doubts.push("another posture explains the points nearly as well".into());
