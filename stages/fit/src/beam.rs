@@ -2,7 +2,7 @@
 //! local maximum of every sweep competes with all others (fit.md §4d, §4e).
 
 use contract::Fan;
-use geometry::{Pose, Probe};
+use geometry::Pose;
 
 use crate::{Prepared, Scene, Settings};
 
@@ -14,6 +14,10 @@ pub(crate) struct Hypothesis {
     /// Sum over placed links of √area · mean sample score.
     pub(crate) score: f64,
 }
+
+/// Mean score by which a value may lag behind the best on a quarter of the samples and still be looked at: three of
+/// that mean's standard deviations.
+const HOPELESS: f64 = 0.5;
 
 /// The search for one model's posture.
 pub(crate) struct Beam<'a> {
@@ -72,19 +76,26 @@ impl Beam<'_> {
 
     /// Weighted score of some links.
     pub(crate) fn score(&self, h: &Hypothesis, links: &[usize], tolerance: f32) -> f64 {
+        self.score_of(h, links, (tolerance, self.settings.n_search))
+    }
+
+    /// That of so many samples of each link.
+    fn score_of(
+        &self,
+        h: &Hypothesis,
+        links: &[usize],
+        (tolerance, n_samples): (f32, usize),
+    ) -> f64 {
         let poses = self.prepared.model.poses(&h.posture);
         links
             .iter()
             .map(|&l| {
-                let probe = self.probe(l, &(h.local_from_base * poses[l]), tolerance);
+                let (points, normals) = self.prepared.samples(l, n_samples);
+                let pose = h.local_from_base * poses[l];
+                let probe = self.scene.evidence.probe(points, normals, &pose, tolerance);
                 self.prepared.links[l].weight * f64::from(probe.mean())
             })
             .sum()
-    }
-
-    fn probe(&self, link: usize, pose: &Pose, tolerance: f32) -> Probe {
-        let (points, normals) = self.prepared.samples(link, self.settings.n_search);
-        self.scene.evidence.probe(points, normals, pose, tolerance)
     }
 
     /// All local maxima of a sweep of one joint, each with the score of what it places added.
@@ -145,24 +156,23 @@ impl Beam<'_> {
     /// Shakes base and joints set so far, one by one, in halving steps, while the score of all placed links rises:
     /// errors of a parent must not pile up in its children.
     fn settle(&self, h: &mut Hypothesis, upto: usize) {
-        let mut links = self.prepared.fixed.clone();
-        for j in 0..=upto {
-            links.extend(&self.prepared.placed_by[j]);
-        }
         let tolerance = (0.7 * self.settings.search_tolerance) as f32;
-        let mut top = self.score(h, &links, tolerance);
+        // Scores of the links that each joint places, the base's first: a joint leaves those before it as they are.
+        let placed = |j: usize| &self.prepared.placed_by[j];
+        let mut parts: Vec<f64> = vec![self.score(h, &self.prepared.fixed, tolerance)];
+        parts.extend((0..=upto).map(|j| self.score(h, placed(j), tolerance)));
         for step in [0.5, 0.25] {
             for j in (0..=upto).rev() {
                 let (_, span, n) = self.sweep(j);
                 let d = step * span / n as f64;
                 let limits = self.prepared.model.limits(j);
-                self.climb(h, &links, tolerance, &mut top, |h, sign| {
+                self.climb(h, (j + 1, &mut parts), tolerance, |h, sign| {
                     h.posture[j] = (h.posture[j] + sign * d).clamp(limits[0], limits[1]);
                 });
             }
             let shift = 0.4 * step * self.settings.search_tolerance;
             for axis in 0..3 {
-                self.climb(h, &links, tolerance, &mut top, |h, sign| {
+                self.climb(h, (0, &mut parts), tolerance, |h, sign| {
                     if axis < 2 {
                         h.local_from_base.translation.vector[axis] += sign * shift;
                     } else {
@@ -175,23 +185,30 @@ impl Beam<'_> {
                 });
             }
         }
-        h.score = top;
+        h.score = parts.iter().sum();
     }
 
+    /// Takes the shaken hypothesis if its score is higher, with the scores of its parts; those before `first` stay.
     fn climb(
         &self,
         h: &mut Hypothesis,
-        links: &[usize],
+        (first, parts): (usize, &mut [f64]),
         tolerance: f32,
-        top: &mut f64,
         shake: impl Fn(&mut Hypothesis, f64),
     ) {
+        let top: f64 = parts[first..].iter().sum();
         for sign in [1.0, -1.0] {
             let mut trial = h.clone();
             shake(&mut trial, sign);
-            let score = self.score(&trial, links, tolerance);
-            if score > *top {
-                *top = score;
+            let links = |part: usize| match part {
+                0 => &self.prepared.fixed,
+                j => &self.prepared.placed_by[j - 1],
+            };
+            let next: Vec<f64> = (first..parts.len())
+                .map(|part| self.score(&trial, links(part), tolerance))
+                .collect();
+            if next.iter().sum::<f64>() > top {
+                parts[first..].copy_from_slice(&next);
                 *h = trial;
                 return;
             }
@@ -209,14 +226,22 @@ impl Beam<'_> {
         let (low, span, n) = self.sweep(free);
         let mut trial = h.clone();
         let values: Vec<f64> = (0..=n).map(|k| low + span * k as f64 / n as f64).collect();
-        let mut score = |value: &f64| {
-            trial.posture[free] = *value;
-            self.score(&trial, links, tolerance)
+        let mut score = |value: f64, n_samples: usize| {
+            trial.posture[free] = value;
+            self.score_of(&trial, links, (tolerance, n_samples))
         };
-        let scores: Vec<f64> = values.iter().map(&mut score).collect();
+        // A few samples tell most values to be hopeless.
+        let few: Vec<f64> = values.iter().map(|v| score(*v, self.settings.n_search / 4)).collect();
+        let weight: f64 = links.iter().map(|&l| self.prepared.links[l].weight).sum();
+        let hopeless = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - HOPELESS * weight;
+        let scores: Vec<f64> = (values.iter().zip(&few))
+            .map(|(v, few)| {
+                if *few < hopeless { *few } else { score(*v, self.settings.n_search) }
+            })
+            .collect();
         (0..=n)
             .filter(|&k| {
-                (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1])
+                few[k] >= hopeless && (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1])
             })
             .map(|k| (values[k], scores[k]))
             .collect()

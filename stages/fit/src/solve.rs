@@ -22,6 +22,8 @@ const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
 const NEAR_MARGIN: f64 = 0.15;
 /// Points of a link in the coarse rounds: enough to hold its pose to a millimetre.
 const COARSE_CAP: usize = 600;
+/// Points that are looked at for those, thinned evenly.
+const COARSE_NEAR: usize = 30_000;
 /// Distance from the roughly placed links within which points take part in the fine rounds, metres: just inside the
 /// reach of the fine field.
 const FINE_GATE: f64 = 0.0255;
@@ -203,7 +205,9 @@ fn rough(
 
 /// Coarse rounds on few points of each link.
 fn roughly(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], rounds: &[Round]) -> Hypothesis {
-    let few = refine.stratified(h, near.iter().copied(), rounds[0].gate, COARSE_CAP);
+    let step = near.len().div_ceil(COARSE_NEAR).max(1);
+    let near = near.iter().copied().step_by(step);
+    let few = refine.stratified(h, near, rounds[0].gate, COARSE_CAP);
     refine.run(h, &few, rounds)
 }
 
