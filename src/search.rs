@@ -168,7 +168,7 @@ impl<'a> Search<'a> {
         ) else {
             return Vec::new();
         };
-        let candidates = search.run(planes);
+        let candidates = search.run(planes, &AllThreads);
         if candidates.is_empty() {
             return Vec::new();
         }

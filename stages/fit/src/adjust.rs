@@ -7,13 +7,14 @@
 //! themselves: a model is drawn to millimetres only. Both or neither: without the patches scans would be bent to fit a
 //! wrong shape.
 
+use contract::Fan;
 use geometry::{Point, Pose, Vector, robust};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 
 use crate::Settings;
 use crate::beam::Hypothesis;
 use crate::normal::{N_SCAN, Normal, Row};
-use crate::refine::Refine;
+use crate::refine::{CHUNK, Refine};
 
 /// How a scan differs from its stated pose, as far as the points near a robot tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,7 +109,13 @@ impl Adjust<'_> {
     }
 
     /// Adjusts on the points with these indices.
-    pub(crate) fn run(&self, start: &Hypothesis, points: &[u32], gate: f64) -> Adjusted {
+    pub(crate) fn run(
+        &self,
+        start: &Hypothesis,
+        points: &[u32],
+        gate: f64,
+        fan: &impl Fan,
+    ) -> Adjusted {
         let n_views = self.refine.scene.views.len();
         let mut state = State {
             hypothesis: start.clone(),
@@ -117,8 +124,8 @@ impl Adjust<'_> {
         };
         let mut round = 0;
         loop {
-            let pairs = self.pairs(&state, points, gate);
-            let normal = self.normal(&state, &pairs, gate);
+            let pairs = self.pairs(&state, points, gate, fan);
+            let normal = self.normal(&state, &pairs, gate, fan);
             let solved = (round < N_ROUNDS).then(|| normal.solve()).flatten();
             let Some(step) = solved else {
                 return self.finish(state, &pairs, &normal);
@@ -132,7 +139,7 @@ impl Adjust<'_> {
     }
 
     /// The points with their facets at the state.
-    fn pairs(&self, state: &State, points: &[u32], gate: f64) -> Vec<Pair> {
+    fn pairs(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> Vec<Pair> {
         let refine = self.refine;
         let scene = refine.scene;
         let poses = refine.local_from_links(&state.hypothesis);
@@ -183,11 +190,25 @@ impl Adjust<'_> {
             };
             Some(Pair { link, sample, view, p, n, ray, variance, r })
         };
-        points.iter().filter_map(pair).collect()
+        let chunks = points.chunks(CHUNK).collect();
+        let found =
+            fan.fan(chunks, |chunk: &[u32]| chunk.iter().filter_map(pair).collect::<Vec<_>>());
+        found.into_iter().flatten().collect()
     }
 
     /// Normal equations of the pairs with all priors, patches taken out. Updates nothing.
-    fn normal(&self, state: &State, pairs: &[Pair], gate: f64) -> Normal {
+    fn normal(&self, state: &State, pairs: &[Pair], gate: f64, fan: &impl Fan) -> Normal {
+        let chunks = pairs.chunks(2 * CHUNK).collect();
+        let sums = fan.fan(chunks, |chunk: &[Pair]| self.sums(state, chunk, gate));
+        let empty = || self.sums(state, &[], gate);
+        let mut normal = sums.into_iter().reduce(Normal::join).unwrap_or_else(empty);
+        normal.close();
+        self.add_priors(state, &mut normal);
+        normal
+    }
+
+    /// The sums of some pairs.
+    fn sums(&self, state: &State, pairs: &[Pair], gate: f64) -> Normal {
         let h = &state.hypothesis;
         let prepared = self.refine.prepared;
         let kinematics = prepared.model.kinematics(&h.posture);
@@ -225,8 +246,6 @@ impl Adjust<'_> {
                 r: pair.r,
             });
         }
-        normal.close();
-        self.add_priors(state, &mut normal);
         normal
     }
 

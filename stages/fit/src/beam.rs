@@ -235,13 +235,13 @@ impl Beam<'_> {
         let weight: f64 = links.iter().map(|&l| self.prepared.links[l].weight).sum();
         let hopeless = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - HOPELESS * weight;
         let scores: Vec<f64> = (values.iter().zip(&few))
-            .map(|(v, few)| {
-                if *few < hopeless { *few } else { score(*v, self.settings.n_search) }
-            })
+            .map(|(v, few)| if *few < hopeless { *few } else { score(*v, self.settings.n_search) })
             .collect();
         (0..=n)
             .filter(|&k| {
-                few[k] >= hopeless && (k == 0 || scores[k] > scores[k - 1]) && (k == n || scores[k] >= scores[k + 1])
+                few[k] >= hopeless
+                    && (k == 0 || scores[k] > scores[k - 1])
+                    && (k == n || scores[k] >= scores[k + 1])
             })
             .map(|k| (values[k], scores[k]))
             .collect()

@@ -114,6 +114,27 @@ impl Normal {
         }
     }
 
+    /// Sums of both; before either is closed.
+    pub(crate) fn join(mut self, later: Self) -> Self {
+        self.hessian += later.hessian;
+        self.chi2 += later.chi2;
+        self.n_rows += later.n_rows;
+        (0..3).for_each(|i| self.kernel[i] += later.kernel[i]);
+        for (own, other) in self.patches.iter_mut().zip(later.patches) {
+            match (own.as_mut(), other) {
+                (Some(own), Some(other)) => {
+                    own.a += other.a;
+                    own.g += other.g;
+                    own.weight += other.weight;
+                    own.r += other.r;
+                }
+                (None, other) => *own = other,
+                (Some(_), None) => {}
+            }
+        }
+        self
+    }
+
     /// Takes the patches out. Call once, after the last residual, before the priors.
     pub(crate) fn close(&mut self) {
         self.hessian.fill_upper_triangle_with_lower_triangle();

@@ -5,6 +5,7 @@
 //! the twist (v, w), so `∂r/∂θ = −(n·v + w·(q × n))`: exact, since x and n both move. The base moves the point's
 //! image the other way. Sums run in the order of the points: the same bits on any machine with IEEE arithmetic.
 
+use contract::Fan;
 use geometry::{Pose, Vector, robust};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::JointKind;
@@ -45,6 +46,8 @@ pub(crate) const FINE_ROUNDS: [Round; 7] = [
     Round { gate: 0.010, balanced: false },
 ];
 
+/// Points that one thread works on at a time. Sums are taken chunk by chunk, so it does not depend on the threads.
+pub(crate) const CHUNK: usize = 8192;
 /// Distance from which the coarse field answers, metres: just inside the fine field's reach.
 const FINE_REACH: f64 = 0.026;
 
@@ -93,35 +96,45 @@ impl Refine<'_> {
     pub(crate) fn stratified(
         &self,
         h: &Hypothesis,
-        points: impl Iterator<Item = u32>,
-        gate: f64,
-        cap: usize,
+        points: &[u32],
+        (gate, cap): (f64, usize),
+        fan: &impl Fan,
     ) -> Vec<u32> {
         let links = self.link_frames(h);
-        let mut strata: Vec<Vec<u32>> = vec![Vec::new(); self.prepared.links.len() + 1];
+        let n_strata = self.prepared.links.len() + 1;
         let grown: Vec<_> = links
             .iter()
             .map(|(l, _)| self.prepared.model.links[*l].bounds.grown(gate.max(0.05) * 1.7))
             .collect();
-        for i in points {
+        let stratum = |i: u32| -> Option<usize> {
             let m = &self.scene.points[i as usize];
             let near = links.iter().zip(&grown).any(|((_, frame), bounds)| {
                 bounds.contains(geometry::depth::transform(frame, m.p).map(f64::from))
             });
             if !near {
-                continue;
+                return None;
             }
             match self.nearest(m.p, &links, gate) {
-                Some((link, _, distance)) if distance <= gate => strata[link].push(i),
-                _ if gate > FINE_REACH => strata[self.prepared.links.len()].push(i),
-                _ => {}
+                Some((link, _, distance)) if distance <= gate => Some(link),
+                _ => (gate > FINE_REACH).then_some(n_strata - 1),
             }
-        }
+        };
+        let sorted = fan.fan(points.chunks(CHUNK).collect(), |chunk: &[u32]| {
+            let mut strata: Vec<Vec<u32>> = vec![Vec::new(); n_strata];
+            for i in chunk {
+                if let Some(at) = stratum(*i) {
+                    strata[at].push(*i);
+                }
+            }
+            strata
+        });
         let mut out = Vec::new();
-        for stratum in strata {
-            let n = stratum.len();
+        for at in 0..n_strata {
+            let whole: Vec<u32> =
+                sorted.iter().flat_map(|strata| strata[at].iter().copied()).collect();
+            let n = whole.len();
             let kept = n.min(cap);
-            out.extend((0..kept).map(|k| stratum[k * n / kept]));
+            out.extend((0..kept).map(|k| whole[k * n / kept]));
         }
         out.sort_unstable();
         out

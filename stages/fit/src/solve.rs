@@ -1,6 +1,6 @@
 //! One candidate in, one fit out: search, refine, judge; or nothing, where no posture explains what was measured.
 
-use contract::{Candidate, Fan, Fit};
+use contract::{Candidate, Fan, Fit, OneByOne};
 use geometry::{Point, Pose};
 use nalgebra::Translation3;
 
@@ -66,8 +66,8 @@ pub fn fit(
     if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
         return None;
     }
-    let best = settle(&refine, best, (&near, &all));
-    let (best, flipped) = flip(&beam, &refine, best, (&near, &all));
+    let best = settle(&refine, best, (&near, &all), fan);
+    let (best, flipped) = flip(&beam, &refine, best, (&near, &all), fan);
     polished.extend(flipped);
     Some(report(&refine, &best, &polished, &near))
 }
@@ -98,15 +98,20 @@ pub fn converge(
 pub(crate) type Settled = (Adjusted, Judgement, Vec<Spin>);
 
 /// Adjusts a posture; where another value of its last joints fits the points better, that one.
-fn settle(refine: &Refine<'_>, h: &Hypothesis, (near, all): (&[u32], &[u32])) -> Settled {
+fn settle(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    (near, all): (&[u32], &[u32]),
+    fan: &impl Fan,
+) -> Settled {
     let variance = refine.scene.noise * refine.scene.noise;
-    let (mut best, mut judgement) = adjust(refine, h, all);
+    let (mut best, mut judgement) = adjust(refine, h, all, fan);
     let mut spins = refine.spins(&best.hypothesis, near, variance);
     let better: Vec<(usize, f64)> = spins.iter().map(|s| (s.joint, s.values[0])).collect();
     if better.iter().any(|(j, v)| is_other(best.hypothesis.posture[*j], *v)) {
         let mut h = best.hypothesis.clone();
         better.iter().for_each(|(j, v)| h.posture[*j] = *v);
-        (best, judgement) = adjust(refine, &h, all);
+        (best, judgement) = adjust(refine, &h, all, fan);
         spins = refine.spins(&best.hypothesis, near, variance);
     }
     (best, judgement, spins)
@@ -122,6 +127,7 @@ fn flip(
     refine: &Refine<'_>,
     mut best: Settled,
     (near, all): (&[u32], &[u32]),
+    fan: &impl Fan,
 ) -> (Settled, Vec<Polished>) {
     let mut others = Vec::new();
     for flipped in beam.flips(&best.0.hypothesis) {
@@ -132,7 +138,7 @@ fn flip(
             others.push(polished);
             continue;
         }
-        let mut other = settle(refine, &polished.0, (near, all));
+        let mut other = settle(refine, &polished.0, (near, all), fan);
         if refine.worsening(&best.0.hypothesis, &other.0.hypothesis, near) < 0.0 {
             std::mem::swap(&mut best, &mut other);
         }
@@ -160,11 +166,16 @@ fn sort(polished: &mut [Polished]) {
 }
 
 /// The last word: all unknowns, those of the scans too, on all points.
-fn adjust(refine: &Refine<'_>, h: &Hypothesis, all: &[u32]) -> (Adjusted, Judgement) {
+fn adjust(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    all: &[u32],
+    fan: &impl Fan,
+) -> (Adjusted, Judgement) {
     let cap = refine.settings.max_points / refine.prepared.model.links.len().max(1);
     let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
-    let points = refine.stratified(h, all.iter().copied(), gate, cap.max(2000));
-    let done = Adjust { refine }.run(h, &points, gate);
+    let points = refine.stratified(h, all, (gate, cap.max(2000)), fan);
+    let done = Adjust { refine }.run(h, &points, gate, fan);
     let judgement = judged(refine, &done.hypothesis);
     (done, judgement)
 }
@@ -206,8 +217,8 @@ fn rough(
 /// Coarse rounds on few points of each link.
 fn roughly(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], rounds: &[Round]) -> Hypothesis {
     let step = near.len().div_ceil(COARSE_NEAR).max(1);
-    let near = near.iter().copied().step_by(step);
-    let few = refine.stratified(h, near, rounds[0].gate, COARSE_CAP);
+    let near: Vec<u32> = near.iter().copied().step_by(step).collect();
+    let few = refine.stratified(h, &near, (rounds[0].gate, COARSE_CAP), &OneByOne);
     refine.run(h, &few, rounds)
 }
 
@@ -220,7 +231,7 @@ pub(crate) type Polished = (Hypothesis, Judgement);
 
 /// Fine rounds on thinned points, with the gate that the noise asks for; then the judgement.
 fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> Polished {
-    let few = refine.stratified(h, near.iter().copied(), FINE_GATE, POLISH_CAP);
+    let few = refine.stratified(h, near, (FINE_GATE, POLISH_CAP), &OneByOne);
     let h = refine.run(h, &few, &FINE_ROUNDS[..3]);
     let gate = (LAST_GATE.0 * refine.noise(&h, &few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
     let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect();

@@ -18,8 +18,7 @@ pub(crate) fn weak(fit: &Fit) -> Option<String> {
     }
     // The base's turn about the vertical, then the joints.
     let at: Vec<usize> = (5..n).collect();
-    let block =
-        DMatrix::from_fn(at.len(), at.len(), |i, j| fit.covariance[at[i] * n + at[j]]);
+    let block = DMatrix::from_fn(at.len(), at.len(), |i, j| fit.covariance[at[i] * n + at[j]]);
     let eigen = block.symmetric_eigen();
     let weakest = eigen.eigenvalues.imax();
     let sigma = eigen.eigenvalues[weakest].max(0.0).sqrt();

@@ -4,7 +4,7 @@
 //! From the second level on the first moving link is swept over its joint and counts too, because many a box looks
 //! like a foot, but few look like a foot with a carousel on it.
 
-use contract::{Candidate, InstallationPlane, Region, View};
+use contract::{Candidate, Fan, InstallationPlane, Region, View};
 use geometry::depth::HIDDEN_PRICE;
 use geometry::{Evidence, Plane, Point, Pose, Probe, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -46,6 +46,8 @@ impl Default for Settings {
     }
 }
 
+/// Mean score on a quarter of the samples below which a pose is not looked at any further.
+const HOPELESS: f64 = -0.35;
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
@@ -131,20 +133,20 @@ impl<'a> BaseSearch<'a> {
 
     /// The candidates: one for each place, best first.
     #[must_use]
-    pub fn run(&self, planes: &[InstallationPlane]) -> Vec<Candidate> {
+    pub fn run(&self, planes: &[InstallationPlane], fan: &impl Fan) -> Vec<Candidate> {
         let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
         let mut trials = Vec::new();
         for (at, plane) in planes.iter().enumerate() {
-            self.coarse(at, plane, &local[at], &mut trials);
+            trials.extend(self.coarse(at, plane, &local[at], fan));
         }
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
         let cells = self.n_cells();
         best(&mut trials, self.settings.keep_coarse * cells, step * 0.9, yaw_step * 0.9);
         let keep = self.settings.keep_middle * cells;
-        let trials = self.finer(&local, &trials, step / 2.0, yaw_step / 2.0, keep);
+        let trials = self.finer(&local, &trials, (step / 2.0, yaw_step / 2.0, keep), fan);
         let keep = self.settings.max_places * cells * self.settings.bases_per_place * 2;
-        let trials = self.finer(&local, &trials, step / 4.0, yaw_step / 5.0, keep);
+        let trials = self.finer(&local, &trials, (step / 4.0, yaw_step / 5.0, keep), fan);
         self.group(planes, &local, &trials)
     }
 
@@ -167,22 +169,34 @@ impl<'a> BaseSearch<'a> {
     }
 
     /// Every place on the plane that has points about it, every yaw.
-    fn coarse(&self, at: usize, plane: &InstallationPlane, local: &Plane, out: &mut Vec<Trial>) {
+    fn coarse(
+        &self,
+        at: usize,
+        plane: &InstallationPlane,
+        local: &Plane,
+        fan: &impl Fan,
+    ) -> Vec<Trial> {
         let step = self.coarse_step();
         let tolerance = (step * 1.3) as f32;
-        let cells = self.occupied(plane, local, step);
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
-        let cad = prefix(self.model, self.base, self.settings.n_coarse);
-        for (x, y) in cells {
-            for k in 0..n {
+        let score = |pose: &Pose, n_samples: usize| {
+            let cad = prefix(self.model, self.base, n_samples);
+            self.mean(&self.evidence.probe(cad.0, cad.1, pose, tolerance))
+        };
+        let place = |(x, y): (f64, f64)| -> Vec<Trial> {
+            let all = (0..n).filter_map(|k| {
                 let yaw = k as f64 * coarse_yaw();
                 let pose = self.pose(local, x, y, yaw) * self.root_from_base;
-                let score = self.mean(&self.evidence.probe(cad.0, cad.1, &pose, tolerance));
-                if score > 0.0 {
-                    out.push(Trial { x, y, yaw, plane: at, score });
+                // A few samples tell most poses to be hopeless.
+                if score(&pose, self.settings.n_coarse / 4) < HOPELESS {
+                    return None;
                 }
-            }
-        }
+                let score = score(&pose, self.settings.n_coarse);
+                (score > 0.0).then_some(Trial { x, y, yaw, plane: at, score })
+            });
+            all.collect()
+        };
+        fan.fan(self.occupied(plane, local, step), place).into_iter().flatten().collect()
     }
 
     /// Places on the plane, in its own coordinates, with points above it within the base's radius, in rows.
@@ -252,27 +266,28 @@ impl<'a> BaseSearch<'a> {
         &self,
         planes: &[Plane],
         trials: &[Trial],
-        step: f64,
-        yaw_step: f64,
-        keep: usize,
+        (step, yaw_step, keep): (f64, f64, usize),
+        fan: &impl Fan,
     ) -> Vec<Trial> {
         let tolerance = (step * 1.5).clamp(0.025, 0.08) as f32;
-        let mut out = Vec::with_capacity(trials.len() * 27);
-        for trial in trials {
-            for n in 0..27_i32 {
+        let around = |trial: Trial| -> Vec<Trial> {
+            let near = (0..27_i32).map(|n| {
                 let (i, j, k) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-                let mut next = *trial;
+                let mut next = trial;
                 next.x += f64::from(i) * step;
                 next.y += f64::from(j) * step;
                 next.yaw += f64::from(k) * yaw_step;
                 next.score = self.score_base(&planes[next.plane], &next, tolerance);
-                out.push(next);
-            }
-        }
+                next
+            });
+            near.collect()
+        };
+        let mut out: Vec<Trial> = fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
         best(&mut out, keep * 2, step * 0.6, yaw_step * 0.6);
-        for trial in &mut out {
-            trial.score = self.score_with_first(&planes[trial.plane], trial, tolerance);
-        }
+        let mut out = fan.fan(out, |mut trial| {
+            trial.score = self.score_with_first(&planes[trial.plane], &trial, tolerance);
+            trial
+        });
         best(&mut out, keep, step * 0.6, yaw_step * 0.6);
         out
     }
