@@ -17,7 +17,7 @@ pub(crate) struct Hypothesis {
 
 /// Mean score by which a value may lag behind the best on a quarter of the samples and still be looked at: three of
 /// that mean's standard deviations.
-const HOPELESS: f64 = 0.5;
+const HOPELESS: f64 = 0.4;
 
 /// The search for one model's posture.
 pub(crate) struct Beam<'a> {

@@ -340,6 +340,10 @@ pub fn probe(
                     ((ahead - tolerance) / tolerance).min(1.0)
                 };
                 through = through.max(v);
+                if through >= 1.0 {
+                    // No other scan can make it worse or better.
+                    break;
+                }
             } else {
                 let off = (look.near - look.range).abs().min((look.far - look.range).abs());
                 on = on.max(1.0 - off / tolerance);
