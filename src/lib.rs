@@ -19,3 +19,4 @@ pub mod scanning;
 mod search;
 pub mod store;
 mod surfaces;
+mod tools;

@@ -9,6 +9,7 @@ use crate::report::Report;
 use crate::search::{Search, Shelf};
 use crate::store::{Scatter, Store};
 use crate::surfaces::{Gather, Surfaces};
+use crate::tools;
 use contract::Result;
 use ingest::{Scanners, Want};
 
@@ -45,13 +46,15 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
     let shelf = Shelf::new(&library.models);
     let search = Search::new(&shelf, scans, &store, &ground, settings);
-    let fits = engine.fan_out("fit", regions, |region| search.region(&region))?;
+    let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
     let fits = fit::choose(fits.into_iter().flatten().collect(), &library.models);
+    let mut models = library.models.clone();
+    let fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
 
     // Tiles near robots once more: which points are links, which hang on them.
     let labelling = Labelling::new(
         &fits,
-        &library.models,
+        &models,
         &sources,
         (&store, &ground.surfaces.floor),
         settings,
@@ -65,6 +68,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         engine,
         sources: &sources,
         library: &library,
+        models: &models,
         fits: &fits,
         clusters: &clusters,
         written: &written,

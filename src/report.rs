@@ -20,6 +20,8 @@ pub(crate) struct Report<'a> {
     pub(crate) engine: &'a Engine,
     pub(crate) sources: &'a Sources,
     pub(crate) library: &'a Library,
+    /// Those that the fits are of: the library's, and arms with tools.
+    pub(crate) models: &'a [robot::Model],
     pub(crate) fits: &'a [Fit],
     pub(crate) clusters: &'a [Cluster],
     pub(crate) written: &'a Done,
@@ -59,7 +61,7 @@ impl Report<'_> {
     }
 
     fn robot(&self, index: usize, fit: &Fit) -> RobotEntry {
-        let model = &self.library.models[fit.model];
+        let model = &self.models[fit.model];
         let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
         let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
         let poses = model.poses(&posture);

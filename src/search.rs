@@ -92,6 +92,21 @@ impl<'a> Search<'a> {
         floor::mounts(&sides.filter(|p| p.bounds.touches(&world)).collect::<Vec<_>>())
     }
 
+    /// Does something with a region's scene.
+    pub(crate) fn with_scene<T>(
+        &self,
+        region: &Region,
+        work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
+    ) -> Result<T> {
+        let views: Vec<View> = self
+            .scans
+            .par_iter()
+            .filter_map(|scan| self.view(scan, region).transpose())
+            .collect::<Result<_>>()?;
+        let planes = self.planes(region);
+        Ok(work(&Scene::new(region, &views, &planes, &self.settings.fit), &self.settings.fit))
+    }
+
     /// Where the refinement of a model alone ends from each of the starts.
     pub(crate) fn converge(
         &self,

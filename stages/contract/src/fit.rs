@@ -93,6 +93,15 @@ pub struct Equal {
     pub margin: f64,
 }
 
+/// A tool on a robot's flange.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mounted {
+    /// Its name in the library.
+    pub model: String,
+    /// Turn of its root about the flange's z, radians.
+    pub mount: f64,
+}
+
 /// A robot found in the scans.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Fit {
@@ -129,6 +138,8 @@ pub struct Fit {
     pub equals: Vec<Equal>,
     /// Posture after the sweeps and before the registration, where the method goes link after link; else empty.
     pub rough: Vec<f64>,
+    /// The tool of the library that it carries, if one was found; its joints follow the robot's own.
+    pub tool: Option<Mounted>,
     /// Other models that fit as well where the points can tell.
     pub alike: Vec<String>,
     /// How far to trust it.

@@ -74,6 +74,9 @@ pub struct RobotEntry {
     /// Other values within the limits, whole turns away, at which the robot stands the same, by joint.
     #[serde(default)]
     pub equivalents: Places<Vec<f64>>,
+    /// The tool of the library that it carries; its joints and links follow the robot's own.
+    #[serde(default)]
+    pub tool: Option<ToolEntry>,
     /// Models that fit as well where the points can tell.
     #[serde(default)]
     pub alike: Vec<String>,
@@ -159,6 +162,15 @@ pub struct RunnerUpEntry {
     /// How clearly the beams prefer the best, on the links that stand differently: about 0 for equals, 1 for clear.
     #[serde(default)]
     pub margin: Option<f64>,
+}
+
+/// A tool on a robot's flange.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ToolEntry {
+    /// Its name in the library.
+    pub model: String,
+    /// Turn of its root about the flange's z, radians.
+    pub mount: f64,
 }
 
 /// Another posture that explains the points as well.
@@ -277,6 +289,7 @@ impl RobotEntry {
                     .map(|j| (j.name.clone(), j.equivalents.clone()))
                     .collect(),
             ),
+            tool: fit.tool.as_ref().map(|t| ToolEntry { model: t.model.clone(), mount: t.mount }),
             alike: fit.alike.clone(),
             surface_sigma: finite(fit.surface_sigma),
             tip_sigma: finite(fit.tip_sigma),

@@ -21,6 +21,7 @@ mod scene;
 mod settings;
 mod solve;
 mod spin;
+mod tool;
 mod verdict;
 mod weak;
 
@@ -29,3 +30,4 @@ pub use prepared::Prepared;
 pub use scene::Scene;
 pub use settings::{Method, Settings};
 pub use solve::{converge, fit};
+pub use tool::{Tooled, fit_tool, try_tool};

@@ -19,7 +19,7 @@ const JUDGE_TOLERANCE: (f64, f64) = (0.012, 0.04);
 const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
 
 /// How far beyond its reach points may still be the robot's, metres: an error of the base.
-const NEAR_MARGIN: f64 = 0.15;
+pub(crate) const NEAR_MARGIN: f64 = 0.15;
 /// Points of a link in the coarse rounds: enough to hold its pose to a millimetre.
 const COARSE_CAP: usize = 600;
 /// Points that are looked at for those, thinned evenly.
@@ -98,7 +98,7 @@ pub fn converge(
 pub(crate) type Settled = (Adjusted, Judgement, Vec<Spin>);
 
 /// Adjusts a posture; where another value of its last joints fits the points better, that one.
-fn settle(
+pub(crate) fn settle(
     refine: &Refine<'_>,
     h: &Hypothesis,
     (near, all): (&[u32], &[u32]),

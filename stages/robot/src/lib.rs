@@ -5,6 +5,7 @@ mod bodies;
 mod chain;
 mod close;
 mod cloud;
+mod dress;
 mod finding;
 mod kinematics;
 mod library;

@@ -1,0 +1,111 @@
+//! Fits of arms and a library with tools in; fits of arms with what hangs on their flanges out, and the models that
+//! these fits are of.
+
+use crate::engine::{AllThreads, Engine};
+use crate::search::Search;
+use contract::{Fit, Mounted, Region, Result, Verdict};
+use fit::{Prepared, Scene, Settings, Tooled};
+use robot::Model;
+use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
+
+/// A tool stands at a multiple of 30° or 45° about the flange: bolt circles have 4, 6, 8 or 12 holes.
+const MOUNTS: [f64; 2] = [FRAC_PI_6, FRAC_PI_4];
+/// The arm's own flange agrees with a mount to within this, radians: 3°.
+const SAME_MOUNT: f64 = 0.052;
+/// Standard deviation up to which the arm's own flange is known, radians: 1°.
+const KNOWN: f64 = 0.0175;
+
+/// The fits, those with a tool replaced by fits of both, whose models are added to `models`.
+pub(crate) fn dress(
+    fits: Vec<Fit>,
+    models: &mut Vec<Model>,
+    (search, regions): (&Search<'_>, &[Region]),
+    engine: &Engine,
+) -> Result<Vec<Fit>> {
+    let tools: Vec<usize> = (0..models.len()).filter(|&i| models[i].is_tool()).collect();
+    if tools.is_empty() {
+        return Ok(fits);
+    }
+    let known: &[Model] = models;
+    let dressed = engine.fan_out("tools", fits, |fit| {
+        if fit.verdict == Verdict::Refused {
+            return Ok((fit, None));
+        }
+        let at = fit.world_from_base.translation.vector;
+        let home = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(at.into()));
+        let Some(region) = home else { return Ok((fit, None)) };
+        search.with_scene(region, |scene, settings| {
+            dress_one(fit, (known, &tools), scene, settings)
+        })
+    })?;
+    let mut out = Vec::with_capacity(dressed.len());
+    for (mut fit, model) in dressed {
+        if let Some(model) = model {
+            fit.model = models.len();
+            models.push(model);
+        }
+        out.push(fit);
+    }
+    Ok(out)
+}
+
+/// One arm: the tool that explains most, if one is there.
+fn dress_one(
+    fit: Fit,
+    (models, tools): (&[Model], &[usize]),
+    scene: &Scene<'_>,
+    settings: &Settings,
+) -> (Fit, Option<Model>) {
+    let arm = &models[fit.model];
+    let n_arm = arm.free.len();
+    let mut best: Option<(usize, Tooled)> = None;
+    for &tool in tools {
+        let Some(both) = arm.with_tool(&models[tool], 0.0) else { continue };
+        let prepared = Prepared::new(fit.model, &both);
+        let own = [n_arm, arm.links.len()];
+        let found = fit::try_tool(&fit, (&prepared, own), scene, settings, &AllThreads);
+        let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
+        if let Some(found) = found.filter(better) {
+            best = Some((tool, found));
+        }
+    }
+    let Some((tool, mut start)) = best else { return (fit, None) };
+    let mount = mount(&fit, &mut start, n_arm);
+    let Some(both) = arm.with_tool(&models[tool], mount) else { return (fit, None) };
+    let prepared = Prepared::new(fit.model, &both);
+    let mut together = fit::fit_tool(&start, &prepared, scene, settings, &AllThreads);
+    if together.verdict == Verdict::Refused || together.verdict < fit.verdict {
+        return (fit, None);
+    }
+    together.tool = Some(Mounted { model: models[tool].name.clone(), mount });
+    together.runner_up = fit.runner_up;
+    together.alike = fit.alike;
+    (together, Some(both))
+}
+
+/// Which hole of the flange the tool stands at, radians: told by the arm's last joint where its own points determine it,
+/// else the first. The last joint takes up the rest.
+fn mount(fit: &Fit, start: &mut Tooled, n_arm: usize) -> f64 {
+    let (Some(flange), Some(value)) = (fit.joints.get(n_arm - 1), start.posture.get_mut(n_arm - 1))
+    else {
+        return 0.0;
+    };
+    if flange.sigma > KNOWN {
+        return 0.0;
+    }
+    let turned = *value - flange.value;
+    let off = |mount: f64| {
+        let d = (turned - mount).rem_euclid(TAU);
+        d.min(TAU - d)
+    };
+    let all = MOUNTS.iter().flat_map(|step| {
+        let n = (TAU / step).round() as usize;
+        (0..n).map(move |k| k as f64 * step)
+    });
+    let nearest = all.min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(0.0);
+    if off(nearest) > SAME_MOUNT {
+        return 0.0;
+    }
+    *value -= nearest;
+    nearest
+}

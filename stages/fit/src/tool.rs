@@ -1,0 +1,97 @@
+//! A fitted arm, a tool and the scene in; whether the tool hangs on the arm, how its joints stand, and the fit of both
+//! together out.
+
+use contract::{Fan, Fit};
+use geometry::Pose;
+
+use crate::beam::{Beam, Hypothesis};
+use crate::judge::{Judgement, judge};
+use crate::refine::Refine;
+use crate::solve::{NEAR_MARGIN, settle};
+use crate::{Prepared, Scene, Settings, report};
+
+/// Score of the tool's links from which on it is there.
+const MIN_SCORE: f64 = 0.5;
+/// Share of the tool's surface that must have been judged.
+const MIN_SEEN: f64 = 0.10;
+/// Tolerance of the judgement, metres: an arm's flange is known to a millimetre.
+const TOLERANCE: f64 = 0.012;
+/// Hypotheses of the tool's joints that are judged.
+const N_JUDGED: usize = 5;
+
+/// A tool that explains what hangs on a flange.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tooled {
+    /// World from base.
+    pub world_from_base: Pose,
+    /// Posture of arm and tool.
+    pub posture: Vec<f64>,
+    /// Surface of the tool explained less 1.5 × contradicted, m²: compares tools.
+    pub explained: f64,
+}
+
+/// Where the tool stands if it is there. `tooled` is the arm with it, of which the first so many joints and links are
+/// the arm's; the arm stays as it was fitted, but for its last joint, which a bare flange may not tell.
+#[must_use]
+pub fn try_tool(
+    fit: &Fit,
+    (tooled, [n_joints, n_links]): (&Prepared<'_>, [usize; 2]),
+    scene: &Scene<'_>,
+    settings: &Settings,
+    fan: &impl Fan,
+) -> Option<Tooled> {
+    let beam = Beam { prepared: tooled, scene, settings };
+    let start = start(fit, tooled, scene);
+    let first = n_joints.checked_sub(1)?;
+    let found = beam.resume(vec![start], first, fan);
+    let judged = found.into_iter().take(N_JUDGED).filter_map(|h| {
+        let judgement = judge(tooled, scene, settings, &h, TOLERANCE);
+        let [explained, judged, whole] = of_tool(tooled, n_links, &judgement);
+        let is_there = judged > MIN_SEEN * whole && explained > MIN_SCORE * judged;
+        is_there.then_some((explained, h))
+    });
+    let (explained, best) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let world_from_base = scene.world_from_local() * best.local_from_base;
+    Some(Tooled { world_from_base, posture: best.posture, explained })
+}
+
+/// The fit of arm and tool together from such a start.
+#[must_use]
+pub fn fit_tool(
+    start: &Tooled,
+    tooled: &Prepared<'_>,
+    scene: &Scene<'_>,
+    settings: &Settings,
+    fan: &impl Fan,
+) -> Fit {
+    let refine = Refine { prepared: tooled, scene, settings, prior: None };
+    let h = Hypothesis {
+        local_from_base: scene.world_from_local().inverse() * start.world_from_base,
+        posture: start.posture.clone(),
+        score: 0.0,
+    };
+    let base = geometry::Point::from(h.local_from_base.translation.vector);
+    let [near, all] = scene.within(&base, tooled.reach + NEAR_MARGIN);
+    let settled = settle(&refine, &h, (&near, &all), fan);
+    report::report(&refine, &settled, &[], &near)
+}
+
+fn start(fit: &Fit, tooled: &Prepared<'_>, scene: &Scene<'_>) -> Hypothesis {
+    let mut posture = tooled.model.home();
+    for (own, joint) in posture.iter_mut().zip(&fit.joints) {
+        *own = joint.value;
+    }
+    Hypothesis {
+        local_from_base: scene.world_from_local().inverse() * fit.world_from_base,
+        posture,
+        score: 0.0,
+    }
+}
+
+/// Surface of the links from `first` on: explained less contradicted, judged, and the whole of it, m².
+fn of_tool(tooled: &Prepared<'_>, first: usize, judgement: &Judgement) -> [f64; 3] {
+    (first..tooled.links.len()).fold([0.0; 3], |sum, l| {
+        let [net, judged] = judgement.links[l];
+        [sum[0] + net, sum[1] + judged, sum[2] + tooled.links[l].area]
+    })
+}
