@@ -58,26 +58,32 @@ fn dress_one(
 ) -> (Fit, Option<Model>) {
     let arm = &models[fit.model];
     let n_arm = arm.free.len();
-    let mut best: Option<(usize, Tooled)> = None;
-    for &tool in tools {
-        let Some(both) = arm.with_tool(&models[tool], 0.0) else { continue };
-        let prepared = Prepared::new(fit.model, &both);
-        let own = [n_arm, arm.links.len()];
-        let found = fit::try_tool(&fit, (&prepared, own), scene, settings, &AllThreads);
-        let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
-        if let Some(found) = found.filter(better) {
-            best = Some((tool, found));
+    let mut best: Option<([usize; 2], Tooled)> = None;
+    for flange in arm.flanges() {
+        for &tool in tools {
+            let both = arm.with_tool(&models[tool], flange, 0.0);
+            let prepared = Prepared::new(fit.model, &both);
+            let own = [n_arm, arm.links.len()];
+            let found = fit::try_tool(&fit, (&prepared, own), scene, settings, &AllThreads);
+            let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
+            if let Some(found) = found.filter(better) {
+                best = Some(([tool, flange], found));
+            }
         }
     }
-    let Some((tool, mut start)) = best else { return (fit, None) };
+    let Some(([tool, flange], mut start)) = best else { return (fit, None) };
     let mount = mount(&fit, &mut start, n_arm);
-    let Some(both) = arm.with_tool(&models[tool], mount) else { return (fit, None) };
+    let both = arm.with_tool(&models[tool], flange, mount);
     let prepared = Prepared::new(fit.model, &both);
-    let mut together = fit::fit_tool(&start, &prepared, scene, settings, &AllThreads);
+    let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
     if together.verdict == Verdict::Refused || together.verdict < fit.verdict {
         return (fit, None);
     }
-    together.tool = Some(Mounted { model: models[tool].name.clone(), mount });
+    together.tool = Some(Mounted {
+        model: models[tool].name.clone(),
+        link: arm.links[flange].name.clone(),
+        mount,
+    });
     together.runner_up = fit.runner_up;
     together.alike = fit.alike;
     (together, Some(both))

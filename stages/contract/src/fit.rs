@@ -98,7 +98,9 @@ pub struct Equal {
 pub struct Mounted {
     /// Its name in the library.
     pub model: String,
-    /// Turn of its root about the flange's z, radians.
+    /// The robot's link that it is bolted to.
+    pub link: String,
+    /// Turn of its root about that link's z, radians.
     pub mount: f64,
 }
 

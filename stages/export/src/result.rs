@@ -169,7 +169,9 @@ pub struct RunnerUpEntry {
 pub struct ToolEntry {
     /// Its name in the library.
     pub model: String,
-    /// Turn of its root about the flange's z, radians.
+    /// The robot's link that it is bolted to.
+    pub link: String,
+    /// Turn of its root about that link's z, radians.
     pub mount: f64,
 }
 
@@ -289,7 +291,11 @@ impl RobotEntry {
                     .map(|j| (j.name.clone(), j.equivalents.clone()))
                     .collect(),
             ),
-            tool: fit.tool.as_ref().map(|t| ToolEntry { model: t.model.clone(), mount: t.mount }),
+            tool: fit.tool.as_ref().map(|t| ToolEntry {
+                model: t.model.clone(),
+                link: t.link.clone(),
+                mount: t.mount,
+            }),
             alike: fit.alike.clone(),
             surface_sigma: finite(fit.surface_sigma),
             tip_sigma: finite(fit.tip_sigma),

@@ -230,7 +230,7 @@ const POLISH_CAP: usize = 2000;
 pub(crate) type Polished = (Hypothesis, Judgement);
 
 /// Fine rounds on thinned points, with the gate that the noise asks for; then the judgement.
-fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> Polished {
+pub(crate) fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> Polished {
     let few = refine.stratified(h, near, (FINE_GATE, POLISH_CAP), &OneByOne);
     let h = refine.run(h, &few, &FINE_ROUNDS[..3]);
     let gate = (LAST_GATE.0 * refine.noise(&h, &few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);

@@ -3,11 +3,12 @@
 
 use contract::{Fan, Fit};
 use geometry::Pose;
+use std::f64::consts::TAU;
 
 use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, judge};
 use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, settle};
+use crate::solve::{NEAR_MARGIN, polish, settle};
 use crate::{Prepared, Scene, Settings, report};
 
 /// Score of the tool's links from which on it is there.
@@ -55,11 +56,11 @@ pub fn try_tool(
     Some(Tooled { world_from_base, posture: best.posture, explained })
 }
 
-/// The fit of arm and tool together from such a start.
+/// The fit of arm and tool together from such a start; `flange` is the arm's last joint.
 #[must_use]
 pub fn fit_tool(
     start: &Tooled,
-    tooled: &Prepared<'_>,
+    (tooled, flange): (&Prepared<'_>, usize),
     scene: &Scene<'_>,
     settings: &Settings,
     fan: &impl Fan,
@@ -73,8 +74,20 @@ pub fn fit_tool(
     let base = geometry::Point::from(h.local_from_base.translation.vector);
     let [near, all] = scene.within(&base, tooled.reach + NEAR_MARGIN);
     let settled = settle(&refine, &h, (&near, &all), fan);
-    report::report(&refine, &settled, &[], &near)
+    // A tool may look the same from several sides.
+    let turned = (1..N_TURNS).filter_map(|k| {
+        let mut h = settled.0.hypothesis.clone();
+        let value = h.posture.get_mut(flange)?;
+        let [low, high] = tooled.model.limits(flange);
+        *value = low + (*value + TAU * f64::from(k) / f64::from(N_TURNS) - low).rem_euclid(TAU);
+        (*value <= high).then_some(h)
+    });
+    let others = fan.fan(turned.collect(), |h| polish(&refine, &h, &near));
+    report::report(&refine, &settled, &others, &near)
 }
+
+/// Turns of the flange that a tool may look alike at: every 30°.
+const N_TURNS: i32 = 12;
 
 fn start(fit: &Fit, tooled: &Prepared<'_>, scene: &Scene<'_>) -> Hypothesis {
     let mut posture = tooled.model.home();

@@ -5,15 +5,19 @@ use geometry::{Pose, Vector};
 
 /// Frames that tools are bolted to, by convention (ROS-Industrial, REP 199), best first.
 const FLANGES: [&str; 3] = ["tool0", "flange", "tool"];
+/// Frames that differ by less are one, metres and radians.
+const SAME_FRAME: f64 = 1e-3;
 
 impl Model {
-    /// Index of the link that a tool is bolted to: a frame of one of the usual names that hangs rigidly on the tip of the
-    /// main chain, else the tip itself.
+    /// Links that a tool may be bolted to: frames of the usual names that hang rigidly on the last link that moves, the
+    /// tip of the main chain, and that link itself; those that stand alike once.
     #[must_use]
-    pub fn flange(&self) -> Option<usize> {
-        let tip = self.joints[*self.main_chain.last()?].child;
+    pub fn flanges(&self) -> Vec<usize> {
+        let moves = |j: &&usize| self.joints[**j].kind != JointKind::Fixed;
+        let Some(&last) = self.main_chain.iter().rev().find(moves) else { return Vec::new() };
+        let carrier = self.joints[last].child;
         let is_rigid = |mut at: usize| {
-            while at != tip {
+            while at != carrier {
                 let Some(j) = self.links[at].parent_joint else { return false };
                 if self.joints[j].kind != JointKind::Fixed {
                     return false;
@@ -22,17 +26,30 @@ impl Model {
             }
             true
         };
-        let named = FLANGES.iter().filter_map(|name| self.link(name)).find(|&l| is_rigid(l));
-        Some(named.unwrap_or(tip))
+        let tip = self.main_chain.last().map(|&j| self.joints[j].child);
+        let named = FLANGES.iter().filter_map(|name| self.link(name));
+        let poses = self.poses(&self.home());
+        let mut out: Vec<usize> = Vec::new();
+        for link in named.chain(tip).chain([carrier]).filter(|&l| is_rigid(l)) {
+            let apart = |k: &usize| {
+                let off = poses[*k].inverse() * poses[link];
+                off.translation.vector.norm() > SAME_FRAME || off.rotation.angle() > SAME_FRAME
+            };
+            if out.iter().all(apart) {
+                out.push(link);
+            }
+        }
+        out
     }
 
-    /// This robot with a tool's root link on its flange, turned by `mount` about the flange's z, radians. A joint of the
+    /// This robot with a tool's root link on one of its links, turned by `mount` about that link's z, radians. A joint of the
     /// tool whose name the robot has already gets the tool's before it; its joints come after the robot's own.
     ///
-    /// `None` for a robot without a main chain.
+    /// # Panics
+    /// If there is no such link.
     #[must_use]
-    pub fn with_tool(&self, tool: &Self, mount: f64) -> Option<Self> {
-        let flange = self.flange()?;
+    pub fn with_tool(&self, tool: &Self, flange: usize, mount: f64) -> Self {
+        assert!(flange < self.links.len(), "a tool hangs on a link of its robot");
         let (n_links, n_joints, n_free) = (self.links.len(), self.joints.len(), self.free.len());
         let mut out = self.clone();
         let moved = |joint: &Joint| {
@@ -87,6 +104,6 @@ impl Model {
             own
         });
         out.symmetries.extend(turned);
-        Some(out)
+        out
     }
 }
