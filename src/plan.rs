@@ -52,13 +52,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
 
     // Tiles near robots once more: which points are links, which hang on them.
-    let labelling = Labelling::new(
-        &fits,
-        &models,
-        &sources,
-        (&store, &ground.surfaces.floor),
-        settings,
-    );
+    let labelling =
+        Labelling::new(&fits, &models, &sources, (&store, &ground.surfaces.floor), settings);
     let near = labelling.near_robots(&store, engine)?;
 
     // Second pass: every point once more, in the order of its file, to label and to write.

@@ -137,18 +137,22 @@ impl Report<'_> {
                 fit.score,
                 fit.rms * 1e3
             );
-            for joint in &fit.joints {
+            if let Some(tool) = &fit.tool {
+                let deg = tool.mount.to_degrees();
+                let _ =
+                    writeln!(text, "     carries {} on '{}' at {deg:.0}°", tool.model, tool.link);
+            }
+            let model = &self.models[fit.model];
+            for (joint, &index) in fit.joints.iter().zip(&model.free) {
+                let slides = model.joints[index].kind == robot::JointKind::Prismatic;
+                let (factor, unit) = if slides { (1e3, " mm") } else { (1_f64.to_degrees(), "°") };
                 let sigma = if joint.determined {
-                    format!("± {:.3}°", joint.sigma.to_degrees())
+                    format!("± {:.3}{unit}", joint.sigma * factor)
                 } else {
                     "not determined".into()
                 };
-                let _ = writeln!(
-                    text,
-                    "     {:<24} {:>9.3}° {sigma}",
-                    joint.name,
-                    joint.value.to_degrees()
-                );
+                let value = joint.value * factor;
+                let _ = writeln!(text, "     {:<24} {value:>9.3}{unit} {sigma}", joint.name);
             }
             for reason in &fit.reasons {
                 let _ = writeln!(

@@ -34,9 +34,8 @@ pub(crate) fn dress(
         let at = fit.world_from_base.translation.vector;
         let home = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(at.into()));
         let Some(region) = home else { return Ok((fit, None)) };
-        search.with_scene(region, |scene, settings| {
-            dress_one(fit, (known, &tools), scene, settings)
-        })
+        search
+            .with_scene(region, |scene, settings| dress_one(fit, (known, &tools), scene, settings))
     })?;
     let mut out = Vec::with_capacity(dressed.len());
     for (mut fit, model) in dressed {

@@ -17,7 +17,7 @@ const MIN_MATCHED: f32 = 0.35;
 /// Smallest share of a link's surface that must be judged for that.
 const MIN_SEEN: f32 = 0.05;
 /// Hypotheses of a new search that are refined.
-const N_AGAIN: usize = 3;
+const N_AGAIN: usize = 10;
 
 impl Beam<'_> {
     /// Other values of single joints that score nearly as well as these or better, best first.
@@ -36,7 +36,7 @@ impl Beam<'_> {
         if self.prepared.placed_by[free].is_empty() {
             return Vec::new();
         }
-        let tolerance = (0.6 * self.settings.search_tolerance) as f32;
+        let tolerance = self.tolerance as f32;
         let moved = self.carried(free);
         let own = self.score(h, &moved, tolerance);
         let (_, span, n) = self.sweep(free);
@@ -57,7 +57,7 @@ impl Beam<'_> {
     /// The other way to hold the same hand: for each three turning joints in a row the outer ones half a turn on, the
     /// middle one mirrored about the value at which the outer axes are parallel. Within limits, where it scores well.
     pub(crate) fn flips(&self, h: &Hypothesis) -> Vec<Hypothesis> {
-        let tolerance = (0.6 * self.settings.search_tolerance) as f32;
+        let tolerance = self.tolerance as f32;
         let mut out = Vec::new();
         for first in 0..h.posture.len().saturating_sub(2) {
             let Some(middle) = self.mirror(h, first) else { continue };
@@ -140,7 +140,7 @@ impl Beam<'_> {
         let mut links = self.prepared.fixed.clone();
         self.prepared.placed_by[..first].iter().for_each(|placed| links.extend(placed));
         let mut start = h.clone();
-        start.score = self.score(h, &links, self.settings.search_tolerance as f32);
+        start.score = self.score(h, &links, self.tolerance as f32);
         let mut found = self.resume(vec![start], first, fan);
         found.truncate(N_AGAIN);
         found

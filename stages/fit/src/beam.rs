@@ -24,13 +24,34 @@ pub(crate) struct Beam<'a> {
     pub(crate) prepared: &'a Prepared<'a>,
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) settings: &'a Settings,
+    /// What a link may be off and still score, metres.
+    pub(crate) tolerance: f64,
+}
+
+/// Tolerance where what carries the searched links is fitted already, metres (fit.md §4e).
+const FITTED: f64 = 0.02;
+
+impl<'a> Beam<'a> {
+    /// For postures of which nothing is known.
+    pub(crate) fn new(
+        prepared: &'a Prepared<'a>,
+        scene: &'a Scene<'a>,
+        settings: &'a Settings,
+    ) -> Self {
+        Self { prepared, scene, settings, tolerance: settings.search_tolerance }
+    }
+
+    /// For links whose carriers are fitted already: a small wrist fits many places to within a hand's width.
+    pub(crate) fn fitted(&self) -> Self {
+        Self { tolerance: self.tolerance.min(FITTED), ..*self }
+    }
 }
 
 impl Beam<'_> {
     /// The best hypotheses over all joints, best first.
     pub(crate) fn run(&self, bases: &[Pose], fan: &impl Fan) -> Vec<Hypothesis> {
         let home = self.prepared.model.home();
-        let tolerance = self.settings.search_tolerance as f32;
+        let tolerance = self.tolerance as f32;
         let beam: Vec<Hypothesis> = bases
             .iter()
             .map(|base| {
@@ -50,7 +71,7 @@ impl Beam<'_> {
         first: usize,
         fan: &impl Fan,
     ) -> Vec<Hypothesis> {
-        let tolerance = self.settings.search_tolerance as f32;
+        let tolerance = self.tolerance as f32;
         for free in first..self.prepared.placed_by.len() {
             if self.prepared.placed_by[free].is_empty() {
                 continue;
@@ -114,7 +135,7 @@ impl Beam<'_> {
     pub(crate) fn sweep(&self, free: usize) -> (f64, f64, usize) {
         let [low, high] = self.prepared.model.limits(free);
         let joint = &self.prepared.model.joints[self.prepared.model.free[free]];
-        let tolerance = self.settings.search_tolerance;
+        let tolerance = self.tolerance;
         let (span, step) = if joint.kind == robot::JointKind::Prismatic {
             (high - low, tolerance / 2.0)
         } else {
@@ -141,7 +162,7 @@ impl Beam<'_> {
 
     /// Whether two hypotheses agree to within `steps` sweep steps in all joints set, and in the base.
     pub(crate) fn alike(&self, a: &Hypothesis, b: &Hypothesis, upto: usize, steps: f64) -> bool {
-        let tolerance = self.settings.search_tolerance;
+        let tolerance = self.tolerance;
         let shift =
             (a.local_from_base.translation.vector - b.local_from_base.translation.vector).norm();
         let turn = a.local_from_base.rotation.angle_to(&b.local_from_base.rotation);
@@ -156,7 +177,7 @@ impl Beam<'_> {
     /// Shakes base and joints set so far, one by one, in halving steps, while the score of all placed links rises:
     /// errors of a parent must not pile up in its children.
     fn settle(&self, h: &mut Hypothesis, upto: usize) {
-        let tolerance = (0.7 * self.settings.search_tolerance) as f32;
+        let tolerance = (0.7 * self.tolerance) as f32;
         // Scores of the links that each joint places, the base's first: a joint leaves those before it as they are.
         let placed = |j: usize| &self.prepared.placed_by[j];
         let mut parts: Vec<f64> = vec![self.score(h, &self.prepared.fixed, tolerance)];
@@ -170,7 +191,7 @@ impl Beam<'_> {
                     h.posture[j] = (h.posture[j] + sign * d).clamp(limits[0], limits[1]);
                 });
             }
-            let shift = 0.4 * step * self.settings.search_tolerance;
+            let shift = 0.4 * step * self.tolerance;
             for axis in 0..3 {
                 self.climb(h, (0, &mut parts), tolerance, |h, sign| {
                     if axis < 2 {

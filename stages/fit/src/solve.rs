@@ -40,7 +40,8 @@ pub fn fit(
     let local_from_world = scene.world_from_local().inverse();
     let bases: Vec<Pose> =
         candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
-    let beam = Beam { prepared, scene, settings };
+    let beam = Beam::new(prepared, scene, settings);
+    let closer = beam.fitted();
     let found = beam.run(&bases, fan);
     let is_seen = candidate.plane.area > 0.0;
     let prior = is_seen.then(|| prior(candidate, &local_from_world));
@@ -53,8 +54,8 @@ pub fn fit(
     for round in [Look::Again, Look::Others] {
         let Some((best, judgement)) = polished.first() else { break };
         let more = match round {
-            Look::Again => beam.again(best, judgement, fan),
-            Look::Others => beam.alternatives(best, fan),
+            Look::Again => closer.again(best, judgement, fan),
+            Look::Others => closer.alternatives(best, fan),
         };
         polished.extend(fan.fan(more, |h| {
             let h = roughly(&refine, &h, &near, &COARSE_ROUNDS[3..]);
@@ -67,7 +68,7 @@ pub fn fit(
         return None;
     }
     let best = settle(&refine, best, (&near, &all), fan);
-    let (best, flipped) = flip(&beam, &refine, best, (&near, &all), fan);
+    let (best, flipped) = flip(&closer, &refine, best, (&near, &all), fan);
     polished.extend(flipped);
     Some(report(&refine, &best, &polished, &near))
 }

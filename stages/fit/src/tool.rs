@@ -41,7 +41,7 @@ pub fn try_tool(
     settings: &Settings,
     fan: &impl Fan,
 ) -> Option<Tooled> {
-    let beam = Beam { prepared: tooled, scene, settings };
+    let beam = Beam::new(tooled, scene, settings).fitted();
     let start = start(fit, tooled, scene);
     let first = n_joints.checked_sub(1)?;
     let found = beam.resume(vec![start], first, fan);

@@ -63,11 +63,8 @@ impl Model {
             };
             let (parent, child) = (joint.parent + n_links, joint.child + n_links);
             let is_taken = self.joints.iter().any(|j| j.name == joint.name);
-            let name = if is_taken {
-                format!("{}/{}", tool.name, joint.name)
-            } else {
-                joint.name.clone()
-            };
+            let name =
+                if is_taken { format!("{}/{}", tool.name, joint.name) } else { joint.name.clone() };
             Joint { name, parent, child, motion, ..joint.clone() }
         };
         // Its own joint first: parents before children.

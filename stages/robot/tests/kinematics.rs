@@ -245,6 +245,33 @@ fn parallelograms_follow_their_mimic_and_fingers_nearly() {
 }
 
 #[test]
+fn a_tool_on_a_flange_moves_as_its_own_chain_does_there() {
+    let Some(mut arm) = looped(RRR[0].0, RRR[0].1) else { return };
+    let gripper = looped(RRR[1].0, RRR[1].1).expect("the gripper loads");
+    let flange = arm.flanges()[0];
+    let mount = 0.4;
+    let both = arm.with_tool(&gripper, flange, mount);
+    assert_eq!(both.free.len(), arm.free.len() + gripper.free.len());
+    let mut dice = Dice::new(8);
+    for _ in 0..20 {
+        let (q, grip) = (dice.posture(&arm), dice.posture(&gripper));
+        let whole: Vec<f64> = q.iter().chain(&grip).copied().collect();
+        let (own, tool, poses) = (arm.poses(&q), gripper.poses(&grip), both.poses(&whole));
+        let turn = geometry::Pose::rotation(geometry::Vector::z() * mount);
+        for (l, pose) in tool.iter().enumerate() {
+            let off = (own[flange] * turn * pose).inverse() * poses[own.len() + l];
+            assert!(
+                off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9,
+                "link {l}"
+            );
+        }
+        assert!(both.loop_gap(&whole) < 1e-9);
+    }
+    arm.main_chain.clear();
+    assert!(arm.flanges().is_empty());
+}
+
+#[test]
 fn newton_agrees_with_the_closed_forms() {
     for (name, sheet) in RPR.iter().chain(RRR) {
         let Some(exact) = looped(name, sheet) else {
