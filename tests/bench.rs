@@ -1,0 +1,60 @@
+//! Cells drawn from seeds, scanned and searched by `bench accuracy`: mounts, closed loops and the source's method are
+//! right in them, and what is written can be read.
+
+use std::path::Path;
+use std::process::Command;
+
+/// Runs suites of one demo robot; returns the rows.
+fn rows(out: &Path, args: &[&str]) -> Vec<serde_json::Value> {
+    let done = Command::new(env!("CARGO_BIN_EXE_stillpoint"))
+        .args(["bench", "accuracy", "--against", "same", "--progress", "none", "--out"])
+        .arg(out)
+        .args(args)
+        .output()
+        .expect("the program starts");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    for picture in ["errors.svg", "reliability.svg"] {
+        let text = std::fs::read_to_string(out.join(picture)).expect("is written");
+        assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"), "{picture}");
+    }
+    let text = std::fs::read_to_string(out.join("accuracy.json")).expect("is written");
+    let whole: serde_json::Value = serde_json::from_str(&text).expect("parses");
+    whole["rows"].as_array().expect("rows").clone()
+}
+
+/// Largest error of the joints said to be determined, degrees.
+fn worst(row: &serde_json::Value) -> f64 {
+    let joints = row["joints"].as_array().expect("joints");
+    let known = joints.iter().filter(|j| j["determined"] == true);
+    known.map(|j| j["error"].as_f64().expect("a number").abs().to_degrees()).fold(0.0, f64::max)
+}
+
+#[test]
+fn robots_hang_from_ceilings_and_walls_and_follow_their_loops() {
+    let out = tempfile::tempdir().expect("a folder");
+    let args = ["--suite", "mounts,loops", "--model", "palletiser", "--cases", "2", "--seed", "4"];
+    let rows = rows(out.path(), &args);
+    assert_eq!(rows.len(), 4);
+    for row in &rows {
+        assert_eq!(row["right"], true, "{row:#}");
+        assert_eq!(row["n_invented"], 0, "{row:#}");
+        assert!(worst(row) < 0.1, "{row:#}");
+        assert!(row["loop_gap"].as_f64().expect("a number") < 1e-9, "{row:#}");
+        let [turn, shift] = [0, 1].map(|i| row["sub"][i].as_f64().expect("a number"));
+        assert!(turn.to_degrees() < 0.1 && shift < 1e-3, "{row:#}");
+    }
+}
+
+#[test]
+fn the_method_of_the_source_stays_within_its_printed_errors_and_trusts_nothing() {
+    let out = tempfile::tempdir().expect("a folder");
+    let args = ["--suite", "models", "--model", "palletiser", "--cases", "1", "--seed", "3"];
+    let rows = rows(out.path(), &[&args[..], &["--method", "paper"]].concat());
+    let row = &rows[0];
+    assert_eq!(row["verdict"], "doubtful", "{row:#}");
+    // Its Table 1: 0.8° after the sweep, 0.54° after the registration.
+    assert!(worst(row) < 0.54, "{row:#}");
+    for joint in row["joints"].as_array().expect("joints") {
+        assert!(joint["rough"].as_f64().expect("swept").abs() < 0.8_f64.to_radians(), "{joint}");
+    }
+}
