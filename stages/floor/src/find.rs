@@ -37,7 +37,7 @@ pub struct Ground {
     pub floor: Floor,
     /// Occupied space over all scans, floor and walls included.
     pub occupancy: Occupancy,
-    /// Patches of walls, ceilings and slopes, in the order of their tiles: what [`crate::mounts`] is asked about.
+    /// Patches of walls, ceilings and slopes, in the order of their tiles: what [`mounts`](fn@crate::mounts) is asked about.
     pub sides: Vec<PlanePatch>,
     /// Number of points.
     pub n_points: u64,
