@@ -47,6 +47,8 @@ pub(crate) struct Search<'a> {
     settings: &'a Settings,
 }
 
+/// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls, and few carry robots.
+const MIN_MOUNT_SCORE: f64 = 0.15;
 /// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
 const MAX_SPACING: f64 = 0.05;
 
@@ -70,17 +72,17 @@ impl<'a> Search<'a> {
             .collect::<Result<_>>()?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit);
-        let on = |planes: &[InstallationPlane]| -> Vec<Fit> {
+        let on = |planes: &[InstallationPlane], least: f64| -> Vec<Fit> {
             let models = (0..self.shelf.models.len()).into_par_iter();
             let fits: Vec<Vec<Fit>> =
-                models.map(|model| self.model(model, &scene, planes)).collect();
+                models.map(|model| self.model(model, &scene, (planes, least))).collect();
             fits.into_iter().flatten().collect()
         };
-        let mut fits = on(&planes);
+        let mut fits = on(&planes, 0.0);
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         let is_explained = fits.iter().any(|f| f.verdict == Verdict::Trusted);
         if !is_explained && self.settings.fit.method != Method::Paper {
-            fits.extend(on(&self.mounts(region)));
+            fits.extend(on(&self.mounts(region), MIN_MOUNT_SCORE));
         }
         Ok(fits)
     }
@@ -162,7 +164,13 @@ impl<'a> Search<'a> {
         floor.planes.iter().filter(|p| p.bounds.grown(0.3).touches(&world)).cloned().collect()
     }
 
-    fn model(&self, index: usize, scene: &Scene<'_>, planes: &[InstallationPlane]) -> Vec<Fit> {
+    /// Fits of one model on some planes, from bases with at least such a score.
+    fn model(
+        &self,
+        index: usize,
+        scene: &Scene<'_>,
+        (planes, least): (&[InstallationPlane], f64),
+    ) -> Vec<Fit> {
         let model = &self.shelf.models[index];
         let settings = self.settings;
         if settings.fit.method == Method::Paper {
@@ -183,7 +191,8 @@ impl<'a> Search<'a> {
         ) else {
             return Vec::new();
         };
-        let candidates = search.run(planes, &AllThreads);
+        let mut candidates = search.run(planes, &AllThreads);
+        candidates.retain(|c| c.bases.first().is_some_and(|b| b.1 >= least));
         if candidates.is_empty() {
             return Vec::new();
         }

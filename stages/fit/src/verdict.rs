@@ -20,6 +20,8 @@ const BAD_RMS: (f64, f64) = (2.5, 0.003);
 /// Score below which a surface that fits too poorly is refused: furniture has room for a small arm that is nowhere
 /// quite right.
 const POOR_SCORE: f64 = 0.52;
+/// Residual of points that fill the gate of the adjustment evenly, metres: of things that are near the model, not on it.
+const ANYTHING_RMS: f64 = 0.0072;
 /// Residual from which a fit that leaves half of its joints open is refused whatever the noise, metres: with so blunt
 /// a measure, many a thing has room for a robot.
 const MAX_OPEN_RMS: f64 = 0.006;
@@ -74,7 +76,8 @@ pub(crate) fn pass(
     // A surface that fits badly and leaves the posture open may be anything.
     let is_bad = fit.rms > BAD_RMS.0 * scene.noise + BAD_RMS.1 || fit.rms > MAX_OPEN_RMS;
     let is_poor = fit.rms > POOR_RMS.0 * scene.noise + POOR_RMS.1;
-    let is_wrong = is_poor && judgement.score < POOR_SCORE;
+    let is_anything = fit.rms > ANYTHING_RMS.max(1.5 * scene.noise);
+    let is_wrong = is_anything || is_poor && judgement.score < POOR_SCORE;
     grade(is_wrong || is_open && is_bad, is_poor, &mut refusals, &mut doubts, words);
     if !scene.evidence.has_beams() {
         doubts.push("no scanner position is known, so nothing proves free space".into());

@@ -11,7 +11,7 @@ use crate::RegionSettings;
 /// Edge of the columns that structure is cut into, metres: no robot is flat over so much.
 const COLUMN: f64 = 1.0;
 /// Structure higher than this above its lowest point is no robot's, metres: ceilings, crane ways.
-const MAX_HEIGHT: f64 = 5.0;
+const MAX_HEIGHT: f64 = 3.6;
 /// Thickness below which a column is a wall, fence or panel, metres, one sigma: voxels of 5 cm make a plane 2 cm thick.
 const FLAT: f64 = 0.045;
 /// Fewest voxels of a column that is not flat.
