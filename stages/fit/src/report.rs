@@ -1,7 +1,7 @@
 //! The adjusted posture, the others that were looked at, and what the beams say in; out comes the fit as it is reported:
 //! values with their standard deviations, which joints are open, rivals, equals, verdict.
 
-use contract::{Equal, Fit, JointFit, RunnerUp, ScanShift};
+use contract::{Equal, Fan, Fit, JointFit, RunnerUp, ScanShift};
 use geometry::{Pose, Vector};
 use nalgebra::{DMatrix, DVector};
 use robot::{Model, Motion};
@@ -11,7 +11,7 @@ use crate::adjust::Adjusted;
 use crate::beam::Hypothesis;
 use crate::judge::{Judgement, evidence, margin};
 use crate::refine::Refine;
-use crate::solve::{Polished, Settled};
+use crate::solve::{Polished, Settled, polish};
 use crate::spin::Spin;
 use crate::verdict;
 
@@ -36,6 +36,7 @@ pub(crate) fn report(
     (best, judgement, spins): &Settled,
     others: &[Polished],
     near: &[u32],
+    fan: &impl Fan,
 ) -> Fit {
     let prepared = refine.prepared;
     let model = prepared.model;
@@ -56,7 +57,10 @@ pub(crate) fn report(
         let own = h.posture[s.joint];
         spread[s.joint] = s.values.iter().map(|v| angle(v - own)).fold(spread[s.joint], f64::max);
     }
-    let covariance = in_world_axes(&best.covariance, &h.local_from_base);
+    let mut covariance = in_world_axes(&best.covariance, &h.local_from_base);
+    for (j, sway) in sway(refine, h, &several, near, fan).into_iter().enumerate() {
+        covariance[(6 + j, 6 + j)] += sway * sway;
+    }
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     let joints = (0..h.posture.len()).map(|j| {
         let (value, equivalents) = whole_turns(model, &h.posture, j);
@@ -162,6 +166,36 @@ fn open_joints(best: &Adjusted, rivals: &[(f64, &Polished)]) -> (Vec<bool>, Vec<
         }
     }
     (open, spread)
+}
+
+/// How far each joint gives way when those that may stand at several values stand at another of theirs, radians or
+/// metres: a flange's bolts pull at the wrist, and which way they pull is as open as the flange.
+fn sway(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    several: &[&Spin],
+    near: &[u32],
+    fan: &impl Fan,
+) -> Vec<f64> {
+    let mut out = vec![0.0_f64; h.posture.len()];
+    if several.is_empty() {
+        return out;
+    }
+    let turned = several.iter().flat_map(|s| {
+        s.values[1..].iter().take(N_EQUALS).map(|value| {
+            let mut other = h.clone();
+            other.posture[s.joint] = *value;
+            other
+        })
+    });
+    let all = std::iter::once(h.clone()).chain(turned).collect();
+    let ends: Vec<Hypothesis> = fan.fan(all, |h| polish(refine, &h, near).0);
+    for end in &ends[1..] {
+        for j in (0..out.len()).filter(|j| several.iter().all(|s| s.joint != *j)) {
+            out[j] = out[j].max(turn(&ends[0], end, j));
+        }
+    }
+    out
 }
 
 /// Difference of a joint between two postures, whole turns taken out, radians.

@@ -70,7 +70,7 @@ pub fn fit(
     let best = settle(&refine, best, (&near, &all), fan);
     let (best, flipped) = flip(&closer, &refine, best, (&near, &all), fan);
     polished.extend(flipped);
-    Some(report(&refine, &best, &polished, &near))
+    Some(report(&refine, &best, &polished, &near, fan))
 }
 
 /// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring

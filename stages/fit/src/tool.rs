@@ -83,7 +83,7 @@ pub fn fit_tool(
         (*value <= high).then_some(h)
     });
     let others = fan.fan(turned.collect(), |h| polish(&refine, &h, &near));
-    report::report(&refine, &settled, &others, &near)
+    report::report(&refine, &settled, &others, &near, fan)
 }
 
 /// Turns of the flange that a tool may look alike at: every 30°.
