@@ -30,6 +30,9 @@ const OTHER_BASE: f64 = 0.03;
 /// Most equals that are listed.
 const N_EQUALS: usize = 4;
 
+/// Other values of a joint at which the joints before it are asked how far they give way.
+const N_SWAYS: usize = 8;
+
 /// What is reported of the best, given the others.
 pub(crate) fn report(
     refine: &Refine<'_>,
@@ -182,7 +185,8 @@ fn sway(
         return out;
     }
     let turned = several.iter().flat_map(|s| {
-        s.values[1..].iter().take(N_EQUALS).map(|value| {
+        let n = (s.values.len() - 1).min(N_SWAYS);
+        (0..n).map(move |k| &s.values[1 + k * (s.values.len() - 1) / n]).map(|value| {
             let mut other = h.clone();
             other.posture[s.joint] = *value;
             other
