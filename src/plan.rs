@@ -1,6 +1,7 @@
 //! The whole way of the data on one page: a job in, everything found and written, its outcome out. Nothing else
 //! decides order.
 
+use crate::calibrate::calibrate;
 use crate::engine::{Engine, Task};
 use crate::job::{Job, Outcome};
 use crate::labelling::Labelling;
@@ -49,7 +50,10 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
     let fits = fit::choose(fits.into_iter().flatten().collect(), &library.models);
     let mut models = library.models.clone();
-    let fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
+    let mut fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
+    if settings.fit.calibrate {
+        fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
+    }
 
     // Tiles near robots once more: which points are links, which hang on them.
     let labelling =

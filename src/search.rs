@@ -94,19 +94,24 @@ impl<'a> Search<'a> {
         floor::mounts(&sides.filter(|p| p.bounds.touches(&world)).collect::<Vec<_>>())
     }
 
-    /// Does something with a region's scene.
+    /// Does something with the scene that a fit stands in; `None` where it stands in none of the regions.
     pub(crate) fn with_scene<T>(
         &self,
-        region: &Region,
+        fit: &Fit,
+        regions: &[Region],
         work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
-    ) -> Result<T> {
+    ) -> Result<Option<T>> {
+        let at = fit.world_from_base.translation.vector;
+        let home = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(at.into()));
+        let Some(region) = home else { return Ok(None) };
         let views: Vec<View> = self
             .scans
             .par_iter()
             .filter_map(|scan| self.view(scan, region).transpose())
             .collect::<Result<_>>()?;
         let planes = self.planes(region);
-        Ok(work(&Scene::new(region, &views, &planes, &self.settings.fit), &self.settings.fit))
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit);
+        Ok(Some(work(&scene, &self.settings.fit)))
     }
 
     /// Where the refinement of a model alone ends from each of the starts.

@@ -31,11 +31,11 @@ pub(crate) fn dress(
         if fit.verdict == Verdict::Refused {
             return Ok((fit, None));
         }
-        let at = fit.world_from_base.translation.vector;
-        let home = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(at.into()));
-        let Some(region) = home else { return Ok((fit, None)) };
-        search
-            .with_scene(region, |scene, settings| dress_one(fit, (known, &tools), scene, settings))
+        let arm = fit.clone();
+        let dressed = search.with_scene(&arm, regions, |scene, settings| {
+            dress_one(arm.clone(), (known, &tools), scene, settings)
+        })?;
+        Ok(dressed.unwrap_or((fit, None)))
     })?;
     let mut out = Vec::with_capacity(dressed.len());
     for (mut fit, model) in dressed {

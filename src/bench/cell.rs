@@ -1,5 +1,6 @@
 //! A scene in; its scans in memory, and what the main job's own stages find in them, out.
 
+use crate::calibrate::calibrate;
 use crate::engine::Engine;
 use crate::job::{Means, Settings};
 use crate::search::{Search, Shelf};
@@ -120,8 +121,11 @@ impl Cell {
             return Ok(Found { ends, n_robot_points, ..Found::default() });
         }
         let started = Instant::now();
-        let fits = engine.fan_out("fit", regions, |region| search.region(&region))?;
-        let fits = fit::choose(fits.into_iter().flatten().collect(), models);
+        let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
+        let mut fits = fit::choose(fits.into_iter().flatten().collect(), models);
+        if settings.fit.calibrate {
+            fits = calibrate(fits, &mut models.to_vec(), (&search, &regions), engine)?;
+        }
         let seconds = started.elapsed().as_secs_f64();
         Ok(Found { fits, n_robot_points: self.n_robot_points, seconds, ends: Vec::new() })
     }

@@ -32,6 +32,11 @@ pub(super) struct Condition {
     pub(super) mixed: bool,
     /// Smooth error of the model's shape, metres, about the largest.
     pub(super) warp: f64,
+    /// How far joints are from where the model has them, one sigma: shift on each axis, metres, turn about each but
+    /// their own, degrees.
+    pub(super) frames: [f64; 2],
+    /// Whether the places of joints are estimated, too.
+    pub(super) calibrate: bool,
     /// Share of 0..1 of each kind of clutter being there.
     pub(super) clutter: f64,
     /// What the robot is bolted to.
@@ -52,6 +57,8 @@ const PLAIN: Condition = Condition {
     registration: [0.0; 3],
     mixed: false,
     warp: 0.0,
+    frames: [0.0; 2],
+    calibrate: false,
     clutter: 0.0,
     stand: 0.0,
     mount: Mount::Floor,
@@ -63,6 +70,9 @@ const PERTURBED_DEG: [f64; 7] = [2.0, 5.0, 8.0, 12.0, 16.0, 20.0, 30.0];
 /// Errors of a usual registration (fit.md §5, T3).
 const REGISTRATION: [f64; 3] = [0.002, 0.01, 0.001];
 
+/// A robot that its model fits poorly: shifts of joints, metres, and turns, degrees.
+const FRAMES: [f64; 2] = [0.002, 0.1];
+
 /// One cell to be drawn.
 #[derive(Debug, Clone)]
 pub(super) struct Case {
@@ -72,6 +82,16 @@ pub(super) struct Case {
     pub(super) model: usize,
     pub(super) condition: Condition,
 }
+
+impl Case {
+    /// The same for all cases of a model: they are of one robot.
+    pub(super) fn robot(&self) -> u64 {
+        self.seed / CASES_OF_A_ROBOT
+    }
+}
+
+/// Seeds of one robot.
+const CASES_OF_A_ROBOT: u64 = 1000;
 
 /// A suite: name, number of cases for each model, and the condition of its k-th case.
 type Suite = (&'static str, usize, fn(usize) -> Condition);
@@ -99,6 +119,8 @@ const SUITES: &[Suite] = &[
         clutter: 1.0,
         ..PLAIN
     }),
+    ("frames", 4, |_| Condition { frames: FRAMES, ..PLAIN }),
+    ("calibration", 4, |_| Condition { frames: FRAMES, calibrate: true, ..PLAIN }),
     ("loops", 6, |_| PLAIN),
     ("mounts", 6, |k| Condition {
         mount: [Mount::Ceiling, Mount::Wall, Mount::Tilted][k % 3],
@@ -135,7 +157,7 @@ pub(super) fn cases(bench: &Bench, models: &[Model], chosen: &[usize]) -> Result
             let own =
                 models[model].name.bytes().fold(0_u64, |a, b| a.wrapping_mul(31) + u64::from(b));
             for k in bench.first..bench.first + bench.n_cases.unwrap_or(*n) {
-                let seed = bench.seed * 1_000_000 + own % 1000 * 1000 + k as u64;
+                let seed = bench.seed * 1_000_000 + own % 1000 * CASES_OF_A_ROBOT + k as u64;
                 out.push(Case { suite: name, seed, model, condition: condition(k) });
             }
         }

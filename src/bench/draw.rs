@@ -43,6 +43,9 @@ impl Drawn {
         if case.condition.warp > 0.0 {
             shape::warp(&mut out[case.model], case.condition.warp, case.seed);
         }
+        if case.condition.frames != [0.0; 2] {
+            shape::displace(&mut out[case.model], case.condition.frames, case.robot());
+        }
         out
     }
 }

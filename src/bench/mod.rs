@@ -113,12 +113,13 @@ fn run(
         if case.condition.method != Method::default() {
             settings.fit.method = case.condition.method;
         }
+        settings.fit.calibrate |= case.condition.calibrate;
         let starts = draw::starts(case, &drawn);
         let found = cell.search((tried, &starts), store, (&settings, means, engine))?;
         Ok((drawn, found))
     });
     match seen {
-        Ok((drawn, found)) => score(case, &models[case.model], &drawn, &found),
+        Ok((drawn, found)) => score(case, models, &drawn, &found),
         Err(error) => {
             Row::failed(case, &models[case.model], &error, started.elapsed().as_secs_f64())
         }

@@ -3,8 +3,8 @@
 use super::cell::{Found, Start};
 use super::condition::Case;
 use super::draw::Drawn;
-use contract::{Error, Fit, Verdict};
-use geometry::Point;
+use contract::{Calibration, Error, Fit, Verdict};
+use geometry::{Point, Pose};
 use robot::{JointKind, Model, Role};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -74,6 +74,9 @@ pub(super) struct Row {
     pub(super) margin: Option<f64>,
     pub(super) reasons: Vec<String>,
     pub(super) seconds: f64,
+    /// Where joints were found to be and where they are, where that was asked for.
+    #[serde(skip)]
+    pub(super) calibration: Option<(Calibration, Vec<Pose>)>,
 }
 
 impl Row {
@@ -148,7 +151,8 @@ impl Row {
 }
 
 /// The figures of a case.
-pub(super) fn score(case: &Case, model: &Model, drawn: &Drawn, found: &Found) -> Row {
+pub(super) fn score(case: &Case, models: &[Model], drawn: &Drawn, found: &Found) -> Row {
+    let model = &models[case.model];
     let base = drawn.world_from_base.translation.vector;
     let apart = |f: &Fit| (f.world_from_base.translation.vector - base).norm();
     let here = found
@@ -178,6 +182,13 @@ pub(super) fn score(case: &Case, model: &Model, drawn: &Drawn, found: &Found) ->
     row.rms = fit.rms;
     row.margin = fit.runner_up.as_ref().map(|r| r.margin);
     row.reasons = fit.reasons.clone();
+    if let Some(found) = &fit.calibration {
+        let real = drawn.models(models, case).swap_remove(case.model);
+        let moved = |&j: &usize| {
+            model.joints[j].parent_from_joint.inverse() * real.joints[j].parent_from_joint
+        };
+        row.calibration = Some((found.clone(), model.free.iter().map(moved).collect()));
+    }
     if fit.model_name == model.name {
         row.joints = joints(model, fit, &drawn.posture);
         displacements(&mut row, model, fit, drawn);

@@ -1,7 +1,8 @@
-//! A model in; the same with its surface off by a smooth field along its normals, as real castings are, out.
+//! A model in; the same as a real robot differs from it out: its surface off by a smooth field along its normals, as
+//! castings are, or its joints elsewhere.
 
-use geometry::Vector;
-use robot::Model;
+use geometry::{Pose, Vector};
+use robot::{JointKind, Model};
 use simulate::random::Random;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -47,5 +48,23 @@ pub(super) fn warp(model: &mut Model, amplitude: f64, seed: u64) {
             let moved = p + n * (amplitude * field / N_WAVES as f64 * 1.4);
             *vertex = [moved.x as f32, moved.y as f32, moved.z as f32];
         }
+    }
+}
+
+/// Moves the place of each free joint: shift on each axis, metres, turn about each but its own, degrees, one sigma.
+pub(super) fn displace(model: &mut Model, [shift, turn]: [f64; 2], seed: u64) {
+    let mut random = Random::keyed(&[seed, 0xF4A]);
+    let free = model.free.clone();
+    for joint in free {
+        let joint = &mut model.joints[joint];
+        let mut vector = |size: f64| Vector::from_fn(|_, _| random.normals()[0]) * size;
+        let across = |v: Vector| v - joint.axis.into_inner() * v.dot(&joint.axis);
+        let (mut moved, mut turned) = (vector(shift), vector(turn.to_radians()));
+        if joint.kind == JointKind::Prismatic {
+            moved = across(moved);
+        } else {
+            turned = across(turned);
+        }
+        joint.parent_from_joint *= Pose::new(moved, turned);
     }
 }

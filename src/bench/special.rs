@@ -1,6 +1,8 @@
 //! Rows in; tables of what is measured otherwise than by suites out: the source's Table 1, closed loops, the basin.
 
 use super::score::Row;
+use contract::{Calibration, JointFrame};
+use geometry::Pose;
 use std::fmt::Write as _;
 
 /// The source's Table 1: three postures of a robot with seven joints, after the sweep and after the registration, degrees.
@@ -20,6 +22,7 @@ const N_POSTURES: usize = 3;
 pub(super) fn tables(rows: &[Row]) -> String {
     let mut out = table_1(rows);
     out.push_str(&loops(rows));
+    out.push_str(&calibration(rows));
     out.push_str(&basin(rows));
     out
 }
@@ -86,6 +89,81 @@ fn loops(rows: &[Row]) -> String {
         );
     }
     out
+}
+
+/// Where joints are against their models, found from single postures and from all of a robot's together.
+fn calibration(rows: &[Row]) -> String {
+    let mut out = String::new();
+    for model in models(rows, "calibration") {
+        if out.is_empty() {
+            out.push_str("\nPlaces of joints against the model, rms over joints:\n\n");
+            out.push_str("| model | postures | axis offset, mm: true / one posture / all | axis swing, °: true / one / all | z rms, one / all | joints, rms °: uncorrected / calibrated |\n| --- | --- | --- | --- | --- | --- |\n");
+        }
+        let own = || rows.iter().filter(|r| r.suite == "calibration" && r.model == model);
+        let single: Vec<&(Calibration, Vec<Pose>)> =
+            own().filter_map(|r| r.calibration.as_ref()).collect();
+        let Some((_, real)) = single.first() else { continue };
+        let all = fit::combine(&single.iter().map(|s| &s.0).collect::<Vec<_>>());
+        let nothing = Calibration {
+            frames: single[0]
+                .0
+                .frames
+                .iter()
+                .map(|f| JointFrame { shift: [0.0; 3], turn: [0.0; 3], ..f.clone() })
+                .collect(),
+            ..Calibration::default()
+        };
+        let truth = off(&[&nothing], real);
+        let one = off(&single.iter().map(|s| &s.0).collect::<Vec<_>>(), real);
+        let all = off(&all.iter().collect::<Vec<_>>(), real);
+        let angles = |suite: &str| {
+            let errors = rows
+                .iter()
+                .filter(|r| r.suite == suite && r.model == model)
+                .flat_map(|r| r.determined());
+            rms(errors.map(|j| j.error)).to_degrees()
+        };
+        let _ = writeln!(
+            out,
+            "| {model} | {} | {:.2} / {:.2} / {:.2} | {:.3} / {:.3} / {:.3} | {:.2} / {:.2} | {:.3} / {:.3} |",
+            single.len(),
+            truth[0] * 1e3,
+            one[0] * 1e3,
+            all[0] * 1e3,
+            truth[1].to_degrees(),
+            one[1].to_degrees(),
+            all[1].to_degrees(),
+            one[2],
+            all[2],
+            angles("frames"),
+            angles("calibration"),
+        );
+    }
+    out
+}
+
+/// Root mean squares over joints: error of the axis across itself, metres; of its direction, radians; errors over
+/// standard deviations.
+fn off(found: &[&Calibration], real: &[Pose]) -> [f64; 3] {
+    let mut errors: [Vec<f64>; 3] = Default::default();
+    for (frame, real) in found.iter().flat_map(|c| c.frames.iter().zip(real)) {
+        let (shift, turn) = (real.translation.vector, real.rotation.scaled_axis());
+        let error = JointFrame {
+            shift: std::array::from_fn(|i| frame.shift[i] - shift[i]),
+            turn: std::array::from_fn(|i| frame.turn[i] - turn[i]),
+            ..frame.clone()
+        };
+        errors[0].push(error.offset()[0]);
+        errors[1].push(error.swing()[0]);
+        let both = error.shift.iter().chain(&error.turn);
+        errors[2].extend(both.zip(&frame.sigma).map(|(e, s)| e / s));
+    }
+    errors.map(|e| rms(e.into_iter()))
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = values.fold((0, 0.0), |(n, sum), v| (n + 1, sum + v * v));
+    (sum / f64::from(n.max(1))).sqrt()
 }
 
 /// How near a search must come.

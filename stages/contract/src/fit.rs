@@ -104,6 +104,61 @@ pub struct Mounted {
     pub mount: f64,
 }
 
+/// Where a joint really is, against its model.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JointFrame {
+    /// As in the URDF.
+    pub name: String,
+    /// Its axis, joint's frame.
+    pub axis: [f64; 3],
+    /// Whether it slides along it; else it turns about it.
+    pub slides: bool,
+    /// Shift of its origin, joint's frame of the model, metres.
+    pub shift: [f64; 3],
+    /// Turn of its frame, joint's frame of the model, radians; about the axis zero, since the joint itself turns there.
+    pub turn: [f64; 3],
+    /// Standard deviations of both, axis by axis.
+    pub sigma: [f64; 6],
+}
+
+impl JointFrame {
+    /// How far its axis leans from the model's, radians, and standard deviation.
+    #[must_use]
+    pub fn swing(&self) -> [f64; 2] {
+        self.across(self.turn, [3, 4, 5])
+    }
+
+    /// How far its axis runs beside the model's, metres, and standard deviation.
+    #[must_use]
+    pub fn offset(&self) -> [f64; 2] {
+        self.across(self.shift, [0, 1, 2])
+    }
+
+    /// Size of the part of a vector across the axis, and its standard deviation.
+    fn across(&self, v: [f64; 3], at: [usize; 3]) -> [f64; 2] {
+        let along: f64 = (0..3).map(|i| v[i] * self.axis[i]).sum();
+        let part = [0, 1, 2].map(|i| v[i] - along * self.axis[i]);
+        let size = part.iter().map(|p| p * p).sum::<f64>().sqrt();
+        let variance = (0..3).map(|i| (part[i] * self.sigma[at[i]]).powi(2)).sum::<f64>();
+        let whole = (0..3).map(|i| self.sigma[at[i]]).fold(0.0, f64::max);
+        [size, if size > 0.0 { variance.sqrt() / size } else { whole }]
+    }
+}
+
+/// How a robot differs from its model, as far as its points tell.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Calibration {
+    /// Its free joints, in the order of the model.
+    pub frames: Vec<JointFrame>,
+    /// Covariance of shifts and turns of all of them, row-major, (6 n)²; what the points do not tell keeps the variance
+    /// of the prior.
+    pub covariance: Vec<f64>,
+    /// Standard deviations of the prior: shift, metres, turn, radians.
+    pub prior: [f64; 2],
+    /// RMS distance of each link's points from its surface before and after, metres.
+    pub link_rms: Vec<[f64; 2]>,
+}
+
 /// A robot found in the scans.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Fit {
@@ -142,6 +197,8 @@ pub struct Fit {
     pub rough: Vec<f64>,
     /// The tool of the library that it carries, if one was found; its joints follow the robot's own.
     pub tool: Option<Mounted>,
+    /// Where its joints really are, where that was asked for; base and joints are those of the robot so corrected.
+    pub calibration: Option<Calibration>,
     /// Other models that fit as well where the points can tell.
     pub alike: Vec<String>,
     /// How far to trust it.

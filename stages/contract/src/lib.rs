@@ -17,7 +17,10 @@ mod view;
 
 pub use candidate::{Candidate, Cluster, Voxel};
 pub use error::{Error, Kind, Result};
-pub use fit::{Equal, Fit, JointFit, LinkEvidence, Mounted, RunnerUp, ScanShift, Verdict};
+pub use fit::{
+    Calibration, Equal, Fit, JointFit, JointFrame, LinkEvidence, Mounted, RunnerUp, ScanShift,
+    Verdict,
+};
 pub use label::{Label, PointKind};
 pub use lattice::{Lattice, Pixel};
 pub use residual::{LinkAt, RESIDUAL_EDGE, ResidualVoxel, TileLabels};

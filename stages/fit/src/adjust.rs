@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 
 use crate::Settings;
 use crate::beam::Hypothesis;
+use crate::calibrate::Frames;
 use crate::normal::{N_SCAN, Normal, Row};
 use crate::refine::{CHUNK, Refine};
 
@@ -63,6 +64,8 @@ pub(crate) struct Adjusted {
 /// The adjustment of one robot.
 pub(crate) struct Adjust<'a> {
     pub(crate) refine: &'a Refine<'a>,
+    /// Joints whose places on their links are unknowns of [`Self::calibration`].
+    pub(crate) frames: &'a [usize],
 }
 
 /// Rounds of the adjustment; the last ones change nothing but the patches' share.
@@ -97,10 +100,10 @@ struct Pair {
 }
 
 /// Where the adjustment stands.
-struct State {
-    hypothesis: Hypothesis,
-    scans: Vec<ScanError>,
-    patch_sigma: f64,
+pub(crate) struct State {
+    pub(crate) hypothesis: Hypothesis,
+    pub(crate) scans: Vec<ScanError>,
+    pub(crate) patch_sigma: f64,
 }
 
 impl Adjust<'_> {
@@ -136,6 +139,11 @@ impl Adjust<'_> {
                 round = round.max(N_ROUNDS);
             }
         }
+    }
+
+    /// Normal equations at a state, the places of the joints among the unknowns.
+    pub(crate) fn at(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> Normal {
+        self.normal(state, &self.pairs(state, points, gate, fan), gate, fan)
     }
 
     /// The points with their facets at the state.
@@ -213,7 +221,9 @@ impl Adjust<'_> {
         let prepared = self.refine.prepared;
         let kinematics = prepared.model.kinematics(&h.posture);
         let base_from_local = h.local_from_base.inverse();
-        let n_robot = 6 + h.posture.len();
+        let n_posed = 6 + h.posture.len();
+        let n_robot = n_posed + 6 * self.frames.len();
+        let frames = Frames::new(prepared.model, &kinematics, self.frames);
         let mut normal = Normal::new(n_robot, self.refine.scene.views.len(), prepared.n_patches);
         let scanners: Vec<Vector> = (0..self.refine.scene.views.len())
             .map(|v| self.refine.scene.scanner(v as u16).map_or_else(Vector::zeros, |s| s.coords))
@@ -232,7 +242,8 @@ impl Adjust<'_> {
             let influence = [(weight * pair.r).powi(2), slope];
             let q = base_from_local * Point::from(pair.p);
             let n = base_from_local.rotation * pair.n;
-            self.refine.row(&q.coords, &n, &kinematics.twists[pair.link], &mut robot);
+            self.refine.row(&q.coords, &n, &kinematics.twists[pair.link], &mut robot[..n_posed]);
+            frames.row(pair.link, &q.coords, &n, &mut robot[n_posed..]);
             let lever = (pair.p - scanners[pair.view]).cross(&pair.n);
             let scan =
                 [pair.n.x, pair.n.y, pair.n.z, lever.x, lever.y, lever.z, -pair.n.dot(&pair.ray)];

@@ -9,6 +9,7 @@
 mod adjust;
 mod alternatives;
 mod beam;
+mod calibrate;
 mod choose;
 mod judge;
 mod noise;
@@ -25,6 +26,7 @@ mod tool;
 mod verdict;
 mod weak;
 
+pub use calibrate::{calibrate, combine};
 pub use choose::choose;
 pub use prepared::Prepared;
 pub use scene::Scene;

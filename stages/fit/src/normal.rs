@@ -150,7 +150,7 @@ impl Normal {
     }
 
     pub(crate) fn add_robot_prior(&mut self, hessian: &DMatrix<f64>, gradient: &DVector<f64>) {
-        let n = self.n_robot;
+        let n = hessian.nrows();
         let mut block = self.hessian.view_mut((0, 0), (n, n));
         block += hessian;
         let mut rows = self.gradient.rows_mut(0, n);
@@ -158,7 +158,11 @@ impl Normal {
     }
 
     pub(crate) fn add_scan_prior(&mut self, view: usize, i: usize, value: f64, sigma: f64) {
-        let at = self.n_robot + view * N_SCAN + i;
+        self.add_prior(self.n_robot + view * N_SCAN + i, value, sigma);
+    }
+
+    /// One unknown is known to be zero, give or take; it has the value.
+    pub(crate) fn add_prior(&mut self, at: usize, value: f64, sigma: f64) {
         let w = 1.0 / (sigma * sigma);
         self.hessian[(at, at)] += w;
         self.gradient[at] += w * value;

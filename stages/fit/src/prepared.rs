@@ -3,6 +3,7 @@
 
 use geometry::{NearestField, Point};
 use robot::Model;
+use std::sync::Arc;
 
 /// A model made ready for fitting.
 #[derive(Debug)]
@@ -11,7 +12,7 @@ pub struct Prepared<'a> {
     pub model: &'a Model,
     /// Index in the library.
     pub index: usize,
-    pub(crate) links: Vec<PreparedLink>,
+    pub(crate) links: Arc<Vec<PreparedLink>>,
     /// For each free joint: the links that get their pose when it is set, later ones not yet.
     pub(crate) placed_by: Vec<Vec<usize>>,
     /// Links with a surface that no free joint moves.
@@ -92,7 +93,7 @@ impl<'a> Prepared<'a> {
         Self {
             model,
             index,
-            links,
+            links: Arc::new(links),
             placed_by,
             fixed,
             reach: reach(model),
@@ -100,6 +101,22 @@ impl<'a> Prepared<'a> {
             leaf,
             n_patches: patch_groups.len(),
             patch_groups,
+        }
+    }
+
+    /// The same for a model that differs in where its joints are, not in its links.
+    pub(crate) fn moved<'b>(&self, model: &'b Model) -> Prepared<'b> {
+        Prepared {
+            model,
+            index: self.index,
+            links: Arc::clone(&self.links),
+            placed_by: self.placed_by.clone(),
+            fixed: self.fixed.clone(),
+            reach: self.reach,
+            lever: self.lever.clone(),
+            leaf: self.leaf.clone(),
+            n_patches: self.n_patches,
+            patch_groups: self.patch_groups.clone(),
         }
     }
 

@@ -45,6 +45,11 @@ pub struct Settings {
     /// Standard deviations of a scan's errors of registration and range: shift on each axis, metres, turn about each
     /// axis, radians (0.02°), range bias, metres (fit.md §4g).
     pub scan_sigma: [f64; 3],
+    /// Whether the places of the joints on their links are estimated, too: for robots that their models fit poorly.
+    pub calibrate: bool,
+    /// How far a joint may be from where its model has it, one sigma: shift on each axis, metres, turn about each axis,
+    /// radians (0.15°).
+    pub frame_sigma: [f64; 2],
     /// A joint is determined by the points if its standard deviation is below this, radians or metres: 0.043°, so that
     /// 0.1° is more than two of them.
     pub determined_sigma: f64,
@@ -72,6 +77,8 @@ impl Default for Settings {
             min_noise: 0.0015,
             plane_sigma: [0.004, 0.006],
             scan_sigma: [0.003, 0.000_35, 0.001],
+            calibrate: false,
+            frame_sigma: [0.003, 0.0026],
             determined_sigma: 0.000_75,
             min_score: 0.30,
             max_violation: 0.20,

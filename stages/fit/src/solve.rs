@@ -173,16 +173,26 @@ fn adjust(
     all: &[u32],
     fan: &impl Fan,
 ) -> (Adjusted, Judgement) {
-    let cap = refine.settings.max_points / refine.prepared.model.links.len().max(1);
-    let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
-    let points = refine.stratified(h, all, (gate, cap.max(2000)), fan);
-    let done = Adjust { refine }.run(h, &points, gate, fan);
+    let (points, gate) = adjusted_points(refine, h, all, fan);
+    let done = Adjust { refine, frames: &[] }.run(h, &points, gate, fan);
     let judgement = judged(refine, &done.hypothesis);
     (done, judgement)
 }
 
+/// Points that an adjustment is made of, and its gate, metres.
+pub(crate) fn adjusted_points(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    all: &[u32],
+    fan: &impl Fan,
+) -> (Vec<u32>, f64) {
+    let cap = refine.settings.max_points / refine.prepared.model.links.len().max(1);
+    let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
+    (refine.stratified(h, all, (gate, cap.max(2000)), fan), gate)
+}
+
 /// The judgement with the tolerance that the scans' noise asks for.
-fn judged(refine: &Refine<'_>, h: &Hypothesis) -> Judgement {
+pub(crate) fn judged(refine: &Refine<'_>, h: &Hypothesis) -> Judgement {
     let tolerance = (4.0 * refine.scene.noise).clamp(JUDGE_TOLERANCE.0, JUDGE_TOLERANCE.1);
     judge(refine.prepared, refine.scene, refine.settings, h, tolerance)
 }
