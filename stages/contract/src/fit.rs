@@ -150,9 +150,6 @@ impl JointFrame {
 pub struct Calibration {
     /// Its free joints, in the order of the model.
     pub frames: Vec<JointFrame>,
-    /// Covariance of shifts and turns of all of them, row-major, (6 n)²; what the points do not tell keeps the variance
-    /// of the prior.
-    pub covariance: Vec<f64>,
     /// Standard deviations of the prior: shift, metres, turn, radians.
     pub prior: [f64; 2],
     /// RMS distance of each link's points from its surface before and after, metres.

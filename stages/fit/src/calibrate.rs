@@ -6,12 +6,13 @@
 //! no scan of one posture can tell.
 
 use contract::{Calibration, Fan, Fit, JointFrame};
-use geometry::{Pose, Vector};
+use geometry::{Pose, Vector, robust};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::{JointKind, Kinematics, Model};
 
-use crate::adjust::{Adjust, State};
+use crate::adjust::{Adjust, Adjusted, State};
 use crate::beam::Hypothesis;
+use crate::normal::Normal;
 use crate::refine::Refine;
 use crate::solve::{NEAR_MARGIN, adjusted_points, judged};
 use crate::{Prepared, Scene, Settings, report};
@@ -34,47 +35,58 @@ pub fn calibrate(
     settings: &Settings,
     fan: &impl Fan,
 ) -> (Model, Fit) {
-    let nominal = prepared.model;
-    let mut model = nominal.clone();
-    let mut h = Hypothesis {
+    let h = Hypothesis {
         local_from_base: scene.world_from_local().inverse() * fit.world_from_base,
         posture: fit.joints.iter().map(|j| j.value).collect(),
         score: 0.0,
     };
     let base = geometry::Point::from(h.local_from_base.translation.vector);
     let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
+    let refine = Refine { prepared, scene, settings, prior: None };
+    let (model, done, frames) = estimate(&refine, &h, &all, 1, fan);
+    let own = prepared.moved(&model);
+    let refine = Refine { prepared: &own, ..refine };
+    let judgement = judged(&refine, &done.hypothesis);
+    let spins = refine.spins(&done.hypothesis, &near, scene.noise * scene.noise);
+    let mut out = report::report(&refine, &(done, judgement, spins), &[], &near, fan);
+    let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();
+    keep(&mut out, fit, Calibration { frames, prior: settings.frame_sigma, link_rms });
+    (model, out)
+}
+
+/// The model with its joints where the points have them, the adjustment of its base and posture, and where they are;
+/// from one point of `every`.
+fn estimate(
+    refine: &Refine<'_>,
+    start: &Hypothesis,
+    all: &[u32],
+    every: usize,
+    fan: &impl Fan,
+) -> (Model, Adjusted, Vec<JointFrame>) {
+    let nominal = refine.prepared.model;
+    let mut model = nominal.clone();
+    let mut h = start.clone();
     let mut step = 0;
     loop {
-        let own = prepared.moved(&model);
-        let refine = Refine { prepared: &own, scene, settings, prior: None };
-        let (points, gate) = adjusted_points(&refine, &h, &all, fan);
+        let own = refine.prepared.moved(&model);
+        let refine = Refine { prepared: &own, prior: refine.prior, ..*refine };
+        let (points, gate) = adjusted_points(&refine, &h, all, fan);
+        let points: Vec<u32> = points.into_iter().step_by(every).collect();
         let mut done = Adjust { refine: &refine, frames: &[] }.run(&h, &points, gate, fan);
         h = done.hypothesis.clone();
-        let state = State {
-            hypothesis: h.clone(),
-            scans: done.scans.clone(),
-            patch_sigma: done.patch_sigma,
-        };
-        let mut normal =
-            Adjust { refine: &refine, frames: &nominal.free }.at(&state, &points, gate, fan);
-        let n = 6 + h.posture.len();
+        let (scans, patch_sigma) = (done.scans.clone(), done.patch_sigma);
+        let state = State { hypothesis: h.clone(), scans, patch_sigma };
+        let with_frames = Adjust { refine: &refine, frames: &nominal.free };
+        let mut normal = with_frames.at(&state, &points, gate, fan);
         let frames = frames(nominal, &model);
-        for (f, frame) in frames.iter().enumerate() {
-            let values = frame.shift.into_iter().chain(frame.turn);
-            for (i, (value, sigma)) in values.zip(prior(frame, settings.frame_sigma)).enumerate() {
-                normal.add_prior(n + 6 * f + i, value, sigma);
-            }
-        }
+        normal.add_frame_priors(&frames, refine.settings.frame_sigma);
         let solved = if step < N_STEPS { normal.solve() } else { None };
         let Some(change) = solved else {
             let covariance = normal.covariance(&own.patch_groups);
+            let n = 6 + h.posture.len();
             done.covariance = covariance.view((0, 0), (n, n)).into_owned();
-            let judgement = judged(&refine, &h);
-            let spins = refine.spins(&h, &near, scene.noise * scene.noise);
-            let mut out = report::report(&refine, &(done, judgement, spins), &[], &near, fan);
-            let found = calibration(frames, &covariance, (fit, &out), settings);
-            keep(&mut out, fit, found);
-            return (model, out);
+            let frames = with_sigmas(frames, &covariance);
+            return (model, done, frames);
         };
         apply(&mut model, &mut h, &change);
         step += 1;
@@ -88,25 +100,64 @@ fn keep(out: &mut Fit, fit: &Fit, found: Calibration) {
     out.alike.clone_from(&fit.alike);
     out.tool.clone_from(&fit.tool);
     out.verdict = out.verdict.min(fit.verdict);
-    for frame in &found.frames {
+    out.reasons.extend(words(&found.frames));
+    out.calibration = Some(found);
+}
+
+/// Joints that are clearly elsewhere than their model has them.
+fn words(frames: &[JointFrame]) -> Vec<String> {
+    let mut out = Vec::new();
+    for frame in frames {
         let ([swing, swing_sigma], [offset, offset_sigma]) = (frame.swing(), frame.offset());
         if swing > WORTH.0 && swing > CLEAR * swing_sigma {
             let (a, s) = (swing.to_degrees(), swing_sigma.to_degrees());
-            out.reasons.push(format!(
+            out.push(format!(
                 "the axis of joint '{}' leans {a:.2} ± {s:.2}° from the model's",
                 frame.name
             ));
         }
         if offset > WORTH.1 && offset > CLEAR * offset_sigma {
             let (a, s) = (offset * 1e3, offset_sigma * 1e3);
-            out.reasons.push(format!(
+            out.push(format!(
                 "the axis of joint '{}' runs {a:.1} ± {s:.1} mm beside the model's",
                 frame.name
             ));
         }
     }
-    out.calibration = Some(found);
+    out
 }
+
+/// Whether the robot's joints are where its model has them, from a part of its points. Where they are not, base and
+/// joints may be off by what they would move if the places of the joints were free: their covariance is widened by
+/// that, and it is said.
+pub(crate) fn doubt(
+    refine: &Refine<'_>,
+    best: &mut Adjusted,
+    all: &[u32],
+    fan: &impl Fan,
+) -> Vec<String> {
+    if best.patch_sigma < SMOOTH {
+        return Vec::new();
+    }
+    let (_, moved, frames) = estimate(refine, &best.hypothesis, all, EVERY, fan);
+    let words = words(&frames);
+    if !words.is_empty() {
+        let (was, is) = (&best.hypothesis, &moved.hypothesis);
+        let off = was.local_from_base.inverse() * is.local_from_base;
+        let (shift, turn) = (off.translation.vector, off.rotation.scaled_axis());
+        let joints = was.posture.iter().zip(&is.posture).map(|(a, b)| b - a);
+        let change = shift.iter().chain(&turn).copied().chain(joints);
+        for (i, change) in change.enumerate() {
+            best.covariance[(i, i)] += change * change;
+        }
+    }
+    words
+}
+
+/// A surface that is off by less over its patches is that of its model, joints and all, metres.
+const SMOOTH: f64 = 0.000_5;
+/// One point of so many is asked about the places of joints.
+const EVERY: usize = 4;
 
 /// Shift and turn of each free joint's frame between two models, in the first one's joint frame.
 fn frames(nominal: &Model, model: &Model) -> Vec<JointFrame> {
@@ -136,40 +187,76 @@ fn prior(frame: &JointFrame, [shift, turn]: [f64; 2]) -> [f64; 6] {
     })
 }
 
+impl Normal {
+    /// Frames are where the model has them, give or take.
+    fn add_frame_priors(&mut self, frames: &[JointFrame], sigmas: [f64; 2]) {
+        let first = self.n_robot() - 6 * frames.len();
+        for (f, frame) in frames.iter().enumerate() {
+            let values = frame.shift.into_iter().chain(frame.turn);
+            for (i, (value, sigma)) in values.zip(prior(frame, sigmas)).enumerate() {
+                self.add_prior(first + 6 * f + i, value, sigma);
+            }
+        }
+    }
+}
+
 /// What several postures of one robot, or several robots of one model, say together of the places of its joints; `None`
 /// where they are of different models.
+///
+/// Value by value, not by their covariance: one wrist that stands wrong must not pull at joints that are right, and
+/// counts less the farther it is off.
 #[must_use]
 pub fn combine(all: &[&Calibration]) -> Option<Calibration> {
     let first = *all.first()?;
-    let n = 6 * first.frames.len();
     let names = |c: &Calibration| c.frames.iter().map(|f| f.name.clone()).collect::<Vec<_>>();
-    let alike = |c: &&Calibration| names(c) == names(first) && c.covariance.len() == n * n;
-    if !all.iter().all(alike) {
+    if !all.iter().all(|c| names(c) == names(first)) {
         return None;
     }
-    let sigmas = first.frames.iter().flat_map(|f| prior(f, first.prior));
-    let own = DMatrix::from_diagonal(&DVector::from_iterator(n, sigmas.map(|s| s.powi(-2))));
-    let (mut information, mut pull) = (own.clone(), DVector::zeros(n));
-    for c in all {
-        let inverse = DMatrix::from_row_slice(n, n, &c.covariance).cholesky()?.inverse();
-        let values = c.frames.iter().flat_map(|f| f.shift.into_iter().chain(f.turn));
-        pull += &inverse * DVector::from_iterator(n, values);
-        // The prior counts once.
-        let mut told = (inverse - &own).symmetric_eigen();
-        told.eigenvalues.iter_mut().for_each(|v| *v = v.max(0.0));
-        information += told.recompose();
-    }
-    let covariance = information.cholesky()?.inverse();
-    let values = &covariance * pull;
-    let mut out = first.clone();
+    let mut out = Calibration { link_rms: Vec::new(), ..first.clone() };
     for (f, frame) in out.frames.iter_mut().enumerate() {
-        frame.shift = [0, 1, 2].map(|i| values[6 * f + i]);
-        frame.turn = [3, 4, 5].map(|i| values[6 * f + i]);
-        frame.sigma = std::array::from_fn(|i| covariance[(6 * f + i, 6 * f + i)].sqrt());
+        let before = prior(frame, first.prior);
+        for i in 0..6 {
+            let value = |c: &&Calibration| {
+                let f = &c.frames[f];
+                let v = if i < 3 { f.shift[i] } else { f.turn[i - 3] };
+                told(v, f.sigma[i], before[i])
+            };
+            let values: Vec<[f64; 2]> = all.iter().filter_map(value).collect();
+            let [v, sigma] = mean(&values, before[i]);
+            frame.sigma[i] = sigma;
+            if i < 3 { frame.shift[i] = v } else { frame.turn[i - 3] = v }
+        }
     }
-    out.covariance = (0..n * n).map(|i| covariance[(i / n, i % n)]).collect();
-    out.link_rms = Vec::new();
     Some(out)
+}
+
+/// What the points alone say of a value that was found with a prior: value and weight; `None` where they say nothing.
+fn told(value: f64, sigma: f64, prior: f64) -> Option<[f64; 2]> {
+    let (whole, own) = (sigma.powi(-2), prior.powi(-2));
+    let weight = whole - own;
+    (weight > 0.05 * own).then(|| [value * whole / weight, weight])
+}
+
+/// Robust weighted mean with the prior, and its standard deviation.
+fn mean(values: &[[f64; 2]], prior: f64) -> [f64; 2] {
+    const N_ROUNDS: usize = 10;
+    // So many standard deviations off a value counts fully; beyond less (Huber).
+    const FULLY: f64 = 1.5;
+    let mut at: Vec<f64> = values.iter().map(|v| v[0]).collect();
+    let mut middle = robust::median(&mut at).unwrap_or(0.0);
+    let mut total = prior.powi(-2);
+    for _ in 0..N_ROUNDS {
+        let mut sum = 0.0;
+        total = prior.powi(-2);
+        for [value, weight] in values {
+            let off = (value - middle).abs() * weight.sqrt();
+            let weight = weight * (FULLY / off.max(FULLY)).powi(2);
+            sum += weight * value;
+            total += weight;
+        }
+        middle = sum / total;
+    }
+    [middle, total.sqrt().recip()]
 }
 
 /// A step of base, posture and frames.
@@ -188,26 +275,16 @@ fn apply(model: &mut Model, h: &mut Hypothesis, change: &DVector<f64>) {
     }
 }
 
-fn calibration(
-    mut frames: Vec<JointFrame>,
-    covariance: &DMatrix<f64>,
-    (before, after): (&Fit, &Fit),
-    settings: &Settings,
-) -> Calibration {
-    let n = 6 * frames.len();
-    let first = covariance.nrows() - n;
+/// Standard deviations of the frames from the covariance, whose last rows are theirs.
+fn with_sigmas(mut frames: Vec<JointFrame>, covariance: &DMatrix<f64>) -> Vec<JointFrame> {
+    let first = covariance.nrows() - 6 * frames.len();
     for (f, frame) in frames.iter_mut().enumerate() {
         frame.sigma = std::array::from_fn(|i| {
             let at = first + 6 * f + i;
             covariance[(at, at)].max(0.0).sqrt()
         });
     }
-    Calibration {
-        frames,
-        covariance: (0..n * n).map(|i| covariance[(first + i / n, first + i % n)]).collect(),
-        prior: settings.frame_sigma,
-        link_rms: before.links.iter().zip(&after.links).map(|(b, a)| [b.rms, a.rms]).collect(),
-    }
+    frames
 }
 
 /// How links move with the places of joints.

@@ -71,6 +71,11 @@ impl Normal {
         }
     }
 
+    /// Unknowns of the robot: all but the scans'.
+    pub(crate) fn n_robot(&self) -> usize {
+        self.n_robot
+    }
+
     /// Adds a residual.
     pub(crate) fn add(&mut self, row: &Row<'_>) {
         let (n, at) = (self.n_robot, self.n_robot + row.view * N_SCAN);

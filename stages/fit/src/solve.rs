@@ -6,6 +6,7 @@ use nalgebra::Translation3;
 
 use crate::adjust::{Adjust, Adjusted};
 use crate::beam::{Beam, Hypothesis};
+use crate::calibrate::doubt;
 use crate::judge::{Judgement, judge};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Round};
 use crate::report::report;
@@ -68,9 +69,12 @@ pub fn fit(
         return None;
     }
     let best = settle(&refine, best, (&near, &all), fan);
-    let (best, flipped) = flip(&closer, &refine, best, (&near, &all), fan);
+    let (mut best, flipped) = flip(&closer, &refine, best, (&near, &all), fan);
     polished.extend(flipped);
-    Some(report(&refine, &best, &polished, &near, fan))
+    let misfits = doubt(&refine, &mut best.0, &all, fan);
+    let mut fit = report(&refine, &best, &polished, &near, fan);
+    fit.reasons.extend(misfits);
+    Some(fit)
 }
 
 /// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring
