@@ -3,7 +3,7 @@
 
 pub mod atomic;
 pub mod bench;
-mod calibrate;
+pub mod calibrate;
 pub mod cli;
 pub mod compare;
 pub mod demo;

@@ -41,6 +41,8 @@ pub(super) enum Command {
 pub(super) enum RobotsCommand {
     /// Check a robot library
     Lint(LintFlags),
+    /// Put together what runs with --calibrate found of one robot, and write its model so corrected
+    Calibrate(CalibrateFlags),
 }
 
 #[derive(Debug, Subcommand)]
@@ -114,6 +116,9 @@ pub(super) struct RunFlags {
     /// Where results go
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
+    /// Estimate where the joints of each robot really are, too: for robots that their models fit poorly
+    #[arg(long)]
+    pub(super) calibrate: bool,
 }
 
 #[derive(Debug, Args)]
@@ -137,6 +142,28 @@ pub(super) struct LintFlags {
     /// Answer in JSON
     #[arg(long)]
     pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CalibrateFlags {
+    /// Output folders of runs with --calibrate
+    #[arg(required = true, value_name = "OUT")]
+    pub(super) results: Vec<PathBuf>,
+    /// Model, as in the library (else the only one that was calibrated)
+    #[arg(long, value_name = "NAME")]
+    pub(super) model: Option<String>,
+    /// Robots by their ids in the results (else all of the model: they count as one and the same)
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    pub(super) robot: Vec<String>,
+    /// Joint values that the controller showed while it was scanned: offsets of its zeros are estimated (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub(super) readings: Option<PathBuf>,
+    /// Robot library that the model is taken from
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: PathBuf,
+    /// Where the corrected model goes: a folder of a library
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
 }
 
 /// Flags of all commands.

@@ -37,6 +37,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         }
         Command::Simulate(flags) => simulate::simulate(flags, &line.common, &say),
         Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, &say),
+        Command::Robots(RobotsCommand::Calibrate(flags)) => robots::calibrate(flags, &say),
     };
     done.unwrap_or_else(|error| {
         say.error(&error);

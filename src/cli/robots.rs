@@ -1,7 +1,9 @@
-//! `robots lint`: a library in; what is wrong with it, in words or JSON, out.
+//! `robots lint`: a library in; what is wrong with it, in words or JSON, out. `robots calibrate`: results in; a corrected
+//! model out.
 
-use super::flags::LintFlags;
+use super::flags::{CalibrateFlags, LintFlags};
 use super::say::Say;
+use crate::calibrate::{Wanted, together};
 use crate::exit;
 use contract::{Error, Kind, Result};
 use robot::{Finding, Library, Severity};
@@ -28,6 +30,16 @@ pub(super) fn lint(flags: &LintFlags, say: &Say) -> Result<u8> {
         say.result(&text);
     }
     Ok(if errors > 0 { exit::code(Kind::BadInput) } else { exit::OK })
+}
+
+/// Puts the calibrations of some results together.
+pub(super) fn calibrate(flags: &CalibrateFlags, say: &Say) -> Result<u8> {
+    let wanted = Wanted { model: flags.model.as_deref(), robots: &flags.robot };
+    let readings = flags.readings.as_deref();
+    let found = together(&flags.results, &wanted, readings)?;
+    found.write(&flags.robots, &flags.out)?;
+    say.result(&found.words(&flags.out));
+    Ok(exit::OK)
 }
 
 fn word(severity: Severity) -> &'static str {

@@ -6,7 +6,8 @@ use crate::{exit, job::Job, plan};
 use contract::Result;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
-    let means = common.means()?;
+    let mut means = common.means()?;
+    means.settings.fit.calibrate |= flags.calibrate;
     present(&flags.inputs)?;
     let engine = common.engine(&means)?;
     let job = Job {

@@ -26,8 +26,8 @@ pub use npy::{Element, NpyWriter};
 pub use plan_picture::PlanPicture;
 pub use record::{LasPoint, LasSettings, Quantum, RawVlr, class_of};
 pub use result::{
-    BasePose, BaseSigma, InputEntry, Labels, LinkEntry, Places, ResultFile, RobotEntry,
-    RunnerUpEntry, SCHEMA, ScanLabels, StageEntry, TipPose,
+    BasePose, BaseSigma, CalibrationEntry, FrameEntry, InputEntry, Labels, LinkEntry, Places,
+    ResultFile, RobotEntry, RunnerUpEntry, SCHEMA, ScanLabels, StageEntry, TipPose,
 };
 pub use robot_picture::RobotPicture;
 pub use table::write_table;

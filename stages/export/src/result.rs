@@ -3,7 +3,7 @@
 
 use crate::atomic;
 use crate::mask::MaskFiles;
-use contract::{Error, Fit, Kind, Mask, Result};
+use contract::{Calibration, Error, Fit, JointFrame, Kind, Mask, Result};
 use geometry::Pose;
 use serde::de::{MapAccess, Visitor};
 use serde::ser::SerializeMap;
@@ -77,6 +77,10 @@ pub struct RobotEntry {
     /// The tool of the library that it carries; its joints and links follow the robot's own.
     #[serde(default)]
     pub tool: Option<ToolEntry>,
+    /// Where its joints are against the model, where that was asked for: base and joints are then those of the robot so
+    /// corrected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationEntry>,
     /// Models that fit as well where the points can tell.
     #[serde(default)]
     pub alike: Vec<String>,
@@ -173,6 +177,84 @@ pub struct ToolEntry {
     pub link: String,
     /// Turn of its root about that link's z, radians.
     pub mount: f64,
+}
+
+/// How a robot differs from its model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationEntry {
+    /// Its free joints.
+    pub joints: Vec<FrameEntry>,
+    /// Standard deviations that were assumed beforehand: shift, metres, turn, radians.
+    pub prior: [f64; 2],
+    /// RMS distance of each link's points from its surface, metres: as in the model, and corrected.
+    pub link_rms: Places<[Option<f64>; 2]>,
+}
+
+/// Where a joint is against its model, in the joint's own frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameEntry {
+    /// Name of the joint.
+    pub joint: String,
+    /// Its axis.
+    pub axis: [f64; 3],
+    /// Whether it slides.
+    pub slides: bool,
+    /// Shift of its origin, metres.
+    pub shift: [f64; 3],
+    /// Turn of its frame, radians.
+    pub turn: [f64; 3],
+    /// Standard deviations of both.
+    pub sigma: [f64; 6],
+    /// How far its axis runs beside the model's, metres, and standard deviation.
+    pub offset: [f64; 2],
+    /// How far its axis leans, radians, and standard deviation.
+    pub swing: [f64; 2],
+}
+
+impl CalibrationEntry {
+    fn new(fit: &Fit, found: &Calibration) -> Self {
+        let names = fit.links.iter().map(|l| l.name.clone());
+        let rms = found.link_rms.iter().map(|r| r.map(finite));
+        Self {
+            joints: found.frames.iter().map(FrameEntry::from).collect(),
+            prior: found.prior,
+            link_rms: Places(names.zip(rms).collect()),
+        }
+    }
+
+    /// As the fit had it.
+    #[must_use]
+    pub fn calibration(&self) -> Calibration {
+        let frame = |e: &FrameEntry| JointFrame {
+            name: e.joint.clone(),
+            axis: e.axis,
+            slides: e.slides,
+            shift: e.shift,
+            turn: e.turn,
+            sigma: e.sigma,
+        };
+        let link_rms = self.link_rms.0.iter().map(|(_, r)| r.map(|v| v.unwrap_or(f64::NAN)));
+        Calibration {
+            frames: self.joints.iter().map(frame).collect(),
+            prior: self.prior,
+            link_rms: link_rms.collect(),
+        }
+    }
+}
+
+impl From<&JointFrame> for FrameEntry {
+    fn from(f: &JointFrame) -> Self {
+        Self {
+            joint: f.name.clone(),
+            axis: f.axis,
+            slides: f.slides,
+            shift: f.shift,
+            turn: f.turn,
+            sigma: f.sigma,
+            offset: f.offset(),
+            swing: f.swing(),
+        }
+    }
 }
 
 /// Another posture that explains the points as well.
@@ -296,6 +378,7 @@ impl RobotEntry {
                 link: t.link.clone(),
                 mount: t.mount,
             }),
+            calibration: fit.calibration.as_ref().map(|c| CalibrationEntry::new(fit, c)),
             alike: fit.alike.clone(),
             surface_sigma: finite(fit.surface_sigma),
             tip_sigma: finite(fit.tip_sigma),
@@ -345,6 +428,23 @@ impl ScanLabels {
 }
 
 impl ResultFile {
+    /// Reads the `result.json` of an output folder, or of a file of that kind.
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = if path.is_dir() { path.join("result.json") } else { path.to_path_buf() };
+        let bad = |e: String| {
+            Error::bad_input(e)
+                .at(file.display())
+                .hint("give the output folder of a run that ended")
+        };
+        let text = std::fs::read_to_string(&file).map_err(|e| bad(e.to_string()))?;
+        let result: Self = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
+        if result.schema == SCHEMA {
+            Ok(result)
+        } else {
+            Err(bad(format!("the schema is \"{}\", not \"{SCHEMA}\"", result.schema)))
+        }
+    }
+
     /// Writes `result.json` under the output folder: the last file of a run, so that its presence says that all the
     /// others are whole.
     pub fn write(&self, out: &Path) -> Result<()> {

@@ -5,6 +5,7 @@ mod bodies;
 mod chain;
 mod close;
 mod cloud;
+mod correct;
 mod dress;
 mod finding;
 mod kinematics;
@@ -20,6 +21,7 @@ mod sheet;
 mod tree;
 mod urdf;
 
+pub use correct::correct;
 pub use finding::{Finding, Severity};
 pub use library::Library;
 pub use load::Settings;

@@ -1,0 +1,100 @@
+//! A robot that its model fits poorly, from outside: runs with --calibrate find where a joint really is, readings of the
+//! controller find where its zeros are, and the corrected model is a model.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use stillpoint::demo::write_robots;
+use stillpoint::engine::Engine;
+use stillpoint::scanning::{Formats, scan_scene};
+
+/// Shift of one joint of the true robot, metres, in the joint's frame.
+const SHIFT: [f64; 3] = [0.004, 0.0, -0.003];
+/// What the controller's zeros are off by, radians.
+const ZERO: f64 = 0.01;
+const N_BEAMS: u64 = 600_000;
+
+fn stillpoint(args: &[&dyn AsRef<std::ffi::OsStr>]) -> String {
+    let done = Command::new(env!("CARGO_BIN_EXE_stillpoint"))
+        .args(args.iter().map(|a| a.as_ref()))
+        .args(["--progress", "none"])
+        .output()
+        .expect("the program starts");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    String::from_utf8_lossy(&done.stdout).into_owned()
+}
+
+/// Two postures of one robot whose third joint is elsewhere, scanned and run; the output folders.
+fn runs(dir: &Path, robots: &Path) -> (Vec<PathBuf>, String) {
+    let mut library =
+        robot::Library::load(robots, &robot::Settings::without_clouds()).expect("loads");
+    let at = library.model(simulate::demo_robots::PALLETISER).expect("is there");
+    let model = &mut library.models[at];
+    let joint = model.free[2];
+    model.joints[joint].parent_from_joint *=
+        geometry::Pose::translation(SHIFT[0], SHIFT[1], SHIFT[2]);
+    let model = library.models[at].clone();
+    let mut readings = String::new();
+    let outs = [0.4, 0.7].map(|share| {
+        let posture: Vec<f64> = (0..model.n_free())
+            .map(|j| {
+                let [low, high] = model.limits(j);
+                low + (high - low) * share
+            })
+            .collect();
+        let scene = simulate::paper_scene(7, &model, &posture, N_BEAMS);
+        let (scans, out) = (dir.join(format!("scans{share}")), dir.join(format!("out{share}")));
+        scan_scene(&scene, &library.models, &scans, Formats::ALL, &Engine::new(2)).expect("scans");
+        let input = scans.join("scans.e57");
+        stillpoint(&[&"run", &input, &"--robots", &robots, &"--out", &out, &"--calibrate"]);
+        let _ =
+            writeln!(readings, "[[posture]]\nresult = {out:?}\nrobot = \"R1\"\n[posture.joints]");
+        for (j, q) in posture.iter().enumerate() {
+            let _ = writeln!(readings, "{} = {:.6}", model.joints[model.free[j]].name, q - ZERO);
+        }
+        out
+    });
+    (outs.to_vec(), readings)
+}
+
+#[test]
+fn a_joint_that_is_elsewhere_is_found_and_the_model_corrected() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let robots = dir.path().join("robots");
+    write_robots(&robots).expect("the library is written");
+    let (outs, readings) = runs(dir.path(), &robots);
+    let (file, corrected) = (dir.path().join("readings.toml"), dir.path().join("corrected/arm"));
+    std::fs::write(&file, readings).expect("is written");
+    let words = stillpoint(&[
+        &"robots",
+        &"calibrate",
+        &outs[0],
+        &outs[1],
+        &"--robots",
+        &robots,
+        &"--out",
+        &corrected,
+        &"--readings",
+        &file,
+    ]);
+    assert!(words.contains("from 2 posture(s)"), "{words}");
+    let load = |dir: &Path| {
+        robot::Library::load(dir, &robot::Settings::without_clouds()).expect("loads").models
+    };
+    let nominal = load(&robots);
+    let nominal =
+        nominal.iter().find(|m| m.name == simulate::demo_robots::PALLETISER).expect("is there");
+    let own = &load(&dir.path().join("corrected"))[0];
+    for &joint in &nominal.free {
+        let moved =
+            nominal.joints[joint].parent_from_joint.inverse() * own.joints[joint].parent_from_joint;
+        let truth = if joint == nominal.free[2] { SHIFT } else { [0.0; 3] };
+        let axis = nominal.joints[joint].axis.into_inner();
+        let off = moved.translation.vector - geometry::Vector::from(truth);
+        let across = off - axis * off.dot(&axis);
+        assert!(across.norm() < 0.0015, "{} {across:?}\n{words}", nominal.joints[joint].name);
+    }
+    let zero = words.lines().find(|l| l.contains("zero off by")).expect("zeros are told");
+    let value: f64 = zero.split_whitespace().nth(4).expect("a value").parse().expect("a number");
+    assert!((value - ZERO.to_degrees()).abs() < 0.1, "{zero}");
+}
