@@ -15,6 +15,15 @@ const SAME_MOUNT: f64 = 0.052;
 /// Standard deviation up to which the arm's own flange is known, radians: 1°.
 const KNOWN: f64 = 0.0175;
 
+/// Gives fits whose loops stand otherwise than the library's model has them a model of their own.
+pub(crate) fn branch(mut fits: Vec<Fit>, models: &mut Vec<Model>) -> Vec<Fit> {
+    for fit in fits.iter_mut().filter(|f| !f.other_branches.is_empty()) {
+        models.push(models[fit.model].with_other_branches(&fit.other_branches));
+        fit.model = models.len() - 1;
+    }
+    fits
+}
+
 /// The fits, those with a tool replaced by fits of both, whose models are added to `models`.
 pub(crate) fn dress(
     fits: Vec<Fit>,
@@ -22,6 +31,7 @@ pub(crate) fn dress(
     (search, regions): (&Search<'_>, &[Region]),
     engine: &Engine,
 ) -> Result<Vec<Fit>> {
+    let fits = branch(fits, models);
     let tools: Vec<usize> = (0..models.len()).filter(|&i| models[i].is_tool()).collect();
     if tools.is_empty() {
         return Ok(fits);
@@ -84,6 +94,7 @@ fn dress_one(
         mount,
     });
     together.runner_up = fit.runner_up;
+    together.other_branches = fit.other_branches;
     together.alike = fit.alike;
     (together, Some(both))
 }

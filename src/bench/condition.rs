@@ -35,6 +35,8 @@ pub(super) struct Condition {
     /// How far joints are from where the model has them, one sigma: shift on each axis, metres, turn about each but
     /// their own, degrees.
     pub(super) frames: [f64; 2],
+    /// Whether the first loop that has two solutions stands on the other one.
+    pub(super) other_branch: bool,
     /// Whether the places of joints are estimated, too.
     pub(super) calibrate: bool,
     /// Share of 0..1 of each kind of clutter being there.
@@ -59,6 +61,7 @@ const PLAIN: Condition = Condition {
     warp: 0.0,
     frames: [0.0; 2],
     calibrate: false,
+    other_branch: false,
     clutter: 0.0,
     stand: 0.0,
     mount: Mount::Floor,
@@ -122,6 +125,7 @@ const SUITES: &[Suite] = &[
     ("frames", 4, |_| Condition { frames: FRAMES, ..PLAIN }),
     ("calibration", 4, |_| Condition { frames: FRAMES, calibrate: true, ..PLAIN }),
     ("loops", 6, |_| PLAIN),
+    ("branches", 3, |_| Condition { other_branch: true, ..PLAIN }),
     ("mounts", 6, |k| Condition {
         mount: [Mount::Ceiling, Mount::Wall, Mount::Tilted][k % 3],
         mixed: true,
@@ -150,7 +154,11 @@ pub(super) fn cases(bench: &Bench, models: &[Model], chosen: &[usize]) -> Result
             continue;
         }
         for &model in chosen {
-            if *name == "loops" && models[model].loops.is_empty() {
+            let own = &models[model];
+            let has_branch = |at| own.has_other_branch(at, &own.home());
+            if *name == "loops" && own.loops.is_empty()
+                || *name == "branches" && !(0..own.loops.len()).any(has_branch)
+            {
                 continue;
             }
             // A model's cases do not change when others join the library.

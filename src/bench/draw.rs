@@ -20,6 +20,8 @@ pub(super) struct Drawn {
     pub(super) scene: Scene,
     pub(super) world_from_base: Pose,
     pub(super) posture: Vec<f64>,
+    /// Loops that stand on the other of their solutions.
+    pub(super) other_branches: Vec<usize>,
 }
 
 /// Starts of a case of the basin's curve, and how far their bases are off: metres, radians (fit.md §6.4).
@@ -40,6 +42,7 @@ impl Drawn {
     /// The library as it really is: the true robot's shape may differ from its model.
     pub(super) fn models(&self, models: &[Model], case: &Case) -> Vec<Model> {
         let mut out = models.to_vec();
+        out[case.model] = out[case.model].with_other_branches(&self.other_branches);
         if case.condition.warp > 0.0 {
             shape::warp(&mut out[case.model], case.condition.warp, case.seed);
         }
@@ -102,7 +105,9 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     let reach = reach(model, &world_from_base, &posture);
     clutter(&mut scene, model, c, reach, &mut random);
     scanners(&mut scene, c, reach, &mut random);
-    Ok(Drawn { scene, world_from_base, posture })
+    let has_branch = |at: &usize| c.other_branch && model.has_other_branch(*at, &posture);
+    let other_branches = (0..model.loops.len()).find(has_branch).into_iter().collect();
+    Ok(Drawn { scene, world_from_base, posture, other_branches })
 }
 
 /// Roll, pitch and yaw, degrees.

@@ -235,7 +235,10 @@ fn is_right(joint: &JointRow, index: usize, fit: &Fit, posture: &[f64]) -> bool 
 fn sub_links(row: &mut Row, model: &Model, fit: &Fit, drawn: &Drawn) {
     let fitted: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     row.loop_gap = model.loop_gap(&fitted);
-    let (ours, theirs) = (model.poses(&fitted), model.poses(&drawn.posture));
+    let (ours, theirs) = (
+        model.with_other_branches(&fit.other_branches).poses(&fitted),
+        model.with_other_branches(&drawn.other_branches).poses(&drawn.posture),
+    );
     for (l, _) in model.links.iter().enumerate().filter(|(_, link)| link.role == Role::Sub) {
         let shift = (ours[l].translation.vector - theirs[l].translation.vector).norm();
         let turn = ours[l].rotation.angle_to(&theirs[l].rotation);

@@ -71,17 +71,19 @@ fn table_1(rows: &[Row]) -> String {
 /// Links that follow through closed loops.
 fn loops(rows: &[Row]) -> String {
     let mut out = String::new();
-    for model in models(rows, "loops") {
-        let own = || rows.iter().filter(|r| r.suite == "loops" && r.model == model && r.right);
+    let each =
+        ["loops", "branches"].map(|suite| models(rows, suite).into_iter().map(move |m| (suite, m)));
+    for (suite, model) in each.into_iter().flatten() {
+        let own = || rows.iter().filter(|r| r.suite == suite && r.model == model && r.right);
         if out.is_empty() {
             out.push_str("\nLinks of closed loops, in the frame of the base, largest over the right fits:\n\n");
-            out.push_str("| model | right | turn ° | shift mm | closure m |\n| --- | --- | --- | --- | --- |\n");
+            out.push_str("| suite | model | right | turn ° | shift mm | closure m |\n| --- | --- | --- | --- | --- | --- |\n");
         }
         let most = |of: &dyn Fn(&Row) -> f64| own().map(of).fold(0.0, f64::max);
-        let n = rows.iter().filter(|r| r.suite == "loops" && r.model == model).count();
+        let n = rows.iter().filter(|r| r.suite == suite && r.model == model).count();
         let _ = writeln!(
             out,
-            "| {model} | {} of {n} | {:.4} | {:.2} | {:.0e} |",
+            "| {suite} | {model} | {} of {n} | {:.4} | {:.2} | {:.0e} |",
             own().count(),
             most(&|r| r.sub[0].to_degrees()),
             most(&|r| r.sub[1] * 1e3),

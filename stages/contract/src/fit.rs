@@ -192,6 +192,8 @@ pub struct Fit {
     pub equals: Vec<Equal>,
     /// Posture after the sweeps and before the registration, where the method goes link after link; else empty.
     pub rough: Vec<f64>,
+    /// Closed loops, by their place in the model, that stand on the other of their two solutions than at the model's zero.
+    pub other_branches: Vec<usize>,
     /// The tool of the library that it carries, if one was found; its joints follow the robot's own.
     pub tool: Option<Mounted>,
     /// Where its joints really are, where that was asked for; base and joints are those of the robot so corrected.

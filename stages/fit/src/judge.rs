@@ -85,7 +85,7 @@ pub(crate) fn margin(
     other: (&Hypothesis, &Judgement),
 ) -> f64 {
     let (mut ahead, mut judged) = (0.0, 0.0);
-    for l in moved(prepared, best.0, other.0) {
+    for l in moved([prepared; 2], [best.0, other.0]) {
         let (p, q) = (best.1.links[l], other.1.links[l]);
         ahead += p[0] - q[0];
         judged += p[1].max(q[1]);
@@ -93,14 +93,14 @@ pub(crate) fn margin(
     if judged > 0.0 { ahead / judged } else { 0.0 }
 }
 
-/// Links that stand differently in two postures.
-pub(crate) fn moved(prepared: &Prepared<'_>, a: &Hypothesis, b: &Hypothesis) -> Vec<usize> {
-    let pose = |h: &Hypothesis| {
+/// Links that stand differently in two postures of two models of one robot.
+pub(crate) fn moved(prepared: [&Prepared<'_>; 2], [a, b]: [&Hypothesis; 2]) -> Vec<usize> {
+    let pose = |prepared: &Prepared<'_>, h: &Hypothesis| {
         let poses = prepared.model.poses(&h.posture);
         poses.iter().map(|p| h.local_from_base * p).collect::<Vec<_>>()
     };
-    let (a, b) = (pose(a), pose(b));
-    let links = prepared.model.links.iter().enumerate().filter(|(_, l)| !l.bounds.is_empty());
+    let (a, b) = (pose(prepared[0], a), pose(prepared[1], b));
+    let links = prepared[0].model.links.iter().enumerate().filter(|(_, l)| !l.bounds.is_empty());
     let stands_apart = |(l, link): &(usize, &robot::Link)| {
         let apart = |c: [f64; 3]| (a[*l] * Point::from(c) - b[*l] * Point::from(c)).norm();
         link.bounds.corners().into_iter().map(apart).fold(0.0, f64::max) > MOVED

@@ -9,6 +9,7 @@
 mod adjust;
 mod alternatives;
 mod beam;
+mod branch;
 mod calibrate;
 mod choose;
 mod judge;

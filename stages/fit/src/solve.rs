@@ -6,6 +6,7 @@ use nalgebra::Translation3;
 
 use crate::adjust::{Adjust, Adjusted};
 use crate::beam::{Beam, Hypothesis};
+use crate::branch::branches;
 use crate::calibrate::doubt;
 use crate::judge::{Judgement, judge};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Round};
@@ -69,12 +70,31 @@ pub fn fit(
         return None;
     }
     let best = settle(&refine, best, (&near, &all), fan);
-    let (mut best, flipped) = flip(&closer, &refine, best, (&near, &all), fan);
+    let (best, flipped) = flip(&closer, &refine, best, (&near, &all), fan);
     polished.extend(flipped);
-    let misfits = doubt(&refine, &mut best.0, &all, fan);
-    let mut fit = report(&refine, &best, &polished, &near, fan);
+    let other = branches(&refine, &best.0.hypothesis, &best.1, &near);
+    let Some((loops, model)) = other else {
+        return Some(finish(&refine, best, &polished, (&near, &all), fan));
+    };
+    let own = prepared.moved(&model);
+    let refine = Refine { prepared: &own, ..refine };
+    let best = settle(&refine, &best.0.hypothesis, (&near, &all), fan);
+    let fit = finish(&refine, best, &polished, (&near, &all), fan);
+    Some(Fit { other_branches: loops, ..fit })
+}
+
+/// The report, with what does not fit.
+fn finish(
+    refine: &Refine<'_>,
+    mut best: Settled,
+    others: &[Polished],
+    (near, all): (&[u32], &[u32]),
+    fan: &impl Fan,
+) -> Fit {
+    let misfits = doubt(refine, &mut best.0, all, fan);
+    let mut fit = report(refine, &best, others, near, fan);
     fit.reasons.extend(misfits);
-    Some(fit)
+    fit
 }
 
 /// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring

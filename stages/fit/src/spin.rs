@@ -90,18 +90,35 @@ impl Refine<'_> {
     /// How much worse another posture explains the points on the links that stand differently in it: the part of its
     /// squared distances that the best one does without; about 0 for equals, negative where the other is better.
     pub(crate) fn worsening(&self, best: &Hypothesis, other: &Hypothesis, near: &[u32]) -> f64 {
-        let moved = crate::judge::moved(self.prepared, best, other);
-        let mut points = self.swept(best, near, &moved);
-        points.extend(self.swept(other, near, &moved));
+        let moved = crate::judge::moved([self.prepared; 2], [best, other]);
+        self.worsening_in(self, [best, other], &moved, near)
+    }
+
+    /// Links that another model of the same robot places otherwise.
+    pub(crate) fn apart(&self, other: &Self, h: &Hypothesis) -> Vec<usize> {
+        crate::judge::moved([self.prepared, other.prepared], [h, h])
+    }
+
+    /// The same for a posture here and one of another model of the same robot; `moved` are the links that stand
+    /// differently.
+    pub(crate) fn worsening_in(
+        &self,
+        there: &Self,
+        [best, other]: [&Hypothesis; 2],
+        moved: &[usize],
+        near: &[u32],
+    ) -> f64 {
+        let mut points = self.swept(best, near, moved);
+        points.extend(there.swept(other, near, moved));
         points.sort_unstable();
         points.dedup();
         if points.len() < MIN_POINTS {
             return 0.0;
         }
-        let squares = |h: &Hypothesis| -> f64 {
-            self.distances(h, &points, |_| true).iter().map(|d| f64::from(*d).powi(2)).sum()
+        let squares = |refine: &Self, h: &Hypothesis| -> f64 {
+            refine.distances(h, &points, |_| true).iter().map(|d| f64::from(*d).powi(2)).sum()
         };
-        let (a, b) = (squares(best), squares(other));
+        let (a, b) = (squares(self, best), squares(there, other));
         (b - a) / b.max(a).max(points.len() as f64 * self.scene.noise * self.scene.noise)
     }
 

@@ -2,6 +2,7 @@
 //! in closed form, anything else by Newton's method from the zero posture.
 
 use crate::kinematics::Placing;
+use crate::model::Model;
 use geometry::{Point, Vector};
 use nalgebra::{DMatrix, DVector};
 
@@ -317,3 +318,47 @@ fn toward_elbow(d: &Vector, near: f64, far: f64, axis: &Vector, mode: f64) -> Ve
     let cos = (length * length + near * near - far * far) / (2.0 * length * near).max(1e-300);
     turned(&d, axis, -mode * cos.clamp(-1.0, 1.0).acos())
 }
+
+impl Model {
+    /// This robot with some of its loops on the other of their two solutions.
+    #[must_use]
+    pub fn with_other_branches(&self, loops: &[usize]) -> Self {
+        let mut out = self.clone();
+        for &at in loops {
+            match &mut out.loops[at].form {
+                Form::RrrSerial { mode } | Form::RrrBranched { mode } | Form::Rpr { mode } => {
+                    *mode = -*mode;
+                }
+                Form::Rr | Form::General => {}
+            }
+        }
+        out
+    }
+
+    /// Whether a loop could stand on the other of its two solutions at a posture: it closes there, its joints stay
+    /// within their limits, and it is another solution.
+    #[must_use]
+    pub fn has_other_branch(&self, at: usize, posture: &[f64]) -> bool {
+        if matches!(self.loops[at].form, Form::Rr | Form::General) {
+            return false;
+        }
+        let other = self.with_other_branches(&[at]);
+        let (own, values) = (self.joint_values(posture), other.joint_values(posture));
+        let passive = || self.loops[at].passive.iter().copied();
+        let inside = |j: usize| {
+            // A cylinder that is turned inside out is no cylinder, limits or not.
+            let limits = self.joints[j].limits;
+            limits.map_or_else(
+                || Placing::open(self, posture).turns(j),
+                |[low, high]| (low - LIMIT_PLAY..=high + LIMIT_PLAY).contains(&values[j]),
+            )
+        };
+        let is_other = passive().any(|j| (own[j] - values[j]).abs() > OTHER_BRANCH);
+        is_other && other.loop_gap(posture) < CLOSED && passive().all(inside)
+    }
+}
+
+/// Limits of passive joints are often rounded, radians or metres.
+const LIMIT_PLAY: f64 = 0.02;
+/// Values that differ by less are one solution, radians or metres.
+const OTHER_BRANCH: f64 = 0.02;
