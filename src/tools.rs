@@ -81,7 +81,7 @@ fn dress_one(
         }
     }
     let Some(([tool, flange], mut start)) = best else { return (fit, None) };
-    let mount = mount(&fit, &mut start, n_arm);
+    let mount = mount(&fit, &mut start, n_arm, arm.mount_axis(flange).1);
     let both = arm.with_tool(&models[tool], flange, mount);
     let prepared = Prepared::new(fit.model, &both);
     let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
@@ -101,7 +101,7 @@ fn dress_one(
 
 /// Which hole of the flange the tool stands at, radians: told by the arm's last joint where its own points determine it,
 /// else the first. The last joint takes up the rest.
-fn mount(fit: &Fit, start: &mut Tooled, n_arm: usize) -> f64 {
+fn mount(fit: &Fit, start: &mut Tooled, n_arm: usize, way: f64) -> f64 {
     let (Some(flange), Some(value)) = (fit.joints.get(n_arm - 1), start.posture.get_mut(n_arm - 1))
     else {
         return 0.0;
@@ -109,7 +109,7 @@ fn mount(fit: &Fit, start: &mut Tooled, n_arm: usize) -> f64 {
     if flange.sigma > KNOWN {
         return 0.0;
     }
-    let turned = *value - flange.value;
+    let turned = way * (*value - flange.value);
     let off = |mount: f64| {
         let d = (turned - mount).rem_euclid(TAU);
         d.min(TAU - d)
@@ -122,6 +122,6 @@ fn mount(fit: &Fit, start: &mut Tooled, n_arm: usize) -> f64 {
     if off(nearest) > SAME_MOUNT {
         return 0.0;
     }
-    *value -= nearest;
+    *value -= way * nearest;
     nearest
 }

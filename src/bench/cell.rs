@@ -6,6 +6,7 @@ use crate::job::{Means, Settings};
 use crate::search::{Search, Shelf};
 use crate::store::{Scatter, Store};
 use crate::surfaces::{Gather, Surfaces};
+use crate::tools;
 use contract::{Fit, InputId, Lattice, Map, MaskId, Region, Result, Scan, ScanId, Strip};
 use geometry::Pose;
 use rayon::prelude::*;
@@ -123,8 +124,10 @@ impl Cell {
         let started = Instant::now();
         let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
         let mut fits = fit::choose(fits.into_iter().flatten().collect(), models);
+        let mut models = models.to_vec();
+        fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
         if settings.fit.calibrate {
-            fits = calibrate(fits, &mut models.to_vec(), (&search, &regions), engine)?;
+            fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
         }
         let seconds = started.elapsed().as_secs_f64();
         Ok(Found { fits, n_robot_points: self.n_robot_points, seconds, ends: Vec::new() })

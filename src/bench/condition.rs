@@ -7,7 +7,7 @@ use robot::Model;
 
 /// What a robot is bolted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mount {
+pub(super) enum Place {
     /// The floor, or a stand on it.
     Floor,
     /// A plate overhead.
@@ -35,6 +35,8 @@ pub(super) struct Condition {
     /// How far joints are from where the model has them, one sigma: shift on each axis, metres, turn about each but
     /// their own, degrees.
     pub(super) frames: [f64; 2],
+    /// Whether a tool of the library hangs on the flange.
+    pub(super) tool: bool,
     /// Whether the first loop that has two solutions stands on the other one.
     pub(super) other_branch: bool,
     /// Whether the places of joints are estimated, too.
@@ -42,7 +44,7 @@ pub(super) struct Condition {
     /// Share of 0..1 of each kind of clutter being there.
     pub(super) clutter: f64,
     /// What the robot is bolted to.
-    pub(super) mount: Mount,
+    pub(super) mount: Place,
     /// How postures are found.
     pub(super) method: Method,
     /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0: the whole search.
@@ -62,9 +64,10 @@ const PLAIN: Condition = Condition {
     frames: [0.0; 2],
     calibrate: false,
     other_branch: false,
+    tool: false,
     clutter: 0.0,
     stand: 0.0,
-    mount: Mount::Floor,
+    mount: Place::Floor,
     method: Method::Beam,
     perturbed_deg: 0.0,
 };
@@ -126,8 +129,9 @@ const SUITES: &[Suite] = &[
     ("calibration", 4, |_| Condition { frames: FRAMES, calibrate: true, ..PLAIN }),
     ("loops", 6, |_| PLAIN),
     ("branches", 3, |_| Condition { other_branch: true, ..PLAIN }),
+    ("tools", 3, |_| Condition { tool: true, ..PLAIN }),
     ("mounts", 6, |k| Condition {
-        mount: [Mount::Ceiling, Mount::Wall, Mount::Tilted][k % 3],
+        mount: [Place::Ceiling, Place::Wall, Place::Tilted][k % 3],
         mixed: true,
         ..PLAIN
     }),
@@ -158,6 +162,7 @@ pub(super) fn cases(bench: &Bench, models: &[Model], chosen: &[usize]) -> Result
             let has_branch = |at| own.has_other_branch(at, &own.home());
             if *name == "loops" && own.loops.is_empty()
                 || *name == "branches" && !(0..own.loops.len()).any(has_branch)
+                || *name == "tools" && !models.iter().any(Model::is_tool)
             {
                 continue;
             }

@@ -1,7 +1,7 @@
 //! A case in; the scene that its seed draws, with the true base and posture, out.
 
 use super::cell::Start;
-use super::condition::{Case, Condition, Mount};
+use super::condition::{Case, Condition, Place};
 use super::shape;
 use contract::Result;
 use geometry::{Point, Pose, Vector};
@@ -51,6 +51,45 @@ impl Drawn {
         }
         out
     }
+}
+
+/// A tool on a flange.
+pub(super) struct Mount {
+    /// Index in the library.
+    pub(super) tool: usize,
+    /// Turn about the flange, radians.
+    pub(super) turn: f64,
+    /// Whether the arm's last joint turns the tool the same way (1) or the other (−1).
+    pub(super) way: f64,
+    /// Free joints of the arm.
+    pub(super) n_arm: usize,
+}
+
+impl Mount {
+    /// The arm with the tool on it.
+    pub(super) fn tooled(&self, models: &[Model], arm: usize) -> Model {
+        models[arm].with_tool(&models[self.tool], flange(&models[arm]), self.turn)
+    }
+}
+
+/// Where tools of the suites are bolted to.
+fn flange(arm: &Model) -> usize {
+    arm.flanges().first().copied().unwrap_or(0)
+}
+
+/// The tool of a case and how it is bolted on, where its condition wants one.
+pub(super) fn mount(case: &Case, models: &[Model]) -> Option<Mount> {
+    let tools: Vec<usize> = (0..models.len()).filter(|&i| models[i].is_tool()).collect();
+    if !case.condition.tool || tools.is_empty() {
+        return None;
+    }
+    let mut random = Random::keyed(&[case.seed, 0x7001]);
+    let any = |random: &mut Random, n: usize| ((random.unit() * n as f64) as usize).min(n - 1);
+    let tool = tools[any(&mut random, tools.len())];
+    // Holes of usual bolt circles.
+    let turn = any(&mut random, 8) as f64 * TAU / 8.0;
+    let way = models[case.model].mount_axis(flange(&models[case.model])).1;
+    Some(Mount { tool, turn, way, n_arm: models[case.model].free.len() })
 }
 
 /// Draws a case of a model.
@@ -126,10 +165,10 @@ fn plate(
 ) -> Option<Pose> {
     let size = reach(model, &Pose::identity(), &model.home());
     let (z, lean) = match c.mount {
-        Mount::Floor => return None,
-        Mount::Ceiling => (0.6 + 1.1 * size[0].max(size[1]), 180.0),
-        Mount::Wall => (0.4 + size[0].max(size[1]) * random.between(0.7, 0.9), 90.0),
-        Mount::Tilted => (random.between(0.7, 1.0), random.between(10.0, 45.0)),
+        Place::Floor => return None,
+        Place::Ceiling => (0.6 + 1.1 * size[0].max(size[1]), 180.0),
+        Place::Wall => (0.4 + size[0].max(size[1]) * random.between(0.7, 0.9), 90.0),
+        Place::Tilted => (random.between(0.7, 1.0), random.between(10.0, 45.0)),
     };
     let heading = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw);
     let lean = UnitQuaternion::from_euler_angles(f64::to_radians(lean), 0.0, 0.0);

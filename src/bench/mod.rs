@@ -102,28 +102,38 @@ fn run(
     (store, means, engine): (&Path, &Means, &Engine),
 ) -> Row {
     let started = Instant::now();
-    let seen = draw::draw(case, &models[case.model]).and_then(|drawn| {
-        let tried = if whole_library && case.condition.perturbed_deg == 0.0 {
-            models
-        } else {
-            std::slice::from_ref(&models[case.model])
-        };
-        let cell = Cell::scan(&drawn.scene, &drawn.models(models, case), engine)?;
+    let mount = draw::mount(case, models);
+    let mut real = models.to_vec();
+    if let Some(mount) = &mount {
+        real[case.model] = mount.tooled(models, case.model);
+    }
+    let seen = draw::draw(case, &real[case.model]).and_then(|drawn| {
+        let tried = tried(case, models, whole_library);
+        let cell = Cell::scan(&drawn.scene, &drawn.models(&real, case), engine)?;
         let mut settings = means.settings.clone();
         if case.condition.method != Method::default() {
             settings.fit.method = case.condition.method;
         }
         settings.fit.calibrate |= case.condition.calibrate;
         let starts = draw::starts(case, &drawn);
-        let found = cell.search((tried, &starts), store, (&settings, means, engine))?;
+        let found = cell.search((&tried, &starts), store, (&settings, means, engine))?;
         Ok((drawn, found))
     });
     match seen {
-        Ok((drawn, found)) => score(case, models, &drawn, &found),
+        Ok((drawn, found)) => score(case, (&real, mount.as_ref()), &drawn, &found),
         Err(error) => {
             Row::failed(case, &models[case.model], &error, started.elapsed().as_secs_f64())
         }
     }
+}
+
+/// Models that a case is searched for.
+fn tried(case: &Case, models: &[Model], whole_library: bool) -> Vec<Model> {
+    if whole_library && case.condition.perturbed_deg == 0.0 {
+        return models.to_vec();
+    }
+    let tools = models.iter().filter(|m| case.condition.tool && m.is_tool());
+    std::iter::once(&models[case.model]).chain(tools).cloned().collect()
 }
 
 /// Indices of the robots whose names are asked for.

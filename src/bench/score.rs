@@ -2,7 +2,7 @@
 
 use super::cell::{Found, Start};
 use super::condition::Case;
-use super::draw::Drawn;
+use super::draw::{Drawn, Mount};
 use contract::{Calibration, Error, Fit, Verdict};
 use geometry::{Point, Pose};
 use robot::{JointKind, Model, Role};
@@ -151,7 +151,12 @@ impl Row {
 }
 
 /// The figures of a case.
-pub(super) fn score(case: &Case, models: &[Model], drawn: &Drawn, found: &Found) -> Row {
+pub(super) fn score(
+    case: &Case,
+    (models, mount): (&[Model], Option<&Mount>),
+    drawn: &Drawn,
+    found: &Found,
+) -> Row {
     let model = &models[case.model];
     let base = drawn.world_from_base.translation.vector;
     let apart = |f: &Fit| (f.world_from_base.translation.vector - base).norm();
@@ -189,22 +194,28 @@ pub(super) fn score(case: &Case, models: &[Model], drawn: &Drawn, found: &Found)
         };
         row.calibration = Some((found.clone(), model.free.iter().map(moved).collect()));
     }
-    if fit.model_name == model.name {
-        row.joints = joints(model, fit, &drawn.posture);
+    if fit.model_name == model.name && fit.joints.len() == model.free.len() {
+        row.joints = joints(model, fit, (&drawn.posture, mount));
         displacements(&mut row, model, fit, drawn);
         sub_links(&mut row, model, fit, drawn);
     }
+    let tool = mount.map(|m| models[m.tool].name.as_str());
     row.right = row.right_model
+        && fit.tool.as_ref().map(|t| t.model.as_str()) == tool
         && row.base[0] < RIGHT_BASE
         && (0..row.joints.len()).all(|j| is_right(&row.joints[j], j, fit, &drawn.posture));
     row
 }
 
-fn joints(model: &Model, fit: &Fit, posture: &[f64]) -> Vec<JointRow> {
+/// The hole that a tool is bolted to and the arm's last joint are one turn: only their sum is compared.
+fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) -> Vec<JointRow> {
+    let bolted = fit.tool.as_ref().map_or(0.0, |t| t.mount);
+    let turned =
+        |j: usize| mount.filter(|m| m.n_arm == j + 1).map_or(0.0, |m| m.way * (bolted - m.turn));
     let each = fit.joints.iter().zip(posture).enumerate().map(|(j, (joint, truth))| {
         let slides = model.joints[model.free[j]].kind == JointKind::Prismatic;
         let whole = |e: f64| if slides { e } else { e - (e / TAU).round() * TAU };
-        let error = joint.value - truth;
+        let error = joint.value - truth + turned(j);
         JointRow {
             rough: fit.rough.get(j).map(|v| whole(v - truth)),
             name: joint.name.clone(),

@@ -100,7 +100,7 @@ pub struct Mounted {
     pub model: String,
     /// The robot's link that it is bolted to.
     pub link: String,
-    /// Turn of its root about that link's z, radians.
+    /// Turn of its root about the axis of the robot's last joint, along that link's own axis, radians.
     pub mount: f64,
 }
 

@@ -2,6 +2,7 @@
 
 use crate::model::{Joint, JointKind, Link, Model, Motion, Role};
 use geometry::{Pose, Vector};
+use nalgebra::Unit;
 
 /// Frames that tools are bolted to, by convention (ROS-Industrial, REP 199), best first.
 const FLANGES: [&str; 3] = ["tool0", "flange", "tool"];
@@ -9,8 +10,9 @@ const FLANGES: [&str; 3] = ["tool0", "flange", "tool"];
 const SAME_FRAME: f64 = 1e-3;
 
 impl Model {
-    /// Links that a tool may be bolted to: frames of the usual names that hang rigidly on the last link that moves, the
-    /// tip of the main chain, and that link itself; those that stand alike once.
+    /// Links that a tool may be bolted to: frames that hang rigidly on the last link that moves, those of the usual names
+    /// first, then the tip of the main chain and others without a body, and that link itself; those that stand alike
+    /// once.
     #[must_use]
     pub fn flanges(&self) -> Vec<usize> {
         let moves = |j: &&usize| self.joints[**j].kind != JointKind::Fixed;
@@ -28,9 +30,10 @@ impl Model {
         };
         let tip = self.main_chain.last().map(|&j| self.joints[j].child);
         let named = FLANGES.iter().filter_map(|name| self.link(name));
+        let frames = (0..self.links.len()).filter(|&l| self.links[l].bounds.is_empty());
         let poses = self.poses(&self.home());
         let mut out: Vec<usize> = Vec::new();
-        for link in named.chain(tip).chain([carrier]).filter(|&l| is_rigid(l)) {
+        for link in named.chain(tip).chain(frames).chain([carrier]).filter(|&l| is_rigid(l)) {
             let apart = |k: &usize| {
                 let off = poses[*k].inverse() * poses[link];
                 off.translation.vector.norm() > SAME_FRAME || off.rotation.angle() > SAME_FRAME
@@ -42,8 +45,27 @@ impl Model {
         out
     }
 
-    /// This robot with a tool's root link on one of its links, turned by `mount` about that link's z, radians. A joint of the
-    /// tool whose name the robot has already gets the tool's before it; its joints come after the robot's own.
+    /// The axis that a tool on this link is turned about: that of the robot's last joint, in the link's frame, in the
+    /// direction of the frame's own axis that is next to it; and whether the joint turns the same way (1) or the other
+    /// (−1).
+    #[must_use]
+    pub fn mount_axis(&self, flange: usize) -> (Unit<Vector>, f64) {
+        let poses = self.poses(&self.home());
+        let mut at = flange;
+        while let Some(j) = self.links[at].parent_joint {
+            let joint = &self.joints[j];
+            if joint.kind != JointKind::Fixed {
+                let axis = poses[flange].inverse() * (poses[at] * joint.axis.into_inner());
+                let way = axis[axis.iamax()].signum();
+                return (Unit::new_normalize(axis * way), way);
+            }
+            at = joint.parent;
+        }
+        (Vector::z_axis(), 1.0)
+    }
+
+    /// This robot with a tool's root link on one of its links, turned by `mount` about [`Self::mount_axis`], radians. A
+    /// joint of the tool whose name the robot has already gets the tool's before it; its joints come after the robot's own.
     ///
     /// # Panics
     /// If there is no such link.
@@ -73,7 +95,10 @@ impl Model {
             kind: JointKind::Fixed,
             parent: flange,
             child: n_links,
-            parent_from_joint: Pose::new(Vector::zeros(), Vector::z() * mount),
+            parent_from_joint: Pose::new(
+                Vector::zeros(),
+                self.mount_axis(flange).0.into_inner() * mount,
+            ),
             axis: Vector::z_axis(),
             limits: None,
             motion: Motion::Fixed,
