@@ -2,6 +2,7 @@
 //! search from the joint on from which the beams contradict the links (fit.md §4e).
 
 use contract::Fan;
+use nalgebra::UnitQuaternion;
 use robot::JointKind;
 use std::f64::consts::{PI, TAU};
 
@@ -19,6 +20,14 @@ const MIN_SEEN: f32 = 0.05;
 /// Hypotheses of a new search that are refined.
 const N_AGAIN: usize = 10;
 
+/// Of those, so many that differ in their last joint only: in the others by fewer sweep steps than so many.
+const N_FLANGES: usize = 3;
+const WRIST_STEPS: f64 = 6.0;
+/// Yaws that a base is tried at: every 4°, the arc that its corners move by the tolerance in.
+const N_YAWS: usize = 90;
+/// Of those, that many are refined.
+const N_TURNED: usize = 2;
+
 impl Beam<'_> {
     /// Other values of single joints that score nearly as well as these or better, best first.
     pub(crate) fn alternatives(&self, h: &Hypothesis, fan: &impl Fan) -> Vec<Hypothesis> {
@@ -27,6 +36,42 @@ impl Beam<'_> {
         let mut out: Vec<Hypothesis> = found.into_iter().flatten().collect();
         sort(&mut out);
         out.truncate(self.settings.n_polish);
+        out.extend(self.turned_bases(h));
+        out
+    }
+
+    /// The base turned under the robot, its first joint turned back: what stands on it stays. A round base shows its
+    /// yaw by a connector box only.
+    fn turned_bases(&self, h: &Hypothesis) -> Vec<Hypothesis> {
+        let model = self.prepared.model;
+        let joint = &model.joints[model.free[0]];
+        if joint.kind == JointKind::Prismatic || self.prepared.fixed.is_empty() {
+            return Vec::new();
+        }
+        let frame = model.poses(&h.posture)[joint.parent] * joint.parent_from_joint;
+        let tolerance = self.tolerance as f32;
+        let turn = |k: usize| {
+            let angle = TAU * k as f64 / N_YAWS as f64;
+            let value = self.within_limits(0, h.posture[0] - angle)?;
+            let spun = frame * UnitQuaternion::from_axis_angle(&joint.axis, angle);
+            let mut next = h.clone();
+            next.local_from_base = h.local_from_base * spun * frame.inverse();
+            next.posture[0] = value;
+            Some((self.score(&next, &self.prepared.fixed, tolerance), next))
+        };
+        let all: Vec<_> = (0..N_YAWS).map(turn).collect();
+        let Some((own, _)) = &all[0] else { return Vec::new() };
+        let score = |k: usize| all[k % N_YAWS].as_ref().map_or(f64::NEG_INFINITY, |a| a.0);
+        let is_peak = |k: &usize| {
+            score(*k) > score(k + 1) && score(*k) >= score(k + N_YAWS - 1) && score(*k) >= *own
+        };
+        let peaks = (2..N_YAWS - 1).filter(is_peak);
+        let mut out: Vec<Hypothesis> = peaks
+            .filter_map(|k| all[k].clone())
+            .map(|(score, next)| Hypothesis { score: h.score + score - own, ..next })
+            .collect();
+        sort(&mut out);
+        out.truncate(N_TURNED);
         out
     }
 
@@ -141,8 +186,20 @@ impl Beam<'_> {
         self.prepared.placed_by[..first].iter().for_each(|placed| links.extend(placed));
         let mut start = h.clone();
         start.score = self.score(h, &links, self.tolerance as f32);
-        let mut found = self.resume(vec![start], first, fan);
-        found.truncate(N_AGAIN);
-        found
+        self.varied(self.resume(vec![start], first, fan), N_AGAIN)
+    }
+
+    /// The first `n` of some hypotheses, few of those that differ in their last joint only: a flange that may stand
+    /// anywhere must not crowd out another wrist.
+    pub(crate) fn varied(&self, found: Vec<Hypothesis>, n: usize) -> Vec<Hypothesis> {
+        let mut kept: Vec<Hypothesis> = Vec::new();
+        for next in found {
+            let upto = next.posture.len().saturating_sub(2);
+            let alike = |k: &&Hypothesis| self.alike(k, &next, upto, WRIST_STEPS);
+            if kept.len() < n && kept.iter().filter(alike).count() < N_FLANGES {
+                kept.push(next);
+            }
+        }
+        kept
     }
 }

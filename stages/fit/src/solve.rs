@@ -70,7 +70,8 @@ pub fn fit(
         return None;
     }
     let best = settle(&refine, best, (&near, &all), fan);
-    let (best, flipped) = flip(&closer, &refine, best, (&near, &all), fan);
+    let rivals = near_rivals(&closer, &polished, &best);
+    let (best, flipped) = flip(&closer, &refine, (best, rivals), (&near, &all), fan);
     polished.extend(flipped);
     let other = branches(&refine, &best.0.hypothesis, &best.1, &near);
     let Some((loops, model)) = other else {
@@ -145,19 +146,43 @@ pub(crate) fn settle(
 /// Share of the surface explained that a flipped posture may lack and still be looked at closely.
 const FLIP_SHORT: f64 = 0.03;
 
-/// The best of a posture and its flips, by the points on the links that stand differently: a small wrist turned by half
+/// Other postures that explain nearly as much, best first, few.
+fn near_rivals(beam: &Beam<'_>, polished: &[Polished], best: &Settled) -> Vec<Polished> {
+    let least = best.1.explained - RIVAL_SHORT * best.1.explained.abs();
+    let last = best.0.hypothesis.posture.len().saturating_sub(2);
+    let mut out: Vec<Polished> = Vec::new();
+    for other in polished.iter().filter(|p| p.1.explained > least) {
+        let is_known = |h: &Hypothesis| beam.alike(h, &other.0, last, RIVAL_STEPS);
+        let is_new = !is_known(&best.0.hypothesis) && !out.iter().any(|p| is_known(&p.0));
+        if is_new && out.len() < N_RIVALS {
+            out.push(other.clone());
+        }
+    }
+    out
+}
+
+/// Share of the surface explained that a posture may lack and still be compared by its points.
+const RIVAL_SHORT: f64 = 0.01;
+/// Sweep steps within which, in all joints but the last, two postures are one.
+const RIVAL_STEPS: f64 = 3.0;
+/// So many are compared.
+const N_RIVALS: usize = 3;
+
+/// The best of a posture, its rivals and its flips, by the points on the links that stand differently: a small wrist turned by half
 /// a turn about both of its axes differs in a bolt or two, which beams alone do not tell. And the others.
 fn flip(
     beam: &Beam<'_>,
     refine: &Refine<'_>,
-    mut best: Settled,
+    (mut best, rivals): (Settled, Vec<Polished>),
     (near, all): (&[u32], &[u32]),
     fan: &impl Fan,
 ) -> (Settled, Vec<Polished>) {
     let mut others = Vec::new();
-    for flipped in beam.flips(&best.0.hypothesis) {
+    let flips = beam.flips(&best.0.hypothesis).into_iter().map(|flipped| {
         let h = roughly(refine, &flipped, near, &COARSE_ROUNDS[3..]);
-        let polished = polish(refine, &h, near);
+        polish(refine, &h, near)
+    });
+    for polished in rivals.into_iter().chain(flips.collect::<Vec<_>>()) {
         let least = best.1.explained - FLIP_SHORT * best.1.explained.abs();
         if polished.1.explained < least {
             others.push(polished);
@@ -229,14 +254,14 @@ const ADJUST_GATE: (f64, f64, f64) = (3.0, 0.02, 0.03);
 fn rough(
     beam: &Beam<'_>,
     refine: &Refine<'_>,
-    mut found: Vec<Hypothesis>,
+    found: Vec<Hypothesis>,
     near: &[u32],
     fan: &impl Fan,
 ) -> Vec<Hypothesis> {
     let settings = refine.settings;
     let mut out: Vec<(Hypothesis, f64)> = Vec::new();
     let last = found.first().map_or(0, |h| h.posture.len().saturating_sub(1));
-    found.truncate(settings.n_refine);
+    let found = beam.varied(found, settings.n_refine);
     for h in fan.fan(found, |h| roughly(refine, &h, near, &COARSE_ROUNDS)) {
         if out.iter().any(|(k, _)| beam.alike(k, &h, last, 0.7)) {
             continue;
