@@ -195,7 +195,7 @@ impl Together {
 }
 
 /// Copies a folder with all that is in it.
-fn copy(from: &Path, to: &Path) -> Result<()> {
+pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
     let at = |path: &Path| {
         let place = path.display().to_string();
         move |e: std::io::Error| Error::from(e).at(place.clone())

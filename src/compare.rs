@@ -23,6 +23,15 @@ pub struct Agreement {
     pub links: [u64; 3],
     /// Points that truly stand still, and those of them that are lost to moving.
     pub fixed: [u64; 2],
+    /// For each true robot, for each of its links: points with the right robot and link, true ones, and said ones.
+    pub by_link: Vec<Vec<[u64; 3]>>,
+    /// For each thing of the scene: its points, and those of them that are said to move. Empty where the truth does not
+    /// name things.
+    pub by_object: Vec<[u64; 2]>,
+    /// Names of the things.
+    pub objects: Vec<String>,
+    /// Points of attachments: said to be moving (attachment or link), and all.
+    pub attached: [u64; 2],
 }
 
 /// One robot.
@@ -32,6 +41,8 @@ pub struct RobotAgreement {
     pub name: String,
     /// True model.
     pub model: String,
+    /// Postures that it stood in while it was scanned.
+    pub n_postures: usize,
     /// What was found at its place.
     pub found: Option<Found>,
 }
@@ -41,8 +52,12 @@ pub struct RobotAgreement {
 pub struct Found {
     /// Its model, which may be the wrong one.
     pub model: String,
+    /// Whether the true model is among those that it is said to be.
+    pub is_right: bool,
     /// Its verdict.
     pub verdict: String,
+    /// Postures that were found.
+    pub n_postures: usize,
     /// Error of the base: metres, radians.
     pub base: [f64; 2],
     /// Name, error (radians or metres; turns of 360° taken out), stated standard deviation, whether it is said to be
@@ -64,13 +79,26 @@ impl Agreement {
             .map(|(t, robot)| match_robot(t, robot, &result.robots, &mut taken));
         let robots: Vec<RobotAgreement> = robots.collect();
         let n_invented = taken.iter().filter(|t| t.is_none()).count();
-        let mut agreement =
-            Self { robots, n_invented, moving: [0; 4], links: [0; 3], fixed: [0; 2] };
+        let by_link = truth.robots.iter().map(|r| vec![[0; 3]; r.links.len()]).collect();
+        let mut agreement = Self {
+            robots,
+            n_invented,
+            moving: [0; 4],
+            links: [0; 3],
+            fixed: [0; 2],
+            by_link,
+            by_object: vec![[0; 2]; truth.objects.len()],
+            objects: truth.objects.clone(),
+            attached: [0; 2],
+        };
         for (i, scan) in result.labels.scans.iter().enumerate() {
             let ours = Triple::read(out, [&scan.kind, &scan.robot, &scan.link])?;
             let name = |what: &str| format!("labels/{i}.{what}.npy");
             let theirs = Triple::read(truth_dir, [&name("kind"), &name("robot"), &name("link")])?;
             agreement.count(&ours, &theirs, &taken)?;
+            if !truth.objects.is_empty() {
+                agreement.count_objects(&ours, &npy(&truth_dir.join(name("object")))?);
+            }
         }
         Ok(agreement)
     }
@@ -96,16 +124,52 @@ impl Agreement {
                 (PointKind::Link as u8 == ours.kind[i], PointKind::Link as u8 == theirs.kind[i]);
             self.links[1] += u64::from(real_link);
             self.links[2] += u64::from(link);
+            if theirs.kind[i] == PointKind::Attachment as u8 {
+                self.attached[0] += u64::from(own);
+                self.attached[1] += 1;
+            }
+            let robot =
+                usize::try_from(ours.robot[i]).ok().and_then(|r| taken.get(r).copied().flatten());
+            let at = |robot: Option<usize>, link: i16| robot.zip(usize::try_from(link).ok());
+            let truly = at(usize::try_from(theirs.robot[i]).ok(), theirs.link[i]);
+            let said = at(robot, ours.link[i]);
+            for (which, place, is_link) in [(1, truly, real_link), (2, said, link)] {
+                let count = place.and_then(|(r, l)| self.by_link.get_mut(r)?.get_mut(l));
+                if let Some(count) = count.filter(|_| is_link) {
+                    count[which] += 1;
+                    count[0] += u64::from(which == 1 && link && said == truly);
+                }
+            }
             if link && real_link {
-                let robot = usize::try_from(ours.robot[i])
-                    .ok()
-                    .and_then(|r| taken.get(r).copied().flatten());
                 let same = robot == usize::try_from(theirs.robot[i]).ok()
                     && ours.link[i] == theirs.link[i];
                 self.links[0] += u64::from(same);
             }
         }
         Ok(())
+    }
+
+    /// Points of each thing, and those that are said to move.
+    fn count_objects(&mut self, ours: &Triple, objects: &[u8]) {
+        for (kind, object) in ours.kind.iter().zip(objects.as_chunks::<2>().0) {
+            let at = usize::from(u16::from_le_bytes(*object));
+            if let Some(count) = self.by_object.get_mut(at) {
+                let moves = [PointKind::Link as u8, PointKind::Attachment as u8].contains(kind);
+                count[0] += 1;
+                count[1] += u64::from(moves);
+            }
+        }
+    }
+
+    /// Intersection over union of each true link of a found robot with at least so many points.
+    #[must_use]
+    pub fn link_ious(&self, least: u64) -> Vec<f64> {
+        let found = self.robots.iter().zip(&self.by_link).filter(|(r, _)| r.found.is_some());
+        let links = found.flat_map(|(_, links)| links);
+        links
+            .filter(|c| c[1] >= least)
+            .map(|c| c[0] as f64 / (c[1] + c[2] - c[0]).max(1) as f64)
+            .collect()
     }
 
     /// Balance of precision and recall of "moves", 0..1.
@@ -207,12 +271,19 @@ fn match_robot(
         });
         Found {
             model: robot.model.clone(),
+            is_right: robot.model == truth.model || robot.alike.contains(&truth.model),
             verdict: robot.verdict.clone(),
+            n_postures: 1,
             base: [distance, turn],
             joints: joints.collect(),
         }
     });
-    RobotAgreement { name: truth.name.clone(), model: truth.model.clone(), found }
+    RobotAgreement {
+        name: truth.name.clone(),
+        model: truth.model.clone(),
+        n_postures: 1 + truth.later.len(),
+        found,
+    }
 }
 
 fn rotation(wxyz: [f64; 4]) -> UnitQuaternion<f64> {

@@ -5,7 +5,7 @@
 //! OUT/scans.las            the same points in the world, scan n has point_source_id n + 1
 //! OUT/scanners.toml        for --scanners: the stated poses, by point_source_id
 //! OUT/truth/truth.json     what really stands there, and where the scanners really stood
-//! OUT/truth/labels/N.*     labels of scan N, in the order of the E57 file
+//! OUT/truth/labels/N.*     labels of scan N, in the order of the E57 file, and the things they are of
 //! OUT/truth/las/labels/0.* labels of the LAS file
 //! ```
 
@@ -14,7 +14,7 @@ use crate::engine::{Engine, Task};
 use crate::progress::Amount;
 use contract::{Error, Kind, Label, Map, MaskId, Result, Weigh};
 use export::{
-    E57Scans, GridPoint, GridScan, LasPoint, LasSettings, LasWriter, MaskWriter, Quantum,
+    E57Scans, GridPoint, GridScan, LasPoint, LasSettings, LasWriter, MaskWriter, NpyWriter, Quantum,
 };
 use geometry::{Aabb, Pose};
 use robot::Model;
@@ -101,6 +101,7 @@ impl Files {
         let n_beams = u64::from(frame.n_rows) * u64::from(frame.n_cols);
         let task = Task::new(format!("scan {}", frame.name)).of(Amount::points(n_beams));
         let mut mask = MaskWriter::create(truth, MaskId(i as u32))?;
+        let mut objects = NpyWriter::create(truth.join(format!("labels/{i}.object.npy")))?;
         let source_id = u16::try_from(i + 1).map_err(|_| {
             Error::bad_input(format!("LAS knows 65535 scanners at most, this is \"{}\"", i + 1))
         })?;
@@ -110,6 +111,7 @@ impl Files {
                 let labels: Vec<Label> =
                     (0..seen.len()).filter(|&k| seen.hit[k]).map(|k| seen.label[k]).collect();
                 mask.push(&labels)?;
+                objects.push((0..seen.len()).filter(|&k| seen.hit[k]).map(|k| seen.object[k]))?;
                 if let Some((las, las_mask)) = &mut self.las {
                     las_mask.push(&labels)?;
                     write_las(las, &seen, &frame.world_from_scan, source_id)?;
@@ -121,6 +123,7 @@ impl Files {
                 None => seen.try_for_each(|s| s.map(drop)),
             }
         })?;
+        objects.finish()?;
         mask.finish()
     }
 

@@ -139,7 +139,7 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
         xyz: world_from_base.translation.vector.into(),
         rpy_deg: rpy_deg(&world_from_base),
         posture: named(model, &posture),
-        tool: None,
+        ..RobotPlace::default()
     });
     let reach = reach(model, &world_from_base, &posture);
     clutter(&mut scene, model, c, reach, &mut random);

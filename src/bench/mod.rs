@@ -7,6 +7,7 @@
 mod cell;
 mod condition;
 mod draw;
+pub mod plant;
 mod plot;
 mod score;
 mod shape;
@@ -60,7 +61,8 @@ pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String>
     let models = library::load(&robots, &means.settings.robot, engine)?.models;
     let chosen = chosen(&models, &bench.models)?;
     let cases = cases(bench, &models, &chosen)?;
-    let mut journal = bench.out.as_deref().map(Journal::create).transpose()?;
+    let mut journal =
+        bench.out.as_deref().map(|dir| Journal::create(dir, "accuracy.jsonl")).transpose()?;
     let mut rows = Vec::with_capacity(cases.len());
     let store = tempfile::tempdir()?;
     // What stages say of single cells would drown what is said of cases.
@@ -151,13 +153,13 @@ fn chosen(models: &[Model], names: &[String]) -> Result<Vec<usize>> {
 struct Journal(std::fs::File, PathBuf);
 
 impl Journal {
-    fn create(dir: &Path) -> Result<Self> {
-        let path = dir.join("accuracy.jsonl");
+    fn create(dir: &Path, name: &str) -> Result<Self> {
+        let path = dir.join(name);
         let made = std::fs::create_dir_all(dir).and_then(|()| std::fs::File::create(&path));
         Ok(Self(made.map_err(|e| Error::from(e).at(path.display()))?, path))
     }
 
-    fn add(&mut self, row: &Row) -> Result<()> {
+    fn add(&mut self, row: &impl serde::Serialize) -> Result<()> {
         let text = serde_json::to_string(row)
             .map_err(|e| Error::new(Kind::Bug, "a row cannot be written").because(e))?;
         writeln!(self.0, "{text}").map_err(|e| Error::from(e).at(self.1.display()))

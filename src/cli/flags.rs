@@ -49,6 +49,8 @@ pub(super) enum RobotsCommand {
 pub(super) enum BenchCommand {
     /// Draw cells from seeds, scan them, find the robots, compare with the truth
     Accuracy(AccuracyFlags),
+    /// Draw cells and lines as files, do the main job on them, compare robots and labels with the truth
+    Plant(PlantFlags),
 }
 
 #[derive(Debug, Args)]
@@ -77,6 +79,31 @@ pub(super) struct AccuracyFlags {
     /// Where rows and tables go
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct PlantFlags {
+    /// Suites, by name (else all)
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(super) suite: Vec<String>,
+    /// Cases of each suite (else the suite's own number)
+    #[arg(long, value_name = "N")]
+    pub(super) cases: Option<usize>,
+    /// Number of the first of them, to look at single ones again
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub(super) first: usize,
+    /// Seed of all that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Robot library (else the demo's robots)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// Where rows and tables go; scenes, scans and results are kept there, too, with --keep
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// Keep scenes, scans and results
+    #[arg(long, requires = "out")]
+    pub(super) keep: bool,
 }
 
 /// Which models a cell is searched for.

@@ -35,6 +35,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Bench(BenchCommand::Accuracy(flags)) => {
             bench::bench_accuracy(flags, &line.common, &say)
         }
+        Command::Bench(BenchCommand::Plant(flags)) => bench::bench_plant(flags, &line.common, &say),
         Command::Simulate(flags) => simulate::simulate(flags, &line.common, &say),
         Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, &say),
         Command::Robots(RobotsCommand::Calibrate(flags)) => robots::calibrate(flags, &say),

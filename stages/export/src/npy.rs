@@ -20,6 +20,13 @@ impl Element for u8 {
     }
 }
 
+impl Element for u16 {
+    const DESCR: &'static str = "<u2";
+    fn put(self, bytes: &mut Vec<u8>) {
+        bytes.extend(self.to_le_bytes());
+    }
+}
+
 impl Element for i16 {
     const DESCR: &'static str = "<i2";
     fn put(self, bytes: &mut Vec<u8>) {

@@ -131,6 +131,15 @@ fn robots(scene: &Scene) -> Result<()> {
         for (joint, value) in &r.posture {
             finite("value", &format!("{at}, joint \"{joint}\""), &[*value], -1000.0, 1000.0)?;
         }
+        for then in &r.later {
+            let known = |s: &&String| scene.scanners.iter().any(|k| k.name == **s);
+            if let Some(odd) = then.scanners.iter().find(|s| !known(s)) {
+                return Err(Error::bad_input(format!("no scanner has this name: \"{odd}\"")).at(at));
+            }
+            for (joint, value) in &then.posture {
+                finite("value", &format!("{at}, joint \"{joint}\""), &[*value], -1000.0, 1000.0)?;
+            }
+        }
         if let Some(tool) = &r.tool {
             finite("tool length", &at, &[tool.length], 0.01, 5.0)?;
         }

@@ -39,6 +39,8 @@ pub struct SimColumns {
     pub intensity: Vec<f32>,
     /// What the point belongs to; uncertain where the beam did not come back.
     pub label: Vec<Label>,
+    /// Index of the thing it belongs to in [`crate::Truth::objects`]; 0 where the beam did not come back.
+    pub object: Vec<u16>,
     /// Whether the range is a mean over surfaces more than 3 cm apart: the point may hang in the air, and its label
     /// is that of the nearest part.
     pub mixed: Vec<bool>,
@@ -71,13 +73,20 @@ impl SimColumns {
     }
 
     pub(crate) fn push(&mut self, beam: Option<Return>, stated: &Vector) {
-        let empty = Return { range: 0.0, intensity: 0.0, label: Label::UNCERTAIN, is_mixed: false };
+        let empty = Return {
+            range: 0.0,
+            intensity: 0.0,
+            label: Label::UNCERTAIN,
+            object: 0,
+            is_mixed: false,
+        };
         let r = beam.unwrap_or(empty);
         self.hit.push(beam.is_some());
         self.range.push(r.range);
         self.xyz.push((stated * r.range).into());
         self.intensity.push(r.intensity);
         self.label.push(r.label);
+        self.object.push(r.object);
         self.mixed.push(r.is_mixed);
     }
 
@@ -90,6 +99,7 @@ impl SimColumns {
             xyz: Vec::with_capacity(n),
             intensity: Vec::with_capacity(n),
             label: Vec::with_capacity(n),
+            object: Vec::with_capacity(n),
             mixed: Vec::with_capacity(n),
         }
     }
@@ -110,6 +120,7 @@ pub(crate) struct Return {
     pub(crate) range: f64,
     pub(crate) intensity: f32,
     pub(crate) label: Label,
+    pub(crate) object: u16,
     pub(crate) is_mixed: bool,
 }
 

@@ -11,6 +11,7 @@ mod columns;
 pub mod demo_robots;
 mod demo_scene;
 mod hall;
+mod plant;
 mod plots;
 mod posture;
 pub mod random;
@@ -25,8 +26,9 @@ mod world;
 
 pub use columns::{ScanFrame, SimColumns, SimScan};
 pub use demo_scene::{demo_scene, paper_scene};
+pub use plant::{Plant, plant};
 pub use plots::hall;
 pub use posture::Postures;
 pub use scene::Scene;
 pub use simulator::Simulator;
-pub use truth::{SCHEMA, TruePose, TrueRobot, TrueScan, Truth};
+pub use truth::{LaterPosture, SCHEMA, TruePose, TrueRobot, TrueScan, Truth};

@@ -189,6 +189,7 @@ impl Station {
             range: measured,
             intensity,
             label: surface.label,
+            object: surface.object,
             is_mixed,
         })
     }

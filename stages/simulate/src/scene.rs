@@ -301,6 +301,34 @@ pub struct RobotPlace {
     /// A tool that no URDF describes.
     #[serde(default)]
     pub tool: Option<Tool>,
+    /// How it stands while other scanners look: it moved between two stations.
+    #[serde(default, rename = "later")]
+    pub later: Vec<Later>,
+}
+
+/// How a robot stands while some scanners look.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Later {
+    /// Names of those scanners.
+    pub scanners: Vec<String>,
+    /// Value of each free joint by name, as for the robot.
+    pub posture: BTreeMap<String, f64>,
+}
+
+impl Scene {
+    /// The scene as one scanner sees it: robots as they stand then.
+    pub(crate) fn as_seen_by(&self, scanner: &str) -> Self {
+        let mut out = self.clone();
+        for robot in &mut out.robots {
+            let then = robot.later.iter().find(|l| l.scanners.iter().any(|s| s == scanner));
+            if let Some(then) = then {
+                robot.posture = then.posture.clone();
+            }
+            robot.later.clear();
+        }
+        out
+    }
 }
 
 impl RobotPlace {

@@ -3,9 +3,9 @@
 use crate::beams::Beams;
 use crate::columns::{ScanFrame, SimColumns, SimScan};
 use crate::scan::Station;
-use crate::scene::Scene;
-use crate::truth::{SCHEMA, TrueRobot, TrueScan, Truth};
-use crate::world::{Surface, World};
+use crate::scene::{RobotPlace, Scene};
+use crate::truth::{LaterPosture, SCHEMA, TrueRobot, TrueScan, Truth};
+use crate::world::{Surface, World, posture_of};
 use contract::Result;
 use geometry::{Pose, Vector};
 use robot::Model;
@@ -13,11 +13,20 @@ use std::ops::Range;
 
 /// A scene ready to be scanned.
 pub struct Simulator {
+    /// One for each set of postures that some scanner saw.
+    states: Vec<State>,
+    stations: Vec<Station>,
+    /// For each station, what it saw.
+    state_of: Vec<usize>,
+    robots: Vec<TrueRobot>,
+    objects: Vec<String>,
+}
+
+/// The scene while nothing moved.
+struct State {
     beams: Beams,
     surfaces: Vec<Surface>,
     n_triangles: usize,
-    stations: Vec<Station>,
-    robots: Vec<TrueRobot>,
 }
 
 impl Simulator {
@@ -27,22 +36,25 @@ impl Simulator {
     /// `BadInput` where the scene names a model, link or joint that does not exist, or a number means nothing.
     pub fn new(scene: &Scene, models: &[Model]) -> Result<Self> {
         crate::check::check(scene)?;
+        let (mut seen, mut states, mut state_of) = (Vec::new(), Vec::new(), Vec::new());
+        for scanner in &scene.scanners {
+            let then = scene.as_seen_by(&scanner.name);
+            let known = seen.iter().position(|s| *s == then.robots);
+            state_of.push(known.unwrap_or(seen.len()));
+            if known.is_none() {
+                states.push(State::new(World::new(&then, models)?));
+                seen.push(then.robots);
+            }
+        }
         let world = World::new(scene, models)?;
-        let robots = true_robots(scene, models, &world);
+        let robots = true_robots(scene, models, &world)?;
         let stations = scene
             .scanners
             .iter()
             .enumerate()
             .map(|(i, s)| Station::new(s, [scene.seed, i as u64], scene.origin))
             .collect::<Result<Vec<_>>>()?;
-        let beams = Beams::new(&world.triangles, &world.surface_of);
-        Ok(Self {
-            beams,
-            surfaces: world.surfaces,
-            n_triangles: world.triangles.len(),
-            stations,
-            robots,
-        })
+        Ok(Self { states, stations, state_of, robots, objects: world.objects })
     }
 
     /// Number of scanners.
@@ -54,7 +66,7 @@ impl Simulator {
     /// Number of triangles in the scene.
     #[must_use]
     pub fn n_triangles(&self) -> usize {
-        self.n_triangles
+        self.states.first().map_or(0, |s| s.n_triangles)
     }
 
     /// What a file says about a scan before its points.
@@ -76,7 +88,8 @@ impl Simulator {
     /// If the scene has no scanner with this index.
     #[must_use]
     pub fn columns(&self, scanner: usize, cols: Range<u32>) -> SimColumns {
-        self.stations[scanner].columns(&self.beams, &self.surfaces, cols)
+        let state = &self.states[self.state_of[scanner]];
+        self.stations[scanner].columns(&state.beams, &state.surfaces, cols)
     }
 
     /// A whole scan.
@@ -100,11 +113,26 @@ impl Simulator {
             n_beams: u64::from(s.frame.n_rows) * u64::from(s.frame.n_cols),
             n_points: 0,
         });
-        Truth { schema: SCHEMA.into(), robots: self.robots.clone(), scans: scans.collect() }
+        Truth {
+            schema: SCHEMA.into(),
+            robots: self.robots.clone(),
+            scans: scans.collect(),
+            objects: self.objects.clone(),
+        }
     }
 }
 
-fn true_robots(scene: &Scene, models: &[Model], world: &World) -> Vec<TrueRobot> {
+impl State {
+    fn new(world: World) -> Self {
+        Self {
+            beams: Beams::new(&world.triangles, &world.surface_of),
+            surfaces: world.surfaces,
+            n_triangles: world.triangles.len(),
+        }
+    }
+}
+
+fn true_robots(scene: &Scene, models: &[Model], world: &World) -> Result<Vec<TrueRobot>> {
     scene
         .robots
         .iter()
@@ -113,15 +141,24 @@ fn true_robots(scene: &Scene, models: &[Model], world: &World) -> Vec<TrueRobot>
             let model = &models[placed.model];
             let mut base: Pose = placed.world_from_link[0];
             base.translation.vector += Vector::from(scene.origin);
-            let joints = model.free.iter().zip(&placed.posture);
-            TrueRobot {
+            let named = |posture: &[f64]| {
+                let joints = model.free.iter().zip(posture);
+                joints.map(|(&j, v)| (model.joints[j].name.clone(), *v)).collect()
+            };
+            let later = place.later.iter().map(|then| {
+                let place = RobotPlace { posture: then.posture.clone(), ..place.clone() };
+                let joints = named(&posture_of(&place, model)?);
+                Ok(LaterPosture { scans: then.scanners.clone(), joints })
+            });
+            Ok(TrueRobot {
                 name: place.name.clone(),
                 model: model.name.clone(),
                 base_link: model.links[0].name.clone(),
                 base_pose: (&base).into(),
-                joints: joints.map(|(&j, v)| (model.joints[j].name.clone(), *v)).collect(),
+                joints: named(&placed.posture),
                 links: model.links.iter().map(|l| l.name.clone()).collect(),
-            }
+                later: later.collect::<Result<_>>()?,
+            })
         })
         .collect()
 }

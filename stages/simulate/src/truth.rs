@@ -17,6 +17,9 @@ pub struct Truth {
     pub robots: Vec<TrueRobot>,
     /// In the order of the scene.
     pub scans: Vec<TrueScan>,
+    /// What stands in the scene, by name: `labels/N.object.npy` counts them.
+    #[serde(default)]
+    pub objects: Vec<String>,
 }
 
 /// A robot as it stands.
@@ -34,6 +37,18 @@ pub struct TrueRobot {
     pub joints: BTreeMap<String, f64>,
     /// Names of its links, in the order that labels count.
     pub links: Vec<String>,
+    /// How it stood for other scans, where it moved in between.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub later: Vec<LaterPosture>,
+}
+
+/// How a robot stood for some of the scans.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LaterPosture {
+    /// Names of those scans.
+    pub scans: Vec<String>,
+    /// Value of each free joint, radians or metres.
+    pub joints: BTreeMap<String, f64>,
 }
 
 /// A scan as it was made.

@@ -13,6 +13,8 @@ use robot::{Mesh, Model, Role};
 pub(crate) struct Surface {
     /// What a point on it belongs to.
     pub(crate) label: Label,
+    /// Index of the thing in [`World::objects`].
+    pub(crate) object: u16,
     /// How much light it sends back, 0..1.
     pub(crate) reflectance: f32,
     /// Thinner than the distance of beams: a beam may touch it where its neighbours do not.
@@ -36,6 +38,8 @@ pub(crate) struct World {
     pub(crate) triangles: Vec<[Vec3A; 3]>,
     pub(crate) surface_of: Vec<u32>,
     pub(crate) surfaces: Vec<Surface>,
+    /// Names of the things of the scene.
+    pub(crate) objects: Vec<String>,
     pub(crate) robots: Vec<PlacedRobot>,
 }
 
@@ -58,6 +62,14 @@ impl World {
         Ok(out)
     }
 
+    /// A new thing: what is added from now on is part of it.
+    fn object(&mut self, kind: &str, name: &str) -> u16 {
+        let words = [kind, name].into_iter().filter(|w| !w.is_empty());
+        self.objects.push(words.collect::<Vec<_>>().join(" "));
+        // A scene of more things counts the rest as one.
+        u16::try_from(self.objects.len() - 1).unwrap_or(u16::MAX)
+    }
+
     fn add(&mut self, surface: Surface, solid: &Solid) {
         self.add_mesh(surface, &solid.vertices, &solid.triangles);
     }
@@ -77,35 +89,44 @@ impl World {
     }
 
     fn add_hall(&mut self, scene: &Scene) {
-        let fixed = Surface { label: Label::FIXED, reflectance: GREY, is_thin: false };
+        let object = self.object("floor", "");
+        let fixed = Surface { label: Label::FIXED, object, reflectance: GREY, is_thin: false };
         let (ground, faces) = hall::ground(scene);
         let lowest = ground.vertices.iter().map(|p| p.z).fold(0.0, f64::min);
         self.add(Surface { label: Label::FLOOR, ..fixed }, &ground);
         self.add(fixed, &faces);
         if let Some(building) = &scene.hall {
-            self.add(Surface { reflectance: 0.8, ..fixed }, &hall::building(building, lowest));
+            let object = self.object("building", "");
+            let surface = Surface { object, reflectance: 0.8, ..fixed };
+            self.add(surface, &hall::building(building, lowest));
         }
         for b in &scene.boxes {
-            let surface = Surface { reflectance: b.reflectance as f32, ..fixed };
+            let object = self.object("box", &b.name);
+            let surface = Surface { object, reflectance: b.reflectance as f32, ..fixed };
             self.add(surface, &cuboid(b.size, 0.002).posed(&pose(b.xyz, b.rpy_deg)));
         }
         let z = |xy: [f64; 2]| scene.ground(xy[0], xy[1]);
         for c in &scene.columns {
-            self.add(fixed, &hall::column(c, z(c.xy)));
+            let object = self.object("column", &c.name);
+            self.add(Surface { object, ..fixed }, &hall::column(c, z(c.xy)));
         }
         for f in &scene.fences {
             let (posts, wires) = hall::fence(f, |x, y| scene.ground(x, y));
-            self.add(fixed, &posts);
-            self.add(Surface { is_thin: true, ..fixed }, &wires);
+            let object = self.object("fence", &f.name);
+            self.add(Surface { object, ..fixed }, &posts);
+            self.add(Surface { object, is_thin: true, ..fixed }, &wires);
         }
         for f in &scene.conveyors {
-            self.add(fixed, &hall::conveyor(f, z(f.xy)));
+            let object = self.object("conveyor", &f.name);
+            self.add(Surface { object, ..fixed }, &hall::conveyor(f, z(f.xy)));
         }
         for f in &scene.benches {
-            self.add(fixed, &hall::bench(f, z(f.xy)));
+            let object = self.object("bench", &f.name);
+            self.add(Surface { object, ..fixed }, &hall::bench(f, z(f.xy)));
         }
         for s in &scene.stands {
-            self.add(fixed, &hall::stand(s, z(s.xy)));
+            let object = self.object("stand", &s.name);
+            self.add(Surface { object, ..fixed }, &hall::stand(s, z(s.xy)));
         }
     }
 
@@ -117,12 +138,13 @@ impl World {
         let posture = posture_of(place, model)?;
         let world_from_base = place.world_from_base();
         let poses: Vec<Pose> = model.poses(&posture).iter().map(|p| world_from_base * p).collect();
+        let object = self.object("robot", &place.name);
         for (link, part) in model.links.iter().enumerate() {
             let kind =
                 if part.role == Role::Effector { PointKind::Attachment } else { PointKind::Link };
             let label = Label { kind, robot: index_i16(index)?, link: index_i16(link)? };
             let vertices = place_mesh(&part.mesh, &poses[link]);
-            let surface = Surface { label, reflectance: PAINT, is_thin: false };
+            let surface = Surface { label, object, reflectance: PAINT, is_thin: false };
             self.add_mesh(surface, &vertices, &part.mesh.triangles);
         }
         self.robots.push(PlacedRobot { model: at, posture, world_from_link: poses });
@@ -134,14 +156,16 @@ impl World {
             if let Some(tool) = &place.tool {
                 let link = self.link_pose(scene, models, &place.name, Some(&tool.link))?;
                 let body = attach::tool(tool).posed(&(link * pose(tool.xyz, tool.rpy_deg)));
-                self.add(attachment(index, GREY)?, &body);
+                let object = self.object("tool of", &place.name);
+                self.add(attachment(index, object, GREY)?, &body);
             }
         }
         for part in &scene.carried {
             let link = self.link_pose(scene, models, &part.robot, Some(&part.link))?;
             let index = robot_index(scene, &part.robot)?;
             let body = cuboid(part.size, 0.002).posed(&(link * pose(part.xyz, part.rpy_deg)));
-            self.add(attachment(index, GREY)?, &body);
+            let object = self.object("carried", &part.name);
+            self.add(attachment(index, object, GREY)?, &body);
         }
         for hose in &scene.hoses {
             let held = hose
@@ -155,9 +179,10 @@ impl World {
                 a.link.as_ref().is_some_and(|link| !self.is_root(scene, models, a, link))
             };
             let owner = hose.anchors.iter().find(moves).and_then(|a| a.robot.as_ref());
+            let object = self.object("hose", &hose.name);
             let surface = match owner {
-                Some(name) => attachment(robot_index(scene, name)?, BLACK)?,
-                None => Surface { label: Label::FIXED, reflectance: BLACK, is_thin: false },
+                Some(name) => attachment(robot_index(scene, name)?, object, BLACK)?,
+                None => Surface { label: Label::FIXED, object, reflectance: BLACK, is_thin: false },
             };
             self.add(surface, &attach::hose(hose, &held));
         }
@@ -199,9 +224,9 @@ impl World {
     }
 }
 
-fn attachment(robot: usize, reflectance: f32) -> Result<Surface> {
+fn attachment(robot: usize, object: u16, reflectance: f32) -> Result<Surface> {
     let label = Label { kind: PointKind::Attachment, robot: index_i16(robot)?, link: -1 };
-    Ok(Surface { label, reflectance, is_thin: false })
+    Ok(Surface { label, object, reflectance, is_thin: false })
 }
 
 fn index_i16(index: usize) -> Result<i16> {
@@ -226,7 +251,7 @@ fn place_mesh(mesh: &Mesh, pose: &Pose) -> Vec<Point> {
 ///
 /// # Errors
 /// `BadInput` for a name that is no free joint of the model.
-fn posture_of(place: &RobotPlace, model: &Model) -> Result<Vec<f64>> {
+pub(crate) fn posture_of(place: &RobotPlace, model: &Model) -> Result<Vec<f64>> {
     let mut posture = model.home();
     for (name, value) in &place.posture {
         let free =

@@ -1,0 +1,351 @@
+//! `bench plant`: suites of drawn cells and lines in; scanned to files, sent through the main job, and compared with the
+//! truth robot by robot and point by point, as a table, out.
+
+use crate::bench::{Journal, chosen};
+use crate::compare::Agreement;
+use crate::engine::Engine;
+use crate::job::{Job, Means};
+use crate::scanning::{Formats, scan_scene};
+use crate::{atomic, demo, library, plan};
+use contract::{Error, Kind, Result};
+use robot::Model;
+use serde::Serialize;
+use simulate::Plant;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct PlantBench {
+    /// Names of suites; all where empty.
+    pub suites: Vec<String>,
+    /// Cases of each suite; its own number where left out.
+    pub n_cases: Option<usize>,
+    /// Number of the first of them.
+    pub first: usize,
+    /// First seed.
+    pub seed: u64,
+    /// Robot library; the demo's robots where left out.
+    pub robots: Option<PathBuf>,
+    /// Where rows and tables go; nowhere where left out.
+    pub out: Option<PathBuf>,
+    /// Whether scenes, scans and results are kept there.
+    pub keep: bool,
+}
+
+/// A cell of three robots.
+const CELL: Plant = Plant {
+    seed: 0,
+    n_robots: 3,
+    n_rows: 1,
+    n_scanners: 5,
+    step_deg: 0.13,
+    is_tight: false,
+    moves: false,
+};
+
+/// A suite: name, number of cases, what the k-th is drawn from, and whether the models of its robots are left out of the
+/// library.
+type Suite = (&'static str, usize, fn(usize) -> Plant, bool);
+
+const SUITES: &[Suite] = &[
+    ("cells", 20, |_| CELL, false),
+    ("lines", 5, |k| Plant { n_robots: 8 + k % 5, n_rows: 2, n_scanners: 10, ..CELL }, false),
+    ("tight", 10, |_| Plant { is_tight: true, ..CELL }, false),
+    ("two", 10, |_| Plant { n_robots: 1, n_scanners: 2, ..CELL }, false),
+    ("empty", 20, |_| Plant { n_robots: 0, n_scanners: 3, ..CELL }, false),
+    ("strangers", 10, |_| Plant { n_robots: 1, n_scanners: 4, ..CELL }, true),
+    ("moved", 20, |_| Plant { n_robots: 2, n_scanners: 6, moves: true, ..CELL }, false),
+];
+
+/// A link with fewer points has no say in the median of links.
+const MIN_LINK_POINTS: u64 = 50;
+/// A thing with fewer points is not asked whether it was lost.
+const MIN_OBJECT_POINTS: u64 = 200;
+
+/// One case.
+#[derive(Debug, Clone, Default, Serialize)]
+struct Row {
+    suite: String,
+    seed: u64,
+    failed: Option<String>,
+    n_points: u64,
+    n_robots: usize,
+    /// Found at the right place; of those with the right model, or one that is said to be alike.
+    n_found: usize,
+    n_right: usize,
+    /// Of the right ones trusted; of the wrong or unknown ones trusted.
+    n_trusted: usize,
+    n_wrong_trusted: usize,
+    n_invented: usize,
+    /// Robots that moved, and those of which both postures were found.
+    n_moved: usize,
+    n_both: usize,
+    f1: f64,
+    /// Intersection over union of each link.
+    ious: Vec<f64>,
+    /// Share of points of hoses, tools and parts that are said to move.
+    attached: Option<f64>,
+    /// Share of points that stand still said to move; and that of the thing that lost most, with its name.
+    lost: f64,
+    worst_lost: f64,
+    worst_object: String,
+    /// Largest error of a joint said to be determined, degrees.
+    worst_joint: f64,
+    seconds: f64,
+    notes: Vec<String>,
+}
+
+/// Runs the suites; returns the table.
+pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<String> {
+    let temporary = tempfile::tempdir()?;
+    let robots = match &bench.robots {
+        Some(dir) => dir.clone(),
+        None => {
+            demo::write_robots(&temporary.path().join("robots"))?;
+            temporary.path().join("robots")
+        }
+    };
+    let models = library::load(&robots, &means.settings.robot, engine)?.models;
+    chosen(&models, &[])?;
+    let mut journal =
+        bench.out.as_deref().map(|dir| Journal::create(dir, "plant.jsonl")).transpose()?;
+    let mut quiet = Engine::new(engine.n_workers);
+    quiet.cancel = engine.cancel.clone();
+    let mut rows = Vec::new();
+    for (suite, seed, wanted, is_strange) in cases(bench)? {
+        engine.cancel.check()?;
+        let dir = match (&bench.out, bench.keep) {
+            (Some(out), true) => out.join(format!("{suite}-{seed}")),
+            _ => temporary.path().join("case"),
+        };
+        let mut row = Row { suite: suite.into(), seed, ..Row::default() };
+        if let Err(error) =
+            run(&mut row, &wanted, (&robots, &models, is_strange), &dir, (means, &quiet))
+        {
+            row.failed = Some(error.to_string());
+        }
+        if !bench.keep {
+            let _ = std::fs::remove_dir_all(&dir);
+        }
+        if let Some(journal) = &mut journal {
+            journal.add(&row)?;
+        }
+        engine.progress.say(&row.line());
+        rows.push(row);
+    }
+    let table = table(&rows);
+    if let Some(dir) = &bench.out {
+        atomic::write(&dir.join("plant.md"), table.as_bytes())?;
+    }
+    Ok(table)
+}
+
+/// Suite, seed, what is drawn, and whether the library knows the robots.
+type Case = (&'static str, u64, Plant, bool);
+
+fn cases(bench: &PlantBench) -> Result<Vec<Case>> {
+    let names: Vec<&str> = SUITES.iter().map(|s| s.0).collect();
+    if let Some(odd) = bench.suites.iter().find(|s| !names.contains(&s.as_str())) {
+        return Err(Error::new(Kind::Usage, format!("there is no suite \"{odd}\""))
+            .hint(format!("there are {}", names.join(", "))));
+    }
+    let wanted = |name: &str| bench.suites.is_empty() || bench.suites.iter().any(|s| s == name);
+    let mut out = Vec::new();
+    for (at, (name, n, draw, is_strange)) in SUITES.iter().enumerate() {
+        for k in bench.first..bench.first + bench.n_cases.unwrap_or(*n) {
+            let seed = bench.seed * 100_000 + at as u64 * 1000 + k as u64;
+            if wanted(name) {
+                out.push((*name, seed, Plant { seed, ..draw(k) }, *is_strange));
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// One case: drawn, scanned, run, compared.
+fn run(
+    row: &mut Row,
+    wanted: &Plant,
+    (library, models, is_strange): (&Path, &[Model], bool),
+    dir: &Path,
+    (means, engine): (&Means, &Engine),
+) -> Result<()> {
+    let scene = simulate::plant(wanted, models)?;
+    atomic::write(&made(dir)?.join("scene.toml"), scene.to_toml()?.as_bytes())?;
+    let scans = dir.join("scans");
+    let truth = scan_scene(&scene, models, &scans, Formats { e57: true, las: false }, engine)?;
+    row.n_points = truth.scans.iter().map(|s| s.n_points).sum();
+    let robots = if is_strange {
+        let known = dir.join("robots");
+        let strange: Vec<&str> = scene.robots.iter().map(|r| r.model.as_str()).collect();
+        link_others(library, &made(&known)?, &strange)?;
+        known
+    } else {
+        library.to_path_buf()
+    };
+    let started = Instant::now();
+    let job = Job {
+        inputs: vec![scans.join("scans.e57")],
+        robots,
+        scanners: None,
+        out: dir.join("result"),
+        means: means.clone(),
+    };
+    plan::run(&job, engine)?;
+    row.seconds = started.elapsed().as_secs_f64();
+    let agreement = Agreement::of(&job.out, &scans.join("truth"))?;
+    judge(row, &agreement);
+    Ok(())
+}
+
+/// The folder, made.
+fn made(dir: &Path) -> Result<PathBuf> {
+    std::fs::create_dir_all(dir).map_err(|e| Error::from(e).at(dir.display()))?;
+    Ok(dir.to_path_buf())
+}
+
+/// A library without some models.
+fn link_others(library: &Path, to: &Path, without: &[&str]) -> Result<()> {
+    for entry in std::fs::read_dir(library)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        if entry.path().is_dir() && !without.iter().any(|w| name == **w) {
+            crate::calibrate::copy(&entry.path(), &to.join(&name))?;
+        }
+    }
+    Ok(())
+}
+
+fn judge(row: &mut Row, agreement: &Agreement) {
+    row.n_robots = agreement.robots.len();
+    row.n_invented = agreement.n_invented;
+    for robot in &agreement.robots {
+        let Some(found) = &robot.found else {
+            row.notes.push(format!("{} ({}) not found", robot.name, robot.model));
+            continue;
+        };
+        let is_trusted = found.verdict == "trusted";
+        row.n_found += 1;
+        row.n_right += usize::from(found.is_right);
+        row.n_trusted += usize::from(found.is_right && is_trusted);
+        row.n_wrong_trusted += usize::from(!found.is_right && is_trusted);
+        row.n_moved += usize::from(robot.n_postures > 1);
+        row.n_both += usize::from(robot.n_postures > 1 && found.n_postures == robot.n_postures);
+        if !found.is_right {
+            row.notes.push(format!(
+                "{} ({}) is {} {}",
+                robot.name, robot.model, found.verdict, found.model
+            ));
+        } else if !is_trusted {
+            row.notes.push(format!("{} ({}) is {}", robot.name, robot.model, found.verdict));
+        }
+    }
+    row.worst_joint = agreement.worst_joint_deg();
+    row.f1 = agreement.f1();
+    row.ious = agreement.link_ious(MIN_LINK_POINTS);
+    let share = |[part, whole]: [u64; 2]| part as f64 / whole.max(1) as f64;
+    row.attached = (agreement.attached[1] > 0).then(|| share(agreement.attached));
+    row.lost = share([agreement.fixed[1], agreement.fixed[0]]);
+    let still = agreement.objects.iter().zip(&agreement.by_object).filter(|(name, count)| {
+        let moves = ["robot ", "tool of ", "carried ", "hose "];
+        count[0] >= MIN_OBJECT_POINTS && !moves.iter().any(|m| name.starts_with(m))
+    });
+    for (name, [all, lost]) in still {
+        let lost = share([*lost, *all]);
+        if lost > row.worst_lost {
+            (row.worst_lost, row.worst_object) = (lost, name.clone());
+        }
+    }
+}
+
+impl Row {
+    fn line(&self) -> String {
+        if let Some(why) = &self.failed {
+            return format!("{} {}: failed: {why}", self.suite, self.seed);
+        }
+        let mut text = format!(
+            "{} {}: {} of {} found, {} right, {} trusted, {} invented, F1 {:.4}, lost {:.4} %, most {:.2} % ({}), {:.1} s",
+            self.suite,
+            self.seed,
+            self.n_found,
+            self.n_robots,
+            self.n_right,
+            self.n_trusted,
+            self.n_invented,
+            self.f1,
+            100.0 * self.lost,
+            100.0 * self.worst_lost,
+            self.worst_object,
+            self.seconds
+        );
+        if self.n_moved > 0 {
+            let _ = write!(text, ", {} of {} moved ones seen", self.n_both, self.n_moved);
+        }
+        if !self.notes.is_empty() {
+            let _ = write!(text, "; {}", self.notes.join(", "));
+        }
+        text
+    }
+}
+
+/// All suites for people.
+fn table(rows: &[Row]) -> String {
+    let mut out = String::from(
+        "| suite | cases | robots | found | right model | trusted | wrong, trusted | invented | moved, seen | F1 median / least | link IoU median / 10 % | attachments | fixed lost mean / largest % | thing that lost most % | s median |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for (name, ..) in SUITES {
+        let own: Vec<&Row> = rows.iter().filter(|r| r.suite == *name).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let sum = |of: fn(&Row) -> usize| own.iter().map(|r| of(r)).sum::<usize>();
+        let sorted = |of: &dyn Fn(&Row) -> Vec<f64>| {
+            let mut all: Vec<f64> =
+                own.iter().filter(|r| r.failed.is_none()).flat_map(|r| of(r)).collect();
+            all.sort_by(f64::total_cmp);
+            all
+        };
+        let at = |all: &[f64], share: f64| {
+            all.get(((all.len() as f64 - 1.0) * share).round().max(0.0) as usize)
+                .copied()
+                .unwrap_or(f64::NAN)
+        };
+        let f1 = sorted(&|r| if r.n_robots > 0 { vec![r.f1] } else { vec![] });
+        let (ious, attached) =
+            (sorted(&|r| r.ious.clone()), sorted(&|r| r.attached.into_iter().collect()));
+        let (lost, worst) = (sorted(&|r| vec![r.lost]), sorted(&|r| vec![r.worst_lost]));
+        let seconds = sorted(&|r| vec![r.seconds]);
+        let _ = writeln!(
+            out,
+            "| {name} | {} | {} | {} | {} | {} | {} | {} | {} of {} | {:.4} / {:.4} | {:.3} / {:.3} | {:.3} | {:.4} / {:.4} | {:.2} | {:.1} |",
+            own.len(),
+            sum(|r| r.n_robots),
+            sum(|r| r.n_found),
+            sum(|r| r.n_right),
+            sum(|r| r.n_trusted),
+            sum(|r| r.n_wrong_trusted),
+            sum(|r| r.n_invented),
+            sum(|r| r.n_both),
+            sum(|r| r.n_moved),
+            at(&f1, 0.5),
+            at(&f1, 0.0),
+            at(&ious, 0.5),
+            at(&ious, 0.1),
+            at(&attached, 0.5),
+            100.0 * lost.iter().sum::<f64>() / lost.len().max(1) as f64,
+            100.0 * at(&lost, 1.0),
+            100.0 * at(&worst, 1.0),
+            at(&seconds, 0.5),
+        );
+    }
+    let odd = rows.iter().filter(|r| r.failed.is_some() || !r.notes.is_empty() || r.n_invented > 0);
+    let odd: String = odd.map(|r| format!("\n- {}", r.line())).collect();
+    if !odd.is_empty() {
+        let _ =
+            writeln!(out, "\nNot all found, right and trusted, or with a robot too many:\n{odd}");
+    }
+    out
+}
