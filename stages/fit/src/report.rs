@@ -55,6 +55,10 @@ pub(crate) fn report(
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (mut open, mut spread) = open_joints(best, &rivals);
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
+    for s in spins {
+        // Any value of the run, each as likely.
+        spread[s.joint] = spread[s.joint].max(s.extent / 3.0_f64.sqrt());
+    }
     for s in &several {
         open[s.joint] = true;
         let own = h.posture[s.joint];

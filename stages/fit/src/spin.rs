@@ -31,6 +31,18 @@ pub(crate) struct Spin {
     pub(crate) joint: usize,
     /// All values at which the points fit as well as at the best one, best first.
     pub(crate) values: Vec<f64>,
+    /// How far around the posture's own value all values are as good, at most, radians: 0 where those beside it are worse.
+    pub(crate) extent: f64,
+}
+
+/// Size of the run of values around `own`, up or down, whose costs are within the limit.
+fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
+    let mut offsets: Vec<(f64, f64)> = costs.iter().map(|c| (c.0 - own, c.1)).collect();
+    offsets.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_good = |c: &&(f64, f64)| c.1 <= limit;
+    let up = offsets.iter().filter(|c| c.0 >= 0.0).take_while(is_good).last();
+    let down = offsets.iter().rev().filter(|c| c.0 <= 0.0).take_while(is_good).last();
+    up.map_or(0.0, |c| c.0).max(down.map_or(0.0, |c| -c.0))
 }
 
 impl Refine<'_> {
@@ -72,6 +84,7 @@ impl Refine<'_> {
             .collect();
         let best = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
         let limit = best + (AS_GOOD.0 * best).max(AS_GOOD.1);
+        let extent = extent(&costs, h.posture[joint], limit);
         let mut good: Vec<(f64, f64)> = costs.into_iter().filter(|c| c.1 <= limit).collect();
         good.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut values: Vec<f64> = Vec::new();
@@ -84,7 +97,7 @@ impl Refine<'_> {
                 values.push(value);
             }
         }
-        Some(Spin { joint, values })
+        Some(Spin { joint, values, extent })
     }
 
     /// How much worse another posture explains the points on the links that stand differently in it: the part of its
