@@ -5,9 +5,9 @@ use crate::engine::AllThreads;
 use crate::job::Settings;
 use crate::store::Store;
 use crate::surfaces::Ground;
-use contract::{Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
+use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
 use fit::{Method, Prepared, Scene};
-use geometry::Pose;
+use geometry::{Point, Pose};
 use identify::BaseSearch;
 use lattice::ViewBuilder;
 use rayon::prelude::*;
@@ -49,6 +49,18 @@ pub(crate) struct Search<'a> {
 
 /// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls, and few carry robots.
 const MIN_MOUNT_SCORE: f64 = 0.15;
+/// Places on walls and ceilings that are looked at for each model.
+const MAX_MOUNTS: usize = 2;
+/// What hangs on a wall keeps its base so far above the floor, metres.
+const FLOOR_SLACK: f64 = 0.05;
+/// A base farther below a floor belongs to a lower level, metres.
+const MAX_SUNK: f64 = 2.0;
+/// Candidates that are fitted at the same time; then it is asked which others they make needless.
+const BATCH: usize = 6;
+/// Bases nearer than this are at one place, metres.
+const SAME_BASE: f64 = 0.35;
+/// Share of the score of a trusted robot's base below which another base at its place is needless.
+const FAR_WORSE: f64 = 0.7;
 /// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
 const MAX_SPACING: f64 = 0.05;
 
@@ -72,19 +84,79 @@ impl<'a> Search<'a> {
             .collect::<Result<_>>()?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit);
-        let on = |planes: &[InstallationPlane], least: f64| -> Vec<Fit> {
+        if self.settings.fit.method == Method::Paper {
+            let means = (&self.settings.fit, &self.settings.paper);
             let models = (0..self.shelf.models.len()).into_par_iter();
-            let fits: Vec<Vec<Fit>> =
-                models.map(|model| self.model(model, &scene, (planes, least))).collect();
-            fits.into_iter().flatten().collect()
-        };
-        let mut fits = on(&planes, 0.0);
+            let robots = models.filter(|&m| !self.shelf.models[m].is_tool());
+            let fit = |m: usize| fit::paper::fit(self.shelf.prepared(m), &scene, &planes, means);
+            return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
+        }
+        let mut fits = self.fits(&scene, self.candidates(&scene, &planes));
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
-        let is_explained = fits.iter().any(|f| f.verdict == Verdict::Trusted);
-        if !is_explained && self.settings.fit.method != Method::Paper {
-            fits.extend(on(&self.mounts(region), MIN_MOUNT_SCORE));
+        if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
+            let mut hung = self.candidates(&scene, &self.mounts(region));
+            hung.retain(|c| c.bases[0].1 >= MIN_MOUNT_SCORE && self.is_above_floor(c));
+            let mut n = vec![0; self.shelf.models.len()];
+            hung.retain(|c| {
+                n[c.model] += 1;
+                n[c.model] <= MAX_MOUNTS
+            });
+            fits.extend(self.fits(&scene, hung));
         }
         Ok(fits)
+    }
+
+    /// Where robots of all models may stand on some planes, best base first.
+    fn candidates(&self, scene: &Scene<'_>, planes: &[InstallationPlane]) -> Vec<Candidate> {
+        let search = |index: usize| {
+            let model = (index, &self.shelf.models[index]);
+            let (region, views) = (scene.region, scene.views);
+            let settings = &self.settings.identify;
+            BaseSearch::new(model, region, views, &scene.evidence, settings)
+                .map(|search| search.run(planes, &AllThreads))
+                .unwrap_or_default()
+        };
+        let models = (0..self.shelf.models.len()).into_par_iter();
+        let found: Vec<Vec<Candidate>> = models.map(search).collect();
+        let mut out: Vec<Candidate> =
+            found.into_iter().flatten().filter(|c| !c.bases.is_empty()).collect();
+        out.sort_by(|a, b| b.bases[0].1.total_cmp(&a.bases[0].1).then(a.model.cmp(&b.model)));
+        out
+    }
+
+    /// Fits of candidates, which come best base first: where a robot is trusted, bases that fit the place far worse are
+    /// not tried any more.
+    fn fits(&self, scene: &Scene<'_>, candidates: Vec<Candidate>) -> Vec<Fit> {
+        let (mut out, mut taken): (Vec<Fit>, Vec<(Point, f64)>) = (Vec::new(), Vec::new());
+        for batch in candidates.chunks(BATCH) {
+            let is_open = |c: &&Candidate| {
+                let here = base(&c.bases[0].0);
+                !taken.iter().any(|(at, score)| {
+                    (at - here).norm() < SAME_BASE && c.bases[0].1 < FAR_WORSE * score
+                })
+            };
+            let open: Vec<&Candidate> = batch.iter().filter(is_open).collect();
+            let fit = |c: &&Candidate| {
+                let prepared = self.shelf.prepared(c.model);
+                fit::fit(c, prepared, scene, &self.settings.fit, &AllThreads)
+            };
+            let found: Vec<Option<Fit>> = open.par_iter().map(fit).collect();
+            for (fit, candidate) in found.into_iter().zip(open) {
+                let Some(fit) = fit else { continue };
+                if fit.verdict == Verdict::Trusted {
+                    taken.push((base(&fit.world_from_base), candidate.bases[0].1));
+                }
+                out.push(fit);
+            }
+        }
+        out
+    }
+
+    /// Whether no base of a candidate reaches into the floor.
+    fn is_above_floor(&self, candidate: &Candidate) -> bool {
+        let at = candidate.bases[0].0.translation.vector;
+        let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
+        height.is_none_or(|h| h > FLOOR_SLACK)
     }
 
     /// Ceilings, walls and tilted plates about the region.
@@ -168,45 +240,10 @@ impl<'a> Search<'a> {
         }
         floor.planes.iter().filter(|p| p.bounds.grown(0.3).touches(&world)).cloned().collect()
     }
+}
 
-    /// Fits of one model on some planes, from bases with at least such a score.
-    fn model(
-        &self,
-        index: usize,
-        scene: &Scene<'_>,
-        (planes, least): (&[InstallationPlane], f64),
-    ) -> Vec<Fit> {
-        let model = &self.shelf.models[index];
-        let settings = self.settings;
-        if settings.fit.method == Method::Paper {
-            let prepared = self.shelf.prepared(index);
-            let means = (&settings.fit, &settings.paper);
-            return if model.is_tool() {
-                Vec::new()
-            } else {
-                fit::paper::fit(prepared, scene, planes, means)
-            };
-        }
-        let Some(search) = BaseSearch::new(
-            (index, model),
-            scene.region,
-            scene.views,
-            &scene.evidence,
-            &settings.identify,
-        ) else {
-            return Vec::new();
-        };
-        let mut candidates = search.run(planes, &AllThreads);
-        candidates.retain(|c| c.bases.first().is_some_and(|b| b.1 >= least));
-        if candidates.is_empty() {
-            return Vec::new();
-        }
-        let prepared = self.shelf.prepared(index);
-        candidates
-            .iter()
-            .filter_map(|c| fit::fit(c, prepared, scene, &settings.fit, &AllThreads))
-            .collect()
-    }
+fn base(world_from_base: &Pose) -> Point {
+    world_from_base.translation.vector.into()
 }
 
 /// Distance from a scan's scanner to the nearest point of a region, metres.

@@ -20,6 +20,8 @@ const JUDGE_TOLERANCE: (f64, f64) = (0.012, 0.04);
 /// Gate of the last rounds in multiples of the noise found, and its bounds, metres.
 const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
 
+/// Score of the best posture so far below which no other wrist makes it a robot.
+const HOPELESS_SCORE: f64 = 0.1;
 /// How far beyond its reach points may still be the robot's, metres: an error of the base.
 pub(crate) const NEAR_MARGIN: f64 = 0.15;
 /// Points of a link in the coarse rounds: enough to hold its pose to a millimetre.
@@ -42,19 +44,26 @@ pub fn fit(
     let local_from_world = scene.world_from_local().inverse();
     let bases: Vec<Pose> =
         candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
-    let beam = Beam::new(prepared, scene, settings);
-    let closer = beam.fitted();
-    let found = beam.run(&bases, fan);
     let is_seen = candidate.plane.area > 0.0;
     let prior = is_seen.then(|| prior(candidate, &local_from_world));
     let refine = Refine { prepared, scene, settings, prior };
     let base = bases.first().map_or_else(Point::origin, |b| Point::from(b.translation.vector));
     let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
+    let is_clear = candidate.bases.first().is_some_and(|b| b.1 >= CLEAR_BASE);
+    if !is_clear && !is_promising(&refine, &bases, &near, fan) {
+        return None;
+    }
+    let beam = Beam::new(prepared, scene, settings);
+    let closer = beam.fitted();
+    let found = beam.run(&bases, fan);
     let refined = rough(&beam, &refine, found, &near, fan);
     let mut polished = fan.fan(refined, |h| polish(&refine, &h, &near));
     sort(&mut polished);
     for round in [Look::Again, Look::Others] {
         let Some((best, judgement)) = polished.first() else { break };
+        if judgement.score < HOPELESS_SCORE {
+            return None;
+        }
         let more = match round {
             Look::Again => closer.again(best, judgement, fan),
             Look::Others => closer.alternatives(best, fan),
@@ -82,6 +91,22 @@ pub fn fit(
     let best = settle(&refine, &best.0.hypothesis, (&near, &all), fan);
     let fit = finish(&refine, best, &polished, (&near, &all), fan);
     Some(Fit { other_branches: loops, ..fit })
+}
+
+/// Score of a base from which on the search is made at once.
+const CLEAR_BASE: f64 = 0.35;
+/// Hypotheses of a quick look, and of those that are settled and refined.
+const QUICK: [usize; 3] = [25, 8, 3];
+
+/// A quick look with few hypotheses: whether anything like the robot's arm stands on one of the bases. A right one may
+/// end with a wrong wrist here, but not without shoulder and elbow.
+fn is_promising(refine: &Refine<'_>, bases: &[Pose], near: &[u32], fan: &impl Fan) -> bool {
+    let [beam, settle, n_refine] = QUICK;
+    let quick = Settings { beam, settle, n_refine, n_polish: 1, ..refine.settings.clone() };
+    let search = Beam::new(refine.prepared, refine.scene, &quick);
+    let refine = Refine { settings: &quick, prior: refine.prior, ..*refine };
+    let best = rough(&search, &refine, search.run(bases, fan), near, fan).into_iter().next();
+    best.is_some_and(|h| polish(&refine, &h, near).1.score >= HOPELESS_SCORE)
 }
 
 /// The report, with what does not fit.

@@ -46,8 +46,10 @@ impl Default for Settings {
     }
 }
 
-/// Mean score on a quarter of the samples below which a pose is not looked at any further.
-const HOPELESS: f64 = -0.35;
+/// Mean score on a quarter of the samples, at the best of every other yaw, below which a place is not looked at any
+/// further; and by how much yaws may lag behind that best.
+const HOPELESS: f64 = -0.2;
+const YAW_LAG: f64 = 0.35;
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
@@ -57,6 +59,15 @@ const MAX_CELLS: usize = 6;
 const QUOTA: usize = 8;
 /// Radius of such a place in steps of the search.
 const PLACE_STEPS: f64 = 2.5;
+/// Tolerances at which base and first link are judged in the end, metres: half a step of the finest grid.
+const JUDGE: (f32, f32) = (0.04, 0.06);
+/// Mean score of what could be judged: of the worse of base and first link, and of both. Of 125 robots that were found
+/// none is below 0.64 and 0.70.
+const LIKE: (f64, f64) = (0.5, 0.58);
+/// Step of the first joint, radians.
+const FIRST_STEP: f64 = 0.14;
+/// Mean score on a quarter of the samples by which a pose may lag behind the best and still be looked at closely.
+const LAG: f64 = 0.15;
 /// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten are hidden.
 const HIDDEN: f32 = 0.03;
 
@@ -184,14 +195,21 @@ impl<'a> BaseSearch<'a> {
             self.mean(&self.evidence.probe(cad.0, cad.1, pose, tolerance))
         };
         let place = |(x, y): (f64, f64)| -> Vec<Trial> {
-            let all = (0..n).filter_map(|k| {
+            let pose =
+                |k: usize| self.pose(local, x, y, k as f64 * coarse_yaw()) * self.root_from_base;
+            // A few samples at every other yaw tell most places to be hopeless, and most yaws of the others.
+            let few: Vec<f64> =
+                (0..n).step_by(2).map(|k| score(&pose(k), self.settings.n_coarse / 4)).collect();
+            let top = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+            if top < HOPELESS {
+                return Vec::new();
+            }
+            let is_open = |k: usize| {
+                few[k / 2 % few.len()].max(few[k.div_ceil(2) % few.len()]) >= top - YAW_LAG
+            };
+            let all = (0..n).filter(|k| is_open(*k)).filter_map(|k| {
+                let score = score(&pose(k), self.settings.n_coarse);
                 let yaw = k as f64 * coarse_yaw();
-                let pose = self.pose(local, x, y, yaw) * self.root_from_base;
-                // A few samples tell most poses to be hopeless.
-                if score(&pose, self.settings.n_coarse / 4) < HOPELESS {
-                    return None;
-                }
-                let score = score(&pose, self.settings.n_coarse);
                 (score > 0.0).then_some(Trial { x, y, yaw, plane: at, score })
             });
             all.collect()
@@ -271,16 +289,22 @@ impl<'a> BaseSearch<'a> {
     ) -> Vec<Trial> {
         let tolerance = (step * 1.5).clamp(0.025, 0.08) as f32;
         let around = |trial: Trial| -> Vec<Trial> {
+            let score = |t: &Trial, n: usize| self.score_base(&planes[t.plane], t, (tolerance, n));
             let near = (0..27_i32).map(|n| {
                 let (i, j, k) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
                 let mut next = trial;
                 next.x += f64::from(i) * step;
                 next.y += f64::from(j) * step;
                 next.yaw += f64::from(k) * yaw_step;
-                next.score = self.score_base(&planes[next.plane], &next, tolerance);
+                next.score = score(&next, self.settings.n_fine / 4);
                 next
             });
-            near.collect()
+            let mut near: Vec<Trial> = near.collect();
+            // A few samples tell most neighbours to be worse.
+            let top = near.iter().map(|t| t.score).fold(f64::NEG_INFINITY, f64::max);
+            near.retain(|t| t.score >= top - LAG);
+            near.iter_mut().for_each(|t| t.score = score(t, self.settings.n_fine));
+            near
         };
         let mut out: Vec<Trial> = fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
         best(&mut out, keep * 2, step * 0.6, yaw_step * 0.6);
@@ -292,8 +316,40 @@ impl<'a> BaseSearch<'a> {
         out
     }
 
-    fn score_base(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> f64 {
+    /// Whether what could be judged of the base and of the first link fits them: much of a cabinet has the height of a
+    /// foot, but not its shape.
+    fn is_like(&self, plane: &Plane, trial: &Trial) -> bool {
+        if !self.evidence.has_beams() {
+            return true;
+        }
+        let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
         let cad = prefix(self.model, self.base, self.settings.n_fine);
+        let pose = local_from_root * self.root_from_base;
+        let base = of_judged(&self.evidence.probe(cad.0, cad.1, &pose, JUDGE.0));
+        let first = self.first.map_or(base, |(free, link)| {
+            let poses = self.turns(free).map(|q| {
+                let mut posture = self.model.home();
+                posture[free] = q;
+                local_from_root * self.model.poses(&posture)[link]
+            });
+            let cad = prefix(self.model, link, self.settings.n_coarse);
+            let probes = poses.map(|pose| self.evidence.probe(cad.0, cad.1, &pose, JUDGE.1));
+            let best = probes.max_by(|a, b| self.mean(a).total_cmp(&self.mean(b)));
+            best.map_or(base, |probe| of_judged(&probe))
+        });
+        base.min(first) >= LIKE.0 && 0.5 * (base + first) >= LIKE.1
+    }
+
+    /// Values of a joint over its range, at most one turn.
+    fn turns(&self, free: usize) -> impl Iterator<Item = f64> + use<> {
+        let [low, high] = self.model.limits(free);
+        let span = (high - low).min(std::f64::consts::TAU);
+        let n = (span / FIRST_STEP).ceil().max(1.0);
+        (0..=n as usize).map(move |k| low + span * k as f64 / n)
+    }
+
+    fn score_base(&self, plane: &Plane, trial: &Trial, (tolerance, n): (f32, usize)) -> f64 {
+        let cad = prefix(self.model, self.base, n);
         let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
         self.mean(&self.evidence.probe(cad.0, cad.1, &pose, tolerance))
     }
@@ -307,21 +363,27 @@ impl<'a> BaseSearch<'a> {
 
     /// Area-weighted mean score of the base and of the first moving link at its best joint value.
     fn score_with_first(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> f64 {
-        let own = self.score_base(plane, trial, tolerance);
+        let own = self.score_base(plane, trial, (tolerance, self.settings.n_fine));
         let Some((free, link)) = self.first else { return own };
         let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
         let cad = prefix(self.model, link, self.settings.n_coarse);
-        let limits = self.model.limits(free);
-        let span = (limits[1] - limits[0]).min(std::f64::consts::TAU);
-        let n = (span / 0.14).ceil().max(1.0);
         let mut posture = self.model.home();
-        let mut top = f64::NEG_INFINITY;
-        for k in 0..=n as usize {
-            posture[free] = limits[0] + span * k as f64 / n;
-            let pose = local_from_base * self.model.poses(&posture)[link];
-            let probe = self.evidence.probe(cad.0, cad.1, &pose, tolerance * 1.5);
-            top = top.max(self.mean(&probe));
-        }
+        let poses: Vec<Pose> = self
+            .turns(free)
+            .map(|q| {
+                posture[free] = q;
+                local_from_base * self.model.poses(&posture)[link]
+            })
+            .collect();
+        // A few samples tell most values to be hopeless.
+        let score = |pose: &Pose, n: usize| {
+            let (points, normals) = (&cad.0[..n.min(cad.0.len())], &cad.1[..n.min(cad.1.len())]);
+            self.mean(&self.evidence.probe(points, normals, pose, tolerance * 1.5))
+        };
+        let few: Vec<f64> = poses.iter().map(|p| score(p, cad.0.len() / 4)).collect();
+        let least = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - LAG;
+        let full = poses.iter().zip(&few).filter(|(_, few)| **few >= least);
+        let top = full.map(|(p, _)| score(p, cad.0.len())).fold(f64::NEG_INFINITY, f64::max);
         let weight = |l: usize| f64::from(self.model.links[l].cad.area).sqrt();
         (weight(self.base) * own + weight(link) * top) / (weight(self.base) + weight(link))
     }
@@ -357,6 +419,7 @@ impl<'a> BaseSearch<'a> {
                 None => {}
             }
         }
+        places.retain(|place| self.is_like(&local[place[0].plane], place[0]));
         let world_from_local = Pose::from_parts(
             Translation3::from(self.region.origin.coords),
             UnitQuaternion::identity(),
@@ -379,6 +442,12 @@ impl<'a> BaseSearch<'a> {
             })
             .collect()
     }
+}
+
+/// Mean score of the samples that could be judged.
+fn of_judged(probe: &Probe) -> f64 {
+    let back = HIDDEN_PRICE * (probe.n - probe.n_seen) as f32;
+    f64::from((probe.score + back) / probe.n_seen.max(1) as f32)
 }
 
 fn coarse_yaw() -> f64 {
