@@ -13,7 +13,7 @@ use export::{
 };
 use geometry::{Aabb, Point};
 use ingest::{Sources, Want};
-use merge::Attach;
+use merge::{Attach, Hanging};
 use robot::Model;
 use segment::{Ground, Segment};
 
@@ -30,8 +30,13 @@ pub(crate) struct Labelling<'a> {
     bounds: Vec<Aabb>,
 }
 
-/// Labels of points near robots: for each mask, by place.
-pub(crate) struct Near(Vec<Vec<(u64, Label)>>);
+/// What is known of points near robots.
+pub(crate) struct Near {
+    /// Their labels: for each mask, by place.
+    labels: Vec<Vec<(u64, Label)>>,
+    /// What hangs on each robot.
+    hanging: Vec<Hanging>,
+}
 
 /// What was written.
 pub(crate) struct Done {
@@ -93,7 +98,7 @@ impl<'a> Labelling<'a> {
         for labels in &mut near {
             labels.sort_unstable_by_key(|entry: &(u64, Label)| entry.0);
         }
-        Ok(Near(near))
+        Ok(Near { labels: near, hanging: merge::hang(&attached, self.fits, self.models) })
     }
 
     /// Streams every input once more and writes its labels.
@@ -125,6 +130,9 @@ impl<'a> Labelling<'a> {
             pictures.push(self.draw_plan(&plan, input.id, out)?);
         }
         let masks = masks.finish()?;
+        for (i, fit) in self.fits.iter().enumerate() {
+            export::write_robot(out, i, fit, &self.models[fit.model], &near.hanging[i])?;
+        }
         for (i, picture) in robots.iter().enumerate() {
             let fit = &self.fits[i];
             let name = format!("pictures/R{}.png", i + 1);
@@ -214,7 +222,7 @@ impl Map for LabelStrip<'_> {
 
     fn apply(&self, strip: Strip, (): &mut ()) -> Result<Labelled> {
         let world = world(&strip, &self.scans[strip.scan.0 as usize]);
-        let near = &self.near.0[strip.mask.0 as usize];
+        let near = &self.near.labels[strip.mask.0 as usize];
         let mut at = near.partition_point(|entry| entry.0 < strip.first_place);
         let mut labels = Vec::with_capacity(strip.len());
         for (place, p) in strip.place.iter().zip(&world) {

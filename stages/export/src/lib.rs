@@ -13,6 +13,7 @@ mod npy;
 mod plan_picture;
 mod record;
 mod result;
+mod robot_model;
 mod robot_picture;
 mod table;
 
@@ -29,5 +30,6 @@ pub use result::{
     BasePose, BaseSigma, CalibrationEntry, FrameEntry, InputEntry, Labels, LinkEntry, Places,
     ResultFile, RobotEntry, RunnerUpEntry, SCHEMA, ScanLabels, StageEntry, TipPose,
 };
+pub use robot_model::write_robot;
 pub use robot_picture::RobotPicture;
 pub use table::write_table;

@@ -7,8 +7,10 @@
 
 mod attach;
 mod graph;
+mod hang;
 
 pub use attach::{Attach, Attached, Group};
+pub use hang::{Hanging, hang};
 
 /// What may be tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]

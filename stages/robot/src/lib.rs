@@ -8,6 +8,7 @@ mod cloud;
 mod correct;
 mod dress;
 mod finding;
+mod hull;
 mod kinematics;
 mod library;
 mod load;
@@ -23,6 +24,7 @@ mod urdf;
 
 pub use correct::correct;
 pub use finding::{Finding, Severity};
+pub use hull::hull;
 pub use library::Library;
 pub use load::Settings;
 pub use loops::{ClosedLoop, Closure, Form};

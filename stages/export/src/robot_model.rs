@@ -1,0 +1,178 @@
+//! A fitted robot and what hangs on it in; its model as a planner loads it out: a URDF with its meshes and the hanging
+//! things as convex pieces of their links, and the posture as YAML and CSV.
+//!
+//! ```text
+//! robots/R1/robot.urdf        links, joints, limits; closed loops are open, their joints stand as found in joints.csv
+//! robots/R1/meshes/*.stl      metres, frames of the links
+//! robots/R1/joints.yaml       name: value, as ROS loads it
+//! robots/R1/joints.csv        name, value, unit, standard deviation, whether it is determined, limits
+//! ```
+
+use crate::atomic;
+use contract::{Fit, Result};
+use geometry::Pose;
+use robot::{Joint, JointKind, Mesh, Model, Motion};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Writes the robot with this index; `hanging` has convex pieces by link.
+pub fn write_robot(
+    out: &Path,
+    index: usize,
+    fit: &Fit,
+    model: &Model,
+    hanging: &BTreeMap<usize, Vec<Mesh>>,
+) -> Result<String> {
+    let folder = format!("robots/R{}", index + 1);
+    let dir = out.join(&folder);
+    let names = file_names(model);
+    let mut links = String::new();
+    for (l, link) in model.links.iter().enumerate() {
+        let mut bodies = Vec::new();
+        if !link.mesh.triangles.is_empty() {
+            bodies.push((names[l].clone(), &link.mesh));
+        }
+        let pieces = hanging.get(&l).into_iter().flatten().enumerate();
+        bodies.extend(pieces.map(|(k, mesh)| (format!("{}_hanging_{k}", names[l]), mesh)));
+        let _ = writeln!(links, "  <link name=\"{}\">", escaped(&link.name));
+        for (name, mesh) in bodies {
+            atomic::write(&dir.join(format!("meshes/{name}.stl")), &stl(mesh))?;
+            for kind in ["visual", "collision"] {
+                let _ = writeln!(
+                    links,
+                    "    <{kind}><geometry><mesh filename=\"meshes/{name}.stl\"/></geometry></{kind}>"
+                );
+            }
+        }
+        links.push_str("  </link>\n");
+    }
+    let joints: String = model.joints.iter().map(|j| joint(model, j)).collect();
+    let urdf = format!(
+        "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n{links}{joints}</robot>\n",
+        escaped(&format!("R{} {}", index + 1, fit.model_name))
+    );
+    atomic::write(&dir.join("robot.urdf"), urdf.as_bytes())?;
+    atomic::write(&dir.join("joints.yaml"), yaml(fit, model).as_bytes())?;
+    atomic::write(&dir.join("joints.csv"), csv(fit, model).as_bytes())?;
+    Ok(folder)
+}
+
+/// A name for the files of each link: letters that every file system knows, each once.
+fn file_names(model: &Model) -> Vec<String> {
+    let plain = |name: &str| -> String {
+        name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+    };
+    let all = model.links.iter().enumerate();
+    all.map(|(l, link)| format!("{l:02}_{}", plain(&link.name))).collect()
+}
+
+fn joint(model: &Model, joint: &Joint) -> String {
+    let kind = match joint.kind {
+        JointKind::Revolute => "revolute",
+        JointKind::Continuous => "continuous",
+        JointKind::Prismatic => "prismatic",
+        JointKind::Fixed => "fixed",
+    };
+    let [parent, child] = [joint.parent, joint.child].map(|l| escaped(&model.links[l].name));
+    let mut text = format!(
+        "  <joint name=\"{}\" type=\"{kind}\">\n    {}\n    <parent link=\"{parent}\"/>\n    <child link=\"{child}\"/>\n",
+        escaped(&joint.name),
+        origin(&joint.parent_from_joint)
+    );
+    if joint.kind != JointKind::Fixed {
+        let a = joint.axis;
+        let _ = writeln!(text, "    <axis xyz=\"{:.9} {:.9} {:.9}\"/>", a.x, a.y, a.z);
+    }
+    if let Some([low, high]) = joint.limits {
+        let _ = writeln!(
+            text,
+            "    <limit lower=\"{low:.9}\" upper=\"{high:.9}\" effort=\"0\" velocity=\"0\"/>"
+        );
+    }
+    if let Motion::Mimic { free, multiplier, offset } = joint.motion {
+        let driver = escaped(&model.joints[model.free[free]].name);
+        let _ = writeln!(
+            text,
+            "    <mimic joint=\"{driver}\" multiplier=\"{multiplier:.9}\" offset=\"{offset:.9}\"/>"
+        );
+    }
+    text + "  </joint>\n"
+}
+
+fn origin(pose: &Pose) -> String {
+    let (p, (roll, pitch, yaw)) = (pose.translation.vector, pose.rotation.euler_angles());
+    format!(
+        "<origin xyz=\"{:.9} {:.9} {:.9}\" rpy=\"{roll:.9} {pitch:.9} {yaw:.9}\"/>",
+        p.x, p.y, p.z
+    )
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}
+
+/// Value of every joint that moves, passive ones of loops included, by name.
+fn values(fit: &Fit, model: &Model) -> Vec<(usize, f64)> {
+    let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    let all = model.joint_values(&posture);
+    (0..all.len())
+        .filter(|&j| model.joints[j].kind != JointKind::Fixed)
+        .map(|j| (j, all[j]))
+        .collect()
+}
+
+fn yaml(fit: &Fit, model: &Model) -> String {
+    let pose = &fit.world_from_base;
+    let (p, q) = (pose.translation.vector, pose.rotation);
+    let mut text = format!(
+        "# {}: metres and radians\nbase:\n  link: \"{}\"\n  xyz: [{:.6}, {:.6}, {:.6}]\n  quat_wxyz: [{:.9}, {:.9}, {:.9}, {:.9}]\njoints:\n",
+        fit.verdict.word(),
+        model.links[0].name,
+        p.x,
+        p.y,
+        p.z,
+        q.w,
+        q.i,
+        q.j,
+        q.k
+    );
+    for (j, value) in values(fit, model) {
+        let _ = writeln!(text, "  \"{}\": {value:.9}", model.joints[j].name);
+    }
+    text
+}
+
+fn csv(fit: &Fit, model: &Model) -> String {
+    let mut text = String::from("joint,value,unit,sigma,determined,lower,upper\n");
+    for (j, value) in values(fit, model) {
+        let joint = &model.joints[j];
+        let unit = if joint.kind == JointKind::Prismatic { "m" } else { "rad" };
+        let own = model.free.iter().position(|&f| f == j).and_then(|free| fit.joints.get(free));
+        let told = own.map_or_else(|| ",".into(), |f| format!("{:.9},{}", f.sigma, f.determined));
+        let limits = joint.limits.map_or_else(|| ",".into(), |[a, b]| format!("{a:.9},{b:.9}"));
+        let name = joint.name.replace('"', "\"\"");
+        let _ = writeln!(text, "\"{name}\",{value:.9},{unit},{told},{limits}");
+    }
+    text
+}
+
+/// Binary STL.
+fn stl(mesh: &Mesh) -> Vec<u8> {
+    let mut out = vec![0_u8; 80];
+    out.extend((mesh.triangles.len() as u32).to_le_bytes());
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| mesh.vertices[i as usize]);
+        let (u, v): ([f32; 3], [f32; 3]) =
+            (std::array::from_fn(|i| b[i] - a[i]), std::array::from_fn(|i| c[i] - a[i]));
+        let n: [f32; 3] = std::array::from_fn(|i| {
+            u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]
+        });
+        let length = n.iter().map(|x| x * x).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
+        for value in n.map(|x| x / length).into_iter().chain(a).chain(b).chain(c) {
+            out.extend(value.to_le_bytes());
+        }
+        out.extend([0, 0]);
+    }
+    out
+}

@@ -1,0 +1,28 @@
+//! Points in; the convex body around them out.
+
+use crate::model::Mesh;
+use parry3d::transformation::try_convex_hull;
+
+/// The convex hull of some points, metres, its triangles counter-clockwise from outside; `None` where they lie in a
+/// plane or are too few.
+#[must_use]
+pub fn hull(points: &[[f32; 3]]) -> Option<Mesh> {
+    let points: Vec<_> = points.iter().map(|p| glamx::Vec3::from_array(*p)).collect();
+    let (vertices, triangles) = try_convex_hull(&points).ok()?;
+    Some(Mesh { vertices: vertices.iter().map(|v| v.to_array()).collect(), triangles })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_with_a_point_inside_has_eight_corners() {
+        let mut points: Vec<[f32; 3]> =
+            (0..8).map(|k| [k & 1, k >> 1 & 1, k >> 2].map(|b| b as f32)).collect();
+        points.push([0.5; 3]);
+        let mesh = hull(&points).expect("a body");
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (8, 12));
+        assert!(hull(&points[..3]).is_none());
+    }
+}
