@@ -35,6 +35,7 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
         robots,
         scanners: None,
         out: dir.join("result"),
+        review: None,
         means: means.clone(),
     };
     let started = Instant::now();

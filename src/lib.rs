@@ -16,6 +16,7 @@ mod masks;
 pub mod plan;
 pub mod progress;
 mod report;
+pub mod review;
 pub mod scanning;
 mod search;
 pub mod store;

@@ -7,18 +7,22 @@ use crate::job::{Job, Outcome};
 use crate::labelling::Labelling;
 use crate::library;
 use crate::report::Report;
+use crate::review::Review;
 use crate::search::{Search, Shelf};
 use crate::store::{Scatter, Store};
 use crate::surfaces::{Gather, Surfaces};
 use crate::tools;
 use contract::Result;
 use ingest::{Scanners, Want};
+use std::path::PathBuf;
 
 /// Does the main job.
 pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let settings = &job.means.settings;
     let room = job.room()?;
     let library = library::load(&job.robots, &settings.robot, engine)?;
+    let read = |path: &PathBuf| Review::read(path, &library.models);
+    let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
     let scans = &sources.scans;
@@ -48,7 +52,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let shelf = Shelf::new(&library.models);
     let search = Search::new(&shelf, scans, &store, &ground, settings);
     let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
-    let fits = fit::choose(fits.into_iter().flatten().collect(), &library.models);
+    let (fits, unmet) = review.apply(fits.into_iter().flatten().collect());
+    let fits = fit::choose(fits, &library.models);
     let mut models = library.models.clone();
     let mut fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
     if settings.fit.calibrate {
@@ -71,6 +76,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         fits: &fits,
         clusters: &clusters,
         written: &written,
+        unmet,
     }
     .finish(&room)
 }

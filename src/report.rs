@@ -25,6 +25,8 @@ pub(crate) struct Report<'a> {
     pub(crate) fits: &'a [Fit],
     pub(crate) clusters: &'a [Cluster],
     pub(crate) written: &'a Done,
+    /// What the review expects and nobody found.
+    pub(crate) unmet: Vec<String>,
 }
 
 impl Report<'_> {
@@ -102,6 +104,7 @@ impl Report<'_> {
 
     fn warnings(&self) -> Vec<String> {
         let mut out = self.sources.warnings.clone();
+        out.extend(self.unmet.iter().cloned());
         for finding in &self.library.findings {
             if finding.severity == robot::Severity::Error {
                 out.push(format!(

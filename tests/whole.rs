@@ -39,7 +39,8 @@ fn scene(dir: &Path) -> PathBuf {
 fn run(input: PathBuf, scanners: Option<PathBuf>, robots: &Path, out: PathBuf, threads: usize) {
     let given = Given { threads: Some(threads), ..Given::default() };
     let means = Means::of(&given).expect("defaults hold");
-    let job = Job { inputs: vec![input], robots: robots.to_path_buf(), scanners, out, means };
+    let robots = robots.to_path_buf();
+    let job = Job { inputs: vec![input], robots, scanners, out, review: None, means };
     plan::run(&job, &Engine::new(threads)).expect("the run ends well");
 }
 

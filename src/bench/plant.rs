@@ -191,6 +191,7 @@ fn run(
         robots,
         scanners: None,
         out: dir.join("result"),
+        review: None,
         means: means.clone(),
     };
     plan::run(&job, engine)?;

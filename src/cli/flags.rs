@@ -143,6 +143,9 @@ pub(super) struct RunFlags {
     /// Where results go
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
+    /// What a person knows of the robots: places where one stands, of which model, or none (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub(super) review: Option<PathBuf>,
     /// Estimate where the joints of each robot really are, too: for robots that their models fit poorly
     #[arg(long)]
     pub(super) calibrate: bool,

@@ -15,6 +15,7 @@ pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
         robots: flags.robots.clone(),
         scanners: common.scanners(&means),
         out: flags.out.clone(),
+        review: flags.review.clone(),
         means,
     };
     let outcome = plan::run(&job, &engine)?;

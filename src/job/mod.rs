@@ -33,6 +33,8 @@ pub struct Job {
     pub scanners: Option<PathBuf>,
     /// Where results go.
     pub out: PathBuf,
+    /// What a person knows of the robots.
+    pub review: Option<PathBuf>,
     /// How much, in which way.
     pub means: Means,
 }
