@@ -4,12 +4,14 @@
 #![forbid(unsafe_code)]
 
 mod atomic;
+mod calibration;
 mod canvas;
 mod clouds;
 mod e57;
 mod las;
 mod mask;
 mod npy;
+mod places;
 mod plan_picture;
 mod record;
 mod result;
@@ -18,17 +20,19 @@ mod robot_picture;
 mod table;
 
 pub use atomic::AtomicFile;
+pub use calibration::{CalibrationEntry, FrameEntry};
 pub use canvas::{Canvas, Rgb, link_color, robot_color};
 pub use clouds::{Clouds, CloudsSettings, Written};
 pub use e57::{E57Scans, GridPoint, GridScan};
 pub use las::{LasSummary, LasWriter};
 pub use mask::{MaskFiles, MaskWriter};
 pub use npy::{Element, NpyWriter};
+pub use places::Places;
 pub use plan_picture::PlanPicture;
 pub use record::{LasPoint, LasSettings, Quantum, RawVlr, class_of};
 pub use result::{
-    BasePose, BaseSigma, CalibrationEntry, FrameEntry, InputEntry, Labels, LinkEntry, Places,
-    ResultFile, RobotEntry, RunnerUpEntry, SCHEMA, ScanLabels, StageEntry, TipPose,
+    BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
+    SCHEMA, ScanLabels, StageEntry, TipPose,
 };
 pub use robot_model::write_robot;
 pub use robot_picture::RobotPicture;

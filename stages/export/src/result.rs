@@ -2,13 +2,12 @@
 //! adding fields. Numbers that are not finite are written as null.
 
 use crate::atomic;
+use crate::calibration::CalibrationEntry;
 use crate::mask::MaskFiles;
-use contract::{Calibration, Error, Fit, JointFrame, Kind, Mask, Result};
+use crate::places::Places;
+use contract::{Error, Fit, Kind, Mask, Result};
 use geometry::Pose;
-use serde::de::{MapAccess, Visitor};
-use serde::ser::SerializeMap;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::marker::PhantomData;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Name and version of the schema.
@@ -177,84 +176,6 @@ pub struct ToolEntry {
     pub link: String,
     /// Turn of its root about the axis of the robot's last joint, along that link's own axis, radians.
     pub mount: f64,
-}
-
-/// How a robot differs from its model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CalibrationEntry {
-    /// Its free joints.
-    pub joints: Vec<FrameEntry>,
-    /// Standard deviations that were assumed beforehand: shift, metres, turn, radians.
-    pub prior: [f64; 2],
-    /// RMS distance of each link's points from its surface, metres: as in the model, and corrected.
-    pub link_rms: Places<[Option<f64>; 2]>,
-}
-
-/// Where a joint is against its model, in the joint's own frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FrameEntry {
-    /// Name of the joint.
-    pub joint: String,
-    /// Its axis.
-    pub axis: [f64; 3],
-    /// Whether it slides.
-    pub slides: bool,
-    /// Shift of its origin, metres.
-    pub shift: [f64; 3],
-    /// Turn of its frame, radians.
-    pub turn: [f64; 3],
-    /// Standard deviations of both.
-    pub sigma: [f64; 6],
-    /// How far its axis runs beside the model's, metres, and standard deviation.
-    pub offset: [f64; 2],
-    /// How far its axis leans, radians, and standard deviation.
-    pub swing: [f64; 2],
-}
-
-impl CalibrationEntry {
-    fn new(fit: &Fit, found: &Calibration) -> Self {
-        let names = fit.links.iter().map(|l| l.name.clone());
-        let rms = found.link_rms.iter().map(|r| r.map(finite));
-        Self {
-            joints: found.frames.iter().map(FrameEntry::from).collect(),
-            prior: found.prior,
-            link_rms: Places(names.zip(rms).collect()),
-        }
-    }
-
-    /// As the fit had it.
-    #[must_use]
-    pub fn calibration(&self) -> Calibration {
-        let frame = |e: &FrameEntry| JointFrame {
-            name: e.joint.clone(),
-            axis: e.axis,
-            slides: e.slides,
-            shift: e.shift,
-            turn: e.turn,
-            sigma: e.sigma,
-        };
-        let link_rms = self.link_rms.0.iter().map(|(_, r)| r.map(|v| v.unwrap_or(f64::NAN)));
-        Calibration {
-            frames: self.joints.iter().map(frame).collect(),
-            prior: self.prior,
-            link_rms: link_rms.collect(),
-        }
-    }
-}
-
-impl From<&JointFrame> for FrameEntry {
-    fn from(f: &JointFrame) -> Self {
-        Self {
-            joint: f.name.clone(),
-            axis: f.axis,
-            slides: f.slides,
-            shift: f.shift,
-            turn: f.turn,
-            sigma: f.sigma,
-            offset: f.offset(),
-            swing: f.swing(),
-        }
-    }
 }
 
 /// Another posture that explains the points as well.
@@ -455,49 +376,6 @@ impl ResultFile {
 }
 
 /// The number, if it is one.
-fn finite(value: f64) -> Option<f64> {
+pub(crate) fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
-}
-
-/// A JSON object whose names keep their order.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Places<T>(pub Vec<(String, T)>);
-
-impl<T> Default for Places<T> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
-}
-
-impl<T: Serialize> Serialize for Places<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.0.len()))?;
-        for (name, value) in &self.0 {
-            map.serialize_entry(name, value)?;
-        }
-        map.end()
-    }
-}
-
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Places<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        struct InOrder<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> Visitor<'de> for InOrder<T> {
-            type Value = Places<T>;
-            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-                f.write_str("an object")
-            }
-            fn visit_map<A: MapAccess<'de>>(
-                self,
-                mut map: A,
-            ) -> std::result::Result<Places<T>, A::Error> {
-                let mut out = Vec::new();
-                while let Some(entry) = map.next_entry()? {
-                    out.push(entry);
-                }
-                Ok(Places(out))
-            }
-        }
-        deserializer.deserialize_map(InOrder(PhantomData))
-    }
 }

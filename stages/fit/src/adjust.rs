@@ -64,7 +64,7 @@ pub(crate) struct Adjusted {
 /// The adjustment of one robot.
 pub(crate) struct Adjust<'a> {
     pub(crate) refine: &'a Refine<'a>,
-    /// Joints whose places on their links are unknowns of [`Self::calibration`].
+    /// Joints whose places on their links are unknowns, too, in [`Self::at`].
     pub(crate) frames: &'a [usize],
 }
 

@@ -10,6 +10,8 @@ use geometry::{Evidence, Plane, Point, Pose, Probe, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
+use crate::trial::{Trial, base_link, best, coarse_yaw, first_moving, of_judged, prefix};
+
 /// What is tuned.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -55,10 +57,6 @@ const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
 const MAX_CELLS: usize = 6;
 
-/// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw leaves room for others.
-const QUOTA: usize = 8;
-/// Radius of such a place in steps of the search.
-const PLACE_STEPS: f64 = 2.5;
 /// Tolerances at which base and first link are judged in the end, metres: half a step of the finest grid.
 const JUDGE: (f32, f32) = (0.04, 0.06);
 /// Mean score of what could be judged: of the worse of base and first link, and of both. Of 125 robots that were found
@@ -89,16 +87,6 @@ pub struct BaseSearch<'a> {
     root_from_base: Pose,
     /// The first joint that moves something with a surface, and the link that it moves.
     first: Option<(usize, usize)>,
-}
-
-/// A base pose under test.
-#[derive(Debug, Clone, Copy)]
-struct Trial {
-    x: f64,
-    y: f64,
-    yaw: f64,
-    plane: usize,
-    score: f64,
 }
 
 impl<'a> BaseSearch<'a> {
@@ -442,76 +430,4 @@ impl<'a> BaseSearch<'a> {
             })
             .collect()
     }
-}
-
-/// Mean score of the samples that could be judged.
-fn of_judged(probe: &Probe) -> f64 {
-    let back = HIDDEN_PRICE * (probe.n - probe.n_seen) as f32;
-    f64::from((probe.score + back) / probe.n_seen.max(1) as f32)
-}
-
-fn coarse_yaw() -> f64 {
-    std::f64::consts::TAU / 24.0
-}
-
-/// The first link in tree order that has a surface and hangs rigidly on the root.
-fn base_link(model: &Model) -> Option<usize> {
-    (0..model.links.len()).find(|&l| {
-        let mut at = l;
-        let mut fixed = true;
-        while let Some(j) = model.links[at].parent_joint {
-            fixed &= model.joints[j].kind == robot::JointKind::Fixed;
-            at = model.joints[j].parent;
-        }
-        fixed && !model.links[l].cad.points.is_empty()
-    })
-}
-
-/// The first free joint and the first link with a surface that it carries directly.
-fn first_moving(model: &Model) -> Option<(usize, usize)> {
-    let joint = *model.free.first()?;
-    let child = model.joints[joint].child;
-    (!model.links[child].cad.points.is_empty()).then_some((0, child))
-}
-
-/// The first `n` samples of a link.
-fn prefix(model: &Model, link: usize, n: usize) -> (&[[f32; 3]], &[[f32; 3]]) {
-    let cad = &model.links[link].cad;
-    let n = n.min(cad.points.len());
-    (&cad.points[..n], &cad.normals[..n])
-}
-
-/// Sorts best first and keeps up to `keep` that differ from every better one by a step in place or yaw.
-fn best(trials: &mut Vec<Trial>, keep: usize, step: f64, yaw_step: f64) {
-    trials.sort_by(|a, b| {
-        b.score
-            .total_cmp(&a.score)
-            .then(a.plane.cmp(&b.plane))
-            .then(a.x.total_cmp(&b.x))
-            .then(a.y.total_cmp(&b.y))
-            .then(a.yaw.total_cmp(&b.yaw))
-    });
-    let mut kept: Vec<Trial> = Vec::new();
-    for trial in trials.iter() {
-        if kept.len() == keep {
-            break;
-        }
-        let here = |k: &&Trial| {
-            k.plane == trial.plane && (k.x - trial.x).hypot(k.y - trial.y) < PLACE_STEPS * step
-        };
-        if kept.iter().filter(here).count() >= QUOTA {
-            continue;
-        }
-        let twin = kept.iter().any(|k| {
-            let turn = (k.yaw - trial.yaw).rem_euclid(std::f64::consts::TAU);
-            k.plane == trial.plane
-                && (k.x - trial.x).abs() < step
-                && (k.y - trial.y).abs() < step
-                && turn.min(std::f64::consts::TAU - turn) < yaw_step
-        });
-        if !twin {
-            kept.push(*trial);
-        }
-    }
-    *trials = kept;
 }

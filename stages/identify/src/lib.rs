@@ -6,6 +6,7 @@
 mod base;
 mod bodies;
 mod sites;
+mod trial;
 
 pub use base::{BaseSearch, Settings};
 pub use sites::{RegionSettings, guessed_planes, regions};

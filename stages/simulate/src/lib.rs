@@ -11,6 +11,7 @@ mod columns;
 pub mod demo_robots;
 mod demo_scene;
 mod hall;
+mod place;
 mod plant;
 mod plots;
 mod posture;

@@ -4,8 +4,8 @@ use contract::{Error, Result};
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
+pub use crate::place::{Later, RobotPlace, Tool, ToolShape};
 pub use crate::scanner::{Mixed, Raster, Registration, Scanner};
 
 /// Everything that the virtual scanner needs. Metres, degrees where a name says so, world frame z up.
@@ -282,40 +282,6 @@ pub struct Carried {
     pub size: [f64; 3],
 }
 
-/// A robot and how it stands.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RobotPlace {
-    /// Its name in the scene.
-    pub name: String,
-    /// Its folder in the library.
-    pub model: String,
-    /// Origin of the root link in the world, metres.
-    pub xyz: [f64; 3],
-    /// Roll, pitch, yaw of the root link, degrees.
-    #[serde(default)]
-    pub rpy_deg: [f64; 3],
-    /// Value of each free joint by name, radians or metres; the model's home value where left out.
-    #[serde(default)]
-    pub posture: BTreeMap<String, f64>,
-    /// A tool that no URDF describes.
-    #[serde(default)]
-    pub tool: Option<Tool>,
-    /// How it stands while other scanners look: it moved between two stations.
-    #[serde(default, rename = "later")]
-    pub later: Vec<Later>,
-}
-
-/// How a robot stands while some scanners look.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Later {
-    /// Names of those scanners.
-    pub scanners: Vec<String>,
-    /// Value of each free joint by name, as for the robot.
-    pub posture: BTreeMap<String, f64>,
-}
-
 impl Scene {
     /// The scene as one scanner sees it: robots as they stand then.
     pub(crate) fn as_seen_by(&self, scanner: &str) -> Self {
@@ -329,45 +295,6 @@ impl Scene {
         }
         out
     }
-}
-
-impl RobotPlace {
-    /// World from root link, without the scene's origin.
-    #[must_use]
-    pub fn world_from_base(&self) -> Pose {
-        pose(self.xyz, self.rpy_deg)
-    }
-}
-
-/// A tool that no URDF describes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Tool {
-    /// The link that carries it.
-    pub link: String,
-    /// What it looks like.
-    pub shape: ToolShape,
-    /// Place in the link's frame; the tool points along +z of the turned frame, metres.
-    #[serde(default)]
-    pub xyz: [f64; 3],
-    /// Roll, pitch, yaw in the link's frame, degrees.
-    #[serde(default)]
-    pub rpy_deg: [f64; 3],
-    /// Its length, metres.
-    #[serde(default = "tool_length")]
-    pub length: f64,
-}
-
-/// What a tool looks like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ToolShape {
-    /// A body with two fingers.
-    Gripper,
-    /// A frame with suction cups.
-    Cups,
-    /// A bent welding torch.
-    Torch,
 }
 
 impl Scene {
@@ -448,7 +375,4 @@ fn fence_height() -> f64 {
 }
 fn sag() -> f64 {
     0.15
-}
-fn tool_length() -> f64 {
-    0.25
 }
