@@ -9,8 +9,20 @@ use parry3d::transformation::try_convex_hull;
 pub fn hull(points: &[[f32; 3]]) -> Option<Mesh> {
     let points: Vec<_> = points.iter().map(|p| glamx::Vec3::from_array(*p)).collect();
     let (vertices, triangles) = try_convex_hull(&points).ok()?;
-    Some(Mesh { vertices: vertices.iter().map(|v| v.to_array()).collect(), triangles })
+    let volume: f32 = triangles
+        .iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|i| vertices[i as usize] - vertices[0]);
+            a.dot(b.cross(c)) / 6.0
+        })
+        .sum();
+    // What is flat has two sides and nothing between them.
+    (volume > FLAT)
+        .then(|| Mesh { vertices: vertices.iter().map(|v| v.to_array()).collect(), triangles })
 }
+
+/// Smaller bodies are none, m³: a cube of 1 mm.
+const FLAT: f32 = 1e-9;
 
 #[cfg(test)]
 mod tests {
