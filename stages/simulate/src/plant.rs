@@ -32,7 +32,7 @@ pub struct Plant {
 }
 
 /// Room around a robot: share of its reach on each side of its base …
-const ROOM: f64 = 0.8;
+const ROOM: f64 = 0.95;
 /// … but at least so much, metres.
 const MIN_ROOM: f64 = 0.9;
 /// Width of the aisles around a row, and of the conveyor's way between two, metres.
@@ -183,7 +183,7 @@ fn furnish(
             // A conveyor or a bench beside the foot.
             let side = if random.unit() < 0.5 { 1.0 } else { -1.0 };
             let width = random.between(0.4, 0.7);
-            let foot = 0.32 + 0.5 * width + gap + random.between(0.0, 0.2);
+            let foot = foot_radius(room.model) + 0.5 * width + gap + random.between(0.0, 0.2);
             let middle = [0.5 * (room.min[0] + room.max[0]), 0.5 * (room.min[1] + room.max[1])];
             let piece = Furniture {
                 name: format!("beside {k}"),
@@ -347,6 +347,16 @@ fn stand(
     hoses(scene, room.model, &name, random);
     scene.robots.push(place);
     Ok(())
+}
+
+/// Farthest corner of the first link with a body from the upright through the base, metres.
+fn foot_radius(model: &Model) -> f64 {
+    let poses = model.poses(&model.home());
+    let standing = model.links.iter().zip(&poses).find(|(l, _)| !l.mesh.vertices.is_empty());
+    standing.map_or(0.3, |(link, pose)| {
+        let corners = link.mesh.vertices.iter().map(|v| pose * Point::from(v.map(f64::from)));
+        corners.map(|p| p.x.hypot(p.y)).fold(0.0, f64::max)
+    })
 }
 
 /// Height of the lowest corner of the first link with a body, metres.
