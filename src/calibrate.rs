@@ -4,6 +4,7 @@
 use crate::atomic;
 use crate::engine::{AllThreads, Engine};
 use crate::search::Search;
+use crate::tools::adopt;
 use contract::{Calibration, Error, Fit, Kind, Region, Result, Verdict};
 use export::{ResultFile, RobotEntry};
 use fit::Prepared;
@@ -33,15 +34,7 @@ pub(crate) fn calibrate(
         })?;
         Ok(found.map_or((fit, None), |(model, fit)| (fit, Some(model))))
     })?;
-    let mut out = Vec::with_capacity(done.len());
-    for (mut fit, model) in done {
-        if let Some(model) = model {
-            fit.model = models.len();
-            models.push(model);
-        }
-        out.push(fit);
-    }
-    Ok(out)
+    Ok(adopt(done, models))
 }
 
 /// Which robots of the results are put together.

@@ -77,11 +77,7 @@ impl<'a> Search<'a> {
 
     /// Fits of all models in one region, whatever their verdict.
     pub(crate) fn region(&self, region: &Region) -> Result<Vec<Fit>> {
-        let views: Vec<View> = self
-            .scans
-            .par_iter()
-            .filter_map(|scan| self.view(scan, region).transpose())
-            .collect::<Result<_>>()?;
+        let views = self.views(region)?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit);
         if self.settings.fit.method == Method::Paper {
@@ -176,11 +172,7 @@ impl<'a> Search<'a> {
         let at = fit.world_from_base.translation.vector;
         let home = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(at.into()));
         let Some(region) = home else { return Ok(None) };
-        let views: Vec<View> = self
-            .scans
-            .par_iter()
-            .filter_map(|scan| self.view(scan, region).transpose())
-            .collect::<Result<_>>()?;
+        let views = self.views(region)?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit);
         Ok(Some(work(&scene, &self.settings.fit)))
@@ -193,17 +185,19 @@ impl<'a> Search<'a> {
         model: usize,
         starts: &[(Pose, Vec<f64>)],
     ) -> Result<Vec<(Pose, Vec<f64>)>> {
-        let views: Vec<View> = self
-            .scans
-            .iter()
-            .filter_map(|scan| self.view(scan, region).transpose())
-            .collect::<Result<_>>()?;
+        let views = self.views(region)?;
         let planes = self.planes(region);
         let settings = &self.settings.fit;
         let scene = Scene::new(region, &views, &planes, settings);
         let prepared = self.shelf.prepared(model);
         let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, &scene, settings, (&s.0, &s.1));
         Ok(starts.par_iter().map(end).collect())
+    }
+
+    /// What each scan sees of the region, those that see something.
+    fn views(&self, region: &Region) -> Result<Vec<View>> {
+        let scans = self.scans.par_iter();
+        scans.filter_map(|scan| self.view(scan, region).transpose()).collect()
     }
 
     /// One scan's view of the region; `None` where it sees nothing of it.

@@ -47,15 +47,19 @@ pub(crate) fn dress(
         })?;
         Ok(dressed.unwrap_or((fit, None)))
     })?;
-    let mut out = Vec::with_capacity(dressed.len());
-    for (mut fit, model) in dressed {
+    Ok(adopt(dressed, models))
+}
+
+/// The fits, those with a model of their own pointing at it among `models`.
+pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) -> Vec<Fit> {
+    let own = |(mut fit, model): (Fit, Option<Model>)| {
         if let Some(model) = model {
             fit.model = models.len();
             models.push(model);
         }
-        out.push(fit);
-    }
-    Ok(out)
+        fit
+    };
+    fits.into_iter().map(own).collect()
 }
 
 /// One arm: the tool that explains most, if one is there.

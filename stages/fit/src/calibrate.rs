@@ -99,6 +99,7 @@ fn keep(out: &mut Fit, fit: &Fit, found: Calibration) {
     out.equals.clone_from(&fit.equals);
     out.alike.clone_from(&fit.alike);
     out.tool.clone_from(&fit.tool);
+    out.other_branches.clone_from(&fit.other_branches);
     out.verdict = out.verdict.min(fit.verdict);
     out.reasons.extend(words(&found.frames));
     out.calibration = Some(found);
