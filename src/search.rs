@@ -197,7 +197,10 @@ impl<'a> Search<'a> {
     /// What each scan sees of the region, those that see something.
     fn views(&self, region: &Region) -> Result<Vec<View>> {
         let scans = self.scans.par_iter();
-        scans.filter_map(|scan| self.view(scan, region).transpose()).collect()
+        let views = scans.filter_map(|scan| self.view(scan, region).transpose());
+        let mut views: Vec<View> = views.collect::<Result<_>>()?;
+        lattice::agree(&mut views);
+        Ok(views)
     }
 
     /// One scan's view of the region; `None` where it sees nothing of it.

@@ -109,7 +109,6 @@ impl DepthImage {
     /// direction in the camera frame, z = 1), and builds the coarser levels. Call once, after the last splat.
     pub fn finish(&mut self, window: i32, mut empty: impl FnMut([f32; 3]) -> Empty) {
         let focal = self.focal;
-        self.levels.truncate(1);
         let base = &mut self.levels[0];
         let (cx, cy) = (0.5 * base.width as f32, 0.5 * base.height as f32);
         let open = base.open_cells(window);
@@ -119,11 +118,48 @@ impl DepthImage {
                 base.cells[at] = [f32::INFINITY; 2];
             }
         }
+        self.build_levels();
+    }
+
+    /// The coarser levels, from level 0.
+    fn build_levels(&mut self) {
+        self.levels.truncate(1);
         while self.levels[self.levels.len() - 1].width > 8 && self.levels.len() < 8 {
             let next = self.levels[self.levels.len() - 1].halved();
             self.levels.push(next);
         }
         self.levels.iter_mut().for_each(Level::look_around);
+    }
+
+    /// Takes back "no return" where others measured matter in that direction (camera frame): beams that ought to have
+    /// ended and did not come back (too near, too dark, too shiny) prove no free space, nor do those within `window`
+    /// cells of them; nor does any, where a share of `blind` of that matter went unseen.
+    pub fn doubt(&mut self, matter: &[[f32; 3]], window: i32, blind: f32) {
+        let focal = self.focal;
+        let base = &mut self.levels[0];
+        let seen: Vec<usize> =
+            matter.iter().filter_map(|p| base.find(focal, *p)).map(|(at, _)| at).collect();
+        let silent: Vec<usize> =
+            seen.iter().copied().filter(|&at| base.cells[at][0] == f32::INFINITY).collect();
+        if silent.is_empty() {
+            return;
+        }
+        if silent.len() as f32 > blind * seen.len() as f32 {
+            let all = base.cells.iter_mut().filter(|c| c[0] == f32::INFINITY);
+            all.for_each(|c| *c = [f32::NAN; 2]);
+        }
+        let window = usize::try_from(window).unwrap_or(0);
+        for at in silent {
+            let (u, v) = (at % base.width, at / base.width);
+            for v in v.saturating_sub(window)..(v + window + 1).min(base.height) {
+                let row = v * base.width;
+                let across = u.saturating_sub(window)..(u + window + 1).min(base.width);
+                let cells = &mut base.cells[row + across.start..row + across.end];
+                let none = cells.iter_mut().filter(|c| c[0] == f32::INFINITY);
+                none.for_each(|c| *c = [f32::NAN; 2]);
+            }
+        }
+        self.build_levels();
     }
 
     /// What the beams found at a camera-frame point, in a cell about `footprint` metres wide; `None` outside the

@@ -18,4 +18,4 @@ pub use normals::normals;
 pub use raster::veils;
 pub use settings::Settings;
 pub use summarise::{Scratch, Summarise};
-pub use view::{Extent, ViewBuilder, ViewSettings};
+pub use view::{Extent, ViewBuilder, ViewSettings, agree};
