@@ -8,7 +8,7 @@ use crate::surfaces::Ground;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
 use fit::{Method, Prepared, Scene};
 use geometry::{Point, Pose};
-use identify::BaseSearch;
+use identify::{BaseSearch, Sight};
 use lattice::ViewBuilder;
 use rayon::prelude::*;
 use robot::Model;
@@ -87,10 +87,11 @@ impl<'a> Search<'a> {
             let fit = |m: usize| fit::paper::fit(self.shelf.prepared(m), &scene, &planes, means);
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
-        let mut fits = self.fits(&scene, self.candidates(&scene, &planes));
+        let sight = Sight::new(region, &views, &scene.evidence, &AllThreads);
+        let mut fits = self.fits(&scene, self.candidates(&sight, &planes));
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
-            let mut hung = self.candidates(&scene, &self.mounts(region));
+            let mut hung = self.candidates(&sight, &self.mounts(region));
             hung.retain(|c| c.bases[0].1 >= MIN_MOUNT_SCORE && self.is_above_floor(c));
             let mut n = vec![0; self.shelf.models.len()];
             hung.retain(|c| {
@@ -103,12 +104,10 @@ impl<'a> Search<'a> {
     }
 
     /// Where robots of all models may stand on some planes, best base first.
-    fn candidates(&self, scene: &Scene<'_>, planes: &[InstallationPlane]) -> Vec<Candidate> {
+    fn candidates(&self, sight: &Sight<'_>, planes: &[InstallationPlane]) -> Vec<Candidate> {
         let search = |index: usize| {
             let model = (index, &self.shelf.models[index]);
-            let (region, views) = (scene.region, scene.views);
-            let settings = &self.settings.identify;
-            BaseSearch::new(model, region, views, &scene.evidence, settings)
+            BaseSearch::new(model, sight, &self.settings.identify)
                 .map(|search| search.run(planes, &AllThreads))
                 .unwrap_or_default()
         };

@@ -19,6 +19,9 @@ pub enum Empty {
 #[derive(Debug, Clone)]
 pub struct DepthImage {
     camera_from_local: Pose,
+    /// The same for inner loops.
+    rows: Rows,
+    scanner: crate::Point,
     /// Cells of level 0 per unit tangent.
     focal: f32,
     levels: Vec<Level>,
@@ -28,11 +31,10 @@ pub struct DepthImage {
 struct Level {
     width: usize,
     height: usize,
-    /// `[near, far]` in metres; NaN unknown, +∞ no return. Row-major.
-    cells: Vec<[f32; 2]>,
-    /// Smallest `near` of a cell and its eight neighbours: at a silhouette the beams of one cell may all have missed
-    /// a body that those of its neighbour hit.
-    around: Vec<f32>,
+    /// `[near, far, around]` in metres; NaN unknown, +∞ no return. Row-major. `around` is the smallest `near` of a cell
+    /// and its eight neighbours: at a silhouette the beams of one cell may all have missed a body that those of its
+    /// neighbour hit.
+    cells: Vec<[f32; 3]>,
 }
 
 /// `a_from_b` as three rows of four f32, for inner loops.
@@ -70,15 +72,19 @@ impl DepthImage {
     #[must_use]
     pub fn new(camera_from_local: Pose, half_tangent: f64, focal: f64) -> Self {
         let side = ((2.0 * half_tangent * focal).ceil().clamp(1.0, 8192.0)) as usize;
-        let cells = vec![[f32::NAN; 2]; side * side];
-        let level = Level { width: side, height: side, cells, around: Vec::new() };
-        Self { camera_from_local, focal: focal as f32, levels: vec![level] }
+        let cells = vec![[f32::NAN; 3]; side * side];
+        let level = Level { width: side, height: side, cells };
+        let rows = rows(&camera_from_local);
+        // To a micrometre, so that images of one scanner agree.
+        let scanner = camera_from_local.inverse() * crate::Point::origin();
+        let scanner = scanner.map(|v| (v * 1e6).round() * 1e-6);
+        Self { camera_from_local, rows, scanner, focal: focal as f32, levels: vec![level] }
     }
 
     /// Where the scanner stands, in the local frame.
     #[must_use]
     pub fn scanner(&self) -> crate::Point {
-        self.camera_from_local.inverse() * crate::Point::origin()
+        self.scanner
     }
 
     /// Camera frame from local frame; the camera looks along its +z.
@@ -101,7 +107,7 @@ impl DepthImage {
         if let Some((at, range)) = level.find(focal, camera) {
             let cell = &mut level.cells[at];
             // `min`/`max` of f32 pass NaN over, which is what an empty cell needs.
-            *cell = [cell[0].min(range), cell[1].max(range)];
+            *cell = [cell[0].min(range), cell[1].max(range), f32::NAN];
         }
     }
 
@@ -115,7 +121,7 @@ impl DepthImage {
         for (at, _) in open.iter().enumerate().filter(|(_, open)| **open) {
             let (u, v) = ((at % base.width) as f32 + 0.5, (at / base.width) as f32 + 0.5);
             if empty([(u - cx) / focal, (v - cy) / focal, 1.0]) == Empty::NoReturn {
-                base.cells[at] = [f32::INFINITY; 2];
+                base.cells[at] = [f32::INFINITY; 3];
             }
         }
         self.build_levels();
@@ -146,7 +152,7 @@ impl DepthImage {
         }
         if silent.len() as f32 > blind * seen.len() as f32 {
             let all = base.cells.iter_mut().filter(|c| c[0] == f32::INFINITY);
-            all.for_each(|c| *c = [f32::NAN; 2]);
+            all.for_each(|c| *c = [f32::NAN; 3]);
         }
         let window = usize::try_from(window).unwrap_or(0);
         for at in silent {
@@ -156,7 +162,7 @@ impl DepthImage {
                 let across = u.saturating_sub(window)..(u + window + 1).min(base.width);
                 let cells = &mut base.cells[row + across.start..row + across.end];
                 let none = cells.iter_mut().filter(|c| c[0] == f32::INFINITY);
-                none.for_each(|c| *c = [f32::NAN; 2]);
+                none.for_each(|c| *c = [f32::NAN; 3]);
             }
         }
         self.build_levels();
@@ -183,12 +189,12 @@ impl DepthImage {
         }
         let l = &self.levels[level];
         let at = (v * scale) as usize * l.width + (u * scale) as usize;
-        let [near, far] = l.cells[at];
+        let [near, far, around] = l.cells[at];
         if near.is_nan() {
             return None;
         }
         let range = (camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]).sqrt();
-        Some(Look { near, far, around: l.around[at], range })
+        Some(Look { near, far, around, range })
     }
 }
 
@@ -242,7 +248,7 @@ impl Level {
 
     fn halved(&self) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
-        let mut cells = vec![[f32::NAN; 2]; width * height];
+        let mut cells = vec![[f32::NAN; 3]; width * height];
         for v in 0..self.height {
             for u in 0..self.width {
                 let from = self.cells[v * self.width + u];
@@ -256,7 +262,7 @@ impl Level {
                 };
             }
         }
-        Self { width, height, cells, around: Vec::new() }
+        Self { width, height, cells }
     }
 
     /// Fills `around`.
@@ -269,13 +275,11 @@ impl Level {
                 out[u] = near.iter().fold(f32::NAN, |a, c| a.min(c[0]));
             }
         }
-        self.around = vec![f32::NAN; across.len()];
         for v in 0..self.height {
-            for w in v.saturating_sub(1)..(v + 2).min(self.height) {
-                for u in 0..self.width {
-                    let to = &mut self.around[v * self.width + u];
-                    *to = to.min(across[w * self.width + u]);
-                }
+            for u in 0..self.width {
+                let near = v.saturating_sub(1)..(v + 2).min(self.height);
+                let least = near.fold(f32::NAN, |a, w| a.min(across[w * self.width + u]));
+                self.cells[v * self.width + u][2] = least;
             }
         }
     }
@@ -325,6 +329,45 @@ impl Probe {
     }
 }
 
+/// The images as a body sees them: each with its camera's frame from the body's, and by scanner (where it stands in the
+/// body's frame) which of them are its own.
+struct Seeing<'a> {
+    cameras: Vec<(&'a DepthImage, Rows)>,
+    scanners: Vec<([f32; 3], std::ops::Range<usize>)>,
+}
+
+impl<'a> Seeing<'a> {
+    /// The images of one scanner being neighbours.
+    fn new(images: &[&'a DepthImage], local_from_body: &Pose) -> Self {
+        let body_from_local = local_from_body.inverse();
+        let to_local = rows(local_from_body);
+        let camera = |image: &&'a DepthImage| (*image, after(&image.rows, &to_local));
+        let mut scanners: Vec<([f32; 3], std::ops::Range<usize>)> = Vec::new();
+        let mut last = None;
+        for (i, image) in images.iter().enumerate() {
+            match scanners.last_mut() {
+                Some((_, own)) if last == Some(image.scanner) => own.end = i + 1,
+                _ => {
+                    let at = (body_from_local * image.scanner).coords.cast::<f32>().into();
+                    scanners.push((at, i..i + 1));
+                }
+            }
+            last = Some(image.scanner);
+        }
+        Self { cameras: images.iter().map(camera).collect(), scanners }
+    }
+}
+
+/// `a_from_c` of `a_from_b` and `b_from_c`.
+fn after(a: &Rows, b: &Rows) -> Rows {
+    std::array::from_fn(|r| {
+        std::array::from_fn(|c| {
+            let turned = a[r][0] * b[0][c] + a[r][1] * b[1][c] + a[r][2] * b[2][c];
+            if c == 3 { turned + a[r][3] } else { turned }
+        })
+    })
+}
+
 /// Price of a sample seen through, against one on the surface (fit.md §4d).
 pub const SEEN_THROUGH_PRICE: f32 = 1.5;
 /// Price of a sample that no scan could judge: small, so that hiding is not rewarded (fit.md §4d).
@@ -340,22 +383,12 @@ pub fn probe(
     local_from_body: &Pose,
     tolerance: f32,
 ) -> Probe {
-    let body_from_local = local_from_body.inverse();
-    let cameras: Vec<(Rows, [f32; 3])> = images
-        .iter()
-        .map(|image| {
-            let scanner = body_from_local * image.scanner();
-            (
-                rows(&(image.camera_from_local * local_from_body)),
-                [scanner.x as f32, scanner.y as f32, scanner.z as f32],
-            )
-        })
-        .collect();
+    let Seeing { cameras, scanners } = Seeing::new(images, local_from_body);
     let mut out = Probe { n: points.len() as u32, ..Probe::default() };
     for (p, n) in points.iter().zip(normals) {
         let (mut through, mut on) = (0.0_f32, 0.0_f32);
-        for (image, (camera_from_body, scanner)) in images.iter().zip(&cameras) {
-            let ray = [scanner[0] - p[0], scanner[1] - p[1], scanner[2] - p[2]];
+        for (at, own) in &scanners {
+            let ray = [at[0] - p[0], at[1] - p[1], at[2] - p[2]];
             let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
             // A beam through a body enters by a front face: back faces tell nothing new.
             if along <= 0.0 {
@@ -365,9 +398,11 @@ pub fn probe(
             if along * along < MIN_FACING * MIN_FACING * far {
                 continue;
             }
-            let Some(look) = image.look(transform(camera_from_body, *p), 0.5 * tolerance) else {
-                continue;
-            };
+            let mut looks = cameras[own.clone()].iter().filter_map(|(image, camera_from_body)| {
+                image.look(transform(camera_from_body, *p), 0.5 * tolerance)
+            });
+            // The images of one scanner share out the directions.
+            let Some(look) = looks.next() else { continue };
             let ahead = look.around - look.range;
             if ahead > tolerance {
                 let v = if ahead == f32::INFINITY {

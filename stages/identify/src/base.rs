@@ -4,12 +4,13 @@
 //! From the second level on the first moving link is swept over its joint and counts too, because many a box looks
 //! like a foot, but few look like a foot with a carousel on it.
 
-use contract::{Candidate, Fan, InstallationPlane, Region, View};
+use contract::{Candidate, Fan, InstallationPlane};
 use geometry::depth::HIDDEN_PRICE;
-use geometry::{Evidence, Plane, Point, Pose, Probe, Vector};
+use geometry::{Plane, Point, Pose, Probe, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
+use crate::volume::Sight;
 use crate::trial::{Trial, base_link, best, coarse_yaw, first_moving, of_judged, prefix};
 
 /// What is tuned.
@@ -74,9 +75,7 @@ const HIDDEN: f32 = 0.03;
 pub struct BaseSearch<'a> {
     model: &'a Model,
     index: usize,
-    region: &'a Region,
-    views: &'a [View],
-    evidence: &'a Evidence<'a>,
+    sight: &'a Sight<'a>,
     settings: &'a Settings,
     /// Farthest sample of the base from its upright axis, metres.
     radius: f64,
@@ -94,9 +93,7 @@ impl<'a> BaseSearch<'a> {
     #[must_use]
     pub fn new(
         (index, model): (usize, &'a Model),
-        region: &'a Region,
-        views: &'a [View],
-        evidence: &'a Evidence<'a>,
+        sight: &'a Sight<'a>,
         settings: &'a Settings,
     ) -> Option<Self> {
         let base = base_link(model)?;
@@ -118,9 +115,7 @@ impl<'a> BaseSearch<'a> {
         Some(Self {
             model,
             index,
-            region,
-            views,
-            evidence,
+            sight,
             settings,
             radius,
             foot,
@@ -151,14 +146,14 @@ impl<'a> BaseSearch<'a> {
 
     /// How many robot cells the region may hold, at least one: the more, the more places must go on.
     fn n_cells(&self) -> usize {
-        let size = self.region.bounds.size();
+        let size = self.sight.region.bounds.size();
         ((size[0] * size[1] / CELL_AREA).round() as usize).clamp(1, MAX_CELLS)
     }
 
     fn to_local(&self, plane: &Plane) -> Plane {
         Plane {
             normal: plane.normal,
-            offset: plane.offset - plane.normal.dot(&self.region.origin.coords),
+            offset: plane.offset - plane.normal.dot(&self.sight.region.origin.coords),
         }
     }
 
@@ -179,8 +174,7 @@ impl<'a> BaseSearch<'a> {
         let tolerance = (step * 1.3) as f32;
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
         let score = |pose: &Pose, n_samples: usize| {
-            let cad = prefix(self.model, self.base, n_samples);
-            self.mean(&self.evidence.probe(cad.0, cad.1, pose, tolerance))
+            self.mean(&self.sight.glance(prefix(self.model, self.base, n_samples), pose, tolerance))
         };
         let place = |(x, y): (f64, f64)| -> Vec<Trial> {
             let pose =
@@ -215,10 +209,10 @@ impl<'a> BaseSearch<'a> {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
         };
         let shifted = plane.bounds.corners().map(|c| {
-            let at = Vector::from(c) - self.region.origin.coords;
+            let at = Vector::from(c) - self.sight.region.origin.coords;
             [at.x, at.y, at.z]
         });
-        let reach = self.region.bounds.corners();
+        let reach = self.sight.region.bounds.corners();
         let grow = self.radius.max(0.1);
         let low: [f64; 2] =
             std::array::from_fn(|i| span(reach, i).0.max(span(shifted, i).0 - grow));
@@ -230,7 +224,7 @@ impl<'a> BaseSearch<'a> {
         let n: [usize; 2] =
             std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
         let mut count = vec![0_u32; n[0] * n[1]];
-        for p in self.views.iter().flat_map(|v| &v.points) {
+        for p in self.sight.views.iter().flat_map(|v| &v.points) {
             let q = to_plane * Vector::from(p.xyz.map(f64::from));
             let height = q.z - local.offset;
             if !(0.03..1.2).contains(&height) {
@@ -277,21 +271,27 @@ impl<'a> BaseSearch<'a> {
     ) -> Vec<Trial> {
         let tolerance = (step * 1.5).clamp(0.025, 0.08) as f32;
         let around = |trial: Trial| -> Vec<Trial> {
-            let score = |t: &Trial, n: usize| self.score_base(&planes[t.plane], t, (tolerance, n));
+            let few = |t: &Trial| {
+                let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
+                let cad = prefix(self.model, self.base, self.settings.n_fine / 4);
+                self.mean(&self.sight.glance(cad, &pose, tolerance))
+            };
             let near = (0..27_i32).map(|n| {
                 let (i, j, k) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
                 let mut next = trial;
                 next.x += f64::from(i) * step;
                 next.y += f64::from(j) * step;
                 next.yaw += f64::from(k) * yaw_step;
-                next.score = score(&next, self.settings.n_fine / 4);
+                next.score = few(&next);
                 next
             });
             let mut near: Vec<Trial> = near.collect();
             // A few samples tell most neighbours to be worse.
             let top = near.iter().map(|t| t.score).fold(f64::NEG_INFINITY, f64::max);
             near.retain(|t| t.score >= top - LAG);
-            near.iter_mut().for_each(|t| t.score = score(t, self.settings.n_fine));
+            near.iter_mut().for_each(|t| {
+                t.score = self.score_base(&planes[t.plane], t, (tolerance, self.settings.n_fine));
+            });
             near
         };
         let mut out: Vec<Trial> = fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
@@ -307,13 +307,13 @@ impl<'a> BaseSearch<'a> {
     /// Whether what could be judged of the base and of the first link fits them: much of a cabinet has the height of a
     /// foot, but not its shape.
     fn is_like(&self, plane: &Plane, trial: &Trial) -> bool {
-        if !self.evidence.has_beams() {
+        if !self.sight.evidence.has_beams() {
             return true;
         }
         let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
         let cad = prefix(self.model, self.base, self.settings.n_fine);
         let pose = local_from_root * self.root_from_base;
-        let base = of_judged(&self.evidence.probe(cad.0, cad.1, &pose, JUDGE.0));
+        let base = of_judged(&self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.0));
         let first = self.first.map_or(base, |(free, link)| {
             let poses = self.turns(free).map(|q| {
                 let mut posture = self.model.home();
@@ -321,7 +321,7 @@ impl<'a> BaseSearch<'a> {
                 local_from_root * self.model.poses(&posture)[link]
             });
             let cad = prefix(self.model, link, self.settings.n_coarse);
-            let probes = poses.map(|pose| self.evidence.probe(cad.0, cad.1, &pose, JUDGE.1));
+            let probes = poses.map(|pose| self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.1));
             let best = probes.max_by(|a, b| self.mean(a).total_cmp(&self.mean(b)));
             best.map_or(base, |probe| of_judged(&probe))
         });
@@ -339,12 +339,12 @@ impl<'a> BaseSearch<'a> {
     fn score_base(&self, plane: &Plane, trial: &Trial, (tolerance, n): (f32, usize)) -> f64 {
         let cad = prefix(self.model, self.base, n);
         let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
-        self.mean(&self.evidence.probe(cad.0, cad.1, &pose, tolerance))
+        self.mean(&self.sight.evidence.probe(cad.0, cad.1, &pose, tolerance))
     }
 
     /// Mean score of the samples, hidden ones at their price for a base.
     fn mean(&self, probe: &Probe) -> f64 {
-        let back = if self.evidence.has_beams() { HIDDEN_PRICE - HIDDEN } else { 0.0 };
+        let back = if self.sight.evidence.has_beams() { HIDDEN_PRICE - HIDDEN } else { 0.0 };
         let score = probe.score + back * (probe.n - probe.n_seen) as f32;
         f64::from(score / probe.n.max(1) as f32)
     }
@@ -364,14 +364,15 @@ impl<'a> BaseSearch<'a> {
             })
             .collect();
         // A few samples tell most values to be hopeless.
-        let score = |pose: &Pose, n: usize| {
-            let (points, normals) = (&cad.0[..n.min(cad.0.len())], &cad.1[..n.min(cad.1.len())]);
-            self.mean(&self.evidence.probe(points, normals, pose, tolerance * 1.5))
-        };
-        let few: Vec<f64> = poses.iter().map(|p| score(p, cad.0.len() / 4)).collect();
+        let tolerance = tolerance * 1.5;
+        let some = prefix(self.model, link, cad.0.len() / 4);
+        let few = |pose: &Pose| self.mean(&self.sight.glance(some, pose, tolerance));
+        let few: Vec<f64> = poses.iter().map(few).collect();
         let least = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - LAG;
         let full = poses.iter().zip(&few).filter(|(_, few)| **few >= least);
-        let top = full.map(|(p, _)| score(p, cad.0.len())).fold(f64::NEG_INFINITY, f64::max);
+        let score =
+            |p: &Pose| self.mean(&self.sight.evidence.probe(cad.0, cad.1, p, tolerance));
+        let top = full.map(|(p, _)| score(p)).fold(f64::NEG_INFINITY, f64::max);
         let weight = |l: usize| f64::from(self.model.links[l].cad.area).sqrt();
         (weight(self.base) * own + weight(link) * top) / (weight(self.base) + weight(link))
     }
@@ -409,10 +410,10 @@ impl<'a> BaseSearch<'a> {
         }
         places.retain(|place| self.is_like(&local[place[0].plane], place[0]));
         let world_from_local = Pose::from_parts(
-            Translation3::from(self.region.origin.coords),
+            Translation3::from(self.sight.region.origin.coords),
             UnitQuaternion::identity(),
         );
-        let world = self.region.world_bounds();
+        let world = self.sight.region.world_bounds();
         places
             .iter()
             .map(|place| Candidate {

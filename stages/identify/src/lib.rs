@@ -7,6 +7,8 @@ mod base;
 mod bodies;
 mod sites;
 mod trial;
+mod volume;
 
 pub use base::{BaseSearch, Settings};
 pub use sites::{RegionSettings, guessed_planes, regions};
+pub use volume::Sight;
