@@ -33,7 +33,7 @@ impl<'a> Shelf<'a> {
     }
 
     /// Serial inside: a thread that waits for it never holds up its own work.
-    fn prepared(&self, index: usize) -> &Prepared<'a> {
+    pub(crate) fn prepared(&self, index: usize) -> &Prepared<'a> {
         self.prepared[index].get_or_init(|| Prepared::new(index, &self.models[index]))
     }
 }
@@ -73,6 +73,11 @@ impl<'a> Search<'a> {
         settings: &'a Settings,
     ) -> Self {
         Self { shelf, scans, store, ground, settings }
+    }
+
+    /// The library.
+    pub(crate) fn shelf(&self) -> &'a Shelf<'a> {
+        self.shelf
     }
 
     /// Fits of all models in one region, whatever their verdict.

@@ -2,9 +2,9 @@
 //! these fits are of.
 
 use crate::engine::{AllThreads, Engine};
-use crate::search::Search;
+use crate::search::{Search, Shelf};
 use contract::{Fit, Mounted, Region, Result, Verdict};
-use fit::{Prepared, Scene, Settings, Tooled};
+use fit::{Scene, Settings, Tooled};
 use robot::Model;
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
 
@@ -43,7 +43,7 @@ pub(crate) fn dress(
         }
         let arm = fit.clone();
         let dressed = search.with_scene(&arm, regions, |scene, settings| {
-            dress_one(arm.clone(), (known, &tools), scene, settings)
+            dress_one(arm.clone(), (known, &tools, search.shelf()), scene, settings)
         })?;
         Ok(dressed.unwrap_or((fit, None)))
     })?;
@@ -65,17 +65,20 @@ pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) ->
 /// One arm: the tool that explains most, if one is there.
 fn dress_one(
     fit: Fit,
-    (models, tools): (&[Model], &[usize]),
+    (models, tools, shelf): (&[Model], &[usize], &Shelf<'_>),
     scene: &Scene<'_>,
     settings: &Settings,
 ) -> (Fit, Option<Model>) {
     let arm = &models[fit.model];
+    // An arm whose loops stand otherwise has the links of its name.
+    let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);
+    let bare = shelf.prepared(bare);
     let n_arm = arm.free.len();
     let mut best: Option<([usize; 2], Tooled)> = None;
     for flange in arm.flanges() {
         for &tool in tools {
             let both = arm.with_tool(&models[tool], flange, 0.0);
-            let prepared = Prepared::new(fit.model, &both);
+            let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
             let own = [n_arm, arm.links.len()];
             let found = fit::try_tool(&fit, (&prepared, own), scene, settings, &AllThreads);
             let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
@@ -87,7 +90,7 @@ fn dress_one(
     let Some(([tool, flange], mut start)) = best else { return (fit, None) };
     let mount = mount(&fit, &mut start, n_arm, arm.mount_axis(flange).1);
     let both = arm.with_tool(&models[tool], flange, mount);
-    let prepared = Prepared::new(fit.model, &both);
+    let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
     let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
     if together.verdict == Verdict::Refused || together.verdict < fit.verdict {
         return (fit, None);

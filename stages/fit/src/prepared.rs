@@ -30,13 +30,30 @@ pub struct Prepared<'a> {
     pub(crate) patch_groups: Vec<u32>,
 }
 
-/// What is kept for a link.
+/// Nearest samples of a link's surface.
 #[derive(Debug, Default)]
-pub(crate) struct PreparedLink {
+pub(crate) struct Fields {
     /// Reaches far, from few samples: for the first iterations.
     pub(crate) coarse: NearestField,
     /// Exact, reaches 3 cm: for the last ones.
     pub(crate) fine: NearestField,
+}
+
+impl Fields {
+    fn new(link: &robot::Link) -> Self {
+        let n = link.cad.points.len().min(COARSE.2);
+        Self {
+            coarse: NearestField::new(&link.cad.points[..n], COARSE.0, COARSE.1),
+            fine: NearestField::new(&link.cad.points, voxel(link), FINE.1),
+        }
+    }
+}
+
+/// What is kept for a link.
+#[derive(Debug, Default)]
+pub(crate) struct PreparedLink {
+    /// Shared by all models that have the link.
+    pub(crate) fields: Arc<Fields>,
     /// √area, m: weight of the link in a total score.
     pub(crate) weight: f64,
     /// Outer area, m².
@@ -58,16 +75,21 @@ impl<'a> Prepared<'a> {
     /// Prepares model `index` of the library.
     #[must_use]
     pub fn new(index: usize, model: &'a Model) -> Self {
-        let links = model.links.iter().map(|link| {
-            let n = link.cad.points.len().min(COARSE.2);
+        let fields = model.links.iter().map(|link| Arc::new(Fields::new(link)));
+        Self::of((index, model), fields)
+    }
+
+    /// Prepares an arm with a tool on it, the links of the arm before those of the tool, from what is known of both.
+    #[must_use]
+    pub fn tooled<'b>(&self, tool: &Prepared<'_>, both: (usize, &'b Model)) -> Prepared<'b> {
+        let fields = self.links.iter().chain(tool.links.iter()).map(|l| Arc::clone(&l.fields));
+        Prepared::of(both, fields)
+    }
+
+    fn of((index, model): (usize, &'a Model), fields: impl Iterator<Item = Arc<Fields>>) -> Self {
+        let links = model.links.iter().zip(fields).map(|(link, fields)| {
             let area = f64::from(link.cad.area);
-            PreparedLink {
-                coarse: NearestField::new(&link.cad.points[..n], COARSE.0, COARSE.1),
-                fine: NearestField::new(&link.cad.points, voxel(link), FINE.1),
-                weight: area.sqrt(),
-                area,
-                patches: Vec::new(),
-            }
+            PreparedLink { fields, weight: area.sqrt(), area, patches: Vec::new() }
         });
         let mut links: Vec<_> = links.collect();
         let patch_groups = patches(model, &mut links);

@@ -169,7 +169,7 @@ impl Refine<'_> {
             let mut least = CAP;
             for (l, frame) in &frames {
                 let q = geometry::depth::transform(frame, p);
-                let Some(at) = self.prepared.links[*l].fine.nearest(q) else { continue };
+                let Some(at) = self.prepared.links[*l].fields.fine.nearest(q) else { continue };
                 let cad = &self.prepared.model.links[*l].cad;
                 let (x, n) = (cad.points[at], cad.normals[at]);
                 let off: f32 = (0..3).map(|k| n[k] * (q[k] - x[k])).sum();

@@ -87,7 +87,7 @@ impl Paper<'_> {
     /// The closest point of a link's surface, and its normal, link frame; `None` beyond the field's reach.
     pub(super) fn closest(&self, link: usize, q: &Point) -> Option<(Point, Vector)> {
         let p = [q.x as f32, q.y as f32, q.z as f32];
-        let fields = &self.prepared.links[link];
+        let fields = &self.prepared.links[link].fields;
         let at = fields.fine.nearest(p).or_else(|| fields.coarse.nearest(p))?;
         let cad = &self.prepared.model.links[link].cad;
         let (x, n) = (cad.points[at].map(f64::from), cad.normals[at].map(f64::from));
