@@ -1,0 +1,188 @@
+//! The evidence of a region in; out comes a grid of it: what the beams say about each place, looked up once for all models
+//! and all base poses of a search instead of once for each sample.
+
+use contract::{Fan, Region, View};
+use geometry::depth::{HIDDEN_PRICE, NO_RETURN_WEIGHT, SEEN_THROUGH_PRICE, rows, transform};
+use geometry::{Evidence, Pose, Probe};
+
+/// Edge of a cell, metres: half of the finest tolerance that is asked of it.
+const EDGE: f32 = 0.03;
+/// Most cells; a larger region gets larger ones.
+const MAX_CELLS: f64 = 16e6;
+/// Least tolerance, in cells, for which the grid is asked.
+const COARSE: f32 = 1.4;
+/// Unit of the distances in a cell, metres.
+const UNIT: f32 = 0.004;
+/// In `off`: no beam got near. In `ahead`: beams went there and none came back.
+const NOTHING: u8 = 255;
+
+/// What is known of one place.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    /// By how much the beam that went farthest went on beyond it, in units; 0 for none.
+    ahead: u8,
+    /// Distance from the nearest end of a beam along it, in units.
+    off: u8,
+}
+
+/// What was seen of a region, ready for searches of all models.
+#[derive(Debug)]
+pub struct Sight<'a> {
+    pub(crate) region: &'a Region,
+    pub(crate) views: &'a [View],
+    pub(crate) evidence: &'a Evidence<'a>,
+    /// Nothing where there are no beams.
+    volume: Option<Volume>,
+}
+
+impl<'a> Sight<'a> {
+    /// Prepares it.
+    #[must_use]
+    pub fn new(
+        region: &'a Region,
+        views: &'a [View],
+        evidence: &'a Evidence<'a>,
+        fan: &impl Fan,
+    ) -> Self {
+        Self { region, views, evidence, volume: Volume::new(region, evidence, fan) }
+    }
+
+    /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: from the grid
+    /// where the tolerance allows.
+    pub(crate) fn glance(
+        &self,
+        (points, normals): (&[[f32; 3]], &[[f32; 3]]),
+        local_from_body: &Pose,
+        tolerance: f32,
+    ) -> Probe {
+        match &self.volume {
+            Some(volume) if tolerance >= COARSE * volume.edge => {
+                volume.probe(points, local_from_body, tolerance)
+            }
+            _ => self.evidence.probe(points, normals, local_from_body, tolerance),
+        }
+    }
+}
+
+/// A grid of evidence in the local frame.
+#[derive(Debug, Clone)]
+struct Volume {
+    min: [f32; 3],
+    edge: f32,
+    n: [usize; 3],
+    cells: Vec<Cell>,
+}
+
+impl Volume {
+    /// The region's grid; `None` where there are no beams.
+    fn new(region: &Region, evidence: &Evidence<'_>, fan: &impl Fan) -> Option<Self> {
+        if !evidence.has_beams() {
+            return None;
+        }
+        let size = region.bounds.size();
+        let content = size.iter().product::<f64>();
+        let edge = EDGE.max((content / MAX_CELLS).cbrt() as f32);
+        let n = size.map(|s| (s / f64::from(edge)).ceil().max(1.0) as usize);
+        let min = region.bounds.min.map(|v| v as f32);
+        let images: Vec<_> =
+            evidence.images.iter().map(|i| (*i, rows(i.camera_from_local()))).collect();
+        let layer = |k: usize| -> Vec<Cell> {
+            let place = |at: usize| {
+                let middle = |i: usize, of: usize| min[i] + (of as f32 + 0.5) * edge;
+                let p = [middle(0, at % n[0]), middle(1, at / n[0]), middle(2, k)];
+                let mut cell = Known::default();
+                for (image, camera_from_local) in &images {
+                    if let Some(look) = image.look(transform(camera_from_local, p), edge) {
+                        cell.add(look.around - look.range, look.near - look.range);
+                        cell.add(look.around - look.range, look.far - look.range);
+                    }
+                }
+                cell.packed()
+            };
+            (0..n[0] * n[1]).map(place).collect()
+        };
+        let cells = fan.fan((0..n[2]).collect(), layer).concat();
+        Some(Self { min, edge, n, cells })
+    }
+
+    /// Judges surface samples (frame of the body) with the body at `local_from_body`, to within `tolerance` metres,
+    /// without regard to the side from which a beam comes.
+    fn probe(
+        &self,
+        points: &[[f32; 3]],
+        local_from_body: &Pose,
+        tolerance: f32,
+    ) -> Probe {
+        let m = rows(local_from_body);
+        let mut out = Probe { n: points.len() as u32, ..Probe::default() };
+        for p in points {
+            let Some(cell) = self.cell(transform(&m, *p)) else {
+                out.score -= HIDDEN_PRICE;
+                continue;
+            };
+            let through = match cell.ahead {
+                NOTHING => NO_RETURN_WEIGHT,
+                ahead => ((f32::from(ahead) * UNIT - tolerance) / tolerance).clamp(0.0, 1.0),
+            };
+            let on = if cell.off == NOTHING { 0.0 } else { 1.0 - f32::from(cell.off) * UNIT / tolerance };
+            if through > 0.0 {
+                out.score -= SEEN_THROUGH_PRICE * through;
+                out.n_seen += 1;
+                out.n_through += u32::from(through >= 1.0);
+            } else if on > 0.0 {
+                out.score += on;
+                out.n_seen += 1;
+                out.n_on += 1;
+            } else {
+                out.score -= HIDDEN_PRICE;
+            }
+        }
+        out
+    }
+
+    #[inline]
+    fn cell(&self, p: [f32; 3]) -> Option<Cell> {
+        let at: [f32; 3] = std::array::from_fn(|i| (p[i] - self.min[i]) / self.edge);
+        let inside = (0..3).all(|i| at[i] >= 0.0 && at[i] < self.n[i] as f32);
+        inside.then(|| {
+            let at = at.map(|v| v as usize);
+            self.cells[(at[2] * self.n[1] + at[1]) * self.n[0] + at[0]]
+        })
+    }
+}
+
+/// What the scans say about one place, being gathered.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    ahead: f32,
+    off: f32,
+    is_silent: bool,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self { ahead: 0.0, off: f32::INFINITY, is_silent: false }
+    }
+}
+
+impl Known {
+    fn add(&mut self, ahead: f32, off: f32) {
+        if ahead == f32::INFINITY {
+            self.is_silent = true;
+        } else {
+            self.ahead = self.ahead.max(ahead);
+        }
+        // `min` passes NaN and infinity over.
+        self.off = self.off.min(off.abs());
+    }
+
+    fn packed(&self) -> Cell {
+        let units = |v: f32| ((v / UNIT) as u32).min(u32::from(NOTHING) - 1) as u8;
+        let ahead = units(self.ahead);
+        let is_silent = self.is_silent && self.ahead <= 0.0;
+        Cell {
+            ahead: if is_silent { NOTHING } else { ahead },
+            off: if self.off.is_finite() { units(self.off) } else { NOTHING },
+        }
+    }
+}
