@@ -15,6 +15,9 @@ const SAME_MOUNT: f64 = 0.052;
 /// Standard deviation up to which the arm's own flange is known, radians: 1°.
 const KNOWN: f64 = 0.0175;
 
+/// Fewest points on a tool: with less, a corner of any part will do.
+const MIN_POINTS: usize = 80;
+
 /// Gives fits whose loops stand otherwise than the library's model has them a model of their own.
 pub(crate) fn branch(mut fits: Vec<Fit>, models: &mut Vec<Model>) -> Vec<Fit> {
     for fit in fits.iter_mut().filter(|f| !f.other_branches.is_empty()) {
@@ -92,7 +95,12 @@ fn dress_one(
     let both = arm.with_tool(&models[tool], flange, mount);
     let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
     let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
-    if together.verdict == Verdict::Refused || together.verdict < fit.verdict {
+    let own = together.links.get(arm.links.len()..).unwrap_or_default();
+    let n_points: usize = own.iter().map(|link| link.n_points).sum();
+    if n_points < MIN_POINTS
+        || together.verdict == Verdict::Refused
+        || together.verdict < fit.verdict
+    {
         return (fit, None);
     }
     together.tool = Some(Mounted {

@@ -11,10 +11,11 @@ use crate::refine::Refine;
 use crate::solve::{NEAR_MARGIN, polish, settle};
 use crate::{Prepared, Scene, Settings, report};
 
-/// Score of the tool's links from which on it is there.
-const MIN_SCORE: f64 = 0.5;
-/// Share of the tool's surface that must have been judged.
-const MIN_SEEN: f64 = 0.10;
+/// Score of the tool's links from which on it is there: tools that are there have 0.69 and more, others that are taken
+/// for them up to 0.67.
+const MIN_SCORE: f64 = 0.62;
+/// Share of the tool's surface that must have been judged: of tools that are there it was 0.4 and more.
+const MIN_SEEN: f64 = 0.20;
 /// Tolerance of the judgement, metres: an arm's flange is known to a millimetre.
 const TOLERANCE: f64 = 0.012;
 /// Hypotheses of the tool's joints that are judged.
