@@ -4,11 +4,14 @@ use contract::{Error, Kind, PointKind, Result};
 use export::{ResultFile, RobotEntry};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use simulate::{TrueRobot, Truth};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
 /// A found robot farther than this from a true one is not it, metres.
 const SAME_PLACE: f64 = 0.5;
+/// A posture is found if no joint that is said to be determined is farther off, radians (1°) or metres.
+const SAME_POSTURE: f64 = 0.0175;
 
 /// How far a result agrees with the truth.
 #[derive(Debug, Clone)]
@@ -262,20 +265,21 @@ fn match_robot(
         let robot = &found[i];
         let turn =
             rotation(truth.base_pose.quat_wxyz).angle_to(&rotation(robot.base_pose.quat_wxyz));
-        let joints = robot.joints.0.iter().filter_map(|(name, value)| {
-            let truth = truth.joints.get(name)?;
-            let sigma = robot.sigma.0.iter().find(|s| s.0 == *name)?.1;
-            let determined = robot.determined.0.iter().any(|d| d.0 == *name && d.1);
-            let turns = ((value - truth) / std::f64::consts::TAU).round() * std::f64::consts::TAU;
-            Some((name.clone(), value - truth - turns, sigma, determined))
-        });
+        // Where it moved between scans: the true posture that the found one is nearest to.
+        let all = || std::iter::once(&truth.joints).chain(truth.later.iter().map(|l| &l.joints));
+        let joints = all().map(|posture| off(robot, posture));
+        let joints = joints.min_by(|a, b| worst(a).total_cmp(&worst(b))).unwrap_or_default();
+        let stands = |posture: &&BTreeMap<String, f64>| {
+            let found = std::iter::once(robot).chain(&robot.stays);
+            found.map(|f| worst(&off(f, posture))).any(|worst| worst < SAME_POSTURE)
+        };
         Found {
             model: robot.model.clone(),
             is_right: robot.model == truth.model || robot.alike.contains(&truth.model),
             verdict: robot.verdict.clone(),
-            n_postures: 1,
+            n_postures: all().filter(stands).count(),
             base: [distance, turn],
-            joints: joints.collect(),
+            joints,
         }
     });
     RobotAgreement {
@@ -284,6 +288,23 @@ fn match_robot(
         n_postures: 1 + truth.later.len(),
         found,
     }
+}
+
+/// Error, stated standard deviation and whether it is said to be determined, of each joint against a true posture.
+fn off(robot: &RobotEntry, truth: &BTreeMap<String, f64>) -> Vec<(String, f64, f64, bool)> {
+    let joints = robot.joints.0.iter().filter_map(|(name, value)| {
+        let truth = truth.get(name)?;
+        let sigma = robot.sigma.0.iter().find(|s| s.0 == *name)?.1;
+        let determined = robot.determined.0.iter().any(|d| d.0 == *name && d.1);
+        let turns = ((value - truth) / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+        Some((name.clone(), value - truth - turns, sigma, determined))
+    });
+    joints.collect()
+}
+
+/// Largest error of a joint that is said to be determined, radians or metres.
+fn worst(joints: &[(String, f64, f64, bool)]) -> f64 {
+    joints.iter().filter(|j| j.3).map(|j| j.1.abs()).fold(0.0, f64::max)
 }
 
 fn rotation(wxyz: [f64; 4]) -> UnitQuaternion<f64> {

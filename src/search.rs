@@ -6,7 +6,7 @@ use crate::job::Settings;
 use crate::store::Store;
 use crate::surfaces::Ground;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
-use fit::{Method, Prepared, Scene};
+use fit::{Method, Prepared, Scene, Sights};
 use geometry::{Point, Pose};
 use identify::{BaseSearch, Sight};
 use lattice::ViewBuilder;
@@ -61,6 +61,13 @@ const BATCH: usize = 6;
 const SAME_BASE: f64 = 0.35;
 /// Share of the score of a trusted robot's base below which another base at its place is needless.
 const FAR_WORSE: f64 = 0.7;
+/// Score of a base from which on it is asked whether its robot moved between scans, and so many of a region are.
+const MIN_FOOT: f64 = 0.12;
+const MAX_FEET: usize = 8;
+/// Share of what was here and gone that must be within its reach: two robots may have moved.
+const GONE_IN_REACH: f64 = 0.3;
+/// Cells of what was here for one scan and gone for another from which on a robot may have moved: a small arm has 100.
+const MIN_GONE: usize = 80;
 /// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
 const MAX_SPACING: f64 = 0.05;
 
@@ -93,7 +100,8 @@ impl<'a> Search<'a> {
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
         let sight = Sight::new(region, &views, &scene.evidence, &AllThreads);
-        let mut fits = self.fits(&scene, self.candidates(&sight, &planes));
+        let candidates = self.candidates(&sight, &planes);
+        let mut fits = self.fits(&scene, &candidates);
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
             let mut hung = self.candidates(&sight, &self.mounts(region));
@@ -103,7 +111,13 @@ impl<'a> Search<'a> {
                 n[c.model] += 1;
                 n[c.model] <= MAX_MOUNTS
             });
-            fits.extend(self.fits(&scene, hung));
+            fits.extend(self.fits(&scene, &hung));
+        }
+        let gone = lattice::disagreement(&views);
+        if gone.len() >= MIN_GONE {
+            let feet = self.candidates(&sight.apart(), &planes);
+            let sights = Sights { region, views: &views, floors: &planes };
+            fits.extend(self.moved(&fits, (&feet, &gone), &sights));
         }
         Ok(fits)
     }
@@ -126,7 +140,7 @@ impl<'a> Search<'a> {
 
     /// Fits of candidates, which come best base first: where a robot is trusted, bases that fit the place far worse are
     /// not tried any more.
-    fn fits(&self, scene: &Scene<'_>, candidates: Vec<Candidate>) -> Vec<Fit> {
+    fn fits(&self, scene: &Scene<'_>, candidates: &[Candidate]) -> Vec<Fit> {
         let (mut out, mut taken): (Vec<Fit>, Vec<(Point, f64)>) = (Vec::new(), Vec::new());
         for batch in candidates.chunks(BATCH) {
             let is_open = |c: &&Candidate| {
@@ -148,6 +162,35 @@ impl<'a> Search<'a> {
                 }
                 out.push(fit);
             }
+        }
+        out
+    }
+
+    /// Robots that moved between scans: where no robot is trusted, but something stands like a robot's foot within whose
+    /// reach things were here and gone (region's frame).
+    fn moved(
+        &self,
+        fits: &[Fit],
+        (feet, gone): (&[Candidate], &[[f32; 3]]),
+        sights: &Sights<'_>,
+    ) -> Vec<Fit> {
+        let mut out: Vec<Fit> = Vec::new();
+        let in_reach = |candidate: &&Candidate| {
+            let here = base(&candidate.bases[0].0) - sights.region.origin.coords;
+            let reach = self.shelf.prepared(candidate.model).reach();
+            let near = |p: &&[f32; 3]| (Point::from(p.map(f64::from)) - here).norm() < reach;
+            gone.iter().filter(near).count() as f64 >= GONE_IN_REACH * gone.len() as f64
+        };
+        let feet = feet.iter().filter(|c| c.bases[0].1 >= MIN_FOOT).filter(in_reach);
+        for candidate in feet.take(MAX_FEET) {
+            let here = base(&candidate.bases[0].0);
+            let trusted = fits.iter().chain(&out).filter(|f| f.verdict == Verdict::Trusted);
+            if trusted.map(|f| base(&f.world_from_base)).any(|at| (at - here).norm() < SAME_BASE) {
+                continue;
+            }
+            let prepared = self.shelf.prepared(candidate.model);
+            let settings = &self.settings.fit;
+            out.extend(fit::stays(candidate, prepared, sights, settings, &AllThreads));
         }
         out
     }

@@ -186,6 +186,10 @@ pub struct Fit {
     pub scans: Vec<ScanShift>,
     /// One for each link of the model, in its order.
     pub links: Vec<LinkEvidence>,
+    /// Scans in which it stands so, if it moved between scans; else empty: in all of them.
+    pub stands_in: Vec<crate::ScanId>,
+    /// How it stands in other scans, if it moved between scans.
+    pub stays: Vec<Fit>,
     /// The best other explanation, if any came near.
     pub runner_up: Option<RunnerUp>,
     /// Other postures that explain the points as well (a symmetric link, a wrist that nobody saw), best first.

@@ -92,6 +92,12 @@ pub struct RobotEntry {
     /// How the scans stand to one another near the robot.
     #[serde(default)]
     pub scans: Vec<ShiftEntry>,
+    /// Numbers of the scans in which it stands so, if it moved between scans; else empty: in all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stands_in: Vec<u32>,
+    /// The same robot as it stands in other scans, if it moved between scans.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stays: Vec<RobotEntry>,
     /// Where the tip of the main chain is.
     #[serde(default)]
     pub tip: Option<TipPose>,
@@ -304,6 +310,12 @@ impl RobotEntry {
             surface_sigma: finite(fit.surface_sigma),
             tip_sigma: finite(fit.tip_sigma),
             scans: fit.scans.iter().map(ShiftEntry::from).collect(),
+            stands_in: fit.stands_in.iter().map(|s| s.0).collect(),
+            stays: fit
+                .stays
+                .iter()
+                .map(|f| Self::new(index, f, &links[..f.links.len().min(links.len())], None))
+                .collect(),
             tip: tip.map(|(link, pose)| TipPose { link, pose: (&pose).into() }),
             evidence: fit.links.iter().map(LinkEntry::from).collect(),
         }

@@ -21,13 +21,13 @@ const FLAT: f64 = 0.05;
 
 /// Standard deviation of the points, metres: from one point to the next, or over a hand's width where that is more, as
 /// it is for depth cameras, whose neighbours err alike.
-pub(crate) fn of(views: &[View], points: &[Measured], thin: &[u32]) -> f64 {
+pub(crate) fn of(views: &[&View], points: &[Measured], thin: &[u32]) -> f64 {
     let beams = between_neighbours(views).unwrap_or(UNKNOWN);
     beams.max(over_patches(points, thin).unwrap_or(0.0))
 }
 
 /// Noise along the beams: how far the middle one of three consecutive points lies off the line through the others.
-fn between_neighbours(views: &[View]) -> Option<f64> {
+fn between_neighbours(views: &[&View]) -> Option<f64> {
     let mut off = Vec::new();
     for view in views {
         let scanner = view.scanner.map(|s| s.coords.cast::<f32>());

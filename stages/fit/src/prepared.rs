@@ -142,6 +142,12 @@ impl<'a> Prepared<'a> {
         }
     }
 
+    /// No part of the robot gets farther from the base's origin, metres.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
     /// The first `n` samples and normals of a link.
     pub(crate) fn samples(&self, link: usize, n: usize) -> (&[[f32; 3]], &[[f32; 3]]) {
         let cad = &self.model.links[link].cad;

@@ -195,8 +195,11 @@ impl Refine<'_> {
         for (l, link_from_local) in links {
             let p = geometry::depth::transform(link_from_local, point);
             let link = &self.prepared.links[*l];
-            let found =
-                if gate < FINE_REACH { link.fields.fine.nearest(p) } else { link.fields.coarse.nearest(p) };
+            let found = if gate < FINE_REACH {
+                link.fields.fine.nearest(p)
+            } else {
+                link.fields.coarse.nearest(p)
+            };
             let Some(at) = found else { continue };
             let s = self.prepared.model.links[*l].cad.points[at];
             let d2 = (0..3).map(|i| (s[i] - p[i]) * (s[i] - p[i])).sum::<f32>();

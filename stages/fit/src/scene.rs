@@ -21,7 +21,7 @@ pub struct Scene<'a> {
     /// The region.
     pub region: &'a Region,
     /// Views of it.
-    pub views: &'a [View],
+    pub views: Vec<&'a View>,
     /// What beams and points say.
     pub evidence: Evidence<'a>,
     /// Noise of the ranges as the points themselves show it, metres, one sigma; not below the settings' least.
@@ -41,6 +41,16 @@ impl<'a> Scene<'a> {
     pub fn new(
         region: &'a Region,
         views: &'a [View],
+        floors: &[InstallationPlane],
+        settings: &Settings,
+    ) -> Self {
+        Self::of(region, &views.iter().collect::<Vec<_>>(), floors, settings)
+    }
+
+    /// The same for some of the views.
+    pub(crate) fn of(
+        region: &'a Region,
+        views: &[&'a View],
         floors: &[InstallationPlane],
         settings: &Settings,
     ) -> Self {
@@ -72,7 +82,14 @@ impl<'a> Scene<'a> {
             Cloud::new(few, CLOUD.0, CLOUD.1)
         });
         let noise = noise::of(views, &points, &thin).max(settings.min_noise);
-        Self { region, views, evidence: Evidence { images, cloud }, noise, points, thin }
+        Self {
+            region,
+            views: views.to_vec(),
+            evidence: Evidence { images, cloud },
+            noise,
+            points,
+            thin,
+        }
     }
 
     /// Thinned points, and all points, within `reach` metres of a place.

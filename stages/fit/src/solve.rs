@@ -99,15 +99,26 @@ const CLEAR_BASE: f64 = 0.35;
 /// Hypotheses of a quick look, and of those that are settled and refined.
 const QUICK: [usize; 3] = [25, 8, 3];
 
-/// A quick look with few hypotheses: whether anything like the robot's arm stands on one of the bases. A right one may
-/// end with a wrong wrist here, but not without shoulder and elbow.
+/// Whether anything like the robot's arm stands on one of the bases. A right one may end with a wrong wrist in a quick
+/// look, but not without shoulder and elbow.
 fn is_promising(refine: &Refine<'_>, bases: &[Pose], near: &[u32], fan: &impl Fan) -> bool {
+    let found = quick(refine, bases, near, fan);
+    found.is_some_and(|found| found.1.score >= hopeless(refine.scene))
+}
+
+/// A quick look with few hypotheses: the best posture.
+pub(crate) fn quick(
+    refine: &Refine<'_>,
+    bases: &[Pose],
+    near: &[u32],
+    fan: &impl Fan,
+) -> Option<Polished> {
     let [beam, settle, n_refine] = QUICK;
     let quick = Settings { beam, settle, n_refine, n_polish: 1, ..refine.settings.clone() };
     let search = Beam::new(refine.prepared, refine.scene, &quick);
     let refine = Refine { settings: &quick, prior: refine.prior, ..*refine };
     let best = rough(&search, &refine, search.run(bases, fan), near, fan).into_iter().next();
-    best.is_some_and(|h| polish(&refine, &h, near).1.score >= hopeless(refine.scene))
+    best.map(|h| polish(&refine, &h, near))
 }
 
 fn hopeless(scene: &Scene<'_>) -> f64 {

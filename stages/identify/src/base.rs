@@ -10,8 +10,8 @@ use geometry::{Plane, Point, Pose, Probe, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
+use crate::trial::{Trial, base_link, best, coarse_yaw, first_moving, prefix};
 use crate::volume::Sight;
-use crate::trial::{Trial, base_link, best, coarse_yaw, first_moving, of_judged, prefix};
 
 /// What is tuned.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,34 +58,27 @@ const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
 const MAX_CELLS: usize = 6;
 
-/// Tolerances at which base and first link are judged in the end, metres: half a step of the finest grid.
-const JUDGE: (f32, f32) = (0.04, 0.06);
-/// Mean score of what could be judged: of the worse of base and first link, and of both. Of 125 robots that were found
-/// none is below 0.64 and 0.70.
-const LIKE: (f64, f64) = (0.5, 0.58);
-/// Step of the first joint, radians.
-const FIRST_STEP: f64 = 0.14;
 /// Mean score on a quarter of the samples by which a pose may lag behind the best and still be looked at closely.
-const LAG: f64 = 0.15;
+pub(crate) const LAG: f64 = 0.15;
 /// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten are hidden.
 const HIDDEN: f32 = 0.03;
 
 /// The search for one model's base in one region.
 #[derive(Debug)]
 pub struct BaseSearch<'a> {
-    model: &'a Model,
+    pub(crate) model: &'a Model,
     index: usize,
-    sight: &'a Sight<'a>,
-    settings: &'a Settings,
+    pub(crate) sight: &'a Sight<'a>,
+    pub(crate) settings: &'a Settings,
     /// Farthest sample of the base from its upright axis, metres.
     radius: f64,
     /// Height of the base's lowest sample in the root's frame, metres.
     foot: f64,
     /// The link that stands on the plane, and its pose in the root's frame.
-    base: usize,
-    root_from_base: Pose,
+    pub(crate) base: usize,
+    pub(crate) root_from_base: Pose,
     /// The first joint that moves something with a surface, and the link that it moves.
-    first: Option<(usize, usize)>,
+    pub(crate) first: Option<(usize, usize)>,
 }
 
 impl<'a> BaseSearch<'a> {
@@ -112,17 +105,7 @@ impl<'a> BaseSearch<'a> {
             foot = foot.min(p.z);
         }
         let first = first_moving(model);
-        Some(Self {
-            model,
-            index,
-            sight,
-            settings,
-            radius,
-            foot,
-            base,
-            root_from_base,
-            first,
-        })
+        Some(Self { model, index, sight, settings, radius, foot, base, root_from_base, first })
     }
 
     /// The candidates: one for each place, best first.
@@ -304,81 +287,26 @@ impl<'a> BaseSearch<'a> {
         out
     }
 
-    /// Whether what could be judged of the base and of the first link fits them: much of a cabinet has the height of a
-    /// foot, but not its shape.
-    fn is_like(&self, plane: &Plane, trial: &Trial) -> bool {
-        if !self.sight.evidence.has_beams() {
-            return true;
-        }
-        let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
-        let cad = prefix(self.model, self.base, self.settings.n_fine);
-        let pose = local_from_root * self.root_from_base;
-        let base = of_judged(&self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.0));
-        let first = self.first.map_or(base, |(free, link)| {
-            let poses = self.turns(free).map(|q| {
-                let mut posture = self.model.home();
-                posture[free] = q;
-                local_from_root * self.model.poses(&posture)[link]
-            });
-            let cad = prefix(self.model, link, self.settings.n_coarse);
-            let probes = poses.map(|pose| self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.1));
-            let best = probes.max_by(|a, b| self.mean(a).total_cmp(&self.mean(b)));
-            best.map_or(base, |probe| of_judged(&probe))
-        });
-        base.min(first) >= LIKE.0 && 0.5 * (base + first) >= LIKE.1
-    }
-
-    /// Values of a joint over its range, at most one turn.
-    fn turns(&self, free: usize) -> impl Iterator<Item = f64> + use<> {
-        let [low, high] = self.model.limits(free);
-        let span = (high - low).min(std::f64::consts::TAU);
-        let n = (span / FIRST_STEP).ceil().max(1.0);
-        (0..=n as usize).map(move |k| low + span * k as f64 / n)
-    }
-
-    fn score_base(&self, plane: &Plane, trial: &Trial, (tolerance, n): (f32, usize)) -> f64 {
+    pub(crate) fn score_base(
+        &self,
+        plane: &Plane,
+        trial: &Trial,
+        (tolerance, n): (f32, usize),
+    ) -> f64 {
         let cad = prefix(self.model, self.base, n);
         let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
         self.mean(&self.sight.evidence.probe(cad.0, cad.1, &pose, tolerance))
     }
 
     /// Mean score of the samples, hidden ones at their price for a base.
-    fn mean(&self, probe: &Probe) -> f64 {
+    pub(crate) fn mean(&self, probe: &Probe) -> f64 {
         let back = if self.sight.evidence.has_beams() { HIDDEN_PRICE - HIDDEN } else { 0.0 };
         let score = probe.score + back * (probe.n - probe.n_seen) as f32;
         f64::from(score / probe.n.max(1) as f32)
     }
 
-    /// Area-weighted mean score of the base and of the first moving link at its best joint value.
-    fn score_with_first(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> f64 {
-        let own = self.score_base(plane, trial, (tolerance, self.settings.n_fine));
-        let Some((free, link)) = self.first else { return own };
-        let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
-        let cad = prefix(self.model, link, self.settings.n_coarse);
-        let mut posture = self.model.home();
-        let poses: Vec<Pose> = self
-            .turns(free)
-            .map(|q| {
-                posture[free] = q;
-                local_from_base * self.model.poses(&posture)[link]
-            })
-            .collect();
-        // A few samples tell most values to be hopeless.
-        let tolerance = tolerance * 1.5;
-        let some = prefix(self.model, link, cad.0.len() / 4);
-        let few = |pose: &Pose| self.mean(&self.sight.glance(some, pose, tolerance));
-        let few: Vec<f64> = poses.iter().map(few).collect();
-        let least = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - LAG;
-        let full = poses.iter().zip(&few).filter(|(_, few)| **few >= least);
-        let score =
-            |p: &Pose| self.mean(&self.sight.evidence.probe(cad.0, cad.1, p, tolerance));
-        let top = full.map(|(p, _)| score(p)).fold(f64::NEG_INFINITY, f64::max);
-        let weight = |l: usize| f64::from(self.model.links[l].cad.area).sqrt();
-        (weight(self.base) * own + weight(link) * top) / (weight(self.base) + weight(link))
-    }
-
     /// The base standing on the plane at a place (its own coordinates), turned by `yaw` about the plane's normal.
-    fn pose(&self, plane: &Plane, x: f64, y: f64, yaw: f64) -> Pose {
+    pub(crate) fn pose(&self, plane: &Plane, x: f64, y: f64, yaw: f64) -> Pose {
         let frame = plane.frame();
         let foot = frame * Vector::new(x, y, plane.offset - self.foot);
         let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), yaw);

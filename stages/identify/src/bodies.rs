@@ -38,7 +38,11 @@ pub(crate) fn bodies(cluster: &Cluster, settings: &RegionSettings) -> Vec<(Aabb,
             columns.entry(at).or_default().push(*voxel);
         }
     }
-    columns.retain(|_, voxels| voxels.len() >= MIN_VOXELS && !is_flat(voxels, cluster.edge) && !is_corner(voxels, cluster.edge));
+    columns.retain(|_, voxels| {
+        voxels.len() >= MIN_VOXELS
+            && !is_flat(voxels, cluster.edge)
+            && !is_corner(voxels, cluster.edge)
+    });
     let share = cluster.n_points as f64 / cluster.voxels.len().max(1) as f64;
     let mut out = Vec::new();
     while let Some((&seed, _)) = columns.first_key_value() {

@@ -5,6 +5,7 @@
 
 mod base;
 mod bodies;
+mod first;
 mod sites;
 mod trial;
 mod volume;

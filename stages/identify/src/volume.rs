@@ -33,6 +33,8 @@ pub struct Sight<'a> {
     pub(crate) evidence: &'a Evidence<'a>,
     /// Nothing where there are no beams.
     volume: Option<Volume>,
+    /// What each scan sees by itself, where they are to be asked one by one; else empty.
+    pub(crate) each: Vec<Evidence<'a>>,
 }
 
 impl<'a> Sight<'a> {
@@ -44,7 +46,17 @@ impl<'a> Sight<'a> {
         evidence: &'a Evidence<'a>,
         fan: &impl Fan,
     ) -> Self {
-        Self { region, views, evidence, volume: Volume::new(region, evidence, fan) }
+        let volume = Volume::new(region, evidence, fan);
+        Self { region, views, evidence, volume, each: Vec::new() }
+    }
+
+    /// The same for robots that moved between scans: what moves is looked for in each scan by itself.
+    #[must_use]
+    pub fn apart(mut self) -> Self {
+        let with_beams = self.views.iter().filter(|v| !v.images.is_empty());
+        let alone = |v: &'a View| Evidence { images: v.images.iter().collect(), cloud: None };
+        self.each = with_beams.map(alone).collect();
+        self
     }
 
     /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: from the grid
@@ -107,12 +119,7 @@ impl Volume {
 
     /// Judges surface samples (frame of the body) with the body at `local_from_body`, to within `tolerance` metres,
     /// without regard to the side from which a beam comes.
-    fn probe(
-        &self,
-        points: &[[f32; 3]],
-        local_from_body: &Pose,
-        tolerance: f32,
-    ) -> Probe {
+    fn probe(&self, points: &[[f32; 3]], local_from_body: &Pose, tolerance: f32) -> Probe {
         let m = rows(local_from_body);
         let mut out = Probe { n: points.len() as u32, ..Probe::default() };
         for p in points {
@@ -124,7 +131,11 @@ impl Volume {
                 NOTHING => NO_RETURN_WEIGHT,
                 ahead => ((f32::from(ahead) * UNIT - tolerance) / tolerance).clamp(0.0, 1.0),
             };
-            let on = if cell.off == NOTHING { 0.0 } else { 1.0 - f32::from(cell.off) * UNIT / tolerance };
+            let on = if cell.off == NOTHING {
+                0.0
+            } else {
+                1.0 - f32::from(cell.off) * UNIT / tolerance
+            };
             if through > 0.0 {
                 out.score -= SEEN_THROUGH_PRICE * through;
                 out.n_seen += 1;

@@ -2,6 +2,7 @@
 //! of other tiles; what spans them is joined by floor and cluster.
 #![forbid(unsafe_code)]
 
+mod accord;
 mod links;
 mod noise;
 mod normals;
@@ -14,8 +15,9 @@ mod summarise;
 mod view;
 mod voxels;
 
+pub use accord::{agree, disagreement};
 pub use normals::normals;
 pub use raster::veils;
 pub use settings::Settings;
 pub use summarise::{Scratch, Summarise};
-pub use view::{Extent, ViewBuilder, ViewSettings, agree};
+pub use view::{Extent, ViewBuilder, ViewSettings};

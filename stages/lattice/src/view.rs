@@ -151,35 +151,6 @@ impl ViewBuilder {
     }
 }
 
-/// Share of the matter measured by other scans that a scanner must have missed for its missing returns to mean nothing.
-const BLIND: f32 = 0.5;
-/// Half-width (cells) of the window about such matter in which missing returns mean nothing.
-const DOUBT_WINDOW: i32 = 3;
-/// Points of each other scan that are asked, at most.
-const N_ASKED: usize = 100_000;
-
-/// Lets the views of a region check each other's missing returns: where one scan measured matter, the silence of another
-/// is no free space (a scanner behind a near post, black or shiny surfaces).
-pub fn agree(views: &mut [View]) {
-    let matter: Vec<Vec<[f32; 3]>> = views
-        .iter()
-        .map(|view| {
-            let step = (view.points.len() / N_ASKED).max(1);
-            view.points.iter().step_by(step).map(|p| p.xyz).collect()
-        })
-        .collect();
-    for (own, view) in views.iter_mut().enumerate() {
-        for image in &mut view.images {
-            let camera_from_local = rows(image.camera_from_local());
-            let others = matter.iter().enumerate().filter(|(other, _)| *other != own);
-            let seen: Vec<[f32; 3]> = others
-                .flat_map(|(_, points)| points.iter().map(|p| transform(&camera_from_local, *p)))
-                .collect();
-            image.doubt(&seen, DOUBT_WINDOW, BLIND);
-        }
-    }
-}
-
 /// Direction to the region's middle in the scan frame, and the largest angle from it to a corner.
 fn cone(scanner: &Point, region: &Region, local_from_scan: &Pose) -> (Vector, f64) {
     let to = region.bounds.center() - scanner;

@@ -2,7 +2,7 @@
 
 use crate::Settings;
 use crate::field::{FIELD_REACH, Field};
-use contract::{Fit, Verdict};
+use contract::{Fit, ScanId, Verdict};
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::{DMatrix, DVector};
 use robot::{Kinematics, Model};
@@ -32,16 +32,28 @@ pub(crate) struct Link {
 pub(crate) struct Body {
     /// Index into the fits.
     pub(crate) robot: u16,
+    /// Scans in which it stands so; empty: in all.
+    stands_in: Vec<ScanId>,
     /// World bounds of everything that is looked at, metres.
     pub(crate) region: Aabb,
     pub(crate) links: Vec<Link>,
+}
+
+impl Body {
+    /// Whether it stands so in a scan.
+    pub(crate) fn is_in(&self, scan: ScanId) -> bool {
+        self.stands_in.is_empty() || self.stands_in.contains(&scan)
+    }
 }
 
 /// The fits that are used for labels; fields are shared between fits of one model.
 pub(crate) fn bodies(fits: &[Fit], models: &[Model], settings: &Settings) -> Vec<Body> {
     let mut fields: BTreeMap<usize, Vec<Option<Arc<Field>>>> = BTreeMap::new();
     let mut out = Vec::new();
-    for (robot, fit) in fits.iter().enumerate() {
+    let all = fits.iter().enumerate().flat_map(|(robot, fit)| {
+        std::iter::once(fit).chain(&fit.stays).map(move |fit| (robot, fit))
+    });
+    for (robot, fit) in all {
         // Labels hold a robot as i16.
         let (Ok(robot), Some(model)) = (i16::try_from(robot), models.get(fit.model)) else {
             continue;
@@ -56,7 +68,7 @@ pub(crate) fn bodies(fits: &[Fit], models: &[Model], settings: &Settings) -> Vec
         let links = posed(fit, model, fields, settings);
         let region = links.iter().fold(Aabb::EMPTY, |all, link| all.union(&link.region()));
         if !region.is_empty() {
-            out.push(Body { robot, region, links });
+            out.push(Body { robot, stands_in: fit.stands_in.clone(), region, links });
         }
     }
     out

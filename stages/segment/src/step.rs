@@ -124,7 +124,8 @@ impl Segment {
     /// The links whose surroundings a tile may touch.
     fn seen<'a>(&'a self, tile: &Tile, world_from_scan: &Pose) -> Vec<Seen<'a>> {
         let mut out = Vec::new();
-        for body in self.bodies.iter().filter(|body| body.region.touches(&tile.bounds)) {
+        let here = |body: &&Body| body.is_in(tile.at.scan) && body.region.touches(&tile.bounds);
+        for body in self.bodies.iter().filter(here) {
             for link in body.links.iter().filter(|link| link.region().touches(&tile.bounds)) {
                 out.push(Seen {
                     at: LinkAt { robot: body.robot, link: link.index },
@@ -274,7 +275,8 @@ impl Map for Segment {
             scratch.raster.fill(&tile, lattice, self.settings.sigma_range);
             &scratch.raster
         });
-        let regions: Vec<&Aabb> = self.bodies.iter().map(|body| &body.region).collect();
+        let here = self.bodies.iter().filter(|body| body.is_in(tile.at.scan));
+        let regions: Vec<&Aabb> = here.map(|body| &body.region).collect();
         scratch.found.clear();
         for (i, p) in tile.xyz.iter().enumerate() {
             let world = world(&scan.world_from_scan, *p);

@@ -23,8 +23,8 @@ const MAX_CELLS: usize = 1 << 24;
 const MIN_FACING: f64 = 0.15;
 
 impl Lattices {
-    pub(super) fn new(views: &[View]) -> Self {
-        Self(views.iter().filter_map(Lattice::new).collect())
+    pub(super) fn new(views: &[&View]) -> Self {
+        Self(views.iter().filter_map(|view| Lattice::new(view)).collect())
     }
 
     /// Distance from a surface sample (local frame) to the nearest measured point in the windows of the scans that it

@@ -53,7 +53,7 @@ pub fn fit(
     (settings, own): (&Settings, &PaperSettings),
 ) -> Vec<Fit> {
     let Some(&base) = prepared.fixed.first() else { return Vec::new() };
-    let lattices = Lattices::new(scene.views);
+    let lattices = Lattices::new(&scene.views);
     let paper = Paper { prepared, scene, settings: own, lattices: &lattices, base };
     let mut out: Vec<Fit> = Vec::new();
     let mut planes: Vec<&InstallationPlane> = planes.iter().collect();

@@ -1,0 +1,165 @@
+//! A candidate and scans that contradict each other in; out come the groups of scans in which the robot stood still, as a
+//! fit with the others beside it: somebody moved the robot between two stations.
+
+use contract::{Candidate, Fan, Fit, InstallationPlane, Region, Verdict, View};
+use geometry::{Point, Pose};
+
+use crate::beam::Hypothesis;
+use crate::refine::Refine;
+use crate::solve::{NEAR_MARGIN, fit, judged, quick};
+use crate::{Prepared, Scene, Settings};
+
+/// Share of a scan's judged surface of the moving links, explained less contradicted, from which on a posture that another
+/// scan tells stands in it too.
+const AGREES: f64 = 0.35;
+/// Share of the moving surface that a scan must have judged to say anything.
+const MIN_JUDGED: f64 = 0.03;
+/// Most postures of one robot that are told apart.
+const MAX_STAYS: usize = 4;
+/// Scans that must agree on a posture for it to be trusted.
+const MIN_AGREEING: usize = 2;
+
+/// What is seen of a region, scan by scan.
+#[derive(Debug, Clone, Copy)]
+pub struct Sights<'a> {
+    /// The region.
+    pub region: &'a Region,
+    /// Its views.
+    pub views: &'a [View],
+    /// Planes about it, world.
+    pub floors: &'a [InstallationPlane],
+}
+
+/// What the scans say where they disagree: the fit of the scans that agree on the best posture, with a fit of the others
+/// beside it ([`Fit::stays`]); `None` where they do not disagree, or no group of them shows the robot plainly.
+#[must_use]
+pub fn stays(
+    candidate: &Candidate,
+    prepared: &Prepared<'_>,
+    sights: &Sights<'_>,
+    settings: &Settings,
+    fan: &impl Fan,
+) -> Option<Fit> {
+    let seeing = (0..sights.views.len()).filter(|&v| !sights.views[v].images.is_empty()).collect();
+    let single =
+        |v: usize| Single::new(&sights.views[v], candidate, prepared, sights, settings, fan);
+    let singles: Vec<Single<'_>> = fan.fan(seeing, single);
+    let mut left: Vec<usize> = (0..singles.len()).collect();
+    let mut out: Vec<(Fit, Hypothesis)> = Vec::new();
+    let mut candidate = candidate.clone();
+    while out.len() < MAX_STAYS {
+        // The posture of one scan that most surface of the others bears out.
+        let groups = left.iter().filter_map(|&v| {
+            let h = singles[v].found.as_ref()?;
+            let says = left.iter().map(|&u| (u, singles[u].says(h, prepared, settings)));
+            let own: Vec<_> = says.filter(|(u, s)| *u == v || bears_out(s)).collect();
+            let net = own.iter().map(|(_, s)| s[0]).sum::<f64>();
+            Some((net, own.into_iter().map(|(u, _)| u).collect::<Vec<_>>()))
+        });
+        let Some((_, own)) = groups.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        if own.len() == singles.len() {
+            return None;
+        }
+        left.retain(|v| !own.contains(v));
+        let views: Vec<&View> = own.iter().map(|&v| singles[v].view).collect();
+        let scene = Scene::of(sights.region, &views, sights.floors, settings);
+        let found = fit(&candidate, prepared, &scene, settings, fan);
+        let is_plain = |f: &Fit| match own.len() < MIN_AGREEING {
+            true => f.verdict == Verdict::Trusted,
+            false => f.verdict != Verdict::Refused,
+        };
+        let Some(mut found) = found.filter(is_plain) else {
+            if out.is_empty() {
+                return None;
+            }
+            continue;
+        };
+        if own.len() < MIN_AGREEING {
+            found.verdict = Verdict::Doubtful;
+            found.reasons.push("only one scan shows this posture".into());
+        }
+        found.stands_in = views.iter().map(|v| v.scan).collect();
+        // It did not move its base.
+        candidate.bases = vec![(found.world_from_base, candidate.bases[0].1)];
+        let h = Hypothesis {
+            local_from_base: scene.world_from_local().inverse() * found.world_from_base,
+            posture: found.joints.iter().map(|j| j.value).collect(),
+            score: found.score,
+        };
+        out.push((found, h));
+    }
+    together(out, &left, &singles, (prepared, settings))
+}
+
+/// One fit of all groups; scans that show too little for a posture of their own go with the one that they bear out most.
+fn together(
+    mut groups: Vec<(Fit, Hypothesis)>,
+    left: &[usize],
+    singles: &[Single<'_>],
+    (prepared, settings): (&Prepared<'_>, &Settings),
+) -> Option<Fit> {
+    let mut n_silent = 0;
+    for &u in left {
+        let net = |h: &Hypothesis| singles[u].says(h, prepared, settings)[0];
+        let best = groups.iter_mut().max_by(|a, b| net(&a.1).total_cmp(&net(&b.1)));
+        match best.filter(|group| net(&group.1) > 0.0) {
+            Some(group) => group.0.stands_in.push(singles[u].view.scan),
+            None => n_silent += 1,
+        }
+    }
+    let mut fits = groups.into_iter().map(|(mut fit, _)| {
+        fit.stands_in.sort_unstable();
+        fit
+    });
+    let mut first = fits.next()?;
+    first.stays = fits.collect();
+    if n_silent > 0 {
+        first.reasons.push(format!("{n_silent} scan(s) show it in no posture that was found"));
+    }
+    first.reasons.push(format!("it moved between scans: {} postures", 1 + first.stays.len()));
+    Some(first)
+}
+
+/// Whether a scan shows what a posture asks for: explained, judged and whole surface of the moving links, m².
+fn bears_out([net, judged, whole]: &[f64; 3]) -> bool {
+    *judged > MIN_JUDGED * whole && *net > AGREES * judged
+}
+
+/// One scan alone, and the posture that it shows, if it shows one.
+struct Single<'a> {
+    view: &'a View,
+    scene: Scene<'a>,
+    found: Option<Hypothesis>,
+}
+
+impl<'a> Single<'a> {
+    fn new(
+        view: &'a View,
+        candidate: &Candidate,
+        prepared: &Prepared<'_>,
+        sights: &Sights<'a>,
+        settings: &Settings,
+        fan: &impl Fan,
+    ) -> Self {
+        let scene = Scene::of(sights.region, &[view], sights.floors, settings);
+        let local_from_world = scene.world_from_local().inverse();
+        let bases: Vec<Pose> =
+            candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
+        let base = bases.first().map_or_else(Point::origin, |b| b.translation.vector.into());
+        let [near, _] = scene.within(&base, prepared.reach + NEAR_MARGIN);
+        let refine = Refine { prepared, scene: &scene, settings, prior: None };
+        let found = quick(&refine, &bases, &near, fan).map(|(h, _)| h);
+        Self { view, scene, found }
+    }
+
+    /// What this scan says of a posture: explained less contradicted, judged and whole surface of the moving links, m².
+    fn says(&self, h: &Hypothesis, prepared: &Prepared<'_>, settings: &Settings) -> [f64; 3] {
+        let refine = Refine { prepared, scene: &self.scene, settings, prior: None };
+        let judgement = judged(&refine, h);
+        let moving = (0..prepared.links.len()).filter(|l| !prepared.fixed.contains(l));
+        moving.fold([0.0; 3], |sum, l| {
+            let [net, judged] = judgement.links[l];
+            [sum[0] + net, sum[1] + judged, sum[2] + prepared.links[l].area]
+        })
+    }
+}

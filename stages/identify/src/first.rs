@@ -1,0 +1,112 @@
+//! A base pose under test in; out comes what the first moving link, swept over its joint, says of it: many a box looks like
+//! a foot, but few look like a foot with a carousel on it.
+
+use geometry::{Plane, Pose, Probe};
+
+use crate::base::{BaseSearch, LAG};
+use crate::trial::{Trial, of_judged, prefix};
+
+/// Tolerances at which base and first link are judged in the end, metres: half a step of the finest grid.
+const JUDGE: (f32, f32) = (0.04, 0.06);
+/// Mean score of what could be judged: of the worse of base and first link, and of both. Of 125 robots that were found
+/// none is below 0.64 and 0.70.
+const LIKE: (f64, f64) = (0.5, 0.58);
+/// Step of the first joint, radians.
+const FIRST_STEP: f64 = 0.14;
+
+impl BaseSearch<'_> {
+    /// Whether what could be judged of the base and of the first link fits them: much of a cabinet has the height of a
+    /// foot, but not its shape.
+    pub(crate) fn is_like(&self, plane: &Plane, trial: &Trial) -> bool {
+        if !self.sight.evidence.has_beams() {
+            return true;
+        }
+        let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
+        let cad = prefix(self.model, self.base, self.settings.n_fine);
+        let pose = local_from_root * self.root_from_base;
+        let base = of_judged(&self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.0));
+        let first = self.first.map_or(base, |(free, link)| {
+            if !self.sight.each.is_empty() {
+                return of_judged(&self.first_apart(local_from_root, (free, link), JUDGE.1));
+            }
+            let poses = self.turns(free).map(|q| {
+                let mut posture = self.model.home();
+                posture[free] = q;
+                local_from_root * self.model.poses(&posture)[link]
+            });
+            let cad = prefix(self.model, link, self.settings.n_coarse);
+            let probes = poses.map(|pose| self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.1));
+            let best = probes.max_by(|a, b| self.mean(a).total_cmp(&self.mean(b)));
+            best.map_or(base, |probe| of_judged(&probe))
+        });
+        base.min(first) >= LIKE.0 && 0.5 * (base + first) >= LIKE.1
+    }
+
+    /// Values of a joint over its range, at most one turn.
+    fn turns(&self, free: usize) -> impl Iterator<Item = f64> + use<> {
+        let [low, high] = self.model.limits(free);
+        let span = (high - low).min(std::f64::consts::TAU);
+        let n = (span / FIRST_STEP).ceil().max(1.0);
+        (0..=n as usize).map(move |k| low + span * k as f64 / n)
+    }
+
+    /// Area-weighted mean score of the base and of the first moving link at its best joint value.
+    pub(crate) fn score_with_first(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> f64 {
+        let own = self.score_base(plane, trial, (tolerance, self.settings.n_fine));
+        let Some((free, link)) = self.first else { return own };
+        let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
+        let cad = prefix(self.model, link, self.settings.n_coarse);
+        let mut posture = self.model.home();
+        let poses: Vec<Pose> = self
+            .turns(free)
+            .map(|q| {
+                posture[free] = q;
+                local_from_base * self.model.poses(&posture)[link]
+            })
+            .collect();
+        let weight = |l: usize| f64::from(self.model.links[l].cad.area).sqrt();
+        let mean = |top: f64| {
+            (weight(self.base) * own + weight(link) * top) / (weight(self.base) + weight(link))
+        };
+        if !self.sight.each.is_empty() {
+            let probe = self.first_apart(local_from_base, (free, link), tolerance * 1.5);
+            // Each scan sees less than half of it.
+            return mean(of_judged(&probe) * (2.0 * f64::from(probe.seen())).min(1.0));
+        }
+        // A few samples tell most values to be hopeless.
+        let tolerance = tolerance * 1.5;
+        let some = prefix(self.model, link, cad.0.len() / 4);
+        let few = |pose: &Pose| self.mean(&self.sight.glance(some, pose, tolerance));
+        let few: Vec<f64> = poses.iter().map(few).collect();
+        let least = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - LAG;
+        let full = poses.iter().zip(&few).filter(|(_, few)| **few >= least);
+        let score = |p: &Pose| self.mean(&self.sight.evidence.probe(cad.0, cad.1, p, tolerance));
+        let top = full.map(|(p, _)| score(p)).fold(f64::NEG_INFINITY, f64::max);
+        mean(top)
+    }
+
+    /// What the scans say of the first moving link, each at the joint value that it likes best.
+    fn first_apart(
+        &self,
+        local_from_root: Pose,
+        (free, link): (usize, usize),
+        tolerance: f32,
+    ) -> Probe {
+        let mut posture = self.model.home();
+        let poses: Vec<Pose> = self
+            .turns(free)
+            .map(|q| {
+                posture[free] = q;
+                local_from_root * self.model.poses(&posture)[link]
+            })
+            .collect();
+        let cad = prefix(self.model, link, self.settings.n_coarse / 2);
+        let mut sum = Probe::default();
+        for evidence in &self.sight.each {
+            let probes = poses.iter().map(|p| evidence.probe(cad.0, cad.1, p, tolerance));
+            let best = probes.max_by(|a, b| a.score.total_cmp(&b.score));
+            best.iter().for_each(|b| sum.join(b));
+        }
+        sum
+    }
+}

@@ -1,0 +1,69 @@
+//! The views of a region in; out comes where they contradict each other: missing returns where others measured matter, which
+//! prove nothing, and matter where others saw free space, which moved.
+
+use contract::View;
+use geometry::depth::{rows, transform};
+use geometry::narrow::floor_i32;
+use std::collections::BTreeMap;
+
+/// Share of the matter measured by other scans that a scanner must have missed for its missing returns to mean nothing.
+const BLIND: f32 = 0.5;
+/// Half-width (cells) of the window about such matter in which missing returns mean nothing.
+const DOUBT_WINDOW: i32 = 3;
+/// Points of each other scan that are asked, at most.
+const N_ASKED: usize = 100_000;
+
+/// Lets the views of a region check each other's missing returns: where one scan measured matter, the silence of another
+/// is no free space (a scanner behind a near post, black or shiny surfaces).
+pub fn agree(views: &mut [View]) {
+    let matter: Vec<Vec<[f32; 3]>> = views
+        .iter()
+        .map(|view| {
+            let step = (view.points.len() / N_ASKED).max(1);
+            view.points.iter().step_by(step).map(|p| p.xyz).collect()
+        })
+        .collect();
+    for (own, view) in views.iter_mut().enumerate() {
+        for image in &mut view.images {
+            let camera_from_local = rows(image.camera_from_local());
+            let others = matter.iter().enumerate().filter(|(other, _)| *other != own);
+            let seen: Vec<[f32; 3]> = others
+                .flat_map(|(_, points)| points.iter().map(|p| transform(&camera_from_local, *p)))
+                .collect();
+            image.doubt(&seen, DOUBT_WINDOW, BLIND);
+        }
+    }
+}
+
+/// Beams that went on so far beyond a point of another scan saw free space there, metres.
+const BEYOND: f32 = 0.10;
+/// Footprint in which they are asked, metres.
+const FOOTPRINT: f32 = 0.03;
+/// Edge of the cells that contradictions are counted in, metres, and points that make one.
+const CELL: f32 = 0.05;
+const MIN_IN_CELL: u32 = 3;
+
+/// What was here for one scan and gone for another: middles of cells of 5 cm, local frame. Edges and wires make a few, what
+/// moved makes many.
+#[must_use]
+pub fn disagreement(views: &[View]) -> Vec<[f32; 3]> {
+    let mut cells: BTreeMap<[i32; 3], u32> = BTreeMap::new();
+    for (own, view) in views.iter().enumerate() {
+        let step = (view.points.len() / N_ASKED).max(1);
+        let others = views.iter().enumerate().filter(|(other, _)| *other != own);
+        let images = others.flat_map(|(_, v)| &v.images);
+        let images: Vec<_> = images.map(|i| (i, rows(i.camera_from_local()))).collect();
+        for point in view.points.iter().step_by(step) {
+            let is_gone = images.iter().any(|(image, camera_from_local)| {
+                let look = image.look(transform(camera_from_local, point.xyz), FOOTPRINT);
+                look.is_some_and(|l| l.around.is_finite() && l.around - l.range > BEYOND)
+            });
+            if is_gone {
+                let cell = point.xyz.map(|v| floor_i32(f64::from(v / CELL)));
+                *cells.entry(cell).or_default() += 1;
+            }
+        }
+    }
+    let many = cells.iter().filter(|(_, n)| **n >= MIN_IN_CELL);
+    many.map(|(cell, _)| cell.map(|i| (i as f32 + 0.5) * CELL)).collect()
+}
