@@ -25,7 +25,8 @@ pub(crate) fn calibrate(
 ) -> Result<Vec<Fit>> {
     let known: &[Model] = models;
     let done = engine.fan_out("calibrate", fits, |fit| {
-        if fit.verdict == Verdict::Refused {
+        // All scans are asked here, of which a robot that moved stands only in some.
+        if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
             return Ok((fit, None));
         }
         let found = search.with_scene(&fit, regions, |scene, settings| {

@@ -122,6 +122,22 @@ impl Report<'_> {
         out
     }
 
+    /// Value and standard deviation of each joint.
+    fn say_posture(&self, text: &mut String, fit: &Fit) {
+        let model = &self.models[fit.model];
+        for (joint, &index) in fit.joints.iter().zip(&model.free) {
+            let slides = model.joints[index].kind == robot::JointKind::Prismatic;
+            let (factor, unit) = if slides { (1e3, " mm") } else { (1_f64.to_degrees(), "°") };
+            let sigma = if joint.determined {
+                format!("± {:.3}{unit}", joint.sigma * factor)
+            } else {
+                "not determined".into()
+            };
+            let value = joint.value * factor;
+            let _ = writeln!(text, "     {:<24} {value:>9.3}{unit} {sigma}", joint.name);
+        }
+    }
+
     fn summary(&self, room: &Room) -> String {
         let mut text = String::new();
         let _ =
@@ -145,24 +161,20 @@ impl Report<'_> {
                 let _ =
                     writeln!(text, "     carries {} on '{}' at {deg:.0}°", tool.model, tool.link);
             }
-            let model = &self.models[fit.model];
-            for (joint, &index) in fit.joints.iter().zip(&model.free) {
-                let slides = model.joints[index].kind == robot::JointKind::Prismatic;
-                let (factor, unit) = if slides { (1e3, " mm") } else { (1_f64.to_degrees(), "°") };
-                let sigma = if joint.determined {
-                    format!("± {:.3}{unit}", joint.sigma * factor)
-                } else {
-                    "not determined".into()
-                };
-                let value = joint.value * factor;
-                let _ = writeln!(text, "     {:<24} {value:>9.3}{unit} {sigma}", joint.name);
-            }
+            self.say_posture(&mut text, fit);
+            let word = if fit.verdict == Verdict::Trusted { "note" } else { "why" };
             for reason in &fit.reasons {
+                let _ = writeln!(text, "     {word}: {reason}");
+            }
+            for stay in &fit.stays {
                 let _ = writeln!(
                     text,
-                    "     {}: {reason}",
-                    if fit.verdict == Verdict::Trusted { "note" } else { "why" }
+                    "     in {} other scan(s): {}, score {:.2}",
+                    stay.stands_in.len(),
+                    stay.verdict.word(),
+                    stay.score
                 );
+                self.say_posture(&mut text, stay);
             }
         }
         let n: u64 = self.written.masks.iter().map(|m| m.n_points).sum();

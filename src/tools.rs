@@ -20,9 +20,12 @@ const MIN_POINTS: usize = 80;
 
 /// Gives fits whose loops stand otherwise than the library's model has them a model of their own.
 pub(crate) fn branch(mut fits: Vec<Fit>, models: &mut Vec<Model>) -> Vec<Fit> {
-    for fit in fits.iter_mut().filter(|f| !f.other_branches.is_empty()) {
-        models.push(models[fit.model].with_other_branches(&fit.other_branches));
-        fit.model = models.len() - 1;
+    for fit in &mut fits {
+        if !fit.other_branches.is_empty() {
+            models.push(models[fit.model].with_other_branches(&fit.other_branches));
+            fit.model = models.len() - 1;
+        }
+        fit.stays = branch(std::mem::take(&mut fit.stays), models);
     }
     fits
 }
@@ -41,7 +44,8 @@ pub(crate) fn dress(
     }
     let known: &[Model] = models;
     let dressed = engine.fan_out("tools", fits, |fit| {
-        if fit.verdict == Verdict::Refused {
+        // Of a robot that moved, the scans of one posture may show too little of a tool.
+        if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
             return Ok((fit, None));
         }
         let arm = fit.clone();

@@ -9,7 +9,7 @@ use stillpoint::job::{Given, Job, Means};
 use stillpoint::plan;
 use stillpoint::scanning::{Formats, scan_scene};
 
-const SEED: u64 = 3;
+const SEED: u64 = 5;
 /// Share of points of links and of what hangs on them that come out as such, and the other way round.
 const F1: f64 = 0.97;
 
@@ -24,7 +24,7 @@ fn a_robot_that_moved_between_stations_has_two_postures() {
         n_robots: 1,
         n_rows: 1,
         n_scanners: 6,
-        step_deg: 0.25,
+        step_deg: 0.2,
         is_tight: false,
         moves: true,
     };

@@ -55,7 +55,7 @@ pub(crate) fn judge(
         // Hidden samples vote for nothing here: take their small price back.
         let net = f64::from(probe.score)
             + if scene.evidence.has_beams() {
-                f64::from(geometry::depth::HIDDEN_PRICE) * hidden
+                f64::from(geometry::probe::HIDDEN_PRICE) * hidden
             } else {
                 0.0
             };

@@ -1,5 +1,5 @@
 //! Depth images: the points of one scan inside a region, as its scanner saw them. Points in; out comes, for any
-//! surface sample, whether a beam ended on it, went through it, or never got there.
+//! direction, how far the nearest and the farthest beam went.
 //!
 //! A depth image is a pinhole raster towards the region (no trigonometry per look-up), with a pyramid above it.
 //! Each cell keeps the nearest and the farthest hit, so that a silhouette does not average robot and background.
@@ -20,8 +20,8 @@ pub enum Empty {
 pub struct DepthImage {
     camera_from_local: Pose,
     /// The same for inner loops.
-    rows: Rows,
-    scanner: crate::Point,
+    pub(crate) rows: Rows,
+    pub(crate) scanner: crate::Point,
     /// Cells of level 0 per unit tangent.
     focal: f32,
     levels: Vec<Level>,
@@ -60,12 +60,6 @@ pub fn transform(m: &Rows, p: [f32; 3]) -> [f32; 3] {
 pub fn rotate(m: &Rows, p: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2])
 }
-
-/// Weight of a beam that did not come back, against one that hit something behind: black paint and glancing
-/// steel swallow beams too.
-pub const NO_RETURN_WEIGHT: f32 = 0.3;
-/// Cosine below which a surface is too oblique to be expected in the scan.
-pub const MIN_FACING: f32 = 0.15;
 
 impl DepthImage {
     /// An empty raster of `2·half_tangent·focal` cells a side, looking along +z of the camera frame.
@@ -282,192 +276,5 @@ impl Level {
                 self.cells[v * self.width + u][2] = least;
             }
         }
-    }
-}
-
-/// What the beams say about a set of surface samples at one pose.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Probe {
-    /// Sum over samples of: −β·violation, or match in 0..1, or −γ where hidden.
-    pub score: f32,
-    /// Number of samples.
-    pub n: u32,
-    /// Samples that some beam could judge (on the surface or seen through).
-    pub n_seen: u32,
-    /// Samples with a beam ending on them, within the tolerance.
-    pub n_on: u32,
-    /// Samples that a beam passed through by more than twice the tolerance.
-    pub n_through: u32,
-}
-
-impl Probe {
-    /// Mean score of a sample, in −β..1; 0 for none.
-    #[must_use]
-    pub fn mean(&self) -> f32 {
-        if self.n == 0 { 0.0 } else { self.score / self.n as f32 }
-    }
-
-    /// Adds the counts of `other`.
-    pub fn join(&mut self, other: &Self) {
-        self.score += other.score;
-        self.n += other.n;
-        self.n_seen += other.n_seen;
-        self.n_on += other.n_on;
-        self.n_through += other.n_through;
-    }
-
-    /// Share of judged samples that a beam passed through.
-    #[must_use]
-    pub fn violation(&self) -> f32 {
-        self.n_through as f32 / self.n_seen.max(1) as f32
-    }
-
-    /// Share of samples that could be judged.
-    #[must_use]
-    pub fn seen(&self) -> f32 {
-        self.n_seen as f32 / self.n.max(1) as f32
-    }
-}
-
-/// The images as a body sees them: each with its camera's frame from the body's, and by scanner (where it stands in the
-/// body's frame) which of them are its own.
-struct Seeing<'a> {
-    cameras: Vec<(&'a DepthImage, Rows)>,
-    scanners: Vec<([f32; 3], std::ops::Range<usize>)>,
-}
-
-impl<'a> Seeing<'a> {
-    /// The images of one scanner being neighbours.
-    fn new(images: &[&'a DepthImage], local_from_body: &Pose) -> Self {
-        let body_from_local = local_from_body.inverse();
-        let to_local = rows(local_from_body);
-        let camera = |image: &&'a DepthImage| (*image, after(&image.rows, &to_local));
-        let mut scanners: Vec<([f32; 3], std::ops::Range<usize>)> = Vec::new();
-        let mut last = None;
-        for (i, image) in images.iter().enumerate() {
-            match scanners.last_mut() {
-                Some((_, own)) if last == Some(image.scanner) => own.end = i + 1,
-                _ => {
-                    let at = (body_from_local * image.scanner).coords.cast::<f32>().into();
-                    scanners.push((at, i..i + 1));
-                }
-            }
-            last = Some(image.scanner);
-        }
-        Self { cameras: images.iter().map(camera).collect(), scanners }
-    }
-}
-
-/// `a_from_c` of `a_from_b` and `b_from_c`.
-fn after(a: &Rows, b: &Rows) -> Rows {
-    std::array::from_fn(|r| {
-        std::array::from_fn(|c| {
-            let turned = a[r][0] * b[0][c] + a[r][1] * b[1][c] + a[r][2] * b[2][c];
-            if c == 3 { turned + a[r][3] } else { turned }
-        })
-    })
-}
-
-/// Price of a sample seen through, against one on the surface (fit.md §4d).
-pub const SEEN_THROUGH_PRICE: f32 = 1.5;
-/// Price of a sample that no scan could judge: small, so that hiding is not rewarded (fit.md §4d).
-pub const HIDDEN_PRICE: f32 = 0.1;
-
-/// Judges surface samples (`points` with outward `normals`, in the frame of a body) with the body at
-/// `local_from_body`: one beam through a sample in any scan outweighs any match in another (fit.md §4d).
-#[must_use]
-pub fn probe(
-    images: &[&DepthImage],
-    points: &[[f32; 3]],
-    normals: &[[f32; 3]],
-    local_from_body: &Pose,
-    tolerance: f32,
-) -> Probe {
-    let Seeing { cameras, scanners } = Seeing::new(images, local_from_body);
-    let mut out = Probe { n: points.len() as u32, ..Probe::default() };
-    for (p, n) in points.iter().zip(normals) {
-        let (mut through, mut on) = (0.0_f32, 0.0_f32);
-        for (at, own) in &scanners {
-            let ray = [at[0] - p[0], at[1] - p[1], at[2] - p[2]];
-            let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
-            // A beam through a body enters by a front face: back faces tell nothing new.
-            if along <= 0.0 {
-                continue;
-            }
-            let far = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
-            if along * along < MIN_FACING * MIN_FACING * far {
-                continue;
-            }
-            let mut looks = cameras[own.clone()].iter().filter_map(|(image, camera_from_body)| {
-                image.look(transform(camera_from_body, *p), 0.5 * tolerance)
-            });
-            // The images of one scanner share out the directions.
-            let Some(look) = looks.next() else { continue };
-            let ahead = look.around - look.range;
-            if ahead > tolerance {
-                let v = if ahead == f32::INFINITY {
-                    NO_RETURN_WEIGHT
-                } else {
-                    ((ahead - tolerance) / tolerance).min(1.0)
-                };
-                through = through.max(v);
-                if through >= 1.0 {
-                    // No other scan can make it worse or better.
-                    break;
-                }
-            } else {
-                let off = (look.near - look.range).abs().min((look.far - look.range).abs());
-                on = on.max(1.0 - off / tolerance);
-            }
-        }
-        if through > 0.0 {
-            out.score -= SEEN_THROUGH_PRICE * through;
-            out.n_seen += 1;
-            out.n_through += u32::from(through >= 1.0);
-        } else if on > 0.0 {
-            out.score += on;
-            out.n_seen += 1;
-            out.n_on += 1;
-        } else {
-            out.score -= HIDDEN_PRICE;
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Vector;
-
-    /// A wall at z = 5 in front of the camera, with a 1 m plate at z = 3.
-    fn image() -> DepthImage {
-        let mut image = DepthImage::new(Pose::identity(), 0.5, 200.0);
-        for i in -250..250 {
-            for j in -250..250 {
-                let (x, y) = (i as f32 * 0.002, j as f32 * 0.002);
-                let z = if x.abs() < 0.16 && y.abs() < 0.16 { 3.0 } else { 5.0 };
-                image.splat([x * z, y * z, z]);
-            }
-        }
-        image.finish(2, |_| Empty::Unknown);
-        image
-    }
-
-    #[test]
-    fn three_answers() {
-        let image = image();
-        let (points, normals) = (vec![[0.0, 0.0, 0.0]; 1], vec![[0.0, 0.0, -1.0]; 1]);
-        let at = |z: f64| {
-            let pose = Pose::from_parts(Vector::new(0.0, 0.0, z).into(), Default::default());
-            probe(&[&image], &points, &normals, &pose, 0.04)
-        };
-        let on = at(3.0);
-        assert_eq!((on.n_on, on.n_through), (1, 0));
-        assert!(on.score > 0.95);
-        let through = at(2.5);
-        assert_eq!((through.n_on, through.n_through), (0, 1));
-        let hidden = at(3.5);
-        assert_eq!((hidden.n_seen, hidden.n_on), (0, 0));
     }
 }

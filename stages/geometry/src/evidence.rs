@@ -1,7 +1,7 @@
 //! Evidence for a body at a pose: the depth images of scans with beams, and the bare points of scans without.
 //! Surface samples in; a [`Probe`] out. The one place where "is it there?" is answered.
 
-use crate::depth::{Probe, probe};
+use crate::probe::{Probe, probe};
 use crate::{DepthImage, NearestField, Pose};
 
 /// Everything that was measured in a region.

@@ -10,13 +10,15 @@ pub mod evidence;
 pub mod field;
 pub mod narrow;
 pub mod plane;
+pub mod probe;
 pub mod robust;
 
 pub use aabb::Aabb;
-pub use depth::{DepthImage, Probe};
+pub use depth::DepthImage;
 pub use evidence::Evidence;
 pub use field::NearestField;
 pub use plane::{Moments, Plane};
+pub use probe::Probe;
 
 /// A rigid motion `a_from_b`: takes coordinates in frame `b` to frame `a`, metres.
 pub type Pose = nalgebra::Isometry3<f64>;

@@ -5,7 +5,7 @@
 //! like a foot, but few look like a foot with a carousel on it.
 
 use contract::{Candidate, Fan, InstallationPlane};
-use geometry::depth::HIDDEN_PRICE;
+use geometry::probe::HIDDEN_PRICE;
 use geometry::{Plane, Point, Pose, Probe, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;

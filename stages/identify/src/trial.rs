@@ -1,7 +1,7 @@
 //! Base poses under test in; the best of them, few of each place, out; and the parts of a model that they are tested by.
 
 use geometry::Probe;
-use geometry::depth::HIDDEN_PRICE;
+use geometry::probe::HIDDEN_PRICE;
 use robot::Model;
 
 /// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw leaves room for others.

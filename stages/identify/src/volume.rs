@@ -2,7 +2,8 @@
 //! and all base poses of a search instead of once for each sample.
 
 use contract::{Fan, Region, View};
-use geometry::depth::{HIDDEN_PRICE, NO_RETURN_WEIGHT, SEEN_THROUGH_PRICE, rows, transform};
+use geometry::depth::{rows, transform};
+use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT, SEEN_THROUGH_PRICE};
 use geometry::{Evidence, Pose, Probe};
 
 /// Edge of a cell, metres: half of the finest tolerance that is asked of it.
