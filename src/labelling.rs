@@ -7,9 +7,12 @@
 use crate::engine::{Engine, Task};
 use crate::job::{Room, Settings};
 use crate::store::Store;
-use contract::{Fit, Floor, Fold, InputId, Label, Map, Result, Scan, Strip, TileLabels, Weigh};
+use contract::{
+    Fit, Floor, Fold, InputId, Label, Map, Result, Scan, Space, SpaceGrid, Strip, TileLabels, Weigh,
+};
 use export::{
-    Clouds, CloudsSettings, LasPoint, LasSettings, PlanPicture, Quantum, RobotPicture, Written,
+    Clouds, CloudsSettings, LasPoint, LasSettings, PlanPicture, Quantum, RobotPicture, SpaceEntry,
+    Written, write_space,
 };
 use geometry::{Aabb, Point};
 use ingest::{Sources, Want};
@@ -18,6 +21,7 @@ use robot::Model;
 use segment::{Ground, Segment};
 
 use crate::masks::Masks;
+use crate::spaces::{Spot, poses, spots};
 
 /// What labelling reads.
 pub(crate) struct Labelling<'a> {
@@ -46,6 +50,8 @@ pub(crate) struct Done {
     pub(crate) masks: Vec<MaskCount>,
     /// Pictures, relative to the output folder.
     pub(crate) pictures: Vec<String>,
+    /// What is known of the space around each robot.
+    pub(crate) spaces: Vec<Option<SpaceEntry>>,
 }
 
 /// Counts of one mask.
@@ -102,7 +108,12 @@ impl<'a> Labelling<'a> {
     }
 
     /// Streams every input once more and writes its labels.
-    pub(crate) fn write(&self, near: &Near, room: &Room, engine: &Engine) -> Result<Done> {
+    pub(crate) fn write(
+        &self,
+        (near, mut spaces): (&Near, Vec<Option<Space>>),
+        room: &Room,
+        engine: &Engine,
+    ) -> Result<Done> {
         let out = room.out();
         let mut las = LasSettings::new(self.quantum());
         las.with_color = self.sources.has_color();
@@ -110,7 +121,14 @@ impl<'a> Labelling<'a> {
         let mut masks = Masks::new(out, &self.sources.masks);
         let mut robots: Vec<RobotPicture> = self.robot_pictures();
         let mut pictures = Vec::new();
-        let label = LabelStrip { near, ground: self.segment.ground(), scans: &self.sources.scans };
+        let grids: Vec<_> =
+            spaces.iter().map(|s| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()))).collect();
+        let label = LabelStrip {
+            near,
+            ground: self.segment.ground(),
+            scans: &self.sources.scans,
+            grids: &grids,
+        };
         for input in &self.sources.inputs {
             let mut plan = PlanPicture::new(&self.bounds_of(input.id));
             let task = Task::new("write").of(crate::report::amount(self.sources, input.id));
@@ -118,6 +136,9 @@ impl<'a> Labelling<'a> {
             engine.pass(task, strips, |f| {
                 f.map(&label).for_each(|strip| {
                     masks.add(&strip.strip, &strip.labels)?;
+                    for (space, voxel, kind) in &strip.spots {
+                        spaces[*space].iter_mut().for_each(|s| s.mark(*voxel, *kind));
+                    }
                     for (i, label) in strip.labels.iter().enumerate() {
                         let point = las_point(&strip.strip, i, strip.world[i]);
                         clouds.push(&point.labelled(*label), label.kind)?;
@@ -130,17 +151,24 @@ impl<'a> Labelling<'a> {
             pictures.push(self.draw_plan(&plan, input.id, out)?);
         }
         let masks = masks.finish()?;
+        let mut said = vec![None; self.fits.len()];
         for (i, fit) in self.fits.iter().enumerate() {
             export::write_robot(out, i, fit, &self.models[fit.model], &near.hanging[i])?;
+            if let Some(space) = &spaces[i] {
+                said[i] = Some(write_space(out, i, space)?);
+            }
         }
         for (i, picture) in robots.iter().enumerate() {
             let fit = &self.fits[i];
             let name = format!("pictures/R{}.png", i + 1);
             let title = format!("R{} {} {}", i + 1, fit.model_name, fit.verdict.word());
             picture.draw(&title).write(&out.join(&name))?;
-            pictures.push(name);
+            let evidence = format!("pictures/R{}_evidence.png", i + 1);
+            let page = export::draw_evidence(&title, picture, fit, &self.models[fit.model]);
+            page.write(&out.join(&evidence))?;
+            pictures.extend([name, evidence]);
         }
-        Ok(Done { clouds: clouds.finish()?, masks, pictures })
+        Ok(Done { clouds: clouds.finish()?, masks, pictures, spaces: said })
     }
 
     /// Scale and offset of the clouds: those of the first LAS input, so that its coordinates stay what they are.
@@ -155,11 +183,8 @@ impl<'a> Labelling<'a> {
             .iter()
             .enumerate()
             .map(|(i, fit)| {
-                let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
                 let model = &self.models[fit.model];
-                let poses: Vec<_> =
-                    model.poses(&posture).into_iter().map(|p| fit.world_from_base * p).collect();
-                RobotPicture::new(i as i16, model, &poses)
+                RobotPicture::new(i as i16, model, &poses(fit, model))
             })
             .collect()
     }
@@ -206,6 +231,7 @@ struct LabelStrip<'a> {
     near: &'a Near,
     ground: &'a Ground,
     scans: &'a [Scan],
+    grids: &'a [Option<(SpaceGrid, Aabb)>],
 }
 
 /// A strip with its labels and world coordinates.
@@ -213,6 +239,7 @@ struct Labelled {
     strip: Strip,
     labels: Vec<Label>,
     world: Vec<[f64; 3]>,
+    spots: Vec<Spot>,
 }
 
 impl Map for LabelStrip<'_> {
@@ -235,7 +262,8 @@ impl Map for LabelStrip<'_> {
                 _ => self.ground.label(*p),
             });
         }
-        Ok(Labelled { strip, labels, world })
+        let spots = spots(self.grids, &world, &labels);
+        Ok(Labelled { strip, labels, world, spots })
     }
 }
 
@@ -264,7 +292,8 @@ fn las_point(strip: &Strip, i: usize, xyz: [f64; 3]) -> LasPoint {
 
 impl Weigh for Labelled {
     fn weight_bytes(&self) -> usize {
-        self.strip.weight_bytes() + self.labels.len() * size_of::<Label>() + self.world.len() * 24
+        let (labels, spots) = (size_of_val(&*self.labels), size_of_val(&*self.spots));
+        self.strip.weight_bytes() + labels + spots + self.world.len() * 24
     }
 
     fn n_points(&self) -> u64 {

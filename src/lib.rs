@@ -19,6 +19,7 @@ mod report;
 pub mod review;
 pub mod scanning;
 mod search;
+mod spaces;
 pub mod store;
 mod surfaces;
 mod tools;

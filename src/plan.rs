@@ -9,6 +9,7 @@ use crate::library;
 use crate::report::Report;
 use crate::review::Review;
 use crate::search::{Search, Shelf};
+use crate::spaces;
 use crate::store::{Scatter, Store};
 use crate::surfaces::{Gather, Surfaces};
 use crate::tools;
@@ -65,8 +66,10 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         Labelling::new(&fits, &models, &sources, (&store, &ground.surfaces.floor), settings);
     let near = labelling.near_robots(&store, engine)?;
 
-    // Second pass: every point once more, in the order of its file, to label and to write.
-    let written = labelling.write(&near, &room, engine)?;
+    // What nobody saw around them; second pass: every point once more, in the order of its file, to label and to
+    // write.
+    let spaces = spaces::around(&fits, &models, (&search, settings), engine)?;
+    let written = labelling.write((&near, spaces), &room, engine)?;
     Report {
         job,
         engine,

@@ -68,7 +68,8 @@ impl Report<'_> {
         let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
         let poses = model.poses(&posture);
         let tip = tip(model).map(|l| (names[l].clone(), fit.world_from_base * poses[l]));
-        RobotEntry::new(index, fit, &names, tip)
+        let space = self.written.spaces[index].clone();
+        RobotEntry { space, ..RobotEntry::new(index, fit, &names, tip) }
     }
 
     fn input(&self, input: &Input, digest: String) -> InputEntry {

@@ -7,9 +7,9 @@ use crate::store::Store;
 use crate::surfaces::Ground;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
 use fit::{Method, Prepared, Scene, Sights};
-use geometry::{Point, Pose};
+use geometry::{Aabb, Point, Pose};
 use identify::{BaseSearch, Sight};
-use lattice::ViewBuilder;
+use lattice::{ViewBuilder, ViewSettings};
 use rayon::prelude::*;
 use robot::Model;
 use std::sync::OnceLock;
@@ -85,6 +85,11 @@ impl<'a> Search<'a> {
     /// The library.
     pub(crate) fn shelf(&self) -> &'a Shelf<'a> {
         self.shelf
+    }
+
+    /// Bounds of all points, world, metres.
+    pub(crate) fn bounds(&self) -> Aabb {
+        self.store.entries().iter().fold(Aabb::EMPTY, |all, entry| all.union(&entry.bounds))
     }
 
     /// Fits of all models in one region, whatever their verdict.
@@ -243,15 +248,19 @@ impl<'a> Search<'a> {
 
     /// What each scan sees of the region, those that see something.
     fn views(&self, region: &Region) -> Result<Vec<View>> {
-        let scans = self.scans.par_iter();
-        let views = scans.filter_map(|scan| self.view(scan, region).transpose());
-        let mut views: Vec<View> = views.collect::<Result<_>>()?;
+        let mut views = self.views_by(region, &self.settings.view)?;
         lattice::agree(&mut views);
         Ok(views)
     }
 
+    /// The same as the beams say it, none of them doubted, as fine as asked for.
+    pub(crate) fn views_by(&self, region: &Region, settings: &ViewSettings) -> Result<Vec<View>> {
+        let scans = self.scans.par_iter();
+        scans.filter_map(|scan| self.view(scan, region, settings).transpose()).collect()
+    }
+
     /// One scan's view of the region; `None` where it sees nothing of it.
-    fn view(&self, scan: &Scan, region: &Region) -> Result<Option<View>> {
+    fn view(&self, scan: &Scan, region: &Region, settings: &ViewSettings) -> Result<Option<View>> {
         let extent = self.ground.extents[scan.id.0 as usize];
         if extent.is_none() {
             return Ok(None);
@@ -262,7 +271,7 @@ impl<'a> Search<'a> {
                 return Ok(None);
             }
         }
-        let mut builder = ViewBuilder::new(scan, region, extent, &self.settings.view);
+        let mut builder = ViewBuilder::new(scan, region, extent, settings);
         for (i, entry) in self.store.entries().iter().enumerate() {
             if builder.wants(entry.at) {
                 builder.add(&self.store.tile(i)?);

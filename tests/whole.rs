@@ -80,11 +80,36 @@ fn the_robot_is_found_and_any_number_of_threads_gives_the_same_bytes() {
     assert!(found.base[0] < BASE, "base off by {} m", found.base[0]);
     assert!(agreement.worst_joint_deg() < JOINT_DEG, "{}", agreement.table());
     assert!(agreement.f1() > 0.97, "{}", agreement.table());
+    space_is_told(&dir.path().join("out2"));
     let (one, two) = (files(&dir.path().join("out1")), files(&dir.path().join("out2")));
     assert!(one.keys().eq(two.keys()), "the same files");
     assert!(one.len() > 10, "{:?}", one.keys());
     for (name, bytes) in &one {
         assert!(two[name] == *bytes, "{} differs", name.display());
+    }
+}
+
+/// Space about the robot: its body is its own, the air beside it was seen, the floor is fixed.
+fn space_is_told(out: &Path) {
+    let text = std::fs::read_to_string(out.join("result.json")).expect("a result");
+    let result: export::ResultFile = serde_json::from_str(&text).expect("parses");
+    let robot = &result.robots[0];
+    let space = robot.space.as_ref().expect("the scans have beams");
+    let bytes = std::fs::read(out.join(&space.grid)).expect("an array");
+    let kinds = &bytes[bytes.len() - space.size.iter().product::<usize>()..];
+    let at = |p: [f64; 3]| {
+        let cell: [usize; 3] =
+            std::array::from_fn(|i| ((p[i] - space.origin[i]) / space.edge) as usize);
+        kinds[(cell[0] * space.size[1] + cell[1]) * space.size[2] + cell[2]]
+    };
+    let [x, y, z] = robot.base_pose.xyz;
+    assert_eq!(at([x, y, z + 0.25]), 3, "inside the base");
+    assert_eq!(at([x + 1.2, y + 1.2, z + 0.5]), 1, "beside the robot");
+    assert_eq!(at([x + 1.2, y + 1.2, z]), 2, "the floor");
+    assert!(space.free_m3 > 10.0 && space.unknown_m3 > 0.0, "{space:?}");
+    for tree in [&space.octomap, &space.unknown] {
+        let bytes = std::fs::read(out.join(tree)).expect("a tree");
+        assert!(bytes.starts_with(b"# Octomap OcTree binary file"), "{tree}");
     }
 }
 

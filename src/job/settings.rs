@@ -90,7 +90,7 @@ settings! {
         hand_reach,
     }
     merge: merge::Settings {
-        contact, hold, cut, min_voxels,
+        contact, hold, cut, min_voxels, space_edge, space,
     }
 }
 

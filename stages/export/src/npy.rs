@@ -1,4 +1,4 @@
-//! NumPy arrays of one dimension: values in, a version 1.0 `.npy` file out, whose length is written at the end.
+//! NumPy arrays: values in, a version 1.0 `.npy` file out, whose length is written at the end.
 
 use crate::atomic::{AtomicFile, refused};
 use contract::Result;
@@ -51,7 +51,7 @@ impl<T: Element> NpyWriter<T> {
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
         let mut file = BufWriter::with_capacity(1 << 18, AtomicFile::create(&path)?);
-        file.write_all(&header::<T>(0))
+        file.write_all(&header::<T>("(0,)"))
             .map_err(|e| refused("array cannot be written", &path, e))?;
         Ok(Self { file, path, bytes: Vec::new(), n: 0, element: std::marker::PhantomData })
     }
@@ -82,9 +82,20 @@ impl<T: Element> NpyWriter<T> {
 
     /// Writes the length and gives the file its name. Returns the number of values.
     pub fn finish(self) -> Result<u64> {
+        let n = self.n;
+        self.end(&format!("({n},)"))
+    }
+
+    /// The same for an array of three dimensions, whose last one runs fastest.
+    pub(crate) fn finish_as(self, [x, y, z]: &[usize; 3]) -> Result<u64> {
+        debug_assert_eq!(self.n, (x * y * z) as u64);
+        self.end(&format!("({x}, {y}, {z})"))
+    }
+
+    fn end(self, shape: &str) -> Result<u64> {
         let Self { mut file, path, n, .. } = self;
         file.seek(SeekFrom::Start(0))
-            .and_then(|_| file.write_all(&header::<T>(n)))
+            .and_then(|_| file.write_all(&header::<T>(shape)))
             .map_err(|e| refused("array cannot be finished", &path, e))?;
         let file = file
             .into_inner()
@@ -95,11 +106,11 @@ impl<T: Element> NpyWriter<T> {
 }
 
 /// Magic, version and dictionary, padded to [`HEADER`] bytes.
-fn header<T: Element>(n: u64) -> Vec<u8> {
+fn header<T: Element>(shape: &str) -> Vec<u8> {
     let mut out = b"\x93NUMPY\x01\x00".to_vec();
     out.extend(((HEADER - 10) as u16).to_le_bytes());
     out.extend(
-        format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({n},), }}", T::DESCR).bytes(),
+        format!("{{'descr': '{}', 'fortran_order': False, 'shape': {shape}, }}", T::DESCR).bytes(),
     );
     out.resize(HEADER - 1, b' ');
     out.push(b'\n');

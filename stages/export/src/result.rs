@@ -5,6 +5,7 @@ use crate::atomic;
 use crate::calibration::CalibrationEntry;
 use crate::mask::MaskFiles;
 use crate::places::Places;
+use crate::space::SpaceEntry;
 use contract::{Error, Fit, Kind, Mask, Result};
 use geometry::Pose;
 use serde::{Deserialize, Serialize};
@@ -98,6 +99,9 @@ pub struct RobotEntry {
     /// The same robot as it stands in other scans, if it moved between scans.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stays: Vec<RobotEntry>,
+    /// What is known of the space around it: what a robot hides is unknown, not free.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub space: Option<SpaceEntry>,
     /// Where the tip of the main chain is.
     #[serde(default)]
     pub tip: Option<TipPose>,
@@ -311,6 +315,7 @@ impl RobotEntry {
             tip_sigma: finite(fit.tip_sigma),
             scans: fit.scans.iter().map(ShiftEntry::from).collect(),
             stands_in: fit.stands_in.iter().map(|s| s.0).collect(),
+            space: None,
             stays: fit
                 .stays
                 .iter()

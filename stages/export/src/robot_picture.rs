@@ -32,6 +32,9 @@ struct View {
     origin: Point,
     points: Vec<(f32, Rgb)>,
     outline: Vec<bool>,
+    /// Depth of the posture's surface and cosine to the eye; of its points nearest to the eye, the distance from it.
+    surface: Vec<(f32, f32)>,
+    residuals: Vec<(f32, f32)>,
 }
 
 /// What of the posture shows in a pixel.
@@ -83,6 +86,9 @@ impl RobotPicture {
         let (color, is_ours) = self.color(label);
         for view in &mut self.views {
             view.splat(world, color, is_ours);
+            if is_ours {
+                view.measure(world);
+            }
         }
     }
 
@@ -103,6 +109,11 @@ impl RobotPicture {
             canvas.text(x + 14, y, 1, INK, &short);
         }
         canvas
+    }
+
+    /// The views from front and side with how far the points of its links are from the posture's surface.
+    pub(crate) fn residuals(&self) -> [Canvas; 2] {
+        [self.views[0].draw_residuals(), self.views[1].draw_residuals()]
     }
 
     fn color(&self, label: Label) -> (Rgb, bool) {
@@ -145,20 +156,39 @@ impl View {
             origin: bounds.center(),
             points: vec![(f32::INFINITY, WHITE); SIDE * SIDE],
             outline: vec![false; SIDE * SIDE],
+            surface: vec![(f32::NAN, 0.0); SIDE * SIDE],
+            residuals: vec![(f32::INFINITY, 0.0); SIDE * SIDE],
+        }
+    }
+
+    /// The pixel of a point of the world, and its depth.
+    fn pixel(&self, world: [f64; 3]) -> Option<(usize, usize, f32)> {
+        let local = [0, 1, 2].map(|i| (world[i] - self.origin[i]) as f32);
+        let [u, v, depth] = transform(&self.view_from_world, local);
+        let inside = u >= 0.0 && v >= 0.0 && u < SIDE as f32 && v < SIDE as f32;
+        inside.then_some((u as usize, v as usize, depth))
+    }
+
+    /// Notes how far a point of the robot is from the surface that shows in its pixel, if it is the nearest to the eye: by
+    /// depth, as the surface leans.
+    fn measure(&mut self, world: [f64; 3]) {
+        let Some((u, v, depth)) = self.pixel(world) else { return };
+        let (surface, facing) = self.surface[v * SIDE + u];
+        let off = (surface - depth) * facing;
+        let pixel = &mut self.residuals[v * SIDE + u];
+        // Points of surfaces behind say nothing of the one that shows.
+        if off.abs() < HIDDEN && (depth, off) < *pixel {
+            *pixel = (depth, off);
         }
     }
 
     fn splat(&mut self, world: [f64; 3], color: Rgb, is_ours: bool) {
-        let local = [0, 1, 2].map(|i| (world[i] - self.origin[i]) as f32);
-        let [u, v, mut depth] = transform(&self.view_from_world, local);
-        if !(u >= 0.0 && v >= 0.0 && u < SIDE as f32 && v < SIDE as f32) {
-            return;
-        }
+        let Some((u, v, mut depth)) = self.pixel(world) else { return };
         // Fixed things before the robot must not hide it.
         depth += if is_ours { 0.0 } else { 1e3 };
         // Two pixels wide, so that a scan's spacing does not look like paper.
         for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let (x, y) = ((u as usize + x).min(SIDE - 1), (v as usize + y).min(SIDE - 1));
+            let (x, y) = ((u + x).min(SIDE - 1), (v + y).min(SIDE - 1));
             let pixel = &mut self.points[y * SIDE + x];
             // Equal depths go to the smaller colour: the order of points must not show.
             if (depth, color) < (pixel.0, pixel.1) {
@@ -181,6 +211,13 @@ impl View {
             for triangle in &link.mesh.triangles {
                 let [(a, p), (b, q), (c, r)] = triangle.map(corner);
                 fill_triangle(&mut shown, [p, q, r], normal(a, b, c), index as u16);
+            }
+        }
+        let away: Vector = [0, 1, 2].map(|i| f64::from(self.view_from_world[2][i])).into();
+        for (own, shown) in self.surface.iter_mut().zip(&shown) {
+            if shown.link != u16::MAX {
+                let facing = away.dot(&Vector::from(shown.normal.map(f64::from))).abs();
+                *own = (shown.depth, facing as f32);
             }
         }
         for v in 1..SIDE {
@@ -209,6 +246,41 @@ impl View {
         canvas
     }
 }
+
+impl View {
+    /// Red where points lie before the surface, blue where behind, white where on it.
+    fn draw_residuals(&self) -> Canvas {
+        let mut canvas = Canvas::new(SIDE, SIDE);
+        for v in 0..SIDE {
+            for u in 0..SIDE {
+                let (depth, off) = self.residuals[v * SIDE + u];
+                let mut color = if self.surface[v * SIDE + u].0.is_nan() { WHITE } else { UNSEEN };
+                if depth < f32::INFINITY {
+                    color = residual_color(off);
+                }
+                if self.outline[v * SIDE + u] {
+                    color = blend(color, INK, 0.5);
+                }
+                canvas.set(u as i64, v as i64, color);
+            }
+        }
+        canvas.text(8, 8, 1, INK, self.name);
+        canvas
+    }
+}
+
+/// Colour of a distance from the surface, metres: full at [`FULL`].
+pub(crate) fn residual_color(off: f32) -> Rgb {
+    let share = f64::from((off.abs() / FULL).min(1.0));
+    blend([246, 244, 214], if off > 0.0 { [196, 30, 40] } else { [20, 70, 190] }, share)
+}
+
+/// Distance from the surface that has the full colour, metres.
+pub(crate) const FULL: f32 = 0.010;
+/// Farther than this a point is of another surface, metres.
+const HIDDEN: f32 = 0.04;
+/// Surface that no point was labelled on.
+const UNSEEN: Rgb = [206, 208, 214];
 
 fn is_edge(a: &Shown, b: &Shown) -> bool {
     if a.link != b.link {

@@ -61,6 +61,14 @@ pub(crate) struct Adjusted {
     pub(crate) link_rms: Vec<f64>,
 }
 
+impl Adjusted {
+    /// Where it stands, to go on from.
+    pub(crate) fn state(&self) -> State {
+        let (hypothesis, scans) = (self.hypothesis.clone(), self.scans.clone());
+        State { hypothesis, scans, patch_sigma: self.patch_sigma }
+    }
+}
+
 /// The adjustment of one robot.
 pub(crate) struct Adjust<'a> {
     pub(crate) refine: &'a Refine<'a>,
@@ -70,8 +78,9 @@ pub(crate) struct Adjust<'a> {
 
 /// Rounds of the adjustment; the last ones change nothing but the patches' share.
 const N_ROUNDS: usize = 7;
-/// A step below this in every joint and 10 µm at the base ends the rounds, radians and metres: 0.0006°.
-const SMALL_STEP: f64 = 1e-5;
+/// A step by less than a fifth of a standard deviation, in every direction, ends the rounds (squared; steps shrink
+/// threefold a round): a flange that the points leave open would wander on for ever.
+const SMALL_STEP: f64 = 0.04;
 /// Tukey's constant: 95 % efficient for normal errors.
 const TUKEY: f64 = 4.685;
 /// Beam direction noise of a common scanner, radians (19″; fit.md §3.2).
@@ -111,7 +120,7 @@ impl Adjust<'_> {
         self.refine.settings
     }
 
-    /// Adjusts on the points with these indices.
+    /// Adjusts on the points with these indices, from where nothing is known of the scans' errors.
     pub(crate) fn run(
         &self,
         start: &Hypothesis,
@@ -120,11 +129,20 @@ impl Adjust<'_> {
         fan: &impl Fan,
     ) -> Adjusted {
         let n_views = self.refine.scene.views.len();
-        let mut state = State {
-            hypothesis: start.clone(),
-            scans: vec![ScanError::NONE; n_views],
-            patch_sigma: 0.0,
-        };
+        let scans = vec![ScanError::NONE; n_views];
+        let start = State { hypothesis: start.clone(), scans, patch_sigma: 0.0 };
+        self.run_from(start, points, gate, fan)
+    }
+
+    /// The same from any state.
+    pub(crate) fn run_from(
+        &self,
+        start: State,
+        points: &[u32],
+        gate: f64,
+        fan: &impl Fan,
+    ) -> Adjusted {
+        let mut state = start;
         let mut round = 0;
         loop {
             let pairs = self.pairs(&state, points, gate, fan);
@@ -135,7 +153,7 @@ impl Adjust<'_> {
             };
             self.apply(&mut state, &step);
             round += 1;
-            if step.rows(0, 6 + state.hypothesis.posture.len()).amax() < SMALL_STEP {
+            if normal.deviations(&step) < SMALL_STEP {
                 round = round.max(N_ROUNDS);
             }
         }

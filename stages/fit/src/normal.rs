@@ -184,6 +184,12 @@ impl Normal {
         Some(if longest > MAX_STEP { step * (MAX_STEP / longest) } else { step })
     }
 
+    /// Squared length of a step in stated standard deviations (the Newton decrement): no unknown moves by more than its
+    /// root.
+    pub(crate) fn deviations(&self, step: &DVector<f64>) -> f64 {
+        -self.gradient.dot(step)
+    }
+
     /// Standard deviation of the patches' offsets, metres.
     pub(crate) fn patch_sigma(&self) -> f64 {
         self.sigma2.sqrt()

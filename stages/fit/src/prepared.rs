@@ -118,7 +118,7 @@ impl<'a> Prepared<'a> {
             links: Arc::new(links),
             placed_by,
             fixed,
-            reach: reach(model),
+            reach: model.reach(),
             lever,
             leaf,
             n_patches: patch_groups.len(),
@@ -204,27 +204,6 @@ fn dependencies(model: &Model) -> Vec<Vec<bool>> {
         .iter()
         .map(|link| link.iter().map(|t| t.iter().any(|v| v.abs() > 1e-9)).collect())
         .collect()
-}
-
-/// Sum of the distances from joint to joint along the longest way, and the size of what hangs at its end.
-fn reach(model: &Model) -> f64 {
-    let mut so_far = vec![0.0_f64; model.links.len()];
-    let mut longest = 0.0_f64;
-    for (l, link) in model.links.iter().enumerate() {
-        if let Some(j) = link.parent_joint {
-            let joint = &model.joints[j];
-            let stroke = match (joint.kind, joint.limits) {
-                (robot::JointKind::Prismatic, Some(limits)) => limits[0].abs().max(limits[1].abs()),
-                _ => 0.0,
-            };
-            so_far[l] =
-                so_far[joint.parent] + joint.parent_from_joint.translation.vector.norm() + stroke;
-        }
-        let size =
-            link.cad.points.iter().take(500).map(|p| f64::from(p[0].hypot(p[1]).hypot(p[2])));
-        longest = longest.max(so_far[l] + size.fold(0.0, f64::max));
-    }
-    longest
 }
 
 fn lever(model: &Model, free: usize, links: &[usize]) -> f64 {

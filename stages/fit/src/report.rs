@@ -71,12 +71,13 @@ pub(crate) fn report(
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     let joints = (0..h.posture.len()).map(|j| {
         let (value, equivalents) = whole_turns(model, &h.posture, j);
+        // The width of one of several values is not how well the joint is known.
+        let sigma = sigma(6 + j).max(spread[j]).min(ANY_ANGLE);
         JointFit {
             name: model.joints[model.free[j]].name.clone(),
             value,
-            // The width of one of several values is not how well the joint is known.
-            sigma: sigma(6 + j).max(spread[j]).min(ANY_ANGLE),
-            determined: !open[j] && sigma(6 + j) < refine.settings.determined_sigma,
+            sigma,
+            determined: !open[j] && sigma < refine.settings.determined_sigma,
             equivalents,
         }
     });

@@ -133,11 +133,30 @@ fn finish(
     (near, all): (&[u32], &[u32]),
     fan: &impl Fan,
 ) -> Fit {
+    sharpen(refine, &mut best, all, fan);
     let misfits = doubt(refine, &mut best.0, all, fan);
     let mut fit = report(refine, &best, others, near, fan);
     fit.reasons.extend(misfits);
     fit
 }
+
+/// The answer once more, on as many points as pay: only what is reported is worth them, not what it is chosen from.
+fn sharpen(refine: &Refine<'_>, (best, judgement, _): &mut Settled, all: &[u32], fan: &impl Fan) {
+    let n_used: usize = best.n_points.iter().sum();
+    let settings =
+        Settings { max_points: SHARPER * refine.settings.max_points, ..refine.settings.clone() };
+    let refine = Refine { settings: &settings, ..*refine };
+    let (points, gate) = adjusted_points(&refine, &best.hypothesis, all, fan);
+    if points.len() > n_used + n_used / 2 {
+        let start = best.state();
+        *best = Adjust { refine: &refine, frames: &[] }.run_from(start, &points, gate, fan);
+        *judgement = judged(&refine, &best.hypothesis);
+    }
+}
+
+/// So many times the points of the adjustment are in the last one: with more, what is not noise (registration, shape) is
+/// what remains.
+const SHARPER: usize = 3;
 
 /// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring
 /// how near a search must come.

@@ -50,6 +50,15 @@ impl Aabb {
         out
     }
 
+    /// What both share; empty where they are apart.
+    #[must_use]
+    pub fn shared(&self, other: &Self) -> Self {
+        Self {
+            min: std::array::from_fn(|i| self.min[i].max(other.min[i])),
+            max: std::array::from_fn(|i| self.max[i].min(other.max[i])),
+        }
+    }
+
     /// Grown by `margin` metres on each side.
     #[must_use]
     pub fn grown(&self, margin: f64) -> Self {

@@ -190,6 +190,13 @@ impl DepthImage {
         let range = (camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]).sqrt();
         Some(Look { near, far, around, range })
     }
+
+    /// The same for a point of the local frame.
+    #[inline]
+    #[must_use]
+    pub fn look_at(&self, local: [f32; 3], footprint: f32) -> Option<Look> {
+        self.look(transform(&self.rows, local), footprint)
+    }
 }
 
 /// What the beams found in the direction of a point.

@@ -1,4 +1,5 @@
-//! Residual voxels of all tiles in, which of them hang on a robot out: hoses, cables, brackets, tools, workpieces.
+//! Residual voxels of all tiles in, which of them hang on a robot out: hoses, cables, brackets, tools, workpieces; and
+//! what the scans know of the space around each robot.
 //!
 //! A component of residual voxels that touches a moving link and nothing fixed is an attachment. One that touches
 //! both is cut where the ways to link and to fixed thing are equally long; what is not clearly the robot's is fixed
@@ -8,9 +9,11 @@
 mod attach;
 mod graph;
 mod hang;
+mod space;
 
 pub use attach::{Attach, Attached, Group};
 pub use hang::{Hanging, hang};
+pub use space::{see, stand};
 
 /// What may be tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,10 +27,14 @@ pub struct Settings {
     pub cut: f64,
     /// Components with fewer voxels are specks, and uncertain.
     pub min_voxels: usize,
+    /// Edge of the voxels that tell seen from unseen space around robots, metres.
+    pub space_edge: f64,
+    /// Whether that space is told at all.
+    pub space: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { contact: 0.025, hold: 0.15, cut: 0.3, min_voxels: 3 }
+        Self { contact: 0.025, hold: 0.15, cut: 0.3, min_voxels: 3, space_edge: 0.05, space: true }
     }
 }

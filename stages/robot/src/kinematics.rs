@@ -166,6 +166,30 @@ impl<'a> Placing<'a> {
 }
 
 impl Model {
+    /// No part of the robot gets farther from the base's origin, metres: sum of the distances from joint to joint along
+    /// the longest way, and the size of what hangs at its end.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        let mut so_far = vec![0.0_f64; self.links.len()];
+        let mut longest = 0.0_f64;
+        for (l, link) in self.links.iter().enumerate() {
+            if let Some(j) = link.parent_joint {
+                let joint = &self.joints[j];
+                let stroke = match (joint.kind, joint.limits) {
+                    (JointKind::Prismatic, Some(limits)) => limits[0].abs().max(limits[1].abs()),
+                    _ => 0.0,
+                };
+                so_far[l] = so_far[joint.parent]
+                    + joint.parent_from_joint.translation.vector.norm()
+                    + stroke;
+            }
+            let size =
+                link.cad.points.iter().take(500).map(|p| f64::from(p[0].hypot(p[1]).hypot(p[2])));
+            longest = longest.max(so_far[l] + size.fold(0.0, f64::max));
+        }
+        longest
+    }
+
     /// Number of free joints: the length of a posture.
     #[must_use]
     pub fn n_free(&self) -> usize {

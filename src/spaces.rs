@@ -1,0 +1,88 @@
+//! Fits and what the scans saw about them in; around each robot, which space was seen free, which it fills itself and
+//! which nobody has seen, out. Points are marked into it while they are labelled.
+
+use crate::engine::Engine;
+use crate::job::Settings;
+use crate::search::Search;
+use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind};
+use geometry::{Aabb, Point, Pose};
+use lattice::ViewSettings;
+use robot::Model;
+
+/// Depth images need cells this much smaller than the voxels, so that each voxel is looked at through its middle.
+const CELLS_PER_EDGE: f64 = 3.0;
+/// Room below a base that belongs to its robot's space, as a share of its reach: what stands on a pedestal reaches below.
+const BELOW: f64 = 0.5;
+
+/// The spaces of all robots, in the order of the fits; none where no scan says where its beams went.
+pub(crate) fn around(
+    fits: &[Fit],
+    models: &[Model],
+    (search, settings): (&Search<'_>, &Settings),
+    engine: &Engine,
+) -> Result<Vec<Option<Space>>> {
+    if !settings.merge.space {
+        return Ok(vec![None; fits.len()]);
+    }
+    engine.fan_out("space", fits.iter().collect(), |fit| {
+        let model = &models[fit.model];
+        let base: Point = fit.world_from_base.translation.vector.into();
+        let edge = settings.merge.space_edge;
+        let bounds = bounds(&base, model.reach()).shared(&search.bounds().grown(edge));
+        let grid = SpaceGrid::over(&bounds, edge);
+        let origin = base.map(f64::round);
+        let world = grid.bounds();
+        let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
+        let local = Aabb { min: shift(world.min), max: shift(world.max) };
+        let region = Region { origin, bounds: local };
+        let min_cell = grid.edge / CELLS_PER_EDGE;
+        let views =
+            search.views_by(&region, &ViewSettings { min_cell, ..settings.view.clone() })?;
+        if views.iter().all(|v| v.images.is_empty()) {
+            return Ok(None);
+        }
+        let mut space = Space::unknown(grid);
+        merge::see(&mut space, &region, &views);
+        merge::stand(&mut space, model, &poses(fit, model));
+        Ok(Some(space))
+    })
+}
+
+/// All that a robot can get to, and no more below it than pedestals are high.
+fn bounds(base: &Point, reach: f64) -> Aabb {
+    let mut out = Aabb::EMPTY;
+    out.add((base.coords.add_scalar(-reach)).into());
+    out.add((base.coords.add_scalar(reach)).into());
+    out.min[2] = base.z - BELOW * reach;
+    out
+}
+
+/// World from the links of a fitted robot.
+pub(crate) fn poses(fit: &Fit, model: &Model) -> Vec<Pose> {
+    let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    model.poses(&posture).into_iter().map(|p| fit.world_from_base * p).collect()
+}
+
+/// A point in a voxel of a space: number of the space, of the voxel, and what the point makes of it.
+pub(crate) type Spot = (usize, usize, SpaceKind);
+
+/// Which voxels labelled points fall into; the same voxel once in a row.
+pub(crate) fn spots(
+    grids: &[Option<(SpaceGrid, Aabb)>],
+    world: &[[f64; 3]],
+    labels: &[Label],
+) -> Vec<Spot> {
+    let own = Aabb::of(world.iter().copied());
+    let mut out: Vec<Spot> = Vec::new();
+    for (s, grid) in grids.iter().enumerate() {
+        let Some((grid, bounds)) = grid.as_ref().filter(|g| g.1.touches(&own)) else { continue };
+        for (p, label) in world.iter().zip(labels).filter(|(p, _)| bounds.contains(**p)) {
+            let Some(at) = grid.index(*p) else { continue };
+            let spot = (s, at, Space::kind_of(*label));
+            if out.last() != Some(&spot) {
+                out.push(spot);
+            }
+        }
+    }
+    out
+}

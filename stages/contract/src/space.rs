@@ -1,0 +1,149 @@
+//! Space around a robot as voxels: seen free, something fixed, the robot itself, or unknown.
+
+use crate::{Label, PointKind};
+use geometry::Aabb;
+
+/// What a voxel is; the numbers are those of the files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SpaceKind {
+    /// No beam went through it, and no point lies in it.
+    Unknown = 0,
+    /// A beam went through it.
+    Free = 1,
+    /// Points lie in it that stand still, or may.
+    Fixed = 2,
+    /// The robot's own body, or points that move with it.
+    Robot = 3,
+}
+
+/// Where voxels lie: aligned to whole multiples of their edge from the origin of the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpaceGrid {
+    /// Edge of a voxel, metres.
+    pub edge: f64,
+    /// Place of the first voxel's corner in the world, in edges.
+    pub first: [i64; 3],
+    /// Number of voxels on each axis.
+    pub size: [usize; 3],
+}
+
+/// Voxels about one robot.
+#[derive(Debug, Clone)]
+pub struct Space {
+    grid: SpaceGrid,
+    /// z runs fastest, then y.
+    voxels: Vec<SpaceKind>,
+}
+
+/// Most voxels of one space: a robot of the largest kind at the default edge has 3 million.
+const MAX_VOXELS: f64 = 64e6;
+
+impl SpaceGrid {
+    /// Over bounds in the world, metres. The edge grows where they would take too many voxels.
+    #[must_use]
+    pub fn over(bounds: &Aabb, edge: f64) -> Self {
+        let volume: f64 = bounds.size().iter().map(|s| s.max(edge)).product();
+        let edge = edge.max((volume / MAX_VOXELS).cbrt());
+        let first = bounds.min.map(|v| (v / edge).floor() as i64);
+        let last = bounds.max.map(|v| (v / edge).ceil() as i64);
+        let size = std::array::from_fn(|i| usize::try_from(last[i] - first[i]).unwrap_or(0).max(1));
+        Self { edge, first, size }
+    }
+
+    /// Bounds in the world, metres.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        let at = |i: usize, v: i64| (self.first[i] + v) as f64 * self.edge;
+        Aabb {
+            min: std::array::from_fn(|i| at(i, 0)),
+            max: std::array::from_fn(|i| at(i, self.size[i] as i64)),
+        }
+    }
+
+    /// The voxel of a point in the world.
+    #[must_use]
+    pub fn index(&self, p: [f64; 3]) -> Option<usize> {
+        let mut out = 0;
+        for i in 0..3 {
+            let at = (p[i] / self.edge).floor() - self.first[i] as f64;
+            if !(at >= 0.0 && at < self.size[i] as f64) {
+                return None;
+            }
+            out = out * self.size[i] + at as usize;
+        }
+        Some(out)
+    }
+
+    /// The place of a voxel on each axis.
+    #[must_use]
+    pub fn cell(&self, at: usize) -> [usize; 3] {
+        let [_, y, z] = self.size;
+        [at / (y * z), at / z % y, at % z]
+    }
+}
+
+impl Space {
+    /// Space that nobody knows anything of.
+    #[must_use]
+    pub fn unknown(grid: SpaceGrid) -> Self {
+        Self { grid, voxels: vec![SpaceKind::Unknown; grid.size.iter().product()] }
+    }
+
+    /// Where its voxels lie.
+    #[must_use]
+    pub fn grid(&self) -> &SpaceGrid {
+        &self.grid
+    }
+
+    /// All voxels, to be filled.
+    pub fn voxels_mut(&mut self) -> &mut [SpaceKind] {
+        &mut self.voxels
+    }
+
+    /// All voxels; z runs fastest, then y.
+    #[must_use]
+    pub fn voxels(&self) -> &[SpaceKind] {
+        &self.voxels
+    }
+
+    /// Volume of one kind, m³.
+    #[must_use]
+    pub fn volume(&self, kind: SpaceKind) -> f64 {
+        let n = self.voxels.iter().filter(|v| **v == kind).count();
+        n as f64 * self.grid.edge.powi(3)
+    }
+
+    /// Puts a labelled point into a voxel. What stands still beats all: an obstacle is never lost.
+    pub fn mark(&mut self, index: usize, voxel: SpaceKind) {
+        let old = &mut self.voxels[index];
+        if *old != SpaceKind::Fixed {
+            *old = voxel;
+        }
+    }
+
+    /// What a point with this label makes of its voxel.
+    #[must_use]
+    pub fn kind_of(label: Label) -> SpaceKind {
+        match label.kind {
+            PointKind::Link | PointKind::Attachment => SpaceKind::Robot,
+            PointKind::Fixed | PointKind::Floor | PointKind::Uncertain => SpaceKind::Fixed,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn far_from_the_origin_voxels_stay_whole() {
+        let bounds = Aabb { min: [4e5, 5e6, 0.0], max: [4e5 + 1.0, 5e6 + 1.0, 1.0] };
+        let grid = SpaceGrid::over(&bounds, 0.05);
+        assert!(grid.size.iter().all(|n| (20..=22).contains(n)), "{:?}", grid.size);
+        assert!(grid.index([4e5 + 0.5, 5e6 + 0.5, 0.5]).is_some());
+        assert!(grid.index([0.0; 3]).is_none());
+        let huge = Aabb { min: [0.0; 3], max: [1e4; 3] };
+        assert!(SpaceGrid::over(&huge, 0.05).size.iter().product::<usize>() < 80_000_000);
+    }
+}

@@ -1,0 +1,147 @@
+//! One robot's fit in; a page that a person checks in ten seconds out: how far its points are from the posture's surface,
+//! where each joint stands within its limits, what the scans say of each link, verdict and runner-up.
+
+use crate::canvas::{Canvas, INK, Rgb};
+use crate::robot_picture::{FULL, RobotPicture, residual_color};
+use contract::{Fit, Verdict};
+use robot::{Joint, JointKind, Model};
+
+/// Width of the page and of one picture on it, pixels.
+const WIDTH: i64 = 1126;
+const SIDE: i64 = 560;
+/// Height of a line, pixels.
+const LINE: i64 = 16;
+/// Left end and width of the bar of a joint's limits, pixels.
+const BAR: (i64, i64) = (190, 300);
+/// Left end of the table of links.
+const LINKS: i64 = 700;
+/// Limits of a joint that has none, radians: a turn to each side.
+const NO_LIMITS: [f64; 2] = [-std::f64::consts::TAU, std::f64::consts::TAU];
+/// Characters of a line over the whole page.
+const LINE_CHARS: usize = 136;
+const GREY: Rgb = [150, 154, 162];
+const PALE: Rgb = [226, 229, 234];
+const RED: Rgb = [196, 30, 40];
+const BLUE: Rgb = [0, 90, 170];
+
+/// Draws the page; `title` names robot, model and verdict.
+#[must_use]
+pub fn draw_evidence(title: &str, picture: &RobotPicture, fit: &Fit, model: &Model) -> Canvas {
+    let words = words(fit);
+    let n_rows = fit.joints.len().max(fit.links.len()) as i64;
+    let top = 36 + SIDE + 40;
+    let height = top + LINE * (n_rows + 3 + words.len() as i64) + 10;
+    let mut canvas = Canvas::new(WIDTH as usize, height as usize);
+    canvas.text(8, 10, 2, verdict_color(fit.verdict), title);
+    for (i, view) in picture.residuals().iter().enumerate() {
+        canvas.paste(i as i64 * (SIDE + 6), 36, view);
+    }
+    scale(&mut canvas, 36 + SIDE + 6);
+    canvas.text(8, top, 1, GREY, "joint");
+    canvas.text(BAR.0, top, 1, GREY, "lower limit .. upper limit");
+    canvas.text(BAR.0 + BAR.1 + 12, top, 1, GREY, "value, std. dev.");
+    for (i, joint) in fit.joints.iter().enumerate() {
+        let own = model.joints.iter().find(|j| j.name == joint.name);
+        if let Some(own) = own {
+            row(&mut canvas, top + LINE * (i as i64 + 1), (fit, i), own);
+        }
+    }
+    canvas.text(LINKS, top, 1, GREY, "link                seen  through  rms mm  points");
+    for (i, link) in fit.links.iter().enumerate() {
+        let name: String = link.name.chars().take(18).collect();
+        let line = format!(
+            "{name:<18} {:>4.0} % {:>5.1} % {:>7.1} {:>8}",
+            100.0 * link.seen,
+            100.0 * link.violated,
+            1e3 * link.rms,
+            link.n_points
+        );
+        let color = if link.violated > 0.1 { RED } else { INK };
+        canvas.text(LINKS, top + LINE * (i as i64 + 1), 1, color, &line);
+    }
+    for (i, line) in words.iter().enumerate() {
+        canvas.text(8, top + LINE * (n_rows + 2 + i as i64), 1, INK, line);
+    }
+    canvas
+}
+
+fn verdict_color(verdict: Verdict) -> Rgb {
+    match verdict {
+        Verdict::Trusted => [20, 110, 60],
+        Verdict::Doubtful => [176, 106, 0],
+        Verdict::Refused => RED,
+    }
+}
+
+/// One joint: its limits as a bar, on it the value with its standard deviation, and values that fit as well.
+fn row(canvas: &mut Canvas, y: i64, (fit, at): (&Fit, usize), own: &Joint) {
+    let joint = &fit.joints[at];
+    let [low, high] = own.limits.unwrap_or(NO_LIMITS);
+    let place = |value: f64| {
+        let share = ((value - low) / (high - low).max(1e-9)).clamp(0.0, 1.0);
+        BAR.0 + (share * BAR.1 as f64).round() as i64
+    };
+    let name: String = joint.name.chars().take(21).collect();
+    canvas.text(8, y, 1, INK, &name);
+    canvas.fill(BAR.0, y + 3, BAR.1, 3, PALE);
+    for equal in &fit.equals {
+        canvas.fill(place(equal.posture[at]), y, 2, 9, GREY);
+    }
+    let (from, to) = (place(joint.value - joint.sigma), place(joint.value + joint.sigma));
+    let color = if joint.determined { BLUE } else { RED };
+    canvas.fill(from, y + 2, (to - from).max(1), 5, color);
+    canvas.fill(place(joint.value) - 1, y - 1, 3, 11, color);
+    let (unit, scale) =
+        if own.kind == JointKind::Prismatic { ("mm", 1e3) } else { ("°", 1f64.to_degrees()) };
+    let open = if joint.determined { "" } else { " open" };
+    let words = format!("{:.3} ± {:.3} {unit}{open}", joint.value * scale, joint.sigma * scale);
+    canvas.text(BAR.0 + BAR.1 + 12, y, 1, color, &words);
+}
+
+/// What the colours of the residuals mean.
+fn scale(canvas: &mut Canvas, y: i64) {
+    let n = 21;
+    for i in 0..n {
+        let off = FULL * (2.0 * i as f32 / (n - 1) as f32 - 1.0);
+        canvas.fill(60 + 12 * i, y, 12, 10, residual_color(off));
+    }
+    let full = format!("{:.0} mm", FULL * 1e3);
+    canvas.text(8, y + 1, 1, GREY, &format!("-{full}"));
+    canvas.text(60 + 12 * n + 6, y + 1, 1, GREY, &format!("+{full} before the surface"));
+}
+
+/// Verdict, reasons and the runner-up, in lines as long as the page.
+fn words(fit: &Fit) -> Vec<String> {
+    let mut all = vec![format!(
+        "{}: score {:.3}, rms {:.2} mm",
+        fit.verdict.word(),
+        fit.score,
+        1e3 * fit.rms
+    )];
+    all.extend(fit.reasons.iter().cloned());
+    if let Some(other) = &fit.runner_up {
+        let whose = if other.same_model { "another posture of " } else { "" };
+        all.push(format!(
+            "runner-up: {whose}{}, score {:.3}, margin {:.2}",
+            other.model, other.score, other.margin
+        ));
+    }
+    all.iter().flat_map(|text| wrapped(text)).collect()
+}
+
+fn wrapped(text: &str) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let last = lines.len() - 1;
+        let fits = lines[last].chars().count() + word.chars().count() < LINE_CHARS;
+        if fits || lines[last].is_empty() {
+            if !lines[last].is_empty() {
+                lines[last].push(' ');
+            }
+            lines[last].push_str(word);
+        } else {
+            lines.push(format!("    {word}"));
+        }
+    }
+    lines
+}

@@ -1,0 +1,153 @@
+//! What the scans saw of the space around a robot, and its posture, in; voxels that are seen free and that the robot
+//! itself fills out.
+//!
+//! What a robot hides is unknown, not free: a voxel is free only where a beam went on beyond it. A beam that did not come
+//! back proves nothing.
+
+use contract::{Region, Space, SpaceKind, View};
+use geometry::{Aabb, Pose};
+use robot::Model;
+
+/// Half the diagonal of a cube of edge 1: a beam that ends this far beyond a voxel's middle has left it.
+const HALF_DIAGONAL: f64 = 0.866;
+/// Range noise and rounding that a beam must go beyond that, metres.
+const BEYOND: f64 = 0.01;
+/// Frees every voxel that a beam of the views (of `region`) went through.
+pub fn see(space: &mut Space, region: &Region, views: &[View]) {
+    let grid = *space.grid();
+    let (edge, first) = (grid.edge, grid.first);
+    let beyond = (HALF_DIAGONAL * edge + BEYOND) as f32;
+    for (at, voxel) in space.voxels_mut().iter_mut().enumerate() {
+        let cell = grid.cell(at);
+        let p: [f32; 3] = std::array::from_fn(|i| {
+            let middle = ((first[i] + cell[i] as i64) as f64 + 0.5) * edge;
+            (middle - region.origin[i]) as f32
+        });
+        let is_passed = |view: &View| {
+            // The images of one view share out the directions.
+            let looks = view.images.iter().filter_map(|image| image.look_at(p, 0.5 * edge as f32));
+            looks.take(1).any(|l| l.far.is_finite() && l.far > l.range + beyond)
+        };
+        if views.iter().any(is_passed) {
+            *voxel = SpaceKind::Free;
+        }
+    }
+}
+
+/// Fills the body of a robot that stands with its links at `world_from_links`: what its surface encloses.
+pub fn stand(space: &mut Space, model: &Model, world_from_links: &[Pose]) {
+    let mut body = Aabb::EMPTY;
+    let mut surface = Vec::new();
+    for (link, pose) in model.links.iter().zip(world_from_links) {
+        for p in &link.cad.points {
+            let p = pose * geometry::Point::from(p.map(f64::from));
+            body.add(p.coords.into());
+            surface.extend(space.grid().index(p.coords.into()));
+        }
+    }
+    if surface.is_empty() {
+        return;
+    }
+    surface.iter().for_each(|at| space.voxels_mut()[*at] = SpaceKind::Robot);
+    fill(space, &body, &surface);
+}
+
+/// Gives the robot what cannot be reached from outside `body` without crossing its surface.
+fn fill(space: &mut Space, body: &Aabb, surface: &[usize]) {
+    let grid = *space.grid();
+    let (low, high) = (body.min, body.max);
+    let cell = |p: [f64; 3], up: bool| -> [usize; 3] {
+        std::array::from_fn(|i| {
+            let at = (p[i] / grid.edge).floor() - grid.first[i] as f64;
+            let at = if up { at + 2.0 } else { at - 1.0 };
+            at.clamp(0.0, grid.size[i] as f64) as usize
+        })
+    };
+    let (low, high) = (cell(low, false), cell(high, true));
+    let size: [usize; 3] = std::array::from_fn(|i| high[i].saturating_sub(low[i]));
+    let place = |c: [usize; 3]| (c[0] * size[1] + c[1]) * size[2] + c[2];
+    let mut seen = vec![false; size.iter().product()];
+    for at in surface {
+        let c = grid.cell(*at);
+        if (0..3).all(|i| c[i] >= low[i] && c[i] < high[i]) {
+            seen[place(std::array::from_fn(|i| c[i] - low[i]))] = true;
+        }
+    }
+    let is_rim = |c: &[usize; 3]| (0..3).any(|i| c[i] == 0 || c[i] + 1 == size[i]);
+    let all = (0..size[0])
+        .flat_map(|x| (0..size[1]).flat_map(move |y| (0..size[2]).map(move |z| [x, y, z])));
+    let mut open: Vec<[usize; 3]> = all.filter(is_rim).filter(|c| !seen[place(*c)]).collect();
+    open.iter().for_each(|c| seen[place(*c)] = true);
+    while let Some(c) = open.pop() {
+        for axis in 0..3 {
+            for step in [-1_isize, 1] {
+                let mut next = c;
+                let Some(to) = c[axis].checked_add_signed(step) else { continue };
+                next[axis] = to;
+                if to < size[axis] && !std::mem::replace(&mut seen[place(next)], true) {
+                    open.push(next);
+                }
+            }
+        }
+    }
+    for (at, _) in seen.iter().enumerate().filter(|(_, seen)| !**seen) {
+        let c = [at / (size[1] * size[2]), at / size[2] % size[1], at % size[2]];
+        let c: [usize; 3] = std::array::from_fn(|i| c[i] + low[i]);
+        let index = (c[0] * grid.size[1] + c[1]) * grid.size[2] + c[2];
+        space.voxels_mut()[index] = SpaceKind::Robot;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::{MaskId, ScanId, SpaceGrid};
+    use geometry::depth::Empty;
+    use geometry::{DepthImage, Point};
+
+    /// A scanner at the origin looks along x at a wall 4 m away, half of it behind a plate 2 m away.
+    fn view() -> View {
+        let turn = nalgebra::UnitQuaternion::from_axis_angle(
+            &nalgebra::Vector3::y_axis(),
+            -std::f64::consts::FRAC_PI_2,
+        );
+        let camera = Pose::from_parts(nalgebra::Translation3::identity(), turn);
+        let mut image = DepthImage::new(camera, 0.5, 200.0);
+        for i in -200..200 {
+            for j in -200..200 {
+                let (y, z) = (f64::from(i) * 0.0025, f64::from(j) * 0.0025);
+                let x = if y > 0.0 { 2.0 } else { 4.0 };
+                let p = camera * Point::new(x, y * x, z * x);
+                image.splat(p.coords.map(|v| v as f32).into());
+            }
+        }
+        image.finish(2, |_| Empty::Unknown);
+        View {
+            scan: ScanId(0),
+            mask: MaskId(0),
+            scanner: Some(Point::origin()),
+            beam_step: 0.0025,
+            images: vec![image],
+            points: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_a_thing_hides_is_unknown() {
+        let bounds = Aabb { min: [0.5, -1.0, -0.5], max: [5.0, 1.0, 0.5] };
+        let region = Region { origin: Point::origin(), bounds };
+        let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));
+        see(&mut space, &region, &[view()]);
+        let at = |space: &Space, p| space.voxels()[space.grid().index(p).expect("inside")];
+        assert_eq!(at(&space, [3.0, -0.5, 0.0]), SpaceKind::Free);
+        assert_eq!(at(&space, [1.5, 0.3, 0.0]), SpaceKind::Free);
+        // Behind the plate, behind the wall, and beside the image.
+        for p in [[3.0, 0.5, 0.0], [4.6, -0.5, 0.0], [0.7, 0.9, 0.0]] {
+            assert_eq!(at(&space, p), SpaceKind::Unknown, "{p:?}");
+        }
+        let wall = space.grid().index([4.0, -0.5, 0.0]).expect("inside");
+        space.mark(wall, SpaceKind::Fixed);
+        space.mark(wall, SpaceKind::Robot);
+        assert_eq!(space.voxels()[wall], SpaceKind::Fixed);
+    }
+}
