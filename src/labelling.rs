@@ -114,7 +114,7 @@ impl<'a> Labelling<'a> {
         room: &Room,
         engine: &Engine,
     ) -> Result<Done> {
-        let out = room.out();
+        let out = room.next();
         let mut las = LasSettings::new(self.quantum());
         las.with_color = self.sources.has_color();
         let mut clouds = Clouds::create(out, CloudsSettings::new(las))?;

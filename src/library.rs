@@ -5,6 +5,11 @@ use contract::Result;
 use robot::{Library, Settings};
 use std::path::Path;
 
+/// Models of a library, loadable or not.
+pub(crate) fn count(dir: &Path) -> Result<usize> {
+    Ok(Library::open(dir)?.0.len())
+}
+
 /// Loads all models; those that cannot be loaded are explained in the library's findings.
 pub(crate) fn load(dir: &Path, settings: &Settings, engine: &Engine) -> Result<Library> {
     let (folders, mut library) = Library::open(dir)?;

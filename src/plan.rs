@@ -2,25 +2,32 @@
 //! decides order.
 
 use crate::calibrate::calibrate;
-use crate::engine::{Engine, Task};
+use crate::engine::Engine;
+use crate::filling::Filling;
 use crate::job::{Job, Outcome};
 use crate::labelling::Labelling;
 use crate::library;
 use crate::report::Report;
+use crate::reuse::{self, KeptFits, Key, Manifest, Sums};
 use crate::review::Review;
 use crate::search::{Search, Shelf};
 use crate::spaces;
-use crate::store::{Scatter, Store};
+use crate::store::Store;
 use crate::surfaces::{Gather, Surfaces};
 use crate::tools;
 use contract::Result;
-use ingest::{Scanners, Want};
+use ingest::Scanners;
 use std::path::PathBuf;
 
 /// Does the main job.
 pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let settings = &job.means.settings;
     let room = job.room()?;
+    let sums = Sums::of(job, &room, engine)?;
+    let key = sums.whole(job);
+    if let Some(manifest) = reuse::unchanged(room.out(), room.store(), &key)? {
+        return Ok(manifest.outcome());
+    }
     let library = library::load(&job.robots, &settings.robot, engine)?;
     let read = |path: &PathBuf| Review::read(path, &library.models);
     let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
@@ -28,15 +35,12 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
     let scans = &sources.scans;
 
-    // First pass: every point once, from the files into the lattice tiles of the store.
-    let scatter = Scatter::new(scans);
-    let mut sink = Store::create(room.store(), scans, job.means.ingest_bytes())?;
-    for input in &sources.inputs {
-        let task = Task::new("ingest").of(crate::report::amount(&sources, input.id));
-        let strips = sources.strips(input.id, Want::Coordinates)?;
-        engine.pass(task, strips, |f| f.map(&scatter).for_each(|s| sink.add(&s)))?;
-    }
-    let store = sink.finish(engine, job.means.store_bytes())?;
+    // First pass: every point once, from the files into the lattice tiles of the store; inputs whose tiles are there are
+    // not read.
+    let filling = Filling::new(&sources, &job.means, room.tiles(), engine);
+    let tiles: Vec<Key> = sources.inputs.iter().map(|i| sums.tiles(i, scans, settings)).collect();
+    let stores = sources.inputs.iter().zip(&tiles).map(|(i, key)| filling.tiles_of(i, key));
+    let store = Store::join(stores.collect::<Result<_>>()?);
 
     // On the tiles: local planes and occupied space, joined over tiles and scans; from here on nothing is as large as
     // the cloud.
@@ -52,7 +56,10 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
     let shelf = Shelf::new(&library.models);
     let search = Search::new(&shelf, scans, &store, &ground, settings);
-    let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
+    let kept = KeptFits::new(room.fits(), sums.fits(&tiles, settings));
+    let fits = engine.fan_out("fit", regions.clone(), |region| {
+        kept.or_find(&region, || search.region(&region))
+    })?;
     let (fits, unmet) = review.apply(fits.into_iter().flatten().collect());
     let fits = fit::choose(fits, &library.models);
     let mut models = library.models.clone();
@@ -70,9 +77,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     // write.
     let spaces = spaces::around(&fits, &models, (&search, settings), engine)?;
     let written = labelling.write((&near, spaces), &room, engine)?;
-    Report {
-        job,
-        engine,
+    let mut outcome = Report {
+        sums: &sums,
         sources: &sources,
         library: &library,
         models: &models,
@@ -81,5 +87,12 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         written: &written,
         unmet,
     }
-    .finish(&room)
+    .finish(&room)?;
+
+    // All is whole: it takes the place of what was there. What this run did not use is not kept.
+    Manifest::write(room.next(), &key, &outcome, engine)?;
+    Manifest::publish(room.next(), room.out())?;
+    room.prune(&tiles, &kept);
+    outcome.reused = reuse::said(&[("tiles", filling.n_kept()), ("fits", kept.n_kept())]);
+    Ok(outcome)
 }

@@ -1,9 +1,10 @@
 //! What a run came to in; `result.json`, the legend of the masks and a summary for people out.
 
-use crate::engine::{Engine, Task};
-use crate::job::{Job, Outcome, Room};
+use crate::engine::Task;
+use crate::job::{Outcome, Room};
 use crate::labelling::Done;
 use crate::progress::Amount;
+use crate::reuse::Sums;
 use crate::store::Store;
 use contract::{Cluster, Fit, Format, Input, InputId, Result, Verdict};
 use export::{
@@ -12,12 +13,10 @@ use export::{
 use ingest::Sources;
 use robot::{Library, Model, Role};
 use std::fmt::Write as _;
-use std::fs::File;
 
 /// Everything that the result tells.
 pub(crate) struct Report<'a> {
-    pub(crate) job: &'a Job,
-    pub(crate) engine: &'a Engine,
+    pub(crate) sums: &'a Sums,
     pub(crate) sources: &'a Sources,
     pub(crate) library: &'a Library,
     /// Those that the fits are of: the library's, and arms with tools.
@@ -34,15 +33,13 @@ impl Report<'_> {
     pub(crate) fn finish(&self, room: &Room) -> Result<Outcome> {
         let robots: Vec<RobotEntry> =
             self.fits.iter().enumerate().map(|(i, f)| self.robot(i, f)).collect();
-        write_table(room.out(), &robots)?;
+        write_table(room.next(), &robots)?;
         let warnings = self.warnings();
         let masks = self.sources.masks.iter().zip(&self.written.masks);
         let labels = Labels {
             table: "labels/table.json".into(),
             scans: masks.map(|(mask, count)| ScanLabels::new(mask, count.n_points)).collect(),
         };
-        let digests =
-            self.engine.fan_out("digest", self.sources.inputs.iter().collect(), digest)?;
         let result = ResultFile {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -52,14 +49,13 @@ impl Report<'_> {
                 .sources
                 .inputs
                 .iter()
-                .zip(digests)
-                .map(|(i, d)| self.input(i, d))
+                .map(|i| self.input(i, self.sums.input(i).to_owned()))
                 .collect(),
             stages: self.stages(),
             warnings: warnings.clone(),
         };
-        result.write(room.out())?;
-        Ok(Outcome { summary: self.summary(room), warnings, partial: false })
+        result.write(room.next())?;
+        Ok(Outcome { summary: self.summary(), warnings, ..Outcome::default() })
     }
 
     fn robot(&self, index: usize, fit: &Fit) -> RobotEntry {
@@ -139,7 +135,7 @@ impl Report<'_> {
         }
     }
 
-    fn summary(&self, room: &Room) -> String {
+    fn summary(&self) -> String {
         let mut text = String::new();
         let _ =
             writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.sources.scans.len());
@@ -183,11 +179,9 @@ impl Report<'_> {
         let _ = writeln!(text, "{n} points labelled, {moving} of them moving");
         let _ = writeln!(
             text,
-            "result in {} ({} spatial tiles, {} pictures; {} worker(s))",
-            room.out().join("result.json").display(),
+            "{} spatial tiles, {} pictures",
             self.written.clouds.tiles.len(),
             self.written.pictures.len(),
-            self.job.means.n_threads
         );
         text
     }
@@ -211,14 +205,6 @@ pub(crate) fn tiles(name: &str, store: &Store) -> Task {
         points: store.n_points(),
         bytes: 0,
     })
-}
-
-/// Digest of an input's bytes.
-fn digest(input: &Input) -> Result<String> {
-    let failed = |e: std::io::Error| contract::Error::from(e).at(input.path.display());
-    let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(&input.path).map_err(failed)?).map_err(failed)?;
-    Ok(format!("blake3:{}", hasher.finalize().to_hex()))
 }
 
 fn format_word(format: Format) -> &'static str {

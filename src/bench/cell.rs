@@ -99,7 +99,7 @@ impl Cell {
     ) -> Result<Found> {
         let scans = &self.scans;
         let scatter = Scatter::new(scans);
-        let mut sink = Store::create(dir, scans, means.ingest_bytes())?;
+        let mut sink = Store::create(dir, scans, 0, means.ingest_bytes())?;
         for strip in self.strips {
             sink.add(&scatter.apply(strip, &mut ())?)?;
         }

@@ -9,9 +9,6 @@ pub(super) fn demo(flags: &DemoFlags, common: &Common, say: &Say) -> Result<u8> 
     let means = common.means()?;
     let engine = common.engine(&means)?;
     let outcome = demo::run(flags.out.as_deref(), &means, &engine)?;
-    for warning in &outcome.warnings {
-        say.warning(warning);
-    }
-    say.result(&outcome.summary);
+    say.outcome(&outcome);
     Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
 }

@@ -27,6 +27,12 @@ pub(super) enum Command {
     Inspect(InspectFlags),
     /// The main job: scans and a robot library in, postures and masks out
     Run(RunFlags),
+    /// As run, but only says what it would take: memory, disk, time
+    Plan(PlanFlags),
+    /// Whether the files of a result are what they were when they were written
+    Verify(OutFlags),
+    /// What a run came to, once more; robots as cases for a build server with --junit
+    Report(ReportFlags),
     /// Virtual scanner: a scene file in, scans and their truth out
     Simulate(SimulateFlags),
     /// How exact, how fast
@@ -149,6 +155,32 @@ pub(super) struct RunFlags {
     /// Estimate where the joints of each robot really are, too: for robots that their models fit poorly
     #[arg(long)]
     pub(super) calibrate: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct PlanFlags {
+    #[command(flatten)]
+    pub(super) run: RunFlags,
+    /// Answer in JSON
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct OutFlags {
+    /// Output folder of a run
+    #[arg(value_name = "OUT")]
+    pub(super) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ReportFlags {
+    /// Output folder of a run
+    #[arg(value_name = "OUT")]
+    pub(super) out: PathBuf,
+    /// Write each robot as a test case: trusted ones pass
+    #[arg(long, value_name = "FILE")]
+    pub(super) junit: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@ mod bench;
 mod demo;
 mod flags;
 mod inspect;
+mod results;
 mod robots;
 mod run;
 mod say;
@@ -32,6 +33,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Demo(flags) => demo::demo(flags, &line.common, &say),
         Command::Inspect(flags) => inspect::inspect(flags, &line.common, &say),
         Command::Run(flags) => run::run(flags, &line.common, &say),
+        Command::Plan(flags) => run::plan(flags, &line.common, &say),
+        Command::Verify(flags) => results::verify(flags, &line.common, &say),
+        Command::Report(flags) => results::report(flags, &say),
         Command::Bench(BenchCommand::Accuracy(flags)) => {
             bench::bench_accuracy(flags, &line.common, &say)
         }

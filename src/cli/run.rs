@@ -1,11 +1,37 @@
-//! `run`: flags in, the main job done.
+//! `run` and `plan`: flags in, the main job done, or what it would take.
 
-use super::flags::{Common, RunFlags, present};
+use super::flags::{Common, PlanFlags, RunFlags, present};
 use super::say::Say;
+use crate::engine::Engine;
+use crate::estimate::estimate;
 use crate::{exit, job::Job, plan};
-use contract::Result;
+use contract::{Error, Kind, Result};
+use std::fmt::Write as _;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
+    let (job, engine) = job(flags, common)?;
+    let mut outcome = plan::run(&job, &engine)?;
+    let _ = writeln!(outcome.summary, "result in {}", job.out.join("result.json").display());
+    say.outcome(&outcome);
+    Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+}
+
+pub(super) fn plan(flags: &PlanFlags, common: &Common, say: &Say) -> Result<u8> {
+    let (job, engine) = job(&flags.run, common)?;
+    let estimate = estimate(&job, &engine)?;
+    if flags.json {
+        let text = serde_json::to_string_pretty(&estimate).map_err(|e| {
+            Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e)
+        })?;
+        say.result(&text);
+    } else {
+        say.result(&estimate.to_string());
+    }
+    estimate.checked(&job.out)?;
+    Ok(exit::OK)
+}
+
+fn job(flags: &RunFlags, common: &Common) -> Result<(Job, Engine)> {
     let mut means = common.means()?;
     means.settings.fit.calibrate |= flags.calibrate;
     present(&flags.inputs)?;
@@ -18,10 +44,5 @@ pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
         review: flags.review.clone(),
         means,
     };
-    let outcome = plan::run(&job, &engine)?;
-    for warning in &outcome.warnings {
-        say.warning(warning);
-    }
-    say.result(&outcome.summary);
-    Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+    Ok((job, engine))
 }

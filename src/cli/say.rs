@@ -1,5 +1,6 @@
 //! What the program says: results to standard output; warnings and errors to standard error, as text or JSON.
 
+use crate::job::Outcome;
 use contract::{Error, Kind};
 use std::io::Write;
 
@@ -26,6 +27,20 @@ impl Say {
     pub(super) fn result(&self, text: &str) {
         let mut out = std::io::stdout().lock();
         let _ = writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush());
+    }
+
+    /// What a run came to: warnings and what was used again on standard error, its summary on standard output.
+    pub(super) fn outcome(&self, outcome: &Outcome) {
+        outcome.warnings.iter().for_each(|warning| self.warning(warning));
+        for piece in &outcome.reused {
+            self.line(&match self.format {
+                LogFormat::Text => format!("used again: {piece}"),
+                LogFormat::Json => {
+                    serde_json::json!({"level": "info", "used_again": piece}).to_string()
+                }
+            });
+        }
+        self.result(&outcome.summary);
     }
 
     /// Something a person should know.

@@ -71,6 +71,8 @@ pub struct Outcome {
     pub warnings: Vec<String>,
     /// Something was skipped or refused, as the result says: exit code 3.
     pub partial: bool,
+    /// What was there from earlier runs and not made again; said on standard error.
+    pub reused: Vec<String>,
 }
 
 /// Means as flags give them; `None` where a flag is missing.

@@ -1,21 +1,27 @@
-//! The output folder of a run: where results go, and where the store lies meanwhile.
+//! The output folder of a run: where results go, where they lie until all are whole, and where the store is kept.
 
+use crate::reuse::{KeptFits, Key, Manifest};
 use contract::{Error, Kind, Result};
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-/// The output folder. `result.json` is the last file of a run: while it is missing, the rest is not whole.
+/// The output folder, which nobody else writes to meanwhile.
 #[derive(Debug, Clone)]
 pub struct Room {
     out: PathBuf,
     store: PathBuf,
+    next: PathBuf,
+    /// Held while the run lives; the system lets go of it, however the run ends.
+    _lock: Arc<File>,
 }
 
 impl Room {
-    /// Makes the folder and takes away the result of an earlier run, which would vouch for files that are about to
-    /// change.
+    /// Makes the folder, keeps others out of it, and finishes what an earlier run was cut short in: results that were
+    /// whole take their places, others are taken away.
     ///
     /// # Errors
-    /// A path that is a file, or that the system refuses.
+    /// A path that is a file, a folder in which another run is at work, or what the system refuses.
     pub(super) fn prepare(out: &Path) -> Result<Self> {
         let at = |e: std::io::Error| Error::from(e).at(out.display());
         if out.exists() && !out.is_dir() {
@@ -24,22 +30,88 @@ impl Room {
         }
         let store = out.join("store");
         std::fs::create_dir_all(&store).map_err(at)?;
-        match std::fs::remove_file(out.join("result.json")) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(at(e)),
-            _ => {}
+        let lock = locked(&store.join("lock"))?;
+        let next = store.join("next");
+        if Manifest::waits(&next) {
+            Manifest::publish(&next, out)?;
         }
-        Ok(Self { out: out.to_path_buf(), store })
+        match std::fs::remove_dir_all(&next) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(at(e)),
+            _ => std::fs::create_dir_all(&next).map_err(at)?,
+        }
+        std::fs::create_dir_all(store.join("fits")).map_err(at)?;
+        sweep(&store);
+        Ok(Self { out: out.to_path_buf(), store, next, _lock: Arc::new(lock) })
     }
 
-    /// Where results go.
+    /// Where results are written; at the end they move to [`Room::out`].
+    #[must_use]
+    pub fn next(&self) -> &Path {
+        &self.next
+    }
+
+    /// Where results end up.
     #[must_use]
     pub fn out(&self) -> &Path {
         &self.out
     }
 
-    /// Where the tiles lie.
+    /// Where the tiles of inputs lie, a folder each.
+    #[must_use]
+    pub fn tiles(&self) -> PathBuf {
+        self.store.join("tiles")
+    }
+
+    /// Where fits of regions lie.
+    #[must_use]
+    pub fn fits(&self) -> PathBuf {
+        self.store.join("fits")
+    }
+
+    /// Takes away tiles and fits that the run which has just ended did not use.
+    pub(crate) fn prune(&self, tiles: &[Key], kept: &KeptFits) {
+        let names: Vec<String> = tiles.iter().map(|key| key.name().into()).collect();
+        crate::reuse::prune(&self.tiles(), &names);
+        crate::reuse::prune(&self.fits(), &[kept.name()]);
+    }
+
+    /// Where tiles, and what else may be used again, lie.
     #[must_use]
     pub fn store(&self) -> &Path {
         &self.store
+    }
+}
+
+/// A file that only one process holds.
+fn locked(path: &Path) -> Result<File> {
+    let refused = |e: std::io::Error| Error::from(e).at(path.display());
+    let file = File::options().create(true).truncate(false).write(true).open(path);
+    let file = file.map_err(refused)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => {
+            let what = "another run is at work in this output folder";
+            Err(Error::new(Kind::Io, what)
+                .at(path.display())
+                .hint("wait for it to end, or give another --out"))
+        }
+        // Some shares know no locks; there the user must take care.
+        Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => Ok(file),
+        Err(TryLockError::Error(e)) => Err(refused(e)),
+    }
+}
+
+/// Takes away what killed runs left half-written. Only space is lost where it stays.
+fn sweep(store: &Path) {
+    let folders = std::fs::read_dir(store).into_iter().flatten().flatten().map(|e| e.path());
+    let folders = folders.filter(|path| path.is_dir()).chain([store.to_path_buf()]);
+    for folder in folders {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            if name.starts_with(".stillpoint-") && name.ends_with(".part") {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
     }
 }

@@ -64,10 +64,16 @@ pub(super) fn tiles_header() -> [u8; HEADER_BYTES as usize] {
     header
 }
 
-/// Writes the catalogue of a tile file that is `n_tile_bytes` long.
-pub(super) fn write(path: &Path, entries: &[TileEntry], n_tile_bytes: u64) -> Result<()> {
+/// Writes the catalogue of a tile file that is `n_tile_bytes` long. Scans are numbered from the `first` of the store: in
+/// another run the same store may hold others.
+pub(super) fn write(
+    path: &Path,
+    entries: &[TileEntry],
+    n_tile_bytes: u64,
+    first: u32,
+) -> Result<()> {
     let rows = entries.iter().map(|e| Row {
-        at: [e.at.scan.0, e.at.row, e.at.col],
+        at: [e.at.scan.0 - first, e.at.row, e.at.col],
         checksum: e.checksum,
         n_points: e.n_points,
         first_place: e.first_place,
@@ -89,11 +95,18 @@ pub(super) fn write(path: &Path, entries: &[TileEntry], n_tile_bytes: u64) -> Re
     atomic::write(path, &bytes)
 }
 
-/// Reads and checks a catalogue; gives the entries and the length of the tile file.
-pub(super) fn read(path: &Path) -> Result<(Vec<TileEntry>, u64)> {
+/// Reads and checks a catalogue whose scans are numbered from `first`; gives the entries and the length of the tile file.
+pub(super) fn read(path: &Path, first: u32) -> Result<(Vec<TileEntry>, u64)> {
     let bytes =
         std::fs::read(path).map_err(|e| io_error(path, "the catalogue cannot be read", e))?;
-    parse(&bytes).map_err(|e| e.at(path.display()))
+    let (mut entries, n) = parse(&bytes).map_err(|e| e.at(path.display()))?;
+    for entry in &mut entries {
+        let Some(scan) = entry.at.scan.0.checked_add(first) else {
+            return Err(broken("the catalogue contradicts itself").at(path.display()));
+        };
+        entry.at.scan = ScanId(scan);
+    }
+    Ok((entries, n))
 }
 
 fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
@@ -174,8 +187,8 @@ mod tests {
         let path = dir.path().join("catalogue");
         let entries = entries();
         let end = entries[4].offset + layout(400)[3];
-        write(&path, &entries, end).expect("writes");
-        assert!(read(&path).expect("reads") == (entries, end));
+        write(&path, &entries, end, 0).expect("writes");
+        assert!(read(&path, 0).expect("reads") == (entries, end));
         std::fs::read(path).expect("a file")
     }
 

@@ -30,26 +30,43 @@ const TILES: &str = "tiles.bin";
 /// A store that is whole: tiles by place, in the order of [`TileAt`], whatever way they came in.
 pub struct Store {
     entries: Vec<TileEntry>,
-    map: FileMap,
+    /// Its folders, each with the place of its first entry.
+    parts: Vec<(usize, FileMap)>,
 }
 
 impl Store {
-    /// Begins a store in `dir` for strips of `scans` (all of a run, in their order); it keeps about `budget_bytes` in
-    /// memory while it is filled.
-    pub fn create(dir: &Path, scans: &[Scan], budget_bytes: usize) -> Result<TileSink> {
-        TileSink::new(dir, scans, budget_bytes)
+    /// Begins a store in `dir` for strips of `scans` (all of a run, in their order) from the scan `first` on; it keeps
+    /// about `budget_bytes` in memory while it is filled.
+    pub fn create(dir: &Path, scans: &[Scan], first: u32, budget_bytes: usize) -> Result<TileSink> {
+        TileSink::new(dir, scans, first, budget_bytes)
     }
 
-    /// Opens a whole store. Mapped pages are given back to the system each time `resident_bytes` have been read.
-    pub fn open(dir: &Path, resident_bytes: usize) -> Result<Self> {
-        let (entries, n_tile_bytes) = catalogue::read(&dir.join(CATALOGUE))?;
+    /// Opens a whole store, its scans numbered from `first`. Mapped pages are given back to the system each time
+    /// `resident_bytes` have been read.
+    pub fn open(dir: &Path, first: u32, resident_bytes: usize) -> Result<Self> {
+        let (entries, n_tile_bytes) = catalogue::read(&dir.join(CATALOGUE), first)?;
         let path = dir.join(TILES);
         let map = FileMap::open(&path, resident_bytes)?;
         let bytes = map.bytes();
         if bytes.len() as u64 != n_tile_bytes || !bytes.starts_with(&catalogue::tiles_header()) {
             return Err(broken("the tiles are not those of the catalogue").at(path.display()));
         }
-        Ok(Self { entries, map })
+        Ok(Self { entries, parts: vec![(0, map)] })
+    }
+
+    /// Stores of scans that follow one another, as one.
+    #[must_use]
+    pub fn join(stores: Vec<Self>) -> Self {
+        let mut all = Self { entries: Vec::new(), parts: Vec::new() };
+        for store in stores {
+            let start = all.entries.len();
+            debug_assert!(
+                all.entries.last().zip(store.entries.first()).is_none_or(|(a, b)| a.at < b.at)
+            );
+            all.parts.extend(store.parts.into_iter().map(|(at, map)| (start + at, map)));
+            all.entries.extend(store.entries);
+        }
+        all
     }
 
     /// What is known of each tile without reading it, sorted by [`TileAt`], then by place. Entries at the same
@@ -72,14 +89,16 @@ impl Store {
     pub fn tile(&self, i: usize) -> Result<Tile> {
         let entry = &self.entries[i];
         let (start, n) = (entry.offset as usize, encode::layout(entry.n_points)[3] as usize);
-        let bytes = &self.map.bytes()[start..start + n];
+        let part = self.parts.partition_point(|part| part.0 <= i);
+        let map = &self.parts[part - 1].1;
+        let bytes = &map.bytes()[start..start + n];
         if crc32c::crc32c(bytes) != entry.checksum {
             let at = entry.at;
             return Err(broken("the tile is damaged: its checksum is not what it should be")
                 .at(format!("store, scan {}, tile {} {}", at.scan.0, at.row, at.col)));
         }
         let tile = encode::decode(entry, bytes);
-        self.map.has_read(n);
+        map.has_read(n);
         Ok(tile)
     }
 

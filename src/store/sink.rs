@@ -34,6 +34,8 @@ pub struct TileSink {
     budget_bytes: usize,
     spill: Option<Spill>,
     n_points: u64,
+    /// First scan of the store.
+    first: u32,
 }
 
 struct Buffer {
@@ -46,8 +48,9 @@ struct Buffer {
 }
 
 impl TileSink {
-    /// A sink that keeps about `budget_bytes` in memory. An older store in `dir` is removed.
-    pub(super) fn new(dir: &Path, scans: &[Scan], budget_bytes: usize) -> Result<Self> {
+    /// A sink for the scans from `first` on that keeps about `budget_bytes` in memory. An older store in `dir` is
+    /// removed.
+    pub(super) fn new(dir: &Path, scans: &[Scan], first: u32, budget_bytes: usize) -> Result<Self> {
         std::fs::create_dir_all(dir).map_err(|e| io_error(dir, "the store cannot be made", e))?;
         // Without its catalogue an old store is no store: nobody can take old tiles for new ones.
         match std::fs::remove_file(dir.join(CATALOGUE)) {
@@ -65,6 +68,7 @@ impl TileSink {
             budget_bytes,
             spill: None,
             n_points: 0,
+            first,
         })
     }
 
@@ -133,7 +137,7 @@ impl TileSink {
 
     /// Writes all tiles and the catalogue, and opens the store. `open_bytes` as in [`Store::open`].
     pub fn finish(self, engine: &Engine, open_bytes: usize) -> Result<Store> {
-        let Self { dir, encode, mut buffers, spill, n_points, .. } = self;
+        let Self { dir, encode, mut buffers, spill, n_points, first, .. } = self;
         buffers.sort_by_key(|b| b.at);
         let task = Task::new("store").of(Amount::points(n_points));
         let path = dir.join(TILES);
@@ -152,8 +156,8 @@ impl TileSink {
             })
         })?;
         file.commit()?;
-        catalogue::write(&dir.join(CATALOGUE), &entries, offset)?;
-        Store::open(&dir, open_bytes)
+        catalogue::write(&dir.join(CATALOGUE), &entries, offset, first)?;
+        Store::open(&dir, first, open_bytes)
     }
 }
 

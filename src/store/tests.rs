@@ -67,7 +67,7 @@ fn strips(n: usize) -> Vec<Strip> {
 fn build(dir: &Path, strips: Vec<Strip>, budget_bytes: usize, n_workers: usize) -> (Store, u64) {
     let scans = scans();
     let engine = Engine::new(n_workers);
-    let mut sink = Store::create(dir, &scans, budget_bytes).expect("begins");
+    let mut sink = Store::create(dir, &scans, 0, budget_bytes).expect("begins");
     let scatter = Scatter::new(&scans);
     engine
         .pass("read", strips.into_iter().map(Ok), |f| f.map(&scatter).for_each(|s| sink.add(&s)))
@@ -197,16 +197,16 @@ fn damage_is_named() {
     let tiles = dir.path().join(TILES);
     let mut file = std::fs::OpenOptions::new().write(true).open(&tiles).expect("a file");
     file.seek(SeekFrom::Start(1000)).and_then(|_| file.write_all(&[0xab])).expect("writes");
-    let store = Store::open(dir.path(), 1 << 20).expect("opens");
+    let store = Store::open(dir.path(), 0, 1 << 20).expect("opens");
     let error = store.tile(0).expect_err("damaged");
     assert_eq!(error.kind(), Kind::BadInput);
     assert!(error.to_string().starts_with("store, scan 0, tile"), "{error}");
     assert!(store.tile(1).is_ok());
     drop(store);
     file.set_len(5000).expect("cuts");
-    assert!(Store::open(dir.path(), 1 << 20).is_err());
+    assert!(Store::open(dir.path(), 0, 1 << 20).is_err());
     std::fs::remove_file(&tiles).expect("removes");
-    assert!(Store::open(dir.path(), 1 << 20).is_err());
+    assert!(Store::open(dir.path(), 0, 1 << 20).is_err());
 }
 
 #[test]

@@ -1,9 +1,12 @@
 //! A fit: which robot, where, in which posture, and how far to trust it.
 
 use geometry::Pose;
+use serde::{Deserialize, Serialize};
 
 /// How far a fit may be trusted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
 pub enum Verdict {
     /// Wrong, or not this robot: not used for labels.
     Refused,
@@ -27,7 +30,7 @@ impl Verdict {
 }
 
 /// One joint of a fit.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointFit {
     /// As in the URDF.
     pub name: String,
@@ -42,7 +45,7 @@ pub struct JointFit {
 }
 
 /// What the scans say of one link at the fitted posture.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LinkEvidence {
     /// As in the URDF.
     pub name: String,
@@ -59,7 +62,7 @@ pub struct LinkEvidence {
 }
 
 /// The best other explanation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunnerUp {
     /// Its model.
     pub model: String,
@@ -72,7 +75,7 @@ pub struct RunnerUp {
 }
 
 /// How a scan differs from its stated pose near a robot.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScanShift {
     /// Whose.
     pub scan: crate::ScanId,
@@ -85,7 +88,7 @@ pub struct ScanShift {
 }
 
 /// Another posture that explains the points as well.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Equal {
     /// Free joints, in the order of the model, radians or metres.
     pub posture: Vec<f64>,
@@ -94,7 +97,7 @@ pub struct Equal {
 }
 
 /// A tool on a robot's flange.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mounted {
     /// Its name in the library.
     pub model: String,
@@ -105,7 +108,7 @@ pub struct Mounted {
 }
 
 /// Where a joint really is, against its model.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointFrame {
     /// As in the URDF.
     pub name: String,
@@ -146,7 +149,7 @@ impl JointFrame {
 }
 
 /// How a robot differs from its model, as far as its points tell.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// Its free joints, in the order of the model.
     pub frames: Vec<JointFrame>,
@@ -157,7 +160,7 @@ pub struct Calibration {
 }
 
 /// A robot found in the scans.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// Index into the library.
     pub model: usize,

@@ -2,13 +2,14 @@
 
 use crate::Lattice;
 use geometry::{Aabb, Pose};
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Index of an input file, in the order of the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct InputId(pub u32);
 /// Index of a scan over all inputs, in their order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ScanId(pub u32);
 /// Index of a mask over all inputs, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

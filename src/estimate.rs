@@ -1,0 +1,186 @@
+//! A job in; what it will take of memory, disk and time, and what of it is there already, out. No point is read.
+
+use crate::engine::Engine;
+use crate::job::{Job, Room, Settings, memory_words};
+use crate::library;
+use crate::reuse::{self, Sums};
+use crate::store::Store;
+use contract::{Error, Format, Input, Kind, Result};
+use ingest::{Scanners, Sources};
+use serde::Serialize;
+use std::path::Path;
+
+/// Bytes of a point in the store, with its share of catalogue and checksums.
+const STORE_BYTES: u64 = 18;
+/// Bytes of a point's labels: kind, robot, link.
+const LABEL_BYTES: u64 = 5;
+/// Clouds are written twice: as spatial tiles, and what moves apart from what stands still.
+const N_CLOUDS: u64 = 2;
+/// Bytes of a point in a cloud, without and with colour.
+const CLOUD_BYTES: [u64; 2] = [34, 40];
+/// Bytes of a point in a text file, about.
+const TEXT_BYTES: u64 = 45;
+/// Pictures, models, voxels and lists, bytes for each model of the library: more robots stand in large plants.
+const EXTRA_BYTES: u64 = 64 << 20;
+/// Points that one thread gets through in a second: ingest of E57, LAS, LAZ, PTX; tiles, planes, labels and writing.
+const INGEST: [(Format, f64); 4] =
+    [(Format::E57, 20e6), (Format::Las, 12e6), (Format::Laz, 4e6), (Format::Ptx, 6e6)];
+const REST: [f64; 4] = [18e6, 2.5e6, 8e6, 2.6e6];
+/// Seconds of one thread to load a model, and to search a million points for it: between empty and crowded halls.
+const LOAD: f64 = 1.0;
+const SEARCH: [f64; 2] = [0.2, 0.9];
+/// Memory of the program with an open library, and of each model and each point until the budget is full, bytes.
+const PROGRAM_BYTES: u64 = 160 << 20;
+const MODEL_BYTES: u64 = 24 << 20;
+const POINT_BYTES: u64 = 40;
+
+/// What a job will take.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Points of all inputs, as far as they say; else by their length.
+    pub n_points: u64,
+    /// Models that are tried.
+    pub n_models: usize,
+    /// Resident memory at most, bytes: never above `--memory`.
+    pub memory_bytes: u64,
+    /// Disk for the store, bytes, where it is not there already.
+    pub store_bytes: u64,
+    /// Disk for what is written, bytes. Old results stay until the new ones are whole.
+    pub output_bytes: u64,
+    /// Free where both go, bytes; 0 where the system does not tell.
+    pub free_bytes: u64,
+    /// Time, seconds: for empty halls, and for crowded ones.
+    pub seconds: [f64; 2],
+    /// Inputs whose tiles are there, of all.
+    pub kept_inputs: [usize; 2],
+    /// Whether nothing has changed, and nothing will be done.
+    pub unchanged: bool,
+}
+
+/// Estimates a job.
+///
+/// # Errors
+/// Inputs or a library that cannot be opened.
+pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
+    let settings = &job.means.settings;
+    // Where no run has been, nothing is there to be used again, and no input need be read to tell.
+    let earlier = job.out.join("store").is_dir().then(|| Earlier::look(job, engine)).transpose()?;
+    let unchanged = earlier.as_ref().is_some_and(|e| e.unchanged);
+    let n_models = library::count(&job.robots)?;
+    let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+    let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
+    let mut estimate = Estimate {
+        n_points: 0,
+        n_models,
+        memory_bytes: 0,
+        store_bytes: 0,
+        output_bytes: 0,
+        free_bytes: free(&job.out),
+        seconds: [0.0; 2],
+        kept_inputs: [0, sources.inputs.len()],
+        unchanged,
+    };
+    let threads = job.means.n_threads as f64;
+    for input in &sources.inputs {
+        let n = points(&sources, input);
+        estimate.n_points += n;
+        if earlier.as_ref().is_some_and(|e| e.has_tiles(input, &sources, settings)) {
+            estimate.kept_inputs[0] += 1;
+        } else {
+            estimate.store_bytes += n * STORE_BYTES;
+            let rate =
+                INGEST.iter().find(|(format, _)| *format == input.format).map_or(6e6, |r| r.1);
+            let seconds = n as f64 / rate + n as f64 / REST[0];
+            estimate.seconds = estimate.seconds.map(|s| s + seconds / threads);
+        }
+    }
+    let n = estimate.n_points;
+    let cloud = CLOUD_BYTES[usize::from(sources.has_color())];
+    estimate.output_bytes = n * (LABEL_BYTES + N_CLOUDS * cloud) + n_models as u64 * EXTRA_BYTES;
+    let need = PROGRAM_BYTES + n_models as u64 * MODEL_BYTES + n * POINT_BYTES;
+    estimate.memory_bytes = need.min(job.means.memory_bytes);
+    let passes: f64 = REST[1..].iter().map(|rate| n as f64 / rate).sum();
+    for (seconds, search) in estimate.seconds.iter_mut().zip(SEARCH) {
+        let work = n_models as f64 * (LOAD + search * n as f64 / 1e6) + passes;
+        *seconds += work / threads;
+    }
+    if unchanged {
+        (estimate.store_bytes, estimate.output_bytes, estimate.seconds) = (0, 0, [0.5; 2]);
+    }
+    Ok(estimate)
+}
+
+/// What an earlier run has left.
+struct Earlier {
+    room: Room,
+    sums: Sums,
+    unchanged: bool,
+}
+
+impl Earlier {
+    fn look(job: &Job, engine: &Engine) -> Result<Self> {
+        let room = job.room()?;
+        let sums = Sums::of(job, &room, engine)?;
+        let result = reuse::unchanged(room.out(), room.store(), &sums.whole(job))?;
+        Ok(Self { room, sums, unchanged: result.is_some() })
+    }
+
+    fn has_tiles(&self, input: &Input, sources: &Sources, settings: &Settings) -> bool {
+        let key = self.sums.tiles(input, &sources.scans, settings);
+        Store::open(&self.room.tiles().join(key.name()), 0, 1).is_ok()
+    }
+}
+
+impl Estimate {
+    /// Refuses what the disk cannot hold.
+    ///
+    /// # Errors
+    /// More is needed than is free.
+    pub fn checked(&self, out: &Path) -> Result<()> {
+        let need = self.store_bytes + self.output_bytes;
+        if self.free_bytes == 0 || need <= self.free_bytes {
+            return Ok(());
+        }
+        let (need, free) = (memory_words(need), memory_words(self.free_bytes));
+        let what = format!("the disk is too small: \"{need}\" are needed, \"{free}\" are free");
+        Err(Error::new(Kind::OverBudget, what)
+            .hint("free some, or give an --out on another disk")
+            .at(out.display()))
+    }
+}
+
+impl std::fmt::Display for Estimate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [kept, all] = self.kept_inputs;
+        if self.unchanged {
+            return write!(f, "nothing has changed: the result that is there is used again");
+        }
+        writeln!(f, "points    {:.1} M in {all} input(s)", self.n_points as f64 / 1e6)?;
+        writeln!(f, "models    {}", self.n_models)?;
+        writeln!(f, "memory    {} at most", memory_words(self.memory_bytes))?;
+        writeln!(
+            f,
+            "disk      {} to keep tiles, {} for results; {} free",
+            memory_words(self.store_bytes),
+            memory_words(self.output_bytes),
+            memory_words(self.free_bytes)
+        )?;
+        writeln!(f, "time      {:.0} to {:.0} s", self.seconds[0], self.seconds[1])?;
+        write!(f, "kept      tiles of {kept} of {all} input(s)")
+    }
+}
+
+/// Points of an input: what it states, else what its length allows.
+fn points(sources: &Sources, input: &Input) -> u64 {
+    let masks = sources.masks.iter().filter(|m| m.input == input.id);
+    let scans = sources.scans.iter().filter(|s| s.input == input.id);
+    let in_masks: Option<u64> = masks.map(|m| m.n_points).sum();
+    let in_scans: Option<u64> = scans.map(|s| s.stated_points).sum();
+    in_masks.or(in_scans).unwrap_or(input.n_bytes / TEXT_BYTES)
+}
+
+/// Bytes that are free where a folder lies, or will.
+fn free(folder: &Path) -> u64 {
+    let there = folder.ancestors().find(|path| path.is_dir()).unwrap_or(Path::new("."));
+    fs4::available_space(there).unwrap_or(0)
+}

@@ -1,0 +1,118 @@
+//! What a run is made from in, names for its pieces out: a piece whose name is there already need not be made again.
+//!
+//! A key is a digest of all that a piece depends on: contents of files, settings, the program itself. Places, times and the
+//! number of threads are no part of it. A piece is looked at before it is believed: a store has its catalogue, kept fits
+//! their checksum, outputs their length and time.
+
+mod contents;
+mod kept;
+mod manifest;
+
+pub(crate) use manifest::unchanged;
+pub use manifest::{Checked, Manifest, OutputFile, check};
+
+use crate::engine::Engine;
+use crate::job::{Job, Room, Settings};
+use contents::Contents;
+use contract::{Input, Result, Scan};
+use std::fmt::Debug;
+use std::path::Path;
+
+pub(crate) use kept::KeptFits;
+
+/// A digest of what a piece is made from, as 32 hexadecimal digits: the name of its file.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Key(String);
+
+impl Key {
+    /// Of a kind of piece and all that it depends on, part by part.
+    fn of(kind: &str, parts: &[&str]) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        for part in [kind, env!("STILLPOINT_CODE")].iter().chain(parts) {
+            // The length before each part: no two lists of parts run into the same bytes.
+            hasher.update(&(part.len() as u64).to_le_bytes());
+            hasher.update(part.as_bytes());
+        }
+        Self(hasher.finalize().to_hex()[..32].into())
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.0
+    }
+}
+
+/// Digests of all that a run reads.
+pub(crate) struct Sums {
+    inputs: Vec<String>,
+    library: String,
+    others: String,
+}
+
+impl Sums {
+    /// Reads every file of the job once, except those that are known and unchanged since.
+    pub(crate) fn of(job: &Job, room: &Room, engine: &Engine) -> Result<Self> {
+        let contents = Contents::open(room.store());
+        let digest = |path: &std::path::PathBuf| contents.digest(path);
+        let inputs = engine.fan_out("digest", job.inputs.iter().collect(), digest)?;
+        let library = contents.folder(&job.robots)?;
+        let others = job.scanners.iter().chain(&job.review);
+        let others: Vec<String> = others.map(|p| contents.digest(p)).collect::<Result<_>>()?;
+        contents.keep()?;
+        Ok(Self { inputs, library, others: others.join(" ") })
+    }
+
+    /// Digest of an input's bytes.
+    pub(crate) fn input(&self, input: &Input) -> &str {
+        &self.inputs[input.id.0 as usize]
+    }
+
+    /// The tiles of one input.
+    pub(crate) fn tiles(&self, input: &Input, scans: &[Scan], settings: &Settings) -> Key {
+        let own = scans.iter().filter(|s| s.input == input.id);
+        let own = own.map(|s| words(&(s.source_id, s.world_from_scan, s.lattice)));
+        let own: Vec<String> = own.collect();
+        Key::of("tiles", &[self.input(input), &own.join("\n"), &words(&settings.ingest)])
+    }
+
+    /// Fits of the regions of a plant whose tiles have these names.
+    pub(crate) fn fits(&self, tiles: &[Key], settings: &Settings) -> Key {
+        let s = settings;
+        let ground = words(&(&s.lattice, &s.floor, &s.cluster, &s.region));
+        let search = words(&(&s.view, &s.identify, &s.fit, &s.paper, &s.robot));
+        Key::of("fits", &[&words(&tiles), &self.library, &ground, &search])
+    }
+
+    /// All that a job writes. Names of files are part of it: results name their inputs.
+    pub(crate) fn whole(&self, job: &Job) -> Key {
+        let names: Vec<_> = job.inputs.iter().map(|p| p.display().to_string()).collect();
+        let inputs = (&names, &self.inputs);
+        Key::of("run", &[&words(&inputs), &self.library, &self.others, &words(&job.means.settings)])
+    }
+}
+
+/// Values as they print: floats print so that they read back the same.
+fn words(value: &impl Debug) -> String {
+    format!("{value:?}")
+}
+
+/// What was kept of what was asked for, in words; nothing of what was all new.
+pub(crate) fn said(pieces: &[(&str, [usize; 2])]) -> Vec<String> {
+    let kept = pieces.iter().filter(|(_, [kept, _])| *kept > 0);
+    kept.map(|(name, [kept, all])| format!("{name}: {kept} of {all}")).collect()
+}
+
+/// Removes what lies in a folder of pieces and is none of `used`.
+pub(crate) fn prune(folder: &Path, used: &[String]) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        if !used.iter().any(|u| name.to_str().is_some_and(|n| n.starts_with(u.as_str()))) {
+            let path = entry.path();
+            // Only space is lost where it stays.
+            let _ = if path.is_dir() {
+                std::fs::remove_dir_all(&path)
+            } else {
+                std::fs::remove_file(&path)
+            };
+        }
+    }
+}
