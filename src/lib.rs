@@ -4,6 +4,7 @@
 pub mod atomic;
 pub mod bench;
 pub mod calibrate;
+pub mod changes;
 pub mod cli;
 pub mod compare;
 pub mod demo;

@@ -65,7 +65,10 @@ impl Report<'_> {
         let poses = model.poses(&posture);
         let tip = tip(model).map(|l| (names[l].clone(), fit.world_from_base * poses[l]));
         let space = self.written.spaces[index].clone();
-        RobotEntry { space, ..RobotEntry::new(index, fit, &names, tip) }
+        let slides = model.free.iter().map(|&j| &model.joints[j]);
+        let slides = slides.filter(|j| j.kind == robot::JointKind::Prismatic);
+        let slides = slides.map(|j| j.name.clone()).collect();
+        RobotEntry { space, slides, ..RobotEntry::new(index, fit, &names, tip) }
     }
 
     fn input(&self, input: &Input, digest: String) -> InputEntry {

@@ -33,6 +33,8 @@ pub(super) enum Command {
     Verify(OutFlags),
     /// What a run came to, once more; robots as cases for a build server with --junit
     Report(ReportFlags),
+    /// Which robots differ between two results of one plant: moved, exchanged, appeared, gone
+    Diff(DiffFlags),
     /// Virtual scanner: a scene file in, scans and their truth out
     Simulate(SimulateFlags),
     /// How exact, how fast
@@ -171,6 +173,19 @@ pub(super) struct OutFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DiffFlags {
+    /// Output folder of the earlier run
+    #[arg(value_name = "THEN")]
+    pub(super) then: PathBuf,
+    /// Output folder of the later run
+    #[arg(value_name = "NOW")]
+    pub(super) now: PathBuf,
+    /// Answer in JSON
+    #[arg(long)]
+    pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -36,6 +36,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Plan(flags) => run::plan(flags, &line.common, &say),
         Command::Verify(flags) => results::verify(flags, &line.common, &say),
         Command::Report(flags) => results::report(flags, &say),
+        Command::Diff(flags) => results::diff(flags, &say),
         Command::Bench(BenchCommand::Accuracy(flags)) => {
             bench::bench_accuracy(flags, &line.common, &say)
         }

@@ -1,11 +1,13 @@
-//! `verify` and `report`: the output folder of a run in; whether it is whole, and what is in it, out.
+//! `verify`, `report` and `diff`: output folders of runs in; whether they are whole, what is in them, and how they differ,
+//! out.
 
-use super::flags::{Common, OutFlags, ReportFlags};
+use super::flags::{Common, DiffFlags, OutFlags, ReportFlags};
 use super::say::Say;
+use crate::changes::{changes, words};
 use crate::exit;
 use crate::job::Outcome;
 use crate::reuse::{Manifest, check};
-use contract::{Error, Result};
+use contract::{Error, Kind, Result};
 use export::ResultFile;
 
 pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8> {
@@ -35,4 +37,19 @@ pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
     let Manifest { summary, warnings, partial, .. } = manifest;
     say.outcome(&Outcome { summary, warnings, partial, reused: Vec::new() });
     Ok(if partial { exit::PARTIAL } else { exit::OK })
+}
+
+pub(super) fn diff(flags: &DiffFlags, say: &Say) -> Result<u8> {
+    let (then, now) = (ResultFile::read(&flags.then)?, ResultFile::read(&flags.now)?);
+    let changes = changes(&then, &now);
+    if flags.json {
+        let all = serde_json::json!({"schema": "stillpoint.diff/1", "robots": changes});
+        let text = serde_json::to_string_pretty(&all).map_err(|e| {
+            Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e)
+        })?;
+        say.result(&text);
+    } else {
+        say.result(&words(&changes));
+    }
+    Ok(exit::OK)
 }

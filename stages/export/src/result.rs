@@ -48,6 +48,9 @@ pub struct RobotEntry {
     pub base_sigma: BaseSigma,
     /// Value of each joint, radians or metres, in the order of the model.
     pub joints: Places<f64>,
+    /// Joints whose values are metres; those of the others are radians.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub slides: Vec<String>,
     /// Standard deviation of each joint, same unit; that of any angle, π/√3, where the points say nothing of it.
     pub sigma: Places<f64>,
     /// Whether the points determine each joint.
@@ -316,6 +319,7 @@ impl RobotEntry {
             scans: fit.scans.iter().map(ShiftEntry::from).collect(),
             stands_in: fit.stands_in.iter().map(|s| s.0).collect(),
             space: None,
+            slides: Vec::new(),
             stays: fit
                 .stays
                 .iter()

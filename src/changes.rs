@@ -1,0 +1,286 @@
+//! Two results of one plant in; which robots stand otherwise, came, went or were exchanged, out.
+//!
+//! A change within what both results know of a value is none: a joint has moved where its values differ by more than
+//! five of their standard deviations together, and by more than models and registration make. Joints that the points of
+//! either session leave open are not compared, and named.
+
+use export::{ResultFile, RobotEntry};
+use serde::Serialize;
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+
+/// Robots nearer than this are one place, metres: no two feet stand so near.
+const SAME_PLACE: f64 = 0.5;
+/// Standard deviations of a difference from which on it is one: of a plant's hundreds of joints none by chance.
+const SURE: f64 = 5.0;
+/// Least differences that count: a joint, radians (0.1°) or metres; the place of a base, metres, since two sessions are
+/// registered to within millimetres; its direction, radians (0.15°).
+const LEAST_JOINT: f64 = 0.001_75;
+const LEAST_SHIFT: f64 = 0.010;
+const LEAST_TURN: f64 = 0.002_6;
+
+/// What became of one robot.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Change {
+    /// Stands as it stood, as far as both results tell.
+    Same,
+    /// Joints or base differ.
+    Moved,
+    /// Another model stands in its place.
+    Exchanged {
+        /// Model before.
+        was: String,
+    },
+    /// Only in the second result.
+    Appeared,
+    /// Only in the first result.
+    Gone,
+}
+
+/// A joint then and now.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointChange {
+    /// As in the URDF.
+    pub joint: String,
+    /// Value and standard deviation then, radians or metres.
+    pub then: [f64; 2],
+    /// Value and standard deviation now.
+    pub now: [f64; 2],
+    /// Now less then; whole turns taken off.
+    pub change: f64,
+    /// Whether it is one, beyond what both know.
+    pub is_change: bool,
+}
+
+/// One robot of either result.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RobotChange {
+    /// Its id in the first result.
+    pub then: Option<String>,
+    /// Its id in the second.
+    pub now: Option<String>,
+    /// Model now, or then if it is gone.
+    pub model: String,
+    /// What became of it.
+    pub change: Change,
+    /// Shift of its base, metres, world axes.
+    pub base_shift: Option<[f64; 3]>,
+    /// Turn of its base, radians.
+    pub base_turn: Option<f64>,
+    /// Joints that both results determine.
+    pub joints: Vec<JointChange>,
+    /// Joints that one of them leaves open.
+    pub not_compared: Vec<String>,
+    /// Verdicts then and now.
+    pub verdicts: [Option<String>; 2],
+}
+
+/// Compares two results: robots of the first in its order, then those that appeared.
+#[must_use]
+pub fn changes(then: &ResultFile, now: &ResultFile) -> Vec<RobotChange> {
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+    for (i, a) in then.robots.iter().enumerate() {
+        for (j, b) in now.robots.iter().enumerate() {
+            let apart = length(shift(a, b));
+            if apart < SAME_PLACE {
+                pairs.push((apart, i, j));
+            }
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut partner = vec![None; then.robots.len()];
+    let mut taken = vec![false; now.robots.len()];
+    for (_, i, j) in pairs {
+        if partner[i].is_none() && !taken[j] {
+            (partner[i], taken[j]) = (Some(j), true);
+        }
+    }
+    let known = then.robots.iter().zip(partner).map(|(a, j)| match j {
+        Some(j) => compared(a, &now.robots[j]),
+        None => alone(a, Change::Gone),
+    });
+    let new = now.robots.iter().zip(&taken).filter(|(_, taken)| !**taken);
+    known.chain(new.map(|(b, _)| alone(b, Change::Appeared))).collect()
+}
+
+fn alone(robot: &RobotEntry, change: Change) -> RobotChange {
+    let (id, verdict) = (Some(robot.id.clone()), Some(robot.verdict.clone()));
+    let is_gone = change == Change::Gone;
+    RobotChange {
+        then: id.clone().filter(|_| is_gone),
+        now: id.filter(|_| !is_gone),
+        model: robot.model.clone(),
+        change,
+        base_shift: None,
+        base_turn: None,
+        joints: Vec::new(),
+        not_compared: Vec::new(),
+        verdicts: if is_gone { [verdict, None] } else { [None, verdict] },
+    }
+}
+
+fn compared(a: &RobotEntry, b: &RobotEntry) -> RobotChange {
+    let (base_shift, base_turn) = (shift(a, b), turn(a, b));
+    let mut out = RobotChange {
+        then: Some(a.id.clone()),
+        now: Some(b.id.clone()),
+        model: b.model.clone(),
+        change: Change::Same,
+        base_shift: Some(base_shift),
+        base_turn: Some(base_turn),
+        joints: Vec::new(),
+        not_compared: Vec::new(),
+        verdicts: [Some(a.verdict.clone()), Some(b.verdict.clone())],
+    };
+    let may_be = |x: &RobotEntry, y: &RobotEntry| x.model == y.model || x.alike.contains(&y.model);
+    if !may_be(a, b) && !may_be(b, a) {
+        out.change = Change::Exchanged { was: a.model.clone() };
+        return out;
+    }
+    for (name, _) in &b.joints.0 {
+        let Some(then) = known(a, name) else {
+            out.not_compared.push(name.clone());
+            continue;
+        };
+        match known(b, name) {
+            Some(now) => out.joints.push(joint(name, then, now, b.slides.contains(name))),
+            None => out.not_compared.push(name.clone()),
+        }
+    }
+    let wide =
+        |sigmas: [Option<f64>; 3]| sigmas.iter().map(|s| s.unwrap_or(0.0).powi(2)).sum::<f64>();
+    let by_shift = SURE * (wide(a.base_sigma.xyz) + wide(b.base_sigma.xyz)).sqrt();
+    let by_turn = SURE * (wide(a.base_sigma.rotation) + wide(b.base_sigma.rotation)).sqrt();
+    let base_moved =
+        length(base_shift) > by_shift.max(LEAST_SHIFT) || base_turn > by_turn.max(LEAST_TURN);
+    if base_moved || out.joints.iter().any(|j| j.is_change) {
+        out.change = Change::Moved;
+    }
+    out
+}
+
+/// Value and standard deviation of a joint that a result determines.
+fn known(robot: &RobotEntry, name: &str) -> Option<[f64; 2]> {
+    let of = |places: &[(String, f64)]| places.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+    let determined = robot.determined.0.iter().find(|(n, _)| n == name).is_none_or(|(_, d)| *d);
+    of(&robot.joints.0).zip(of(&robot.sigma.0)).filter(|_| determined).map(|(v, s)| [v, s])
+}
+
+fn joint(name: &str, then: [f64; 2], now: [f64; 2], slides: bool) -> JointChange {
+    let mut change = now[0] - then[0];
+    if !slides {
+        change -= (change / TAU).round() * TAU;
+    }
+    let is_change = change.abs() > (SURE * then[1].hypot(now[1])).max(LEAST_JOINT);
+    JointChange { joint: name.into(), then, now, change, is_change }
+}
+
+fn shift(a: &RobotEntry, b: &RobotEntry) -> [f64; 3] {
+    std::array::from_fn(|i| b.base_pose.xyz[i] - a.base_pose.xyz[i])
+}
+
+/// Angle between two bases, radians.
+fn turn(a: &RobotEntry, b: &RobotEntry) -> f64 {
+    let (p, q) = (a.base_pose.quat_wxyz, b.base_pose.quat_wxyz);
+    let dot: f64 = p.iter().zip(q).map(|(x, y)| x * y).sum();
+    2.0 * dot.abs().min(1.0).acos()
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// The changes in words, a robot a paragraph; those that stand as they stood in a line each.
+#[must_use]
+pub fn words(changes: &[RobotChange]) -> String {
+    let mut text = String::new();
+    for robot in changes {
+        let id = |id: &Option<String>| id.clone().unwrap_or_else(|| "-".into());
+        let what = match &robot.change {
+            Change::Same => "stands as it stood".into(),
+            Change::Moved => "moved".into(),
+            Change::Exchanged { was } => format!("stands where {was} stood"),
+            Change::Appeared => "appeared".into(),
+            Change::Gone => "is gone".into(),
+        };
+        let (then, now) = (id(&robot.then), id(&robot.now));
+        let _ = writeln!(text, "{then} -> {now} {}: {what}", robot.model);
+        if robot.change == Change::Moved {
+            let [x, y, z] = robot.base_shift.unwrap_or_default().map(|v| v * 1e3);
+            let turn = robot.base_turn.unwrap_or_default().to_degrees();
+            let _ = writeln!(
+                text,
+                "     base shifted by ({x:.1}, {y:.1}, {z:.1}) mm, turned {turn:.2}°"
+            );
+            for j in robot.joints.iter().filter(|j| j.is_change) {
+                let _ = writeln!(
+                    text,
+                    "     {:<24} {:.5} ± {:.5} -> {:.5} ± {:.5} rad or m",
+                    j.joint, j.then[0], j.then[1], j.now[0], j.now[1]
+                );
+            }
+        }
+        if !robot.not_compared.is_empty() {
+            let _ = writeln!(text, "     not compared: {}", robot.not_compared.join(", "));
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn robot(id: &str, model: &str, x: f64, joint: f64) -> RobotEntry {
+        serde_json::from_value(serde_json::json!({
+            "id": id, "model": model, "base_link": "base",
+            "base_pose": {"xyz": [x, 0.0, 0.0], "quat_wxyz": [1.0, 0.0, 0.0, 0.0]},
+            "base_sigma": {"xyz": [1e-4, 1e-4, 1e-4], "rotation": [1e-4, 1e-4, 1e-4]},
+            "joints": {"a": joint, "flange": 0.3}, "sigma": {"a": 0.001, "flange": 1.8},
+            "determined": {"a": true, "flange": false},
+            "links": ["base"], "verdict": "trusted", "score": 0.9
+        }))
+        .expect("an entry")
+    }
+
+    fn result(robots: Vec<RobotEntry>) -> ResultFile {
+        serde_json::from_value(serde_json::json!({
+            "schema": export::SCHEMA, "version": "0", "robots": robots,
+            "labels": {"table": "t", "scans": []}, "inputs": [], "stages": [], "warnings": []
+        }))
+        .expect("a result")
+    }
+
+    #[test]
+    fn what_lies_within_sigma_is_no_change() {
+        let then = result(vec![
+            robot("R1", "m", 0.0, 0.5),
+            robot("R2", "m", 3.0, 0.5),
+            robot("R3", "m", 6.0, 0.5),
+            robot("R4", "m", 9.0, 0.5),
+        ]);
+        let now = result(vec![
+            robot("R1", "m", 0.002, 0.504 + TAU),
+            robot("R2", "m", 3.0, 0.6),
+            robot("R3", "other", 6.0, 0.5),
+            robot("R4", "m", 12.0, 0.5),
+        ]);
+        let found = changes(&then, &now);
+        let kinds: Vec<_> = found.iter().map(|r| r.change.clone()).collect();
+        let was = Change::Exchanged { was: "m".into() };
+        assert_eq!(kinds, [Change::Same, Change::Moved, was, Change::Gone, Change::Appeared]);
+        assert_eq!(found[0].not_compared, ["flange"]);
+        assert!((found[1].joints[0].change - 0.1).abs() < 1e-12);
+        assert_eq!((found[3].then.as_deref(), found[4].now.as_deref()), (Some("R4"), Some("R4")));
+        assert!(words(&found).contains("R2 -> R2 m: moved"), "{}", words(&found));
+        assert!(changes(&then, &then).iter().all(|r| r.change == Change::Same));
+    }
+
+    #[test]
+    fn a_base_beyond_registration_has_moved() {
+        let then = result(vec![robot("R1", "m", 0.0, 0.5)]);
+        let now = result(vec![robot("R1", "m", 0.05, 0.5)]);
+        assert_eq!(changes(&then, &now)[0].change, Change::Moved);
+    }
+}
