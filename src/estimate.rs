@@ -4,7 +4,6 @@ use crate::engine::Engine;
 use crate::job::{Job, Room, Settings, memory_words};
 use crate::library;
 use crate::reuse::{self, Sums};
-use crate::store::Store;
 use contract::{Error, Format, Input, Kind, Result};
 use ingest::{Scanners, Sources};
 use serde::Serialize;
@@ -21,7 +20,7 @@ const CLOUD_BYTES: [u64; 2] = [34, 40];
 /// Bytes of a point in a text file, about.
 const TEXT_BYTES: u64 = 45;
 /// Pictures, models, voxels and lists, bytes for each model of the library: more robots stand in large plants.
-const EXTRA_BYTES: u64 = 64 << 20;
+const EXTRA_BYTES: u64 = 32 << 20;
 /// Points that one thread gets through in a second: ingest of E57, LAS, LAZ, PTX; tiles, planes, labels and writing.
 const INGEST: [(Format, f64); 4] =
     [(Format::E57, 20e6), (Format::Las, 12e6), (Format::Laz, 4e6), (Format::Ptx, 6e6)];
@@ -69,45 +68,13 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
     let n_models = library::count(&job.robots)?;
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
-    let mut estimate = Estimate {
-        n_points: 0,
-        n_models,
-        memory_bytes: 0,
-        store_bytes: 0,
-        output_bytes: 0,
-        free_bytes: free(&job.out),
-        seconds: [0.0; 2],
-        kept_inputs: [0, sources.inputs.len()],
-        unchanged,
-    };
-    let threads = job.means.n_threads as f64;
-    for input in &sources.inputs {
-        let n = points(&sources, input);
-        estimate.n_points += n;
-        if earlier.as_ref().is_some_and(|e| e.has_tiles(input, &sources, settings)) {
-            estimate.kept_inputs[0] += 1;
-        } else {
-            estimate.store_bytes += n * STORE_BYTES;
-            let rate =
-                INGEST.iter().find(|(format, _)| *format == input.format).map_or(6e6, |r| r.1);
-            let seconds = n as f64 / rate + n as f64 / REST[0];
-            estimate.seconds = estimate.seconds.map(|s| s + seconds / threads);
-        }
-    }
-    let n = estimate.n_points;
-    let cloud = CLOUD_BYTES[usize::from(sources.has_color())];
-    estimate.output_bytes = n * (LABEL_BYTES + N_CLOUDS * cloud) + n_models as u64 * EXTRA_BYTES;
-    let need = PROGRAM_BYTES + n_models as u64 * MODEL_BYTES + n * POINT_BYTES;
-    estimate.memory_bytes = need.min(job.means.memory_bytes);
-    let passes: f64 = REST[1..].iter().map(|rate| n as f64 / rate).sum();
-    for (seconds, search) in estimate.seconds.iter_mut().zip(SEARCH) {
-        let work = n_models as f64 * (LOAD + search * n as f64 / 1e6) + passes;
-        *seconds += work / threads;
-    }
+    let has_tiles =
+        |i: &Input| earlier.as_ref().is_some_and(|e| e.has_tiles(i, &sources, settings));
+    let mut estimate = Estimate::of(job, &sources, n_models, has_tiles);
     if unchanged {
         (estimate.store_bytes, estimate.output_bytes, estimate.seconds) = (0, 0, [0.5; 2]);
     }
-    Ok(estimate)
+    Ok(Estimate { unchanged, ..estimate })
 }
 
 /// What an earlier run has left.
@@ -127,17 +94,59 @@ impl Earlier {
 
     fn has_tiles(&self, input: &Input, sources: &Sources, settings: &Settings) -> bool {
         let key = self.sums.tiles(input, &sources.scans, settings);
-        Store::open(&self.room.tiles().join(key.name()), 0, 1).is_ok()
+        self.room.has_tiles(&key)
     }
 }
 
 impl Estimate {
+    /// Of opened inputs; `has_tiles` says whose tiles are there.
+    pub(crate) fn of(
+        job: &Job,
+        sources: &Sources,
+        n_models: usize,
+        has_tiles: impl Fn(&Input) -> bool,
+    ) -> Self {
+        let threads = job.means.n_threads as f64;
+        let (mut n, mut n_new, mut n_kept, mut seconds) = (0_u64, 0_u64, 0, 0.0);
+        // What a file states may be a lie of any size.
+        for input in &sources.inputs {
+            let own = points(sources, input);
+            n = n.saturating_add(own);
+            if has_tiles(input) {
+                n_kept += 1;
+                continue;
+            }
+            n_new = n_new.saturating_add(own);
+            let rate =
+                INGEST.iter().find(|(format, _)| *format == input.format).map_or(6e6, |r| r.1);
+            seconds += own as f64 / rate + own as f64 / REST[0];
+        }
+        seconds += REST[1..].iter().map(|rate| n as f64 / rate).sum::<f64>();
+        let models = n_models as u64;
+        let cloud = CLOUD_BYTES[usize::from(sources.has_color())];
+        let labelled = n.saturating_mul(LABEL_BYTES + N_CLOUDS * cloud);
+        let memory = n.saturating_mul(POINT_BYTES).saturating_add(PROGRAM_BYTES);
+        Self {
+            n_points: n,
+            n_models,
+            memory_bytes: memory.saturating_add(models * MODEL_BYTES).min(job.means.memory_bytes),
+            store_bytes: n_new.saturating_mul(STORE_BYTES),
+            output_bytes: labelled.saturating_add(models * EXTRA_BYTES),
+            free_bytes: free(&job.out),
+            seconds: SEARCH.map(|search| {
+                (seconds + n_models as f64 * (LOAD + search * n as f64 / 1e6)) / threads
+            }),
+            kept_inputs: [n_kept, sources.inputs.len()],
+            unchanged: false,
+        }
+    }
+
     /// Refuses what the disk cannot hold.
     ///
     /// # Errors
     /// More is needed than is free.
     pub fn checked(&self, out: &Path) -> Result<()> {
-        let need = self.store_bytes + self.output_bytes;
+        let need = self.store_bytes.saturating_add(self.output_bytes);
         if self.free_bytes == 0 || need <= self.free_bytes {
             return Ok(());
         }

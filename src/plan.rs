@@ -3,6 +3,7 @@
 
 use crate::calibrate::calibrate;
 use crate::engine::Engine;
+use crate::estimate::Estimate;
 use crate::filling::Filling;
 use crate::job::{Job, Outcome};
 use crate::labelling::Labelling;
@@ -15,7 +16,7 @@ use crate::spaces;
 use crate::store::Store;
 use crate::surfaces::{Gather, Surfaces};
 use crate::tools;
-use contract::Result;
+use contract::{Input, Result};
 use ingest::Scanners;
 use std::path::PathBuf;
 
@@ -34,6 +35,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
     let scans = &sources.scans;
+    let has_tiles = |input: &Input| room.has_tiles(&sums.tiles(input, scans, settings));
+    Estimate::of(job, &sources, library.models.len(), has_tiles).checked(room.out())?;
 
     // First pass: every point once, from the files into the lattice tiles of the store; inputs whose tiles are there are
     // not read.

@@ -1,6 +1,7 @@
 //! The output folder of a run: where results go, where they lie until all are whole, and where the store is kept.
 
 use crate::reuse::{KeptFits, Key, Manifest};
+use crate::store::Store;
 use contract::{Error, Kind, Result};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -60,6 +61,11 @@ impl Room {
     #[must_use]
     pub fn tiles(&self) -> PathBuf {
         self.store.join("tiles")
+    }
+
+    /// Whether the tiles of this name are there and whole.
+    pub(crate) fn has_tiles(&self, key: &Key) -> bool {
+        Store::open(&self.tiles().join(key.name()), 0, 1).is_ok()
     }
 
     /// Where fits of regions lie.

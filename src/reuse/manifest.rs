@@ -127,6 +127,8 @@ impl Manifest {
         }
         shift(&next.join(RESULT), &out.join(RESULT))?;
         shift(&next.join(LIST), &out.join(LIST))?;
+        // Empty folders; where they stay the next run takes them away.
+        let _ = std::fs::remove_dir_all(next);
         Ok(manifest)
     }
 
