@@ -5,6 +5,7 @@ use crate::job::{Outcome, Room};
 use crate::labelling::Done;
 use crate::progress::Amount;
 use crate::reuse::Sums;
+use crate::spaces::poses;
 use crate::store::Store;
 use contract::{Cluster, Fit, Format, Input, InputId, Result, Verdict};
 use export::{
@@ -61,9 +62,8 @@ impl Report<'_> {
     fn robot(&self, index: usize, fit: &Fit) -> RobotEntry {
         let model = &self.models[fit.model];
         let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
-        let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
-        let poses = model.poses(&posture);
-        let tip = tip(model).map(|l| (names[l].clone(), fit.world_from_base * poses[l]));
+        let poses = poses(fit, model);
+        let tip = tip(model).map(|l| (names[l].clone(), poses[l]));
         let space = self.written.spaces[index].clone();
         let slides = model.free.iter().map(|&j| &model.joints[j]);
         let slides = slides.filter(|j| j.kind == robot::JointKind::Prismatic);

@@ -60,9 +60,7 @@ impl Contents {
         if let Some(digest) = known(&self.lock()) {
             return Ok(digest);
         }
-        let mut hasher = blake3::Hasher::new();
-        hasher.update_reader(File::open(path).map_err(failed)?).map_err(failed)?;
-        let digest = format!("blake3:{}", hasher.finalize().to_hex());
+        let digest = digest_of(path)?;
         let after = std::fs::metadata(path).map_err(failed)?;
         let seen = Seen::of(&before, digest.clone());
         let is_settled = after
@@ -104,8 +102,16 @@ impl Seen {
     }
 }
 
+/// Digest of a file's bytes, all of them read.
+pub(super) fn digest_of(path: &Path) -> Result<String> {
+    let failed = |e: std::io::Error| Error::from(e).at(path.display());
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(path).map_err(failed)?).map_err(failed)?;
+    Ok(format!("blake3:{}", hasher.finalize().to_hex()))
+}
+
 /// Time of the last change, nanoseconds since 1970; zero where the system does not tell.
-pub(super) fn changed(meta: &Metadata) -> u128 {
+fn changed(meta: &Metadata) -> u128 {
     let since = meta.modified().ok().and_then(|at| at.duration_since(SystemTime::UNIX_EPOCH).ok());
     since.map_or(0, |since| since.as_nanos())
 }

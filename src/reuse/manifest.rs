@@ -3,7 +3,7 @@
 //! Outputs are written beside the old ones and take their places together: the list is the last to be written there and
 //! the last to move, so that a run that is cut short while they move is finished by the next one.
 
-use super::contents::{Contents, walk};
+use super::contents::{Contents, digest_of, walk};
 use crate::atomic;
 use crate::engine::Engine;
 use crate::job::Outcome;
@@ -191,15 +191,11 @@ pub(crate) fn unchanged(out: &Path, store: &Path, key: &super::Key) -> Result<Op
 
 fn output(root: &Path, path: &Path) -> Result<OutputFile> {
     let failed = |e: std::io::Error| Error::from(e).at(path.display());
-    let mut hasher = blake3::Hasher::new();
-    let file = std::fs::File::open(path).map_err(failed)?;
-    let n_bytes = file.metadata().map_err(failed)?.len();
-    hasher.update_reader(file).map_err(failed)?;
+    let n_bytes = std::fs::metadata(path).map_err(failed)?.len();
     let parts: Vec<_> = path.strip_prefix(root).unwrap_or(path).components().collect();
     let parts: Vec<String> =
         parts.iter().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
-    let digest = format!("blake3:{}", hasher.finalize().to_hex());
-    Ok(OutputFile { path: parts.join("/"), n_bytes, digest })
+    Ok(OutputFile { path: parts.join("/"), n_bytes, digest: digest_of(path)? })
 }
 
 /// Moves a file unless it has moved already.

@@ -32,6 +32,22 @@ impl Probe {
         if self.n == 0 { 0.0 } else { self.score / self.n as f32 }
     }
 
+    /// Counts one sample: how far it is seen through and how well a beam ends on it, 0..1 each; through outweighs on.
+    #[inline]
+    pub fn count(&mut self, through: f32, on: f32) {
+        if through > 0.0 {
+            self.score -= SEEN_THROUGH_PRICE * through;
+            self.n_seen += 1;
+            self.n_through += u32::from(through >= 1.0);
+        } else if on > 0.0 {
+            self.score += on;
+            self.n_seen += 1;
+            self.n_on += 1;
+        } else {
+            self.score -= HIDDEN_PRICE;
+        }
+    }
+
     /// Adds the counts of `other`.
     pub fn join(&mut self, other: &Self) {
         self.score += other.score;
@@ -94,7 +110,7 @@ fn after(a: &Rows, b: &Rows) -> Rows {
 }
 
 /// Price of a sample seen through, against one on the surface (fit.md §4d).
-pub const SEEN_THROUGH_PRICE: f32 = 1.5;
+const SEEN_THROUGH_PRICE: f32 = 1.5;
 /// Price of a sample that no scan could judge: small, so that hiding is not rewarded (fit.md §4d).
 pub const HIDDEN_PRICE: f32 = 0.1;
 
@@ -145,17 +161,7 @@ pub fn probe(
                 on = on.max(1.0 - off / tolerance);
             }
         }
-        if through > 0.0 {
-            out.score -= SEEN_THROUGH_PRICE * through;
-            out.n_seen += 1;
-            out.n_through += u32::from(through >= 1.0);
-        } else if on > 0.0 {
-            out.score += on;
-            out.n_seen += 1;
-            out.n_on += 1;
-        } else {
-            out.score -= HIDDEN_PRICE;
-        }
+        out.count(through, on);
     }
     out
 }

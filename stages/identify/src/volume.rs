@@ -3,7 +3,7 @@
 
 use contract::{Fan, Region, View};
 use geometry::depth::{rows, transform};
-use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT, SEEN_THROUGH_PRICE};
+use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
 use geometry::{Evidence, Pose, Probe};
 
 /// Edge of a cell, metres: half of the finest tolerance that is asked of it.
@@ -137,17 +137,7 @@ impl Volume {
             } else {
                 1.0 - f32::from(cell.off) * UNIT / tolerance
             };
-            if through > 0.0 {
-                out.score -= SEEN_THROUGH_PRICE * through;
-                out.n_seen += 1;
-                out.n_through += u32::from(through >= 1.0);
-            } else if on > 0.0 {
-                out.score += on;
-                out.n_seen += 1;
-                out.n_on += 1;
-            } else {
-                out.score -= HIDDEN_PRICE;
-            }
+            out.count(through, on);
         }
         out
     }
