@@ -31,6 +31,12 @@ impl AtomicFile {
         })
     }
 
+    /// The file once more, for reading what was written so far.
+    pub(crate) fn again(&mut self) -> std::io::Result<File> {
+        self.file.flush()?;
+        self.file.get_ref().reopen()
+    }
+
     /// Writes what is left, waits for the disk, gives the file its name.
     pub fn commit(self) -> Result<()> {
         let path = self.path;

@@ -3,7 +3,7 @@
 use crate::engine::Engine;
 use crate::job::{Job, Room, Settings, memory_words};
 use crate::library;
-use crate::reuse::{self, Sums};
+use crate::reuse::Sums;
 use contract::{Error, Format, Input, Kind, Result};
 use ingest::{Scanners, Sources};
 use serde::Serialize;
@@ -13,8 +13,8 @@ use std::path::Path;
 const STORE_BYTES: u64 = 18;
 /// Bytes of a point's labels: kind, robot, link.
 const LABEL_BYTES: u64 = 5;
-/// Clouds are written twice: as spatial tiles, and what moves apart from what stands still.
-const N_CLOUDS: u64 = 2;
+/// Share of their length that compressed clouds keep.
+const COMPRESSED: f64 = 0.35;
 /// Bytes of a point in a cloud, without and with colour.
 const CLOUD_BYTES: [u64; 2] = [34, 40];
 /// Bytes of a point in a text file, about.
@@ -23,8 +23,8 @@ const TEXT_BYTES: u64 = 45;
 const EXTRA_BYTES: u64 = 32 << 20;
 /// Points that one thread gets through in a second: ingest of E57, LAS, LAZ, PTX; tiles, planes, labels and writing.
 const INGEST: [(Format, f64); 4] =
-    [(Format::E57, 20e6), (Format::Las, 12e6), (Format::Laz, 4e6), (Format::Ptx, 6e6)];
-const REST: [f64; 4] = [18e6, 2.5e6, 8e6, 2.6e6];
+    [(Format::E57, 20e6), (Format::Las, 18e6), (Format::Laz, 2.8e6), (Format::Ptx, 6e6)];
+const REST: [f64; 4] = [30e6, 8e6, 60e6, 9e6];
 /// Seconds of one thread to load a model, and to search a million points for it: between empty and crowded halls.
 const LOAD: f64 = 1.0;
 const SEARCH: [f64; 2] = [0.2, 0.9];
@@ -88,13 +88,13 @@ impl Earlier {
     fn look(job: &Job, engine: &Engine) -> Result<Self> {
         let room = job.room()?;
         let sums = Sums::of(job, &room, engine)?;
-        let result = reuse::unchanged(room.out(), room.store(), &sums.whole(job))?;
+        let result = sums.unchanged(job, &room)?;
         Ok(Self { room, sums, unchanged: result.is_some() })
     }
 
     fn has_tiles(&self, input: &Input, sources: &Sources, settings: &Settings) -> bool {
         let key = self.sums.tiles(input, &sources.scans, settings);
-        self.room.has_tiles(&key)
+        key.is_some_and(|key| self.room.has_tiles(&key))
     }
 }
 
@@ -124,7 +124,12 @@ impl Estimate {
         seconds += REST[1..].iter().map(|rate| n as f64 / rate).sum::<f64>();
         let models = n_models as u64;
         let cloud = CLOUD_BYTES[usize::from(sources.has_color())];
-        let labelled = n.saturating_mul(LABEL_BYTES + N_CLOUDS * cloud);
+        let export = &job.means.settings.export;
+        let body = if export.bodies { 4 } else { 0 };
+        let n_clouds = u64::from(export.tiles) + u64::from(export.fixed_cloud);
+        let share = if export.compress { COMPRESSED } else { 1.0 };
+        let clouds = ((n_clouds * (cloud + body)) as f64 * share).ceil() as u64;
+        let labelled = n.saturating_mul(LABEL_BYTES + clouds);
         let memory = n.saturating_mul(POINT_BYTES).saturating_add(PROGRAM_BYTES);
         Self {
             n_points: n,

@@ -2,12 +2,16 @@
 
 use crate::engine::{Engine, Task};
 use crate::job::Means;
-use crate::reuse::Key;
+use crate::reuse::{Key, Pace, Sums};
 use crate::store::{Scatter, Store};
-use contract::{Input, Result};
+use contract::{Error, Input, Kind, Result, Weigh};
 use ingest::{Sources, Want};
 use std::cell::Cell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// Name of a store that is being filled, before the number of its input.
+const NEW: &str = "new-";
 
 /// What filling stores takes.
 pub(crate) struct Filling<'a> {
@@ -35,24 +39,59 @@ impl<'a> Filling<'a> {
         self.n_kept.get()
     }
 
-    /// The tiles of one input. A store that is there and whole is believed; one that is damaged is made again.
-    pub(crate) fn tiles_of(&self, input: &Input, key: &Key) -> Result<Store> {
+    /// The tiles of one input and their key. A store that is there and whole is believed; one that is damaged is made
+    /// again.
+    pub(crate) fn tiles_of(&self, input: &Input, sums: &Sums) -> Result<(Key, Store)> {
         let scans = &self.sources.scans;
         let first = scans.iter().find(|s| s.input == input.id).map_or(0, |s| s.id.0);
-        let n_inputs = self.sources.inputs.len();
-        let resident_bytes = self.means.store_bytes() / n_inputs.max(1);
-        let dir = self.folder.join(key.name());
+        let resident_bytes = self.means.store_bytes() / self.sources.inputs.len().max(1);
+        let key = || sums.tiles(input, scans, &self.means.settings);
         let [n_kept, n] = self.n_kept.get();
         self.n_kept.set([n_kept, n + 1]);
-        if let Ok(store) = Store::open(&dir, first, resident_bytes) {
+        let open = |key: &Key| Store::open(&self.folder.join(key.name()), first, resident_bytes);
+        if let Some((key, Ok(store))) = key().map(|key| (key.clone(), open(&key))) {
             self.n_kept.set([n_kept + 1, n + 1]);
-            return Ok(store);
+            return Ok((key, store));
         }
+        let new = self.folder.join(format!("{NEW}{}", input.id.0));
+        self.fill(&new, input, (first, resident_bytes), sums)?;
+        let key = key().ok_or_else(|| Error::new(Kind::Bug, "an input was not read"))?;
+        let place = self.folder.join(key.name());
+        let _ = std::fs::remove_dir_all(&place);
+        let moved = std::fs::rename(&new, &place);
+        moved.map_err(|e| Error::from(e).at(place.display()))?;
+        Ok((key.clone(), open(&key)?))
+    }
+
+    /// Reads an input into a new store; its digest beside that, if nobody knows it.
+    fn fill(
+        &self,
+        dir: &Path,
+        input: &Input,
+        (first, resident_bytes): (u32, usize),
+        sums: &Sums,
+    ) -> Result<()> {
+        let scans = &self.sources.scans;
         let scatter = Scatter::new(scans);
-        let mut sink = Store::create(&dir, scans, first, self.means.ingest_bytes())?;
-        let task = Task::new("ingest").of(crate::report::amount(self.sources, input.id));
-        let strips = self.sources.strips(input.id, Want::Coordinates)?;
-        self.engine.pass(task, strips, |f| f.map(&scatter).for_each(|s| sink.add(&s)))?;
-        sink.finish(self.engine, resident_bytes)
+        let ingest_bytes = self.means.ingest_bytes();
+        let mut sink = Store::create(dir, scans, first, ingest_bytes)?;
+        let amount = crate::report::amount(self.sources, input.id);
+        let pace = Pace { all: amount.points, ..Pace::default() };
+        std::thread::scope(|scope| {
+            let is_new = sums.input(input).is_none();
+            let digest = is_new.then(|| scope.spawn(|| sums.read(input, &pace)));
+            let strips = self.sources.strips(input.id, Want::Coordinates)?;
+            let task = Task::new("ingest").of(amount);
+            let filled = self.engine.pass(task, strips, |f| {
+                f.map(&scatter).for_each(|s| {
+                    pace.done.fetch_add(s.n_points(), Ordering::Relaxed);
+                    sink.add(&s)
+                })
+            });
+            pace.end();
+            let digest = digest.map(|d| d.join().unwrap_or_else(|p| std::panic::resume_unwind(p)));
+            filled.and(digest.unwrap_or(Ok(())))
+        })?;
+        sink.finish(self.engine, resident_bytes).map(drop)
     }
 }

@@ -4,24 +4,24 @@
 //! labels by place. Then each input is streamed once more: a point's label is that of the list, or else that of its
 //! place alone (floor or fixed).
 
-use crate::engine::{Engine, Task};
+use crate::engine::{AllThreads, Engine, Task};
 use crate::job::{Room, Settings};
 use crate::store::Store;
-use contract::{
-    Fit, Floor, Fold, InputId, Label, Map, Result, Scan, Space, SpaceGrid, Strip, TileLabels, Weigh,
-};
+use contract::{Cluster, Fit, Floor, Fold, InputId, Label, PlaceRun, Result, Space, TileLabels};
 use export::{
-    Clouds, CloudsSettings, LasPoint, LasSettings, PlanPicture, Quantum, RobotPicture, SpaceEntry,
-    Written, write_space,
+    Clouds, FileSum, LasSettings, PlanPicture, Quantum, RobotPicture, SpaceEntry, Written,
+    write_space,
 };
-use geometry::{Aabb, Point};
+use geometry::Aabb;
 use ingest::{Sources, Want};
 use merge::{Attach, Hanging};
 use robot::Model;
-use segment::{Ground, Segment};
+use segment::Segment;
 
+use crate::bodies::Bodies;
+use crate::labelled::LabelStrip;
 use crate::masks::Masks;
-use crate::spaces::{Spot, poses, spots};
+use crate::spaces::poses;
 
 /// What labelling reads.
 pub(crate) struct Labelling<'a> {
@@ -32,12 +32,15 @@ pub(crate) struct Labelling<'a> {
     attach: Attach,
     /// World bounds of each scan's points, metres.
     bounds: Vec<Aabb>,
+    export: export::Settings,
+    /// Where points are to be told which body is theirs.
+    bodies: Option<Bodies>,
 }
 
 /// What is known of points near robots.
 pub(crate) struct Near {
     /// Their labels: for each mask, by place.
-    labels: Vec<Vec<(u64, Label)>>,
+    labels: Vec<Vec<PlaceRun<Label>>>,
     /// What hangs on each robot.
     hanging: Vec<Hanging>,
 }
@@ -52,6 +55,8 @@ pub(crate) struct Done {
     pub(crate) pictures: Vec<String>,
     /// What is known of the space around each robot.
     pub(crate) spaces: Vec<Option<SpaceEntry>>,
+    /// Checksums of the files that are as large as the cloud.
+    pub(crate) sums: Vec<FileSum>,
 }
 
 /// Counts of one mask.
@@ -67,7 +72,7 @@ impl<'a> Labelling<'a> {
         fits: &'a [Fit],
         models: &'a [Model],
         sources: &'a Sources,
-        (store, floor): (&Store, &Floor),
+        (store, floor, clusters): (&Store, &Floor, &[Cluster]),
         settings: &Settings,
     ) -> Self {
         let segment = Segment::new(fits, models, floor, &sources.scans, settings.segment);
@@ -77,7 +82,9 @@ impl<'a> Labelling<'a> {
             let scan = &mut bounds[entry.at.scan.0 as usize];
             *scan = scan.union(&entry.bounds);
         }
-        Self { fits, models, sources, segment, attach, bounds }
+        let export = settings.export;
+        let bodies = export.bodies.then(|| Bodies::new(clusters));
+        Self { fits, models, sources, segment, attach, bounds, export, bodies }
     }
 
     /// Segments the tiles near robots, and decides over all scans what hangs on them.
@@ -102,7 +109,7 @@ impl<'a> Labelling<'a> {
             near[tile.mask.0 as usize].extend(tile.settle(|voxel| attached.label(voxel)));
         }
         for labels in &mut near {
-            labels.sort_unstable_by_key(|entry: &(u64, Label)| entry.0);
+            PlaceRun::join(labels);
         }
         Ok(Near { labels: near, hanging: merge::hang(&attached, self.fits, self.models) })
     }
@@ -117,40 +124,42 @@ impl<'a> Labelling<'a> {
         let out = room.next();
         let mut las = LasSettings::new(self.quantum());
         las.with_color = self.sources.has_color();
-        let mut clouds = Clouds::create(out, CloudsSettings::new(las))?;
+        let mut clouds = Clouds::create(out, &las, &self.export)?;
         let mut masks = Masks::new(out, &self.sources.masks);
         let mut robots: Vec<RobotPicture> = self.robot_pictures();
         let mut pictures = Vec::new();
         let grids: Vec<_> =
             spaces.iter().map(|s| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()))).collect();
-        let label = LabelStrip {
-            near,
-            ground: self.segment.ground(),
-            scans: &self.sources.scans,
-            grids: &grids,
-        };
+        let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
         for input in &self.sources.inputs {
-            let mut plan = PlanPicture::new(&self.bounds_of(input.id));
+            let plan = PlanPicture::new(&self.bounds_of(input.id));
+            let label = LabelStrip {
+                near: &near.labels,
+                ground: self.segment.ground(),
+                scans: &self.sources.scans,
+                grids: &grids,
+                shown: &shown,
+                plan: &plan,
+                pack: clouds.pack(),
+                bodies: self.bodies.as_ref(),
+            };
             let task = Task::new("write").of(crate::report::amount(self.sources, input.id));
             let strips = self.sources.strips(input.id, Want::Everything)?;
             engine.pass(task, strips, |f| {
                 f.map(&label).for_each(|strip| {
-                    masks.add(&strip.strip, &strip.labels)?;
-                    for (space, voxel, kind) in &strip.spots {
-                        spaces[*space].iter_mut().for_each(|s| s.mark(*voxel, *kind));
+                    masks.add(&strip)?;
+                    for (space, voxel, kind) in strip.spots {
+                        spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));
                     }
-                    for (i, label) in strip.labels.iter().enumerate() {
-                        let point = las_point(&strip.strip, i, strip.world[i]);
-                        clouds.push(&point.labelled(*label), label.kind)?;
-                        plan.add(strip.world[i], *label);
-                        robots.iter_mut().for_each(|r| r.add(strip.world[i], *label));
+                    for (robot, point, label) in strip.shown {
+                        robots[robot].add(point, label);
                     }
-                    Ok(())
+                    clouds.add(&strip.packed)
                 })
             })?;
             pictures.push(self.draw_plan(&plan, input.id, out)?);
         }
-        let masks = masks.finish()?;
+        let (masks, mut sums) = masks.finish()?;
         let mut said = vec![None; self.fits.len()];
         for (i, fit) in self.fits.iter().enumerate() {
             export::write_robot(out, i, fit, &self.models[fit.model], &near.hanging[i])?;
@@ -168,7 +177,9 @@ impl<'a> Labelling<'a> {
             page.write(&out.join(&evidence))?;
             pictures.extend([name, evidence]);
         }
-        Ok(Done { clouds: clouds.finish()?, masks, pictures, spaces: said })
+        let clouds = engine.pool()?.install(|| clouds.finish(&AllThreads))?;
+        sums.extend(clouds.sums().cloned());
+        Ok(Done { clouds, masks, pictures, spaces: said, sums })
     }
 
     /// Scale and offset of the clouds: those of the first LAS input, so that its coordinates stay what they are.
@@ -223,80 +234,5 @@ impl<'a> Labelling<'a> {
     fn bounds_of(&self, input: InputId) -> Aabb {
         let own = self.sources.scans.iter().zip(&self.bounds).filter(|(s, _)| s.input == input);
         own.fold(Aabb::EMPTY, |all, (_, bounds)| all.union(bounds))
-    }
-}
-
-/// The map of the second pass.
-struct LabelStrip<'a> {
-    near: &'a Near,
-    ground: &'a Ground,
-    scans: &'a [Scan],
-    grids: &'a [Option<(SpaceGrid, Aabb)>],
-}
-
-/// A strip with its labels and world coordinates.
-struct Labelled {
-    strip: Strip,
-    labels: Vec<Label>,
-    world: Vec<[f64; 3]>,
-    spots: Vec<Spot>,
-}
-
-impl Map for LabelStrip<'_> {
-    type In = Strip;
-    type Out = Labelled;
-    type Scratch = ();
-
-    fn apply(&self, strip: Strip, (): &mut ()) -> Result<Labelled> {
-        let world = world(&strip, &self.scans[strip.scan.0 as usize]);
-        let near = &self.near.labels[strip.mask.0 as usize];
-        let mut at = near.partition_point(|entry| entry.0 < strip.first_place);
-        let mut labels = Vec::with_capacity(strip.len());
-        for (place, p) in strip.place.iter().zip(&world) {
-            let place = strip.first_place + u64::from(*place);
-            while near.get(at).is_some_and(|entry| entry.0 < place) {
-                at += 1;
-            }
-            labels.push(match near.get(at) {
-                Some(entry) if entry.0 == place => entry.1,
-                _ => self.ground.label(*p),
-            });
-        }
-        let spots = spots(self.grids, &world, &labels);
-        Ok(Labelled { strip, labels, world, spots })
-    }
-}
-
-/// World coordinates of a strip's points: those of the file where it states them.
-fn world(strip: &Strip, scan: &Scan) -> Vec<[f64; 3]> {
-    match &strip.attributes {
-        Some(a) if a.world.len() == strip.len() => a.world.clone(),
-        _ => strip
-            .xyz
-            .iter()
-            .map(|p| (scan.world_from_scan * Point::from(p.map(f64::from))).coords.into())
-            .collect(),
-    }
-}
-
-fn las_point(strip: &Strip, i: usize, xyz: [f64; 3]) -> LasPoint {
-    let mut point = LasPoint { xyz, source_id: (strip.scan.0 + 1) as u16, ..LasPoint::default() };
-    if let Some(a) = &strip.attributes {
-        point.intensity = a.intensity.get(i).copied().unwrap_or_default();
-        point.color = a.color.get(i).copied().unwrap_or_default();
-        point.gps_time = a.gps_time.get(i).copied().unwrap_or_default();
-        point.source_id = a.source_id.get(i).copied().unwrap_or(point.source_id);
-    }
-    point
-}
-
-impl Weigh for Labelled {
-    fn weight_bytes(&self) -> usize {
-        let (labels, spots) = (size_of_val(&*self.labels), size_of_val(&*self.spots));
-        self.strip.weight_bytes() + labels + spots + self.world.len() * 24
-    }
-
-    fn n_points(&self) -> u64 {
-        self.strip.len() as u64
     }
 }

@@ -3,6 +3,7 @@
 
 pub mod atomic;
 pub mod bench;
+mod bodies;
 pub mod calibrate;
 pub mod changes;
 pub mod cli;
@@ -13,6 +14,7 @@ pub mod estimate;
 pub mod exit;
 mod filling;
 pub mod job;
+mod labelled;
 mod labelling;
 mod library;
 mod masks;

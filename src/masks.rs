@@ -1,9 +1,10 @@
 //! Strips with labels in, in the order of each file; one triple of label arrays a mask out, an entry for every point
 //! that the file does not itself flag as invalid.
 
+use crate::labelled::Labelled;
 use crate::labelling::MaskCount;
-use contract::{Error, Kind, Label, Mask, PointKind, Result, Strip};
-use export::MaskWriter;
+use contract::{Error, Kind, Mask, Result};
+use export::{FileSum, LabelColumns, MaskWriter};
 use std::path::{Path, PathBuf};
 
 /// Writes the masks of all inputs.
@@ -19,7 +20,7 @@ pub(crate) struct Masks {
 struct Open {
     writer: MaskWriter,
     /// Labels of the places from `writer.len()` on; what no strip named stays uncertain.
-    window: Vec<Label>,
+    window: LabelColumns,
     n_named: u64,
 }
 
@@ -34,24 +35,21 @@ impl Masks {
     }
 
     /// Takes the labels of a strip's points.
-    pub(crate) fn add(&mut self, strip: &Strip, labels: &[Label]) -> Result<()> {
+    pub(crate) fn add(&mut self, strip: &Labelled) -> Result<()> {
         let at = strip.mask.0 as usize;
         let slot = &mut self.open[at];
         let open = match slot {
             Some(open) => open,
             None => slot.insert(Open::create(&self.out, &self.masks[at])?),
         };
-        let count = &mut self.counts[at];
-        count.n_moving += labels
-            .iter()
-            .filter(|l| matches!(l.kind, PointKind::Link | PointKind::Attachment))
-            .count() as u64;
-        open.add(strip, labels)
+        self.counts[at].n_moving += strip.n_moving;
+        open.add(strip)
     }
 
     /// Finishes all masks; what the file states beyond the last point is uncertain.
-    pub(crate) fn finish(self) -> Result<Vec<MaskCount>> {
+    pub(crate) fn finish(self) -> Result<(Vec<MaskCount>, Vec<FileSum>)> {
         let Self { out, masks, open, mut counts } = self;
+        let mut sums = Vec::new();
         for ((mask, open), count) in masks.iter().zip(open).zip(&mut counts) {
             let mut open = match open {
                 Some(open) => open,
@@ -62,9 +60,9 @@ impl Masks {
             open.pad(missing)?;
             count.n_points = open.writer.len();
             count.n_dropped = count.n_points - open.n_named;
-            open.writer.finish()?;
+            sums.extend(open.writer.finish()?);
         }
-        Ok(counts)
+        Ok((counts, sums))
     }
 }
 
@@ -73,24 +71,31 @@ const PAD: usize = 1 << 16;
 
 impl Open {
     fn create(out: &Path, mask: &Mask) -> Result<Self> {
-        Ok(Self { writer: MaskWriter::create(out, mask.id)?, window: Vec::new(), n_named: 0 })
+        let (writer, window) = (MaskWriter::create(out, mask.id)?, LabelColumns::default());
+        Ok(Self { writer, window, n_named: 0 })
     }
 
-    fn add(&mut self, strip: &Strip, labels: &[Label]) -> Result<()> {
+    fn add(&mut self, strip: &Labelled) -> Result<()> {
+        let n = strip.place.len();
         if strip.first_place >= self.writer.len() + self.window.len() as u64 {
             self.flush(strip.first_place)?;
         }
         let Some(start) = strip.first_place.checked_sub(self.writer.len()) else {
             return Err(Error::new(Kind::Bug, "a strip came after its places were written"));
         };
-        for (place, label) in strip.place.iter().zip(labels) {
-            let at = start as usize + *place as usize;
-            if at >= self.window.len() {
-                self.window.resize(at + 1, Label::UNCERTAIN);
-            }
-            self.window[at] = *label;
+        self.n_named += n as u64;
+        // Most strips have every place from their first to their last, and no other strip lies among them.
+        let is_dense = strip.place.last().is_none_or(|last| *last as usize + 1 == n);
+        if is_dense && start == 0 && self.window.is_empty() {
+            return self.writer.push(&strip.labels);
         }
-        self.n_named += labels.len() as u64;
+        let end = start as usize + strip.place.last().map_or(0, |last| *last as usize + 1);
+        if end > self.window.len() {
+            self.window.pad(end);
+        }
+        for (i, place) in strip.place.iter().enumerate() {
+            self.window.set(start as usize + *place as usize, &strip.labels, i);
+        }
         Ok(())
     }
 
@@ -102,10 +107,12 @@ impl Open {
     }
 
     fn pad(&mut self, mut n: u64) -> Result<()> {
-        let uncertain = [Label::UNCERTAIN; PAD];
+        let mut uncertain = LabelColumns::default();
         while n > 0 {
             let some = n.min(PAD as u64) as usize;
-            self.writer.push(&uncertain[..some])?;
+            uncertain.clear();
+            uncertain.pad(some);
+            self.writer.push(&uncertain)?;
             n -= some as u64;
         }
         Ok(())

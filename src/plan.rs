@@ -25,8 +25,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let settings = &job.means.settings;
     let room = job.room()?;
     let sums = Sums::of(job, &room, engine)?;
-    let key = sums.whole(job);
-    if let Some(manifest) = reuse::unchanged(room.out(), room.store(), &key)? {
+    if let Some(manifest) = sums.unchanged(job, &room)? {
         return Ok(manifest.outcome());
     }
     let library = library::load(&job.robots, &settings.robot, engine)?;
@@ -35,15 +34,16 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
     let scans = &sources.scans;
-    let has_tiles = |input: &Input| room.has_tiles(&sums.tiles(input, scans, settings));
+    let has_tiles =
+        |i: &Input| sums.tiles(i, scans, settings).is_some_and(|key| room.has_tiles(&key));
     Estimate::of(job, &sources, library.models.len(), has_tiles).checked(room.out())?;
 
     // First pass: every point once, from the files into the lattice tiles of the store; inputs whose tiles are there are
     // not read.
     let filling = Filling::new(&sources, &job.means, room.tiles(), engine);
-    let tiles: Vec<Key> = sources.inputs.iter().map(|i| sums.tiles(i, scans, settings)).collect();
-    let stores = sources.inputs.iter().zip(&tiles).map(|(i, key)| filling.tiles_of(i, key));
-    let store = Store::join(stores.collect::<Result<_>>()?);
+    let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, &sums));
+    let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
+    let store = Store::join(stores);
 
     // On the tiles: local planes and occupied space, joined over tiles and scans; from here on nothing is as large as
     // the cloud.
@@ -72,8 +72,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     }
 
     // Tiles near robots once more: which points are links, which hang on them.
-    let labelling =
-        Labelling::new(&fits, &models, &sources, (&store, &ground.surfaces.floor), settings);
+    let floor = &ground.surfaces.floor;
+    let labelling = Labelling::new(&fits, &models, &sources, (&store, floor, &clusters), settings);
     let near = labelling.near_robots(&store, engine)?;
 
     // What nobody saw around them; second pass: every point once more, in the order of its file, to label and to
@@ -93,8 +93,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     .finish(&room)?;
 
     // All is whole: it takes the place of what was there. What this run did not use is not kept.
-    Manifest::write(room.next(), &key, &outcome, engine)?;
-    Manifest::publish(room.next(), room.out())?;
+    Manifest::write(room.next(), sums.whole(job), (&outcome, &written.sums), engine)?;
+    sums.remember(&Manifest::publish(room.next(), room.out())?, room.out())?;
     room.prune(&tiles, &kept);
     outcome.reused = reuse::said(&[("tiles", filling.n_kept()), ("fits", kept.n_kept())]);
     Ok(outcome)

@@ -50,7 +50,7 @@ impl Report<'_> {
                 .sources
                 .inputs
                 .iter()
-                .map(|i| self.input(i, self.sums.input(i).to_owned()))
+                .map(|i| self.input(i, self.sums.input(i).unwrap_or_default().to_owned()))
                 .collect(),
             stages: self.stages(),
             warnings: warnings.clone(),

@@ -14,7 +14,8 @@ use crate::engine::{Engine, Task};
 use crate::progress::Amount;
 use contract::{Error, Kind, Label, Map, MaskId, Result, Weigh};
 use export::{
-    E57Scans, GridPoint, GridScan, LasPoint, LasSettings, LasWriter, MaskWriter, NpyWriter, Quantum,
+    E57Scans, GridPoint, GridScan, LabelColumns, LasSettings, LasWriter, MaskWriter, NpyWriter,
+    PointColumns, Quantum,
 };
 use geometry::{Aabb, Pose};
 use robot::Model;
@@ -32,11 +33,13 @@ pub struct Formats {
     pub e57: bool,
     /// `scans.las`.
     pub las: bool,
+    /// `truth/labels` and `truth/las/labels`.
+    pub labels: bool,
 }
 
 impl Formats {
-    /// Both.
-    pub const ALL: Self = Self { e57: true, las: true };
+    /// All.
+    pub const ALL: Self = Self { e57: true, las: true, labels: true };
 }
 
 /// Scans a scene into `out`; returns the truth with its counts.
@@ -67,21 +70,25 @@ pub fn scan_scene(
 /// The open files of all scans.
 struct Files {
     e57: Option<E57Scans>,
-    las: Option<(LasWriter, MaskWriter)>,
+    las: Option<LasWriter>,
+    las_mask: Option<MaskWriter>,
+    labels: bool,
 }
 
 impl Files {
     fn create(simulator: &Simulator, out: &Path, formats: Formats) -> Result<Self> {
         let e57 = formats.e57.then(|| E57Scans::create(out.join("scans.e57"))).transpose()?;
-        let las = formats.las.then(|| -> Result<_> {
+        let las = formats.las.then(|| {
             let frames = (0..simulator.n_scans()).map(|i| simulator.frame(i));
             let near = Aabb::of(frames.map(|f| f.world_from_scan.translation.vector.into()));
             let mut settings = LasSettings::new(Quantum::around(&near));
             settings.with_labels = false;
-            let mask = MaskWriter::create(&out.join("truth/las"), MaskId(0))?;
-            Ok((LasWriter::create(out.join("scans.las"), settings)?, mask))
+            LasWriter::create(out.join("scans.las"), settings)
         });
-        Ok(Self { e57, las: las.transpose()? })
+        let labels = formats.labels;
+        let mask = || MaskWriter::create(&out.join("truth/las"), MaskId(0));
+        let las_mask = (formats.las && labels).then(mask).transpose()?;
+        Ok(Self { e57, las: las.transpose()?, las_mask, labels })
     }
 
     /// Casts and writes one scan; returns its number of points.
@@ -100,20 +107,20 @@ impl Files {
             .map(|from| Ok(Columns { range: from..(from + COLUMNS).min(frame.n_cols), n_rows }));
         let n_beams = u64::from(frame.n_rows) * u64::from(frame.n_cols);
         let task = Task::new(format!("scan {}", frame.name)).of(Amount::points(n_beams));
-        let mut mask = MaskWriter::create(truth, MaskId(i as u32))?;
-        let mut objects = NpyWriter::create(truth.join(format!("labels/{i}.object.npy")))?;
+        let mut known = self.labels.then(|| Known::create(truth, i)).transpose()?;
+        let mut n_points = 0;
         let source_id = u16::try_from(i + 1).map_err(|_| {
             Error::bad_input(format!("LAS knows 65535 scanners at most, this is \"{}\"", i + 1))
         })?;
         engine.pass(task, source, |flow| {
             let mut seen = flow.map(&cast).items().map(|seen| {
                 let seen = seen?.0;
-                let labels: Vec<Label> =
-                    (0..seen.len()).filter(|&k| seen.hit[k]).map(|k| seen.label[k]).collect();
-                mask.push(&labels)?;
-                objects.push((0..seen.len()).filter(|&k| seen.hit[k]).map(|k| seen.object[k]))?;
-                if let Some((las, las_mask)) = &mut self.las {
-                    las_mask.push(&labels)?;
+                n_points += seen.n_points() as u64;
+                if let Some(known) = &mut known {
+                    let labels = known.add(&seen)?;
+                    self.las_mask.iter_mut().try_for_each(|mask| mask.push(&labels))?;
+                }
+                if let Some(las) = &mut self.las {
                     write_las(las, &seen, &frame.world_from_scan, source_id)?;
                 }
                 Ok(seen)
@@ -123,19 +130,46 @@ impl Files {
                 None => seen.try_for_each(|s| s.map(drop)),
             }
         })?;
-        objects.finish()?;
-        mask.finish()
+        known.map_or(Ok(()), Known::finish)?;
+        Ok(n_points)
     }
 
     fn finish(self) -> Result<()> {
         if let Some(e57) = self.e57 {
             e57.finish()?;
         }
-        if let Some((las, mask)) = self.las {
+        if let Some(las) = self.las {
             las.finish()?;
-            mask.finish()?;
         }
-        Ok(())
+        self.las_mask.map_or(Ok(()), |mask| mask.finish().map(drop))
+    }
+}
+
+/// What is true of the points of one scan.
+struct Known {
+    mask: MaskWriter,
+    objects: NpyWriter<u16>,
+}
+
+impl Known {
+    fn create(truth: &Path, i: usize) -> Result<Self> {
+        let objects = NpyWriter::create(truth.join(format!("labels/{i}.object.npy")))?;
+        Ok(Self { mask: MaskWriter::create(truth, MaskId(i as u32))?, objects })
+    }
+
+    /// Writes the labels of the beams that came back.
+    fn add(&mut self, seen: &SimColumns) -> Result<LabelColumns> {
+        let hits = || (0..seen.len()).filter(|&k| seen.hit[k]);
+        let labels: Vec<Label> = hits().map(|k| seen.label[k]).collect();
+        let labels = LabelColumns::of(&labels);
+        self.mask.push(&labels)?;
+        self.objects.push(&hits().map(|k| seen.object[k]).collect::<Vec<_>>())?;
+        Ok(labels)
+    }
+
+    fn finish(self) -> Result<()> {
+        self.objects.finish()?;
+        self.mask.finish().map(drop)
     }
 }
 
@@ -158,16 +192,19 @@ fn write_las(
     world_from_scan: &Pose,
     id: u16,
 ) -> Result<()> {
-    for k in (0..seen.len()).filter(|&k| seen.hit[k]) {
-        let world = world_from_scan * nalgebra::Point3::from(seen.xyz[k]);
-        las.push(&LasPoint {
-            xyz: world.into(),
-            intensity: intensity(seen.intensity[k]),
-            source_id: id,
-            ..LasPoint::default()
-        })?;
-    }
-    Ok(())
+    let hits: Vec<usize> = (0..seen.len()).filter(|&k| seen.hit[k]).collect();
+    let world = |k: &usize| (world_from_scan * nalgebra::Point3::from(seen.xyz[*k])).into();
+    let world: Vec<[f64; 3]> = hits.iter().map(world).collect();
+    let intensity: Vec<u16> = hits.iter().map(|&k| intensity(seen.intensity[k])).collect();
+    // Scans hold no labels: what a point belongs to is the truth, which stands beside them.
+    let labels = vec![Label::FIXED; hits.len()];
+    las.push(&PointColumns {
+        world: &world,
+        labels: &labels,
+        intensity: &intensity,
+        scan: id,
+        ..PointColumns::default()
+    })
 }
 
 /// Some columns to be cast.

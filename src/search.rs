@@ -47,6 +47,9 @@ pub(crate) struct Search<'a> {
     settings: &'a Settings,
 }
 
+/// Points of a region beyond which more of them tell a fit nothing new: a robot has a hundredth of that in its adjustment. Up to
+/// four times as many are kept.
+const ENOUGH_POINTS: u64 = 3_000_000;
 /// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls, and few carry robots.
 const MIN_MOUNT_SCORE: f64 = 0.15;
 /// Places on walls and ceilings that are looked at for each model.
@@ -104,7 +107,7 @@ impl<'a> Search<'a> {
             let fit = |m: usize| fit::paper::fit(self.shelf.prepared(m), &scene, &planes, means);
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
-        let sight = Sight::new(region, &views, &scene.evidence, &AllThreads);
+        let sight = Sight::new(region, &views, (&scene.evidence, &scene.scouts), &AllThreads);
         let candidates = self.candidates(&sight, &planes);
         let mut fits = self.fits(&scene, &candidates);
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
@@ -255,12 +258,26 @@ impl<'a> Search<'a> {
 
     /// The same as the beams say it, none of them doubted, as fine as asked for.
     pub(crate) fn views_by(&self, region: &Region, settings: &ViewSettings) -> Result<Vec<View>> {
+        let thin = self.thin(region);
         let scans = self.scans.par_iter();
-        scans.filter_map(|scan| self.view(scan, region, settings).transpose()).collect()
+        scans.filter_map(|scan| self.view(scan, region, thin, settings).transpose()).collect()
+    }
+
+    /// How much of the points of a region may be skipped: as much as leaves [`ENOUGH_POINTS`].
+    fn thin(&self, region: &Region) -> u32 {
+        let touching = self.store.touching(&region.world_bounds());
+        let n_points: u64 = touching.iter().map(|&i| self.store.entries()[i].n_points).sum();
+        (0..).find(|thin| n_points >> (2 * (thin + 1)) < ENOUGH_POINTS).unwrap_or(0)
     }
 
     /// One scan's view of the region; `None` where it sees nothing of it.
-    fn view(&self, scan: &Scan, region: &Region, settings: &ViewSettings) -> Result<Option<View>> {
+    fn view(
+        &self,
+        scan: &Scan,
+        region: &Region,
+        thin: u32,
+        settings: &ViewSettings,
+    ) -> Result<Option<View>> {
         let extent = self.ground.extents[scan.id.0 as usize];
         if extent.is_none() {
             return Ok(None);
@@ -271,7 +288,7 @@ impl<'a> Search<'a> {
                 return Ok(None);
             }
         }
-        let mut builder = ViewBuilder::new(scan, region, extent, settings);
+        let mut builder = ViewBuilder::new(scan, region, extent, thin, settings);
         for (i, entry) in self.store.entries().iter().enumerate() {
             if builder.wants(entry.at) {
                 builder.add(&self.store.tile(i)?);

@@ -8,6 +8,7 @@ use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind};
 use geometry::{Aabb, Point, Pose};
 use lattice::ViewSettings;
 use robot::Model;
+use std::ops::Range;
 
 /// Depth images need cells this much smaller than the voxels, so that each voxel is looked at through its middle.
 const CELLS_PER_EDGE: f64 = 3.0;
@@ -66,21 +67,24 @@ pub(crate) fn poses(fit: &Fit, model: &Model) -> Vec<Pose> {
 /// A point in a voxel of a space: number of the space, of the voxel, and what the point makes of it.
 pub(crate) type Spot = (usize, usize, SpaceKind);
 
-/// Which voxels labelled points fall into; the same voxel once in a row.
+/// Which voxels labelled points fall into; the same voxel once in a row. `blocks` are bounds of runs of points.
 pub(crate) fn spots(
     grids: &[Option<(SpaceGrid, Aabb)>],
     world: &[[f64; 3]],
     labels: &[Label],
+    blocks: &[(Range<usize>, Aabb)],
 ) -> Vec<Spot> {
-    let own = Aabb::of(world.iter().copied());
     let mut out: Vec<Spot> = Vec::new();
     for (s, grid) in grids.iter().enumerate() {
-        let Some((grid, bounds)) = grid.as_ref().filter(|g| g.1.touches(&own)) else { continue };
-        for (p, label) in world.iter().zip(labels).filter(|(p, _)| bounds.contains(**p)) {
-            let Some(at) = grid.index(*p) else { continue };
-            let spot = (s, at, Space::kind_of(*label));
-            if out.last() != Some(&spot) {
-                out.push(spot);
+        let Some((grid, bounds)) = grid else { continue };
+        for (range, _) in blocks.iter().filter(|(_, own)| own.touches(bounds)) {
+            for i in range.clone() {
+                let at = bounds.contains(world[i]).then(|| grid.index(world[i])).flatten();
+                let Some(at) = at else { continue };
+                let spot = (s, at, Space::kind_of(labels[i]));
+                if out.last() != Some(&spot) {
+                    out.push(spot);
+                }
             }
         }
     }

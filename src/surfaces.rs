@@ -1,7 +1,7 @@
 //! Tiles in; what the scans cover, floor and occupied space out: the lattice stage's map and the floor stage's fold,
 //! joined so that one pass over the tiles serves both.
 
-use contract::{Fold, Map, Result, Scan, ScanId, Tile, TileSummary, Weigh};
+use contract::{Fold, Map, Result, Scan, ScanId, TILE_SIDE, Tile, TileSummary, Weigh};
 use lattice::{Extent, Summarise};
 
 /// The map: a tile's summary, and which rows and columns of its scan it covers.
@@ -47,11 +47,7 @@ impl Map for Surfaces {
 
     fn apply(&self, tile: Tile, scratch: &mut Self::Scratch) -> Result<Surface> {
         let scan = tile.at.scan;
-        let extent =
-            (0..tile.len()).map(|i| tile.pixel_at(i)).fold(None, |sum: Option<Extent>, p| {
-                let own = [p.row, p.row, p.col, p.col];
-                Some(sum.map_or(own, |s| union(s, own)))
-            });
+        let extent = extent(&tile);
         Ok(Surface { scan, extent, summary: self.0.apply(tile, scratch)? })
     }
 }
@@ -81,6 +77,18 @@ impl Fold for Gather {
     fn finish(&self, sum: Self::Sum) -> Result<Ground> {
         Ok(Ground { surfaces: self.find.finish(sum.0)?, extents: sum.1 })
     }
+}
+
+/// Rows and columns that a tile covers, in its lattice.
+fn extent(tile: &Tile) -> Option<Extent> {
+    // Sorted by pixel, so by row.
+    let (first, last) = (tile.pixel.first()?, tile.pixel.last()?);
+    let cols = tile.pixel.iter().map(|pixel| *pixel as u8);
+    let [left, right] =
+        cols.fold([u8::MAX, 0], |[least, most], c| [least.min(c), most.max(c)]).map(u32::from);
+    let [low, high] = [first, last].map(|pixel| u32::from(pixel >> 8));
+    let (row, col) = (tile.at.row * TILE_SIDE, tile.at.col * TILE_SIDE);
+    Some([row + low, row + high, col + left, col + right])
 }
 
 fn union(a: Extent, b: Extent) -> Extent {

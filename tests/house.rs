@@ -208,7 +208,7 @@ fn every_stage_is_in_the_table_of_stages() {
 }
 
 /// Settings of a stage that nobody can set, by room and name: made by the program, not by people.
-const NOT_FOR_PEOPLE: [&str; 2] = ["export::CloudsSettings", "export::LasSettings"];
+const NOT_FOR_PEOPLE: [&str; 1] = ["export::LasSettings"];
 
 #[test]
 fn every_setting_of_a_stage_can_be_set() {

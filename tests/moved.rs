@@ -30,7 +30,7 @@ fn a_robot_that_moved_between_stations_has_two_postures() {
     };
     let scene = simulate::plant(&wanted, &models).expect("is drawn");
     let scans = dir.path().join("scans");
-    scan_scene(&scene, &models, &scans, Formats { e57: true, las: false }, &Engine::new(2))
+    scan_scene(&scene, &models, &scans, Formats { las: false, ..Formats::ALL }, &Engine::new(2))
         .expect("scans");
     let out = dir.path().join("out");
     let means = Means::of(&Given::default()).expect("defaults hold");

@@ -7,12 +7,16 @@
 mod cell;
 mod condition;
 mod draw;
+mod growth;
+mod limits;
 pub mod plant;
 mod plot;
 mod score;
 mod shape;
 mod special;
 mod table;
+pub mod throughput;
+mod watch;
 
 use crate::engine::Engine;
 use crate::job::Means;

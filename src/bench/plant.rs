@@ -175,7 +175,7 @@ fn run(
     let scene = simulate::plant(wanted, models)?;
     atomic::write(&made(dir)?.join("scene.toml"), scene.to_toml()?.as_bytes())?;
     let scans = dir.join("scans");
-    let truth = scan_scene(&scene, models, &scans, Formats { e57: true, las: false }, engine)?;
+    let truth = scan_scene(&scene, models, &scans, Formats { las: false, ..Formats::ALL }, engine)?;
     row.n_points = truth.scans.iter().map(|s| s.n_points).sum();
     let robots = if is_strange {
         let known = dir.join("robots");

@@ -1,11 +1,12 @@
 //! `bench`: suites and numbers in; tables of what the program is worth out.
 
-use super::flags::{AccuracyFlags, Against, Common, PlantFlags};
+use super::flags::{AccuracyFlags, Against, Common, PlantFlags, ThroughputFlags};
 use super::say::Say;
 use crate::bench::plant::{PlantBench, plants};
+use crate::bench::throughput::{ThroughputBench, throughput};
 use crate::bench::{Bench, accuracy};
 use crate::exit;
-use contract::Result;
+use contract::{Error, Kind, Result};
 
 pub(super) fn bench_accuracy(flags: &AccuracyFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
@@ -37,5 +38,40 @@ pub(super) fn bench_plant(flags: &PlantFlags, common: &Common, say: &Say) -> Res
         keep: flags.keep,
     };
     say.result(&plants(&bench, &means, &engine)?);
+    Ok(exit::OK)
+}
+
+pub(super) fn bench_throughput(flags: &ThroughputFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let size = |text: &String| -> Result<u64> {
+        let number = text.to_ascii_uppercase();
+        let split = number.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(number.len());
+        let factor = match &number[split..] {
+            "" => Some(1.0),
+            "K" => Some(1e3),
+            "M" => Some(1e6),
+            "G" => Some(1e9),
+            _ => None,
+        };
+        let size = number[..split].parse().ok().zip(factor).map(|(n, f): (f64, f64)| n * f);
+        size.filter(|n| (1e4..=1e12).contains(n)).map(|n| n as u64).ok_or_else(|| {
+            Error::new(Kind::Usage, format!("this is no number of points: \"{text}\""))
+                .hint("write for example 100M")
+        })
+    };
+    let bench = ThroughputBench {
+        sizes: flags.points.iter().map(size).collect::<Result<_>>()?,
+        n_scans: flags.scans,
+        n_robots: flags.n_robots,
+        n_runs: flags.runs,
+        format: flags.format,
+        seed: flags.seed,
+        robots: flags.robots.clone(),
+        out: flags.out.clone(),
+        keep: flags.keep,
+        truth: flags.truth,
+    };
+    say.result(&throughput(&bench, &means, &engine)?);
     Ok(exit::OK)
 }

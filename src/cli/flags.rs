@@ -1,6 +1,7 @@
 //! Commands and flags, as `clap` knows them. Their names are fixed: people and scripts rely on them.
 
 use super::say::LogFormat;
+use crate::bench::throughput::Scanned;
 use crate::engine::Engine;
 use crate::job::{Given, Means};
 use crate::progress::{Mode, Progress};
@@ -59,6 +60,8 @@ pub(super) enum BenchCommand {
     Accuracy(AccuracyFlags),
     /// Draw cells and lines as files, do the main job on them, compare robots and labels with the truth
     Plant(PlantFlags),
+    /// Draw plants of given sizes as files, do the main job on them: points a second, memory, share of the machine's limits
+    Throughput(ThroughputFlags),
 }
 
 #[derive(Debug, Args)]
@@ -112,6 +115,40 @@ pub(super) struct PlantFlags {
     /// Keep scenes, scans and results
     #[arg(long, requires = "out")]
     pub(super) keep: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ThroughputFlags {
+    /// Beams of each plant, for example 1M,10M,100M
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "10M")]
+    pub(super) points: Vec<String>,
+    /// Scanners (else one for 50 million beams, two at least)
+    #[arg(long, value_name = "N")]
+    pub(super) scans: Option<usize>,
+    /// Robots that stand in it
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub(super) n_robots: usize,
+    /// Times that each is run; medians count
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) runs: usize,
+    /// Format of the scans
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "las")]
+    pub(super) format: Scanned,
+    /// Seed of the plants
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Robot library (else the demo's robots)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// Where scans, results and figures go
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Keep the scans: the next bench of the same plant finds them
+    #[arg(long)]
+    pub(super) keep: bool,
+    /// Write what is true of each point beside the scans
+    #[arg(long)]
+    pub(super) truth: bool,
 }
 
 /// Which models a cell is searched for.

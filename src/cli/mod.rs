@@ -41,6 +41,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
             bench::bench_accuracy(flags, &line.common, &say)
         }
         Command::Bench(BenchCommand::Plant(flags)) => bench::bench_plant(flags, &line.common, &say),
+        Command::Bench(BenchCommand::Throughput(flags)) => {
+            bench::bench_throughput(flags, &line.common, &say)
+        }
         Command::Simulate(flags) => simulate::simulate(flags, &line.common, &say),
         Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, &say),
         Command::Robots(RobotsCommand::Calibrate(flags)) => robots::calibrate(flags, &say),

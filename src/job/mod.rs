@@ -119,18 +119,18 @@ impl Means {
         means.checked()
     }
 
-    /// What the points that wait for their tiles may keep, bytes: half of what the program itself leaves. The other
-    /// half is for channels, workers, and vectors that grow by copying.
+    /// What the points that wait for their tiles may keep, bytes: a quarter of what the program itself leaves. As much goes
+    /// into vectors that grow by copying and tiles on their way to disk; more would not make scans any faster.
     #[must_use]
     pub fn ingest_bytes(&self) -> usize {
-        let free = self.memory_bytes.saturating_sub(PROGRAM_BYTES) / 2;
+        let free = self.memory_bytes.saturating_sub(PROGRAM_BYTES) / 4;
         usize::try_from(free).unwrap_or(usize::MAX)
     }
 
     /// What mapped pages of the store may keep resident, bytes.
     #[must_use]
     pub fn store_bytes(&self) -> usize {
-        usize::try_from(self.memory_bytes / 8).unwrap_or(usize::MAX)
+        usize::try_from(self.memory_bytes / 16).unwrap_or(usize::MAX)
     }
 
     /// What each channel of a pass may keep, bytes: small beside the whole, and never more than is of use.

@@ -53,8 +53,8 @@ settings! {
     lattice: lattice::Settings {
         noise, noise_growth, angular_noise, noise_limit, max_incidence, max_grazing, window,
         max_window_pixels, normal_tolerance, max_normal_tolerance, flatness, min_patch_points,
-        min_level_area, min_level_width, min_patch_area, min_patch_width, level_tilt, voxel,
-        surface_voxel, surface_noise,
+        min_level_area, min_level_width, min_patch_area, min_patch_width, level_tilt,
+        spacing, voxel, surface_voxel, surface_noise,
     }
     view: lattice::ViewSettings {
         beams_per_cell, min_cell, empty_window,
@@ -91,6 +91,9 @@ settings! {
     }
     merge: merge::Settings {
         contact, hold, cut, min_voxels, space_edge, space,
+    }
+    export: export::Settings {
+        tiles, tile_edge, fixed_cloud, bodies, compress, waiting_bytes,
     }
 }
 

@@ -3,12 +3,14 @@
 //! Outputs are written beside the old ones and take their places together: the list is the last to be written there and
 //! the last to move, so that a run that is cut short while they move is finished by the next one.
 
-use super::contents::{Contents, digest_of, walk};
+use super::contents::{Contents, Sum, walk};
 use crate::atomic;
 use crate::engine::Engine;
 use crate::job::Outcome;
 use contract::{Error, Kind, Result};
+use export::FileSum;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Name of the list.
@@ -88,14 +90,23 @@ impl Manifest {
     /// Lists what lies in `next` and writes the list there.
     pub(crate) fn write(
         next: &Path,
-        key: &super::Key,
-        outcome: &Outcome,
+        key: Option<super::Key>,
+        (outcome, sums): (&Outcome, &[FileSum]),
         engine: &Engine,
     ) -> Result<Self> {
+        let key = key.ok_or_else(|| Error::new(Kind::Bug, "an input has no digest"))?;
         let mut paths = Vec::new();
         walk(next, &mut paths)?;
         paths.sort();
-        let files = engine.fan_out("list", paths, |path| output(next, &path))?;
+        let known: HashMap<&Path, &FileSum> = sums.iter().map(|s| (s.path.as_path(), s)).collect();
+        let files = engine.fan_out("list", paths, |path| match known.get(path.as_path()) {
+            Some(sum) => Ok(OutputFile {
+                path: name(next, &path),
+                n_bytes: sum.n_bytes,
+                digest: Sum::Crc32c.word(&format!("{:08x}", sum.crc32c)),
+            }),
+            None => output(next, &path, Sum::Blake3),
+        })?;
         let manifest = Self {
             schema: SCHEMA.into(),
             key: key.name().into(),
@@ -158,7 +169,13 @@ pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
     let manifest = Manifest::read(out)?;
     let look = |file: &OutputFile| -> Result<Option<String>> {
         let path = out.join(&file.path);
-        Ok(match output(out, &path) {
+        let Some(sum) = Sum::of(&file.digest) else {
+            return Ok(Some(format!(
+                "{}: its checksum is of no kind that is known",
+                path.display()
+            )));
+        };
+        Ok(match output(out, &path, sum) {
             Ok(now) if now == *file => None,
             Ok(now) if now.n_bytes != file.n_bytes => Some(format!(
                 "{}: {} bytes long, not {}",
@@ -175,27 +192,37 @@ pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
 }
 
 /// The list of `out`, if it is of `key` and every file is what it was, as far as lengths, times and known digests tell.
-pub(crate) fn unchanged(out: &Path, store: &Path, key: &super::Key) -> Result<Option<Manifest>> {
+pub(super) fn unchanged(
+    contents: &Contents,
+    out: &Path,
+    key: &super::Key,
+) -> Result<Option<Manifest>> {
     let Ok(manifest) = Manifest::read(out) else { return Ok(None) };
     if manifest.key != key.name() {
         return Ok(None);
     }
-    let contents = Contents::open(store);
     let same = |file: &OutputFile| {
-        contents.digest(&out.join(&file.path)).is_ok_and(|digest| digest == file.digest)
+        let path = out.join(&file.path);
+        let now = Sum::of(&file.digest).map(|sum| contents.digest(&path, sum));
+        now.is_some_and(|digest| digest.is_ok_and(|digest| digest == file.digest))
     };
     let all = manifest.files.iter().all(same);
     contents.keep()?;
     Ok(all.then_some(manifest))
 }
 
-fn output(root: &Path, path: &Path) -> Result<OutputFile> {
+fn output(root: &Path, path: &Path, sum: Sum) -> Result<OutputFile> {
     let failed = |e: std::io::Error| Error::from(e).at(path.display());
     let n_bytes = std::fs::metadata(path).map_err(failed)?.len();
-    let parts: Vec<_> = path.strip_prefix(root).unwrap_or(path).components().collect();
+    Ok(OutputFile { path: name(root, path), n_bytes, digest: sum.read(path)? })
+}
+
+/// Path within the folder, with `/` on every system.
+fn name(root: &Path, path: &Path) -> String {
+    let parts = path.strip_prefix(root).unwrap_or(path).components();
     let parts: Vec<String> =
-        parts.iter().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
-    Ok(OutputFile { path: parts.join("/"), n_bytes, digest: digest_of(path)? })
+        parts.map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
+    parts.join("/")
 }
 
 /// Moves a file unless it has moved already.

@@ -8,16 +8,17 @@ mod contents;
 mod kept;
 mod manifest;
 
-pub(crate) use manifest::unchanged;
 pub use manifest::{Checked, Manifest, OutputFile, check};
 
 use crate::engine::Engine;
 use crate::job::{Job, Room, Settings};
-use contents::Contents;
+use contents::{Contents, Sum};
 use contract::{Input, Result, Scan};
 use std::fmt::Debug;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
+pub(crate) use contents::Pace;
 pub(crate) use kept::KeptFits;
 
 /// A digest of what a piece is made from, as 32 hexadecimal digits: the name of its file.
@@ -43,35 +44,69 @@ impl Key {
 
 /// Digests of all that a run reads.
 pub(crate) struct Sums {
-    inputs: Vec<String>,
+    contents: Contents,
+    /// Of each input; one that nobody has ever read gets its digest while it is decoded.
+    inputs: Vec<OnceLock<String>>,
+    paths: Vec<PathBuf>,
     library: String,
     others: String,
 }
 
 impl Sums {
-    /// Reads every file of the job once, except those that are known and unchanged since.
+    /// Reads every file of the job once, except those that are known and unchanged since, and inputs that are new.
     pub(crate) fn of(job: &Job, room: &Room, engine: &Engine) -> Result<Self> {
         let contents = Contents::open(room.store());
-        let digest = |path: &std::path::PathBuf| contents.digest(path);
+        let digest = |path: &PathBuf| -> Result<OnceLock<String>> {
+            let is_new =
+                contents.known(path, Sum::Blake3)?.is_none() && !contents.may_know(path)?;
+            Ok(if is_new {
+                OnceLock::new()
+            } else {
+                OnceLock::from(contents.digest(path, Sum::Blake3)?)
+            })
+        };
         let inputs = engine.fan_out("digest", job.inputs.iter().collect(), digest)?;
         let library = contents.folder(&job.robots)?;
         let others = job.scanners.iter().chain(&job.review);
-        let others: Vec<String> = others.map(|p| contents.digest(p)).collect::<Result<_>>()?;
+        let others: Vec<String> =
+            others.map(|p| contents.digest(p, Sum::Blake3)).collect::<Result<_>>()?;
         contents.keep()?;
-        Ok(Self { inputs, library, others: others.join(" ") })
+        Ok(Self { contents, inputs, paths: job.inputs.clone(), library, others: others.join(" ") })
     }
 
-    /// Digest of an input's bytes.
-    pub(crate) fn input(&self, input: &Input) -> &str {
-        &self.inputs[input.id.0 as usize]
+    /// Digest of an input's bytes, where it is known yet.
+    pub(crate) fn input(&self, input: &Input) -> Option<&str> {
+        self.inputs[input.id.0 as usize].get().map(String::as_str)
     }
 
-    /// The tiles of one input.
-    pub(crate) fn tiles(&self, input: &Input, scans: &[Scan], settings: &Settings) -> Key {
+    /// Reads an input whose digest is not known, beside the one who decodes it and tells how far he is.
+    pub(crate) fn read(&self, input: &Input, pace: &Pace) -> Result<()> {
+        let at = input.id.0 as usize;
+        let digest = self.contents.read(&self.paths[at], Sum::Blake3, pace)?;
+        let _ = self.inputs[at].set(digest);
+        self.contents.keep()
+    }
+
+    /// The list of an earlier run, if it was of the same job and its files are what they were.
+    pub(crate) fn unchanged(&self, job: &Job, room: &Room) -> Result<Option<Manifest>> {
+        let key = self.whole(job);
+        key.map_or(Ok(None), |key| manifest::unchanged(&self.contents, room.out(), &key))
+    }
+
+    /// Remembers outputs as they were written, so that the next run need not read them to see that nothing has changed.
+    pub(crate) fn remember(&self, manifest: &Manifest, out: &Path) -> Result<()> {
+        for file in &manifest.files {
+            self.contents.believe(&out.join(&file.path), &file.digest)?;
+        }
+        self.contents.keep()
+    }
+
+    /// The tiles of one input, where its digest is known yet.
+    pub(crate) fn tiles(&self, input: &Input, scans: &[Scan], settings: &Settings) -> Option<Key> {
         let own = scans.iter().filter(|s| s.input == input.id);
         let own = own.map(|s| words(&(s.source_id, s.world_from_scan, s.lattice)));
         let own: Vec<String> = own.collect();
-        Key::of("tiles", &[self.input(input), &own.join("\n"), &words(&settings.ingest)])
+        Some(Key::of("tiles", &[self.input(input)?, &own.join("\n"), &words(&settings.ingest)]))
     }
 
     /// Fits of the regions of a plant whose tiles have these names.
@@ -82,11 +117,13 @@ impl Sums {
         Key::of("fits", &[&words(&tiles), &self.library, &ground, &search])
     }
 
-    /// All that a job writes. Names of files are part of it: results name their inputs.
-    pub(crate) fn whole(&self, job: &Job) -> Key {
+    /// All that a job writes, where the digests of all inputs are known yet. Names of files are part of it: results name
+    /// their inputs.
+    pub(crate) fn whole(&self, job: &Job) -> Option<Key> {
         let names: Vec<_> = job.inputs.iter().map(|p| p.display().to_string()).collect();
-        let inputs = (&names, &self.inputs);
-        Key::of("run", &[&words(&inputs), &self.library, &self.others, &words(&job.means.settings)])
+        let digests: Option<Vec<&String>> = self.inputs.iter().map(OnceLock::get).collect();
+        let inputs = words(&(&names, digests?));
+        Some(Key::of("run", &[&inputs, &self.library, &self.others, &words(&job.means.settings)]))
     }
 }
 

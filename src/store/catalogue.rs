@@ -130,16 +130,14 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
     aligned.extend_from_slice(archive);
     let rows = rkyv::from_bytes::<Rows, rkyv::rancor::Error>(&aligned)
         .map_err(|e| broken("the catalogue is damaged").because(e))?;
-    let mut end = HEADER_BYTES;
     let mut entries: Vec<TileEntry> = Vec::with_capacity(rows.rows.len());
     for row in &rows.rows {
         let [scan, tile_row, col] = row.at;
         let at = TileAt { scan: ScanId(scan), row: tile_row, col };
         let sorted = entries.last().is_none_or(|e| (e.at, e.first_place) < (at, row.first_place));
-        if row.offset != end || !sorted || row.n_points > rows.n_tile_bytes {
+        if !sorted || row.n_points > rows.n_tile_bytes || !row.offset.is_multiple_of(ALIGN) {
             return torn("the catalogue contradicts itself");
         }
-        end += layout(row.n_points)[3];
         entries.push(TileEntry {
             at,
             n_points: row.n_points,
@@ -149,10 +147,18 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
             checksum: row.checksum,
         });
     }
-    if end != rows.n_tile_bytes {
-        return torn("the catalogue contradicts itself");
+    // In the order of the file no tile begins before the one before it ends; gaps are tiles that were written twice.
+    let mut spans: Vec<(u64, u64)> =
+        entries.iter().map(|e| (e.offset, layout(e.n_points)[3])).collect();
+    spans.sort_unstable();
+    let mut end = Some(HEADER_BYTES);
+    for (offset, n) in spans {
+        end = end.filter(|end| offset >= *end).and_then(|_| offset.checked_add(n));
     }
-    Ok((entries, end))
+    match end {
+        Some(end) if end <= rows.n_tile_bytes => Ok((entries, rows.n_tile_bytes)),
+        _ => torn("the catalogue contradicts itself"),
+    }
 }
 
 /// An error about a store that cannot be used.

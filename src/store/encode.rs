@@ -4,8 +4,8 @@
 //! place), pixel (u16).
 
 use super::catalogue::{ALIGN, TileEntry};
+use super::parts::Part;
 use super::record::{PixelOrder, Record};
-use super::sink::Part;
 use contract::{Map, Result, Scan, Tile, Weigh};
 use geometry::{Aabb, Pose};
 

@@ -30,6 +30,15 @@ impl FileMap {
         &self.map
     }
 
+    /// Has the system read a range that will be asked for soon: page by page it would be read at the disk's leisure.
+    pub(super) fn will_need(&self, start: usize, n: usize) {
+        #[cfg(unix)]
+        {
+            // Advice only.
+            let _ = self.map.advise_range(memmap2::Advice::WillNeed, start, n);
+        }
+    }
+
     /// To be told after `n` bytes were read.
     pub(super) fn has_read(&self, n: usize) {
         if self.read_bytes.fetch_add(n, Ordering::Relaxed) + n < self.resident_bytes {

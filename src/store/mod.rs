@@ -3,13 +3,16 @@
 
 mod catalogue;
 mod encode;
+mod file;
 mod map;
+mod parts;
 mod record;
 mod scatter;
 mod sink;
 mod spill;
 #[cfg(test)]
 mod tests;
+mod writer;
 
 use catalogue::broken;
 use contract::{Error, Kind, Result, Scan, Tile, TileAt, Weigh};
@@ -22,6 +25,8 @@ pub use catalogue::TileEntry;
 pub use scatter::{Scatter, Scattered};
 pub use sink::{TILE_POINTS, TileSink};
 
+/// Tiles that the system reads ahead of the one that is asked for: some ten megabytes.
+const AHEAD: usize = 8;
 /// Name of the catalogue in the folder of a store.
 const CATALOGUE: &str = "catalogue.rkyv";
 /// Name of the file of all tiles.
@@ -102,6 +107,13 @@ impl Store {
         Ok(tile)
     }
 
+    fn will_need(&self, i: usize) {
+        let entry = &self.entries[i];
+        let part = self.parts.partition_point(|part| part.0 <= i);
+        let n = encode::layout(entry.n_points)[3] as usize;
+        self.parts[part - 1].1.will_need(entry.offset as usize, n);
+    }
+
     /// Indices of the tile at `at`: none where it holds no point, mostly one, several where it has parts.
     #[must_use]
     pub fn find(&self, at: TileAt) -> Range<usize> {
@@ -117,12 +129,21 @@ impl Store {
 
     /// All tiles in order: a source for a pass.
     pub fn tiles(&self) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
-        (0..self.entries.len()).map(|i| self.tile(i))
+        self.tiles_of((0..self.entries.len()).collect())
     }
 
     /// These tiles in the given order: a source for a pass.
     pub fn tiles_of(&self, indices: Vec<usize>) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
-        indices.into_iter().map(|i| self.tile(i))
+        let mut ahead = indices.clone().into_iter();
+        for i in ahead.by_ref().take(AHEAD) {
+            self.will_need(i);
+        }
+        indices.into_iter().map(move |i| {
+            if let Some(next) = ahead.next() {
+                self.will_need(next);
+            }
+            self.tile(i)
+        })
     }
 }
 

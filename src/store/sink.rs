@@ -1,50 +1,63 @@
-//! Scattered strips in, a whole store out. Memory is bounded by a budget: what does not fit is spilled.
-//!
-//! Each tile has a buffer. When all buffers together pass the budget, the largest are written as segments to a spill
-//! file, until half of the budget is free. At the end each tile's segments and buffer are joined, sorted by pixel and
-//! place, and written.
+//! Grouped strips in, a store out. Tiles gather in memory; what does not fit is written: tiles that no point has come to for
+//! the longest time first, since a scanner that has passed a place does not come back. Where points do come back, the rest
+//! of their tile goes through a spill file, and the tile is written once more in the end.
 
-use super::catalogue::{self, TileEntry};
+use super::catalogue;
 use super::encode::{Encode, Encoded};
+use super::file::TileFile;
+use super::parts::{LONGEST_SPAN, Part, Parts, span};
 use super::record::Record;
 use super::scatter::Scattered;
 use super::spill::{Segment, Spill};
-use super::{CATALOGUE, Store, TILES, io_error};
-use crate::atomic::AtomicFile;
+use super::writer::Writer;
+use super::{CATALOGUE, Store, TILES, TileEntry, io_error};
 use crate::engine::{Engine, Task};
 use crate::progress::Amount;
-use contract::{Result, Scan, TileAt, Weigh};
+use contract::{Result, Scan, TileAt};
 use std::collections::HashMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Most points of one tile: bounds what a worker holds. A square of ground of a dense cloud, or a lattice far coarser
 /// than its scan, may have more; then several tiles stand at the same [`TileAt`], cut in the order of places.
 pub const TILE_POINTS: usize = 1 << 21;
+/// Records that go to disk at once, bytes: some tens of tiles, and little beside what gathers.
+const BATCH_BYTES: usize = 48 << 20;
 
 /// Fills a store. Feed it in the order of the input.
 pub struct TileSink {
     dir: PathBuf,
-    encode: Encode,
+    encode: Arc<Encode>,
     /// Where the tile of a scan, row and column has its buffer; never iterated.
     places: HashMap<(u32, [u32; 2]), usize>,
     buffers: Vec<Buffer>,
     /// Capacity of all buffers, bytes.
     bytes: usize,
     budget_bytes: usize,
+    writer: Writer,
     spill: Option<Spill>,
     n_points: u64,
+    n_strips: u64,
     /// First scan of the store.
     first: u32,
 }
 
-struct Buffer {
-    at: TileAt,
-    records: Vec<Record>,
-    segments: Vec<Segment>,
-    n_points: usize,
+/// What is known of a tile.
+pub(super) struct Buffer {
+    pub(super) at: TileAt,
+    /// In memory.
+    pub(super) records: Vec<Record>,
+    /// In the spill file.
+    pub(super) segments: Vec<Segment>,
+    /// In the tile file, as the end knows it.
+    pub(super) written: Vec<TileEntry>,
+    is_written: bool,
+    /// All that came so far.
+    pub(super) n_points: usize,
     last_place: u64,
-    ascending: bool,
+    pub(super) ascending: bool,
+    /// Number of the last strip that had points for it.
+    touched: u64,
 }
 
 impl TileSink {
@@ -59,15 +72,19 @@ impl TileSink {
             }
             _ => {}
         }
+        let encode = Arc::new(Encode::new(scans));
+        let file = TileFile::create(&dir.join(TILES))?;
         Ok(Self {
             dir: dir.to_owned(),
-            encode: Encode::new(scans),
+            writer: Writer::start(file, &encode)?,
+            encode,
             places: HashMap::new(),
             buffers: Vec::new(),
             bytes: 0,
             budget_bytes,
             spill: None,
             n_points: 0,
+            n_strips: 0,
             first,
         })
     }
@@ -87,205 +104,118 @@ impl TileSink {
     /// Takes the points of one strip.
     pub fn add(&mut self, strip: &Scattered) -> Result<()> {
         let mut start = 0;
+        self.n_strips += 1;
         for run in &strip.runs {
             let place = self.place(strip.scan.0, run.tile);
             let buffer = &mut self.buffers[place];
             let before = buffer.records.capacity();
             buffer.add(&strip.records[start..start + run.n]);
+            buffer.touched = self.n_strips;
             self.bytes += (buffer.records.capacity() - before) * Record::BYTES;
             start += run.n;
         }
         self.n_points += strip.records.len() as u64;
-        if self.bytes > self.budget_bytes { self.spill_half() } else { Ok(()) }
+        if self.bytes > self.budget_bytes { self.relieve() } else { Ok(()) }
     }
 
     fn place(&mut self, scan: u32, tile: [u32; 2]) -> usize {
         *self.places.entry((scan, tile)).or_insert_with(|| {
             let at = TileAt { scan: contract::ScanId(scan), row: tile[0], col: tile[1] };
-            self.buffers.push(Buffer {
-                at,
-                records: Vec::new(),
-                segments: Vec::new(),
-                n_points: 0,
-                last_place: 0,
-                ascending: true,
-            });
+            self.buffers.push(Buffer::new(at));
             self.buffers.len() - 1
         })
     }
 
-    /// Largest first, since a long segment costs one seek as a short one does.
-    fn spill_half(&mut self) -> Result<()> {
-        if self.spill.is_none() {
-            self.spill = Some(Spill::create(&self.dir)?);
-        }
-        let spill = self.spill.as_mut().expect("just made");
+    /// Brings tiles to disk until they fit into the budget again, those first that were touched the longest time ago.
+    fn relieve(&mut self) -> Result<()> {
         let mut order: Vec<usize> =
             (0..self.buffers.len()).filter(|&i| !self.buffers[i].records.is_empty()).collect();
-        order.sort_by_key(|&i| std::cmp::Reverse(self.buffers[i].records.len()));
+        order.sort_by_key(|&i| (self.buffers[i].touched, i));
+        let enough = self.budget_bytes.saturating_sub(BATCH_BYTES.min(self.budget_bytes / 4));
+        let mut batch: Vec<(usize, Part)> = Vec::new();
         for i in order {
-            if self.bytes * 2 <= self.budget_bytes {
+            if self.bytes <= enough {
                 break;
             }
             let buffer = &mut self.buffers[i];
             let records = std::mem::take(&mut buffer.records);
-            buffer.segments.push(spill.write(&records)?);
             self.bytes -= records.capacity() * Record::BYTES;
+            // Points have come back to it, or are too many for one tile: the end decides.
+            let early = !buffer.comes_back()
+                && records.len() <= TILE_POINTS
+                && span(&records) <= LONGEST_SPAN;
+            if early {
+                buffer.is_written = true;
+                batch.push((i, Part { at: buffer.at, records }));
+                continue;
+            }
+            let spill = match &mut self.spill {
+                Some(spill) => spill,
+                None => self.spill.insert(Spill::create(&self.dir)?),
+            };
+            buffer.segments.push(spill.write(&records)?);
         }
-        Ok(())
+        self.writer.write(batch)
     }
 
-    /// Writes all tiles and the catalogue, and opens the store. `open_bytes` as in [`Store::open`].
+    /// Writes what is left of the tiles, and the catalogue, and opens the store. `open_bytes` as in [`Store::open`].
     pub fn finish(self, engine: &Engine, open_bytes: usize) -> Result<Store> {
-        let Self { dir, encode, mut buffers, spill, n_points, first, .. } = self;
-        buffers.sort_by_key(|b| b.at);
+        let Self { dir, encode, mut buffers, writer, spill, first, .. } = self;
+        let (mut file, written) = writer.finish()?;
+        for (i, entry) in written {
+            buffers[i].written.push(entry);
+        }
+        let (done, mut left): (Vec<_>, Vec<_>) = buffers.into_iter().partition(Buffer::is_done);
+        left.sort_by_key(|b| b.at);
+        let mut entries: Vec<TileEntry> = done.into_iter().flat_map(|b| b.written).collect();
+        let n_points = left.iter().map(|b| b.n_points as u64).sum();
         let task = Task::new("store").of(Amount::points(n_points));
-        let path = dir.join(TILES);
-        let mut file = AtomicFile::create(&path)?;
-        let failed = |e| io_error(&path, "a tile cannot be written", e);
-        file.write_all(&catalogue::tiles_header()).map_err(failed)?;
-        let mut offset = catalogue::HEADER_BYTES;
-        let mut entries: Vec<TileEntry> = Vec::new();
-        let parts = Parts { buffers: buffers.into_iter(), spill, current: None };
-        engine.pass(task, parts, |flow| {
-            flow.map(&encode).for_each(|Encoded { mut entry, bytes }| {
-                entry.offset = offset;
-                offset += bytes.len() as u64;
-                entries.push(entry);
-                file.write_all(&bytes).map_err(failed)
+        let early = left.iter().any(|b| !b.written.is_empty());
+        let early = early.then(|| file.again()).transpose()?;
+        engine.pass(task, Parts::new(left, spill, early), |flow| {
+            flow.map(&*encode).for_each(|encoded: Encoded| {
+                entries.push(file.append(encoded)?);
+                Ok(())
             })
         })?;
-        file.commit()?;
-        catalogue::write(&dir.join(CATALOGUE), &entries, offset, first)?;
+        let n_tile_bytes = file.commit()?;
+        entries.sort_by_key(|e| (e.at, e.first_place));
+        catalogue::write(&dir.join(CATALOGUE), &entries, n_tile_bytes, first)?;
         Store::open(&dir, first, open_bytes)
     }
 }
 
 impl Buffer {
-    fn add(&mut self, records: &[Record]) {
-        for r in records {
-            let place = r.place();
-            self.ascending &= self.n_points == 0 || place > self.last_place;
-            self.last_place = place;
+    fn new(at: TileAt) -> Self {
+        Self {
+            at,
+            records: Vec::new(),
+            segments: Vec::new(),
+            written: Vec::new(),
+            n_points: 0,
+            last_place: 0,
+            ascending: true,
+            is_written: false,
+            touched: 0,
         }
+    }
+
+    fn add(&mut self, records: &[Record]) {
+        // Within a run places ascend, as they do in strips.
+        let (Some(first), Some(last)) = (records.first(), records.last()) else { return };
+        self.ascending &= self.n_points == 0 || first.place() > self.last_place;
+        self.last_place = last.place();
         self.n_points += records.len();
         self.records.extend_from_slice(records);
     }
-}
 
-/// The points of a tile, or of a part of it that is small enough.
-pub(super) struct Part {
-    pub(super) at: TileAt,
-    pub(super) records: Vec<Record>,
-}
-
-impl Weigh for Part {
-    fn weight_bytes(&self) -> usize {
-        size_of::<Self>() + self.records.len() * Record::BYTES
+    /// Whether some of it was brought to disk before.
+    fn comes_back(&self) -> bool {
+        self.is_written || !self.segments.is_empty()
     }
 
-    fn n_points(&self) -> u64 {
-        self.records.len() as u64
-    }
-}
-
-/// Reads the tiles back, one after the other, each in parts of at most [`TILE_POINTS`].
-struct Parts {
-    buffers: std::vec::IntoIter<Buffer>,
-    spill: Option<Spill>,
-    current: Option<Current>,
-}
-
-/// A tile that is being read back.
-struct Current {
-    at: TileAt,
-    /// Segments still to be read.
-    segments: std::vec::IntoIter<Segment>,
-    /// What was in memory; comes after all segments.
-    last: Vec<Record>,
-    /// Read, not yet given out.
-    ahead: Vec<Record>,
-}
-
-impl Parts {
-    fn part(&mut self) -> Result<Option<Part>> {
-        loop {
-            let current = match &mut self.current {
-                Some(current) => current,
-                None => {
-                    let Some(buffer) = self.buffers.next() else {
-                        return Ok(None);
-                    };
-                    self.current.insert(Self::begin(buffer, &mut self.spill)?)
-                }
-            };
-            let at = current.at;
-            let records = current.records(&mut self.spill)?;
-            if records.is_empty() {
-                self.current = None;
-                continue;
-            }
-            return Ok(Some(Part { at, records }));
-        }
-    }
-
-    fn begin(buffer: Buffer, spill: &mut Option<Spill>) -> Result<Current> {
-        let Buffer { at, records, segments, ascending, n_points, .. } = buffer;
-        let mut current =
-            Current { at, segments: segments.into_iter(), last: records, ahead: Vec::new() };
-        if !ascending && n_points > TILE_POINTS {
-            // Rare: points out of order, and too many. Their order decides where parts are cut.
-            current.fill(usize::MAX, spill)?;
-            current.ahead.sort_unstable_by_key(Record::place);
-        }
-        Ok(current)
-    }
-}
-
-impl Current {
-    /// Reads until `n` records are ahead, or all.
-    fn fill(&mut self, n: usize, spill: &mut Option<Spill>) -> Result<()> {
-        while self.ahead.len() < n {
-            if let Some(segment) = self.segments.next() {
-                let spill = spill.as_mut().expect("a segment has a spill file");
-                spill.read(&segment, &mut self.ahead)?;
-            } else if self.last.is_empty() {
-                break;
-            } else if self.ahead.is_empty() {
-                self.ahead = std::mem::take(&mut self.last);
-            } else {
-                self.ahead.append(&mut self.last);
-                self.last = Vec::new();
-            }
-        }
-        Ok(())
-    }
-
-    /// The next part. Within one, places span less than 2³².
-    fn records(&mut self, spill: &mut Option<Spill>) -> Result<Vec<Record>> {
-        self.fill(TILE_POINTS, spill)?;
-        let mut n = self.ahead.len().min(TILE_POINTS);
-        let span = |r: &[Record]| {
-            let places = || r.iter().map(Record::place);
-            places().max().zip(places().min()).map_or(0, |(max, min)| max - min)
-        };
-        if span(&self.ahead[..n]) > u64::from(u32::MAX) {
-            self.ahead.sort_unstable_by_key(Record::place);
-            let end = self.ahead[0].place() + u64::from(u32::MAX);
-            n = self.ahead[..n].partition_point(|r| r.place() <= end);
-        }
-        if n == self.ahead.len() {
-            return Ok(std::mem::take(&mut self.ahead));
-        }
-        let rest = self.ahead.split_off(n);
-        Ok(std::mem::replace(&mut self.ahead, rest))
-    }
-}
-
-impl Iterator for Parts {
-    type Item = Result<Part>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        self.part().transpose()
+    /// Whether all of it is written.
+    fn is_done(&self) -> bool {
+        self.records.is_empty() && self.segments.is_empty()
     }
 }

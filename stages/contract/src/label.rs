@@ -16,6 +16,12 @@ pub enum PointKind {
     Uncertain = 255,
 }
 
+impl PointKind {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Fixed, Self::Link, Self::Attachment, Self::Floor, Self::Uncertain];
+}
+
 /// The label of one point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Label {

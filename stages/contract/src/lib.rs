@@ -24,7 +24,7 @@ pub use fit::{
 };
 pub use label::{Label, PointKind};
 pub use lattice::{Lattice, Pixel};
-pub use residual::{LinkAt, RESIDUAL_EDGE, ResidualVoxel, TileLabels};
+pub use residual::{LinkAt, PlaceRun, RESIDUAL_EDGE, ResidualVoxel, TileLabels};
 pub use scan::{Format, Input, InputId, Mask, MaskId, Scan, ScanId};
 pub use space::{Space, SpaceGrid, SpaceKind};
 pub use step::{Fan, Fold, Map, OneByOne, Weigh};

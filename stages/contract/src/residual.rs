@@ -58,10 +58,10 @@ pub struct TileLabels {
     pub at: TileAt,
     /// The mask that its points belong to.
     pub mask: MaskId,
-    /// Certain labels other than the default of the place: place in the mask and label, by place.
-    pub labels: Vec<(u64, Label)>,
-    /// Points to be settled by their voxel: place in the mask and voxel, by place.
-    pub residuals: Vec<(u64, Voxel)>,
+    /// Certain labels other than the default of the place, by place.
+    pub labels: Vec<PlaceRun<Label>>,
+    /// Points to be settled by their voxel, by place.
+    pub residuals: Vec<PlaceRun<Voxel>>,
     /// The voxels of `residuals` and of points on links, sorted by voxel, each once.
     pub voxels: Vec<ResidualVoxel>,
 }
@@ -69,20 +69,80 @@ pub struct TileLabels {
 impl TileLabels {
     /// Labels of all points that differ from fixed, by place, once the label of each residual voxel is known.
     #[must_use]
-    pub fn settle(&self, label_of: impl Fn(Voxel) -> Label) -> Vec<(u64, Label)> {
+    pub fn settle(&self, label_of: impl Fn(Voxel) -> Label) -> Vec<PlaceRun<Label>> {
         let mut out = self.labels.clone();
-        let settled = self.residuals.iter().map(|&(place, voxel)| (place, label_of(voxel)));
-        out.extend(settled.filter(|(_, label)| *label != Label::FIXED));
-        out.sort_unstable_by_key(|entry| entry.0);
+        let settled = self.residuals.iter().map(|run| run.of(label_of(run.what)));
+        out.extend(settled.filter(|run| run.what != Label::FIXED));
+        PlaceRun::join(&mut out);
         out
+    }
+}
+
+/// Consecutive places of a mask that share something: points of a scan in the order of measurement mostly do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PlaceRun<T> {
+    /// First of them.
+    pub first: u64,
+    /// How many.
+    pub n: u32,
+    /// What they share.
+    pub what: T,
+}
+
+impl<T: Copy + PartialEq> PlaceRun<T> {
+    /// A single place.
+    #[must_use]
+    pub fn one(place: u64, what: T) -> Self {
+        Self { first: place, n: 1, what }
+    }
+
+    /// The same places with something else.
+    pub fn of<U>(&self, what: U) -> PlaceRun<U> {
+        PlaceRun { first: self.first, n: self.n, what }
+    }
+
+    /// The place after the last.
+    #[must_use]
+    pub fn end(&self) -> u64 {
+        self.first + u64::from(self.n)
+    }
+
+    /// Sorts runs, which have no place in common, and joins those that follow each other and share the same.
+    pub fn join(runs: &mut Vec<Self>) {
+        runs.sort_unstable_by_key(|run| run.first);
+        runs.dedup_by(|later, kept| {
+            let joins = kept.end() == later.first && kept.what == later.what;
+            let n = kept.n.checked_add(later.n).filter(|_| joins);
+            if let Some(n) = n {
+                kept.n = n;
+            }
+            n.is_some()
+        });
+        runs.shrink_to_fit();
     }
 }
 
 impl Weigh for TileLabels {
     fn weight_bytes(&self) -> usize {
         size_of::<Self>()
-            + self.labels.len() * size_of::<(u64, Label)>()
-            + self.residuals.len() * size_of::<(u64, Voxel)>()
+            + self.labels.len() * size_of::<PlaceRun<Label>>()
+            + self.residuals.len() * size_of::<PlaceRun<Voxel>>()
             + self.voxels.len() * size_of::<ResidualVoxel>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_join_where_they_follow_and_share() {
+        let mut runs: Vec<PlaceRun<u8>> = [(7, 1), (3, 0), (4, 0), (6, 1), (5, 0), (9, 1)]
+            .map(|(p, w)| PlaceRun::one(p, w))
+            .into();
+        PlaceRun::join(&mut runs);
+        let run = |first, n, what| PlaceRun { first, n, what };
+        assert_eq!(runs, [run(3, 3, 0), run(6, 2, 1), run(9, 1, 1)]);
+        assert_eq!(runs[1].end(), 8);
     }
 }

@@ -46,3 +46,38 @@ pub struct View {
     /// The scan's points inside the region's bounds, sorted by place.
     pub points: Vec<ViewPoint>,
 }
+
+/// Views that a search looks through: more tell it little, and cost it as much as the first.
+const MAX_SCOUTS: usize = 8;
+/// Scanners nearer to each other than this, seen from the region's middle, see the same side of it; cosine of 25°.
+const SAME_SIDE: f64 = 0.906;
+
+impl View {
+    /// The views that a search goes by, where there are many: those with most points, of scanners on different sides first.
+    /// In their order.
+    #[must_use]
+    pub fn scouts<'a>(views: &[&'a Self], region: &Region) -> Vec<&'a Self> {
+        if views.len() <= MAX_SCOUTS {
+            return views.to_vec();
+        }
+        let middle = region.bounds.center();
+        let side = |view: &Self| view.scanner.map(|s| (s - middle).normalize());
+        let mut order: Vec<usize> = (0..views.len()).collect();
+        order.sort_by_key(|&i| (std::cmp::Reverse(views[i].points.len()), i));
+        let mut chosen: Vec<usize> = Vec::new();
+        for apart in [true, false] {
+            for &i in &order {
+                let alike = |&c: &usize| {
+                    let both = side(views[i]).zip(side(views[c]));
+                    both.is_some_and(|(a, b)| a.dot(&b) > SAME_SIDE)
+                };
+                let is_known = chosen.contains(&i) || apart && chosen.iter().any(alike);
+                if !is_known && chosen.len() < MAX_SCOUTS {
+                    chosen.push(i);
+                }
+            }
+        }
+        chosen.sort_unstable();
+        chosen.into_iter().map(|i| views[i]).collect()
+    }
+}

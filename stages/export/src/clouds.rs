@@ -1,38 +1,22 @@
-//! Labelled clouds: points in any order in; spatial tiles, and robots and fixed things apart, out.
+//! Packed strips in, in any order; spatial tiles, and robots and fixed things apart, out.
 //!
 //! Tiles are as many as the plant is large, so none of them keeps a file open: records wait in memory, bounded in
-//! bytes, and the fullest tiles are appended to their files.
+//! bytes, and full tiles are appended to their files.
 
 use crate::atomic::{part_of, refused};
 use crate::las::{LasSummary, LasWriter, bounds, head};
-use crate::record::{Extent, LasPoint, LasSettings, encode};
-use contract::{PointKind, Result};
-use geometry::narrow::floor_i32;
+use crate::pack::{Pack, Packed, Run};
+use crate::record::{Extent, LasSettings};
+use crate::settings::Settings;
+use crate::summed::{BodySum, FileSum};
+use contract::{Fan, Result};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// What clouds are written, and how.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CloudsSettings {
-    /// Format of all of them.
-    pub las: LasSettings,
-    /// Edge of a tile, metres; `None` for no tiles. 10 m is a robot cell.
-    pub tile_edge: Option<f64>,
-    /// Whether `clouds/robots` (links and attachments) and `clouds/fixed` (all the rest, uncertain too) are written.
-    pub apart: bool,
-    /// Records that may wait in memory, bytes.
-    pub memory: usize,
-}
-
-impl CloudsSettings {
-    /// Tiles of 10 m and clouds apart, with 64 MiB of waiting records.
-    #[must_use]
-    pub fn new(las: LasSettings) -> Self {
-        Self { las, tile_edge: Some(10.0), apart: true, memory: 64 << 20 }
-    }
-}
+/// A tile with so many waiting bytes is appended to its file: one call to the system for a hundred thousand points.
+const FULL_BYTES: usize = 4 << 20;
 
 /// What [`Clouds`] wrote.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,71 +25,87 @@ pub struct Written {
     pub tiles: Vec<LasSummary>,
     /// Links and attachments.
     pub robots: Option<LasSummary>,
-    /// All the rest.
+    /// All the rest, where asked for.
     pub fixed: Option<LasSummary>,
+}
+
+impl Written {
+    /// Checksums of the files, where they are known.
+    pub fn sums(&self) -> impl Iterator<Item = &FileSum> {
+        let all = self.tiles.iter().chain(&self.robots).chain(&self.fixed);
+        all.filter_map(|summary| summary.sum.as_ref())
+    }
 }
 
 /// Writes labelled clouds under `OUT/tiles` and `OUT/clouds`.
 pub struct Clouds {
     out: PathBuf,
-    settings: CloudsSettings,
+    las: LasSettings,
+    settings: Settings,
     tiles: BTreeMap<[i32; 2], Spool>,
+    /// Capacity of all waiting records, bytes.
     waiting: usize,
-    robots: Option<LasWriter>,
+    robots: LasWriter,
     fixed: Option<LasWriter>,
 }
 
 impl Clouds {
-    /// Opens the clouds under the output folder.
-    pub fn create(out: &Path, settings: CloudsSettings) -> Result<Self> {
-        let ending = if settings.las.compress { "laz" } else { "las" };
+    /// Opens the clouds under the output folder; `las` says what records hold.
+    pub fn create(out: &Path, las: &LasSettings, settings: &Settings) -> Result<Self> {
+        let (compress, with_bodies) = (settings.compress, settings.bodies);
+        let las = LasSettings { compress, with_bodies, ..las.clone() };
         let open = |name: &str| {
-            settings
-                .apart
-                .then(|| {
-                    LasWriter::create(
-                        out.join(format!("clouds/{name}.{ending}")),
-                        settings.las.clone(),
-                    )
-                })
-                .transpose()
+            LasWriter::create(out.join(format!("clouds/{name}.{}", ending(&las))), las.clone())
         };
-        let (robots, fixed) = (open("robots")?, open("fixed")?);
-        if settings.tile_edge.is_some() {
+        let (robots, fixed) =
+            (open("robots")?, settings.fixed_cloud.then(|| open("fixed")).transpose()?);
+        if settings.tiles {
             let folder = out.join("tiles");
             std::fs::create_dir_all(&folder)
                 .map_err(|e| refused("folder cannot be made", &folder, e))?;
         }
-        Ok(Self {
-            out: out.to_path_buf(),
-            settings,
-            tiles: BTreeMap::new(),
-            waiting: 0,
-            robots,
-            fixed,
-        })
+        let (tiles, settings) = (BTreeMap::new(), *settings);
+        Ok(Self { out: out.to_path_buf(), las, settings, tiles, waiting: 0, robots, fixed })
     }
 
-    /// Adds a labelled point.
-    #[inline]
-    pub fn push(&mut self, point: &LasPoint, kind: PointKind) -> Result<()> {
-        let moves = matches!(kind, PointKind::Link | PointKind::Attachment);
-        if let Some(cloud) = if moves { &mut self.robots } else { &mut self.fixed } {
-            cloud.push(point)?;
+    /// What workers pack strips with.
+    #[must_use]
+    pub fn pack(&self) -> Pack {
+        Pack::new(&self.las, self.settings.tiles.then_some(self.settings.tile_edge))
+    }
+
+    /// Adds a packed strip.
+    pub fn add(&mut self, packed: &Packed) -> Result<()> {
+        let mut start = 0;
+        for run in &packed.runs {
+            let end = start + run.extent.n as usize * self.las.record_len();
+            let records = &packed.bytes[start..end];
+            if run.moves {
+                self.robots.push_records(records, &run.extent)?;
+            } else if let Some(fixed) = &mut self.fixed {
+                fixed.push_records(records, &run.extent)?;
+            }
+            if self.settings.tiles {
+                self.spool(run, records)?;
+            }
+            start = end;
         }
-        let Some(edge) = self.settings.tile_edge else {
-            return Ok(());
-        };
-        let at = [floor_i32(point.xyz[1] / edge), floor_i32(point.xyz[0] / edge)];
+        Ok(())
+    }
+
+    fn spool(&mut self, run: &Run, records: &[u8]) -> Result<()> {
+        let at = run.tile;
         let spool = self.tiles.entry(at).or_insert_with(|| {
-            let ending = if self.settings.las.compress { "laz" } else { "las" };
-            Spool::new(self.out.join(format!("tiles/{}_{}.{ending}", at[1], at[0])))
+            Spool::new(self.out.join(format!("tiles/{}_{}.{}", at[1], at[0], ending(&self.las))))
         });
-        let before = spool.records.len();
-        encode(point, &self.settings.las, &mut spool.extent, &mut spool.records)
-            .map_err(|e| e.at(spool.path.display()))?;
-        self.waiting += spool.records.len() - before;
-        if self.waiting >= self.settings.memory { self.relieve() } else { Ok(()) }
+        let before = spool.records.capacity();
+        spool.records.extend_from_slice(records);
+        spool.extent.join(&run.extent);
+        self.waiting += spool.records.capacity() - before;
+        if spool.records.len() >= FULL_BYTES {
+            self.waiting -= spool.append(&self.las)?;
+        }
+        if self.waiting >= self.settings.waiting_bytes { self.relieve() } else { Ok(()) }
     }
 
     /// Appends the fullest tiles to their files until half of the memory is free.
@@ -114,30 +114,29 @@ impl Clouds {
             self.tiles.iter().map(|(at, s)| (*at, s.records.len())).collect();
         fullest.sort_by_key(|(at, n)| (std::cmp::Reverse(*n), *at));
         for (at, _) in fullest {
-            if self.waiting <= self.settings.memory / 2 {
+            if self.waiting <= self.settings.waiting_bytes / 2 {
                 break;
             }
             if let Some(spool) = self.tiles.get_mut(&at) {
-                self.waiting -= spool.records.len();
-                spool.append(&self.settings.las)?;
-                // Capacity counts as memory too.
-                spool.records = Vec::new();
+                self.waiting -= spool.append(&self.las)?;
             }
         }
         Ok(())
     }
 
-    /// Finishes all files.
-    pub fn finish(self) -> Result<Written> {
-        let Self { settings, tiles, robots, fixed, .. } = self;
-        let robots = robots.map(LasWriter::finish).transpose()?;
+    /// Finishes all files, tiles side by side.
+    pub fn finish(self, fan: &impl Fan) -> Result<Written> {
+        let Self { las, tiles, robots, fixed, .. } = self;
+        let robots = Some(robots.finish()?);
         let fixed = fixed.map(LasWriter::finish).transpose()?;
-        let mut written = Vec::new();
-        for (_, spool) in tiles {
-            written.push(spool.finish(&settings.las)?);
-        }
-        Ok(Written { tiles: written, robots, fixed })
+        let spools = tiles.into_values().collect();
+        let tiles = fan.fan(spools, |spool: Spool| spool.finish(&las));
+        Ok(Written { tiles: tiles.into_iter().collect::<Result<_>>()?, robots, fixed })
     }
+}
+
+fn ending(las: &LasSettings) -> &'static str {
+    if las.compress { "laz" } else { "las" }
 }
 
 /// A tile that grows by appending.
@@ -147,16 +146,19 @@ struct Spool {
     part: PathBuf,
     records: Vec<u8>,
     extent: Extent,
+    body: BodySum,
     is_begun: bool,
 }
 
 impl Spool {
     fn new(path: PathBuf) -> Self {
         let part = part_of(&path.with_extension("records"));
-        Self { path, part, records: Vec::new(), extent: Extent::default(), is_begun: false }
+        let (extent, body) = (Extent::default(), BodySum::default());
+        Self { path, part, records: Vec::new(), extent, body, is_begun: false }
     }
 
-    fn append(&mut self, las: &LasSettings) -> Result<()> {
+    /// Appends what waits; returns how much memory that freed.
+    fn append(&mut self, las: &LasSettings) -> Result<usize> {
         let failed = |e| refused("tile cannot be written", &self.part, e);
         let begin = !self.is_begun;
         let mut options = OpenOptions::new();
@@ -171,9 +173,10 @@ impl Spool {
             file.write_all(&head(las, &Extent::default())?).map_err(failed)?;
         }
         file.write_all(&self.records).map_err(failed)?;
-        self.records.clear();
+        self.body.add(&self.records);
         self.is_begun = true;
-        Ok(())
+        // Capacity counts as memory: what is not full yet may stay so for long.
+        Ok(std::mem::take(&mut self.records).capacity())
     }
 
     fn finish(mut self, las: &LasSettings) -> Result<LasSummary> {
@@ -195,6 +198,7 @@ impl Spool {
             path: self.path.clone(),
             n_points: self.extent.n,
             bounds: bounds(las, &self.extent),
+            sum: Some(self.body.behind(&head, &self.path)),
         })
     }
 
@@ -202,15 +206,16 @@ impl Spool {
     fn compress(&self, las: &LasSettings) -> Result<LasSummary> {
         let failed = |e| refused("tile cannot be read again", &self.part, e);
         let mut writer = LasWriter::create(&self.path, las.clone())?;
-        writer.widen(&self.extent);
         let mut file = File::open(&self.part).map_err(failed)?;
+        // All of it with the first piece.
+        let mut extent = self.extent;
         let mut left = self.extent.n as usize * las.record_len();
         let mut piece = vec![0; 8192 * las.record_len()];
         while left > 0 {
             let n = left.min(piece.len());
             file.read_exact(&mut piece[..n]).map_err(failed)?;
-            writer.push_records(&piece[..n])?;
-            left -= n;
+            writer.push_records(&piece[..n], &extent)?;
+            (left, extent) = (left - n, Extent::default());
         }
         writer.finish()
     }

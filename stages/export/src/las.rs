@@ -1,7 +1,9 @@
 //! LAS 1.4 and LAZ: points in, one file out; counts and bounds are written into the header at the end.
 
 use crate::atomic::{AtomicFile, refused};
-use crate::record::{EXTRA_LEN, Extent, LasPoint, LasSettings, encode};
+use crate::pack::{Pack, PointColumns};
+use crate::record::{Extent, LasSettings};
+use crate::summed::{FileSum, SummedFile};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use las::raw;
@@ -25,10 +27,12 @@ pub struct LasSummary {
     pub n_points: u64,
     /// Bounds as in the header, metres; empty without points.
     pub bounds: Aabb,
+    /// Of the file, where it was not compressed.
+    pub sum: Option<FileSum>,
 }
 
 enum Sink {
-    Plain(BufWriter<AtomicFile>),
+    Plain(SummedFile),
     Compressed(Box<LasZipCompressor<'static, BufWriter<AtomicFile>>>),
 }
 
@@ -36,6 +40,7 @@ enum Sink {
 pub struct LasWriter {
     sink: Sink,
     settings: LasSettings,
+    pack: Pack,
     extent: Extent,
     path: PathBuf,
     gathered: Vec<u8>,
@@ -45,42 +50,43 @@ impl LasWriter {
     /// Opens the file; whether it is compressed is up to `settings`, not to its name.
     pub fn create(path: impl Into<PathBuf>, settings: LasSettings) -> Result<Self> {
         let path = path.into();
-        let mut file = BufWriter::with_capacity(GATHER, AtomicFile::create(&path)?);
         let head = head(&settings, &Extent::default())?;
-        file.write_all(&head).map_err(|e| refused("cloud cannot be written", &path, e))?;
         let sink = if settings.compress {
+            let mut file = BufWriter::with_capacity(GATHER, AtomicFile::create(&path)?);
+            file.write_all(&head).map_err(|e| refused("cloud cannot be written", &path, e))?;
             let compressor =
                 LasZipCompressor::new(file, laz_vlr(&settings)).map_err(|e| ours(e, &path))?;
             Sink::Compressed(Box::new(compressor))
         } else {
-            Sink::Plain(file)
+            Sink::Plain(SummedFile::create(&path, &head)?)
         };
+        let pack = Pack::new(&settings, None);
         Ok(Self {
             sink,
             settings,
+            pack,
             extent: Extent::default(),
             path,
             gathered: Vec::with_capacity(GATHER + 64),
         })
     }
 
-    /// Appends a point.
-    #[inline]
-    pub fn push(&mut self, point: &LasPoint) -> Result<()> {
-        encode(point, &self.settings, &mut self.extent, &mut self.gathered)
-            .map_err(|e| e.at(self.path.display()))?;
-        if self.gathered.len() >= GATHER { self.flush() } else { Ok(()) }
+    /// Appends points.
+    pub fn push(&mut self, points: &PointColumns<'_>) -> Result<()> {
+        let packed = self.pack.pack(points).map_err(|e| e.at(self.path.display()))?;
+        packed.runs.iter().for_each(|run| self.extent.join(&run.extent));
+        self.gather(&packed.bytes)
     }
 
-    /// Appends encoded records, whose extent is added by [`Self::widen`].
-    pub(crate) fn push_records(&mut self, records: &[u8]) -> Result<()> {
+    /// Appends records that were encoded elsewhere.
+    pub(crate) fn push_records(&mut self, records: &[u8], extent: &Extent) -> Result<()> {
+        self.extent.join(extent);
+        self.gather(records)
+    }
+
+    fn gather(&mut self, records: &[u8]) -> Result<()> {
         self.gathered.extend_from_slice(records);
-        self.flush()
-    }
-
-    /// Takes over the extent of records that were encoded elsewhere.
-    pub(crate) fn widen(&mut self, extent: &Extent) {
-        self.extent = *extent;
+        if self.gathered.len() >= GATHER { self.flush() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -96,18 +102,21 @@ impl LasWriter {
     pub fn finish(mut self) -> Result<LasSummary> {
         self.flush()?;
         let Self { sink, settings, extent, path, .. } = self;
-        let failed = |e| refused("cloud cannot be finished", &path, e);
-        let mut file = match sink {
-            Sink::Plain(file) => file,
+        let head = head(&settings, &extent)?;
+        let sum = match sink {
+            Sink::Plain(file) => Some(file.finish(&head)?),
             Sink::Compressed(mut compressor) => {
+                let failed = |e| refused("cloud cannot be finished", &path, e);
                 compressor.done().map_err(failed)?;
-                compressor.into_inner()
+                let mut file = compressor.into_inner();
+                file.seek(SeekFrom::Start(0))
+                    .and_then(|_| file.write_all(&head))
+                    .map_err(failed)?;
+                file.into_inner().map_err(|e| failed(e.into_error()))?.commit()?;
+                None
             }
         };
-        let head = head(&settings, &extent)?;
-        file.seek(SeekFrom::Start(0)).and_then(|_| file.write_all(&head)).map_err(failed)?;
-        file.into_inner().map_err(|e| failed(e.into_error()))?.commit()?;
-        Ok(LasSummary { path, n_points: extent.n, bounds: bounds(&settings, &extent) })
+        Ok(LasSummary { path, n_points: extent.n, bounds: bounds(&settings, &extent), sum })
     }
 }
 
@@ -128,8 +137,8 @@ pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     for vlr in &settings.vlrs {
         records.push(vlr_of(&vlr.user_id, vlr.record_id, &vlr.description, vlr.data.clone())?);
     }
-    if settings.with_labels {
-        records.push(vlr_of("LASF_Spec", 4, "RobotId and LinkId", extra_bytes())?);
+    if settings.extra_len() > 0 {
+        records.push(vlr_of("LASF_Spec", 4, "what points belong to", extra_bytes(settings))?);
     }
     if settings.compress {
         let mut data = Vec::new();
@@ -199,12 +208,19 @@ fn vlr_of(user_id: &str, record_id: u16, description: &str, data: Vec<u8>) -> Re
 }
 
 /// The Extra Bytes record of LAS 1.4 (R15, table 24): 192 bytes a field.
-fn extra_bytes() -> Vec<u8> {
+fn extra_bytes(settings: &LasSettings) -> Vec<u8> {
     const UNSIGNED_SHORT: u8 = 3;
+    const UNSIGNED_LONG: u8 = 5;
+    let labels = [
+        ("RobotId", UNSIGNED_SHORT, "robot + 1, 0 for none"),
+        ("LinkId", UNSIGNED_SHORT, "link + 1, 0 for none"),
+    ];
+    let bodies = [("BodyId", UNSIGNED_LONG, "connected body + 1, 0: floor")];
+    let labels = labels.iter().filter(|_| settings.with_labels);
     let mut out = Vec::new();
-    for (name, what) in [("RobotId", "robot + 1, 0 for none"), ("LinkId", "link + 1, 0 for none")] {
+    for (name, kind, what) in labels.chain(bodies.iter().filter(|_| settings.with_bodies)) {
         let start = out.len();
-        out.extend([0, 0, UNSIGNED_SHORT, 0]);
+        out.extend([0, 0, *kind, 0]);
         out.extend(text::<32>(name));
         // Unused, no-data, least, largest, scale and offset: none of them given.
         out.resize(start + 160, 0);
@@ -219,8 +235,8 @@ fn laz_vlr(settings: &LasSettings) -> LazVlr {
     if settings.with_color {
         items.add_item(LazItemType::RGB14);
     }
-    if settings.with_labels {
-        items.add_item(LazItemType::Byte14(EXTRA_LEN as u16));
+    if settings.extra_len() > 0 {
+        items.add_item(LazItemType::Byte14(settings.extra_len() as u16));
     }
     LazVlr::from_laz_items(items.build())
 }

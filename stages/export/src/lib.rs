@@ -14,33 +14,39 @@ mod las;
 mod mask;
 mod npy;
 mod octomap;
+mod pack;
 mod places;
 mod plan_picture;
 mod record;
 mod result;
 mod robot_model;
 mod robot_picture;
+mod settings;
 mod space;
+mod summed;
 mod table;
 
 pub use atomic::AtomicFile;
 pub use calibration::{CalibrationEntry, FrameEntry};
 pub use canvas::{Canvas, Rgb, link_color, robot_color};
-pub use clouds::{Clouds, CloudsSettings, Written};
+pub use clouds::{Clouds, Written};
 pub use e57::{E57Scans, GridPoint, GridScan};
 pub use evidence_picture::draw_evidence;
 pub use junit::write_junit;
 pub use las::{LasSummary, LasWriter};
-pub use mask::{MaskFiles, MaskWriter};
+pub use mask::{LabelColumns, MaskFiles, MaskWriter};
 pub use npy::{Element, NpyWriter};
+pub use pack::{Pack, Packed, PointColumns};
 pub use places::Places;
 pub use plan_picture::PlanPicture;
-pub use record::{LasPoint, LasSettings, Quantum, RawVlr, class_of};
+pub use record::{LasSettings, Quantum, RawVlr, class_of};
 pub use result::{
     BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
     SCHEMA, ScanLabels, StageEntry, TipPose,
 };
 pub use robot_model::write_robot;
 pub use robot_picture::RobotPicture;
+pub use settings::Settings;
 pub use space::{SpaceEntry, write_space};
+pub use summed::FileSum;
 pub use table::write_table;

@@ -1,6 +1,7 @@
 //! The labels of one mask: labels in the order of the input in, three arrays out.
 
 use crate::npy::NpyWriter;
+use crate::summed::FileSum;
 use contract::{Label, MaskId, Result};
 use std::path::Path;
 
@@ -21,6 +22,65 @@ impl MaskFiles {
     pub fn of(mask: MaskId) -> Self {
         let name = |what: &str| format!("labels/{}.{what}.npy", mask.0);
         Self { kind: name("kind"), robot: name("robot"), link: name("link") }
+    }
+}
+
+/// Labels as the three arrays have them.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LabelColumns {
+    kind: Vec<u8>,
+    robot: Vec<i16>,
+    link: Vec<i16>,
+}
+
+impl LabelColumns {
+    /// The columns of some labels.
+    #[must_use]
+    pub fn of(labels: &[Label]) -> Self {
+        Self {
+            kind: labels.iter().map(|l| l.kind as u8).collect(),
+            robot: labels.iter().map(|l| l.robot).collect(),
+            link: labels.iter().map(|l| l.link).collect(),
+        }
+    }
+
+    /// Number of labels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.kind.len()
+    }
+
+    /// Holds none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.kind.is_empty()
+    }
+
+    /// Makes it `n` long, filled up with uncertain ones.
+    pub fn pad(&mut self, n: usize) {
+        self.kind.resize(n, Label::UNCERTAIN.kind as u8);
+        self.robot.resize(n, Label::UNCERTAIN.robot);
+        self.link.resize(n, Label::UNCERTAIN.link);
+    }
+
+    /// Copies one label.
+    pub fn set(&mut self, at: usize, from: &Self, i: usize) {
+        self.kind[at] = from.kind[i];
+        self.robot[at] = from.robot[i];
+        self.link[at] = from.link[i];
+    }
+
+    /// Forgets all of them, but not its memory.
+    pub fn clear(&mut self) {
+        self.kind.clear();
+        self.robot.clear();
+        self.link.clear();
+    }
+
+    /// Memory that it takes, bytes.
+    #[must_use]
+    pub fn weight_bytes(&self) -> usize {
+        self.len() * 5
     }
 }
 
@@ -55,28 +115,14 @@ impl MaskWriter {
     }
 
     /// Appends the labels of the next points.
-    pub fn push(&mut self, labels: &[Label]) -> Result<()> {
-        self.kind.push(labels.iter().map(|l| l.kind as u8))?;
-        self.robot.push(labels.iter().map(|l| l.robot))?;
-        self.link.push(labels.iter().map(|l| l.link))
+    pub fn push(&mut self, labels: &LabelColumns) -> Result<()> {
+        self.kind.push(&labels.kind)?;
+        self.robot.push(&labels.robot)?;
+        self.link.push(&labels.link)
     }
 
-    /// Fills up to `place` with uncertain entries: points that were dropped keep their place.
-    pub fn skip_to(&mut self, place: u64) -> Result<()> {
-        const STEP: u64 = 1 << 16;
-        while self.len() < place {
-            let n = (place - self.len()).min(STEP) as usize;
-            self.kind.push(std::iter::repeat_n(Label::UNCERTAIN.kind as u8, n))?;
-            self.robot.push(std::iter::repeat_n(Label::UNCERTAIN.robot, n))?;
-            self.link.push(std::iter::repeat_n(Label::UNCERTAIN.link, n))?;
-        }
-        Ok(())
-    }
-
-    /// Gives the files their names. Returns the number of entries.
-    pub fn finish(self) -> Result<u64> {
-        self.kind.finish()?;
-        self.robot.finish()?;
-        self.link.finish()
+    /// Gives the files their names.
+    pub fn finish(self) -> Result<[FileSum; 3]> {
+        Ok([self.kind.finish()?, self.robot.finish()?, self.link.finish()?])
     }
 }

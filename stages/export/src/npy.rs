@@ -1,36 +1,45 @@
 //! NumPy arrays: values in, a version 1.0 `.npy` file out, whose length is written at the end.
 
-use crate::atomic::{AtomicFile, refused};
+use crate::atomic::refused;
+use crate::summed::{FileSum, SummedFile};
 use contract::Result;
-use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 /// A type of array element.
 pub trait Element: Copy {
     /// NumPy's name for it.
     const DESCR: &'static str;
-    /// Appends its little-endian bytes.
-    fn put(self, bytes: &mut Vec<u8>);
+    /// Its length, bytes.
+    const LEN: usize;
+    /// Writes its little-endian bytes.
+    fn put(self, bytes: &mut [u8]);
 }
 
 impl Element for u8 {
     const DESCR: &'static str = "|u1";
-    fn put(self, bytes: &mut Vec<u8>) {
-        bytes.push(self);
+    const LEN: usize = 1;
+    #[inline]
+    fn put(self, bytes: &mut [u8]) {
+        bytes.copy_from_slice(&self.to_le_bytes());
     }
 }
 
 impl Element for u16 {
     const DESCR: &'static str = "<u2";
-    fn put(self, bytes: &mut Vec<u8>) {
-        bytes.extend(self.to_le_bytes());
+    const LEN: usize = 2;
+    #[inline]
+    fn put(self, bytes: &mut [u8]) {
+        bytes.copy_from_slice(&self.to_le_bytes());
     }
 }
 
 impl Element for i16 {
     const DESCR: &'static str = "<i2";
-    fn put(self, bytes: &mut Vec<u8>) {
-        bytes.extend(self.to_le_bytes());
+    const LEN: usize = 2;
+    #[inline]
+    fn put(self, bytes: &mut [u8]) {
+        bytes.copy_from_slice(&self.to_le_bytes());
     }
 }
 
@@ -39,7 +48,7 @@ const HEADER: usize = 128;
 
 /// Writes an array piece by piece.
 pub struct NpyWriter<T> {
-    file: BufWriter<AtomicFile>,
+    file: BufWriter<SummedFile>,
     path: PathBuf,
     bytes: Vec<u8>,
     n: u64,
@@ -50,19 +59,18 @@ impl<T: Element> NpyWriter<T> {
     /// Opens the file; its length need not be known.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
-        let mut file = BufWriter::with_capacity(1 << 18, AtomicFile::create(&path)?);
-        file.write_all(&header::<T>("(0,)"))
-            .map_err(|e| refused("array cannot be written", &path, e))?;
+        let file = SummedFile::create(&path, &header::<T>("(0,)"))?;
+        let file = BufWriter::with_capacity(1 << 18, file);
         Ok(Self { file, path, bytes: Vec::new(), n: 0, element: std::marker::PhantomData })
     }
 
     /// Appends values.
-    pub fn push(&mut self, values: impl IntoIterator<Item = T>) -> Result<()> {
-        self.bytes.clear();
-        for value in values {
-            value.put(&mut self.bytes);
-            self.n += 1;
+    pub fn push(&mut self, values: &[T]) -> Result<()> {
+        self.bytes.resize(values.len() * T::LEN, 0);
+        for (value, bytes) in values.iter().zip(self.bytes.chunks_exact_mut(T::LEN)) {
+            value.put(bytes);
         }
+        self.n += values.len() as u64;
         self.file
             .write_all(&self.bytes)
             .map_err(|e| refused("array cannot be written", &self.path, e))
@@ -80,28 +88,24 @@ impl<T: Element> NpyWriter<T> {
         self.n == 0
     }
 
-    /// Writes the length and gives the file its name. Returns the number of values.
-    pub fn finish(self) -> Result<u64> {
+    /// Writes the length and gives the file its name.
+    pub fn finish(self) -> Result<FileSum> {
         let n = self.n;
         self.end(&format!("({n},)"))
     }
 
     /// The same for an array of three dimensions, whose last one runs fastest.
-    pub(crate) fn finish_as(self, [x, y, z]: &[usize; 3]) -> Result<u64> {
+    pub(crate) fn finish_as(self, [x, y, z]: &[usize; 3]) -> Result<FileSum> {
         debug_assert_eq!(self.n, (x * y * z) as u64);
         self.end(&format!("({x}, {y}, {z})"))
     }
 
-    fn end(self, shape: &str) -> Result<u64> {
-        let Self { mut file, path, n, .. } = self;
-        file.seek(SeekFrom::Start(0))
-            .and_then(|_| file.write_all(&header::<T>(shape)))
-            .map_err(|e| refused("array cannot be finished", &path, e))?;
-        let file = file
+    fn end(self, shape: &str) -> Result<FileSum> {
+        let file = self
+            .file
             .into_inner()
-            .map_err(|e| refused("array cannot be finished", &path, e.into_error()))?;
-        file.commit()?;
-        Ok(n)
+            .map_err(|e| refused("array cannot be finished", &self.path, e.into_error()))?;
+        file.finish(&header::<T>(shape))
     }
 }
 

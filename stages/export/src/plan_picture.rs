@@ -3,7 +3,7 @@
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, robot_color};
 use contract::{Label, PointKind};
 use geometry::Aabb;
-use geometry::narrow::floor_i32;
+use std::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
 
 /// Finest cell, metres.
 const MIN_CELL: f64 = 0.05;
@@ -14,8 +14,8 @@ const MIN_PIXELS: usize = 900;
 /// Room about the plan, pixels.
 const MARGIN: i64 = 24;
 
-/// Counts of points by cell of the ground; small, so that each worker may have its own.
-#[derive(Debug, Clone, PartialEq)]
+/// Counts of points by cell of the ground. Workers count into it side by side: sums know no order.
+#[derive(Debug)]
 pub struct PlanPicture {
     min: [f64; 2],
     cell: f64,
@@ -24,14 +24,14 @@ pub struct PlanPicture {
     cells: Vec<Cell>,
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Default)]
 struct Cell {
-    n_floor: u32,
-    n_fixed: u32,
-    n_uncertain: u32,
-    n_moving: u32,
-    /// Lowest robot number + 1 seen here, 0 for none.
-    robot: u16,
+    n_floor: AtomicU32,
+    n_fixed: AtomicU32,
+    n_uncertain: AtomicU32,
+    n_moving: AtomicU32,
+    /// Highest of `u16::MAX - robot` seen here, which is the lowest robot; 0 for none.
+    robot: AtomicU16,
 }
 
 impl PlanPicture {
@@ -49,43 +49,40 @@ impl PlanPicture {
             cell,
             width,
             height,
-            cells: vec![Cell::default(); width * height],
+            cells: (0..width * height).map(|_| Cell::default()).collect(),
         }
     }
 
-    /// Adds a labelled point of the world.
-    #[inline]
-    pub fn add(&mut self, world: [f64; 3], label: Label) {
-        let Some(at) = self.at([world[0], world[1]]) else {
-            return;
-        };
-        let cell = &mut self.cells[at];
+    /// Adds labelled points of the world.
+    pub fn add(&self, world: &[[f64; 3]], labels: &[Label]) {
+        // Neighbours mostly fall into the same cell: they are counted together.
+        let mut last = (None, Label::FIXED);
+        let mut n = 0;
+        for (p, label) in world.iter().zip(labels) {
+            let now = (self.at([p[0], p[1]]), *label);
+            if now != last {
+                self.count(last, n);
+                (last, n) = (now, 0);
+            }
+            n += 1;
+        }
+        self.count(last, n);
+    }
+
+    fn count(&self, (at, label): (Option<usize>, Label), n: u32) {
+        let Some(at) = at else { return };
+        let cell = &self.cells[at];
         let count = match label.kind {
-            PointKind::Floor => &mut cell.n_floor,
-            PointKind::Fixed => &mut cell.n_fixed,
-            PointKind::Uncertain => &mut cell.n_uncertain,
+            PointKind::Floor => &cell.n_floor,
+            PointKind::Fixed => &cell.n_fixed,
+            PointKind::Uncertain => &cell.n_uncertain,
             PointKind::Link | PointKind::Attachment => {
-                let robot = u16::try_from(i32::from(label.robot) + 1).unwrap_or(0);
-                cell.robot = if cell.robot == 0 { robot } else { cell.robot.min(robot) };
-                &mut cell.n_moving
+                let robot = u16::try_from(label.robot).map_or(0, |r| u16::MAX - r);
+                cell.robot.fetch_max(robot, Relaxed);
+                &cell.n_moving
             }
         };
-        *count = count.saturating_add(1);
-    }
-
-    /// Adds the counts of another worker.
-    pub fn join(&mut self, other: &Self) {
-        for (a, b) in self.cells.iter_mut().zip(&other.cells) {
-            a.n_floor = a.n_floor.saturating_add(b.n_floor);
-            a.n_fixed = a.n_fixed.saturating_add(b.n_fixed);
-            a.n_uncertain = a.n_uncertain.saturating_add(b.n_uncertain);
-            a.n_moving = a.n_moving.saturating_add(b.n_moving);
-            a.robot = if a.robot == 0 || b.robot == 0 {
-                a.robot.max(b.robot)
-            } else {
-                a.robot.min(b.robot)
-            };
-        }
+        count.fetch_add(n, Relaxed);
     }
 
     /// Draws the plan: robots with their names and places of their bases, scanners with theirs, world, metres.
@@ -157,7 +154,7 @@ impl PlanPicture {
     /// Points in a well filled cell: the 98th percentile of those that hold any standing point.
     fn full(&self) -> f64 {
         let mut counts: Vec<u32> =
-            self.cells.iter().map(|c| c.n_fixed + c.n_uncertain).filter(|n| *n > 0).collect();
+            self.cells.iter().map(Cell::n_standing).filter(|n| *n > 0).collect();
         if counts.is_empty() {
             return 1.0;
         }
@@ -165,10 +162,11 @@ impl PlanPicture {
         f64::from(*counts.select_nth_unstable(at).1).max(1.0)
     }
 
+    #[inline]
     fn at(&self, p: [f64; 2]) -> Option<usize> {
-        let u = usize::try_from(floor_i32((p[0] - self.min[0]) / self.cell)).ok()?;
-        let v = usize::try_from(floor_i32((p[1] - self.min[1]) / self.cell)).ok()?;
-        (u < self.width && v < self.height).then_some(v * self.width + u)
+        let [u, v] = [0, 1].map(|i| (p[i] - self.min[i]) / self.cell);
+        let inside = u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
+        inside.then(|| v as usize * self.width + u as usize)
     }
 }
 
@@ -177,19 +175,24 @@ const FIXED: Rgb = [120, 126, 134];
 const UNCERTAIN: Rgb = [236, 190, 60];
 
 impl Cell {
+    fn n_standing(&self) -> u32 {
+        self.n_fixed.load(Relaxed).saturating_add(self.n_uncertain.load(Relaxed))
+    }
+
     fn color(&self, full: f64) -> Rgb {
-        let standing = f64::from(self.n_fixed) + f64::from(self.n_uncertain);
-        if self.n_moving > 0 && self.robot > 0 {
-            return robot_color(usize::from(self.robot) - 1);
+        let robot = self.robot.load(Relaxed);
+        if self.n_moving.load(Relaxed) > 0 && robot > 0 {
+            return robot_color(usize::from(u16::MAX - robot));
         }
-        if self.n_uncertain > self.n_fixed {
+        if self.n_uncertain.load(Relaxed) > self.n_fixed.load(Relaxed) {
             return UNCERTAIN;
         }
+        let standing = f64::from(self.n_standing());
         if standing > 0.0 {
             // The logarithm shows a cable beside a wall.
             let share = (1.0 + standing).ln() / (1.0 + full).ln();
             return blend(FLOOR, [60, 64, 70], 0.25 + 0.75 * share);
         }
-        if self.n_floor > 0 { FLOOR } else { WHITE }
+        if self.n_floor.load(Relaxed) > 0 { FLOOR } else { WHITE }
     }
 }

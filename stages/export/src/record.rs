@@ -1,6 +1,6 @@
-//! LAS point records: a point in, the bytes of format 6 or 7 with our two extra fields out.
+//! What LAS records hold: kinds in, classes out; coordinates in, whole steps out; the settings of a file.
 
-use contract::{Error, Kind, Label, PointKind, Result};
+use contract::{Error, Kind, PointKind};
 use geometry::Aabb;
 
 /// Kind, LAS class (2 is the standard's ground, 64 and up are the user's) and name.
@@ -40,9 +40,17 @@ impl Quantum {
         Self { scale: [1e-4; 3], offset }
     }
 
-    fn step(&self, axis: usize, value: f64) -> Option<i32> {
-        let step = ((value - self.offset[axis]) / self.scale[axis]).round();
-        (step >= f64::from(i32::MIN) && step <= f64::from(i32::MAX)).then_some(step as i32)
+    /// The nearest steps; `None` where they do not fit into 32 bits.
+    pub(crate) fn steps(&self, xyz: [f64; 3]) -> Option<[i32; 3]> {
+        let mut steps = [0; 3];
+        for i in 0..3 {
+            let step = ((xyz[i] - self.offset[i]) / self.scale[i]).round();
+            if !(step >= f64::from(i32::MIN) && step <= f64::from(i32::MAX)) {
+                return None;
+            }
+            steps[i] = step as i32;
+        }
+        Some(steps)
     }
 }
 
@@ -66,8 +74,10 @@ pub struct LasSettings {
     pub quantum: Quantum,
     /// With colour (format 7) or without (format 6).
     pub with_color: bool,
-    /// With the extra fields `RobotId` and `LinkId`.
+    /// With classes and the extra fields `RobotId` and `LinkId`.
     pub with_labels: bool,
+    /// With the extra field `BodyId`.
+    pub with_bodies: bool,
     /// Compressed (LAZ).
     pub compress: bool,
     /// GPS times are adjusted standard time, as in the input's header.
@@ -84,6 +94,7 @@ impl LasSettings {
             quantum,
             with_color: false,
             with_labels: true,
+            with_bodies: false,
             compress: false,
             standard_gps_time: false,
             vlrs: Vec::new(),
@@ -99,43 +110,12 @@ impl LasSettings {
     /// Length of a record, bytes.
     #[must_use]
     pub fn record_len(&self) -> usize {
-        30 + if self.with_color { 6 } else { 0 } + if self.with_labels { EXTRA_LEN } else { 0 }
+        30 + if self.with_color { 6 } else { 0 } + self.extra_len()
     }
-}
 
-/// Length of our extra fields, bytes: two u16.
-pub(crate) const EXTRA_LEN: usize = 4;
-
-/// One point to be written.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct LasPoint {
-    /// World, metres.
-    pub xyz: [f64; 3],
-    /// 0..65535.
-    pub intensity: u16,
-    /// 0..65535 a channel; written by format 7 only.
-    pub color: [u16; 3],
-    /// GPS time, seconds.
-    pub gps_time: f64,
-    /// LAS class.
-    pub class: u8,
-    /// LAS point source id.
-    pub source_id: u16,
-    /// Index of the robot + 1, 0 for none.
-    pub robot: u16,
-    /// Index of the link + 1, 0 for none.
-    pub link: u16,
-}
-
-impl LasPoint {
-    /// Takes class, robot and link from a label.
-    #[must_use]
-    pub fn labelled(mut self, label: Label) -> Self {
-        let one_based = |v: i16| u16::try_from(i32::from(v) + 1).unwrap_or(0);
-        self.class = class_of(label.kind);
-        self.robot = one_based(label.robot);
-        self.link = one_based(label.link);
-        self
+    /// Length of our extra fields, bytes: two u16 for robot and link, a u32 for the body.
+    pub(crate) fn extra_len(&self) -> usize {
+        4 * (usize::from(self.with_labels) + usize::from(self.with_bodies))
     }
 }
 
@@ -154,52 +134,27 @@ impl Default for Extent {
     }
 }
 
-/// Appends the record of a point.
-#[inline]
-pub(crate) fn encode(
-    point: &LasPoint,
-    settings: &LasSettings,
-    extent: &mut Extent,
-    out: &mut Vec<u8>,
-) -> Result<()> {
-    let mut steps = [0; 3];
-    for i in 0..3 {
-        let Some(step) = settings.quantum.step(i, point.xyz[i]) else {
-            return Err(too_far(point.xyz));
-        };
-        steps[i] = step;
-        extent.min[i] = extent.min[i].min(step);
-        extent.max[i] = extent.max[i].max(step);
+impl Extent {
+    #[inline]
+    pub(crate) fn add(&mut self, steps: [i32; 3]) {
+        self.n += 1;
+        for i in 0..3 {
+            self.min[i] = self.min[i].min(steps[i]);
+            self.max[i] = self.max[i].max(steps[i]);
+        }
     }
-    extent.n += 1;
-    let mut bytes = [0; 40];
-    for i in 0..3 {
-        bytes[4 * i..4 * i + 4].copy_from_slice(&steps[i].to_le_bytes());
+
+    pub(crate) fn join(&mut self, other: &Self) {
+        self.n += other.n;
+        for i in 0..3 {
+            self.min[i] = self.min[i].min(other.min[i]);
+            self.max[i] = self.max[i].max(other.max[i]);
+        }
     }
-    bytes[12..14].copy_from_slice(&point.intensity.to_le_bytes());
-    // Return 1 of 1.
-    bytes[14] = 0x11;
-    bytes[16] = point.class;
-    bytes[20..22].copy_from_slice(&point.source_id.to_le_bytes());
-    bytes[22..30].copy_from_slice(&point.gps_time.to_le_bytes());
-    let mut at = 30;
-    let mut put = |value: u16| {
-        bytes[at..at + 2].copy_from_slice(&value.to_le_bytes());
-        at += 2;
-    };
-    if settings.with_color {
-        point.color.into_iter().for_each(&mut put);
-    }
-    if settings.with_labels {
-        put(point.robot);
-        put(point.link);
-    }
-    out.extend_from_slice(&bytes[..at]);
-    Ok(())
 }
 
 #[cold]
-fn too_far(xyz: [f64; 3]) -> Error {
+pub(crate) fn too_far(xyz: [f64; 3]) -> Error {
     Error::new(Kind::BadInput, format!("point does not fit into LAS coordinates: \"{xyz:?}\""))
         .hint("choose a larger scale or an offset near the points")
 }

@@ -77,6 +77,12 @@ impl RobotPicture {
         Self { robot, bounds: shown.grown(AROUND), links, views }
     }
 
+    /// What it shows, world, metres.
+    #[must_use]
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
     /// Adds a labelled point of the world; points away from the robot are passed over.
     #[inline]
     pub fn add(&mut self, world: [f64; 3], label: Label) {

@@ -41,7 +41,8 @@ pub fn write_space(out: &Path, index: usize, space: &Space) -> Result<SpaceEntry
     let name = |file: &str| format!("{folder}/{file}");
     let grid = *space.grid();
     let mut array = NpyWriter::create(out.join(name("space.npy")))?;
-    array.push(space.voxels().iter().map(|v| *v as u8))?;
+    let kinds: Vec<u8> = space.voxels().iter().map(|v| *v as u8).collect();
+    array.push(&kinds)?;
     array.finish_as(&grid.size)?;
     // An octree reaches 32768 voxels to each side of its origin.
     let is_near = (0..3).all(|i| grid.first[i].abs() + (grid.size[i] as i64) < HALF);

@@ -29,33 +29,52 @@ fn label(i: usize) -> Label {
     }
 }
 
-fn point(i: usize) -> LasPoint {
+fn world(i: usize) -> [f64; 3] {
     let turn = i as f64 * 0.37;
-    LasPoint {
-        xyz: [
-            400_000.0 + 15.0 * turn.sin(),
-            5_000_000.0 + 12.0 * turn.cos(),
-            100.0 + (i % 300) as f64 * 0.01,
-        ],
-        intensity: (i * 7 % 65536) as u16,
-        color: [(i % 65536) as u16, 2, 65535],
-        gps_time: i as f64 * 0.001,
-        source_id: (i % 4) as u16 + 1,
-        ..LasPoint::default()
-    }
-    .labelled(label(i))
+    [
+        400_000.0 + 15.0 * turn.sin(),
+        5_000_000.0 + 12.0 * turn.cos(),
+        100.0 + (i % 300) as f64 * 0.01,
+    ]
 }
 
-fn clouds(out: &Path, n: usize, [compress, with_color]: [bool; 2], memory: usize) -> Written {
+fn intensity(i: usize) -> u16 {
+    (i * 7 % 65536) as u16
+}
+
+fn source_id(i: usize) -> u16 {
+    (i % 4) as u16 + 1
+}
+
+fn clouds(
+    out: &Path,
+    n: usize,
+    [compress, with_color]: [bool; 2],
+    waiting_bytes: usize,
+) -> Written {
     let around =
         Aabb { min: [399_985.0, 4_999_988.0, 100.0], max: [400_015.0, 5_000_012.0, 103.0] };
-    let las = LasSettings { compress, with_color, ..LasSettings::new(Quantum::around(&around)) };
-    let settings = CloudsSettings { memory, ..CloudsSettings::new(las) };
-    let mut clouds = Clouds::create(out, settings).expect("create");
-    for i in 0..n {
-        clouds.push(&point(i), label(i).kind).expect("push");
+    let las = LasSettings { with_color, ..LasSettings::new(Quantum::around(&around)) };
+    let settings = Settings { compress, waiting_bytes, ..Settings::default() };
+    let mut clouds = Clouds::create(out, &las, &settings).expect("create");
+    let pack = clouds.pack();
+    // Strips of a length that divides nothing.
+    let all: Vec<usize> = (0..n).collect();
+    for strip in all.chunks(1013) {
+        let world: Vec<_> = strip.iter().map(|&i| world(i)).collect();
+        let labels: Vec<_> = strip.iter().map(|&i| label(i)).collect();
+        let points = PointColumns {
+            world: &world,
+            labels: &labels,
+            intensity: &strip.iter().map(|&i| intensity(i)).collect::<Vec<_>>(),
+            color: &strip.iter().map(|&i| [i as u16, 2, 65535]).collect::<Vec<_>>(),
+            gps_time: &strip.iter().map(|&i| i as f64 * 0.001).collect::<Vec<_>>(),
+            source_id: &strip.iter().map(|&i| source_id(i)).collect::<Vec<_>>(),
+            ..PointColumns::default()
+        };
+        clouds.add(&pack.pack(&points).expect("packs")).expect("adds");
     }
-    clouds.finish().expect("finish")
+    clouds.finish(&contract::OneByOne).expect("finish")
 }
 
 fn read(path: &Path) -> (las::Header, Vec<las::Point>) {
@@ -84,9 +103,14 @@ fn tiles_hold_every_point_once_whatever_the_memory_and_compression() {
                 assert!(tile.bounds.grown(1e-6).contains([p.x, p.y, p.z]));
                 assert_eq!(p.color.is_some(), with_color);
                 let i = (p.gps_time.expect("has time") * 1000.0).round() as i64;
-                let truth = point(i as usize);
-                assert!((p.x - truth.xyz[0]).abs() < 6e-5 && (p.z - truth.xyz[2]).abs() < 6e-5);
-                assert_eq!((p.intensity, p.point_source_id), (truth.intensity, truth.source_id));
+                let xyz = world(i as usize);
+                assert!((p.x - xyz[0]).abs() < 6e-5 && (p.y - xyz[1]).abs() < 6e-5);
+                assert!((p.z - xyz[2]).abs() < 6e-5);
+                let ids = (intensity(i as usize), source_id(i as usize));
+                assert_eq!((p.intensity, p.point_source_id), ids);
+                if let Some(color) = p.color {
+                    assert_eq!([color.red, color.green, color.blue], [i as u16, 2, 65535]);
+                }
                 all.push((i, u8::from(p.classification), p.extra_bytes.clone()));
             }
         }
@@ -108,14 +132,35 @@ fn tiles_hold_every_point_once_whatever_the_memory_and_compression() {
 }
 
 #[test]
+fn bodies_are_an_extra_field_behind_labels() {
+    let out = folder("bodies");
+    let las = LasSettings::new(Quantum { scale: [1e-3; 3], offset: [0.0; 3] });
+    let settings = Settings { bodies: true, fixed_cloud: false, ..Settings::default() };
+    let mut clouds = Clouds::create(&out, &las, &settings).expect("create");
+    let points = PointColumns {
+        world: &[[1.0; 3], [2.0; 3]],
+        labels: &[label(6), Label::FLOOR],
+        body: &[70_000, 0],
+        ..PointColumns::default()
+    };
+    clouds.add(&clouds.pack().pack(&points).expect("packs")).expect("adds");
+    let written = clouds.finish(&contract::OneByOne).expect("finish");
+    assert!(written.fixed.is_none());
+    let (_, points) = read(&written.tiles[0].path);
+    let mut extra: Vec<_> = points.iter().map(|p| p.extra_bytes.clone()).collect();
+    extra.sort();
+    assert_eq!(extra, [vec![0; 8], vec![1, 0, 1, 0, 0x70, 0x11, 1, 0]]);
+}
+
+#[test]
 fn a_dropped_file_leaves_nothing_and_an_empty_cloud_is_whole() {
     let out = folder("dropped");
     let path = out.join("a.las");
     let settings = LasSettings::new(Quantum { scale: [1e-4; 3], offset: [0.0; 3] });
     let mut writer = LasWriter::create(&path, settings.clone()).expect("create");
-    writer.push(&LasPoint::default()).expect("push");
-    let far = LasPoint { xyz: [1e9, 0.0, 0.0], ..LasPoint::default() };
-    let error = writer.push(&far).expect_err("too far for i32");
+    let at = |world| PointColumns { world, labels: &[Label::FIXED], ..PointColumns::default() };
+    writer.push(&at(&[[0.0; 3]])).expect("push");
+    let error = writer.push(&at(&[[1e9, 0.0, 0.0]])).expect_err("too far for i32");
     assert!(error.to_string().contains("a.las"), "{error}");
     drop(writer);
     assert_eq!(std::fs::read_dir(&out).expect("folder").count(), 0);
@@ -221,11 +266,14 @@ fn sample(out: &Path) {
     };
     let mut writer = MaskWriter::create(out, mask.id).expect("create");
     let labels: Vec<Label> = (0..N - 5).map(label).collect();
-    for piece in labels.chunks(777) {
-        writer.push(piece).expect("push");
+    let mut padded = LabelColumns::of(&labels[N - 5 - 777..]);
+    padded.pad(777 + 5);
+    for piece in labels[..N - 5 - 777].chunks(777) {
+        writer.push(&LabelColumns::of(piece)).expect("push");
     }
-    writer.skip_to(N as u64).expect("dropped points");
-    let n_points = writer.finish().expect("finish");
+    writer.push(&padded).expect("dropped points");
+    let n_points = writer.len();
+    writer.finish().expect("finish");
     let links = ["base", "arm", "hand"].map(String::from);
     let robots: Vec<_> = (0..2)
         .map(|i| RobotEntry::new(i, &fit(), &links, Some(("hand".into(), Pose::identity()))))
@@ -324,9 +372,9 @@ fn pictures_show_robots_where_they_stand() {
     let mut views = RobotPicture::new(0, &model, &poses);
     let bounds =
         Aabb { min: [399_995.0, 4_999_995.0, 100.0], max: [400_012.0, 5_000_009.0, 103.0] };
-    let mut plan = PlanPicture::new(&bounds);
+    let plan = PlanPicture::new(&bounds);
     let mut add = |world: [f64; 3], label: Label| {
-        plan.add(world, label);
+        plan.add(&[world], &[label]);
         views.add(world, label);
     };
     for i in 0..170 * 140 {

@@ -302,6 +302,7 @@ impl Adjust<'_> {
         for (j, q) in h.posture.iter_mut().enumerate() {
             *q += step[6 + j];
         }
+        self.refine.keep_slides(h);
         for (view, scan) in state.scans.iter_mut().enumerate() {
             let at = n + view * N_SCAN;
             scan.add(&step.as_slice()[at..at + N_SCAN]);

@@ -113,7 +113,7 @@ impl Beam<'_> {
             .map(|&l| {
                 let (points, normals) = self.prepared.samples(l, n_samples);
                 let pose = h.local_from_base * poses[l];
-                let probe = self.scene.evidence.probe(points, normals, &pose, tolerance);
+                let probe = self.scene.scouts.probe(points, normals, &pose, tolerance);
                 self.prepared.links[l].weight * f64::from(probe.mean())
             })
             .sum()

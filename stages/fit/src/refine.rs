@@ -344,6 +344,23 @@ impl Refine<'_> {
         for (j, q) in h.posture.iter_mut().enumerate() {
             *q += step[6 + j];
         }
+        self.keep_slides(h);
+    }
+
+    /// Whether a free joint slides.
+    pub(crate) fn is_prismatic(&self, joint: usize) -> bool {
+        let model = &self.prepared.model;
+        model.joints[model.free[joint]].kind == JointKind::Prismatic
+    }
+
+    /// Keeps sliding joints on their way: points along a rod would pull it past its end.
+    pub(crate) fn keep_slides(&self, h: &mut Hypothesis) {
+        /// What models and stops may be off, metres.
+        const PLAY: f64 = 0.004;
+        for joint in (0..h.posture.len()).filter(|&j| self.is_prismatic(j)) {
+            let [low, high] = self.prepared.model.limits(joint);
+            h.posture[joint] = h.posture[joint].clamp(low - PLAY, high + PLAY);
+        }
     }
 
     /// Robust standard deviation of the residuals within a gate, metres.

@@ -24,6 +24,8 @@ pub struct Scene<'a> {
     pub views: Vec<&'a View>,
     /// What beams and points say.
     pub evidence: Evidence<'a>,
+    /// The same of those views that suffice for a search.
+    pub scouts: Evidence<'a>,
     /// Noise of the ranges as the points themselves show it, metres, one sigma; not below the settings' least.
     pub(crate) noise: f64,
     /// All points that are not on a floor.
@@ -81,11 +83,17 @@ impl<'a> Scene<'a> {
             let few = thin.iter().map(|&i| points[i as usize].p).collect();
             Cloud::new(few, CLOUD.0, CLOUD.1)
         });
+        let scouts = View::scouts(views, region);
+        let scouts = Evidence {
+            images: scouts.into_iter().flat_map(|v| &v.images).collect(),
+            cloud: cloud.clone(),
+        };
         let noise = noise::of(views, &points, &thin).max(settings.min_noise);
         Self {
             region,
             views: views.to_vec(),
             evidence: Evidence { images, cloud },
+            scouts,
             noise,
             points,
             thin,

@@ -1,6 +1,7 @@
 //! Evidence of a fit in; verdict and reasons in words out (fit.md §4l).
 
 use contract::{Fit, Verdict};
+use robot::JointKind;
 use std::f64::consts::TAU;
 
 use crate::judge::Judgement;
@@ -31,6 +32,8 @@ const KNOWN_SIGMA: f64 = 0.0175;
 const SEEN: f64 = 0.12;
 /// Fewest points on the links that a joint moves.
 const JOINT_POINTS: usize = 30;
+/// Play of a stop: a degree for joints that turn, a millimetre for those that slide.
+const STOP_PLAY: (f64, f64) = (0.0175, 0.001);
 /// Most values of a joint that are named.
 const MAX_VALUES: usize = 3;
 /// A runner-up that the beams prefer less clearly than this makes the best doubtful.
@@ -95,6 +98,11 @@ pub(crate) fn pass(
             notes.push(undetermined(fit, j));
         }
     }
+    for (j, joint) in fit.joints.iter().enumerate().filter(|(_, joint)| joint.determined) {
+        if beyond(prepared, j, joint.value) > 3.0 * joint.sigma {
+            doubts.push(format!("joint '{}' stands beyond its limit", joint.name));
+        }
+    }
     notes.extend(weak(fit));
     let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
     if rival {
@@ -108,6 +116,18 @@ pub(crate) fn pass(
     fit.reasons = refusals;
     fit.reasons.extend(doubts);
     fit.reasons.extend(notes);
+}
+
+/// How far a joint stands beyond what its limit and the play of its stop allow, radians or metres.
+fn beyond(prepared: &Prepared<'_>, j: usize, value: f64) -> f64 {
+    let joint = &prepared.model.joints[prepared.model.free[j]];
+    let play = match joint.kind {
+        JointKind::Prismatic => STOP_PLAY.1,
+        JointKind::Continuous => return 0.0,
+        _ => STOP_PLAY.0,
+    };
+    let [low, high] = prepared.model.limits(j);
+    (low - value).max(value - high) - play
 }
 
 /// What is said of a joint that the points do not determine.

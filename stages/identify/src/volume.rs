@@ -39,16 +39,16 @@ pub struct Sight<'a> {
 }
 
 impl<'a> Sight<'a> {
-    /// Prepares it.
+    /// Prepares it, from what all views say, and those by which single poses are judged.
     #[must_use]
     pub fn new(
         region: &'a Region,
         views: &'a [View],
-        evidence: &'a Evidence<'a>,
+        (all, scouts): (&Evidence<'_>, &'a Evidence<'a>),
         fan: &impl Fan,
     ) -> Self {
-        let volume = Volume::new(region, evidence, fan);
-        Self { region, views, evidence, volume, each: Vec::new() }
+        let volume = Volume::new(region, all, fan);
+        Self { region, views, evidence: scouts, volume, each: Vec::new() }
     }
 
     /// The same for robots that moved between scans: what moves is looked for in each scan by itself.

@@ -5,11 +5,10 @@ use crate::las_header::LasHeader;
 use crate::las_record::Decoder;
 use crate::las_scans::{self, LasScanner};
 use crate::laz::{Laz, Stream};
-use crate::map::map;
+use crate::map::{Mapped, map};
 use crate::reader::{MaskSeed, RawStrip, RawStrips, Reader, Sampled, ScanSeed, Want};
 use crate::settings::Settings;
 use contract::{Error, Format, Result};
-use memmap2::Mmap;
 use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::path::Path;
@@ -21,7 +20,7 @@ const RECORDS_AT_ONCE: usize = 32 << 20;
 
 /// The records of a file, whichever way they are stored.
 pub(crate) struct Records {
-    map: Mmap,
+    map: Mapped,
     /// Header, checked.
     pub(crate) header: LasHeader,
     /// How to decompress, where they are compressed.
@@ -170,6 +169,7 @@ impl Reader for Las {
             records: Cow::Borrowed(&[]),
             used: 0,
             ready: VecDeque::new(),
+            given: 0,
             failed: false,
         }))
     }
@@ -214,6 +214,8 @@ struct Strips<'a> {
     records: Cow<'a, [u8]>,
     used: usize,
     ready: VecDeque<RawStrip>,
+    /// Bytes of the map that were given back.
+    given: usize,
     failed: bool,
 }
 
@@ -225,6 +227,12 @@ impl<'a> Strips<'a> {
         if self.place >= n_points {
             return Ok(false);
         }
+        let header = &las.records.header;
+        let read = match &las.records.laz {
+            None => header.points_at + self.place as usize * header.record_len,
+            Some(laz) => laz.pieces.get(self.piece).map_or(0, |piece| piece.at),
+        };
+        las.records.map.passed(read, &mut self.given);
         let n = usize::try_from(n_points - self.place).unwrap_or(usize::MAX).min(las.strip_points);
         self.records = match &las.records.laz {
             None => Cow::Borrowed(las.records.mapped(self.place, n)),

@@ -34,6 +34,8 @@ const LAYOUTS: [Layout; 11] = [
     Layout { len: 67, modern: true, gps_time: Some(22), color: Some(30) },
 ];
 
+/// Records that are decoded together: small enough for the first-level cache, long enough for vector loops.
+const BLOCK: usize = 64;
 /// Intensity lies at the same place in all formats.
 const INTENSITY: usize = 12;
 
@@ -72,10 +74,27 @@ fn i32_at(record: &[u8], at: usize) -> f64 {
     f64::from(i32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]))
 }
 
+#[inline]
+fn f64_at(record: &[u8], at: usize) -> f64 {
+    let mut bytes = [0; 8];
+    bytes.copy_from_slice(&record[at..at + 8]);
+    f64::from_le_bytes(bytes)
+}
+
 /// The counts of a record.
 #[inline]
 fn counts(record: &[u8]) -> [f64; 3] {
     [i32_at(record, 0), i32_at(record, 4), i32_at(record, 8)]
+}
+
+/// A strip whose first place is that of its first point; nothing where it has none.
+fn trimmed(mut strip: RawStrip) -> Option<RawStrip> {
+    let shift = *strip.place.first()?;
+    if shift > 0 {
+        strip.first_place += u64::from(shift);
+        strip.place.iter_mut().for_each(|p| *p -= shift);
+    }
+    Some(strip)
 }
 
 /// From counts to the scan frame: `m · counts + t`.
@@ -83,8 +102,6 @@ fn counts(record: &[u8]) -> [f64; 3] {
 struct Frame {
     m: [[f64; 3]; 3],
     t: [f64; 3],
-    /// Whether `m` is diagonal (scanner not rotated).
-    diagonal: bool,
 }
 
 /// Turns records into strips.
@@ -122,8 +139,7 @@ impl Decoder {
                     nalgebra::Vector3::from(header.offset) - world_from_scan.translation.vector;
                 let t = turn * from;
                 let m = [0, 1, 2].map(|i| [0, 1, 2].map(|j| turn[(i, j)] * header.scale[j]));
-                let diagonal = world_from_scan.rotation == nalgebra::UnitQuaternion::identity();
-                Frame { m, t: [t.x, t.y, t.z], diagonal }
+                Frame { m, t: [t.x, t.y, t.z] }
             })
             .collect();
         Self {
@@ -152,48 +168,101 @@ impl Decoder {
     /// Strips of consecutive records, one for each scan that has points among them, by their first place.
     /// `first` is the place of the first record.
     pub(crate) fn decode(&self, records: &[u8], first: u64, want: Want) -> Vec<RawStrip> {
+        let n = records.len() / self.record_len;
         if self.scan_of_source.is_empty() {
-            return self.decode_one(records, first, want).into_iter().collect();
+            let mut strip = self.empty(0, first, n, want);
+            self.add(&mut strip, records, first);
+            return trimmed(strip).into_iter().collect();
         }
         let mut strips: Vec<Option<RawStrip>> = vec![None; self.frames.len()];
-        for (i, record) in records.chunks_exact(self.record_len).enumerate() {
-            let scan = usize::from(self.scan_of_source[usize::from(self.layout.source_id(record))]);
-            let Some(xyz) = self.local(record, &self.frames[scan]) else {
-                continue;
-            };
-            let place = first + i as u64;
-            let strip = strips[scan].get_or_insert_with(|| self.empty(scan, place, 0, want));
-            // The range of a strip is that of one block of records, far below 2³².
-            strip.place.push((place - strip.first_place) as u32);
-            strip.xyz.push(xyz);
-            if let Some(attributes) = &mut strip.attributes {
-                self.add_attributes(record, attributes);
-            }
+        let scan = |i: usize| {
+            let record = &records[i * self.record_len..];
+            usize::from(self.scan_of_source[usize::from(self.layout.source_id(record))])
+        };
+        // Points of one scan mostly lie together.
+        let mut from = 0;
+        while from < n {
+            let own = scan(from);
+            let to = (from + 1..n).find(|&i| scan(i) != own).unwrap_or(n);
+            let strip = strips[own].get_or_insert_with(|| {
+                self.empty(own, first + from as u64, if from == 0 { n } else { 0 }, want)
+            });
+            let bytes = &records[from * self.record_len..to * self.record_len];
+            self.add(strip, bytes, first + from as u64);
+            from = to;
         }
-        let mut strips: Vec<_> = strips.into_iter().flatten().collect();
+        let mut strips: Vec<_> = strips.into_iter().flatten().filter_map(trimmed).collect();
         strips.sort_by_key(|s| s.first_place);
         strips
     }
 
-    fn decode_one(&self, records: &[u8], first: u64, want: Want) -> Option<RawStrip> {
-        let frame = &self.frames[0];
-        let mut strip = self.empty(0, first, records.len() / self.record_len, want);
-        for (i, record) in records.chunks_exact(self.record_len).enumerate() {
-            let Some(xyz) = self.local(record, frame) else {
+    /// Adds records of one scan, of which the first has the place `first`, to its strip.
+    fn add(&self, strip: &mut RawStrip, records: &[u8], first: u64) {
+        let frame = &self.frames[strip.scan];
+        // The range of a strip is that of one block of records, far below 2³².
+        let mut place = (first - strip.first_place) as u32;
+        for block in records.chunks(BLOCK * self.record_len) {
+            let n = block.len() / self.record_len;
+            if n == BLOCK && self.add_block(strip, block, frame, place) {
+                place += n as u32;
                 continue;
-            };
-            strip.place.push(i as u32);
-            strip.xyz.push(xyz);
-            if let Some(attributes) = &mut strip.attributes {
-                self.add_attributes(record, attributes);
+            }
+            for record in block.chunks_exact(self.record_len) {
+                if let Some(xyz) = self.local(record, frame) {
+                    strip.place.push(place);
+                    strip.xyz.push(xyz);
+                    if let Some(attributes) = &mut strip.attributes {
+                        self.add_attributes(record, attributes);
+                    }
+                }
+                place += 1;
             }
         }
-        let shift = *strip.place.first()?;
-        if shift > 0 {
-            strip.first_place += u64::from(shift);
-            strip.place.iter_mut().for_each(|p| *p -= shift);
+    }
+
+    /// The same for a whole block of records, in loops without branches; false, and nothing done, where one of them is
+    /// withheld or not to be believed.
+    fn add_block(&self, strip: &mut RawStrip, block: &[u8], frame: &Frame, place: u32) -> bool {
+        let mut counts = [[0.0_f64; 3]; BLOCK];
+        let mut withheld = false;
+        for (record, count) in block.chunks_exact(self.record_len).zip(&mut counts) {
+            *count = self::counts(record);
+            withheld |= self.layout.withheld(record);
         }
-        Some(strip)
+        let (m, t) = (&frame.m, &frame.t);
+        let mut xyz = [[0.0_f32; 3]; BLOCK];
+        let mut near = true;
+        for (c, p) in counts.iter().zip(&mut xyz) {
+            for i in 0..3 {
+                // One order of sums for all scans: see `local`.
+                let v = c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i];
+                near &= v.abs() <= self.max_range;
+                p[i] = v as f32;
+            }
+        }
+        if withheld || !near {
+            return false;
+        }
+        strip.xyz.extend_from_slice(&xyz);
+        strip.place.extend(place..place + BLOCK as u32);
+        if let Some(to) = &mut strip.attributes {
+            let (s, o) = (&self.scale, &self.offset);
+            to.world.extend(
+                counts.iter().map(|c| [c[0] * s[0] + o[0], c[1] * s[1] + o[1], c[2] * s[2] + o[2]]),
+            );
+            let records = || block.chunks_exact(self.record_len);
+            to.intensity.extend(records().map(|r| u16_at(r, INTENSITY)));
+            to.classification.extend(records().map(|r| self.layout.classification(r)));
+            to.source_id.extend(records().map(|r| self.layout.source_id(r)));
+            if let Some(at) = self.layout.color {
+                let color = |r: &[u8]| [u16_at(r, at), u16_at(r, at + 2), u16_at(r, at + 4)];
+                to.color.extend(records().map(color));
+            }
+            if let Some(at) = self.layout.gps_time {
+                to.gps_time.extend(records().map(|r| f64_at(r, at)));
+            }
+        }
+        true
     }
 
     /// A strip with room for `n` points.
@@ -219,11 +288,10 @@ impl Decoder {
     #[inline]
     fn local(&self, record: &[u8], frame: &Frame) -> Option<[f32; 3]> {
         let (c, m, t) = (counts(record), &frame.m, &frame.t);
-        let p = if frame.diagonal {
-            [c[0] * m[0][0] + t[0], c[1] * m[1][1] + t[1], c[2] * m[2][2] + t[2]]
-        } else {
-            [0, 1, 2].map(|i| c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i])
-        };
+        let mut p = [0.0; 3];
+        for i in 0..3 {
+            p[i] = c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i];
+        }
         // Written so that a NaN (from a scale near the end of f64) fails too.
         let near = p[0].abs() <= self.max_range
             && p[1].abs() <= self.max_range
@@ -240,9 +308,7 @@ impl Decoder {
             to.color.push([u16_at(record, at), u16_at(record, at + 2), u16_at(record, at + 4)]);
         }
         if let Some(at) = self.layout.gps_time {
-            let mut bytes = [0; 8];
-            bytes.copy_from_slice(&record[at..at + 8]);
-            to.gps_time.push(f64::from_le_bytes(bytes));
+            to.gps_time.push(f64_at(record, at));
         }
     }
 }

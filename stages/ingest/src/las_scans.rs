@@ -35,6 +35,14 @@ pub(crate) struct Found {
     pub(crate) bounds_hold: bool,
 }
 
+impl Census {
+    /// Records of the whole file, of which `n` were seen.
+    fn likely(&self, n: u64, whole: (u64, u64)) -> u64 {
+        let all = (whole.1 + 1 - whole.0) as f64;
+        (n as f64 / self.n_looked.max(1) as f64 * all) as u64
+    }
+}
+
 /// What is worse without scanner.
 pub(crate) const NO_SCANNER: &str = "the scanner's position is not known: no free-space evidence, so postures are less \
      certain and wrong ones harder to refuse; give it with --scanners";
@@ -50,8 +58,10 @@ const FAR_SCANNER: f64 = 2_000.0;
 /// What a look at the file shows.
 #[derive(Default)]
 struct Census {
-    /// First and last place of each source id.
-    ids: BTreeMap<u16, (u64, u64)>,
+    /// First and last place of each source id, and how many records had it.
+    ids: BTreeMap<u16, (u64, u64, u64)>,
+    /// Records that were looked at.
+    n_looked: u64,
     /// Whether every record was looked at.
     complete: bool,
 }
@@ -83,6 +93,7 @@ pub(crate) fn find(
         scanner_known: pose.is_some(),
         stated_bounds: header.bounds.filter(|_| !look.bounds_wrong()),
         stated_points: None,
+        likely_points: None,
         notes: notes.clone(),
     };
     let mut found = Found {
@@ -144,9 +155,11 @@ fn by_source_id(
         }
         scan_of_source[usize::from(id)] = found.scans.len() as u16;
         let name = scanner.name.clone().unwrap_or_else(|| format!("{stem} {id}"));
-        found.scans.push(seed(name, Some(id), Some(scanner.pose)));
+        let mut scan = seed(name, Some(id), Some(scanner.pose));
+        scan.likely_points = seen.map(|seen| census.likely(seen.2, whole));
+        found.scans.push(scan);
         // Windows may miss its first and last points; a look between those seen is enough for a sample.
-        found.extents.push(seen.copied().unwrap_or(whole));
+        found.extents.push(seen.map_or(whole, |seen| (seen.0, seen.1)));
     }
     let rest = census.ids.keys().any(|id| scan_of_source[usize::from(*id)] == NONE);
     if rest || !census.complete || found.scans.is_empty() {
@@ -263,8 +276,9 @@ fn census(records: &Records) -> Result<Census> {
     let mut add = |first: u64, run: &[u8]| {
         for (i, record) in run.chunks_exact(header.record_len).enumerate() {
             let place = first + i as u64;
-            let extent = census.ids.entry(layout.source_id(record)).or_insert((place, place));
-            *extent = (extent.0.min(place), extent.1.max(place));
+            let id = census.ids.entry(layout.source_id(record)).or_insert((place, place, 0));
+            *id = (id.0.min(place), id.1.max(place), id.2 + 1);
+            census.n_looked += 1;
         }
     };
     let stream = records.laz.as_ref().is_some_and(|l| l.pieces.is_empty());

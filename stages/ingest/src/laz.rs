@@ -19,7 +19,7 @@ const SMALL_PIECE: u64 = 4 << 20;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece {
     /// Bytes from the start of the file.
-    at: usize,
+    pub(crate) at: usize,
     n_bytes: usize,
     /// Place of its first point.
     pub(crate) first: u64,

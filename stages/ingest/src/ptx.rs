@@ -58,6 +58,7 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
             scanner_known: block.frame.scanner_known,
             stated_bounds: None,
             stated_points: Some(block.n_valid),
+            likely_points: None,
             notes,
         });
         file.blocks.push(block);

@@ -38,6 +38,8 @@ pub(crate) struct ScanSeed {
     pub(crate) stated_bounds: Option<Aabb>,
     /// Stated number of valid points.
     pub(crate) stated_points: Option<u64>,
+    /// About how many it has, where a look at the file told.
+    pub(crate) likely_points: Option<u64>,
     /// What is missing and what is worse for it.
     pub(crate) notes: Vec<String>,
 }

@@ -204,7 +204,8 @@ impl File {
         if let Some(new_from_file) = &self.moved[i] {
             sample.iter_mut().for_each(|s| s.xyz = moved(new_from_file, s.xyz));
         }
-        let Some(raster) = raster::estimate(&sample, scan.stated_points, settings) else {
+        let n_points = scan.stated_points.or(self.reader.scans()[i].likely_points);
+        let Some(raster) = raster::estimate(&sample, n_points, settings) else {
             if !sample.is_empty() {
                 scan.notes.push(
                     "too few points to tell the raster: no free-space evidence from this scan"

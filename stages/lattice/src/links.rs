@@ -1,7 +1,7 @@
 //! A raster in, its links out: which neighbouring pixels see one surface, and which pixels see none (veils).
 
 use crate::Settings;
-use crate::raster::{NONE, PIXELS, Raster, SIDE};
+use crate::raster::{NONE, Raster};
 
 /// Towards lower columns.
 pub(crate) const LEFT: usize = 0;
@@ -23,12 +23,12 @@ const MIN_PIECE: usize = 4;
 
 /// Index of the neighbour of `at` in `direction`, `by` pixels away; must lie inside.
 #[inline]
-pub(crate) fn step(at: usize, direction: usize, by: usize) -> usize {
+pub(crate) fn step(side: usize, at: usize, direction: usize, by: usize) -> usize {
     match direction {
         LEFT => at - by,
         RIGHT => at + by,
-        DOWN => at - by * SIDE,
-        _ => at + by * SIDE,
+        DOWN => at - by * side,
+        _ => at + by * side,
     }
 }
 
@@ -36,7 +36,7 @@ pub(crate) fn step(at: usize, direction: usize, by: usize) -> usize {
 #[inline]
 pub(crate) fn linked(raster: &Raster, at: usize, direction: usize) -> Option<usize> {
     let link = raster.links[at][direction];
-    (link != 0 && link & BROKEN == 0).then(|| step(at, direction, usize::from(link)))
+    (link != 0 && link & BROKEN == 0).then(|| step(raster.side, at, direction, usize::from(link)))
 }
 
 /// Limits for links of one raster.
@@ -48,24 +48,25 @@ struct Rule {
 /// Links each pixel with its next neighbours along row and column: 0 for none, the distance in pixels for one on
 /// the same surface, the same with [`BROKEN`] for one on another surface.
 pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
+    let (side, n_pixels) = (raster.side, raster.n_pixels());
     raster.links.clear();
-    raster.links.resize(PIXELS, [0; 4]);
+    raster.links.resize(n_pixels, [0; 4]);
     raster.bridged.clear();
-    raster.bridged.resize(PIXELS, false);
+    raster.bridged.resize(n_pixels, false);
     let rule = Rule {
         incidence: settings.max_incidence.tan() as f32,
         grazing: settings.max_grazing.tan() as f32,
     };
-    for row in 0..SIDE {
-        for col in 0..SIDE {
-            let at = row * SIDE + col;
+    for row in 0..side {
+        for col in 0..side {
+            let at = row * side + col;
             if raster.xyzr[at][3] == 0.0 {
                 continue;
             }
             let angle = raster.col_step[row];
-            link_one(raster, &rule, (at, RIGHT, LEFT), angle, (col, SIDE - 1 - col));
+            link_one(raster, &rule, (at, RIGHT, LEFT), angle, (col, side - 1 - col));
             let angle = raster.row_step;
-            link_one(raster, &rule, (at, UP, DOWN), angle, (row, SIDE - 1 - row));
+            link_one(raster, &rule, (at, UP, DOWN), angle, (row, side - 1 - row));
         }
     }
 }
@@ -79,9 +80,9 @@ fn link_one(
     angle: f32,
     room: (usize, usize),
 ) {
-    let range = raster.xyzr[at][3];
+    let (side, range) = (raster.side, raster.xyzr[at][3]);
     for by in 1..=REACH.min(room.1) {
-        let other = step(at, forth, by);
+        let other = step(side, at, forth, by);
         let there = raster.xyzr[other][3];
         if there == 0.0 {
             continue;
@@ -93,8 +94,8 @@ fn link_one(
         // A surface seen at this incidence cannot step more than that (fit.md §2.1).
         let mut joined = difference <= across * rule.incidence + 4.243 * sigma;
         if !joined && difference <= across * rule.grazing && room.0 >= by && room.1 >= 2 * by {
-            let before = raster.xyzr[step(at, back, by)][3];
-            let after = raster.xyzr[step(other, forth, by)][3];
+            let before = raster.xyzr[step(side, at, back, by)][3];
+            let after = raster.xyzr[step(side, other, forth, by)][3];
             joined = continues([before, range, there, after], difference, sigma);
         }
         let value = if joined { by as u8 } else { by as u8 | BROKEN };
@@ -102,7 +103,7 @@ fn link_one(
         raster.links[other][back] = value;
         if joined {
             for between in 1..by {
-                raster.bridged[step(at, forth, between)] = true;
+                raster.bridged[step(side, at, forth, between)] = true;
             }
         }
         return;
@@ -129,7 +130,7 @@ fn continues(ranges: [f32; 4], difference: f32, sigma: f32) -> bool {
 pub(crate) fn veils(raster: &mut Raster) {
     let mut out = std::mem::take(&mut raster.veils);
     out.clear();
-    for at in 0..PIXELS {
+    for at in 0..raster.n_pixels() {
         if raster.point[at] == NONE {
             continue;
         }
@@ -152,9 +153,9 @@ fn between(raster: &Raster, at: usize, back: usize, forth: usize) -> bool {
     if b & BROKEN == 0 || f & BROKEN == 0 {
         return false;
     }
-    let range = raster.xyzr[at][3];
-    let one = raster.xyzr[step(at, back, usize::from(b & !BROKEN))][3];
-    let other = raster.xyzr[step(at, forth, usize::from(f & !BROKEN))][3];
+    let (side, range) = (raster.side, raster.xyzr[at][3]);
+    let one = raster.xyzr[step(side, at, back, usize::from(b & !BROKEN))][3];
+    let other = raster.xyzr[step(side, at, forth, usize::from(f & !BROKEN))][3];
     (one < range) != (other < range)
 }
 
@@ -182,12 +183,12 @@ fn is_small(raster: &Raster, at: usize) -> bool {
 
 /// Whether broken links lead from `at` to something nearer and to something farther.
 fn near_and_far(raster: &Raster, at: usize) -> bool {
-    let range = raster.xyzr[at][3];
+    let (side, range) = (raster.side, raster.xyzr[at][3]);
     let (mut near, mut far) = (false, false);
     for direction in 0..4 {
         let link = raster.links[at][direction];
         if link & BROKEN != 0 {
-            let other = raster.xyzr[step(at, direction, usize::from(link & !BROKEN))][3];
+            let other = raster.xyzr[step(side, at, direction, usize::from(link & !BROKEN))][3];
             near |= other < range;
             far |= other > range;
         }

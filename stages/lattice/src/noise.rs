@@ -1,7 +1,6 @@
 //! Ranges of a raster in, range noise out: what the scanner promises, or more where the tile itself shows more.
 
 use crate::Settings;
-use crate::raster::SIDE;
 
 /// Bins of range, an octave each: noise of depth cameras grows with the square of the range.
 const N_BINS: usize = 16;
@@ -38,18 +37,18 @@ impl Noise {
 
     /// Measures the noise from second differences of the inverse range along rows and along columns: a plane has
     /// next to none, at any incidence. The larger of both counts, since some scanners err by the line.
-    pub(crate) fn measure(&mut self, xyzr: &[[f32; 4]], settings: &Settings) {
+    pub(crate) fn measure(&mut self, xyzr: &[[f32; 4]], side: usize, settings: &Settings) {
         self.base = settings.noise as f32;
         self.growth = settings.noise_growth as f32;
         self.factor = [1.0; N_BINS];
         self.samples.resize(N_BINS, Vec::new());
         let limit = settings.noise_limit as f32;
         let mut factors = [None; N_BINS];
-        for along in [1, SIDE] {
+        for along in [1, side] {
             // Where the raster is finer than the data, direct neighbours are missing: look one further.
             for step in [1, 2] {
                 self.samples.iter_mut().for_each(Vec::clear);
-                self.sample(xyzr, step, along);
+                self.sample(xyzr, side, step, along);
                 if self.samples.iter().map(Vec::len).sum::<usize>() >= MIN_SAMPLES {
                     break;
                 }
@@ -74,13 +73,13 @@ impl Noise {
     }
 
     /// Gathers second differences over neighbours `step` pixels apart, `along` rows (1) or columns (one row).
-    fn sample(&mut self, xyzr: &[[f32; 4]], step: usize, along: usize) {
+    fn sample(&mut self, xyzr: &[[f32; 4]], side: usize, step: usize, along: usize) {
         // Every sixth pixel: thousands of samples a tile, at a small share of the work.
         let by = step * along;
         let (rows, cols) = if along == 1 { (0, step) } else { (step, 0) };
-        for row in (rows..SIDE - rows).step_by(3) {
-            for col in (cols..SIDE - cols).step_by(2) {
-                let at = row * SIDE + col;
+        for row in (rows..side - rows).step_by(3) {
+            for col in (cols..side - cols).step_by(2) {
+                let at = row * side + col;
                 let (a, b, c) = (xyzr[at - by][3], xyzr[at][3], xyzr[at + by][3]);
                 if a > 0.0 && b > 0.0 && c > 0.0 {
                     let second = 1.0 / a + 1.0 / c - 2.0 / b;

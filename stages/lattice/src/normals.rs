@@ -3,16 +3,20 @@
 
 use crate::Settings;
 use crate::links::{BROKEN, linked};
-use crate::raster::{PIXELS, Raster, SIDE};
+use crate::raster::Raster;
 use crate::{Scratch, voxels};
 use contract::{Scan, Tile};
 
 /// Ten units a millimetre: window sums are exact integers modulo 2³², and a window never holds 200 km.
 const UNIT: f32 = 1e4;
+/// [`BROKEN`] in any of the four links of a pixel.
+const ANY_BROKEN: u32 = u32::from_ne_bytes([BROKEN; 4]);
+/// Reach from which normals of neighbours may be shared: their windows are nearly the same …
+const SHARED_REACH: u8 = 2;
+/// … and largest turn between those at either end of four pixels, cosine of 2°: a pipe of 50 mm radius turns more.
+const SHARED_COSINE: f32 = 0.999_39;
 /// Longest reach that is told apart, pixels.
 const MOST_REACH: u8 = 127;
-/// Columns of the summed-area table: one more than pixels.
-const WIDE: usize = SIDE + 1;
 
 /// Normals of one tile and the windows they come from; buffers are reused.
 #[derive(Debug, Default)]
@@ -34,68 +38,91 @@ impl Normals {
     pub(crate) fn fill(&mut self, raster: &Raster, settings: &Settings) {
         self.measure_reach(raster);
         self.sum(raster);
+        let (side, n_pixels) = (raster.side, raster.n_pixels());
         self.normal.clear();
-        self.normal.resize(PIXELS, [0.0; 3]);
+        self.normal.resize(n_pixels, [0.0; 3]);
         self.error.clear();
-        self.error.resize(PIXELS, 0.0);
+        self.error.resize(n_pixels, 0.0);
         self.half.clear();
-        self.half.resize(PIXELS, 0);
-        for row in 0..SIDE {
-            for col in 0..SIDE {
-                let at = row * SIDE + col;
-                if raster.holds(at) && self.reach[at] > 0 {
-                    self.compute(raster, row, col, settings);
-                }
+        self.half.resize(n_pixels, 0);
+        for row in (0..side).step_by(2) {
+            for col in (0..side).step_by(2) {
+                self.compute_four(raster, row, col, settings);
             }
         }
         self.borrow_at_borders(raster);
     }
 
+    /// The normals of a pixel and of those right, above and right above it. Where the first and the last agree, the surface is
+    /// flat, and the two between have the first's.
+    #[inline]
+    fn compute_four(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
+        let first = row * raster.side + col;
+        let four = [(0, 0), (1, 1), (0, 1), (1, 0)];
+        let mut is_flat = raster.holds(first) && self.reach[first] >= SHARED_REACH;
+        for (k, (dr, dc)) in four.into_iter().enumerate() {
+            let at = first + dr * raster.side + dc;
+            if !raster.holds(at) || self.reach[at] == 0 {
+                continue;
+            }
+            if k > 1 && is_flat {
+                self.normal[at] = self.normal[first];
+                self.error[at] = self.error[first];
+                self.half[at] = self.half[first];
+                continue;
+            }
+            self.compute(raster, row + dr, col + dc, settings);
+            let (a, b) = (self.normal[first], self.normal[at]);
+            is_flat &= k != 1 || a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > SHARED_COSINE;
+        }
+    }
+
     /// Chessboard distance of each pixel to the next broken link or unbridged gap.
     fn measure_reach(&mut self, raster: &Raster) {
+        let side = raster.side;
         self.reach.clear();
-        self.reach.extend((0..PIXELS).map(|at| {
+        self.reach.extend((0..raster.n_pixels()).map(|at| {
             let whole = if raster.holds(at) {
-                raster.links[at].iter().all(|l| l & BROKEN == 0)
+                u32::from_ne_bytes(raster.links[at]) & ANY_BROKEN == 0
             } else {
                 raster.bridged[at]
             };
             if whole { MOST_REACH } else { 0 }
         }));
         let reach = &mut self.reach;
-        for row in 0..SIDE {
-            for col in 0..SIDE {
-                let at = row * SIDE + col;
+        for row in 0..side {
+            for col in 0..side {
+                let at = row * side + col;
                 let mut least = reach[at];
                 if col > 0 {
                     least = least.min(reach[at - 1] + 1);
                 }
                 if row > 0 {
-                    least = least.min(reach[at - SIDE] + 1);
+                    least = least.min(reach[at - side] + 1);
                     if col > 0 {
-                        least = least.min(reach[at - SIDE - 1] + 1);
+                        least = least.min(reach[at - side - 1] + 1);
                     }
-                    if col + 1 < SIDE {
-                        least = least.min(reach[at - SIDE + 1] + 1);
+                    if col + 1 < side {
+                        least = least.min(reach[at - side + 1] + 1);
                     }
                 }
                 reach[at] = least;
             }
         }
-        for row in (0..SIDE).rev() {
-            for col in (0..SIDE).rev() {
-                let at = row * SIDE + col;
+        for row in (0..side).rev() {
+            for col in (0..side).rev() {
+                let at = row * side + col;
                 let mut least = reach[at];
-                if col + 1 < SIDE {
+                if col + 1 < side {
                     least = least.min(reach[at + 1] + 1);
                 }
-                if row + 1 < SIDE {
-                    least = least.min(reach[at + SIDE] + 1);
+                if row + 1 < side {
+                    least = least.min(reach[at + side] + 1);
                     if col > 0 {
-                        least = least.min(reach[at + SIDE - 1] + 1);
+                        least = least.min(reach[at + side - 1] + 1);
                     }
-                    if col + 1 < SIDE {
-                        least = least.min(reach[at + SIDE + 1] + 1);
+                    if col + 1 < side {
+                        least = least.min(reach[at + side + 1] + 1);
                     }
                 }
                 reach[at] = least;
@@ -104,14 +131,15 @@ impl Normals {
     }
 
     fn sum(&mut self, raster: &Raster) {
+        let (side, wide) = (raster.side, raster.side + 1);
         self.table.clear();
-        self.table.resize(WIDE * WIDE, [0; 4]);
-        for row in 0..SIDE {
+        self.table.resize(wide * wide, [0; 4]);
+        for row in 0..side {
             let mut line = [0_i32; 4];
-            let (below, here) = self.table.split_at_mut((row + 1) * WIDE);
-            let below = &below[row * WIDE + 1..];
-            let from = &raster.xyzr[row * SIDE..(row + 1) * SIDE];
-            for ((p, to), low) in from.iter().zip(&mut here[1..WIDE]).zip(below) {
+            let (below, here) = self.table.split_at_mut((row + 1) * wide);
+            let below = &below[row * wide + 1..];
+            let from = &raster.xyzr[row * side..(row + 1) * side];
+            for ((p, to), low) in from.iter().zip(&mut here[1..wide]).zip(below) {
                 // Empty pixels are all zero; `as` saturates beyond 200 km.
                 let n = i32::from(p[3] > 0.0);
                 let q = [(p[0] * UNIT) as i32, (p[1] * UNIT) as i32, (p[2] * UNIT) as i32, n];
@@ -140,7 +168,8 @@ impl Normals {
 
     #[inline]
     fn compute(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
-        let at = row * SIDE + col;
+        let (side, wide) = (raster.side, raster.side + 1);
+        let at = row * side + col;
         let [x, y, z, range] = raster.xyzr[at];
         let sigma = raster.noise.sigma(range);
         let window = (settings.window as f32).max(6.0 * sigma) / range;
@@ -151,10 +180,10 @@ impl Normals {
         // Columns draw together towards the poles: there a window of the same width holds more of them.
         let squeeze = raster.row_step / raster.col_step[row].min(raster.row_step);
         let (h, v) = (pixels(raster.col_step[row], most * squeeze), pixels(raster.row_step, most));
-        let (r0, r1) = (row.saturating_sub(v), (row + v + 1).min(SIDE));
-        let (c0, c1) = (col.saturating_sub(h), (col + h + 1).min(SIDE));
+        let (r0, r1) = (row.saturating_sub(v), (row + v + 1).min(side));
+        let (c0, c1) = (col.saturating_sub(h), (col + h + 1).min(side));
         // The halves share the middle line, so that neither is empty at the tile's border.
-        let t = |r: usize, c: usize| self.table[r * WIDE + c];
+        let t = |r: usize, c: usize| self.table[r * wide + c];
         let [low0, low1, high0, high1] = [t(r0, c0), t(r0, c1), t(r1, c0), t(r1, c1)];
         let centre = [x, y, z].map(|v| (v * UNIT) as i32);
         let means = (
@@ -185,7 +214,7 @@ impl Normals {
 
     /// Border pixels take the normal of a linked neighbour whose tangent plane they lie on.
     fn borrow_at_borders(&mut self, raster: &Raster) {
-        for at in 0..PIXELS {
+        for at in 0..raster.n_pixels() {
             if !raster.holds(at) || self.reach[at] > 0 {
                 continue;
             }
@@ -228,13 +257,14 @@ pub fn normals(tile: &Tile, scan: &Scan, settings: &Settings) -> Vec<Option<[f32
     let Some(lattice) = &scan.lattice else {
         return voxels::normals(tile, &mut scratch.surface, settings);
     };
-    scratch.raster.fill(tile, lattice, settings);
+    scratch.raster.fill(tile, lattice, 0, settings);
     scratch.normals.fill(&scratch.raster, settings);
     let (raster, normals) = (&scratch.raster, &scratch.normals);
     tile.pixel
         .iter()
         .zip(&tile.xyz)
         .map(|(pixel, p)| {
+            // Nothing is skipped, so pixels of the tile are pixels of the raster.
             let at = usize::from(*pixel);
             if !raster.holds(at) || normals.error[at] == 0.0 {
                 return None;

@@ -21,11 +21,10 @@ pub(crate) struct Counter {
 }
 
 impl Counter {
-    /// Counts the points of a tile that are not veils.
+    /// Counts points.
     pub(crate) fn count(
         &mut self,
         xyz: &[[f32; 3]],
-        veils: &[bool],
         world_from_scan: &WorldRows,
         edge: f64,
     ) -> Occupancy {
@@ -37,10 +36,7 @@ impl Counter {
             return Occupancy { edge, voxels: Vec::new() };
         };
         let origin = apply(world_from_scan, *first).map(|v| floor_i32(v * inverse));
-        for (i, p) in xyz.iter().enumerate() {
-            if veils.get(i).copied().unwrap_or(false) {
-                continue;
-            }
+        for p in xyz {
             let voxel = apply(world_from_scan, *p).map(|v| floor_i32(v * inverse));
             self.add(pack(voxel, origin));
         }
@@ -103,10 +99,9 @@ mod tests {
         let xyz: Vec<[f32; 3]> = (0..5000)
             .map(|i| [(i % 71) as f32 * 0.031, (i / 71) as f32 * -0.07, (i % 13) as f32])
             .collect();
-        let veils: Vec<bool> = (0..5000).map(|i| i % 17 == 0).collect();
-        let got = Counter::default().count(&xyz, &veils, &pose, 0.05);
+        let got = Counter::default().count(&xyz, &pose, 0.05);
         let mut expected = std::collections::BTreeMap::new();
-        for (p, _) in xyz.iter().zip(&veils).filter(|(_, v)| !**v) {
+        for p in &xyz {
             let w = apply(&pose, *p);
             *expected.entry([2, 1, 0].map(|i: usize| (w[i] / 0.05).floor() as i32)).or_insert(0) +=
                 1;

@@ -65,11 +65,12 @@ fn patch(
     let rows = world_rows(&scan.world_from_scan);
     let mut bounds = Aabb::EMPTY;
     let mut ground = Ground::default();
+    let weight = raster.weight();
     for p in points {
         let w = apply(&rows, [p[0], p[1], p[2]]);
         bounds.add(w);
         if level {
-            ground.add(w, 1);
+            ground.add(w, weight);
         }
     }
     Some(PlanePatch {
@@ -100,7 +101,7 @@ fn area(raster: &Raster, members: &[u16], grown: &Grown) -> f64 {
         let p = raster.xyzr[usize::from(at)];
         let n = grown.normal;
         let cosine = (n[0] * p[0] + n[1] * p[1] + n[2] * p[2]).abs() / p[3];
-        let solid = raster.row_step * raster.col_step[usize::from(at) / crate::raster::SIDE];
+        let solid = raster.row_step * raster.col_step[usize::from(at) / raster.side];
         area += f64::from(p[3] * p[3] * solid / cosine.max(MIN_COSINE));
     }
     area

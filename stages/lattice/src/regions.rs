@@ -3,7 +3,7 @@
 use crate::Settings;
 use crate::links::linked;
 use crate::normals::Normals;
-use crate::raster::{PIXELS, Raster, SIDE};
+use crate::raster::Raster;
 use geometry::{Moments, Vector};
 use nalgebra::Matrix3;
 
@@ -125,7 +125,7 @@ impl Regions {
     /// Grows all regions of `raster`.
     pub(crate) fn fill(&mut self, raster: &Raster, normals: &Normals, settings: &Settings) {
         self.owner.clear();
-        self.owner.resize(PIXELS, FREE);
+        self.owner.resize(raster.n_pixels(), FREE);
         self.members.clear();
         self.grown.clear();
         self.find_seeds(raster, normals);
@@ -143,9 +143,10 @@ impl Regions {
     fn find_seeds(&mut self, raster: &Raster, normals: &Normals) {
         self.seeds.iter_mut().for_each(Vec::clear);
         let limits = SEED_CLASSES.map(f32::cos);
-        for row in (SEED_STEP / 2..SIDE).step_by(SEED_STEP) {
-            for col in (SEED_STEP / 2..SIDE).step_by(SEED_STEP) {
-                let at = row * SIDE + col;
+        let side = raster.side;
+        for row in (SEED_STEP / 2..side).step_by(SEED_STEP) {
+            for col in (SEED_STEP / 2..side).step_by(SEED_STEP) {
+                let at = row * side + col;
                 if !raster.holds(at) || normals.error[at] == 0.0 {
                     continue;
                 }
@@ -162,14 +163,14 @@ impl Regions {
                 if col >= by {
                     look(at - by);
                 }
-                if col + by < SIDE {
+                if col + by < side {
                     look(at + by);
                 }
                 if row >= by {
-                    look(at - by * SIDE);
+                    look(at - by * side);
                 }
-                if row + by < SIDE {
-                    look(at + by * SIDE);
+                if row + by < side {
+                    look(at + by * side);
                 }
                 let class = limits.iter().position(|&l| least >= l);
                 if let (Some(class), true) = (class, count >= 2) {

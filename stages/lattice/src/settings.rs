@@ -37,6 +37,9 @@ pub struct Settings {
     pub min_patch_width: f64,
     /// Tilt up to which a patch counts as nearly horizontal, radians: 8°, more than a floor may have.
     pub level_tilt: f64,
+    /// Distance of neighbouring points that suffices for floors, planes and occupied space, metres: of scans that are
+    /// denser, rows and columns are skipped there. A cable has more; scans of five million points have it at six metres.
+    pub spacing: f64,
     /// Edge of an occupancy voxel, metres: finer than the gap between a robot and its fence.
     pub voxel: f64,
     /// Edge of the voxels that stand in for a lattice where the scanner is unknown, metres.
@@ -65,6 +68,7 @@ impl Default for Settings {
             min_patch_area: 0.01,
             min_patch_width: 0.04,
             level_tilt: 8_f64.to_radians(),
+            spacing: 0.010,
             voxel: 0.05,
             surface_voxel: 0.10,
             surface_noise: 0.006,

@@ -3,11 +3,11 @@
 use crate::Settings;
 use crate::normals::Normals;
 use crate::occupied::Counter;
-use crate::patch::{patches, world_rows};
-use crate::raster::Raster;
+use crate::patch::{WorldRows, patches, world_rows};
+use crate::raster::{NONE, Raster};
 use crate::regions::Regions;
 use crate::voxels::{self, Surface};
-use contract::{Error, Kind, Map, Result, Scan, Tile, TileSummary};
+use contract::{Error, Kind, Map, Occupancy, Result, Scan, Tile, TileSummary};
 
 /// Makes the summary of each tile.
 #[derive(Debug, Clone)]
@@ -35,6 +35,7 @@ pub struct Scratch {
     pub(crate) counter: Counter,
     pub(crate) surface: Surface,
     veils: Vec<bool>,
+    solid: Vec<[f32; 3]>,
 }
 
 impl Map for Summarise {
@@ -49,21 +50,42 @@ impl Map for Summarise {
         })?;
         let scan = &self.scans[at];
         let settings = &self.settings;
-        scratch.veils.clear();
-        scratch.veils.resize(tile.len(), false);
-        let mut n_veils = 0;
-        let patches = if let Some(lattice) = &scan.lattice {
-            scratch.raster.fill(&tile, lattice, settings);
-            scratch.raster.flag_veils(&tile, &mut scratch.veils);
-            n_veils = scratch.raster.veils.len() as u64;
-            scratch.normals.fill(&scratch.raster, settings);
-            scratch.regions.fill(&scratch.raster, &scratch.normals, settings);
-            patches(&scratch.raster, &scratch.regions, scan, settings)
-        } else {
-            voxels::patches(&tile, scan, &mut scratch.surface, settings)
-        };
         let rows = world_rows(&scan.world_from_scan);
-        let occupancy = scratch.counter.count(&tile.xyz, &scratch.veils, &rows, settings.voxel);
-        Ok(TileSummary { n_points: tile.len() as u64, n_veils, patches, occupancy })
+        let n_points = tile.len() as u64;
+        let Some(lattice) = &scan.lattice else {
+            let patches = voxels::patches(&tile, scan, &mut scratch.surface, settings);
+            let occupancy = scratch.counter.count(&tile.xyz, &rows, settings.voxel);
+            return Ok(TileSummary { n_points, n_veils: 0, patches, occupancy });
+        };
+        let skip = Raster::dense(&tile, lattice, settings.spacing);
+        scratch.raster.fill(&tile, lattice, skip, settings);
+        scratch.normals.fill(&scratch.raster, settings);
+        scratch.regions.fill(&scratch.raster, &scratch.normals, settings);
+        let patches = patches(&scratch.raster, &scratch.regions, scan, settings);
+        let occupancy = self.occupancy(&tile, &rows, scratch);
+        let n_veils = scratch.raster.veils.len() as u64;
+        Ok(TileSummary { n_points, n_veils, patches, occupancy })
+    }
+}
+
+impl Summarise {
+    /// Space that is occupied by what is no veil; in dense tiles, by what was read of them.
+    fn occupancy(&self, tile: &Tile, rows: &WorldRows, scratch: &mut Scratch) -> Occupancy {
+        let (raster, solid) = (&scratch.raster, &mut scratch.solid);
+        solid.clear();
+        if raster.skip > 0 {
+            let of = |at: &u32| tile.xyz[*at as usize];
+            solid.extend(raster.point.iter().filter(|at| **at != NONE).map(of));
+        } else {
+            scratch.veils.clear();
+            scratch.veils.resize(tile.len(), false);
+            raster.flag_veils(tile, &mut scratch.veils);
+            let all = tile.xyz.iter().zip(&scratch.veils);
+            solid.extend(all.filter(|(_, veil)| !**veil).map(|(p, _)| *p));
+        }
+        let weight = raster.weight();
+        let mut occupancy = scratch.counter.count(solid, rows, self.settings.voxel);
+        occupancy.voxels.iter_mut().for_each(|(_, n)| *n = n.saturating_mul(weight));
+        occupancy
     }
 }

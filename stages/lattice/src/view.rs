@@ -36,18 +36,55 @@ pub struct ViewBuilder {
     lattice: Option<Lattice>,
     extent: Option<Extent>,
     bounds: geometry::Aabb,
-    /// Unit direction to the region's middle (scan frame) and the angle that it subtends about it, radians.
-    cone: Option<(Vector, f64)>,
+    /// Cones from the scanner that together hold the region; none without scanner.
+    cones: Option<Vec<Cone>>,
     empty_window: i32,
+    /// Of dense scans, one of each square of pixels is enough to fill the cells of the images, and one of larger squares
+    /// as a point.
+    splatted: Squares,
+    kept: Squares,
+}
+
+/// Squares of 2^skip by 2^skip pixels of a tile, of which each gives one point.
+#[derive(Debug, Default)]
+struct Squares {
+    skip: u32,
+    taken: Vec<bool>,
+}
+
+impl Squares {
+    fn new(skip: u32) -> Self {
+        Self { skip, taken: Vec::new() }
+    }
+
+    /// Forgets the tile before.
+    fn clear(&mut self) {
+        let side = if self.skip > 0 { TILE_SIDE >> self.skip } else { 0 };
+        self.taken.clear();
+        self.taken.resize((side * side) as usize, false);
+    }
+
+    /// Whether a pixel's point is the first of its square.
+    #[inline]
+    fn take(&mut self, pixel: u16) -> bool {
+        if self.skip == 0 {
+            return true;
+        }
+        let (row, col) = (u32::from(pixel) / TILE_SIDE, u32::from(pixel) % TILE_SIDE);
+        let square = (row >> self.skip) * (TILE_SIDE >> self.skip) + (col >> self.skip);
+        !std::mem::replace(&mut self.taken[square as usize], true)
+    }
 }
 
 impl ViewBuilder {
-    /// An empty view of `region` from `scan`; `extent` is what the scan covers of its lattice, if known.
+    /// An empty view of `region` from `scan`; `extent` is what the scan covers of its lattice, if known. Each
+    /// 2^`thin`-th row and column of its points is kept.
     #[must_use]
     pub fn new(
         scan: &Scan,
         region: &Region,
         extent: Option<Extent>,
+        thin: u32,
         settings: &ViewSettings,
     ) -> Self {
         let local_from_world =
@@ -55,8 +92,11 @@ impl ViewBuilder {
         let local_from_scan = local_from_world * scan.world_from_scan;
         let scanner = scan.lattice.map(|_| local_from_scan * Point::origin());
         let beam_step = scan.lattice.map_or(0.0, |l| l.row_step.max(l.col_step));
-        let images = scanner.map_or_else(Vec::new, |s| cameras(&s, region, beam_step, settings));
-        let cone = scanner.map(|s| cone(&s, region, &local_from_scan));
+        let focal = scanner.map_or(0.0, |s| focal(&s, region, beam_step, settings));
+        let images = scanner.map_or_else(Vec::new, |s| cameras(&s, region, focal));
+        let skip = lattice_skip(scan, focal);
+        let thin = if scan.lattice.is_some() { thin } else { 0 };
+        let cones = scanner.map(|s| cones(&s, region, &local_from_scan));
         let view =
             View { scan: scan.id, mask: scan.mask, scanner, beam_step, images, points: Vec::new() };
         Self {
@@ -65,8 +105,10 @@ impl ViewBuilder {
             lattice: scan.lattice,
             extent,
             bounds: region.bounds,
-            cone,
+            cones,
             empty_window: settings.empty_window,
+            splatted: Squares::new(skip),
+            kept: Squares::new(skip.max(thin).min(MAX_SKIP)),
         }
     }
 
@@ -77,7 +119,7 @@ impl ViewBuilder {
         if at.scan != self.view.scan {
             return false;
         }
-        let (Some(lattice), Some((axis, angle))) = (&self.lattice, &self.cone) else {
+        let (Some(lattice), Some(cones)) = (&self.lattice, &self.cones) else {
             return self.wants_ground(at);
         };
         let corner = |dr: u32, dc: u32| {
@@ -92,7 +134,7 @@ impl ViewBuilder {
             .fold(0.0, f64::max);
         // A tile near the pole bulges beyond its corners; its half height covers that.
         let radius = radius.max(f64::from(TILE_SIDE) * 0.5 * lattice.row_step);
-        middle.angle(axis) <= radius + angle
+        cones.iter().any(|cone| middle.angle(&cone.axis) <= radius + cone.angle)
     }
 
     fn wants_ground(&self, at: TileAt) -> bool {
@@ -106,8 +148,10 @@ impl ViewBuilder {
             && y + side >= self.bounds.min[1]
     }
 
-    /// Adds the points of a tile.
+    /// Adds the points of a tile; of a dense scan, one of each square of pixels.
     pub fn add(&mut self, tile: &Tile) {
+        self.splatted.clear();
+        self.kept.clear();
         let local_from_scan = rows(&self.local_from_scan);
         let cameras: Vec<_> = self
             .view
@@ -116,8 +160,13 @@ impl ViewBuilder {
             .map(|image| rows(&(image.camera_from_local() * self.local_from_scan)))
             .collect();
         for (i, p) in tile.xyz.iter().enumerate() {
-            for (image, camera_from_scan) in self.view.images.iter_mut().zip(&cameras) {
-                image.splat(transform(camera_from_scan, *p));
+            if self.splatted.take(tile.pixel[i]) {
+                for (image, camera_from_scan) in self.view.images.iter_mut().zip(&cameras) {
+                    image.splat(transform(camera_from_scan, *p));
+                }
+            }
+            if !self.kept.take(tile.pixel[i]) {
+                continue;
             }
             let local = transform(&local_from_scan, *p);
             if self.bounds.contains(local.map(f64::from)) {
@@ -151,42 +200,67 @@ impl ViewBuilder {
     }
 }
 
-/// Direction to the region's middle in the scan frame, and the largest angle from it to a corner.
-fn cone(scanner: &Point, region: &Region, local_from_scan: &Pose) -> (Vector, f64) {
-    let to = region.bounds.center() - scanner;
-    if region.bounds.grown(0.05).contains(scanner.coords.into()) || to.norm() < 1e-6 {
-        return (Vector::z(), std::f64::consts::PI);
-    }
-    let angle = region
-        .bounds
-        .corners()
-        .iter()
-        .map(|c| (Point::from(*c) - scanner).angle(&to))
-        .fold(0.0, f64::max);
-    // Seen from close by, the cone of the corners may miss an edge's middle: beyond 60° take everything.
-    let angle = if angle > std::f64::consts::FRAC_PI_3 { std::f64::consts::PI } else { angle };
-    (local_from_scan.rotation.inverse() * to.normalize(), angle)
+/// What a scanner sees of a piece of space.
+#[derive(Debug)]
+struct Cone {
+    /// Unit direction, scan frame.
+    axis: Vector,
+    /// Half of its opening, radians.
+    angle: f64,
+}
+
+/// Pieces of a region on each axis, each with its cone: seen from close by, one cone around all of it would be the whole
+/// sphere, and all tiles of the scan would have to be read.
+const PIECES: usize = 4;
+/// Room around each piece, metres: what a depth image shows beside the region must be there as well.
+const BESIDE: f64 = 0.15;
+
+/// Cones around the pieces of a region; one that is the whole sphere where the scanner stands in or at a piece.
+fn cones(scanner: &Point, region: &Region, local_from_scan: &Pose) -> Vec<Cone> {
+    let (min, size) = (region.bounds.min, region.bounds.size());
+    let half = Vector::from(size) * (0.5 / PIECES as f64);
+    let radius = half.norm() + BESIDE;
+    let middle = |i: usize| {
+        let at = [i % PIECES, i / PIECES % PIECES, i / (PIECES * PIECES)];
+        Point::from([0, 1, 2].map(|k| min[k] + (2 * at[k] + 1) as f64 * half[k]))
+    };
+    let cone = |i: usize| {
+        let to = middle(i) - scanner;
+        let distance = to.norm();
+        (distance > radius).then(|| Cone {
+            axis: local_from_scan.rotation.inverse() * (to / distance),
+            angle: (radius / distance).asin(),
+        })
+    };
+    let all: Option<Vec<Cone>> = (0..PIECES * PIECES * PIECES).map(cone).collect();
+    all.unwrap_or_else(|| vec![Cone { axis: Vector::z(), angle: std::f64::consts::PI }])
+}
+
+/// Cells of an image in one unit of its plane, as fine as beams and settings allow.
+fn focal(scanner: &Point, region: &Region, beam_step: f64, settings: &ViewSettings) -> f64 {
+    let outside = |i: usize| {
+        let (min, max) = (region.bounds.min[i], region.bounds.max[i]);
+        (min - scanner[i]).max(scanner[i] - max).max(0.0).powi(2)
+    };
+    let near = (0..3).map(outside).sum::<f64>().sqrt().max(0.3);
+    (1.0 / (settings.beams_per_cell * beam_step.max(1e-5))).min(near / settings.min_cell)
+}
+
+/// Fewest beams across a cell that leave no holes in the image of a regular scan.
+const LEAST_BEAMS: f64 = 1.3;
+/// Most that is skipped: every eighth row and column is read.
+const MAX_SKIP: u32 = 3;
+
+/// How much of a scan may be skipped where its beams are far denser than cells.
+fn lattice_skip(scan: &Scan, focal: f64) -> u32 {
+    let Some(lattice) = &scan.lattice else { return 0 };
+    let beams = 1.0 / (focal.max(1e-6) * lattice.row_step.max(lattice.col_step));
+    (0..=MAX_SKIP).rfind(|s| beams >= LEAST_BEAMS * f64::from(1 << s)).unwrap_or(0)
 }
 
 /// The images that together cover the region: one towards its middle, or the faces of a cube.
-fn cameras(
-    scanner: &Point,
-    region: &Region,
-    beam_step: f64,
-    settings: &ViewSettings,
-) -> Vec<DepthImage> {
+fn cameras(scanner: &Point, region: &Region, focal: f64) -> Vec<DepthImage> {
     let to = region.bounds.center() - scanner;
-    let near = (0..3)
-        .map(|i| {
-            let outside =
-                (region.bounds.min[i] - scanner[i]).max(scanner[i] - region.bounds.max[i]);
-            outside.max(0.0).powi(2)
-        })
-        .sum::<f64>()
-        .sqrt()
-        .max(0.3);
-    let focal =
-        (1.0 / (settings.beams_per_cell * beam_step.max(1e-5))).min(near / settings.min_cell);
     if to.norm() > 1e-6 {
         let camera_from_local = look_at(scanner, &to);
         let mut half = 0.0_f64;

@@ -144,7 +144,9 @@ fn used_buffers_and_far_worlds_change_nothing() {
         }
         let sum = |s: &TileSummary| s.occupancy.voxels.iter().map(|v| u64::from(v.1)).sum::<u64>();
         assert_eq!(sum(a), sum(&b));
-        assert_eq!(sum(a) + a.n_veils, a.n_points);
+        // Of dense tiles a part is read; it stands for all of them.
+        let all = (sum(a) + a.n_veils) as f64 / a.n_points as f64;
+        assert!((0.97..1.04).contains(&all), "{all}");
     }
 }
 

@@ -30,6 +30,8 @@ struct Raster {
     heights: Vec<f32>,
     /// Subtracted from heights, metres, so that f32 is exact far above sea level.
     base: f64,
+    /// Lowest and highest height, metres.
+    span: [f64; 2],
 }
 
 impl Ground {
@@ -70,7 +72,14 @@ impl Ground {
     #[inline]
     #[must_use]
     pub fn is_floor(&self, world: [f64; 3]) -> bool {
-        self.height_above(world).is_some_and(|h| h <= self.band)
+        // Most points of a plant are far above the floor, or under the ceiling.
+        let near = |level: &Level| match level {
+            Level::Dense(raster) => {
+                world[2] - self.band <= raster.span[1] && world[2] + self.depth >= raster.span[0]
+            }
+            Level::Sparse(_) => true,
+        };
+        self.levels.iter().any(near) && self.height_above(world).is_some_and(|h| h <= self.band)
     }
 
     /// The label that a point has by its place alone: floor or fixed.
@@ -111,7 +120,9 @@ impl Raster {
             let (u, v) = at(*cell);
             heights[v * width + u] = local_f32(height - base);
         }
-        Some(Self { cell: level.cell, min, width, heights, base })
+        let known = || heights.iter().filter(|h| !h.is_nan()).map(|h| base + f64::from(*h));
+        let span = [known().fold(f64::MAX, f64::min), known().fold(f64::MIN, f64::max)];
+        Some(Self { cell: level.cell, min, width, heights, base, span })
     }
 
     /// Bilinear height between cell middles, metres.

@@ -1,17 +1,20 @@
 //! The step itself: one tile in, its labels near robots and its residual voxels out.
 
 use crate::body::{Body, bodies, box_distance};
+use crate::field::FIELD_REACH;
 use crate::raster::Raster;
 use crate::{Ground, Settings};
 use contract::{
-    Fit, Floor, Label, LinkAt, Map, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Scan, Tile,
-    TileLabels,
+    Fit, Floor, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result,
+    Scan, Tile, TileLabels,
 };
 use geometry::depth::{Rows, rotate, rows, transform};
 use geometry::narrow::floor_i32;
 use geometry::{Aabb, Point, Pose};
 use robot::{Model, Role};
 
+/// Points that are asked together which links are near: neighbours along a row of the tile.
+const BLOCK: usize = 32;
 /// A surface turned by more than this (cosine of 70°) from the link's is something else …
 const MIN_AGREEMENT: f32 = 0.35;
 /// … unless it lies closer than this, metres: at edges normals are smeared.
@@ -66,6 +69,7 @@ struct Touch {
 }
 
 /// A link as one tile sees it.
+#[derive(Clone, Copy)]
 struct Seen<'a> {
     at: LinkAt,
     link: &'a crate::body::Link,
@@ -112,7 +116,8 @@ impl Segment {
 
     /// A tool's link is part of an effector, not of the robot.
     fn name_tools(&self, tile: &mut TileLabels) {
-        for (_, label) in tile.labels.iter_mut().filter(|l| l.1.kind == PointKind::Link) {
+        let labels = tile.labels.iter_mut().map(|run| &mut run.what);
+        for label in labels.filter(|label| label.kind == PointKind::Link) {
             let links = usize::try_from(label.robot).ok().and_then(|r| self.effectors.get(r));
             let link = usize::try_from(label.link).ok();
             if links.zip(link).is_some_and(|(links, link)| links.get(link) == Some(&true)) {
@@ -278,20 +283,47 @@ impl Map for Segment {
         let here = self.bodies.iter().filter(|body| body.is_in(tile.at.scan));
         let regions: Vec<&Aabb> = here.map(|body| &body.region).collect();
         scratch.found.clear();
-        for (i, p) in tile.xyz.iter().enumerate() {
-            let world = world(&scan.world_from_scan, *p);
-            let found = if regions.iter().any(|region| region.contains(world)) {
-                self.judge(&seen, *p, world, || raster.and_then(|r| r.normal(&tile, i)))
-            } else {
-                Found::Default
-            };
-            scratch.found.push(found);
+        for (block, points) in tile.xyz.chunks(BLOCK).enumerate() {
+            let near = near(&seen, points);
+            if near.is_empty() {
+                scratch.found.resize(scratch.found.len() + points.len(), Found::Default);
+                continue;
+            }
+            for (i, p) in points.iter().enumerate() {
+                let at = block * BLOCK + i;
+                let world = world(&scan.world_from_scan, *p);
+                let found = if regions.iter().any(|region| region.contains(world)) {
+                    self.judge(&near, *p, world, || raster.and_then(|r| r.normal(&tile, at)))
+                } else {
+                    Found::Default
+                };
+                scratch.found.push(found);
+            }
         }
         self.settle(&tile, raster, &mut scratch.found);
         let mut out = gather(&tile, &scan.world_from_scan, &scratch.found, empty);
         self.name_tools(&mut out);
         Ok(out)
     }
+}
+
+/// Links that a point of a block may be near; those beyond the reach of all of them have no say in it.
+fn near<'a>(seen: &[Seen<'a>], points: &[[f32; 3]]) -> Vec<Seen<'a>> {
+    let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for p in points {
+        for i in 0..3 {
+            min[i] = if p[i] < min[i] { p[i] } else { min[i] };
+            max[i] = if p[i] > max[i] { p[i] } else { max[i] };
+        }
+    }
+    let middle: [f32; 3] = std::array::from_fn(|i| 0.5 * (min[i] + max[i]));
+    let radius = (0..3).map(|i| (0.5 * (max[i] - min[i])).powi(2)).sum::<f32>().sqrt();
+    let reach = seen.iter().map(|s| s.link.reach as f32).fold(0.0, f32::max).max(FIELD_REACH);
+    // A millimetre for what transforms round.
+    let far = reach + radius + 1e-3;
+    let is_near =
+        |s: &&Seen| box_distance(s.min, s.max, transform(&s.link_from_scan, middle)) <= far;
+    seen.iter().filter(is_near).copied().collect()
 }
 
 /// Turns what was found into lists sorted by place and by voxel.
@@ -302,7 +334,7 @@ fn gather(tile: &Tile, world_from_scan: &Pose, found: &[Found], mut out: TileLab
             Found::Link(touch) => (touch, true),
             Found::Residual(touch) | Found::Doubt(touch) => (touch, false),
             Found::Veil => {
-                out.labels.push((place, Label::UNCERTAIN));
+                out.labels.push(PlaceRun::one(place, Label::UNCERTAIN));
                 continue;
             }
             Found::Default => continue,
@@ -310,9 +342,9 @@ fn gather(tile: &Tile, world_from_scan: &Pose, found: &[Found], mut out: TileLab
         let voxel = world(world_from_scan, tile.xyz[i]).map(|v| floor_i32(v / RESIDUAL_EDGE));
         if on_link {
             let (robot, link) = (touch.link.robot as i16, touch.link.link as i16);
-            out.labels.push((place, Label { kind: PointKind::Link, robot, link }));
+            out.labels.push(PlaceRun::one(place, Label { kind: PointKind::Link, robot, link }));
         } else {
-            out.residuals.push((place, voxel));
+            out.residuals.push(PlaceRun::one(place, voxel));
         }
         let entry = ResidualVoxel {
             voxel,
@@ -328,8 +360,8 @@ fn gather(tile: &Tile, world_from_scan: &Pose, found: &[Found], mut out: TileLab
             _ => out.voxels.push(entry),
         }
     }
-    out.labels.sort_unstable_by_key(|entry| entry.0);
-    out.residuals.sort_unstable_by_key(|entry| entry.0);
+    PlaceRun::join(&mut out.labels);
+    PlaceRun::join(&mut out.residuals);
     out.voxels.sort_by_key(|entry| entry.voxel);
     out.voxels.dedup_by(|later, kept| {
         let same = later.voxel == kept.voxel;

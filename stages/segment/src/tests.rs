@@ -2,8 +2,8 @@
 
 use crate::{Ground, Scratch, Segment, Settings};
 use contract::{
-    Fit, Floor, FloorLevel, InputId, JointFit, Label, Lattice, Map, MaskId, Pixel, PointKind, Scan,
-    ScanId, Tile, TileAt, Verdict,
+    Fit, Floor, FloorLevel, InputId, JointFit, Label, Lattice, Map, MaskId, Pixel, PlaceRun,
+    PointKind, Scan, ScanId, Tile, TileAt, Verdict,
 };
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use robot::{CadCloud, Joint, JointKind, Link, Mesh, Model, Motion, Role};
@@ -200,6 +200,11 @@ fn shoot(bricks: &[Brick], scan: &Scan) -> Vec<Shot> {
     tiles.into_values().collect()
 }
 
+/// Labels place by place.
+fn single(runs: &[PlaceRun<Label>]) -> impl Iterator<Item = (u64, Label)> {
+    runs.iter().flat_map(|run| (run.first..run.end()).map(|place| (place, run.what)))
+}
+
 #[test]
 fn links_are_found_and_nothing_fixed_is_lost() {
     let q = 0.7;
@@ -225,14 +230,14 @@ fn links_are_found_and_nothing_fixed_is_lost() {
     for (tile, truth) in tiles {
         let xyz = tile.xyz.clone();
         let out = segment.apply(tile.clone(), &mut scratch).expect("maps");
-        assert!(out.labels.windows(2).all(|w| w[0].0 < w[1].0));
+        assert!(out.labels.windows(2).all(|w| w[0].end() <= w[1].first));
+        let known: std::collections::HashMap<u64, Label> = single(&out.labels).collect();
         assert!(out.voxels.windows(2).all(|w| w[0].voxel < w[1].voxel));
         for (i, truth) in truth.iter().enumerate() {
             let place = u64::from(tile.place[i]);
             let world = scan.world_from_scan * Point::from(xyz[i].map(f64::from));
-            let found = out.labels.binary_search_by_key(&place, |l| l.0);
-            let label =
-                found.map_or(ground.label([world.x, world.y, world.z]), |at| out.labels[at].1);
+            let by_place = ground.label([world.x, world.y, world.z]);
+            let label = known.get(&place).copied().unwrap_or(by_place);
             let Some(truth) = truth else {
                 n_veils += 1;
                 veils_on_link += u32::from(label.kind == PointKind::Link);
@@ -336,15 +341,15 @@ fn points_of_a_real_robot_go_to_their_links() {
     let segment = Segment::new(&[fit], &[model], &floor(), &[scan], Settings::default());
     let built = started.elapsed();
     let out = segment.apply(tile, &mut Scratch::default()).expect("maps");
-    let right =
-        out.labels.iter().filter(|(place, label)| label.link == truth[*place as usize]).count();
+    let labels: Vec<(u64, Label)> = single(&out.labels).collect();
+    let right = labels.iter().filter(|(place, label)| label.link == truth[*place as usize]).count();
     let taken = started.elapsed() - built;
     eprintln!(
         "{} points: {:.3} on a link, {:.3} on the right one; fields {built:?}, {taken:?}",
         truth.len(),
-        out.labels.len() as f64 / truth.len() as f64,
+        labels.len() as f64 / truth.len() as f64,
         right as f64 / truth.len() as f64
     );
-    assert!(out.labels.len() as f64 > 0.985 * truth.len() as f64);
+    assert!(labels.len() as f64 > 0.985 * truth.len() as f64);
     assert!(right as f64 > 0.985 * truth.len() as f64);
 }

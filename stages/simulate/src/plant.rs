@@ -10,7 +10,7 @@ use crate::scene::{
 use crate::spot::{Spot, scanner};
 use contract::{Error, Result};
 use geometry::Point;
-use robot::Model;
+use robot::{Model, Role};
 
 /// What a plant scene is drawn from.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,8 +79,7 @@ pub fn plant(wanted: &Plant, models: &[Model]) -> Result<Scene> {
     };
     furnish(&mut scene, wanted, &rooms, size, &mut random);
     for (k, room) in rooms.iter().enumerate() {
-        let later = wanted.moves && k == 0;
-        stand(&mut scene, room, (k, later), wanted, &mut random)?;
+        stand(&mut scene, room, (k, wanted.moves && k == 0), wanted, &mut random)?;
     }
     scanners(&mut scene, wanted, &rooms, size, &mut random);
     if let (true, Some(robot)) = (wanted.moves, scene.robots.first_mut()) {
@@ -316,13 +315,14 @@ fn stand(
         max: room.max.map(|v| v - grow),
     };
     let mut place = spot.place(scene, room.model, random)?;
-    let low = lowest(room.model);
-    place.xyz[2] -= low;
+    place.xyz[2] -= lowest(room.model);
     if later {
         let again = spot.place(scene, room.model, random)?;
         place.later.push(Later { scanners: Vec::new(), posture: again.posture });
     }
-    let hand = room.model.flanges().first().copied();
+    // A robot that brings its own tool carries no other on it.
+    let is_armed = room.model.links.iter().any(|link| link.role == Role::Effector);
+    let hand = room.model.flanges().first().copied().filter(|_| !is_armed);
     if let Some(hand) = hand.filter(|_| random.unit() < 0.7) {
         let shapes = [ToolShape::Gripper, ToolShape::Cups, ToolShape::Torch];
         let shape = shapes[random.below(shapes.len())];

@@ -99,6 +99,7 @@ impl E57Scan {
             scanner_known: scan.frame.scanner_known,
             stated_bounds,
             stated_points: scan.n_valid(),
+            likely_points: None,
             notes,
         };
         Ok((scan, seed))

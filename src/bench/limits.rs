@@ -1,0 +1,86 @@
+//! A file and a folder in; what this machine can do at best out: copying the file, copying memory. A run is measured
+//! against both, in the same minute.
+
+use contract::{Error, Result};
+use serde::Serialize;
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::time::Instant;
+
+/// Bytes that are read and written at a time, as `cp` does.
+const PIECE: usize = 1 << 20;
+/// Buffers of the memory test, bytes: more than any cache.
+const BUFFER: usize = 128 << 20;
+/// Times that memory is copied; the median counts.
+const N_COPIES: usize = 7;
+
+/// A copy of a file, cold, synced.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Copied {
+    /// Bytes that were copied: all of the file, or what the disk has room for.
+    pub(super) n_bytes: u64,
+    pub(super) seconds: f64,
+}
+
+impl Copied {
+    /// The time that a whole file of this length takes.
+    pub(super) fn seconds_for(&self, n_bytes: u64) -> f64 {
+        self.seconds * n_bytes as f64 / self.n_bytes.max(1) as f64
+    }
+}
+
+/// Copies a file beside itself, at most `most` bytes of it, waits for the disk, and removes the copy.
+pub(super) fn copy(path: &Path, most: u64) -> Result<Copied> {
+    let copy = path.with_extension("copy");
+    let failed = |e: std::io::Error| Error::from(e).at(path.display());
+    forget(path)?;
+    let started = Instant::now();
+    let copied = (|| {
+        let mut from = File::open(path)?.take(most);
+        let mut to = File::create(&copy)?;
+        let mut piece = vec![0; PIECE];
+        let mut n_bytes = 0;
+        loop {
+            let n = from.read(&mut piece)?;
+            if n == 0 {
+                break;
+            }
+            to.write_all(&piece[..n])?;
+            n_bytes += n as u64;
+        }
+        to.sync_all()?;
+        Ok(n_bytes)
+    })();
+    let seconds = started.elapsed().as_secs_f64();
+    let _ = std::fs::remove_file(&copy);
+    Ok(Copied { n_bytes: copied.map_err(failed)?, seconds })
+}
+
+/// Has the system forget what it keeps of a file in memory, so that it is read from disk.
+pub(super) fn forget(path: &Path) -> Result<()> {
+    let failed = |e: std::io::Error| Error::from(e).at(path.display());
+    let file = File::open(path).map_err(failed)?;
+    // What is not on disk yet cannot be forgotten.
+    file.sync_all().map_err(failed)?;
+    #[cfg(target_os = "linux")]
+    rustix::fs::fadvise(&file, 0, None, rustix::fs::Advice::DontNeed)
+        .map_err(|e| failed(e.into()))?;
+    Ok(())
+}
+
+/// Bytes a second that one thread copies in memory: read and written bytes both count.
+pub(super) fn memory() -> f64 {
+    let from = vec![1_u8; BUFFER];
+    let mut to = vec![0_u8; BUFFER];
+    let mut rates: Vec<f64> = (0..N_COPIES)
+        .map(|_| {
+            let started = Instant::now();
+            to.copy_from_slice(&from);
+            std::hint::black_box(&mut to);
+            2.0 * BUFFER as f64 / started.elapsed().as_secs_f64()
+        })
+        .collect();
+    rates.sort_by(f64::total_cmp);
+    rates[N_COPIES / 2]
+}

@@ -1,0 +1,169 @@
+//! A strip in; its labels, its records for the clouds, and what pictures and spaces take of it, out: the map of the second
+//! pass, so that the one thread that writes has only to copy.
+
+use crate::bodies::Bodies;
+use crate::spaces::{Spot, spots};
+use contract::{Label, Map, MaskId, PlaceRun, PointKind, Result, Scan, SpaceGrid, Strip, Weigh};
+use export::{LabelColumns, Pack, Packed, PlanPicture, PointColumns};
+use geometry::{Aabb, Point};
+use segment::Ground;
+use std::ops::Range;
+
+/// Points whose bounds are looked at together: neighbours of a scan are near each other.
+const BLOCK: usize = 128;
+/// Of so many points that stand still near a robot, one is drawn: its picture has fewer pixels than they are.
+const DRAWN: u64 = 4;
+
+/// The map of the second pass.
+pub(crate) struct LabelStrip<'a> {
+    /// Labels of points near robots: for each mask, by place.
+    pub(crate) near: &'a [Vec<PlaceRun<Label>>],
+    pub(crate) ground: &'a Ground,
+    pub(crate) scans: &'a [Scan],
+    /// Grids of the robots' spaces and their bounds.
+    pub(crate) grids: &'a [Option<(SpaceGrid, Aabb)>],
+    /// What the picture of each robot shows.
+    pub(crate) shown: &'a [Aabb],
+    pub(crate) plan: &'a PlanPicture,
+    pub(crate) pack: Pack,
+    /// Connected bodies, where points are to be told which is theirs.
+    pub(crate) bodies: Option<&'a Bodies>,
+}
+
+/// A labelled strip.
+pub(crate) struct Labelled {
+    pub(crate) mask: MaskId,
+    /// As in [`Strip`].
+    pub(crate) first_place: u64,
+    pub(crate) place: Vec<u32>,
+    pub(crate) labels: LabelColumns,
+    pub(crate) n_moving: u64,
+    pub(crate) packed: Packed,
+    pub(crate) spots: Vec<Spot>,
+    /// Points that pictures of robots show: number of the robot, world, label.
+    pub(crate) shown: Vec<(usize, [f64; 3], Label)>,
+}
+
+impl Map for LabelStrip<'_> {
+    type In = Strip;
+    type Out = Labelled;
+    type Scratch = ();
+
+    fn apply(&self, mut strip: Strip, (): &mut ()) -> Result<Labelled> {
+        let scan = &self.scans[strip.scan.0 as usize];
+        let world = world(&mut strip, scan);
+        let labels = self.labels(&strip, &world);
+        let blocks = blocks(&world);
+        let mut points = PointColumns {
+            world: &world,
+            labels: &labels,
+            scan: (strip.scan.0 + 1) as u16,
+            ..PointColumns::default()
+        };
+        if let Some(a) = &strip.attributes {
+            points.intensity = &a.intensity;
+            points.color = &a.color;
+            points.gps_time = &a.gps_time;
+            points.source_id = &a.source_id;
+        }
+        let body = self.bodies.map(|bodies| bodies.of(&world)).unwrap_or_default();
+        points.body = &body;
+        self.plan.add(&world, &labels);
+        let moves = |label: &&Label| matches!(label.kind, PointKind::Link | PointKind::Attachment);
+        Ok(Labelled {
+            mask: strip.mask,
+            first_place: strip.first_place,
+            packed: self.pack.pack(&points)?,
+            n_moving: labels.iter().filter(moves).count() as u64,
+            spots: spots(self.grids, &world, &labels, &blocks),
+            shown: self.shown(&strip, &world, &labels, &blocks),
+            labels: LabelColumns::of(&labels),
+            place: strip.place,
+        })
+    }
+}
+
+impl LabelStrip<'_> {
+    /// The labels of a strip's points: those that are known near robots, else those of their places alone.
+    fn labels(&self, strip: &Strip, world: &[[f64; 3]]) -> Vec<Label> {
+        let mut labels: Vec<Label> = world.iter().map(|p| self.ground.label(*p)).collect();
+        let near = &self.near[strip.mask.0 as usize];
+        let from = near.partition_point(|run| run.end() <= strip.first_place);
+        let Some(last) = strip.place.last() else { return labels };
+        let end = strip.first_place + u64::from(*last) + 1;
+        let mut at = 0;
+        for run in near[from..].iter().take_while(|run| run.first < end) {
+            let begins = run.first.saturating_sub(strip.first_place) as u32;
+            let ends = (run.end().min(end) - strip.first_place) as u32;
+            at += strip.place[at..].iter().take_while(|p| **p < begins).count();
+            while strip.place.get(at).is_some_and(|p| *p < ends) {
+                labels[at] = run.what;
+                at += 1;
+            }
+        }
+        labels
+    }
+
+    fn shown(
+        &self,
+        strip: &Strip,
+        world: &[[f64; 3]],
+        labels: &[Label],
+        blocks: &[(Range<usize>, Aabb)],
+    ) -> Vec<(usize, [f64; 3], Label)> {
+        let mut out = Vec::new();
+        for (robot, bounds) in self.shown.iter().enumerate() {
+            for (range, _) in blocks.iter().filter(|(_, own)| own.touches(bounds)) {
+                for i in range.clone().filter(|&i| bounds.contains(world[i])) {
+                    let stands = matches!(labels[i].kind, PointKind::Fixed | PointKind::Floor);
+                    let place = strip.first_place + u64::from(strip.place[i]);
+                    if !stands || place.is_multiple_of(DRAWN) {
+                        out.push((robot, world[i], labels[i]));
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Bounds of each [`BLOCK`] of points.
+fn blocks(world: &[[f64; 3]]) -> Vec<(Range<usize>, Aabb)> {
+    let bounds = |points: &[[f64; 3]]| {
+        // Plain comparisons: `f64::min` would spend most of the time on NaN, which no point is.
+        let mut out = Aabb::EMPTY;
+        for p in points {
+            for (i, v) in p.iter().enumerate() {
+                out.min[i] = if *v < out.min[i] { *v } else { out.min[i] };
+                out.max[i] = if *v > out.max[i] { *v } else { out.max[i] };
+            }
+        }
+        out
+    };
+    let range = |i: usize, n: usize| i * BLOCK..i * BLOCK + n;
+    world.chunks(BLOCK).enumerate().map(|(i, c)| (range(i, c.len()), bounds(c))).collect()
+}
+
+/// World coordinates of a strip's points: those of the file where it states them.
+fn world(strip: &mut Strip, scan: &Scan) -> Vec<[f64; 3]> {
+    match &mut strip.attributes {
+        Some(a) if a.world.len() == strip.xyz.len() => std::mem::take(&mut a.world),
+        _ => strip
+            .xyz
+            .iter()
+            .map(|p| (scan.world_from_scan * Point::from(p.map(f64::from))).coords.into())
+            .collect(),
+    }
+}
+
+impl Weigh for Labelled {
+    fn weight_bytes(&self) -> usize {
+        let (spots, shown) = (size_of_val(&*self.spots), size_of_val(&*self.shown));
+        let place = size_of_val(&*self.place);
+        place + self.labels.weight_bytes() + self.packed.weight_bytes() + spots + shown
+    }
+
+    fn n_points(&self) -> u64 {
+        self.place.len() as u64
+    }
+}

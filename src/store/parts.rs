@@ -1,0 +1,150 @@
+//! Tiles as they were gathered in, in memory, in the spill file, or written too early; parts of at most [`TILE_POINTS`] out,
+//! whole and in the order of tiles.
+
+use super::encode::decode;
+use super::file::TileFile;
+use super::record::Record;
+use super::sink::{Buffer, TILE_POINTS};
+use super::spill::{Segment, Spill};
+use contract::{Result, TileAt, Weigh};
+
+/// Longest way from the first to the last place of one tile: places are kept as 32 bits from the first.
+pub(super) const LONGEST_SPAN: u64 = u32::MAX as u64;
+
+/// From the smallest to the largest place.
+pub(super) fn span(records: &[Record]) -> u64 {
+    let places = || records.iter().map(Record::place);
+    places().max().zip(places().min()).map_or(0, |(max, min)| max - min)
+}
+
+/// The points of a tile, or of a part of it that is small enough.
+pub(super) struct Part {
+    pub(super) at: TileAt,
+    pub(super) records: Vec<Record>,
+}
+
+impl Weigh for Part {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>() + self.records.len() * Record::BYTES
+    }
+
+    fn n_points(&self) -> u64 {
+        self.records.len() as u64
+    }
+}
+
+/// Gives the tiles out, one after the other, each in parts of at most [`TILE_POINTS`].
+pub(super) struct Parts {
+    buffers: std::vec::IntoIter<Buffer>,
+    spill: Option<Spill>,
+    /// Where tiles were written before all of their points had come.
+    file: Option<TileFile>,
+    current: Option<Current>,
+}
+
+/// A tile that is being read back.
+struct Current {
+    at: TileAt,
+    /// Segments still to be read.
+    segments: std::vec::IntoIter<Segment>,
+    /// What was in memory; comes after all segments.
+    last: Vec<Record>,
+    /// Read, not yet given out.
+    ahead: Vec<Record>,
+}
+
+impl Parts {
+    pub(super) fn new(buffers: Vec<Buffer>, spill: Option<Spill>, file: Option<TileFile>) -> Self {
+        Self { buffers: buffers.into_iter(), spill, file, current: None }
+    }
+
+    fn part(&mut self) -> Result<Option<Part>> {
+        loop {
+            let current = match &mut self.current {
+                Some(current) => current,
+                None => {
+                    let Some(buffer) = self.buffers.next() else {
+                        return Ok(None);
+                    };
+                    let begun = self.begin(buffer)?;
+                    self.current.insert(begun)
+                }
+            };
+            let at = current.at;
+            let records = current.records(&mut self.spill)?;
+            if records.is_empty() {
+                self.current = None;
+                continue;
+            }
+            return Ok(Some(Part { at, records }));
+        }
+    }
+
+    fn begin(&mut self, buffer: Buffer) -> Result<Current> {
+        let Buffer { at, records, segments, written, mut ascending, n_points, .. } = buffer;
+        let mut early = Vec::new();
+        for entry in &written {
+            let file = self.file.as_mut().expect("a tile was written to a file");
+            let tile = decode(entry, &file.read(entry)?);
+            early.extend((0..tile.len()).map(|i| {
+                let place = tile.first_place + u64::from(tile.place[i]);
+                Record::new(tile.xyz[i], place, tile.pixel[i])
+            }));
+            // Tiles are sorted by pixel.
+            ascending = false;
+        }
+        let spill = &mut self.spill;
+        let mut current =
+            Current { at, segments: segments.into_iter(), last: records, ahead: early };
+        if !ascending && n_points > TILE_POINTS {
+            // Rare: points out of order, and too many. Their order decides where parts are cut.
+            current.fill(usize::MAX, spill)?;
+            current.ahead.sort_unstable_by_key(Record::place);
+        }
+        Ok(current)
+    }
+}
+
+impl Current {
+    /// Reads until `n` records are ahead, or all.
+    fn fill(&mut self, n: usize, spill: &mut Option<Spill>) -> Result<()> {
+        while self.ahead.len() < n {
+            if let Some(segment) = self.segments.next() {
+                let spill = spill.as_mut().expect("a segment has a spill file");
+                spill.read(&segment, &mut self.ahead)?;
+            } else if self.last.is_empty() {
+                break;
+            } else if self.ahead.is_empty() {
+                self.ahead = std::mem::take(&mut self.last);
+            } else {
+                self.ahead.append(&mut self.last);
+                self.last = Vec::new();
+            }
+        }
+        Ok(())
+    }
+
+    /// The next part. Within one, places span less than 2³².
+    fn records(&mut self, spill: &mut Option<Spill>) -> Result<Vec<Record>> {
+        self.fill(TILE_POINTS, spill)?;
+        let mut n = self.ahead.len().min(TILE_POINTS);
+        if span(&self.ahead[..n]) > LONGEST_SPAN {
+            self.ahead.sort_unstable_by_key(Record::place);
+            let end = self.ahead[0].place() + LONGEST_SPAN;
+            n = self.ahead[..n].partition_point(|r| r.place() <= end);
+        }
+        if n == self.ahead.len() {
+            return Ok(std::mem::take(&mut self.ahead));
+        }
+        let rest = self.ahead.split_off(n);
+        Ok(std::mem::replace(&mut self.ahead, rest))
+    }
+}
+
+impl Iterator for Parts {
+    type Item = Result<Part>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.part().transpose()
+    }
+}

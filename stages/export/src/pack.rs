@@ -1,0 +1,205 @@
+//! Columns of labelled points in; their LAS records, in runs of one spatial tile, out. No object is made for a point, and
+//! nothing is shared, so that workers pack strips while one thread writes them.
+
+use crate::record::{Extent, LasSettings, Quantum, class_of, too_far};
+use contract::{Label, PointKind, Result};
+use geometry::narrow::floor_i32;
+
+/// Runs shorter than this on average are worth joining: a look-up of a tile costs as much as copying that many records.
+const SHORT_RUN: usize = 8;
+/// Added to a number below 2³¹, it leaves the nearest whole number in the low 32 bits: 1.5 · 2⁵².
+const NEAREST: f64 = 6_755_399_441_055_744.0;
+
+/// Points to be written; a column that is unknown is empty, all others have the same length.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PointColumns<'a> {
+    /// World, metres.
+    pub world: &'a [[f64; 3]],
+    /// What each point belongs to.
+    pub labels: &'a [Label],
+    /// 0..65535.
+    pub intensity: &'a [u16],
+    /// 0..65535 a channel; written by format 7 only.
+    pub color: &'a [[u16; 3]],
+    /// GPS time, seconds.
+    pub gps_time: &'a [f64],
+    /// Connected body + 1, 0 for the floor; written where asked for.
+    pub body: &'a [u32],
+    /// LAS point source id.
+    pub source_id: &'a [u16],
+    /// Point source id of all points where the column is empty.
+    pub scan: u16,
+}
+
+/// Consecutive records of one tile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Run {
+    /// Row and column of the tile.
+    pub(crate) tile: [i32; 2],
+    /// Links and attachments.
+    pub(crate) moves: bool,
+    pub(crate) extent: Extent,
+}
+
+/// Records of a strip.
+#[derive(Debug, Clone, Default)]
+pub struct Packed {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) runs: Vec<Run>,
+}
+
+impl Packed {
+    /// Memory that it takes, bytes.
+    #[must_use]
+    pub fn weight_bytes(&self) -> usize {
+        self.bytes.len() + size_of_val(&*self.runs)
+    }
+}
+
+/// Turns points into records.
+#[derive(Debug, Clone)]
+pub struct Pack {
+    las: LasSettings,
+    /// Metres; without tiles all points lie in one.
+    tile_edge: Option<f64>,
+    class_of_kind: [u8; 256],
+}
+
+impl Pack {
+    pub(crate) fn new(las: &LasSettings, tile_edge: Option<f64>) -> Self {
+        let mut class_of_kind = [1; 256];
+        for kind in PointKind::ALL {
+            class_of_kind[kind as usize] = class_of(kind);
+        }
+        Self { las: las.clone(), tile_edge, class_of_kind }
+    }
+
+    /// The records of some points, in their order where they are in the order of a scan: then neighbours share a tile.
+    ///
+    /// # Errors
+    /// A point that the integers of LAS cannot hold.
+    pub fn pack(&self, points: &PointColumns<'_>) -> Result<Packed> {
+        let n = points.world.len();
+        let record_len = self.las.record_len();
+        let mut bytes = vec![0; n * record_len];
+        let steps = steps(points.world, &self.las.quantum)?;
+        for (i, record) in bytes.chunks_exact_mut(record_len).enumerate() {
+            self.write(points, i, steps[i], record);
+        }
+        let runs = self.runs(points, &steps);
+        let packed = Packed { bytes, runs };
+        let short = packed.runs.len() * SHORT_RUN > n;
+        Ok(if short { packed.joined(record_len) } else { packed })
+    }
+
+    #[inline]
+    fn write(&self, points: &PointColumns<'_>, i: usize, steps: [i32; 3], record: &mut [u8]) {
+        let label = points.labels[i];
+        for axis in 0..3 {
+            record[4 * axis..4 * axis + 4].copy_from_slice(&steps[axis].to_le_bytes());
+        }
+        if let Some(intensity) = points.intensity.get(i) {
+            record[12..14].copy_from_slice(&intensity.to_le_bytes());
+        }
+        // Return 1 of 1.
+        record[14] = 0x11;
+        let source = points.source_id.get(i).copied().unwrap_or(points.scan);
+        record[20..22].copy_from_slice(&source.to_le_bytes());
+        if let Some(time) = points.gps_time.get(i) {
+            record[22..30].copy_from_slice(&time.to_le_bytes());
+        }
+        let mut at = 30;
+        if self.las.with_color {
+            for (channel, to) in points.color.get(i).into_iter().flatten().zip([30, 32, 34]) {
+                record[to..to + 2].copy_from_slice(&channel.to_le_bytes());
+            }
+            at += 6;
+        }
+        if self.las.with_labels {
+            record[16] = self.class_of_kind[label.kind as usize];
+            for (index, to) in [(label.robot, at), (label.link, at + 2)] {
+                record[to..to + 2].copy_from_slice(&index.wrapping_add(1).to_le_bytes());
+            }
+            at += 4;
+        }
+        if let (true, Some(body)) = (self.las.with_bodies, points.body.get(i)) {
+            record[at..at + 4].copy_from_slice(&body.to_le_bytes());
+        }
+    }
+
+    fn runs(&self, points: &PointColumns<'_>, steps: &[[i32; 3]]) -> Vec<Run> {
+        let edge = self.tile_edge.unwrap_or(f64::INFINITY);
+        let mut runs: Vec<Run> = Vec::new();
+        // Bounds of the current tile, metres: most points lie where the one before lies.
+        let mut bounds = [f64::NAN; 4];
+        let mut tile = [0; 2];
+        for ((p, label), step) in points.world.iter().zip(points.labels).zip(steps) {
+            let moves = matches!(label.kind, PointKind::Link | PointKind::Attachment);
+            let inside =
+                p[0] >= bounds[0] && p[0] < bounds[1] && p[1] >= bounds[2] && p[1] < bounds[3];
+            if !inside {
+                tile = [floor_i32(p[1] / edge), floor_i32(p[0] / edge)];
+                let side = |at: i32| if edge.is_finite() { f64::from(at) * edge } else { f64::NAN };
+                bounds = [side(tile[1]), side(tile[1] + 1), side(tile[0]), side(tile[0] + 1)];
+                if !edge.is_finite() {
+                    (tile, bounds) = ([0; 2], [f64::MIN, f64::MAX, f64::MIN, f64::MAX]);
+                }
+            }
+            match runs.last_mut() {
+                Some(run) if run.tile == tile && run.moves == moves => run.extent.add(*step),
+                _ => {
+                    let mut extent = Extent::default();
+                    extent.add(*step);
+                    runs.push(Run { tile, moves, extent });
+                }
+            }
+        }
+        runs
+    }
+}
+
+impl Packed {
+    /// Joins runs of one tile, keeping their order within it.
+    fn joined(self, record_len: usize) -> Self {
+        let mut start = 0;
+        let mut order: Vec<([i32; 2], bool, usize, Extent)> = Vec::with_capacity(self.runs.len());
+        for run in &self.runs {
+            order.push((run.tile, run.moves, start, run.extent));
+            start += run.extent.n as usize * record_len;
+        }
+        order.sort_unstable_by_key(|entry| (entry.0, entry.1, entry.2));
+        let mut out = Self { bytes: Vec::with_capacity(self.bytes.len()), runs: Vec::new() };
+        for (tile, moves, start, extent) in order {
+            let end = start + extent.n as usize * record_len;
+            out.bytes.extend_from_slice(&self.bytes[start..end]);
+            match out.runs.last_mut() {
+                Some(run) if run.tile == tile && run.moves == moves => run.extent.join(&extent),
+                _ => out.runs.push(Run { tile, moves, extent }),
+            }
+        }
+        out
+    }
+}
+
+/// Whole steps of coordinates, in one loop without calls that the compiler turns into vector instructions.
+fn steps(world: &[[f64; 3]], quantum: &Quantum) -> Result<Vec<[i32; 3]>> {
+    let inverse = quantum.scale.map(|s| 1.0 / s);
+    let offset = quantum.offset;
+    let mut far = false;
+    let out: Vec<[i32; 3]> = world
+        .iter()
+        .map(|p| {
+            let at: [f64; 3] = std::array::from_fn(|i| (p[i] - offset[i]) * inverse[i]);
+            far |= !at.iter().all(|v| v.abs() < f64::from(i32::MAX));
+            at.map(|v| (v + NEAREST).to_bits() as i32)
+        })
+        .collect();
+    if !far {
+        return Ok(out);
+    }
+    let is_far = |p: &&[f64; 3]| quantum.steps(**p).is_none();
+    match world.iter().find(is_far) {
+        Some(p) => Err(too_far(*p)),
+        None => Ok(out),
+    }
+}

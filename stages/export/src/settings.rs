@@ -1,0 +1,32 @@
+//! What can be tuned in writing; defaults in, no file knows another number.
+
+/// Tunables of this room.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Whether all points are written with their labels, in spatial tiles (`tiles/`).
+    pub tiles: bool,
+    /// Edge of a tile, metres: 10 m is a robot cell.
+    pub tile_edge: f64,
+    /// Whether all that does not move is written as one cloud too (`clouds/fixed`). It is what most planners read, and
+    /// twice the disk; a plant is read by tiles, whose classes tell the same.
+    pub fixed_cloud: bool,
+    /// Whether records hold the number of the connected body that a point belongs to (`BodyId`).
+    pub bodies: bool,
+    /// Whether clouds are compressed (LAZ): a quarter of the disk, at a tenth of the speed.
+    pub compress: bool,
+    /// Records that wait in memory for their tile, bytes.
+    pub waiting_bytes: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            tiles: true,
+            tile_edge: 10.0,
+            fixed_cloud: true,
+            bodies: false,
+            compress: false,
+            waiting_bytes: 64 << 20,
+        }
+    }
+}
