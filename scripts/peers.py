@@ -10,11 +10,12 @@ PDAL, Open3D, CloudCompare."""
 
 import argparse
 import json
+import os
 import platform
-import resource
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from importlib import metadata
 from pathlib import Path
@@ -113,16 +114,19 @@ def versions(tool):
     return found
 
 
-def measured(command, **options):
-    """Seconds and peak resident memory of a command, GiB; None where it failed."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    started = time.monotonic()
-    done = subprocess.run(command, capture_output=True, text=True, **options)
-    seconds = time.monotonic() - started
-    # The largest of all children so far: each tool is run by a fresh process of this script.
-    peak = max(before, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 2**20
-    error = None if done.returncode in (0, 3) else (done.stderr.strip().splitlines() or ["failed"])[-1]
-    return {"seconds": round(seconds, 2), "peak_gib": round(peak, 2), "error": error}
+def measured(command):
+    """Seconds and peak resident memory of a command, GiB; an error where it failed."""
+    with tempfile.TemporaryFile("w+") as said:
+        started = time.monotonic()
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
+        # Of this one process: what `resource` knows of children is the most of all of them.
+        _, status, usage = os.wait4(process.pid, 0)
+        seconds = time.monotonic() - started
+        process.returncode = os.waitstatus_to_exitcode(status)
+        said.seek(0)
+        last = (said.read().strip().splitlines() or ["failed"])[-1]
+    error = None if process.returncode in (0, 3) else last
+    return {"seconds": round(seconds, 2), "peak_gib": round(usage.ru_maxrss / 2**20, 2), "error": error}
 
 
 def floor_iou(plant, mine):

@@ -8,7 +8,6 @@ use contract::{Error, Input, Kind, Result, Weigh};
 use ingest::{Sources, Want};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 
 /// Name of a store that is being filled, before the number of its input.
 const NEW: &str = "new-";
@@ -72,26 +71,30 @@ impl<'a> Filling<'a> {
         sums: &Sums,
     ) -> Result<()> {
         let scans = &self.sources.scans;
+        // What a run that was cut short has left there would go along for ever.
+        let _ = std::fs::remove_dir_all(dir);
+        let mut sink = Store::create(dir, scans, first, self.means.ingest_bytes())?;
         let scatter = Scatter::new(scans);
-        let ingest_bytes = self.means.ingest_bytes();
-        let mut sink = Store::create(dir, scans, first, ingest_bytes)?;
         let amount = crate::report::amount(self.sources, input.id);
-        let pace = Pace { all: amount.points, ..Pace::default() };
-        std::thread::scope(|scope| {
-            let is_new = sums.input(input).is_none();
-            let digest = is_new.then(|| scope.spawn(|| sums.read(input, &pace)));
+        let pace = Pace::of(amount.points);
+        let lead = pace.lead();
+        let ingest = || {
             let strips = self.sources.strips(input.id, Want::Coordinates)?;
-            let task = Task::new("ingest").of(amount);
-            let filled = self.engine.pass(task, strips, |f| {
+            self.engine.pass(Task::new("ingest").of(amount), strips, |f| {
                 f.map(&scatter).for_each(|s| {
-                    pace.done.fetch_add(s.n_points(), Ordering::Relaxed);
+                    lead.has_decoded(s.n_points());
                     sink.add(&s)
                 })
-            });
-            pace.end();
-            let digest = digest.map(|d| d.join().unwrap_or_else(|p| std::panic::resume_unwind(p)));
-            filled.and(digest.unwrap_or(Ok(())))
-        })?;
+            })?;
+            lead.end();
+            Ok(())
+        };
+        if sums.input(input).is_none() {
+            self.engine.beside("digest", || sums.read(input, &pace), ingest)?;
+        } else {
+            ingest()?;
+        }
+        sums.check(input)?;
         sink.finish(self.engine, resident_bytes).map(drop)
     }
 }

@@ -129,19 +129,10 @@ impl LabelStrip<'_> {
 
 /// Bounds of each [`BLOCK`] of points.
 fn blocks(world: &[[f64; 3]]) -> Vec<(Range<usize>, Aabb)> {
-    let bounds = |points: &[[f64; 3]]| {
-        // Plain comparisons: `f64::min` would spend most of the time on NaN, which no point is.
-        let mut out = Aabb::EMPTY;
-        for p in points {
-            for (i, v) in p.iter().enumerate() {
-                out.min[i] = if *v < out.min[i] { *v } else { out.min[i] };
-                out.max[i] = if *v > out.max[i] { *v } else { out.max[i] };
-            }
-        }
-        out
+    let block = |(i, points): (usize, &[[f64; 3]])| {
+        (i * BLOCK..i * BLOCK + points.len(), Aabb::of(points.iter().copied()))
     };
-    let range = |i: usize, n: usize| i * BLOCK..i * BLOCK + n;
-    world.chunks(BLOCK).enumerate().map(|(i, c)| (range(i, c.len()), bounds(c))).collect()
+    world.chunks(BLOCK).enumerate().map(block).collect()
 }
 
 /// World coordinates of a strip's points: those of the file where it states them.

@@ -92,7 +92,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     }
     .finish(&room)?;
 
-    // All is whole: it takes the place of what was there. What this run did not use is not kept.
+    // All is whole, and of the inputs that the run began with: it takes the place of what was there. What this run did not use is not kept.
+    sources.inputs.iter().try_for_each(|input| sums.check(input))?;
     Manifest::write(room.next(), sums.whole(job), (&outcome, &written.sums), engine)?;
     sums.remember(&Manifest::publish(room.next(), room.out())?, room.out())?;
     room.prune(&tiles, &kept);

@@ -12,11 +12,11 @@ pub(super) fn bench_accuracy(flags: &AccuracyFlags, common: &Common, say: &Say) 
     let means = common.means()?;
     let engine = common.engine(&means)?;
     let bench = Bench {
-        suites: flags.suite.clone(),
-        n_cases: flags.cases,
-        first: flags.first,
-        seed: flags.seed,
-        robots: flags.robots.clone(),
+        suites: flags.drawn.suite.clone(),
+        n_cases: flags.drawn.cases,
+        first: flags.drawn.first,
+        seed: flags.drawn.seed,
+        robots: flags.drawn.robots.clone(),
         models: flags.model.clone(),
         whole_library: flags.against == Against::Library,
         out: flags.out.clone(),
@@ -29,11 +29,11 @@ pub(super) fn bench_plant(flags: &PlantFlags, common: &Common, say: &Say) -> Res
     let means = common.means()?;
     let engine = common.engine(&means)?;
     let bench = PlantBench {
-        suites: flags.suite.clone(),
-        n_cases: flags.cases,
-        first: flags.first,
-        seed: flags.seed,
-        robots: flags.robots.clone(),
+        suites: flags.drawn.suite.clone(),
+        n_cases: flags.drawn.cases,
+        first: flags.drawn.first,
+        seed: flags.drawn.seed,
+        robots: flags.drawn.robots.clone(),
         out: flags.out.clone(),
         keep: flags.keep,
     };

@@ -64,12 +64,13 @@ pub(super) enum BenchCommand {
     Throughput(ThroughputFlags),
 }
 
+/// Cases that are drawn from seeds.
 #[derive(Debug, Args)]
-pub(super) struct AccuracyFlags {
+pub(super) struct Drawn {
     /// Suites, by name (else all)
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub(super) suite: Vec<String>,
-    /// Cases of each suite and model (else the suite's own number)
+    /// Cases of each suite, and of each model where there is one a case (else the suite's own number)
     #[arg(long, value_name = "N")]
     pub(super) cases: Option<usize>,
     /// Number of the first of them, to look at single ones again
@@ -81,6 +82,12 @@ pub(super) struct AccuracyFlags {
     /// Robot library (else the demo's robots)
     #[arg(long, value_name = "DIR")]
     pub(super) robots: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct AccuracyFlags {
+    #[command(flatten)]
+    pub(super) drawn: Drawn,
     /// Only robots whose name holds one of these
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub(super) model: Vec<String>,
@@ -94,21 +101,8 @@ pub(super) struct AccuracyFlags {
 
 #[derive(Debug, Args)]
 pub(super) struct PlantFlags {
-    /// Suites, by name (else all)
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
-    pub(super) suite: Vec<String>,
-    /// Cases of each suite (else the suite's own number)
-    #[arg(long, value_name = "N")]
-    pub(super) cases: Option<usize>,
-    /// Number of the first of them, to look at single ones again
-    #[arg(long, value_name = "K", default_value_t = 0)]
-    pub(super) first: usize,
-    /// Seed of all that is drawn
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) seed: u64,
-    /// Robot library (else the demo's robots)
-    #[arg(long, value_name = "DIR")]
-    pub(super) robots: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) drawn: Drawn,
     /// Where rows and tables go; scenes, scans and results are kept there, too, with --keep
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,

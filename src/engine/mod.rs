@@ -157,6 +157,25 @@ impl Engine {
             .collect()
     }
 
+    /// Does `aside` on a thread of its own while `work` is done on this one; the error of the work goes first.
+    ///
+    /// # Errors
+    /// Those of both; a panic of either is a bug.
+    pub fn beside<T: Send, U>(
+        &self,
+        name: &str,
+        aside: impl FnOnce() -> Result<T> + Send,
+        work: impl FnOnce() -> Result<U>,
+    ) -> Result<(T, U)> {
+        std::thread::scope(|scope| {
+            let aside = scope.spawn(|| guarded(name, 0, aside));
+            let done = guarded(name, 0, work);
+            let lost = || Err(Error::new(Kind::Bug, format!("{name} was lost")));
+            let aside = aside.join().unwrap_or_else(|_| lost());
+            done.and_then(|done| Ok((aside?, done)))
+        })
+    }
+
     /// The pool of [`Engine::fan_out`], for steps that use rayon by themselves.
     pub fn pool(&self) -> Result<&rayon::ThreadPool> {
         if let Some(pool) = self.pool.get() {

@@ -2,14 +2,14 @@
 //! is not read again.
 
 use crate::atomic;
-use contract::{Error, Result};
+use contract::{Error, Kind, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 /// Name of the list in the store.
@@ -21,14 +21,20 @@ const AHEAD: u64 = 256 << 20;
 /// A file that changed so recently may change again without its time telling.
 const SETTLED: Duration = Duration::from_secs(2);
 
-/// What a file looked like when it was read.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-struct Seen {
+/// What the system says of a file: as long as that stays, so do its bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Stamp {
     n_bytes: u64,
     /// Time of its last change, nanoseconds since 1970.
     changed: u128,
     /// Its number on its disk, where it has one.
     number: u64,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Seen {
+    stamp: Stamp,
     digest: String,
 }
 
@@ -51,7 +57,7 @@ impl Contents {
     pub(super) fn keep(&self) -> Result<()> {
         let seen = self.seen.lock().expect("no thread panics while it holds the list");
         let text = serde_json::to_string_pretty(&*seen)
-            .map_err(|e| Error::new(contract::Kind::Bug, "a list cannot be written").because(e))?;
+            .map_err(|e| Error::new(Kind::Bug, "a list cannot be written").because(e))?;
         atomic::write(&self.list, text.as_bytes())
     }
 
@@ -65,40 +71,31 @@ impl Contents {
 
     /// Takes the word of the one who wrote a file.
     pub(super) fn believe(&self, path: &Path, digest: &str) -> Result<()> {
-        let (name, now) = look(path)?;
-        self.lock().insert(name, Seen::of(&now, digest.to_owned()));
+        let seen = Seen { stamp: Stamp::of(path)?, digest: digest.to_owned() };
+        self.lock().insert(name(path)?, seen);
         Ok(())
     }
 
     /// The digest of a file that has not changed since it was read.
     pub(super) fn known(&self, path: &Path, sum: Sum) -> Result<Option<String>> {
-        let (name, now) = look(path)?;
-        let is_known = |s: &&Seen| s.is(&now) && Sum::of(&s.digest) == Some(sum);
-        Ok(self.lock().get(&name).filter(is_known).map(|s| s.digest.clone()))
+        let stamp = Stamp::of(path)?;
+        let is_known = |s: &&Seen| s.stamp == stamp && Sum::of(&s.digest) == Some(sum);
+        Ok(self.lock().get(&name(path)?).filter(is_known).map(|s| s.digest.clone()))
     }
 
     /// Whether a file may be one that was read before, under another name or time: it has the length of one.
     pub(super) fn may_know(&self, path: &Path) -> Result<bool> {
-        let (_, now) = look(path)?;
-        Ok(self.lock().values().any(|s| s.n_bytes == now.len()))
+        let n_bytes = Stamp::of(path)?.n_bytes;
+        Ok(self.lock().values().any(|s| s.stamp.n_bytes == n_bytes))
     }
 
     /// Reads a file, not faster than `pace` allows.
     pub(super) fn read(&self, path: &Path, sum: Sum, pace: &Pace) -> Result<String> {
-        let (name, before) = look(path)?;
+        let stamp = Stamp::of(path)?;
         let digest = sum.of_file(path, pace)?;
-        let (_, after) = look(path)?;
-        let seen = Seen::of(&before, digest.clone());
-        // Within the resolution of a file's time, a later change would not show.
-        let is_settled = after
-            .modified()
-            .is_ok_and(|at| SystemTime::now().duration_since(at).is_ok_and(|age| age > SETTLED));
-        if !seen.is(&after) {
-            let error = Error::bad_input("the file was changed while it was read");
-            return Err(error.at(path.display()).hint("start again once it is whole"));
-        }
-        if is_settled {
-            self.lock().insert(name, seen);
+        stamp.check(path)?;
+        if stamp.is_settled() {
+            self.lock().insert(name(path)?, Seen { stamp, digest: digest.clone() });
         }
         Ok(digest)
     }
@@ -123,13 +120,25 @@ impl Contents {
     }
 }
 
-impl Seen {
-    fn of(meta: &Metadata, digest: String) -> Self {
-        Self { n_bytes: meta.len(), changed: changed(meta), number: number(meta), digest }
+impl Stamp {
+    pub(super) fn of(path: &Path) -> Result<Self> {
+        let meta = std::fs::metadata(path).map_err(|e| Error::from(e).at(path.display()))?;
+        Ok(Self { n_bytes: meta.len(), changed: changed(&meta), number: number(&meta) })
     }
 
-    fn is(&self, meta: &Metadata) -> bool {
-        *self == Self::of(meta, self.digest.clone())
+    /// Refuses a file that is not what it was.
+    pub(super) fn check(&self, path: &Path) -> Result<()> {
+        if Self::of(path)? == *self {
+            return Ok(());
+        }
+        let error = Error::bad_input("the file was changed while it was read");
+        Err(error.at(path.display()).hint("start again once it is whole"))
+    }
+
+    /// Whether its last change is so long ago that a later one would show.
+    fn is_settled(&self) -> bool {
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        now.is_ok_and(|now| now.as_nanos() > self.changed + SETTLED.as_nanos())
     }
 }
 
@@ -182,7 +191,7 @@ impl Sum {
                 Self::Crc32c => crc = crc32c::crc32c_append(crc, &piece[..n]),
             }
             at += n as u64;
-            pace.wait(at, n_bytes);
+            pace.wait(at, n_bytes)?;
         }
         Ok(match self {
             Self::Blake3 => self.word(&hasher.finalize().to_hex()),
@@ -191,35 +200,65 @@ impl Sum {
     }
 }
 
-/// Where a file is known by, and what the system says of it now.
-fn look(path: &Path) -> Result<(String, Metadata)> {
-    let failed = |e: std::io::Error| Error::from(e).at(path.display());
-    let name = std::path::absolute(path).map_err(failed)?.display().to_string();
-    Ok((name, std::fs::metadata(path).map_err(failed)?))
+/// Where a file is known by.
+fn name(path: &Path) -> Result<String> {
+    let absolute = std::path::absolute(path).map_err(|e| Error::from(e).at(path.display()))?;
+    Ok(absolute.display().to_string())
 }
 
-/// How far another reader of the same file has come: both read it from disk only once if they stay near each other.
+/// How far the one who decodes a file has come, for another who sums it up: both read it from disk only once if they stay
+/// near each other.
 #[derive(Debug, Default)]
 pub(crate) struct Pace {
-    /// Of all its points, and how many there are; no pace where that is 0.
-    pub(crate) done: AtomicU64,
-    pub(crate) all: u64,
+    /// Points that are decoded, and how many there are; no pace where that is 0.
+    done: AtomicU64,
+    all: u64,
+    /// There is nothing to keep pace with: 1 all is decoded, 2 it was given up.
+    end: AtomicU8,
 }
 
 impl Pace {
-    fn wait(&self, at: u64, n_bytes: u64) {
-        let may = |done: u64| {
-            let share = done as f64 / self.all as f64;
-            at <= (share * n_bytes as f64) as u64 + AHEAD
-        };
-        while self.all > 0 && !may(self.done.load(Ordering::Relaxed)) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+    /// For a file of so many points, 0 where that is not known.
+    pub(crate) fn of(all: u64) -> Self {
+        Self { all, ..Self::default() }
     }
 
-    /// Nobody waits any longer.
-    pub(crate) fn end(&self) {
-        self.done.store(self.all.max(1) * 2, Ordering::Relaxed);
+    /// Of the one who decodes. Where it goes without having ended, the other one gives up.
+    pub(crate) fn lead(&self) -> Lead<'_> {
+        Lead(self)
+    }
+
+    /// Waits for its turn to read on from `at`.
+    fn wait(&self, at: u64, n_bytes: u64) -> Result<()> {
+        loop {
+            let share = self.done.load(Ordering::Relaxed) as f64 / self.all.max(1) as f64;
+            let is_near = at <= (share * n_bytes as f64) as u64 + AHEAD;
+            match self.end.load(Ordering::Relaxed) {
+                2 => return Err(Error::new(Kind::Cancelled, "a file is no longer wanted")),
+                0 if self.all > 0 && !is_near => std::thread::sleep(Duration::from_millis(1)),
+                _ => return Ok(()),
+            }
+        }
+    }
+}
+
+/// The one who sets the pace.
+pub(crate) struct Lead<'a>(&'a Pace);
+
+impl Lead<'_> {
+    pub(crate) fn has_decoded(&self, n_points: u64) {
+        self.0.done.fetch_add(n_points, Ordering::Relaxed);
+    }
+
+    pub(crate) fn end(self) {
+        self.0.end.store(1, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Lead<'_> {
+    fn drop(&mut self) {
+        // After the end nothing changes any more.
+        let _ = self.0.end.compare_exchange(0, 2, Ordering::Relaxed, Ordering::Relaxed);
     }
 }
 

@@ -12,7 +12,7 @@ pub use manifest::{Checked, Manifest, OutputFile, check};
 
 use crate::engine::Engine;
 use crate::job::{Job, Room, Settings};
-use contents::{Contents, Sum};
+use contents::{Contents, Stamp, Sum};
 use contract::{Input, Result, Scan};
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
@@ -47,7 +47,8 @@ pub(crate) struct Sums {
     contents: Contents,
     /// Of each input; one that nobody has ever read gets its digest while it is decoded.
     inputs: Vec<OnceLock<String>>,
-    paths: Vec<PathBuf>,
+    /// Places of inputs, and what they were before anything of them was read.
+    files: Vec<(PathBuf, Stamp)>,
     library: String,
     others: String,
 }
@@ -56,6 +57,8 @@ impl Sums {
     /// Reads every file of the job once, except those that are known and unchanged since, and inputs that are new.
     pub(crate) fn of(job: &Job, room: &Room, engine: &Engine) -> Result<Self> {
         let contents = Contents::open(room.store());
+        let stamped = |path: &PathBuf| Ok((path.clone(), Stamp::of(path)?));
+        let files = job.inputs.iter().map(stamped).collect::<Result<_>>()?;
         let digest = |path: &PathBuf| -> Result<OnceLock<String>> {
             let is_new =
                 contents.known(path, Sum::Blake3)?.is_none() && !contents.may_know(path)?;
@@ -71,7 +74,7 @@ impl Sums {
         let others: Vec<String> =
             others.map(|p| contents.digest(p, Sum::Blake3)).collect::<Result<_>>()?;
         contents.keep()?;
-        Ok(Self { contents, inputs, paths: job.inputs.clone(), library, others: others.join(" ") })
+        Ok(Self { contents, inputs, files, library, others: others.join(" ") })
     }
 
     /// Digest of an input's bytes, where it is known yet.
@@ -82,9 +85,15 @@ impl Sums {
     /// Reads an input whose digest is not known, beside the one who decodes it and tells how far he is.
     pub(crate) fn read(&self, input: &Input, pace: &Pace) -> Result<()> {
         let at = input.id.0 as usize;
-        let digest = self.contents.read(&self.paths[at], Sum::Blake3, pace)?;
+        let digest = self.contents.read(&self.files[at].0, Sum::Blake3, pace)?;
         let _ = self.inputs[at].set(digest);
         self.contents.keep()
+    }
+
+    /// Refuses an input that is not the one any more that the run began with: what was read of it may be of either.
+    pub(crate) fn check(&self, input: &Input) -> Result<()> {
+        let (path, stamp) = &self.files[input.id.0 as usize];
+        stamp.check(path)
     }
 
     /// The list of an earlier run, if it was of the same job and its files are what they were.

@@ -42,17 +42,14 @@ impl Encode {
         let world_from_scan = self.world_from_scan.get(scan as usize).copied().unwrap_or_default();
         let r = world_from_scan.rotation.to_rotation_matrix();
         let (m, t) = (r.matrix(), world_from_scan.translation.vector);
-        // Plain comparisons: `f64::min` would spend most of the time on NaN, which no point is.
-        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let mut bounds = Aabb::EMPTY;
         for record in records {
             let p = record.xyz.map(f64::from);
-            for i in 0..3 {
-                let v = m[(i, 0)] * p[0] + m[(i, 1)] * p[1] + m[(i, 2)] * p[2] + t[i];
-                min[i] = if v < min[i] { v } else { min[i] };
-                max[i] = if v > max[i] { v } else { max[i] };
-            }
+            bounds.add(std::array::from_fn(|i| {
+                m[(i, 0)] * p[0] + m[(i, 1)] * p[1] + m[(i, 2)] * p[2] + t[i]
+            }));
         }
-        Aabb { min, max }
+        bounds
     }
 }
 

@@ -5,19 +5,21 @@ use super::encode::{Encoded, layout};
 use super::io_error;
 use crate::atomic::AtomicFile;
 use contract::Result;
+use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// The tile file of a sink. A tile that was written too early and is written again leaves a gap.
 pub(super) struct TileFile {
-    file: Access,
+    file: AtomicFile,
     path: PathBuf,
     len: u64,
 }
 
-enum Access {
-    Write(AtomicFile),
-    Read(std::fs::File),
+/// The same file, to read what was written so far.
+pub(super) struct Early {
+    file: File,
+    path: PathBuf,
 }
 
 impl TileFile {
@@ -25,8 +27,7 @@ impl TileFile {
         let mut file = AtomicFile::create(path)?;
         file.write_all(&catalogue::tiles_header())
             .map_err(|e| io_error(path, "a tile cannot be written", e))?;
-        let len = catalogue::HEADER_BYTES;
-        Ok(Self { file: Access::Write(file), path: path.to_owned(), len })
+        Ok(Self { file, path: path.to_owned(), len: catalogue::HEADER_BYTES })
     }
 
     /// Appends a tile; returns its entry.
@@ -34,46 +35,31 @@ impl TileFile {
         let Encoded { mut entry, bytes } = encoded;
         entry.offset = self.len;
         self.len += bytes.len() as u64;
-        let written = match &mut self.file {
-            Access::Write(file) => file.write_all(&bytes),
-            Access::Read(_) => Err(std::io::ErrorKind::PermissionDenied.into()),
-        };
-        written.map_err(|e| io_error(&self.path, "a tile cannot be written", e))?;
+        self.file
+            .write_all(&bytes)
+            .map_err(|e| io_error(&self.path, "a tile cannot be written", e))?;
         Ok(entry)
     }
 
-    /// The same file once more, to read what was written so far.
-    pub(super) fn again(&mut self) -> Result<Self> {
-        let again = match &mut self.file {
-            Access::Write(file) => file.again(),
-            Access::Read(file) => file.try_clone(),
-        };
+    pub(super) fn early(&mut self) -> Result<Early> {
         let failed = |e| io_error(&self.path, "the tiles cannot be read again", e);
-        Ok(Self {
-            file: Access::Read(again.map_err(failed)?),
-            path: self.path.clone(),
-            len: self.len,
-        })
-    }
-
-    /// The bytes of a tile.
-    pub(super) fn read(&mut self, entry: &TileEntry) -> Result<Vec<u8>> {
-        let mut bytes = vec![0; layout(entry.n_points)[3] as usize];
-        let read = match &mut self.file {
-            Access::Read(file) => {
-                file.seek(SeekFrom::Start(entry.offset)).and_then(|_| file.read_exact(&mut bytes))
-            }
-            Access::Write(_) => Err(std::io::ErrorKind::PermissionDenied.into()),
-        };
-        read.map_err(|e| io_error(&self.path, "a tile cannot be read again", e))?;
-        Ok(bytes)
+        Ok(Early { file: self.file.again().map_err(failed)?, path: self.path.clone() })
     }
 
     /// Gives the file its name; returns its length.
     pub(super) fn commit(self) -> Result<u64> {
-        if let Access::Write(file) = self.file {
-            file.commit()?;
-        }
+        self.file.commit()?;
         Ok(self.len)
+    }
+}
+
+impl Early {
+    /// The bytes of a tile.
+    pub(super) fn read(&mut self, entry: &TileEntry) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; layout(entry.n_points)[3] as usize];
+        let read = self.file.seek(SeekFrom::Start(entry.offset));
+        read.and_then(|_| self.file.read_exact(&mut bytes))
+            .map_err(|e| io_error(&self.path, "a tile cannot be read again", e))?;
+        Ok(bytes)
     }
 }

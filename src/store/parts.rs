@@ -2,7 +2,7 @@
 //! whole and in the order of tiles.
 
 use super::encode::decode;
-use super::file::TileFile;
+use super::file::Early;
 use super::record::Record;
 use super::sink::{Buffer, TILE_POINTS};
 use super::spill::{Segment, Spill};
@@ -38,7 +38,7 @@ pub(super) struct Parts {
     buffers: std::vec::IntoIter<Buffer>,
     spill: Option<Spill>,
     /// Where tiles were written before all of their points had come.
-    file: Option<TileFile>,
+    early: Option<Early>,
     current: Option<Current>,
 }
 
@@ -54,8 +54,8 @@ struct Current {
 }
 
 impl Parts {
-    pub(super) fn new(buffers: Vec<Buffer>, spill: Option<Spill>, file: Option<TileFile>) -> Self {
-        Self { buffers: buffers.into_iter(), spill, file, current: None }
+    pub(super) fn new(buffers: Vec<Buffer>, spill: Option<Spill>, early: Option<Early>) -> Self {
+        Self { buffers: buffers.into_iter(), spill, early, current: None }
     }
 
     fn part(&mut self) -> Result<Option<Part>> {
@@ -82,11 +82,11 @@ impl Parts {
 
     fn begin(&mut self, buffer: Buffer) -> Result<Current> {
         let Buffer { at, records, segments, written, mut ascending, n_points, .. } = buffer;
-        let mut early = Vec::new();
+        let mut ahead = Vec::new();
         for entry in &written {
-            let file = self.file.as_mut().expect("a tile was written to a file");
+            let file = self.early.as_mut().expect("a tile was written to a file");
             let tile = decode(entry, &file.read(entry)?);
-            early.extend((0..tile.len()).map(|i| {
+            ahead.extend((0..tile.len()).map(|i| {
                 let place = tile.first_place + u64::from(tile.place[i]);
                 Record::new(tile.xyz[i], place, tile.pixel[i])
             }));
@@ -94,8 +94,7 @@ impl Parts {
             ascending = false;
         }
         let spill = &mut self.spill;
-        let mut current =
-            Current { at, segments: segments.into_iter(), last: records, ahead: early };
+        let mut current = Current { at, segments: segments.into_iter(), last: records, ahead };
         if !ascending && n_points > TILE_POINTS {
             // Rare: points out of order, and too many. Their order decides where parts are cut.
             current.fill(usize::MAX, spill)?;

@@ -171,7 +171,7 @@ impl TileSink {
         let n_points = left.iter().map(|b| b.n_points as u64).sum();
         let task = Task::new("store").of(Amount::points(n_points));
         let early = left.iter().any(|b| !b.written.is_empty());
-        let early = early.then(|| file.again()).transpose()?;
+        let early = early.then(|| file.early()).transpose()?;
         engine.pass(task, Parts::new(left, spill, early), |flow| {
             flow.map(&*encode).for_each(|encoded: Encoded| {
                 entries.push(file.append(encoded)?);

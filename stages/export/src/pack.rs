@@ -127,23 +127,25 @@ impl Pack {
         }
     }
 
+    /// The tile of a place, and its bounds, metres: least and most of x and y.
+    fn tile(&self, p: &[f64; 3]) -> ([i32; 2], [f64; 4]) {
+        let Some(edge) = self.tile_edge else {
+            return ([0; 2], [f64::MIN, f64::MAX, f64::MIN, f64::MAX]);
+        };
+        let [row, col] = [1, 0].map(|axis| floor_i32(p[axis] / edge));
+        let side = |at: i32| f64::from(at) * edge;
+        ([row, col], [side(col), side(col + 1), side(row), side(row + 1)])
+    }
+
     fn runs(&self, points: &PointColumns<'_>, steps: &[[i32; 3]]) -> Vec<Run> {
-        let edge = self.tile_edge.unwrap_or(f64::INFINITY);
         let mut runs: Vec<Run> = Vec::new();
-        // Bounds of the current tile, metres: most points lie where the one before lies.
-        let mut bounds = [f64::NAN; 4];
-        let mut tile = [0; 2];
+        // Most points lie in the tile of the one before.
+        let (mut tile, mut bounds) = ([0; 2], [f64::NAN; 4]);
         for ((p, label), step) in points.world.iter().zip(points.labels).zip(steps) {
             let moves = matches!(label.kind, PointKind::Link | PointKind::Attachment);
-            let inside =
-                p[0] >= bounds[0] && p[0] < bounds[1] && p[1] >= bounds[2] && p[1] < bounds[3];
-            if !inside {
-                tile = [floor_i32(p[1] / edge), floor_i32(p[0] / edge)];
-                let side = |at: i32| if edge.is_finite() { f64::from(at) * edge } else { f64::NAN };
-                bounds = [side(tile[1]), side(tile[1] + 1), side(tile[0]), side(tile[0] + 1)];
-                if !edge.is_finite() {
-                    (tile, bounds) = ([0; 2], [f64::MIN, f64::MAX, f64::MIN, f64::MAX]);
-                }
+            let [x0, x1, y0, y1] = bounds;
+            if !(p[0] >= x0 && p[0] < x1 && p[1] >= y0 && p[1] < y1) {
+                (tile, bounds) = self.tile(p);
             }
             match runs.last_mut() {
                 Some(run) if run.tile == tile && run.moves == moves => run.extent.add(*step),
@@ -183,23 +185,20 @@ impl Packed {
 
 /// Whole steps of coordinates, in one loop without calls that the compiler turns into vector instructions.
 fn steps(world: &[[f64; 3]], quantum: &Quantum) -> Result<Vec<[i32; 3]>> {
-    let inverse = quantum.scale.map(|s| 1.0 / s);
-    let offset = quantum.offset;
+    let (inverse, offset) = (quantum.scale.map(|s| 1.0 / s), quantum.offset);
+    let scaled =
+        |p: &[f64; 3]| -> [f64; 3] { std::array::from_fn(|i| (p[i] - offset[i]) * inverse[i]) };
+    // Written so that what is no number is far, too.
+    let is_far = |at: &[f64; 3]| !at.iter().all(|v| v.abs() < f64::from(i32::MAX));
     let mut far = false;
-    let out: Vec<[i32; 3]> = world
-        .iter()
-        .map(|p| {
-            let at: [f64; 3] = std::array::from_fn(|i| (p[i] - offset[i]) * inverse[i]);
-            far |= !at.iter().all(|v| v.abs() < f64::from(i32::MAX));
-            at.map(|v| (v + NEAREST).to_bits() as i32)
-        })
-        .collect();
-    if !far {
-        return Ok(out);
-    }
-    let is_far = |p: &&[f64; 3]| quantum.steps(**p).is_none();
-    match world.iter().find(is_far) {
+    let steps = world.iter().map(|p| {
+        let at = scaled(p);
+        far |= is_far(&at);
+        at.map(|v| (v + NEAREST).to_bits() as i32)
+    });
+    let steps = steps.collect();
+    match world.iter().find(|p| far && is_far(&scaled(p))) {
         Some(p) => Err(too_far(*p)),
-        None => Ok(out),
+        None => Ok(steps),
     }
 }

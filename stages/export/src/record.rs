@@ -39,19 +39,6 @@ impl Quantum {
         });
         Self { scale: [1e-4; 3], offset }
     }
-
-    /// The nearest steps; `None` where they do not fit into 32 bits.
-    pub(crate) fn steps(&self, xyz: [f64; 3]) -> Option<[i32; 3]> {
-        let mut steps = [0; 3];
-        for i in 0..3 {
-            let step = ((xyz[i] - self.offset[i]) / self.scale[i]).round();
-            if !(step >= f64::from(i32::MIN) && step <= f64::from(i32::MAX)) {
-                return None;
-            }
-            steps[i] = step as i32;
-        }
-        Some(steps)
-    }
 }
 
 /// A variable length record to pass on, such as the reference system of an input.
