@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 pub(crate) fn calibrate(
     fits: Vec<Fit>,
     models: &mut Vec<Model>,
-    (search, regions): (&Search<'_>, &[Region]),
+    (search, regions): (&Search<'_, '_>, &[Region]),
     engine: &Engine,
 ) -> Result<Vec<Fit>> {
     let known: &[Model] = models;

@@ -4,6 +4,7 @@
 //! five of their standard deviations together, and by more than models and registration make. Joints that the points of
 //! either session leave open are not compared, and named.
 
+use contract::Fit;
 use export::{ResultFile, RobotEntry};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -102,6 +103,26 @@ pub fn changes(then: &ResultFile, now: &ResultFile) -> Vec<RobotChange> {
     });
     let new = now.robots.iter().zip(&taken).filter(|(_, taken)| !**taken);
     known.chain(new.map(|(b, _)| alone(b, Change::Appeared))).collect()
+}
+
+/// Whether a robot stands otherwise, or is known better.
+pub(crate) fn stands_otherwise(then: &Fit, now: &Fit) -> bool {
+    let entry = |fit: &Fit| RobotEntry::new("", fit, &[], None);
+    now.verdict > then.verdict || compared(&entry(then), &entry(now)).change != Change::Same
+}
+
+impl Change {
+    /// In one word.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Same => "same",
+            Self::Moved => "moved",
+            Self::Exchanged { .. } => "exchanged",
+            Self::Appeared => "appeared",
+            Self::Gone => "gone",
+        }
+    }
 }
 
 fn alone(robot: &RobotEntry, change: Change) -> RobotChange {

@@ -71,6 +71,12 @@ pub struct Found {
 impl Agreement {
     /// Compares `OUT/result.json` and its masks with the truth beside the scans; the result must be of `scans.e57`.
     pub fn of(out: &Path, truth_dir: &Path) -> Result<Self> {
+        Self::of_session(out, truth_dir, 0)
+    }
+
+    /// The same for a result that goes on from another, by the masks of its own scans, from the mask `first` on. Uncertain
+    /// points of theirs lie outside of the cell, and are passed over.
+    pub fn of_session(out: &Path, truth_dir: &Path, first: usize) -> Result<Self> {
         let truth = Truth::from_json(&read_text(&truth_dir.join("truth.json"))?)?;
         let result: ResultFile = serde_json::from_str(&read_text(&out.join("result.json"))?)
             .map_err(|e| Error::bad_input("the result is no result").because(e))?;
@@ -81,7 +87,9 @@ impl Agreement {
             .enumerate()
             .map(|(t, robot)| match_robot(t, robot, &result.robots, &mut taken));
         let robots: Vec<RobotAgreement> = robots.collect();
-        let n_invented = taken.iter().filter(|t| t.is_none()).count();
+        let stands = result.robots.iter().map(|r| r.verdict != "refused");
+        let n_invented =
+            taken.iter().zip(stands).filter(|(t, stands)| t.is_none() && *stands).count();
         let by_link = truth.robots.iter().map(|r| vec![[0; 3]; r.links.len()]).collect();
         let mut agreement = Self {
             robots,
@@ -94,11 +102,21 @@ impl Agreement {
             objects: truth.objects.clone(),
             attached: [0; 2],
         };
-        for (i, scan) in result.labels.scans.iter().enumerate() {
-            let ours = Triple::read(out, [&scan.kind, &scan.robot, &scan.link])?;
+        for (i, scan) in result.labels.scans[first..].iter().enumerate() {
+            let mut ours = Triple::read(out, [&scan.kind, &scan.robot, &scan.link])?;
             let name = |what: &str| format!("labels/{i}.{what}.npy");
-            let theirs = Triple::read(truth_dir, [&name("kind"), &name("robot"), &name("link")])?;
+            let mut theirs =
+                Triple::read(truth_dir, [&name("kind"), &name("robot"), &name("link")])?;
+            if first > 0 {
+                let inside: Vec<bool> =
+                    ours.kind.iter().map(|k| *k != PointKind::Uncertain as u8).collect();
+                ours.keep(&inside);
+                theirs.keep(&inside);
+            }
             agreement.count(&ours, &theirs, &taken)?;
+            if first > 0 {
+                continue;
+            }
             if !truth.objects.is_empty() {
                 agreement.count_objects(&ours, &npy(&truth_dir.join(name("object")))?);
             }
@@ -328,6 +346,19 @@ impl Triple {
             robot: wide(npy(&dir.join(names[1]))?),
             link: wide(npy(&dir.join(names[2]))?),
         })
+    }
+}
+
+impl Triple {
+    /// Keeps the entries that are marked.
+    fn keep(&mut self, marked: &[bool]) {
+        fn few<T: Copy>(all: &mut Vec<T>, marked: &[bool]) {
+            let kept = all.iter().zip(marked).filter(|(_, keep)| **keep).map(|(v, _)| *v);
+            *all = kept.collect();
+        }
+        few(&mut self.kind, marked);
+        few(&mut self.robot, marked);
+        few(&mut self.link, marked);
     }
 }
 

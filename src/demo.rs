@@ -25,7 +25,7 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
     let robots = dir.join("robots");
     write_robots(&robots)?;
     let started = Instant::now();
-    let models = library::load(&robots, &means.settings.robot, engine)?.models;
+    let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     let scene = simulate::demo_scene(SEED, &models)?;
     atomic::write(&dir.join("scene.toml"), scene.to_toml()?.as_bytes())?;
     let truth = scan_scene(&scene, &models, &dir.join("scans"), Formats::ALL, engine)?;

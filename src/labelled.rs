@@ -5,7 +5,7 @@ use crate::bodies::Bodies;
 use crate::spaces::{Spot, spots};
 use contract::{Label, Map, MaskId, PlaceRun, PointKind, Result, Scan, SpaceGrid, Strip, Weigh};
 use export::{LabelColumns, Pack, Packed, PlanPicture, PointColumns};
-use geometry::{Aabb, Point};
+use geometry::{Aabb, Point, Pose};
 use segment::Ground;
 use std::ops::Range;
 
@@ -26,6 +26,10 @@ pub(crate) struct LabelStrip<'a> {
     pub(crate) shown: &'a [Aabb],
     pub(crate) plan: &'a PlanPicture,
     pub(crate) pack: Pack,
+    /// Bounds that records of the clouds are written in; labels outside stay uncertain. All where left out.
+    pub(crate) cell: Option<Aabb>,
+    /// World as it is from the world as the file states it, by scan, where that differs.
+    pub(crate) moved: &'a [Option<Pose>],
     /// Connected bodies, where points are to be told which is theirs.
     pub(crate) bodies: Option<&'a Bodies>,
 }
@@ -51,8 +55,13 @@ impl Map for LabelStrip<'_> {
 
     fn apply(&self, mut strip: Strip, (): &mut ()) -> Result<Labelled> {
         let scan = &self.scans[strip.scan.0 as usize];
-        let world = world(&mut strip, scan);
-        let labels = self.labels(&strip, &world);
+        let moved = self.moved.get(strip.scan.0 as usize).and_then(Option::as_ref);
+        let world = world(&mut strip, scan, moved);
+        let mut labels = self.labels(&strip, &world);
+        if let Some(cell) = &self.cell {
+            let outside = labels.iter_mut().zip(&world).filter(|(_, p)| !cell.contains(**p));
+            outside.for_each(|(label, _)| *label = Label::UNCERTAIN);
+        }
         let blocks = blocks(&world);
         let mut points = PointColumns {
             world: &world,
@@ -73,7 +82,7 @@ impl Map for LabelStrip<'_> {
         Ok(Labelled {
             mask: strip.mask,
             first_place: strip.first_place,
-            packed: self.pack.pack(&points)?,
+            packed: self.packed(&points)?,
             n_moving: labels.iter().filter(moves).count() as u64,
             spots: spots(self.grids, &world, &labels, &blocks),
             shown: self.shown(&strip, &world, &labels, &blocks),
@@ -102,6 +111,26 @@ impl LabelStrip<'_> {
             }
         }
         labels
+    }
+
+    /// Records of those points that lie in the cell.
+    fn packed(&self, points: &PointColumns<'_>) -> Result<Packed> {
+        let Some(cell) = &self.cell else { return self.pack.pack(points) };
+        let inside: Vec<usize> =
+            (0..points.world.len()).filter(|&i| cell.contains(points.world[i])).collect();
+        fn few<T: Copy>(all: &[T], inside: &[usize]) -> Vec<T> {
+            inside.iter().filter_map(|&i| all.get(i).copied()).collect()
+        }
+        self.pack.pack(&PointColumns {
+            world: &few(points.world, &inside),
+            labels: &few(points.labels, &inside),
+            intensity: &few(points.intensity, &inside),
+            color: &few(points.color, &inside),
+            gps_time: &few(points.gps_time, &inside),
+            body: &few(points.body, &inside),
+            source_id: &few(points.source_id, &inside),
+            scan: points.scan,
+        })
     }
 
     fn shown(
@@ -135,10 +164,16 @@ fn blocks(world: &[[f64; 3]]) -> Vec<(Range<usize>, Aabb)> {
     world.chunks(BLOCK).enumerate().map(block).collect()
 }
 
-/// World coordinates of a strip's points: those of the file where it states them.
-fn world(strip: &mut Strip, scan: &Scan) -> Vec<[f64; 3]> {
+/// World coordinates of a strip's points: those of the file where it states them, moved where that has to be.
+fn world(strip: &mut Strip, scan: &Scan, moved: Option<&Pose>) -> Vec<[f64; 3]> {
     match &mut strip.attributes {
-        Some(a) if a.world.len() == strip.xyz.len() => std::mem::take(&mut a.world),
+        Some(a) if a.world.len() == strip.xyz.len() => {
+            let stated = std::mem::take(&mut a.world);
+            let move_by = |pose: &Pose| {
+                stated.iter().map(|p| (pose * Point::from(*p)).coords.into()).collect()
+            };
+            moved.map(move_by).unwrap_or(stated)
+        }
         _ => strip
             .xyz
             .iter()

@@ -5,22 +5,26 @@
 //! place alone (floor or fixed).
 
 use crate::engine::{AllThreads, Engine, Task};
-use crate::job::{Room, Settings};
+use crate::job::Settings;
 use crate::store::Store;
-use contract::{Cluster, Fit, Floor, Fold, InputId, Label, PlaceRun, Result, Space, TileLabels};
+use contract::{
+    Cluster, Fit, Floor, Fold, InputId, Label, MaskId, PlaceRun, Result, Space, TileLabels,
+};
 use export::{
     Clouds, FileSum, LasSettings, PlanPicture, Quantum, RobotPicture, SpaceEntry, Written,
     write_space,
 };
-use geometry::Aabb;
+use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
 use merge::{Attach, Hanging};
 use robot::Model;
 use segment::Segment;
+use std::path::Path;
 
 use crate::bodies::Bodies;
 use crate::labelled::LabelStrip;
 use crate::masks::Masks;
+use crate::report::id;
 use crate::spaces::poses;
 
 /// What labelling reads.
@@ -37,12 +41,34 @@ pub(crate) struct Labelling<'a> {
     bodies: Option<Bodies>,
 }
 
+/// Which part of a plant is written: all of it, unless said otherwise.
+#[derive(Default)]
+pub(crate) struct Scope {
+    /// Robots whose files are written, by their places among the fits; all where left out.
+    pub(crate) robots: Option<Vec<usize>>,
+    /// As in [`LabelStrip`].
+    pub(crate) cell: Option<Aabb>,
+    /// As in [`LabelStrip`].
+    pub(crate) moved: Vec<Option<Pose>>,
+    /// What records hold, where clouds are to be like others.
+    pub(crate) las: Option<LasSettings>,
+}
+
 /// What is known of points near robots.
 pub(crate) struct Near {
     /// Their labels: for each mask, by place.
     labels: Vec<Vec<PlaceRun<Label>>>,
     /// What hangs on each robot.
     hanging: Vec<Hanging>,
+}
+
+impl Near {
+    /// The label of a point near a robot.
+    pub(crate) fn label(&self, mask: MaskId, place: u64) -> Option<Label> {
+        let runs = &self.labels[mask.0 as usize];
+        let run = runs.get(runs.partition_point(|run| run.end() <= place))?;
+        (run.first <= place).then_some(run.what)
+    }
 }
 
 /// What was written.
@@ -57,6 +83,8 @@ pub(crate) struct Done {
     pub(crate) spaces: Vec<Option<SpaceEntry>>,
     /// Checksums of the files that are as large as the cloud.
     pub(crate) sums: Vec<FileSum>,
+    /// What records of the clouds hold.
+    pub(crate) las: LasSettings,
 }
 
 /// Counts of one mask.
@@ -85,6 +113,11 @@ impl<'a> Labelling<'a> {
         let export = settings.export;
         let bodies = export.bodies.then(|| Bodies::new(clusters));
         Self { fits, models, sources, segment, attach, bounds, export, bodies }
+    }
+
+    /// The floor, for the label of a point that is near no robot.
+    pub(crate) fn ground(&self) -> &segment::Ground {
+        self.segment.ground()
     }
 
     /// Segments the tiles near robots, and decides over all scans what hangs on them.
@@ -118,20 +151,19 @@ impl<'a> Labelling<'a> {
     pub(crate) fn write(
         &self,
         (near, mut spaces): (&Near, Vec<Option<Space>>),
-        room: &Room,
+        scope: &Scope,
+        (out, clouds_out): (&Path, &Path),
         engine: &Engine,
     ) -> Result<Done> {
-        let out = room.next();
-        let mut las = LasSettings::new(self.quantum());
-        las.with_color = self.sources.has_color();
-        let mut clouds = Clouds::create(out, &las, &self.export)?;
-        let mut masks = Masks::new(out, &self.sources.masks);
+        let las = scope.las.clone().unwrap_or_else(|| self.las());
+        let mut clouds = Clouds::create(clouds_out, &las, &self.export)?;
+        let mut masks = Masks::new(out, self.sources.opened_masks());
         let mut robots: Vec<RobotPicture> = self.robot_pictures();
         let mut pictures = Vec::new();
         let grids: Vec<_> =
             spaces.iter().map(|s| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()))).collect();
         let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
-        for input in &self.sources.inputs {
+        for input in self.sources.opened() {
             let plan = PlanPicture::new(&self.bounds_of(input.id));
             let label = LabelStrip {
                 near: &near.labels,
@@ -141,6 +173,8 @@ impl<'a> Labelling<'a> {
                 shown: &shown,
                 plan: &plan,
                 pack: clouds.pack(),
+                cell: scope.cell,
+                moved: &scope.moved,
                 bodies: self.bodies.as_ref(),
             };
             let task = Task::new("write").of(crate::report::amount(self.sources, input.id));
@@ -161,25 +195,32 @@ impl<'a> Labelling<'a> {
         }
         let (masks, mut sums) = masks.finish()?;
         let mut said = vec![None; self.fits.len()];
-        for (i, fit) in self.fits.iter().enumerate() {
-            export::write_robot(out, i, fit, &self.models[fit.model], &near.hanging[i])?;
+        let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
+        for i in (0..self.fits.len()).filter(is_written) {
+            let fit = &self.fits[i];
+            export::write_robot(out, &id(i), fit, &self.models[fit.model], &near.hanging[i])?;
             if let Some(space) = &spaces[i] {
-                said[i] = Some(write_space(out, i, space)?);
+                said[i] = Some(write_space(out, &id(i), space)?);
             }
         }
-        for (i, picture) in robots.iter().enumerate() {
+        for (i, picture) in robots.iter().enumerate().filter(|(i, _)| is_written(i)) {
             let fit = &self.fits[i];
-            let name = format!("pictures/R{}.png", i + 1);
-            let title = format!("R{} {} {}", i + 1, fit.model_name, fit.verdict.word());
+            let name = format!("pictures/{}.png", id(i));
+            let title = format!("{} {} {}", id(i), fit.model_name, fit.verdict.word());
             picture.draw(&title).write(&out.join(&name))?;
-            let evidence = format!("pictures/R{}_evidence.png", i + 1);
+            let evidence = format!("pictures/{}_evidence.png", id(i));
             let page = export::draw_evidence(&title, picture, fit, &self.models[fit.model]);
             page.write(&out.join(&evidence))?;
             pictures.extend([name, evidence]);
         }
         let clouds = engine.pool()?.install(|| clouds.finish(&AllThreads))?;
         sums.extend(clouds.sums().cloned());
-        Ok(Done { clouds, masks, pictures, spaces: said, sums })
+        Ok(Done { clouds, masks, pictures, spaces: said, sums, las })
+    }
+
+    fn las(&self) -> LasSettings {
+        let with_color = self.sources.has_color();
+        LasSettings { with_color, ..LasSettings::new(self.quantum()) }
     }
 
     /// Scale and offset of the clouds: those of the first LAS input, so that its coordinates stay what they are.
@@ -212,7 +253,7 @@ impl<'a> Labelling<'a> {
             .enumerate()
             .map(|(i, f)| {
                 let p = f.world_from_base.translation.vector;
-                (format!("R{}", i + 1), [p.x, p.y])
+                (id(i), [p.x, p.y])
             })
             .collect();
         let scanners: Vec<_> = self

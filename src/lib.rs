@@ -21,6 +21,7 @@ mod masks;
 pub mod plan;
 pub mod progress;
 mod report;
+pub mod rescan;
 pub mod reuse;
 pub mod review;
 pub mod scanning;

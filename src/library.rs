@@ -1,6 +1,7 @@
 //! A folder in, the robot library out, its models loaded in parallel.
 
 use crate::engine::Engine;
+use crate::reuse::Kept;
 use contract::Result;
 use robot::{Library, Settings};
 use std::path::Path;
@@ -10,11 +11,19 @@ pub(crate) fn count(dir: &Path) -> Result<usize> {
     Ok(Library::open(dir)?.0.len())
 }
 
-/// Loads all models; those that cannot be loaded are explained in the library's findings.
-pub(crate) fn load(dir: &Path, settings: &Settings, engine: &Engine) -> Result<Library> {
+/// Loads all models, those that are `kept` from there; those that cannot be loaded are explained in the library's findings.
+pub(crate) fn load(
+    dir: &Path,
+    settings: &Settings,
+    kept: Option<&Kept>,
+    engine: &Engine,
+) -> Result<Library> {
     let (folders, mut library) = Library::open(dir)?;
-    let loaded = engine
-        .fan_out("robots", folders, |folder| Ok(Library::load_folder(dir, &folder, settings)))?;
+    let loaded = engine.fan_out("robots", folders, |folder| {
+        let load = || Ok(Library::load_folder(dir, &folder, settings));
+        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        kept.map_or_else(load, |kept| kept.or_find(&name, load))
+    })?;
     for model in loaded {
         library.add(model);
     }

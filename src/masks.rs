@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 /// Writes the masks of all inputs.
 pub(crate) struct Masks {
     out: PathBuf,
+    /// In the order of their numbers, which need not begin with 0.
     masks: Vec<Mask>,
     open: Vec<Option<Open>>,
     counts: Vec<MaskCount>,
@@ -36,7 +37,7 @@ impl Masks {
 
     /// Takes the labels of a strip's points.
     pub(crate) fn add(&mut self, strip: &Labelled) -> Result<()> {
-        let at = strip.mask.0 as usize;
+        let at = (strip.mask.0 - self.masks[0].id.0) as usize;
         let slot = &mut self.open[at];
         let open = match slot {
             Some(open) => open,

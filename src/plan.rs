@@ -6,10 +6,11 @@ use crate::engine::Engine;
 use crate::estimate::Estimate;
 use crate::filling::Filling;
 use crate::job::{Job, Outcome};
-use crate::labelling::Labelling;
+use crate::labelling::{Labelling, Scope};
 use crate::library;
 use crate::report::Report;
-use crate::reuse::{self, KeptFits, Key, Manifest, Sums};
+use crate::rescan::{Records, State};
+use crate::reuse::{self, Kept, Key, Manifest, OutputFile, Sums};
 use crate::review::Review;
 use crate::search::{Search, Shelf};
 use crate::spaces;
@@ -28,7 +29,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     if let Some(manifest) = sums.unchanged(job, &room)? {
         return Ok(manifest.outcome());
     }
-    let library = library::load(&job.robots, &settings.robot, engine)?;
+    let shelved = Kept::new(room.models(), sums.models(settings));
+    let library = library::load(&job.robots, &settings.robot, Some(&shelved), engine)?;
     let read = |path: &PathBuf| Review::read(path, &library.models);
     let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
@@ -59,9 +61,9 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
     let shelf = Shelf::new(&library.models);
     let search = Search::new(&shelf, scans, &store, &ground, settings);
-    let kept = KeptFits::new(room.fits(), sums.fits(&tiles, settings));
+    let kept = Kept::new(room.fits(), sums.fits(&tiles, settings));
     let fits = engine.fan_out("fit", regions.clone(), |region| {
-        kept.or_find(&region, || search.region(&region))
+        kept.or_find(&format!("{region:?}"), || search.region(&region))
     })?;
     let (fits, unmet) = review.apply(fits.into_iter().flatten().collect());
     let fits = fit::choose(fits, &library.models);
@@ -79,7 +81,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     // What nobody saw around them; second pass: every point once more, in the order of its file, to label and to
     // write.
     let spaces = spaces::around(&fits, &models, (&search, settings), engine)?;
-    let written = labelling.write((&near, spaces), &room, engine)?;
+    let written =
+        labelling.write((&near, spaces), &Scope::default(), (room.next(), room.next()), engine)?;
     let mut outcome = Report {
         sums: &sums,
         sources: &sources,
@@ -94,9 +97,25 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
 
     // All is whole, and of the inputs that the run began with: it takes the place of what was there. What this run did not use is not kept.
     sources.inputs.iter().try_for_each(|input| sums.check(input))?;
-    Manifest::write(room.next(), sums.whole(job), (&outcome, &written.sums), engine)?;
+    State {
+        inputs: sources.inputs.clone(),
+        masks: sources.masks.clone(),
+        scans: sources.scans.clone(),
+        tiles: tiles.clone(),
+        floor: ground.surfaces.floor,
+        fits,
+        robots: job.robots.clone(),
+        records: Records::of(&written.las, &settings.export),
+    }
+    .write(room.next())?;
+    let known = written.sums.iter().map(|sum| OutputFile::of(room.next(), sum)).collect();
+    Manifest::write(room.next(), sums.whole(job), (&outcome, known), engine)?;
     sums.remember(&Manifest::publish(room.next(), room.out())?, room.out())?;
-    room.prune(&tiles, &kept);
-    outcome.reused = reuse::said(&[("tiles", filling.n_kept()), ("fits", kept.n_kept())]);
+    room.prune(&tiles, &kept, &shelved);
+    outcome.reused = reuse::said(&[
+        ("models", shelved.n_kept()),
+        ("tiles", filling.n_kept()),
+        ("fits", kept.n_kept()),
+    ]);
     Ok(outcome)
 }

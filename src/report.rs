@@ -2,14 +2,15 @@
 
 use crate::engine::Task;
 use crate::job::{Outcome, Room};
-use crate::labelling::Done;
+use crate::labelling::{Done, MaskCount};
 use crate::progress::Amount;
 use crate::reuse::Sums;
 use crate::spaces::poses;
 use crate::store::Store;
 use contract::{Cluster, Fit, Format, Input, InputId, Result, Verdict};
 use export::{
-    InputEntry, Labels, ResultFile, RobotEntry, SCHEMA, ScanLabels, StageEntry, write_table,
+    InputEntry, Labels, ResultFile, RobotEntry, SCHEMA, ScanLabels, SpaceEntry, StageEntry,
+    write_table,
 };
 use ingest::Sources;
 use robot::{Library, Model, Role};
@@ -32,13 +33,20 @@ pub(crate) struct Report<'a> {
 impl Report<'_> {
     /// Writes the legend and the result, last of all files.
     pub(crate) fn finish(&self, room: &Room) -> Result<Outcome> {
-        let robots: Vec<RobotEntry> =
-            self.fits.iter().enumerate().map(|(i, f)| self.robot(i, f)).collect();
+        let robots: Vec<RobotEntry> = self
+            .fits
+            .iter()
+            .enumerate()
+            .map(|(i, fit)| {
+                let space = self.written.spaces[i].clone();
+                robot_entry(i, fit, &self.models[fit.model], space)
+            })
+            .collect();
         write_table(room.next(), &robots)?;
         let warnings = self.warnings();
         let masks = self.sources.masks.iter().zip(&self.written.masks);
         let labels = Labels {
-            table: "labels/table.json".into(),
+            table: Labels::TABLE.into(),
             scans: masks.map(|(mask, count)| ScanLabels::new(mask, count.n_points)).collect(),
         };
         let result = ResultFile {
@@ -50,43 +58,14 @@ impl Report<'_> {
                 .sources
                 .inputs
                 .iter()
-                .map(|i| self.input(i, self.sums.input(i).unwrap_or_default().to_owned()))
+                .map(|i| input_entry(self.sources, i, self.sums, &self.written.masks))
                 .collect(),
             stages: self.stages(),
             warnings: warnings.clone(),
+            rescan: None,
         };
         result.write(room.next())?;
         Ok(Outcome { summary: self.summary(), warnings, ..Outcome::default() })
-    }
-
-    fn robot(&self, index: usize, fit: &Fit) -> RobotEntry {
-        let model = &self.models[fit.model];
-        let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
-        let poses = poses(fit, model);
-        let tip = tip(model).map(|l| (names[l].clone(), poses[l]));
-        let space = self.written.spaces[index].clone();
-        let slides = model.free.iter().map(|&j| &model.joints[j]);
-        let slides = slides.filter(|j| j.kind == robot::JointKind::Prismatic);
-        let slides = slides.map(|j| j.name.clone()).collect();
-        RobotEntry { space, slides, ..RobotEntry::new(index, fit, &names, tip) }
-    }
-
-    fn input(&self, input: &Input, digest: String) -> InputEntry {
-        let scans: Vec<_> = self.sources.scans.iter().filter(|s| s.input == input.id).collect();
-        let counts =
-            self.sources.masks.iter().zip(&self.written.masks).filter(|(m, _)| m.input == input.id);
-        let (n_points, n_dropped) =
-            counts.fold((0, 0), |sum, (_, c)| (sum.0 + c.n_points, sum.1 + c.n_dropped));
-        InputEntry {
-            path: input.path.display().to_string(),
-            format: format_word(input.format).into(),
-            n_bytes: input.n_bytes,
-            digest,
-            n_scans: scans.len() as u32,
-            n_points,
-            n_dropped,
-            notes: scans.iter().flat_map(|s| &s.notes).cloned().collect(),
-        }
     }
 
     /// Counts of each stage; no times, so that the same input gives the same bytes.
@@ -188,6 +167,50 @@ impl Report<'_> {
         );
         text
     }
+}
+
+/// The entry of a robot in the result.
+pub(crate) fn robot_entry(
+    index: usize,
+    fit: &Fit,
+    model: &Model,
+    space: Option<SpaceEntry>,
+) -> RobotEntry {
+    let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
+    let poses = poses(fit, model);
+    let tip = tip(model).map(|l| (names[l].clone(), poses[l]));
+    let slides = model.free.iter().map(|&j| &model.joints[j]);
+    let slides = slides.filter(|j| j.kind == robot::JointKind::Prismatic);
+    let slides = slides.map(|j| j.name.clone()).collect();
+    RobotEntry { space, slides, ..RobotEntry::new(&id(index), fit, &names, tip) }
+}
+
+/// The entry of an input in the result; `counts` of the masks of the inputs that are open.
+pub(crate) fn input_entry(
+    sources: &Sources,
+    input: &Input,
+    sums: &Sums,
+    counts: &[MaskCount],
+) -> InputEntry {
+    let scans: Vec<_> = sources.scans.iter().filter(|s| s.input == input.id).collect();
+    let own = sources.opened_masks().iter().zip(counts).filter(|(m, _)| m.input == input.id);
+    let (n_points, n_dropped) =
+        own.fold((0, 0), |sum, (_, c)| (sum.0 + c.n_points, sum.1 + c.n_dropped));
+    InputEntry {
+        path: input.path.display().to_string(),
+        format: format_word(input.format).into(),
+        n_bytes: input.n_bytes,
+        digest: sums.input(input).unwrap_or_default().to_owned(),
+        n_scans: scans.len() as u32,
+        n_points,
+        n_dropped,
+        notes: scans.iter().flat_map(|s| &s.notes).cloned().collect(),
+    }
+}
+
+/// What a robot is called, by its place among the fits.
+pub(crate) fn id(index: usize) -> String {
+    format!("R{}", index + 1)
 }
 
 /// The last link of the main chain.

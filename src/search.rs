@@ -7,7 +7,7 @@ use crate::store::Store;
 use crate::surfaces::Ground;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
 use fit::{Method, Prepared, Scene, Sights};
-use geometry::{Aabb, Point, Pose};
+use geometry::{Aabb, Plane, Point, Pose, Vector};
 use identify::{BaseSearch, Sight};
 use lattice::{ViewBuilder, ViewSettings};
 use rayon::prelude::*;
@@ -39,8 +39,8 @@ impl<'a> Shelf<'a> {
 }
 
 /// Everything that the search of a region reads.
-pub(crate) struct Search<'a> {
-    shelf: &'a Shelf<'a>,
+pub(crate) struct Search<'a, 'm> {
+    shelf: &'a Shelf<'m>,
     scans: &'a [Scan],
     store: &'a Store,
     ground: &'a Ground,
@@ -74,9 +74,9 @@ const MIN_GONE: usize = 80;
 /// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
 const MAX_SPACING: f64 = 0.05;
 
-impl<'a> Search<'a> {
+impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn new(
-        shelf: &'a Shelf<'a>,
+        shelf: &'a Shelf<'m>,
         scans: &'a [Scan],
         store: &'a Store,
         ground: &'a Ground,
@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
     }
 
     /// The library.
-    pub(crate) fn shelf(&self) -> &'a Shelf<'a> {
+    pub(crate) fn shelf(&self) -> &'a Shelf<'m> {
         self.shelf
     }
 
@@ -208,6 +208,40 @@ impl<'a> Search<'a> {
         let at = candidate.bases[0].0.translation.vector;
         let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
         height.is_none_or(|h| h > FLOOR_SLACK)
+    }
+
+    /// The fit of a robot that stands in a region as an earlier one had it; `None` where it does not.
+    pub(crate) fn again(
+        &self,
+        region: &Region,
+        before: &Fit,
+        model: &Model,
+    ) -> Result<Option<Fit>> {
+        let views = self.views(region)?;
+        let planes = self.planes(region);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit);
+        let prepared = Prepared::new(before.model, model);
+        Ok(fit::again(before, &prepared, &scene, &self.settings.fit, &AllThreads))
+    }
+
+    /// The fit of a model on a base that is known.
+    pub(crate) fn on_base(
+        &self,
+        region: &Region,
+        model: usize,
+        base: &Pose,
+    ) -> Result<Option<Fit>> {
+        let views = self.views(region)?;
+        let planes = self.planes(region);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit);
+        let normal = base.rotation * Vector::z();
+        let offset = normal.dot(&base.translation.vector);
+        let plane = Plane { normal, offset };
+        let bounds = region.world_bounds();
+        let plane = InstallationPlane { plane, bounds, area: 1.0, is_floor: false };
+        let candidate = Candidate { model, bounds, plane, bases: vec![(*base, 1.0)], group: 0 };
+        let prepared = self.shelf.prepared(model);
+        Ok(fit::fit(&candidate, prepared, &scene, &self.settings.fit, &AllThreads))
     }
 
     /// Ceilings, walls and tilted plates about the region.

@@ -19,7 +19,7 @@ const BELOW: f64 = 0.5;
 pub(crate) fn around(
     fits: &[Fit],
     models: &[Model],
-    (search, settings): (&Search<'_>, &Settings),
+    (search, settings): (&Search<'_, '_>, &Settings),
     engine: &Engine,
 ) -> Result<Vec<Option<Space>>> {
     if !settings.merge.space {
@@ -31,11 +31,7 @@ pub(crate) fn around(
         let edge = settings.merge.space_edge;
         let bounds = bounds(&base, model.reach()).shared(&search.bounds().grown(edge));
         let grid = SpaceGrid::over(&bounds, edge);
-        let origin = base.map(f64::round);
-        let world = grid.bounds();
-        let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
-        let local = Aabb { min: shift(world.min), max: shift(world.max) };
-        let region = Region { origin, bounds: local };
+        let region = region(&base, &grid.bounds());
         let min_cell = grid.edge / CELLS_PER_EDGE;
         let views =
             search.views_by(&region, &ViewSettings { min_cell, ..settings.view.clone() })?;
@@ -47,6 +43,19 @@ pub(crate) fn around(
         merge::stand(&mut space, model, &poses(fit, model));
         Ok(Some(space))
     })
+}
+
+/// The region of all that a robot can get to.
+pub(crate) fn reach(fit: &Fit, model: &Model) -> Region {
+    let base: Point = fit.world_from_base.translation.vector.into();
+    region(&base, &bounds(&base, model.reach()))
+}
+
+/// A region of the world, its frame near `middle`.
+pub(crate) fn region(middle: &Point, world: &Aabb) -> Region {
+    let origin = middle.map(f64::round);
+    let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
+    Region { origin, bounds: Aabb { min: shift(world.min), max: shift(world.max) } }
 }
 
 /// All that a robot can get to, and no more below it than pedestals are high.

@@ -34,7 +34,7 @@ pub(crate) fn branch(mut fits: Vec<Fit>, models: &mut Vec<Model>) -> Vec<Fit> {
 pub(crate) fn dress(
     fits: Vec<Fit>,
     models: &mut Vec<Model>,
-    (search, regions): (&Search<'_>, &[Region]),
+    (search, regions): (&Search<'_, '_>, &[Region]),
     engine: &Engine,
 ) -> Result<Vec<Fit>> {
     let fits = branch(fits, models);

@@ -11,6 +11,7 @@ mod growth;
 mod limits;
 pub mod plant;
 mod plot;
+pub mod rescan;
 mod score;
 mod shape;
 mod special;
@@ -62,7 +63,7 @@ pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String>
             temporary.path().to_path_buf()
         }
     };
-    let models = library::load(&robots, &means.settings.robot, engine)?.models;
+    let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     let chosen = chosen(&models, &bench.models)?;
     let cases = cases(bench, &models, &chosen)?;
     let mut journal =

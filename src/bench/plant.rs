@@ -107,7 +107,7 @@ pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<Stri
             temporary.path().join("robots")
         }
     };
-    let models = library::load(&robots, &means.settings.robot, engine)?.models;
+    let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     chosen(&models, &[])?;
     let mut journal =
         bench.out.as_deref().map(|dir| Journal::create(dir, "plant.jsonl")).transpose()?;

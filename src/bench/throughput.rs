@@ -148,7 +148,7 @@ fn scan(
     robots: &Path,
     (means, engine): (&Means, &Engine),
 ) -> Result<u64> {
-    let models = library::load(robots, &means.settings.robot, engine)?.models;
+    let models = library::load(robots, &means.settings.robot, None, engine)?.models;
     let plant = Plant {
         seed: bench.seed,
         n_robots: bench.n_robots,

@@ -1,8 +1,9 @@
 //! `bench`: suites and numbers in; tables of what the program is worth out.
 
-use super::flags::{AccuracyFlags, Against, Common, PlantFlags, ThroughputFlags};
+use super::flags::{AccuracyFlags, Against, Common, PlantFlags, RescanBenchFlags, ThroughputFlags};
 use super::say::Say;
 use crate::bench::plant::{PlantBench, plants};
+use crate::bench::rescan::{RescanBench, rescans};
 use crate::bench::throughput::{ThroughputBench, throughput};
 use crate::bench::{Bench, accuracy};
 use crate::exit;
@@ -38,6 +39,24 @@ pub(super) fn bench_plant(flags: &PlantFlags, common: &Common, say: &Say) -> Res
         keep: flags.keep,
     };
     say.result(&plants(&bench, &means, &engine)?);
+    Ok(exit::OK)
+}
+
+pub(super) fn bench_rescan(flags: &RescanBenchFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let bench = RescanBench {
+        n_cases: flags.cases,
+        first: flags.first,
+        seed: flags.seed,
+        n_robots: flags.n_robots,
+        n_scanners: flags.scans,
+        step_deg: flags.step,
+        robots: flags.robots.clone(),
+        out: flags.out.clone(),
+        keep: flags.keep,
+    };
+    say.result(&rescans(&bench, &means, &engine)?);
     Ok(exit::OK)
 }
 

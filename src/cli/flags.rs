@@ -30,6 +30,8 @@ pub(super) enum Command {
     Run(RunFlags),
     /// As run, but only says what it would take: memory, disk, time
     Plan(PlanFlags),
+    /// One cell again: an earlier result and new scans in, the whole result with that cell brought up to date out
+    Rescan(RescanFlags),
     /// Whether the files of a result are what they were when they were written
     Verify(OutFlags),
     /// What a run came to, once more; robots as cases for a build server with --junit
@@ -60,6 +62,8 @@ pub(super) enum BenchCommand {
     Accuracy(AccuracyFlags),
     /// Draw cells and lines as files, do the main job on them, compare robots and labels with the truth
     Plant(PlantFlags),
+    /// Draw plants of which one cell is scanned again: what a rescan finds, what it invents, its time beside a whole run
+    Rescan(RescanBenchFlags),
     /// Draw plants of given sizes as files, do the main job on them: points a second, memory, share of the machine's limits
     Throughput(ThroughputFlags),
 }
@@ -107,6 +111,37 @@ pub(super) struct PlantFlags {
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
     /// Keep scenes, scans and results
+    #[arg(long, requires = "out")]
+    pub(super) keep: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct RescanBenchFlags {
+    /// Plants
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub(super) cases: usize,
+    /// Number of the first of them
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub(super) first: usize,
+    /// Seed of all that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Robots of each plant
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub(super) n_robots: usize,
+    /// Scanners of its first session
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub(super) scans: usize,
+    /// Angle between beams, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.13)]
+    pub(super) step: f64,
+    /// Robot library (else the demo's robots)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// Where rows go; scans and results are kept there, too, with --keep
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// Keep scans and results
     #[arg(long, requires = "out")]
     pub(super) keep: bool,
 }
@@ -197,6 +232,35 @@ pub(super) struct PlanFlags {
     /// Answer in JSON
     #[arg(long)]
     pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct RescanFlags {
+    /// Output folder of the earlier run, or rescan
+    #[arg(long, value_name = "OUT")]
+    pub(super) base: PathBuf,
+    /// New scans of the cell: E57, PTX, LAS, LAZ
+    #[arg(required = true, value_name = "INPUT")]
+    pub(super) inputs: Vec<PathBuf>,
+    /// Where results go; what did not change is shared with the earlier run
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Robot library (else that of the earlier run)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// Bounds of the cell, metres: least x, y, z, greatest x, y, z (else what the new scans see well)
+    #[arg(
+        long,
+        value_name = "X,Y,Z,X,Y,Z",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        conflicts_with = "robot"
+    )]
+    pub(super) cell: Vec<f64>,
+    /// The cell is what these robots of the earlier run reach
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    pub(super) robot: Vec<String>,
 }
 
 #[derive(Debug, Args)]

@@ -34,6 +34,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Inspect(flags) => inspect::inspect(flags, &line.common, &say),
         Command::Run(flags) => run::run(flags, &line.common, &say),
         Command::Plan(flags) => run::plan(flags, &line.common, &say),
+        Command::Rescan(flags) => run::rescan(flags, &line.common, &say),
         Command::Verify(flags) => results::verify(flags, &line.common, &say),
         Command::Report(flags) => results::report(flags, &say),
         Command::Diff(flags) => results::diff(flags, &say),
@@ -41,6 +42,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
             bench::bench_accuracy(flags, &line.common, &say)
         }
         Command::Bench(BenchCommand::Plant(flags)) => bench::bench_plant(flags, &line.common, &say),
+        Command::Bench(BenchCommand::Rescan(flags)) => {
+            bench::bench_rescan(flags, &line.common, &say)
+        }
         Command::Bench(BenchCommand::Throughput(flags)) => {
             bench::bench_throughput(flags, &line.common, &say)
         }

@@ -1,11 +1,13 @@
-//! `run` and `plan`: flags in, the main job done, or what it would take.
+//! `run`, `plan` and `rescan`: flags in, the main job done, or what it would take, or done again for one cell.
 
-use super::flags::{Common, PlanFlags, RunFlags, present};
+use super::flags::{Common, PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;
 use crate::engine::Engine;
 use crate::estimate::estimate;
+use crate::rescan::{self, Cell, Wish};
 use crate::{exit, job::Job, plan};
 use contract::{Error, Kind, Result};
+use geometry::Aabb;
 use std::fmt::Write as _;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
@@ -29,6 +31,44 @@ pub(super) fn plan(flags: &PlanFlags, common: &Common, say: &Say) -> Result<u8> 
     }
     estimate.checked(&job.out)?;
     Ok(exit::OK)
+}
+
+pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    present(&flags.inputs)?;
+    let engine = common.engine(&means)?;
+    let wish = Wish {
+        base: flags.base.clone(),
+        cell: cell(flags)?,
+        job: Job {
+            inputs: flags.inputs.clone(),
+            robots: flags.robots.clone().unwrap_or_default(),
+            scanners: common.scanners(&means),
+            out: flags.out.clone(),
+            review: None,
+            means,
+        },
+    };
+    let mut outcome = rescan::rescan(&wish, &engine)?;
+    let _ = writeln!(outcome.summary, "result in {}", flags.out.join("result.json").display());
+    say.outcome(&outcome);
+    Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+}
+
+fn cell(flags: &RescanFlags) -> Result<Cell> {
+    if !flags.robot.is_empty() {
+        return Ok(Cell::Robots(flags.robot.clone()));
+    }
+    match flags.cell[..] {
+        [] => Ok(Cell::Seen),
+        [x, y, z, u, v, w] if x < u && y < v && z < w => {
+            Ok(Cell::Box(Aabb { min: [x, y, z], max: [u, v, w] }))
+        }
+        _ => {
+            let what = "--cell takes six numbers, the least corner first";
+            Err(Error::new(Kind::Usage, what).hint("for example --cell 2,1,0,8,6,4"))
+        }
+    }
 }
 
 fn job(flags: &RunFlags, common: &Common) -> Result<(Job, Engine)> {

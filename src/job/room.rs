@@ -1,6 +1,6 @@
 //! The output folder of a run: where results go, where they lie until all are whole, and where the store is kept.
 
-use crate::reuse::{KeptFits, Key, Manifest};
+use crate::reuse::{Kept, Key, Manifest};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
 use std::fs::{File, TryLockError};
@@ -40,7 +40,9 @@ impl Room {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(at(e)),
             _ => std::fs::create_dir_all(&next).map_err(at)?,
         }
-        std::fs::create_dir_all(store.join("fits")).map_err(at)?;
+        for pieces in ["fits", "models"] {
+            std::fs::create_dir_all(store.join(pieces)).map_err(at)?;
+        }
         sweep(&store);
         Ok(Self { out: out.to_path_buf(), store, next, _lock: Arc::new(lock) })
     }
@@ -74,11 +76,23 @@ impl Room {
         self.store.join("fits")
     }
 
-    /// Takes away tiles and fits that the run which has just ended did not use.
-    pub(crate) fn prune(&self, tiles: &[Key], kept: &KeptFits) {
+    /// Where models of the library lie as they were loaded.
+    #[must_use]
+    pub fn models(&self) -> PathBuf {
+        self.store.join("models")
+    }
+
+    /// Takes away tiles, fits and models that the run which has just ended did not use.
+    pub(crate) fn prune(&self, tiles: &[Key], fits: &Kept, models: &Kept) {
+        self.prune_tiles(tiles, models);
+        crate::reuse::prune(&self.fits(), &[fits.name()]);
+    }
+
+    /// The same without fits.
+    pub(crate) fn prune_tiles(&self, tiles: &[Key], models: &Kept) {
         let names: Vec<String> = tiles.iter().map(|key| key.name().into()).collect();
         crate::reuse::prune(&self.tiles(), &names);
-        crate::reuse::prune(&self.fits(), &[kept.name()]);
+        crate::reuse::prune(&self.models(), &[models.name()]);
     }
 
     /// Where tiles, and what else may be used again, lie.

@@ -92,6 +92,9 @@ settings! {
     merge: merge::Settings {
         contact, hold, cut, min_voxels, space_edge, space,
     }
+    things: merge::ThingSettings {
+        min_size, min_voxels, min_points, robot_margin,
+    }
     export: export::Settings {
         tiles, tile_edge, fixed_cloud, bodies, compress, waiting_bytes,
     }

@@ -57,6 +57,14 @@ pub struct Checked {
     pub wrong: Vec<String>,
 }
 
+impl OutputFile {
+    /// A file below `next` whose checksum was taken while it was written.
+    pub(crate) fn of(next: &Path, sum: &FileSum) -> Self {
+        let (path, n_bytes) = (name(next, &sum.path), sum.n_bytes);
+        Self { path, n_bytes, digest: Sum::Crc32c.word(&format!("{:08x}", sum.crc32c)) }
+    }
+}
+
 impl Manifest {
     /// The list of an output folder.
     ///
@@ -87,25 +95,27 @@ impl Manifest {
         }
     }
 
-    /// Lists what lies in `next` and writes the list there.
+    /// Digest of the list of an output folder: it names every byte of the result.
+    pub(crate) fn digest(out: &Path) -> Result<String> {
+        Sum::Blake3.read(&out.join(LIST))
+    }
+
+    /// Lists what lies in `next`, files that are known as they are `known`, and writes the list there.
     pub(crate) fn write(
         next: &Path,
         key: Option<super::Key>,
-        (outcome, sums): (&Outcome, &[FileSum]),
+        (outcome, known): (&Outcome, Vec<OutputFile>),
         engine: &Engine,
     ) -> Result<Self> {
         let key = key.ok_or_else(|| Error::new(Kind::Bug, "an input has no digest"))?;
         let mut paths = Vec::new();
         walk(next, &mut paths)?;
         paths.sort();
-        let known: HashMap<&Path, &FileSum> = sums.iter().map(|s| (s.path.as_path(), s)).collect();
-        let files = engine.fan_out("list", paths, |path| match known.get(path.as_path()) {
-            Some(sum) => Ok(OutputFile {
-                path: name(next, &path),
-                n_bytes: sum.n_bytes,
-                digest: Sum::Crc32c.word(&format!("{:08x}", sum.crc32c)),
-            }),
-            None => output(next, &path, Sum::Blake3),
+        let known: HashMap<&str, &OutputFile> =
+            known.iter().map(|f| (f.path.as_str(), f)).collect();
+        let files = engine.fan_out("list", paths, |path| {
+            let listed = known.get(name(next, &path).as_str()).map(|file| (*file).clone());
+            listed.map_or_else(|| output(next, &path, Sum::Blake3), Ok)
         })?;
         let manifest = Self {
             schema: SCHEMA.into(),

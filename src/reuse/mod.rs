@@ -14,15 +14,16 @@ use crate::engine::Engine;
 use crate::job::{Job, Room, Settings};
 use contents::{Contents, Stamp, Sum};
 use contract::{Input, Result, Scan};
+use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 pub(crate) use contents::Pace;
-pub(crate) use kept::KeptFits;
+pub(crate) use kept::{Kept, read, written};
 
 /// A digest of what a piece is made from, as 32 hexadecimal digits: the name of its file.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct Key(String);
 
 impl Key {
@@ -51,6 +52,10 @@ pub(crate) struct Sums {
     files: Vec<(PathBuf, Stamp)>,
     library: String,
     others: String,
+    /// Number of the first input: those before it were read by an earlier run.
+    first: usize,
+    /// Digest of the result that this run goes on from, and what is asked of it.
+    base: String,
 }
 
 impl Sums {
@@ -74,17 +79,28 @@ impl Sums {
         let others: Vec<String> =
             others.map(|p| contents.digest(p, Sum::Blake3)).collect::<Result<_>>()?;
         contents.keep()?;
-        Ok(Self { contents, inputs, files, library, others: others.join(" ") })
+        let (others, base) = (others.join(" "), String::new());
+        Ok(Self { contents, inputs, files, library, others, first: 0, base })
+    }
+
+    /// The same for a run that goes on from a result with this digest, and so many inputs.
+    #[must_use]
+    pub(crate) fn after(self, first: usize, base: String) -> Self {
+        Self { first, base, ..self }
+    }
+
+    fn at(&self, input: &Input) -> usize {
+        input.id.0 as usize - self.first
     }
 
     /// Digest of an input's bytes, where it is known yet.
     pub(crate) fn input(&self, input: &Input) -> Option<&str> {
-        self.inputs[input.id.0 as usize].get().map(String::as_str)
+        self.inputs[self.at(input)].get().map(String::as_str)
     }
 
     /// Reads an input whose digest is not known, beside the one who decodes it and tells how far he is.
     pub(crate) fn read(&self, input: &Input, pace: &Pace) -> Result<()> {
-        let at = input.id.0 as usize;
+        let at = self.at(input);
         let digest = self.contents.read(&self.files[at].0, Sum::Blake3, pace)?;
         let _ = self.inputs[at].set(digest);
         self.contents.keep()
@@ -92,7 +108,7 @@ impl Sums {
 
     /// Refuses an input that is not the one any more that the run began with: what was read of it may be of either.
     pub(crate) fn check(&self, input: &Input) -> Result<()> {
-        let (path, stamp) = &self.files[input.id.0 as usize];
+        let (path, stamp) = &self.files[self.at(input)];
         stamp.check(path)
     }
 
@@ -126,13 +142,19 @@ impl Sums {
         Key::of("fits", &[&words(&tiles), &self.library, &ground, &search])
     }
 
+    /// Models of the library, as they are loaded with these settings.
+    pub(crate) fn models(&self, settings: &Settings) -> Key {
+        Key::of("models", &[&self.library, &words(&settings.robot)])
+    }
+
     /// All that a job writes, where the digests of all inputs are known yet. Names of files are part of it: results name
     /// their inputs.
     pub(crate) fn whole(&self, job: &Job) -> Option<Key> {
         let names: Vec<_> = job.inputs.iter().map(|p| p.display().to_string()).collect();
         let digests: Option<Vec<&String>> = self.inputs.iter().map(OnceLock::get).collect();
         let inputs = words(&(&names, digests?));
-        Some(Key::of("run", &[&inputs, &self.library, &self.others, &words(&job.means.settings)]))
+        let settings = words(&job.means.settings);
+        Some(Key::of("run", &[&inputs, &self.library, &self.others, &self.base, &settings]))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use geometry::direction::{spherical, unit};
 use nalgebra::UnitQuaternion;
+use serde::{Deserialize, Serialize};
 
 /// A regular raster of elevation (rows, upwards) and azimuth (columns, counter-clockwise) about the axis of the
 /// lattice frame, covering the whole sphere; only the pixels that a scan fills exist in tiles.
@@ -9,7 +10,7 @@ use nalgebra::UnitQuaternion;
 /// A file's native rows and columns choose its steps and phase where they are regular to 0.3 pixels; otherwise the
 /// steps come from the directions of the points. A pixel may then hold two returns or none: consumers must not rely
 /// on one each.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Lattice {
     /// Turns the scan frame so that the scanner's spin axis is z (identity for most scanners).
     pub lattice_from_scan: UnitQuaternion<f64>,

@@ -6,17 +6,17 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Index of an input file, in the order of the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct InputId(pub u32);
 /// Index of a scan over all inputs, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ScanId(pub u32);
 /// Index of a mask over all inputs, in their order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct MaskId(pub u32);
 
 /// A point format that is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Format {
     /// ASTM E2807.
     E57,
@@ -29,7 +29,7 @@ pub enum Format {
 }
 
 /// One input file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Input {
     /// Its place on the command line.
     pub id: InputId,
@@ -42,7 +42,7 @@ pub struct Input {
 }
 
 /// The points of one output triple (`labels/N.*.npy`): one scan of an E57 or PTX file, one LAS or LAZ file whole.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Mask {
     /// Its number.
     pub id: MaskId,
@@ -56,7 +56,7 @@ pub struct Mask {
 }
 
 /// All points measured from one scanner position.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scan {
     /// Its number.
     pub id: ScanId,

@@ -2,6 +2,7 @@
 
 use crate::{ScanId, Weigh};
 use geometry::{Aabb, Moments, Plane};
+use serde::{Deserialize, Serialize};
 
 /// A planar region of one tile, in the world frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,7 +86,7 @@ impl Weigh for TileSummary {
 }
 
 /// One level of the floor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FloorLevel {
     /// Mean plane, normal up.
     pub plane: Plane,
@@ -141,7 +142,7 @@ impl FloorLevel {
 }
 
 /// A horizontal plane that a robot may stand on: a floor level, or a stand, pedestal or table top.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InstallationPlane {
     /// Normal up (away from the body that carries it).
     pub plane: Plane,
@@ -154,7 +155,7 @@ pub struct InstallationPlane {
 }
 
 /// The floor of the plant: its levels, largest first, and the smaller planes that something may stand on.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Floor {
     /// Largest first; none where nothing like a floor was found.
     pub levels: Vec<FloorLevel>,

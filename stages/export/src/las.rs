@@ -229,7 +229,7 @@ fn extra_bytes(settings: &LasSettings) -> Vec<u8> {
     out
 }
 
-fn laz_vlr(settings: &LasSettings) -> LazVlr {
+pub(crate) fn laz_vlr(settings: &LasSettings) -> LazVlr {
     let mut items = LazItemRecordBuilder::new();
     items.add_item(LazItemType::Point14);
     if settings.with_color {

@@ -6,6 +6,7 @@
 mod atomic;
 mod calibration;
 mod canvas;
+mod change_picture;
 mod clouds;
 mod e57;
 mod evidence_picture;
@@ -18,9 +19,11 @@ mod pack;
 mod places;
 mod plan_picture;
 mod record;
+mod refill;
 mod result;
 mod robot_model;
 mod robot_picture;
+mod session;
 mod settings;
 mod space;
 mod summed;
@@ -29,23 +32,26 @@ mod table;
 pub use atomic::AtomicFile;
 pub use calibration::{CalibrationEntry, FrameEntry};
 pub use canvas::{Canvas, Rgb, link_color, robot_color};
+pub use change_picture::{ChangedThing, draw_changes};
 pub use clouds::{Clouds, Written};
 pub use e57::{E57Scans, GridPoint, GridScan};
 pub use evidence_picture::draw_evidence;
 pub use junit::write_junit;
 pub use las::{LasSummary, LasWriter};
-pub use mask::{LabelColumns, MaskFiles, MaskWriter};
-pub use npy::{Element, NpyWriter};
+pub use mask::{LabelColumns, MaskFiles, MaskReader, MaskWriter};
+pub use npy::{Element, NpyWriter, read_places};
 pub use pack::{Pack, Packed, PointColumns};
 pub use places::Places;
 pub use plan_picture::PlanPicture;
 pub use record::{LasSettings, Quantum, RawVlr, class_of};
+pub use refill::{OldPoint, refill};
 pub use result::{
     BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
     SCHEMA, ScanLabels, StageEntry, TipPose,
 };
 pub use robot_model::write_robot;
 pub use robot_picture::RobotPicture;
+pub use session::{RegistrationEntry, RescanEntry};
 pub use settings::Settings;
 pub use space::{SpaceEntry, write_space};
 pub use summed::FileSum;

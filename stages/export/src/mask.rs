@@ -1,9 +1,9 @@
-//! The labels of one mask: labels in the order of the input in, three arrays out.
+//! The labels of one mask: labels in the order of the input in, three arrays out; and back.
 
-use crate::npy::NpyWriter;
+use crate::npy::{self, NpyWriter};
 use crate::summed::FileSum;
-use contract::{Label, MaskId, Result};
-use std::path::Path;
+use contract::{Error, Label, MaskId, PointKind, Result};
+use std::path::{Path, PathBuf};
 
 /// The files of one mask, relative to the output folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,6 +17,12 @@ pub struct MaskFiles {
 }
 
 impl MaskFiles {
+    /// Name of the list of places of a mask that later scans have superseded.
+    #[must_use]
+    pub fn superseded(mask: MaskId) -> String {
+        format!("labels/{}.superseded.npy", mask.0)
+    }
+
     /// Names of the files of a mask.
     #[must_use]
     pub fn of(mask: MaskId) -> Self {
@@ -81,6 +87,38 @@ impl LabelColumns {
     #[must_use]
     pub fn weight_bytes(&self) -> usize {
         self.len() * 5
+    }
+}
+
+/// Reads labels back, a range of places at a time.
+#[derive(Debug, Clone)]
+pub struct MaskReader {
+    paths: [PathBuf; 3],
+}
+
+impl MaskReader {
+    /// The mask of an output folder with these files.
+    #[must_use]
+    pub fn new(out: &Path, [kind, robot, link]: [&str; 3]) -> Self {
+        Self { paths: [kind, robot, link].map(|name| out.join(name)) }
+    }
+
+    /// Labels of `n` places from `first` on.
+    ///
+    /// # Errors
+    /// A file that is missing or too short; a kind that is none.
+    pub fn range(&self, first: u64, n: usize) -> Result<Vec<Label>> {
+        let [kind, robot, link] = [1, 2, 2];
+        let read = |at: usize, len: usize| npy::read_bytes(&self.paths[at], first, n, len);
+        let (kind, robot, link) = (read(0, kind)?, read(1, robot)?, read(2, link)?);
+        let wide = |bytes: &[u8], i: usize| i16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]);
+        let label = |i: usize| {
+            let known = PointKind::ALL.into_iter().find(|k| *k as u8 == kind[i]);
+            let broken = || Error::bad_input(format!("there is no kind \"{}\"", kind[i]));
+            let kind = known.ok_or_else(|| broken().at(self.paths[0].display()))?;
+            Ok(Label { kind, robot: wide(&robot, i), link: wide(&link, i) })
+        };
+        (0..n).map(label).collect()
     }
 }
 

@@ -3,8 +3,9 @@
 use crate::atomic::refused;
 use crate::summed::{FileSum, SummedFile};
 use contract::Result;
-use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
 
 /// A type of array element.
 pub trait Element: Copy {
@@ -34,6 +35,15 @@ impl Element for u16 {
     }
 }
 
+impl Element for u64 {
+    const DESCR: &'static str = "<u8";
+    const LEN: usize = 8;
+    #[inline]
+    fn put(self, bytes: &mut [u8]) {
+        bytes.copy_from_slice(&self.to_le_bytes());
+    }
+}
+
 impl Element for i16 {
     const DESCR: &'static str = "<i2";
     const LEN: usize = 2;
@@ -45,6 +55,30 @@ impl Element for i16 {
 
 /// Length of magic and header, bytes: room for any length, a multiple of 64 as NumPy asks for.
 const HEADER: usize = 128;
+
+/// The bytes of `n` elements, `len` bytes each, from the `first` on, of a file that [`NpyWriter`] wrote.
+pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Result<Vec<u8>> {
+    let mut bytes = vec![0; n * len];
+    let read = File::open(path).and_then(|mut file| {
+        file.seek(SeekFrom::Start(HEADER as u64 + first * len as u64))?;
+        file.read_exact(&mut bytes)
+    });
+    read.map_err(|e| refused("array cannot be read back", path, e))?;
+    Ok(bytes)
+}
+
+/// All of a list of places (u64) that [`NpyWriter`] wrote.
+///
+/// # Errors
+/// A file that cannot be read, or is none of ours.
+pub fn read_places(path: &Path) -> Result<Vec<u64>> {
+    let n_bytes =
+        std::fs::metadata(path).map_err(|e| refused("list cannot be read", path, e))?.len();
+    let n = n_bytes.saturating_sub(HEADER as u64) / 8;
+    let bytes = read_bytes(path, 0, n as usize, 8)?;
+    let (whole, _) = bytes.as_chunks::<8>();
+    Ok(whole.iter().map(|b| u64::from_le_bytes(*b)).collect())
+}
 
 /// Writes an array piece by piece.
 pub struct NpyWriter<T> {

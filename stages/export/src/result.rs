@@ -5,6 +5,7 @@ use crate::atomic;
 use crate::calibration::CalibrationEntry;
 use crate::mask::MaskFiles;
 use crate::places::Places;
+use crate::session::RescanEntry;
 use crate::space::SpaceEntry;
 use contract::{Error, Fit, Kind, Mask, Result};
 use geometry::Pose;
@@ -31,6 +32,9 @@ pub struct ResultFile {
     pub stages: Vec<StageEntry>,
     /// What a person should know, in words.
     pub warnings: Vec<String>,
+    /// Which result it goes on from, where one cell was scanned again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rescan: Option<RescanEntry>,
 }
 
 /// One robot.
@@ -237,6 +241,10 @@ pub struct ScanLabels {
     pub robot: String,
     /// Links, i16.
     pub link: String,
+    /// Points that a later scan has replaced or proved gone: their places in the mask, u64, ascending. They are no part of
+    /// the plant any more, whatever their labels say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub superseded: Option<String>,
 }
 
 /// An input as it was read.
@@ -272,15 +280,15 @@ pub struct StageEntry {
 }
 
 impl RobotEntry {
-    /// The entry of the robot with this index; names of the model's links in their order.
+    /// The entry of the robot with this id; names of the model's links in their order.
     #[must_use]
-    pub fn new(index: usize, fit: &Fit, links: &[String], tip: Option<(String, Pose)>) -> Self {
+    pub fn new(id: &str, fit: &Fit, links: &[String], tip: Option<(String, Pose)>) -> Self {
         let sigma = |range: usize| finite(fit.base_sigma[range]);
         let named = |value: fn(&contract::JointFit) -> f64| {
             fit.joints.iter().map(move |j| (j.name.clone(), value(j)))
         };
         Self {
-            id: format!("R{}", index + 1),
+            id: id.into(),
             model: fit.model_name.clone(),
             base_link: links.first().cloned().unwrap_or_default(),
             base_pose: (&fit.world_from_base).into(),
@@ -323,7 +331,7 @@ impl RobotEntry {
             stays: fit
                 .stays
                 .iter()
-                .map(|f| Self::new(index, f, &links[..f.links.len().min(links.len())], None))
+                .map(|f| Self::new(id, f, &links[..f.links.len().min(links.len())], None))
                 .collect(),
             tip: tip.map(|(link, pose)| TipPose { link, pose: (&pose).into() }),
             evidence: fit.links.iter().map(LinkEntry::from).collect(),
@@ -360,12 +368,18 @@ impl From<&contract::LinkEvidence> for LinkEntry {
     }
 }
 
+impl Labels {
+    /// Name of the legend.
+    pub const TABLE: &'static str = "labels/table.json";
+}
+
 impl ScanLabels {
     /// The entry of a mask with so many entries.
     #[must_use]
     pub fn new(mask: &Mask, n_points: u64) -> Self {
         let MaskFiles { kind, robot, link } = MaskFiles::of(mask.id);
-        Self { scan: mask.name.clone(), input: mask.input.0, n_points, kind, robot, link }
+        let (scan, input) = (mask.name.clone(), mask.input.0);
+        Self { scan, input, n_points, kind, robot, link, superseded: None }
     }
 }
 

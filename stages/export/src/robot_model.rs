@@ -16,15 +16,15 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Writes the robot with this index; `hanging` has convex pieces by link.
+/// Writes the robot with this id; `hanging` has convex pieces by link.
 pub fn write_robot(
     out: &Path,
-    index: usize,
+    id: &str,
     fit: &Fit,
     model: &Model,
     hanging: &BTreeMap<usize, Vec<Mesh>>,
 ) -> Result<String> {
-    let folder = format!("robots/R{}", index + 1);
+    let folder = format!("robots/{id}");
     let dir = out.join(&folder);
     let names = file_names(model);
     let mut links = String::new();
@@ -50,7 +50,7 @@ pub fn write_robot(
     let joints: String = model.joints.iter().map(|j| joint(model, j)).collect();
     let urdf = format!(
         "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n{links}{joints}</robot>\n",
-        escaped(&format!("R{} {}", index + 1, fit.model_name))
+        escaped(&format!("{id} {}", fit.model_name))
     );
     atomic::write(&dir.join("robot.urdf"), urdf.as_bytes())?;
     atomic::write(&dir.join("joints.yaml"), yaml(fit, model).as_bytes())?;

@@ -35,9 +35,9 @@ pub struct SpaceEntry {
     pub free_m3: f64,
 }
 
-/// Writes the space of the robot with this index.
-pub fn write_space(out: &Path, index: usize, space: &Space) -> Result<SpaceEntry> {
-    let folder = format!("robots/R{}", index + 1);
+/// Writes the space of the robot with this id.
+pub fn write_space(out: &Path, id: &str, space: &Space) -> Result<SpaceEntry> {
+    let folder = format!("robots/{id}");
     let name = |file: &str| format!("{folder}/{file}");
     let grid = *space.grid();
     let mut array = NpyWriter::create(out.join(name("space.npy")))?;

@@ -276,7 +276,14 @@ fn sample(out: &Path) {
     writer.finish().expect("finish");
     let links = ["base", "arm", "hand"].map(String::from);
     let robots: Vec<_> = (0..2)
-        .map(|i| RobotEntry::new(i, &fit(), &links, Some(("hand".into(), Pose::identity()))))
+        .map(|i: usize| {
+            RobotEntry::new(
+                &format!("R{}", i + 1),
+                &fit(),
+                &links,
+                Some(("hand".into(), Pose::identity())),
+            )
+        })
         .collect();
     write_table(out, &robots).expect("table");
     write_e57(&out.join("scans.e57"));
@@ -304,6 +311,7 @@ fn sample(out: &Path) {
             n_out: written.tiles.len() as u64,
         }],
         warnings: Vec::new(),
+        rescan: None,
     };
     result.write(out).expect("result");
 }

@@ -33,6 +33,6 @@ pub use choose::choose;
 pub use prepared::Prepared;
 pub use scene::Scene;
 pub use settings::{Method, Settings};
-pub use solve::{converge, fit};
+pub use solve::{again, converge, fit};
 pub use stays::{Sights, stays};
 pub use tool::{Tooled, fit_tool, try_tool};

@@ -94,6 +94,34 @@ pub fn fit(
     Some(Fit { other_branches: loops, ..fit })
 }
 
+/// The fit of a robot that stands where an earlier one had it, or near enough for the refinement; `None` where the beams
+/// contradict that.
+#[must_use]
+pub fn again(
+    before: &Fit,
+    prepared: &Prepared<'_>,
+    scene: &Scene<'_>,
+    settings: &Settings,
+    fan: &impl Fan,
+) -> Option<Fit> {
+    let refine = Refine { prepared, scene, settings, prior: None };
+    let start = Hypothesis {
+        local_from_base: scene.world_from_local().inverse() * before.world_from_base,
+        posture: before.joints.iter().map(|joint| joint.value).collect(),
+        score: 0.0,
+    };
+    let base = Point::from(start.local_from_base.translation.vector);
+    let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
+    let polished = polish(&refine, &roughly(&refine, &start, &near, &COARSE_ROUNDS[3..]), &near);
+    if polished.1.score < settings.min_score || polished.1.violation > settings.max_violation {
+        return None;
+    }
+    let best = settle(&refine, &polished.0, (&near, &all), fan);
+    let fit = finish(&refine, best, &[polished], (&near, &all), fan);
+    let (tool, other_branches) = (before.tool.clone(), before.other_branches.clone());
+    Some(Fit { tool, other_branches, ..fit })
+}
+
 /// Score of a base from which on the search is made at once.
 const CLEAR_BASE: f64 = 0.35;
 /// Hypotheses of a quick look, and of those that are settled and refined.

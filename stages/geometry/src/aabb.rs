@@ -1,9 +1,10 @@
 //! Axis-aligned boxes: points in, bounds out.
 
 use crate::Point;
+use serde::{Deserialize, Serialize};
 
 /// An axis-aligned box; empty when `min > max` on any axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Aabb {
     /// Smallest corner, metres.
     pub min: [f64; 3],

@@ -3,9 +3,10 @@
 
 use crate::Vector;
 use nalgebra::{Matrix3, SymmetricEigen, UnitQuaternion};
+use serde::{Deserialize, Serialize};
 
 /// The plane `normal · p = offset`, normal of unit length, metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plane {
     /// Unit normal.
     pub normal: Vector,

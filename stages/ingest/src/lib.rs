@@ -29,4 +29,4 @@ pub use inspect::{
 pub use reader::Want;
 pub use scanners::{Scanner, Scanners};
 pub use settings::Settings;
-pub use sources::{Sources, Strips, open};
+pub use sources::{Before, Sources, Strips, open, open_after};

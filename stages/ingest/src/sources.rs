@@ -26,6 +26,18 @@ pub struct Sources {
     /// What is odd about inputs and scanners, in words.
     pub warnings: Vec<String>,
     pub(crate) files: Vec<File>,
+    n_before: [usize; 2],
+}
+
+/// Inputs of an earlier run, which are known but not open: those that are opened now are numbered after them.
+#[derive(Debug, Clone, Default)]
+pub struct Before {
+    /// In their order.
+    pub inputs: Vec<Input>,
+    /// In the order of the inputs.
+    pub masks: Vec<Mask>,
+    /// In the order of the inputs.
+    pub scans: Vec<Scan>,
 }
 
 /// One open file.
@@ -51,13 +63,23 @@ pub fn open(
     scanners: Option<&Scanners>,
     settings: &Settings,
 ) -> Result<Sources> {
-    let mut sources = Sources {
-        inputs: Vec::new(),
-        masks: Vec::new(),
-        scans: Vec::new(),
-        warnings: Vec::new(),
-        files: Vec::new(),
-    };
+    open_after(Before::default(), paths, scanners, settings)
+}
+
+/// The same, numbered after inputs of an earlier run.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_after(
+    before: Before,
+    paths: &[PathBuf],
+    scanners: Option<&Scanners>,
+    settings: &Settings,
+) -> Result<Sources> {
+    let n_before = [before.inputs.len(), before.masks.len()];
+    let Before { inputs, masks, scans } = before;
+    let (warnings, files) = (Vec::new(), Vec::new());
+    let mut sources = Sources { inputs, masks, scans, warnings, files, n_before };
     if paths.is_empty() {
         return Err(
             Error::new(Kind::Usage, "no input was given").hint("name at least one scan file")
@@ -79,7 +101,8 @@ impl Sources {
     /// An input that does not exist. Errors of the iterator name file and place; it ends after the first.
     pub fn strips(&self, input: InputId, want: Want) -> Result<Strips<'_>> {
         let at = input.0 as usize;
-        let (Some(file), Some(known)) = (self.files.get(at), self.inputs.get(at)) else {
+        let open = at.checked_sub(self.n_before[0]).and_then(|at| self.files.get(at));
+        let (Some(file), Some(known)) = (open, self.inputs.get(at)) else {
             return Err(Error::new(Kind::Bug, format!("there is no input \"{at}\"")));
         };
         let path = &known.path;
@@ -88,6 +111,18 @@ impl Sources {
             Ok(raw) => Ok(file.number(raw)),
             Err(error) => Err(error.at(path.display())),
         })))
+    }
+
+    /// The inputs that are open.
+    #[must_use]
+    pub fn opened(&self) -> &[Input] {
+        &self.inputs[self.n_before[0]..]
+    }
+
+    /// The masks of the inputs that are open.
+    #[must_use]
+    pub fn opened_masks(&self) -> &[Mask] {
+        &self.masks[self.n_before[1]..]
     }
 
     /// Scale and offset of the first LAS input's coordinates, metres.

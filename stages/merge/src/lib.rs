@@ -9,11 +9,17 @@
 mod attach;
 mod graph;
 mod hang;
+mod register;
+mod sight;
 mod space;
+mod things;
 
 pub use attach::{Attach, Attached, Group};
 pub use hang::{Hanging, hang};
+pub use register::{Registration, Surfaces};
+pub use sight::{Sight, Watch};
 pub use space::{see, stand};
+pub use things::{Tally, Thing, ThingChange, ThingSettings, things};
 
 /// What may be tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,10 +1,11 @@
 //! Findings: what is wrong with a library or worth knowing, for people.
 
 use contract::{Error, Kind};
+use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 
 /// How bad a finding is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Severity {
     /// Worth knowing.
     Note,
@@ -15,7 +16,7 @@ pub enum Severity {
 }
 
 /// Something to say about a model.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Finding {
     /// Name of the model; empty for the library itself.
     pub model: String,

@@ -5,6 +5,7 @@ use crate::kinematics::Placing;
 use crate::model::Model;
 use geometry::{Point, Vector};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// Steps from the zero posture for loops without a closed form: small enough to stay in the assembly mode.
 const N_STEPS: u32 = 8;
@@ -14,7 +15,7 @@ const N_NEWTON: u32 = 12;
 pub(crate) const CLOSED: f64 = 1e-9;
 
 /// A loop that the tree leaves open.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClosedLoop {
     /// As `robot.toml` calls it.
     pub name: String,
@@ -27,7 +28,7 @@ pub struct ClosedLoop {
 }
 
 /// A pin: two points of two links that coincide, seen along the axes of the loop.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Closure {
     /// Index of the link on the side of the first passive joint.
     pub link_a: usize,
@@ -40,7 +41,7 @@ pub struct Closure {
 }
 
 /// How a loop is solved. `mode` is +1 or −1: which of two solutions, that of the zero posture.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Form {
     /// Two revolute joints one after the other, then the pin.
     RrrSerial {

@@ -3,9 +3,10 @@
 use crate::loops::ClosedLoop;
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::Unit;
+use serde::{Deserialize, Serialize};
 
 /// Triangles of a link in the link's frame, metres; all visuals of the link together.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     /// Corners.
     pub vertices: Vec<[f32; 3]>,
@@ -17,7 +18,7 @@ pub struct Mesh {
 ///
 /// # Law
 /// Any prefix is spread evenly over the surface, so that `points[..300]` is the coarse cloud and all of it the fine.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct CadCloud {
     /// Positions, metres.
     pub points: Vec<[f32; 3]>,
@@ -30,7 +31,7 @@ pub struct CadCloud {
 }
 
 /// What a link is part of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
     /// Sets the posture.
     Main,
@@ -41,7 +42,7 @@ pub enum Role {
 }
 
 /// A rigid body of the robot.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Link {
     /// As in the URDF.
     pub name: String,
@@ -58,7 +59,7 @@ pub struct Link {
 }
 
 /// How a joint moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum JointKind {
     /// Turns between limits, radians.
     Revolute,
@@ -71,7 +72,7 @@ pub enum JointKind {
 }
 
 /// What sets a joint's value.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Motion {
     /// Its own entry in the posture.
     Free(usize),
@@ -91,7 +92,7 @@ pub enum Motion {
 }
 
 /// A joint of the tree.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
     /// As in the URDF.
     pub name: String,
@@ -112,7 +113,7 @@ pub struct Joint {
 }
 
 /// A turn that leaves a link's surface as it is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Symmetry {
     /// Index of the link.
     pub link: usize,
@@ -125,7 +126,7 @@ pub struct Symmetry {
 }
 
 /// A robot: links and joints in tree order (parents before children, `links[0]` is the root).
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// Name of its folder in the library.
     pub name: String,

@@ -1,0 +1,313 @@
+//! Seeds and sizes in; plants of which one cell is scanned again, what the rescan found of what was changed, what it
+//! invented, and its time beside a run of the whole, out.
+
+use crate::atomic;
+use crate::bench::Journal;
+use crate::compare::Agreement;
+use crate::demo;
+use crate::engine::Engine;
+use crate::job::{Job, Means};
+use crate::rescan::{Cell, Wish, rescan};
+use crate::reuse::Manifest;
+use crate::scanning::{Formats, scan_scene};
+use crate::{library, plan};
+use contract::{Error, Result};
+use geometry::Vector;
+use serde::Serialize;
+use simulate::{Plant, Scene, sessions};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What is drawn.
+#[derive(Debug, Clone)]
+pub struct RescanBench {
+    /// Cases.
+    pub n_cases: usize,
+    /// Number of the first of them.
+    pub first: usize,
+    /// Seed of all.
+    pub seed: u64,
+    /// Robots of each plant, and scanners.
+    pub n_robots: usize,
+    /// See `n_robots`.
+    pub n_scanners: usize,
+    /// Angle between beams, degrees.
+    pub step_deg: f64,
+    /// Robot library; the demo's robots where left out.
+    pub robots: Option<PathBuf>,
+    /// Where rows go, and scans and results with `keep`.
+    pub out: Option<PathBuf>,
+    /// Keep scenes, scans and results.
+    pub keep: bool,
+}
+
+/// A found thing nearer to a true one than this is it, metres.
+const SAME_THING: f64 = 0.35;
+
+/// One case.
+#[derive(Debug, Clone, Default, Serialize)]
+struct Row {
+    seed: u64,
+    failed: Option<String>,
+    n_points: u64,
+    n_new: u64,
+    /// Whether each change was found.
+    robot: bool,
+    pallet: bool,
+    barrel: bool,
+    /// Changes that are none, in words.
+    invented: Vec<String>,
+    /// Largest error of a determined joint of the robot that moved, degrees: rescan, and a run of the new scans alone.
+    joint: [f64; 2],
+    /// F1 of moving points in the cell, likewise.
+    f1: [f64; 2],
+    /// Registration that is left, metres: least and largest of the scans.
+    left: [f64; 2],
+    /// Tiles that are the same bytes, and all of the base.
+    n_same: [usize; 2],
+    seconds: [f64; 2],
+}
+
+/// Runs the cases; returns the table.
+pub fn rescans(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {
+    let temporary = tempfile::tempdir()?;
+    let robots = match &bench.robots {
+        Some(dir) => dir.clone(),
+        None => {
+            demo::write_robots(&temporary.path().join("robots"))?;
+            temporary.path().join("robots")
+        }
+    };
+    let mut journal =
+        bench.out.as_deref().map(|dir| Journal::create(dir, "rescan.jsonl")).transpose()?;
+    let mut quiet = Engine::new(engine.n_workers);
+    quiet.cancel = engine.cancel.clone();
+    let mut rows = Vec::new();
+    for k in bench.first..bench.first + bench.n_cases {
+        engine.cancel.check()?;
+        let seed = bench.seed * 100_000 + k as u64;
+        let dir = match (&bench.out, bench.keep) {
+            (Some(out), true) => out.join(seed.to_string()),
+            _ => temporary.path().join("case"),
+        };
+        let mut row = Row { seed, ..Row::default() };
+        if let Err(error) = case(&mut row, bench, (&robots, &dir), (means, &quiet)) {
+            row.failed = Some(error.to_string());
+        }
+        if !bench.keep {
+            let _ = std::fs::remove_dir_all(&dir);
+        }
+        if let Some(journal) = &mut journal {
+            journal.add(&row)?;
+        }
+        engine.progress.say(&row.line());
+        rows.push(row);
+    }
+    let table = table(&rows);
+    if let Some(dir) = &bench.out {
+        atomic::write(&dir.join("rescan.md"), table.as_bytes())?;
+    }
+    Ok(table)
+}
+
+fn case(
+    row: &mut Row,
+    bench: &RescanBench,
+    (robots, dir): (&Path, &Path),
+    (means, engine): (&Means, &Engine),
+) -> Result<()> {
+    let models = library::load(robots, &means.settings.robot, None, engine)?.models;
+    let wanted = Plant {
+        seed: row.seed,
+        n_robots: bench.n_robots,
+        n_rows: bench.n_robots.div_ceil(5),
+        n_scanners: bench.n_scanners,
+        step_deg: bench.step_deg,
+        is_tight: false,
+        moves: false,
+    };
+    let [then, now] = sessions(&wanted, &models)?;
+    let formats = Formats { las: false, ..Formats::ALL };
+    let scanned = |scene: &Scene, name: &str| {
+        let scans = dir.join(name);
+        std::fs::create_dir_all(&scans).map_err(|e| Error::from(e).at(scans.display()))?;
+        let truth = scan_scene(scene, &models, &scans, formats, engine)?;
+        Ok::<_, Error>((scans, truth.scans.iter().map(|s| s.n_points).sum::<u64>()))
+    };
+    let ((old, n_points), (new, n_new)) = (scanned(&then, "then")?, scanned(&now, "now")?);
+    (row.n_points, row.n_new) = (n_points, n_new);
+    let job = |scans: &Path, out: &str| Job {
+        inputs: vec![scans.join("scans.e57")],
+        robots: robots.to_path_buf(),
+        scanners: None,
+        out: dir.join(out),
+        review: None,
+        means: means.clone(),
+    };
+    let started = Instant::now();
+    let whole = job(&old, "base");
+    plan::run(&whole, engine)?;
+    row.seconds[0] = started.elapsed().as_secs_f64();
+    let started = Instant::now();
+    let wish = Wish { base: whole.out.clone(), cell: Cell::Seen, job: job(&new, "again") };
+    rescan(&wish, engine)?;
+    row.seconds[1] = started.elapsed().as_secs_f64();
+    let alone = job(&new, "alone");
+    plan::run(&alone, engine)?;
+    let n_masks = then.scanners.len();
+    let found = [
+        Agreement::of_session(&wish.job.out, &new.join("truth"), n_masks)?,
+        Agreement::of(&alone.out, &new.join("truth"))?,
+    ];
+    for (i, agreement) in found.iter().enumerate() {
+        row.joint[i] = joint(agreement);
+        row.f1[i] = agreement.f1();
+    }
+    judge(row, (&then, &now), &wish.job.out)?;
+    row.n_same = same(&whole.out, &wish.job.out)?;
+    Ok(())
+}
+
+/// Largest error of a determined joint of the robot that moved, degrees.
+fn joint(agreement: &Agreement) -> f64 {
+    let found = agreement.robots.first().and_then(|robot| robot.found.as_ref());
+    let joints = found.iter().flat_map(|f| &f.joints).filter(|j| j.3);
+    joints
+        .map(|j| j.1.abs().to_degrees())
+        .fold(if found.is_some() { 0.0 } else { f64::NAN }, f64::max)
+}
+
+/// Compares the list of changes with what was changed.
+fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()> {
+    let path = out.join("changes.json");
+    let text = std::fs::read_to_string(&path).map_err(|e| Error::from(e).at(path.display()))?;
+    let changes: serde_json::Value = serde_json::from_str(&text)
+        .map_err(|e| Error::bad_input("the changes cannot be read").because(e))?;
+    let list = |name: &str| changes[name].as_array().cloned().unwrap_or_default();
+    let base = Vector::from(now.robots[0].xyz);
+    let result = export::ResultFile::read(out)?;
+    for robot in list("robots").iter().filter(|r| r["change"]["kind"] != "same") {
+        let id = robot["now"].as_str().or(robot["then"].as_str()).unwrap_or_default();
+        let entry = result.robots.iter().find(|r| r.id == id);
+        let is_it = entry.is_some_and(|e| (Vector::from(e.base_pose.xyz) - base).norm() < 0.5);
+        if is_it && robot["change"]["kind"] == "moved" {
+            row.robot = true;
+        } else {
+            row.invented.push(format!("{id} {}", robot["change"]["kind"]));
+        }
+    }
+    let middle = |thing: &serde_json::Value, when: &str| {
+        let corner = |k: usize, i: usize| thing[when][k][i].as_f64();
+        let at = |i: usize| Some(0.5 * (corner(0, i)? + corner(1, i)?));
+        Some([at(0)?, at(1)?])
+    };
+    let pallet = |scene: &Scene| {
+        let found = scene.boxes.iter().find(|b| b.name == "pallet");
+        found.map(|b| [b.xyz[0], b.xyz[1]]).unwrap_or_default()
+    };
+    let barrel = then.columns.iter().find(|c| c.name == "barrel").map(|c| c.xy).unwrap_or_default();
+    let is_at = |found: Option<[f64; 2]>, at: [f64; 2]| {
+        found.is_some_and(|f| (f[0] - at[0]).hypot(f[1] - at[1]) < SAME_THING)
+    };
+    for thing in &list("things") {
+        let (was, is) = (middle(thing, "then"), middle(thing, "now"));
+        match thing["change"].as_str() {
+            Some("moved") if is_at(was, pallet(then)) && is_at(is, pallet(now)) => {
+                row.pallet = true
+            }
+            Some("gone") if is_at(was, barrel) => row.barrel = true,
+            change => {
+                row.invented.push(format!("{} at {:?}", change.unwrap_or_default(), is.or(was)))
+            }
+        }
+    }
+    let off = list("scans").into_iter().zip(&now.scanners).map(|(found, scanner)| {
+        let shift = Vector::from([0, 1, 2].map(|i| found["shift"][i].as_f64().unwrap_or(f64::NAN)));
+        let real = scanner
+            .world_from_scan()
+            .and_then(|real| Ok((real, scanner.stated_world_from_scan()?)));
+        real.map_or(f64::NAN, |(real, stated)| {
+            // At the scanner; the turn is a hundredth of a degree.
+            (real.translation.vector - stated.translation.vector - shift).norm()
+        })
+    });
+    let off: Vec<f64> = off.collect();
+    row.left = [
+        off.iter().copied().fold(f64::INFINITY, f64::min),
+        off.iter().copied().fold(0.0, f64::max),
+    ];
+    Ok(())
+}
+
+/// Tiles of a base that a later result has with the same bytes, and all of them.
+fn same(base: &Path, out: &Path) -> Result<[usize; 2]> {
+    let tiles = |dir: &Path| -> Result<BTreeMap<String, String>> {
+        let files = Manifest::read(dir)?.files.into_iter().filter(|f| f.path.starts_with("tiles/"));
+        Ok(files.map(|f| (f.path, f.digest)).collect())
+    };
+    let (old, new) = (tiles(base)?, tiles(out)?);
+    Ok([old.iter().filter(|(path, digest)| new.get(*path) == Some(digest)).count(), old.len()])
+}
+
+impl Row {
+    fn line(&self) -> String {
+        if let Some(why) = &self.failed {
+            return format!("{}: failed: {why}", self.seed);
+        }
+        let yes = |b: bool| if b { "found" } else { "MISSED" };
+        format!(
+            "{}: {:.1} M points and {:.1} M new: {:.1} s, again {:.1} s ({:.1} %); robot {}, pallet {}, barrel {}, {} invented {:?}; joint {:.3}° ({:.3}° alone), F1 {:.4} ({:.4}), registration left {:.1} to {:.1} mm, {} of {} tiles the same",
+            self.seed,
+            self.n_points as f64 * 1e-6,
+            self.n_new as f64 * 1e-6,
+            self.seconds[0],
+            self.seconds[1],
+            100.0 * self.seconds[1] / self.seconds[0],
+            yes(self.robot),
+            yes(self.pallet),
+            yes(self.barrel),
+            self.invented.len(),
+            self.invented,
+            self.joint[0],
+            self.joint[1],
+            self.f1[0],
+            self.f1[1],
+            1e3 * self.left[0],
+            1e3 * self.left[1],
+            self.n_same[0],
+            self.n_same[1],
+        )
+    }
+}
+
+fn table(rows: &[Row]) -> String {
+    let mut out = String::from(
+        "| seed | points, new | whole s | again s | share | robot, pallet, barrel | invented | joint °, alone | F1, alone | tiles the same |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for row in rows.iter().filter(|r| r.failed.is_none()) {
+        let n = [row.robot, row.pallet, row.barrel].iter().filter(|b| **b).count();
+        let _ = writeln!(
+            out,
+            "| {} | {:.1} M, {:.1} M | {:.1} | {:.1} | {:.1} % | {n} of 3 | {} | {:.3}, {:.3} | {:.4}, {:.4} | {} of {} |",
+            row.seed,
+            row.n_points as f64 * 1e-6,
+            row.n_new as f64 * 1e-6,
+            row.seconds[0],
+            row.seconds[1],
+            100.0 * row.seconds[1] / row.seconds[0],
+            row.invented.len(),
+            row.joint[0],
+            row.joint[1],
+            row.f1[0],
+            row.f1[1],
+            row.n_same[0],
+            row.n_same[1],
+        );
+    }
+    for row in rows.iter().filter(|r| r.failed.is_some() || !r.invented.is_empty()) {
+        let _ = write!(out, "\n- {}", row.line());
+    }
+    out
+}

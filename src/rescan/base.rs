@@ -1,0 +1,139 @@
+//! The result that a rescan goes on from: its folder in; what it found, and its files shared with the new result, out.
+
+use super::state::State;
+use crate::job::Room;
+use crate::reuse::{Manifest, OutputFile};
+use crate::store::Store;
+use contract::{Error, Kind, Result};
+use export::{MaskReader, ResultFile, ScanLabels, read_places};
+use std::path::{Path, PathBuf};
+
+/// An earlier result that is whole.
+pub(crate) struct Base {
+    pub(crate) out: PathBuf,
+    pub(crate) result: ResultFile,
+    pub(crate) state: State,
+    /// Digest of its list of files, which names all of it.
+    pub(crate) digest: String,
+    files: Vec<OutputFile>,
+}
+
+impl Base {
+    /// Reads what a result says of itself.
+    ///
+    /// # Errors
+    /// No result, or one without its store.
+    pub(crate) fn open(out: &Path) -> Result<Self> {
+        let Manifest { files, .. } = Manifest::read(out)?;
+        let digest = Manifest::digest(out)?;
+        let (result, state) = (ResultFile::read(out)?, State::read(out)?);
+        let base = Self { out: out.to_path_buf(), result, state, digest, files };
+        for key in &base.state.tiles {
+            let folder = base.tiles_folder().join(key.name());
+            if !folder.is_dir() {
+                return Err(Error::bad_input("the tiles of the earlier result are not there")
+                    .at(folder.display())
+                    .hint("run the whole plant again: its store was taken away"));
+            }
+        }
+        Ok(base)
+    }
+
+    fn tiles_folder(&self) -> PathBuf {
+        self.out.join("store").join("tiles")
+    }
+
+    /// Makes its tiles and loaded models those of a new result, too.
+    pub(crate) fn share_store(&self, room: &Room) -> Result<()> {
+        for key in &self.state.tiles {
+            let (from, to) = (self.tiles_folder().join(key.name()), room.tiles().join(key.name()));
+            if !to.is_dir() {
+                share_folder(&from, &to)?;
+            }
+        }
+        share_folder(&self.out.join("store").join("models"), &room.models())
+    }
+
+    /// The store of its scans, as it lies with a new result.
+    pub(crate) fn store(&self, room: &Room, resident_bytes: usize) -> Result<Store> {
+        let open = |(input, key): (usize, &crate::reuse::Key)| {
+            let place = room.tiles().join(key.name());
+            Store::open(&place, self.state.first_scan(input), resident_bytes)
+        };
+        let stores: Result<Vec<Store>> = self.state.tiles.iter().enumerate().map(open).collect();
+        Ok(Store::join(stores?))
+    }
+
+    /// Gives the new result the files of this one but those that `is_new` says are made anew; returns them as they are
+    /// listed.
+    pub(crate) fn share_files(
+        &self,
+        next: &Path,
+        is_new: impl Fn(&str) -> bool,
+    ) -> Result<Vec<OutputFile>> {
+        let stay: Vec<OutputFile> =
+            self.files.iter().filter(|file| !is_new(&file.path)).cloned().collect();
+        for file in &stay {
+            share(&self.out.join(&file.path), &next.join(&file.path))?;
+        }
+        Ok(stay)
+    }
+
+    /// Whether the result has a file of this name.
+    pub(crate) fn has(&self, path: &str) -> bool {
+        self.files.iter().any(|file| file.path == path)
+    }
+
+    /// Names of its spatial tiles, as row and column, relative to its folder.
+    pub(crate) fn tiles(&self) -> Vec<(String, [i32; 2])> {
+        let at = |file: &OutputFile| {
+            let name = file.path.strip_prefix("tiles/")?;
+            let (x, y) = name.split_once('.')?.0.split_once('_')?;
+            Some((file.path.clone(), [y.parse().ok()?, x.parse().ok()?]))
+        };
+        self.files.iter().filter_map(at).collect()
+    }
+
+    /// Reads labels of each of its masks.
+    pub(crate) fn masks(&self) -> Vec<MaskReader> {
+        let reader = |s: &ScanLabels| MaskReader::new(&self.out, [&s.kind, &s.robot, &s.link]);
+        self.result.labels.scans.iter().map(reader).collect()
+    }
+
+    /// Places of each mask that were superseded before, ascending.
+    pub(crate) fn superseded(&self) -> Result<Vec<Vec<u64>>> {
+        let read = |s: &ScanLabels| {
+            let file = s.superseded.as_ref();
+            file.map_or(Ok(Vec::new()), |name| read_places(&self.out.join(name)))
+        };
+        self.result.labels.scans.iter().map(read).collect()
+    }
+}
+
+/// Every file of a folder under a second name; links where the system has them.
+fn share_folder(from: &Path, to: &Path) -> Result<()> {
+    let failed = |e: std::io::Error| Error::from(e).at(from.display());
+    for entry in std::fs::read_dir(from).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if let (true, Some(name)) = (path.is_file(), path.file_name()) {
+            share(&path, &to.join(name))?;
+        }
+    }
+    Ok(())
+}
+
+/// A file under a second name: nobody writes to it under either, so it takes no room twice. A copy where the two lie on
+/// different disks.
+fn share(from: &Path, to: &Path) -> Result<()> {
+    let made = to.parent().map_or(Ok(()), std::fs::create_dir_all);
+    let _ = std::fs::remove_file(to);
+    let shared = made.and_then(|()| {
+        std::fs::hard_link(from, to).or_else(|_| std::fs::copy(from, to).map(|_| ()))
+    });
+    shared.map_err(|e| {
+        Error::new(Kind::Io, "a file of the earlier result cannot be shared")
+            .because(e)
+            .at(from.display())
+            .hint("`stillpoint verify` tells whether the earlier result is whole")
+    })
+}

@@ -1,0 +1,169 @@
+//! One cell of a plant scanned again: an earlier result and new scans in; the same result with that cell brought up to date,
+//! and what changed, out. What the new scans do not touch is shared with the earlier result, byte for byte.
+
+mod base;
+mod past;
+mod present;
+mod robots;
+mod say;
+mod session;
+mod state;
+mod write;
+
+pub(crate) use state::{Records, State};
+
+use crate::engine::Engine;
+use crate::filling::Filling;
+use crate::job::{Job, Outcome};
+use crate::library;
+use crate::reuse::{self, Kept, Key, Manifest, Sums};
+use crate::search::Shelf;
+use crate::store::Store;
+use base::Base;
+use contract::{Error, Input, Kind, Result};
+use geometry::Aabb;
+use ingest::Scanners;
+use past::Past;
+use session::Session;
+use std::path::{Path, PathBuf};
+use write::Written;
+
+/// What is to be done.
+#[derive(Debug, Clone)]
+pub struct Wish {
+    /// Output folder of the result that is gone on from.
+    pub base: PathBuf,
+    /// Which part of the plant.
+    pub cell: Cell,
+    /// The new scans, where the result goes, and the means; the library is that of the base where its path is empty.
+    pub job: Job,
+}
+
+/// Which part of a plant was scanned again.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// Within these bounds, world, metres.
+    Box(Aabb),
+    /// All that these robots reach, by their ids.
+    Robots(Vec<String>),
+    /// What the new scans see well.
+    Seen,
+}
+
+/// Brings a cell up to date.
+///
+/// # Errors
+/// A base that is no whole result, an input that is part of it already; what a run may end with.
+pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
+    let base = Base::open(&wish.base)?;
+    let job = job(wish, &base)?;
+    let settings = &job.means.settings;
+    let room = job.room()?;
+    let sums = Sums::of(&job, &room, engine)?
+        .after(base.state.inputs.len(), format!("{} {:?}", base.digest, wish.cell));
+    if let Some(manifest) = sums.unchanged(&job, &room)? {
+        return Ok(manifest.outcome());
+    }
+    base.share_store(&room)?;
+    let shelved = Kept::new(room.models(), sums.models(settings));
+    let library = library::load(&job.robots, &settings.robot, Some(&shelved), engine)?;
+    let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+    let before = base.state.before();
+    let mut sources = ingest::open_after(before, &job.inputs, scanners.as_ref(), &settings.ingest)?;
+
+    // The new scans into tiles; those of the plant are there.
+    let filling = Filling::new(&sources, &job.means, room.tiles(), engine);
+    let filled = sources.opened().iter().map(|i| filling.tiles_of(i, &sums));
+    let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
+    let n_kept = filling.n_kept();
+    sources.opened().iter().try_for_each(|input| fresh(input, &base, &sums))?;
+    let (old, new) = (base.store(&room, job.means.store_bytes())?, Store::join(stores));
+
+    // Where the cell is, and how far the new scans are off what stood there: they are taken back by that.
+    let mut fits = base.state.fits.clone();
+    let mut models = robots::models_of(&mut fits, &library)?;
+    let cell = session::bounds(&wish.cell, &base, (&fits, &models), (&sources, &new))?;
+    let scans = base.state.scans.clone();
+    let past = Past::new(&base, &scans, &old, cell)?;
+    let registered = session::register(&past, &mut sources, &new, engine)?;
+
+    // Robots and things of the cell, then and now.
+    let shelf = Shelf::new(&library.models);
+    let session = Session::new(&base, &sources, (&past, &new), &shelf, settings, engine)?;
+    let (robots, labels) = session.compare((&mut fits, &mut models), engine)?;
+
+    // New masks and records of the new scans, tiles of the cell anew, all the rest as it was.
+    let written = Written {
+        base: &base,
+        session: &session,
+        robots: &robots,
+        labels: &labels,
+        models: &models,
+        fits: &fits,
+    }
+    .write(&registered, (&room, &sums), engine)?;
+    sources.opened().iter().try_for_each(|input| sums.check(input))?;
+    let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
+    let stays = |i: &usize| !robots.changed.contains(i) && !robots.gone.contains(i);
+    for i in (0..base.state.fits.len()).filter(stays) {
+        fits[i].clone_from(&base.state.fits[i]);
+    }
+    let state = State {
+        inputs: sources.inputs.clone(),
+        masks: sources.masks.clone(),
+        scans: sources.scans.clone(),
+        tiles: all.clone(),
+        fits,
+        robots: job.robots.clone(),
+        ..base.state.clone()
+    };
+    state.write(room.next())?;
+    Manifest::write(room.next(), sums.whole(&job), (&written.outcome, written.known), engine)?;
+    sums.remember(&Manifest::publish(room.next(), room.out())?, room.out())?;
+    room.prune_tiles(&all, &shelved);
+    let mut outcome = written.outcome;
+    outcome.reused = reuse::said(&[
+        ("models", shelved.n_kept()),
+        ("tiles of new scans", n_kept),
+        ("files of the earlier result", written.n_shared),
+    ]);
+    Ok(outcome)
+}
+
+/// The job with the base's library and ways of writing.
+fn job(wish: &Wish, base: &Base) -> Result<Job> {
+    let mut job = wish.job.clone();
+    if job.robots.as_os_str().is_empty() {
+        job.robots.clone_from(&base.state.robots);
+    }
+    if !job.robots.is_dir() {
+        return Err(Error::new(Kind::Usage, "the robot library is not there")
+            .at(job.robots.display())
+            .hint("name it with --robots"));
+    }
+    let same = |a: &Path, b: &Path| std::fs::canonicalize(a).ok() == std::fs::canonicalize(b).ok();
+    if job.out.exists() && same(&job.out, &wish.base) {
+        return Err(Error::new(
+            Kind::Usage,
+            "a rescan does not write over the result it goes on from",
+        )
+        .at(job.out.display())
+        .hint("give another --out"));
+    }
+    job.means.settings.export = base.state.records.export(&job.means.settings.export);
+    Ok(job)
+}
+
+/// Refuses an input that the base was made of.
+fn fresh(input: &Input, base: &Base, sums: &Sums) -> Result<()> {
+    let own = sums.input(input).unwrap_or_default();
+    match base.result.inputs.iter().find(|i| i.digest == own) {
+        None => Ok(()),
+        Some(known) => {
+            Err(Error::new(Kind::Usage, "this scan is part of the earlier result already")
+                .because(format!("it was read as {}", known.path))
+                .at(input.path.display())
+                .hint("give the scans of the new session only"))
+        }
+    }
+}

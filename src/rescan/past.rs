@@ -1,0 +1,233 @@
+//! Points of earlier scans in a cell in; the surfaces that they lie on, what the new scans say of each of them, and which of
+//! them are superseded, out.
+
+use super::base::Base;
+use crate::engine::{Engine, Task};
+use crate::report::tiles;
+use crate::store::Store;
+use contract::{Label, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
+use export::MaskReader;
+use geometry::{Aabb, Point};
+use merge::{Sight, Surfaces, Tally, Watch};
+use std::collections::BTreeSet;
+
+/// Of so many points one tells the surfaces: a tenth of a voxel's points is enough for its plane.
+const SAMPLE: usize = 5;
+/// Places so far apart are read from the mask one after the other.
+const GAP: u64 = 1 << 14;
+
+/// Earlier points in a cell.
+pub(crate) struct Past<'a> {
+    pub(crate) scans: &'a [Scan],
+    pub(crate) store: &'a Store,
+    pub(crate) cell: Aabb,
+    masks: Vec<MaskReader>,
+    /// By mask: places that were superseded before.
+    before: Vec<Vec<u64>>,
+    tiles: Vec<usize>,
+}
+
+/// What the new scans say of the points of one tile.
+#[derive(Default)]
+pub(crate) struct Looked {
+    mask: u32,
+    /// Places where they saw a surface: it was measured anew.
+    onto: Vec<u64>,
+    /// Places that their beams went through, with their voxels.
+    through: Vec<(u64, [i32; 3])>,
+    /// Places that belong to robots.
+    robots: Vec<(u64, i16)>,
+    tally: Tally,
+}
+
+impl<'a> Past<'a> {
+    pub(crate) fn new(
+        base: &Base,
+        scans: &'a [Scan],
+        store: &'a Store,
+        cell: Aabb,
+    ) -> Result<Self> {
+        let (masks, before) = (base.masks(), base.superseded()?);
+        Ok(Self { scans, store, cell, masks, before, tiles: store.touching(&cell) })
+    }
+
+    /// The surfaces of what stood there.
+    pub(crate) fn surfaces(&self, engine: &Engine) -> Result<Surfaces> {
+        let (mut all, sample) = (Surfaces::default(), Sample(self));
+        engine.pass(self.task("register"), self.store.tiles_of(self.tiles.clone()), |f| {
+            f.map(&sample).for_each(|own| {
+                all.join(own.0);
+                Ok(())
+            })
+        })?;
+        Ok(all)
+    }
+
+    /// Asks the new scans about every point.
+    pub(crate) fn look(&self, watch: &Watch<'_>, engine: &Engine) -> Result<(Tally, Vec<Looked>)> {
+        let (mut tally, mut all) = (Tally::default(), Vec::new());
+        let look = Look { past: self, watch };
+        engine.pass(self.task("compare"), self.store.tiles_of(self.tiles.clone()), |f| {
+            f.map(&look).for_each(|mut looked| {
+                tally.join(std::mem::take(&mut looked.tally));
+                all.push(looked);
+                Ok(())
+            })
+        })?;
+        Ok((tally, all))
+    }
+
+    /// All places that are superseded now, by mask, ascending: those that were measured anew, those of things that are gone,
+    /// and those of robots that stand otherwise.
+    pub(crate) fn superseded(
+        &self,
+        looked: &[Looked],
+        gone: &BTreeSet<[i32; 3]>,
+        stands_otherwise: impl Fn(i16) -> bool,
+    ) -> Vec<Vec<u64>> {
+        let mut all = self.before.clone();
+        for tile in looked {
+            let own = &mut all[tile.mask as usize];
+            own.extend(&tile.onto);
+            let away = tile.through.iter().filter(|(_, cell)| gone.contains(cell));
+            own.extend(away.map(|(place, _)| *place));
+            let left = tile.robots.iter().filter(|(_, robot)| stands_otherwise(*robot));
+            own.extend(left.map(|(place, _)| *place));
+        }
+        for places in &mut all {
+            places.sort_unstable();
+            places.dedup();
+        }
+        all
+    }
+
+    /// How many of one mask were superseded before.
+    pub(crate) fn n_of(&self, mask: usize) -> usize {
+        self.before[mask].len()
+    }
+
+    /// How many were superseded before.
+    pub(crate) fn n_before(&self) -> u64 {
+        self.before.iter().map(|places| places.len() as u64).sum()
+    }
+
+    fn task(&self, name: &str) -> Task {
+        let n_points = self.tiles.iter().map(|&i| self.store.entries()[i].n_points).sum();
+        let amount =
+            crate::progress::Amount { items: self.tiles.len() as u64, points: n_points, bytes: 0 };
+        tiles(name, self.store).of(amount)
+    }
+
+    fn scan(&self, tile: &Tile) -> (&Scan, MaskId) {
+        let scan = &self.scans[tile.at.scan.0 as usize];
+        (scan, scan.mask)
+    }
+
+    /// Labels of a tile's points.
+    fn labels(&self, mask: MaskId, places: &[u64]) -> Result<Vec<Label>> {
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_unstable_by_key(|&i| places[i]);
+        let mut labels = vec![Label::UNCERTAIN; places.len()];
+        for group in order.chunk_by(|&a, &b| places[b] - places[a] < GAP) {
+            let first = places[group[0]];
+            let n = places[group[group.len() - 1]] - first + 1;
+            let read = self.masks[mask.0 as usize].range(first, n as usize)?;
+            group.iter().for_each(|&i| labels[i] = read[(places[i] - first) as usize]);
+        }
+        Ok(labels)
+    }
+}
+
+/// The map that gathers surfaces.
+struct Sample<'a>(&'a Past<'a>);
+
+struct Sampled(Surfaces);
+
+impl Map for Sample<'_> {
+    type In = Tile;
+    type Out = Sampled;
+    type Scratch = ();
+
+    fn apply(&self, tile: Tile, (): &mut ()) -> Result<Sampled> {
+        let (scan, mask) = self.0.scan(&tile);
+        let old = &self.0.before[mask.0 as usize];
+        let mut out = Surfaces::default();
+        for i in (0..tile.len()).step_by(SAMPLE) {
+            let world = world(scan, tile.xyz[i]);
+            let place = tile.first_place + u64::from(tile.place[i]);
+            if self.0.cell.contains(world) && old.binary_search(&place).is_err() {
+                out.add(world);
+            }
+        }
+        Ok(Sampled(out))
+    }
+}
+
+/// The map that asks the new scans.
+struct Look<'a> {
+    past: &'a Past<'a>,
+    watch: &'a Watch<'a>,
+}
+
+impl Map for Look<'_> {
+    type In = Tile;
+    type Out = Looked;
+    type Scratch = ();
+
+    fn apply(&self, tile: Tile, (): &mut ()) -> Result<Looked> {
+        let (scan, mask) = self.past.scan(&tile);
+        let old = &self.past.before[mask.0 as usize];
+        let (mut places, mut worlds) = (Vec::new(), Vec::new());
+        for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
+            let (world, place) = (world(scan, *xyz), tile.first_place + u64::from(*place));
+            if self.past.cell.contains(world) && old.binary_search(&place).is_err() {
+                places.push(place);
+                worlds.push(world);
+            }
+        }
+        let labels = self.past.labels(mask, &places)?;
+        let mut out = Looked { mask: mask.0, ..Looked::default() };
+        for ((place, world), label) in places.into_iter().zip(worlds).zip(labels) {
+            let sight = self.watch.look(world);
+            match sight {
+                Sight::Onto => out.onto.push(place),
+                Sight::Through => out.through.push((place, Tally::cell(world))),
+                Sight::Hidden | Sight::Unseen => {}
+            }
+            match label.kind {
+                PointKind::Fixed => out.tally.add(world, sight == Sight::Through),
+                PointKind::Link | PointKind::Attachment => {
+                    out.robots.push((place, label.robot));
+                    out.tally.add_robot(world);
+                }
+                PointKind::Floor | PointKind::Uncertain => {}
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// A point of a scan in the world, metres.
+pub(crate) fn world(scan: &Scan, xyz: [f32; 3]) -> [f64; 3] {
+    (scan.world_from_scan * Point::from(xyz.map(f64::from))).coords.into()
+}
+
+impl Weigh for Sampled {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>()
+    }
+
+    fn n_points(&self) -> u64 {
+        0
+    }
+}
+
+impl Weigh for Looked {
+    fn weight_bytes(&self) -> usize {
+        size_of_val(&*self.onto) + size_of_val(&*self.through) + size_of_val(&*self.robots)
+    }
+
+    fn n_points(&self) -> u64 {
+        0
+    }
+}

@@ -1,0 +1,98 @@
+//! Points of the new scans in; how far each scan is off the plant, and what stands still in the cell now, out.
+
+use super::past::world;
+use crate::engine::Engine;
+use crate::labelling::Near;
+use crate::report::tiles;
+use crate::store::Store;
+use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
+use geometry::{Aabb, Point};
+use merge::{Registration, Sight, Surfaces, Tally, Watch};
+use segment::Ground;
+
+/// Points of a scan that are laid on the plant's surfaces, about.
+const N_LAID: u64 = 300_000;
+
+/// How each new scan, from the number `first` on, is off the plant; none where too little of what stood is seen.
+pub(crate) fn register(
+    surfaces: &Surfaces,
+    (scans, first): (&[Scan], usize),
+    (store, cell): (&Store, &Aabb),
+    engine: &Engine,
+) -> Result<Vec<Option<Registration>>> {
+    let touching = store.touching(cell);
+    engine.fan_out("register", scans[first..].iter().collect(), |scan| {
+        let entries = || touching.iter().filter(|&&i| store.entries()[i].at.scan == scan.id);
+        let n: u64 = entries().map(|&i| store.entries()[i].n_points).sum();
+        let step = (n / N_LAID).max(1) as usize;
+        let mut points = Vec::new();
+        for &i in entries() {
+            let tile = store.tile(i)?;
+            let worlds = tile.xyz.iter().step_by(step).map(|p| world(scan, *p));
+            points.extend(worlds.filter(|p| cell.contains(*p)));
+        }
+        Ok(surfaces.register(&points, &Point::from(cell.center().coords)))
+    })
+}
+
+/// What stands still in a cell, and where the earlier scans saw nothing.
+pub(crate) struct Present<'a> {
+    pub(crate) scans: &'a [Scan],
+    pub(crate) near: &'a Near,
+    pub(crate) ground: &'a Ground,
+    pub(crate) cell: Aabb,
+    /// Earlier scans.
+    pub(crate) watch: &'a Watch<'a>,
+}
+
+/// What one tile adds.
+pub(crate) struct Tallied(Tally);
+
+impl Present<'_> {
+    pub(crate) fn tally(&self, store: &Store, engine: &Engine) -> Result<Tally> {
+        let mut all = Tally::default();
+        let source = store.tiles_of(store.touching(&self.cell));
+        engine.pass(tiles("compare", store), source, |f| {
+            f.map(self).for_each(|own| {
+                all.join(own.0);
+                Ok(())
+            })
+        })?;
+        Ok(all)
+    }
+}
+
+impl Map for Present<'_> {
+    type In = Tile;
+    type Out = Tallied;
+    type Scratch = ();
+
+    fn apply(&self, tile: Tile, (): &mut ()) -> Result<Tallied> {
+        let scan = &self.scans[tile.at.scan.0 as usize];
+        let mut out = Tally::default();
+        for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
+            let world = world(scan, *xyz);
+            if !self.cell.contains(world) {
+                continue;
+            }
+            let known = self.near.label(scan.mask, tile.first_place + u64::from(*place));
+            let label: Label = known.unwrap_or_else(|| self.ground.label(world));
+            match label.kind {
+                PointKind::Fixed => out.add(world, self.watch.look(world) == Sight::Through),
+                PointKind::Link | PointKind::Attachment => out.add_robot(world),
+                PointKind::Floor | PointKind::Uncertain => {}
+            }
+        }
+        Ok(Tallied(out))
+    }
+}
+
+impl Weigh for Tallied {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>()
+    }
+
+    fn n_points(&self) -> u64 {
+        0
+    }
+}

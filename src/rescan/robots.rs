@@ -1,0 +1,161 @@
+//! A robot of the earlier result, and what the new scans saw, in; how it stands now, or that it is gone, out.
+
+use crate::engine::Engine;
+use crate::search::Search;
+use crate::spaces::{poses, reach};
+use crate::tools::dress;
+use contract::{Error, Fit, Region, Result, Verdict};
+use geometry::{Aabb, Point};
+use merge::{Sight, Watch};
+use robot::{Library, Model};
+
+/// Points of each link's surface that the new scans are asked about.
+const ASKED: usize = 400;
+/// Share of those that they must have judged for the robot to be compared at all.
+const MIN_JUDGED: f64 = 0.06;
+/// Share of the judged that they went through up to which it may still stand so, though too little of it is seen for a fit;
+/// and from which on it does not stand so any more. Fences and edges make up to a tenth.
+const STANDS: f64 = 0.1;
+const CONTRADICTED: f64 = 0.25;
+/// The same of the link that it stands on: it has gone.
+const GONE: f64 = 0.6;
+/// A base farther from the old one is another robot's, metres.
+const SAME_PLACE: f64 = 0.5;
+
+/// How a robot stands now.
+pub(crate) enum Now {
+    /// As found by the new scans.
+    Found(Fit),
+    /// It stands no longer there.
+    Gone,
+    /// The new scans saw too little of it.
+    Unseen,
+    /// They contradict how it stood, and show no other posture.
+    Lost,
+}
+
+/// What the new scans say of a posture: points of the surface that were judged, of all, and gone through, of the judged;
+/// and the same share of the link it stands on.
+struct Said {
+    judged: f64,
+    through: f64,
+    foot: f64,
+}
+
+/// The models that earlier fits are of, rebuilt from a library: those with tools or with other loops after its own.
+///
+/// # Errors
+/// A model that the library no longer has.
+pub(crate) fn models_of(fits: &mut [Fit], library: &Library) -> Result<Vec<Model>> {
+    let mut models = library.models.clone();
+    for fit in fits {
+        let missing = |name: &str| {
+            let what =
+                format!("the library has no model \"{name}\", which the earlier result found");
+            Error::bad_input(what).hint("give the library of the earlier run with --robots")
+        };
+        let known = |name: &str| library.model(name).ok_or_else(|| missing(name));
+        fit.model = known(&fit.model_name)?;
+        let mut own = (!fit.other_branches.is_empty())
+            .then(|| models[fit.model].with_other_branches(&fit.other_branches));
+        if let Some(tool) = &fit.tool {
+            let arm = own.as_ref().unwrap_or(&models[fit.model]);
+            let flange = arm.links.iter().position(|l| l.name == tool.link).unwrap_or(0);
+            own = Some(arm.with_tool(&models[known(&tool.model)?], flange, tool.mount));
+        }
+        if let Some(own) = own {
+            fit.model = models.len();
+            models.push(own);
+        }
+    }
+    Ok(models)
+}
+
+/// World bounds of a robot as it stands.
+pub(crate) fn bounds(fit: &Fit, model: &Model) -> Aabb {
+    let mut out = Aabb::EMPTY;
+    for (link, pose) in model.links.iter().zip(poses(fit, model)) {
+        if !link.bounds.is_empty() {
+            link.bounds.corners().into_iter().for_each(|c| out.add((pose * Point::from(c)).into()));
+        }
+    }
+    out
+}
+
+/// Looks at one robot again; `regions` are those of the new scans. The model is its own, where it is none of the library.
+pub(crate) fn look(
+    before: &Fit,
+    models: &[Model],
+    (search, watch, regions): (&Search<'_, '_>, &Watch<'_>, &[Region]),
+    engine: &Engine,
+) -> Result<(Now, Option<Model>)> {
+    let model = &models[before.model];
+    let said = said(before, model, watch);
+    if said.judged < MIN_JUDGED {
+        return Ok((Now::Unseen, None));
+    }
+    let region = home(before, model, regions);
+    if before.calibration.is_none()
+        && let Some(fit) = search.again(&region, before, model)?
+    {
+        let is_same = !crate::changes::stands_otherwise(before, &fit);
+        if fit.verdict == Verdict::Trusted || is_same && fit.verdict != Verdict::Refused {
+            let verdict = if is_same { fit.verdict.max(before.verdict) } else { fit.verdict };
+            return Ok((Now::Found(Fit { verdict, ..fit }), None));
+        }
+    }
+    if said.through < STANDS && before.verdict != Verdict::Refused {
+        return Ok((Now::Unseen, None));
+    }
+    let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
+    let mut found: Vec<Fit> =
+        search.on_base(&region, bare, &before.world_from_base)?.into_iter().collect();
+    if found.iter().all(|f| f.verdict != Verdict::Trusted) {
+        found.extend(search.region(&region)?);
+        found = fit::choose(found, models);
+    }
+    let base = before.world_from_base.translation.vector;
+    found.retain(|fit| (fit.world_from_base.translation.vector - base).norm() < SAME_PLACE);
+    let mut own = if found.is_empty() { Vec::new() } else { models.to_vec() };
+    let dressed = dress(found, &mut own, (search, &[region]), engine)?;
+    Ok(match dressed.into_iter().max_by(|a, b| a.verdict.cmp(&b.verdict)) {
+        Some(fit) => {
+            let dressed = (fit.model >= models.len()).then(|| own.swap_remove(fit.model));
+            (Now::Found(fit), dressed)
+        }
+        None if said.foot > GONE => (Now::Gone, None),
+        None if said.through > CONTRADICTED => (Now::Lost, None),
+        None => (Now::Unseen, None),
+    })
+}
+
+/// The region of the new scans that a robot stands in; all that it can get to, where it stands in none.
+fn home(fit: &Fit, model: &Model, regions: &[Region]) -> Region {
+    let base = fit.world_from_base.translation.vector;
+    let own = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(base.into()));
+    own.copied().unwrap_or_else(|| reach(fit, model))
+}
+
+fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> Said {
+    let (mut n, mut judged, mut through) = (0_usize, 0_usize, 0_usize);
+    let mut foot = None;
+    for (link, pose) in model.links.iter().zip(poses(fit, model)) {
+        let step = (link.cad.points.len() / ASKED).max(1);
+        let (mut own, mut gone) = (0_usize, 0_usize);
+        for p in link.cad.points.iter().step_by(step) {
+            n += 1;
+            let sight = watch.look((pose * Point::from(p.map(f64::from))).into());
+            own += usize::from(sight >= Sight::Through);
+            gone += usize::from(sight == Sight::Through);
+        }
+        (judged, through) = (judged + own, through + gone);
+        if own > 0 && foot.is_none() {
+            foot = Some(gone as f64 / own as f64);
+        }
+    }
+    Said {
+        judged: judged as f64 / n.max(1) as f64,
+        through: through as f64 / judged.max(1) as f64,
+        foot: foot.unwrap_or(0.0),
+    }
+}

@@ -1,0 +1,297 @@
+//! What a rescan found in; the result of the whole plant, the list of changes as JSON, CSV and picture, and a summary for
+//! people, out.
+
+use super::base::Base;
+use super::session::{Labels, Robots, Session};
+use crate::changes::{Change, RobotChange, changes, words};
+use crate::job::Outcome;
+use crate::labelling::Done;
+use crate::report::{id, input_entry, robot_entry};
+use crate::reuse::Sums;
+use contract::{Error, Fit, Kind, Result, Verdict};
+use export::{
+    ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, RobotEntry,
+    ScanLabels, draw_changes, write_table,
+};
+use merge::{Registration, Thing, ThingChange};
+use robot::Model;
+use serde_json::json;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Files that are written here.
+pub(crate) const NAMES: [&str; 6] = [
+    "result.json",
+    "plant.bin",
+    "labels/table.json",
+    "changes.json",
+    "changes.csv",
+    "pictures/changes.png",
+];
+
+/// Everything that is said.
+pub(crate) struct Said<'a, 's> {
+    pub(crate) base: &'a Base,
+    pub(crate) session: &'a Session<'s>,
+    pub(crate) robots: &'a Robots,
+    pub(crate) labels: &'a Labels,
+    pub(crate) models: &'a [Model],
+    pub(crate) fits: &'a [Fit],
+    pub(crate) done: &'a Done,
+    pub(crate) registered: &'a [Option<Registration>],
+    /// By mask of the base: the list of its superseded places.
+    pub(crate) lists: &'a [Option<String>],
+    pub(crate) n_superseded: u64,
+}
+
+impl Said<'_, '_> {
+    pub(crate) fn finish(&self, sums: &Sums, next: &Path) -> Result<Outcome> {
+        let result = self.result(sums);
+        let robots = self.changes(&result);
+        write_table(next, &result.robots)?;
+        let all = json!({
+            "schema": "stillpoint.changes/1",
+            "base": self.base.out.display().to_string(),
+            "cell": result.rescan.as_ref().map(|r| r.cell),
+            "scans": result.rescan.as_ref().map(|r| &r.scans),
+            "robots": robots,
+            "things": self.labels.things.iter().map(thing).collect::<Vec<_>>(),
+            "not_compared": self.robots.unseen.iter().map(|&i| id(i)).collect::<Vec<_>>(),
+        });
+        let text = serde_json::to_string_pretty(&all)
+            .map_err(|e| Error::new(Kind::Bug, "changes cannot be written").because(e))?;
+        crate::atomic::write(&next.join("changes.json"), (text + "\n").as_bytes())?;
+        crate::atomic::write(&next.join("changes.csv"), self.csv(&robots).as_bytes())?;
+        self.draw().write(&next.join("pictures/changes.png"))?;
+        result.write(next)?;
+        let summary = self.summary(&robots);
+        Ok(Outcome { summary, warnings: result.warnings, ..Outcome::default() })
+    }
+
+    /// The result of the whole plant: entries of what did not change are those of the base.
+    fn result(&self, sums: &Sums) -> ResultFile {
+        let mut result = self.base.result.clone();
+        for &i in self.robots.changed.iter().chain(&self.robots.gone) {
+            let space = self.done.spaces[i].clone();
+            let entry = robot_entry(i, &self.fits[i], &self.models[self.fits[i].model], space);
+            if i < result.robots.len() {
+                result.robots[i] = entry
+            } else {
+                result.robots.push(entry)
+            }
+        }
+        for (scan, list) in result.labels.scans.iter_mut().zip(self.lists) {
+            scan.superseded.clone_from(list);
+        }
+        let sources = self.session.sources;
+        let masks = sources.opened_masks().iter().zip(&self.done.masks);
+        result.labels.scans.extend(masks.map(|(m, count)| ScanLabels::new(m, count.n_points)));
+        result.labels.table = LabelFiles::TABLE.into();
+        let inputs = sources
+            .opened()
+            .iter()
+            .map(|input| input_entry(sources, input, sums, &self.done.masks));
+        result.inputs.extend(inputs);
+        result.warnings.extend(sources.warnings.iter().cloned());
+        result.warnings.extend(self.warnings());
+        let cell = &self.session.past.cell;
+        result.rescan = Some(RescanEntry {
+            base: self.base.digest.clone(),
+            cell: [cell.min, cell.max],
+            inputs: sources.opened().iter().map(|i| i.id.0).collect(),
+            robots: self.robots.in_cell.iter().chain(&self.robots.gone).map(|&i| id(i)).collect(),
+            scans: self.registrations(),
+            n_superseded: self.n_superseded,
+            changes: "changes.json".into(),
+        });
+        result
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        let first = self.session.past.scans.len();
+        for (scan, found) in self.session.sources.scans[first..].iter().zip(self.registered) {
+            if found.is_none() {
+                out.push(format!(
+                    "scan '{}' shares too few surfaces with the plant: it is taken as it is placed",
+                    scan.name
+                ));
+            }
+        }
+        if ["las", "laz"].iter().any(|end| self.base.has(&format!("clouds/fixed.{end}"))) {
+            let what = "clouds/fixed is not made by a rescan: tiles/ hold the same points by class";
+            out.push(what.into());
+        }
+        out
+    }
+
+    fn registrations(&self) -> Vec<RegistrationEntry> {
+        let first = self.session.past.scans.len();
+        let about = self.session.past.cell.center();
+        let scans = self.session.sources.scans[first..].iter().zip(self.registered);
+        let entry = |(scan, found): (&contract::Scan, &Option<Registration>)| {
+            let found = found.as_ref()?;
+            let shift = found.plant_from_stated * about - about;
+            Some(RegistrationEntry {
+                scan: scan.name.clone(),
+                shift: shift.into(),
+                turn: found.plant_from_stated.rotation.scaled_axis().into(),
+                sigma: found.sigma,
+                rms: found.rms,
+            })
+        };
+        scans.filter_map(entry).collect()
+    }
+
+    /// Robots of the cell, then and now.
+    fn changes(&self, result: &ResultFile) -> Vec<RobotChange> {
+        let standing = |robots: &[RobotEntry]| {
+            let refused = Verdict::Refused.word();
+            robots.iter().filter(|r| r.verdict != refused).cloned().collect()
+        };
+        let then = ResultFile { robots: standing(&self.base.result.robots), ..result.clone() };
+        let now = ResultFile { robots: standing(&result.robots), ..result.clone() };
+        let looked: Vec<String> =
+            self.robots.in_cell.iter().chain(&self.robots.gone).map(|&i| id(i)).collect();
+        let mut all = changes(&then, &now);
+        all.retain(|c| c.then.iter().chain(&c.now).any(|id| looked.contains(id)));
+        all
+    }
+
+    fn csv(&self, robots: &[RobotChange]) -> String {
+        let mut text =
+            String::from("what,id,change,x_m,y_m,z_m,dx_m,dy_m,dz_m,joint,then,now,sigma\n");
+        for robot in robots.iter().filter(|r| r.change != Change::Same) {
+            let id = robot.now.as_ref().or(robot.then.as_ref()).cloned().unwrap_or_default();
+            let word = robot.change.word();
+            let at = self.place(&id);
+            let [dx, dy, dz] = robot.base_shift.unwrap_or_default();
+            let _ = writeln!(text, "robot,{id},{word},{at},{dx:.4},{dy:.4},{dz:.4},,,,");
+            for joint in robot.joints.iter().filter(|j| j.is_change) {
+                let sigma = joint.then[1].hypot(joint.now[1]);
+                let (name, then, now) = (&joint.joint, joint.then[0], joint.now[0]);
+                let _ = writeln!(
+                    text,
+                    "joint,{id},{word},{at},,,,\"{name}\",{then:.6},{now:.6},{sigma:.6}"
+                );
+            }
+        }
+        for (k, thing) in self.labels.things.iter().enumerate() {
+            let at = thing.now.or(thing.then).map(|b| b.center()).unwrap_or_default();
+            let [dx, dy, dz] = thing.shift.unwrap_or_default();
+            let _ = writeln!(
+                text,
+                "thing,T{},{},{:.3},{:.3},{:.3},{dx:.3},{dy:.3},{dz:.3},,,,",
+                k + 1,
+                word(thing.change),
+                at.x,
+                at.y,
+                at.z
+            );
+        }
+        text
+    }
+
+    fn place(&self, robot: &str) -> String {
+        let at = (0..self.fits.len()).find(|&i| id(i) == robot);
+        let p = at.map(|i| self.fits[i].world_from_base.translation.vector).unwrap_or_default();
+        format!("{:.3},{:.3},{:.3}", p.x, p.y, p.z)
+    }
+
+    fn draw(&self) -> export::Canvas {
+        let things = self.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
+            name: format!("T{} {}", k + 1, word(thing.change)),
+            gone: merge::Tally::middles(&thing.gone),
+            filled: merge::Tally::middles(&thing.filled),
+            at: thing.now.or(thing.then).map(|b| b.center().into()).unwrap_or_default(),
+        });
+        let robots = self.robots.in_cell.iter().chain(&self.robots.gone).map(|&i| {
+            let p = self.fits[i].world_from_base.translation.vector;
+            let changed = self.robots.changed.contains(&i);
+            let word = match self.fits[i].verdict {
+                Verdict::Refused => " gone",
+                _ if changed => " changed",
+                _ => "",
+            };
+            (format!("{}{word}", id(i)), [p.x, p.y])
+        });
+        draw_changes(
+            &self.session.past.cell,
+            &self.labels.now.solid(),
+            &things.collect::<Vec<_>>(),
+            &robots.collect::<Vec<_>>(),
+        )
+    }
+
+    fn summary(&self, robots: &[RobotChange]) -> String {
+        let mut text = String::new();
+        let size = self.session.past.cell.size();
+        let _ = writeln!(
+            text,
+            "a cell of {:.1} x {:.1} x {:.1} m, {} robot(s) looked at again",
+            size[0],
+            size[1],
+            size[2],
+            self.robots.in_cell.len() + self.robots.gone.len()
+        );
+        for scan in self.registrations() {
+            let [x, y, z] = scan.shift.map(|v| v * 1e3);
+            let turn = scan.turn.iter().map(|v| v * v).sum::<f64>().sqrt().to_degrees();
+            let _ = writeln!(
+                text,
+                "  scan '{}' was off by ({:.1}, {:.1}, {:.1}) mm, {turn:.3}°",
+                scan.scan, -x, -y, -z
+            );
+        }
+        for line in words(robots).lines() {
+            let _ = writeln!(text, "  {line}");
+        }
+        for (k, thing) in self.labels.things.iter().enumerate() {
+            let at = thing.now.or(thing.then).map(|b| b.center()).unwrap_or_default();
+            let size = thing.now.or(thing.then).map(|b| b.size()).unwrap_or_default();
+            let _ = write!(
+                text,
+                "  T{} {}: {:.2} x {:.2} x {:.2} m at ({:.2}, {:.2}, {:.2}) m",
+                k + 1,
+                word(thing.change),
+                size[0],
+                size[1],
+                size[2],
+                at.x,
+                at.y,
+                at.z
+            );
+            match thing.shift {
+                Some([x, y, z]) => {
+                    let _ = writeln!(text, ", by ({x:.2}, {y:.2}, {z:.2}) m");
+                }
+                None => text.push('\n'),
+            }
+        }
+        for &i in &self.robots.unseen {
+            let _ = writeln!(text, "  {} not compared: the new scans hardly see it", id(i));
+        }
+        let _ = writeln!(text, "{} points of earlier scans superseded", self.n_superseded);
+        text
+    }
+}
+
+fn word(change: ThingChange) -> &'static str {
+    match change {
+        ThingChange::Appeared => "appeared",
+        ThingChange::Gone => "gone",
+        ThingChange::Moved => "moved",
+    }
+}
+
+fn thing(thing: &Thing) -> serde_json::Value {
+    let bounds = |b: Option<geometry::Aabb>| b.map(|b| [b.min, b.max]);
+    json!({
+        "change": word(thing.change),
+        "then": bounds(thing.then),
+        "now": bounds(thing.now),
+        "shift": thing.shift,
+        "volume_m3": thing.volume,
+        "n_points": thing.n_points,
+    })
+}

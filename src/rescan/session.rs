@@ -1,0 +1,365 @@
+//! Earlier and new scans of a cell in; how its robots stand now, and what else is not where it was, out.
+
+use super::Cell;
+use super::base::Base;
+use super::past::{Looked, Past};
+use super::present::{self, Present};
+use super::robots::{Now, bounds as robot_bounds, look};
+use crate::engine::Engine;
+use crate::job::Settings;
+use crate::labelling::{Labelling, Near};
+use crate::search::{Search, Shelf};
+use crate::spaces::{reach, region};
+use crate::store::Store;
+use crate::surfaces::{Gather, Ground, Surfaces};
+use contract::{Cluster, Error, Fit, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View};
+use geometry::{Aabb, Pose};
+use ingest::Sources;
+use lattice::ViewSettings;
+use merge::{Registration, Tally, Thing, Watch, things};
+use robot::Model;
+
+/// How far from its scanner a new scan may see the cell, metres, where nobody says where it is: a robot cell.
+const CELL_RADIUS: f64 = 8.0;
+/// Beams farther apart say less than the scans that were there, metres.
+const CELL_SPACING: f64 = 0.025;
+/// Cells of depth images in a unit of their plane, at most, and nearest distance for which they are as fine, metres: 2.5 mm
+/// at 1 m, as fine as a common scan.
+const LOOK_CELL: f64 = 0.3 / 400.0;
+/// Earlier scans that are asked what was there: those with most points in the cell.
+const MAX_ASKED: usize = 6;
+/// Smallest height and largest edge of a new thing that may be a robot, metres.
+const ROBOT_LIKE: [f64; 2] = [0.4, 0.5];
+/// Room about such a thing, metres.
+const ABOUT: f64 = 0.3;
+
+/// All that is asked while a cell is compared.
+pub(crate) struct Session<'a> {
+    pub(crate) sources: &'a Sources,
+    pub(crate) past: &'a Past<'a>,
+    pub(crate) store: &'a Store,
+    pub(crate) ground: Ground,
+    pub(crate) clusters: Vec<Cluster>,
+    pub(crate) settings: &'a Settings,
+    pub(crate) cell: Region,
+    shelf: &'a Shelf<'a>,
+    /// What the new scans and the earlier ones saw of the cell.
+    new_views: Vec<View>,
+    old_views: Vec<View>,
+}
+
+/// Robots of the plant after the comparison.
+#[derive(Default)]
+pub(crate) struct Robots {
+    /// By place among the fits: looked at again.
+    pub(crate) in_cell: Vec<usize>,
+    /// Of those: stand otherwise, are of another model, or are new.
+    pub(crate) changed: Vec<usize>,
+    /// Are gone.
+    pub(crate) gone: Vec<usize>,
+    /// The new scans saw too little of them.
+    pub(crate) unseen: Vec<usize>,
+    /// Bounds of robots as they stood that do no longer stand so.
+    pub(crate) left: Vec<Aabb>,
+}
+
+/// Labels and differences.
+pub(crate) struct Labels {
+    pub(crate) near: Near,
+    pub(crate) looked: Vec<Looked>,
+    pub(crate) things: Vec<Thing>,
+    /// What stands in the cell now.
+    pub(crate) now: Tally,
+}
+
+/// Bounds of the cell that is meant.
+pub(crate) fn bounds(
+    wish: &Cell,
+    base: &Base,
+    (fits, models): (&[Fit], &[Model]),
+    (sources, new): (&Sources, &Store),
+) -> Result<Aabb> {
+    let usage = |what: String| Err(Error::new(Kind::Usage, what));
+    let all = new.entries().iter().fold(Aabb::EMPTY, |all, e| all.union(&e.bounds)).grown(0.1);
+    let cell = match wish {
+        Cell::Box(bounds) => *bounds,
+        Cell::Robots(ids) => {
+            let mut out = Aabb::EMPTY;
+            for id in ids {
+                let Some(at) = base.result.robots.iter().position(|r| r.id == *id) else {
+                    return usage(format!("the earlier result has no robot \"{id}\""));
+                };
+                out = out.union(&reach(&fits[at], &models[fits[at].model]).world_bounds());
+            }
+            out
+        }
+        Cell::Seen => {
+            let mut out = Aabb::EMPTY;
+            for scan in &sources.scans[base.state.scans.len()..] {
+                let Some(lattice) = &scan.lattice else { continue };
+                let step = lattice.row_step.max(lattice.col_step);
+                let radius = CELL_RADIUS.min(CELL_SPACING / step);
+                let at = scan.world_from_scan.translation.vector;
+                out.add(at.add_scalar(-radius).into());
+                out.add(at.add_scalar(radius).into());
+            }
+            if out.is_empty() {
+                return usage("the new scans have no scanner: say which cell with --cell".into());
+            }
+            out
+        }
+    };
+    let cell = cell.shared(&all);
+    if cell.is_empty() {
+        return usage("the new scans have no point in the cell".into());
+    }
+    Ok(cell)
+}
+
+/// Lays the new scans on what stood in the cell; returns how far each was off.
+pub(crate) fn register(
+    past: &Past<'_>,
+    sources: &mut Sources,
+    new: &Store,
+    engine: &Engine,
+) -> Result<Vec<Option<Registration>>> {
+    let surfaces = past.surfaces(engine)?;
+    let first = past.scans.len();
+    let found = present::register(&surfaces, (&sources.scans, first), (new, &past.cell), engine)?;
+    for (scan, found) in sources.scans[first..].iter_mut().zip(&found) {
+        if let Some(found) = found {
+            scan.world_from_scan = found.plant_from_stated * scan.world_from_scan;
+        }
+    }
+    Ok(found)
+}
+
+impl<'a> Session<'a> {
+    /// Looks at the cell through earlier and new scans.
+    pub(crate) fn new(
+        base: &Base,
+        sources: &'a Sources,
+        (past, store): (&'a Past<'a>, &'a Store),
+        shelf: &'a Shelf<'a>,
+        settings: &'a Settings,
+        engine: &Engine,
+    ) -> Result<Self> {
+        let scans = &sources.scans;
+        let (surfaces, gather) =
+            (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
+        let mut ground =
+            engine.pass(crate::report::tiles("surfaces", store), store.tiles(), |f| {
+                f.map(&surfaces).fold(&gather)
+            })?;
+        if !base.state.floor.levels.is_empty() {
+            ground.surfaces.floor = base.state.floor.clone();
+        }
+        let clusters =
+            cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
+        let cell = region(&past.cell.center(), &past.cell);
+        let fine = ViewSettings { min_cell: LOOK_CELL, ..settings.view.clone() };
+        let old_ground = asked(past, scans.len());
+        let old = Search::new(shelf, scans, past.store, &old_ground, settings);
+        let new = Search::new(shelf, scans, store, &ground, settings);
+        let views = engine.fan_out("views", vec![&old, &new], |s| s.views_by(&cell, &fine))?;
+        let [old_views, new_views] = <[_; 2]>::try_from(views).unwrap_or_default();
+        Ok(Self {
+            sources,
+            past,
+            store,
+            ground,
+            clusters,
+            settings,
+            cell,
+            shelf,
+            new_views,
+            old_views,
+        })
+    }
+
+    /// What the new scans say of places.
+    pub(crate) fn watch(&self) -> Watch<'_> {
+        Watch::new(&self.cell, &self.new_views)
+    }
+
+    /// The search in the new scans.
+    pub(crate) fn search(&self) -> Search<'_, 'a> {
+        Search::new(self.shelf, &self.sources.scans, self.store, &self.ground, self.settings)
+    }
+
+    /// How the robots of the cell stand now, and what else differs; fits are brought up to date.
+    pub(crate) fn compare(
+        &self,
+        (fits, models): (&mut Vec<Fit>, &mut Vec<Model>),
+        engine: &Engine,
+    ) -> Result<(Robots, Labels)> {
+        let mut robots = self.known_robots((fits, models), engine)?;
+        let mut labels = self.labels((fits, models), &robots, engine)?;
+        let appeared = self.new_robots(&labels, (fits, models), engine)?;
+        if !appeared.is_empty() {
+            for fit in appeared {
+                robots.in_cell.push(fits.len());
+                robots.changed.push(fits.len());
+                fits.push(fit);
+            }
+            labels = self.labels((fits, models), &robots, engine)?;
+        }
+        Ok((robots, labels))
+    }
+
+    fn known_robots(
+        &self,
+        (fits, models): (&mut Vec<Fit>, &mut Vec<Model>),
+        engine: &Engine,
+    ) -> Result<Robots> {
+        let mut out = Robots::default();
+        let (search, watch) = (self.search(), self.watch());
+        let regions = identify::regions(&self.clusters, &self.settings.region);
+        let bounds: Vec<Aabb> =
+            fits.iter().map(|fit| robot_bounds(fit, &models[fit.model])).collect();
+        let here =
+            |i: &usize| fits[*i].verdict != Verdict::Refused && bounds[*i].touches(&self.past.cell);
+        let here: Vec<usize> = (0..fits.len()).filter(here).collect();
+        let looked = engine.fan_out("fit", here.clone(), |i| {
+            look(&fits[i], models, (&search, &watch, &regions), engine)
+        })?;
+        for (i, (now, own)) in here.into_iter().zip(looked) {
+            let bounds = bounds[i];
+            match now {
+                Now::Unseen => out.unseen.push(i),
+                Now::Found(mut fit) => {
+                    if let Some(own) = own {
+                        fit.model = models.len();
+                        models.push(own);
+                    }
+                    out.in_cell.push(i);
+                    if crate::changes::stands_otherwise(&fits[i], &fit) {
+                        out.changed.push(i);
+                        out.left.push(bounds);
+                    }
+                    fits[i] = fit;
+                }
+                Now::Gone => {
+                    out.gone.push(i);
+                    out.left.push(bounds);
+                    fits[i].verdict = Verdict::Refused;
+                    fits[i].reasons = vec!["it is gone: the new scans see through it".into()];
+                }
+                Now::Lost => {
+                    out.in_cell.push(i);
+                    out.changed.push(i);
+                    fits[i].verdict = Verdict::Doubtful;
+                    let why = "the new scans contradict this posture and show no other";
+                    fits[i].reasons = vec![why.into()];
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    /// Labels of the new points, and what stands elsewhere than it did.
+    fn labels(
+        &self,
+        (fits, models): (&[Fit], &[Model]),
+        robots: &Robots,
+        engine: &Engine,
+    ) -> Result<Labels> {
+        let own = self.own_fits(fits, robots);
+        let labelling = self.labelling(&own, models);
+        let near = labelling.near_robots(self.store, engine)?;
+        let (watch, old_watch) = (self.watch(), Watch::new(&self.cell, &self.old_views));
+        let present = Present {
+            scans: &self.sources.scans,
+            near: &near,
+            ground: labelling.ground(),
+            cell: self.past.cell,
+            watch: &old_watch,
+        };
+        let now = present.tally(self.store, engine)?;
+        let (then, looked) = self.past.look(&watch, engine)?;
+        let things = things(&then, &now, &self.settings.things);
+        Ok(Labels { near, looked, things, now })
+    }
+
+    /// The fits, those refused that the new scans have no say in: they give no labels here.
+    pub(crate) fn own_fits(&self, fits: &[Fit], robots: &Robots) -> Vec<Fit> {
+        let mut own = fits.to_vec();
+        for (i, fit) in own.iter_mut().enumerate() {
+            if !robots.in_cell.contains(&i) {
+                fit.verdict = Verdict::Refused;
+            }
+            fit.stands_in.clear();
+            fit.stays.clear();
+        }
+        own
+    }
+
+    /// The labelling of the new points by these fits.
+    pub(crate) fn labelling<'b>(&'b self, fits: &'b [Fit], models: &'b [Model]) -> Labelling<'b> {
+        let floor = &self.ground.surfaces.floor;
+        Labelling::new(
+            fits,
+            models,
+            self.sources,
+            (self.store, floor, &self.clusters),
+            self.settings,
+        )
+    }
+
+    /// Robots among the things that appeared.
+    fn new_robots(
+        &self,
+        labels: &Labels,
+        (fits, models): (&[Fit], &mut Vec<Model>),
+        engine: &Engine,
+    ) -> Result<Vec<Fit>> {
+        let search = self.search();
+        let like =
+            |size: [f64; 3]| size[2] >= ROBOT_LIKE[0] && size.iter().any(|s| *s >= ROBOT_LIKE[1]);
+        let bounds = labels.things.iter().filter_map(|thing| thing.now);
+        let regions: Vec<Region> = bounds
+            .filter(|bounds| like(bounds.size()))
+            .map(|bounds| region(&bounds.center(), &bounds.grown(ABOUT)))
+            .collect();
+        let found = engine.fan_out("search", regions.clone(), |region| search.region(&region))?;
+        let found = found.into_iter().flatten().collect();
+        let is_new = |fit: &Fit| {
+            let at = fit.world_from_base.translation.vector;
+            let known = fits.iter().filter(|f| f.verdict != Verdict::Refused);
+            known.into_iter().all(|f| (f.world_from_base.translation.vector - at).norm() > 0.5)
+        };
+        let mut chosen = fit::choose(found, models);
+        chosen.retain(is_new);
+        crate::tools::dress(chosen, models, (&search, &regions), engine)
+    }
+
+    /// By scan: what takes back how far it was off, where its file states coordinates of the world.
+    pub(crate) fn moved(&self, registered: &[Option<Registration>]) -> Vec<Option<Pose>> {
+        let first = self.past.scans.len();
+        let moved = registered.iter().map(|r| r.map(|r| r.plant_from_stated));
+        std::iter::repeat_n(None, first).chain(moved).collect()
+    }
+}
+
+/// What the earlier scans cover, as far as they are asked.
+fn asked(past: &Past<'_>, n_scans: usize) -> Ground {
+    let mut n_points = vec![0_u64; n_scans];
+    for &i in &past.store.touching(&past.cell) {
+        let entry = &past.store.entries()[i];
+        n_points[entry.at.scan.0 as usize] += entry.n_points;
+    }
+    let mut order: Vec<usize> = (0..past.scans.len()).filter(|&s| n_points[s] > 0).collect();
+    order.sort_by_key(|&s| (std::cmp::Reverse(n_points[s]), s));
+    let mut extents = vec![None; n_scans];
+    for &s in order.iter().take(MAX_ASKED) {
+        let own = past.store.entries().iter().filter(|e| e.at.scan == ScanId(s as u32));
+        extents[s] = own.fold(None, |sum: Option<[u32; 4]>, e| {
+            let (row, col) = (e.at.row * TILE_SIDE, e.at.col * TILE_SIDE);
+            let one = [row, row + TILE_SIDE - 1, col, col + TILE_SIDE - 1];
+            Some(sum.map_or(one, |a| {
+                [a[0].min(one[0]), a[1].max(one[1]), a[2].min(one[2]), a[3].max(one[3])]
+            }))
+        });
+    }
+    Ground { surfaces: floor::Ground::default(), extents }
+}

@@ -1,0 +1,147 @@
+//! What a run leaves for a later session of its plant, and that again: `plant.bin` beside the result.
+
+use crate::reuse::{Key, read, written};
+use contract::{Error, Fit, Floor, Input, Kind, Mask, Result, Scan};
+use export::{LasSettings, Quantum};
+use ingest::Before;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Name of the file.
+const NAME: &str = "plant.bin";
+/// What the file begins with: its format.
+const FORMAT: &[u8] = b"stillpoint.plant/1\n";
+
+/// Scans, floor and robots of a plant as a run found them.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct State {
+    pub(crate) inputs: Vec<Input>,
+    pub(crate) masks: Vec<Mask>,
+    pub(crate) scans: Vec<Scan>,
+    /// Tiles of each input, by the name of their folder in the store.
+    pub(crate) tiles: Vec<Key>,
+    pub(crate) floor: Floor,
+    /// In the order of the result; robots that are gone are refused.
+    pub(crate) fits: Vec<Fit>,
+    /// The library, as it was given.
+    pub(crate) robots: PathBuf,
+    pub(crate) records: Records,
+}
+
+/// How clouds are written.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Records {
+    scale: [f64; 3],
+    offset: [f64; 3],
+    with_color: bool,
+    with_bodies: bool,
+    compress: bool,
+    /// Edge of the spatial tiles, metres, where there are any.
+    tile_edge: Option<f64>,
+}
+
+impl Records {
+    pub(crate) fn of(las: &LasSettings, export: &export::Settings) -> Self {
+        Self {
+            scale: las.quantum.scale,
+            offset: las.quantum.offset,
+            with_color: las.with_color,
+            with_bodies: export.bodies,
+            compress: export.compress,
+            tile_edge: export.tiles.then_some(export.tile_edge),
+        }
+    }
+
+    pub(crate) fn las(&self) -> LasSettings {
+        let quantum = Quantum { scale: self.scale, offset: self.offset };
+        LasSettings {
+            with_color: self.with_color,
+            with_bodies: self.with_bodies,
+            compress: self.compress,
+            ..LasSettings::new(quantum)
+        }
+    }
+
+    /// The same for what is written beside them.
+    pub(crate) fn export(&self, settings: &export::Settings) -> export::Settings {
+        export::Settings {
+            tiles: self.tile_edge.is_some(),
+            tile_edge: self.tile_edge.unwrap_or(settings.tile_edge),
+            fixed_cloud: false,
+            bodies: self.with_bodies,
+            compress: self.compress,
+            ..*settings
+        }
+    }
+
+    /// Edge of the spatial tiles, metres, where there are any.
+    pub(crate) fn tile_edge(&self) -> Option<f64> {
+        self.tile_edge
+    }
+}
+
+impl State {
+    /// Writes it beside a result.
+    pub(crate) fn write(&self, out: &Path) -> Result<()> {
+        let body = written(self).ok_or_else(|| Error::new(Kind::Bug, "a plant cannot be kept"))?;
+        crate::atomic::write(&out.join(NAME), &[FORMAT, &body].concat())
+    }
+
+    /// That of a result.
+    ///
+    /// # Errors
+    /// There is none, or it is not what was written.
+    pub(crate) fn read(out: &Path) -> Result<Self> {
+        let path = out.join(NAME);
+        let hint = "run the whole plant again with this version";
+        let bad = |what: &str| Error::bad_input(what.to_owned()).at(path.display()).hint(hint);
+        let bytes = std::fs::read(&path)
+            .map_err(|e| bad("what a rescan starts from cannot be read").because(e))?;
+        let body = bytes.strip_prefix(FORMAT);
+        let body = body.ok_or_else(|| bad("this was written by another version"))?;
+        read(body).ok_or_else(|| bad("the file is damaged"))
+    }
+
+    /// Its inputs, for new ones to be numbered after them.
+    pub(crate) fn before(&self) -> Before {
+        let (inputs, masks, scans) = (self.inputs.clone(), self.masks.clone(), self.scans.clone());
+        Before { inputs, masks, scans }
+    }
+
+    /// Number of the first scan of an input.
+    pub(crate) fn first_scan(&self, input: usize) -> u32 {
+        let own = self.scans.iter().find(|s| s.input.0 as usize == input);
+        own.map_or(0, |s| s.id.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_comes_back_and_damage_is_told() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let las = LasSettings::new(Quantum { scale: [1e-4; 3], offset: [1e3, 0.0, 0.0] });
+        let state = State {
+            inputs: Vec::new(),
+            masks: Vec::new(),
+            scans: Vec::new(),
+            tiles: Vec::new(),
+            floor: Floor::default(),
+            fits: vec![Fit { score: 0.7, ..Fit::default() }],
+            robots: "robots".into(),
+            records: Records::of(&las, &export::Settings::default()),
+        };
+        state.write(dir.path()).expect("writes");
+        let again = State::read(dir.path()).expect("reads");
+        assert_eq!((again.fits, again.records.las()), (state.fits, las));
+        let path = dir.path().join(NAME);
+        let mut bytes = std::fs::read(&path).expect("reads");
+        *bytes.last_mut().expect("a byte") ^= 1;
+        std::fs::write(&path, &bytes).expect("writes");
+        assert!(State::read(dir.path()).expect_err("damaged").to_string().contains("plant.bin"));
+        std::fs::write(&path, b"stillpoint.plant/0\n").expect("writes");
+        assert!(State::read(dir.path()).expect_err("old").to_string().contains("version"));
+    }
+}

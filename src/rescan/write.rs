@@ -1,0 +1,240 @@
+//! What a rescan found in; masks of the new scans, tiles of the cell anew, the rest of the earlier result shared, and the
+//! result that joins them, out.
+
+use super::base::Base;
+use super::say::{self, Said};
+use super::session::{Labels, Robots, Session};
+use crate::engine::Engine;
+use crate::job::{Outcome, Room};
+use crate::labelling::{Done, Scope};
+use crate::report::id;
+use crate::reuse::{OutputFile, Sums};
+use contract::{Fit, MaskId, PointKind, Result, Space};
+use export::{FileSum, MaskFiles, NpyWriter, OldPoint, refill};
+use geometry::Aabb;
+use merge::{Registration, Sight, Tally, ThingChange};
+use robot::Model;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Name of the folder of the store where the new points' clouds are made.
+const SCRATCH: &str = "cell";
+
+/// Everything that is written.
+pub(crate) struct Written<'a, 's> {
+    pub(crate) base: &'a Base,
+    pub(crate) session: &'a Session<'s>,
+    pub(crate) robots: &'a Robots,
+    pub(crate) labels: &'a Labels,
+    pub(crate) models: &'a [Model],
+    pub(crate) fits: &'a [Fit],
+}
+
+/// What came of it.
+pub(crate) struct Out {
+    pub(crate) outcome: Outcome,
+    /// Files whose checksums are known.
+    pub(crate) known: Vec<OutputFile>,
+    /// Files that the earlier result has, too, and all.
+    pub(crate) n_shared: [usize; 2],
+}
+
+impl Written<'_, '_> {
+    pub(crate) fn write(
+        &self,
+        registered: &[Option<Registration>],
+        (room, sums): (&Room, &Sums),
+        engine: &Engine,
+    ) -> Result<Out> {
+        let next = room.next();
+        let scratch = room.store().join(SCRATCH);
+        let _ = std::fs::remove_dir_all(&scratch);
+        let mut done = self.label(registered, (next, &scratch), engine)?;
+        let gone = self.gone();
+        let superseded = self
+            .session
+            .past
+            .superseded(&self.labels.looked, &gone, |robot| self.stands_otherwise(robot));
+        let touched = self.tiles(&gone, (next, &scratch), engine)?;
+        let mut written: BTreeSet<String> = touched.names;
+        done.sums.extend(touched.sums);
+        let lists = self.lists(&superseded, next, &mut written, &mut done.sums)?;
+        let _ = std::fs::remove_dir_all(&scratch);
+        let said = Said {
+            base: self.base,
+            session: self.session,
+            robots: self.robots,
+            labels: self.labels,
+            models: self.models,
+            fits: self.fits,
+            done: &done,
+            registered,
+            lists: &lists,
+            n_superseded: superseded.iter().map(|l| l.len() as u64).sum::<u64>()
+                - self.session.past.n_before(),
+        };
+        let outcome = said.finish(sums, next)?;
+        written.extend(say::NAMES.map(String::from));
+        let rewritten = self.robots.changed.iter().chain(&self.robots.gone);
+        let folders: Vec<String> = rewritten.map(|&i| id(i)).collect();
+        let is_new = |path: &str| written.contains(path) || is_of(path, &folders);
+        let shared = self.base.share_files(next, is_new)?;
+        let fresh = done.sums.iter().filter(|sum| sum.path.starts_with(next));
+        let mut known: Vec<OutputFile> = fresh.map(|sum| OutputFile::of(next, sum)).collect();
+        let n_shared = [shared.len(), shared.len() + known.len()];
+        known.extend(shared);
+        Ok(Out { outcome, known, n_shared })
+    }
+
+    /// Masks of the new scans, clouds of their points in the cell, and files of robots that stand otherwise.
+    fn label(
+        &self,
+        registered: &[Option<Registration>],
+        (next, scratch): (&Path, &Path),
+        engine: &Engine,
+    ) -> Result<Done> {
+        let session = self.session;
+        let own = session.own_fits(self.fits, self.robots);
+        let labelling = session.labelling(&own, self.models);
+        let changed = &self.robots.changed;
+        let mut spaces: Vec<Option<Space>> = vec![None; own.len()];
+        let seen: Vec<Fit> = changed.iter().map(|&i| own[i].clone()).collect();
+        let search = session.search();
+        let around =
+            crate::spaces::around(&seen, self.models, (&search, session.settings), engine)?;
+        changed.iter().zip(around).for_each(|(&i, space)| spaces[i] = space);
+        let scope = Scope {
+            robots: Some(changed.clone()),
+            cell: Some(session.past.cell),
+            moved: session.moved(registered),
+            las: Some(self.base.state.records.las()),
+        };
+        labelling.write((&self.labels.near, spaces), &scope, (next, scratch), engine)
+    }
+
+    /// Voxels of things that are gone, and those next to them.
+    fn gone(&self) -> BTreeSet<[i32; 3]> {
+        let things = self.labels.things.iter().filter(|t| t.change != ThingChange::Appeared);
+        let near = |c: &[i32; 3]| {
+            let [x, y, z] = *c;
+            let steps = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
+            steps.map(|[i, j, k]| [x + i, y + j, z + k]).collect::<Vec<_>>()
+        };
+        things.flat_map(|t| &t.gone).flat_map(near).collect()
+    }
+
+    fn stands_otherwise(&self, robot: i16) -> bool {
+        let robot = usize::try_from(robot).unwrap_or(usize::MAX);
+        self.robots.changed.contains(&robot) || self.robots.gone.contains(&robot)
+    }
+
+    /// Whether a point of the earlier result is still part of the plant.
+    fn stays(&self, point: &OldPoint, gone: &BTreeSet<[i32; 3]>) -> bool {
+        let moves = matches!(point.label.kind, PointKind::Link | PointKind::Attachment);
+        if moves && self.stands_otherwise(point.label.robot) {
+            return false;
+        }
+        if !self.session.past.cell.contains(point.world) {
+            return true;
+        }
+        match self.session.watch().look(point.world) {
+            Sight::Onto => false,
+            Sight::Through => !gone.contains(&Tally::cell(point.world)),
+            Sight::Hidden | Sight::Unseen => true,
+        }
+    }
+
+    /// Tiles that the cell touches, and the cloud of all that moves: what is left of the old points, and the new ones.
+    fn tiles(
+        &self,
+        gone: &BTreeSet<[i32; 3]>,
+        (next, scratch): (&Path, &Path),
+        engine: &Engine,
+    ) -> Result<Touched> {
+        let las = self.base.state.records.las();
+        let ending = if las.compress { "laz" } else { "las" };
+        let mut names: BTreeMap<String, [bool; 2]> = BTreeMap::new();
+        let touched = self.robots.left.iter().chain([&self.session.past.cell]);
+        let touched: Vec<&Aabb> = touched.collect();
+        if let Some(edge) = self.base.state.records.tile_edge() {
+            for (name, [row, col]) in self.base.tiles() {
+                let at = [col, row].map(|i| f64::from(i) * edge);
+                let is_touched =
+                    |b: &&Aabb| (0..2).all(|i| b.max[i] >= at[i] && b.min[i] <= at[i] + edge);
+                if touched.iter().any(is_touched) {
+                    names.entry(name).or_default()[0] = true;
+                }
+            }
+        }
+        for name in files(&scratch.join("tiles")) {
+            names.entry(format!("tiles/{name}")).or_default()[1] = true;
+        }
+        let robots = format!("clouds/robots.{ending}");
+        names.insert(robots.clone(), [self.base.has(&robots), scratch.join(&robots).is_file()]);
+        let all: Vec<(String, [bool; 2])> = names.into_iter().collect();
+        let sums = engine.fan_out("tiles", all.clone(), |(name, [old, new])| {
+            let (old, new) =
+                (old.then(|| self.base.out.join(&name)), new.then(|| scratch.join(&name)));
+            let stays = |point: &OldPoint| self.stays(point, gone);
+            refill([old.as_deref(), new.as_deref()], &next.join(&name), &las, stays)
+        })?;
+        let fixed = ["las", "laz"].map(|end| format!("clouds/fixed.{end}"));
+        let names = all.into_iter().map(|(name, _)| name).chain(fixed).collect();
+        let sums = sums.into_iter().flatten().filter_map(|summary| summary.sum).collect();
+        Ok(Touched { names, sums })
+    }
+
+    /// Lists of the places of old points that are superseded, of masks whose list grew; the name of each mask's list.
+    fn lists(
+        &self,
+        superseded: &[Vec<u64>],
+        next: &Path,
+        written: &mut BTreeSet<String>,
+        sums: &mut Vec<FileSum>,
+    ) -> Result<Vec<Option<String>>> {
+        let mut names = Vec::new();
+        for (i, places) in superseded.iter().enumerate() {
+            let before = &self.base.result.labels.scans[i].superseded;
+            let name = MaskFiles::superseded(MaskId(i as u32));
+            if places.is_empty() {
+                names.push(None);
+                continue;
+            }
+            if before.is_none() || self.session.past.n_of(i) != places.len() {
+                let mut list = NpyWriter::<u64>::create(next.join(&name))?;
+                list.push(places)?;
+                sums.push(list.finish()?);
+                written.insert(name.clone());
+            }
+            names.push(Some(name));
+        }
+        Ok(names)
+    }
+}
+
+struct Touched {
+    names: BTreeSet<String>,
+    sums: Vec<FileSum>,
+}
+
+/// Whether a file belongs to one of these robots.
+fn is_of(path: &str, robots: &[String]) -> bool {
+    robots.iter().any(|id| {
+        path.starts_with(&format!("robots/{id}/"))
+            || path == format!("pictures/{id}.png")
+            || path == format!("pictures/{id}_evidence.png")
+    })
+}
+
+/// Names of the files of a folder, sorted.
+fn files(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
+    let mut names: Vec<String> = paths
+        .iter()
+        .filter_map(|p| p.file_name())
+        .map(|n| n.to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}

@@ -1,0 +1,72 @@
+//! A cell that was scanned again: what stands in it, what went and what came, in; a picture from above and one from the
+//! side out.
+
+use crate::canvas::{Canvas, INK, Rgb, blend};
+use geometry::Aabb;
+
+/// Longer side of the picture from above, pixels.
+const SIDE: f64 = 900.0;
+/// Room about the pictures, pixels.
+const MARGIN: i64 = 30;
+/// What stands higher than this in the cell is not drawn, metres: a ceiling would hide all.
+const SHOWN: f64 = 3.0;
+/// What stands, what went, what came.
+const STANDS: Rgb = [150, 156, 164];
+const GONE: Rgb = [213, 94, 0];
+const FILLED: Rgb = [0, 158, 115];
+
+/// A thing that is not where it was.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangedThing {
+    /// Its name and what became of it.
+    pub name: String,
+    /// Places that are empty now, and places that are filled now, world, metres.
+    pub gone: Vec<[f64; 3]>,
+    /// See `gone`.
+    pub filled: Vec<[f64; 3]>,
+    /// Where its name stands, world, metres.
+    pub at: [f64; 3],
+}
+
+/// Draws the cell: places where something stands, things that changed, robots with the places of their bases, world, metres.
+#[must_use]
+pub fn draw_changes(
+    cell: &Aabb,
+    stands: &[[f64; 3]],
+    things: &[ChangedThing],
+    robots: &[(String, [f64; 2])],
+) -> Canvas {
+    let size = cell.size().map(|s| if s.is_finite() { s.max(0.1) } else { 0.1 });
+    let scale = SIDE / size[0].max(size[1]);
+    let pixels = size.map(|s| (s * scale) as i64 + 1);
+    let (width, top) = (pixels[0].max(520) + 2 * MARGIN, pixels[1] + 2 * MARGIN);
+    let mut canvas = Canvas::new(width as usize, (top + pixels[2] + MARGIN) as usize);
+    // North is up; below it the cell from the south.
+    let place = |p: &[f64; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|i| ((p[i] - cell.min[i]) * scale) as i64);
+        [(MARGIN + x, MARGIN + pixels[1] - y), (MARGIN + x, top + pixels[2] - z)]
+    };
+    let dot = (0.05 * scale).ceil().max(1.0) as i64;
+    let mut draw = |points: &[[f64; 3]], color: Rgb| {
+        for (x, y) in points.iter().flat_map(place) {
+            canvas.fill(x - dot / 2, y - dot / 2, dot, dot, color);
+        }
+    };
+    let low: Vec<_> = stands.iter().filter(|p| p[2] < cell.min[2] + SHOWN).copied().collect();
+    draw(&low, blend(STANDS, [255; 3], 0.4));
+    for thing in things {
+        draw(&thing.gone, GONE);
+        draw(&thing.filled, FILLED);
+    }
+    for thing in things {
+        let [(x, y), _] = place(&thing.at);
+        canvas.text(x + 6, y - 4, 1, INK, &thing.name);
+    }
+    for (name, at) in robots {
+        let [(x, y), _] = place(&[at[0], at[1], cell.min[2]]);
+        canvas.disc(x, y, 5, [0, 114, 178]);
+        canvas.text(x + 8, y - 4, 1, [0, 60, 110], name);
+    }
+    canvas.text(MARGIN, 8, 1, INK, "grey: stands   orange: was there   green: is there now");
+    canvas
+}

@@ -1,0 +1,131 @@
+//! A spatial tile of an earlier result and one of new points in; the tile without the old points that are superseded, the
+//! new ones behind them, out. Records stay as they are, byte for byte.
+
+use crate::atomic::refused;
+use crate::las::{LasSummary, LasWriter, head};
+use crate::record::{CLASSES, Extent, LasSettings};
+use contract::{Error, Label, PointKind, Result};
+use las::raw;
+use laz::LasZipDecompressor;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Records that are read at a time.
+const PIECE: u64 = 1 << 15;
+
+/// A point of an earlier result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OldPoint {
+    /// World, metres.
+    pub world: [f64; 3],
+    /// What it was said to belong to.
+    pub label: Label,
+}
+
+/// Writes `to` from the points of `old` that `keep` wants and all of `new`; both are tiles of ours with records as `las` has
+/// them. `None`, and no file, where nothing is left.
+///
+/// # Errors
+/// A tile that is not one of ours or cannot be read; what [`LasWriter`] says.
+pub fn refill(
+    [old, new]: [Option<&Path>; 2],
+    to: &Path,
+    las: &LasSettings,
+    keep: impl Fn(&OldPoint) -> bool + Sync,
+) -> Result<Option<LasSummary>> {
+    let mut writer = LasWriter::create(to, las.clone())?;
+    let mut n = 0;
+    for (path, is_old) in [(old, true), (new, false)] {
+        let Some(path) = path else { continue };
+        let mut tile = Tile::open(path, las)?;
+        while let Some(records) = tile.piece()? {
+            let mut kept = Vec::with_capacity(records.len());
+            let mut extent = Extent::default();
+            for record in records.chunks_exact(las.record_len()) {
+                let steps = [0, 4, 8].map(|at| int(record, at));
+                if !is_old || keep(&point(record, steps, las)) {
+                    extent.add(steps);
+                    kept.extend_from_slice(record);
+                }
+            }
+            n += extent.n;
+            if extent.n > 0 {
+                writer.push_records(&kept, &extent)?;
+            }
+        }
+    }
+    if n == 0 { Ok(None) } else { writer.finish().map(Some) }
+}
+
+fn int(record: &[u8], at: usize) -> i32 {
+    i32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
+}
+
+fn point(record: &[u8], steps: [i32; 3], las: &LasSettings) -> OldPoint {
+    let q = &las.quantum;
+    let world = std::array::from_fn(|i| f64::from(steps[i]) * q.scale[i] + q.offset[i]);
+    let kind = CLASSES.iter().find(|c| c.1 == record[16]).map_or(PointKind::Uncertain, |c| c.0);
+    let at = if las.with_color { 36 } else { 30 };
+    let index = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]).wrapping_sub(1) as i16;
+    OldPoint { world, label: Label { kind, robot: index(at), link: index(at + 2) } }
+}
+
+/// A tile that is read piece by piece.
+struct Tile<'a> {
+    path: &'a Path,
+    records: Records,
+    record_len: usize,
+    left: u64,
+}
+
+enum Records {
+    Plain(BufReader<File>),
+    Compressed(Box<LasZipDecompressor<'static, BufReader<File>>>),
+}
+
+impl<'a> Tile<'a> {
+    fn open(path: &'a Path, las: &LasSettings) -> Result<Self> {
+        let failed = |e| refused("tile cannot be read", path, e);
+        let foreign = || {
+            let what = "this is no tile of the earlier result: its records are others";
+            Error::bad_input(what).at(path.display()).hint("run the whole plant again")
+        };
+        let mut file = BufReader::new(File::open(path).map_err(failed)?);
+        let header = raw::Header::read_from(&mut file).map_err(|e| foreign().because(e))?;
+        let expected = head(las, &Extent::default())?.len();
+        let scales = [header.x_scale_factor, header.y_scale_factor, header.z_scale_factor];
+        let is_ours = header.offset_to_point_data as usize == expected
+            && usize::from(header.point_data_record_length) == las.record_len()
+            && scales == las.quantum.scale;
+        if !is_ours {
+            return Err(foreign());
+        }
+        let left = header.large_file.map_or(0, |large| large.number_of_point_records);
+        file.seek(SeekFrom::Start(expected as u64)).map_err(failed)?;
+        let records = if las.compress {
+            let laz = crate::las::laz_vlr(las);
+            let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;
+            Records::Compressed(Box::new(reader))
+        } else {
+            Records::Plain(file)
+        };
+        Ok(Self { path, records, record_len: las.record_len(), left })
+    }
+
+    /// The next records; `None` behind the last.
+    fn piece(&mut self) -> Result<Option<Vec<u8>>> {
+        let n = self.left.min(PIECE);
+        if n == 0 {
+            return Ok(None);
+        }
+        let mut bytes = vec![0; n as usize * self.record_len];
+        let read = match &mut self.records {
+            Records::Plain(file) => file.read_exact(&mut bytes),
+            Records::Compressed(reader) => reader.decompress_many(&mut bytes),
+        };
+        read.map_err(|e| refused("tile cannot be read", self.path, e))?;
+        self.left -= n;
+        Ok(Some(bytes))
+    }
+}

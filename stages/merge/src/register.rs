@@ -1,0 +1,233 @@
+//! Surfaces that stood still, as the plant has them, and points of a new scan in; how far the scan is off them out.
+//!
+//! Points are compared with planes through the plant's own points, voxel by voxel: point-to-plane distances (Chen and
+//! Medioni 1992), one for each voxel, so that a dense wall counts no more than it covers, with Tukey weights, so that what
+//! was moved between the sessions counts nothing.
+
+use geometry::{Moments, Plane, Point, Pose, Vector};
+use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector6};
+use std::collections::BTreeMap;
+
+/// Edge of a voxel, metres: a hundred points of a common scan, and still flat where a machine is.
+const EDGE: f64 = 0.10;
+/// Where voxels begin, metres: floors and walls stand at round figures, and must not run along their borders.
+const BEGIN: f64 = 0.0371;
+/// A plane is made of this many points and has at most this RMS distance from them, metres.
+const MIN_POINTS: f64 = 12.0;
+const MAX_RMS: f64 = 0.008;
+/// A plane whose points lie on a line is none: least spread across it, metres.
+const MIN_SPREAD: f64 = 0.012;
+/// Points farther from a plane are of something else, metres: more than sessions are off each other.
+const GATE: f64 = 0.05;
+/// Fewest points of the new scan in a voxel.
+const MIN_NEW: usize = 3;
+/// Fewest voxels that tell a scan's place.
+const MIN_CELLS: usize = 50;
+/// Standard deviations that are expected of a scan's place before it is looked at: metres, radians.
+const PRIOR: [f64; 2] = [0.02, 0.003];
+/// Rounds of weights; the last ones change nothing that can be measured.
+const ROUNDS: usize = 12;
+/// Tukey's constant, and the median's ratio to a standard deviation.
+const TUKEY: f64 = 4.685;
+const FROM_MEDIAN: f64 = 1.4826;
+
+/// Points of a plant by voxel.
+#[derive(Debug, Clone, Default)]
+pub struct Surfaces {
+    cells: BTreeMap<[i32; 3], Moments>,
+}
+
+/// How far a scan is off the plant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Registration {
+    /// Brings the scan's world into the plant's.
+    pub plant_from_stated: Pose,
+    /// Standard deviation of the shift about the middle of the cell, metres, and of the turn, radians, axis by axis.
+    pub sigma: [f64; 6],
+    /// Voxels that it is told by.
+    pub n_surfaces: usize,
+    /// RMS distance from the plant's planes before and after, metres.
+    pub rms: [f64; 2],
+}
+
+/// What one voxel says: distance, normal and place of the new points in it.
+struct Told {
+    distance: f64,
+    normal: Vector,
+    at: Vector,
+}
+
+impl Surfaces {
+    /// Adds a point, world, metres.
+    pub fn add(&mut self, p: [f64; 3]) {
+        let cell = cell(&p);
+        let middle = Vector::from(cell.map(|i| (f64::from(i) + 0.5) * EDGE + BEGIN));
+        self.cells.entry(cell).or_insert_with(|| Moments::new(middle)).add(&p.into());
+    }
+
+    /// Adds those of others.
+    pub fn join(&mut self, other: Self) {
+        for (cell, moments) in other.cells {
+            match self.cells.entry(cell) {
+                std::collections::btree_map::Entry::Vacant(slot) => drop(slot.insert(moments)),
+                std::collections::btree_map::Entry::Occupied(mut own) => {
+                    own.get_mut().join(&moments)
+                }
+            }
+        }
+    }
+
+    fn planes(&self) -> BTreeMap<[i32; 3], Plane> {
+        let flat = self.cells.iter().filter_map(|(cell, moments)| {
+            let fit = moments.plane()?;
+            let is_flat =
+                moments.n >= MIN_POINTS && fit.rms <= MAX_RMS && fit.spread[1] >= MIN_SPREAD;
+            is_flat.then_some((*cell, fit.plane))
+        });
+        flat.collect()
+    }
+
+    /// The rigid motion that lays points of a scan (its stated world, metres) on the planes, turned about `about`; `None`
+    /// where too few of them lie on any.
+    #[must_use]
+    pub fn register(&self, points: &[[f64; 3]], about: &Point) -> Option<Registration> {
+        let planes = self.planes();
+        let (mut pose, mut sigma, mut rms) = (Pose::identity(), [0.0; 6], [None; 2]);
+        let mut n_surfaces = 0;
+        for _ in 0..ROUNDS {
+            let told = told(&planes, points, &pose);
+            if told.len() < MIN_CELLS {
+                return None;
+            }
+            let scale = scale(&told);
+            let step = solve(&told, scale, about, &total(&pose, about))?;
+            rms[0] = rms[0].or(Some(scale));
+            rms[1] = Some(scale);
+            n_surfaces = told.len();
+            sigma = step.1;
+            pose = motion(&step.0, about) * pose;
+        }
+        let rms = rms.map(Option::unwrap_or_default);
+        Some(Registration { plant_from_stated: pose, sigma, n_surfaces, rms })
+    }
+}
+
+fn cell(p: &[f64; 3]) -> [i32; 3] {
+    p.map(|v| ((v - BEGIN) / EDGE).floor() as i32)
+}
+
+/// A motion by shift and turn about a place.
+fn motion(step: &Vector6<f64>, about: &Point) -> Pose {
+    let turn = UnitQuaternion::from_scaled_axis(Vector::new(step[3], step[4], step[5]));
+    let shift = Vector::new(step[0], step[1], step[2]);
+    Pose::from_parts(Translation3::from(about.coords + shift - turn * about.coords), turn)
+}
+
+/// Shift at a place and turn of a motion.
+fn total(pose: &Pose, about: &Point) -> Vector6<f64> {
+    let (shift, turn) = (pose * about - about, pose.rotation.scaled_axis());
+    Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
+}
+
+fn told(planes: &BTreeMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -> Vec<Told> {
+    let mut sums: BTreeMap<[i32; 3], (usize, f64, Vector)> = BTreeMap::new();
+    for p in points {
+        let p = (pose * Point::from(*p)).coords;
+        let cell = cell(&p.into());
+        let Some(plane) = planes.get(&cell) else { continue };
+        let distance = plane.distance(&p);
+        if distance.abs() < GATE {
+            let sum = sums.entry(cell).or_insert((0, 0.0, Vector::zeros()));
+            *sum = (sum.0 + 1, sum.1 + distance, sum.2 + p);
+        }
+    }
+    let many = sums.into_iter().filter(|(_, sum)| sum.0 >= MIN_NEW);
+    let mean = |(cell, (n, distance, at)): ([i32; 3], (usize, f64, Vector))| Told {
+        distance: distance / n as f64,
+        normal: planes[&cell].normal,
+        at: at / n as f64,
+    };
+    many.map(mean).collect()
+}
+
+/// Robust standard deviation of what the voxels say, metres.
+fn scale(told: &[Told]) -> f64 {
+    let mut all: Vec<f64> = told.iter().map(|t| t.distance.abs()).collect();
+    let middle = all.len() / 2;
+    let (_, median, _) = all.select_nth_unstable_by(middle, f64::total_cmp);
+    (FROM_MEDIAN * *median).max(1e-4)
+}
+
+/// The next step of shift and turn, and standard deviations.
+fn solve(
+    told: &[Told],
+    scale: f64,
+    about: &Point,
+    total: &Vector6<f64>,
+) -> Option<(Vector6<f64>, [f64; 6])> {
+    let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
+    for t in told {
+        let u = t.distance / (TUKEY * scale);
+        if u.abs() >= 1.0 {
+            continue;
+        }
+        let weight = (1.0 - u * u).powi(2) / (scale * scale);
+        let turn = (t.at - about.coords).cross(&t.normal);
+        let n = t.normal;
+        let row = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
+        normal += weight * row * row.transpose();
+        right -= weight * t.distance * row;
+    }
+    for i in 0..6 {
+        let information = PRIOR[i / 3].powi(-2);
+        normal[(i, i)] += information;
+        right[i] -= information * total[i];
+    }
+    let covariance = normal.try_inverse()?;
+    Some((covariance * right, std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on a floor and two walls, with some noise; `phase` tells scans apart.
+    fn room(phase: f64) -> Vec<[f64; 3]> {
+        let noise = |k: usize| 0.002 * ((k as f64 * 12.9898 + phase).sin() * 43758.5453).fract();
+        let mut out = Vec::new();
+        for i in 0..160 {
+            for j in 0..160 {
+                let (u, v) = (0.02 * f64::from(i) + 0.003 * phase, 0.02 * f64::from(j));
+                let k = out.len();
+                out.push([u, v, noise(k)]);
+                out.push([u, 3.3 + noise(k + 1), v]);
+                out.push([3.4 + noise(k + 2), u, v]);
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn a_scan_that_is_off_is_brought_back() {
+        let mut surfaces = Surfaces::default();
+        room(0.0).iter().for_each(|p| surfaces.add(*p));
+        let about = Point::new(1.5, 1.5, 1.0);
+        let off = motion(&Vector6::new(0.004, -0.006, 0.003, 0.0005, -0.0003, 0.001), &about);
+        let mut seen: Vec<[f64; 3]> =
+            room(1.0).iter().map(|p| (off * Point::from(*p)).coords.into()).collect();
+        // A quarter of one wall was pushed by 3 cm: it must not count.
+        seen.iter_mut().filter(|p| p[0] > 3.3 && p[1] < 0.9).for_each(|p| p[0] += 0.03);
+        let found = surfaces.register(&seen, &about).expect("enough walls");
+        let left = total(&(found.plant_from_stated * off), &about);
+        for i in 0..6 {
+            assert!(left[i].abs() < 3e-4, "{i}: {left:?}");
+            assert!(
+                left[i].abs() < 5.0 * found.sigma[i].max(2e-5),
+                "{i}: {left:?} {:?}",
+                found.sigma
+            );
+        }
+        assert!(found.rms[1] < 0.002 && found.rms[0] > found.rms[1], "{:?}", found.rms);
+        assert!(surfaces.register(&seen[..20], &about).is_none());
+    }
+}

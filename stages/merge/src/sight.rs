@@ -1,0 +1,63 @@
+//! A place and the views of some scans in; whether their beams went through it, ended on it, or never got there, out.
+
+use contract::{Region, View};
+
+/// A beam that ended so far behind a place went through it, metres.
+const BEYOND: f32 = 0.04;
+/// A beam that ended so near a place ended on it, metres: noise, registration and the cell's slope.
+const ON: f32 = 0.02;
+/// Width in which beams are asked, metres.
+const FOOTPRINT: f32 = 0.012;
+
+/// What scans say of a place.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Sight {
+    /// No beam went there.
+    #[default]
+    Unseen = 0,
+    /// Something nearer hid it.
+    Hidden = 1,
+    /// Beams, and all around them, went on beyond it: nothing is there.
+    Through = 2,
+    /// A beam ended there: something is.
+    Onto = 3,
+}
+
+/// Scans that are asked.
+pub struct Watch<'a> {
+    region: &'a Region,
+    views: &'a [View],
+}
+
+impl<'a> Watch<'a> {
+    /// Views of a region.
+    #[must_use]
+    pub fn new(region: &'a Region, views: &'a [View]) -> Self {
+        Self { region, views }
+    }
+
+    /// What the scans say of a place in the world: the strongest of what each of them says.
+    #[must_use]
+    pub fn look(&self, world: [f64; 3]) -> Sight {
+        let p: [f32; 3] = std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32);
+        let mut best = Sight::Unseen;
+        for view in self.views {
+            // The images of one view share out the directions.
+            let look = view.images.iter().find_map(|image| image.look_at(p, FOOTPRINT));
+            let Some(look) = look else { continue };
+            let is_on = |range: f32| (range - look.range).abs() <= ON;
+            let says = if is_on(look.near) || is_on(look.far) {
+                Sight::Onto
+            } else if look.around.is_finite() && look.around - look.range > BEYOND {
+                Sight::Through
+            } else if look.far < look.range {
+                Sight::Hidden
+            } else {
+                Sight::Unseen
+            };
+            best = best.max(says);
+        }
+        best
+    }
+}

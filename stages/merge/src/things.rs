@@ -1,0 +1,346 @@
+//! Points that stand still, of two sessions, by voxel, with what each session's beams say of the other's, in; what
+//! appeared, went and moved out.
+
+use geometry::Aabb;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A voxel of a world: `floor(p / edge)`.
+type Cell = [i32; 3];
+
+/// Edge of a voxel, metres.
+const EDGE: f64 = 0.05;
+/// Fewest points that make a voxel solid.
+const MIN_POINTS: u32 = 3;
+/// A change whose voxels hold fewer points than this share of what they hold elsewhere is a veil at an edge.
+const MIN_DENSITY: f64 = 0.25;
+/// Share of a voxel's points whose place the other session must have seen empty.
+const MIN_SHARE: f64 = 0.6;
+/// Voxels so many steps apart are of one thing.
+const REACH: i32 = 2;
+/// A thing of which at least this share changed is looked at whole.
+const WHOLE: f64 = 0.2;
+/// Most voxels of a thing that is looked at whole: what is larger is structure that something stood against.
+const MAX_WHOLE: usize = 40_000;
+/// How much the sizes of a thing may differ between two sessions, which see other sides of it: metres, and share.
+const SAME_SIZE: [f64; 2] = [0.12, 0.2];
+
+/// Points of one session by voxel: how many, and at how many places of theirs the other session saw nothing.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tally {
+    cells: BTreeMap<Cell, [u32; 2]>,
+    /// Voxels with points of robots and what hangs on them.
+    robots: BTreeSet<Cell>,
+}
+
+/// What is tuned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThingSettings {
+    /// Smallest larger edge of a change, metres.
+    pub min_size: f64,
+    /// Fewest voxels and points of it.
+    pub min_voxels: usize,
+    /// Fewest points of it.
+    pub min_points: u32,
+    /// How near a robot's points a change is the robot's own, metres: what segmentation left of it.
+    pub robot_margin: f64,
+}
+
+impl Default for ThingSettings {
+    fn default() -> Self {
+        Self { min_size: 0.12, min_voxels: 24, min_points: 60, robot_margin: 0.15 }
+    }
+}
+
+/// What became of a thing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ThingChange {
+    /// It was not there before.
+    Appeared,
+    /// It is no longer there.
+    Gone,
+    /// It stands elsewhere.
+    Moved,
+}
+
+/// A thing that stands still and is not where it was.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thing {
+    /// What became of it.
+    pub change: ThingChange,
+    /// Bounds before, world, metres.
+    pub then: Option<Aabb>,
+    /// Bounds now.
+    pub now: Option<Aabb>,
+    /// Middle now less middle then, metres, where it moved.
+    pub shift: Option<[f64; 3]>,
+    /// Volume of the voxels that changed, m³: its surface, as far as it was seen.
+    pub volume: f64,
+    /// Points in them.
+    pub n_points: u64,
+    /// Voxels that are empty now.
+    pub gone: Vec<Cell>,
+    /// Voxels that are filled now.
+    pub filled: Vec<Cell>,
+}
+
+/// One connected change.
+#[derive(Debug, Clone)]
+struct Piece {
+    cells: Vec<Cell>,
+    n_points: u64,
+    /// Of the whole thing, where it could be told from others.
+    bounds: Aabb,
+}
+
+impl Tally {
+    /// The voxel of a place.
+    #[must_use]
+    pub fn cell(world: [f64; 3]) -> Cell {
+        world.map(|v| (v / EDGE).floor() as i32)
+    }
+
+    /// Middles of voxels, world, metres.
+    #[must_use]
+    pub fn middles(cells: &[Cell]) -> Vec<[f64; 3]> {
+        cells.iter().map(|c| c.map(|i| (f64::from(i) + 0.5) * EDGE)).collect()
+    }
+
+    /// Middles of the voxels in which something stands.
+    #[must_use]
+    pub fn solid(&self) -> Vec<[f64; 3]> {
+        let solid = self.cells.iter().filter(|(_, c)| c[0] >= MIN_POINTS);
+        Self::middles(&solid.map(|(cell, _)| *cell).collect::<Vec<_>>())
+    }
+
+    /// Adds a point that stands still; `is_empty`: the other session saw nothing at its place.
+    pub fn add(&mut self, world: [f64; 3], is_empty: bool) {
+        let cell = self.cells.entry(Self::cell(world)).or_default();
+        *cell = [cell[0] + 1, cell[1] + u32::from(is_empty)];
+    }
+
+    /// Adds a point of a robot or of what hangs on it.
+    pub fn add_robot(&mut self, world: [f64; 3]) {
+        self.robots.insert(Self::cell(world));
+    }
+
+    /// Adds all of another.
+    pub fn join(&mut self, other: Self) {
+        for (cell, [n, empty]) in other.cells {
+            let own = self.cells.entry(cell).or_default();
+            *own = [own[0] + n, own[1] + empty];
+        }
+        self.robots.extend(other.robots);
+    }
+
+    fn is_solid(&self, cell: &Cell) -> bool {
+        self.cells.get(cell).is_some_and(|c| c[0] >= MIN_POINTS)
+    }
+
+    /// Voxels in and beside which the other session has nothing: of a wire or an edge it has a point here and there.
+    fn changed(&self, other: &Self) -> BTreeSet<Cell> {
+        let is_empty = |c: &[u32; 2]| f64::from(c[1]) >= MIN_SHARE * f64::from(c[0]);
+        let has_some = |cell: &Cell| around(cell, 1).any(|c| other.cells.contains_key(&c));
+        let solid = self.cells.iter().filter(|(_, c)| c[0] >= MIN_POINTS && is_empty(c));
+        solid.map(|(cell, _)| *cell).filter(|cell| !has_some(cell)).collect()
+    }
+
+    /// Points that a solid voxel usually holds: the median.
+    fn usual(&self) -> f64 {
+        let mut all: Vec<u32> =
+            self.cells.values().map(|c| c[0]).filter(|n| *n >= MIN_POINTS).collect();
+        let middle = all.len() / 2;
+        if all.is_empty() { 0.0 } else { f64::from(*all.select_nth_unstable(middle).1) }
+    }
+
+    /// Connected changes that are large enough and no robot's.
+    fn pieces(&self, other: &Self, settings: &ThingSettings) -> Vec<Piece> {
+        let (mut left, usual) = (self.changed(other), self.usual());
+        let margin = (settings.robot_margin / EDGE).ceil() as i32;
+        let is_near = |cell: &Cell| {
+            around(cell, margin).any(|c| self.robots.contains(&c) || other.robots.contains(&c))
+        };
+        let mut out = Vec::new();
+        while let Some(first) = left.pop_first() {
+            let cells = connected(first, REACH, |c| left.remove(c), usize::MAX);
+            let n_points: u64 = cells.iter().map(|c| u64::from(self.cells[c][0])).sum();
+            let bounds = bounds(&cells);
+            let size = bounds.size().iter().fold(0.0_f64, |a, b| a.max(*b));
+            let is_dense = n_points as f64 >= MIN_DENSITY * usual * cells.len() as f64;
+            let is_large = is_dense
+                && cells.len() >= settings.min_voxels
+                && n_points >= u64::from(settings.min_points)
+                && size >= settings.min_size;
+            if is_large && 2 * cells.iter().filter(|c| is_near(c)).count() < cells.len() {
+                let bounds = self.whole(&cells).unwrap_or(bounds);
+                out.push(Piece { cells, n_points, bounds });
+            }
+        }
+        out
+    }
+
+    /// Bounds of the whole thing that some voxels are part of, where it stands apart from others and much of it changed.
+    fn whole(&self, cells: &[Cell]) -> Option<Aabb> {
+        let mut seen: BTreeSet<Cell> = BTreeSet::new();
+        let mut all = Vec::new();
+        for first in cells {
+            if seen.insert(*first) {
+                let new = |c: &Cell| self.is_solid(c) && seen.insert(*c);
+                all.extend(connected(*first, 1, new, MAX_WHOLE));
+            }
+            if all.len() >= MAX_WHOLE {
+                return None;
+            }
+        }
+        (cells.len() as f64 >= WHOLE * all.len() as f64).then(|| bounds(&all))
+    }
+}
+
+/// What differs between two sessions: things that moved, then those that went, then those that appeared, each by size.
+#[must_use]
+pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Thing> {
+    let by_size = |mut pieces: Vec<Piece>| {
+        pieces.sort_by_key(|p| std::cmp::Reverse(p.cells.len()));
+        pieces
+    };
+    let mut gone = by_size(then.pieces(now, settings));
+    let mut filled = by_size(now.pieces(then, settings));
+    let mut out = Vec::new();
+    gone.retain(|was| {
+        let fits = filled.iter().map(|is| unlike(&was.bounds, &is.bounds));
+        let best = fits.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((at, _)) = best.filter(|(_, unlike)| *unlike <= 1.0) else { return true };
+        out.push(thing(ThingChange::Moved, Some(was), Some(&filled.remove(at))));
+        false
+    });
+    out.extend(gone.iter().map(|was| thing(ThingChange::Gone, Some(was), None)));
+    out.extend(filled.iter().map(|is| thing(ThingChange::Appeared, None, Some(is))));
+    out
+}
+
+fn thing(change: ThingChange, was: Option<&Piece>, is: Option<&Piece>) -> Thing {
+    let (then, now) = (was.map(|p| p.bounds), is.map(|p| p.bounds));
+    let shift = then.zip(now).map(|(a, b)| (b.center() - a.center()).into());
+    let cells = |p: Option<&Piece>| p.map(|p| p.cells.clone()).unwrap_or_default();
+    let (gone, filled) = (cells(was), cells(is));
+    let main = is.or(was);
+    let n_points = main.map_or(0, |p| p.n_points);
+    let volume = main.map_or(0.0, |p| p.cells.len() as f64 * EDGE.powi(3));
+    Thing { change, then, now, shift, volume, n_points, gone, filled }
+}
+
+/// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may be one thing.
+fn unlike(a: &Aabb, b: &Aabb) -> f64 {
+    let sorted = |x: &Aabb| {
+        let [w, d, h] = x.size();
+        [w.min(d), w.max(d), h]
+    };
+    let (a, b) = (sorted(a), sorted(b));
+    let off = |i: usize| (a[i] - b[i]).abs() / SAME_SIZE[0].max(SAME_SIZE[1] * a[i].max(b[i]));
+    (0..3).map(off).fold(0.0, f64::max)
+}
+
+fn around(cell: &Cell, reach: i32) -> impl Iterator<Item = Cell> {
+    let ([x, y, z], r) = (*cell, reach);
+    (-r..=r)
+        .flat_map(move |i| (-r..=r).flat_map(move |j| (-r..=r).map(move |k| [x + i, y + j, z + k])))
+}
+
+/// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is new and belongs to it.
+fn connected(
+    first: Cell,
+    reach: i32,
+    mut take: impl FnMut(&Cell) -> bool,
+    at_most: usize,
+) -> Vec<Cell> {
+    let mut out = vec![first];
+    let mut next = 0;
+    while next < out.len() && out.len() < at_most {
+        let cell = out[next];
+        next += 1;
+        out.extend(around(&cell, reach).filter(|c| take(c)));
+    }
+    out.sort_unstable();
+    out
+}
+
+fn bounds(cells: &[Cell]) -> Aabb {
+    let mut out = Aabb::EMPTY;
+    for cell in cells {
+        out.add(cell.map(|i| f64::from(i) * EDGE));
+        out.add(cell.map(|i| f64::from(i + 1) * EDGE));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A box's surface, five points a voxel.
+    fn solid(tally: &mut Tally, min: [f64; 3], size: [f64; 3], is_empty: bool) {
+        let n = size.map(|s| (s / 0.02) as i32);
+        for i in 0..=n[0] {
+            for j in 0..=n[1] {
+                for k in 0..=n[2] {
+                    let rim =
+                        [(i, n[0]), (j, n[1]), (k, n[2])].iter().any(|(v, n)| *v == 0 || v == n);
+                    if rim {
+                        let at = [i, j, k].map(|v| 0.02 * f64::from(v));
+                        tally.add([min[0] + at[0], min[1] + at[1], min[2] + at[2]], is_empty);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_pallet_moves_a_barrel_goes_and_a_crate_comes() {
+        let (mut then, mut now) = (Tally::default(), Tally::default());
+        // A cabinet stays; the other session saw surfaces there.
+        solid(&mut then, [5.0, 5.0, 0.02], [0.8, 0.6, 1.8], false);
+        solid(&mut now, [5.0, 5.0, 0.02], [0.8, 0.6, 1.8], false);
+        solid(&mut then, [1.0, 1.0, 0.02], [1.2, 0.8, 0.6], true);
+        solid(&mut now, [3.0, 1.0, 0.02], [0.8, 1.2, 0.6], true);
+        solid(&mut then, [1.0, 6.0, 0.02], [0.6, 0.6, 0.9], true);
+        solid(&mut now, [8.0, 1.0, 0.02], [0.3, 0.3, 0.4], true);
+        let found = things(&then, &now, &ThingSettings::default());
+        let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
+        assert_eq!(kinds, [ThingChange::Moved, ThingChange::Gone, ThingChange::Appeared]);
+        let shift = found[0].shift.expect("a shift");
+        assert!((shift[0] - 1.8).abs() < 0.06 && (shift[1] - 0.2).abs() < 0.06, "{shift:?}");
+        assert!(things(&then, &then, &ThingSettings::default()).is_empty());
+    }
+
+    #[test]
+    fn a_thing_pushed_by_less_than_its_length_moved_as_a_whole() {
+        let (mut then, mut now) = (Tally::default(), Tally::default());
+        // Where it stands in both sessions nothing was seen empty.
+        let parts = [(&mut then, 1.0, 0.4, 1.4, 0.8), (&mut now, 2.2, 0.4, 1.4, 0.8)];
+        for (tally, own, own_length, shared, shared_length) in parts {
+            solid(tally, [own, 1.0, 0.02], [own_length, 0.8, 0.6], true);
+            solid(tally, [shared, 1.0, 0.02], [shared_length, 0.8, 0.6], false);
+        }
+        let found = things(&then, &now, &ThingSettings::default());
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].change, ThingChange::Moved);
+        let shift = found[0].shift.expect("a shift");
+        assert!((shift[0] - 0.4).abs() < 0.06, "{shift:?}");
+    }
+
+    #[test]
+    fn what_is_near_a_robot_is_the_robots() {
+        let (mut then, now) = (Tally::default(), Tally::default());
+        solid(&mut then, [1.0, 1.0, 0.5], [0.2, 0.2, 0.2], true);
+        for i in 0..60 {
+            then.add_robot([1.25, 1.0 + 0.005 * f64::from(i), 0.6]);
+        }
+        assert!(
+            things(&then, &now, &ThingSettings { robot_margin: 0.3, ..Default::default() })
+                .is_empty()
+        );
+        assert_eq!(
+            things(&then, &now, &ThingSettings { robot_margin: 0.0, ..Default::default() }).len(),
+            1
+        );
+    }
+}

@@ -1,0 +1,132 @@
+//! A plant as it was scanned, and one cell of it as it was scanned again weeks later, in two scenes: a robot moved, a pallet
+//! was pushed, a barrel was taken away.
+
+use crate::plant::{Plant, plant};
+use crate::random::Random;
+use crate::scene::{Column, Cuboid, Raster, Registration, Scene, Section};
+use crate::spot::scanner;
+use contract::{Error, Result};
+use robot::Model;
+
+/// Size of the pallet with its load, and of the barrel (radius, height), metres.
+const PALLET: [f64; 3] = [1.2, 0.8, 0.7];
+const BARREL: [f64; 2] = [0.29, 0.88];
+/// Room that both keep to other things, metres.
+const FREE: f64 = 0.8;
+/// How far the new scanners stand from the robot's base, at most, and from the walls, metres.
+const NEAR: f64 = 3.6;
+const WALL: f64 = 0.8;
+/// Standard deviations of the new scans' registration: metres, degrees.
+const OFF: [f64; 2] = [0.003, 0.01];
+/// Places that are tried.
+const TRIES: usize = 2000;
+
+/// The two sessions of a plant, drawn as [`plant`] draws it; its first robot is the one that moves.
+///
+/// # Errors
+/// As [`plant`]; `BadInput` where the hall has no room for the pallet.
+pub fn sessions(wanted: &Plant, models: &[Model]) -> Result<[Scene; 2]> {
+    let mut then = plant(&Plant { moves: true, ..wanted.clone() }, models)?;
+    let mut random = Random::keyed(&[wanted.seed, 0x5E5]);
+    let later: Vec<_> = then.robots.iter_mut().flat_map(|r| std::mem::take(&mut r.later)).collect();
+    let (Some(robot), Some(later)) = (then.robots.first(), later.into_iter().next()) else {
+        return Err(Error::bad_input("a plant without robots has no cell"));
+    };
+    let at = [robot.xyz[0], robot.xyz[1]];
+    let size = then.hall.as_ref().map_or([20.0; 3], |hall| hall.size);
+    let new = new_scanners(&then, at, size, wanted.step_deg, &mut random);
+    let mut taken: Vec<[f64; 2]> = new.iter().map(|s| [s.position[0], s.position[1]]).collect();
+    let pallet = free(&then, (at, size), &mut taken, &mut random)?;
+    let pushed = free(&then, (at, size), &mut taken, &mut random)?;
+    let barrel = free(&then, (at, size), &mut taken, &mut random)?;
+    let mut now = then.clone();
+    put_pallet(&mut then, pallet, random.between(-15.0, 15.0));
+    put_pallet(&mut now, pushed, random.between(-15.0, 15.0));
+    then.columns.push(Column {
+        name: "barrel".into(),
+        xy: barrel,
+        radius: BARREL[0],
+        height: BARREL[1],
+        section: Section::Round,
+    });
+    now.robots[0].posture = later.posture;
+    now.seed = wanted.seed ^ 0x5E55_1045;
+    now.scanners = new;
+    Ok([then, now])
+}
+
+fn put_pallet(scene: &mut Scene, [x, y]: [f64; 2], yaw: f64) {
+    let z = scene.ground(x, y) + 0.5 * PALLET[2];
+    scene.boxes.push(Cuboid {
+        name: "pallet".into(),
+        xyz: [x, y, z],
+        size: PALLET,
+        rpy_deg: [0.0, 0.0, yaw],
+        reflectance: 0.6,
+    });
+}
+
+/// Two scanners, on two sides of the robot, registered as well as rescans are.
+fn new_scanners(
+    scene: &Scene,
+    at: [f64; 2],
+    size: [f64; 3],
+    step_deg: f64,
+    random: &mut Random,
+) -> Vec<crate::scene::Scanner> {
+    let side = |axis: usize, random: &mut Random| {
+        let mut xy = at;
+        let to_wall = at[axis] + 0.5 * size[axis] - WALL;
+        xy[axis] -= to_wall.min(NEAR);
+        xy[1 - axis] += random.between(-0.6, 0.6);
+        xy
+    };
+    let places = [side(0, random), side(1, random)];
+    let one = |(k, xy): (usize, [f64; 2])| {
+        let raster = Raster { elevation_deg: [-60.0, 70.0], step_deg, ..Raster::default() };
+        let z = scene.ground(xy[0], xy[1]) + random.between(1.6, 2.2);
+        let mut out = scanner(format!("again_{}", k + 1), [xy[0], xy[1], z], raster);
+        out.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];
+        let mut normal = |sigma: f64| sigma * random.normals()[0];
+        out.registration = Registration {
+            xyz: [normal(OFF[0]), normal(OFF[0]), normal(OFF[0])],
+            rpy_deg: [normal(OFF[1]), normal(OFF[1]), normal(OFF[1])],
+        };
+        out
+    };
+    places.into_iter().enumerate().map(one).collect()
+}
+
+/// A place on the floor near the robot's aisles that nothing stands on.
+fn free(
+    scene: &Scene,
+    (at, size): ([f64; 2], [f64; 3]),
+    taken: &mut Vec<[f64; 2]>,
+    random: &mut Random,
+) -> Result<[f64; 2]> {
+    let around =
+        |p: [f64; 2], xy: [f64; 2], half: f64| (p[0] - xy[0]).hypot(p[1] - xy[1]) < FREE + half;
+    for _ in 0..TRIES {
+        let along = random.between(-6.5, 6.5);
+        let edge = random.between(0.7, 1.1);
+        let p = if random.unit() < 0.5 {
+            [at[0] + along, edge - 0.5 * size[1]]
+        } else {
+            [edge - 0.5 * size[0], at[1] + along]
+        };
+        let inside = (0..2).all(|i| p[i].abs() < 0.5 * size[i] - 0.65);
+        let things = scene
+            .boxes
+            .iter()
+            .map(|b| ([b.xyz[0], b.xyz[1]], 0.5 * b.size[0].hypot(b.size[1])))
+            .chain(scene.columns.iter().map(|c| (c.xy, c.radius)))
+            .chain(scene.scanners.iter().map(|s| ([s.position[0], s.position[1]], 0.0)))
+            .chain(taken.iter().map(|xy| (*xy, 0.45)));
+        let mut things = things;
+        if inside && !things.any(|(xy, half)| around(p, xy, half)) {
+            taken.push(p);
+            return Ok(p);
+        }
+    }
+    Err(Error::bad_input("the hall has no room for what is to be moved").hint("draw another seed"))
+}
