@@ -30,14 +30,8 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
     atomic::write(&dir.join("scene.toml"), scene.to_toml()?.as_bytes())?;
     let truth = scan_scene(&scene, &models, &dir.join("scans"), Formats::ALL, engine)?;
     let scanned = started.elapsed().as_secs_f64();
-    let job = Job {
-        inputs: vec![dir.join("scans/scans.e57")],
-        robots,
-        scanners: None,
-        out: dir.join("result"),
-        review: None,
-        means: means.clone(),
-    };
+    let job =
+        Job::new(vec![dir.join("scans/scans.e57")], robots, dir.join("result"), means.clone());
     let started = Instant::now();
     let outcome = plan::run(&job, engine)?;
     let seconds = started.elapsed().as_secs_f64();

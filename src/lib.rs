@@ -16,6 +16,7 @@ mod filling;
 pub mod job;
 mod labelled;
 mod labelling;
+pub mod lenient;
 mod library;
 mod masks;
 pub mod plan;

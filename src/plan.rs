@@ -7,6 +7,7 @@ use crate::estimate::Estimate;
 use crate::filling::Filling;
 use crate::job::{Job, Outcome};
 use crate::labelling::{Labelling, Scope};
+use crate::lenient::Failures;
 use crate::library;
 use crate::report::Report;
 use crate::rescan::{Records, State};
@@ -62,8 +63,10 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let shelf = Shelf::new(&library.models);
     let search = Search::new(&shelf, scans, &store, &ground, settings);
     let kept = Kept::new(room.fits(), sums.fits(&tiles, settings));
+    let failures = Failures::of(job);
     let fits = engine.fan_out("fit", regions.clone(), |region| {
-        kept.or_find(&format!("{region:?}"), || search.region(&region))
+        let find = || kept.or_find(&format!("{region:?}"), || search.region(&region));
+        failures.spare(&region, find)
     })?;
     let (fits, unmet) = review.apply(fits.into_iter().flatten().collect());
     let fits = fit::choose(fits, &library.models);
@@ -92,6 +95,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         clusters: &clusters,
         written: &written,
         unmet,
+        left_out: failures.said(job),
     }
     .finish(&room)?;
 

@@ -28,6 +28,8 @@ pub(crate) struct Report<'a> {
     pub(crate) written: &'a Done,
     /// What the review expects and nobody found.
     pub(crate) unmet: Vec<String>,
+    /// Inputs and regions that failed and were left out.
+    pub(crate) left_out: Vec<String>,
 }
 
 impl Report<'_> {
@@ -65,7 +67,8 @@ impl Report<'_> {
             rescan: None,
         };
         result.write(room.next())?;
-        Ok(Outcome { summary: self.summary(), warnings, ..Outcome::default() })
+        let partial = !self.left_out.is_empty();
+        Ok(Outcome { summary: self.summary(), warnings, partial, ..Outcome::default() })
     }
 
     /// Counts of each stage; no times, so that the same input gives the same bytes.
@@ -83,7 +86,7 @@ impl Report<'_> {
 
     fn warnings(&self) -> Vec<String> {
         let mut out = self.sources.warnings.clone();
-        out.extend(self.unmet.iter().cloned());
+        out.extend(self.left_out.iter().chain(&self.unmet).cloned());
         for finding in &self.library.findings {
             if finding.severity == robot::Severity::Error {
                 out.push(format!(

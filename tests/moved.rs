@@ -35,7 +35,7 @@ fn a_robot_that_moved_between_stations_has_two_postures() {
     let out = dir.path().join("out");
     let means = Means::of(&Given::default()).expect("defaults hold");
     let inputs = vec![scans.join("scans.e57")];
-    let job = Job { inputs, robots, scanners: None, out: out.clone(), review: None, means };
+    let job = Job::new(inputs, robots, out.clone(), means);
     plan::run(&job, &Engine::new(2)).expect("the run ends well");
     let agreement = Agreement::of(&out, &scans.join("truth")).expect("compares");
     assert_eq!(agreement.n_invented, 0, "{}", agreement.table());

@@ -40,7 +40,7 @@ fn run(input: PathBuf, scanners: Option<PathBuf>, robots: &Path, out: PathBuf, t
     let given = Given { threads: Some(threads), ..Given::default() };
     let means = Means::of(&given).expect("defaults hold");
     let robots = robots.to_path_buf();
-    let job = Job { inputs: vec![input], robots, scanners, out, review: None, means };
+    let job = Job { scanners, ..Job::new(vec![input], robots, out, means) };
     plan::run(&job, &Engine::new(threads)).expect("the run ends well");
 }
 

@@ -186,14 +186,7 @@ fn run(
         library.to_path_buf()
     };
     let started = Instant::now();
-    let job = Job {
-        inputs: vec![scans.join("scans.e57")],
-        robots,
-        scanners: None,
-        out: dir.join("result"),
-        review: None,
-        means: means.clone(),
-    };
+    let job = Job::new(vec![scans.join("scans.e57")], robots, dir.join("result"), means.clone());
     plan::run(&job, engine)?;
     row.seconds = started.elapsed().as_secs_f64();
     let agreement = Agreement::of(&job.out, &scans.join("truth"))?;

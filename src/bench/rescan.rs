@@ -41,6 +41,8 @@ pub struct RescanBench {
     pub out: Option<PathBuf>,
     /// Keep scenes, scans and results.
     pub keep: bool,
+    /// Do the main job on the new scans alone, too, to compare with.
+    pub alone: bool,
 }
 
 /// A found thing nearer to a true one than this is it, metres.
@@ -138,13 +140,8 @@ fn case(
     };
     let ((old, n_points), (new, n_new)) = (scanned(&then, "then")?, scanned(&now, "now")?);
     (row.n_points, row.n_new) = (n_points, n_new);
-    let job = |scans: &Path, out: &str| Job {
-        inputs: vec![scans.join("scans.e57")],
-        robots: robots.to_path_buf(),
-        scanners: None,
-        out: dir.join(out),
-        review: None,
-        means: means.clone(),
+    let job = |scans: &Path, out: &str| {
+        Job::new(vec![scans.join("scans.e57")], robots.to_path_buf(), dir.join(out), means.clone())
     };
     let started = Instant::now();
     let whole = job(&old, "base");
@@ -154,13 +151,14 @@ fn case(
     let wish = Wish { base: whole.out.clone(), cell: Cell::Seen, job: job(&new, "again") };
     rescan(&wish, engine)?;
     row.seconds[1] = started.elapsed().as_secs_f64();
-    let alone = job(&new, "alone");
-    plan::run(&alone, engine)?;
-    let n_masks = then.scanners.len();
-    let found = [
-        Agreement::of_session(&wish.job.out, &new.join("truth"), n_masks)?,
-        Agreement::of(&alone.out, &new.join("truth"))?,
-    ];
+    let mut found =
+        vec![Agreement::of_session(&wish.job.out, &new.join("truth"), then.scanners.len())?];
+    if bench.alone {
+        let alone = job(&new, "alone");
+        plan::run(&alone, engine)?;
+        found.push(Agreement::of(&alone.out, &new.join("truth"))?);
+    }
+    (row.joint, row.f1) = ([f64::NAN; 2], [f64::NAN; 2]);
     for (i, agreement) in found.iter().enumerate() {
         row.joint[i] = joint(agreement);
         row.f1[i] = agreement.f1();

@@ -55,6 +55,7 @@ pub(super) fn bench_rescan(flags: &RescanBenchFlags, common: &Common, say: &Say)
         robots: flags.robots.clone(),
         out: flags.out.clone(),
         keep: flags.keep,
+        alone: flags.alone,
     };
     say.result(&rescans(&bench, &means, &engine)?);
     Ok(exit::OK)

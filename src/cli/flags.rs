@@ -144,6 +144,9 @@ pub(super) struct RescanBenchFlags {
     /// Keep scans and results
     #[arg(long, requires = "out")]
     pub(super) keep: bool,
+    /// Do the main job on the new scans alone, too, to compare with
+    #[arg(long)]
+    pub(super) alone: bool,
 }
 
 #[derive(Debug, Args)]
@@ -220,6 +223,9 @@ pub(super) struct RunFlags {
     /// What a person knows of the robots: places where one stands, of which model, or none (TOML)
     #[arg(long, value_name = "FILE")]
     pub(super) review: Option<PathBuf>,
+    /// Finish without the files and robots that fail, and exit with 3
+    #[arg(long)]
+    pub(super) keep_going: bool,
     /// Estimate where the joints of each robot really are, too: for robots that their models fit poorly
     #[arg(long)]
     pub(super) calibrate: bool,

@@ -5,14 +5,14 @@ use super::say::Say;
 use crate::engine::Engine;
 use crate::estimate::estimate;
 use crate::rescan::{self, Cell, Wish};
-use crate::{exit, job::Job, plan};
+use crate::{exit, job::Job, lenient};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use std::fmt::Write as _;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
     let (job, engine) = job(flags, common)?;
-    let mut outcome = plan::run(&job, &engine)?;
+    let mut outcome = lenient::run(&job, &engine)?;
     let _ = writeln!(outcome.summary, "result in {}", job.out.join("result.json").display());
     say.outcome(&outcome);
     Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
@@ -41,12 +41,13 @@ pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<
         base: flags.base.clone(),
         cell: cell(flags)?,
         job: Job {
-            inputs: flags.inputs.clone(),
-            robots: flags.robots.clone().unwrap_or_default(),
             scanners: common.scanners(&means),
-            out: flags.out.clone(),
-            review: None,
-            means,
+            ..Job::new(
+                flags.inputs.clone(),
+                flags.robots.clone().unwrap_or_default(),
+                flags.out.clone(),
+                means,
+            )
         },
     };
     let mut outcome = rescan::rescan(&wish, &engine)?;
@@ -77,12 +78,10 @@ fn job(flags: &RunFlags, common: &Common) -> Result<(Job, Engine)> {
     present(&flags.inputs)?;
     let engine = common.engine(&means)?;
     let job = Job {
-        inputs: flags.inputs.clone(),
-        robots: flags.robots.clone(),
         scanners: common.scanners(&means),
-        out: flags.out.clone(),
         review: flags.review.clone(),
-        means,
+        keep_going: flags.keep_going,
+        ..Job::new(flags.inputs.clone(), flags.robots.clone(), flags.out.clone(), means)
     };
     Ok((job, engine))
 }

@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Runs `step` on item `at` of pass `name`. What the step leaves half-done after a panic is never used again, since
 /// the pass ends; hence `AssertUnwindSafe`.
-pub(super) fn guarded<T>(name: &str, at: u64, step: impl FnOnce() -> Result<T>) -> Result<T> {
+pub(crate) fn guarded<T>(name: &str, at: u64, step: impl FnOnce() -> Result<T>) -> Result<T> {
     catch_unwind(AssertUnwindSafe(step)).unwrap_or_else(|panic| {
         let what = message(panic.as_ref());
         // Dropping a payload may panic in its turn; nothing may escape from here.

@@ -19,7 +19,7 @@ mod tests;
 use crate::progress::{Amount, Progress};
 use contract::{Error, Kind, Result, Weigh};
 use flow::Pass;
-use guard::guarded;
+pub(crate) use guard::guarded;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};

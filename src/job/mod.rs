@@ -35,11 +35,22 @@ pub struct Job {
     pub out: PathBuf,
     /// What a person knows of the robots.
     pub review: Option<PathBuf>,
+    /// Finish without the inputs and regions that fail, and say so.
+    pub keep_going: bool,
+    /// Inputs that were left out because they failed, in words.
+    pub left_out: Vec<String>,
     /// How much, in which way.
     pub means: Means,
 }
 
 impl Job {
+    /// A job as most are: nothing known of scanners and robots, and no failure forgiven.
+    #[must_use]
+    pub fn new(inputs: Vec<PathBuf>, robots: PathBuf, out: PathBuf, means: Means) -> Self {
+        let (scanners, review, keep_going, left_out) = (None, None, false, Vec::new());
+        Self { inputs, robots, scanners, out, review, keep_going, left_out, means }
+    }
+
     /// Prepares the output folder.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use merge::{Registration, Sight, Surfaces, Tally, Watch};
 use segment::Ground;
 
 /// Points of a scan that are laid on the plant's surfaces, about.
-const N_LAID: u64 = 300_000;
+const N_LAID: u64 = 100_000;
 
 /// How each new scan, from the number `first` on, is off the plant; none where too little of what stood is seen.
 pub(crate) fn register(

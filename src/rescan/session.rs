@@ -16,7 +16,7 @@ use contract::{Cluster, Error, Fit, Kind, Region, Result, ScanId, TILE_SIDE, Ver
 use geometry::{Aabb, Pose};
 use ingest::Sources;
 use lattice::ViewSettings;
-use merge::{Registration, Tally, Thing, Watch, things};
+use merge::{Registration, Tally, Thing, ThingChange, Watch, things};
 use robot::Model;
 
 /// How far from its scanner a new scan may see the cell, metres, where nobody says where it is: a robot cell.
@@ -316,7 +316,9 @@ impl<'a> Session<'a> {
         let search = self.search();
         let like =
             |size: [f64; 3]| size[2] >= ROBOT_LIKE[0] && size.iter().any(|s| *s >= ROBOT_LIKE[1]);
-        let bounds = labels.things.iter().filter_map(|thing| thing.now);
+        // What stood elsewhere before, in the same shape, is none.
+        let new = labels.things.iter().filter(|thing| thing.change == ThingChange::Appeared);
+        let bounds = new.filter_map(|thing| thing.now);
         let regions: Vec<Region> = bounds
             .filter(|bounds| like(bounds.size()))
             .map(|bounds| region(&bounds.center(), &bounds.grown(ABOUT)))

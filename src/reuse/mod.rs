@@ -153,7 +153,7 @@ impl Sums {
         let names: Vec<_> = job.inputs.iter().map(|p| p.display().to_string()).collect();
         let digests: Option<Vec<&String>> = self.inputs.iter().map(OnceLock::get).collect();
         let inputs = words(&(&names, digests?));
-        let settings = words(&job.means.settings);
+        let settings = words(&(&job.means.settings, job.keep_going, &job.left_out));
         Some(Key::of("run", &[&inputs, &self.library, &self.others, &self.base, &settings]))
     }
 }

@@ -120,6 +120,10 @@ impl Reader for Las {
         Some((header.scale, header.offset))
     }
 
+    fn check(&self) -> Result<()> {
+        self.records.map.check()
+    }
+
     fn masks(&self) -> &[MaskSeed] {
         &self.masks
     }

@@ -90,6 +90,10 @@ pub(crate) trait Reader: Send + Sync {
     fn quantum(&self) -> Option<([f64; 3], [f64; 3])> {
         None
     }
+    /// Whether all that was read so far was really there: a mapped file may have been cut short.
+    fn check(&self) -> Result<()> {
+        Ok(())
+    }
     /// What the file says of itself, as `(name, value)` pairs for `inspect`.
     fn facts(&self) -> Vec<(String, String)>;
 }

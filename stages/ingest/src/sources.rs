@@ -107,9 +107,10 @@ impl Sources {
         };
         let path = &known.path;
         let strips = file.reader.strips(want).map_err(|e| e.at(path.display()))?;
-        Ok(Box::new(strips.map(move |strip| match strip {
-            Ok(raw) => Ok(file.number(raw)),
-            Err(error) => Err(error.at(path.display())),
+        // A file that was cut short reads as zeros from there: that it was goes before what its reader makes of them.
+        Ok(Box::new(strips.map(move |strip| {
+            let whole = file.reader.check().and(strip);
+            whole.map(|raw| file.number(raw)).map_err(|error| error.at(path.display()))
         })))
     }
 
@@ -176,6 +177,7 @@ impl Sources {
             file.steps.push(steps);
             self.scans.push(scan);
         }
+        file.reader.check()?;
         self.files.push(file);
         Ok(())
     }

@@ -21,6 +21,8 @@ const REACH: i32 = 2;
 const WHOLE: f64 = 0.2;
 /// Most voxels of a thing that is looked at whole: what is larger is structure that something stood against.
 const MAX_WHOLE: usize = 40_000;
+/// Of a thing that one session sees only in part, the other may see up to so many times the ground.
+const MAX_PART: f64 = 2.5;
 /// How much the sizes of a thing may differ between two sessions, which see other sides of it: metres, and share.
 const SAME_SIZE: [f64; 2] = [0.12, 0.2];
 
@@ -228,15 +230,22 @@ fn thing(change: ThingChange, was: Option<&Piece>, is: Option<&Piece>) -> Thing 
     Thing { change, then, now, shift, volume, n_points, gone, filled }
 }
 
-/// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may be one thing.
+/// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may be one thing, of which
+/// one session saw less than the other.
 fn unlike(a: &Aabb, b: &Aabb) -> f64 {
     let sorted = |x: &Aabb| {
         let [w, d, h] = x.size();
         [w.min(d), w.max(d), h]
     };
     let (a, b) = (sorted(a), sorted(b));
-    let off = |i: usize| (a[i] - b[i]).abs() / SAME_SIZE[0].max(SAME_SIZE[1] * a[i].max(b[i]));
-    (0..3).map(off).fold(0.0, f64::max)
+    let same = |i: usize| SAME_SIZE[0].max(SAME_SIZE[1] * a[i].max(b[i]));
+    let off = |i: usize| (a[i] - b[i]).abs() / same(i);
+    // The smaller one within the larger one, and no small part of it.
+    let (small, large) = if a[0] * a[1] < b[0] * b[1] { (a, b) } else { (b, a) };
+    let beyond = |i: usize| (small[i] - large[i]) / same(i);
+    let part = large[0] * large[1] / (small[0] * small[1]).max(1e-9) / MAX_PART;
+    let seen_less = beyond(0).max(beyond(1)).max(part).max(off(2));
+    (0..3).map(off).fold(0.0, f64::max).min(seen_less)
 }
 
 fn around(cell: &Cell, reach: i32) -> impl Iterator<Item = Cell> {

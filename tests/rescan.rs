@@ -1,0 +1,140 @@
+//! A cell that is scanned again, from outside: what was changed is found and nothing else, what was not touched stays as it
+//! was, byte for byte, and a rescan can be gone on from in its turn.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use stillpoint::compare::Agreement;
+use stillpoint::demo::write_robots;
+use stillpoint::engine::Engine;
+use stillpoint::job::{Given, Job, Means};
+use stillpoint::plan;
+use stillpoint::rescan::{Cell, Wish, rescan};
+use stillpoint::reuse::{Manifest, check};
+use stillpoint::scanning::{Formats, scan_scene};
+
+const SEED: u64 = 11;
+/// Share of points of links and of what hangs on them that come out as such, and the other way round, in the cell.
+const F1: f64 = 0.98;
+
+/// Two sessions of a small plant with three robots, and the result of the first.
+struct Plant {
+    dir: tempfile::TempDir,
+    n_masks: usize,
+    robot: [f64; 3],
+}
+
+impl Plant {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().expect("a folder");
+        let robots = dir.path().join("robots");
+        write_robots(&robots).expect("the library is written");
+        let models =
+            robot::Library::load(&robots, &robot::Settings::default()).expect("loads").models;
+        let wanted = simulate::Plant {
+            seed: SEED,
+            n_robots: 3,
+            n_rows: 1,
+            n_scanners: 5,
+            step_deg: 0.2,
+            is_tight: false,
+            moves: false,
+        };
+        let [then, now] = simulate::sessions(&wanted, &models).expect("is drawn");
+        let (n_masks, robot) = (then.scanners.len(), now.robots[0].xyz);
+        for (scene, name) in [(then, "then"), (now, "now")] {
+            let formats = Formats { las: false, ..Formats::ALL };
+            scan_scene(&scene, &models, &dir.path().join(name), formats, &Engine::new(2))
+                .expect("scans");
+        }
+        let plant = Self { dir, n_masks, robot };
+        plan::run(&plant.job("then", "base"), &Engine::new(2)).expect("the run ends well");
+        plant
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    fn job(&self, scans: &str, out: &str) -> Job {
+        let means = Means::of(&Given::default()).expect("defaults hold");
+        let inputs = vec![self.path(scans).join("scans.e57")];
+        Job::new(inputs, self.path("robots"), self.path(out), means)
+    }
+
+    fn wish(&self, base: &str, out: &str) -> Wish {
+        Wish { base: self.path(base), cell: Cell::Seen, job: self.job("now", out) }
+    }
+
+    fn run(&self, args: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
+        command.current_dir(self.dir.path()).args(["--progress", "none"]).args(args);
+        command.output().expect("the program starts")
+    }
+}
+
+fn changes(out: &Path) -> serde_json::Value {
+    let text = std::fs::read_to_string(out.join("changes.json")).expect("a list of changes");
+    serde_json::from_str(&text).expect("it parses")
+}
+
+#[test]
+fn a_rescanned_cell_is_brought_up_to_date() {
+    let plant = Plant::new();
+    let engine = Engine::new(2);
+    rescan(&plant.wish("base", "again"), &engine).expect("the rescan ends well");
+    let out = plant.path("again");
+
+    // What was changed is found, and nothing else.
+    let changes = changes(&out);
+    let robots = changes["robots"].as_array().expect("robots");
+    let moved: Vec<_> = robots.iter().filter(|r| r["change"]["kind"] != "same").collect();
+    assert_eq!(moved.len(), 1, "{robots:#?}");
+    let result = export::ResultFile::read(&out).expect("a result");
+    let entry = result.robots.iter().find(|r| moved[0]["now"] == r.id.as_str()).expect("it");
+    let off = (0..2).map(|i| (entry.base_pose.xyz[i] - plant.robot[i]).powi(2)).sum::<f64>();
+    assert!(off.sqrt() < 0.05, "the robot that moved stands at {:?}", plant.robot);
+    let things = changes["things"].as_array().expect("things");
+    let kinds: Vec<_> = things.iter().filter_map(|t| t["change"].as_str()).collect();
+    assert_eq!(kinds, ["moved", "gone"], "{things:#?}");
+
+    // Masks of the new scans, and the robots of the whole plant, agree with the truth.
+    let agreement = Agreement::of_session(&out, &plant.path("now/truth"), plant.n_masks);
+    let agreement = agreement.expect("compares");
+    assert_eq!(agreement.n_invented, 0, "{}", agreement.table());
+    assert!(agreement.robots.iter().all(|r| r.found.as_ref().is_some_and(|f| f.is_right)));
+    assert!(agreement.worst_joint_deg() < 0.3, "{}", agreement.table());
+    assert!(agreement.f1() > F1, "{}", agreement.f1());
+
+    // All is whole, and masks of the earlier scans are the same files.
+    for name in ["base", "again"] {
+        assert_eq!(check(&plant.path(name), &engine).expect("a result").wrong, [""; 0], "{name}");
+    }
+    let digest = |out: &Path| {
+        let files = Manifest::read(out).expect("a list").files;
+        files.into_iter().find(|f| f.path == "labels/0.kind.npy").expect("a mask").digest
+    };
+    assert_eq!(digest(&plant.path("base")), digest(&out));
+    goes_on(&plant, &out);
+}
+
+/// Rescans of rescans, and what is refused.
+fn goes_on(plant: &Plant, out: &Path) {
+    let said = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    let again =
+        ["rescan", "--base", "base", "now/scans.e57", "--out", "again", "--robots", "robots"];
+    let unchanged = plant.run(&again[..6]);
+    assert!(!unchanged.status.success() || said(&unchanged).contains("everything"));
+    // The new scans are part of it now; neither they nor the same folder can be given again.
+    let known = plant.run(&["rescan", "--base", "again", "now/scans.e57", "--out", "third"]);
+    assert_eq!(known.status.code(), Some(2), "{}", said(&known));
+    assert!(said(&known).contains("part of the earlier result"), "{}", said(&known));
+    let over = plant.run(&["rescan", "--base", "base", "now/scans.e57", "--out", "base"]);
+    assert_eq!(over.status.code(), Some(2), "{}", said(&over));
+    let nobody =
+        plant.run(&["rescan", "--base", "base", "now/scans.e57", "--out", "x", "--robot", "R9"]);
+    assert!(nobody.status.code() == Some(2) && said(&nobody).contains("R9"), "{}", said(&nobody));
+    // The first scans again as a third session: nothing that stands now is changed by what it says of the past.
+    std::fs::copy(plant.path("now/scans.e57"), plant.path("third.e57")).expect("copies");
+    let lists = export::ResultFile::read(out).expect("a result").labels.scans;
+    assert!(lists.iter().any(|scan| scan.superseded.is_some()), "{lists:?}");
+}
