@@ -4,7 +4,7 @@
 //! five of their standard deviations together, and by more than models and registration make. Joints that the points of
 //! either session leave open are not compared, and named.
 
-use contract::Fit;
+use contract::{Fit, Verdict};
 use export::{ResultFile, RobotEntry};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -77,12 +77,17 @@ pub struct RobotChange {
     pub verdicts: [Option<String>; 2],
 }
 
-/// Compares two results: robots of the first in its order, then those that appeared.
+/// Compares two results: robots of the first in its order, then those that appeared. Refused ones stand in neither.
 #[must_use]
 pub fn changes(then: &ResultFile, now: &ResultFile) -> Vec<RobotChange> {
+    let standing = |result| -> Vec<&RobotEntry> {
+        let ResultFile { robots, .. }: &ResultFile = result;
+        robots.iter().filter(|r| r.verdict != Verdict::Refused.word()).collect()
+    };
+    let (then, now) = (standing(then), standing(now));
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
-    for (i, a) in then.robots.iter().enumerate() {
-        for (j, b) in now.robots.iter().enumerate() {
+    for (i, a) in then.iter().enumerate() {
+        for (j, b) in now.iter().enumerate() {
             let apart = length(shift(a, b));
             if apart < SAME_PLACE {
                 pairs.push((apart, i, j));
@@ -90,18 +95,18 @@ pub fn changes(then: &ResultFile, now: &ResultFile) -> Vec<RobotChange> {
         }
     }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let mut partner = vec![None; then.robots.len()];
-    let mut taken = vec![false; now.robots.len()];
+    let mut partner = vec![None; then.len()];
+    let mut taken = vec![false; now.len()];
     for (_, i, j) in pairs {
         if partner[i].is_none() && !taken[j] {
             (partner[i], taken[j]) = (Some(j), true);
         }
     }
-    let known = then.robots.iter().zip(partner).map(|(a, j)| match j {
-        Some(j) => compared(a, &now.robots[j]),
+    let known = then.iter().zip(partner).map(|(a, j)| match j {
+        Some(j) => compared(a, now[j]),
         None => alone(a, Change::Gone),
     });
-    let new = now.robots.iter().zip(&taken).filter(|(_, taken)| !**taken);
+    let new = now.iter().zip(&taken).filter(|(_, taken)| !**taken);
     known.chain(new.map(|(b, _)| alone(b, Change::Appeared))).collect()
 }
 

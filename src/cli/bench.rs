@@ -1,6 +1,7 @@
 //! `bench`: suites and numbers in; tables of what the program is worth out.
 
-use super::flags::{AccuracyFlags, Against, Common, PlantFlags, RescanBenchFlags, ThroughputFlags};
+use super::bench_flags::{AccuracyFlags, Against, PlantFlags, RescanBenchFlags, ThroughputFlags};
+use super::flags::Common;
 use super::say::Say;
 use crate::bench::plant::{PlantBench, plants};
 use crate::bench::rescan::{RescanBench, rescans};

@@ -2,6 +2,7 @@
 //! standard error.
 
 mod bench;
+mod bench_flags;
 mod demo;
 mod flags;
 mod inspect;
@@ -12,8 +13,9 @@ mod say;
 mod simulate;
 
 use crate::exit;
+use bench_flags::BenchCommand;
 use clap::Parser;
-use flags::{BenchCommand, Command, Line, RobotsCommand};
+use flags::{Command, Line, RobotsCommand};
 use say::Say;
 use std::ffi::OsString;
 
@@ -38,6 +40,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Verify(flags) => results::verify(flags, &line.common, &say),
         Command::Report(flags) => results::report(flags, &say),
         Command::Diff(flags) => results::diff(flags, &say),
+        Command::History(flags) => results::history(flags, &say),
         Command::Bench(BenchCommand::Accuracy(flags)) => {
             bench::bench_accuracy(flags, &line.common, &say)
         }

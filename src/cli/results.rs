@@ -1,14 +1,16 @@
-//! `verify`, `report` and `diff`: output folders of runs in; whether they are whole, what is in them, and how they differ,
-//! out.
+//! `verify`, `report`, `diff` and `history`: output folders of runs in; whether they are whole, what is in them, how they
+//! differ and which goes on from which, out.
 
-use super::flags::{Common, DiffFlags, OutFlags, ReportFlags};
+use super::flags::{Common, DiffFlags, HistoryFlags, OutFlags, ReportFlags};
 use super::say::Say;
 use crate::changes::{changes, words};
 use crate::exit;
+use crate::history;
 use crate::job::Outcome;
 use crate::reuse::{Manifest, check};
 use contract::{Error, Kind, Result};
 use export::ResultFile;
+use std::path::Path;
 
 pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8> {
     let engine = common.engine(&common.means()?)?;
@@ -39,17 +41,48 @@ pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
     Ok(if partial { exit::PARTIAL } else { exit::OK })
 }
 
+pub(super) fn history(flags: &HistoryFlags, say: &Say) -> Result<u8> {
+    for name in &flags.remove {
+        history::remove(&flags.folder, name)?;
+    }
+    let sessions = history::sessions(&flags.folder)?;
+    say.result(&if flags.json { json(&sessions)? } else { history::words(&sessions) });
+    Ok(exit::OK)
+}
+
 pub(super) fn diff(flags: &DiffFlags, say: &Say) -> Result<u8> {
     let (then, now) = (ResultFile::read(&flags.then)?, ResultFile::read(&flags.now)?);
     let changes = changes(&then, &now);
+    // Where the one goes on from the other, that one knows what else changed.
+    let goes_on =
+        now.rescan.as_ref().map(|r| &r.base) == Manifest::digest(&flags.then).ok().as_ref();
+    let things = if goes_on { things(&flags.now)? } else { Vec::new() };
     if flags.json {
-        let all = serde_json::json!({"schema": "stillpoint.diff/1", "robots": changes});
-        let text = serde_json::to_string_pretty(&all).map_err(|e| {
-            Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e)
-        })?;
-        say.result(&text);
+        let all = serde_json::json!({
+            "schema": "stillpoint.diff/1", "robots": changes, "things": things,
+        });
+        say.result(&json(&all)?);
     } else {
-        say.result(&words(&changes));
+        let lines = things
+            .iter()
+            .map(|t| format!("thing {}: {} -> {}\n", t["change"], t["then"], t["now"]));
+        say.result(&(words(&changes) + &lines.collect::<String>()));
     }
     Ok(exit::OK)
+}
+
+/// Things that are not where they were, as a rescan listed them.
+fn things(out: &Path) -> Result<Vec<serde_json::Value>> {
+    let path = out.join("changes.json");
+    let bad = |e: String| Error::bad_input("the list of changes cannot be read").because(e);
+    let text = std::fs::read_to_string(&path);
+    let text = text.map_err(|e| bad(e.to_string()).at(path.display()))?;
+    let all: serde_json::Value =
+        serde_json::from_str(&text).map_err(|e| bad(e.to_string()).at(path.display()))?;
+    Ok(all["things"].as_array().cloned().unwrap_or_default())
+}
+
+fn json(value: &impl serde::Serialize) -> Result<String> {
+    serde_json::to_string_pretty(value)
+        .map_err(|e| Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e))
 }

@@ -51,6 +51,14 @@ impl Job {
         Self { inputs, robots, scanners, out, review, keep_going, left_out, means }
     }
 
+    /// Keeps others out of an output folder for as long as what is returned lives.
+    ///
+    /// # Errors
+    /// Another run is at work in it.
+    pub fn hold(out: &Path) -> Result<std::fs::File> {
+        room::hold(out)
+    }
+
     /// Prepares the output folder.
     ///
     /// # Errors

@@ -102,6 +102,11 @@ impl Room {
     }
 }
 
+/// Keeps others out of an output folder.
+pub(super) fn hold(out: &Path) -> Result<File> {
+    locked(&out.join("store").join("lock"))
+}
+
 /// A file that only one process holds.
 fn locked(path: &Path) -> Result<File> {
     let refused = |e: std::io::Error| Error::from(e).at(path.display());

@@ -195,7 +195,9 @@ impl Map for Look<'_> {
                 Sight::Hidden | Sight::Unseen => {}
             }
             match label.kind {
-                PointKind::Fixed => out.tally.add(world, sight == Sight::Through),
+                PointKind::Fixed => {
+                    out.tally.add(world, area(scan, world), sight == Sight::Through);
+                }
                 PointKind::Link | PointKind::Attachment => {
                     out.robots.push((place, label.robot));
                     out.tally.add_robot(world);
@@ -205,6 +207,13 @@ impl Map for Look<'_> {
         }
         Ok(out)
     }
+}
+
+/// Area across its beam that a point stands for, m²: that of its pixel, or of a voxel's share where no scanner is known.
+pub(crate) fn area(scan: &Scan, world: [f64; 3]) -> f64 {
+    let Some(lattice) = &scan.lattice else { return Tally::FACE };
+    let range = (Point::from(world) - Point::from(scan.world_from_scan.translation.vector)).norm();
+    (lattice.row_step * range) * (lattice.col_step * range)
 }
 
 /// A point of a scan in the world, metres.

@@ -1,6 +1,6 @@
 //! Points of the new scans in; how far each scan is off the plant, and what stands still in the cell now, out.
 
-use super::past::world;
+use super::past::{area, world};
 use crate::engine::Engine;
 use crate::labelling::Near;
 use crate::report::tiles;
@@ -78,7 +78,10 @@ impl Map for Present<'_> {
             let known = self.near.label(scan.mask, tile.first_place + u64::from(*place));
             let label: Label = known.unwrap_or_else(|| self.ground.label(world));
             match label.kind {
-                PointKind::Fixed => out.add(world, self.watch.look(world) == Sight::Through),
+                PointKind::Fixed => {
+                    let is_empty = self.watch.look(world) == Sight::Through;
+                    out.add(world, area(scan, world), is_empty);
+                }
                 PointKind::Link | PointKind::Attachment => out.add_robot(world),
                 PointKind::Floor | PointKind::Uncertain => {}
             }

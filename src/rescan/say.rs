@@ -10,8 +10,8 @@ use crate::report::{id, input_entry, robot_entry};
 use crate::reuse::Sums;
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::{
-    ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, RobotEntry,
-    ScanLabels, draw_changes, write_table,
+    ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
+    draw_changes, write_table,
 };
 use merge::{Registration, Thing, ThingChange};
 use robot::Model;
@@ -145,15 +145,9 @@ impl Said<'_, '_> {
 
     /// Robots of the cell, then and now.
     fn changes(&self, result: &ResultFile) -> Vec<RobotChange> {
-        let standing = |robots: &[RobotEntry]| {
-            let refused = Verdict::Refused.word();
-            robots.iter().filter(|r| r.verdict != refused).cloned().collect()
-        };
-        let then = ResultFile { robots: standing(&self.base.result.robots), ..result.clone() };
-        let now = ResultFile { robots: standing(&result.robots), ..result.clone() };
         let looked: Vec<String> =
             self.robots.in_cell.iter().chain(&self.robots.gone).map(|&i| id(i)).collect();
-        let mut all = changes(&then, &now);
+        let mut all = changes(&self.base.result, result);
         all.retain(|c| c.then.iter().chain(&c.now).any(|id| looked.contains(id)));
         all
     }
