@@ -1,6 +1,7 @@
 //! Writes, syncs and renames that fail, one after the other, and inputs that change under a run, from outside: the state is
 //! the old one or the new one, and the next run ends right. Linux only: faults are put between the program and its system.
 #![cfg(target_os = "linux")]
+#![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

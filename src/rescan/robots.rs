@@ -25,7 +25,7 @@ const SAME_PLACE: f64 = 0.5;
 /// How a robot stands now.
 pub(crate) enum Now {
     /// As found by the new scans.
-    Found(Fit),
+    Found(Box<Fit>),
     /// It stands no longer there.
     Gone,
     /// The new scans saw too little of it.
@@ -101,7 +101,7 @@ pub(crate) fn look(
         let is_same = !crate::changes::stands_otherwise(before, &fit);
         if fit.verdict == Verdict::Trusted || is_same && fit.verdict != Verdict::Refused {
             let verdict = if is_same { fit.verdict.max(before.verdict) } else { fit.verdict };
-            return Ok((Now::Found(Fit { verdict, ..fit }), None));
+            return Ok((Now::Found(Box::new(Fit { verdict, ..fit })), None));
         }
     }
     if said.through < STANDS && before.verdict != Verdict::Refused {
@@ -121,7 +121,7 @@ pub(crate) fn look(
     Ok(match dressed.into_iter().max_by(|a, b| a.verdict.cmp(&b.verdict)) {
         Some(fit) => {
             let dressed = (fit.model >= models.len()).then(|| own.swap_remove(fit.model));
-            (Now::Found(fit), dressed)
+            (Now::Found(Box::new(fit)), dressed)
         }
         None if said.foot > GONE => (Now::Gone, None),
         None if said.through > CONTRADICTED => (Now::Lost, None),

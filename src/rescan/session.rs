@@ -237,7 +237,7 @@ impl<'a> Session<'a> {
                         out.changed.push(i);
                         out.left.push(bounds);
                     }
-                    fits[i] = fit;
+                    fits[i] = *fit;
                 }
                 Now::Gone => {
                     out.gone.push(i);
