@@ -7,6 +7,9 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Name of the folder of the store that nothing is kept in.
+const SCRATCH: &str = "cell";
+
 /// The output folder, which nobody else writes to meanwhile.
 #[derive(Debug, Clone)]
 pub struct Room {
@@ -44,6 +47,7 @@ impl Room {
             std::fs::create_dir_all(store.join(pieces)).map_err(at)?;
         }
         sweep(&store);
+        let _ = std::fs::remove_dir_all(store.join(SCRATCH));
         Ok(Self { out: out.to_path_buf(), store, next, _lock: Arc::new(lock) })
     }
 
@@ -93,6 +97,12 @@ impl Room {
         let names: Vec<String> = tiles.iter().map(|key| key.name().into()).collect();
         crate::reuse::prune(&self.tiles(), &names);
         crate::reuse::prune(&self.models(), &[models.name()]);
+    }
+
+    /// Where a rescan makes the clouds of its new points; taken away by the next run where one is cut short.
+    #[must_use]
+    pub fn scratch(&self) -> PathBuf {
+        self.store.join(SCRATCH)
     }
 
     /// Where tiles, and what else may be used again, lie.

@@ -28,8 +28,10 @@ pub(crate) enum Now {
     Found(Box<Fit>),
     /// It stands no longer there.
     Gone,
-    /// The new scans saw too little of it.
+    /// The new scans saw too little of it; what they saw does not contradict that it stands as it stood.
     Unseen,
+    /// They saw too little of it, and that speaks against how it stood.
+    Open,
     /// They contradict how it stood, and show no other posture.
     Lost,
 }
@@ -92,7 +94,7 @@ pub(crate) fn look(
     let model = &models[before.model];
     let said = said(before, model, watch);
     if said.judged < MIN_JUDGED {
-        return Ok((Now::Unseen, None));
+        return Ok((if said.through < STANDS { Now::Unseen } else { Now::Open }, None));
     }
     let region = home(before, model, regions);
     if before.calibration.is_none()
@@ -125,7 +127,7 @@ pub(crate) fn look(
         }
         None if said.foot > GONE => (Now::Gone, None),
         None if said.through > CONTRADICTED => (Now::Lost, None),
-        None => (Now::Unseen, None),
+        None => (Now::Open, None),
     })
 }
 

@@ -99,7 +99,7 @@ impl Said<'_, '_> {
             base: self.base.digest.clone(),
             cell: [cell.min, cell.max],
             inputs: sources.opened().iter().map(|i| i.id.0).collect(),
-            robots: self.robots.in_cell.iter().chain(&self.robots.gone).map(|&i| id(i)).collect(),
+            robots: self.robots.compared().into_iter().map(id).collect(),
             scans: self.registrations(),
             n_superseded: self.n_superseded,
             changes: "changes.json".into(),
@@ -145,8 +145,7 @@ impl Said<'_, '_> {
 
     /// Robots of the cell, then and now.
     fn changes(&self, result: &ResultFile) -> Vec<RobotChange> {
-        let looked: Vec<String> =
-            self.robots.in_cell.iter().chain(&self.robots.gone).map(|&i| id(i)).collect();
+        let looked: Vec<String> = self.robots.compared().into_iter().map(id).collect();
         let mut all = changes(&self.base.result, result);
         all.retain(|c| c.then.iter().chain(&c.now).any(|id| looked.contains(id)));
         all
@@ -199,7 +198,7 @@ impl Said<'_, '_> {
             filled: merge::Tally::middles(&thing.filled),
             at: thing.now.or(thing.then).map(|b| b.center().into()).unwrap_or_default(),
         });
-        let robots = self.robots.in_cell.iter().chain(&self.robots.gone).map(|&i| {
+        let robots = self.robots.compared().into_iter().map(|i| {
             let p = self.fits[i].world_from_base.translation.vector;
             let changed = self.robots.changed.contains(&i);
             let word = match self.fits[i].verdict {
@@ -226,7 +225,7 @@ impl Said<'_, '_> {
             size[0],
             size[1],
             size[2],
-            self.robots.in_cell.len() + self.robots.gone.len()
+            self.robots.compared().len()
         );
         for scan in self.registrations() {
             let [x, y, z] = scan.shift.map(|v| v * 1e3);

@@ -18,6 +18,7 @@ use ingest::Sources;
 use lattice::ViewSettings;
 use merge::{Registration, Tally, Thing, ThingChange, Watch, things};
 use robot::Model;
+use std::collections::BTreeSet;
 
 /// How far from its scanner a new scan may see the cell, metres, where nobody says where it is: a robot cell.
 const CELL_RADIUS: f64 = 8.0;
@@ -51,16 +52,24 @@ pub(crate) struct Session<'a> {
 /// Robots of the plant after the comparison.
 #[derive(Default)]
 pub(crate) struct Robots {
-    /// By place among the fits: looked at again.
+    /// By place among the fits: seen as they stand now.
     pub(crate) in_cell: Vec<usize>,
-    /// Of those: stand otherwise, are of another model, or are new.
+    /// Stand otherwise, are of another model, or are new; or stand nobody knows how.
     pub(crate) changed: Vec<usize>,
     /// Are gone.
     pub(crate) gone: Vec<usize>,
-    /// The new scans saw too little of them.
+    /// The new scans saw too little of them; and those of them that label points by how they stood.
     pub(crate) unseen: Vec<usize>,
+    pub(crate) as_it_stood: Vec<usize>,
     /// Bounds of robots as they stood that do no longer stand so.
     pub(crate) left: Vec<Aabb>,
+}
+
+impl Robots {
+    /// All that were compared, by place.
+    pub(crate) fn compared(&self) -> BTreeSet<usize> {
+        self.in_cell.iter().chain(&self.changed).chain(&self.gone).copied().collect()
+    }
 }
 
 /// Labels and differences.
@@ -226,7 +235,11 @@ impl<'a> Session<'a> {
         for (i, (now, own)) in here.into_iter().zip(looked) {
             let bounds = bounds[i];
             match now {
-                Now::Unseen => out.unseen.push(i),
+                Now::Unseen => {
+                    out.unseen.push(i);
+                    out.as_it_stood.push(i);
+                }
+                Now::Open => out.unseen.push(i),
                 Now::Found(mut fit) => {
                     if let Some(own) = own {
                         fit.model = models.len();
@@ -245,9 +258,10 @@ impl<'a> Session<'a> {
                     fits[i].verdict = Verdict::Refused;
                     fits[i].reasons = vec!["it is gone: the new scans see through it".into()];
                 }
+                // Labels by a posture that is none could take a fixed thing for a link: it gives none.
                 Now::Lost => {
-                    out.in_cell.push(i);
                     out.changed.push(i);
+                    out.left.push(bounds);
                     fits[i].verdict = Verdict::Doubtful;
                     let why = "the new scans contradict this posture and show no other";
                     fits[i].reasons = vec![why.into()];
@@ -285,7 +299,7 @@ impl<'a> Session<'a> {
     pub(crate) fn own_fits(&self, fits: &[Fit], robots: &Robots) -> Vec<Fit> {
         let mut own = fits.to_vec();
         for (i, fit) in own.iter_mut().enumerate() {
-            if !robots.in_cell.contains(&i) {
+            if !robots.in_cell.contains(&i) && !robots.as_it_stood.contains(&i) {
                 fit.verdict = Verdict::Refused;
             }
             fit.stands_in.clear();

@@ -17,9 +17,6 @@ use robot::Model;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Name of the folder of the store where the new points' clouds are made.
-const SCRATCH: &str = "cell";
-
 /// Everything that is written.
 pub(crate) struct Written<'a, 's> {
     pub(crate) base: &'a Base,
@@ -47,8 +44,7 @@ impl Written<'_, '_> {
         engine: &Engine,
     ) -> Result<Out> {
         let next = room.next();
-        let scratch = room.store().join(SCRATCH);
-        let _ = std::fs::remove_dir_all(&scratch);
+        let scratch = room.scratch();
         let mut done = self.label(registered, (next, &scratch), engine)?;
         let gone = self.gone();
         let superseded = self

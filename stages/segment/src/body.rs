@@ -26,6 +26,15 @@ pub(crate) struct Link {
     pub(crate) reach: f64,
     /// Distance at which a point still belongs to it, metres.
     pub(crate) gate: f32,
+    /// Of the link that the robot stands on: the plane of its underside in the link's frame, unit normal and offset.
+    foot: Option<([f32; 3], f32)>,
+}
+
+impl Link {
+    /// How far a point (link frame) is above what the robot stands on, metres; `None` for links that do not stand.
+    pub(crate) fn above_foot(&self, p: [f32; 3]) -> Option<f32> {
+        self.foot.map(|(n, offset)| n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - offset)
+    }
 }
 
 /// One robot as it stands.
@@ -93,6 +102,8 @@ fn posed(
         let stated = model.mesh_sigmas.iter().find(|entry| entry.0 == index).map(|entry| entry.1);
         let mesh = stated.unwrap_or(settings.sigma_cad);
         let sigma = (settings.sigma_range.powi(2) + mesh * mesh + spread * spread).sqrt();
+        // The first link with a body stands; what carries it on turns and slides is no foot.
+        let stands = out.is_empty() && twists[index].iter().flatten().all(|v| *v == 0.0);
         out.push(Link {
             index: at,
             world_from_link: fit.world_from_base * base_from_link[index],
@@ -100,9 +111,17 @@ fn posed(
             bounds: model.links[index].bounds,
             reach: if hands[index] { settings.hand_reach } else { settings.reach },
             gate: (3.0 * sigma).clamp(settings.min_gate, settings.max_gate) as f32,
+            foot: stands.then(|| foot(&model.links[index].mesh, &base_from_link[index])),
         });
     }
     out
+}
+
+/// The plane under a mesh, square to the axis of the base, in the mesh's frame.
+fn foot(mesh: &robot::Mesh, base_from_link: &Pose) -> ([f32; 3], f32) {
+    let up = (base_from_link.rotation.inverse() * Vector::z()).cast::<f32>();
+    let heights = mesh.vertices.iter().map(|v| up.x * v[0] + up.y * v[1] + up.z * v[2]);
+    (up.into(), heights.fold(f32::INFINITY, f32::min))
 }
 
 /// Which links have no other link with a body beyond them: there the tool and the workpiece are.

@@ -26,7 +26,8 @@ pub struct Settings {
     pub floor_band: f64,
     /// How far below the floor a point still counts as floor, metres (mixed pixels, reflections).
     pub floor_depth: f64,
-    /// Below this height above the floor a point is floor unless it lies on the side of a link, metres.
+    /// Below this height above the floor a point is floor unless it lies on the side of a link, and above the plane that a robot
+    /// stands on it is no part of the foot, metres.
     pub foot_band: f64,
     /// How far around a link points are looked at, metres.
     pub reach: f64,

@@ -187,6 +187,11 @@ impl Segment {
         let is_floor = height.is_some_and(|h| h <= self.settings.floor_band);
         if let Some((gates, s, distance, surface)) = best.filter(|b| b.0 <= 2.0) {
             let found = touch(s.at, distance);
+            // A stand's top goes on beside the foot, within its gate.
+            let above = s.link.above_foot(transform(&s.link_from_scan, p));
+            if above.is_some_and(|above| f64::from(above) <= self.settings.foot_band) {
+                return Found::Default;
+            }
             if height.is_some_and(|h| h <= self.settings.foot_band)
                 && !self.on_side(s, surface, distance)
             {
