@@ -111,16 +111,21 @@ fn posed(
             bounds: model.links[index].bounds,
             reach: if hands[index] { settings.hand_reach } else { settings.reach },
             gate: (3.0 * sigma).clamp(settings.min_gate, settings.max_gate) as f32,
-            foot: stands.then(|| foot(&model.links[index].mesh, &base_from_link[index])),
+            foot: stands.then(|| foot(&model.links[index], &base_from_link[index])),
         });
     }
     out
 }
 
-/// The plane under a mesh, square to the axis of the base, in the mesh's frame.
-fn foot(mesh: &robot::Mesh, base_from_link: &Pose) -> ([f32; 3], f32) {
+/// The plane under a link, square to the axis of the base, in the link's frame.
+fn foot(link: &robot::Link, base_from_link: &Pose) -> ([f32; 3], f32) {
     let up = (base_from_link.rotation.inverse() * Vector::z()).cast::<f32>();
-    let heights = mesh.vertices.iter().map(|v| up.x * v[0] + up.y * v[1] + up.z * v[2]);
+    let heights = link
+        .mesh
+        .vertices
+        .iter()
+        .chain(&link.cad.points)
+        .map(|v| up.x * v[0] + up.y * v[1] + up.z * v[2]);
     (up.into(), heights.fold(f32::INFINITY, f32::min))
 }
 

@@ -274,6 +274,37 @@ fn links_are_found_and_nothing_fixed_is_lost() {
     assert!(f64::from(veils_on_link) < 0.15 * f64::from(n_veils), "{veils_on_link} of {n_veils}");
 }
 
+#[test]
+fn the_top_of_a_stand_goes_on_beside_the_foot() {
+    let world_from_base = at(0.5, 0.2, 0.6);
+    let on = |link: i16| Label { kind: PointKind::Link, robot: 0, link };
+    let stand = [0.25, 0.25, 0.3];
+    let bricks = [
+        Brick { world_from_box: world_from_base * at(0.0, 0.0, 0.25), half: BASE, label: on(0) },
+        Brick { world_from_box: at(0.5, 0.2, 0.3), half: stand, label: Label::FIXED },
+    ];
+    let scan = scan(at(3.0, 1.6, 1.9) * Pose::rotation(Vector::z() * 3.6));
+    let fits = [fit(world_from_base, 0.0)];
+    let segment =
+        Segment::new(&fits, &[model()], &floor(), std::slice::from_ref(&scan), Settings::default());
+    let mut scratch = Scratch::default();
+    let (mut n_stand, mut n_lost, mut n_base, mut n_found) = (0_u32, 0_u32, 0_u32, 0_u32);
+    for (tile, truth) in shoot(&bricks, &scan) {
+        let out = segment.apply(tile.clone(), &mut scratch).expect("maps");
+        let known: std::collections::HashMap<u64, Label> = single(&out.labels).collect();
+        for (truth, place) in truth.iter().zip(&tile.place) {
+            let is_link = known.get(&u64::from(*place)).is_some_and(|l| l.kind == PointKind::Link);
+            n_stand += u32::from(*truth == Some(Label::FIXED));
+            n_lost += u32::from(*truth == Some(Label::FIXED) && is_link);
+            n_base += u32::from(*truth == Some(on(0)));
+            n_found += u32::from(*truth == Some(on(0)) && is_link);
+        }
+    }
+    assert!(n_stand > 5000 && n_base > 5000, "{n_stand} {n_base}");
+    assert!(f64::from(n_lost) < 0.005 * f64::from(n_stand), "{n_lost} of {n_stand} lost");
+    assert!(f64::from(n_found) > 0.97 * f64::from(n_base), "{n_found} of {n_base} found");
+}
+
 /// Points of a real robot's own surface with 2 mm of noise, in a tile without raster.
 #[test]
 #[allow(clippy::print_stderr)]
