@@ -61,8 +61,9 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
 
     // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
     let shelf = Shelf::new(&library.models);
-    let search = Search::new(&shelf, scans, &store, &ground, settings);
-    let kept = Kept::new(room.fits(), sums.fits(&tiles, settings));
+    let of_plant = || Kept::new(room.fits(), sums.fits(&tiles, settings));
+    let (kept, pieces) = (of_plant(), of_plant());
+    let search = Search::new(&shelf, scans, &store, &ground, settings).keeping(&pieces);
     let failures = Failures::of(job);
     let fits = engine.fan_out("fit", regions.clone(), |region| {
         let find = || kept.or_find(&format!("{region:?}"), || search.region(&region));

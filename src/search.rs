@@ -3,6 +3,7 @@
 
 use crate::engine::AllThreads;
 use crate::job::Settings;
+use crate::reuse::Kept;
 use crate::store::Store;
 use crate::surfaces::Ground;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
@@ -12,6 +13,8 @@ use identify::{BaseSearch, Sight};
 use lattice::{ViewBuilder, ViewSettings};
 use rayon::prelude::*;
 use robot::Model;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::sync::OnceLock;
 
 /// A library with what fits of its models need, made when the first of them asks for it.
@@ -45,6 +48,8 @@ pub(crate) struct Search<'a, 'm> {
     store: &'a Store,
     ground: &'a Ground,
     settings: &'a Settings,
+    /// Where what was found of a region piece by piece is kept, for a run that is cut short.
+    kept: Option<&'a Kept>,
 }
 
 /// Points of a region beyond which more of them tell a fit nothing new: a robot has a hundredth of that in its adjustment. Up to
@@ -82,7 +87,25 @@ impl<'a, 'm> Search<'a, 'm> {
         ground: &'a Ground,
         settings: &'a Settings,
     ) -> Self {
-        Self { shelf, scans, store, ground, settings }
+        Self { shelf, scans, store, ground, settings, kept: None }
+    }
+
+    /// The same, which keeps what it finds of a region piece by piece.
+    #[must_use]
+    pub(crate) fn keeping(self, kept: &'a Kept) -> Self {
+        Self { kept: Some(kept), ..self }
+    }
+
+    /// A piece of what is found in a region: the one that is kept, else a new one.
+    fn piece<T: Serialize + DeserializeOwned>(
+        &self,
+        (region, name): (&Region, &str),
+        find: impl FnOnce() -> T,
+    ) -> Result<T> {
+        match self.kept {
+            Some(kept) => kept.or_find(&format!("{region:?} {name}"), || Ok(find())),
+            None => Ok(find()),
+        }
     }
 
     /// The library.
@@ -108,18 +131,19 @@ impl<'a, 'm> Search<'a, 'm> {
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
         let sight = Sight::new(region, &views, (&scene.evidence, &scene.scouts), &AllThreads);
-        let candidates = self.candidates(&sight, &planes);
-        let mut fits = self.fits(&scene, &candidates);
+        let candidates = self.piece((region, "candidates"), || self.candidates(&sight, &planes))?;
+        let mut fits = self.fits(&scene, &candidates)?;
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
-            let mut hung = self.candidates(&sight, &self.mounts(region));
+            let find = || self.candidates(&sight, &self.mounts(region));
+            let mut hung = self.piece((region, "mounts"), find)?;
             hung.retain(|c| c.bases[0].1 >= MIN_MOUNT_SCORE && self.is_above_floor(c));
             let mut n = vec![0; self.shelf.models.len()];
             hung.retain(|c| {
                 n[c.model] += 1;
                 n[c.model] <= MAX_MOUNTS
             });
-            fits.extend(self.fits(&scene, &hung));
+            fits.extend(self.fits(&scene, &hung)?);
         }
         let gone = lattice::disagreement(&views);
         if gone.len() >= MIN_GONE {
@@ -148,7 +172,7 @@ impl<'a, 'm> Search<'a, 'm> {
 
     /// Fits of candidates, which come best base first: where a robot is trusted, bases that fit the place far worse are
     /// not tried any more.
-    fn fits(&self, scene: &Scene<'_>, candidates: &[Candidate]) -> Vec<Fit> {
+    fn fits(&self, scene: &Scene<'_>, candidates: &[Candidate]) -> Result<Vec<Fit>> {
         let (mut out, mut taken): (Vec<Fit>, Vec<(Point, f64)>) = (Vec::new(), Vec::new());
         for batch in candidates.chunks(BATCH) {
             let is_open = |c: &&Candidate| {
@@ -159,10 +183,14 @@ impl<'a, 'm> Search<'a, 'm> {
             };
             let open: Vec<&Candidate> = batch.iter().filter(is_open).collect();
             let fit = |c: &&Candidate| {
-                let prepared = self.shelf.prepared(c.model);
-                fit::fit(c, prepared, scene, &self.settings.fit, &AllThreads)
+                let find = || {
+                    let prepared = self.shelf.prepared(c.model);
+                    fit::fit(c, prepared, scene, &self.settings.fit, &AllThreads)
+                };
+                self.piece((scene.region, &format!("{} {:?}", c.model, c.bases)), find)
             };
-            let found: Vec<Option<Fit>> = open.par_iter().map(fit).collect();
+            let found: Result<Vec<Option<Fit>>> = open.par_iter().map(fit).collect();
+            let found = found?;
             for (fit, candidate) in found.into_iter().zip(open) {
                 let Some(fit) = fit else { continue };
                 if fit.verdict == Verdict::Trusted {
@@ -171,7 +199,7 @@ impl<'a, 'm> Search<'a, 'm> {
                 out.push(fit);
             }
         }
-        out
+        Ok(out)
     }
 
     /// Robots that moved between scans: where no robot is trusted, but something stands like a robot's foot within whose

@@ -133,4 +133,15 @@ fn goes_on(plant: &Plant, out: &Path) {
     assert!(nobody.status.code() == Some(2) && said(&nobody).contains("R9"), "{}", said(&nobody));
     let lists = export::ResultFile::read(out).expect("a result").labels.scans;
     assert!(lists.iter().any(|scan| scan.superseded.is_some()), "{lists:?}");
+    // The sessions of the plant; without the first, the second is as whole as before.
+    let listed = plant.run(&["history", ".", "--json"]);
+    let listed: serde_json::Value = serde_json::from_slice(&listed.stdout).expect("a list");
+    let names: Vec<_> = (0..2).map(|i| (&listed[i]["name"], &listed[i]["base"])).collect();
+    assert!(names[0].0 == "base" && names[1].0 == "again" && names[1].1 == "base", "{listed}");
+    let own = |i: usize| listed[i]["n_own_bytes"].as_u64().zip(listed[i]["n_bytes"].as_u64());
+    assert!(own(1).is_some_and(|(own, all)| own < all), "{listed}");
+    let removed = plant.run(&["history", ".", "--remove", "base"]);
+    assert!(removed.status.success(), "{}", said(&removed));
+    assert!(!plant.path("base").exists());
+    assert_eq!(check(out, &Engine::new(2)).expect("a result").wrong, [""; 0]);
 }

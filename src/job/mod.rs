@@ -59,6 +59,14 @@ impl Job {
         room::hold(out)
     }
 
+    /// Keeps those who would write to an output folder out of it for as long as what is returned lives.
+    ///
+    /// # Errors
+    /// A run is at work in it.
+    pub fn hold_shared(out: &Path) -> Result<std::fs::File> {
+        room::hold_shared(out)
+    }
+
     /// Prepares the output folder.
     ///
     /// # Errors

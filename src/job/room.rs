@@ -117,12 +117,26 @@ pub(super) fn hold(out: &Path) -> Result<File> {
     locked(&out.join("store").join("lock"))
 }
 
+/// Keeps those who would write to an output folder out of it, and lets others read.
+pub(super) fn hold_shared(out: &Path) -> Result<File> {
+    let path = out.join("store").join("lock");
+    let file = File::open(&path).map_err(|e| Error::from(e).at(path.display()))?;
+    let taken = file.try_lock_shared();
+    granted(file, taken, &path)
+}
+
 /// A file that only one process holds.
 fn locked(path: &Path) -> Result<File> {
     let refused = |e: std::io::Error| Error::from(e).at(path.display());
     let file = File::options().create(true).truncate(false).write(true).open(path);
     let file = file.map_err(refused)?;
-    match file.try_lock() {
+    let taken = file.try_lock();
+    granted(file, taken, path)
+}
+
+/// What became of the attempt to lock a file.
+fn granted(file: File, taken: std::result::Result<(), TryLockError>, path: &Path) -> Result<File> {
+    match taken {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
             let what = "another run is at work in this output folder";
@@ -132,7 +146,7 @@ fn locked(path: &Path) -> Result<File> {
         }
         // Some shares know no locks; there the user must take care.
         Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => Ok(file),
-        Err(TryLockError::Error(e)) => Err(refused(e)),
+        Err(TryLockError::Error(e)) => Err(Error::from(e).at(path.display())),
     }
 }
 

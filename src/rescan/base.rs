@@ -1,7 +1,7 @@
 //! The result that a rescan goes on from: its folder in; what it found, and its files shared with the new result, out.
 
 use super::state::State;
-use crate::job::Room;
+use crate::job::{Job, Room};
 use crate::reuse::{Manifest, OutputFile};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
@@ -16,6 +16,8 @@ pub(crate) struct Base {
     /// Digest of its list of files, which names all of it.
     pub(crate) digest: String,
     files: Vec<OutputFile>,
+    /// Nobody rewrites it meanwhile.
+    _lock: std::fs::File,
 }
 
 impl Base {
@@ -25,9 +27,10 @@ impl Base {
     /// No result, or one without its store.
     pub(crate) fn open(out: &Path) -> Result<Self> {
         let Manifest { files, .. } = Manifest::read(out)?;
+        let lock = Job::hold_shared(out)?;
         let digest = Manifest::digest(out)?;
         let (result, state) = (ResultFile::read(out)?, State::read(out)?);
-        let base = Self { out: out.to_path_buf(), result, state, digest, files };
+        let base = Self { out: out.to_path_buf(), result, state, digest, files, _lock: lock };
         for key in &base.state.tiles {
             let folder = base.tiles_folder().join(key.name());
             if !folder.is_dir() {

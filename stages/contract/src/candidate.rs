@@ -2,6 +2,7 @@
 
 use crate::InstallationPlane;
 use geometry::{Aabb, Pose};
+use serde::{Deserialize, Serialize};
 
 /// Index of a voxel of the occupancy.
 pub type Voxel = [i32; 3];
@@ -22,7 +23,7 @@ pub struct Cluster {
 }
 
 /// A place where one robot of the library may stand.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
     /// Index into the library.
     pub model: usize,
