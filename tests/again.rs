@@ -1,33 +1,17 @@
 //! Runs that come again, from outside: what is there is used, what is damaged is made anew, and runs that are killed go on.
 
+mod common;
+
+use common::palletiser;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
-use stillpoint::demo::write_robots;
-use stillpoint::engine::Engine;
-use stillpoint::scanning::{Formats, scan_scene};
 
 /// Beams of each scanner: few, since only whether runs agree matters here.
 const N_BEAMS: u64 = 250_000;
 /// Kills of one job; `scripts` has the long version.
 const N_KILLS: u64 = 6;
-
-/// A palletiser on a bare floor, and its library of one model.
-fn scene(dir: &Path) {
-    let robots = dir.join("robots");
-    write_robots(&robots).expect("the library is written");
-    for other in ["demo_welder_2600", "demo_arm_1100"] {
-        std::fs::remove_dir_all(robots.join(other)).expect("one model is enough");
-    }
-    let library = robot::Library::load(&robots, &robot::Settings::without_clouds()).expect("loads");
-    let posture: Vec<f64> = (0..library.models[0].n_free())
-        .map(|j| library.models[0].limits(j).into_iter().sum::<f64>() / 2.0)
-        .collect();
-    let scene = simulate::paper_scene(11, &library.models[0], &posture, N_BEAMS);
-    let engine = Engine::new(2);
-    scan_scene(&scene, &library.models, &dir.join("scans"), Formats::ALL, &engine).expect("scans");
-}
 
 fn command(dir: &Path, out: &str, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
@@ -76,7 +60,7 @@ fn same(a: &Path, b: &Path) {
 fn what_is_there_is_used_again_and_what_is_not_is_made() {
     let dir = tempfile::tempdir().expect("a folder");
     let dir = dir.path();
-    scene(dir);
+    palletiser(dir, 11, N_BEAMS);
     run(dir, "first", &[]);
     run(dir, "again", &[]);
     let whole = files(&dir.join("again"));
@@ -112,7 +96,7 @@ fn what_is_there_is_used_again_and_what_is_not_is_made() {
 #[test]
 fn two_runs_in_one_folder_refuse_by_name() {
     let dir = tempfile::tempdir().expect("a folder");
-    scene(dir.path());
+    palletiser(dir.path(), 11, N_BEAMS);
     let mut first = command(dir.path(), "out", &[]).stdout(Stdio::null()).spawn().expect("starts");
     let lock = dir.path().join("out/store/lock");
     while !lock.exists() {
@@ -129,7 +113,7 @@ fn two_runs_in_one_folder_refuse_by_name() {
 fn killed_runs_go_on_and_end_with_the_same_bytes() {
     let dir = tempfile::tempdir().expect("a folder");
     let dir = dir.path();
-    scene(dir);
+    palletiser(dir, 11, N_BEAMS);
     let started = std::time::Instant::now();
     run(dir, "first", &[]);
     let whole = started.elapsed();

@@ -3,11 +3,11 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
+mod common;
+
+use common::palletiser;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use stillpoint::demo::write_robots;
-use stillpoint::engine::Engine;
-use stillpoint::scanning::{Formats, scan_scene};
 
 /// Beams of each scanner: few, since only what is written matters here.
 const N_BEAMS: u64 = 60_000;
@@ -16,21 +16,6 @@ const N_FAULTS: usize = 16;
 const ALL: &str = "STILLPOINT_ALL_FAULTS";
 /// Counts calls that write below a folder, and lets one of them fail.
 const SHIM: &str = include_str!("faults.c");
-
-fn scene(dir: &Path) {
-    let robots = dir.join("robots");
-    write_robots(&robots).expect("the library is written");
-    for other in ["demo_welder_2600", "demo_arm_1100"] {
-        std::fs::remove_dir_all(robots.join(other)).expect("one model is enough");
-    }
-    let library = robot::Library::load(&robots, &robot::Settings::without_clouds()).expect("loads");
-    let model = &library.models[0];
-    let posture: Vec<f64> =
-        (0..model.n_free()).map(|j| model.limits(j).into_iter().sum::<f64>() / 2.0).collect();
-    let scene = simulate::paper_scene(12, model, &posture, N_BEAMS);
-    let engine = Engine::new(2);
-    scan_scene(&scene, &library.models, &dir.join("scans"), Formats::ALL, &engine).expect("scans");
-}
 
 /// The library that is put between; `None` where the machine has no C compiler.
 fn shim(dir: &Path) -> Option<PathBuf> {
@@ -72,7 +57,7 @@ fn list(dir: &Path, out: &str) -> String {
 fn whatever_fails_to_be_written_the_state_is_old_or_new() {
     let dir = tempfile::tempdir().expect("a folder");
     let dir = dir.path();
-    scene(dir);
+    palletiser(dir, 12, N_BEAMS);
     let Some(shim) = shim(dir) else {
         eprintln!("there is no C compiler here: faults are not tried");
         return;
@@ -128,7 +113,7 @@ fn copy(from: &Path, to: &Path) {
 fn inputs_that_change_under_a_run_are_named() {
     let dir = tempfile::tempdir().expect("a folder");
     let dir = dir.path();
-    scene(dir);
+    palletiser(dir, 12, N_BEAMS);
     let (whole, input) = (dir.join("scans/scans.las"), dir.join("scan.las"));
     let bytes = std::fs::read(&whole).expect("reads");
     // Later and later in a run: while it is opened, read, labelled.

@@ -53,16 +53,20 @@ pub struct Bench {
     pub out: Option<PathBuf>,
 }
 
+/// The library that is asked for; else the demo's, written below a folder.
+fn robots_of(asked: Option<&Path>, folder: &Path) -> Result<PathBuf> {
+    if let Some(dir) = asked {
+        return Ok(dir.to_path_buf());
+    }
+    let robots = folder.join("robots");
+    demo::write_robots(&robots)?;
+    Ok(robots)
+}
+
 /// Runs the suites; returns the table.
 pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
-    let robots = match &bench.robots {
-        Some(dir) => dir.clone(),
-        None => {
-            demo::write_robots(temporary.path())?;
-            temporary.path().to_path_buf()
-        }
-    };
+    let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     let chosen = chosen(&models, &bench.models)?;
     let cases = cases(bench, &models, &chosen)?;

@@ -1,12 +1,12 @@
 //! `bench plant`: suites of drawn cells and lines in; scanned to files, sent through the main job, and compared with the
 //! truth robot by robot and point by point, as a table, out.
 
-use crate::bench::{Journal, chosen};
+use crate::bench::{Journal, chosen, robots_of};
 use crate::compare::Agreement;
 use crate::engine::Engine;
 use crate::job::{Job, Means};
 use crate::scanning::{Formats, scan_scene};
-use crate::{atomic, demo, library, plan};
+use crate::{atomic, library, plan};
 use contract::{Error, Kind, Result};
 use robot::Model;
 use serde::Serialize;
@@ -100,19 +100,12 @@ struct Row {
 /// Runs the suites; returns the table.
 pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
-    let robots = match &bench.robots {
-        Some(dir) => dir.clone(),
-        None => {
-            demo::write_robots(&temporary.path().join("robots"))?;
-            temporary.path().join("robots")
-        }
-    };
+    let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     chosen(&models, &[])?;
     let mut journal =
         bench.out.as_deref().map(|dir| Journal::create(dir, "plant.jsonl")).transpose()?;
-    let mut quiet = Engine::new(engine.n_workers);
-    quiet.cancel = engine.cancel.clone();
+    let quiet = engine.quiet();
     let mut rows = Vec::new();
     for (suite, seed, wanted, is_strange) in cases(bench)? {
         engine.cancel.check()?;

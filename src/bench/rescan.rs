@@ -2,9 +2,8 @@
 //! invented, and its time beside a run of the whole, out.
 
 use crate::atomic;
-use crate::bench::Journal;
+use crate::bench::{Journal, robots_of};
 use crate::compare::Agreement;
-use crate::demo;
 use crate::engine::Engine;
 use crate::job::{Job, Means};
 use crate::rescan::{Cell, Wish, rescan};
@@ -75,17 +74,10 @@ struct Row {
 /// Runs the cases; returns the table.
 pub fn rescans(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
-    let robots = match &bench.robots {
-        Some(dir) => dir.clone(),
-        None => {
-            demo::write_robots(&temporary.path().join("robots"))?;
-            temporary.path().join("robots")
-        }
-    };
+    let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
     let mut journal =
         bench.out.as_deref().map(|dir| Journal::create(dir, "rescan.jsonl")).transpose()?;
-    let mut quiet = Engine::new(engine.n_workers);
-    quiet.cancel = engine.cancel.clone();
+    let quiet = engine.quiet();
     let mut rows = Vec::new();
     for k in bench.first..bench.first + bench.n_cases {
         engine.cancel.check()?;

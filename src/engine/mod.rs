@@ -84,6 +84,12 @@ impl Engine {
         }
     }
 
+    /// One like it that shows nothing and is cancelled with it.
+    #[must_use]
+    pub fn quiet(&self) -> Self {
+        Self { cancel: self.cancel.clone(), ..Self::new(self.n_workers) }
+    }
+
     /// Runs one pass: a source, some maps, one fold or sink.
     ///
     /// `source` is read on a thread of its own; its errors take part in the order of errors.

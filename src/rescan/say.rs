@@ -1,20 +1,18 @@
 //! What a rescan found in; the result of the whole plant, the list of changes as JSON, CSV and picture, and a summary for
 //! people, out.
 
-use super::base::Base;
-use super::session::{Labels, Robots, Session};
+use super::write::Written;
 use crate::changes::{Change, RobotChange, changes, words};
 use crate::job::Outcome;
 use crate::labelling::Done;
 use crate::report::{id, input_entry, robot_entry};
 use crate::reuse::Sums;
-use contract::{Error, Fit, Kind, Result, Verdict};
+use contract::{Error, Kind, Result, Verdict};
 use export::{
     ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
     draw_changes, write_table,
 };
 use merge::{Registration, Thing, ThingChange};
-use robot::Model;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -31,12 +29,7 @@ pub(crate) const NAMES: [&str; 6] = [
 
 /// Everything that is said.
 pub(crate) struct Said<'a, 's> {
-    pub(crate) base: &'a Base,
-    pub(crate) session: &'a Session<'s>,
-    pub(crate) robots: &'a Robots,
-    pub(crate) labels: &'a Labels,
-    pub(crate) models: &'a [Model],
-    pub(crate) fits: &'a [Fit],
+    pub(crate) found: &'a Written<'a, 's>,
     pub(crate) done: &'a Done,
     pub(crate) registered: &'a [Option<Registration>],
     /// By mask of the base: the list of its superseded places.
@@ -51,12 +44,12 @@ impl Said<'_, '_> {
         write_table(next, &result.robots)?;
         let all = json!({
             "schema": "stillpoint.changes/1",
-            "base": self.base.out.display().to_string(),
+            "base": self.found.base.out.display().to_string(),
             "cell": result.rescan.as_ref().map(|r| r.cell),
             "scans": result.rescan.as_ref().map(|r| &r.scans),
             "robots": robots,
-            "things": self.labels.things.iter().map(thing).collect::<Vec<_>>(),
-            "not_compared": self.robots.unseen.iter().map(|&i| id(i)).collect::<Vec<_>>(),
+            "things": self.found.labels.things.iter().map(thing).collect::<Vec<_>>(),
+            "not_compared": self.found.robots.unseen.iter().map(|&i| id(i)).collect::<Vec<_>>(),
         });
         let text = serde_json::to_string_pretty(&all)
             .map_err(|e| Error::new(Kind::Bug, "changes cannot be written").because(e))?;
@@ -70,10 +63,15 @@ impl Said<'_, '_> {
 
     /// The result of the whole plant: entries of what did not change are those of the base.
     fn result(&self, sums: &Sums) -> ResultFile {
-        let mut result = self.base.result.clone();
-        for &i in self.robots.changed.iter().chain(&self.robots.gone) {
+        let mut result = self.found.base.result.clone();
+        for &i in self.found.robots.changed.iter().chain(&self.found.robots.gone) {
             let space = self.done.spaces[i].clone();
-            let entry = robot_entry(i, &self.fits[i], &self.models[self.fits[i].model], space);
+            let entry = robot_entry(
+                i,
+                &self.found.fits[i],
+                &self.found.models[self.found.fits[i].model],
+                space,
+            );
             if i < result.robots.len() {
                 result.robots[i] = entry
             } else {
@@ -83,7 +81,7 @@ impl Said<'_, '_> {
         for (scan, list) in result.labels.scans.iter_mut().zip(self.lists) {
             scan.superseded.clone_from(list);
         }
-        let sources = self.session.sources;
+        let sources = self.found.session.sources;
         let masks = sources.opened_masks().iter().zip(&self.done.masks);
         result.labels.scans.extend(masks.map(|(m, count)| ScanLabels::new(m, count.n_points)));
         result.labels.table = LabelFiles::TABLE.into();
@@ -94,12 +92,12 @@ impl Said<'_, '_> {
         result.inputs.extend(inputs);
         result.warnings.extend(sources.warnings.iter().cloned());
         result.warnings.extend(self.warnings());
-        let cell = &self.session.past.cell;
+        let cell = &self.found.session.past.cell;
         result.rescan = Some(RescanEntry {
-            base: self.base.digest.clone(),
+            base: self.found.base.digest.clone(),
             cell: [cell.min, cell.max],
             inputs: sources.opened().iter().map(|i| i.id.0).collect(),
-            robots: self.robots.compared().into_iter().map(id).collect(),
+            robots: self.found.robots.compared().into_iter().map(id).collect(),
             scans: self.registrations(),
             n_superseded: self.n_superseded,
             changes: "changes.json".into(),
@@ -109,8 +107,8 @@ impl Said<'_, '_> {
 
     fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
-        let first = self.session.past.scans.len();
-        for (scan, found) in self.session.sources.scans[first..].iter().zip(self.registered) {
+        let first = self.found.session.past.scans.len();
+        for (scan, found) in self.found.session.sources.scans[first..].iter().zip(self.registered) {
             if found.is_none() {
                 out.push(format!(
                     "scan '{}' shares too few surfaces with the plant: it is taken as it is placed",
@@ -118,7 +116,7 @@ impl Said<'_, '_> {
                 ));
             }
         }
-        if ["las", "laz"].iter().any(|end| self.base.has(&format!("clouds/fixed.{end}"))) {
+        if ["las", "laz"].iter().any(|end| self.found.base.has(&format!("clouds/fixed.{end}"))) {
             let what = "clouds/fixed is not made by a rescan: tiles/ hold the same points by class";
             out.push(what.into());
         }
@@ -126,9 +124,9 @@ impl Said<'_, '_> {
     }
 
     fn registrations(&self) -> Vec<RegistrationEntry> {
-        let first = self.session.past.scans.len();
-        let about = self.session.past.cell.center();
-        let scans = self.session.sources.scans[first..].iter().zip(self.registered);
+        let first = self.found.session.past.scans.len();
+        let about = self.found.session.past.cell.center();
+        let scans = self.found.session.sources.scans[first..].iter().zip(self.registered);
         let entry = |(scan, found): (&contract::Scan, &Option<Registration>)| {
             let found = found.as_ref()?;
             let shift = found.plant_from_stated * about - about;
@@ -145,8 +143,8 @@ impl Said<'_, '_> {
 
     /// Robots of the cell, then and now.
     fn changes(&self, result: &ResultFile) -> Vec<RobotChange> {
-        let looked: Vec<String> = self.robots.compared().into_iter().map(id).collect();
-        let mut all = changes(&self.base.result, result);
+        let looked: Vec<String> = self.found.robots.compared().into_iter().map(id).collect();
+        let mut all = changes(&self.found.base.result, result);
         all.retain(|c| c.then.iter().chain(&c.now).any(|id| looked.contains(id)));
         all
     }
@@ -169,7 +167,7 @@ impl Said<'_, '_> {
                 );
             }
         }
-        for (k, thing) in self.labels.things.iter().enumerate() {
+        for (k, thing) in self.found.labels.things.iter().enumerate() {
             let at = thing.now.or(thing.then).map(|b| b.center()).unwrap_or_default();
             let [dx, dy, dz] = thing.shift.unwrap_or_default();
             let _ = writeln!(
@@ -186,22 +184,23 @@ impl Said<'_, '_> {
     }
 
     fn place(&self, robot: &str) -> String {
-        let at = (0..self.fits.len()).find(|&i| id(i) == robot);
-        let p = at.map(|i| self.fits[i].world_from_base.translation.vector).unwrap_or_default();
+        let at = (0..self.found.fits.len()).find(|&i| id(i) == robot);
+        let p =
+            at.map(|i| self.found.fits[i].world_from_base.translation.vector).unwrap_or_default();
         format!("{:.3},{:.3},{:.3}", p.x, p.y, p.z)
     }
 
     fn draw(&self) -> export::Canvas {
-        let things = self.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
+        let things = self.found.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
             name: format!("T{} {}", k + 1, word(thing.change)),
             gone: merge::Tally::middles(&thing.gone),
             filled: merge::Tally::middles(&thing.filled),
             at: thing.now.or(thing.then).map(|b| b.center().into()).unwrap_or_default(),
         });
-        let robots = self.robots.compared().into_iter().map(|i| {
-            let p = self.fits[i].world_from_base.translation.vector;
-            let changed = self.robots.changed.contains(&i);
-            let word = match self.fits[i].verdict {
+        let robots = self.found.robots.compared().into_iter().map(|i| {
+            let p = self.found.fits[i].world_from_base.translation.vector;
+            let changed = self.found.robots.changed.contains(&i);
+            let word = match self.found.fits[i].verdict {
                 Verdict::Refused => " gone",
                 _ if changed => " changed",
                 _ => "",
@@ -209,8 +208,8 @@ impl Said<'_, '_> {
             (format!("{}{word}", id(i)), [p.x, p.y])
         });
         draw_changes(
-            &self.session.past.cell,
-            &self.labels.now.solid(),
+            &self.found.session.past.cell,
+            &self.found.labels.now.solid(),
             &things.collect::<Vec<_>>(),
             &robots.collect::<Vec<_>>(),
         )
@@ -218,14 +217,14 @@ impl Said<'_, '_> {
 
     fn summary(&self, robots: &[RobotChange]) -> String {
         let mut text = String::new();
-        let size = self.session.past.cell.size();
+        let size = self.found.session.past.cell.size();
         let _ = writeln!(
             text,
             "a cell of {:.1} x {:.1} x {:.1} m, {} robot(s) looked at again",
             size[0],
             size[1],
             size[2],
-            self.robots.compared().len()
+            self.found.robots.compared().len()
         );
         for scan in self.registrations() {
             let [x, y, z] = scan.shift.map(|v| v * 1e3);
@@ -239,7 +238,7 @@ impl Said<'_, '_> {
         for line in words(robots).lines() {
             let _ = writeln!(text, "  {line}");
         }
-        for (k, thing) in self.labels.things.iter().enumerate() {
+        for (k, thing) in self.found.labels.things.iter().enumerate() {
             let at = thing.now.or(thing.then).map(|b| b.center()).unwrap_or_default();
             let size = thing.now.or(thing.then).map(|b| b.size()).unwrap_or_default();
             let _ = write!(
@@ -261,7 +260,7 @@ impl Said<'_, '_> {
                 None => text.push('\n'),
             }
         }
-        for &i in &self.robots.unseen {
+        for &i in &self.found.robots.unseen {
             let _ = writeln!(text, "  {} not compared: the new scans hardly see it", id(i));
         }
         let _ = writeln!(text, "{} points of earlier scans superseded", self.n_superseded);

@@ -57,12 +57,7 @@ impl Written<'_, '_> {
         let lists = self.lists(&superseded, next, &mut written, &mut done.sums)?;
         let _ = std::fs::remove_dir_all(&scratch);
         let said = Said {
-            base: self.base,
-            session: self.session,
-            robots: self.robots,
-            labels: self.labels,
-            models: self.models,
-            fits: self.fits,
+            found: self,
             done: &done,
             registered,
             lists: &lists,
