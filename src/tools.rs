@@ -10,11 +10,8 @@ use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
 
 /// A tool stands at a multiple of 30° or 45° about the flange: bolt circles have 4, 6, 8 or 12 holes.
 const MOUNTS: [f64; 2] = [FRAC_PI_6, FRAC_PI_4];
-/// The arm's own flange agrees with a mount to within this, radians: 3°.
-const SAME_MOUNT: f64 = 0.052;
-/// Standard deviation up to which the arm's own flange is known, radians: 1°.
-const KNOWN: f64 = 0.0175;
-
+/// Most other holes that are named.
+const MAX_NAMED: usize = 3;
 /// Fewest points on a tool: with less, a corner of any part will do.
 const MIN_POINTS: usize = 80;
 
@@ -95,7 +92,18 @@ fn dress_one(
         }
     }
     let Some(([tool, flange], mut start)) = best else { return (fit, None) };
-    let mount = mount(&fit, &mut start, n_arm, arm.mount_axis(flange).1);
+    let both = arm.with_tool(&models[tool], flange, 0.0);
+    let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
+    let holes = holes();
+    let way = arm.mount_axis(flange).1;
+    let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
+    let bolts = fit::bolt(&start, (&prepared, n_arm - 1), &turns, scene, settings);
+    // Where the flange does not tell, the first hole has it, and the last joint takes up the rest.
+    let bolt = bolts.iter().find(|(hole, _)| *hole == 0).or(bolts.first());
+    let mount = bolt.map_or(0.0, |(hole, value)| {
+        start.posture[n_arm - 1] = *value;
+        holes[*hole]
+    });
     let both = arm.with_tool(&models[tool], flange, mount);
     let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
     let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
@@ -107,10 +115,14 @@ fn dress_one(
     {
         return (fit, None);
     }
+    let others = bolts.iter().filter(|(hole, _)| holes[*hole] != mount);
+    let alike: Vec<[f64; 2]> = others.map(|(hole, value)| [holes[*hole], *value]).collect();
+    together.reasons.extend(in_words(&alike));
     together.tool = Some(Mounted {
         model: models[tool].name.clone(),
         link: arm.links[flange].name.clone(),
         mount,
+        alike,
     });
     together.runner_up = fit.runner_up;
     together.other_branches = fit.other_branches;
@@ -118,29 +130,27 @@ fn dress_one(
     (together, Some(both))
 }
 
-/// Which hole of the flange the tool stands at, radians: told by the arm's last joint where its own points determine it,
-/// else the first. The last joint takes up the rest.
-fn mount(fit: &Fit, start: &mut Tooled, n_arm: usize, way: f64) -> f64 {
-    let (Some(flange), Some(value)) = (fit.joints.get(n_arm - 1), start.posture.get_mut(n_arm - 1))
-    else {
-        return 0.0;
-    };
-    if flange.sigma > KNOWN {
-        return 0.0;
-    }
-    let turned = way * (*value - flange.value);
-    let off = |mount: f64| {
-        let d = (turned - mount).rem_euclid(TAU);
-        d.min(TAU - d)
-    };
+/// What is said where a flange looks the same at several holes.
+fn in_words(alike: &[[f64; 2]]) -> Option<String> {
+    let mut holes: Vec<f64> = alike.iter().map(|a| a[0].to_degrees()).collect();
+    holes.sort_by(f64::total_cmp);
+    holes.dedup();
+    let named: Vec<String> = holes.iter().take(MAX_NAMED).map(|deg| format!("{deg:.0}°")).collect();
+    let more = if holes.len() > MAX_NAMED { ", …" } else { "" };
+    (!named.is_empty()).then(|| {
+        let named = named.join(", ");
+        format!("the tool may as well be bolted on at {named}{more}, the last joint turned back")
+    })
+}
+
+/// All turns that a tool may be bolted on at, 0 first, radians.
+fn holes() -> Vec<f64> {
     let all = MOUNTS.iter().flat_map(|step| {
         let n = (TAU / step).round() as usize;
         (0..n).map(move |k| k as f64 * step)
     });
-    let nearest = all.min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(0.0);
-    if off(nearest) > SAME_MOUNT {
-        return 0.0;
-    }
-    *value -= way * nearest;
-    nearest
+    let mut all: Vec<f64> = all.collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+    all
 }

@@ -15,6 +15,8 @@ const SAME_PLACE: f64 = 0.5;
 const RIGHT: f64 = 0.005_236;
 /// … or within so many of its stated standard deviations, where the fit says that the points do not determine it.
 const RIGHT_SIGMAS: f64 = 4.0;
+/// Other holes of a flange are told by sweeps in steps of a degree: right within this, radians (2°).
+const NEARLY_RIGHT: f64 = 0.035;
 /// From this standard deviation on a joint is said to be open: nothing is claimed of it, radians.
 const OPEN: f64 = 0.02;
 /// The base is right within this, metres: three standard deviations of a usual registration.
@@ -203,7 +205,10 @@ pub(super) fn score(
     row.right = row.right_model
         && fit.tool.as_ref().map(|t| t.model.as_str()) == tool
         && row.base[0] < RIGHT_BASE
-        && (0..row.joints.len()).all(|j| is_right(&row.joints[j], j, fit, &drawn.posture));
+        && (0..row.joints.len()).all(|j| {
+            is_right(&row.joints[j], j, fit, &drawn.posture)
+                || mount.is_some_and(|m| bolted_elsewhere(m, j, fit, &drawn.posture))
+        });
     row
 }
 
@@ -226,6 +231,13 @@ fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) 
         }
     });
     each.collect()
+}
+
+/// Whether the tool hangs as it should with another of the holes that are said to be as good.
+fn bolted_elsewhere(mount: &Mount, joint: usize, fit: &Fit, posture: &[f64]) -> bool {
+    let Some(tool) = fit.tool.as_ref().filter(|_| mount.n_arm == joint + 1) else { return false };
+    let error = |[hole, value]: &[f64; 2]| value - posture[joint] + mount.way * (hole - mount.turn);
+    tool.alike.iter().map(error).any(|e| (e - (e / TAU).round() * TAU).abs() < NEARLY_RIGHT)
 }
 
 /// Whether what is claimed of a joint holds.

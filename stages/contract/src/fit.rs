@@ -105,6 +105,8 @@ pub struct Mounted {
     pub link: String,
     /// Turn of its root about the axis of the robot's last joint, along that link's own axis, radians.
     pub mount: f64,
+    /// Other such turns, and the last joint's value with each, radians, that explain the points as well.
+    pub alike: Vec<[f64; 2]>,
 }
 
 /// Where a joint really is, against its model.

@@ -82,7 +82,7 @@ impl Beam<'_> {
             return Vec::new();
         }
         let tolerance = self.tolerance as f32;
-        let moved = self.carried(free);
+        let moved = self.prepared.carried(free);
         let own = self.score(h, &moved, tolerance);
         let (_, span, n) = self.sweep(free);
         let far = |value: f64| (value - h.posture[free]).abs() > 2.5 * span / n as f64;
@@ -106,7 +106,7 @@ impl Beam<'_> {
         let mut out = Vec::new();
         for first in 0..h.posture.len().saturating_sub(2) {
             let Some(middle) = self.mirror(h, first) else { continue };
-            let moved = self.carried(first);
+            let moved = self.prepared.carried(first);
             let own = self.score(h, &moved, tolerance);
             let mut next = h.clone();
             let turned = [
@@ -160,11 +160,6 @@ impl Beam<'_> {
         let [low, high] = self.prepared.model.limits(free);
         let value = low + (value - low).rem_euclid(TAU);
         (value <= high).then_some(value)
-    }
-
-    /// Links placed by a joint or a later one: what stands before it does not change with it.
-    fn carried(&self, free: usize) -> Vec<usize> {
-        self.prepared.placed_by[free..].iter().flatten().copied().collect()
     }
 
     /// A new search from the joint before the first link that the beams contradict; nothing where they contradict none.

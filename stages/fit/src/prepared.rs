@@ -22,7 +22,7 @@ pub struct Prepared<'a> {
     /// For each free joint: distance of the samples it places from its axis, 95th percentile, metres (1 for
     /// prismatic joints, so that steps are in metres).
     pub(crate) lever: Vec<f64>,
-    /// For each free joint: whether it moves nothing but the links that it places.
+    /// For each free joint: whether it moves nothing but the links that it places and the tool.
     pub(crate) leaf: Vec<bool>,
     /// Number of patches over all links.
     pub(crate) n_patches: usize,
@@ -107,8 +107,12 @@ impl<'a> Prepared<'a> {
             }
         }
         let leaf = (0..n_free).map(|j| {
-            let carried = (0..depends.len()).filter(|&l| depends[l][j]);
-            carried.filter(|&l| !model.links[l].cad.points.is_empty()).count() == placed_by[j].len()
+            let is_arm =
+                |l: &usize| depends[*l][j] && model.links[*l].role != robot::Role::Effector;
+            let carried = (0..depends.len()).filter(is_arm);
+            carried
+                .filter(|&l| !model.links[l].cad.points.is_empty())
+                .all(|l| placed_by[j].contains(&l))
         });
         let leaf = leaf.collect();
         let lever = (0..n_free).map(|j| lever(model, j, &placed_by[j])).collect();
@@ -146,6 +150,11 @@ impl<'a> Prepared<'a> {
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.reach
+    }
+
+    /// Links placed by a joint or a later one: what stands before it does not change with it.
+    pub(crate) fn carried(&self, joint: usize) -> Vec<usize> {
+        self.placed_by[joint..].iter().flatten().copied().collect()
     }
 
     /// The first `n` samples and normals of a link.

@@ -199,7 +199,9 @@ fn sway(
     });
     let all = std::iter::once(h.clone()).chain(turned).collect();
     let ends: Vec<Hypothesis> = fan.fan(all, |h| polish(refine, &h, near).0);
-    for end in &ends[1..] {
+    // Where it ended at something worse, it is no value that the joint may stand at.
+    let as_good = |end: &&Hypothesis| refine.worsening(&ends[0], end, near) < EQUAL;
+    for end in ends[1..].iter().filter(as_good) {
         for j in (0..out.len()).filter(|j| several.iter().all(|s| s.joint != *j)) {
             out[j] = out[j].max(turn(&ends[0], end, j));
         }

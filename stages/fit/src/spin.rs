@@ -8,9 +8,9 @@ use crate::beam::Hypothesis;
 use crate::refine::Refine;
 
 /// Arc between trial values at the joint's lever, metres: finer than the features that tell them apart.
-const STEP: f64 = 0.003;
+pub(crate) const STEP: f64 = 0.003;
 /// Largest step, radians: 1°.
-const MAX_STEP: f64 = 0.0175;
+pub(crate) const MAX_STEP: f64 = 0.0175;
 /// Points farther than this from everything count as if they were so far, metres.
 const CAP: f32 = 0.015;
 /// Points within this of the swept links take part, metres.
@@ -18,12 +18,12 @@ const NEAR: f64 = 0.03;
 /// Most points of a sweep.
 const MAX_POINTS: usize = 3000;
 /// Fewer points tell nothing.
-const MIN_POINTS: usize = 30;
+pub(crate) const MIN_POINTS: usize = 30;
 /// Values nearer than this to one another are one, radians: 3°.
 const APART: f64 = 0.052;
 /// Extra sum of squares, relative to the best's and in units of the noise's variance, up to which a value is as good:
 /// 3 % of the squares is less than what real castings differ by.
-const AS_GOOD: (f64, f64) = (0.03, 30.0);
+pub(crate) const AS_GOOD: (f64, f64) = (0.03, 30.0);
 
 /// Values of one joint.
 #[derive(Debug, Clone)]
@@ -46,14 +46,14 @@ fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
 }
 
 impl Refine<'_> {
-    /// Sweeps each joint that moves nothing but the links that it places.
+    /// Sweeps each joint that moves nothing but the links that it places and the tool.
     pub(crate) fn spins(&self, h: &Hypothesis, near: &[u32], variance: f64) -> Vec<Spin> {
         let leaves = (0..h.posture.len()).filter(|&j| self.prepared.leaf[j]);
         leaves.filter_map(|joint| self.spin(h, near, joint, variance)).collect()
     }
 
     fn spin(&self, h: &Hypothesis, near: &[u32], joint: usize, variance: f64) -> Option<Spin> {
-        let moved = &self.prepared.placed_by[joint];
+        let moved = &self.prepared.carried(joint);
         let [low, high] = self.prepared.model.limits(joint);
         let prismatic = self.prepared.model.joints[self.prepared.model.free[joint]].kind
             == robot::JointKind::Prismatic;
@@ -85,6 +85,9 @@ impl Refine<'_> {
         let best = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
         let limit = best + (AS_GOOD.0 * best).max(AS_GOOD.1);
         let extent = extent(&costs, h.posture[joint], limit);
+        // A tool is held by more than its outline: within its own valley the covariance tells.
+        let is_bare = moved.len() == self.prepared.placed_by[joint].len();
+        let extent = if is_bare || extent > APART { extent } else { 0.0 };
         let mut good: Vec<(f64, f64)> = costs.into_iter().filter(|c| c.1 <= limit).collect();
         good.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut values: Vec<f64> = Vec::new();
@@ -136,7 +139,7 @@ impl Refine<'_> {
     }
 
     /// Points near the links whatever their joint's value: within their sphere about the joint's axis, thinned.
-    fn swept(&self, h: &Hypothesis, near: &[u32], moved: &[usize]) -> Vec<u32> {
+    pub(crate) fn swept(&self, h: &Hypothesis, near: &[u32], moved: &[usize]) -> Vec<u32> {
         let poses = self.local_from_links(h);
         let spheres: Vec<(Point, f64)> = moved
             .iter()
@@ -157,7 +160,7 @@ impl Refine<'_> {
     }
 
     /// Distance of each point from the surface of the chosen links along their normals, at most the cap, metres.
-    fn distances(
+    pub(crate) fn distances(
         &self,
         h: &Hypothesis,
         points: &[u32],

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, judge};
 use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, polish, settle};
+use crate::solve::{NEAR_MARGIN, Polished, polish, settle};
 use crate::{Prepared, Scene, Settings, report};
 
 /// Score of the tool's links from which on it is there: tools that are there have 0.69 and more, others that are taken
@@ -57,6 +57,22 @@ pub fn try_tool(
     Some(Tooled { world_from_base, posture: best.posture, explained })
 }
 
+/// Which holes the tool may be bolted to, given as turns about the arm's last joint `flange`, radians: the indices of all
+/// that explain the points as well as the best, the first of them with the last joint's value there, best first.
+#[must_use]
+pub fn bolt(
+    start: &Tooled,
+    (tooled, flange): (&Prepared<'_>, usize),
+    holes: &[f64],
+    scene: &Scene<'_>,
+    settings: &Settings,
+) -> Vec<(usize, f64)> {
+    let refine = Refine { prepared: tooled, scene, settings, prior: None };
+    let [near, _] = near(start, tooled, scene);
+    let (h, _) = polish(&refine, &hypothesis(start, scene), &near);
+    refine.bolted(&h, &near, flange, holes).into_iter().map(|b| (b.hole, b.value)).collect()
+}
+
 /// The fit of arm and tool together from such a start; `flange` is the arm's last joint.
 #[must_use]
 pub fn fit_tool(
@@ -67,14 +83,8 @@ pub fn fit_tool(
     fan: &impl Fan,
 ) -> Fit {
     let refine = Refine { prepared: tooled, scene, settings, prior: None };
-    let h = Hypothesis {
-        local_from_base: scene.world_from_local().inverse() * start.world_from_base,
-        posture: start.posture.clone(),
-        score: 0.0,
-    };
-    let base = geometry::Point::from(h.local_from_base.translation.vector);
-    let [near, all] = scene.within(&base, tooled.reach + NEAR_MARGIN);
-    let settled = settle(&refine, &h, (&near, &all), fan);
+    let [near, all] = near(start, tooled, scene);
+    let mut settled = settle(&refine, &hypothesis(start, scene), (&near, &all), fan);
     // A tool may look the same from several sides.
     let turned = (1..N_TURNS).filter_map(|k| {
         let mut h = settled.0.hypothesis.clone();
@@ -83,10 +93,35 @@ pub fn fit_tool(
         *value = low + (*value + TAU * f64::from(k) / f64::from(N_TURNS) - low).rem_euclid(TAU);
         (*value <= high).then_some(h)
     });
-    let others = fan.fan(turned.collect(), |h| polish(&refine, &h, &near));
+    let mut others = fan.fan(turned.collect(), |h| polish(&refine, &h, &near));
+    // Sides that look alike from afar differ in a bolt or a finger.
+    let worse = |other: &Polished| refine.worsening(&settled.0.hypothesis, &other.0, &near);
+    let all_worse: Vec<f64> = others.iter().map(worse).collect();
+    let best = (0..others.len()).min_by(|a, b| all_worse[*a].total_cmp(&all_worse[*b]));
+    if let Some(best) = best.filter(|best| all_worse[*best] < -BETTER) {
+        let other = settle(&refine, &others[best].0, (&near, &all), fan);
+        let before = std::mem::replace(&mut settled, other);
+        others.push((before.0.hypothesis, before.1));
+    }
     report::report(&refine, &settled, &others, &near, fan)
 }
 
+fn hypothesis(start: &Tooled, scene: &Scene<'_>) -> Hypothesis {
+    Hypothesis {
+        local_from_base: scene.world_from_local().inverse() * start.world_from_base,
+        posture: start.posture.clone(),
+        score: 0.0,
+    }
+}
+
+/// Points that may be the robot's.
+fn near(start: &Tooled, tooled: &Prepared<'_>, scene: &Scene<'_>) -> [Vec<u32>; 2] {
+    let base = hypothesis(start, scene).local_from_base.translation.vector;
+    scene.within(&geometry::Point::from(base), tooled.reach + NEAR_MARGIN)
+}
+
+/// Share of the squares that another side must do without to be taken: twins differ by less.
+const BETTER: f64 = 0.01;
 /// Turns of the flange that a tool may look alike at: every 30°.
 const N_TURNS: i32 = 12;
 

@@ -89,7 +89,7 @@ pub(crate) fn pass(
         doubts.push(format!("only {:.0} % of the surface was seen", judgement.seen * 100.0));
     }
     for (j, joint) in fit.joints.iter().enumerate() {
-        let n: usize = carried(prepared, j).map(|l| fit.links[l].n_points).sum();
+        let n: usize = prepared.carried(j).into_iter().map(|l| fit.links[l].n_points).sum();
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
             doubts.push(format!("only {n} points on what joint '{}' moves", joint.name));
         } else if j + 1 < fit.joints.len() && own_sigma(j) > KNOWN_SIGMA {
@@ -166,9 +166,4 @@ fn grade(
     } else if doubt {
         doubts.push(say());
     }
-}
-
-/// Links placed by a joint or by one after it.
-fn carried<'a>(prepared: &'a Prepared<'_>, joint: usize) -> impl Iterator<Item = usize> + 'a {
-    prepared.placed_by[joint..].iter().flatten().copied()
 }
