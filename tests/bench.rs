@@ -58,3 +58,35 @@ fn the_method_of_the_source_stays_within_its_printed_errors_and_trusts_nothing()
         assert!(joint["rough"].as_f64().expect("swept").abs() < 0.8_f64.to_radians(), "{joint}");
     }
 }
+
+#[test]
+fn robots_whose_feet_hide_all_of_their_stands_are_found() {
+    let out = tempfile::tempdir().expect("a folder");
+    let args = ["--suite", "pillars", "--model", "palletiser", "--cases", "2", "--seed", "6"];
+    for row in rows(out.path(), &args) {
+        assert_eq!(row["right"], true, "{row:#}");
+        assert_eq!(row["verdict"], "trusted", "{row:#}");
+    }
+}
+
+/// Real models, where they are there, by links in a folder of their own.
+#[cfg(unix)]
+#[test]
+fn grippers_are_found_on_real_flanges_and_turned_as_they_hang() {
+    let real = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/robots");
+    let robots = tempfile::tempdir().expect("a folder");
+    for name in ["abb_irb7600_150_350", "robotiq_2f_85"] {
+        let Ok(model) = real.join(name).canonicalize() else {
+            eprintln!("skipped: no {name} in {}", real.display());
+            return;
+        };
+        std::os::unix::fs::symlink(model, robots.path().join(name)).expect("links");
+    }
+    let out = tempfile::tempdir().expect("a folder");
+    let folder = robots.path().display().to_string();
+    let args = ["--suite", "tools", "--cases", "2", "--seed", "131", "--robots", &folder];
+    for row in rows(out.path(), &args) {
+        assert_eq!(row["right"], true, "{row:#}");
+        assert_eq!(row["verdict"], "trusted", "{row:#}");
+    }
+}

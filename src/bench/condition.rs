@@ -10,6 +10,8 @@ use robot::Model;
 pub(super) enum Place {
     /// The floor, or a stand on it.
     Floor,
+    /// A block that is narrower than its foot, so that nobody sees what it stands on.
+    Pillar,
     /// A plate overhead.
     Ceiling,
     /// An upright plate.
@@ -135,6 +137,7 @@ const SUITES: &[Suite] = &[
         mixed: true,
         ..PLAIN
     }),
+    ("pillars", 6, |_| Condition { mount: Place::Pillar, mixed: true, ..PLAIN }),
     ("basin", 7, |k| Condition { perturbed_deg: PERTURBED_DEG[k % 7], ..PLAIN }),
     ("unknown", 20, |k| Condition {
         n_scanners: 6 - k % 5,

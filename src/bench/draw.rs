@@ -37,6 +37,9 @@ const DOME: [f64; 2] = [-60.0, 90.0];
 const PLATE: [f64; 2] = [1.6, 0.08];
 /// Side of a stand, metres: room for the largest foot.
 const STAND_SIDE: f64 = 1.4;
+/// Heights of stands that a foot hides the top of, metres, and their side in widths of the foot.
+const PILLAR: [f64; 2] = [0.25, 1.2];
+const NARROW: f64 = 0.7;
 
 impl Drawn {
     /// The library as it really is: the true robot's shape may differ from its model.
@@ -107,8 +110,11 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
         }),
         ..Scene::default()
     };
-    let stand =
-        if c.stand > 0.0 && random.unit() < 0.5 { random.between(0.15, c.stand) } else { 0.0 };
+    let (stand, side) = match c.mount {
+        Place::Pillar => (random.between(PILLAR[0], PILLAR[1]), NARROW * narrower(model)),
+        _ if c.stand > 0.0 && random.unit() < 0.5 => (random.between(0.15, c.stand), STAND_SIDE),
+        _ => (0.0, STAND_SIDE),
+    };
     let xy = [random.between(-0.5, 0.5), random.between(-0.5, 0.5)];
     let yaw = random.between(0.0, TAU);
     let ground = scene.ground(xy[0], xy[1]);
@@ -124,7 +130,7 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
             xy,
             yaw_deg: yaw.to_degrees(),
             top: stand,
-            side: STAND_SIDE,
+            side,
             shape: StandShape::Plinth,
         });
     }
@@ -165,7 +171,7 @@ fn plate(
 ) -> Option<Pose> {
     let size = reach(model, &Pose::identity(), &model.home());
     let (z, lean) = match c.mount {
-        Place::Floor => return None,
+        Place::Floor | Place::Pillar => return None,
         Place::Ceiling => (0.6 + 1.1 * size[0].max(size[1]), 180.0),
         Place::Wall => (0.4 + size[0].max(size[1]) * random.between(0.7, 0.9), 90.0),
         Place::Tilted => (random.between(0.7, 1.0), random.between(10.0, 45.0)),
@@ -216,6 +222,15 @@ fn foot(model: &Model) -> f64 {
     };
     let heights = link.cad.points.iter().map(|p| (pose * Point::from(p.map(f64::from))).z);
     heights.fold(f64::INFINITY, f64::min)
+}
+
+/// The shorter side of the link that stands on the ground, metres.
+fn narrower(model: &Model) -> f64 {
+    let link = model.links.iter().find(|link| !link.cad.points.is_empty());
+    link.map_or(STAND_SIDE, |link| {
+        let size = link.bounds.size();
+        size[0].min(size[1])
+    })
 }
 
 /// Bounds of the robot in the world: farthest from the upright through its base, and highest, metres.

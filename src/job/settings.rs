@@ -68,7 +68,7 @@ settings! {
         gap, clearance, slack, min_points,
     }
     identify: identify::Settings {
-        n_coarse, n_fine, keep_coarse, keep_middle, max_places, bases_per_place, place_radius,
+        n_coarse, n_fine, keep_feet, keep_coarse, keep_middle, max_places, bases_per_place, place_radius,
         min_score,
     }
     region: identify::RegionSettings {

@@ -10,6 +10,7 @@ use geometry::{Plane, Point, Pose, Probe, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
+use crate::sites::GUESS_STEP;
 use crate::trial::{Trial, base_link, best, coarse_yaw, first_moving, prefix};
 use crate::volume::Sight;
 
@@ -20,6 +21,8 @@ pub struct Settings {
     pub n_coarse: usize,
     /// Samples of a link at finer levels.
     pub n_fine: usize,
+    /// Base poses of the coarse level whose first link is looked at.
+    pub keep_feet: usize,
     /// Base poses that survive the coarse level.
     pub keep_coarse: usize,
     /// Base poses that survive the middle level.
@@ -39,7 +42,8 @@ impl Default for Settings {
         Self {
             n_coarse: 80,
             n_fine: 160,
-            keep_coarse: 200,
+            keep_feet: 800,
+            keep_coarse: 120,
             keep_middle: 60,
             max_places: 5,
             bases_per_place: 12,
@@ -53,6 +57,13 @@ impl Default for Settings {
 /// further; and by how much yaws may lag behind that best.
 const HOPELESS: f64 = -0.2;
 const YAW_LAG: f64 = 0.35;
+/// Of so many guessed heights one is looked at coarsely, at most: two up and down are tried then, and one more.
+const MAX_STRIDE: usize = 6;
+/// Tolerance of the coarse level in steps of its grid.
+const COARSE_REACH: f64 = 1.3;
+/// Share of the lowest score that a base must have after the coarse level, and after the next: on coarse grids the right
+/// one scores a little more or less than in the end.
+const SHORT: (f64, f64) = (0.4, 0.6);
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
@@ -79,6 +90,10 @@ pub struct BaseSearch<'a> {
     pub(crate) root_from_base: Pose,
     /// The first joint that moves something with a surface, and the link that it moves.
     pub(crate) first: Option<(usize, usize)>,
+    /// Whether the planes are guesses, one close above the other.
+    is_guess: bool,
+    /// Lowest mean score of base and first link that counts.
+    min_score: f64,
 }
 
 impl<'a> BaseSearch<'a> {
@@ -105,7 +120,32 @@ impl<'a> BaseSearch<'a> {
             foot = foot.min(p.z);
         }
         let first = first_moving(model);
-        Some(Self { model, index, sight, settings, radius, foot, base, root_from_base, first })
+        let is_guess = false;
+        Some(Self {
+            model,
+            index,
+            sight,
+            settings,
+            radius,
+            foot,
+            base,
+            root_from_base,
+            first,
+            is_guess,
+            min_score: settings.min_score,
+        })
+    }
+
+    /// The same on planes that are guesses, one close above the other: a few of them tell where to look at the others.
+    #[must_use]
+    pub fn on_guesses(self) -> Self {
+        Self { is_guess: true, ..self }
+    }
+
+    /// The same for bases that score so much at least.
+    #[must_use]
+    pub fn at_least(self, score: f64) -> Self {
+        Self { min_score: self.min_score.max(score), ..self }
     }
 
     /// The candidates: one for each place, best first.
@@ -113,18 +153,29 @@ impl<'a> BaseSearch<'a> {
     pub fn run(&self, planes: &[InstallationPlane], fan: &impl Fan) -> Vec<Candidate> {
         let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
         let mut trials = Vec::new();
-        for (at, plane) in planes.iter().enumerate() {
+        for (at, plane) in planes.iter().enumerate().step_by(self.stride()) {
             trials.extend(self.coarse(at, plane, &local[at], fan));
         }
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
         let cells = self.n_cells();
+        best(&mut trials, self.settings.keep_feet * cells, step * 0.9, yaw_step * 0.9);
+        // Half of a cell has the height of a foot: what stands on it tells sooner than a closer look.
+        let tolerance = (step * COARSE_REACH) as f32;
+        let mut trials = fan.fan(trials, |t| self.glance_at_first(&local[t.plane], t, tolerance));
         best(&mut trials, self.settings.keep_coarse * cells, step * 0.9, yaw_step * 0.9);
+        self.drop_hopeless(&mut trials, SHORT.0);
         let keep = self.settings.keep_middle * cells;
-        let trials = self.finer(&local, &trials, (step / 2.0, yaw_step / 2.0, keep), fan);
-        let keep = self.settings.max_places * cells * self.settings.bases_per_place * 2;
-        let trials = self.finer(&local, &trials, (step / 4.0, yaw_step / 5.0, keep), fan);
+        let mut trials = self.finer(&local, &trials, (step / 2.0, yaw_step / 2.0, 2, keep), fan);
+        self.drop_hopeless(&mut trials, SHORT.1);
+        let keep = self.settings.max_places * cells * self.settings.bases_per_place;
+        let trials = self.finer(&local, &trials, (step / 4.0, yaw_step / 5.0, 1, keep), fan);
         self.group(planes, &local, &trials)
+    }
+
+    /// Drops trials that score less than a share of what they need in the end.
+    fn drop_hopeless(&self, trials: &mut Vec<Trial>, share: f64) {
+        trials.retain(|t| t.score >= share * self.min_score);
     }
 
     /// How many robot cells the region may hold, at least one: the more, the more places must go on.
@@ -145,6 +196,12 @@ impl<'a> BaseSearch<'a> {
         (self.radius * 0.35).clamp(0.04, 0.10)
     }
 
+    /// Of so many planes one is looked at coarsely.
+    fn stride(&self) -> usize {
+        let reach = COARSE_REACH * self.coarse_step();
+        if self.is_guess { ((1.5 * reach / GUESS_STEP) as usize).clamp(1, MAX_STRIDE) } else { 1 }
+    }
+
     /// Every place on the plane that has points about it, every yaw.
     fn coarse(
         &self,
@@ -154,7 +211,7 @@ impl<'a> BaseSearch<'a> {
         fan: &impl Fan,
     ) -> Vec<Trial> {
         let step = self.coarse_step();
-        let tolerance = (step * 1.3) as f32;
+        let tolerance = (step * COARSE_REACH) as f32;
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
         let score = |pose: &Pose, n_samples: usize| {
             self.mean(&self.sight.glance(prefix(self.model, self.base, n_samples), pose, tolerance))
@@ -175,7 +232,7 @@ impl<'a> BaseSearch<'a> {
             let all = (0..n).filter(|k| is_open(*k)).filter_map(|k| {
                 let score = score(&pose(k), self.settings.n_coarse);
                 let yaw = k as f64 * coarse_yaw();
-                (score > 0.0).then_some(Trial { x, y, yaw, plane: at, score })
+                (score > 0.0).then_some(Trial { x, y, yaw, plane: at, score, first: 0.0 })
             });
             all.collect()
         };
@@ -207,8 +264,8 @@ impl<'a> BaseSearch<'a> {
         let n: [usize; 2] =
             std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
         let mut count = vec![0_u32; n[0] * n[1]];
-        for p in self.sight.views.iter().flat_map(|v| &v.points) {
-            let q = to_plane * Vector::from(p.xyz.map(f64::from));
+        for p in self.sight.points() {
+            let q = to_plane * Vector::from(p.map(f64::from));
             let height = q.z - local.offset;
             if !(0.03..1.2).contains(&height) {
                 continue;
@@ -244,45 +301,47 @@ impl<'a> BaseSearch<'a> {
         out
     }
 
-    /// Tries the neighbours of each trial on a grid of half the spacing, with base and first link.
+    /// Tries the neighbours of each trial on a grid of half the spacing, with base and first link; of guessed heights those
+    /// `rise` planes up and down.
     fn finer(
         &self,
         planes: &[Plane],
         trials: &[Trial],
-        (step, yaw_step, keep): (f64, f64, usize),
+        (step, yaw_step, rise, keep): (f64, f64, isize, usize),
         fan: &impl Fan,
     ) -> Vec<Trial> {
         let tolerance = (step * 1.5).clamp(0.025, 0.08) as f32;
         let around = |trial: Trial| -> Vec<Trial> {
-            let few = |t: &Trial| {
+            let look = |t: &Trial, n: usize| {
                 let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
-                let cad = prefix(self.model, self.base, self.settings.n_fine / 4);
-                self.mean(&self.sight.glance(cad, &pose, tolerance))
+                self.mean(&self.sight.glance(prefix(self.model, self.base, n), &pose, tolerance))
             };
-            let near = (0..27_i32).map(|n| {
+            let levels = if self.is_guess { -1..2 } else { 0..1 };
+            let all = levels.flat_map(|level| (0..27_i32).map(move |n| (level * rise, n)));
+            let on_plane = |(level, n): (isize, i32)| {
+                let plane = trial.plane.checked_add_signed(level).filter(|p| *p < planes.len())?;
+                Some((plane, n))
+            };
+            let near = all.filter_map(on_plane).map(|(plane, n)| {
                 let (i, j, k) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-                let mut next = trial;
+                let mut next = Trial { plane, ..trial };
                 next.x += f64::from(i) * step;
                 next.y += f64::from(j) * step;
                 next.yaw += f64::from(k) * yaw_step;
-                next.score = few(&next);
+                next.score = look(&next, self.settings.n_fine / 4);
                 next
             });
             let mut near: Vec<Trial> = near.collect();
             // A few samples tell most neighbours to be worse.
             let top = near.iter().map(|t| t.score).fold(f64::NEG_INFINITY, f64::max);
             near.retain(|t| t.score >= top - LAG);
-            near.iter_mut().for_each(|t| {
-                t.score = self.score_base(&planes[t.plane], t, (tolerance, self.settings.n_fine));
-            });
+            near.iter_mut()
+                .for_each(|t| t.score = self.joined(look(t, self.settings.n_fine), t.first));
             near
         };
         let mut out: Vec<Trial> = fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
         best(&mut out, keep * 2, step * 0.6, yaw_step * 0.6);
-        let mut out = fan.fan(out, |mut trial| {
-            trial.score = self.score_with_first(&planes[trial.plane], &trial, tolerance);
-            trial
-        });
+        let mut out = fan.fan(out, |t| self.with_first(&planes[t.plane], t, tolerance));
         best(&mut out, keep, step * 0.6, yaw_step * 0.6);
         out
     }
@@ -320,7 +379,7 @@ impl<'a> BaseSearch<'a> {
         trials: &[Trial],
     ) -> Vec<Candidate> {
         let mut places: Vec<Vec<&Trial>> = Vec::new();
-        for trial in trials.iter().filter(|t| t.score >= self.settings.min_score) {
+        for trial in trials.iter().filter(|t| t.score >= self.min_score) {
             let radius = self.settings.place_radius;
             let at = |t: &Trial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
             let here = at(trial);

@@ -11,5 +11,5 @@ mod trial;
 mod volume;
 
 pub use base::{BaseSearch, Settings};
-pub use sites::{RegionSettings, guessed_planes, regions};
+pub use sites::{RegionSettings, guessed_planes, regions, stand_planes};
 pub use volume::Sight;

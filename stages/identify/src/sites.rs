@@ -76,31 +76,40 @@ pub fn regions(clusters: &[Cluster], settings: &RegionSettings) -> Vec<Region> {
     groups.iter().flat_map(|(b, _)| cut(b, settings)).map(|b| local(&b, settings.margin)).collect()
 }
 
-/// Distance between guessed heights, metres: the base search forgives half of it.
-const GUESS_STEP: f64 = 0.06;
+/// Distance between guessed heights, metres: the last tolerance of the base search forgives half of it.
+pub(crate) const GUESS_STEP: f64 = 0.03;
 /// How far below what is seen a foot may stand, metres: a camera often cuts off the lower half of a base.
 const GUESS_BELOW: f64 = 0.5;
+
+/// Heights above the floor that a stand may have, metres: lower ones the fit takes up, higher ones are gantries.
+const STANDS: (f64, f64) = (0.12, 1.5);
+
+/// Most guessed heights: six metres.
+const MAX_GUESSES: f64 = 200.0;
 
 /// Level planes at all heights of a box, where no plane is known to stand on. Their area is zero: no points carry
 /// them, so that a fit does not hold on to their height.
 #[must_use]
 pub fn guessed_planes(world: &Aabb) -> Vec<InstallationPlane> {
-    let (low, high) = (world.min[2] - GUESS_BELOW, world.max[2] - 0.3);
-    let n = ((high - low) / GUESS_STEP).ceil().clamp(0.0, 100.0) as usize;
-    (0..n)
-        .map(|k| {
-            let z = low + k as f64 * GUESS_STEP;
-            InstallationPlane {
-                plane: Plane { normal: Vector::z(), offset: z },
-                bounds: Aabb {
-                    min: [world.min[0], world.min[1], z],
-                    max: [world.max[0], world.max[1], z],
-                },
-                area: 0.0,
-                is_floor: false,
-            }
-        })
-        .collect()
+    level_planes(world, (world.min[2] - GUESS_BELOW, world.max[2] - 0.3))
+}
+
+/// The same above a floor (height, metres) in a box: a foot may hide all of the stand's top under it.
+#[must_use]
+pub fn stand_planes(world: &Aabb, floor: f64) -> Vec<InstallationPlane> {
+    level_planes(world, (floor + STANDS.0, (floor + STANDS.1).min(world.max[2] - 0.3)))
+}
+
+fn level_planes(world: &Aabb, (low, high): (f64, f64)) -> Vec<InstallationPlane> {
+    let n = ((high - low) / GUESS_STEP).ceil().clamp(0.0, MAX_GUESSES) as usize;
+    let level = |k: usize| {
+        let z = low + k as f64 * GUESS_STEP;
+        let bounds =
+            Aabb { min: [world.min[0], world.min[1], z], max: [world.max[0], world.max[1], z] };
+        let plane = Plane { normal: Vector::z(), offset: z };
+        InstallationPlane { plane, bounds, area: 0.0, is_floor: false }
+    };
+    (0..n).map(level).collect()
 }
 
 /// Squares of at most `max_extent` that overlap and cover the box.

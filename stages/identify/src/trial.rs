@@ -15,7 +15,10 @@ pub(crate) struct Trial {
     pub(crate) y: f64,
     pub(crate) yaw: f64,
     pub(crate) plane: usize,
+    /// Of the base, joined with that of the first moving link once it was looked at.
     pub(crate) score: f64,
+    /// Of the first moving link alone, at the place that this one was refined from; 0 before.
+    pub(crate) first: f64,
 }
 
 /// Mean score of the samples that could be judged.
@@ -71,7 +74,8 @@ pub(crate) fn best(trials: &mut Vec<Trial>, keep: usize, step: f64, yaw_step: f6
             break;
         }
         let here = |k: &&Trial| {
-            k.plane == trial.plane && (k.x - trial.x).hypot(k.y - trial.y) < PLACE_STEPS * step
+            let (dx, dy) = (k.x - trial.x, k.y - trial.y);
+            k.plane == trial.plane && dx * dx + dy * dy < (PLACE_STEPS * step).powi(2)
         };
         if kept.iter().filter(here).count() >= QUOTA {
             continue;

@@ -4,7 +4,7 @@
 use contract::{Fan, Region, View};
 use geometry::depth::{rows, transform};
 use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
-use geometry::{Evidence, Pose, Probe};
+use geometry::{Aabb, Evidence, Pose, Probe, Vector};
 
 /// Edge of a cell, metres: half of the finest tolerance that is asked of it.
 const EDGE: f32 = 0.03;
@@ -36,6 +36,8 @@ pub struct Sight<'a> {
     volume: Option<Volume>,
     /// What each scan sees by itself, where they are to be asked one by one; else empty.
     pub(crate) each: Vec<Evidence<'a>>,
+    /// Points that nothing explains yet, local, metres; `None` for all that the views have.
+    rest: Option<Vec<[f32; 3]>>,
 }
 
 impl<'a> Sight<'a> {
@@ -48,7 +50,7 @@ impl<'a> Sight<'a> {
         fan: &impl Fan,
     ) -> Self {
         let volume = Volume::new(region, all, fan);
-        Self { region, views, evidence: scouts, volume, each: Vec::new() }
+        Self { region, views, evidence: scouts, volume, each: Vec::new(), rest: None }
     }
 
     /// The same for robots that moved between scans: what moves is looked for in each scan by itself.
@@ -57,7 +59,31 @@ impl<'a> Sight<'a> {
         let with_beams = self.views.iter().filter(|v| !v.images.is_empty());
         let alone = |v: &'a View| Evidence { images: v.images.iter().collect(), cloud: None };
         self.each = with_beams.map(alone).collect();
+        self.rest = None;
         self
+    }
+
+    /// Lets only points count that are in none of the boxes (world, metres), and says how many there are higher than
+    /// `height` above the region's lowest, metres.
+    pub fn pass_over(&mut self, boxes: &[Aabb], height: f64) -> usize {
+        let origin = self.region.origin;
+        let is_left = |p: &[f32; 3]| {
+            let world = origin + Vector::from(p.map(f64::from));
+            !boxes.iter().any(|b| b.contains(world.into()))
+        };
+        self.rest = None;
+        let rest: Vec<[f32; 3]> = self.points().filter(is_left).collect();
+        let least = self.region.bounds.min[2] + height;
+        let n = rest.iter().filter(|p| f64::from(p[2]) > least).count();
+        self.rest = Some(rest);
+        n
+    }
+
+    /// Points that a base may stand among, local, metres.
+    pub(crate) fn points(&self) -> impl Iterator<Item = [f32; 3]> + '_ {
+        let all = if self.rest.is_some() { &[] } else { self.views };
+        let all = all.iter().flat_map(|v| &v.points).map(|p| p.xyz);
+        all.chain(self.rest.iter().flatten().copied())
     }
 
     /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: from the grid

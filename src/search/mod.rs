@@ -1,20 +1,22 @@
 //! A region in, the fits of all models in it out: reads the tiles that the region's views need, and sends every model
 //! of the library through base search and fit.
 
+mod views;
+
 use crate::engine::AllThreads;
 use crate::job::Settings;
 use crate::reuse::Kept;
 use crate::store::Store;
 use crate::surfaces::Ground;
-use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict, View};
+use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict};
 use fit::{Method, Prepared, Scene, Sights};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use identify::{BaseSearch, Sight};
-use lattice::{ViewBuilder, ViewSettings};
 use rayon::prelude::*;
 use robot::Model;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 /// A library with what fits of its models need, made when the first of them asks for it.
@@ -52,12 +54,17 @@ pub(crate) struct Search<'a, 'm> {
     kept: Option<&'a Kept>,
 }
 
-/// Points of a region beyond which more of them tell a fit nothing new: a robot has a hundredth of that in its adjustment. Up to
-/// four times as many are kept.
-const ENOUGH_POINTS: u64 = 3_000_000;
 /// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls, and few carry robots.
 const MIN_MOUNT_SCORE: f64 = 0.15;
-/// Places on walls and ceilings that are looked at for each model.
+/// The same of a base on a stand of which nothing is seen.
+const MIN_STAND_SCORE: f64 = 0.10;
+/// Such stands are looked for where at least so many points are left over, so far above the region's lowest, metres: a
+/// stand and an arm.
+const MIN_LEFT: usize = 500;
+const MIN_STANDING: f64 = 1.2;
+/// How far beyond the box of a link points may be its own, metres.
+const BOX_MARGIN: f64 = 0.08;
+/// Places on walls, ceilings and such stands that are looked at for each model.
 const MAX_MOUNTS: usize = 2;
 /// What hangs on a wall keeps its base so far above the floor, metres.
 const FLOOR_SLACK: f64 = 0.05;
@@ -76,8 +83,6 @@ const MAX_FEET: usize = 8;
 const GONE_IN_REACH: f64 = 0.3;
 /// Cells of what was here for one scan and gone for another from which on a robot may have moved: a small arm has 100.
 const MIN_GONE: usize = 80;
-/// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
-const MAX_SPACING: f64 = 0.05;
 
 impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn new(
@@ -102,9 +107,18 @@ impl<'a, 'm> Search<'a, 'm> {
         (region, name): (&Region, &str),
         find: impl FnOnce() -> T,
     ) -> Result<T> {
+        self.or_find(&format!("{region:?} {name}"), || Ok(find()))
+    }
+
+    /// The piece of that name that is kept, else a new one.
+    pub(crate) fn or_find<T: Serialize + DeserializeOwned>(
+        &self,
+        name: &str,
+        find: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
         match self.kept {
-            Some(kept) => kept.or_find(&format!("{region:?} {name}"), || Ok(find())),
-            None => Ok(find()),
+            Some(kept) => kept.or_find(name, find),
+            None => find(),
         }
     }
 
@@ -130,37 +144,76 @@ impl<'a, 'm> Search<'a, 'm> {
             let fit = |m: usize| fit::paper::fit(self.shelf.prepared(m), &scene, &planes, means);
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
-        let sight = Sight::new(region, &views, (&scene.evidence, &scene.scouts), &AllThreads);
-        let candidates = self.piece((region, "candidates"), || self.candidates(&sight, &planes))?;
+        let mut sight = Sight::new(region, &views, (&scene.evidence, &scene.scouts), &AllThreads);
+        let candidates =
+            self.piece((region, "candidates"), || self.candidates(&sight, &planes, 0.0))?;
         let mut fits = self.fits(&scene, &candidates)?;
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
-            let find = || self.candidates(&sight, &self.mounts(region));
+            let find = || self.candidates(&sight, &self.mounts(region), MIN_MOUNT_SCORE);
             let mut hung = self.piece((region, "mounts"), find)?;
-            hung.retain(|c| c.bases[0].1 >= MIN_MOUNT_SCORE && self.is_above_floor(c));
-            let mut n = vec![0; self.shelf.models.len()];
-            hung.retain(|c| {
-                n[c.model] += 1;
-                n[c.model] <= MAX_MOUNTS
-            });
-            fits.extend(self.fits(&scene, &hung)?);
+            hung.retain(|c| self.is_above_floor(c));
+            fits.extend(self.fits(&scene, &few(hung))?);
         }
+        fits.extend(self.on_stands(&scene, &mut sight, &fits)?);
         let gone = lattice::disagreement(&views);
         if gone.len() >= MIN_GONE {
-            let feet = self.candidates(&sight.apart(), &planes);
+            let feet = self.candidates(&sight.apart(), &planes, 0.0);
             let sights = Sights { region, views: &views, floors: &planes };
             fits.extend(self.moved(&fits, (&feet, &gone), &sights));
         }
         Ok(fits)
     }
 
-    /// Where robots of all models may stand on some planes, best base first.
-    fn candidates(&self, sight: &Sight<'_>, planes: &[InstallationPlane]) -> Vec<Candidate> {
+    /// Fits of robots that hide all of the stand under their feet: where much is left that no trusted robot explains, all
+    /// heights are tried.
+    fn on_stands(
+        &self,
+        scene: &Scene<'_>,
+        sight: &mut Sight<'_>,
+        fits: &[Fit],
+    ) -> Result<Vec<Fit>> {
+        let region = scene.region;
+        // Without beams nothing contradicts a wrong height.
+        if !scene.evidence.has_beams() {
+            return Ok(Vec::new());
+        }
+        let at = region.origin;
+        let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
+        let floor = height.map(|h| at.z - h);
+        let trusted = fits.iter().filter(|f| f.verdict == Verdict::Trusted);
+        let feet: Vec<Point> = trusted.clone().map(|f| base(&f.world_from_base)).collect();
+        let taken: Vec<Aabb> =
+            trusted.flat_map(|f| boxes(f, &self.shelf.models[f.model])).collect();
+        let Some(floor) = floor.filter(|_| sight.pass_over(&taken, MIN_STANDING) >= MIN_LEFT)
+        else {
+            return Ok(Vec::new());
+        };
+        let planes = identify::stand_planes(&region.world_bounds(), floor);
+        let find = || self.candidates(sight, &planes, MIN_STAND_SCORE);
+        let mut found = self.piece((region, "stands"), find)?;
+        found.retain(|c| {
+            let here = base(&c.bases[0].0);
+            !feet.iter().any(|at| (at - here).norm() < SAME_BASE)
+        });
+        self.fits(scene, &few(found))
+    }
+
+    /// Where robots of all models may stand on some planes, best base first, those that score so much.
+    fn candidates(
+        &self,
+        sight: &Sight<'_>,
+        planes: &[InstallationPlane],
+        min_score: f64,
+    ) -> Vec<Candidate> {
+        // Planes that no points carry are guesses.
+        let guessed = planes.iter().all(|p| p.area == 0.0);
         let search = |index: usize| {
             let model = (index, &self.shelf.models[index]);
-            BaseSearch::new(model, sight, &self.settings.identify)
-                .map(|search| search.run(planes, &AllThreads))
-                .unwrap_or_default()
+            let search = BaseSearch::new(model, sight, &self.settings.identify);
+            let search = search.map(|s| if guessed { s.on_guesses() } else { s });
+            let search = search.map(|s| s.at_least(min_score));
+            search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default()
         };
         let models = (0..self.shelf.models.len()).into_par_iter();
         let found: Vec<Vec<Candidate>> = models.map(search).collect();
@@ -311,55 +364,6 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(starts.par_iter().map(end).collect())
     }
 
-    /// What each scan sees of the region, those that see something.
-    fn views(&self, region: &Region) -> Result<Vec<View>> {
-        let mut views = self.views_by(region, &self.settings.view)?;
-        lattice::agree(&mut views);
-        Ok(views)
-    }
-
-    /// The same as the beams say it, none of them doubted, as fine as asked for.
-    pub(crate) fn views_by(&self, region: &Region, settings: &ViewSettings) -> Result<Vec<View>> {
-        let thin = self.thin(region);
-        let scans = self.scans.par_iter();
-        scans.filter_map(|scan| self.view(scan, region, thin, settings).transpose()).collect()
-    }
-
-    /// How much of the points of a region may be skipped: as much as leaves [`ENOUGH_POINTS`].
-    fn thin(&self, region: &Region) -> u32 {
-        let touching = self.store.touching(&region.world_bounds());
-        let n_points: u64 = touching.iter().map(|&i| self.store.entries()[i].n_points).sum();
-        (0..).find(|thin| n_points >> (2 * (thin + 1)) < ENOUGH_POINTS).unwrap_or(0)
-    }
-
-    /// One scan's view of the region; `None` where it sees nothing of it.
-    fn view(
-        &self,
-        scan: &Scan,
-        region: &Region,
-        thin: u32,
-        settings: &ViewSettings,
-    ) -> Result<Option<View>> {
-        let extent = self.ground.extents[scan.id.0 as usize];
-        if extent.is_none() {
-            return Ok(None);
-        }
-        if let Some(lattice) = &scan.lattice {
-            let near = distance(scan, region);
-            if near * lattice.row_step.max(lattice.col_step) > MAX_SPACING {
-                return Ok(None);
-            }
-        }
-        let mut builder = ViewBuilder::new(scan, region, extent, thin, settings);
-        for (i, entry) in self.store.entries().iter().enumerate() {
-            if builder.wants(entry.at) {
-                builder.add(&self.store.tile(i)?);
-            }
-        }
-        let view = builder.finish();
-        Ok((!view.points.is_empty() || !view.images.is_empty()).then_some(view))
-    }
-
     /// Planes that a robot of this region may stand on; heights guessed all over the region where the plant has no
     /// floor to go by (a camera's view, a cut-out).
     fn planes(&self, region: &Region) -> Vec<InstallationPlane> {
@@ -374,20 +378,31 @@ impl<'a, 'm> Search<'a, 'm> {
     }
 }
 
-fn base(world_from_base: &Pose) -> Point {
-    world_from_base.translation.vector.into()
+/// The best candidates of each model, few.
+fn few(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let mut n: BTreeMap<usize, usize> = BTreeMap::new();
+    candidates.retain(|c| {
+        let n = n.entry(c.model).or_default();
+        *n += 1;
+        *n <= MAX_MOUNTS
+    });
+    candidates
 }
 
-/// Distance from a scan's scanner to the nearest point of a region, metres.
-fn distance(scan: &Scan, region: &Region) -> f64 {
-    let scanner = scan.world_from_scan.translation.vector - region.origin.coords;
-    (0..3)
-        .map(|i| {
-            (region.bounds.min[i] - scanner[i])
-                .max(scanner[i] - region.bounds.max[i])
-                .max(0.0)
-                .powi(2)
-        })
-        .sum::<f64>()
-        .sqrt()
+/// Boxes of the links of a robot, world, metres.
+fn boxes(fit: &Fit, model: &Model) -> Vec<Aabb> {
+    let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
+    let poses = model.poses(&posture);
+    let links = model.links.iter().zip(&poses).filter(|(link, _)| !link.bounds.is_empty());
+    let bounds = links.map(|(link, pose)| {
+        let mut all = Aabb::EMPTY;
+        let corners = link.bounds.corners().map(Point::from);
+        corners.iter().for_each(|c| all.add((fit.world_from_base * pose * c).into()));
+        all.grown(BOX_MARGIN)
+    });
+    bounds.collect()
+}
+
+fn base(world_from_base: &Pose) -> Point {
+    world_from_base.translation.vector.into()
 }
