@@ -52,8 +52,11 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     // the cloud.
     let (surfaces, gather) =
         (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
-    let ground = engine.pass(crate::report::tiles("surfaces", &store), store.tiles(), |f| {
-        f.map(&surfaces).fold(&gather)
+    let grounds = Kept::new(room.fits(), sums.ground(&tiles, settings));
+    let ground = grounds.or_find("ground", || {
+        engine.pass(crate::report::tiles("surfaces", &store), store.tiles(), |f| {
+            f.map(&surfaces).fold(&gather)
+        })
     })?;
     let clusters =
         cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
@@ -116,7 +119,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let known = written.sums.iter().map(|sum| OutputFile::of(room.next(), sum)).collect();
     Manifest::write(room.next(), sums.whole(job), (&outcome, known), engine)?;
     sums.remember(&Manifest::publish(room.next(), room.out())?, room.out())?;
-    room.prune(&tiles, &kept, &shelved);
+    room.prune(&tiles, &[&grounds, &kept], &shelved);
     outcome.reused = reuse::said(&[
         ("models", shelved.n_kept()),
         ("tiles", filling.n_kept()),

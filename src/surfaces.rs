@@ -3,6 +3,7 @@
 
 use contract::{Fold, Map, Result, Scan, ScanId, TILE_SIDE, Tile, TileSummary, Weigh};
 use lattice::{Extent, Summarise};
+use serde::{Deserialize, Serialize};
 
 /// The map: a tile's summary, and which rows and columns of its scan it covers.
 pub(crate) struct Surfaces(Summarise);
@@ -21,6 +22,7 @@ pub(crate) struct Gather {
 }
 
 /// What all tiles leave behind.
+#[derive(Serialize, Deserialize)]
 pub(crate) struct Ground {
     /// Floor, planes and occupied space.
     pub(crate) surfaces: floor::Ground,

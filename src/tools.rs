@@ -45,14 +45,25 @@ pub(crate) fn dress(
         if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
             return Ok((fit, None));
         }
-        let arm = fit.clone();
-        let dressed = search.with_scene(&arm, regions, |scene, settings| {
-            dress_one(arm.clone(), (known, &tools, search.shelf()), scene, settings)
-        })?;
-        Ok(dressed.unwrap_or((fit, None)))
+        let find = || {
+            let dressed = search.with_scene(&fit, regions, |scene, settings| {
+                dress_one(&fit, (known, &tools, search.shelf()), scene, settings)
+            })?;
+            Ok(dressed.flatten())
+        };
+        let (together, [tool, flange], mount) =
+            match search.or_find(&format!("tool of {fit:?}"), find)? {
+                Some(dressed) => dressed,
+                None => return Ok((fit, None)),
+            };
+        let both = known[fit.model].with_tool(&known[tool], flange, mount);
+        Ok((together, Some(both)))
     })?;
     Ok(adopt(dressed, models))
 }
+
+/// A fit of arm and tool, the tool's number in the library and the link that it hangs on, and its turn about it, radians.
+type Dressed = (Fit, [usize; 2], f64);
 
 /// The fits, those with a model of their own pointing at it among `models`.
 pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) -> Vec<Fit> {
@@ -68,11 +79,11 @@ pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) ->
 
 /// One arm: the tool that explains most, if one is there.
 fn dress_one(
-    fit: Fit,
+    fit: &Fit,
     (models, tools, shelf): (&[Model], &[usize], &Shelf<'_>),
     scene: &Scene<'_>,
     settings: &Settings,
-) -> (Fit, Option<Model>) {
+) -> Option<Dressed> {
     let arm = &models[fit.model];
     // An arm whose loops stand otherwise has the links of its name.
     let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);
@@ -84,14 +95,14 @@ fn dress_one(
             let both = arm.with_tool(&models[tool], flange, 0.0);
             let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
             let own = [n_arm, arm.links.len()];
-            let found = fit::try_tool(&fit, (&prepared, own), scene, settings, &AllThreads);
+            let found = fit::try_tool(fit, (&prepared, own), scene, settings, &AllThreads);
             let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
             if let Some(found) = found.filter(better) {
                 best = Some(([tool, flange], found));
             }
         }
     }
-    let Some(([tool, flange], mut start)) = best else { return (fit, None) };
+    let ([tool, flange], mut start) = best?;
     let both = arm.with_tool(&models[tool], flange, 0.0);
     let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
     let holes = holes();
@@ -113,7 +124,7 @@ fn dress_one(
         || together.verdict == Verdict::Refused
         || together.verdict < fit.verdict
     {
-        return (fit, None);
+        return None;
     }
     let others = bolts.iter().filter(|(hole, _)| holes[*hole] != mount);
     let alike: Vec<[f64; 2]> = others.map(|(hole, value)| [holes[*hole], *value]).collect();
@@ -124,10 +135,10 @@ fn dress_one(
         mount,
         alike,
     });
-    together.runner_up = fit.runner_up;
-    together.other_branches = fit.other_branches;
-    together.alike = fit.alike;
-    (together, Some(both))
+    together.runner_up = fit.runner_up.clone();
+    together.other_branches = fit.other_branches.clone();
+    together.alike = fit.alike.clone();
+    Some((together, [tool, flange], mount))
 }
 
 /// What is said where a flange looks the same at several holes.

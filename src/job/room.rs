@@ -87,9 +87,10 @@ impl Room {
     }
 
     /// Takes away tiles, fits and models that the run which has just ended did not use.
-    pub(crate) fn prune(&self, tiles: &[Key], fits: &Kept, models: &Kept) {
+    pub(crate) fn prune(&self, tiles: &[Key], fits: &[&Kept], models: &Kept) {
         self.prune_tiles(tiles, models);
-        crate::reuse::prune(&self.fits(), &[fits.name()]);
+        let names: Vec<String> = fits.iter().map(|kept| kept.name()).collect();
+        crate::reuse::prune(&self.fits(), &names);
     }
 
     /// The same without fits.

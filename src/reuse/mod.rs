@@ -134,6 +134,11 @@ impl Sums {
         Some(Key::of("tiles", &[self.input(input)?, &own.join("\n"), &words(&settings.ingest)]))
     }
 
+    /// Floor, planes and occupied space of a plant whose tiles have these names.
+    pub(crate) fn ground(&self, tiles: &[Key], settings: &Settings) -> Key {
+        Key::of("ground", &[&words(&tiles), &words(&(&settings.lattice, &settings.floor))])
+    }
+
     /// Fits of the regions of a plant whose tiles have these names.
     pub(crate) fn fits(&self, tiles: &[Key], settings: &Settings) -> Key {
         let s = settings;

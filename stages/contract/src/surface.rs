@@ -5,7 +5,7 @@ use geometry::{Aabb, Moments, Plane};
 use serde::{Deserialize, Serialize};
 
 /// A planar region of one tile, in the world frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanePatch {
     /// Who saw it.
     pub scan: ScanId,
@@ -25,7 +25,7 @@ pub struct PlanePatch {
 }
 
 /// Occupied voxels with the number of points in each: sorted by (z, y, x), each voxel once.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Occupancy {
     /// Edge of a voxel, metres. Voxel `[i, j, k]` spans `[i·edge, (i+1)·edge)` along x, and so on, in the world.
     pub edge: f64,

@@ -10,6 +10,7 @@ use contract::{
     Floor, Fold, InstallationPlane, Occupancy, PlanePatch, Result, Scan, ScanId, TileSummary,
 };
 use geometry::{Aabb, Vector};
+use serde::{Deserialize, Serialize};
 
 /// Finds floor and installation planes in the summaries of all tiles.
 #[derive(Debug, Clone)]
@@ -31,7 +32,7 @@ pub struct Sum {
 }
 
 /// What the whole leaves behind.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ground {
     /// Levels and installation planes.
     pub floor: Floor,

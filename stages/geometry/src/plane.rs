@@ -44,7 +44,7 @@ impl Plane {
 }
 
 /// Sums of points up to second order about a fixed `origin` (keeps f64 exact far from zero).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Moments {
     /// What is subtracted from each point before it is summed, metres.
     pub origin: Vector,
