@@ -1,5 +1,6 @@
 //! Cells drawn from seeds, scanned and searched by `bench accuracy`: mounts, closed loops and the source's method are
 //! right in them, and what is written can be read.
+#![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 use std::path::Path;
 use std::process::Command;
