@@ -116,7 +116,10 @@ fn together(
     if n_silent > 0 {
         first.reasons.push(format!("{n_silent} scan(s) show it in no posture that was found"));
     }
-    first.reasons.push(format!("it moved between scans: {} postures", 1 + first.stays.len()));
+    first.reasons.push(match first.stays.len() {
+        0 => "scans contradict one another about it: some of them bear this posture out".into(),
+        n => format!("it moved between scans: {} postures", 1 + n),
+    });
     Some(first)
 }
 
