@@ -237,9 +237,10 @@ fn whole_turns(model: &Model, posture: &[f64], joint: usize) -> (f64, Vec<f64>) 
         .iter()
         .any(|j| matches!(j.motion, Motion::Mimic { free, .. } if free == joint));
     let slides = model.joints[index].kind == robot::JointKind::Prismatic;
-    if slides || followed || high - low < TAU {
+    if slides || followed {
         return (value, Vec::new());
     }
+    // A refinement may have come from beyond a stop: a whole turn away the joint stands within its limits.
     let first = ((low - value) / TAU).ceil() as i32;
     let last = ((high - value) / TAU).floor() as i32;
     let mut all: Vec<f64> = (first..=last).map(|k| value + TAU * f64::from(k)).collect();
