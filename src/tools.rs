@@ -110,10 +110,10 @@ fn dress_one(
     let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
     let bolts = fit::bolt(&start, (&prepared, n_arm - 1), &turns, scene, settings);
     // Where the flange does not tell, the first hole has it, and the last joint takes up the rest.
-    let bolt = bolts.iter().find(|(hole, _)| *hole == 0).or(bolts.first());
-    let mount = bolt.map_or(0.0, |(hole, value)| {
-        start.posture[n_arm - 1] = *value;
-        holes[*hole]
+    let bolt = bolts.iter().find(|b| b.hole == 0).or(bolts.first());
+    let mount = bolt.map_or(0.0, |bolt| {
+        start.posture[n_arm - 1] = bolt.value;
+        holes[bolt.hole]
     });
     let both = arm.with_tool(&models[tool], flange, mount);
     let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
@@ -126,8 +126,8 @@ fn dress_one(
     {
         return None;
     }
-    let others = bolts.iter().filter(|(hole, _)| holes[*hole] != mount);
-    let alike: Vec<[f64; 2]> = others.map(|(hole, value)| [holes[*hole], *value]).collect();
+    let others = bolts.iter().filter(|b| holes[b.hole] != mount);
+    let alike: Vec<[f64; 2]> = others.map(|b| [holes[b.hole], b.value]).collect();
     together.reasons.extend(in_words(&alike));
     together.tool = Some(Mounted {
         model: models[tool].name.clone(),

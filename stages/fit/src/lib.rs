@@ -31,6 +31,7 @@ mod weak;
 
 pub use calibrate::{calibrate, combine};
 pub use choose::choose;
+pub use mount::Bolt;
 pub use prepared::Prepared;
 pub use scene::Scene;
 pub use settings::{Method, Settings};

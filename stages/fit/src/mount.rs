@@ -11,67 +11,95 @@ use crate::spin::{AS_GOOD, MAX_STEP, MIN_POINTS, STEP};
 /// Turns of the tool that are tried with every hole: the best of those at which the tool alone fits best.
 const N_TURNS: usize = 6;
 
-/// A turn of the last joint and a hole that go together.
+/// A hole that a tool may be bolted to, and the value of the arm's last joint that goes with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bolted {
-    /// Value of the arm's last joint, radians.
-    pub(crate) value: f64,
+pub struct Bolt {
     /// Index among the holes.
-    pub(crate) hole: usize,
+    pub hole: usize,
+    /// Value of the arm's last joint, radians.
+    pub value: f64,
 }
 
-impl Refine<'_> {
-    /// All pairs of the joint `flange` and a hole that explain the points as well as the best one, best first; the holes
-    /// are turns of the tool about that joint, the posture is that of the hole at 0. Empty where the points are too few.
-    pub(crate) fn bolted(
-        &self,
-        h: &Hypothesis,
-        near: &[u32],
-        flange: usize,
-        holes: &[f64],
-    ) -> Vec<Bolted> {
-        let model = self.prepared.model;
-        let carried = self.prepared.carried(flange);
-        let is_tool = |l: usize| model.links[l].role == Role::Effector;
-        let (tool, own): (Vec<usize>, Vec<usize>) = carried.iter().partition(|l| is_tool(**l));
-        let points = self.swept(h, near, &carried);
+/// The links behind one joint, which turn apart from the rest of a posture.
+struct Turning<'a> {
+    refine: &'a Refine<'a>,
+    h: &'a Hypothesis,
+    flange: usize,
+    /// Points that any turn of those links may explain.
+    points: Vec<u32>,
+    /// Distances of the points to all other links, metres.
+    still: Vec<f32>,
+    /// Links of the arm, and of the tool, that turn.
+    own: Vec<usize>,
+    tool: Vec<usize>,
+}
+
+impl<'a> Turning<'a> {
+    /// `None` where the points are too few, or nothing turns that is a tool.
+    fn new(refine: &'a Refine<'a>, h: &'a Hypothesis, near: &[u32], flange: usize) -> Option<Self> {
+        let model = refine.prepared.model;
+        let carried = refine.prepared.carried(flange);
+        let is_tool = |l: &usize| model.links[*l].role == Role::Effector;
+        let (tool, own): (Vec<usize>, Vec<usize>) = carried.iter().copied().partition(is_tool);
+        let points = refine.swept(h, near, &carried);
         let slides = model.joints[model.free[flange]].kind == JointKind::Prismatic;
         if points.len() < MIN_POINTS || slides || tool.is_empty() {
-            return Vec::new();
+            return None;
         }
-        let at = |value: f64, links: &[usize]| {
-            let mut trial = h.clone();
-            trial.posture[flange] = value;
-            self.distances(&trial, &points, |l| links.contains(&l))
-        };
-        let still = self.distances(h, &points, |l| !carried.contains(&l));
-        let variance = self.scene.noise * self.scene.noise;
-        let cost = |all: [&[f32]; 3]| -> f64 {
-            let least =
-                |i: usize| f64::from(all.iter().map(|d| d[i]).fold(f32::INFINITY, f32::min));
-            (0..points.len()).map(|i| least(i).powi(2)).sum::<f64>() / variance
-        };
-        let step = (STEP / self.prepared.lever[flange]).min(MAX_STEP);
+        let still = refine.distances(h, &points, |l| !carried.contains(&l));
+        Some(Self { refine, h, flange, points, still, own, tool })
+    }
+
+    /// Distances of the points to some of the links where the joint has a value, metres.
+    fn at(&self, value: f64, links: &[usize]) -> Vec<f32> {
+        let mut trial = self.h.clone();
+        trial.posture[self.flange] = value;
+        self.refine.distances(&trial, &self.points, |l| links.contains(&l))
+    }
+
+    /// Squared distances to the nearest of what stands still and what is turned, in units of the noise.
+    fn cost(&self, turned: &[&[f32]]) -> f64 {
+        let least = |i: usize| turned.iter().map(|d| d[i]).fold(self.still[i], f32::min);
+        let sum: f64 = (0..self.points.len()).map(|i| f64::from(least(i)).powi(2)).sum();
+        sum / (self.refine.scene.noise * self.refine.scene.noise)
+    }
+
+    /// Turns of the tool alone at which it fits better than beside them, best first; the one that it was found at is among
+    /// those that are tried.
+    fn turns(&self) -> Vec<f64> {
+        let step = (STEP / self.refine.prepared.lever[self.flange]).min(MAX_STEP);
         let n = (TAU / step).ceil() as usize;
-        // The turn found is one of those tried.
-        let turns: Vec<f64> =
-            (0..n).map(|k| h.posture[flange] + TAU * k as f64 / n as f64).collect();
-        let costs: Vec<f64> =
-            turns.iter().map(|t| cost([&still, &at(*t, &tool), &still])).collect();
+        let turn = |k: usize| self.h.posture[self.flange] + TAU * k as f64 / n as f64;
+        let costs: Vec<f64> = (0..n).map(|k| self.cost(&[&self.at(turn(k), &self.tool)])).collect();
         let is_least =
             |k: &usize| costs[*k] <= costs[(k + 1) % n] && costs[*k] <= costs[(k + n - 1) % n];
         let mut best: Vec<usize> = (0..n).filter(is_least).collect();
         best.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
         best.truncate(N_TURNS);
-        let [low, high] = model.limits(flange);
-        let mut all: Vec<(f64, Bolted)> = Vec::new();
-        for turn in best.into_iter().map(|k| turns[k]) {
-            let of_tool = at(turn, &tool);
+        best.into_iter().map(turn).collect()
+    }
+}
+
+impl Refine<'_> {
+    /// All pairs of the joint `flange` and a hole that explain the points as well as the best one, best first; the holes
+    /// are turns of the tool about that joint, the posture is that of the hole at 0. Empty where the points are too few.
+    pub(crate) fn bolts(
+        &self,
+        h: &Hypothesis,
+        near: &[u32],
+        flange: usize,
+        holes: &[f64],
+    ) -> Vec<Bolt> {
+        let Some(turning) = Turning::new(self, h, near, flange) else { return Vec::new() };
+        let [low, high] = self.prepared.model.limits(flange);
+        let mut all: Vec<(f64, Bolt)> = Vec::new();
+        for turn in turning.turns() {
+            let of_tool = turning.at(turn, &turning.tool);
             for (hole, by) in holes.iter().enumerate() {
                 let value = low + (turn - by - low).rem_euclid(TAU);
                 if value <= high {
-                    let cost = cost([&still, &of_tool, &at(value, &own)]);
-                    all.push((cost, Bolted { value, hole }));
+                    let cost = turning.cost(&[&of_tool, &turning.at(value, &turning.own)]);
+                    all.push((cost, Bolt { hole, value }));
                 }
             }
         }

@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 
 use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, judge};
+use crate::mount::Bolt;
 use crate::refine::Refine;
 use crate::solve::{NEAR_MARGIN, Polished, polish, settle};
 use crate::{Prepared, Scene, Settings, report};
@@ -57,8 +58,8 @@ pub fn try_tool(
     Some(Tooled { world_from_base, posture: best.posture, explained })
 }
 
-/// Which holes the tool may be bolted to, given as turns about the arm's last joint `flange`, radians: the indices of all
-/// that explain the points as well as the best, the first of them with the last joint's value there, best first.
+/// Which holes the tool may be bolted to, given as turns about the arm's last joint `flange`, radians: all that explain the
+/// points as well as the best, best first.
 #[must_use]
 pub fn bolt(
     start: &Tooled,
@@ -66,11 +67,11 @@ pub fn bolt(
     holes: &[f64],
     scene: &Scene<'_>,
     settings: &Settings,
-) -> Vec<(usize, f64)> {
+) -> Vec<Bolt> {
     let refine = Refine { prepared: tooled, scene, settings, prior: None };
     let [near, _] = near(start, tooled, scene);
     let (h, _) = polish(&refine, &hypothesis(start, scene), &near);
-    refine.bolted(&h, &near, flange, holes).into_iter().map(|b| (b.hole, b.value)).collect()
+    refine.bolts(&h, &near, flange, holes)
 }
 
 /// The fit of arm and tool together from such a start; `flange` is the arm's last joint.
