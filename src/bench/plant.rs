@@ -115,9 +115,7 @@ pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<Stri
             _ => temporary.path().join("case"),
         };
         let mut row = Row { suite: suite.into(), seed, ..Row::default() };
-        if let Err(error) =
-            run(&mut row, &wanted, (&known, is_strange), &dir, (means, &quiet))
-        {
+        if let Err(error) = run(&mut row, &wanted, (&known, is_strange), &dir, (means, &quiet)) {
             row.failed = Some(error.to_string());
         }
         if !bench.keep {

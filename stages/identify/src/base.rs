@@ -5,11 +5,11 @@
 //! like a foot, but few look like a foot with a carousel on it.
 
 use contract::{Candidate, Fan, InstallationPlane};
-use geometry::probe::HIDDEN_PRICE;
-use geometry::{Plane, Point, Pose, Probe, Vector};
+use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
+use crate::graded::Stencil;
 use crate::sites::GUESS_STEP;
 use crate::trial::{Trial, base_link, best, coarse_yaw, first_moving, prefix};
 use crate::volume::Sight;
@@ -71,8 +71,6 @@ const MAX_CELLS: usize = 6;
 
 /// Mean score on a quarter of the samples by which a pose may lag behind the best and still be looked at closely.
 pub(crate) const LAG: f64 = 0.15;
-/// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten are hidden.
-const HIDDEN: f32 = 0.03;
 
 /// The search for one model's base in one region.
 #[derive(Debug)]
@@ -213,15 +211,26 @@ impl<'a> BaseSearch<'a> {
         let step = self.coarse_step();
         let tolerance = (step * COARSE_REACH) as f32;
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
-        let score = |pose: &Pose, n_samples: usize| {
-            self.mean(&self.sight.glance(prefix(self.model, self.base, n_samples), pose, tolerance))
-        };
+        let cad = prefix(self.model, self.base, self.settings.n_coarse);
+        let turned =
+            |k: usize| self.pose(local, 0.0, 0.0, k as f64 * coarse_yaw()) * self.root_from_base;
+        let stencils: Option<Vec<Stencil<'_>>> =
+            (0..n).map(|k| self.sight.stencil(cad.0, &turned(k), tolerance)).collect();
+        let frame = local.frame();
         let place = |(x, y): (f64, f64)| -> Vec<Trial> {
-            let pose =
-                |k: usize| self.pose(local, x, y, k as f64 * coarse_yaw()) * self.root_from_base;
+            let shift = frame * Vector::new(x, y, 0.0);
+            let score = |k: usize, n_samples: usize| {
+                let known = stencils.as_ref().map(|s| &s[k]);
+                let known = known.and_then(|s| s.mean(shift.cast::<f32>().into(), n_samples));
+                known.unwrap_or_else(|| {
+                    let mut pose = turned(k);
+                    pose.translation.vector += shift;
+                    self.sight.glance(prefix(self.model, self.base, n_samples), &pose, tolerance)
+                })
+            };
             // A few samples at every other yaw tell most places to be hopeless, and most yaws of the others.
             let few: Vec<f64> =
-                (0..n).step_by(2).map(|k| score(&pose(k), self.settings.n_coarse / 4)).collect();
+                (0..n).step_by(2).map(|k| score(k, self.settings.n_coarse / 4)).collect();
             let top = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
             if top < HOPELESS {
                 return Vec::new();
@@ -230,7 +239,7 @@ impl<'a> BaseSearch<'a> {
                 few[k / 2 % few.len()].max(few[k.div_ceil(2) % few.len()]) >= top - YAW_LAG
             };
             let all = (0..n).filter(|k| is_open(*k)).filter_map(|k| {
-                let score = score(&pose(k), self.settings.n_coarse);
+                let score = score(k, self.settings.n_coarse);
                 let yaw = k as f64 * coarse_yaw();
                 (score > 0.0).then_some(Trial { x, y, yaw, plane: at, score, first: 0.0 })
             });
@@ -314,7 +323,7 @@ impl<'a> BaseSearch<'a> {
         let around = |trial: Trial| -> Vec<Trial> {
             let look = |t: &Trial, n: usize| {
                 let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
-                self.mean(&self.sight.glance(prefix(self.model, self.base, n), &pose, tolerance))
+                self.sight.glance(prefix(self.model, self.base, n), &pose, tolerance)
             };
             let levels = if self.is_guess { -1..2 } else { 0..1 };
             let all = levels.flat_map(|level| (0..27_i32).map(move |n| (level * rise, n)));
@@ -354,14 +363,7 @@ impl<'a> BaseSearch<'a> {
     ) -> f64 {
         let cad = prefix(self.model, self.base, n);
         let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
-        self.mean(&self.sight.evidence.probe(cad.0, cad.1, &pose, tolerance))
-    }
-
-    /// Mean score of the samples, hidden ones at their price for a base.
-    pub(crate) fn mean(&self, probe: &Probe) -> f64 {
-        let back = if self.sight.evidence.has_beams() { HIDDEN_PRICE - HIDDEN } else { 0.0 };
-        let score = probe.score + back * (probe.n - probe.n_seen) as f32;
-        f64::from(score / probe.n.max(1) as f32)
+        self.sight.mean(&self.sight.evidence.probe(cad.0, cad.1, &pose, tolerance))
     }
 
     /// The base standing on the plane at a place (its own coordinates), turned by `yaw` about the plane's normal.

@@ -38,7 +38,7 @@ impl BaseSearch<'_> {
             });
             let cad = prefix(self.model, link, self.settings.n_coarse);
             let probes = poses.map(|pose| self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.1));
-            let best = probes.max_by(|a, b| self.mean(a).total_cmp(&self.mean(b)));
+            let best = probes.max_by(|a, b| self.sight.mean(a).total_cmp(&self.sight.mean(b)));
             best.map_or(base, |probe| of_judged(&probe))
         });
         base.min(first) >= LIKE.0 && 0.5 * (base + first) >= LIKE.1
@@ -63,7 +63,7 @@ impl BaseSearch<'_> {
             let least = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - LAG;
             let full = poses.iter().zip(&few).filter(|(_, few)| **few >= least);
             let score =
-                |p: &Pose| self.mean(&self.sight.evidence.probe(cad.0, cad.1, p, tolerance));
+                |p: &Pose| self.sight.mean(&self.sight.evidence.probe(cad.0, cad.1, p, tolerance));
             full.map(|(p, _)| score(p)).fold(f64::NEG_INFINITY, f64::max)
         } else {
             let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
@@ -83,7 +83,7 @@ impl BaseSearch<'_> {
         let (poses, few) = self.sweep(plane, &trial, of_first, tolerance);
         let mut best: Vec<usize> = (0..few.len()).collect();
         best.sort_by(|a, b| few[*b].total_cmp(&few[*a]));
-        let score = |k: &usize| self.mean(&self.sight.glance(cad, &poses[*k], tolerance));
+        let score = |k: &usize| self.sight.glance(cad, &poses[*k], tolerance);
         let first = best.iter().take(N_GLANCES).map(score).fold(f64::NEG_INFINITY, f64::max);
         Trial { score: self.joined(trial.score, first), first, ..trial }
     }
@@ -111,7 +111,7 @@ impl BaseSearch<'_> {
         };
         let poses: Vec<Pose> = self.turns(free).map(pose).collect();
         let some = prefix(self.model, link, self.settings.n_coarse / 4);
-        let few = |pose: &Pose| self.mean(&self.sight.glance(some, pose, tolerance));
+        let few = |pose: &Pose| self.sight.glance(some, pose, tolerance);
         let few = poses.iter().map(few).collect();
         (poses, few)
     }

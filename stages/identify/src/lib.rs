@@ -6,6 +6,7 @@
 mod base;
 mod bodies;
 mod first;
+mod graded;
 mod sites;
 mod trial;
 mod volume;

@@ -5,6 +5,9 @@ use contract::{Fan, Region, View};
 use geometry::depth::{rows, transform};
 use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
 use geometry::{Aabb, Evidence, Pose, Probe, Vector};
+use std::sync::OnceLock;
+
+use crate::graded::{Graded, HIDDEN, SCORE_UNIT, Stencil};
 
 /// Edge of a cell, metres: half of the finest tolerance that is asked of it.
 const EDGE: f32 = 0.03;
@@ -12,6 +15,10 @@ const EDGE: f32 = 0.03;
 const MAX_CELLS: f64 = 16e6;
 /// Least tolerance, in cells, for which the grid is asked.
 const COARSE: f32 = 1.4;
+/// Tolerances that the grid is asked for, from the least on, each so many times the one before: a twentieth more or less
+/// than was asked for tells no place from another.
+const RUNG: f32 = 1.1;
+const N_RUNGS: usize = 16;
 /// Unit of the distances in a cell, metres.
 const UNIT: f32 = 0.004;
 /// In `off`: no beam got near. In `ahead`: beams went there and none came back.
@@ -24,6 +31,24 @@ struct Cell {
     ahead: u8,
     /// Distance from the nearest end of a beam along it, in units.
     off: u8,
+}
+
+impl Cell {
+    /// What a sample at such a place scores, without regard to the side from which a beam comes, in [`SCORE_UNIT`]s.
+    fn score(self, tolerance: f32) -> i8 {
+        let through = match self.ahead {
+            NOTHING => NO_RETURN_WEIGHT,
+            ahead => ((f32::from(ahead) * UNIT - tolerance) / tolerance).clamp(0.0, 1.0),
+        };
+        let on = match self.off {
+            NOTHING => 0.0,
+            off => 1.0 - f32::from(off) * UNIT / tolerance,
+        };
+        let mut probe = Probe::default();
+        probe.count(through, on);
+        let score = if probe.n_seen > 0 { probe.score } else { -HIDDEN };
+        (score / SCORE_UNIT).round() as i8
+    }
 }
 
 /// What was seen of a region, ready for searches of all models.
@@ -86,30 +111,52 @@ impl<'a> Sight<'a> {
         all.chain(self.rest.iter().flatten().copied())
     }
 
-    /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: from the grid
-    /// where the tolerance allows.
+    /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: their mean score,
+    /// from the grid where the tolerance allows.
     pub(crate) fn glance(
         &self,
         (points, normals): (&[[f32; 3]], &[[f32; 3]]),
         local_from_body: &Pose,
         tolerance: f32,
-    ) -> Probe {
-        match &self.volume {
-            Some(volume) if tolerance >= COARSE * volume.edge => {
-                volume.probe(points, local_from_body, tolerance)
-            }
-            _ => self.evidence.probe(points, normals, local_from_body, tolerance),
+    ) -> f64 {
+        match self.graded(tolerance) {
+            Some(graded) => graded.mean(points, local_from_body),
+            None => self.mean(&self.evidence.probe(points, normals, local_from_body, tolerance)),
         }
+    }
+
+    /// Samples of a body that will be moved about in one attitude, for glances by the thousand; `None` where there is no grid
+    /// for the tolerance.
+    pub(crate) fn stencil(
+        &self,
+        points: &[[f32; 3]],
+        local_from_body: &Pose,
+        tolerance: f32,
+    ) -> Option<Stencil<'_>> {
+        self.graded(tolerance).map(|graded| graded.stencil(points, local_from_body))
+    }
+
+    fn graded(&self, tolerance: f32) -> Option<Graded<'_>> {
+        self.volume.as_ref().and_then(|volume| volume.graded(tolerance))
+    }
+
+    /// Mean score of the samples, hidden ones at their price for a base.
+    pub(crate) fn mean(&self, probe: &Probe) -> f64 {
+        let back = if self.evidence.has_beams() { HIDDEN_PRICE - HIDDEN } else { 0.0 };
+        let score = probe.score + back * (probe.n - probe.n_seen) as f32;
+        f64::from(score / probe.n.max(1) as f32)
     }
 }
 
 /// A grid of evidence in the local frame.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct Volume {
     min: [f32; 3],
     edge: f32,
     n: [usize; 3],
     cells: Vec<Cell>,
+    /// What each cell scores, for each rung of tolerance that was asked for.
+    scores: [OnceLock<Vec<i8>>; N_RUNGS],
 }
 
 impl Volume {
@@ -141,41 +188,21 @@ impl Volume {
             (0..n[0] * n[1]).map(place).collect()
         };
         let cells = fan.fan((0..n[2]).collect(), layer).concat();
-        Some(Self { min, edge, n, cells })
+        Some(Self { min, edge, n, cells, scores: Default::default() })
     }
 
-    /// Judges surface samples (frame of the body) with the body at `local_from_body`, to within `tolerance` metres,
-    /// without regard to the side from which a beam comes.
-    fn probe(&self, points: &[[f32; 3]], local_from_body: &Pose, tolerance: f32) -> Probe {
-        let m = rows(local_from_body);
-        let mut out = Probe { n: points.len() as u32, ..Probe::default() };
-        for p in points {
-            let Some(cell) = self.cell(transform(&m, *p)) else {
-                out.score -= HIDDEN_PRICE;
-                continue;
-            };
-            let through = match cell.ahead {
-                NOTHING => NO_RETURN_WEIGHT,
-                ahead => ((f32::from(ahead) * UNIT - tolerance) / tolerance).clamp(0.0, 1.0),
-            };
-            let on = if cell.off == NOTHING {
-                0.0
-            } else {
-                1.0 - f32::from(cell.off) * UNIT / tolerance
-            };
-            out.count(through, on);
+    /// The grid at the rung nearest to a tolerance; `None` where it is too fine to be asked.
+    fn graded(&self, tolerance: f32) -> Option<Graded<'_>> {
+        let least = COARSE * self.edge;
+        if tolerance < least {
+            return None;
         }
-        out
-    }
-
-    #[inline]
-    fn cell(&self, p: [f32; 3]) -> Option<Cell> {
-        let at: [f32; 3] = std::array::from_fn(|i| (p[i] - self.min[i]) / self.edge);
-        let inside = (0..3).all(|i| at[i] >= 0.0 && at[i] < self.n[i] as f32);
-        inside.then(|| {
-            let at = at.map(|v| v as usize);
-            self.cells[(at[2] * self.n[1] + at[1]) * self.n[0] + at[0]]
-        })
+        let rung = ((tolerance / least).ln() / RUNG.ln()).round() as usize;
+        let rung = rung.min(N_RUNGS - 1);
+        let tolerance = least * RUNG.powi(rung as i32);
+        let scores = self.scores[rung]
+            .get_or_init(|| self.cells.iter().map(|c| c.score(tolerance)).collect());
+        Some(Graded { min: self.min, edge: self.edge, n: self.n.map(|n| n as i32), scores })
     }
 }
 
