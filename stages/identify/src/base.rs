@@ -191,7 +191,7 @@ impl<'a> BaseSearch<'a> {
 
     /// Spacing of the coarse grid: small enough that the true place lies within the tolerance.
     fn coarse_step(&self) -> f64 {
-        (self.radius * 0.35).clamp(0.04, 0.10)
+        self.sight.in_cells((self.radius * 0.35).clamp(0.04, 0.10))
     }
 
     /// Of so many planes one is looked at coarsely.
@@ -211,14 +211,17 @@ impl<'a> BaseSearch<'a> {
         let step = self.coarse_step();
         let tolerance = (step * COARSE_REACH) as f32;
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
+        let places = self.occupied(plane, local, step);
+        let Some(start) = places.first().copied() else { return Vec::new() };
         let cad = prefix(self.model, self.base, self.settings.n_coarse);
-        let turned =
-            |k: usize| self.pose(local, 0.0, 0.0, k as f64 * coarse_yaw()) * self.root_from_base;
+        let turned = |k: usize| {
+            self.pose(local, start.0, start.1, k as f64 * coarse_yaw()) * self.root_from_base
+        };
         let stencils: Option<Vec<Stencil<'_>>> =
             (0..n).map(|k| self.sight.stencil(cad.0, &turned(k), tolerance)).collect();
         let frame = local.frame();
         let place = |(x, y): (f64, f64)| -> Vec<Trial> {
-            let shift = frame * Vector::new(x, y, 0.0);
+            let shift = frame * Vector::new(x - start.0, y - start.1, 0.0);
             let score = |k: usize, n_samples: usize| {
                 let known = stencils.as_ref().map(|s| &s[k]);
                 let known = known.and_then(|s| s.mean(shift.cast::<f32>().into(), n_samples));
@@ -245,7 +248,7 @@ impl<'a> BaseSearch<'a> {
             });
             all.collect()
         };
-        fan.fan(self.occupied(plane, local, step), place).into_iter().flatten().collect()
+        fan.fan(places, place).into_iter().flatten().collect()
     }
 
     /// Places on the plane, in its own coordinates, with points above it within the base's radius, in rows.

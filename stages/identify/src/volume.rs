@@ -125,8 +125,8 @@ impl<'a> Sight<'a> {
         }
     }
 
-    /// Samples of a body that will be moved about in one attitude, for glances by the thousand; `None` where there is no grid
-    /// for the tolerance.
+    /// Samples of a body at a pose from which it will be moved about, for glances by the thousand; `None` where there is no
+    /// grid for the tolerance.
     pub(crate) fn stencil(
         &self,
         points: &[[f32; 3]],
@@ -138,6 +138,12 @@ impl<'a> Sight<'a> {
 
     fn graded(&self, tolerance: f32) -> Option<Graded<'_>> {
         self.volume.as_ref().and_then(|volume| volume.graded(tolerance))
+    }
+
+    /// A length as so many whole cells of the grid, metres.
+    pub(crate) fn in_cells(&self, length: f64) -> f64 {
+        let whole = |edge: f64| (length / edge).floor().max(1.0) * edge;
+        self.volume.as_ref().map_or(length, |volume| whole(f64::from(volume.edge)))
     }
 
     /// Mean score of the samples, hidden ones at their price for a base.
@@ -200,9 +206,16 @@ impl Volume {
         let rung = ((tolerance / least).ln() / RUNG.ln()).round() as usize;
         let rung = rung.min(N_RUNGS - 1);
         let tolerance = least * RUNG.powi(rung as i32);
-        let scores = self.scores[rung]
-            .get_or_init(|| self.cells.iter().map(|c| c.score(tolerance)).collect());
+        let scores = self.scores[rung].get_or_init(|| self.score(tolerance));
         Some(Graded { min: self.min, edge: self.edge, n: self.n.map(|n| n as i32), scores })
+    }
+
+    /// The scores of all cells at a tolerance.
+    fn score(&self, tolerance: f32) -> Vec<i8> {
+        let of = |at: usize| Cell { ahead: (at >> 8) as u8, off: at as u8 }.score(tolerance);
+        let all: Vec<i8> = (0..1 << 16).map(of).collect();
+        let score = |c: &Cell| all[usize::from(c.ahead) << 8 | usize::from(c.off)];
+        self.cells.iter().map(score).collect()
     }
 }
 
