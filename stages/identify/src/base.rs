@@ -276,8 +276,8 @@ impl<'a> BaseSearch<'a> {
         let n: [usize; 2] =
             std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
         let mut count = vec![0_u32; n[0] * n[1]];
-        for p in self.sight.points() {
-            let q = to_plane * Vector::from(p.map(f64::from));
+        for spot in self.sight.spots() {
+            let q = to_plane * Vector::from(spot.at.map(f64::from));
             let height = q.z - local.offset;
             if !(0.03..1.2).contains(&height) {
                 continue;
@@ -285,7 +285,7 @@ impl<'a> BaseSearch<'a> {
             let i = ((q.x - low[0]) / step).round();
             let j = ((q.y - low[1]) / step).round();
             if i >= 0.0 && j >= 0.0 && (i as usize) < n[0] && (j as usize) < n[1] {
-                count[j as usize * n[0] + i as usize] += 1;
+                count[j as usize * n[0] + i as usize] += spot.n_points;
             }
         }
         // A base's middle is empty: what counts is points within half its radius on most sides.

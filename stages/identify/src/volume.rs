@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use crate::graded::{Graded, HIDDEN, SCORE_UNIT, Stencil};
 
-/// Edge of a cell, metres: half of the finest tolerance that is asked of it.
+/// Edge of a cell, and of the cubes of points, metres: half of the finest tolerance that is asked of it.
 const EDGE: f32 = 0.03;
 /// Most cells; a larger region gets larger ones.
 const MAX_CELLS: f64 = 16e6;
@@ -51,6 +51,14 @@ impl Cell {
     }
 }
 
+/// The points of a small cube.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spot {
+    /// Their mean, local, metres.
+    pub(crate) at: [f32; 3],
+    pub(crate) n_points: u32,
+}
+
 /// What was seen of a region, ready for searches of all models.
 #[derive(Debug)]
 pub struct Sight<'a> {
@@ -61,8 +69,8 @@ pub struct Sight<'a> {
     volume: Option<Volume>,
     /// What each scan sees by itself, where they are to be asked one by one; else empty.
     pub(crate) each: Vec<Evidence<'a>>,
-    /// Points that nothing explains yet, local, metres; `None` for all that the views have.
-    rest: Option<Vec<[f32; 3]>>,
+    /// Where there are points that a base may stand among.
+    spots: Vec<Spot>,
 }
 
 impl<'a> Sight<'a> {
@@ -75,7 +83,8 @@ impl<'a> Sight<'a> {
         fan: &impl Fan,
     ) -> Self {
         let volume = Volume::new(region, all, fan);
-        Self { region, views, evidence: scouts, volume, each: Vec::new(), rest: None }
+        let spots = spots(views);
+        Self { region, views, evidence: scouts, volume, each: Vec::new(), spots }
     }
 
     /// The same for robots that moved between scans: what moves is looked for in each scan by itself.
@@ -84,7 +93,7 @@ impl<'a> Sight<'a> {
         let with_beams = self.views.iter().filter(|v| !v.images.is_empty());
         let alone = |v: &'a View| Evidence { images: v.images.iter().collect(), cloud: None };
         self.each = with_beams.map(alone).collect();
-        self.rest = None;
+        self.spots = spots(self.views);
         self
     }
 
@@ -92,23 +101,19 @@ impl<'a> Sight<'a> {
     /// `height` above the region's lowest, metres.
     pub fn pass_over(&mut self, boxes: &[Aabb], height: f64) -> usize {
         let origin = self.region.origin;
-        let is_left = |p: &[f32; 3]| {
-            let world = origin + Vector::from(p.map(f64::from));
+        self.spots = spots(self.views);
+        self.spots.retain(|spot| {
+            let world = origin + Vector::from(spot.at.map(f64::from));
             !boxes.iter().any(|b| b.contains(world.into()))
-        };
-        self.rest = None;
-        let rest: Vec<[f32; 3]> = self.points().filter(is_left).collect();
+        });
         let least = self.region.bounds.min[2] + height;
-        let n = rest.iter().filter(|p| f64::from(p[2]) > least).count();
-        self.rest = Some(rest);
-        n
+        let high = self.spots.iter().filter(|spot| f64::from(spot.at[2]) > least);
+        high.map(|spot| spot.n_points as usize).sum()
     }
 
-    /// Points that a base may stand among, local, metres.
-    pub(crate) fn points(&self) -> impl Iterator<Item = [f32; 3]> + '_ {
-        let all = if self.rest.is_some() { &[] } else { self.views };
-        let all = all.iter().flat_map(|v| &v.points).map(|p| p.xyz);
-        all.chain(self.rest.iter().flatten().copied())
+    /// Where there are points that a base may stand among.
+    pub(crate) fn spots(&self) -> &[Spot] {
+        &self.spots
     }
 
     /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: their mean score,
@@ -152,6 +157,19 @@ impl<'a> Sight<'a> {
         let score = probe.score + back * (probe.n - probe.n_seen) as f32;
         f64::from(score / probe.n.max(1) as f32)
     }
+}
+
+/// The points of all views, cube by cube.
+fn spots(views: &[View]) -> Vec<Spot> {
+    let cell = |p: &[f32; 3]| p.map(|v| (v / EDGE).floor() as i32);
+    let mut points: Vec<[f32; 3]> = views.iter().flat_map(|v| &v.points).map(|p| p.xyz).collect();
+    points.sort_by_key(cell);
+    let spot = |own: &[[f32; 3]]| {
+        let n = own.len() as f32;
+        let at = std::array::from_fn(|i| own.iter().map(|p| p[i] / n).sum());
+        Spot { at, n_points: own.len() as u32 }
+    };
+    points.chunk_by(|a, b| cell(a) == cell(b)).map(spot).collect()
 }
 
 /// A grid of evidence in the local frame.
