@@ -1,0 +1,121 @@
+//! A grid of scores and the samples of a body in; out comes the mean score of the samples at a pose, in whole numbers: one
+//! look-up and one addition a sample.
+
+use geometry::Pose;
+use geometry::depth::{Rows, rows, transform};
+
+/// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten are hidden.
+pub(crate) const HIDDEN: f32 = 0.03;
+/// Unit of the scores in a grid: the price of a hidden sample is two of them, that of one seen through a hundred.
+pub(crate) const SCORE_UNIT: f32 = 0.015;
+
+/// What each cell of a region scores at some tolerance.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Graded<'a> {
+    /// Low corner of the first cell, local, metres.
+    pub(crate) min: [f32; 3],
+    /// Edge of a cell, metres.
+    pub(crate) edge: f32,
+    /// Cells along x, y, z; x runs fastest.
+    pub(crate) n: [i32; 3],
+    /// Score of each cell, in [`SCORE_UNIT`]s.
+    pub(crate) scores: &'a [i8],
+}
+
+/// Samples of a body in one attitude, as cells of the grid: the body is moved by whole cells.
+#[derive(Debug, Clone)]
+pub(crate) struct Stencil<'a> {
+    grid: Graded<'a>,
+    places: Vec<i32>,
+    /// Least and most cells of the samples along x, y, z.
+    low: [i32; 3],
+    high: [i32; 3],
+}
+
+impl<'a> Graded<'a> {
+    /// The rows that lead from the body's frame into cells.
+    fn cells_from(&self, local_from_body: &Pose) -> Rows {
+        let mut m = rows(local_from_body);
+        for (row, min) in m.iter_mut().zip(self.min) {
+            row[3] -= min;
+            row.iter_mut().for_each(|v| *v /= self.edge);
+        }
+        m
+    }
+
+    /// Mean score of samples (frame of the body) with the body at a pose; what lies outside of the grid is hidden.
+    pub(crate) fn mean(&self, points: &[[f32; 3]], local_from_body: &Pose) -> f64 {
+        let m = self.cells_from(local_from_body);
+        let hidden = (-HIDDEN / SCORE_UNIT) as i32;
+        let score = |p: &[f32; 3]| {
+            let at = transform(&m, *p);
+            let is_inside = (0..3).all(|i| at[i] >= 0.0 && at[i] < self.n[i] as f32);
+            let place = || self.place(at.map(|v| v as i32)) as usize;
+            if is_inside { i32::from(self.scores[place()]) } else { hidden }
+        };
+        mean(points.iter().map(score).sum(), points.len())
+    }
+
+    /// The samples of a body at a pose, which is where it is moved from.
+    pub(crate) fn stencil(self, points: &[[f32; 3]], local_from_body: &Pose) -> Stencil<'a> {
+        let m = self.cells_from(local_from_body);
+        let cells: Vec<[i32; 3]> =
+            points.iter().map(|p| transform(&m, *p).map(|v| v.floor() as i32)).collect();
+        let end = |i: usize, of: fn(i32, i32) -> i32| cells.iter().map(|c| c[i]).reduce(of);
+        Stencil {
+            grid: self,
+            places: cells.iter().map(|c| self.place(*c)).collect(),
+            low: std::array::from_fn(|i| end(i, i32::min).unwrap_or(0)),
+            high: std::array::from_fn(|i| end(i, i32::max).unwrap_or(0)),
+        }
+    }
+
+    /// Index of a cell, or the way to one that is so many cells away.
+    fn place(&self, at: [i32; 3]) -> i32 {
+        (at[2] * self.n[1] + at[1]) * self.n[0] + at[0]
+    }
+}
+
+impl Stencil<'_> {
+    /// Mean score of the first `n` samples with the body moved by `shift` (local, metres), to the nearest cell; `None` where
+    /// some of them would lie outside of the grid.
+    pub(crate) fn mean(&self, shift: [f32; 3], n: usize) -> Option<f64> {
+        let grid = &self.grid;
+        let by = shift.map(|v| (v / grid.edge).round() as i32);
+        let is_inside =
+            (0..3).all(|i| by[i] + self.low[i] >= 0 && by[i] + self.high[i] < grid.n[i]);
+        is_inside.then(|| {
+            let step = grid.place(by);
+            let places = &self.places[..n.min(self.places.len())];
+            let sum = places.iter().map(|p| i32::from(grid.scores[(p + step) as usize])).sum();
+            mean(sum, places.len())
+        })
+    }
+}
+
+fn mean(sum: i32, n: usize) -> f64 {
+    f64::from(sum) * f64::from(SCORE_UNIT) / n.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moved_body_scores_as_where_it_was_moved_to_and_nothing_outside() {
+        let n = [20, 17, 13];
+        let scores: Vec<i8> = (0..20 * 17 * 13).map(|i| (i * 37 % 150 - 100) as i8).collect();
+        let grid = Graded { min: [-0.3, 0.1, -0.2], edge: 0.03, n, scores: &scores };
+        let points = [[0.0, 0.02, 0.05], [0.07, -0.01, 0.1], [-0.05, 0.03, 0.0]];
+        let at = |x: f64, y: f64, z: f64| Pose::translation(-0.1 + x, 0.2 + y, -0.1 + z);
+        let stencil = grid.stencil(&points, &at(0.0, 0.0, 0.0));
+        for (i, j, k) in [(0, 0, 0), (3, -1, 2), (7, 9, -1)] {
+            let by = [i, j, k].map(|n| f64::from(n) * 0.03);
+            let moved = grid.mean(&points, &at(by[0], by[1], by[2]));
+            assert_eq!(stencil.mean(by.map(|v| v as f32), 3), Some(moved), "{by:?}");
+        }
+        assert_eq!(stencil.mean([1.0, 0.0, 0.0], 3), None);
+        let outside = grid.mean(&points, &at(9.0, 0.0, 0.0));
+        assert!((outside + f64::from(HIDDEN)).abs() < 1e-6, "{outside}");
+    }
+}
