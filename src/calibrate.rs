@@ -1,11 +1,11 @@
 //! Fits in; the same with the places of their joints estimated, and the models so corrected, out: for robots that their
 //! models fit poorly, where it is asked for. And results of several such runs in; one corrected model out.
 
-use crate::atomic;
 use crate::engine::{AllThreads, Engine};
 use crate::search::Search;
 use crate::tools::adopt;
 use contract::{Calibration, Error, Fit, Kind, Region, Result, Verdict};
+use export::atomic;
 use export::{ResultFile, RobotEntry};
 use fit::Prepared;
 use geometry::{Pose, Vector};

@@ -1,7 +1,6 @@
 //! How a run goes: plan, engine, store, command line, configuration, progress. Scans and a robot library in, postures
 //! and masks out. Knows no geometry: what is done stands in `stages/`.
 
-pub mod atomic;
 pub mod bench;
 mod bodies;
 pub mod calibrate;

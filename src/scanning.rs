@@ -9,10 +9,10 @@
 //! OUT/truth/las/labels/0.* labels of the LAS file
 //! ```
 
-use crate::atomic;
 use crate::engine::{Engine, Task};
 use crate::progress::Amount;
 use contract::{Error, Kind, Label, Map, MaskId, Result, Weigh};
+use export::atomic;
 use export::{
     E57Scans, GridPoint, GridScan, LabelColumns, LasSettings, LasWriter, MaskWriter, NpyWriter,
     PointColumns, Quantum,

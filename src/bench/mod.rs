@@ -21,10 +21,11 @@ mod watch;
 
 use crate::engine::Engine;
 use crate::job::Means;
-use crate::{atomic, demo, library};
+use crate::{demo, library};
 use cell::Cell;
 use condition::{Case, cases};
 use contract::{Error, Kind, Result};
+use export::atomic;
 use fit::Method;
 use robot::Model;
 use score::{Row, score};

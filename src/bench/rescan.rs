@@ -1,7 +1,6 @@
 //! Seeds and sizes in; plants of which one cell is scanned again, what the rescan found of what was changed, what it
 //! invented, and its time beside a run of the whole, out.
 
-use crate::atomic;
 use crate::bench::{Journal, robots_of};
 use crate::compare::Agreement;
 use crate::engine::Engine;
@@ -11,6 +10,7 @@ use crate::reuse::Manifest;
 use crate::scanning::{Formats, scan_scene};
 use crate::{library, plan};
 use contract::{Error, Result};
+use export::atomic;
 use geometry::Vector;
 use serde::Serialize;
 use simulate::{Plant, Scene, sessions};

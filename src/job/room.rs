@@ -3,6 +3,7 @@
 use crate::reuse::{Kept, Key, Manifest};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
+use export::atomic;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -157,9 +158,7 @@ fn sweep(store: &Path) {
     let folders = folders.filter(|path| path.is_dir()).chain([store.to_path_buf()]);
     for folder in folders {
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-            let name = entry.file_name();
-            let name = name.to_string_lossy();
-            if name.starts_with(".stillpoint-") && name.ends_with(".part") {
+            if entry.path().extension().is_some_and(|ending| ending == atomic::PART) {
                 let _ = std::fs::remove_file(entry.path());
             }
         }

@@ -53,8 +53,8 @@ impl Said<'_, '_> {
         });
         let text = serde_json::to_string_pretty(&all)
             .map_err(|e| Error::new(Kind::Bug, "changes cannot be written").because(e))?;
-        crate::atomic::write(&next.join("changes.json"), (text + "\n").as_bytes())?;
-        crate::atomic::write(&next.join("changes.csv"), self.csv(&robots).as_bytes())?;
+        export::atomic::write(&next.join("changes.json"), (text + "\n").as_bytes())?;
+        export::atomic::write(&next.join("changes.csv"), self.csv(&robots).as_bytes())?;
         self.draw().write(&next.join("pictures/changes.png"))?;
         result.write(next)?;
         let summary = self.summary(&robots);

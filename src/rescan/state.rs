@@ -84,7 +84,7 @@ impl State {
     /// Writes it beside a result.
     pub(crate) fn write(&self, out: &Path) -> Result<()> {
         let body = written(self).ok_or_else(|| Error::new(Kind::Bug, "a plant cannot be kept"))?;
-        crate::atomic::write(&out.join(NAME), &[FORMAT, &body].concat())
+        export::atomic::write(&out.join(NAME), &[FORMAT, &body].concat())
     }
 
     /// That of a result.

@@ -1,8 +1,8 @@
 //! Files in, digests of their bytes out. A file that was read before and has since kept its length, time and place on disk
 //! is not read again.
 
-use crate::atomic;
 use contract::{Error, Kind, Result};
+use export::atomic;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};

@@ -2,8 +2,8 @@
 //! run had found already.
 
 use super::Key;
-use crate::atomic;
 use contract::Result;
+use export::atomic;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::PathBuf;

@@ -4,11 +4,11 @@
 //! the last to move, so that a run that is cut short while they move is finished by the next one.
 
 use super::contents::{Contents, Sum, walk};
-use crate::atomic;
 use crate::engine::Engine;
 use crate::job::Outcome;
 use contract::{Error, Kind, Result};
 use export::FileSum;
+use export::atomic;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

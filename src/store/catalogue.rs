@@ -5,8 +5,8 @@
 
 use super::encode::layout;
 use super::io_error;
-use crate::atomic;
 use contract::{Error, Result, ScanId, TileAt};
+use export::atomic;
 use geometry::Aabb;
 use rkyv::{Archive, Deserialize, Serialize};
 use std::path::Path;

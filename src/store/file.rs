@@ -3,8 +3,8 @@
 use super::catalogue::{self, TileEntry};
 use super::encode::{Encoded, layout};
 use super::io_error;
-use crate::atomic::AtomicFile;
 use contract::Result;
+use export::AtomicFile;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};

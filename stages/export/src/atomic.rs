@@ -6,7 +6,7 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Ending of a file that is not yet whole.
-pub(crate) const PART: &str = "part";
+pub const PART: &str = "part";
 
 /// A file that takes its own name only when it is committed; dropped before, it is removed.
 #[derive(Debug)]
@@ -41,6 +41,11 @@ impl AtomicFile {
         &self.path
     }
 
+    /// The file once more, for reading what was written so far.
+    pub fn again(&self) -> std::io::Result<File> {
+        File::open(&self.part)
+    }
+
     /// Brings the bytes to disk, then gives the file its name, replacing what had it.
     pub fn commit(mut self) -> Result<()> {
         let file = self.file.take().expect("taken only here and on drop");
@@ -59,7 +64,7 @@ impl AtomicFile {
 }
 
 /// Writes a whole file at once.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     file.write_all(bytes).map_err(|e| refused("file cannot be written", path, e))?;
     file.commit()
@@ -110,5 +115,29 @@ impl Read for AtomicFile {
 impl Seek for AtomicFile {
     fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
         self.file().seek(to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_committed_file_has_its_name() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("result.json");
+        let mut file = AtomicFile::create(&path).expect("begins");
+        file.write_all(b"half").expect("writes");
+        assert!(!path.exists());
+        let mut half = String::new();
+        file.again().expect("opens").read_to_string(&mut half).expect("reads");
+        assert_eq!(half, "half");
+        drop(file);
+        assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 0);
+        write(&path, b"one").expect("writes");
+        write(&path, b"two").expect("replaces");
+        assert_eq!(std::fs::read(&path).expect("a file"), b"two");
+        assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 1);
+        assert_eq!(write(&path.join("no/such"), b"").expect_err("fails").kind(), Kind::Io);
     }
 }

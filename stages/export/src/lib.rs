@@ -3,7 +3,7 @@
 //! Every file is written under a temporary name, synced, and gets its own name only when it is whole.
 #![forbid(unsafe_code)]
 
-mod atomic;
+pub mod atomic;
 mod calibration;
 mod canvas;
 mod change_picture;
