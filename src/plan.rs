@@ -72,7 +72,9 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         let find = || kept.or_find(&format!("{region:?}"), || search.region(&region));
         failures.spare(&region, find)
     })?;
-    let (fits, unmet) = review.apply(fits.into_iter().flatten().collect());
+    let fits = fits.into_iter().flatten().collect();
+    let (fits, wrong) = review.correct(fits, (&search, &regions), &library.models)?;
+    let (fits, unmet) = review.apply(fits);
     let fits = fit::choose(fits, &library.models);
     let mut models = library.models.clone();
     let mut fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
@@ -98,7 +100,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         fits: &fits,
         clusters: &clusters,
         written: &written,
-        unmet,
+        unmet: [wrong, unmet].concat(),
         left_out: failures.said(job),
     }
     .finish(&room)?;

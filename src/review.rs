@@ -6,13 +6,20 @@
 //! radius = 0.5                  # how near, metres
 //! model = "kuka_kr10"           # no other model stands here
 //! verdict = "accept"            # or "reject": no robot stands here; left out: as the program finds
+//! joints = { joint_1 = 0.35 }   # near which posture it stands, radians or metres: the fit begins there; others are 0
+//! rpy = [0.0, 0.0, 1.57]        # with joints: `at` is its base, so turned (URDF, radians); else the base that was found
 //! ```
 //!
 //! The file is the user's and is given again with every run, so what it says survives reruns.
 
-use contract::{Error, Fit, Kind, Result, Verdict};
-use geometry::Point;
+use crate::engine::AllThreads;
+use crate::search::Search;
+use contract::{Error, Fit, JointFit, Region, Result, Verdict};
+use geometry::{Point, Pose};
+use nalgebra::{Translation3, UnitQuaternion};
+use robot::Model;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// How near a base must be to the place given, metres.
@@ -44,6 +51,12 @@ pub struct Place {
     /// What a person decided.
     #[serde(default)]
     pub verdict: Option<Decision>,
+    /// Values of joints near which it stands, by name, radians or metres; empty where that is not known.
+    #[serde(default)]
+    pub joints: BTreeMap<String, f64>,
+    /// How its base is turned, roll, pitch and yaw as in URDF, radians; [`Place::at`] is the base itself then.
+    #[serde(default)]
+    pub rpy: Option<[f64; 3]>,
 }
 
 /// What a person decided of a robot.
@@ -65,11 +78,11 @@ impl Review {
     ///
     /// # Errors
     /// A file that cannot be read, is no review, or names a model that the library has not.
-    pub fn read(path: &Path, models: &[robot::Model]) -> Result<Self> {
+    pub fn read(path: &Path, models: &[Model]) -> Result<Self> {
         let bad = |what: String| {
             Error::bad_input(what)
                 .at(path.display())
-                .hint("a review has [[robot]] with at, and radius, model or verdict")
+                .hint("a review has [[robot]] with at, and radius, model, verdict, joints or rpy")
         };
         let io = |e: std::io::Error| Error::from(e).at(path.display());
         if std::fs::metadata(path).map_err(io)?.len() > MAX_BYTES {
@@ -78,18 +91,44 @@ impl Review {
         let text = std::fs::read_to_string(path).map_err(io)?;
         let review: Self = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
         for place in &review.places {
-            if !place.at.iter().chain([&place.radius]).all(|v| v.is_finite()) || place.radius <= 0.0
-            {
-                return Err(bad(format!("a place or radius is no number: {place:?}")));
-            }
-            if let Some(model) = &place.model
-                && !models.iter().any(|m| m.name == *model)
-            {
-                let what = format!("the library has no model \"{model}\"");
-                return Err(Error::new(Kind::BadInput, what).at(path.display()));
-            }
+            place.check(models).map_err(bad)?;
         }
         Ok(review)
+    }
+
+    /// The fits of all candidates, those from postures that are given in the place of others; and a warning for each posture
+    /// that the scans do not bear out.
+    pub(crate) fn correct(
+        &self,
+        mut fits: Vec<Fit>,
+        (search, regions): (&Search<'_, '_>, &[Region]),
+        models: &[Model],
+    ) -> Result<(Vec<Fit>, Vec<String>)> {
+        let mut warnings = Vec::new();
+        for place in self.places.iter().filter(|place| !place.joints.is_empty()) {
+            let Some(start) = place.start(&fits, models) else { continue };
+            let fit = search.with_scene(&start, regions, |scene, settings| {
+                fit::again(
+                    &start,
+                    search.shelf().prepared(start.model),
+                    scene,
+                    settings,
+                    &AllThreads,
+                )
+            })?;
+            match fit.flatten() {
+                Some(fit) => {
+                    fits.retain(|f| !place.has(f));
+                    fits.push(fit);
+                }
+                None => warnings.push(format!(
+                    "the posture that the review gives for the {} near {} is not what the scans show",
+                    start.model_name,
+                    place.words()
+                )),
+            }
+        }
+        Ok((fits, warnings))
     }
 
     /// The fits of all candidates with what is known applied, and a warning for each place where nothing fits it.
@@ -97,10 +136,7 @@ impl Review {
     pub fn apply(&self, mut fits: Vec<Fit>) -> (Vec<Fit>, Vec<String>) {
         let mut warnings = Vec::new();
         for place in &self.places {
-            let here = |f: &Fit| {
-                let base = Point::from(f.world_from_base.translation.vector);
-                (base - Point::from(place.at)).norm() <= place.radius
-            };
+            let here = |f: &Fit| place.has(f);
             if place.verdict == Some(Decision::Reject) {
                 fits.retain(|f| !here(f));
                 continue;
@@ -121,10 +157,9 @@ impl Review {
                 }
                 Some(_) => {}
                 None => {
-                    let [x, y, z] = place.at;
-                    let what = place.model.as_deref().unwrap_or("robot");
+                    let (what, at) = (place.model.as_deref().unwrap_or("robot"), place.words());
                     warnings.push(format!(
-                        "the review expects a {what} near ({x:.2}, {y:.2}, {z:.2}), and none was found there"
+                        "the review expects a {what} near {at}, and none was found there"
                     ));
                 }
             }
@@ -133,10 +168,78 @@ impl Review {
     }
 }
 
+impl Place {
+    /// Whether all of it can be; else what cannot.
+    fn check(&self, models: &[Model]) -> std::result::Result<(), String> {
+        let numbers = self.at.iter().chain([&self.radius]).chain(self.joints.values());
+        if !numbers.chain(self.rpy.iter().flatten()).all(|v| v.is_finite()) || self.radius <= 0.0 {
+            return Err(format!("a place, radius, joint or turn is no number: {self:?}"));
+        }
+        let Some(name) = &self.model else {
+            return if self.joints.is_empty() {
+                Ok(())
+            } else {
+                Err(format!("joints near {} belong to no model: give it, too", self.words()))
+            };
+        };
+        let Some(model) = models.iter().find(|m| m.name == *name) else {
+            return Err(format!("the library has no model \"{name}\""));
+        };
+        let known: Vec<&str> = model.free.iter().map(|&joint| &*model.joints[joint].name).collect();
+        match self.joints.keys().find(|joint| !known.contains(&joint.as_str())) {
+            Some(odd) => {
+                Err(format!("{name} has no joint \"{odd}\": there are {}", known.join(", ")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Whether a fit stands here.
+    fn has(&self, fit: &Fit) -> bool {
+        let base = Point::from(fit.world_from_base.translation.vector);
+        (base - Point::from(self.at)).norm() <= self.radius
+    }
+
+    /// What the fit of the posture that is given begins with: on the base that is given, else that of the best fit here.
+    fn start(&self, fits: &[Fit], models: &[Model]) -> Option<Fit> {
+        let index = models.iter().position(|m| Some(&m.name) == self.model.as_ref())?;
+        let own = fits.iter().filter(|f| f.model == index && self.has(f));
+        let best = own.max_by(|a, b| a.explained.total_cmp(&b.explained));
+        let turn = |[r, p, y]: [f64; 3]| UnitQuaternion::from_euler_angles(r, p, y);
+        let world_from_base = match (self.rpy, best) {
+            (None, Some(best)) => best.world_from_base,
+            (rpy, _) => {
+                Pose::from_parts(Translation3::from(self.at), turn(rpy.unwrap_or_default()))
+            }
+        };
+        let model = &models[index];
+        let joint = |&joint: &usize| {
+            let name = model.joints[joint].name.clone();
+            JointFit {
+                value: self.joints.get(&name).copied().unwrap_or(0.0),
+                name,
+                ..JointFit::default()
+            }
+        };
+        Some(Fit {
+            model: index,
+            model_name: model.name.clone(),
+            world_from_base,
+            joints: model.free.iter().map(joint).collect(),
+            ..Fit::default()
+        })
+    }
+
+    /// The place for people.
+    fn words(&self) -> String {
+        let [x, y, z] = self.at;
+        format!("({x:.2}, {y:.2}, {z:.2})")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::Pose;
 
     fn fit(model: &str, x: f64, explained: f64) -> Fit {
         let world_from_base = Pose::translation(x, 0.0, 0.0);
@@ -144,7 +247,8 @@ mod tests {
     }
 
     fn place(x: f64, model: Option<&str>, verdict: Option<Decision>) -> Place {
-        Place { at: [x, 0.0, 0.0], radius: RADIUS, model: model.map(Into::into), verdict }
+        let (model, joints) = (model.map(Into::into), BTreeMap::new());
+        Place { at: [x, 0.0, 0.0], radius: RADIUS, model, verdict, joints, rpy: None }
     }
 
     #[test]

@@ -1,0 +1,79 @@
+//! What a person says of a robot, from outside: a posture near which it stands, one at which it does not, that nothing stands
+//! there, and what cannot be.
+
+mod common;
+
+use common::palletiser;
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Beams of each scanner.
+const N_BEAMS: u64 = 250_000;
+/// How far the posture in the review is from the true one, and how far from it the fit may end, radians.
+const OFF: f64 = 0.05;
+const NEAR: f64 = 2e-4;
+
+fn run(dir: &Path, review: &str) -> Output {
+    std::fs::write(dir.join("review.toml"), review).expect("writes");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
+    command.current_dir(dir).args(["run", "scans/scans.e57", "--robots", "robots", "--out", "out"]);
+    command.args(["--review", "review.toml", "--progress", "none"]);
+    command.output().expect("the program starts")
+}
+
+fn result(dir: &Path, review: &str) -> Value {
+    let output = run(dir, review);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(dir.join("out/result.json")).expect("a result");
+    serde_json::from_str(&text).expect("JSON")
+}
+
+fn joints(robot: &Value) -> Vec<(String, f64)> {
+    let joints = robot["joints"].as_object().expect("joints");
+    joints.iter().map(|(name, v)| (name.clone(), v.as_f64().expect("a value"))).collect()
+}
+
+#[test]
+fn a_posture_that_is_given_is_where_the_fit_begins_and_no_more() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let dir = dir.path();
+    palletiser(dir, 11, N_BEAMS);
+    let found = &result(dir, "")["robots"][0];
+    let at = &found["base_pose"]["xyz"];
+    let given = |off: f64| {
+        let words =
+            joints(found).into_iter().map(|(name, value)| format!("{name} = {}", value + off));
+        let words: Vec<String> = words.collect();
+        format!(
+            "[[robot]]\nat = {at}\nmodel = {}\njoints = {{ {} }}\n",
+            found["model"],
+            words.join(", ")
+        )
+    };
+    let near = &result(dir, &given(OFF))["robots"][0];
+    assert_eq!(near["verdict"], "trusted");
+    for ((name, a), (_, b)) in joints(found).iter().zip(joints(near)) {
+        let sigma = found["sigma"][name].as_f64().expect("a deviation");
+        assert!((a - b).abs() < NEAR.max(3.0 * sigma), "{name}: {a} and {b} ± {sigma}");
+    }
+    let far = result(dir, &given(0.6));
+    assert!(
+        far["warnings"].to_string().contains("is not what the scans show"),
+        "{}",
+        far["warnings"]
+    );
+    assert_eq!(joints(&far["robots"][0]), joints(found));
+    let none = result(dir, &format!("[[robot]]\nat = {at}\nverdict = \"reject\"\n"));
+    assert_eq!(none["robots"].as_array().expect("robots").len(), 0);
+    let odd = run(
+        dir,
+        &format!("[[robot]]\nat = {at}\nmodel = {}\njoints = {{ elbow = 1.0 }}", found["model"]),
+    );
+    let said = String::from_utf8_lossy(&odd.stderr).into_owned();
+    assert_eq!(odd.status.code(), Some(4), "{said}");
+    assert!(
+        said.contains("review.toml") && said.contains("no joint \"elbow\": there are "),
+        "{said}"
+    );
+}
