@@ -64,6 +64,8 @@ const COARSE_REACH: f64 = 1.3;
 /// Share of the lowest score that a base must have after the coarse level, and after the next: on coarse grids the right
 /// one scores a little more or less than in the end.
 const SHORT: (f64, f64) = (0.4, 0.6);
+/// Base poses of a place that are asked whether they look like the robot.
+const N_LIKE: usize = 4;
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
@@ -400,7 +402,10 @@ impl<'a> BaseSearch<'a> {
                 None => {}
             }
         }
-        places.retain(|place| self.is_like(&local[place[0].plane], place[0]));
+        // The best of a place may be the right place turned wrongly.
+        places.retain(|place| {
+            place.iter().take(N_LIKE).any(|trial| self.is_like(&local[trial.plane], trial))
+        });
         let world_from_local = Pose::from_parts(
             Translation3::from(self.sight.region.origin.coords),
             UnitQuaternion::identity(),

@@ -27,6 +27,9 @@ impl BaseSearch<'_> {
         let cad = prefix(self.model, self.base, self.settings.n_fine);
         let pose = local_from_root * self.root_from_base;
         let base = of_judged(&self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.0));
+        if base < LIKE.0 {
+            return false;
+        }
         let first = self.first.map_or(base, |(free, link)| {
             if !self.sight.each.is_empty() {
                 return of_judged(&self.first_apart(local_from_root, (free, link), JUDGE.1));
