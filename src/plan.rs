@@ -73,7 +73,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         failures.spare(&region, find)
     })?;
     let fits = fits.into_iter().flatten().collect();
-    let (fits, wrong) = review.correct(fits, (&search, &regions), &library.models)?;
+    let (fits, wrong) = review.correct(fits, (&search, &regions), &library.models, engine)?;
     let (fits, unmet) = review.apply(fits);
     let fits = fit::choose(fits, &library.models);
     let mut models = library.models.clone();

@@ -12,7 +12,7 @@
 //!
 //! The file is the user's and is given again with every run, so what it says survives reruns.
 
-use crate::engine::AllThreads;
+use crate::engine::{AllThreads, Engine};
 use crate::search::Search;
 use contract::{Error, Fit, JointFit, Region, Result, Verdict};
 use geometry::{Point, Pose};
@@ -103,19 +103,19 @@ impl Review {
         mut fits: Vec<Fit>,
         (search, regions): (&Search<'_, '_>, &[Region]),
         models: &[Model],
+        engine: &Engine,
     ) -> Result<(Vec<Fit>, Vec<String>)> {
+        let given = self.places.iter().filter(|place| !place.joints.is_empty());
+        let starts: Vec<(&Place, Fit)> =
+            given.filter_map(|place| Some((place, place.start(&fits, models)?))).collect();
+        let found = engine.fan_out("review", starts.iter().collect(), |(_, start)| {
+            search.with_scene(start, regions, |scene, settings| {
+                let prepared = search.shelf().prepared(start.model);
+                fit::again(start, prepared, scene, settings, &AllThreads)
+            })
+        })?;
         let mut warnings = Vec::new();
-        for place in self.places.iter().filter(|place| !place.joints.is_empty()) {
-            let Some(start) = place.start(&fits, models) else { continue };
-            let fit = search.with_scene(&start, regions, |scene, settings| {
-                fit::again(
-                    &start,
-                    search.shelf().prepared(start.model),
-                    scene,
-                    settings,
-                    &AllThreads,
-                )
-            })?;
+        for ((place, start), fit) in starts.iter().zip(found) {
             match fit.flatten() {
                 Some(fit) => {
                     fits.retain(|f| !place.has(f));

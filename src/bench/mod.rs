@@ -4,6 +4,7 @@
 //! main job, from strips of points on: nothing but the scans' points and stated poses goes in. Suites and their goals
 //! follow fit.md §5.
 
+mod cases;
 mod cell;
 mod condition;
 mod draw;

@@ -1,7 +1,8 @@
 //! `bench plant`: suites of drawn cells and lines in; scanned to files, sent through the main job, and compared with the
 //! truth robot by robot and point by point, as a table, out.
 
-use crate::bench::{Journal, chosen, robots_of};
+use super::cases::{Case, CaseRow, Cases};
+use super::{chosen, robots_of};
 use crate::compare::Agreement;
 use crate::engine::Engine;
 use crate::job::{Job, Means};
@@ -105,40 +106,21 @@ pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<Stri
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     chosen(&models, &[])?;
     let known = Known { folder: robots, models, kept: temporary.path().join("models") };
-    let mut journal =
-        bench.out.as_deref().map(|dir| Journal::create(dir, "plant.jsonl")).transpose()?;
     let quiet = engine.quiet();
-    let mut rows = Vec::new();
-    for (suite, seed, wanted, is_strange) in cases(bench)? {
-        engine.cancel.check()?;
-        let dir = match (&bench.out, bench.keep) {
-            (Some(out), true) => out.join(format!("{suite}-{seed}")),
-            _ => temporary.path().join("case"),
-        };
-        let mut row = Row { suite: suite.into(), seed, ..Row::default() };
-        if let Err(error) = run(&mut row, &wanted, (&known, is_strange), &dir, (means, &quiet)) {
-            row.failed = Some(error.to_string());
-        }
-        if !bench.keep {
-            let _ = std::fs::remove_dir_all(&dir);
-        }
-        if let Some(journal) = &mut journal {
-            journal.add(&row)?;
-        }
-        engine.progress.say(&row.line());
-        rows.push(row);
-    }
-    let table = table(&rows);
-    if let Some(dir) = &bench.out {
-        atomic::write(&dir.join("plant.md"), table.as_bytes())?;
-    }
-    Ok(table)
+    let place = Cases {
+        name: "plant",
+        out: bench.out.as_deref(),
+        keep: bench.keep,
+        temporary: temporary.path(),
+    };
+    let case = |row: &mut Row, of: &Wanted, dir: &Path| run(row, of, &known, dir, (means, &quiet));
+    place.run(cases(bench)?, case, table, engine)
 }
 
-/// Suite, seed, what is drawn, and whether the library knows the robots.
-type Case = (&'static str, u64, Plant, bool);
+/// What is drawn, and whether the models of its robots are left out of the library.
+type Wanted = (Plant, bool);
 
-fn cases(bench: &PlantBench) -> Result<Vec<Case>> {
+fn cases(bench: &PlantBench) -> Result<Vec<Case<Row, Wanted>>> {
     let names: Vec<&str> = SUITES.iter().map(|s| s.0).collect();
     if let Some(odd) = bench.suites.iter().find(|s| !names.contains(&s.as_str())) {
         return Err(Error::new(Kind::Usage, format!("there is no suite \"{odd}\""))
@@ -150,7 +132,9 @@ fn cases(bench: &PlantBench) -> Result<Vec<Case>> {
         for k in bench.first..bench.first + bench.n_cases.unwrap_or(*n) {
             let seed = bench.seed * 100_000 + at as u64 * 1000 + k as u64;
             if wanted(name) {
-                out.push((*name, seed, Plant { seed, ..draw(k) }, *is_strange));
+                let row = Row { suite: (*name).into(), seed, ..Row::default() };
+                let of = (Plant { seed, ..draw(k) }, *is_strange);
+                out.push(Case { name: format!("{name}-{seed}"), row, of });
             }
         }
     }
@@ -168,8 +152,8 @@ struct Known {
 /// One case: drawn, scanned, run, compared.
 fn run(
     row: &mut Row,
-    wanted: &Plant,
-    (known, is_strange): (&Known, bool),
+    (wanted, is_strange): &Wanted,
+    known: &Known,
     dir: &Path,
     (means, engine): (&Means, &Engine),
 ) -> Result<()> {
@@ -179,7 +163,7 @@ fn run(
     let scans = dir.join("scans");
     let truth = scan_scene(&scene, models, &scans, Formats { las: false, ..Formats::ALL }, engine)?;
     row.n_points = truth.scans.iter().map(|s| s.n_points).sum();
-    let robots = if is_strange {
+    let robots = if *is_strange {
         let others = dir.join("robots");
         let strange: Vec<&str> = scene.robots.iter().map(|r| r.model.as_str()).collect();
         link_others(&known.folder, &made(&others)?, &strange)?;
@@ -263,7 +247,11 @@ fn judge(row: &mut Row, agreement: &Agreement) {
     }
 }
 
-impl Row {
+impl CaseRow for Row {
+    fn fail(&mut self, why: String) {
+        self.failed = Some(why);
+    }
+
     fn line(&self) -> String {
         if let Some(why) = &self.failed {
             return format!("{} {}: failed: {why}", self.suite, self.seed);

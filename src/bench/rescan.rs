@@ -1,7 +1,8 @@
 //! Seeds and sizes in; plants of which one cell is scanned again, what the rescan found of what was changed, what it
 //! invented, and its time beside a run of the whole, out.
 
-use crate::bench::{Journal, robots_of};
+use super::cases::{Case, CaseRow, Cases};
+use super::robots_of;
 use crate::compare::Agreement;
 use crate::engine::Engine;
 use crate::job::{Job, Means};
@@ -10,7 +11,6 @@ use crate::reuse::Manifest;
 use crate::scanning::{Formats, scan_scene};
 use crate::{library, plan};
 use contract::{Error, Result};
-use export::atomic;
 use geometry::Vector;
 use serde::Serialize;
 use simulate::{Plant, Scene, sessions};
@@ -75,35 +75,23 @@ struct Row {
 pub fn rescans(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
     let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
-    let mut journal =
-        bench.out.as_deref().map(|dir| Journal::create(dir, "rescan.jsonl")).transpose()?;
     let quiet = engine.quiet();
-    let mut rows = Vec::new();
-    for k in bench.first..bench.first + bench.n_cases {
-        engine.cancel.check()?;
-        let seed = bench.seed * 100_000 + k as u64;
-        let dir = match (&bench.out, bench.keep) {
-            (Some(out), true) => out.join(seed.to_string()),
-            _ => temporary.path().join("case"),
-        };
-        let mut row = Row { seed, ..Row::default() };
-        if let Err(error) = case(&mut row, bench, (&robots, &dir), (means, &quiet)) {
-            row.failed = Some(error.to_string());
-        }
-        if !bench.keep {
-            let _ = std::fs::remove_dir_all(&dir);
-        }
-        if let Some(journal) = &mut journal {
-            journal.add(&row)?;
-        }
-        engine.progress.say(&row.line());
-        rows.push(row);
-    }
-    let table = table(&rows);
-    if let Some(dir) = &bench.out {
-        atomic::write(&dir.join("rescan.md"), table.as_bytes())?;
-    }
-    Ok(table)
+    let place = Cases {
+        name: "rescan",
+        out: bench.out.as_deref(),
+        keep: bench.keep,
+        temporary: temporary.path(),
+    };
+    let seed = |k: usize| bench.seed * 100_000 + k as u64;
+    let draw = |k: usize| Case {
+        name: seed(k).to_string(),
+        row: Row { seed: seed(k), ..Row::default() },
+        of: (),
+    };
+    let cases = (bench.first..bench.first + bench.n_cases).map(draw).collect();
+    let case =
+        |row: &mut Row, _: &(), dir: &Path| case(row, bench, (&robots, dir), (means, &quiet));
+    place.run(cases, case, table, engine)
 }
 
 fn case(
@@ -241,7 +229,11 @@ fn same(base: &Path, out: &Path) -> Result<[usize; 2]> {
     Ok([old.iter().filter(|(path, digest)| new.get(*path) == Some(digest)).count(), old.len()])
 }
 
-impl Row {
+impl CaseRow for Row {
+    fn fail(&mut self, why: String) {
+        self.failed = Some(why);
+    }
+
     fn line(&self) -> String {
         if let Some(why) = &self.failed {
             return format!("{}: failed: {why}", self.seed);
