@@ -77,6 +77,21 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
     Ok(Estimate { unchanged, ..estimate })
 }
 
+/// An error of the job; where a disk was full, with what is missing there.
+pub(crate) fn with_missing(error: Error, job: &Job, engine: &Engine) -> Error {
+    if !error.is_full_disk() {
+        return error;
+    }
+    // What the job left half-written is taken away by now, and its tiles and fits need not be written again.
+    match estimate(job, engine).map(|e| e.need().saturating_sub(e.free_bytes)) {
+        Ok(missing) if missing > 0 => error.hint(format!(
+            "about {} are missing: make room, or choose another --out; what was done is kept, and the next run goes on from it",
+            memory_words(missing)
+        )),
+        _ => error,
+    }
+}
+
 /// What an earlier run has left.
 struct Earlier {
     room: Room,
@@ -146,12 +161,17 @@ impl Estimate {
         }
     }
 
+    /// Disk that it takes, bytes.
+    fn need(&self) -> u64 {
+        self.store_bytes.saturating_add(self.output_bytes)
+    }
+
     /// Refuses what the disk cannot hold.
     ///
     /// # Errors
     /// More is needed than is free.
     pub fn checked(&self, out: &Path) -> Result<()> {
-        let need = self.store_bytes.saturating_add(self.output_bytes);
+        let need = self.need();
         if self.free_bytes == 0 || need <= self.free_bytes {
             return Ok(());
         }

@@ -3,7 +3,7 @@
 use super::flags::{Common, PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;
 use crate::engine::Engine;
-use crate::estimate::estimate;
+use crate::estimate::{estimate, with_missing};
 use crate::rescan::{self, Cell, Wish};
 use crate::{exit, job::Job, lenient};
 use contract::{Error, Kind, Result};
@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
     let (job, engine) = job(flags, common)?;
-    let mut outcome = lenient::run(&job, &engine)?;
+    let mut outcome = lenient::run(&job, &engine).map_err(|e| with_missing(e, &job, &engine))?;
     let _ = writeln!(outcome.summary, "result in {}", job.out.join("result.json").display());
     say.outcome(&outcome);
     Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })

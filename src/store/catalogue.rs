@@ -4,7 +4,6 @@
 //! `rkyv` archive of exactly that length, and nothing more: `rkyv` may read trailing bytes as another answer.
 
 use super::encode::layout;
-use super::io_error;
 use contract::{Error, Result, ScanId, TileAt};
 use export::atomic;
 use geometry::Aabb;
@@ -98,7 +97,7 @@ pub(super) fn write(
 /// Reads and checks a catalogue whose scans are numbered from `first`; gives the entries and the length of the tile file.
 pub(super) fn read(path: &Path, first: u32) -> Result<(Vec<TileEntry>, u64)> {
     let bytes =
-        std::fs::read(path).map_err(|e| io_error(path, "the catalogue cannot be read", e))?;
+        std::fs::read(path).map_err(|e| Error::of_file("the catalogue cannot be read", path, e))?;
     let (mut entries, n) = parse(&bytes).map_err(|e| e.at(path.display()))?;
     for entry in &mut entries {
         let Some(scan) = entry.at.scan.0.checked_add(first) else {

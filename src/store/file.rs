@@ -2,8 +2,7 @@
 
 use super::catalogue::{self, TileEntry};
 use super::encode::{Encoded, layout};
-use super::io_error;
-use contract::Result;
+use contract::{Error, Result};
 use export::AtomicFile;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -26,7 +25,7 @@ impl TileFile {
     pub(super) fn create(path: &Path) -> Result<Self> {
         let mut file = AtomicFile::create(path)?;
         file.write_all(&catalogue::tiles_header())
-            .map_err(|e| io_error(path, "a tile cannot be written", e))?;
+            .map_err(|e| Error::of_file("a tile cannot be written", path, e))?;
         Ok(Self { file, path: path.to_owned(), len: catalogue::HEADER_BYTES })
     }
 
@@ -37,12 +36,12 @@ impl TileFile {
         self.len += bytes.len() as u64;
         self.file
             .write_all(&bytes)
-            .map_err(|e| io_error(&self.path, "a tile cannot be written", e))?;
+            .map_err(|e| Error::of_file("a tile cannot be written", &self.path, e))?;
         Ok(entry)
     }
 
     pub(super) fn early(&mut self) -> Result<Early> {
-        let failed = |e| io_error(&self.path, "the tiles cannot be read again", e);
+        let failed = |e| Error::of_file("the tiles cannot be read again", &self.path, e);
         Ok(Early { file: self.file.again().map_err(failed)?, path: self.path.clone() })
     }
 
@@ -59,7 +58,7 @@ impl Early {
         let mut bytes = vec![0; layout(entry.n_points)[3] as usize];
         let read = self.file.seek(SeekFrom::Start(entry.offset));
         read.and_then(|_| self.file.read_exact(&mut bytes))
-            .map_err(|e| io_error(&self.path, "a tile cannot be read again", e))?;
+            .map_err(|e| Error::of_file("a tile cannot be read again", &self.path, e))?;
         Ok(bytes)
     }
 }

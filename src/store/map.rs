@@ -1,8 +1,7 @@
 //! A file of ours in, its bytes in memory out. The only unsafe code of `src`.
 #![allow(unsafe_code, reason = "a memory map is unsafe by its nature; it is gathered here")]
 
-use super::io_error;
-use contract::Result;
+use contract::{Error, Result};
 use memmap2::Mmap;
 use std::fs::File;
 use std::path::Path;
@@ -18,11 +17,12 @@ pub(super) struct FileMap {
 
 impl FileMap {
     pub(super) fn open(path: &Path, resident_bytes: usize) -> Result<Self> {
-        let file = File::open(path).map_err(|e| io_error(path, "the tiles cannot be opened", e))?;
+        let file =
+            File::open(path).map_err(|e| Error::of_file("the tiles cannot be opened", path, e))?;
         // SAFETY: the file lies in the store's private folder, was renamed there whole, and is never written again;
         // nobody but us has reason to change it while it is mapped.
         let map = unsafe { Mmap::map(&file) };
-        let map = map.map_err(|e| io_error(path, "the tiles cannot be mapped", e))?;
+        let map = map.map_err(|e| Error::of_file("the tiles cannot be mapped", path, e))?;
         Ok(Self { map, resident_bytes, read_bytes: AtomicUsize::new(0) })
     }
 

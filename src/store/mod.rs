@@ -15,7 +15,7 @@ mod tests;
 mod writer;
 
 use catalogue::broken;
-use contract::{Error, Kind, Result, Scan, Tile, TileAt, Weigh};
+use contract::{Result, Scan, Tile, TileAt, Weigh};
 use geometry::Aabb;
 use map::FileMap;
 use std::ops::Range;
@@ -155,10 +155,4 @@ impl Weigh for TileEntry {
     fn n_points(&self) -> u64 {
         self.n_points
     }
-}
-
-/// An error of the system about a file of ours.
-fn io_error(path: &Path, what: &str, cause: std::io::Error) -> Error {
-    let error = Error::new(Kind::Io, what).because(cause).at(path.display());
-    error.hint("check that the folder exists, is writable, and that the disk is not full")
 }

@@ -10,10 +10,10 @@ use super::record::Record;
 use super::scatter::Scattered;
 use super::spill::{Segment, Spill};
 use super::writer::Writer;
-use super::{CATALOGUE, Store, TILES, TileEntry, io_error};
+use super::{CATALOGUE, Store, TILES, TileEntry};
 use crate::engine::{Engine, Task};
 use crate::progress::Amount;
-use contract::{Result, Scan, TileAt};
+use contract::{Error, Result, Scan, TileAt};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -64,11 +64,12 @@ impl TileSink {
     /// A sink for the scans from `first` on that keeps about `budget_bytes` in memory. An older store in `dir` is
     /// removed.
     pub(super) fn new(dir: &Path, scans: &[Scan], first: u32, budget_bytes: usize) -> Result<Self> {
-        std::fs::create_dir_all(dir).map_err(|e| io_error(dir, "the store cannot be made", e))?;
+        std::fs::create_dir_all(dir)
+            .map_err(|e| Error::of_file("the store cannot be made", dir, e))?;
         // Without its catalogue an old store is no store: nobody can take old tiles for new ones.
         match std::fs::remove_file(dir.join(CATALOGUE)) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                return Err(io_error(dir, "an old catalogue cannot be removed", e));
+                return Err(Error::of_file("an old catalogue cannot be removed", dir, e));
             }
             _ => {}
         }

@@ -1,10 +1,9 @@
 //! Records in, segments of a spill file out, and back. The file has no name in the folder once it is open (where the
 //! system can do that), so that nothing is left behind when the program is killed.
 
-use super::io_error;
 use super::record::Record;
 use bytemuck::Zeroable;
-use contract::Result;
+use contract::{Error, Result};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -26,7 +25,7 @@ pub(super) struct Spill {
 impl Spill {
     pub(super) fn create(dir: &Path) -> Result<Self> {
         let file = tempfile::tempfile_in(dir)
-            .map_err(|e| io_error(dir, "a spill file cannot be made", e))?;
+            .map_err(|e| Error::of_file("a spill file cannot be made", dir, e))?;
         Ok(Self { dir: dir.to_owned(), file, len: 0 })
     }
 
@@ -39,7 +38,7 @@ impl Spill {
         let bytes: &[u8] = bytemuck::cast_slice(records);
         self.file
             .write_all(bytes)
-            .map_err(|e| io_error(&self.dir, "the spill file cannot be written", e))?;
+            .map_err(|e| Error::of_file("the spill file cannot be written", &self.dir, e))?;
         let segment = Segment { offset: self.len, n: records.len() };
         self.len += bytes.len() as u64;
         Ok(segment)
@@ -53,6 +52,6 @@ impl Spill {
         self.file
             .seek(SeekFrom::Start(segment.offset))
             .and_then(|_| self.file.read_exact(bytes))
-            .map_err(|e| io_error(&self.dir, "the spill file cannot be read", e))
+            .map_err(|e| Error::of_file("the spill file cannot be read", &self.dir, e))
     }
 }

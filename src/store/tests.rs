@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::engine::Engine;
-use contract::{InputId, Lattice, MaskId, ScanId, Strip, TILE_SIDE};
+use contract::{InputId, Kind, Lattice, MaskId, ScanId, Strip, TILE_SIDE};
 use geometry::Pose;
 use std::io::{Seek, SeekFrom, Write};
 

@@ -1,6 +1,7 @@
 //! Errors by what a caller can do about them; one type for all rooms, since a stage's errors only travel up.
 
 use std::fmt;
+use std::path::Path;
 
 /// What a caller can do about an error. As many kinds as there are reactions; each has an exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -49,6 +50,21 @@ impl Error {
     /// Broken input.
     pub fn bad_input(what: impl Into<String>) -> Self {
         Self::new(Kind::BadInput, what)
+    }
+
+    /// What the system refuses about a file; a disk that is full is a limit, which the user can lift.
+    pub fn of_file(what: impl Into<String>, path: &Path, cause: std::io::Error) -> Self {
+        let is_full = is_full(&cause);
+        let kind = if is_full { Kind::OverBudget } else { Kind::Io };
+        let error = Self::new(kind, what).because(cause).at(path.display());
+        if is_full { error.hint("make room on the disk, or choose another --out") } else { error }
+    }
+
+    /// Whether it is for want of room on a disk.
+    #[must_use]
+    pub fn is_full_disk(&self) -> bool {
+        let cause = self.0.source.as_ref().and_then(|s| s.downcast_ref::<std::io::Error>());
+        cause.is_some_and(is_full)
     }
 
     /// Keeps the cause.
@@ -118,6 +134,11 @@ impl std::error::Error for Error {
 
 impl From<std::io::Error> for Error {
     fn from(source: std::io::Error) -> Self {
-        Self::new(Kind::Io, "the system refused").because(source)
+        let kind = if is_full(&source) { Kind::OverBudget } else { Kind::Io };
+        Self::new(kind, "the system refused").because(source)
     }
+}
+
+fn is_full(cause: &std::io::Error) -> bool {
+    matches!(cause.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded)
 }

@@ -1,6 +1,6 @@
 //! Files that exist whole or not at all: bytes in; a temporary name until the end, then a sync and a rename.
 
-use contract::{Error, Kind, Result};
+use contract::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ impl AtomicFile {
         let path = path.into();
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)
-                .map_err(|e| refused("folder cannot be made", folder, e))?;
+                .map_err(|e| Error::of_file("folder cannot be made", folder, e))?;
         }
         let part = part_of(&path);
         let file = OpenOptions::new()
@@ -31,7 +31,7 @@ impl AtomicFile {
             .write(true)
             .truncate(true)
             .open(&part)
-            .map_err(|e| refused("file cannot be made", &part, e))?;
+            .map_err(|e| Error::of_file("file cannot be made", &part, e))?;
         Ok(Self { file: Some(file), part, path })
     }
 
@@ -50,7 +50,7 @@ impl AtomicFile {
     pub fn commit(mut self) -> Result<()> {
         let file = self.file.take().expect("taken only here and on drop");
         let done = file.sync_all().and_then(|()| std::fs::rename(&self.part, &self.path));
-        done.map_err(|e| refused("file cannot be finished", &self.path, e))?;
+        done.map_err(|e| Error::of_file("file cannot be finished", &self.path, e))?;
         // The new name itself must survive a power cut; where folders cannot be opened (Windows) it does anyway.
         if let Some(folder) = self.path.parent().and_then(|f| File::open(f).ok()) {
             let _ = folder.sync_all();
@@ -66,17 +66,8 @@ impl AtomicFile {
 /// Writes a whole file at once.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
-    file.write_all(bytes).map_err(|e| refused("file cannot be written", path, e))?;
+    file.write_all(bytes).map_err(|e| Error::of_file("file cannot be written", path, e))?;
     file.commit()
-}
-
-/// An error of the system about a file.
-pub(crate) fn refused(what: &str, path: &Path, source: std::io::Error) -> Error {
-    let full = source.kind() == std::io::ErrorKind::StorageFull;
-    let error = Error::new(if full { Kind::OverBudget } else { Kind::Io }, what)
-        .because(source)
-        .at(path.display());
-    if full { error.hint("make room on the disk, or choose another --out") } else { error }
 }
 
 /// The name of a file while it is not yet whole.
@@ -138,6 +129,9 @@ mod tests {
         write(&path, b"two").expect("replaces");
         assert_eq!(std::fs::read(&path).expect("a file"), b"two");
         assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 1);
-        assert_eq!(write(&path.join("no/such"), b"").expect_err("fails").kind(), Kind::Io);
+        assert_eq!(
+            write(&path.join("no/such"), b"").expect_err("fails").kind(),
+            contract::Kind::Io
+        );
     }
 }

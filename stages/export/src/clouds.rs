@@ -3,13 +3,13 @@
 //! Tiles are as many as the plant is large, so none of them keeps a file open: records wait in memory, bounded in
 //! bytes, and full tiles are appended to their files.
 
-use crate::atomic::{part_of, refused};
+use crate::atomic::part_of;
 use crate::las::{LasSummary, LasWriter, bounds, head};
 use crate::pack::{Pack, Packed, Run};
 use crate::record::{Extent, LasSettings};
 use crate::settings::Settings;
 use crate::summed::{BodySum, FileSum};
-use contract::{Fan, Result};
+use contract::{Error, Fan, Result};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -62,7 +62,7 @@ impl Clouds {
         if settings.tiles {
             let folder = out.join("tiles");
             std::fs::create_dir_all(&folder)
-                .map_err(|e| refused("folder cannot be made", &folder, e))?;
+                .map_err(|e| Error::of_file("folder cannot be made", &folder, e))?;
         }
         let (tiles, settings) = (BTreeMap::new(), *settings);
         Ok(Self { out: out.to_path_buf(), las, settings, tiles, waiting: 0, robots, fixed })
@@ -159,7 +159,7 @@ impl Spool {
 
     /// Appends what waits; returns how much memory that freed.
     fn append(&mut self, las: &LasSettings) -> Result<usize> {
-        let failed = |e| refused("tile cannot be written", &self.part, e);
+        let failed = |e| Error::of_file("tile cannot be written", &self.part, e);
         let begin = !self.is_begun;
         let mut options = OpenOptions::new();
         // The first time, what an earlier run left behind goes.
@@ -193,7 +193,7 @@ impl Spool {
             file.sync_all()?;
             std::fs::rename(&self.part, &self.path)
         });
-        sealed.map_err(|e| refused("tile cannot be finished", &self.path, e))?;
+        sealed.map_err(|e| Error::of_file("tile cannot be finished", &self.path, e))?;
         Ok(LasSummary {
             path: self.path.clone(),
             n_points: self.extent.n,
@@ -204,7 +204,7 @@ impl Spool {
 
     /// Compresses the spooled records.
     fn compress(&self, las: &LasSettings) -> Result<LasSummary> {
-        let failed = |e| refused("tile cannot be read again", &self.part, e);
+        let failed = |e| Error::of_file("tile cannot be read again", &self.part, e);
         let mut writer = LasWriter::create(&self.path, las.clone())?;
         let mut file = File::open(&self.part).map_err(failed)?;
         // All of it with the first piece.

@@ -1,6 +1,6 @@
 //! Simulated scans: grid points in, one E57 file with poses, rows and columns out.
 
-use crate::atomic::{AtomicFile, refused};
+use crate::atomic::AtomicFile;
 use contract::{Error, Kind, Result};
 use e57::{
     E57Writer, IntensityLimits, Quaternion, Record, RecordDataType, RecordName, RecordValue,
@@ -120,7 +120,7 @@ impl E57Scans {
         drop(writer);
         let file = Arc::into_inner(file).and_then(|file| file.into_inner().ok());
         let mut file = file.expect("the writer held the only other handle, and is gone");
-        file.settle().map_err(|e| refused("scans cannot be finished", &path, e))?;
+        file.settle().map_err(|e| Error::of_file("scans cannot be finished", &path, e))?;
         file.file.commit()
     }
 }

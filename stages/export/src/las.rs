@@ -1,6 +1,6 @@
 //! LAS 1.4 and LAZ: points in, one file out; counts and bounds are written into the header at the end.
 
-use crate::atomic::{AtomicFile, refused};
+use crate::atomic::AtomicFile;
 use crate::pack::{Pack, PointColumns};
 use crate::record::{Extent, LasSettings};
 use crate::summed::{FileSum, SummedFile};
@@ -53,7 +53,8 @@ impl LasWriter {
         let head = head(&settings, &Extent::default())?;
         let sink = if settings.compress {
             let mut file = BufWriter::with_capacity(GATHER, AtomicFile::create(&path)?);
-            file.write_all(&head).map_err(|e| refused("cloud cannot be written", &path, e))?;
+            file.write_all(&head)
+                .map_err(|e| Error::of_file("cloud cannot be written", &path, e))?;
             let compressor =
                 LasZipCompressor::new(file, laz_vlr(&settings)).map_err(|e| ours(e, &path))?;
             Sink::Compressed(Box::new(compressor))
@@ -95,7 +96,7 @@ impl LasWriter {
             Sink::Compressed(compressor) => compressor.compress_many(&self.gathered),
         };
         self.gathered.clear();
-        written.map_err(|e| refused("cloud cannot be written", &self.path, e))
+        written.map_err(|e| Error::of_file("cloud cannot be written", &self.path, e))
     }
 
     /// Writes counts and bounds, and gives the file its name.
@@ -106,7 +107,7 @@ impl LasWriter {
         let sum = match sink {
             Sink::Plain(file) => Some(file.finish(&head)?),
             Sink::Compressed(mut compressor) => {
-                let failed = |e| refused("cloud cannot be finished", &path, e);
+                let failed = |e| Error::of_file("cloud cannot be finished", &path, e);
                 compressor.done().map_err(failed)?;
                 let mut file = compressor.into_inner();
                 file.seek(SeekFrom::Start(0))

@@ -1,8 +1,7 @@
 //! NumPy arrays: values in, a version 1.0 `.npy` file out, whose length is written at the end.
 
-use crate::atomic::refused;
 use crate::summed::{FileSum, SummedFile};
-use contract::Result;
+use contract::{Error, Result};
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -63,7 +62,7 @@ pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Resul
         file.seek(SeekFrom::Start(HEADER as u64 + first * len as u64))?;
         file.read_exact(&mut bytes)
     });
-    read.map_err(|e| refused("array cannot be read back", path, e))?;
+    read.map_err(|e| Error::of_file("array cannot be read back", path, e))?;
     Ok(bytes)
 }
 
@@ -73,7 +72,7 @@ pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Resul
 /// A file that cannot be read, or is none of ours.
 pub fn read_places(path: &Path) -> Result<Vec<u64>> {
     let n_bytes =
-        std::fs::metadata(path).map_err(|e| refused("list cannot be read", path, e))?.len();
+        std::fs::metadata(path).map_err(|e| Error::of_file("list cannot be read", path, e))?.len();
     let n = n_bytes.saturating_sub(HEADER as u64) / 8;
     let bytes = read_bytes(path, 0, n as usize, 8)?;
     let (whole, _) = bytes.as_chunks::<8>();
@@ -107,7 +106,7 @@ impl<T: Element> NpyWriter<T> {
         self.n += values.len() as u64;
         self.file
             .write_all(&self.bytes)
-            .map_err(|e| refused("array cannot be written", &self.path, e))
+            .map_err(|e| Error::of_file("array cannot be written", &self.path, e))
     }
 
     /// Number of values so far.
@@ -138,7 +137,7 @@ impl<T: Element> NpyWriter<T> {
         let file = self
             .file
             .into_inner()
-            .map_err(|e| refused("array cannot be finished", &self.path, e.into_error()))?;
+            .map_err(|e| Error::of_file("array cannot be finished", &self.path, e.into_error()))?;
         file.finish(&header::<T>(shape))
     }
 }

@@ -1,7 +1,6 @@
 //! A spatial tile of an earlier result and one of new points in; the tile without the old points that are superseded, the
 //! new ones behind them, out. Records stay as they are, byte for byte.
 
-use crate::atomic::refused;
 use crate::las::{LasSummary, LasWriter, head};
 use crate::record::{CLASSES, Extent, LasSettings};
 use contract::{Error, Label, PointKind, Result};
@@ -86,7 +85,7 @@ enum Records {
 
 impl<'a> Tile<'a> {
     fn open(path: &'a Path, las: &LasSettings) -> Result<Self> {
-        let failed = |e| refused("tile cannot be read", path, e);
+        let failed = |e| Error::of_file("tile cannot be read", path, e);
         let foreign = || {
             let what = "this is no tile of the earlier result: its records are others";
             Error::bad_input(what).at(path.display()).hint("run the whole plant again")
@@ -124,7 +123,7 @@ impl<'a> Tile<'a> {
             Records::Plain(file) => file.read_exact(&mut bytes),
             Records::Compressed(reader) => reader.decompress_many(&mut bytes),
         };
-        read.map_err(|e| refused("tile cannot be read", self.path, e))?;
+        read.map_err(|e| Error::of_file("tile cannot be read", self.path, e))?;
         self.left -= n;
         Ok(Some(bytes))
     }

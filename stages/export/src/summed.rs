@@ -2,7 +2,7 @@
 //! not be read again to be listed.
 
 use crate::atomic::AtomicFile;
-use contract::Result;
+use contract::{Error, Result};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -48,8 +48,7 @@ impl SummedFile {
     /// Opens the file and writes a head that is only as long as the last one will be.
     pub(crate) fn create(path: &Path, head: &[u8]) -> Result<Self> {
         let mut file = AtomicFile::create(path)?;
-        file.write_all(head)
-            .map_err(|e| crate::atomic::refused("file cannot be written", path, e))?;
+        file.write_all(head).map_err(|e| Error::of_file("file cannot be written", path, e))?;
         Ok(Self { file, body: BodySum::default() })
     }
 
@@ -59,7 +58,7 @@ impl SummedFile {
         let path = file.path().to_path_buf();
         file.seek(SeekFrom::Start(0))
             .and_then(|_| file.write_all(head))
-            .map_err(|e| crate::atomic::refused("file cannot be finished", &path, e))?;
+            .map_err(|e| Error::of_file("file cannot be finished", &path, e))?;
         file.commit()?;
         Ok(body.behind(head, &path))
     }
