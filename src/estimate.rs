@@ -65,16 +65,22 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
     // Where no run has been, nothing is there to be used again, and no input need be read to tell.
     let earlier = job.out.join("store").is_dir().then(|| Earlier::look(job, engine)).transpose()?;
     let unchanged = earlier.as_ref().is_some_and(|e| e.unchanged);
-    let n_models = library::count(&job.robots)?;
-    let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
-    let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
-    let has_tiles =
-        |i: &Input| earlier.as_ref().is_some_and(|e| e.has_tiles(i, &sources, settings));
-    let mut estimate = Estimate::of(job, &sources, n_models, has_tiles);
+    let has_tiles = |i: &Input, sources: &Sources| {
+        earlier.as_ref().is_some_and(|e| e.has_tiles(i, sources, settings))
+    };
+    let mut estimate = opened(job, has_tiles)?;
     if unchanged {
         (estimate.store_bytes, estimate.output_bytes, estimate.seconds) = (0, 0, [0.5; 2]);
     }
     Ok(Estimate { unchanged, ..estimate })
+}
+
+/// Opens what a job reads, and estimates it.
+fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<Estimate> {
+    let n_models = library::count(&job.robots)?;
+    let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+    let sources = ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest)?;
+    Ok(Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)))
 }
 
 /// An error of the job; where a disk was full, with what is missing there.
@@ -82,8 +88,9 @@ pub(crate) fn with_missing(error: Error, job: &Job, engine: &Engine) -> Error {
     if !error.is_full_disk() {
         return error;
     }
-    // What the job left half-written is taken away by now, and its tiles and fits need not be written again.
-    match estimate(job, engine).map(|e| e.need().saturating_sub(e.free_bytes)) {
+    // Where there is no room even to look at what is kept, none of it is counted.
+    let estimate = estimate(job, engine).or_else(|_| opened(job, |_, _| false));
+    match estimate.map(|e| e.need().saturating_sub(e.free_bytes)) {
         Ok(missing) if missing > 0 => error.hint(format!(
             "about {} are missing: make room, or choose another --out; what was done is kept, and the next run goes on from it",
             memory_words(missing)
