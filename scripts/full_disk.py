@@ -73,7 +73,7 @@ def main():
                 out, ballast = disk / "out", disk / "ballast"
                 # Every second case has an old result that must not be lost.
                 if case % 2:
-                    run(out, "--set", "fit.beam=100")
+                    run(out, "--set", "fit.beam=90")
                 job = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
                 wait = draw.uniform(0.0, length)
                 time.sleep(wait)
