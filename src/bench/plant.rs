@@ -289,48 +289,9 @@ fn table(rows: &[Row]) -> String {
     );
     for (name, ..) in SUITES {
         let own: Vec<&Row> = rows.iter().filter(|r| r.suite == *name).collect();
-        if own.is_empty() {
-            continue;
+        if !own.is_empty() {
+            let _ = writeln!(out, "| {name} | {} | {} |", counts(&own), figures(&own));
         }
-        let sum = |of: fn(&Row) -> usize| own.iter().map(|r| of(r)).sum::<usize>();
-        let sorted = |of: &dyn Fn(&Row) -> Vec<f64>| {
-            let mut all: Vec<f64> =
-                own.iter().filter(|r| r.failed.is_none()).flat_map(|r| of(r)).collect();
-            all.sort_by(f64::total_cmp);
-            all
-        };
-        let at = |all: &[f64], share: f64| {
-            all.get(((all.len() as f64 - 1.0) * share).round().max(0.0) as usize)
-                .copied()
-                .unwrap_or(f64::NAN)
-        };
-        let f1 = sorted(&|r| if r.n_robots > 0 { vec![r.f1] } else { vec![] });
-        let (ious, attached) =
-            (sorted(&|r| r.ious.clone()), sorted(&|r| r.attached.into_iter().collect()));
-        let (lost, worst) = (sorted(&|r| vec![r.lost]), sorted(&|r| vec![r.worst_lost]));
-        let seconds = sorted(&|r| vec![r.seconds]);
-        let _ = writeln!(
-            out,
-            "| {name} | {} | {} | {} | {} | {} | {} | {} | {} of {} | {:.4} / {:.4} | {:.3} / {:.3} | {:.3} | {:.4} / {:.4} | {:.2} | {:.1} |",
-            own.len(),
-            sum(|r| r.n_robots),
-            sum(|r| r.n_found),
-            sum(|r| r.n_right),
-            sum(|r| r.n_trusted),
-            sum(|r| r.n_wrong_trusted),
-            sum(|r| r.n_invented),
-            sum(|r| r.n_both),
-            sum(|r| r.n_moved),
-            at(&f1, 0.5),
-            at(&f1, 0.0),
-            at(&ious, 0.5),
-            at(&ious, 0.1),
-            at(&attached, 0.5),
-            100.0 * lost.iter().sum::<f64>() / lost.len().max(1) as f64,
-            100.0 * at(&lost, 1.0),
-            100.0 * at(&worst, 1.0),
-            at(&seconds, 0.5),
-        );
     }
     let odd = rows.iter().filter(|r| r.failed.is_some() || !r.notes.is_empty() || r.n_invented > 0);
     let odd: String = odd.map(|r| format!("\n- {}", r.line())).collect();
@@ -339,4 +300,53 @@ fn table(rows: &[Row]) -> String {
             writeln!(out, "\nNot all found, right and trusted, or with a robot too many:\n{odd}");
     }
     out
+}
+
+/// Robots of a suite, as cells of its row.
+fn counts(own: &[&Row]) -> String {
+    let sum = |of: fn(&Row) -> usize| own.iter().map(|r| of(r)).sum::<usize>();
+    format!(
+        "{} | {} | {} | {} | {} | {} | {} | {} of {}",
+        own.len(),
+        sum(|r| r.n_robots),
+        sum(|r| r.n_found),
+        sum(|r| r.n_right),
+        sum(|r| r.n_trusted),
+        sum(|r| r.n_wrong_trusted),
+        sum(|r| r.n_invented),
+        sum(|r| r.n_both),
+        sum(|r| r.n_moved)
+    )
+}
+
+/// Labels and time of a suite, as cells of its row; a dash where nothing was to be compared.
+fn figures(own: &[&Row]) -> String {
+    let sorted = |of: fn(&Row) -> Vec<f64>| {
+        let done = own.iter().filter(|r| r.failed.is_none());
+        let mut all: Vec<f64> = done.flat_map(|r| of(r)).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
+    let at = |all: &[f64], share: f64, digits: usize| {
+        let index = ((all.len() as f64 - 1.0) * share).round().max(0.0) as usize;
+        all.get(index).map_or("–".into(), |v| format!("{v:.digits$}"))
+    };
+    let f1 = sorted(|r| if r.n_found > 0 { vec![r.f1] } else { vec![] });
+    let ious = sorted(|r| r.ious.clone());
+    let attached = sorted(|r| if r.n_found > 0 { Vec::from_iter(r.attached) } else { vec![] });
+    let lost = sorted(|r| vec![100.0 * r.lost]);
+    let worst = sorted(|r| vec![100.0 * r.worst_lost]);
+    let seconds = sorted(|r| vec![r.seconds]);
+    format!(
+        "{} / {} | {} / {} | {} | {:.4} / {} | {} | {}",
+        at(&f1, 0.5, 4),
+        at(&f1, 0.0, 4),
+        at(&ious, 0.5, 3),
+        at(&ious, 0.1, 3),
+        at(&attached, 0.5, 3),
+        lost.iter().sum::<f64>() / lost.len().max(1) as f64,
+        at(&lost, 1.0, 4),
+        at(&worst, 1.0, 2),
+        at(&seconds, 0.5, 1)
+    )
 }
