@@ -51,13 +51,16 @@ const CELL: Plant = Plant {
 /// library.
 type Suite = (&'static str, usize, fn(usize) -> Plant, bool);
 
+/// Name of the suite whose robots nobody knows.
+const STRANGERS: &str = "strangers";
+
 const SUITES: &[Suite] = &[
     ("cells", 20, |_| CELL, false),
     ("lines", 5, |k| Plant { n_robots: 8 + k % 5, n_rows: 2, n_scanners: 10, ..CELL }, false),
     ("tight", 10, |_| Plant { is_tight: true, ..CELL }, false),
     ("two", 10, |_| Plant { n_robots: 1, n_scanners: 2, ..CELL }, false),
     ("empty", 20, |_| Plant { n_robots: 0, n_scanners: 3, ..CELL }, false),
-    ("strangers", 10, |_| Plant { n_robots: 1, n_scanners: 4, ..CELL }, true),
+    (STRANGERS, 10, |_| Plant { n_robots: 1, n_scanners: 4, ..CELL }, true),
     ("moved", 20, |_| Plant { n_robots: 2, n_scanners: 6, moves: true, ..CELL }, false),
 ];
 
@@ -321,7 +324,7 @@ fn counts(own: &[&Row]) -> String {
 
 /// Labels and time of a suite, as cells of its row; a dash where nothing was to be compared.
 fn figures(own: &[&Row]) -> String {
-    let sorted = |of: fn(&Row) -> Vec<f64>| {
+    let sorted = |of: &dyn Fn(&Row) -> Vec<f64>| {
         let done = own.iter().filter(|r| r.failed.is_none());
         let mut all: Vec<f64> = done.flat_map(|r| of(r)).collect();
         all.sort_by(f64::total_cmp);
@@ -331,12 +334,14 @@ fn figures(own: &[&Row]) -> String {
         let index = ((all.len() as f64 - 1.0) * share).round().max(0.0) as usize;
         all.get(index).map_or("–".into(), |v| format!("{v:.digits$}"))
     };
-    let f1 = sorted(|r| if r.n_found > 0 { vec![r.f1] } else { vec![] });
-    let ious = sorted(|r| r.ious.clone());
-    let attached = sorted(|r| if r.n_found > 0 { Vec::from_iter(r.attached) } else { vec![] });
-    let lost = sorted(|r| vec![100.0 * r.lost]);
-    let worst = sorted(|r| vec![100.0 * r.worst_lost]);
-    let seconds = sorted(|r| vec![r.seconds]);
+    // What no robot explains is not to be labelled as one's.
+    let is_asked = |r: &Row| r.n_robots > 0 && r.suite != STRANGERS;
+    let f1 = sorted(&|r| if is_asked(r) { vec![r.f1] } else { vec![] });
+    let ious = sorted(&|r| r.ious.clone());
+    let attached = sorted(&|r| r.attached.filter(|_| is_asked(r)).into_iter().collect());
+    let lost = sorted(&|r| vec![100.0 * r.lost]);
+    let worst = sorted(&|r| vec![100.0 * r.worst_lost]);
+    let seconds = sorted(&|r| vec![r.seconds]);
     format!(
         "{} / {} | {} / {} | {} | {:.4} / {} | {} | {}",
         at(&f1, 0.5, 4),
