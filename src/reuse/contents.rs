@@ -317,4 +317,47 @@ mod tests {
         assert_ne!(again.digest(&path, Sum::Blake3).expect("reads"), one);
         assert!(contents.digest(&dir.path().join("none"), Sum::Blake3).is_err());
     }
+
+    #[test]
+    fn who_sums_up_keeps_near_who_decodes_and_gives_up_with_him() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("scan.las");
+        // Longer than anyone may be ahead; takes no room.
+        File::create(&path).and_then(|f| f.set_len(AHEAD + (4 << 20))).expect("writes");
+        let whole = Sum::Crc32c.read(&path).expect("reads");
+        let pace = Pace::of(100);
+        std::thread::scope(|scope| {
+            let sum = scope.spawn(|| Sum::Crc32c.of_file(&path, &pace));
+            let lead = pace.lead();
+            lead.has_decoded(50);
+            lead.end();
+            assert_eq!(sum.join().expect("ends").expect("reads"), whole);
+        });
+        let pace = Pace::of(100);
+        drop(pace.lead());
+        let error = Sum::Crc32c.of_file(&path, &pace).expect_err("nobody wants it");
+        assert_eq!(error.kind(), Kind::Cancelled);
+    }
+
+    #[test]
+    fn a_file_that_is_another_now_is_refused_by_name() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (path, other) = (dir.path().join("scan.ptx"), dir.path().join("other.ptx"));
+        std::fs::write(&path, b"one").expect("writes");
+        let stamp = Stamp::of(&path).expect("is there");
+        assert!(stamp.check(&path).is_ok());
+        std::fs::write(&path, b"one and more").expect("writes");
+        let error = stamp.check(&path).expect_err("it is longer");
+        assert_eq!(error.kind(), Kind::BadInput);
+        assert!(error.to_string().contains("scan.ptx"), "{error}");
+        // The same length and time under another number.
+        let at = std::fs::metadata(&path).and_then(|m| m.modified()).expect("a time");
+        let stamp = Stamp::of(&path).expect("is there");
+        std::fs::write(&other, b"two and more").expect("writes");
+        File::options().write(true).open(&other).and_then(|f| f.set_modified(at)).expect("a time");
+        std::fs::rename(&other, &path).expect("takes its place");
+        assert_eq!(stamp.check(&path).is_err(), cfg!(unix));
+        std::fs::remove_file(&path).expect("is removed");
+        assert!(stamp.check(&path).is_err());
+    }
 }
