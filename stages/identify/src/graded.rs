@@ -46,7 +46,7 @@ impl<'a> Graded<'a> {
     /// Mean score of samples (frame of the body) with the body at a pose; what lies outside of the grid is hidden.
     pub(crate) fn mean(&self, points: &[[f32; 3]], local_from_body: &Pose) -> f64 {
         let m = self.cells_from(local_from_body);
-        let hidden = (-HIDDEN / SCORE_UNIT) as i32;
+        let hidden = (-HIDDEN / SCORE_UNIT).round() as i32;
         let score = |p: &[f32; 3]| {
             let at = transform(&m, *p);
             let is_inside = (0..3).all(|i| at[i] >= 0.0 && at[i] < self.n[i] as f32);

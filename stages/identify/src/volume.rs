@@ -145,10 +145,10 @@ impl<'a> Sight<'a> {
         self.volume.as_ref().and_then(|volume| volume.graded(tolerance))
     }
 
-    /// A length as so many whole cells of the grid, metres.
+    /// The length of as many whole cells of the grid as it holds, metres; itself where it holds none.
     pub(crate) fn in_cells(&self, length: f64) -> f64 {
-        let whole = |edge: f64| (length / edge).floor().max(1.0) * edge;
-        self.volume.as_ref().map_or(length, |volume| whole(f64::from(volume.edge)))
+        let edge = self.volume.as_ref().map_or(f64::INFINITY, |volume| f64::from(volume.edge));
+        if edge <= length { (length / edge).floor() * edge } else { length }
     }
 
     /// Mean score of the samples, hidden ones at their price for a base.
