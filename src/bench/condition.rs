@@ -56,7 +56,7 @@ pub(super) struct Condition {
 }
 
 /// The protocol of the method's source (§7.2), with 5 M beams instead of 50.
-const PLAIN: Condition = Condition {
+pub(super) const PLAIN: Condition = Condition {
     n_scanners: 6,
     n_beams: 5e6,
     noise: 0.002,

@@ -2,6 +2,8 @@
 //! truth robot by robot and point by point, as a table, out.
 
 use super::cases::{Case, CaseRow, Cases};
+use super::condition::{self, Condition, PLAIN, Place};
+use super::draw::draw;
 use super::{chosen, robots_of};
 use crate::compare::Agreement;
 use crate::engine::Engine;
@@ -12,7 +14,7 @@ use contract::{Error, Kind, Result};
 use export::atomic;
 use robot::Model;
 use serde::Serialize;
-use simulate::Plant;
+use simulate::{Plant, Scene};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -47,21 +49,52 @@ const CELL: Plant = Plant {
     moves: false,
 };
 
-/// A suite: name, number of cases, what the k-th is drawn from, and whether the models of its robots are left out of the
-/// library.
-type Suite = (&'static str, usize, fn(usize) -> Plant, bool);
+/// What a case is drawn from.
+enum Drawing {
+    /// A plant, all of whose robots are known.
+    Plant(Plant),
+    /// A plant: the models of its robots are left out of the library.
+    Strange(Plant),
+    /// One robot in clutter, bolted to such a thing.
+    Hung(Place),
+}
+
+impl Drawing {
+    fn scene(&self, seed: u64, models: &[Model]) -> Result<Scene> {
+        match self {
+            Self::Plant(plant) | Self::Strange(plant) => {
+                simulate::plant(&Plant { seed, ..plant.clone() }, models)
+            }
+            Self::Hung(mount) => {
+                let robots: Vec<usize> =
+                    (0..models.len()).filter(|m| !models[*m].is_tool()).collect();
+                let model = robots[seed as usize % robots.len()];
+                let condition =
+                    Condition { mount: *mount, mixed: true, clutter: 0.7, n_beams: 2e6, ..PLAIN };
+                let case = condition::Case { suite: "mounts", seed, model, condition };
+                Ok(draw(&case, &models[model])?.scene)
+            }
+        }
+    }
+}
+
+/// A suite: name, number of cases, and what the k-th is drawn from.
+type Suite = (&'static str, usize, fn(usize) -> Drawing);
 
 /// Name of the suite whose robots nobody knows.
 const STRANGERS: &str = "strangers";
 
 const SUITES: &[Suite] = &[
-    ("cells", 20, |_| CELL, false),
-    ("lines", 5, |k| Plant { n_robots: 8 + k % 5, n_rows: 2, n_scanners: 10, ..CELL }, false),
-    ("tight", 10, |_| Plant { is_tight: true, ..CELL }, false),
-    ("two", 10, |_| Plant { n_robots: 1, n_scanners: 2, ..CELL }, false),
-    ("empty", 20, |_| Plant { n_robots: 0, n_scanners: 3, ..CELL }, false),
-    (STRANGERS, 10, |_| Plant { n_robots: 1, n_scanners: 4, ..CELL }, true),
-    ("moved", 20, |_| Plant { n_robots: 2, n_scanners: 6, moves: true, ..CELL }, false),
+    ("cells", 20, |_| Drawing::Plant(CELL)),
+    ("lines", 5, |k| {
+        Drawing::Plant(Plant { n_robots: 8 + k % 5, n_rows: 2, n_scanners: 10, ..CELL })
+    }),
+    ("tight", 10, |_| Drawing::Plant(Plant { is_tight: true, ..CELL })),
+    ("two", 10, |_| Drawing::Plant(Plant { n_robots: 1, n_scanners: 2, ..CELL })),
+    ("empty", 20, |_| Drawing::Plant(Plant { n_robots: 0, n_scanners: 3, ..CELL })),
+    (STRANGERS, 10, |_| Drawing::Strange(Plant { n_robots: 1, n_scanners: 4, ..CELL })),
+    ("moved", 20, |_| Drawing::Plant(Plant { n_robots: 2, n_scanners: 6, moves: true, ..CELL })),
+    ("mounts", 12, |k| Drawing::Hung([Place::Ceiling, Place::Wall, Place::Tilted][k % 3])),
 ];
 
 /// A link with fewer points has no say in the median of links.
@@ -116,14 +149,11 @@ pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<Stri
         keep: bench.keep,
         temporary: temporary.path(),
     };
-    let case = |row: &mut Row, of: &Wanted, dir: &Path| run(row, of, &known, dir, (means, &quiet));
+    let case = |row: &mut Row, of: &Drawing, dir: &Path| run(row, of, &known, dir, (means, &quiet));
     place.run(cases(bench)?, case, table, engine)
 }
 
-/// What is drawn, and whether the models of its robots are left out of the library.
-type Wanted = (Plant, bool);
-
-fn cases(bench: &PlantBench) -> Result<Vec<Case<Row, Wanted>>> {
+fn cases(bench: &PlantBench) -> Result<Vec<Case<Row, Drawing>>> {
     let names: Vec<&str> = SUITES.iter().map(|s| s.0).collect();
     if let Some(odd) = bench.suites.iter().find(|s| !names.contains(&s.as_str())) {
         return Err(Error::new(Kind::Usage, format!("there is no suite \"{odd}\""))
@@ -131,13 +161,12 @@ fn cases(bench: &PlantBench) -> Result<Vec<Case<Row, Wanted>>> {
     }
     let wanted = |name: &str| bench.suites.is_empty() || bench.suites.iter().any(|s| s == name);
     let mut out = Vec::new();
-    for (at, (name, n, draw, is_strange)) in SUITES.iter().enumerate() {
+    for (at, (name, n, draw)) in SUITES.iter().enumerate() {
         for k in bench.first..bench.first + bench.n_cases.unwrap_or(*n) {
             let seed = bench.seed * 100_000 + at as u64 * 1000 + k as u64;
             if wanted(name) {
                 let row = Row { suite: (*name).into(), seed, ..Row::default() };
-                let of = (Plant { seed, ..draw(k) }, *is_strange);
-                out.push(Case { name: format!("{name}-{seed}"), row, of });
+                out.push(Case { name: format!("{name}-{seed}"), row, of: draw(k) });
             }
         }
     }
@@ -155,18 +184,19 @@ struct Known {
 /// One case: drawn, scanned, run, compared.
 fn run(
     row: &mut Row,
-    (wanted, is_strange): &Wanted,
+    drawing: &Drawing,
     known: &Known,
     dir: &Path,
     (means, engine): (&Means, &Engine),
 ) -> Result<()> {
     let models = &known.models;
-    let scene = simulate::plant(wanted, models)?;
+    let scene = drawing.scene(row.seed, models)?;
+    let is_strange = matches!(drawing, Drawing::Strange(_));
     atomic::write(&made(dir)?.join("scene.toml"), scene.to_toml()?.as_bytes())?;
     let scans = dir.join("scans");
     let truth = scan_scene(&scene, models, &scans, Formats { las: false, ..Formats::ALL }, engine)?;
     row.n_points = truth.scans.iter().map(|s| s.n_points).sum();
-    let robots = if *is_strange {
+    let robots = if is_strange {
         let others = dir.join("robots");
         let strange: Vec<&str> = scene.robots.iter().map(|r| r.model.as_str()).collect();
         link_others(&known.folder, &made(&others)?, &strange)?;
