@@ -316,11 +316,12 @@ fn clutter(scene: &mut Scene, model: &Model, c: &Condition, reach: [f64; 2], ran
     let tip = model.main_chain.last().map(|&j| model.joints[j].child);
     if let (true, Some(tip)) = (there(random), tip) {
         let side = (0.25 * reach[0]).clamp(0.1, 0.4);
+        // It lies on the flange.
         scene.carried.push(Carried {
             name: "part".into(),
             robot: "R1".into(),
             link: model.links[tip].name.clone(),
-            xyz: [0.05, 0.0, 0.5 * side + 0.05],
+            xyz: [0.05, 0.0, 0.25 * side],
             rpy_deg: [0.0; 3],
             size: [side, 0.7 * side, 0.5 * side],
         });
