@@ -241,6 +241,7 @@ fn link_others(library: &Path, to: &Path, without: &[&str]) -> Result<()> {
 fn judge(row: &mut Row, agreement: &Agreement) {
     row.n_robots = agreement.robots.len();
     row.n_invented = agreement.n_invented;
+    row.n_moved = agreement.robots.iter().filter(|r| r.n_postures > 1).count();
     for robot in &agreement.robots {
         let Some(found) = &robot.found else {
             row.notes.push(format!("{} ({}) not found", robot.name, robot.model));
@@ -251,7 +252,6 @@ fn judge(row: &mut Row, agreement: &Agreement) {
         row.n_right += usize::from(found.is_right);
         row.n_trusted += usize::from(found.is_right && is_trusted);
         row.n_wrong_trusted += usize::from(!found.is_right && is_trusted);
-        row.n_moved += usize::from(robot.n_postures > 1);
         row.n_both += usize::from(robot.n_postures > 1 && found.n_postures == robot.n_postures);
         if !found.is_right {
             row.notes.push(format!(
