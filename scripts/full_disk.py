@@ -8,13 +8,13 @@ next run, with room again, ends with the bytes of an undisturbed one. Needs Linu
 The output folder lies on a file system in memory that is as large as a run needs. Somewhat into the run a file takes all room
 that is left; it goes away before the next run."""
 
-import argparse
-import hashlib
 import random
 import subprocess
 import tempfile
 import time
 from pathlib import Path
+
+from job import Job, manifest
 
 # Exit codes of the program: all is well, and what was asked for does not fit.
 WELL, NO_ROOM = 0, 5
@@ -34,26 +34,12 @@ def fill(path):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", default="target/release/stillpoint")
-    parser.add_argument("--inputs", nargs="+", required=True, type=Path)
-    parser.add_argument("--robots", required=True, type=Path)
-    parser.add_argument("--scanners", type=Path)
-    parser.add_argument("--cases", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=1)
-    args = parser.parse_args()
+    job = Job(__doc__, lambda parser: parser.add_argument("--cases", type=int, default=20))
+    args, command = job.flags, job.command
     draw = random.Random(args.seed)
-
-    def command(out, *more):
-        line = [args.program, "run", *map(str, args.inputs), "--robots", str(args.robots), "--out", str(out)]
-        line += ["--scanners", str(args.scanners)] if args.scanners else []
-        return [*line, "--progress", "none", *more]
 
     def run(out, *more):
         return subprocess.run(command(out, *more), capture_output=True, text=True)
-
-    def manifest(out):
-        return hashlib.sha256((out / "manifest.json").read_bytes()).hexdigest()
 
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / "whole"
@@ -74,15 +60,15 @@ def main():
                 # Every second case has an old result that must not be lost.
                 if case % 2:
                     run(out, "--set", "fit.beam=90")
-                job = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+                process = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
                 wait = draw.uniform(0.0, length)
                 time.sleep(wait)
                 fill(ballast)
-                said = job.communicate()[1].strip()
+                said = process.communicate()[1].strip()
                 wrong = []
-                if job.returncode not in (WELL, NO_ROOM):
-                    wrong.append(f"code {job.returncode}")
-                if job.returncode == NO_ROOM and str(disk) not in said:
+                if process.returncode not in (WELL, NO_ROOM):
+                    wrong.append(f"code {process.returncode}")
+                if process.returncode == NO_ROOM and str(disk) not in said:
                     wrong.append("the error does not say where")
                 if case % 2 and subprocess.run([args.program, "verify", out], capture_output=True).returncode != WELL:
                     wrong.append("the result that was there is not whole")
@@ -92,9 +78,9 @@ def main():
                     wrong.append(f"the next run fails: {again.stderr.strip()}")
                 elif manifest(out) != wanted:
                     wrong.append("the next run has other bytes")
-                n_full += job.returncode == NO_ROOM
+                n_full += process.returncode == NO_ROOM
                 n_wrong += bool(wrong)
-                last = said.splitlines()[-1] if said and job.returncode else "ended before"
+                last = said.splitlines()[-1] if said and process.returncode else "ended before"
                 print(f"full after {wait:.1f} s: {last}; {', '.join(wrong) or 'as it should be'}", flush=True)
             finally:
                 subprocess.run(["umount", disk], check=True)

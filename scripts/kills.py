@@ -8,8 +8,6 @@ nobody disturbs, and whether the outputs are the same bytes.
 Each chain begins with an empty folder. Its runs are killed (SIGKILL) after a random time, evenly drawn from the length of an
 undisturbed run, until one of them ends before. Work is the time that all runs of a chain took."""
 
-import argparse
-import hashlib
 import json
 import random
 import shutil
@@ -19,29 +17,22 @@ import tempfile
 import time
 from pathlib import Path
 
+from job import Job, manifest
+
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", default="target/release/stillpoint")
-    parser.add_argument("--inputs", nargs="+", required=True, type=Path)
-    parser.add_argument("--robots", required=True, type=Path)
-    parser.add_argument("--scanners", type=Path)
-    parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, help="where rows and results go (else a temporary folder)")
-    args = parser.parse_args()
+    def add_flags(parser):
+        parser.add_argument("--kills", type=int, default=200)
+        parser.add_argument("--out", type=Path, help="where rows and results go (else a temporary folder)")
+
+    job = Job(__doc__, add_flags)
+    args = job.flags
     draw = random.Random(args.seed)
     folder = args.out or Path(tempfile.mkdtemp(prefix="kills-"))
     folder.mkdir(parents=True, exist_ok=True)
 
     def start(out):
-        line = [args.program, "run", *map(str, args.inputs), "--robots", str(args.robots)]
-        line += ["--scanners", str(args.scanners)] if args.scanners else []
-        line += ["--out", str(out), "--progress", "none"]
-        return subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-
-    def manifest(out):
-        return hashlib.sha256((out / "manifest.json").read_bytes()).hexdigest()
+        return subprocess.Popen(job.command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
     whole = []
     for k in range(3):

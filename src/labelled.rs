@@ -113,11 +113,15 @@ impl LabelStrip<'_> {
         labels
     }
 
-    /// Records of those points that lie in the cell.
+    /// Records of those points that lie in the cell and that some cloud holds.
     fn packed(&self, points: &PointColumns<'_>) -> Result<Packed> {
-        let Some(cell) = &self.cell else { return self.pack.pack(points) };
+        let is_inside = |i: usize| self.cell.is_none_or(|cell| cell.contains(points.world[i]));
+        let n = points.world.len();
         let inside: Vec<usize> =
-            (0..points.world.len()).filter(|&i| cell.contains(points.world[i])).collect();
+            (0..n).filter(|&i| self.pack.takes(&points.labels[i]) && is_inside(i)).collect();
+        if inside.len() == n {
+            return self.pack.pack(points);
+        }
         fn few<T: Copy>(all: &[T], inside: &[usize]) -> Vec<T> {
             inside.iter().filter_map(|&i| all.get(i).copied()).collect()
         }

@@ -1,6 +1,6 @@
 //! A folder in, the robot library out, its models loaded in parallel.
 
-use crate::engine::Engine;
+use crate::engine::{AllThreads, Engine};
 use crate::reuse::Kept;
 use contract::Result;
 use robot::{Library, Settings};
@@ -20,7 +20,15 @@ pub(crate) fn load(
 ) -> Result<Library> {
     let (folders, mut library) = Library::open(dir)?;
     let loaded = engine.fan_out("robots", folders, |folder| {
-        let load = || Ok(Library::load_folder(dir, &folder, settings));
+        let load = || {
+            let bare = Settings { clouds: false, ..*settings };
+            let (mut model, findings) = Library::load_folder(dir, &folder, &bare);
+            // A library has few models, and one of them is the largest: its links are sampled side by side.
+            if let (Some(model), true) = (&mut model, settings.clouds) {
+                model.sample(settings, &AllThreads);
+            }
+            Ok((model, findings))
+        };
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         kept.map_or_else(load, |kept| kept.or_find(&name, load))
     })?;

@@ -56,8 +56,11 @@ impl Error {
     pub fn of_file(what: impl Into<String>, path: &Path, cause: std::io::Error) -> Self {
         let is_full = is_full(&cause);
         let kind = if is_full { Kind::OverBudget } else { Kind::Io };
-        let error = Self::new(kind, what).because(cause).at(path.display());
-        if is_full { error.hint("make room on the disk, or choose another --out") } else { error }
+        Self::new(kind, what).because(cause).at(path.display()).hint(if is_full {
+            "make room on the disk, or choose another --out"
+        } else {
+            "check that its folder is there, and that you may read and write it"
+        })
     }
 
     /// Whether it is for want of room on a disk.

@@ -71,7 +71,7 @@ impl Clouds {
     /// What workers pack strips with.
     #[must_use]
     pub fn pack(&self) -> Pack {
-        Pack::new(&self.las, self.settings.tiles.then_some(self.settings.tile_edge))
+        Pack::of_clouds(&self.las, &self.settings)
     }
 
     /// Adds a packed strip.

@@ -61,7 +61,7 @@ impl LasWriter {
         } else {
             Sink::Plain(SummedFile::create(&path, &head)?)
         };
-        let pack = Pack::new(&settings, None);
+        let pack = Pack::new(&settings);
         Ok(Self {
             sink,
             settings,

@@ -2,6 +2,7 @@
 //! nothing is shared, so that workers pack strips while one thread writes them.
 
 use crate::record::{Extent, LasSettings, Quantum, class_of, too_far};
+use crate::settings::Settings;
 use contract::{Label, PointKind, Result};
 use geometry::narrow::floor_i32;
 
@@ -62,16 +63,34 @@ pub struct Pack {
     las: LasSettings,
     /// Metres; without tiles all points lie in one.
     tile_edge: Option<f64>,
+    /// Whether any cloud holds what stands still.
+    with_fixed: bool,
     class_of_kind: [u8; 256],
 }
 
 impl Pack {
-    pub(crate) fn new(las: &LasSettings, tile_edge: Option<f64>) -> Self {
+    /// For one cloud of all points.
+    pub(crate) fn new(las: &LasSettings) -> Self {
         let mut class_of_kind = [1; 256];
         for kind in PointKind::ALL {
             class_of_kind[kind as usize] = class_of(kind);
         }
-        Self { las: las.clone(), tile_edge, class_of_kind }
+        Self { las: las.clone(), tile_edge: None, with_fixed: true, class_of_kind }
+    }
+
+    /// For the clouds that are asked for.
+    pub(crate) fn of_clouds(las: &LasSettings, settings: &Settings) -> Self {
+        Self {
+            tile_edge: settings.tiles.then_some(settings.tile_edge),
+            with_fixed: settings.tiles || settings.fixed_cloud,
+            ..Self::new(las)
+        }
+    }
+
+    /// Whether the clouds hold points with this label at all.
+    #[must_use]
+    pub fn takes(&self, label: &Label) -> bool {
+        self.with_fixed || moves(label)
     }
 
     /// The records of some points, in their order where they are in the order of a scan: then neighbours share a tile.
@@ -142,7 +161,7 @@ impl Pack {
         // Most points lie in the tile of the one before.
         let (mut tile, mut bounds) = ([0; 2], [f64::NAN; 4]);
         for ((p, label), step) in points.world.iter().zip(points.labels).zip(steps) {
-            let moves = matches!(label.kind, PointKind::Link | PointKind::Attachment);
+            let moves = moves(label);
             let [x0, x1, y0, y1] = bounds;
             if !(p[0] >= x0 && p[0] < x1 && p[1] >= y0 && p[1] < y1) {
                 (tile, bounds) = self.tile(p);
@@ -181,6 +200,10 @@ impl Packed {
         }
         out
     }
+}
+
+fn moves(label: &Label) -> bool {
+    matches!(label.kind, PointKind::Link | PointKind::Attachment)
 }
 
 /// Whole steps of coordinates, in one loop without calls that the compiler turns into vector instructions.

@@ -69,7 +69,9 @@ pub struct Sight<'a> {
     volume: Option<Volume>,
     /// What each scan sees by itself, where they are to be asked one by one; else empty.
     pub(crate) each: Vec<Evidence<'a>>,
-    /// Where there are points that a base may stand among.
+    /// Where there are points.
+    all_spots: Vec<Spot>,
+    /// Those of them that a base may stand among.
     spots: Vec<Spot>,
 }
 
@@ -83,8 +85,9 @@ impl<'a> Sight<'a> {
         fan: &impl Fan,
     ) -> Self {
         let volume = Volume::new(region, all, fan);
-        let spots = spots(views);
-        Self { region, views, evidence: scouts, volume, each: Vec::new(), spots }
+        let all_spots = spots(views);
+        let (each, spots) = (Vec::new(), all_spots.clone());
+        Self { region, views, evidence: scouts, volume, each, all_spots, spots }
     }
 
     /// The same for robots that moved between scans: what moves is looked for in each scan by itself.
@@ -93,7 +96,7 @@ impl<'a> Sight<'a> {
         let with_beams = self.views.iter().filter(|v| !v.images.is_empty());
         let alone = |v: &'a View| Evidence { images: v.images.iter().collect(), cloud: None };
         self.each = with_beams.map(alone).collect();
-        self.spots = spots(self.views);
+        self.spots.clone_from(&self.all_spots);
         self
     }
 
@@ -101,11 +104,11 @@ impl<'a> Sight<'a> {
     /// `height` above the region's lowest, metres.
     pub fn pass_over(&mut self, boxes: &[Aabb], height: f64) -> usize {
         let origin = self.region.origin;
-        self.spots = spots(self.views);
-        self.spots.retain(|spot| {
+        let is_free = |spot: &&Spot| {
             let world = origin + Vector::from(spot.at.map(f64::from));
             !boxes.iter().any(|b| b.contains(world.into()))
-        });
+        };
+        self.spots = self.all_spots.iter().filter(is_free).copied().collect();
         let least = self.region.bounds.min[2] + height;
         let high = self.spots.iter().filter(|spot| f64::from(spot.at[2]) > least);
         high.map(|spot| spot.n_points as usize).sum()
@@ -161,15 +164,24 @@ impl<'a> Sight<'a> {
 
 /// The points of all views, cube by cube.
 fn spots(views: &[View]) -> Vec<Spot> {
-    let cell = |p: &[f32; 3]| p.map(|v| (v / EDGE).floor() as i32);
-    let mut points: Vec<[f32; 3]> = views.iter().flat_map(|v| &v.points).map(|p| p.xyz).collect();
-    points.sort_by_key(cell);
-    let spot = |own: &[[f32; 3]]| {
+    let points: Vec<[f32; 3]> = views.iter().flat_map(|v| &v.points).map(|p| p.xyz).collect();
+    let cubes = points.iter().map(cube).zip(0..);
+    let mut order: Vec<(u64, u32)> = cubes.collect();
+    order.sort_unstable();
+    let spot = |own: &[(u64, u32)]| {
         let n = own.len() as f32;
-        let at = std::array::from_fn(|i| own.iter().map(|p| p[i] / n).sum());
-        Spot { at, n_points: own.len() as u32 }
+        let mean = |i: usize| own.iter().map(|(_, at)| points[*at as usize][i] / n).sum();
+        Spot { at: std::array::from_fn(mean), n_points: own.len() as u32 }
     };
-    points.chunk_by(|a, b| cell(a) == cell(b)).map(spot).collect()
+    order.chunk_by(|a, b| a.0 == b.0).map(spot).collect()
+}
+
+/// The cube of a place in a region's frame, in the order of x, y, z: 21 bits each, 60 km either way.
+fn cube(p: &[f32; 3]) -> u64 {
+    const MIDDLE: i32 = 1 << 20;
+    let along =
+        |v: f32| ((v / EDGE).floor() as i32).saturating_add(MIDDLE).clamp(0, 2 * MIDDLE - 1);
+    p.iter().fold(0, |cube, v| cube << 21 | along(*v) as u64)
 }
 
 /// A grid of evidence in the local frame.

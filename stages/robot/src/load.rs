@@ -2,7 +2,7 @@
 
 use crate::bodies::Bodies;
 use crate::finding::{Finding, Findings};
-use crate::model::Model;
+use crate::model::{Link, Model};
 use crate::notes::{named_passive, note_links};
 use crate::reading::{file_name, read_text};
 use crate::resolve::Roots;
@@ -10,7 +10,7 @@ use crate::sheet::{MAX_SHEET_BYTES, Sheet, SubChain};
 use crate::tree::Tree;
 use crate::urdf::{Description, MAX_URDF_BYTES};
 use crate::{chain, close, cloud, tree, urdf};
-use contract::{Error, Result};
+use contract::{Error, Fan, OneByOne, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -69,6 +69,19 @@ impl Model {
         match loader.load(path, &Sheet::default(), &mut findings) {
             Some(model) => Ok((model, findings.list)),
             None => Err(findings.first_error()),
+        }
+    }
+}
+
+impl Model {
+    /// Makes the CAD clouds of all links, of a model that was loaded without them.
+    pub fn sample(&mut self, settings: &Settings, fan: &impl Fan) {
+        let links = self.links.iter().collect();
+        let sample =
+            |link: &Link| cloud::sample(&link.mesh, settings.spacing, settings.max_samples);
+        let clouds = fan.fan(links, sample);
+        for (link, cloud) in self.links.iter_mut().zip(clouds) {
+            link.cad = cloud;
         }
     }
 }
@@ -205,10 +218,7 @@ impl Loader<'_> {
             return None;
         }
         if self.settings.clouds {
-            for link in &mut model.links {
-                link.cad =
-                    cloud::sample(&link.mesh, self.settings.spacing, self.settings.max_samples);
-            }
+            model.sample(self.settings, &OneByOne);
         }
         Some(model)
     }
