@@ -9,10 +9,10 @@ use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 use simulate::random::Random;
 use simulate::scene::{
-    Anchor, Carried, Column, Cuboid, Fence, Filling, Floor, Furniture, Hose, Mixed, Raster,
-    Registration, RobotPlace, Scanner, Section, Stand, StandShape,
+    Anchor, Column, Cuboid, Fence, Filling, Floor, Furniture, Hose, Mixed, Raster, Registration,
+    RobotPlace, Scanner, Section, Stand, StandShape, ToolShape,
 };
-use simulate::{Postures, Scene};
+use simulate::{Postures, Scene, part_in, tool_on};
 use std::f64::consts::TAU;
 
 /// A case, drawn.
@@ -313,18 +313,11 @@ fn clutter(scene: &mut Scene, model: &Model, c: &Condition, reach: [f64; 2], ran
             });
         }
     }
-    let tip = model.main_chain.last().map(|&j| model.joints[j].child);
-    if let (true, Some(tip)) = (there(random), tip) {
+    if let (true, Some(flange)) = (there(random), model.flanges().first()) {
         let side = (0.25 * reach[0]).clamp(0.1, 0.4);
-        // It lies on the flange.
-        scene.carried.push(Carried {
-            name: "part".into(),
-            robot: "R1".into(),
-            link: model.links[tip].name.clone(),
-            xyz: [0.05, 0.0, 0.25 * side],
-            rpy_deg: [0.0; 3],
-            size: [side, 0.7 * side, 0.5 * side],
-        });
+        let gripper = tool_on(model, *flange, ToolShape::Gripper, 0.5 * side);
+        scene.carried.push(part_in(&gripper, "R1", [side, 0.7 * side, 0.5 * side]));
+        scene.robots[0].tool = Some(gripper);
     }
 }
 

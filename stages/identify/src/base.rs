@@ -161,7 +161,7 @@ impl<'a> BaseSearch<'a> {
         let cells = self.n_cells();
         best(&mut trials, self.settings.keep_feet * cells, step * 0.9, yaw_step * 0.9);
         // Half of a cell has the height of a foot: what stands on it tells sooner than a closer look.
-        let tolerance = (step * COARSE_REACH) as f32;
+        let tolerance = self.coarse_tolerance();
         let mut trials = fan.fan(trials, |t| self.glance_at_first(&local[t.plane], t, tolerance));
         best(&mut trials, self.settings.keep_coarse * cells, step * 0.9, yaw_step * 0.9);
         self.drop_hopeless(&mut trials, SHORT.0);
@@ -196,6 +196,11 @@ impl<'a> BaseSearch<'a> {
         self.sight.in_cells((self.radius * 0.35).clamp(0.04, 0.10))
     }
 
+    /// Tolerance of the coarse level, metres.
+    fn coarse_tolerance(&self) -> f32 {
+        self.sight.of_grid((COARSE_REACH * self.coarse_step()) as f32)
+    }
+
     /// Of so many planes one is looked at coarsely.
     fn stride(&self) -> usize {
         let reach = COARSE_REACH * self.coarse_step();
@@ -210,8 +215,7 @@ impl<'a> BaseSearch<'a> {
         local: &Plane,
         fan: &impl Fan,
     ) -> Vec<Trial> {
-        let step = self.coarse_step();
-        let tolerance = (step * COARSE_REACH) as f32;
+        let (step, tolerance) = (self.coarse_step(), self.coarse_tolerance());
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
         let places = self.occupied(plane, local, step);
         let Some(start) = places.first().copied() else { return Vec::new() };

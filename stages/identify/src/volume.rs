@@ -148,6 +148,12 @@ impl<'a> Sight<'a> {
         self.volume.as_ref().and_then(|volume| volume.graded(tolerance))
     }
 
+    /// A tolerance that the grid can be asked for, where one a little wider than this is.
+    pub(crate) fn of_grid(&self, tolerance: f32) -> f32 {
+        let least = self.volume.as_ref().map_or(0.0, |volume| COARSE * volume.edge);
+        if tolerance * RUNG >= least { tolerance.max(least) } else { tolerance }
+    }
+
     /// The length of as many whole cells of the grid as it holds, metres; itself where it holds none.
     pub(crate) fn in_cells(&self, length: f64) -> f64 {
         let edge = self.volume.as_ref().map_or(f64::INFINITY, |volume| f64::from(volume.edge));

@@ -12,8 +12,9 @@ const EDGE: f64 = 0.05;
 /// Fewest points that make a voxel solid.
 const MIN_POINTS: u32 = 3;
 /// Share of a voxel's face that its points stand for, over all voxels of a change. Solid things make 0.6 and more even where
-/// they are seen askew; wires of a fence that a nearer scanner sees for the first time, and veils at edges, 0.1.
-const MIN_COVER: f64 = 0.25;
+/// they are seen askew; veils at edges 0.1, and a mesh of 4 mm wires 50 mm apart, which other beams go through, 0.16 and as
+/// much as 0.32 where beams are as wide as its wires.
+const MIN_COVER: f64 = 0.4;
 /// Share of a voxel's points whose place the other session must have seen empty.
 const MIN_SHARE: f64 = 0.6;
 /// Voxels so many steps apart are of one thing.
@@ -355,7 +356,7 @@ mod tests {
         for wire in 0..12 {
             for i in 0..400 {
                 let at = [0.0025 * f64::from(i), 1.0, 0.05 * f64::from(wire) + 0.02];
-                now.add(at, 6e-6, true);
+                now.add(at, 3.7e-5, true);
             }
         }
         assert!(things(&then, &now, &ThingSettings::default()).is_empty());

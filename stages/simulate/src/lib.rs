@@ -11,6 +11,7 @@ mod columns;
 pub mod demo_robots;
 mod demo_scene;
 mod hall;
+mod hand;
 mod place;
 mod plant;
 mod plots;
@@ -28,6 +29,7 @@ mod world;
 
 pub use columns::{ScanFrame, SimColumns, SimScan};
 pub use demo_scene::{demo_scene, paper_scene};
+pub use hand::{part_in, tool_on};
 pub use plant::{Plant, plant};
 pub use plots::hall;
 pub use posture::Postures;

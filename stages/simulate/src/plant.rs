@@ -2,10 +2,11 @@
 //! robots of mixed models on floor and stands with hoses, tools and carried parts, between fences, conveyors, machines,
 //! posts and people.
 
+use crate::hand::{part_in, tool_on};
 use crate::random::Random;
 use crate::scene::{
-    Anchor, Carried, Column, Cuboid, Fence, Filling, Floor, Furniture, Hall, Hose, Later, Raster,
-    Scene, Section, StandShape, Tool, ToolShape,
+    Anchor, Column, Cuboid, Fence, Filling, Floor, Furniture, Hall, Hose, Later, Raster, Scene,
+    Section, StandShape, ToolShape,
 };
 use crate::spot::{Spot, scanner};
 use contract::{Error, Result};
@@ -326,23 +327,13 @@ fn stand(
     if let Some(hand) = hand.filter(|_| random.unit() < 0.7) {
         let shapes = [ToolShape::Gripper, ToolShape::Cups, ToolShape::Torch];
         let shape = shapes[random.below(shapes.len())];
-        let rpy_deg = outward(room.model, hand);
         let length = (0.12 * reach(room.model)).clamp(0.1, 0.35);
-        let link = room.model.links[hand].name.clone();
-        place.tool = Some(Tool { link: link.clone(), shape, xyz: [0.0; 3], rpy_deg, length });
+        let tool = tool_on(room.model, hand, shape, length);
         if shape != ToolShape::Torch && random.unit() < 0.5 {
             let side = (0.2 * reach(room.model)).clamp(0.1, 0.5);
-            let turn = crate::scene::pose([0.0; 3], rpy_deg);
-            let middle = turn * Point::new(0.0, 0.0, length + 0.5 * side);
-            scene.carried.push(Carried {
-                name: format!("part of {name}"),
-                robot: name.clone(),
-                link,
-                xyz: middle.coords.into(),
-                rpy_deg,
-                size: [side, 0.7 * side, side],
-            });
+            scene.carried.push(part_in(&tool, &name, [side, 0.7 * side, side]));
         }
+        place.tool = Some(tool);
     }
     hoses(scene, room.model, &name, random);
     scene.robots.push(place);
@@ -367,26 +358,6 @@ fn lowest(model: &Model) -> f64 {
         let heights = link.mesh.vertices.iter().map(|v| (pose * Point::from(v.map(f64::from))).z);
         heights.fold(f64::INFINITY, f64::min)
     })
-}
-
-/// Roll, pitch, yaw (degrees) that turn z into the direction in which a flange looks.
-fn outward(model: &Model, flange: usize) -> [f64; 3] {
-    let (axis, _) = model.mount_axis(flange);
-    let poses = model.poses(&model.home());
-    let body = (0..model.links.len()).rev().find(|&l| !model.links[l].bounds.is_empty());
-    let inward = body.map_or_else(Point::origin, |l| {
-        poses[flange].inverse() * (poses[l] * model.links[l].bounds.center())
-    });
-    let away = if inward.coords.dot(&axis) > 0.0 { -axis.into_inner() } else { axis.into_inner() };
-    let turn = nalgebra::UnitQuaternion::rotation_between(&geometry::Vector::z(), &away)
-        .unwrap_or_else(|| {
-            nalgebra::UnitQuaternion::from_axis_angle(
-                &geometry::Vector::x_axis(),
-                std::f64::consts::PI,
-            )
-        });
-    let (roll, pitch, yaw) = turn.euler_angles();
-    [roll, pitch, yaw].map(f64::to_degrees)
 }
 
 /// Cables from body to body, their ends on the surfaces.
