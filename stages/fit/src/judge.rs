@@ -74,8 +74,8 @@ pub(crate) fn judge(
     out
 }
 
-/// A link that moves less than this between two postures stands the same in both to a beam, metres: its width and noise.
-pub(crate) const MOVED: f64 = 0.02;
+/// A link that moves less than this between two postures stands the same in both, metres: a beam's width and noise.
+const MOVED: f64 = 0.02;
 
 /// How clearly the beams prefer one posture to another: difference of the share explained on the links that stand
 /// differently, about 0 for equals, 1 for right against nothing.
@@ -85,7 +85,7 @@ pub(crate) fn margin(
     other: (&Hypothesis, &Judgement),
 ) -> f64 {
     let (mut ahead, mut judged) = (0.0, 0.0);
-    for l in moved([prepared; 2], [best.0, other.0], MOVED) {
+    for l in moved([prepared; 2], [best.0, other.0]) {
         let (p, q) = (best.1.links[l], other.1.links[l]);
         ahead += p[0] - q[0];
         judged += p[1].max(q[1]);
@@ -93,12 +93,8 @@ pub(crate) fn margin(
     if judged > 0.0 { ahead / judged } else { 0.0 }
 }
 
-/// Links that stand differently, by more than so many metres, in two postures of two models of one robot.
-pub(crate) fn moved(
-    prepared: [&Prepared<'_>; 2],
-    [a, b]: [&Hypothesis; 2],
-    least: f64,
-) -> Vec<usize> {
+/// Links that stand differently in two postures of two models of one robot.
+pub(crate) fn moved(prepared: [&Prepared<'_>; 2], [a, b]: [&Hypothesis; 2]) -> Vec<usize> {
     let pose = |prepared: &Prepared<'_>, h: &Hypothesis| {
         let poses = prepared.model.poses(&h.posture);
         poses.iter().map(|p| h.local_from_base * p).collect::<Vec<_>>()
@@ -107,7 +103,7 @@ pub(crate) fn moved(
     let links = prepared[0].model.links.iter().enumerate().filter(|(_, l)| !l.bounds.is_empty());
     let stands_apart = |(l, link): &(usize, &robot::Link)| {
         let apart = |c: [f64; 3]| (a[*l] * Point::from(c) - b[*l] * Point::from(c)).norm();
-        link.bounds.corners().into_iter().map(apart).fold(0.0, f64::max) > least
+        link.bounds.corners().into_iter().map(apart).fold(0.0, f64::max) > MOVED
     };
     links.filter(stands_apart).map(|(l, _)| l).collect()
 }

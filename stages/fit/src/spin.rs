@@ -15,9 +15,6 @@ pub(crate) const MAX_STEP: f64 = 0.0175;
 const CAP: f32 = 0.015;
 /// Points within this of the swept links take part, metres.
 const NEAR: f64 = 0.03;
-/// A link that moves by more between two postures stands differently as far as distances tell, metres: the noise of a few
-/// hundred points is far less, and a wrist of five centimetres moves no more by some degrees.
-const MOVED: f64 = 0.003;
 /// Most points of a sweep.
 const MAX_POINTS: usize = 3000;
 /// Fewer points tell nothing.
@@ -109,13 +106,13 @@ impl Refine<'_> {
     /// How much worse another posture explains the points on the links that stand differently in it: the part of its
     /// squared distances that the best one does without; about 0 for equals, negative where the other is better.
     pub(crate) fn worsening(&self, best: &Hypothesis, other: &Hypothesis, near: &[u32]) -> f64 {
-        let moved = crate::judge::moved([self.prepared; 2], [best, other], MOVED);
+        let moved = crate::judge::moved([self.prepared; 2], [best, other]);
         self.worsening_in(self, [best, other], &moved, near)
     }
 
     /// Links that another model of the same robot places otherwise.
     pub(crate) fn apart(&self, other: &Self, h: &Hypothesis) -> Vec<usize> {
-        crate::judge::moved([self.prepared, other.prepared], [h, h], crate::judge::MOVED)
+        crate::judge::moved([self.prepared, other.prepared], [h, h])
     }
 
     /// The same for a posture here and one of another model of the same robot; `moved` are the links that stand
@@ -131,25 +128,14 @@ impl Refine<'_> {
         points.extend(there.swept(other, near, moved));
         points.sort_unstable();
         points.dedup();
-        let moves = |l: usize| moved.contains(&l);
-        let (a, b) = (self.distances(best, &points, moves), there.distances(other, &points, moves));
-        let rest = self.distances(best, &points, |l| !moves(l));
-        let (mut n, mut sums) = (0_u32, [0.0_f64; 2]);
-        for ((a, b), rest) in a.iter().zip(&b).zip(&rest) {
-            // What lies on links that stand the same, or on none, has no say: a gripper has more points than a wrist.
-            if a.min(*b) < *rest {
-                n += 1;
-                sums[0] += f64::from(a.min(*rest)).powi(2);
-                sums[1] += f64::from(b.min(*rest)).powi(2);
-            }
-        }
-        if n < MIN_POINTS as u32 {
+        if points.len() < MIN_POINTS {
             return 0.0;
         }
-        let noise = self.scene.noise * self.scene.noise;
-        let worse = sums[1] - sums[0];
-        let clearly = worse.signum() * (worse.abs() - AS_GOOD.1 * noise).max(0.0);
-        clearly / sums[0].max(sums[1]).max(f64::from(n) * noise)
+        let squares = |refine: &Self, h: &Hypothesis| -> f64 {
+            refine.distances(h, &points, |_| true).iter().map(|d| f64::from(*d).powi(2)).sum()
+        };
+        let (a, b) = (squares(self, best), squares(there, other));
+        (b - a) / b.max(a).max(points.len() as f64 * self.scene.noise * self.scene.noise)
     }
 
     /// Points near the links whatever their joint's value: within their sphere about the joint's axis, thinned.
