@@ -78,12 +78,11 @@ impl Map for LabelStrip<'_> {
         let body = self.bodies.map(|bodies| bodies.of(&world)).unwrap_or_default();
         points.body = &body;
         self.plan.add(&world, &labels);
-        let moves = |label: &&Label| matches!(label.kind, PointKind::Link | PointKind::Attachment);
         Ok(Labelled {
             mask: strip.mask,
             first_place: strip.first_place,
             packed: self.packed(&points)?,
-            n_moving: labels.iter().filter(moves).count() as u64,
+            n_moving: labels.iter().filter(|label| label.moves()).count() as u64,
             spots: spots(self.grids, &world, &labels, &blocks),
             shown: self.shown(&strip, &world, &labels, &blocks),
             labels: LabelColumns::of(&labels),
@@ -115,13 +114,15 @@ impl LabelStrip<'_> {
 
     /// Records of those points that lie in the cell and that some cloud holds.
     fn packed(&self, points: &PointColumns<'_>) -> Result<Packed> {
-        let is_inside = |i: usize| self.cell.is_none_or(|cell| cell.contains(points.world[i]));
-        let n = points.world.len();
-        let inside: Vec<usize> =
-            (0..n).filter(|&i| self.pack.takes(&points.labels[i]) && is_inside(i)).collect();
-        if inside.len() == n {
+        let is_held = |i: &usize| {
+            let is_inside = self.cell.is_none_or(|cell| cell.contains(points.world[*i]));
+            is_inside && self.pack.takes(&points.labels[*i])
+        };
+        let all = 0..points.world.len();
+        if all.clone().all(|i| is_held(&i)) {
             return self.pack.pack(points);
         }
+        let inside: Vec<usize> = all.filter(is_held).collect();
         fn few<T: Copy>(all: &[T], inside: &[usize]) -> Vec<T> {
             inside.iter().filter_map(|&i| all.get(i).copied()).collect()
         }

@@ -9,7 +9,7 @@ use crate::job::{Outcome, Room};
 use crate::labelling::{Done, Scope};
 use crate::report::id;
 use crate::reuse::{OutputFile, Sums};
-use contract::{Fit, MaskId, PointKind, Result, Space};
+use contract::{Fit, MaskId, Result, Space};
 use export::{FileSum, MaskFiles, NpyWriter, OldPoint, refill};
 use geometry::Aabb;
 use merge::{Registration, Sight, Tally, ThingChange};
@@ -121,7 +121,7 @@ impl Written<'_, '_> {
 
     /// Whether a point of the earlier result is still part of the plant.
     fn stays(&self, point: &OldPoint, gone: &BTreeSet<[i32; 3]>) -> bool {
-        let moves = matches!(point.label.kind, PointKind::Link | PointKind::Attachment);
+        let moves = point.label.moves();
         if moves && self.stands_otherwise(point.label.robot) {
             return false;
         }

@@ -40,4 +40,11 @@ impl Label {
     pub const FLOOR: Self = Self { kind: PointKind::Floor, robot: -1, link: -1 };
     /// In doubt.
     pub const UNCERTAIN: Self = Self { kind: PointKind::Uncertain, robot: -1, link: -1 };
+
+    /// Whether it belongs to a robot, or to what hangs on one.
+    #[inline]
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        matches!(self.kind, PointKind::Link | PointKind::Attachment)
+    }
 }

@@ -90,7 +90,7 @@ impl Pack {
     /// Whether the clouds hold points with this label at all.
     #[must_use]
     pub fn takes(&self, label: &Label) -> bool {
-        self.with_fixed || moves(label)
+        self.with_fixed || label.moves()
     }
 
     /// The records of some points, in their order where they are in the order of a scan: then neighbours share a tile.
@@ -161,7 +161,7 @@ impl Pack {
         // Most points lie in the tile of the one before.
         let (mut tile, mut bounds) = ([0; 2], [f64::NAN; 4]);
         for ((p, label), step) in points.world.iter().zip(points.labels).zip(steps) {
-            let moves = moves(label);
+            let moves = label.moves();
             let [x0, x1, y0, y1] = bounds;
             if !(p[0] >= x0 && p[0] < x1 && p[1] >= y0 && p[1] < y1) {
                 (tile, bounds) = self.tile(p);
@@ -200,10 +200,6 @@ impl Packed {
         }
         out
     }
-}
-
-fn moves(label: &Label) -> bool {
-    matches!(label.kind, PointKind::Link | PointKind::Attachment)
 }
 
 /// Whole steps of coordinates, in one loop without calls that the compiler turns into vector instructions.

@@ -230,36 +230,27 @@ fn sharpen(angles: &[[f64; 2]], axis: usize, step: f64) -> (f64, f64) {
     let values: Vec<f64> = angles.iter().step_by(every).map(|a| a[axis]).collect();
     let (low, high) =
         values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |m, v| (m.0.min(*v), m.1.max(*v)));
-    let phasor = |f: f64| {
-        let (sum_cos, sum_sin) = values.iter().fold((0.0, 0.0), |s, v| {
-            let (sin, cos) = (TAU * f * (v - low)).sin_cos();
-            (s.0 + cos, s.1 + sin)
-        });
-        (f64::hypot(sum_cos, sum_sin) / values.len() as f64, sum_sin.atan2(sum_cos))
-    };
     let middle = values[values.len() / 2];
     let apart = 0.2 / (high - low).max(step);
     let n = ((REACH / step) / apart).ceil().min(4_000.0) as i32;
-    let mut best = (0.0, 1.0 / step);
-    let mut sweep = Sweep::new(&values, low, 1.0 / step - f64::from(n) * apart, apart);
-    for i in -n..=n {
-        let length = sweep.next();
-        if length > best.0 {
-            best = (length, 1.0 / step + f64::from(i) * apart);
+    let sharpest = |about: f64, apart: f64, n: i32| -> (f64, f64) {
+        let mut sweep = Sweep::new(&values, low, about - f64::from(n) * apart, apart);
+        let mut best = (0.0, about);
+        for i in -n..=n {
+            let length = sweep.next();
+            if length > best.0 {
+                best = (length, about + f64::from(i) * apart);
+            }
         }
-    }
-    for i in -10..=10 {
-        let f = best.1 + f64::from(i) * apart / 20.0;
-        let length = phasor(f).0;
-        if length > best.0 {
-            best = (length, f);
-        }
-    }
-    if best.0 < SHARP {
+        best
+    };
+    let (length, f) = sharpest(sharpest(1.0 / step, apart, n).1, apart / 20.0, 10);
+    if length < SHARP {
         return (step, middle);
     }
-    let (_, angle) = phasor(best.1);
-    let phase = low + angle / (TAU * best.1);
-    let found = 1.0 / best.1;
+    let turn = |v: &f64| TAU * f * (v - low);
+    let (cos, sin) =
+        values.iter().fold((0.0, 0.0), |s, v| (s.0 + turn(v).cos(), s.1 + turn(v).sin()));
+    let (phase, found) = (low + sin.atan2(cos) / (TAU * f), 1.0 / f);
     (found, phase + ((middle - phase) / found).round() * found)
 }

@@ -71,9 +71,7 @@ impl Model {
             None => Err(findings.first_error()),
         }
     }
-}
 
-impl Model {
     /// Makes the CAD clouds of all links, of a model that was loaded without them.
     pub fn sample(&mut self, settings: &Settings, fan: &impl Fan) {
         let links = self.links.iter().collect();
