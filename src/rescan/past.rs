@@ -63,10 +63,14 @@ impl<'a> Past<'a> {
         Ok(all)
     }
 
-    /// Asks the new scans about every point.
-    pub(crate) fn look(&self, watch: &Watch<'_>, engine: &Engine) -> Result<(Tally, Vec<Looked>)> {
+    /// Asks the new scans about every point, and the earlier ones where those saw nothing.
+    pub(crate) fn look(
+        &self,
+        [watch, own]: [&Watch<'_>; 2],
+        engine: &Engine,
+    ) -> Result<(Tally, Vec<Looked>)> {
         let (mut tally, mut all) = (Tally::default(), Vec::new());
-        let look = Look { past: self, watch };
+        let look = Look { past: self, watch, own };
         engine.pass(self.task("compare"), self.store.tiles_of(self.tiles.clone()), |f| {
             f.map(&look).for_each(|mut looked| {
                 tally.join(std::mem::take(&mut looked.tally));
@@ -167,6 +171,8 @@ impl Map for Sample<'_> {
 struct Look<'a> {
     past: &'a Past<'a>,
     watch: &'a Watch<'a>,
+    /// Of the earlier scans.
+    own: &'a Watch<'a>,
 }
 
 impl Map for Look<'_> {
@@ -196,7 +202,8 @@ impl Map for Look<'_> {
             }
             match label.kind {
                 PointKind::Fixed => {
-                    out.tally.add(world, area(scan, world), sight == Sight::Through);
+                    let empty = (sight == Sight::Through).then(|| self.own.is_pierced(world));
+                    out.tally.add(world, area(scan, world), empty);
                 }
                 PointKind::Link | PointKind::Attachment => {
                     out.robots.push((place, label.robot));

@@ -41,8 +41,9 @@ pub(crate) struct Present<'a> {
     pub(crate) near: &'a Near,
     pub(crate) ground: &'a Ground,
     pub(crate) cell: Aabb,
-    /// Earlier scans.
+    /// Earlier scans, and the new ones.
     pub(crate) watch: &'a Watch<'a>,
+    pub(crate) own: &'a Watch<'a>,
 }
 
 /// What one tile adds.
@@ -80,7 +81,8 @@ impl Map for Present<'_> {
             match label.kind {
                 PointKind::Fixed => {
                     let is_empty = self.watch.look(world) == Sight::Through;
-                    out.add(world, area(scan, world), is_empty);
+                    let empty = is_empty.then(|| self.own.is_pierced(world));
+                    out.add(world, area(scan, world), empty);
                 }
                 PointKind::Link | PointKind::Attachment => out.add_robot(world),
                 PointKind::Floor | PointKind::Uncertain => {}

@@ -26,6 +26,8 @@ const SAME_PLACE: f64 = 0.5;
 pub(crate) enum Now {
     /// As found by the new scans.
     Found(Box<Fit>),
+    /// They contradict how it stood; it was searched anew, and found so.
+    Anew(Box<Fit>),
     /// It stands no longer there.
     Gone,
     /// The new scans saw too little of it; what they saw does not contradict that it stands as it stood.
@@ -96,9 +98,9 @@ pub(crate) fn look(
     if said.judged < MIN_JUDGED {
         return Ok((if said.through < STANDS { Now::Unseen } else { Now::Open }, None));
     }
-    let region = home(before, model, regions);
+    let near = home(before, model, regions);
     if before.calibration.is_none()
-        && let Some(fit) = search.again(&region, before, model)?
+        && let Some(fit) = search.again(&near, before, model)?
     {
         let is_same = !crate::changes::stands_otherwise(before, &fit);
         if fit.verdict == Verdict::Trusted || is_same && fit.verdict != Verdict::Refused {
@@ -109,11 +111,13 @@ pub(crate) fn look(
     if said.through < STANDS && before.verdict != Verdict::Refused {
         return Ok((Now::Unseen, None));
     }
+    // Its arm may have left what stands about its base.
+    let region = reach(before, model);
     let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
     let mut found: Vec<Fit> =
         search.on_base(&region, bare, &before.world_from_base)?.into_iter().collect();
     if found.iter().all(|f| f.verdict != Verdict::Trusted) {
-        found.extend(search.region(&region)?);
+        found.extend(search.region(&near)?);
         found = fit::choose(found, models);
     }
     let base = before.world_from_base.translation.vector;
@@ -123,7 +127,7 @@ pub(crate) fn look(
     Ok(match dressed.into_iter().max_by(|a, b| a.verdict.cmp(&b.verdict)) {
         Some(fit) => {
             let dressed = (fit.model >= models.len()).then(|| own.swap_remove(fit.model));
-            (Now::Found(Box::new(fit)), dressed)
+            (Now::Anew(Box::new(fit)), dressed)
         }
         None if said.foot > GONE => (Now::Gone, None),
         None if said.through > CONTRADICTED => (Now::Lost, None),

@@ -234,19 +234,20 @@ impl<'a> Session<'a> {
         })?;
         for (i, (now, own)) in here.into_iter().zip(looked) {
             let bounds = bounds[i];
+            let is_anew = matches!(now, Now::Anew(_));
             match now {
                 Now::Unseen => {
                     out.unseen.push(i);
                     out.as_it_stood.push(i);
                 }
                 Now::Open => out.unseen.push(i),
-                Now::Found(mut fit) => {
+                Now::Found(mut fit) | Now::Anew(mut fit) => {
                     if let Some(own) = own {
                         fit.model = models.len();
                         models.push(own);
                     }
                     out.in_cell.push(i);
-                    if crate::changes::stands_otherwise(&fits[i], &fit) {
+                    if is_anew || crate::changes::stands_otherwise(&fits[i], &fit) {
                         out.changed.push(i);
                         out.left.push(bounds);
                     }
@@ -288,9 +289,10 @@ impl<'a> Session<'a> {
             ground: labelling.ground(),
             cell: self.past.cell,
             watch: &old_watch,
+            own: &watch,
         };
         let now = present.tally(self.store, engine)?;
-        let (then, looked) = self.past.look(&watch, engine)?;
+        let (then, looked) = self.past.look([&watch, &old_watch], engine)?;
         let things = things(&then, &now, &self.settings.things);
         Ok(Labels { near, looked, things, now })
     }

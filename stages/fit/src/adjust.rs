@@ -90,9 +90,6 @@ const SURFACE_NOISE: f64 = 3e-4;
 /// Where no scanner is known a point is as uncertain in every direction.
 const NO_BEAM: Vector = Vector::new(0.0, 0.0, 0.0);
 
-/// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
-const BESIDE: (f64, f64) = (1.6, 1.5);
-
 /// A point matched with the facet that it most likely lies on, local frame.
 struct Pair {
     link: usize,
@@ -200,7 +197,7 @@ impl Adjust<'_> {
             let r = n.dot(&(p - x.coords));
             // Beside the surface's edge its plane means nothing.
             let beside = (distance * distance - r * r).max(0.0).sqrt();
-            if beside > BESIDE.0 * f64::from(cad.spacing) + BESIDE.1 * scene.noise {
+            if beside > refine.beside(link) {
                 return None;
             }
             let facing = -n.dot(&ray);

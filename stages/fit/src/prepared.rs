@@ -5,6 +5,8 @@ use geometry::{NearestField, Point};
 use robot::Model;
 use std::sync::Arc;
 
+use crate::face::Face;
+
 /// A model made ready for fitting.
 #[derive(Debug)]
 pub struct Prepared<'a> {
@@ -24,6 +26,8 @@ pub struct Prepared<'a> {
     pub(crate) lever: Vec<f64>,
     /// For each free joint: whether it moves nothing but the links that it places and the tool.
     pub(crate) leaf: Vec<bool>,
+    /// The face of a bare flange.
+    pub(crate) face: Option<Face>,
     /// Number of patches over all links.
     pub(crate) n_patches: usize,
     /// For each patch: its group, one for each link and side.
@@ -115,6 +119,7 @@ impl<'a> Prepared<'a> {
                 .all(|l| placed_by[j].contains(&l))
         });
         let leaf = leaf.collect();
+        let face = placed_by.last().and_then(|placed| Face::of(model, placed));
         let lever = (0..n_free).map(|j| lever(model, j, &placed_by[j])).collect();
         Self {
             model,
@@ -125,6 +130,7 @@ impl<'a> Prepared<'a> {
             reach: model.reach(),
             lever,
             leaf,
+            face,
             n_patches: patch_groups.len(),
             patch_groups,
         }
@@ -141,6 +147,7 @@ impl<'a> Prepared<'a> {
             reach: self.reach,
             lever: self.lever.clone(),
             leaf: self.leaf.clone(),
+            face: self.face,
             n_patches: self.n_patches,
             patch_groups: self.patch_groups.clone(),
         }

@@ -51,6 +51,9 @@ pub(crate) const CHUNK: usize = 8192;
 /// Distance from which the coarse field answers, metres: just inside the fine field's reach.
 const FINE_REACH: f64 = 0.026;
 
+/// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
+const BESIDE: (f64, f64) = (1.6, 1.5);
+
 /// Sums of one link's part of the normal equations.
 struct Sums {
     h: DMatrix<f64>,
@@ -171,6 +174,12 @@ impl Refine<'_> {
                 let n = pose.rotation * Vector::from(n);
                 let q = base_from_local * geometry::Point::from(m.p.map(f64::from));
                 let x = pose * geometry::Point::from(p.map(f64::from));
+                let r = n.dot(&(q - x));
+                // Beside the surface's edge its plane means nothing: what hangs on a flange is wider than it.
+                let beside = (distance * distance - r * r).max(0.0).sqrt();
+                if gate < FINE_REACH && beside > self.beside(link).max(0.33 * gate) {
+                    return None;
+                }
                 // A facet that faces away from the scanner cannot have given this point.
                 if let Some(scanner) = &scanners[usize::from(m.view)] {
                     let ray = (base_from_local * scanner) - q;
@@ -178,9 +187,15 @@ impl Refine<'_> {
                         return None;
                     }
                 }
-                Some(Match { link, q: q.coords, n, r: n.dot(&(q - x)) })
+                Some(Match { link, q: q.coords, n, r })
             })
             .collect()
+    }
+
+    /// How far beside its nearest sample a point of a link may lie, metres.
+    pub(crate) fn beside(&self, link: usize) -> f64 {
+        let spacing = f64::from(self.prepared.model.links[link].cad.spacing);
+        BESIDE.0 * spacing + BESIDE.1 * self.scene.noise
     }
 
     /// The nearest sample over all links to a point (local frame): link, sample, distance.

@@ -9,8 +9,9 @@ use std::f64::consts::TAU;
 
 use crate::adjust::Adjusted;
 use crate::beam::Hypothesis;
-use crate::judge::{Judgement, evidence, margin};
+use crate::judge::{Judgement, evidence};
 use crate::refine::Refine;
+use crate::rivals::lead;
 use crate::solve::{Polished, Settled, polish};
 use crate::spin::Spin;
 use crate::verdict;
@@ -48,8 +49,8 @@ pub(crate) fn report(
     let mut rivals: Vec<(f64, &Polished)> = others
         .iter()
         .map(|other| {
-            let by_beams = margin(prepared, (h, judgement), (&other.0, &other.1));
-            (by_beams.max(refine.worsening(h, &other.0, near)), other)
+            let [by_beams, by_points] = lead(refine, (h, judgement), other, near);
+            (by_beams.max(by_points), other)
         })
         .collect();
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));

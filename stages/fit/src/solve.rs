@@ -11,6 +11,7 @@ use crate::calibrate::doubt;
 use crate::judge::{Judgement, judge};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Round};
 use crate::report::report;
+use crate::rivals::best_of;
 use crate::spin::Spin;
 use crate::{Prepared, Scene, Settings};
 
@@ -80,9 +81,7 @@ pub fn fit(
         return None;
     }
     let best = settle(&refine, best, (&near, &all), fan);
-    let rivals = near_rivals(&closer, &polished, &best);
-    let (best, flipped) = flip(&closer, &refine, (best, rivals), (&near, &all), fan);
-    polished.extend(flipped);
+    let best = best_of(&closer, &refine, best, &mut polished, (&near, &all), fan);
     let other = branches(&refine, &best.0.hypothesis, &best.1, &near);
     let Some((loops, model)) = other else {
         return Some(finish(&refine, best, &polished, (&near, &all), fan));
@@ -231,60 +230,6 @@ pub(crate) fn settle(
     (best, judgement, spins)
 }
 
-/// Share of the surface explained that a flipped posture may lack and still be looked at closely.
-const FLIP_SHORT: f64 = 0.03;
-
-/// Other postures that explain nearly as much, best first, few.
-fn near_rivals(beam: &Beam<'_>, polished: &[Polished], best: &Settled) -> Vec<Polished> {
-    let least = best.1.explained - RIVAL_SHORT * best.1.explained.abs();
-    let last = best.0.hypothesis.posture.len().saturating_sub(2);
-    let mut out: Vec<Polished> = Vec::new();
-    for other in polished.iter().filter(|p| p.1.explained > least) {
-        let is_known = |h: &Hypothesis| beam.alike(h, &other.0, last, RIVAL_STEPS);
-        let is_new = !is_known(&best.0.hypothesis) && !out.iter().any(|p| is_known(&p.0));
-        if is_new && out.len() < N_RIVALS {
-            out.push(other.clone());
-        }
-    }
-    out
-}
-
-/// Share of the surface explained that a posture may lack and still be compared by its points.
-const RIVAL_SHORT: f64 = 0.01;
-/// Sweep steps within which, in all joints but the last, two postures are one.
-const RIVAL_STEPS: f64 = 3.0;
-/// So many are compared.
-const N_RIVALS: usize = 3;
-
-/// The best of a posture, its rivals and its flips, by the points on the links that stand differently: a small wrist turned by half
-/// a turn about both of its axes differs in a bolt or two, which beams alone do not tell. And the others.
-fn flip(
-    beam: &Beam<'_>,
-    refine: &Refine<'_>,
-    (mut best, rivals): (Settled, Vec<Polished>),
-    (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
-) -> (Settled, Vec<Polished>) {
-    let mut others = Vec::new();
-    let flips = beam.flips(&best.0.hypothesis).into_iter().map(|flipped| {
-        let h = roughly(refine, &flipped, near, &COARSE_ROUNDS[3..]);
-        polish(refine, &h, near)
-    });
-    for polished in rivals.into_iter().chain(flips.collect::<Vec<_>>()) {
-        let least = best.1.explained - FLIP_SHORT * best.1.explained.abs();
-        if polished.1.explained < least {
-            others.push(polished);
-            continue;
-        }
-        let mut other = settle(refine, &polished.0, (near, all), fan);
-        if refine.worsening(&best.0.hypothesis, &other.0.hypothesis, near) < 0.0 {
-            std::mem::swap(&mut best, &mut other);
-        }
-        others.push((other.0.hypothesis, other.1));
-    }
-    (best, others)
-}
-
 /// Whether a joint's value is another mode, not the same one found again: 3°.
 fn is_other(a: f64, b: f64) -> bool {
     let d = (a - b).rem_euclid(std::f64::consts::TAU);
@@ -363,7 +308,12 @@ fn rough(
 }
 
 /// Coarse rounds on few points of each link.
-fn roughly(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], rounds: &[Round]) -> Hypothesis {
+pub(crate) fn roughly(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    near: &[u32],
+    rounds: &[Round],
+) -> Hypothesis {
     let step = near.len().div_ceil(COARSE_NEAR).max(1);
     let near: Vec<u32> = near.iter().copied().step_by(step).collect();
     let few = refine.stratified(h, &near, (rounds[0].gate, COARSE_CAP), &OneByOne);

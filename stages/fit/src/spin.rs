@@ -13,6 +13,8 @@ pub(crate) const STEP: f64 = 0.003;
 pub(crate) const MAX_STEP: f64 = 0.0175;
 /// Points farther than this from everything count as if they were so far, metres.
 const CAP: f32 = 0.015;
+/// Points in front of the flange's face count as if they were no farther, metres: something may hang there.
+const HELD: f32 = 0.5 * CAP;
 /// Points within this of the swept links take part, metres.
 const NEAR: f64 = 0.03;
 /// Most points of a sweep.
@@ -131,11 +133,33 @@ impl Refine<'_> {
         if points.len() < MIN_POINTS {
             return 0.0;
         }
-        let squares = |refine: &Self, h: &Hypothesis| -> f64 {
-            refine.distances(h, &points, |_| true).iter().map(|d| f64::from(*d).powi(2)).sum()
+        let squares = |refine: &Self, h: &Hypothesis| {
+            refine.squares(h, &points, &[&refine.distances(h, &points, |_| true)])
         };
         let (a, b) = (squares(self, best), squares(there, other));
         (b - a) / b.max(a).max(points.len() as f64 * self.scene.noise * self.scene.noise)
+    }
+
+    /// Sum of the squared distances of points, each the least of its own; those in front of the flange's face count less:
+    /// something may hang there.
+    pub(crate) fn squares(&self, h: &Hypothesis, points: &[u32], distances: &[&[f32]]) -> f64 {
+        let held = self.held(h, points);
+        let of = |i: usize| {
+            let most = if held[i] { HELD } else { CAP };
+            f64::from(distances.iter().map(|d| d[i]).fold(most, f32::min)).powi(2)
+        };
+        (0..points.len()).map(of).sum()
+    }
+
+    /// Which points may be of what hangs on the flange.
+    fn held(&self, h: &Hypothesis, points: &[u32]) -> Vec<bool> {
+        let face = self.prepared.face.and_then(|face| {
+            let frames = self.link_frames(h);
+            frames.into_iter().find(|(l, _)| *l == face.link).map(|(_, frame)| (face, frame))
+        });
+        let Some((face, frame)) = face else { return vec![false; points.len()] };
+        let at = |i: &u32| geometry::depth::transform(&frame, self.scene.points[*i as usize].p);
+        points.iter().map(|i| face.is_held(at(i))).collect()
     }
 
     /// Points near the links whatever their joint's value: within their sphere about the joint's axis, thinned.

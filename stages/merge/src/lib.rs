@@ -12,6 +12,7 @@ mod hang;
 mod register;
 mod sight;
 mod space;
+mod tally;
 mod things;
 
 pub use attach::{Attach, Attached, Group};
@@ -19,7 +20,8 @@ pub use hang::{Hanging, hang};
 pub use register::{Registration, Surfaces};
 pub use sight::{Sight, Watch};
 pub use space::{see, stand};
-pub use things::{Tally, Thing, ThingChange, ThingSettings, things};
+pub use tally::Tally;
+pub use things::{Thing, ThingChange, ThingSettings, things};
 
 /// What may be tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]

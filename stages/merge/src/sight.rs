@@ -37,10 +37,24 @@ impl<'a> Watch<'a> {
         Self { region, views }
     }
 
+    /// Whether a beam of any scan went on beyond a place in the world, whatever others met there.
+    #[must_use]
+    pub fn is_pierced(&self, world: [f64; 3]) -> bool {
+        let p = self.local(world);
+        self.views.iter().any(|view| {
+            let look = view.images.iter().find_map(|image| image.look_at(p, FOOTPRINT));
+            look.is_some_and(|look| look.near.is_finite() && look.near - look.range > BEYOND)
+        })
+    }
+
+    fn local(&self, world: [f64; 3]) -> [f32; 3] {
+        std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32)
+    }
+
     /// What the scans say of a place in the world: the strongest of what each of them says.
     #[must_use]
     pub fn look(&self, world: [f64; 3]) -> Sight {
-        let p: [f32; 3] = std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32);
+        let p = self.local(world);
         let mut best = Sight::Unseen;
         for view in self.views {
             // The images of one view share out the directions.

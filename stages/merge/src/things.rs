@@ -1,24 +1,21 @@
-//! Points that stand still, of two sessions, by voxel, with what each session's beams say of the other's, in; what
-//! appeared, went and moved out.
+//! Voxels of what stands still in two sessions, and what each session's beams say of the other's, in; what appeared, went
+//! and moved out.
 
+use crate::tally::{Cell, EDGE, MIN_POINTS, Tally, around};
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A voxel of a world: `floor(p / edge)`.
-type Cell = [i32; 3];
-
-/// Edge of a voxel, metres.
-const EDGE: f64 = 0.05;
-/// Fewest points that make a voxel solid.
-const MIN_POINTS: u32 = 3;
 /// Share of a voxel's face that its points stand for, over all voxels of a change. Solid things make 0.6 and more even where
 /// they are seen askew; veils at edges 0.1, and a mesh of 4 mm wires 50 mm apart, which other beams go through, 0.16 and as
 /// much as 0.32 where beams are as wide as its wires.
 const MIN_COVER: f64 = 0.4;
-/// Share of a voxel's points whose place the other session must have seen empty.
-const MIN_SHARE: f64 = 0.6;
+/// Share of the points of a change at whose places other beams of their own session may have gone on: past an edge, but
+/// not between wires, of which enough scans together cover a fence.
+const MAX_PIERCED: f64 = 0.3;
 /// Voxels so many steps apart are of one thing.
 const REACH: i32 = 2;
+/// The same of voxels with fewer points: rows of beams that only graze a thing lie that far apart.
+const THIN_REACH: i32 = 3;
 /// A thing of which at least this share changed is looked at whole.
 const WHOLE: f64 = 0.2;
 /// Most voxels of a thing that is looked at whole: what is larger is structure that something stood against.
@@ -27,24 +24,6 @@ const MAX_WHOLE: usize = 40_000;
 const MAX_PART: f64 = 2.5;
 /// How much the sizes of a thing may differ between two sessions, which see other sides of it: metres, and share.
 const SAME_SIZE: [f64; 2] = [0.12, 0.2];
-
-/// Points of one session by voxel: how many, and at how many places of theirs the other session saw nothing.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Tally {
-    cells: BTreeMap<Cell, Count>,
-    /// Voxels with points of robots and what hangs on them.
-    robots: BTreeSet<Cell>,
-}
-
-/// What is in a voxel.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Count {
-    n_points: u32,
-    /// At whose places the other session saw nothing.
-    n_empty: u32,
-    /// That the points stand for, across their beams, m².
-    area: f64,
-}
 
 /// What is tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,90 +86,54 @@ struct Piece {
 }
 
 impl Tally {
-    /// Face of a voxel, m².
-    pub const FACE: f64 = EDGE * EDGE;
-
-    /// The voxel of a place.
-    #[must_use]
-    pub fn cell(world: [f64; 3]) -> Cell {
-        world.map(|v| (v / EDGE).floor() as i32)
-    }
-
-    /// Middles of voxels, world, metres.
-    #[must_use]
-    pub fn middles(cells: &[Cell]) -> Vec<[f64; 3]> {
-        cells.iter().map(|c| c.map(|i| (f64::from(i) + 0.5) * EDGE)).collect()
-    }
-
-    /// Middles of the voxels in which something stands.
-    #[must_use]
-    pub fn solid(&self) -> Vec<[f64; 3]> {
-        let solid = self.cells.iter().filter(|(_, c)| c.n_points >= MIN_POINTS);
-        Self::middles(&solid.map(|(cell, _)| *cell).collect::<Vec<_>>())
-    }
-
-    /// Adds a point that stands still, and for so much area across its beam, m²; `is_empty`: the other session saw nothing at
-    /// its place.
-    pub fn add(&mut self, world: [f64; 3], area: f64, is_empty: bool) {
-        let cell = self.cells.entry(Self::cell(world)).or_default();
-        cell.n_points += 1;
-        cell.n_empty += u32::from(is_empty);
-        cell.area += area;
-    }
-
-    /// Adds a point of a robot or of what hangs on it.
-    pub fn add_robot(&mut self, world: [f64; 3]) {
-        self.robots.insert(Self::cell(world));
-    }
-
-    /// Adds all of another.
-    pub fn join(&mut self, other: Self) {
-        for (cell, count) in other.cells {
-            let own = self.cells.entry(cell).or_default();
-            own.n_points += count.n_points;
-            own.n_empty += count.n_empty;
-            own.area += count.area;
-        }
-        self.robots.extend(other.robots);
-    }
-
-    fn is_solid(&self, cell: &Cell) -> bool {
-        self.cells.get(cell).is_some_and(|c| c.n_points >= MIN_POINTS)
-    }
-
-    /// Voxels in and beside which the other session has nothing: of a wire or an edge it has a point here and there.
-    fn changed(&self, other: &Self) -> BTreeSet<Cell> {
-        let is_empty = |c: &Count| f64::from(c.n_empty) >= MIN_SHARE * f64::from(c.n_points);
-        let has_some = |cell: &Cell| around(cell, 1).any(|c| other.cells.contains_key(&c));
-        let solid = self.cells.iter().filter(|(_, c)| c.n_points >= MIN_POINTS && is_empty(c));
-        solid.map(|(cell, _)| *cell).filter(|cell| !has_some(cell)).collect()
-    }
-
     /// Connected changes that are large enough and no robot's.
     fn pieces(&self, other: &Self, settings: &ThingSettings) -> Vec<Piece> {
-        let mut left = self.changed(other);
+        let mut left = self.changed(other, MIN_POINTS);
         let margin = (settings.robot_margin / EDGE).ceil() as i32;
-        let is_near = |cell: &Cell| {
-            around(cell, margin).any(|c| self.robots.contains(&c) || other.robots.contains(&c))
-        };
+        let is_near =
+            |cell: &Cell| around(cell, margin).any(|c| self.has_robot(&c) || other.has_robot(&c));
         let mut out = Vec::new();
         while let Some(first) = left.pop_first() {
             let cells = connected(first, REACH, |c| left.remove(c), usize::MAX);
-            let n_points: u64 = cells.iter().map(|c| u64::from(self.cells[c].n_points)).sum();
-            let area: f64 = cells.iter().map(|c| self.cells[c].area).sum();
-            let bounds = bounds(&cells);
-            let size = bounds.size().iter().fold(0.0_f64, |a, b| a.max(*b));
-            let is_solid = area >= MIN_COVER * cells.len() as f64 * EDGE * EDGE;
-            let is_large = is_solid
-                && cells.len() >= settings.min_voxels
+            let n_points = self.n_points(&cells);
+            let size = bounds(&cells).size().iter().fold(0.0_f64, |a, b| a.max(*b));
+            let is_large = cells.len() >= settings.min_voxels
                 && n_points >= u64::from(settings.min_points)
-                && size >= settings.min_size;
+                && size >= settings.min_size
+                && self.cover(&cells) >= MIN_COVER
+                && self.pierced(&cells) <= MAX_PIERCED;
             if is_large && 2 * cells.iter().filter(|c| is_near(c)).count() < cells.len() {
-                let bounds = self.whole(&cells).unwrap_or(bounds);
-                out.push(Piece { cells, n_points, bounds });
+                out.push(cells);
             }
         }
+        let mut thin = self.changed(other, 1);
+        thin.retain(|cell| !is_near(cell));
+        let joined = self.joined(out, thin);
+        joined.into_iter().map(|(cells, bounds)| self.piece(cells, bounds)).collect()
+    }
+
+    /// Changes of which few points are seen between them are one thing; and its bounds with those.
+    fn joined(&self, pieces: Vec<Vec<Cell>>, mut thin: BTreeSet<Cell>) -> Vec<(Vec<Cell>, Aabb)> {
+        let mut out = Vec::new();
+        thin.extend(pieces.iter().flatten());
+        let mut left: BTreeMap<Cell, Vec<Cell>> =
+            pieces.into_iter().map(|cells| (cells[0], cells)).collect();
+        while let Some((first, mut cells)) = left.pop_first() {
+            thin.remove(&first);
+            let all = connected(first, THIN_REACH, |c| thin.remove(c), usize::MAX);
+            for cell in &all {
+                cells.extend(left.remove(cell).into_iter().flatten());
+            }
+            cells.sort_unstable();
+            out.push((cells, bounds(&all)));
+        }
         out
+    }
+
+    fn piece(&self, cells: Vec<Cell>, seen: Aabb) -> Piece {
+        let n_points = self.n_points(&cells);
+        let whole = self.whole(&cells);
+        Piece { cells, n_points, bounds: whole.map_or(seen, |whole| whole.union(&seen)) }
     }
 
     /// Bounds of the whole thing that some voxels are part of, where it stands apart from others and much of it changed.
@@ -261,12 +204,6 @@ fn unlike(a: &Aabb, b: &Aabb) -> f64 {
     (0..3).map(off).fold(0.0, f64::max).min(seen_less)
 }
 
-fn around(cell: &Cell, reach: i32) -> impl Iterator<Item = Cell> {
-    let ([x, y, z], r) = (*cell, reach);
-    (-r..=r)
-        .flat_map(move |i| (-r..=r).flat_map(move |j| (-r..=r).map(move |k| [x + i, y + j, z + k])))
-}
-
 /// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is new and belongs to it.
 fn connected(
     first: Cell,
@@ -309,7 +246,7 @@ mod tests {
                     if rim {
                         let at = [i, j, k].map(|v| 0.02 * f64::from(v));
                         let p = [min[0] + at[0], min[1] + at[1], min[2] + at[2]];
-                        tally.add(p, 4e-4, is_empty);
+                        tally.add(p, 4e-4, is_empty.then_some(false));
                     }
                 }
             }
@@ -351,12 +288,30 @@ mod tests {
     }
 
     #[test]
+    fn a_thing_of_which_beams_graze_the_top_is_one() {
+        let (mut then, mut now) = (Tally::default(), Tally::default());
+        solid(&mut then, [1.0, 1.0, 0.02], [1.2, 1.0, 0.7], true);
+        // Two sides are seen in part, and rows of the top, 14 cm apart.
+        solid(&mut now, [5.0, 1.0, 0.02], [0.1, 0.4, 0.7], true);
+        solid(&mut now, [5.0, 1.9, 0.02], [0.3, 0.1, 0.7], true);
+        for row in 1..=8 {
+            for i in 0..10 {
+                let (x, y) = (5.01 + 0.14 * f64::from(row), 1.05 + 0.1 * f64::from(i));
+                now.add([x, y, 0.71], 4e-4, Some(false));
+            }
+        }
+        let found = things(&then, &now, &ThingSettings::default());
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].change, ThingChange::Moved);
+    }
+
+    #[test]
     fn wires_that_a_nearer_scanner_sees_are_no_change() {
         let (then, mut now) = (Tally::default(), Tally::default());
-        for wire in 0..12 {
+        for (scan, wire) in (0..4).flat_map(|scan| (0..12).map(move |wire| (scan, wire))) {
             for i in 0..400 {
                 let at = [0.0025 * f64::from(i), 1.0, 0.05 * f64::from(wire) + 0.02];
-                now.add(at, 3.7e-5, true);
+                now.add(at, 3.7e-5, Some(scan > 0));
             }
         }
         assert!(things(&then, &now, &ThingSettings::default()).is_empty());

@@ -1,0 +1,109 @@
+//! A settled posture and others in; out comes the best of them, its flips and other bends of its wrist looked at, too.
+//!
+//! Beams and points decide together, on the links that stand differently: a small wrist turned by half a turn about both of
+//! its axes differs in a bolt or two, which beams alone do not tell; and a wrist among the points of what hangs on it is
+//! drawn to them, which beams do tell.
+
+use contract::Fan;
+
+use crate::beam::{Beam, Hypothesis};
+use crate::judge::{Judgement, margin};
+use crate::refine::{COARSE_ROUNDS, Refine};
+use crate::solve::{Polished, Settled, polish, roughly, settle};
+
+/// Share of the surface explained that a flipped posture may lack and still be looked at closely …
+const FLIP_SHORT: f64 = 0.03;
+/// … and any other.
+const SHORT: f64 = 0.01;
+/// Sweep steps within which, in all joints but the last, two postures are one.
+const STEPS: f64 = 1.0;
+/// How clearly a posture may be worse before it is settled and still be compared.
+const LEAD: f64 = 0.1;
+/// So many are compared.
+const N_RIVALS: usize = 3;
+
+/// How clearly the beams, and the points, prefer a posture to another on the links that stand differently.
+pub(crate) fn lead(
+    refine: &Refine<'_>,
+    best: (&Hypothesis, &Judgement),
+    (other, judgement): &Polished,
+    near: &[u32],
+) -> [f64; 2] {
+    let by_beams = margin(refine.prepared, best, (other, judgement));
+    [by_beams, refine.worsening(best.0, other, near)]
+}
+
+/// The best of a posture, the others, and what is like it but for its wrist; all the rest joins the others.
+pub(crate) fn best_of(
+    beam: &Beam<'_>,
+    refine: &Refine<'_>,
+    best: Settled,
+    others: &mut Vec<Polished>,
+    (near, all): (&[u32], &[u32]),
+    fan: &impl Fan,
+) -> Settled {
+    let mut rivals = near_rivals((beam, refine), others, &best, near);
+    rivals.extend(fan.fan(beam.flips(&best.0.hypothesis), |flipped| {
+        polish(refine, &roughly(refine, &flipped, near, &COARSE_ROUNDS[3..]), near)
+    }));
+    let (best, rest) = compare(refine, best, rivals, (near, all), fan);
+    others.extend(rest);
+    let bends = fan.fan(refine.bends(&best.0.hypothesis, near), |h| polish(refine, &h, near));
+    let rivals = near_rivals((beam, refine), &bends, &best, near);
+    others.extend(bends);
+    let (best, rest) = compare(refine, best, rivals, (near, all), fan);
+    others.extend(rest);
+    best
+}
+
+/// Postures that explain nearly as much and that beams and points together hardly like less, best first, few.
+fn near_rivals(
+    (beam, refine): (&Beam<'_>, &Refine<'_>),
+    others: &[Polished],
+    (best, judgement, _): &Settled,
+    near: &[u32],
+) -> Vec<Polished> {
+    let least = judgement.explained - SHORT * judgement.explained.abs();
+    let last = best.hypothesis.posture.len().saturating_sub(2);
+    let is_known = |a: &Hypothesis, b: &Hypothesis| beam.alike(a, b, last, STEPS);
+    let mut all: Vec<(f64, &Polished)> = others
+        .iter()
+        .filter(|p| p.1.explained > least && !is_known(&best.hypothesis, &p.0))
+        .map(|p| (lead(refine, (&best.hypothesis, judgement), p, near).iter().sum(), p))
+        .filter(|(lead, _)| *lead < LEAD)
+        .collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut out: Vec<Polished> = Vec::new();
+    for (_, other) in all {
+        if out.len() < N_RIVALS && !out.iter().any(|p| is_known(&p.0, &other.0)) {
+            out.push(other.clone());
+        }
+    }
+    out
+}
+
+/// The best of a posture and others, and the rest.
+fn compare(
+    refine: &Refine<'_>,
+    mut best: Settled,
+    others: Vec<Polished>,
+    (near, all): (&[u32], &[u32]),
+    fan: &impl Fan,
+) -> (Settled, Vec<Polished>) {
+    let mut rest = Vec::new();
+    for polished in others {
+        let least = best.1.explained - FLIP_SHORT * best.1.explained.abs();
+        if polished.1.explained < least {
+            rest.push(polished);
+            continue;
+        }
+        let mut other = settle(refine, &polished.0, (near, all), fan);
+        let end = |settled: &Settled| (settled.0.hypothesis.clone(), settled.1.clone());
+        let ahead = lead(refine, (&best.0.hypothesis, &best.1), &end(&other), near);
+        if ahead.iter().sum::<f64>() < 0.0 {
+            std::mem::swap(&mut best, &mut other);
+        }
+        rest.push(end(&other));
+    }
+    (best, rest)
+}

@@ -1,0 +1,125 @@
+//! Points of one session that stand still, with what the other session's beams say of their places, in; out come voxels: in
+//! which of them something stands, which of them changed, and how much of them is covered.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A voxel of a world: `floor(p / edge)`.
+pub(crate) type Cell = [i32; 3];
+
+/// Edge of a voxel, metres.
+pub(crate) const EDGE: f64 = 0.05;
+/// Fewest points that make a voxel solid.
+pub(crate) const MIN_POINTS: u32 = 3;
+/// Share of a voxel's points whose place the other session must have seen empty.
+const MIN_SHARE: f64 = 0.6;
+/// Points of one session by voxel: how many, and at how many places of theirs the other session saw nothing.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tally {
+    cells: BTreeMap<Cell, Count>,
+    /// Voxels with points of robots and what hangs on them.
+    robots: BTreeSet<Cell>,
+}
+
+/// What is in a voxel.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Count {
+    n_points: u32,
+    /// At whose places the other session saw nothing …
+    n_empty: u32,
+    /// … and another beam of their own session went on.
+    n_pierced: u32,
+    /// That the points stand for, across their beams, m².
+    area: f64,
+}
+
+impl Tally {
+    /// Face of a voxel, m².
+    pub const FACE: f64 = EDGE * EDGE;
+
+    /// The voxel of a place.
+    #[must_use]
+    pub fn cell(world: [f64; 3]) -> Cell {
+        world.map(|v| (v / EDGE).floor() as i32)
+    }
+
+    /// Middles of voxels, world, metres.
+    #[must_use]
+    pub fn middles(cells: &[Cell]) -> Vec<[f64; 3]> {
+        cells.iter().map(|c| c.map(|i| (f64::from(i) + 0.5) * EDGE)).collect()
+    }
+
+    /// Middles of the voxels in which something stands.
+    #[must_use]
+    pub fn solid(&self) -> Vec<[f64; 3]> {
+        let solid = self.cells.iter().filter(|(_, c)| c.n_points >= MIN_POINTS);
+        Self::middles(&solid.map(|(cell, _)| *cell).collect::<Vec<_>>())
+    }
+
+    /// Adds a point that stands still, and for so much area across its beam, m²; where the other session saw nothing at its
+    /// place, also whether another beam of its own session went on there.
+    pub fn add(&mut self, world: [f64; 3], area: f64, empty: Option<bool>) {
+        let cell = self.cells.entry(Self::cell(world)).or_default();
+        cell.n_points += 1;
+        cell.n_empty += u32::from(empty.is_some());
+        cell.n_pierced += u32::from(empty == Some(true));
+        cell.area += area;
+    }
+
+    /// Adds a point of a robot or of what hangs on it.
+    pub fn add_robot(&mut self, world: [f64; 3]) {
+        self.robots.insert(Self::cell(world));
+    }
+
+    /// Adds all of another.
+    pub fn join(&mut self, other: Self) {
+        for (cell, count) in other.cells {
+            let own = self.cells.entry(cell).or_default();
+            own.n_points += count.n_points;
+            own.n_empty += count.n_empty;
+            own.n_pierced += count.n_pierced;
+            own.area += count.area;
+        }
+        self.robots.extend(other.robots);
+    }
+
+    pub(crate) fn has_robot(&self, cell: &Cell) -> bool {
+        self.robots.contains(cell)
+    }
+
+    pub(crate) fn is_solid(&self, cell: &Cell) -> bool {
+        self.cells.get(cell).is_some_and(|c| c.n_points >= MIN_POINTS)
+    }
+
+    /// Points in some voxels.
+    pub(crate) fn n_points(&self, cells: &[Cell]) -> u64 {
+        cells.iter().map(|c| u64::from(self.cells[c].n_points)).sum()
+    }
+
+    /// Voxels with so many points, in and beside which the other session has nothing: of a wire or an edge it has a point
+    /// here and there.
+    pub(crate) fn changed(&self, other: &Self, min_points: u32) -> BTreeSet<Cell> {
+        let is_empty = |c: &Count| f64::from(c.n_empty) >= MIN_SHARE * f64::from(c.n_points);
+        let has_some = |cell: &Cell| around(cell, 1).any(|c| other.cells.contains_key(&c));
+        let full = self.cells.iter().filter(|(_, c)| c.n_points >= min_points && is_empty(c));
+        full.map(|(cell, _)| *cell).filter(|cell| !has_some(cell)).collect()
+    }
+
+    /// Share of the faces of some voxels that their points stand for.
+    pub(crate) fn cover(&self, cells: &[Cell]) -> f64 {
+        let area: f64 = cells.iter().map(|c| self.cells[c].area).sum();
+        area / (cells.len() as f64 * Self::FACE)
+    }
+
+    /// Share of the points in some voxels at whose places another beam of their own session went on.
+    pub(crate) fn pierced(&self, cells: &[Cell]) -> f64 {
+        let n: u64 = cells.iter().map(|c| u64::from(self.cells[c].n_pierced)).sum();
+        n as f64 / self.n_points(cells) as f64
+    }
+}
+
+/// All voxels within so many steps of one.
+pub(crate) fn around(cell: &Cell, reach: i32) -> impl Iterator<Item = Cell> {
+    let ([x, y, z], r) = (*cell, reach);
+    (-r..=r)
+        .flat_map(move |i| (-r..=r).flat_map(move |j| (-r..=r).map(move |k| [x + i, y + j, z + k])))
+}
