@@ -4,8 +4,8 @@
 use geometry::Point;
 use robot::{JointKind, Model, Role};
 
-/// What hangs on a face is seen from this far behind it on, metres: twice the noise of a common scanner.
-const THICK: f32 = -0.005;
+/// What hangs on a face begins so far behind it, metres: twice the noise of a common scanner.
+const BEHIND: f32 = 0.005;
 
 /// The face of a flange.
 #[derive(Debug, Clone, Copy)]
@@ -19,7 +19,7 @@ pub(crate) struct Face {
 }
 
 impl Face {
-    /// The face of the last link that a model's last joint places; `None` where that joint slides or a tool hangs there.
+    /// The face of the last of the links `placed` by a model's last joint; `None` where that joint slides or a tool hangs there.
     pub(crate) fn of(model: &Model, placed: &[usize]) -> Option<Self> {
         let &link = placed.last()?;
         let joint = &model.joints[*model.free.last()?];
@@ -30,9 +30,10 @@ impl Face {
         let poses = model.poses(&model.home());
         let axis = poses[link].inverse() * (poses[joint.child] * joint.axis.into_inner());
         // The body before it is on the other side.
-        let others = (0..model.links.len()).rev();
-        let before =
-            others.filter(|l| !placed.contains(l) && !model.links[*l].bounds.is_empty()).max()?;
+        let mut before = joint.parent;
+        while model.links[before].bounds.is_empty() {
+            before = model.joints[model.links[before].parent_joint?].parent;
+        }
         let before: Point =
             poses[link].inverse() * (poses[before] * model.links[before].bounds.center());
         let middle: Point = model.links[link].bounds.center();
@@ -45,6 +46,47 @@ impl Face {
 
     /// Whether a point, link frame, may be of what hangs on it.
     pub(crate) fn is_held(&self, q: [f32; 3]) -> bool {
-        (0..3).map(|k| q[k] * self.outward[k]).sum::<f32>() > self.height + THICK
+        (0..3).map(|k| q[k] * self.outward[k]).sum::<f32>() > self.height - BEHIND
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Prepared;
+
+    /// A post whose flange turns about z, so far above its middle, metres; `kind` of the joint.
+    fn model(height: f64, kind: &str) -> Model {
+        let body = |name: &str, size: &str| {
+            format!(
+                "<link name='{name}'><visual><geometry><box size='{size}'/></geometry></visual></link>"
+            )
+        };
+        let urdf = format!(
+            "<robot name='post'>{}{}<joint name='a' type='{kind}'><parent link='post'/><child link='flange'/>\
+             <origin xyz='0 0 {height}'/><axis xyz='0 0 1'/><limit lower='-3' upper='3' effort='1' velocity='1'/></joint></robot>",
+            body("post", "0.2 0.2 1"),
+            body("flange", "0.1 0.1 0.02")
+        );
+        let dir = tempfile::tempdir().expect("a folder");
+        std::fs::write(dir.path().join("post.urdf"), urdf).expect("is written");
+        let path = dir.path().join("post.urdf");
+        Model::load_urdf(&path, "post", &robot::Settings::default()).expect("loads").0
+    }
+
+    #[test]
+    fn what_lies_in_front_of_a_flange_may_hang_on_it() {
+        for (height, way) in [(0.6, 1.0_f32), (-0.6, -1.0)] {
+            let model = model(height, "revolute");
+            let face = Prepared::new(0, &model).face.expect("a face");
+            assert_eq!(model.links[face.link].name, "flange");
+            assert!(face.is_held([0.08, 0.0, way * 0.03]), "a gripper wider than the flange");
+            assert!(!face.is_held([0.08, 0.0, way * -0.01]), "beside the wrist");
+        }
+    }
+
+    #[test]
+    fn a_carriage_has_no_face() {
+        assert!(Prepared::new(0, &model(0.6, "prismatic")).face.is_none());
     }
 }
