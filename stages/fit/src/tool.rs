@@ -19,6 +19,12 @@ const MIN_SCORE: f64 = 0.62;
 const MIN_SEEN: f64 = 0.20;
 /// Tolerance of the judgement, metres: an arm's flange is known to a millimetre.
 const TOLERANCE: f64 = 0.012;
+/// Share of the points about the tool that may lie on neither tool nor arm: of tools that are there it is 0.02 and less,
+/// more where they hold something; of other grippers that are taken for them, half and more.
+const MAX_STRANGE: f64 = 0.3;
+/// How far about the tool that is, and from which distance on a point is not on it, metres.
+const ABOUT: f64 = 0.02;
+const STRANGE: f32 = 0.008;
 /// Hypotheses of the tool's joints that are judged.
 const N_JUDGED: usize = 5;
 
@@ -46,12 +52,15 @@ pub fn try_tool(
     let beam = Beam::new(tooled, scene, settings).fitted();
     let start = start(fit, tooled, scene);
     let first = n_joints.checked_sub(1)?;
+    let refine = Refine { prepared: tooled, scene, settings, prior: None };
+    let base = geometry::Point::from(start.local_from_base.translation.vector);
+    let [near, _] = scene.within(&base, tooled.reach + NEAR_MARGIN);
     let found = beam.resume(vec![start], first, fan);
     let judged = found.into_iter().take(N_JUDGED).filter_map(|h| {
         let judgement = judge(tooled, scene, settings, &h, TOLERANCE);
         let [explained, judged, whole] = of_tool(tooled, n_links, &judgement);
         let is_there = judged > MIN_SEEN * whole && explained > MIN_SCORE * judged;
-        is_there.then_some((explained, h))
+        (is_there && strange(&refine, &h, &near, n_links) < MAX_STRANGE).then_some((explained, h))
     });
     let (explained, best) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let world_from_base = scene.world_from_local() * best.local_from_base;
@@ -136,6 +145,22 @@ fn start(fit: &Fit, tooled: &Prepared<'_>, scene: &Scene<'_>) -> Hypothesis {
         posture,
         score: 0.0,
     }
+}
+
+/// Share of the points within the bounds of the links from `first` on and a little about them that lie on no link.
+fn strange(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], first: usize) -> f64 {
+    let tool: Vec<_> = refine.link_frames(h).into_iter().filter(|(l, _)| *l >= first).collect();
+    let is_about = |i: &u32| {
+        let p = refine.scene.points[*i as usize].p;
+        tool.iter().any(|(l, frame)| {
+            let q = geometry::depth::transform(frame, p).map(f64::from);
+            refine.prepared.model.links[*l].bounds.grown(ABOUT).contains(q)
+        })
+    };
+    let about: Vec<u32> = near.iter().copied().filter(is_about).collect();
+    let limit = STRANGE.max(4.0 * refine.scene.noise as f32);
+    let off = refine.distances(h, &about, |_| true).into_iter().filter(|d| *d > limit).count();
+    off as f64 / about.len().max(1) as f64
 }
 
 /// Surface of the links from `first` on: explained less contradicted, judged, and the whole of it, m².
