@@ -50,7 +50,8 @@ pub(crate) fn report(
         .iter()
         .map(|other| {
             let [by_beams, by_points] = lead(refine, (h, judgement), other, near);
-            (by_beams.max(by_points), other)
+            // What either of them has against the best counts against it.
+            (by_beams.max(by_points) + by_beams.min(by_points).min(0.0), other)
         })
         .collect();
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
