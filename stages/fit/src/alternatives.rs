@@ -23,6 +23,8 @@ const N_AGAIN: usize = 10;
 /// Of those, so many that differ in their last joint only: in the others by fewer sweep steps than so many.
 const N_FLANGES: usize = 3;
 const WRIST_STEPS: f64 = 6.0;
+/// So far beyond its limit a mirrored joint is put to its limit, radians: 3°.
+const BEYOND: f64 = 0.052;
 /// Yaws that a base is tried at: every 4°, the arc that its corners move by the tolerance in.
 const N_YAWS: usize = 90;
 /// Of those, that many are refined.
@@ -155,11 +157,12 @@ impl Beam<'_> {
         (b.hypot(c) > 0.5).then(|| c.atan2(b))
     }
 
-    /// A value of a joint, whole turns added, within its limits.
+    /// A value of a joint, whole turns added, within its limits; at a limit that it is only a little beyond, since what it was
+    /// made of may be off.
     fn within_limits(&self, free: usize, value: f64) -> Option<f64> {
         let [low, high] = self.prepared.model.limits(free);
-        let value = low + (value - low).rem_euclid(TAU);
-        (value <= high).then_some(value)
+        let value = low - BEYOND + (value - low + BEYOND).rem_euclid(TAU);
+        (value <= high + BEYOND).then_some(value.clamp(low, high))
     }
 
     /// A new search from the joint before the first link that the beams contradict; nothing where they contradict none.

@@ -10,6 +10,7 @@ use crate::judge::{Judgement, judge};
 use crate::mount::Bolt;
 use crate::refine::Refine;
 use crate::solve::{NEAR_MARGIN, Polished, polish, settle};
+use crate::spin::MIN_POINTS;
 use crate::{Prepared, Scene, Settings, report};
 
 /// Score of the tool's links from which on it is there: tools that are there have 0.69 and more, others that are taken
@@ -19,8 +20,8 @@ const MIN_SCORE: f64 = 0.62;
 const MIN_SEEN: f64 = 0.20;
 /// Tolerance of the judgement, metres: an arm's flange is known to a millimetre.
 const TOLERANCE: f64 = 0.012;
-/// Share of the points about the tool that may lie on neither tool nor arm: of tools that are there it is 0.02 and less,
-/// more where they hold something; of other grippers that are taken for them, half and more.
+/// Share that points on nothing may have of those about the tool that are not the arm's: with tools that are there it is a few
+/// hundredths, more where they hold something; with other grippers that are taken for them, half and more.
 const MAX_STRANGE: f64 = 0.3;
 /// How far about the tool that is, and from which distance on a point is not on it, metres.
 const ABOUT: f64 = 0.02;
@@ -60,7 +61,7 @@ pub fn try_tool(
         let judgement = judge(tooled, scene, settings, &h, TOLERANCE);
         let [explained, judged, whole] = of_tool(tooled, n_links, &judgement);
         let is_there = judged > MIN_SEEN * whole && explained > MIN_SCORE * judged;
-        (is_there && strange(&refine, &h, &near, n_links) < MAX_STRANGE).then_some((explained, h))
+        (is_there && has_own_points(&refine, &h, &near, n_links)).then_some((explained, h))
     });
     let (explained, best) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let world_from_base = scene.world_from_local() * best.local_from_base;
@@ -147,8 +148,9 @@ fn start(fit: &Fit, tooled: &Prepared<'_>, scene: &Scene<'_>) -> Hypothesis {
     }
 }
 
-/// Share of the points within the bounds of the links from `first` on and a little about them that lie on no link.
-fn strange(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], first: usize) -> f64 {
+/// Whether enough points lie on the links from `first` on and not on those before, and few about them on nothing: a bare flange
+/// has no such points, another gripper many that lie on nothing.
+fn has_own_points(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], first: usize) -> bool {
     let tool: Vec<_> = refine.link_frames(h).into_iter().filter(|(l, _)| *l >= first).collect();
     let is_about = |i: &u32| {
         let p = refine.scene.points[*i as usize].p;
@@ -159,8 +161,12 @@ fn strange(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], first: usize) -> f
     };
     let about: Vec<u32> = near.iter().copied().filter(is_about).collect();
     let limit = STRANGE.max(4.0 * refine.scene.noise as f32);
-    let off = refine.distances(h, &about, |_| true).into_iter().filter(|d| *d > limit).count();
-    off as f64 / about.len().max(1) as f64
+    let arm = refine.distances(h, &about, |l| l < first);
+    let own = refine.distances(h, &about, |l| l >= first);
+    let beside: Vec<f32> =
+        own.into_iter().zip(arm).filter(|(_, arm)| *arm > limit).map(|(own, _)| own).collect();
+    let n_strange = beside.iter().filter(|d| **d > limit).count();
+    beside.len() - n_strange >= MIN_POINTS && (n_strange as f64) < MAX_STRANGE * beside.len() as f64
 }
 
 /// Surface of the links from `first` on: explained less contradicted, judged, and the whole of it, m².
