@@ -41,8 +41,9 @@ pub(crate) struct Present<'a> {
     pub(crate) near: &'a Near,
     pub(crate) ground: &'a Ground,
     pub(crate) cell: Aabb,
-    /// Earlier scans, and the new ones.
+    /// Earlier scans.
     pub(crate) watch: &'a Watch<'a>,
+    /// The new ones.
     pub(crate) own: &'a Watch<'a>,
 }
 

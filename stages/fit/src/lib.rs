@@ -28,6 +28,7 @@ mod settings;
 mod solve;
 mod spin;
 mod stays;
+mod sweep;
 mod tool;
 mod verdict;
 mod weak;

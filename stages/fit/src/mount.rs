@@ -1,12 +1,13 @@
 //! An arm with a tool that stands as the points have it, and the holes that it may be bolted to; which of them explain the
 //! flange under it, out: the turn of the tool is the sum of the last joint's and the hole's, only the flange tells them apart.
 
-use robot::{JointKind, Role};
+use robot::Role;
 use std::f64::consts::TAU;
 
 use crate::beam::Hypothesis;
 use crate::refine::Refine;
-use crate::spin::{AS_GOOD, MAX_STEP, MIN_POINTS, STEP};
+use crate::spin::AS_GOOD;
+use crate::sweep::Sweep;
 
 /// Turns of the tool that are tried with every hole: the best of those at which the tool alone fits best.
 const N_TURNS: usize = 6;
@@ -20,57 +21,32 @@ pub struct Bolt {
     pub value: f64,
 }
 
-/// The links behind one joint, which turn apart from the rest of a posture.
+/// The tool, and the links of the arm that turn with it about one joint.
 struct Turning<'a> {
-    refine: &'a Refine<'a>,
-    h: &'a Hypothesis,
-    flange: usize,
-    /// Points that any turn of those links may explain.
-    points: Vec<u32>,
-    /// Distances of the points to all other links, metres.
-    still: Vec<f32>,
-    /// Links of the arm, and of the tool, that turn.
+    sweep: Sweep<'a>,
     own: Vec<usize>,
     tool: Vec<usize>,
+    /// Value of the joint in the posture as it stands, radians.
+    value: f64,
 }
 
 impl<'a> Turning<'a> {
     /// `None` where the points are too few, or nothing turns that is a tool.
     fn new(refine: &'a Refine<'a>, h: &'a Hypothesis, near: &[u32], flange: usize) -> Option<Self> {
-        let model = refine.prepared.model;
-        let carried = refine.prepared.carried(flange);
-        let is_tool = |l: &usize| model.links[*l].role == Role::Effector;
-        let (tool, own): (Vec<usize>, Vec<usize>) = carried.iter().copied().partition(is_tool);
-        let points = refine.swept(h, near, &carried);
-        let slides = model.joints[model.free[flange]].kind == JointKind::Prismatic;
-        if points.len() < MIN_POINTS || slides || tool.is_empty() {
-            return None;
-        }
-        let still = refine.distances(h, &points, |l| !carried.contains(&l));
-        Some(Self { refine, h, flange, points, still, own, tool })
-    }
-
-    /// Distances of the points to some of the links where the joint has a value, metres.
-    fn at(&self, value: f64, links: &[usize]) -> Vec<f32> {
-        let mut trial = self.h.clone();
-        trial.posture[self.flange] = value;
-        self.refine.distances(&trial, &self.points, |l| links.contains(&l))
-    }
-
-    /// Squared distances to the nearest of what stands still and what is turned, in units of the noise.
-    fn cost(&self, turned: &[&[f32]]) -> f64 {
-        let least = |i: usize| turned.iter().map(|d| d[i]).fold(self.still[i], f32::min);
-        let sum: f64 = (0..self.points.len()).map(|i| f64::from(least(i)).powi(2)).sum();
-        sum / (self.refine.scene.noise * self.refine.scene.noise)
+        let sweep = Sweep::new(refine, h, near, flange)?;
+        let is_tool = |l: &usize| refine.prepared.model.links[*l].role == Role::Effector;
+        let (tool, own): (Vec<usize>, Vec<usize>) = sweep.moved.iter().copied().partition(is_tool);
+        let value = h.posture[flange];
+        (!tool.is_empty()).then_some(Self { sweep, own, tool, value })
     }
 
     /// Turns of the tool alone at which it fits better than beside them, best first; the one that it was found at is among
     /// those that are tried.
     fn turns(&self) -> Vec<f64> {
-        let step = (STEP / self.refine.prepared.lever[self.flange]).min(MAX_STEP);
-        let n = (TAU / step).ceil() as usize;
-        let turn = |k: usize| self.h.posture[self.flange] + TAU * k as f64 / n as f64;
-        let costs: Vec<f64> = (0..n).map(|k| self.cost(&[&self.at(turn(k), &self.tool)])).collect();
+        let n = self.sweep.n_values(TAU);
+        let turn = |k: usize| self.value + TAU * k as f64 / n as f64;
+        let cost = |k: usize| self.sweep.cost(&[&self.sweep.distances(turn(k), &self.tool)]);
+        let costs: Vec<f64> = (0..n).map(cost).collect();
         let is_least =
             |k: &usize| costs[*k] <= costs[(k + 1) % n] && costs[*k] <= costs[(k + n - 1) % n];
         let mut best: Vec<usize> = (0..n).filter(is_least).collect();
@@ -92,13 +68,15 @@ impl Refine<'_> {
     ) -> Vec<Bolt> {
         let Some(turning) = Turning::new(self, h, near, flange) else { return Vec::new() };
         let [low, high] = self.prepared.model.limits(flange);
+        let (sweep, variance) = (&turning.sweep, self.scene.noise * self.scene.noise);
         let mut all: Vec<(f64, Bolt)> = Vec::new();
         for turn in turning.turns() {
-            let of_tool = turning.at(turn, &turning.tool);
+            let of_tool = sweep.distances(turn, &turning.tool);
             for (hole, by) in holes.iter().enumerate() {
                 let value = low + (turn - by - low).rem_euclid(TAU);
                 if value <= high {
-                    let cost = turning.cost(&[&of_tool, &turning.at(value, &turning.own)]);
+                    let of_arm = sweep.distances(value, &turning.own);
+                    let cost = sweep.cost(&[&of_tool, &of_arm]) / variance;
                     all.push((cost, Bolt { hole, value }));
                 }
             }

@@ -10,7 +10,7 @@ use crate::judge::{Judgement, judge};
 use crate::mount::Bolt;
 use crate::refine::Refine;
 use crate::solve::{NEAR_MARGIN, Polished, polish, settle};
-use crate::spin::MIN_POINTS;
+use crate::sweep::MIN_POINTS;
 use crate::{Prepared, Scene, Settings, report};
 
 /// Score of the tool's links from which on it is there: tools that are there have 0.69 and more, others that are taken

@@ -37,38 +37,32 @@ impl NearestField {
 
     /// Spreads each sample from its own voxel outwards, ring by ring, while it is nearer than what is there.
     fn fill(&mut self, points: &[[f32; 3]], edge: f32, reach: f32) {
-        let mut ring: Vec<usize> = Vec::new();
+        // Squared distance of each voxel's middle from its sample, for as long as samples spread.
+        let mut nearest = vec![f32::INFINITY; self.cells.len()];
+        let mut ring: Vec<[u32; 3]> = Vec::new();
         for (i, p) in points.iter().enumerate() {
-            let Some(at) = self.cell(*p) else { continue };
-            let old = self.cells[at];
-            if old == 0 {
-                ring.push(at);
+            let Some(index) = self.index(*p) else { continue };
+            let (at, d2) = (self.at(index), distance2(*p, self.middle(index, edge)));
+            if self.cells[at] == 0 {
+                ring.push(index);
             }
-            let middle = self.middle(at, edge);
-            if old == 0 || distance2(points[old as usize - 1], middle) > distance2(*p, middle) {
-                self.cells[at] = i as u32 + 1;
+            if d2 < nearest[at] {
+                (self.cells[at], nearest[at]) = (i as u32 + 1, d2);
             }
         }
         let reach2 = reach * reach;
         let mut next = Vec::new();
         while !ring.is_empty() {
-            for &at in &ring {
-                let sample = self.cells[at];
+            for &index in &ring {
+                let sample = self.cells[self.at(index)];
                 let from = points[sample as usize - 1];
-                for neighbour in self.around(at) {
-                    let middle = self.middle(neighbour, edge);
-                    let d2 = distance2(from, middle);
-                    if d2 > reach2 {
-                        continue;
+                for neighbour in around(index) {
+                    let at = self.at(neighbour);
+                    let d2 = distance2(from, self.middle(neighbour, edge));
+                    if d2 <= reach2 && d2 < nearest[at] {
+                        (self.cells[at], nearest[at]) = (sample, d2);
+                        next.push(neighbour);
                     }
-                    let old = self.cells[neighbour];
-                    if old == sample
-                        || (old != 0 && distance2(points[old as usize - 1], middle) <= d2)
-                    {
-                        continue;
-                    }
-                    self.cells[neighbour] = sample;
-                    next.push(neighbour);
                 }
             }
             std::mem::swap(&mut ring, &mut next);
@@ -76,36 +70,35 @@ impl NearestField {
         }
     }
 
-    /// The six neighbours across faces. The border of the grid lies beyond reach and is never left.
-    fn around(&self, at: usize) -> [usize; 6] {
-        let (row, slab) = (self.size[0], self.size[0] * self.size[1]);
-        [at - 1, at + 1, at - row, at + row, at - slab, at + slab]
-    }
-
-    fn middle(&self, at: usize, edge: f32) -> [f32; 3] {
-        let [w, h, _] = self.size;
-        let index = [at % w, at / w % h, at / (w * h)];
-        std::array::from_fn(|i| self.origin[i] + (index[i] as f32 + 0.5) * edge)
+    #[inline]
+    fn at(&self, [x, y, z]: [u32; 3]) -> usize {
+        (z as usize * self.size[1] + y as usize) * self.size[0] + x as usize
     }
 
     #[inline]
-    fn cell(&self, p: [f32; 3]) -> Option<usize> {
+    fn middle(&self, index: [u32; 3], edge: f32) -> [f32; 3] {
+        std::array::from_fn(|i| self.origin[i] + (index[i] as f32 + 0.5) * edge)
+    }
+
+    /// The voxel of a place; `None` outside.
+    #[inline]
+    fn index(&self, p: [f32; 3]) -> Option<[u32; 3]> {
         let mut index = [0; 3];
         for i in 0..3 {
             let v = (p[i] - self.origin[i]) * self.inverse_edge;
             if !(v >= 0.0 && v < self.size[i] as f32) {
                 return None;
             }
-            index[i] = v as usize;
+            index[i] = v as u32;
         }
-        Some((index[2] * self.size[1] + index[1]) * self.size[0] + index[0])
+        Some(index)
     }
 
     /// Index of the sample nearest to `p` (to within a voxel's half diagonal); `None` beyond reach.
     #[inline]
     #[must_use]
     pub fn nearest(&self, p: [f32; 3]) -> Option<usize> {
-        let at = self.cell(p)?;
+        let at = self.at(self.index(p)?);
         (self.cells[at] as usize).checked_sub(1)
     }
 
@@ -114,6 +107,11 @@ impl NearestField {
     pub fn weight_bytes(&self) -> usize {
         self.cells.len() * 4
     }
+}
+
+/// The six neighbours across faces. The border of the grid lies beyond reach and is never left.
+fn around([x, y, z]: [u32; 3]) -> [[u32; 3]; 6] {
+    [[x - 1, y, z], [x + 1, y, z], [x, y - 1, z], [x, y + 1, z], [x, y, z - 1], [x, y, z + 1]]
 }
 
 #[inline]

@@ -1,6 +1,7 @@
 //! A place and the views of some scans in; whether their beams went through it, ended on it, or never got there, out.
 
 use contract::{Region, View};
+use geometry::depth::{DepthImage, Look};
 
 /// A beam that ended so far behind a place went through it, metres.
 const BEYOND: f32 = 0.04;
@@ -40,26 +41,22 @@ impl<'a> Watch<'a> {
     /// Whether a beam of any scan went on beyond a place in the world, whatever others met there.
     #[must_use]
     pub fn is_pierced(&self, world: [f64; 3]) -> bool {
-        let p = self.local(world);
-        self.views.iter().any(|view| {
-            let look = view.images.iter().find_map(|image| image.look_at(p, FOOTPRINT));
-            look.is_some_and(|look| look.near.is_finite() && look.near - look.range > BEYOND)
-        })
+        self.looks(world).any(|look| look.near.is_finite() && look.near - look.range > BEYOND)
     }
 
-    fn local(&self, world: [f64; 3]) -> [f32; 3] {
-        std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32)
+    /// What each scan that looked there has.
+    fn looks(&self, world: [f64; 3]) -> impl Iterator<Item = Look> + '_ {
+        let p: [f32; 3] = std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32);
+        // The images of one view share out the directions.
+        let of = move |image: &DepthImage| image.look_at(p, FOOTPRINT);
+        self.views.iter().filter_map(move |view| view.images.iter().find_map(of))
     }
 
     /// What the scans say of a place in the world: the strongest of what each of them says.
     #[must_use]
     pub fn look(&self, world: [f64; 3]) -> Sight {
-        let p = self.local(world);
         let mut best = Sight::Unseen;
-        for view in self.views {
-            // The images of one view share out the directions.
-            let look = view.images.iter().find_map(|image| image.look_at(p, FOOTPRINT));
-            let Some(look) = look else { continue };
+        for look in self.looks(world) {
             let is_on = |range: f32| (range - look.range).abs() <= ON;
             let says = if is_on(look.near) || is_on(look.far) {
                 Sight::Onto

@@ -12,6 +12,7 @@ pub(crate) const EDGE: f64 = 0.05;
 pub(crate) const MIN_POINTS: u32 = 3;
 /// Share of a voxel's points whose place the other session must have seen empty.
 const MIN_SHARE: f64 = 0.6;
+
 /// Points of one session by voxel: how many, and at how many places of theirs the other session saw nothing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tally {
@@ -95,12 +96,12 @@ impl Tally {
         cells.iter().map(|c| u64::from(self.cells[c].n_points)).sum()
     }
 
-    /// Voxels with so many points, in and beside which the other session has nothing: of a wire or an edge it has a point
+    /// Voxels that hold points, in and beside which the other session has nothing: of a wire or an edge it has a point
     /// here and there.
-    pub(crate) fn changed(&self, other: &Self, min_points: u32) -> BTreeSet<Cell> {
+    pub(crate) fn changed(&self, other: &Self) -> BTreeSet<Cell> {
         let is_empty = |c: &Count| f64::from(c.n_empty) >= MIN_SHARE * f64::from(c.n_points);
         let has_some = |cell: &Cell| around(cell, 1).any(|c| other.cells.contains_key(&c));
-        let full = self.cells.iter().filter(|(_, c)| c.n_points >= min_points && is_empty(c));
+        let full = self.cells.iter().filter(|(_, c)| is_empty(c));
         full.map(|(cell, _)| *cell).filter(|cell| !has_some(cell)).collect()
     }
 

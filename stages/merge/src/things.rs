@@ -1,7 +1,7 @@
 //! Voxels of what stands still in two sessions, and what each session's beams say of the other's, in; what appeared, went
 //! and moved out.
 
-use crate::tally::{Cell, EDGE, MIN_POINTS, Tally, around};
+use crate::tally::{Cell, EDGE, Tally, around};
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -88,7 +88,8 @@ struct Piece {
 impl Tally {
     /// Connected changes that are large enough and no robot's.
     fn pieces(&self, other: &Self, settings: &ThingSettings) -> Vec<Piece> {
-        let mut left = self.changed(other, MIN_POINTS);
+        let mut thin = self.changed(other);
+        let mut left: BTreeSet<Cell> = thin.iter().copied().filter(|c| self.is_solid(c)).collect();
         let margin = (settings.robot_margin / EDGE).ceil() as i32;
         let is_near =
             |cell: &Cell| around(cell, margin).any(|c| self.has_robot(&c) || other.has_robot(&c));
@@ -106,7 +107,6 @@ impl Tally {
                 out.push(cells);
             }
         }
-        let mut thin = self.changed(other, 1);
         thin.retain(|cell| !is_near(cell));
         let joined = self.joined(out, thin);
         joined.into_iter().map(|(cells, bounds)| self.piece(cells, bounds)).collect()
