@@ -6,10 +6,12 @@ nobody disturbs, and whether the outputs are the same bytes.
     scripts/kills.py --inputs hall/20000000/scans.las --scanners hall/20000000/scanners.toml --robots ROBOTS --kills 200
 
 Each chain begins with an empty folder. Its runs are killed (SIGKILL) after a random time, evenly drawn from the length of an
-undisturbed run, until one of them ends before. Work is the time that all runs of a chain took."""
+undisturbed run, until one of them ends before. Work is what all runs of a chain took, by the clock and in processor time: the one feels whatever
+else the machine does."""
 
 import json
 import random
+import resource
 import shutil
 import statistics
 import subprocess
@@ -34,53 +36,71 @@ def main():
     def start(out):
         return subprocess.Popen(job.command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
+    def finish(out, life=None):
+        """Runs into `out`, for `life` seconds at most: exit code (none where it was killed), seconds, processor seconds."""
+        begun, before = time.monotonic(), cpu()
+        run = start(out)
+        try:
+            code = run.wait(timeout=life)
+        except subprocess.TimeoutExpired:
+            run.kill()
+            run.wait()
+            code = None
+        if code:
+            print(run.stderr.read().decode())
+        return code, time.monotonic() - begun, cpu() - before
+
     whole = []
     for k in range(3):
-        out = folder / "whole"
-        shutil.rmtree(out, ignore_errors=True)
-        begun = time.monotonic()
-        run = start(out)
-        if run.wait() != 0:
-            raise SystemExit(run.stderr.read().decode())
-        whole.append(time.monotonic() - begun)
-    length, wanted = statistics.median(whole), manifest(folder / "whole")
-    print(f"an undisturbed run takes {length:.1f} s (of {len(whole)}: {min(whole):.1f} to {max(whole):.1f})", flush=True)
+        shutil.rmtree(folder / "whole", ignore_errors=True)
+        code, *spent = finish(folder / "whole")
+        if code != 0:
+            raise SystemExit("the undisturbed run failed")
+        whole.append(spent)
+    length, length_cpu = (statistics.median(column) for column in zip(*whole))
+    wanted = manifest(folder / "whole")
+    print(f"an undisturbed run takes {length:.1f} s, {length_cpu:.1f} s of processors (medians of {len(whole)})", flush=True)
 
     n_kills, chains = 0, []
     rows = (folder / "kills.jsonl").open("w")
     while n_kills < args.kills:
         out = folder / "killed"
         shutil.rmtree(out, ignore_errors=True)
-        work, lives = 0.0, []
-        while True:
-            life = draw.uniform(0.0, length)
-            begun = time.monotonic()
-            run = start(out)
-            try:
-                code = run.wait(timeout=life)
-            except subprocess.TimeoutExpired:
-                run.kill()
-                run.wait()
-                code = None
-                n_kills += 1
-            spent = time.monotonic() - begun
-            work += spent
-            lives.append(round(spent, 3))
-            if code is not None:
-                break
-        is_right = code == 0 and manifest(out) == wanted
-        chains.append((work / length, is_right))
-        rows.write(json.dumps({"lives": lives, "work": work / length, "code": code, "same": is_right}) + "\n")
+        lives, code = [], None
+        while code is None:
+            code, *spent = finish(out, draw.uniform(0.0, length))
+            lives.append(spent)
+        n_kills += len(lives) - 1
+        work, work_cpu = (sum(column) for column in zip(*lives))
+        chain = {
+            "kills": len(lives) - 1,
+            "work": work / length,
+            "work_cpu": work_cpu / length_cpu,
+            "same": code == 0 and manifest(out) == wanted,
+            "lives": [round(life[0], 3) for life in lives],
+        }
+        chains.append(chain)
+        rows.write(json.dumps(chain) + "\n")
         rows.flush()
-        print(f"{n_kills} kills: {len(lives)} runs, work {work / length:.2f}, {'same bytes' if is_right else 'OTHER BYTES'}", flush=True)
-        if code != 0:
-            print(run.stderr.read().decode())
-    works = sorted(work for work, _ in chains)
-    wrong = sum(not right for _, right in chains)
-    print(
-        f"{n_kills} kills in {len(chains)} chains: work of a chain, median {statistics.median(works):.2f}, "
-        f"90 % {works[int(0.9 * (len(works) - 1))]:.2f}, largest {works[-1]:.2f} of one run; {wrong} with other bytes"
-    )
+        same = "same bytes" if chain["same"] else "OTHER BYTES"
+        print(f"{n_kills} kills: {len(lives)} runs, work {chain['work']:.2f}, cpu {chain['work_cpu']:.2f}, {same}", flush=True)
+    wrong = sum(not chain["same"] for chain in chains)
+    print(f"{n_kills} kills in {len(chains)} chains, {wrong} with other bytes; work in parts of one run:")
+    for name, some in [("all", chains)] + [(f"{n} kills", [c for c in chains if c["kills"] == n]) for n in range(1, 9)]:
+        if some:
+            print(f"  {name}, {len(some)} chains: " + ", ".join(words(some, key) for key in ("work", "work_cpu")))
+
+
+def cpu():
+    """Processor seconds of all programs that ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def words(chains, key):
+    works = sorted(chain[key] for chain in chains)
+    tenth = works[int(0.9 * (len(works) - 1))]
+    return f"{key} median {statistics.median(works):.2f}, 90 % {tenth:.2f}, largest {works[-1]:.2f}"
 
 
 if __name__ == "__main__":

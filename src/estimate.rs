@@ -1,5 +1,6 @@
 //! A job in; what it will take of memory, disk and time, and what of it is there already, out. No point is read.
 
+use crate::engine::AllThreads;
 use crate::engine::Engine;
 use crate::job::{Job, Room, Settings, memory_words};
 use crate::library;
@@ -79,7 +80,8 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
 fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<Estimate> {
     let n_models = library::count(&job.robots)?;
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
-    let sources = ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest)?;
+    let sources =
+        ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest, &AllThreads)?;
     Ok(Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)))
 }
 

@@ -18,7 +18,7 @@ use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
 use merge::{Attach, Hanging};
 use robot::Model;
-use segment::Segment;
+use segment::{Ground, Segment};
 use std::path::Path;
 
 use crate::bodies::Bodies;
@@ -32,7 +32,9 @@ pub(crate) struct Labelling<'a> {
     fits: &'a [Fit],
     models: &'a [Model],
     sources: &'a Sources,
-    segment: Segment,
+    floor: &'a Floor,
+    ground: Ground,
+    settings: segment::Settings,
     attach: Attach,
     /// World bounds of each scan's points, metres.
     bounds: Vec<Aabb>,
@@ -100,10 +102,10 @@ impl<'a> Labelling<'a> {
         fits: &'a [Fit],
         models: &'a [Model],
         sources: &'a Sources,
-        (store, floor, clusters): (&Store, &Floor, &[Cluster]),
+        (store, floor, clusters): (&Store, &'a Floor, &[Cluster]),
         settings: &Settings,
     ) -> Self {
-        let segment = Segment::new(fits, models, floor, &sources.scans, settings.segment);
+        let ground = Ground::new(floor, &settings.segment);
         let attach = Attach::new(fits, models, settings.merge);
         let mut bounds = vec![Aabb::EMPTY; sources.scans.len()];
         for entry in store.entries() {
@@ -112,17 +114,22 @@ impl<'a> Labelling<'a> {
         }
         let export = settings.export;
         let bodies = export.bodies.then(|| Bodies::new(clusters));
-        Self { fits, models, sources, segment, attach, bounds, export, bodies }
+        let settings = settings.segment;
+        Self { fits, models, sources, floor, ground, settings, attach, bounds, export, bodies }
     }
 
     /// The floor, for the label of a point that is near no robot.
-    pub(crate) fn ground(&self) -> &segment::Ground {
-        self.segment.ground()
+    pub(crate) fn ground(&self) -> &Ground {
+        &self.ground
     }
 
     /// Segments the tiles near robots, and decides over all scans what hangs on them.
     pub(crate) fn near_robots(&self, store: &Store, engine: &Engine) -> Result<Near> {
-        let regions = self.segment.regions();
+        let scans = &self.sources.scans;
+        let segment =
+            || Segment::new(self.fits, self.models, self.floor, scans, self.settings, &AllThreads);
+        let segment = engine.pool()?.install(segment);
+        let regions = segment.regions();
         let mut tiles: Vec<usize> = regions.iter().flat_map(|r| store.touching(r)).collect();
         tiles.sort_unstable();
         tiles.dedup();
@@ -130,7 +137,7 @@ impl<'a> Labelling<'a> {
         let mut sum = self.attach.empty();
         let mut labelled: Vec<TileLabels> = Vec::new();
         engine.pass(task, store.tiles_of(tiles), |f| {
-            f.map(&self.segment).for_each(|mut tile| {
+            f.map(&segment).for_each(|mut tile| {
                 self.attach.add(&mut sum, std::mem::take(&mut tile.voxels))?;
                 labelled.push(tile);
                 Ok(())
@@ -158,7 +165,7 @@ impl<'a> Labelling<'a> {
         let las = scope.las.clone().unwrap_or_else(|| self.las());
         let mut clouds = Clouds::create(clouds_out, &las, &self.export)?;
         let mut masks = Masks::new(out, self.sources.opened_masks());
-        let mut robots: Vec<RobotPicture> = self.robot_pictures();
+        let mut robots: Vec<RobotPicture> = self.robot_pictures(engine)?;
         let mut pictures = Vec::new();
         let grids: Vec<_> =
             spaces.iter().map(|s| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()))).collect();
@@ -167,7 +174,7 @@ impl<'a> Labelling<'a> {
             let plan = PlanPicture::new(&self.bounds_of(input.id));
             let label = LabelStrip {
                 near: &near.labels,
-                ground: self.segment.ground(),
+                ground: &self.ground,
                 scans: &self.sources.scans,
                 grids: &grids,
                 shown: &shown,
@@ -194,28 +201,38 @@ impl<'a> Labelling<'a> {
             pictures.push(self.draw_plan(&plan, input.id, out)?);
         }
         let (masks, mut sums) = masks.finish()?;
-        let mut said = vec![None; self.fits.len()];
         let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
-        for i in (0..self.fits.len()).filter(is_written) {
-            let fit = &self.fits[i];
-            export::write_robot(out, &id(i), fit, &self.models[fit.model], &near.hanging[i])?;
-            if let Some(space) = &spaces[i] {
-                said[i] = Some(write_space(out, &id(i), space)?);
-            }
-        }
-        for (i, picture) in robots.iter().enumerate().filter(|(i, _)| is_written(i)) {
-            let fit = &self.fits[i];
-            let name = format!("pictures/{}.png", id(i));
-            let title = format!("{} {} {}", id(i), fit.model_name, fit.verdict.word());
-            picture.draw(&title).write(&out.join(&name))?;
-            let evidence = format!("pictures/{}_evidence.png", id(i));
-            let page = export::draw_evidence(&title, picture, fit, &self.models[fit.model]);
-            page.write(&out.join(&evidence))?;
-            pictures.extend([name, evidence]);
+        let mut said = vec![None; self.fits.len()];
+        let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
+        let written = engine.each(chosen.clone(), |i| {
+            self.write_robot(i, &near.hanging[i], (spaces[i].as_ref(), &robots[i]), out)
+        })?;
+        for (i, (space, names)) in chosen.into_iter().zip(written) {
+            said[i] = space;
+            pictures.extend(names);
         }
         let clouds = engine.pool()?.install(|| clouds.finish(&AllThreads))?;
         sums.extend(clouds.sums().cloned());
         Ok(Done { clouds, masks, pictures, spaces: said, sums, las })
+    }
+
+    /// The files of one robot: model, space, pictures; what is said of its space, and the pictures' names.
+    fn write_robot(
+        &self,
+        i: usize,
+        hanging: &Hanging,
+        (space, picture): (Option<&Space>, &RobotPicture),
+        out: &Path,
+    ) -> Result<(Option<SpaceEntry>, [String; 2])> {
+        let (fit, id) = (&self.fits[i], id(i));
+        let model = &self.models[fit.model];
+        export::write_robot(out, &id, fit, model, hanging)?;
+        let space = space.map(|space| write_space(out, &id, space)).transpose()?;
+        let names = [format!("pictures/{id}.png"), format!("pictures/{id}_evidence.png")];
+        let title = format!("{id} {} {}", fit.model_name, fit.verdict.word());
+        picture.draw(&title).write(&out.join(&names[0]))?;
+        export::draw_evidence(&title, picture, fit, model).write(&out.join(&names[1]))?;
+        Ok((space, names))
     }
 
     fn las(&self) -> LasSettings {
@@ -230,15 +247,12 @@ impl<'a> Labelling<'a> {
         of_input.map_or_else(|| Quantum::around(&all), |(scale, offset)| Quantum { scale, offset })
     }
 
-    fn robot_pictures(&self) -> Vec<RobotPicture> {
-        self.fits
-            .iter()
-            .enumerate()
-            .map(|(i, fit)| {
-                let model = &self.models[fit.model];
-                RobotPicture::new(i as i16, model, &poses(fit, model))
-            })
-            .collect()
+    fn robot_pictures(&self, engine: &Engine) -> Result<Vec<RobotPicture>> {
+        engine.each((0..self.fits.len()).collect(), |i| {
+            let fit = &self.fits[i];
+            let model = &self.models[fit.model];
+            Ok(RobotPicture::new(i as i16, model, &poses(fit, model)))
+        })
     }
 
     fn draw_plan(

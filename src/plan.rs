@@ -2,7 +2,7 @@
 //! decides order.
 
 use crate::calibrate::calibrate;
-use crate::engine::Engine;
+use crate::engine::{AllThreads, Engine};
 use crate::estimate::Estimate;
 use crate::filling::Filling;
 use crate::job::{Job, Outcome};
@@ -35,7 +35,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let read = |path: &PathBuf| Review::read(path, &library.models);
     let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
-    let sources = ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest)?;
+    let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
+    let sources = engine.pool()?.install(open)?;
     let scans = &sources.scans;
     let has_tiles =
         |i: &Input| sums.tiles(i, scans, settings).is_some_and(|key| room.has_tiles(&key));

@@ -108,7 +108,7 @@ fn dress_one(
     let holes = holes();
     let way = arm.mount_axis(flange).1;
     let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
-    let bolts = fit::bolt(&start, (&prepared, n_arm - 1), &turns, scene, settings);
+    let bolts = fit::bolt(&start, (&prepared, n_arm - 1), &turns, scene, settings, &AllThreads);
     // Where the flange does not tell, the first hole has it, and the last joint takes up the rest.
     let bolt = bolts.iter().find(|b| b.hole == 0).or(bolts.first());
     let mount = bolt.map_or(0.0, |bolt| {

@@ -2,6 +2,7 @@
 
 use super::flags::{Common, InspectFlags, present};
 use super::say::Say;
+use crate::engine::AllThreads;
 use crate::exit;
 use contract::{Error, Kind, Result};
 use ingest::Scanners;
@@ -10,8 +11,12 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
     let means = common.means()?;
     present(&flags.inputs)?;
     let scanners = common.scanners(&means).map(|path| Scanners::read(&path));
-    let sources =
-        ingest::open(&flags.inputs, scanners.transpose()?.as_ref(), &means.settings.ingest)?;
+    let sources = ingest::open(
+        &flags.inputs,
+        scanners.transpose()?.as_ref(),
+        &means.settings.ingest,
+        &AllThreads,
+    )?;
     let descriptions = ingest::describe(&sources);
     if flags.json {
         let all = serde_json::json!({

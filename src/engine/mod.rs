@@ -17,7 +17,7 @@ mod guard;
 mod tests;
 
 use crate::progress::{Amount, Progress};
-use contract::{Error, Kind, Result, Weigh};
+use contract::{Error, Fan, Kind, Result, Weigh};
 use flow::Pass;
 pub(crate) use guard::guarded;
 use rayon::prelude::*;
@@ -163,6 +163,20 @@ impl Engine {
             .collect()
     }
 
+    /// The same for small work that is over before anybody asks how far it is.
+    ///
+    /// # Errors
+    /// The first by position.
+    pub(crate) fn each<T: Send, U: Send>(
+        &self,
+        items: Vec<T>,
+        f: impl Fn(T) -> Result<U> + Sync + Send,
+    ) -> Result<Vec<U>> {
+        let f = |(at, item): (usize, T)| guarded("small work", at as u64, || f(item));
+        let items = items.into_iter().enumerate().collect();
+        self.pool()?.install(|| AllThreads.fan(items, f)).into_iter().collect()
+    }
+
     /// Does `aside` on a thread of its own while `work` is done on this one; the error of the work goes first.
     ///
     /// # Errors
@@ -200,8 +214,9 @@ impl Engine {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct AllThreads;
 
-impl contract::Fan for AllThreads {
+impl Fan for AllThreads {
     fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
-        items.into_par_iter().map(work).collect()
+        // Items are few and large: each may go to whichever thread is free.
+        items.into_par_iter().with_max_len(1).map(work).collect()
     }
 }

@@ -12,7 +12,7 @@ mod write;
 
 pub(crate) use state::{Records, State};
 
-use crate::engine::Engine;
+use crate::engine::{AllThreads, Engine};
 use crate::filling::Filling;
 use crate::job::{Job, Outcome};
 use crate::library;
@@ -69,7 +69,11 @@ pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
     let library = library::load(&job.robots, &settings.robot, Some(&shelved), engine)?;
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let before = base.state.before();
-    let mut sources = ingest::open_after(before, &job.inputs, scanners.as_ref(), &settings.ingest)?;
+    let open = || {
+        let settings = &settings.ingest;
+        ingest::open_after(before, &job.inputs, scanners.as_ref(), settings, &AllThreads)
+    };
+    let mut sources = engine.pool()?.install(open)?;
 
     // The new scans into tiles; those of the plant are there.
     let filling = Filling::new(&sources, &job.means, room.tiles(), engine);

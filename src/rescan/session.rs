@@ -312,14 +312,8 @@ impl<'a> Session<'a> {
 
     /// The labelling of the new points by these fits.
     pub(crate) fn labelling<'b>(&'b self, fits: &'b [Fit], models: &'b [Model]) -> Labelling<'b> {
-        let floor = &self.ground.surfaces.floor;
-        Labelling::new(
-            fits,
-            models,
-            self.sources,
-            (self.store, floor, &self.clusters),
-            self.settings,
-        )
+        let ground = (self.store, &self.ground.surfaces.floor, &self.clusters[..]);
+        Labelling::new(fits, models, self.sources, ground, self.settings)
     }
 
     /// Robots among the things that appeared.

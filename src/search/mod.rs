@@ -156,7 +156,7 @@ impl<'a, 'm> Search<'a, 'm> {
             fits.extend(self.fits(&scene, &few(hung))?);
         }
         fits.extend(self.on_stands(&scene, &mut sight, &fits)?);
-        let gone = lattice::disagreement(&views);
+        let gone = lattice::disagreement(&views, &AllThreads);
         if gone.len() >= MIN_GONE {
             let feet = self.candidates(&sight.apart(), &planes, 0.0);
             let sights = Sights { region, views: &views, floors: &planes };

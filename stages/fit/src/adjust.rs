@@ -15,6 +15,7 @@ use crate::Settings;
 use crate::beam::Hypothesis;
 use crate::calibrate::Frames;
 use crate::normal::{N_SCAN, Normal, Row};
+use crate::placed::{Near, Placed};
 use crate::refine::{CHUNK, Refine};
 
 /// How a scan differs from its stated pose, as far as the points near a robot tell.
@@ -166,7 +167,7 @@ impl Adjust<'_> {
         let refine = self.refine;
         let scene = refine.scene;
         let poses = refine.local_from_links(&state.hypothesis);
-        let frames = refine.link_frames(&state.hypothesis);
+        let placed = Placed::all(refine.prepared, &state.hypothesis, gate);
         let scanners: Vec<Option<Point>> =
             (0..scene.views.len()).map(|v| scene.scanner(v as u16)).collect();
         let turns: Vec<UnitQuaternion<f64>> =
@@ -186,8 +187,7 @@ impl Adjust<'_> {
                 }
                 None => (raw, NO_BEAM, 0.0),
             };
-            let (link, sample, distance) =
-                refine.nearest(p.map(|v| v as f32).into(), &frames, gate)?;
+            let Near { link, sample, distance } = placed.nearest(p.map(|v| v as f32).into())?;
             if distance > gate {
                 return None;
             }

@@ -97,26 +97,23 @@ impl Beam<'_> {
 
     /// Weighted score of some links.
     pub(crate) fn score(&self, h: &Hypothesis, links: &[usize], tolerance: f32) -> f64 {
-        self.score_of(h, links, (tolerance, self.settings.n_search))
+        self.score_at(&self.placed(h, links), (tolerance, self.settings.n_search))
     }
 
-    /// That of so many samples of each link.
-    fn score_of(
-        &self,
-        h: &Hypothesis,
-        links: &[usize],
-        (tolerance, n_samples): (f32, usize),
-    ) -> f64 {
+    /// Where some links stand, local frame.
+    fn placed(&self, h: &Hypothesis, links: &[usize]) -> Vec<(usize, Pose)> {
         let poses = self.prepared.model.poses(&h.posture);
-        links
-            .iter()
-            .map(|&l| {
-                let (points, normals) = self.prepared.samples(l, n_samples);
-                let pose = h.local_from_base * poses[l];
-                let probe = self.scene.scouts.probe(points, normals, &pose, tolerance);
-                self.prepared.links[l].weight * f64::from(probe.mean())
-            })
-            .sum()
+        links.iter().map(|&l| (l, h.local_from_base * poses[l])).collect()
+    }
+
+    /// Weighted score of so many samples of each link.
+    fn score_at(&self, placed: &[(usize, Pose)], (tolerance, n_samples): (f32, usize)) -> f64 {
+        let score = |(l, pose): &(usize, Pose)| {
+            let (points, normals) = self.prepared.samples(*l, n_samples);
+            let probe = self.scene.scouts.probe(points, normals, pose, tolerance);
+            self.prepared.links[*l].weight * f64::from(probe.mean())
+        };
+        placed.iter().map(score).sum()
     }
 
     /// All local maxima of a sweep of one joint, each with the score of what it places added.
@@ -247,17 +244,18 @@ impl Beam<'_> {
         let (low, span, n) = self.sweep(free);
         let mut trial = h.clone();
         let values: Vec<f64> = (0..=n).map(|k| low + span * k as f64 / n as f64).collect();
-        let mut score = |value: f64, n_samples: usize| {
-            trial.posture[free] = value;
-            self.score_of(&trial, links, (tolerance, n_samples))
+        let mut at = |value: &f64| {
+            trial.posture[free] = *value;
+            self.placed(&trial, links)
         };
+        let placed: Vec<_> = values.iter().map(&mut at).collect();
+        let score = |k: usize, n_samples: usize| self.score_at(&placed[k], (tolerance, n_samples));
         // A few samples tell most values to be hopeless.
-        let few: Vec<f64> = values.iter().map(|v| score(*v, self.settings.n_search / 4)).collect();
+        let few: Vec<f64> = (0..=n).map(|k| score(k, self.settings.n_search / 4)).collect();
         let weight: f64 = links.iter().map(|&l| self.prepared.links[l].weight).sum();
         let hopeless = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - HOPELESS * weight;
-        let scores: Vec<f64> = (values.iter().zip(&few))
-            .map(|(v, few)| if *few < hopeless { *few } else { score(*v, self.settings.n_search) })
-            .collect();
+        let full = |k| if few[k] < hopeless { few[k] } else { score(k, self.settings.n_search) };
+        let scores: Vec<f64> = (0..=n).map(full).collect();
         (0..=n)
             .filter(|&k| {
                 few[k] >= hopeless

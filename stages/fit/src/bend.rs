@@ -1,6 +1,7 @@
 //! An adjusted posture in; out come other values of the joint before its last at which the points fit about as well: a
 //! wrist of which little is seen has many, and what hangs on its flange draws it to some of them (fit.md §4e).
 
+use contract::Fan;
 use std::f64::consts::TAU;
 
 use crate::beam::Hypothesis;
@@ -16,7 +17,7 @@ const N_VALUES: usize = 4;
 
 impl Refine<'_> {
     /// Postures with other values of the joint before the last, best first.
-    pub(crate) fn bends(&self, h: &Hypothesis, near: &[u32]) -> Vec<Hypothesis> {
+    pub(crate) fn bends(&self, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<Hypothesis> {
         let joint = h.posture.len().checked_sub(2);
         let sweep = joint.and_then(|joint| Some((joint, Sweep::new(self, h, near, joint)?)));
         let Some((joint, sweep)) = sweep else { return Vec::new() };
@@ -24,7 +25,7 @@ impl Refine<'_> {
         let span = (high - low).min(TAU);
         let n = sweep.n_values(span);
         let value = |k: usize| low + span * k as f64 / n as f64;
-        let costs: Vec<f64> = (0..=n).map(|k| sweep.cost_held(value(k))).collect();
+        let costs: Vec<f64> = fan.fan((0..=n).collect(), |k| sweep.cost_held(value(k)));
         let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
         let cost = |k: usize| costs.get(k).copied().unwrap_or(f64::INFINITY);
         let is_least = |k: &usize| {

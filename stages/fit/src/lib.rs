@@ -19,6 +19,7 @@ mod mount;
 mod noise;
 mod normal;
 pub mod paper;
+mod placed;
 mod prepared;
 mod refine;
 mod report;

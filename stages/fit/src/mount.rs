@@ -1,6 +1,7 @@
 //! An arm with a tool that stands as the points have it, and the holes that it may be bolted to; which of them explain the
 //! flange under it, out: the turn of the tool is the sum of the last joint's and the hole's, only the flange tells them apart.
 
+use contract::Fan;
 use robot::Role;
 use std::f64::consts::TAU;
 
@@ -42,11 +43,11 @@ impl<'a> Turning<'a> {
 
     /// Turns of the tool alone at which it fits better than beside them, best first; the one that it was found at is among
     /// those that are tried.
-    fn turns(&self) -> Vec<f64> {
+    fn turns(&self, fan: &impl Fan) -> Vec<f64> {
         let n = self.sweep.n_values(TAU);
         let turn = |k: usize| self.value + TAU * k as f64 / n as f64;
         let cost = |k: usize| self.sweep.cost(&[&self.sweep.distances(turn(k), &self.tool)]);
-        let costs: Vec<f64> = (0..n).map(cost).collect();
+        let costs: Vec<f64> = fan.fan((0..n).collect(), cost);
         let is_least =
             |k: &usize| costs[*k] <= costs[(k + 1) % n] && costs[*k] <= costs[(k + n - 1) % n];
         let mut best: Vec<usize> = (0..n).filter(is_least).collect();
@@ -65,12 +66,13 @@ impl Refine<'_> {
         near: &[u32],
         flange: usize,
         holes: &[f64],
+        fan: &impl Fan,
     ) -> Vec<Bolt> {
         let Some(turning) = Turning::new(self, h, near, flange) else { return Vec::new() };
         let [low, high] = self.prepared.model.limits(flange);
         let (sweep, variance) = (&turning.sweep, self.scene.noise * self.scene.noise);
         let mut all: Vec<(f64, Bolt)> = Vec::new();
-        for turn in turning.turns() {
+        for turn in turning.turns(fan) {
             let of_tool = sweep.distances(turn, &turning.tool);
             for (hole, by) in holes.iter().enumerate() {
                 let value = low + (turn - by - low).rem_euclid(TAU);

@@ -26,6 +26,12 @@ pub(crate) struct Row<'a> {
     pub(crate) r: f64,
 }
 
+/// `sums += factor · row`.
+#[inline]
+fn add(sums: &mut [f64], factor: f64, row: &[f64]) {
+    sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += factor * v);
+}
+
 /// Sums over one patch.
 #[derive(Debug, Clone)]
 struct Patch {
@@ -100,22 +106,16 @@ impl Normal {
             let wv = w * v;
             patch.a[i] += wv;
             patch.g[i] += wv * row.r;
-            let column = &mut self.hessian.column_mut(i);
-            for k in i..n {
-                column[k] += wv * row.robot[k];
-            }
-            for k in 0..N_SCAN {
-                column[at + k] += wv * row.scan[k];
-            }
+            let column = &mut self.hessian.as_mut_slice()[i * self.n..(i + 1) * self.n];
+            add(&mut column[i..n], wv, &row.robot[i..]);
+            add(&mut column[at..at + N_SCAN], wv, &row.scan);
         }
         for (i, v) in row.scan.iter().enumerate() {
             let wv = w * v;
             patch.a[at + i] += wv;
             patch.g[at + i] += wv * row.r;
-            let column = &mut self.hessian.column_mut(at + i);
-            for k in i..N_SCAN {
-                column[at + k] += wv * row.scan[k];
-            }
+            let column = &mut self.hessian.as_mut_slice()[(at + i) * self.n..];
+            add(&mut column[at + i..at + N_SCAN], wv, &row.scan[i..]);
         }
     }
 

@@ -1,11 +1,14 @@
 //! A model in; out comes what every fit of it needs: nearest-sample fields, search samples, and which link is placed
 //! by which joint. Made once per model, shared by all its fits.
 
+use geometry::depth::Rows;
 use geometry::{NearestField, Point};
 use robot::Model;
 use std::sync::Arc;
 
+use crate::beam::Hypothesis;
 use crate::face::Face;
+use crate::placed::Ball;
 
 /// A model made ready for fitting.
 #[derive(Debug)]
@@ -58,6 +61,7 @@ impl Fields {
 pub(crate) struct PreparedLink {
     /// Shared by all models that have the link.
     pub(crate) fields: Arc<Fields>,
+    pub(crate) ball: Ball,
     /// √area, m: weight of the link in a total score.
     pub(crate) weight: f64,
     /// Outer area, m².
@@ -93,7 +97,8 @@ impl<'a> Prepared<'a> {
     fn of((index, model): (usize, &'a Model), fields: impl Iterator<Item = Arc<Fields>>) -> Self {
         let links = model.links.iter().zip(fields).map(|(link, fields)| {
             let area = f64::from(link.cad.area);
-            PreparedLink { fields, weight: area.sqrt(), area, patches: Vec::new() }
+            let ball = Ball::of(link);
+            PreparedLink { fields, ball, weight: area.sqrt(), area, patches: Vec::new() }
         });
         let mut links: Vec<_> = links.collect();
         let patch_groups = patches(model, &mut links);
@@ -162,6 +167,16 @@ impl<'a> Prepared<'a> {
     /// Links placed by a joint or a later one: what stands before it does not change with it.
     pub(crate) fn carried(&self, joint: usize) -> Vec<usize> {
         self.placed_by[joint..].iter().flatten().copied().collect()
+    }
+
+    /// Links with a surface, and their frames from the local frame.
+    pub(crate) fn frames(&self, h: &Hypothesis) -> Vec<(usize, Rows)> {
+        let base_from_local = h.local_from_base.inverse();
+        let poses = self.model.poses(&h.posture);
+        (0..poses.len())
+            .filter(|&l| self.links[l].weight > 0.0)
+            .map(|l| (l, geometry::depth::rows(&(poses[l].inverse() * base_from_local))))
+            .collect()
     }
 
     /// The first `n` samples and normals of a link.

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::JointKind;
 
 use crate::beam::Hypothesis;
+use crate::placed::{Near, Placed};
 use crate::{Prepared, Scene, Settings};
 
 /// One round of the schedule.
@@ -49,7 +50,7 @@ pub(crate) const FINE_ROUNDS: [Round; 7] = [
 /// Points that one thread works on at a time. Sums are taken chunk by chunk, so it does not depend on the threads.
 pub(crate) const CHUNK: usize = 8192;
 /// Distance from which the coarse field answers, metres: just inside the fine field's reach.
-const FINE_REACH: f64 = 0.026;
+pub(crate) const FINE_REACH: f64 = 0.026;
 
 /// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
 const BESIDE: (f64, f64) = (1.6, 1.5);
@@ -103,7 +104,8 @@ impl Refine<'_> {
         (gate, cap): (f64, usize),
         fan: &impl Fan,
     ) -> Vec<u32> {
-        let links = self.link_frames(h);
+        let links = self.prepared.frames(h);
+        let placed = Placed::all(self.prepared, h, gate);
         let n_strata = self.prepared.links.len() + 1;
         let grown: Vec<_> = links
             .iter()
@@ -117,8 +119,8 @@ impl Refine<'_> {
             if !near {
                 return None;
             }
-            match self.nearest(m.p, &links, gate) {
-                Some((link, _, distance)) if distance <= gate => Some(link),
+            match placed.nearest(m.p) {
+                Some(near) if near.distance <= gate => Some(near.link),
                 _ => (gate > FINE_REACH).then_some(n_strata - 1),
             }
         };
@@ -143,28 +145,18 @@ impl Refine<'_> {
         out
     }
 
-    /// Links with a surface, and their frames from the local frame.
-    pub(crate) fn link_frames(&self, h: &Hypothesis) -> Vec<(usize, geometry::depth::Rows)> {
-        let base_from_local = h.local_from_base.inverse();
-        let poses = self.prepared.model.poses(&h.posture);
-        (0..poses.len())
-            .filter(|&l| self.prepared.links[l].weight > 0.0)
-            .map(|l| (l, geometry::depth::rows(&(poses[l].inverse() * base_from_local))))
-            .collect()
-    }
-
     /// Matches of the points within the gate, in their order.
     fn matches(&self, h: &Hypothesis, points: &[u32], gate: f64) -> Vec<Match> {
         let poses = self.prepared.model.poses(&h.posture);
         let base_from_local = h.local_from_base.inverse();
-        let links = self.link_frames(h);
+        let placed = Placed::all(self.prepared, h, gate);
         let scanners: Vec<_> =
             (0..self.scene.views.len()).map(|v| self.scene.scanner(v as u16)).collect();
         points
             .iter()
             .filter_map(|&i| {
                 let m = &self.scene.points[i as usize];
-                let (link, sample, distance) = self.nearest(m.p, &links, gate)?;
+                let Near { link, sample, distance } = placed.nearest(m.p)?;
                 if distance > gate {
                     return None;
                 }
@@ -196,33 +188,6 @@ impl Refine<'_> {
     pub(crate) fn beside(&self, link: usize) -> f64 {
         let spacing = f64::from(self.prepared.model.links[link].cad.spacing);
         BESIDE.0 * spacing + BESIDE.1 * self.scene.noise
-    }
-
-    /// The nearest sample over all links to a point (local frame): link, sample, distance.
-    #[inline]
-    pub(crate) fn nearest(
-        &self,
-        point: [f32; 3],
-        links: &[(usize, geometry::depth::Rows)],
-        gate: f64,
-    ) -> Option<(usize, usize, f64)> {
-        let mut best: Option<(usize, usize, f32)> = None;
-        for (l, link_from_local) in links {
-            let p = geometry::depth::transform(link_from_local, point);
-            let link = &self.prepared.links[*l];
-            let found = if gate < FINE_REACH {
-                link.fields.fine.nearest(p)
-            } else {
-                link.fields.coarse.nearest(p)
-            };
-            let Some(at) = found else { continue };
-            let s = self.prepared.model.links[*l].cad.points[at];
-            let d2 = (0..3).map(|i| (s[i] - p[i]) * (s[i] - p[i])).sum::<f32>();
-            if best.is_none_or(|b| d2 < b.2) {
-                best = Some((*l, at, d2));
-            }
-        }
-        best.map(|(link, at, d2)| (link, at, f64::from(d2).sqrt()))
     }
 
     /// Poses of all links in the local frame.
@@ -272,9 +237,8 @@ impl Refine<'_> {
                 }
                 let wa = w * row[a];
                 s.g[a] += wa * m.r;
-                for b in a..n {
-                    s.h[(b, a)] += wa * row[b];
-                }
+                let column = &mut s.h.as_mut_slice()[a * n + a..(a + 1) * n];
+                column.iter_mut().zip(&row[a..]).for_each(|(h, b)| *h += wa * b);
             }
         }
         for s in &mut sums {

@@ -12,7 +12,7 @@ use crate::beam::Hypothesis;
 use crate::judge::{Judgement, evidence};
 use crate::refine::Refine;
 use crate::rivals::lead;
-use crate::solve::{Polished, Settled, polish};
+use crate::solve::{Polished, Settled, fine};
 use crate::spin::Spin;
 use crate::verdict;
 
@@ -200,7 +200,7 @@ fn sway(
         })
     });
     let all = std::iter::once(h.clone()).chain(turned).collect();
-    let ends: Vec<Hypothesis> = fan.fan(all, |h| polish(refine, &h, near).0);
+    let ends: Vec<Hypothesis> = fan.fan(all, |h| fine(refine, &h, near));
     // Where it ended at something worse, it is no value that the joint may stand at.
     let as_good = |end: &&Hypothesis| refine.worsening(&ends[0], end, near) < EQUAL;
     for end in ends[1..].iter().filter(as_good) {

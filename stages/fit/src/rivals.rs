@@ -48,7 +48,7 @@ pub(crate) fn best_of(
     }));
     let (best, rest) = compare(refine, best, rivals, (near, all), fan);
     others.extend(rest);
-    let bends = fan.fan(refine.bends(&best.0.hypothesis, near), |h| polish(refine, &h, near));
+    let bends = fan.fan(refine.bends(&best.0.hypothesis, near, fan), |h| polish(refine, &h, near));
     let rivals = near_rivals((beam, refine), &bends, &best, near);
     others.extend(bends);
     let (best, rest) = compare(refine, best, rivals, (near, all), fan);

@@ -219,13 +219,13 @@ pub(crate) fn settle(
 ) -> Settled {
     let variance = refine.scene.noise * refine.scene.noise;
     let (mut best, mut judgement) = adjust(refine, h, all, fan);
-    let mut spins = refine.spins(&best.hypothesis, near, variance);
+    let mut spins = refine.spins(&best.hypothesis, near, variance, fan);
     let better: Vec<(usize, f64)> = spins.iter().map(|s| (s.joint, s.values[0])).collect();
     if better.iter().any(|(j, v)| is_other(best.hypothesis.posture[*j], *v)) {
         let mut h = best.hypothesis.clone();
         better.iter().for_each(|(j, v)| h.posture[*j] = *v);
         (best, judgement) = adjust(refine, &h, all, fan);
-        spins = refine.spins(&best.hypothesis, near, variance);
+        spins = refine.spins(&best.hypothesis, near, variance, fan);
     }
     (best, judgement, spins)
 }
@@ -327,15 +327,20 @@ const POLISH_CAP: usize = 2000;
 /// A posture on thinned points, with what the beams say of it.
 pub(crate) type Polished = (Hypothesis, Judgement);
 
-/// Fine rounds on thinned points, with the gate that the noise asks for; then the judgement.
+/// Fine rounds, then the judgement.
 pub(crate) fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> Polished {
+    let h = fine(refine, h, near);
+    let judgement = judged(refine, &h);
+    (h, judgement)
+}
+
+/// Fine rounds on thinned points, with the gate that the noise asks for.
+pub(crate) fn fine(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> Hypothesis {
     let few = refine.stratified(h, near, (FINE_GATE, POLISH_CAP), &OneByOne);
     let h = refine.run(h, &few, &FINE_ROUNDS[..3]);
     let gate = (LAST_GATE.0 * refine.noise(&h, &few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
     let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect();
-    let h = refine.run(&h, &few, &rounds);
-    let judgement = judged(refine, &h);
-    (h, judgement)
+    refine.run(&h, &few, &rounds)
 }
 
 /// Frame on the installation plane with z along its normal, at the height of the base's origin.

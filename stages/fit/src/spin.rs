@@ -1,6 +1,7 @@
 //! An adjusted posture in; out come the other values of its last joints at which the points fit as well or better: a
 //! flange with six bolts looks the same every 60°, and only points on its small features tell (fit.md §4e).
 
+use contract::Fan;
 use std::f64::consts::TAU;
 
 use crate::beam::Hypothesis;
@@ -35,12 +36,24 @@ fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
 
 impl Refine<'_> {
     /// Sweeps each joint that moves nothing but the links that it places and the tool.
-    pub(crate) fn spins(&self, h: &Hypothesis, near: &[u32], variance: f64) -> Vec<Spin> {
+    pub(crate) fn spins(
+        &self,
+        h: &Hypothesis,
+        near: &[u32],
+        variance: f64,
+        fan: &impl Fan,
+    ) -> Vec<Spin> {
         let leaves = (0..h.posture.len()).filter(|&j| self.prepared.leaf[j]);
-        leaves.filter_map(|joint| self.spin(h, near, joint, variance)).collect()
+        leaves.filter_map(|joint| self.spin(h, near, (joint, variance), fan)).collect()
     }
 
-    fn spin(&self, h: &Hypothesis, near: &[u32], joint: usize, variance: f64) -> Option<Spin> {
+    fn spin(
+        &self,
+        h: &Hypothesis,
+        near: &[u32],
+        (joint, variance): (usize, f64),
+        fan: &impl Fan,
+    ) -> Option<Spin> {
         let sweep = Sweep::new(self, h, near, joint)?;
         let [low, high] = self.prepared.model.limits(joint);
         let span = (high - low).min(TAU);
@@ -48,11 +61,9 @@ impl Refine<'_> {
         // Around the value found, so that it is one of those tried.
         let first = if high - low > TAU { h.posture[joint] - span / 2.0 } else { low };
         let cost = |value: f64| sweep.cost(&[&sweep.distances(value, &sweep.moved)]) / variance;
-        let costs: Vec<(f64, f64)> = (0..=n)
-            .map(|k| first + span * k as f64 / n as f64)
-            .chain([h.posture[joint]])
-            .map(|value| (value, cost(value)))
-            .collect();
+        let values = (0..=n).map(|k| first + span * k as f64 / n as f64);
+        let values = values.chain([h.posture[joint]]).collect();
+        let costs: Vec<(f64, f64)> = fan.fan(values, |value| (value, cost(value)));
         let best = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
         let limit = best + (AS_GOOD.0 * best).max(AS_GOOD.1);
         let extent = extent(&costs, h.posture[joint], limit);

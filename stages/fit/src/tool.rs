@@ -77,11 +77,12 @@ pub fn bolt(
     holes: &[f64],
     scene: &Scene<'_>,
     settings: &Settings,
+    fan: &impl Fan,
 ) -> Vec<Bolt> {
     let refine = Refine { prepared: tooled, scene, settings, prior: None };
     let [near, _] = near(start, tooled, scene);
     let (h, _) = polish(&refine, &hypothesis(start, scene), &near);
-    refine.bolts(&h, &near, flange, holes)
+    refine.bolts(&h, &near, flange, holes, fan)
 }
 
 /// The fit of arm and tool together from such a start; `flange` is the arm's last joint.
@@ -151,7 +152,7 @@ fn start(fit: &Fit, tooled: &Prepared<'_>, scene: &Scene<'_>) -> Hypothesis {
 /// Whether enough points lie on the links from `first` on and not on those before, and few about them on nothing: a bare flange
 /// has no such points, another gripper many that lie on nothing.
 fn has_own_points(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], first: usize) -> bool {
-    let tool: Vec<_> = refine.link_frames(h).into_iter().filter(|(l, _)| *l >= first).collect();
+    let tool: Vec<_> = refine.prepared.frames(h).into_iter().filter(|(l, _)| *l >= first).collect();
     let is_about = |i: &u32| {
         let p = refine.scene.points[*i as usize].p;
         tool.iter().any(|(l, frame)| {

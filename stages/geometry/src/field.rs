@@ -9,6 +9,8 @@ pub struct NearestField {
     origin: [f32; 3],
     inverse_edge: f32,
     size: [usize; 3],
+    /// Farthest place from a sample that knows it, metres.
+    reach: f32,
     /// Index of the nearest sample + 1; 0 beyond reach. x fastest.
     cells: Vec<u32>,
 }
@@ -29,6 +31,7 @@ impl NearestField {
             origin: bounds.min.map(|v| v as f32),
             inverse_edge: 1.0 / edge,
             size,
+            reach: reach + edge,
             cells: vec![0; size[0] * size[1] * size[2]],
         };
         field.fill(points, edge, reach);
@@ -100,6 +103,12 @@ impl NearestField {
     pub fn nearest(&self, p: [f32; 3]) -> Option<usize> {
         let at = self.at(self.index(p)?);
         (self.cells[at] as usize).checked_sub(1)
+    }
+
+    /// No place farther than this from all samples knows one, metres.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        f64::from(self.reach)
     }
 
     /// Bytes kept.

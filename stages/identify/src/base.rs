@@ -9,9 +9,10 @@ use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
+use crate::first::First;
 use crate::graded::Stencil;
 use crate::sites::GUESS_STEP;
-use crate::trial::{Trial, base_link, best, coarse_yaw, first_moving, prefix};
+use crate::trial::{Trial, base_link, best, coarse_yaw, prefix};
 use crate::volume::Sight;
 
 /// What is tuned.
@@ -88,8 +89,8 @@ pub struct BaseSearch<'a> {
     /// The link that stands on the plane, and its pose in the root's frame.
     pub(crate) base: usize,
     pub(crate) root_from_base: Pose,
-    /// The first joint that moves something with a surface, and the link that it moves.
-    pub(crate) first: Option<(usize, usize)>,
+    /// The first link that moves and has a surface.
+    pub(crate) first: Option<First>,
     /// Whether the planes are guesses, one close above the other.
     is_guess: bool,
     /// Lowest mean score of base and first link that counts.
@@ -119,7 +120,7 @@ impl<'a> BaseSearch<'a> {
             radius = radius.max(p.x.hypot(p.y));
             foot = foot.min(p.z);
         }
-        let first = first_moving(model);
+        let first = First::of(model);
         let is_guess = false;
         Some(Self {
             model,

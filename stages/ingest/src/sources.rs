@@ -4,11 +4,13 @@
 use crate::format::detect;
 use crate::las::Las;
 use crate::las_scans::LasScanner;
-use crate::raster::{self, Steps};
+use crate::raster::{self, Raster, Steps};
 use crate::reader::{RawStrip, Reader, Sampled, ScanSeed, Want};
 use crate::scanners::{Scanner, Scanners};
 use crate::settings::Settings;
-use contract::{Error, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip};
+use contract::{
+    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip,
+};
 use geometry::Pose;
 use std::path::{Path, PathBuf};
 
@@ -40,6 +42,9 @@ pub struct Before {
     pub scans: Vec<Scan>,
 }
 
+/// Said of a scan whose scanner is known and whose raster is not.
+const NO_RASTER: &str = "too few points to tell the raster: no free-space evidence from this scan";
+
 /// One open file.
 pub(crate) struct File {
     pub(crate) reader: Box<dyn Reader>,
@@ -62,8 +67,9 @@ pub fn open(
     paths: &[PathBuf],
     scanners: Option<&Scanners>,
     settings: &Settings,
+    fan: &impl Fan,
 ) -> Result<Sources> {
-    open_after(Before::default(), paths, scanners, settings)
+    open_after(Before::default(), paths, scanners, settings, fan)
 }
 
 /// The same, numbered after inputs of an earlier run.
@@ -75,6 +81,7 @@ pub fn open_after(
     paths: &[PathBuf],
     scanners: Option<&Scanners>,
     settings: &Settings,
+    fan: &impl Fan,
 ) -> Result<Sources> {
     let n_before = [before.inputs.len(), before.masks.len()];
     let Before { inputs, masks, scans } = before;
@@ -90,6 +97,7 @@ pub fn open_after(
     for path in paths {
         sources.add(path, &mut poses, settings).map_err(|e| e.at(path.display()))?;
     }
+    sources.find_lattices(settings, fan)?;
     sources.warnings.extend(poses.unused());
     Ok(sources)
 }
@@ -162,23 +170,39 @@ impl Sources {
                 n_points: mask.n_points,
             });
         }
-        let mut file = File {
-            reader,
-            first_scan,
-            first_mask,
-            moved: Vec::new(),
-            known: Vec::new(),
-            steps: Vec::new(),
-        };
+        let (moved, known, steps) = (Vec::new(), Vec::new(), Vec::new());
+        let mut file = File { reader, first_scan, first_mask, moved, known, steps };
         for i in 0..file.reader.scans().len() {
-            let mut scan = self.scan(id, &mut file, i, poses);
-            let (lattice, steps) = file.lattice(i, &mut scan, settings)?;
-            scan.lattice = lattice;
-            file.steps.push(steps);
+            let scan = self.scan(id, &mut file, i, poses);
             self.scans.push(scan);
         }
-        file.reader.check()?;
         self.files.push(file);
+        Ok(())
+    }
+
+    /// Looks at a sample of each scan for the raster that it was taken in.
+    fn find_lattices(&mut self, settings: &Settings, fan: &impl Fan) -> Result<()> {
+        let n_scans = |file: &File| file.reader.scans().len();
+        let all = (self.files.iter().enumerate())
+            .flat_map(|(f, file)| (0..n_scans(file)).map(move |i| (f, i)))
+            .collect();
+        let scan_of = |file: &File, i: usize| file.first_scan as usize + i;
+        let found = fan.fan(all, |(f, i): (usize, usize)| {
+            let file = &self.files[f];
+            let found = file.raster(i, self.scans[scan_of(file, i)].stated_points, settings);
+            let whole = file.reader.check().and(found);
+            whole.map_err(|e| e.at(self.inputs[self.n_before[0] + f].path.display()))
+        });
+        let mut found = found.into_iter();
+        for file in &mut self.files {
+            for i in 0..n_scans(file) {
+                let at = scan_of(file, i);
+                let (raster, note) = found.next().transpose()?.unwrap_or_default();
+                self.scans[at].notes.extend(note.map(str::to_owned));
+                self.scans[at].lattice = raster.map(|r| r.lattice);
+                file.steps.push(raster.map_or(Steps::None, |r| r.steps));
+            }
+        }
         Ok(())
     }
 
@@ -201,6 +225,7 @@ impl Sources {
             Format::Las | Format::Laz => None,
             Format::E57 | Format::Ptx => poses.by_scan_name(&seed.name),
         };
+        file.known.push(seed.scanner_known || replaced.is_some());
         file.moved.push(replaced.map(|pose| pose.inverse() * seed.world_from_scan));
         if let Some(pose) = replaced {
             scan.world_from_scan = pose;
@@ -226,32 +251,24 @@ impl File {
         }
     }
 
-    fn lattice(
-        &mut self,
+    /// The raster of a scan, where scanner and points are known and tell it, and what is odd about that.
+    fn raster(
+        &self,
         i: usize,
-        scan: &mut Scan,
+        stated_points: Option<u64>,
         settings: &Settings,
-    ) -> Result<(Option<contract::Lattice>, Steps)> {
-        let known = self.reader.scans()[i].scanner_known || self.moved[i].is_some();
-        self.known.push(known);
-        if !known || scan.stated_points == Some(0) {
-            return Ok((None, Steps::None));
+    ) -> Result<(Option<Raster>, Option<&'static str>)> {
+        if !self.known[i] || stated_points == Some(0) {
+            return Ok((None, None));
         }
         let mut sample: Vec<Sampled> = self.reader.sample(i, settings.sample_points)?;
         if let Some(new_from_file) = &self.moved[i] {
             sample.iter_mut().for_each(|s| s.xyz = moved(new_from_file, s.xyz));
         }
-        let n_points = scan.stated_points.or(self.reader.scans()[i].likely_points);
-        let Some(raster) = raster::estimate(&sample, n_points, settings) else {
-            if !sample.is_empty() {
-                scan.notes.push(
-                    "too few points to tell the raster: no free-space evidence from this scan"
-                        .into(),
-                );
-            }
-            return Ok((None, Steps::None));
-        };
-        Ok((Some(raster.lattice), raster.steps))
+        let n_points = stated_points.or(self.reader.scans()[i].likely_points);
+        let raster = raster::estimate(&sample, n_points, settings);
+        let is_odd = raster.is_none() && !sample.is_empty();
+        Ok((raster, is_odd.then_some(NO_RASTER)))
     }
 }
 

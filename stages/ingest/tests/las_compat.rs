@@ -2,6 +2,7 @@
 //! refused by name. The files are not part of the repository; without them these tests say that they were skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
+use contract::OneByOne;
 use ingest::{Settings, Sources, Want, open};
 use std::path::{Path, PathBuf};
 
@@ -160,7 +161,8 @@ fn valid_files_are_read_in_full() {
     let Some(folder) = folder() else { return };
     let settings = Settings::default();
     for (name, n, withheld, min, max) in VALID.iter().chain([&OLD_STREAM]) {
-        let sources = open(&[folder.join(name)], None, &settings).unwrap_or_else(|e| panic!("{e}"));
+        let sources = open(&[folder.join(name)], None, &settings, &OneByOne)
+            .unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(sources.masks.len(), 1, "{name}");
         assert_eq!(sources.masks[0].n_points, Some(*n), "{name}");
         assert_eq!(sources.scans.len(), 1, "{name}");
@@ -196,15 +198,17 @@ fn no_file_is_forgotten() {
 fn broken_files_are_refused_by_name() {
     let Some(folder) = folder() else { return };
     for (name, words) in BROKEN {
-        let error =
-            open(&[folder.join(name)], None, &Settings::default()).err().expect(name).to_string();
+        let error = open(&[folder.join(name)], None, &Settings::default(), &OneByOne)
+            .err()
+            .expect(name)
+            .to_string();
         assert!(error.contains(name) && error.contains(words), "{error}");
     }
 }
 
 /// Reads all of a damaged copy: an error or an answer, but no panic, and no memory beyond what the file can hold.
 fn survives(path: &Path) -> bool {
-    match open(&[path.to_owned()], None, &Settings::default()) {
+    match open(&[path.to_owned()], None, &Settings::default(), &OneByOne) {
         Err(_) => false,
         Ok(sources) => sources
             .strips(sources.inputs[0].id, Want::Everything)

@@ -1,6 +1,7 @@
 //! LAS files made here: how scanners apply to them, what is dropped, and what lies in the header costs.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
+use contract::OneByOne;
 use ingest::{Scanners, Settings, Sources, Want, open};
 use std::path::{Path, PathBuf};
 
@@ -94,7 +95,7 @@ fn source_ids_go_to_their_scanners_and_the_rest_to_none() {
          [[scanner]]\npoint_source_id = 2\nposition = [1004, 5, 6]\n[[scanner]]\npoint_source_id = 9\nposition = [0, 0, 0]\n",
     );
     let settings = Settings { strip_points: 700, ..Settings::default() };
-    let sources = open(&[path], Some(&scanners), &settings).unwrap();
+    let sources = open(&[path], Some(&scanners), &settings, &OneByOne).unwrap();
     let names: Vec<_> = sources.scans.iter().map(|s| s.name.as_str()).collect();
     assert_eq!(names, ["one", "hall 2", "hall (rest)"]);
     assert!(
@@ -116,7 +117,7 @@ fn entries_find_their_file_or_are_reported() {
     let poses = scanners(
         "[[scanner]]\nname = 'b'\nposition = [1007, 0, 0]\n[[scanner]]\nname = 'c'\nposition = [1, 0, 0]\n",
     );
-    let sources = open(&paths, Some(&poses), &Settings::default()).unwrap();
+    let sources = open(&paths, Some(&poses), &Settings::default(), &OneByOne).unwrap();
     assert_eq!(sources.scans.len(), 2);
     assert!(!sources.scans[0].has_beams() && sources.scans[1].has_beams());
     assert_eq!(
@@ -134,13 +135,14 @@ fn entries_find_their_file_or_are_reported() {
     );
 
     let one = scanners("[[scanner]]\nposition = [1001, 0, 0]\n");
-    let sources = open(&paths[..1], Some(&one), &Settings::default()).unwrap();
+    let sources = open(&paths[..1], Some(&one), &Settings::default(), &OneByOne).unwrap();
     assert!(
         sources.warnings.is_empty() && sources.scans.len() == 1 && sources.scans[0].has_beams()
     );
 
     let far = scanners("[[scanner]]\nposition = [50000000, 0, 0]\n");
-    let error = open(&paths[..1], Some(&far), &Settings::default()).err().unwrap().to_string();
+    let error =
+        open(&paths[..1], Some(&far), &Settings::default(), &OneByOne).err().unwrap().to_string();
     assert!(error.contains("a.las") && error.contains("same frame"), "{error}");
 }
 
@@ -165,7 +167,8 @@ fn lies_of_a_header_are_errors() {
         let mut bad = good.clone();
         bad[*at..at + bytes.len()].copy_from_slice(bytes);
         let path = write(folder.path(), "bad.las", &bad);
-        let error = open(&[path], None, &Settings::default()).err().expect(words).to_string();
+        let error =
+            open(&[path], None, &Settings::default(), &OneByOne).err().expect(words).to_string();
         assert!(error.contains("bad.las") && error.contains(words), "{error}");
     }
 }
@@ -183,13 +186,14 @@ fn what_is_no_scan_is_refused_by_name() {
         ("cloud.xyz", b"1 2 3\n4 5 6\n", "without scanner positions"),
     ] {
         let path = write(folder.path(), name, bytes);
-        let error = open(&[path], None, &settings).err().expect(name).to_string();
+        let error = open(&[path], None, &settings, &OneByOne).err().expect(name).to_string();
         assert!(error.contains(name) && error.contains(words), "{error}");
     }
-    let error = open(&[folder.path().to_owned()], None, &settings).err().unwrap().to_string();
+    let error =
+        open(&[folder.path().to_owned()], None, &settings, &OneByOne).err().unwrap().to_string();
     assert!(error.contains("folder"), "{error}");
-    assert!(open(&[folder.path().join("missing.las")], None, &settings).is_err());
-    assert!(open(&[], None, &settings).is_err());
+    assert!(open(&[folder.path().join("missing.las")], None, &settings, &OneByOne).is_err());
+    assert!(open(&[], None, &settings, &OneByOne).is_err());
 }
 
 /// A measurement, not a test: `cargo test --release -p ingest --test las_scanners -- --ignored --nocapture`.

@@ -2,7 +2,7 @@
 //! the repository; without them these tests say that they were skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
-use contract::Lattice;
+use contract::{Lattice, OneByOne};
 use ingest::{Scanners, Settings, Sources, Want, describe, open};
 use std::path::{Path, PathBuf};
 
@@ -52,7 +52,7 @@ fn depth_cameras_have_about_one_point_a_pixel() {
         let position = &scene["scanner_position_world"];
         let scanners = Scanners::parse(&format!("[[scanner]]\nposition = {position}")).unwrap();
         let path = folder.join(scene["files"][0].as_str().unwrap());
-        let sources = open(&[path], Some(&scanners), &Settings::default()).unwrap();
+        let sources = open(&[path], Some(&scanners), &Settings::default(), &OneByOne).unwrap();
         assert!(sources.warnings.is_empty());
         let lattice = sources.scans[0].lattice.unwrap();
         let (alone, filled) = filling(&sources, 0);
@@ -72,8 +72,13 @@ fn a_tilting_laser_without_rows_is_rebuilt() {
         return;
     };
     let scanners = Scanners::parse("[[scanner]]\nposition = [0, 0, 0]").unwrap();
-    let sources =
-        open(&[folder.join("pcl__room_scan1.laz")], Some(&scanners), &Settings::default()).unwrap();
+    let sources = open(
+        &[folder.join("pcl__room_scan1.laz")],
+        Some(&scanners),
+        &Settings::default(),
+        &OneByOne,
+    )
+    .unwrap();
     let (alone, filled) = filling(&sources, 0);
     eprintln!(
         "room: {:?} alone {alone:.3} points a pixel {filled:.3}",
@@ -81,7 +86,8 @@ fn a_tilting_laser_without_rows_is_rebuilt() {
     );
     // Each point stands twice in this file.
     assert!((1.9..2.3).contains(&filled), "{filled}");
-    let sources = open(&[folder.join("lgl__indoor.laz")], None, &Settings::default()).unwrap();
+    let sources =
+        open(&[folder.join("lgl__indoor.laz")], None, &Settings::default(), &OneByOne).unwrap();
     assert!(!sources.scans[0].has_beams());
     let text = describe(&sources)[0].to_string();
     assert!(text.contains("scanner: not known") && text.contains("free-space"), "{text}");
@@ -93,7 +99,7 @@ fn gridded_files_keep_their_grid() {
         return;
     };
     for name in ["kurt_2scans_cartesian.e57", "kurt_2scans_spherical.e57", "kurt_2scans.ptx"] {
-        let sources = open(&[kurt.join(name)], None, &Settings::default()).unwrap();
+        let sources = open(&[kurt.join(name)], None, &Settings::default(), &OneByOne).unwrap();
         assert_eq!(sources.scans.len(), 2, "{name}");
         for scan in 0..2 {
             let lattice = sources.scans[scan].lattice.unwrap();
@@ -115,7 +121,8 @@ fn gridded_files_keep_their_grid() {
         return;
     };
     let sources =
-        open(&[pump.join("pumpAVisualReferenceImage.e57")], None, &Settings::default()).unwrap();
+        open(&[pump.join("pumpAVisualReferenceImage.e57")], None, &Settings::default(), &OneByOne)
+            .unwrap();
     let [row, col] = degrees(&sources.scans[0].lattice.unwrap());
     let (alone, filled) = filling(&sources, 0);
     eprintln!("pump: {row:.4} {col:.4} alone {alone:.4} filled {filled:.3}");

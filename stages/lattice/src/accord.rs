@@ -1,10 +1,9 @@
 //! The views of a region in; out comes where they contradict each other: missing returns where others measured matter, which
 //! prove nothing, and matter where others saw free space, which moved.
 
-use contract::View;
+use contract::{Fan, View};
 use geometry::depth::{rows, transform};
 use geometry::narrow::floor_i32;
-use std::collections::BTreeMap;
 
 /// Share of the matter measured by other scans that a scanner must have missed for its missing returns to mean nothing.
 const BLIND: f32 = 0.5;
@@ -41,29 +40,29 @@ const BEYOND: f32 = 0.10;
 const FOOTPRINT: f32 = 0.03;
 /// Edge of the cells that contradictions are counted in, metres, and points that make one.
 const CELL: f32 = 0.05;
-const MIN_IN_CELL: u32 = 3;
+const MIN_IN_CELL: usize = 3;
 
 /// What was here for one scan and gone for another: middles of cells of 5 cm, local frame. Edges and wires make a few, what
 /// moved makes many.
 #[must_use]
-pub fn disagreement(views: &[View]) -> Vec<[f32; 3]> {
-    let mut cells: BTreeMap<[i32; 3], u32> = BTreeMap::new();
-    for (own, view) in views.iter().enumerate() {
-        let step = (view.points.len() / N_ASKED).max(1);
+pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
+    let gone_of = |own: usize| {
         let others = views.iter().enumerate().filter(|(other, _)| *other != own);
         let images = others.flat_map(|(_, v)| &v.images);
         let images: Vec<_> = images.map(|i| (i, rows(i.camera_from_local()))).collect();
-        for point in view.points.iter().step_by(step) {
-            let is_gone = images.iter().any(|(image, camera_from_local)| {
-                let look = image.look(transform(camera_from_local, point.xyz), FOOTPRINT);
+        let is_gone = |point: &[f32; 3]| {
+            images.iter().any(|(image, camera_from_local)| {
+                let look = image.look(transform(camera_from_local, *point), FOOTPRINT);
                 look.is_some_and(|l| l.around.is_finite() && l.around - l.range > BEYOND)
-            });
-            if is_gone {
-                let cell = point.xyz.map(|v| floor_i32(f64::from(v / CELL)));
-                *cells.entry(cell).or_default() += 1;
-            }
-        }
-    }
-    let many = cells.iter().filter(|(_, n)| **n >= MIN_IN_CELL);
-    many.map(|(cell, _)| cell.map(|i| (i as f32 + 0.5) * CELL)).collect()
+            })
+        };
+        let step = (views[own].points.len() / N_ASKED).max(1);
+        let asked = views[own].points.iter().step_by(step).map(|point| point.xyz);
+        asked.filter(is_gone).map(|p| p.map(|v| floor_i32(f64::from(v / CELL)))).collect()
+    };
+    let found: Vec<Vec<[i32; 3]>> = fan.fan((0..views.len()).collect(), gone_of);
+    let mut cells: Vec<[i32; 3]> = found.into_iter().flatten().collect();
+    cells.sort_unstable();
+    let many = cells.chunk_by(|a, b| a == b).filter(|same| same.len() >= MIN_IN_CELL);
+    many.map(|same| same[0].map(|i| (i as f32 + 0.5) * CELL)).collect()
 }

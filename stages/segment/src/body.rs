@@ -2,7 +2,7 @@
 
 use crate::Settings;
 use crate::field::{FIELD_REACH, Field};
-use contract::{Fit, ScanId, Verdict};
+use contract::{Fan, Fit, ScanId, Verdict};
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::{DMatrix, DVector};
 use robot::{Kinematics, Model};
@@ -56,29 +56,43 @@ impl Body {
 }
 
 /// The fits that are used for labels; fields are shared between fits of one model.
-pub(crate) fn bodies(fits: &[Fit], models: &[Model], settings: &Settings) -> Vec<Body> {
-    let mut fields: BTreeMap<usize, Vec<Option<Arc<Field>>>> = BTreeMap::new();
-    let mut out = Vec::new();
+pub(crate) fn bodies(
+    fits: &[Fit],
+    models: &[Model],
+    settings: &Settings,
+    fan: &impl Fan,
+) -> Vec<Body> {
     let all = fits.iter().enumerate().flat_map(|(robot, fit)| {
         std::iter::once(fit).chain(&fit.stays).map(move |fit| (robot, fit))
     });
-    for (robot, fit) in all {
+    let used = all.filter_map(|(robot, fit)| {
         // Labels hold a robot as i16.
-        let (Ok(robot), Some(model)) = (i16::try_from(robot), models.get(fit.model)) else {
-            continue;
-        };
-        let robot = robot.unsigned_abs();
-        if fit.verdict == Verdict::Refused || fit.joints.len() != model.free.len() {
-            continue;
-        }
-        let fields = fields.entry(fit.model).or_insert_with(|| {
-            model.links.iter().map(|l| Field::new(&l.cad).map(Arc::new)).collect()
-        });
-        let links = posed(fit, model, fields, settings);
+        let (robot, model) = (i16::try_from(robot).ok()?, models.get(fit.model)?);
+        let is_used = fit.verdict != Verdict::Refused && fit.joints.len() == model.free.len();
+        is_used.then_some((robot.unsigned_abs(), fit, model))
+    });
+    let used: Vec<(u16, &Fit, &Model)> = used.collect();
+    let fields = fields(&used, fan);
+    let body = |(robot, fit, model): &(u16, &Fit, &Model)| {
+        let links = posed(fit, model, &fields[&fit.model], settings);
         let region = links.iter().fold(Aabb::EMPTY, |all, link| all.union(&link.region()));
-        if !region.is_empty() {
-            out.push(Body { robot, stands_in: fit.stands_in.clone(), region, links });
-        }
+        let stands_in = fit.stands_in.clone();
+        (!region.is_empty()).then_some(Body { robot: *robot, stands_in, region, links })
+    };
+    used.iter().filter_map(body).collect()
+}
+
+/// For each model in use: the fields of its links that have a surface.
+fn fields(
+    used: &[(u16, &Fit, &Model)],
+    fan: &impl Fan,
+) -> BTreeMap<usize, Vec<Option<Arc<Field>>>> {
+    let models: BTreeMap<usize, &Model> = used.iter().map(|(_, fit, m)| (fit.model, *m)).collect();
+    let links = models.iter().flat_map(|(at, model)| model.links.iter().map(move |l| (*at, l)));
+    let made = |(at, link): (usize, &robot::Link)| (at, Field::new(&link.cad).map(Arc::new));
+    let mut out: BTreeMap<usize, Vec<Option<Arc<Field>>>> = BTreeMap::new();
+    for (at, field) in fan.fan(links.collect(), made) {
+        out.entry(at).or_default().push(field);
     }
     out
 }

@@ -5,7 +5,7 @@ use crate::field::FIELD_REACH;
 use crate::raster::Raster;
 use crate::{Ground, Settings};
 use contract::{
-    Fit, Floor, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result,
+    Fan, Fit, Floor, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result,
     Scan, Tile, TileLabels,
 };
 use geometry::depth::{Rows, rotate, rows, transform};
@@ -92,9 +92,10 @@ impl Segment {
         floor: &Floor,
         scans: &[Scan],
         settings: Settings,
+        fan: &impl Fan,
     ) -> Self {
         Self {
-            bodies: bodies(fits, models, &settings),
+            bodies: bodies(fits, models, &settings, fan),
             effectors: fits.iter().map(|fit| effectors(models.get(fit.model))).collect(),
             ground: Ground::new(floor, &settings),
             scans: scans.to_vec(),
@@ -106,12 +107,6 @@ impl Segment {
     #[must_use]
     pub fn regions(&self) -> Vec<Aabb> {
         self.bodies.iter().map(|body| body.region).collect()
-    }
-
-    /// The floor, for the default label of every point.
-    #[must_use]
-    pub fn ground(&self) -> &Ground {
-        &self.ground
     }
 
     /// A tool's link is part of an effector, not of the robot.

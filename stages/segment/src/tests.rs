@@ -2,8 +2,8 @@
 
 use crate::{Ground, Scratch, Segment, Settings};
 use contract::{
-    Fit, Floor, FloorLevel, InputId, JointFit, Label, Lattice, Map, MaskId, Pixel, PlaceRun,
-    PointKind, Scan, ScanId, Tile, TileAt, Verdict,
+    Fit, Floor, FloorLevel, InputId, JointFit, Label, Lattice, Map, MaskId, OneByOne, Pixel,
+    PlaceRun, PointKind, Scan, ScanId, Tile, TileAt, Verdict,
 };
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use robot::{CadCloud, Joint, JointKind, Link, Mesh, Model, Motion, Role};
@@ -221,8 +221,14 @@ fn links_are_found_and_nothing_fixed_is_lost() {
     let scan = scan(at(4.0, 1.6, 1.4) * Pose::rotation(Vector::z() * 3.5));
     let tiles = shoot(&bricks, &scan);
     let fits = [fit(world_from_base, q)];
-    let segment =
-        Segment::new(&fits, &[model()], &floor(), std::slice::from_ref(&scan), Settings::default());
+    let segment = Segment::new(
+        &fits,
+        &[model()],
+        &floor(),
+        std::slice::from_ref(&scan),
+        Settings::default(),
+        &OneByOne,
+    );
     let ground = Ground::new(&floor(), &Settings::default());
     let mut scratch = Scratch::default();
     let (mut hit, mut missed, mut invented, mut n_fixed) = ([0_u32; 2], [0_u32; 2], [0_u32; 2], 0);
@@ -285,8 +291,14 @@ fn the_top_of_a_stand_goes_on_beside_the_foot() {
     ];
     let scan = scan(at(3.0, 1.6, 1.9) * Pose::rotation(Vector::z() * 3.6));
     let fits = [fit(world_from_base, 0.0)];
-    let segment =
-        Segment::new(&fits, &[model()], &floor(), std::slice::from_ref(&scan), Settings::default());
+    let segment = Segment::new(
+        &fits,
+        &[model()],
+        &floor(),
+        std::slice::from_ref(&scan),
+        Settings::default(),
+        &OneByOne,
+    );
     let mut scratch = Scratch::default();
     let (mut n_stand, mut n_lost, mut n_base, mut n_found) = (0_u32, 0_u32, 0_u32, 0_u32);
     for (tile, truth) in shoot(&bricks, &scan) {
@@ -369,7 +381,7 @@ fn points_of_a_real_robot_go_to_their_links() {
     }
     let scan = Scan { lattice: None, ..scan(Pose::identity()) };
     let started = std::time::Instant::now();
-    let segment = Segment::new(&[fit], &[model], &floor(), &[scan], Settings::default());
+    let segment = Segment::new(&[fit], &[model], &floor(), &[scan], Settings::default(), &OneByOne);
     let built = started.elapsed();
     let out = segment.apply(tile, &mut Scratch::default()).expect("maps");
     let labels: Vec<(u64, Label)> = single(&out.labels).collect();

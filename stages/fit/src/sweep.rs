@@ -1,0 +1,190 @@
+//! A posture and one of its joints in; out comes how far the points near the links that the joint moves are from the arm as
+//! it turns (fit.md §4e).
+
+use geometry::Point;
+
+use crate::beam::Hypothesis;
+use crate::placed::Placed;
+use crate::refine::Refine;
+
+/// Arc between trial values at the joint's lever, metres: finer than the features that tell them apart.
+const STEP: f64 = 0.003;
+/// Largest step, radians: 1°.
+const MAX_STEP: f64 = 0.0175;
+/// Points farther than this from everything count as if they were so far, metres.
+const CAP: f32 = 0.015;
+/// Points in front of the flange's face count as if they were no farther, metres: something may hang there.
+const HELD: f32 = 0.5 * CAP;
+/// Points within this of the swept links take part, metres.
+const NEAR: f64 = 0.03;
+/// Most points of a sweep.
+const MAX_POINTS: usize = 3000;
+/// Fewer points tell nothing.
+pub(crate) const MIN_POINTS: usize = 30;
+
+/// The links behind one joint, which turn apart from the rest of a posture.
+pub(crate) struct Sweep<'a> {
+    refine: &'a Refine<'a>,
+    h: &'a Hypothesis,
+    joint: usize,
+    /// Points that any turn of those links may explain.
+    points: Vec<u32>,
+    /// Distances of the points to all other links, metres.
+    still: Vec<f32>,
+    /// The links that turn.
+    pub(crate) moved: Vec<usize>,
+}
+
+impl<'a> Sweep<'a> {
+    /// `None` where the joint slides or moves nothing, or the points are too few.
+    pub(crate) fn new(
+        refine: &'a Refine<'a>,
+        h: &'a Hypothesis,
+        near: &[u32],
+        joint: usize,
+    ) -> Option<Self> {
+        let moved = refine.prepared.carried(joint);
+        if refine.is_prismatic(joint) || moved.is_empty() {
+            return None;
+        }
+        let points = refine.swept(h, near, &moved);
+        if points.len() < MIN_POINTS {
+            return None;
+        }
+        let still = refine.distances(h, &points, |l| !moved.contains(&l));
+        Some(Self { refine, h, joint, points, still, moved })
+    }
+
+    /// Values that tell all there is over a span, radians.
+    pub(crate) fn n_values(&self, span: f64) -> usize {
+        let step = (STEP / self.refine.prepared.lever[self.joint]).min(MAX_STEP);
+        (span / step).ceil() as usize
+    }
+
+    /// The posture with another value of the joint.
+    pub(crate) fn at(&self, value: f64) -> Hypothesis {
+        let mut other = self.h.clone();
+        other.posture[self.joint] = value;
+        other
+    }
+
+    /// Distances of the points to some of the links where the joint has a value, metres.
+    pub(crate) fn distances(&self, value: f64, links: &[usize]) -> Vec<f32> {
+        self.refine.distances(&self.at(value), &self.points, |l| links.contains(&l))
+    }
+
+    /// Sum of the squared distances to the nearest of what stands still and what is turned, m².
+    pub(crate) fn cost(&self, turned: &[&[f32]]) -> f64 {
+        let least = |i: usize| turned.iter().map(|d| d[i]).fold(self.still[i], f32::min);
+        (0..self.points.len()).map(|i| f64::from(least(i)).powi(2)).sum()
+    }
+
+    /// The same where the joint has a value, and something may hang on the flange.
+    pub(crate) fn cost_held(&self, value: f64) -> f64 {
+        let own = self.distances(value, &self.moved);
+        self.refine.squares(&self.at(value), &self.points, &[&own, &self.still])
+    }
+}
+
+impl Refine<'_> {
+    /// How much worse another posture explains the points on the links that stand differently in it: the part of its
+    /// squared distances that the best one does without; about 0 for equals, negative where the other is better.
+    pub(crate) fn worsening(&self, best: &Hypothesis, other: &Hypothesis, near: &[u32]) -> f64 {
+        let moved = crate::judge::moved([self.prepared; 2], [best, other]);
+        self.worsening_in(self, [best, other], &moved, near)
+    }
+
+    /// Links that another model of the same robot places otherwise.
+    pub(crate) fn apart(&self, other: &Self, h: &Hypothesis) -> Vec<usize> {
+        crate::judge::moved([self.prepared, other.prepared], [h, h])
+    }
+
+    /// The same for a posture here and one of another model of the same robot; `moved` are the links that stand
+    /// differently.
+    pub(crate) fn worsening_in(
+        &self,
+        there: &Self,
+        [best, other]: [&Hypothesis; 2],
+        moved: &[usize],
+        near: &[u32],
+    ) -> f64 {
+        let mut points = self.swept(best, near, moved);
+        points.extend(there.swept(other, near, moved));
+        points.sort_unstable();
+        points.dedup();
+        if points.len() < MIN_POINTS {
+            return 0.0;
+        }
+        let squares = |refine: &Self, h: &Hypothesis| {
+            refine.squares(h, &points, &[&refine.distances(h, &points, |_| true)])
+        };
+        let (a, b) = (squares(self, best), squares(there, other));
+        (b - a) / b.max(a).max(points.len() as f64 * self.scene.noise * self.scene.noise)
+    }
+
+    /// Sum of the squared distances of points, each the least of its own; those in front of the flange's face count less:
+    /// something may hang there.
+    pub(crate) fn squares(&self, h: &Hypothesis, points: &[u32], distances: &[&[f32]]) -> f64 {
+        let held = self.held(h, points);
+        let of = |i: usize| {
+            let most = if held[i] { HELD } else { CAP };
+            f64::from(distances.iter().map(|d| d[i]).fold(most, f32::min)).powi(2)
+        };
+        (0..points.len()).map(of).sum()
+    }
+
+    /// Which points may be of what hangs on the flange.
+    fn held(&self, h: &Hypothesis, points: &[u32]) -> Vec<bool> {
+        let face = self.prepared.face.and_then(|face| {
+            let frames = self.prepared.frames(h);
+            frames.into_iter().find(|(l, _)| *l == face.link).map(|(_, frame)| (face, frame))
+        });
+        let Some((face, frame)) = face else { return vec![false; points.len()] };
+        let at = |i: &u32| geometry::depth::transform(&frame, self.scene.points[*i as usize].p);
+        points.iter().map(|i| face.is_held(at(i))).collect()
+    }
+
+    /// Points near the links whatever their joint's value: within their sphere about the joint's axis, thinned.
+    pub(crate) fn swept(&self, h: &Hypothesis, near: &[u32], moved: &[usize]) -> Vec<u32> {
+        let poses = self.local_from_links(h);
+        let spheres: Vec<(Point, f64)> = moved
+            .iter()
+            .map(|&l| {
+                let bounds = &self.prepared.model.links[l].bounds;
+                let radius = 0.5 * bounds.size().iter().map(|s| s * s).sum::<f64>().sqrt() + NEAR;
+                let middle: Point = bounds.center();
+                (poses[l] * middle, radius)
+            })
+            .collect();
+        let inside = |i: &u32| {
+            let p = Point::from(self.scene.points[*i as usize].p.map(f64::from));
+            spheres.iter().any(|(c, r)| (p - c).norm() < *r)
+        };
+        let all: Vec<u32> = near.iter().copied().filter(inside).collect();
+        let n = all.len().min(MAX_POINTS);
+        (0..n).map(|k| all[k * all.len() / n]).collect()
+    }
+
+    /// Distance of each point from the surface of the chosen links along their normals, at most the cap, metres.
+    pub(crate) fn distances(
+        &self,
+        h: &Hypothesis,
+        points: &[u32],
+        chosen: impl Fn(usize) -> bool,
+    ) -> Vec<f32> {
+        let placed = Placed::new(self.prepared, h, f64::from(CAP), chosen);
+        let of = |&i: &u32| {
+            let mut least = CAP;
+            placed.each(self.scene.points[i as usize].p, |link, at, q| {
+                let cad = &self.prepared.model.links[link].cad;
+                let (x, n) = (cad.points[at], cad.normals[at]);
+                let off: f32 = (0..3).map(|k| n[k] * (q[k] - x[k])).sum();
+                let apart: f32 = (0..3).map(|k| (q[k] - x[k]).powi(2)).sum::<f32>().sqrt();
+                // Beyond the edge of a facet its plane means nothing.
+                least = least.min(if apart > 2.0 * cad.spacing + CAP { CAP } else { off.abs() });
+            });
+            least
+        };
+        points.iter().map(of).collect()
+    }
+}
