@@ -24,13 +24,17 @@ pub(crate) struct Spin {
     pub(crate) extent: f64,
 }
 
-/// Size of the run of values around `own`, up or down, whose costs are within the limit.
+/// How far the run of values around `own` reaches, up or down, whose costs are within the limit; it may begin a little
+/// beside `own`, to which all points drew it, not those of the sweep alone.
 fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
     let mut offsets: Vec<(f64, f64)> = costs.iter().map(|c| (c.0 - own, c.1)).collect();
     offsets.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_beside = |c: &&(f64, f64)| c.1 > limit && c.0.abs() <= APART;
     let is_good = |c: &&(f64, f64)| c.1 <= limit;
-    let up = offsets.iter().filter(|c| c.0 >= 0.0).take_while(is_good).last();
-    let down = offsets.iter().rev().filter(|c| c.0 <= 0.0).take_while(is_good).last();
+    let up = offsets.iter().filter(|c| c.0 >= 0.0);
+    let down = offsets.iter().rev().filter(|c| c.0 <= 0.0);
+    let up = up.skip_while(is_beside).take_while(is_good).last();
+    let down = down.skip_while(is_beside).take_while(is_good).last();
     up.map_or(0.0, |c| c.0).max(down.map_or(0.0, |c| -c.0))
 }
 
@@ -83,5 +87,25 @@ impl Refine<'_> {
             }
         }
         Some(Spin { joint, values, extent })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::extent;
+
+    #[test]
+    fn runs_reach_as_far_as_values_are_as_good() {
+        let costs = |good: &[i32]| -> Vec<(f64, f64)> {
+            let cost = |k: i32| if good.contains(&k) { 1.0 } else { 3.0 };
+            (-9..=9).map(|k| (0.02 * f64::from(k), cost(k))).collect()
+        };
+        let of = |good: &[i32]| (extent(&costs(good), 0.0, 2.0) / 0.02).round() as i32;
+        assert_eq!(of(&[-1, 0, 1, 2, 5]), 2);
+        // The own value is none of the run, but near it.
+        assert_eq!(of(&[-4, -3, -2, -1]), 4);
+        // Another run altogether.
+        assert_eq!(of(&[6, 7]), 0);
+        assert_eq!(of(&[]), 0);
     }
 }
