@@ -89,11 +89,11 @@ impl Cell {
         *place += hits.len() as u64;
     }
 
-    /// Sends the scans through the stages of the main job, from the store on; `models` are tried, or the first one is
-    /// refined from the starts where there are any.
+    /// Sends the scans through the stages of the main job, from the store on; the models of the shelf are
+    /// tried, or the first one is refined from the starts where there are any.
     pub(super) fn search(
         self,
-        (models, starts): (&[Model], &[Start]),
+        (shelf, starts): (&Shelf<'_>, &[Start]),
         dir: &Path,
         (settings, means, engine): (&Settings, &Means, &Engine),
     ) -> Result<Found> {
@@ -104,7 +104,6 @@ impl Cell {
             sink.add(&scatter.apply(strip, &mut ())?)?;
         }
         let store = sink.finish(engine, means.store_bytes())?;
-        let shelf = Shelf::new(models);
         shelf.prepare();
         let (surfaces, gather) =
             (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
@@ -112,7 +111,7 @@ impl Cell {
         let clusters =
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let regions = identify::regions(&clusters, &settings.region);
-        let search = Search::new(&shelf, scans, &store, &ground, settings);
+        let search = Search::new(shelf, scans, &store, &ground, settings);
         if let Some(start) = starts.first() {
             let base = start.0.translation.vector;
             let apart = |r: &Region| (r.origin.coords - base).norm();
@@ -123,8 +122,8 @@ impl Cell {
         }
         let started = Instant::now();
         let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
-        let mut fits = fit::choose(fits.into_iter().flatten().collect(), models);
-        let mut models = models.to_vec();
+        let mut models = shelf.models().to_vec();
+        let mut fits = fit::choose(fits.into_iter().flatten().collect(), &models);
         fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
         if settings.fit.calibrate {
             fits = calibrate(fits, &mut models, (&search, &regions), engine)?;

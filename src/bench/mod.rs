@@ -22,6 +22,7 @@ mod watch;
 
 use crate::engine::Engine;
 use crate::job::Means;
+use crate::search::Shelf;
 use crate::{demo, library};
 use cell::Cell;
 use condition::{Case, cases};
@@ -74,6 +75,7 @@ pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String>
     let cases = cases(bench, &models, &chosen)?;
     let mut journal =
         bench.out.as_deref().map(|dir| Journal::create(dir, "accuracy.jsonl")).transpose()?;
+    let library = Shelf::new(&models);
     let mut rows = Vec::with_capacity(cases.len());
     let store = tempfile::tempdir()?;
     // What stages say of single cells would drown what is said of cases.
@@ -81,7 +83,7 @@ pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String>
     quiet.cancel = engine.cancel.clone();
     for (i, case) in cases.iter().enumerate() {
         engine.cancel.check()?;
-        let row = run(case, &models, bench.whole_library, (store.path(), means, &quiet));
+        let row = run(case, &library, bench.whole_library, (store.path(), means, &quiet));
         let line = row.line();
         if let Some(journal) = &mut journal {
             journal.add(&row)?;
@@ -110,10 +112,11 @@ fn json(rows: &[Row]) -> Result<String> {
 /// One case; what goes wrong in it is a row, too.
 fn run(
     case: &Case,
-    models: &[Model],
+    library: &Shelf<'_>,
     whole_library: bool,
     (store, means, engine): (&Path, &Means, &Engine),
 ) -> Row {
+    let models = library.models();
     let started = Instant::now();
     let mount = draw::mount(case, models);
     let mut real = models.to_vec();
@@ -121,7 +124,7 @@ fn run(
         real[case.model] = mount.tooled(models, case.model);
     }
     let seen = draw::draw(case, &real[case.model]).and_then(|drawn| {
-        let tried = tried(case, models, whole_library);
+        let few = few(case, models, whole_library);
         let cell = Cell::scan(&drawn.scene, &drawn.models(&real, case), engine)?;
         let mut settings = means.settings.clone();
         if case.condition.method != Method::default() {
@@ -129,7 +132,12 @@ fn run(
         }
         settings.fit.calibrate |= case.condition.calibrate;
         let starts = draw::starts(case, &drawn);
-        let found = cell.search((&tried, &starts), store, (&settings, means, engine))?;
+        let search =
+            |shelf: &Shelf<'_>| cell.search((shelf, &starts), store, (&settings, means, engine));
+        let found = match &few {
+            Some(few) => search(&Shelf::new(few)),
+            None => search(library),
+        }?;
         Ok((drawn, found))
     });
     match seen {
@@ -140,13 +148,13 @@ fn run(
     }
 }
 
-/// Models that a case is searched for.
-fn tried(case: &Case, models: &[Model], whole_library: bool) -> Vec<Model> {
+/// Models that a case is searched for, where they are not all of the library.
+fn few(case: &Case, models: &[Model], whole_library: bool) -> Option<Vec<Model>> {
     if whole_library && case.condition.perturbed_deg == 0.0 {
-        return models.to_vec();
+        return None;
     }
     let tools = models.iter().filter(|m| case.condition.tool && m.is_tool());
-    std::iter::once(&models[case.model]).chain(tools).cloned().collect()
+    Some(std::iter::once(&models[case.model]).chain(tools).cloned().collect())
 }
 
 /// Indices of the robots whose names are asked for.

@@ -240,7 +240,7 @@ impl CaseRow for Row {
         }
         let yes = |b: bool| if b { "found" } else { "MISSED" };
         format!(
-            "{}: {:.1} M points and {:.1} M new: {:.1} s, again {:.1} s ({:.1} %); robot {}, pallet {}, barrel {}, {} invented {:?}; joint {:.3}° ({:.3}° alone), F1 {:.4} ({:.4}), registration left {:.1} to {:.1} mm, {} of {} tiles the same",
+            "{}: {:.1} M points and {:.1} M new: {:.1} s, again {:.1} s ({:.1} %); robot {}, pallet {}, barrel {}, {} invented {:?}; joint {}°, F1 {}, registration left {:.1} to {:.1} mm, {} of {} tiles the same",
             self.seed,
             self.n_points as f64 * 1e-6,
             self.n_new as f64 * 1e-6,
@@ -252,10 +252,8 @@ impl CaseRow for Row {
             yes(self.barrel),
             self.invented.len(),
             self.invented,
-            self.joint[0],
-            self.joint[1],
-            self.f1[0],
-            self.f1[1],
+            alone(self.joint, 3),
+            alone(self.f1, 4),
             1e3 * self.left[0],
             1e3 * self.left[1],
             self.n_same[0],
@@ -264,15 +262,24 @@ impl CaseRow for Row {
     }
 }
 
+/// A figure, and that of a run of the new scans alone where there was one.
+fn alone([own, alone]: [f64; 2], digits: usize) -> String {
+    if alone.is_finite() {
+        format!("{own:.digits$} ({alone:.digits$} alone)")
+    } else {
+        format!("{own:.digits$}")
+    }
+}
+
 fn table(rows: &[Row]) -> String {
     let mut out = String::from(
-        "| seed | points, new | whole s | again s | share | robot, pallet, barrel | invented | joint °, alone | F1, alone | tiles the same |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        "| seed | points, new | whole s | again s | share | robot, pallet, barrel | invented | joint ° | F1 | tiles the same |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for row in rows.iter().filter(|r| r.failed.is_none()) {
         let n = [row.robot, row.pallet, row.barrel].iter().filter(|b| **b).count();
         let _ = writeln!(
             out,
-            "| {} | {:.1} M, {:.1} M | {:.1} | {:.1} | {:.1} % | {n} of 3 | {} | {:.3}, {:.3} | {:.4}, {:.4} | {} of {} |",
+            "| {} | {:.1} M, {:.1} M | {:.1} | {:.1} | {:.1} % | {n} of 3 | {} | {} | {} | {} of {} |",
             row.seed,
             row.n_points as f64 * 1e-6,
             row.n_new as f64 * 1e-6,
@@ -280,10 +287,8 @@ fn table(rows: &[Row]) -> String {
             row.seconds[1],
             100.0 * row.seconds[1] / row.seconds[0],
             row.invented.len(),
-            row.joint[0],
-            row.joint[1],
-            row.f1[0],
-            row.f1[1],
+            alone(row.joint, 3),
+            alone(row.f1, 4),
             row.n_same[0],
             row.n_same[1],
         );

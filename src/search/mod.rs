@@ -30,6 +30,11 @@ impl<'a> Shelf<'a> {
         Self { models, prepared: models.iter().map(|_| OnceLock::new()).collect() }
     }
 
+    /// The library.
+    pub(crate) fn models(&self) -> &'a [Model] {
+        self.models
+    }
+
     /// Makes all of it now.
     pub(crate) fn prepare(&self) {
         (0..self.models.len()).into_par_iter().for_each(|i| {
@@ -136,7 +141,7 @@ impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn region(&self, region: &Region) -> Result<Vec<Fit>> {
         let views = self.views(region)?;
         let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
         if self.settings.fit.method == Method::Paper {
             let means = (&self.settings.fit, &self.settings.paper);
             let models = (0..self.shelf.models.len()).into_par_iter();
@@ -299,7 +304,7 @@ impl<'a, 'm> Search<'a, 'm> {
     ) -> Result<Option<Fit>> {
         let views = self.views(region)?;
         let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
         let prepared = Prepared::new(before.model, model);
         Ok(fit::again(before, &prepared, &scene, &self.settings.fit, &AllThreads))
     }
@@ -313,7 +318,7 @@ impl<'a, 'm> Search<'a, 'm> {
     ) -> Result<Option<Fit>> {
         let views = self.views(region)?;
         let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
         let normal = base.rotation * Vector::z();
         let offset = normal.dot(&base.translation.vector);
         let plane = Plane { normal, offset };
@@ -343,7 +348,7 @@ impl<'a, 'm> Search<'a, 'm> {
         let Some(region) = home else { return Ok(None) };
         let views = self.views(region)?;
         let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
         Ok(Some(work(&scene, &self.settings.fit)))
     }
 
@@ -357,7 +362,7 @@ impl<'a, 'm> Search<'a, 'm> {
         let views = self.views(region)?;
         let planes = self.planes(region);
         let settings = &self.settings.fit;
-        let scene = Scene::new(region, &views, &planes, settings);
+        let scene = Scene::new(region, &views, &planes, settings, &AllThreads);
         let prepared = self.shelf.prepared(model);
         let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, &scene, settings, (&s.0, &s.1));
         Ok(starts.par_iter().map(end).collect())

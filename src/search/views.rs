@@ -2,6 +2,7 @@
 //! can use.
 
 use super::Search;
+use crate::engine::AllThreads;
 use contract::{Region, Result, Scan, View};
 use lattice::{ViewBuilder, ViewSettings};
 use rayon::prelude::*;
@@ -16,7 +17,7 @@ impl Search<'_, '_> {
     /// What each scan sees of the region, those that see something.
     pub(super) fn views(&self, region: &Region) -> Result<Vec<View>> {
         let mut views = self.views_by(region, &self.settings.view)?;
-        lattice::agree(&mut views);
+        lattice::agree(&mut views, &AllThreads);
         Ok(views)
     }
 

@@ -191,9 +191,9 @@ impl Adjust<'_> {
             if distance > gate {
                 return None;
             }
-            let cad = &refine.prepared.model.links[link].cad;
-            let n = poses[link].rotation * Vector::from(cad.normals[sample].map(f64::from));
-            let x = poses[link] * Point::from(cad.points[sample].map(f64::from));
+            let facet = &refine.prepared.links[link].fields.facets[sample];
+            let n = poses[link].rotation * Vector::from(facet.n.map(f64::from));
+            let x = poses[link] * Point::from(facet.x.map(f64::from));
             let r = n.dot(&(p - x.coords));
             // Beside the surface's edge its plane means nothing.
             let beside = (distance * distance - r * r).max(0.0).sqrt();

@@ -14,6 +14,7 @@ mod branch;
 mod calibrate;
 mod choose;
 mod face;
+mod facets;
 mod judge;
 mod mount;
 mod noise;

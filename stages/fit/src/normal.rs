@@ -5,7 +5,7 @@
 //! `H −= Σ κ_c a_c a_cᵀ`, `g −= Σ κ_c a_c R_c` with `a_c = Σ w J`, `R_c = Σ w r`, `W_c = Σ w`,
 //! `κ_c = σ_u² / (1 + σ_u² W_c)`.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 /// Unknowns of a scan: shift, turn, range bias.
 pub(crate) const N_SCAN: usize = 7;
@@ -45,6 +45,50 @@ struct Patch {
     r: f64,
 }
 
+/// Residuals whose products are added together.
+const BATCH: usize = 64;
+
+/// Rows of one scan that wait for that.
+#[derive(Debug)]
+struct Batch {
+    view: usize,
+    n: usize,
+    /// Length of a row: unknowns of the robot, then those of the scan.
+    width: usize,
+    /// Row after row, plain and with their weights.
+    rows: Vec<f64>,
+    weighted: Vec<f64>,
+}
+
+impl Batch {
+    fn new(width: usize) -> Self {
+        let zeros = || vec![0.0; BATCH * width];
+        Self { view: 0, n: 0, width, rows: zeros(), weighted: zeros() }
+    }
+
+    /// Keeps a row; it, with its weight, back.
+    #[inline]
+    fn push(&mut self, row: &Row<'_>) -> &[f64] {
+        let at = self.n * self.width..(self.n + 1) * self.width;
+        (self.view, self.n) = (row.view, self.n + 1);
+        let (plain, weighted) = (&mut self.rows[at.clone()], &mut self.weighted[at]);
+        plain[..row.robot.len()].copy_from_slice(row.robot);
+        plain[row.robot.len()..].copy_from_slice(&row.scan);
+        weighted.iter_mut().zip(&*plain).for_each(|(w, v)| *w = row.weight * v);
+        weighted
+    }
+
+    /// `Σ w Jᵀ J` of the rows, which are gone then.
+    fn take(&mut self) -> DMatrix<f64> {
+        let (n, width) = (std::mem::take(&mut self.n), self.width);
+        let mut sum = DMatrix::zeros(width, width);
+        let rows = DMatrixView::from_slice(&self.rows, width, n);
+        let weighted = DMatrixView::from_slice_with_strides(&self.weighted, n, width, width, 1);
+        sum.gemm(1.0, &rows, &weighted, 0.0);
+        sum
+    }
+}
+
 /// The normal equations.
 #[derive(Debug)]
 pub(crate) struct Normal {
@@ -53,6 +97,7 @@ pub(crate) struct Normal {
     hessian: DMatrix<f64>,
     gradient: DVector<f64>,
     patches: Vec<Option<Patch>>,
+    batch: Batch,
     /// Sum of w·r².
     chi2: f64,
     /// Sums of the rows' influences, of slopes over variance, and of weights.
@@ -70,6 +115,7 @@ impl Normal {
             hessian: DMatrix::zeros(n, n),
             gradient: DVector::zeros(n),
             patches: vec![None; n_patches],
+            batch: Batch::new(n_robot + N_SCAN),
             chi2: 0.0,
             kernel: [0.0; 3],
             n_rows: 0,
@@ -84,6 +130,9 @@ impl Normal {
 
     /// Adds a residual.
     pub(crate) fn add(&mut self, row: &Row<'_>) {
+        if self.batch.view != row.view || self.batch.n == BATCH {
+            self.flush();
+        }
         let (n, at) = (self.n_robot, self.n_robot + row.view * N_SCAN);
         let patch = self.patches[row.patch].get_or_insert_with(|| Patch {
             a: DVector::zeros(self.n),
@@ -91,6 +140,11 @@ impl Normal {
             weight: 0.0,
             r: 0.0,
         });
+        let weighted = self.batch.push(row);
+        add(&mut patch.a.as_mut_slice()[..n], 1.0, &weighted[..n]);
+        add(&mut patch.a.as_mut_slice()[at..at + N_SCAN], 1.0, &weighted[n..]);
+        add(&mut patch.g.as_mut_slice()[..n], row.r, &weighted[..n]);
+        add(&mut patch.g.as_mut_slice()[at..at + N_SCAN], row.r, &weighted[n..]);
         let w = row.weight;
         patch.weight += w;
         patch.r += w * row.r;
@@ -99,28 +153,27 @@ impl Normal {
         self.kernel[1] += row.influence[1];
         self.kernel[2] += w;
         self.n_rows += 1;
-        for (i, v) in row.robot.iter().enumerate() {
-            if *v == 0.0 {
-                continue;
-            }
-            let wv = w * v;
-            patch.a[i] += wv;
-            patch.g[i] += wv * row.r;
-            let column = &mut self.hessian.as_mut_slice()[i * self.n..(i + 1) * self.n];
-            add(&mut column[i..n], wv, &row.robot[i..]);
-            add(&mut column[at..at + N_SCAN], wv, &row.scan);
+    }
+
+    /// Adds the products of the rows that wait: one product of matrices for many rows.
+    fn flush(&mut self) {
+        if self.batch.n == 0 {
+            return;
         }
-        for (i, v) in row.scan.iter().enumerate() {
-            let wv = w * v;
-            patch.a[at + i] += wv;
-            patch.g[at + i] += wv * row.r;
-            let column = &mut self.hessian.as_mut_slice()[(at + i) * self.n..];
-            add(&mut column[at + i..at + N_SCAN], wv, &row.scan[i..]);
-        }
+        let (n, at) = (self.n_robot, self.n_robot + self.batch.view * N_SCAN);
+        let sum = self.batch.take();
+        let mut robot = self.hessian.view_mut((0, 0), (n, n));
+        robot += sum.view((0, 0), (n, n));
+        let mut both = self.hessian.view_mut((at, 0), (N_SCAN, n));
+        both += sum.view((n, 0), (N_SCAN, n));
+        let mut scan = self.hessian.view_mut((at, at), (N_SCAN, N_SCAN));
+        scan += sum.view((n, n), (N_SCAN, N_SCAN));
     }
 
     /// Sums of both; before either is closed.
-    pub(crate) fn join(mut self, later: Self) -> Self {
+    pub(crate) fn join(mut self, mut later: Self) -> Self {
+        self.flush();
+        later.flush();
         self.hessian += later.hessian;
         self.chi2 += later.chi2;
         self.n_rows += later.n_rows;
@@ -142,6 +195,7 @@ impl Normal {
 
     /// Takes the patches out. Call once, after the last residual, before the priors.
     pub(crate) fn close(&mut self) {
+        self.flush();
         self.hessian.fill_upper_triangle_with_lower_triangle();
         self.sigma2 = patch_variance(self.patches.iter().flatten());
         for patch in self.patches.iter_mut().flatten() {
@@ -289,3 +343,39 @@ fn patch_variance<'a>(patches: impl Iterator<Item = &'a Patch>) -> f64 {
 const TYPICAL_OFFSET: f64 = 0.001;
 /// Larger mean residuals are things beside the robot, not its shape, metres.
 const MAX_OFFSET: f64 = 0.008;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn batches_of_rows_add_up_as_single_ones_do() {
+        let (n_robot, n_views) = (8, 2);
+        let n = n_robot + n_views * N_SCAN;
+        let mut normal = Normal::new(n_robot, n_views, 3);
+        let mut wanted = DMatrix::<f64>::zeros(n, n);
+        for i in 0..300_usize {
+            let value = |k: usize| ((i * 31 + k * 17) % 23) as f64 - 11.0;
+            let robot: Vec<f64> = (0..n_robot).map(value).collect();
+            let scan: [f64; N_SCAN] = std::array::from_fn(|k| value(50 + k));
+            // Runs of one scan, longer and shorter than a batch.
+            let (view, weight) = (usize::from(i % 150 > 110), 1.0 + (i % 4) as f64);
+            normal.add(&Row {
+                robot: &robot,
+                scan,
+                view,
+                patch: i % 3,
+                weight,
+                influence: [0.0; 2],
+                r: value(99),
+            });
+            let mut whole = DVector::zeros(n);
+            whole.rows_mut(0, n_robot).copy_from_slice(&robot);
+            whole.rows_mut(n_robot + view * N_SCAN, N_SCAN).copy_from_slice(&scan);
+            wanted.ger(weight, &whole, &whole, 1.0);
+        }
+        normal.flush();
+        normal.hessian.fill_upper_triangle_with_lower_triangle();
+        assert!((&normal.hessian - &wanted).amax() < 1e-6 * wanted.amax());
+    }
+}

@@ -36,6 +36,7 @@ impl Ball {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Near {
     pub(crate) link: usize,
+    /// Number of the facet.
     pub(crate) sample: usize,
     /// Metres.
     pub(crate) distance: f64,
@@ -127,7 +128,7 @@ impl<'a> Placed<'a> {
     pub(crate) fn nearest(&self, point: [f32; 3]) -> Option<Near> {
         let mut best: Option<(usize, usize, f32)> = None;
         self.each(point, |link, sample, p| {
-            let s = self.prepared.model.links[link].cad.points[sample];
+            let s = self.prepared.links[link].fields.facets[sample].x;
             let d2 = (0..3).map(|i| (s[i] - p[i]) * (s[i] - p[i])).sum::<f32>();
             if best.is_none_or(|b| d2 < b.2) {
                 best = Some((link, sample, d2));

@@ -1,13 +1,14 @@
 //! A model in; out comes what every fit of it needs: nearest-sample fields, search samples, and which link is placed
 //! by which joint. Made once per model, shared by all its fits.
 
+use geometry::Point;
 use geometry::depth::Rows;
-use geometry::{NearestField, Point};
 use robot::Model;
 use std::sync::Arc;
 
 use crate::beam::Hypothesis;
 use crate::face::Face;
+use crate::facets::{Facet, Fields};
 use crate::placed::Ball;
 
 /// A model made ready for fitting.
@@ -37,25 +38,6 @@ pub struct Prepared<'a> {
     pub(crate) patch_groups: Vec<u32>,
 }
 
-/// Nearest samples of a link's surface.
-#[derive(Debug, Default)]
-pub(crate) struct Fields {
-    /// Reaches far, from few samples: for the first iterations.
-    pub(crate) coarse: NearestField,
-    /// Exact, reaches 3 cm: for the last ones.
-    pub(crate) fine: NearestField,
-}
-
-impl Fields {
-    fn new(link: &robot::Link) -> Self {
-        let n = link.cad.points.len().min(COARSE.2);
-        Self {
-            coarse: NearestField::new(&link.cad.points[..n], COARSE.0, COARSE.1),
-            fine: NearestField::new(&link.cad.points, voxel(link), FINE.1),
-        }
-    }
-}
-
 /// What is kept for a link.
 #[derive(Debug, Default)]
 pub(crate) struct PreparedLink {
@@ -66,18 +48,9 @@ pub(crate) struct PreparedLink {
     pub(crate) weight: f64,
     /// Outer area, m².
     pub(crate) area: f64,
-    /// Patch of each sample, counted over all links.
+    /// Patch of each facet, counted over all links.
     pub(crate) patches: Vec<u32>,
 }
-
-/// Coarse field: reach covers the first gate (120 mm, fit.md §6.4), voxels a fifth of it.
-const COARSE: (f32, f32, usize) = (0.025, 0.15, 2500);
-/// Largest voxel and reach of the fine field, metres: the reach of the last gates.
-const FINE: (f32, f32) = (0.007, 0.032);
-/// Voxel of the fine field against the spacing of the samples: with larger ones the nearest sample is missed …
-const VOXEL: f32 = 1.4;
-/// … but no more voxels than about so many.
-const MAX_VOXELS: f64 = 5e5;
 
 impl<'a> Prepared<'a> {
     /// Prepares model `index` of the library.
@@ -101,7 +74,7 @@ impl<'a> Prepared<'a> {
             PreparedLink { fields, ball, weight: area.sqrt(), area, patches: Vec::new() }
         });
         let mut links: Vec<_> = links.collect();
-        let patch_groups = patches(model, &mut links);
+        let patch_groups = patches(&mut links);
         let n_free = model.free.len();
         let depends = dependencies(model);
         let mut placed_by = vec![Vec::new(); n_free];
@@ -187,30 +160,21 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Edge of a link's fine voxels, metres.
-fn voxel(link: &robot::Link) -> f32 {
-    let volume: f64 = link.bounds.grown(2.0 * f64::from(FINE.1)).size().iter().product();
-    (VOXEL * link.cad.spacing).max((volume / MAX_VOXELS).cbrt() as f32).min(FINE.0)
-}
-
 /// Edge of a patch, metres: within it a model's error of shape is about the same (fit.md §4g: 12–15 cm).
 const PATCH: f32 = 0.13;
 
 /// Cuts the surface of each link into patches: cells of its frame, apart by the side they look to. Returns the group
 /// of each patch.
-fn patches(model: &Model, links: &mut [PreparedLink]) -> Vec<u32> {
+fn patches(links: &mut [PreparedLink]) -> Vec<u32> {
     let mut groups = Vec::new();
     for (l, link) in links.iter_mut().enumerate() {
-        let cad = &model.links[l].cad;
-        let key = |i: usize| {
-            let n = cad.normals[i];
+        let facets = &link.fields.facets;
+        let key = |facet: &Facet| {
+            let n = facet.n;
             let side = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
-            (
-                side * 2 + usize::from(n[side] < 0.0),
-                cad.points[i].map(|v| (v / PATCH).floor() as i32),
-            )
+            (side * 2 + usize::from(n[side] < 0.0), facet.x.map(|v| (v / PATCH).floor() as i32))
         };
-        let mut keys: Vec<_> = (0..cad.points.len()).map(key).collect();
+        let mut keys: Vec<_> = facets.iter().map(key).collect();
         let each = keys.clone();
         keys.sort_unstable();
         keys.dedup();

@@ -161,11 +161,10 @@ impl Refine<'_> {
                     return None;
                 }
                 let pose = &poses[link];
-                let cad = &self.prepared.model.links[link].cad;
-                let (p, n) = (cad.points[sample], cad.normals[sample].map(f64::from));
-                let n = pose.rotation * Vector::from(n);
+                let facet = &self.prepared.links[link].fields.facets[sample];
+                let n = pose.rotation * Vector::from(facet.n.map(f64::from));
                 let q = base_from_local * geometry::Point::from(m.p.map(f64::from));
-                let x = pose * geometry::Point::from(p.map(f64::from));
+                let x = pose * geometry::Point::from(facet.x.map(f64::from));
                 let r = n.dot(&(q - x));
                 // Beside the surface's edge its plane means nothing: what hangs on a flange is wider than it.
                 let beside = (distance * distance - r * r).max(0.0).sqrt();

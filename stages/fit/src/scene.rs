@@ -1,6 +1,6 @@
 //! The views of a region in; out comes what fits of any model read: the evidence, and thinned points with their scans.
 
-use contract::{InstallationPlane, Region, View};
+use contract::{Fan, InstallationPlane, Region, View};
 use geometry::evidence::Cloud;
 use geometry::{Evidence, Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
@@ -45,8 +45,9 @@ impl<'a> Scene<'a> {
         views: &'a [View],
         floors: &[InstallationPlane],
         settings: &Settings,
+        fan: &impl Fan,
     ) -> Self {
-        Self::of(region, &views.iter().collect::<Vec<_>>(), floors, settings)
+        Self::of(region, &views.iter().collect::<Vec<_>>(), floors, settings, fan)
     }
 
     /// The same for some of the views.
@@ -55,6 +56,7 @@ impl<'a> Scene<'a> {
         views: &[&'a View],
         floors: &[InstallationPlane],
         settings: &Settings,
+        fan: &impl Fan,
     ) -> Self {
         let planes: Vec<Plane> = floors
             .iter()
@@ -68,16 +70,19 @@ impl<'a> Scene<'a> {
             let q = Vector::from(p.map(f64::from));
             planes.iter().any(|plane| plane.distance(&q).abs() < settings.floor_band)
         };
-        let mut points = Vec::new();
-        for (view, v) in views.iter().enumerate() {
-            points.extend(
-                v.points
-                    .iter()
-                    .filter(|p| !on_floor(p.xyz))
-                    .map(|p| Measured { p: p.xyz, view: view as u16 }),
-            );
+        let above = |(view, v): (usize, &View)| {
+            let points = v.points.iter().filter(|p| !on_floor(p.xyz));
+            let points: Vec<Measured> =
+                points.map(|p| Measured { p: p.xyz, view: view as u16 }).collect();
+            let thin = thin(&points, settings.thin as f32);
+            (points, thin)
+        };
+        let (mut points, mut thin) = (Vec::new(), Vec::new());
+        for (own, few) in fan.fan(views.iter().copied().enumerate().collect(), above) {
+            let first = points.len() as u32;
+            thin.extend(few.into_iter().map(|i| first + i));
+            points.extend(own);
         }
-        let thin = thin(&points, settings.thin as f32);
         let images = views.iter().flat_map(|v| &v.images).collect::<Vec<_>>();
         let cloud = images.is_empty().then(|| {
             let few = thin.iter().map(|&i| points[i as usize].p).collect();
@@ -120,13 +125,11 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// The first point of each grid cell and view, in the order of the points.
+/// The first point of each grid cell, in the order of the points of one view.
 fn thin(points: &[Measured], edge: f32) -> Vec<u32> {
-    // 18 bits an axis: 3 km of 12 mm cells, folded over beyond.
-    let cell = |v: f32| u64::from((v / edge).floor() as i32 as u32 & 0x3_ffff);
-    let key = |m: &Measured| {
-        u64::from(m.view) << 54 | cell(m.p[2]) << 36 | cell(m.p[1]) << 18 | cell(m.p[0])
-    };
+    // 21 bits an axis: 25 km of 12 mm cells, folded over beyond.
+    let cell = |v: f32| u64::from((v / edge).floor() as i32 as u32 & 0x1f_ffff);
+    let key = |m: &Measured| cell(m.p[2]) << 42 | cell(m.p[1]) << 21 | cell(m.p[0]);
     let mut keyed: Vec<_> = points.iter().enumerate().map(|(i, m)| (key(m), i as u32)).collect();
     keyed.sort_unstable();
     keyed.dedup_by_key(|k| k.0);

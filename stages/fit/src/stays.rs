@@ -62,7 +62,7 @@ pub fn stays(
         }
         left.retain(|v| !own.contains(v));
         let views: Vec<&View> = own.iter().map(|&v| singles[v].view).collect();
-        let scene = Scene::of(sights.region, &views, sights.floors, settings);
+        let scene = Scene::of(sights.region, &views, sights.floors, settings, fan);
         let found = fit(&candidate, prepared, &scene, settings, fan);
         let is_plain = |f: &Fit| match own.len() < MIN_AGREEING {
             true => f.verdict == Verdict::Trusted,
@@ -144,7 +144,7 @@ impl<'a> Single<'a> {
         settings: &Settings,
         fan: &impl Fan,
     ) -> Self {
-        let scene = Scene::of(sights.region, &[view], sights.floors, settings);
+        let scene = Scene::of(sights.region, &[view], sights.floors, settings, fan);
         let local_from_world = scene.world_from_local().inverse();
         let bases: Vec<Pose> =
             candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();

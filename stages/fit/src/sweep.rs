@@ -4,6 +4,7 @@
 use geometry::Point;
 
 use crate::beam::Hypothesis;
+use crate::facets::Facet;
 use crate::placed::Placed;
 use crate::refine::Refine;
 
@@ -176,12 +177,12 @@ impl Refine<'_> {
         let of = |&i: &u32| {
             let mut least = CAP;
             placed.each(self.scene.points[i as usize].p, |link, at, q| {
-                let cad = &self.prepared.model.links[link].cad;
-                let (x, n) = (cad.points[at], cad.normals[at]);
+                let spacing = self.prepared.model.links[link].cad.spacing;
+                let Facet { x, n } = self.prepared.links[link].fields.facets[at];
                 let off: f32 = (0..3).map(|k| n[k] * (q[k] - x[k])).sum();
                 let apart: f32 = (0..3).map(|k| (q[k] - x[k]).powi(2)).sum::<f32>().sqrt();
                 // Beyond the edge of a facet its plane means nothing.
-                least = least.min(if apart > 2.0 * cad.spacing + CAP { CAP } else { off.abs() });
+                least = least.min(if apart > 2.0 * spacing + CAP { CAP } else { off.abs() });
             });
             least
         };

@@ -38,6 +38,15 @@ impl NearestField {
         field
     }
 
+    /// The same for samples with other numbers.
+    #[must_use]
+    pub fn renumbered(mut self, numbers: &[u32]) -> Self {
+        for cell in self.cells.iter_mut().filter(|cell| **cell > 0) {
+            *cell = numbers[*cell as usize - 1] + 1;
+        }
+        self
+    }
+
     /// Spreads each sample from its own voxel outwards, ring by ring, while it is nearer than what is there.
     fn fill(&mut self, points: &[[f32; 3]], edge: f32, reach: f32) {
         // Squared distance of each voxel's middle from its sample, for as long as samples spread.

@@ -14,7 +14,7 @@ const N_ASKED: usize = 100_000;
 
 /// Lets the views of a region check each other's missing returns: where one scan measured matter, the silence of another
 /// is no free space (a scanner behind a near post, black or shiny surfaces).
-pub fn agree(views: &mut [View]) {
+pub fn agree(views: &mut [View], fan: &impl Fan) {
     let matter: Vec<Vec<[f32; 3]>> = views
         .iter()
         .map(|view| {
@@ -22,7 +22,7 @@ pub fn agree(views: &mut [View]) {
             view.points.iter().step_by(step).map(|p| p.xyz).collect()
         })
         .collect();
-    for (own, view) in views.iter_mut().enumerate() {
+    let doubt = |(own, view): (usize, &mut View)| {
         for image in &mut view.images {
             let camera_from_local = rows(image.camera_from_local());
             let others = matter.iter().enumerate().filter(|(other, _)| *other != own);
@@ -31,7 +31,8 @@ pub fn agree(views: &mut [View]) {
                 .collect();
             image.doubt(&seen, DOUBT_WINDOW, BLIND);
         }
-    }
+    };
+    fan.fan(views.iter_mut().enumerate().collect(), doubt);
 }
 
 /// Beams that went on so far beyond a point of another scan saw free space there, metres.

@@ -89,8 +89,8 @@ impl Paper<'_> {
         let p = [q.x as f32, q.y as f32, q.z as f32];
         let fields = &self.prepared.links[link].fields;
         let at = fields.fine.nearest(p).or_else(|| fields.coarse.nearest(p))?;
-        let cad = &self.prepared.model.links[link].cad;
-        let (x, n) = (cad.points[at].map(f64::from), cad.normals[at].map(f64::from));
+        let (facet, cad) = (&fields.facets[at], &self.prepared.model.links[link].cad);
+        let (x, n) = (facet.x.map(f64::from), facet.n.map(f64::from));
         let (x, n) = (Point::from(x), Vector::from(n));
         // The facet goes on beside its sample, about as far as to the next one.
         let beside = (q - x) - n * n.dot(&(q - x));

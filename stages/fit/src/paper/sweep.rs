@@ -102,9 +102,9 @@ impl Paper<'_> {
             for p in points {
                 let q = motion * Point::from(p.map(f64::from));
                 let q = [q.x as f32, q.y as f32, q.z as f32];
-                let cad = &model.links[link].cad;
-                let near = self.prepared.links[link].fields.fine.nearest(q).is_some_and(|at| {
-                    let d: f32 = (0..3).map(|i| (cad.points[at][i] - q[i]).powi(2)).sum();
+                let fields = &self.prepared.links[link].fields;
+                let near = fields.fine.nearest(q).is_some_and(|at| {
+                    let d: f32 = (0..3).map(|i| (fields.facets[at].x[i] - q[i]).powi(2)).sum();
                     d.sqrt() < OFF_SURFACE
                 });
                 off += usize::from(!near);

@@ -1,0 +1,85 @@
+//! The samples of a link's surface in; out come the same so that neighbours in space are neighbours in memory, and for any
+//! place near the surface which of them is the nearest.
+
+use geometry::NearestField;
+use robot::{CadCloud, Link};
+
+/// Coarse field: reach covers the first gate (120 mm, fit.md §6.4), voxels a fifth of it.
+const COARSE: (f32, f32, usize) = (0.025, 0.15, 2500);
+/// Largest voxel and reach of the fine field, metres: the reach of the last gates.
+const FINE: (f32, f32) = (0.007, 0.032);
+/// Voxel of the fine field against the spacing of the samples: with larger ones the nearest sample is missed …
+const VOXEL: f32 = 1.4;
+/// … but no more voxels than about so many.
+const MAX_VOXELS: f64 = 5e5;
+/// Samples within a cube of this edge, metres, are neighbours in memory: some twenty of them.
+const NEAR: f32 = 0.016;
+
+/// A sample of a surface, link frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Facet {
+    /// Metres.
+    pub(crate) x: [f32; 3],
+    /// Outward, unit length.
+    pub(crate) n: [f32; 3],
+}
+
+/// Samples of a link's surface, and which of them is nearest to a place.
+#[derive(Debug, Default)]
+pub(crate) struct Fields {
+    pub(crate) facets: Vec<Facet>,
+    /// Reaches far, from few samples: for the first iterations.
+    pub(crate) coarse: NearestField,
+    /// Exact, reaches 3 cm: for the last ones.
+    pub(crate) fine: NearestField,
+}
+
+impl Fields {
+    pub(crate) fn new(link: &Link) -> Self {
+        let cad = &link.cad;
+        let order = order(cad);
+        let facet = |&i: &u32| Facet { x: cad.points[i as usize], n: cad.normals[i as usize] };
+        let facets: Vec<Facet> = order.iter().map(facet).collect();
+        let all: Vec<[f32; 3]> = facets.iter().map(|f| f.x).collect();
+        // The first samples of a model are spread evenly.
+        let is_first = |at: &u32| (order[*at as usize] as usize) < COARSE.2;
+        let first: Vec<u32> = (0..order.len() as u32).filter(is_first).collect();
+        let few: Vec<[f32; 3]> = first.iter().map(|&at| all[at as usize]).collect();
+        let coarse = NearestField::new(&few, COARSE.0, COARSE.1).renumbered(&first);
+        let fine = NearestField::new(&all, voxel(link), FINE.1);
+        Self { facets, coarse, fine }
+    }
+}
+
+/// Edge of a link's fine voxels, metres.
+fn voxel(link: &Link) -> f32 {
+    let volume: f64 = link.bounds.grown(2.0 * f64::from(FINE.1)).size().iter().product();
+    (VOXEL * link.cad.spacing).max((volume / MAX_VOXELS).cbrt() as f32).min(FINE.0)
+}
+
+/// The samples along a curve that fills space (Morton's).
+fn order(cad: &CadCloud) -> Vec<u32> {
+    let low =
+        cad.points.iter().fold([f32::INFINITY; 3], |low, p| [0, 1, 2].map(|i| low[i].min(p[i])));
+    let key = |p: &[f32; 3]| {
+        (0..3).fold(0_u64, |key, i| key | spread(((p[i] - low[i]) / NEAR) as u32) << i)
+    };
+    let mut keyed: Vec<(u64, u32)> = cad.points.iter().map(key).zip(0..).collect();
+    keyed.sort_unstable();
+    keyed.into_iter().map(|(_, i)| i).collect()
+}
+
+/// The low 21 bits of a number with two zeros between each.
+fn spread(v: u32) -> u64 {
+    let mut x = u64::from(v & 0x1f_ffff);
+    for (shift, mask) in [
+        (32, 0x1f_0000_0000_ffff),
+        (16, 0x1f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ] {
+        x = (x | x << shift) & mask;
+    }
+    x
+}
