@@ -7,6 +7,9 @@ use geometry::depth::{DepthImage, Look};
 const BEYOND: f32 = 0.04;
 /// A beam that ended so near a place ended on it, metres: noise, registration and the cell's slope.
 const ON: f32 = 0.02;
+/// A beam that went on so far beyond a point of its own session passed through the thing that the point is of, metres: rows
+/// that graze a flat top end up to this far apart on it, 5 m away, 0.13° between rows, at 2°.
+const PIERCED: f32 = 0.3;
 /// Width in which beams are asked, metres.
 const FOOTPRINT: f32 = 0.012;
 
@@ -38,10 +41,10 @@ impl<'a> Watch<'a> {
         Self { region, views }
     }
 
-    /// Whether a beam of any scan went on beyond a place in the world, whatever others met there.
+    /// Whether a beam of any scan went on far beyond a place in the world, whatever others met there.
     #[must_use]
     pub fn is_pierced(&self, world: [f64; 3]) -> bool {
-        self.looks(world).any(|look| look.near.is_finite() && look.near - look.range > BEYOND)
+        self.looks(world).any(|look| look.near.is_finite() && look.near - look.range > PIERCED)
     }
 
     /// What each scan that looked there has.
