@@ -9,6 +9,7 @@
 mod attach;
 mod graph;
 mod hang;
+mod parted;
 mod register;
 mod sight;
 mod space;

@@ -1,6 +1,7 @@
 //! Voxels of what stands still in two sessions, and what each session's beams say of the other's, in; what appeared, went
 //! and moved out.
 
+use crate::parted::parted;
 use crate::tally::{Cell, EDGE, Tally, around};
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,6 +23,8 @@ const WHOLE: f64 = 0.2;
 const MAX_WHOLE: usize = 40_000;
 /// Of a thing that one session sees only in part, the other may see up to so many times the ground.
 const MAX_PART: f64 = 2.5;
+/// A change on so many times the ground of one in the other session may be that thing and another one beside it.
+const WIDER: f64 = 1.4;
 /// How much the sizes of a thing may differ between two sessions, which see other sides of it: metres, and share.
 const SAME_SIZE: [f64; 2] = [0.12, 0.2];
 
@@ -96,20 +99,30 @@ impl Tally {
         let mut out = Vec::new();
         while let Some(first) = left.pop_first() {
             let cells = connected(first, REACH, |c| left.remove(c), usize::MAX);
-            let n_points = self.n_points(&cells);
-            let size = bounds(&cells).size().iter().fold(0.0_f64, |a, b| a.max(*b));
-            let is_large = cells.len() >= settings.min_voxels
-                && n_points >= u64::from(settings.min_points)
-                && size >= settings.min_size
-                && self.cover(&cells) >= MIN_COVER
-                && self.pierced(&cells) <= MAX_PIERCED;
-            if is_large && 2 * cells.iter().filter(|c| is_near(c)).count() < cells.len() {
+            if self.is_thing(&cells, settings)
+                && 2 * cells.iter().filter(|c| is_near(c)).count() < cells.len()
+            {
                 out.push(cells);
             }
         }
         thin.retain(|cell| !is_near(cell));
         let joined = self.joined(out, thin);
         joined.into_iter().map(|(cells, bounds)| self.piece(cells, bounds)).collect()
+    }
+
+    /// Changes, those in two of which one is as the other session has it and stands beside something else.
+    fn apart(&self, pieces: &[Piece], others: &[Piece], settings: &ThingSettings) -> Vec<Piece> {
+        let two = |piece: &Piece| {
+            let smaller =
+                others.iter().filter(|o| ground(&piece.bounds) > WIDER * ground(&o.bounds));
+            let parts = smaller.filter_map(|other| {
+                let parts = parted(&piece.cells, other.bounds.size())?;
+                let is_it = unlike(&bounds(&parts[0]), &other.bounds) <= 1.0;
+                (is_it && self.is_thing(&parts[1], settings)).then_some(parts)
+            });
+            parts.map(|parts| parts.map(|cells| self.piece_of(cells))).next()
+        };
+        pieces.iter().flat_map(|p| two(p).map_or_else(|| vec![p.clone()], Vec::from)).collect()
     }
 
     /// Changes of which few points are seen between them are one thing; and its bounds with those.
@@ -128,6 +141,21 @@ impl Tally {
             out.push((cells, bounds(&all)));
         }
         out
+    }
+
+    /// Whether connected voxels are large and solid enough for a thing.
+    fn is_thing(&self, cells: &[Cell], settings: &ThingSettings) -> bool {
+        let size = bounds(cells).size().iter().fold(0.0_f64, |a, b| a.max(*b));
+        cells.len() >= settings.min_voxels
+            && self.n_points(cells) >= u64::from(settings.min_points)
+            && size >= settings.min_size
+            && self.cover(cells) >= MIN_COVER
+            && self.pierced(cells) <= MAX_PIERCED
+    }
+
+    /// One of two that stand side by side: what is about it is the other.
+    fn piece_of(&self, cells: Vec<Cell>) -> Piece {
+        Piece { n_points: self.n_points(&cells), bounds: bounds(&cells), cells }
     }
 
     fn piece(&self, cells: Vec<Cell>, seen: Aabb) -> Piece {
@@ -160,8 +188,9 @@ pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Thing>
         pieces.sort_by_key(|p| std::cmp::Reverse(p.cells.len()));
         pieces
     };
-    let mut gone = by_size(then.pieces(now, settings));
-    let mut filled = by_size(now.pieces(then, settings));
+    let pieces = [then.pieces(now, settings), now.pieces(then, settings)];
+    let mut gone = by_size(then.apart(&pieces[0], &pieces[1], settings));
+    let mut filled = by_size(now.apart(&pieces[1], &pieces[0], settings));
     let mut out = Vec::new();
     gone.retain(|was| {
         let fits = filled.iter().map(|is| unlike(&was.bounds, &is.bounds));
@@ -202,6 +231,12 @@ fn unlike(a: &Aabb, b: &Aabb) -> f64 {
     let part = large[0] * large[1] / (small[0] * small[1]).max(1e-9) / MAX_PART;
     let seen_less = beyond(0).max(beyond(1)).max(part).max(off(2));
     (0..3).map(off).fold(0.0, f64::max).min(seen_less)
+}
+
+/// Area of the ground under a box, m².
+fn ground(bounds: &Aabb) -> f64 {
+    let [w, d, _] = bounds.size();
+    w * d
 }
 
 /// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is new and belongs to it.

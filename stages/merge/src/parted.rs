@@ -1,0 +1,105 @@
+//! The voxels of a change and the size of a thing in; where such a thing and another one make up the change, standing side by
+//! side, the voxels of each out.
+
+use crate::tally::{Cell, EDGE};
+use std::collections::BTreeMap;
+
+/// Tops so many voxels apart are not of one thing.
+const STEP: i32 = 2;
+/// Of the thing's ground at least this share must lie where the change is.
+const FILLED: f64 = 0.5;
+
+/// Heights of the change over its ground, in voxels: the top of each column, and how many voxels it has.
+type Columns = BTreeMap<[i32; 2], (i32, usize)>;
+
+/// Parts a change into a thing of that size (metres, standing on the lowest voxel) and the rest, of which the tops tell that
+/// it is something else; `None` where no place of the thing makes that of it.
+pub(crate) fn parted(cells: &[Cell], size: [f64; 3]) -> Option<[Vec<Cell>; 2]> {
+    let steps = size.map(|s| ((s / EDGE).round() as i32).max(1));
+    let low = cells.iter().map(|c| c[2]).min()?;
+    let top = low + steps[2] - 1;
+    let columns = columns(cells);
+    let placed = [[steps[0], steps[1]], [steps[1], steps[0]]].into_iter();
+    let best = placed.filter_map(|sides| Some((sides, place(&columns, sides, top)?)));
+    let (sides, (_, at)) = best.max_by_key(|(_, (n, _))| *n)?;
+    let (own, rest): (Vec<Cell>, Vec<Cell>) =
+        cells.iter().partition(|c| is_within([c[0], c[1]], at, sides));
+    let off = |part: &[Cell]| Some((part.iter().map(|c| c[2]).max()? - top).abs());
+    (off(&own)? < STEP && off(&rest)? >= STEP).then_some([own, rest])
+}
+
+fn columns(cells: &[Cell]) -> Columns {
+    let mut columns = Columns::new();
+    for [x, y, z] in cells {
+        let column = columns.entry([*x, *y]).or_insert((*z, 0));
+        *column = (column.0.max(*z), column.1 + 1);
+    }
+    columns
+}
+
+fn is_within(at: [i32; 2], low: [i32; 2], sides: [i32; 2]) -> bool {
+    (0..2).all(|i| (low[i]..low[i] + sides[i]).contains(&at[i]))
+}
+
+/// The place at which a thing holds most voxels, none of them above its top, and how many.
+fn place(columns: &Columns, sides: [i32; 2], top: i32) -> Option<(usize, [i32; 2])> {
+    let span = |i: usize| {
+        let along = columns.keys().map(|c| c[i]);
+        Some((along.clone().min()?, along.max()?))
+    };
+    let (spans, mut best) = ([span(0)?, span(1)?], None::<(usize, [i32; 2])>);
+    let starts = |i: usize| spans[i].0..=(spans[i].1 + 1 - sides[i]).max(spans[i].0);
+    for at in starts(0).flat_map(|x| starts(1).map(move |y| [x, y])) {
+        let rows = columns.range([at[0], i32::MIN]..[at[0] + sides[0], i32::MIN]);
+        let own = rows.filter(|(c, _)| is_within(**c, at, sides)).map(|(_, column)| column);
+        let (mut n, mut filled, mut is_higher) = (0, 0, false);
+        for (own_top, n_voxels) in own {
+            (n, filled) = (n + n_voxels, filled + 1);
+            is_higher |= *own_top > top + 1;
+        }
+        let is_full = f64::from(filled) >= FILLED * f64::from(sides[0] * sides[1]);
+        if is_full && !is_higher && best.is_none_or(|(most, _)| n > most) {
+            best = Some((n, at));
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sides and top of a box, voxels.
+    fn shell(low: Cell, size: [i32; 3]) -> Vec<Cell> {
+        let mut out = Vec::new();
+        for i in 0..size[0] {
+            for j in 0..size[1] {
+                for k in 0..size[2] {
+                    let side = i == 0 || j == 0 || i == size[0] - 1 || j == size[1] - 1;
+                    if side || k == size[2] - 1 {
+                        out.push([low[0] + i, low[1] + j, low[2] + k]);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn a_barrel_beside_a_pallet_is_told_from_it() {
+        let (pallet, barrel) = (shell([0, 0, 0], [26, 18, 14]), shell([26, 3, 0], [14, 14, 18]));
+        let both = [pallet.clone(), barrel.clone()].concat();
+        // It stands turned now.
+        let [own, rest] = parted(&both, [0.9, 1.3, 0.7]).expect("two things");
+        assert!(own.iter().filter(|c| pallet.contains(c)).count() >= pallet.len() * 9 / 10);
+        assert!(rest.iter().filter(|c| barrel.contains(c)).count() >= barrel.len() * 9 / 10);
+    }
+
+    #[test]
+    fn a_thing_of_which_less_is_seen_now_stays_one() {
+        let pallet = shell([0, 0, 0], [26, 18, 14]);
+        assert_eq!(parted(&pallet, [0.7, 0.9, 0.7]), None);
+        // Nor does a barrel that went make two of it.
+        assert_eq!(parted(&pallet, [0.7, 0.7, 0.9]), None);
+    }
+}
