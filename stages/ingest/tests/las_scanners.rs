@@ -210,7 +210,8 @@ fn throughput() {
     {
         let poses = (!text.is_empty()).then(|| scanners(text));
         let sources =
-            open(std::slice::from_ref(&path), poses.as_ref(), &Settings::default()).unwrap();
+            open(std::slice::from_ref(&path), poses.as_ref(), &Settings::default(), &OneByOne)
+                .unwrap();
         for want in [Want::Coordinates, Want::Everything] {
             let start = std::time::Instant::now();
             let n: usize =
