@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use crate::Settings;
 use crate::beam::Hypothesis;
 use crate::calibrate::Frames;
+use crate::facets::Facet;
 use crate::normal::{N_SCAN, Normal, Row};
 use crate::placed::{Near, Placed};
 use crate::refine::{CHUNK, Refine};
@@ -94,7 +95,7 @@ const NO_BEAM: Vector = Vector::new(0.0, 0.0, 0.0);
 /// A point matched with the facet that it most likely lies on, local frame.
 struct Pair {
     link: usize,
-    sample: usize,
+    facet: usize,
     view: usize,
     /// The point, corrected by its scan's error.
     p: Vector,
@@ -187,13 +188,13 @@ impl Adjust<'_> {
                 }
                 None => (raw, NO_BEAM, 0.0),
             };
-            let Near { link, sample, distance } = placed.nearest(p.map(|v| v as f32).into())?;
+            let Near { link, facet, distance } = placed.nearest(p.map(|v| v as f32).into())?;
             if distance > gate {
                 return None;
             }
-            let facet = &refine.prepared.links[link].fields.facets[sample];
-            let n = poses[link].rotation * Vector::from(facet.n.map(f64::from));
-            let x = poses[link] * Point::from(facet.x.map(f64::from));
+            let Facet { x, n } = refine.prepared.links[link].fields.facets[facet];
+            let n = poses[link].rotation * Vector::from(n.map(f64::from));
+            let x = poses[link] * Point::from(x.map(f64::from));
             let r = n.dot(&(p - x.coords));
             // Beside the surface's edge its plane means nothing.
             let beside = (distance * distance - r * r).max(0.0).sqrt();
@@ -211,7 +212,7 @@ impl Adjust<'_> {
             } else {
                 sigma2
             };
-            Some(Pair { link, sample, view, p, n, ray, variance, r })
+            Some(Pair { link, facet, view, p, n, ray, variance, r })
         };
         let chunks = points.chunks(CHUNK).collect();
         let found =
@@ -266,7 +267,7 @@ impl Adjust<'_> {
                 robot: &robot,
                 scan,
                 view: pair.view,
-                patch: prepared.links[pair.link].patches[pair.sample] as usize,
+                patch: prepared.links[pair.link].patches[pair.facet] as usize,
                 weight,
                 influence,
                 r: pair.r,

@@ -1,4 +1,4 @@
-//! A posture in; its links with a surface where they stand, and for any point the nearest sample of them, out.
+//! A posture in; its links with a surface where they stand, and for any point the nearest facet of them, out.
 //!
 //! Most links are far from most points: a ball about each tells, eight at a time, before their fields are asked.
 
@@ -32,12 +32,12 @@ impl Ball {
     }
 }
 
-/// A sample of a link next to a point.
+/// A facet of a link next to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Near {
     pub(crate) link: usize,
-    /// Number of the facet.
-    pub(crate) sample: usize,
+    /// Its number among the link's.
+    pub(crate) facet: usize,
     /// Metres.
     pub(crate) distance: f64,
 }
@@ -105,7 +105,7 @@ impl<'a> Placed<'a> {
         Self::new(prepared, h, gate, |_| true)
     }
 
-    /// For each link whose field knows a sample near a point: the link, the sample, and the point in the link's frame.
+    /// For each link whose field knows a facet near a point: the link, the facet, and the point in the link's frame.
     #[inline]
     pub(crate) fn each(&self, point: [f32; 3], mut take: impl FnMut(usize, usize, [f32; 3])) {
         for (balls, links) in self.balls.iter().zip(self.links.chunks(N_LANES)) {
@@ -116,25 +116,25 @@ impl<'a> Placed<'a> {
                 let p = transform(link_from_local, point);
                 let fields = &self.prepared.links[*link].fields;
                 let field = if self.is_fine { &fields.fine } else { &fields.coarse };
-                if let Some(sample) = field.nearest(p) {
-                    take(*link, sample, p);
+                if let Some(facet) = field.nearest(p) {
+                    take(*link, facet, p);
                 }
             }
         }
     }
 
-    /// The nearest sample over all links to a point.
+    /// The nearest facet over all links to a point.
     #[inline]
     pub(crate) fn nearest(&self, point: [f32; 3]) -> Option<Near> {
         let mut best: Option<(usize, usize, f32)> = None;
-        self.each(point, |link, sample, p| {
-            let s = self.prepared.links[link].fields.facets[sample].x;
+        self.each(point, |link, facet, p| {
+            let s = self.prepared.links[link].fields.facets[facet].x;
             let d2 = (0..3).map(|i| (s[i] - p[i]) * (s[i] - p[i])).sum::<f32>();
             if best.is_none_or(|b| d2 < b.2) {
-                best = Some((link, sample, d2));
+                best = Some((link, facet, d2));
             }
         });
-        let (link, sample, d2) = best?;
-        Some(Near { link, sample, distance: f64::from(d2).sqrt() })
+        let (link, facet, d2) = best?;
+        Some(Near { link, facet, distance: f64::from(d2).sqrt() })
     }
 }

@@ -156,12 +156,12 @@ impl Refine<'_> {
             .iter()
             .filter_map(|&i| {
                 let m = &self.scene.points[i as usize];
-                let Near { link, sample, distance } = placed.nearest(m.p)?;
+                let Near { link, facet, distance } = placed.nearest(m.p)?;
                 if distance > gate {
                     return None;
                 }
                 let pose = &poses[link];
-                let facet = &self.prepared.links[link].fields.facets[sample];
+                let facet = &self.prepared.links[link].fields.facets[facet];
                 let n = pose.rotation * Vector::from(facet.n.map(f64::from));
                 let q = base_from_local * geometry::Point::from(m.p.map(f64::from));
                 let x = pose * geometry::Point::from(facet.x.map(f64::from));

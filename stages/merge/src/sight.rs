@@ -75,3 +75,35 @@ impl<'a> Watch<'a> {
         best
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::{MaskId, ScanId};
+    use geometry::depth::Empty;
+    use geometry::{Aabb, Point, Pose};
+
+    /// A plate 3 m ahead that another surface stands `behind`, seen through a gap in it.
+    fn view(behind: f32) -> View {
+        let mut image = DepthImage::new(Pose::identity(), 0.5, 200.0);
+        for (i, j) in (-250..250).flat_map(|i| (-250..250).map(move |j| (i, j))) {
+            let (x, y) = (i as f32 * 0.002, j as f32 * 0.002);
+            let z = if x.abs() < 0.05 { 3.0 + behind } else { 3.0 };
+            image.splat([x * z, y * z, z]);
+        }
+        image.finish(2, |_| Empty::Unknown);
+        let (scanner, images) = (Some(Point::origin()), vec![image]);
+        let (scan, mask, beam_step) = (ScanId(0), MaskId(0), 0.002);
+        View { scan, mask, scanner, beam_step, images, points: Vec::new() }
+    }
+
+    #[test]
+    fn a_beam_that_ends_on_the_same_thing_a_little_farther_pierces_nothing() {
+        let region = Region { origin: Point::origin(), bounds: Aabb::EMPTY };
+        let is_pierced =
+            |behind: f32, x: f64| Watch::new(&region, &[view(behind)]).is_pierced([x, 0.0, 3.0]);
+        assert!(is_pierced(0.8, 0.0));
+        assert!(!is_pierced(0.8, 0.6));
+        assert!(!is_pierced(0.1, 0.0));
+    }
+}
