@@ -10,6 +10,8 @@ const ON: f32 = 0.02;
 /// A beam that went on so far beyond a point of its own session passed through the thing that the point is of, metres: rows
 /// that graze a flat top end up to this far apart on it, 5 m away, 0.13° between rows, at 2°.
 const PIERCED: f32 = 0.3;
+/// Beams farther apart than this at a place say nothing of that, metres: one row of them may pass over all of a flat top.
+const MAX_GAP: f64 = 0.02;
 /// Width in which beams are asked, metres.
 const FOOTPRINT: f32 = 0.012;
 
@@ -44,22 +46,24 @@ impl<'a> Watch<'a> {
     /// Whether a beam of any scan went on far beyond a place in the world, whatever others met there.
     #[must_use]
     pub fn is_pierced(&self, world: [f64; 3]) -> bool {
-        self.looks(world).any(|look| look.near.is_finite() && look.near - look.range > PIERCED)
+        let goes_on = |look: Look| look.near.is_finite() && look.near - look.range > PIERCED;
+        let is_dense = |view: &View, look: &Look| view.beam_step * f64::from(look.range) <= MAX_GAP;
+        self.looks(world).any(|(view, look)| is_dense(view, &look) && goes_on(look))
     }
 
     /// What each scan that looked there has.
-    fn looks(&self, world: [f64; 3]) -> impl Iterator<Item = Look> + '_ {
+    fn looks(&self, world: [f64; 3]) -> impl Iterator<Item = (&View, Look)> + '_ {
         let p: [f32; 3] = std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32);
         // The images of one view share out the directions.
         let of = move |image: &DepthImage| image.look_at(p, FOOTPRINT);
-        self.views.iter().filter_map(move |view| view.images.iter().find_map(of))
+        self.views.iter().filter_map(move |view| Some((view, view.images.iter().find_map(of)?)))
     }
 
     /// What the scans say of a place in the world: the strongest of what each of them says.
     #[must_use]
     pub fn look(&self, world: [f64; 3]) -> Sight {
         let mut best = Sight::Unseen;
-        for look in self.looks(world) {
+        for (_, look) in self.looks(world) {
             let is_on = |range: f32| (range - look.range).abs() <= ON;
             let says = if is_on(look.near) || is_on(look.far) {
                 Sight::Onto
@@ -105,5 +109,7 @@ mod tests {
         assert!(is_pierced(0.8, 0.0));
         assert!(!is_pierced(0.8, 0.6));
         assert!(!is_pierced(0.1, 0.0));
+        let far = View { beam_step: 0.01, ..view(0.8) };
+        assert!(!Watch::new(&region, &[far]).is_pierced([0.0, 0.0, 3.0]));
     }
 }
