@@ -189,18 +189,33 @@ pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Thing>
         pieces
     };
     let pieces = [then.pieces(now, settings), now.pieces(then, settings)];
-    let mut gone = by_size(then.apart(&pieces[0], &pieces[1], settings));
-    let mut filled = by_size(now.apart(&pieces[1], &pieces[0], settings));
-    let mut out = Vec::new();
-    gone.retain(|was| {
-        let fits = filled.iter().map(|is| unlike(&was.bounds, &is.bounds));
-        let best = fits.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((at, _)) = best.filter(|(_, unlike)| *unlike <= 1.0) else { return true };
-        out.push(thing(ThingChange::Moved, Some(was), Some(&filled.remove(at))));
-        false
-    });
-    out.extend(gone.iter().map(|was| thing(ThingChange::Gone, Some(was), None)));
-    out.extend(filled.iter().map(|is| thing(ThingChange::Appeared, None, Some(is))));
+    let gone = by_size(then.apart(&pieces[0], &pieces[1], settings));
+    let filled = by_size(now.apart(&pieces[1], &pieces[0], settings));
+    let moved = moved(&gone, &filled);
+    let one = |(was, is): &(usize, usize)| {
+        thing(ThingChange::Moved, Some(&gone[*was]), Some(&filled[*is]))
+    };
+    let mut out: Vec<Thing> = moved.iter().map(one).collect();
+    let left = gone.iter().enumerate().filter(|(i, _)| moved.iter().all(|m| m.0 != *i));
+    out.extend(left.map(|(_, was)| thing(ThingChange::Gone, Some(was), None)));
+    let left = filled.iter().enumerate().filter(|(i, _)| moved.iter().all(|m| m.1 != *i));
+    out.extend(left.map(|(_, is)| thing(ThingChange::Appeared, None, Some(is))));
+    out
+}
+
+/// Which of those that went stands elsewhere, the most alike first chosen: a barrel must not take a pallet's new place.
+fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<(usize, usize)> {
+    let pairs = (0..gone.len()).flat_map(|i| (0..filled.len()).map(move |j| (i, j)));
+    let alike = pairs.map(|(i, j)| (unlike(&gone[i].bounds, &filled[j].bounds), i, j));
+    let mut alike: Vec<_> = alike.filter(|(unlike, ..)| *unlike <= 1.0).collect();
+    alike.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut out: Vec<(usize, usize)> = Vec::new();
+    for (_, i, j) in alike {
+        if out.iter().all(|(was, is)| *was != i && *is != j) {
+            out.push((i, j));
+        }
+    }
+    out.sort_unstable();
     out
 }
 
