@@ -23,8 +23,9 @@ const WHOLE: f64 = 0.2;
 const MAX_WHOLE: usize = 40_000;
 /// Of a thing that one session sees only in part, the other may see up to so many times the ground.
 const MAX_PART: f64 = 2.5;
-/// A change on so many times the ground of one in the other session may be that thing and another one beside it.
-const WIDER: f64 = 1.4;
+/// A change on so many times the ground of one in the other session may be that thing and another one beside it; one on more
+/// is no pair of things, and would take long to look through.
+const WIDER: [f64; 2] = [1.4, 6.0];
 /// How much the sizes of a thing may differ between two sessions, which see other sides of it: metres, and share.
 const SAME_SIZE: [f64; 2] = [0.12, 0.2];
 
@@ -113,8 +114,8 @@ impl Tally {
     /// Changes, those in two of which one is as the other session has it and stands beside something else.
     fn apart(&self, pieces: &[Piece], others: &[Piece], settings: &ThingSettings) -> Vec<Piece> {
         let two = |piece: &Piece| {
-            let smaller =
-                others.iter().filter(|o| ground(&piece.bounds) > WIDER * ground(&o.bounds));
+            let times = |other: &Piece| ground(&piece.bounds) / ground(&other.bounds);
+            let smaller = others.iter().filter(|o| (WIDER[0]..WIDER[1]).contains(&times(o)));
             let parts = smaller.filter_map(|other| {
                 let parts = parted(&piece.cells, other.bounds.size())?;
                 let is_it = unlike(&bounds(&parts[0]), &other.bounds) <= 1.0;

@@ -205,6 +205,11 @@ fn single(runs: &[PlaceRun<Label>]) -> impl Iterator<Item = (u64, Label)> {
     runs.iter().flat_map(|run| (run.first..run.end()).map(|place| (place, run.what)))
 }
 
+fn segment(fits: &[Fit], scan: &Scan) -> Segment {
+    let scans = std::slice::from_ref(scan);
+    Segment::new(fits, &[model()], &floor(), scans, Settings::default(), &OneByOne)
+}
+
 #[test]
 fn links_are_found_and_nothing_fixed_is_lost() {
     let q = 0.7;
@@ -221,14 +226,7 @@ fn links_are_found_and_nothing_fixed_is_lost() {
     let scan = scan(at(4.0, 1.6, 1.4) * Pose::rotation(Vector::z() * 3.5));
     let tiles = shoot(&bricks, &scan);
     let fits = [fit(world_from_base, q)];
-    let segment = Segment::new(
-        &fits,
-        &[model()],
-        &floor(),
-        std::slice::from_ref(&scan),
-        Settings::default(),
-        &OneByOne,
-    );
+    let segment = segment(&fits, &scan);
     let ground = Ground::new(&floor(), &Settings::default());
     let mut scratch = Scratch::default();
     let (mut hit, mut missed, mut invented, mut n_fixed) = ([0_u32; 2], [0_u32; 2], [0_u32; 2], 0);
@@ -291,14 +289,7 @@ fn the_top_of_a_stand_goes_on_beside_the_foot() {
     ];
     let scan = scan(at(3.0, 1.6, 1.9) * Pose::rotation(Vector::z() * 3.6));
     let fits = [fit(world_from_base, 0.0)];
-    let segment = Segment::new(
-        &fits,
-        &[model()],
-        &floor(),
-        std::slice::from_ref(&scan),
-        Settings::default(),
-        &OneByOne,
-    );
+    let segment = segment(&fits, &scan);
     let mut scratch = Scratch::default();
     let (mut n_stand, mut n_lost, mut n_base, mut n_found) = (0_u32, 0_u32, 0_u32, 0_u32);
     for (tile, truth) in shoot(&bricks, &scan) {
