@@ -1,8 +1,8 @@
 //! The voxels of a change and the size of a thing in; where such a thing and another one make up the change, standing side by
 //! side, the voxels of each out.
 
-use crate::tally::{Cell, EDGE};
-use std::collections::BTreeMap;
+use crate::tally::{Cell, EDGE, REACH, connected};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Tops so many voxels apart are not of one thing.
 const STEP: i32 = 2;
@@ -22,10 +22,22 @@ pub(crate) fn parted(cells: &[Cell], size: [f64; 3]) -> Option<[Vec<Cell>; 2]> {
     let placed = [[steps[0], steps[1]], [steps[1], steps[0]]].into_iter();
     let best = placed.filter_map(|sides| Some((sides, place(&columns, sides, top)?)));
     let (sides, (_, at)) = best.max_by_key(|(_, (n, _))| *n)?;
-    let (own, rest): (Vec<Cell>, Vec<Cell>) =
-        cells.iter().partition(|c| is_within([c[0], c[1]], at, sides));
+    let (mut own, rest): (Vec<Cell>, Vec<Cell>) =
+        cells.iter().copied().partition(|c| is_within([c[0], c[1]], at, sides));
+    let (rest, slivers) = largest(rest.into_iter().collect());
+    own.extend(slivers);
     let off = |part: &[Cell]| Some((part.iter().map(|c| c[2]).max()? - top).abs());
     (off(&own)? < STEP && off(&rest)? >= STEP).then_some([own, rest])
+}
+
+/// What is connected and largest, and all else: a thing that stands askew has corners beyond its place.
+fn largest(mut cells: BTreeSet<Cell>) -> (Vec<Cell>, Vec<Cell>) {
+    let mut parts = Vec::new();
+    while let Some(first) = cells.pop_first() {
+        parts.push(connected(first, REACH, |c| cells.remove(c), usize::MAX));
+    }
+    parts.sort_by_key(Vec::len);
+    (parts.pop().unwrap_or_default(), parts.concat())
 }
 
 fn columns(cells: &[Cell]) -> Columns {

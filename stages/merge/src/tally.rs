@@ -8,6 +8,8 @@ pub(crate) type Cell = [i32; 3];
 
 /// Edge of a voxel, metres.
 pub(crate) const EDGE: f64 = 0.05;
+/// Voxels so many steps apart are of one thing.
+pub(crate) const REACH: i32 = 2;
 /// Fewest points that make a voxel solid.
 pub(crate) const MIN_POINTS: u32 = 3;
 /// Share of a voxel's points whose place the other session must have seen empty.
@@ -123,4 +125,22 @@ pub(crate) fn around(cell: &Cell, reach: i32) -> impl Iterator<Item = Cell> {
     let ([x, y, z], r) = (*cell, reach);
     (-r..=r)
         .flat_map(move |i| (-r..=r).flat_map(move |j| (-r..=r).map(move |k| [x + i, y + j, z + k])))
+}
+
+/// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is new and belongs to it.
+pub(crate) fn connected(
+    first: Cell,
+    reach: i32,
+    mut take: impl FnMut(&Cell) -> bool,
+    at_most: usize,
+) -> Vec<Cell> {
+    let mut out = vec![first];
+    let mut next = 0;
+    while next < out.len() && out.len() < at_most {
+        let cell = out[next];
+        next += 1;
+        out.extend(around(&cell, reach).filter(|c| take(c)));
+    }
+    out.sort_unstable();
+    out
 }

@@ -2,7 +2,7 @@
 //! and moved out.
 
 use crate::parted::parted;
-use crate::tally::{Cell, EDGE, Tally, around};
+use crate::tally::{Cell, EDGE, REACH, Tally, around, connected};
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,8 +13,6 @@ const MIN_COVER: f64 = 0.4;
 /// Share of the points of a change at whose places other beams of their own session may have gone on: past an edge, but
 /// not between wires, of which enough scans together cover a fence.
 const MAX_PIERCED: f64 = 0.3;
-/// Voxels so many steps apart are of one thing.
-const REACH: i32 = 2;
 /// The same of voxels with fewer points: rows of beams that only graze a thing lie that far apart.
 const THIN_REACH: i32 = 3;
 /// A thing of which at least this share changed is looked at whole.
@@ -85,8 +83,19 @@ pub struct Thing {
 struct Piece {
     cells: Vec<Cell>,
     n_points: u64,
-    /// Of the whole thing, where it could be told from others.
     bounds: Aabb,
+    /// With rows of beams about it that graze the thing, and whatever else lies there.
+    wide: Aabb,
+    /// Of all that it is connected with, where much of that changed: a thing pushed by less than its length stands in part
+    /// where it stood.
+    whole: Option<Aabb>,
+}
+
+impl Piece {
+    /// Bounds that the thing may have.
+    fn boxes(&self) -> impl Iterator<Item = &Aabb> {
+        self.whole.iter().chain([&self.wide, &self.bounds])
+    }
 }
 
 impl Tally {
@@ -107,18 +116,18 @@ impl Tally {
             }
         }
         thin.retain(|cell| !is_near(cell));
-        let joined = self.joined(out, thin);
-        joined.into_iter().map(|(cells, bounds)| self.piece(cells, bounds)).collect()
+        self.wholes(self.joined(out, thin))
     }
 
     /// Changes, those in two of which one is as the other session has it and stands beside something else.
     fn apart(&self, pieces: &[Piece], others: &[Piece], settings: &ThingSettings) -> Vec<Piece> {
         let two = |piece: &Piece| {
-            let times = |other: &Piece| ground(&piece.bounds) / ground(&other.bounds);
-            let smaller = others.iter().filter(|o| (WIDER[0]..WIDER[1]).contains(&times(o)));
+            let times = |other: &Aabb| ground(&piece.bounds) / ground(other);
+            let boxes = others.iter().flat_map(Piece::boxes);
+            let smaller = boxes.filter(|o| (WIDER[0]..WIDER[1]).contains(&times(o)));
             let parts = smaller.filter_map(|other| {
-                let parts = parted(&piece.cells, other.bounds.size())?;
-                let is_it = unlike(&bounds(&parts[0]), &other.bounds) <= 1.0;
+                let parts = parted(&piece.cells, other.size())?;
+                let is_it = unlike(&bounds(&parts[0]), other) <= 1.0;
                 (is_it && self.is_thing(&parts[1], settings)).then_some(parts)
             });
             parts.map(|parts| parts.map(|cells| self.piece_of(cells))).next()
@@ -126,8 +135,8 @@ impl Tally {
         pieces.iter().flat_map(|p| two(p).map_or_else(|| vec![p.clone()], Vec::from)).collect()
     }
 
-    /// Changes of which few points are seen between them are one thing; and its bounds with those.
-    fn joined(&self, pieces: Vec<Vec<Cell>>, mut thin: BTreeSet<Cell>) -> Vec<(Vec<Cell>, Aabb)> {
+    /// Changes of which few points are seen between them are one thing.
+    fn joined(&self, pieces: Vec<Vec<Cell>>, mut thin: BTreeSet<Cell>) -> Vec<Piece> {
         let mut out = Vec::new();
         thin.extend(pieces.iter().flatten());
         let mut left: BTreeMap<Cell, Vec<Cell>> =
@@ -139,7 +148,7 @@ impl Tally {
                 cells.extend(left.remove(cell).into_iter().flatten());
             }
             cells.sort_unstable();
-            out.push((cells, bounds(&all)));
+            out.push(Piece { wide: bounds(&all), ..self.piece_of(cells) });
         }
         out
     }
@@ -156,29 +165,42 @@ impl Tally {
 
     /// One of two that stand side by side: what is about it is the other.
     fn piece_of(&self, cells: Vec<Cell>) -> Piece {
-        Piece { n_points: self.n_points(&cells), bounds: bounds(&cells), cells }
+        let bounds = bounds(&cells);
+        Piece { n_points: self.n_points(&cells), bounds, wide: bounds, whole: None, cells }
     }
 
-    fn piece(&self, cells: Vec<Cell>, seen: Aabb) -> Piece {
-        let n_points = self.n_points(&cells);
-        let whole = self.whole(&cells);
-        Piece { cells, n_points, bounds: whole.map_or(seen, |whole| whole.union(&seen)) }
-    }
-
-    /// Bounds of the whole thing that some voxels are part of, where it stands apart from others and much of it changed.
-    fn whole(&self, cells: &[Cell]) -> Option<Aabb> {
-        let mut seen: BTreeSet<Cell> = BTreeSet::new();
-        let mut all = Vec::new();
-        for first in cells {
-            if seen.insert(*first) {
-                let new = |c: &Cell| self.is_solid(c) && seen.insert(*c);
-                all.extend(connected(*first, 1, new, MAX_WHOLE));
+    /// Changes, those joined that are parts of one thing which stands apart from others.
+    fn wholes(&self, mut pieces: Vec<Piece>) -> Vec<Piece> {
+        let mut out = Vec::new();
+        while let Some(mut piece) = pieces.pop() {
+            let all = self.standing(&piece.cells);
+            let is_part = |other: &Piece| other.cells.iter().any(|c| all.contains(c));
+            let n_changed = |p: &&Piece| is_part(p).then_some(p.cells.len());
+            let n = piece.cells.len() + pieces.iter().filter_map(|p| n_changed(&p)).sum::<usize>();
+            if all.len() < MAX_WHOLE && n as f64 >= WHOLE * all.len() as f64 {
+                for part in pieces.extract_if(.., |p| is_part(p)) {
+                    piece.cells.extend(part.cells);
+                    piece.wide = piece.wide.union(&part.wide);
+                }
+                piece.cells.sort_unstable();
+                let whole = bounds(&all).union(&piece.wide);
+                piece =
+                    Piece { wide: piece.wide, whole: Some(whole), ..self.piece_of(piece.cells) };
             }
-            if all.len() >= MAX_WHOLE {
-                return None;
+            out.push(piece);
+        }
+        out
+    }
+
+    /// All that some voxels are connected with: [`MAX_WHOLE`] and more where that is much.
+    fn standing(&self, cells: &[Cell]) -> BTreeSet<Cell> {
+        let mut all: BTreeSet<Cell> = cells.iter().copied().collect();
+        for first in cells {
+            if all.len() < MAX_WHOLE {
+                connected(*first, 1, |c| self.is_solid(c) && all.insert(*c), MAX_WHOLE);
             }
         }
-        (cells.len() as f64 >= WHOLE * all.len() as f64).then(|| bounds(&all))
+        all
     }
 }
 
@@ -193,8 +215,11 @@ pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Thing>
     let gone = by_size(then.apart(&pieces[0], &pieces[1], settings));
     let filled = by_size(now.apart(&pieces[1], &pieces[0], settings));
     let moved = moved(&gone, &filled);
-    let one = |(was, is): &(usize, usize)| {
-        thing(ThingChange::Moved, Some(&gone[*was]), Some(&filled[*is]))
+    let one = |(was, is, [then, now]): &(usize, usize, [Aabb; 2])| Thing {
+        then: Some(*then),
+        now: Some(*now),
+        shift: Some((now.center() - then.center()).into()),
+        ..thing(ThingChange::Moved, Some(&gone[*was]), Some(&filled[*is]))
     };
     let mut out: Vec<Thing> = moved.iter().map(one).collect();
     let left = gone.iter().enumerate().filter(|(i, _)| moved.iter().all(|m| m.0 != *i));
@@ -204,31 +229,39 @@ pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Thing>
     out
 }
 
-/// Which of those that went stands elsewhere, the most alike first chosen: a barrel must not take a pallet's new place.
-fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<(usize, usize)> {
+/// Which of those that went stands elsewhere and the bounds there and here, the most alike first chosen: a barrel must not take
+/// a pallet's new place.
+fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<(usize, usize, [Aabb; 2])> {
     let pairs = (0..gone.len()).flat_map(|i| (0..filled.len()).map(move |j| (i, j)));
-    let alike = pairs.map(|(i, j)| (unlike(&gone[i].bounds, &filled[j].bounds), i, j));
-    let mut alike: Vec<_> = alike.filter(|(unlike, ..)| *unlike <= 1.0).collect();
+    let alike = pairs.filter_map(|(i, j)| {
+        let (was, is) = (&gone[i], &filled[j]);
+        let pair = |then: &Aabb, now: &Aabb| (unlike(then, now), i, j, [*then, *now]);
+        let others = was.boxes().flat_map(|then| is.boxes().map(move |now| pair(then, now)));
+        // Whole first: the two strips of a thing that was pushed a little are alike as well.
+        let whole = was.whole.zip(is.whole).map(|(then, now)| pair(&then, &now));
+        let is_alike = |pair: &(f64, usize, usize, [Aabb; 2])| pair.0 <= 1.0;
+        whole.filter(is_alike).or(others.filter(is_alike).min_by(|a, b| a.0.total_cmp(&b.0)))
+    });
+    let mut alike: Vec<_> = alike.collect();
     alike.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut out: Vec<(usize, usize)> = Vec::new();
-    for (_, i, j) in alike {
-        if out.iter().all(|(was, is)| *was != i && *is != j) {
-            out.push((i, j));
+    let mut out: Vec<(usize, usize, [Aabb; 2])> = Vec::new();
+    for (_, i, j, boxes) in alike {
+        if out.iter().all(|(was, is, _)| *was != i && *is != j) {
+            out.push((i, j, boxes));
         }
     }
-    out.sort_unstable();
+    out.sort_by_key(|(was, ..)| *was);
     out
 }
 
 fn thing(change: ThingChange, was: Option<&Piece>, is: Option<&Piece>) -> Thing {
     let (then, now) = (was.map(|p| p.bounds), is.map(|p| p.bounds));
-    let shift = then.zip(now).map(|(a, b)| (b.center() - a.center()).into());
     let cells = |p: Option<&Piece>| p.map(|p| p.cells.clone()).unwrap_or_default();
     let (gone, filled) = (cells(was), cells(is));
     let main = is.or(was);
     let n_points = main.map_or(0, |p| p.n_points);
     let volume = main.map_or(0.0, |p| p.cells.len() as f64 * EDGE.powi(3));
-    Thing { change, then, now, shift, volume, n_points, gone, filled }
+    Thing { change, then, now, shift: None, volume, n_points, gone, filled }
 }
 
 /// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may be one thing, of which
@@ -255,25 +288,7 @@ fn ground(bounds: &Aabb) -> f64 {
     w * d
 }
 
-/// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is new and belongs to it.
-fn connected(
-    first: Cell,
-    reach: i32,
-    mut take: impl FnMut(&Cell) -> bool,
-    at_most: usize,
-) -> Vec<Cell> {
-    let mut out = vec![first];
-    let mut next = 0;
-    while next < out.len() && out.len() < at_most {
-        let cell = out[next];
-        next += 1;
-        out.extend(around(&cell, reach).filter(|c| take(c)));
-    }
-    out.sort_unstable();
-    out
-}
-
-fn bounds(cells: &[Cell]) -> Aabb {
+fn bounds<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Aabb {
     let mut out = Aabb::EMPTY;
     for cell in cells {
         out.add(cell.map(|i| f64::from(i) * EDGE));
