@@ -53,14 +53,25 @@ impl Shell {
     }
 
     /// The side from which more rays escape, if enough do from either; clear cases end early.
-    pub(super) fn side(&self, sample: &Sample) -> Option<Side> {
+    pub(super) fn side(&self, sample: &Sample, blockers: &mut Blockers) -> Option<Side> {
         let (mut front, mut back) = (0, 0);
-        for (n_cast, ray) in self.rays.iter().enumerate() {
-            if n_cast % N_FIRST == 0 && is_clear(n_cast, front, back) {
+        let [ahead, behind] = &mut blockers.0;
+        for round in (0..N_RAYS).step_by(N_FIRST) {
+            if is_clear(round, front, back) {
                 break;
             }
-            front += usize::from(self.escapes(sample.at, sample.normal, ray));
-            back += usize::from(self.escapes(sample.at, -sample.normal, ray));
+            for n in round..round + N_FIRST {
+                let (ray, blocker) = (&self.rays[n], &mut behind[n]);
+                back += usize::from(self.escapes(sample.at, -sample.normal, ray, blocker));
+            }
+            for n in round..round + N_FIRST {
+                // Rays that escape take longest: no more of them than tell.
+                if back == 0 && front >= N_ESCAPES {
+                    return Some(Side::Front);
+                }
+                let (ray, blocker) = (&self.rays[n], &mut ahead[n]);
+                front += usize::from(self.escapes(sample.at, sample.normal, ray, blocker));
+            }
         }
         if front.max(back) < N_ESCAPES {
             None
@@ -71,29 +82,49 @@ impl Shell {
         }
     }
 
-    /// Whether a ray of the hemisphere about `normal` leaves the mesh for good.
-    fn escapes(&self, at: Vector3<f32>, normal: Vector3<f32>, ray: &Vector3<f32>) -> bool {
+    /// Whether a ray of the hemisphere about `normal` leaves the mesh for good. What stopped the same ray at the place before,
+    /// which is mostly beside this one, is tried first.
+    fn escapes(
+        &self,
+        at: Vector3<f32>,
+        normal: Vector3<f32>,
+        ray: &Vector3<f32>,
+        blocker: &mut u32,
+    ) -> bool {
         let helper = if normal.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
         let e = normal.cross(&helper).normalize();
         let f = normal.cross(&e);
         let direction = e * ray.x + f * ray.y + normal * ray.z;
         let origin = at + normal * LIFT;
+        let is_hit = |triangle| hits(triangle, &origin, &direction);
+        if self.triangles.get(*blocker as usize).is_some_and(is_hit) {
+            return false;
+        }
         // A direction along an axis would divide by zero.
         let inverse = direction.map(|v| if v.abs() < 1e-12 { 1e12 } else { 1.0 / v });
-        let mut hit = false;
+        let mut escapes = true;
         self.bvh.traverse(|node: &BvhNode| {
             if !crosses(node, &origin, &inverse) {
                 return TraversalAction::Prune;
             }
             match node.leaf_data() {
-                Some(leaf) if hits(&self.triangles[leaf as usize], &origin, &direction) => {
-                    hit = true;
+                Some(leaf) if is_hit(&self.triangles[leaf as usize]) => {
+                    (escapes, *blocker) = (false, leaf);
                     TraversalAction::EarlyExit
                 }
                 _ => TraversalAction::Continue,
             }
         });
-        !hit
+        escapes
+    }
+}
+
+/// The triangle that each ray to either side was last stopped by.
+pub(super) struct Blockers([[u32; N_RAYS]; 2]);
+
+impl Blockers {
+    pub(super) fn none() -> Self {
+        Self([[u32::MAX; N_RAYS]; 2])
     }
 }
 
@@ -108,10 +139,12 @@ fn crosses(node: &BvhNode, origin: &Vector3<f32>, inverse: &Vector3<f32>) -> boo
     let (low, high) = (node.mins(), node.maxs());
     let (low, high) = ([low.x, low.y, low.z], [high.x, high.y, high.z]);
     let (mut enter, mut leave) = (0.0_f32, f32::INFINITY);
+    // Nothing here is NaN, which `f32::min` would look for.
+    let (least, most) = (|a: f32, b: f32| if a < b { a } else { b }, |a: f32, b: f32| if a > b { a } else { b });
     for k in 0..3 {
         let (a, b) = ((low[k] - origin[k]) * inverse[k], (high[k] - origin[k]) * inverse[k]);
-        enter = enter.max(a.min(b));
-        leave = leave.min(a.max(b));
+        enter = most(enter, least(a, b));
+        leave = least(leave, most(a, b));
     }
     // A flat box must not vanish by rounding.
     enter <= leave * 1.000_001 + 1e-7

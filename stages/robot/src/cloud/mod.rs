@@ -4,7 +4,7 @@ mod exterior;
 mod spread;
 
 use crate::model::{CadCloud, Mesh};
-use exterior::{Shell, Side};
+use exterior::{Blockers, Shell, Side};
 use nalgebra::Vector3;
 
 /// Candidates for each sample that is kept: with fewer the spread gets holes, with more it only costs time.
@@ -143,8 +143,9 @@ fn outer(mesh: &Mesh, candidates: Vec<Sample>) -> Vec<Sample> {
     let mut order: Vec<(_, u32)> = candidates.iter().map(key).zip(0..).collect();
     order.sort_unstable();
     let mut sides = vec![None; candidates.len()];
+    let mut blockers = Blockers::none();
     for group in order.chunk_by(|a, b| a.0 == b.0) {
-        let judge = |at: u32| shell.side(&candidates[at as usize]);
+        let mut judge = |at: u32| shell.side(&candidates[at as usize], &mut blockers);
         let (first, last) = (group[0].1, group[group.len() - 1].1);
         let side = judge(first);
         if first == last || side == judge(last) {

@@ -59,8 +59,8 @@ fn throw(out: &mut Vec<Sample>, waiting: &mut Vec<Sample>, n_darts: usize, radiu
 struct Grid {
     radius: f32,
     first: Vec<u32>,
-    next: Vec<u32>,
-    samples: Vec<Sample>,
+    /// Each with the next one of its slot.
+    samples: Vec<(Sample, u32)>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -68,7 +68,7 @@ const NONE: u32 = u32::MAX;
 impl Grid {
     fn new(radius: f32, n: usize) -> Self {
         let n_slots = (2 * n).next_power_of_two().max(64);
-        Self { radius, first: vec![NONE; n_slots], next: Vec::new(), samples: Vec::new() }
+        Self { radius, first: vec![NONE; n_slots], samples: Vec::with_capacity(n) }
     }
 
     /// Cells are two radii wide, so that a ball of one radius touches two along each axis.
@@ -86,26 +86,28 @@ impl Grid {
 
     fn add(&mut self, sample: &Sample) {
         let slot = self.slot(self.cell(sample, 0.0));
-        self.next.push(self.first[slot]);
-        self.first[slot] = self.samples.len() as u32;
-        self.samples.push(*sample);
+        let at = self.samples.len() as u32;
+        self.samples.push((*sample, std::mem::replace(&mut self.first[slot], at)));
     }
 
     /// A sample that faces the same half of the world is nearer than the radius. The other side of a sheet is another
     /// surface.
     fn is_taken(&self, sample: &Sample) -> bool {
-        let [x, y, z] = self.cell(sample, -0.5);
+        let (low, own) = (self.cell(sample, -0.5), self.cell(sample, 0.0));
+        // Its own cell first: most that are taken are so by one of that.
+        let own = (0..3).map(|k| (own[k] - low[k]) << k).sum::<i32>();
         let limit = self.radius * self.radius;
         for n in 0..8 {
-            let mut at = self.first[self.slot([x + (n & 1), y + (n >> 1 & 1), z + (n >> 2)])];
+            let cell = [0, 1, 2].map(|k| low[k] + ((n ^ own) >> k & 1));
+            let mut at = self.first[self.slot(cell)];
             while at != NONE {
-                let other = &self.samples[at as usize];
+                let (other, next) = &self.samples[at as usize];
                 if (other.at - sample.at).norm_squared() < limit
                     && other.normal.dot(&sample.normal) > 0.0
                 {
                     return true;
                 }
-                at = self.next[at as usize];
+                at = *next;
             }
         }
         false
