@@ -58,6 +58,8 @@ struct Row {
     robot: bool,
     pallet: bool,
     barrel: bool,
+    /// Where it stood was said not to have been looked at.
+    unseen: bool,
     /// Changes that are none, in words.
     invented: Vec<String>,
     /// Largest error of a determined joint of the robot that moved, degrees: rescan, and a run of the new scans alone.
@@ -201,6 +203,13 @@ fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()>
             }
         }
     }
+    row.unseen = list("fixed_not_compared").iter().any(|region| {
+        let inside = |i: usize| {
+            let corner = |k: usize| region["bounds"][k][i].as_f64().unwrap_or(f64::NAN);
+            barrel[i] > corner(0) - SAME_THING && barrel[i] < corner(1) + SAME_THING
+        };
+        inside(0) && inside(1)
+    });
     let off = list("scans").into_iter().zip(&now.scanners).map(|(found, scanner)| {
         let shift = Vector::from([0, 1, 2].map(|i| found["shift"][i].as_f64().unwrap_or(f64::NAN)));
         let real = scanner
@@ -249,7 +258,7 @@ impl CaseRow for Row {
             100.0 * self.seconds[1] / self.seconds[0],
             yes(self.robot),
             yes(self.pallet),
-            yes(self.barrel),
+            if self.unseen && !self.barrel { "not seen" } else { yes(self.barrel) },
             self.invented.len(),
             self.invented,
             alone(self.joint, 3),

@@ -8,7 +8,7 @@ use crate::store::Store;
 use contract::{Label, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
 use export::MaskReader;
 use geometry::{Aabb, Point};
-use merge::{Sight, Surfaces, Tally, Watch};
+use merge::{Seen, Sight, Surfaces, Tally, Watch};
 use std::collections::BTreeSet;
 
 /// Of so many points one tells the surfaces: a tenth of a voxel's points is enough for its plane.
@@ -202,8 +202,7 @@ impl Map for Look<'_> {
             }
             match label.kind {
                 PointKind::Fixed => {
-                    let empty = (sight == Sight::Through).then(|| self.own.is_pierced(world));
-                    out.tally.add(world, area(scan, world), empty);
+                    out.tally.add(world, area(scan, world), seen(sight, self.own, world));
                 }
                 PointKind::Link | PointKind::Attachment => {
                     out.robots.push((place, label.robot));
@@ -213,6 +212,15 @@ impl Map for Look<'_> {
             }
         }
         Ok(out)
+    }
+}
+
+/// What a session has at the place of another one's point, of which that one's own beams say whether it is of a mesh.
+pub(crate) fn seen(sight: Sight, own: &Watch<'_>, world: [f64; 3]) -> Seen {
+    match sight {
+        Sight::Through => Seen::Nothing { is_pierced: own.is_pierced(world) },
+        Sight::Onto => Seen::Something,
+        Sight::Hidden | Sight::Unseen => Seen::Not,
     }
 }
 

@@ -1,13 +1,13 @@
 //! Points of the new scans in; how far each scan is off the plant, and what stands still in the cell now, out.
 
-use super::past::{area, world};
+use super::past::{area, seen, world};
 use crate::engine::Engine;
 use crate::labelling::Near;
 use crate::report::tiles;
 use crate::store::Store;
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
 use geometry::{Aabb, Point};
-use merge::{Registration, Sight, Surfaces, Tally, Watch};
+use merge::{Registration, Surfaces, Tally, Watch};
 use segment::Ground;
 
 /// Points of a scan that are laid on the plant's surfaces, about.
@@ -81,9 +81,8 @@ impl Map for Present<'_> {
             let label: Label = known.unwrap_or_else(|| self.ground.label(world));
             match label.kind {
                 PointKind::Fixed => {
-                    let is_empty = self.watch.look(world) == Sight::Through;
-                    let empty = is_empty.then(|| self.own.is_pierced(world));
-                    out.add(world, area(scan, world), empty);
+                    let seen = seen(self.watch.look(world), self.own, world);
+                    out.add(world, area(scan, world), seen);
                 }
                 PointKind::Link | PointKind::Attachment => out.add_robot(world),
                 PointKind::Floor | PointKind::Uncertain => {}

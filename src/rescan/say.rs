@@ -12,7 +12,7 @@ use export::{
     ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
     draw_changes, write_table,
 };
-use merge::{Registration, Thing, ThingChange};
+use merge::{Registration, Thing, ThingChange, Unseen};
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -49,6 +49,7 @@ impl Said<'_, '_> {
             "scans": result.rescan.as_ref().map(|r| &r.scans),
             "robots": robots,
             "things": self.found.labels.things.iter().map(thing).collect::<Vec<_>>(),
+            "fixed_not_compared": self.found.labels.unseen.iter().map(region).collect::<Vec<_>>(),
             "not_compared": self.found.robots.unseen.iter().map(|&i| id(i)).collect::<Vec<_>>(),
         });
         let text = serde_json::to_string_pretty(&all)
@@ -180,6 +181,11 @@ impl Said<'_, '_> {
                 at.z
             );
         }
+        for (k, region) in self.found.labels.unseen.iter().enumerate() {
+            let at = region.bounds.center();
+            let at = format!("{:.3},{:.3},{:.3}", at.x, at.y, at.z);
+            let _ = writeln!(text, "fixed,U{},not compared,{at},,,,,,,", k + 1);
+        }
         text
     }
 
@@ -207,9 +213,11 @@ impl Said<'_, '_> {
             };
             (format!("{}{word}", id(i)), [p.x, p.y])
         });
+        let unseen = self.found.labels.unseen.iter().flat_map(|region| &region.cells);
+        let unseen: Vec<_> = unseen.copied().collect();
         draw_changes(
             &self.found.session.past.cell,
-            &self.found.labels.now.solid(),
+            [&self.found.labels.now.solid(), &merge::Tally::middles(&unseen)],
             &things.collect::<Vec<_>>(),
             &robots.collect::<Vec<_>>(),
         )
@@ -263,6 +271,16 @@ impl Said<'_, '_> {
         for &i in &self.found.robots.unseen {
             let _ = writeln!(text, "  {} not compared: the new scans hardly see it", id(i));
         }
+        let unseen = &self.found.labels.unseen;
+        if let Some(largest) = unseen.first() {
+            let ([x, y, z], n) = (largest.bounds.size(), unseen.len());
+            let at = largest.bounds.center();
+            let _ = writeln!(
+                text,
+                "  {n} place(s) of what stands still not compared: no new beam got there; the largest {x:.1} x {y:.1} x {z:.1} m at ({:.1}, {:.1}, {:.1}) m",
+                at.x, at.y, at.z
+            );
+        }
         let _ = writeln!(text, "{} points of earlier scans superseded", self.n_superseded);
         text
     }
@@ -286,4 +304,9 @@ fn thing(thing: &Thing) -> serde_json::Value {
         "volume_m3": thing.volume,
         "n_points": thing.n_points,
     })
+}
+
+fn region(region: &Unseen) -> serde_json::Value {
+    let bounds = [region.bounds.min, region.bounds.max];
+    json!({ "bounds": bounds, "volume_m3": region.volume, "n_points": region.n_points })
 }

@@ -16,7 +16,7 @@ use contract::{Cluster, Error, Fit, Kind, Region, Result, ScanId, TILE_SIDE, Ver
 use geometry::{Aabb, Pose};
 use ingest::Sources;
 use lattice::ViewSettings;
-use merge::{Registration, Tally, Thing, ThingChange, Watch, things};
+use merge::{Registration, Tally, Thing, ThingChange, Unseen, Watch, things};
 use robot::Model;
 use std::collections::BTreeSet;
 
@@ -77,6 +77,8 @@ pub(crate) struct Labels {
     pub(crate) near: Near,
     pub(crate) looked: Vec<Looked>,
     pub(crate) things: Vec<Thing>,
+    /// What stood in the cell and was not looked at.
+    pub(crate) unseen: Vec<Unseen>,
     /// What stands in the cell now.
     pub(crate) now: Tally,
 }
@@ -294,7 +296,8 @@ impl<'a> Session<'a> {
         let now = present.tally(self.store, engine)?;
         let (then, looked) = self.past.look([&watch, &old_watch], engine)?;
         let things = things(&then, &now, &self.settings.things);
-        Ok(Labels { near, looked, things, now })
+        let unseen = merge::unseen(&then, &now, &self.settings.things);
+        Ok(Labels { near, looked, things, unseen, now })
     }
 
     /// The fits, those refused that the new scans have no say in: they give no labels here.

@@ -10,8 +10,9 @@ const SIDE: f64 = 900.0;
 const MARGIN: i64 = 30;
 /// What stands higher than this in the cell is not drawn, metres: a ceiling would hide all.
 const SHOWN: f64 = 3.0;
-/// What stands, what went, what came.
+/// What stands, what nobody looked at, what went, what came.
 const STANDS: Rgb = [150, 156, 164];
+const UNSEEN: Rgb = [240, 228, 66];
 const GONE: Rgb = [213, 94, 0];
 const FILLED: Rgb = [0, 158, 115];
 
@@ -28,11 +29,11 @@ pub struct ChangedThing {
     pub at: [f64; 3],
 }
 
-/// Draws the cell: places where something stands, things that changed, robots with the places of their bases, world, metres.
+/// Draws the cell: places where something stands, those where something stood that was not looked at again, things that changed, robots with the places of their bases, world, metres.
 #[must_use]
 pub fn draw_changes(
     cell: &Aabb,
-    stands: &[[f64; 3]],
+    [stands, unseen]: [&[[f64; 3]]; 2],
     things: &[ChangedThing],
     robots: &[(String, [f64; 2])],
 ) -> Canvas {
@@ -52,8 +53,10 @@ pub fn draw_changes(
             canvas.fill(x - dot / 2, y - dot / 2, dot, dot, color);
         }
     };
-    let low: Vec<_> = stands.iter().filter(|p| p[2] < cell.min[2] + SHOWN).copied().collect();
-    draw(&low, blend(STANDS, [255; 3], 0.4));
+    for (places, color) in [(stands, blend(STANDS, [255; 3], 0.4)), (unseen, UNSEEN)] {
+        let low: Vec<_> = places.iter().filter(|p| p[2] < cell.min[2] + SHOWN).copied().collect();
+        draw(&low, color);
+    }
     for thing in things {
         draw(&thing.gone, GONE);
         draw(&thing.filled, FILLED);
@@ -67,6 +70,12 @@ pub fn draw_changes(
         canvas.disc(x, y, 5, [0, 114, 178]);
         canvas.text(x + 8, y - 4, 1, [0, 60, 110], name);
     }
-    canvas.text(MARGIN, 8, 1, INK, "grey: stands   orange: was there   green: is there now");
+    canvas.text(
+        MARGIN,
+        8,
+        1,
+        INK,
+        "grey: stands   yellow: not seen again   orange: was there   green: is there now",
+    );
     canvas
 }

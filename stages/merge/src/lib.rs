@@ -15,14 +15,16 @@ mod sight;
 mod space;
 mod tally;
 mod things;
+mod unseen;
 
 pub use attach::{Attach, Attached, Group};
 pub use hang::{Hanging, hang};
 pub use register::{Registration, Surfaces};
 pub use sight::{Sight, Watch};
 pub use space::{see, stand};
-pub use tally::Tally;
+pub use tally::{Seen, Tally};
 pub use things::{Thing, ThingChange, ThingSettings, things};
+pub use unseen::{Unseen, unseen};
 
 /// What may be tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]

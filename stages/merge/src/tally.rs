@@ -1,6 +1,7 @@
 //! Points of one session that stand still, with what the other session's beams say of their places, in; out come voxels: in
 //! which of them something stands, which of them changed, and how much of them is covered.
 
+use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A voxel of a world: `floor(p / edge)`.
@@ -12,7 +13,7 @@ pub(crate) const EDGE: f64 = 0.05;
 pub(crate) const REACH: i32 = 2;
 /// Fewest points that make a voxel solid.
 pub(crate) const MIN_POINTS: u32 = 3;
-/// Share of a voxel's points whose place the other session must have seen empty.
+/// Share of a voxel's points whose places the other session must have seen empty, or not at all.
 const MIN_SHARE: f64 = 0.6;
 
 /// Points of one session by voxel: how many, and at how many places of theirs the other session saw nothing.
@@ -23,6 +24,20 @@ pub struct Tally {
     robots: BTreeSet<Cell>,
 }
 
+/// What another session says of a point's place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seen {
+    /// None of its beams got there.
+    Not,
+    /// Some ended there.
+    Something,
+    /// They went on beyond it.
+    Nothing {
+        /// As did another beam of the point's own session: it is of a wire or an edge.
+        is_pierced: bool,
+    },
+}
+
 /// What is in a voxel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Count {
@@ -31,6 +46,8 @@ struct Count {
     n_empty: u32,
     /// … and another beam of their own session went on.
     n_pierced: u32,
+    /// To whose places no beam of the other session got.
+    n_unseen: u32,
     /// That the points stand for, across their beams, m².
     area: f64,
 }
@@ -58,13 +75,13 @@ impl Tally {
         Self::middles(&solid.map(|(cell, _)| *cell).collect::<Vec<_>>())
     }
 
-    /// Adds a point that stands still, and for so much area across its beam, m²; where the other session saw nothing at its
-    /// place, also whether another beam of its own session went on there.
-    pub fn add(&mut self, world: [f64; 3], area: f64, empty: Option<bool>) {
+    /// Adds a point that stands still, and for so much area across its beam, m²; and what the other session has at its place.
+    pub fn add(&mut self, world: [f64; 3], area: f64, seen: Seen) {
         let cell = self.cells.entry(Self::cell(world)).or_default();
         cell.n_points += 1;
-        cell.n_empty += u32::from(empty.is_some());
-        cell.n_pierced += u32::from(empty == Some(true));
+        cell.n_empty += u32::from(matches!(seen, Seen::Nothing { .. }));
+        cell.n_pierced += u32::from(seen == Seen::Nothing { is_pierced: true });
+        cell.n_unseen += u32::from(seen == Seen::Not);
         cell.area += area;
     }
 
@@ -80,6 +97,7 @@ impl Tally {
             own.n_points += count.n_points;
             own.n_empty += count.n_empty;
             own.n_pierced += count.n_pierced;
+            own.n_unseen += count.n_unseen;
             own.area += count.area;
         }
         self.robots.extend(other.robots);
@@ -101,9 +119,21 @@ impl Tally {
     /// Voxels that hold points, in and beside which the other session has nothing: of a wire or an edge it has a point
     /// here and there.
     pub(crate) fn changed(&self, other: &Self) -> BTreeSet<Cell> {
-        let is_empty = |c: &Count| f64::from(c.n_empty) >= MIN_SHARE * f64::from(c.n_points);
+        self.alone(other, |c| c.n_empty)
+    }
+
+    /// Solid voxels that no beam of the other session reached.
+    pub(crate) fn unseen(&self, other: &Self) -> BTreeSet<Cell> {
+        let mut out = self.alone(other, |c| c.n_unseen);
+        out.retain(|cell| self.is_solid(cell));
+        out
+    }
+
+    /// Voxels of which so many points are enough, in and beside which the other session has none.
+    fn alone(&self, other: &Self, n: impl Fn(&Count) -> u32) -> BTreeSet<Cell> {
+        let is_enough = |c: &Count| f64::from(n(c)) >= MIN_SHARE * f64::from(c.n_points);
         let has_some = |cell: &Cell| around(cell, 1).any(|c| other.cells.contains_key(&c));
-        let full = self.cells.iter().filter(|(_, c)| is_empty(c));
+        let full = self.cells.iter().filter(|(_, c)| is_enough(c));
         full.map(|(cell, _)| *cell).filter(|cell| !has_some(cell)).collect()
     }
 
@@ -142,5 +172,15 @@ pub(crate) fn connected(
         out.extend(around(&cell, reach).filter(|c| take(c)));
     }
     out.sort_unstable();
+    out
+}
+
+/// What some voxels fill, world, metres.
+pub(crate) fn bounds<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Aabb {
+    let mut out = Aabb::EMPTY;
+    for cell in cells {
+        out.add(cell.map(|i| f64::from(i) * EDGE));
+        out.add(cell.map(|i| f64::from(i + 1) * EDGE));
+    }
     out
 }

@@ -2,7 +2,7 @@
 //! and moved out.
 
 use crate::parted::parted;
-use crate::tally::{Cell, EDGE, REACH, Tally, around, connected};
+use crate::tally::{Cell, EDGE, REACH, Tally, around, bounds, connected};
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -288,18 +288,10 @@ fn ground(bounds: &Aabb) -> f64 {
     w * d
 }
 
-fn bounds<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Aabb {
-    let mut out = Aabb::EMPTY;
-    for cell in cells {
-        out.add(cell.map(|i| f64::from(i) * EDGE));
-        out.add(cell.map(|i| f64::from(i + 1) * EDGE));
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tally::Seen;
 
     /// A box's surface, five points a voxel.
     fn solid(tally: &mut Tally, min: [f64; 3], size: [f64; 3], is_empty: bool) {
@@ -312,7 +304,8 @@ mod tests {
                     if rim {
                         let at = [i, j, k].map(|v| 0.02 * f64::from(v));
                         let p = [min[0] + at[0], min[1] + at[1], min[2] + at[2]];
-                        tally.add(p, 4e-4, is_empty.then_some(false));
+                        let nothing = Seen::Nothing { is_pierced: false };
+                        tally.add(p, 4e-4, if is_empty { nothing } else { Seen::Something });
                     }
                 }
             }
@@ -363,7 +356,7 @@ mod tests {
         for row in 1..=8 {
             for i in 0..10 {
                 let (x, y) = (5.01 + 0.14 * f64::from(row), 1.05 + 0.1 * f64::from(i));
-                now.add([x, y, 0.71], 4e-4, Some(false));
+                now.add([x, y, 0.71], 4e-4, Seen::Nothing { is_pierced: false });
             }
         }
         let found = things(&then, &now, &ThingSettings::default());
@@ -377,7 +370,7 @@ mod tests {
         for (scan, wire) in (0..4).flat_map(|scan| (0..12).map(move |wire| (scan, wire))) {
             for i in 0..400 {
                 let at = [0.0025 * f64::from(i), 1.0, 0.05 * f64::from(wire) + 0.02];
-                now.add(at, 3.7e-5, Some(scan > 0));
+                now.add(at, 3.7e-5, Seen::Nothing { is_pierced: scan > 0 });
             }
         }
         assert!(things(&then, &now, &ThingSettings::default()).is_empty());

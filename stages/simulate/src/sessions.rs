@@ -18,6 +18,10 @@ const NEAR: f64 = 3.6;
 const WALL: f64 = 0.8;
 /// Standard deviations of the new scans' registration: metres, degrees.
 const OFF: [f64; 2] = [0.003, 0.01];
+/// Room about a new scanner, metres: a tripod's feet, and a person beside it.
+const TRIPOD: f64 = 0.6;
+/// Half of what a robot's foot takes up, metres.
+const ROBOT: f64 = 0.9;
 /// Places that are tried.
 const TRIES: usize = 2000;
 
@@ -34,7 +38,7 @@ pub fn sessions(wanted: &Plant, models: &[Model]) -> Result<[Scene; 2]> {
     };
     let at = [robot.xyz[0], robot.xyz[1]];
     let size = then.hall.as_ref().map_or([20.0; 3], |hall| hall.size);
-    let new = new_scanners(&then, at, size, wanted.step_deg, &mut random);
+    let new = new_scanners(&then, at, size, wanted.step_deg, &mut random)?;
     let mut taken: Vec<[f64; 2]> = new.iter().map(|s| [s.position[0], s.position[1]]).collect();
     let pallet = free(&then, (at, size), &mut taken, &mut random)?;
     let pushed = free(&then, (at, size), &mut taken, &mut random)?;
@@ -73,15 +77,21 @@ fn new_scanners(
     size: [f64; 3],
     step_deg: f64,
     random: &mut Random,
-) -> Vec<crate::scene::Scanner> {
+) -> Result<Vec<crate::scene::Scanner>> {
     let side = |axis: usize, random: &mut Random| {
-        let mut xy = at;
-        let to_wall = at[axis] + 0.5 * size[axis] - WALL;
-        xy[axis] -= to_wall.min(NEAR);
-        xy[1 - axis] += random.between(-0.6, 0.6);
-        xy
+        let to_wall = (at[axis] + 0.5 * size[axis] - WALL).min(NEAR);
+        for _ in 0..TRIES {
+            let mut xy = at;
+            xy[axis] -= to_wall * random.between(0.75, 1.0);
+            xy[1 - axis] += random.between(-1.5, 1.5);
+            let inside = (0..2).all(|i| xy[i].abs() < 0.5 * size[i] - WALL);
+            if inside && is_free(scene, xy) {
+                return Ok(xy);
+            }
+        }
+        Err(no_room("a scanner"))
     };
-    let places = [side(0, random), side(1, random)];
+    let places = [side(0, random)?, side(1, random)?];
     let one = |(k, xy): (usize, [f64; 2])| {
         let raster = Raster { elevation_deg: [-60.0, 70.0], step_deg, ..Raster::default() };
         let z = scene.ground(xy[0], xy[1]) + random.between(1.6, 2.2);
@@ -94,7 +104,7 @@ fn new_scanners(
         };
         out
     };
-    places.into_iter().enumerate().map(one).collect()
+    Ok(places.into_iter().enumerate().map(one).collect())
 }
 
 /// A place on the floor near the robot's aisles that nothing stands on.
@@ -104,8 +114,6 @@ fn free(
     taken: &mut Vec<[f64; 2]>,
     random: &mut Random,
 ) -> Result<[f64; 2]> {
-    let around =
-        |p: [f64; 2], xy: [f64; 2], half: f64| (p[0] - xy[0]).hypot(p[1] - xy[1]) < FREE + half;
     for _ in 0..TRIES {
         let along = random.between(-6.5, 6.5);
         let edge = random.between(0.7, 1.1);
@@ -115,18 +123,40 @@ fn free(
             [edge - 0.5 * size[0], at[1] + along]
         };
         let inside = (0..2).all(|i| p[i].abs() < 0.5 * size[i] - 0.65);
-        let things = scene
-            .boxes
-            .iter()
-            .map(|b| ([b.xyz[0], b.xyz[1]], 0.5 * b.size[0].hypot(b.size[1])))
-            .chain(scene.columns.iter().map(|c| (c.xy, c.radius)))
-            .chain(scene.scanners.iter().map(|s| ([s.position[0], s.position[1]], 0.0)))
-            .chain(taken.iter().map(|xy| (*xy, 0.45)));
-        let mut things = things;
-        if inside && !things.any(|(xy, half)| around(p, xy, half)) {
+        let scanners = scene.scanners.iter().map(|s| ([s.position[0], s.position[1]], 0.0));
+        let taken_up = scanners.chain(taken.iter().map(|xy| (*xy, 0.45)));
+        if inside && !things(scene).chain(taken_up).any(|thing| is_near(p, thing, FREE)) {
             taken.push(p);
             return Ok(p);
         }
     }
-    Err(Error::bad_input("the hall has no room for what is to be moved").hint("draw another seed"))
+    Err(no_room("what is to be moved"))
+}
+
+/// What stands in a scene: middle and half of its greatest extent on the floor, metres.
+fn things(scene: &Scene) -> impl Iterator<Item = ([f64; 2], f64)> + '_ {
+    let boxes = scene.boxes.iter();
+    let boxes = boxes.map(|b| ([b.xyz[0], b.xyz[1]], 0.5 * b.size[0].hypot(b.size[1])));
+    boxes.chain(scene.columns.iter().map(|c| (c.xy, c.radius)))
+}
+
+fn is_near(p: [f64; 2], (xy, half): ([f64; 2], f64), room: f64) -> bool {
+    (p[0] - xy[0]).hypot(p[1] - xy[1]) < room + half
+}
+
+/// Whether a tripod has room at a place.
+fn is_free(scene: &Scene, xy: [f64; 2]) -> bool {
+    let robots = scene.robots.iter().map(|r| ([r.xyz[0], r.xyz[1]], ROBOT));
+    let furniture = scene.benches.iter().chain(&scene.conveyors).map(|f| {
+        let (sin, cos) = f.yaw_deg.to_radians().sin_cos();
+        let (x, y) = (xy[0] - f.xy[0], xy[1] - f.xy[1]);
+        let beside = |along: f64, length: f64| (along.abs() - 0.5 * length).max(0.0);
+        beside(x * cos + y * sin, f.size[0]).hypot(beside(y * cos - x * sin, f.size[1]))
+    });
+    !things(scene).chain(robots).any(|thing| is_near(xy, thing, TRIPOD))
+        && furniture.fold(f64::MAX, f64::min) > TRIPOD
+}
+
+fn no_room(what: &str) -> Error {
+    Error::bad_input(format!("the hall has no room for {what}")).hint("draw another seed")
 }

@@ -140,7 +140,8 @@ fn crosses(node: &BvhNode, origin: &Vector3<f32>, inverse: &Vector3<f32>) -> boo
     let (low, high) = ([low.x, low.y, low.z], [high.x, high.y, high.z]);
     let (mut enter, mut leave) = (0.0_f32, f32::INFINITY);
     // Nothing here is NaN, which `f32::min` would look for.
-    let (least, most) = (|a: f32, b: f32| if a < b { a } else { b }, |a: f32, b: f32| if a > b { a } else { b });
+    let (least, most) =
+        (|a: f32, b: f32| if a < b { a } else { b }, |a: f32, b: f32| if a > b { a } else { b });
     for k in 0..3 {
         let (a, b) = ((low[k] - origin[k]) * inverse[k], (high[k] - origin[k]) * inverse[k]);
         enter = most(enter, least(a, b));
