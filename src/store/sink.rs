@@ -21,6 +21,8 @@ use std::sync::Arc;
 /// Most points of one tile: bounds what a worker holds. A square of ground of a dense cloud, or a lattice far coarser
 /// than its scan, may have more; then several tiles stand at the same [`TileAt`], cut in the order of places.
 pub const TILE_POINTS: usize = 1 << 21;
+/// Most room that a tile gets before it needs it, points: that of a scan with about a point a pixel.
+const USUAL_POINTS: usize = 1 << 16;
 /// Records that go to disk at once, bytes: some tens of tiles, and little beside what gathers.
 const BATCH_BYTES: usize = 48 << 20;
 
@@ -31,8 +33,10 @@ pub struct TileSink {
     /// Where the tile of a scan, row and column has its buffer; never iterated.
     places: HashMap<(u32, [u32; 2]), usize>,
     buffers: Vec<Buffer>,
-    /// Capacity of all buffers, bytes.
+    /// Points in all buffers, bytes.
     bytes: usize,
+    /// Most points that a tile had when it was written: room for the next ones, so that they need not grow.
+    usual: usize,
     budget_bytes: usize,
     writer: Writer,
     spill: Option<Spill>,
@@ -82,6 +86,7 @@ impl TileSink {
             places: HashMap::new(),
             buffers: Vec::new(),
             bytes: 0,
+            usual: 0,
             budget_bytes,
             spill: None,
             n_points: 0,
@@ -109,10 +114,12 @@ impl TileSink {
         for run in &strip.runs {
             let place = self.place(strip.scan.0, run.tile);
             let buffer = &mut self.buffers[place];
-            let before = buffer.records.capacity();
+            if buffer.records.capacity() == 0 {
+                buffer.records.reserve_exact(self.usual.max(run.n));
+            }
             buffer.add(&strip.records[start..start + run.n]);
             buffer.touched = self.n_strips;
-            self.bytes += (buffer.records.capacity() - before) * Record::BYTES;
+            self.bytes += run.n * Record::BYTES;
             start += run.n;
         }
         self.n_points += strip.records.len() as u64;
@@ -140,7 +147,8 @@ impl TileSink {
             }
             let buffer = &mut self.buffers[i];
             let records = std::mem::take(&mut buffer.records);
-            self.bytes -= records.capacity() * Record::BYTES;
+            self.bytes -= records.len() * Record::BYTES;
+            self.usual = self.usual.max(records.len().min(USUAL_POINTS));
             // Points have come back to it, or are too many for one tile: the end decides.
             let early = !buffer.comes_back()
                 && records.len() <= TILE_POINTS

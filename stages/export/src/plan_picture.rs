@@ -19,6 +19,8 @@ const MARGIN: i64 = 24;
 pub struct PlanPicture {
     min: [f64; 2],
     cell: f64,
+    /// Cells a metre.
+    per_metre: f64,
     width: usize,
     height: usize,
     cells: Vec<Cell>,
@@ -47,6 +49,7 @@ impl PlanPicture {
         Self {
             min: [bounds.min[0], bounds.min[1]],
             cell,
+            per_metre: 1.0 / cell,
             width,
             height,
             cells: (0..width * height).map(|_| Cell::default()).collect(),
@@ -164,7 +167,7 @@ impl PlanPicture {
 
     #[inline]
     fn at(&self, p: [f64; 2]) -> Option<usize> {
-        let [u, v] = [0, 1].map(|i| (p[i] - self.min[i]) / self.cell);
+        let [u, v] = [0, 1].map(|i| (p[i] - self.min[i]) * self.per_metre);
         let inside = u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
         inside.then(|| v as usize * self.width + u as usize)
     }

@@ -19,13 +19,15 @@ const THIN_REACH: i32 = 3;
 const WHOLE: f64 = 0.2;
 /// Most voxels of a thing that is looked at whole: what is larger is structure that something stood against.
 const MAX_WHOLE: usize = 40_000;
-/// Of a thing that one session sees only in part, the other may see up to so many times the ground.
-const MAX_PART: f64 = 2.5;
+/// Of a thing that one session sees only in part, the other may see up to so many times the ground; where one of its sides is
+/// seen in all its length, that may be all that is seen.
+const MAX_PART: [f64; 2] = [2.5, 6.0];
 /// A change on so many times the ground of one in the other session may be that thing and another one beside it; one on more
 /// is no pair of things, and would take long to look through.
 const WIDER: [f64; 2] = [1.4, 6.0];
-/// How much the sizes of a thing may differ between two sessions, which see other sides of it: metres, and share.
-const SAME_SIZE: [f64; 2] = [0.12, 0.2];
+/// How much the sizes of a thing may differ between two sessions, which see other sides of it, but both its top: metres, and
+/// share of its sides and of its height.
+const SAME_SIZE: (f64, [f64; 3]) = (0.12, [0.2, 0.2, 0.1]);
 
 /// What is tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -175,8 +177,8 @@ impl Tally {
         while let Some(mut piece) = pieces.pop() {
             let all = self.standing(&piece.cells);
             let is_part = |other: &Piece| other.cells.iter().any(|c| all.contains(c));
-            let n_changed = |p: &&Piece| is_part(p).then_some(p.cells.len());
-            let n = piece.cells.len() + pieces.iter().filter_map(|p| n_changed(&p)).sum::<usize>();
+            let parts = pieces.iter().filter(|p| is_part(p));
+            let n = piece.cells.len() + parts.map(|p| p.cells.len()).sum::<usize>();
             if all.len() < MAX_WHOLE && n as f64 >= WHOLE * all.len() as f64 {
                 for part in pieces.extract_if(.., |p| is_part(p)) {
                     piece.cells.extend(part.cells);
@@ -272,12 +274,14 @@ fn unlike(a: &Aabb, b: &Aabb) -> f64 {
         [w.min(d), w.max(d), h]
     };
     let (a, b) = (sorted(a), sorted(b));
-    let same = |i: usize| SAME_SIZE[0].max(SAME_SIZE[1] * a[i].max(b[i]));
+    let same = |i: usize| SAME_SIZE.0.max(SAME_SIZE.1[i] * a[i].max(b[i]));
     let off = |i: usize| (a[i] - b[i]).abs() / same(i);
     // The smaller one within the larger one, and no small part of it.
     let (small, large) = if a[0] * a[1] < b[0] * b[1] { (a, b) } else { (b, a) };
     let beyond = |i: usize| (small[i] - large[i]) / same(i);
-    let part = large[0] * large[1] / (small[0] * small[1]).max(1e-9) / MAX_PART;
+    let is_side = (0..2).any(|i| (small[1] - large[i]).abs() <= same(i));
+    let part =
+        large[0] * large[1] / (small[0] * small[1]).max(1e-9) / MAX_PART[usize::from(is_side)];
     let seen_less = beyond(0).max(beyond(1)).max(part).max(off(2));
     (0..3).map(off).fold(0.0, f64::max).min(seen_less)
 }
@@ -362,6 +366,19 @@ mod tests {
         let found = things(&then, &now, &ThingSettings::default());
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!(found[0].change, ThingChange::Moved);
+    }
+
+    #[test]
+    fn one_side_of_a_thing_is_enough_to_know_it_by_and_a_barrel_is_none() {
+        let (mut then, mut now) = (Tally::default(), Tally::default());
+        solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.0, 0.66], true);
+        solid(&mut then, [1.0, 6.0, 0.02], [0.9, 0.9, 0.86], true);
+        // Its long side, and a strip of its top.
+        solid(&mut now, [5.0, 1.0, 0.02], [1.2, 0.36, 0.66], true);
+        let found = things(&then, &now, &ThingSettings::default());
+        let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
+        assert_eq!(kinds, [ThingChange::Moved, ThingChange::Gone]);
+        assert!(found[1].then.expect("bounds").contains([1.4, 6.4, 0.5]));
     }
 
     #[test]

@@ -24,7 +24,8 @@ enum Level {
 /// Heights at cell middles; cells without one but near known ones hold the mean plane, others NaN.
 #[derive(Debug, Clone)]
 struct Raster {
-    cell: f64,
+    /// Cells a metre.
+    per_metre: f64,
     min: [i32; 2],
     width: usize,
     heights: Vec<f32>,
@@ -68,18 +69,22 @@ impl Ground {
         best
     }
 
-    /// Whether a place in the world lies on the floor.
+    /// Whether a place in the world lies on the floor: on any of its levels.
     #[inline]
     #[must_use]
     pub fn is_floor(&self, world: [f64; 3]) -> bool {
-        // Most points of a plant are far above the floor, or under the ceiling.
-        let near = |level: &Level| match level {
-            Level::Dense(raster) => {
-                world[2] - self.band <= raster.span[1] && world[2] + self.depth >= raster.span[0]
-            }
-            Level::Sparse(_) => true,
+        let is_on = |floor: Option<f64>| {
+            floor.is_some_and(|h| (-self.depth..=self.band).contains(&(world[2] - h)))
         };
-        self.levels.iter().any(near) && self.height_above(world).is_some_and(|h| h <= self.band)
+        self.levels.iter().any(|level| match level {
+            // Most points of a plant are far above the floor, or under the ceiling.
+            Level::Dense(raster) => {
+                world[2] - self.band <= raster.span[1]
+                    && world[2] + self.depth >= raster.span[0]
+                    && is_on(raster.height(world[0], world[1]))
+            }
+            Level::Sparse(level) => is_on(level.height(world[0], world[1])),
+        })
     }
 
     /// The label that a point has by its place alone: floor or fixed.
@@ -122,16 +127,41 @@ impl Raster {
         }
         let known = || heights.iter().filter(|h| !h.is_nan()).map(|h| base + f64::from(*h));
         let span = [known().fold(f64::MAX, f64::min), known().fold(f64::MIN, f64::max)];
-        Some(Self { cell: level.cell, min, width, heights, base, span })
+        Some(Self { per_metre: 1.0 / level.cell, min, width, heights, base, span })
     }
 
-    /// Bilinear height between cell middles, metres.
+    /// Bilinear height between cell middles, metres; where not all four are known, of those that are.
     #[inline]
     fn height(&self, x: f64, y: f64) -> Option<f64> {
-        let (u, v) = (x / self.cell - 0.5, y / self.cell - 0.5);
+        let (u, v) = (x * self.per_metre - 0.5, y * self.per_metre - 0.5);
         let (i, j) = (floor_i32(u), floor_i32(v));
         let (fu, fv) = (u - f64::from(i), v - f64::from(j));
         let (i, j) = (i64::from(i) - i64::from(self.min[0]), i64::from(j) - i64::from(self.min[1]));
+        // Wholly within the raster, as nearly all points are.
+        if i >= 0 && j >= 0 && i + 1 < self.width as i64 {
+            let at = j as usize * self.width + i as usize;
+            if let (Some([a, b]), Some([c, d])) =
+                (self.pair(at), self.pair(at.saturating_add(self.width)))
+            {
+                let mean = (1.0 - fv) * (a + fu * (b - a)) + fv * (c + fu * (d - c));
+                if !mean.is_nan() {
+                    return Some(mean + self.base);
+                }
+            }
+        }
+        self.known_height((i, j), (fu, fv))
+    }
+
+    /// Two neighbours of a row.
+    #[inline]
+    fn pair(&self, at: usize) -> Option<[f64; 2]> {
+        let pair = self.heights.get(at..at.checked_add(2)?)?;
+        Some([f64::from(pair[0]), f64::from(pair[1])])
+    }
+
+    /// The same at the rim of what is known.
+    #[cold]
+    fn known_height(&self, (i, j): (i64, i64), (fu, fv): (f64, f64)) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for (di, dj, w) in [
             (0, 0, (1.0 - fu) * (1.0 - fv)),
