@@ -27,6 +27,9 @@ use crate::masks::Masks;
 use crate::report::id;
 use crate::spaces::poses;
 
+/// Records that wait for their tiles may take so many times what a channel does, where memory is short.
+const SPOOLED: usize = 8;
+
 /// What labelling reads.
 pub(crate) struct Labelling<'a> {
     fits: &'a [Fit],
@@ -163,7 +166,9 @@ impl<'a> Labelling<'a> {
         engine: &Engine,
     ) -> Result<Done> {
         let las = scope.las.clone().unwrap_or_else(|| self.las());
-        let mut clouds = Clouds::create(clouds_out, &las, &self.export)?;
+        let waiting_bytes = self.export.waiting_bytes.min(SPOOLED * engine.channel_bytes);
+        let export = export::Settings { waiting_bytes, ..self.export };
+        let mut clouds = Clouds::create(clouds_out, &las, &export)?;
         let mut masks = Masks::new(out, self.sources.opened_masks());
         let mut robots: Vec<RobotPicture> = self.robot_pictures(engine)?;
         let mut pictures = Vec::new();

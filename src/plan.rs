@@ -91,6 +91,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     // What nobody saw around them; second pass: every point once more, in the order of its file, to label and to
     // write.
     let spaces = spaces::around(&fits, &models, (&search, settings), engine)?;
+    drop(shelf);
     let written =
         labelling.write((&near, spaces), &Scope::default(), (room.next(), room.next()), engine)?;
     let mut outcome = Report {
