@@ -11,8 +11,10 @@ use std::process::{Command, Output};
 
 /// Beams of each scanner: few, since only what is written matters here.
 const N_BEAMS: u64 = 60_000;
-/// Faults that are tried, spread over the run; all of them where the environment asks for it.
-const N_FAULTS: usize = 16;
+/// Faults that are tried, spread over the run, and the last ones, when results take their places; all of them, from the
+/// number that it gives on, where the environment asks for it.
+const N_FAULTS: usize = 14;
+const LAST_FAULTS: usize = 3;
 const ALL: &str = "STILLPOINT_ALL_FAULTS";
 /// Counts calls that write below a folder, and lets one of them fail.
 const SHIM: &str = include_str!("faults.c");
@@ -77,8 +79,11 @@ fn whatever_fails_to_be_written_the_state_is_old_or_new() {
     let n: usize =
         std::fs::read_to_string(dir.join("count")).expect("a count").parse().expect("it");
     assert!(n > 50, "only {n} calls were seen");
-    let step = if std::env::var_os(ALL).is_some() { 1 } else { n.div_ceil(N_FAULTS) };
-    for at in (1..=n).step_by(step) {
+    let first = std::env::var(ALL).ok().map(|from| from.parse().expect("a number"));
+    let step = if first.is_some() { 1 } else { n.div_ceil(N_FAULTS) };
+    let mut faults: Vec<usize> = (first.unwrap_or(1)..=n).step_by(step).collect();
+    faults.extend(n + 1 - LAST_FAULTS..=n);
+    for at in faults {
         let _ = std::fs::remove_dir_all(dir.join("out"));
         copy(&dir.join("old"), &dir.join("out"));
         let failed = with("out", &[], at);

@@ -136,7 +136,10 @@ impl Manifest {
     pub(crate) fn publish(next: &Path, out: &Path) -> Result<Self> {
         let manifest = Self::read(next)?;
         let old = Self::read(out).map(|old| old.files).unwrap_or_default();
-        remove(&out.join(RESULT))?;
+        // Where it has moved already, all but the list has: a run was cut short between the two.
+        if next.join(RESULT).exists() {
+            remove(&out.join(RESULT))?;
+        }
         for file in &manifest.files {
             if file.path != RESULT {
                 shift(&next.join(&file.path), &out.join(&file.path))?;
