@@ -198,7 +198,7 @@ impl Map for Look<'_> {
             match sight {
                 Sight::Onto => out.onto.push(place),
                 Sight::Through => out.through.push((place, Tally::cell(world))),
-                Sight::Hidden | Sight::Unseen => {}
+                Sight::Close | Sight::Hidden | Sight::Unseen => {}
             }
             match label.kind {
                 PointKind::Fixed => {
@@ -219,7 +219,7 @@ impl Map for Look<'_> {
 pub(crate) fn seen(sight: Sight, own: &Watch<'_>, world: [f64; 3]) -> Seen {
     match sight {
         Sight::Through => Seen::Nothing { is_pierced: own.is_pierced(world) },
-        Sight::Onto => Seen::Something,
+        Sight::Onto | Sight::Close => Seen::Something,
         Sight::Hidden | Sight::Unseen => Seen::Not,
     }
 }

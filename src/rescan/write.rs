@@ -131,7 +131,7 @@ impl Written<'_, '_> {
         match self.session.watch().look(point.world) {
             Sight::Onto => false,
             Sight::Through => !gone.contains(&Tally::cell(point.world)),
-            Sight::Hidden | Sight::Unseen => true,
+            Sight::Close | Sight::Hidden | Sight::Unseen => true,
         }
     }
 

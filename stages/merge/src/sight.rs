@@ -24,10 +24,12 @@ pub enum Sight {
     Unseen = 0,
     /// Something nearer hid it.
     Hidden = 1,
+    /// Beams got there and ended little beyond it: what is there may be what they ended on, or not.
+    Close = 2,
     /// Beams, and all around them, went on beyond it: nothing is there.
-    Through = 2,
+    Through = 3,
     /// A beam ended there: something is.
-    Onto = 3,
+    Onto = 4,
 }
 
 /// Scans that are asked.
@@ -71,6 +73,8 @@ impl<'a> Watch<'a> {
                 Sight::Through
             } else if look.far < look.range {
                 Sight::Hidden
+            } else if look.far.is_finite() {
+                Sight::Close
             } else {
                 Sight::Unseen
             };

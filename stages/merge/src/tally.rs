@@ -29,7 +29,7 @@ pub struct Tally {
 pub enum Seen {
     /// None of its beams got there.
     Not,
-    /// Some ended there.
+    /// Some ended there, or so close that it may be the same.
     Something,
     /// They went on beyond it.
     Nothing {
