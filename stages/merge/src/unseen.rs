@@ -22,7 +22,7 @@ pub struct Unseen {
     pub cells: Vec<Cell>,
 }
 
-/// What stood then and was not looked at since, by size; specks are left out as among [`crate::things`].
+/// What stood then and was not looked at since, by size; specks are left out as among [`crate::things()`].
 #[must_use]
 pub fn unseen(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Unseen> {
     let mut left: BTreeSet<Cell> = then.unseen(now);
