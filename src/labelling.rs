@@ -170,7 +170,9 @@ impl<'a> Labelling<'a> {
         let export = export::Settings { waiting_bytes, ..self.export };
         let mut clouds = Clouds::create(clouds_out, &las, &export)?;
         let mut masks = Masks::new(out, self.sources.opened_masks());
-        let mut robots: Vec<RobotPicture> = self.robot_pictures(engine)?;
+        let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
+        let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
+        let mut robots: Vec<RobotPicture> = self.robot_pictures(&chosen, engine)?;
         let mut pictures = Vec::new();
         let grids: Vec<_> =
             spaces.iter().map(|s| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()))).collect();
@@ -206,11 +208,10 @@ impl<'a> Labelling<'a> {
             pictures.push(self.draw_plan(&plan, input.id, out)?);
         }
         let (masks, mut sums) = masks.finish()?;
-        let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
         let mut said = vec![None; self.fits.len()];
-        let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
-        let written = engine.each(chosen.clone(), |i| {
-            self.write_robot(i, &near.hanging[i], (spaces[i].as_ref(), &robots[i]), out)
+        let shown = chosen.iter().copied().zip(&robots).collect();
+        let written = engine.each(shown, |(i, picture)| {
+            self.write_robot(i, &near.hanging[i], (spaces[i].as_ref(), picture), out)
         })?;
         for (i, (space, names)) in chosen.into_iter().zip(written) {
             said[i] = space;
@@ -252,8 +253,8 @@ impl<'a> Labelling<'a> {
         of_input.map_or_else(|| Quantum::around(&all), |(scale, offset)| Quantum { scale, offset })
     }
 
-    fn robot_pictures(&self, engine: &Engine) -> Result<Vec<RobotPicture>> {
-        engine.each((0..self.fits.len()).collect(), |i| {
+    fn robot_pictures(&self, chosen: &[usize], engine: &Engine) -> Result<Vec<RobotPicture>> {
+        engine.each(chosen.to_vec(), |i| {
             let fit = &self.fits[i];
             let model = &self.models[fit.model];
             Ok(RobotPicture::new(i as i16, model, &poses(fit, model)))

@@ -34,7 +34,7 @@ pub(crate) fn around(
         let region = region(&base, &grid.bounds());
         let min_cell = grid.edge / CELLS_PER_EDGE;
         let views =
-            search.views_by(&region, &ViewSettings { min_cell, ..settings.view.clone() })?;
+            search.images(&region, &ViewSettings { min_cell, ..settings.view.clone() })?;
         if views.iter().all(|v| v.images.is_empty()) {
             return Ok(None);
         }

@@ -4,7 +4,7 @@
 use crate::engine::{AllThreads, Engine};
 use crate::search::{Search, Shelf};
 use contract::{Fit, Mounted, Region, Result, Verdict};
-use fit::{Scene, Settings, Tooled};
+use fit::{Prepared, Scene, Settings, Tooled};
 use robot::Model;
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
 
@@ -93,7 +93,7 @@ fn dress_one(
     for flange in arm.flanges() {
         for &tool in tools {
             let both = arm.with_tool(&models[tool], flange, 0.0);
-            let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
+            let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
             let own = [n_arm, arm.links.len()];
             let found = fit::try_tool(fit, (&prepared, own), scene, settings, &AllThreads);
             let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
@@ -104,7 +104,7 @@ fn dress_one(
     }
     let ([tool, flange], mut start) = best?;
     let both = arm.with_tool(&models[tool], flange, 0.0);
-    let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
+    let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
     let holes = holes();
     let way = arm.mount_axis(flange).1;
     let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
@@ -116,7 +116,7 @@ fn dress_one(
         holes[bolt.hole]
     });
     let both = arm.with_tool(&models[tool], flange, mount);
-    let prepared = bare.tooled(shelf.prepared(tool), (fit.model, &both));
+    let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
     let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
     let own = together.links.get(arm.links.len()..).unwrap_or_default();
     let n_points: usize = own.iter().map(|link| link.n_points).sum();

@@ -8,13 +8,16 @@ use crate::store::Store;
 use contract::{Label, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
 use export::MaskReader;
 use geometry::{Aabb, Point};
-use merge::{Seen, Sight, Surfaces, Tally, Watch};
+use merge::{Seen, Sight, Surfaces, Tally, Tallying, Watch};
 use std::collections::BTreeSet;
 
 /// Of so many points one tells the surfaces: a tenth of a voxel's points is enough for its plane.
 const SAMPLE: usize = 5;
 /// Places so far apart are read from the mask one after the other.
 const GAP: u64 = 1 << 14;
+
+/// Masks are read through where at least one place in so many is asked for.
+const SPARSE: u64 = 64;
 
 /// Earlier points in a cell.
 pub(crate) struct Past<'a> {
@@ -89,20 +92,16 @@ impl<'a> Past<'a> {
         gone: &BTreeSet<[i32; 3]>,
         stands_otherwise: impl Fn(i16) -> bool,
     ) -> Vec<Vec<u64>> {
-        let mut all = self.before.clone();
+        let mut all: Vec<Places> = self.before.iter().map(|b| Places::of(b)).collect();
         for tile in looked {
             let own = &mut all[tile.mask as usize];
-            own.extend(&tile.onto);
+            tile.onto.iter().for_each(|place| own.add(*place));
             let away = tile.through.iter().filter(|(_, cell)| gone.contains(cell));
-            own.extend(away.map(|(place, _)| *place));
+            away.for_each(|(place, _)| own.add(*place));
             let left = tile.robots.iter().filter(|(_, robot)| stands_otherwise(*robot));
-            own.extend(left.map(|(place, _)| *place));
+            left.for_each(|(place, _)| own.add(*place));
         }
-        for places in &mut all {
-            places.sort_unstable();
-            places.dedup();
-        }
-        all
+        all.iter().map(Places::sorted).collect()
     }
 
     /// How many of one mask were superseded before.
@@ -129,16 +128,60 @@ impl<'a> Past<'a> {
 
     /// Labels of a tile's points.
     fn labels(&self, mask: MaskId, places: &[u64]) -> Result<Vec<Label>> {
+        let mask = &self.masks[mask.0 as usize];
+        let of = |first: u64, last: u64| mask.range(first, (last - first + 1) as usize);
+        let (first, last) =
+            places.iter().fold((u64::MAX, 0), |(a, b), &p| (a.min(p), b.max(p)));
+        if first > last {
+            return Ok(Vec::new());
+        }
+        if (last - first) / SPARSE <= places.len() as u64 {
+            let read = of(first, last)?;
+            return places.iter().map(|&p| read.label((p - first) as usize)).collect();
+        }
         let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_unstable_by_key(|&i| places[i]);
         let mut labels = vec![Label::UNCERTAIN; places.len()];
         for group in order.chunk_by(|&a, &b| places[b] - places[a] < GAP) {
             let first = places[group[0]];
-            let n = places[group[group.len() - 1]] - first + 1;
-            let read = self.masks[mask.0 as usize].range(first, n as usize)?;
-            group.iter().for_each(|&i| labels[i] = read[(places[i] - first) as usize]);
+            let read = of(first, places[group[group.len() - 1]])?;
+            for &i in group {
+                labels[i] = read.label((places[i] - first) as usize)?;
+            }
         }
         Ok(labels)
+    }
+}
+
+/// Places of a mask, one bit each: millions of them are in order without being sorted.
+struct Places(Vec<u64>);
+
+impl Places {
+    fn of(places: &[u64]) -> Self {
+        let mut out = Self(Vec::new());
+        places.iter().for_each(|place| out.add(*place));
+        out
+    }
+
+    fn add(&mut self, place: u64) {
+        let at = (place / 64) as usize;
+        if at >= self.0.len() {
+            self.0.resize((at + 1).next_power_of_two(), 0);
+        }
+        self.0[at] |= 1 << (place % 64);
+    }
+
+    /// All of them, ascending.
+    fn sorted(&self) -> Vec<u64> {
+        let mut out = Vec::with_capacity(self.0.iter().map(|w| w.count_ones() as usize).sum());
+        for (at, &word) in self.0.iter().enumerate() {
+            let mut left = word;
+            while left != 0 {
+                out.push(at as u64 * 64 + u64::from(left.trailing_zeros()));
+                left &= left - 1;
+            }
+        }
+        out
     }
 }
 
@@ -193,6 +236,7 @@ impl Map for Look<'_> {
         }
         let labels = self.past.labels(mask, &places)?;
         let mut out = Looked { mask: mask.0, ..Looked::default() };
+        let mut tallying = Tallying::default();
         for ((place, world), label) in places.into_iter().zip(worlds).zip(labels) {
             let sight = self.watch.look(world);
             match sight {
@@ -202,15 +246,16 @@ impl Map for Look<'_> {
             }
             match label.kind {
                 PointKind::Fixed => {
-                    out.tally.add(world, area(scan, world), seen(sight, self.own, world));
+                    tallying.add(world, area(scan, world), seen(sight, self.own, world));
                 }
                 PointKind::Link | PointKind::Attachment => {
                     out.robots.push((place, label.robot));
-                    out.tally.add_robot(world);
+                    tallying.add_robot(world);
                 }
                 PointKind::Floor | PointKind::Uncertain => {}
             }
         }
+        out.tally = tallying.finish();
         Ok(out)
     }
 }

@@ -7,7 +7,7 @@ use crate::report::tiles;
 use crate::store::Store;
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
 use geometry::{Aabb, Point};
-use merge::{Registration, Surfaces, Tally, Watch};
+use merge::{Registration, Surfaces, Tally, Tallying, Watch};
 use segment::Ground;
 
 /// Points of a scan that are laid on the plant's surfaces, about.
@@ -71,7 +71,7 @@ impl Map for Present<'_> {
 
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Tallied> {
         let scan = &self.scans[tile.at.scan.0 as usize];
-        let mut out = Tally::default();
+        let mut out = Tallying::default();
         for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
             let world = world(scan, *xyz);
             if !self.cell.contains(world) {
@@ -88,7 +88,7 @@ impl Map for Present<'_> {
                 PointKind::Floor | PointKind::Uncertain => {}
             }
         }
-        Ok(Tallied(out))
+        Ok(Tallied(out.finish()))
     }
 }
 

@@ -172,7 +172,7 @@ impl<'a> Session<'a> {
         let old_ground = asked(past, scans.len());
         let old = Search::new(shelf, scans, past.store, &old_ground, settings);
         let new = Search::new(shelf, scans, store, &ground, settings);
-        let views = engine.fan_out("views", vec![&old, &new], |s| s.views_by(&cell, &fine))?;
+        let views = engine.fan_out("views", vec![&old, &new], |s| s.images(&cell, &fine))?;
         let [old_views, new_views] = <[_; 2]>::try_from(views).unwrap_or_default();
         Ok(Self {
             sources,

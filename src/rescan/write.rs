@@ -12,7 +12,7 @@ use crate::reuse::{OutputFile, Sums};
 use contract::{Fit, MaskId, Result, Space};
 use export::{FileSum, MaskFiles, NpyWriter, OldPoint, refill};
 use geometry::Aabb;
-use merge::{Registration, Sight, Tally, ThingChange};
+use merge::{Registration, Sight, Tally, ThingChange, Watch};
 use robot::Model;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -119,16 +119,15 @@ impl Written<'_, '_> {
         self.robots.changed.contains(&robot) || self.robots.gone.contains(&robot)
     }
 
-    /// Whether a point of the earlier result is still part of the plant.
-    fn stays(&self, point: &OldPoint, gone: &BTreeSet<[i32; 3]>) -> bool {
-        let moves = point.label.moves();
-        if moves && self.stands_otherwise(point.label.robot) {
+    /// Whether a point of the earlier result is still part of the plant, as the new scans see it.
+    fn stays(&self, point: &OldPoint, watch: &Watch<'_>, gone: &BTreeSet<[i32; 3]>) -> bool {
+        if point.label.moves() && self.stands_otherwise(point.label.robot) {
             return false;
         }
         if !self.session.past.cell.contains(point.world) {
             return true;
         }
-        match self.session.watch().look(point.world) {
+        match watch.look(point.world) {
             Sight::Onto => false,
             Sight::Through => !gone.contains(&Tally::cell(point.world)),
             Sight::Close | Sight::Hidden | Sight::Unseen => true,
@@ -163,10 +162,11 @@ impl Written<'_, '_> {
         let robots = format!("clouds/robots.{ending}");
         names.insert(robots.clone(), [self.base.has(&robots), scratch.join(&robots).is_file()]);
         let all: Vec<(String, [bool; 2])> = names.into_iter().collect();
+        let watch = self.session.watch();
         let sums = engine.fan_out("tiles", all.clone(), |(name, [old, new])| {
             let (old, new) =
                 (old.then(|| self.base.out.join(&name)), new.then(|| scratch.join(&name)));
-            let stays = |point: &OldPoint| self.stays(point, gone);
+            let stays = |point: &OldPoint| self.stays(point, &watch, gone);
             refill([old.as_deref(), new.as_deref()], &next.join(&name), &las, stays)
         })?;
         let fixed = ["las", "laz"].map(|end| format!("clouds/fixed.{end}"));

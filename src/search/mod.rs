@@ -305,7 +305,11 @@ impl<'a, 'm> Search<'a, 'm> {
         let views = self.views(region)?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
-        let prepared = Prepared::new(before.model, model);
+        let known = |name: &str| self.shelf.models.iter().position(|m| m.name == name);
+        let tool = before.tool.as_ref().map(|tool| tool.model.as_str());
+        let parts = [before.model_name.as_str()].into_iter().chain(tool).filter_map(known);
+        let parts: Vec<&Prepared<'_>> = parts.map(|part| self.shelf.prepared(part)).collect();
+        let prepared = Prepared::joined(&parts, (before.model, model));
         Ok(fit::again(before, &prepared, &scene, &self.settings.fit, &AllThreads))
     }
 

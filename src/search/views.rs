@@ -16,14 +16,23 @@ const MAX_SPACING: f64 = 0.05;
 impl Search<'_, '_> {
     /// What each scan sees of the region, those that see something.
     pub(super) fn views(&self, region: &Region) -> Result<Vec<View>> {
-        let mut views = self.views_by(region, &self.settings.view)?;
+        let thin = self.thin(region);
+        let mut views = self.seen(region, Some(thin), &self.settings.view)?;
         lattice::agree(&mut views, &AllThreads);
         Ok(views)
     }
 
-    /// The same as the beams say it, none of them doubted, as fine as asked for.
-    pub(crate) fn views_by(&self, region: &Region, settings: &ViewSettings) -> Result<Vec<View>> {
-        let thin = self.thin(region);
+    /// The same as the beams say it, none of them doubted, as fine as asked for; without points.
+    pub(crate) fn images(&self, region: &Region, settings: &ViewSettings) -> Result<Vec<View>> {
+        self.seen(region, None, settings)
+    }
+
+    fn seen(
+        &self,
+        region: &Region,
+        thin: Option<u32>,
+        settings: &ViewSettings,
+    ) -> Result<Vec<View>> {
         let scans = self.scans.par_iter();
         scans.filter_map(|scan| self.view(scan, region, thin, settings).transpose()).collect()
     }
@@ -40,7 +49,7 @@ impl Search<'_, '_> {
         &self,
         scan: &Scan,
         region: &Region,
-        thin: u32,
+        thin: Option<u32>,
         settings: &ViewSettings,
     ) -> Result<Option<View>> {
         let extent = self.ground.extents[scan.id.0 as usize];

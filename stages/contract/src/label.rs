@@ -20,6 +20,20 @@ impl PointKind {
     /// All of them.
     pub const ALL: [Self; 5] =
         [Self::Fixed, Self::Link, Self::Attachment, Self::Floor, Self::Uncertain];
+
+    /// The one of that number; `None` for a number that is none's.
+    #[inline]
+    #[must_use]
+    pub fn of(number: u8) -> Option<Self> {
+        match number {
+            0 => Some(Self::Fixed),
+            1 => Some(Self::Link),
+            2 => Some(Self::Attachment),
+            3 => Some(Self::Floor),
+            255 => Some(Self::Uncertain),
+            _ => None,
+        }
+    }
 }
 
 /// The label of one point.

@@ -38,7 +38,7 @@ pub use e57::{E57Scans, GridPoint, GridScan};
 pub use evidence_picture::draw_evidence;
 pub use junit::write_junit;
 pub use las::{LasSummary, LasWriter};
-pub use mask::{LabelColumns, MaskFiles, MaskReader, MaskWriter};
+pub use mask::{LabelColumns, MaskFiles, MaskRange, MaskReader, MaskWriter};
 pub use npy::{Element, NpyWriter, read_places};
 pub use pack::{Pack, Packed, PointColumns};
 pub use places::Places;

@@ -106,19 +106,34 @@ impl MaskReader {
     /// Labels of `n` places from `first` on.
     ///
     /// # Errors
-    /// A file that is missing or too short; a kind that is none.
-    pub fn range(&self, first: u64, n: usize) -> Result<Vec<Label>> {
+    /// A file that is missing or too short.
+    pub fn range(&self, first: u64, n: usize) -> Result<MaskRange<'_>> {
         let [kind, robot, link] = [1, 2, 2];
         let read = |at: usize, len: usize| npy::read_bytes(&self.paths[at], first, n, len);
         let (kind, robot, link) = (read(0, kind)?, read(1, robot)?, read(2, link)?);
-        let wide = |bytes: &[u8], i: usize| i16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]);
-        let label = |i: usize| {
-            let known = PointKind::ALL.into_iter().find(|k| *k as u8 == kind[i]);
-            let broken = || Error::bad_input(format!("there is no kind \"{}\"", kind[i]));
-            let kind = known.ok_or_else(|| broken().at(self.paths[0].display()))?;
-            Ok(Label { kind, robot: wide(&robot, i), link: wide(&link, i) })
-        };
-        (0..n).map(label).collect()
+        Ok(MaskRange { path: &self.paths[0], kind, robot, link })
+    }
+}
+
+/// Labels of neighbouring places.
+#[derive(Debug)]
+pub struct MaskRange<'a> {
+    path: &'a Path,
+    kind: Vec<u8>,
+    robot: Vec<u8>,
+    link: Vec<u8>,
+}
+
+impl MaskRange<'_> {
+    /// The `i`-th of them.
+    ///
+    /// # Errors
+    /// A kind that is none.
+    pub fn label(&self, i: usize) -> Result<Label> {
+        let broken = || Error::bad_input(format!("there is no kind \"{}\"", self.kind[i]));
+        let kind = PointKind::of(self.kind[i]).ok_or_else(|| broken().at(self.path.display()))?;
+        let wide = |bytes: &[u8]| i16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]);
+        Ok(Label { kind, robot: wide(&self.robot), link: wide(&self.link) })
     }
 }
 

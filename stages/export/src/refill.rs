@@ -34,23 +34,26 @@ pub fn refill(
     keep: impl Fn(&OldPoint) -> bool + Sync,
 ) -> Result<Option<LasSummary>> {
     let mut writer = LasWriter::create(to, las.clone())?;
-    let mut n = 0;
+    let (mut n, mut bytes, record_len) = (0, Vec::new(), las.record_len());
     for (path, is_old) in [(old, true), (new, false)] {
         let Some(path) = path else { continue };
         let mut tile = Tile::open(path, las)?;
-        while let Some(records) = tile.piece()? {
-            let mut kept = Vec::with_capacity(records.len());
-            let mut extent = Extent::default();
-            for record in records.chunks_exact(las.record_len()) {
+        while let Some(records) = tile.piece(&mut bytes)? {
+            let (mut extent, mut kept) = (Extent::default(), 0);
+            for from in (0..records.len()).step_by(record_len) {
+                let record = &records[from..from + record_len];
                 let steps = [0, 4, 8].map(|at| int(record, at));
                 if !is_old || keep(&point(record, steps, las)) {
                     extent.add(steps);
-                    kept.extend_from_slice(record);
+                    if kept < from {
+                        records.copy_within(from..from + record_len, kept);
+                    }
+                    kept += record_len;
                 }
             }
             n += extent.n;
             if extent.n > 0 {
-                writer.push_records(&kept, &extent)?;
+                writer.push_records(&records[..kept], &extent)?;
             }
         }
     }
@@ -112,16 +115,16 @@ impl<'a> Tile<'a> {
         Ok(Self { path, records, record_len: las.record_len(), left })
     }
 
-    /// The next records; `None` behind the last.
-    fn piece(&mut self) -> Result<Option<Vec<u8>>> {
+    /// The next records, read into `bytes`; `None` behind the last.
+    fn piece<'b>(&mut self, bytes: &'b mut Vec<u8>) -> Result<Option<&'b mut [u8]>> {
         let n = self.left.min(PIECE);
         if n == 0 {
             return Ok(None);
         }
-        let mut bytes = vec![0; n as usize * self.record_len];
+        bytes.resize(n as usize * self.record_len, 0);
         let read = match &mut self.records {
-            Records::Plain(file) => file.read_exact(&mut bytes),
-            Records::Compressed(reader) => reader.decompress_many(&mut bytes),
+            Records::Plain(file) => file.read_exact(bytes),
+            Records::Compressed(reader) => reader.decompress_many(bytes),
         };
         read.map_err(|e| Error::of_file("tile cannot be read", self.path, e))?;
         self.left -= n;

@@ -60,11 +60,12 @@ impl<'a> Prepared<'a> {
         Self::of((index, model), fields)
     }
 
-    /// Prepares an arm with a tool on it, the links of the arm before those of the tool, from what is known of both.
+    /// Prepares a model whose links are those of others, one after the other (an arm, and a tool on it), from what is known
+    /// of them.
     #[must_use]
-    pub fn tooled<'b>(&self, tool: &Prepared<'_>, both: (usize, &'b Model)) -> Prepared<'b> {
-        let fields = self.links.iter().chain(tool.links.iter()).map(|l| Arc::clone(&l.fields));
-        Prepared::of(both, fields)
+    pub fn joined(parts: &[&Prepared<'_>], whole: (usize, &'a Model)) -> Self {
+        let links = parts.iter().flat_map(|part| part.links.iter());
+        Self::of(whole, links.map(|l| Arc::clone(&l.fields)))
     }
 
     fn of((index, model): (usize, &'a Model), fields: impl Iterator<Item = Arc<Fields>>) -> Self {

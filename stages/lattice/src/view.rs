@@ -2,7 +2,7 @@
 
 use contract::{Lattice, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, View, ViewPoint};
 use geometry::depth::{Empty, rows, transform};
-use geometry::{DepthImage, Point, Pose, Vector};
+use geometry::{DepthImage, Faces, Point, Pose, Vector};
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 
 /// What is tuned.
@@ -32,6 +32,7 @@ pub type Extent = [u32; 4];
 #[derive(Debug)]
 pub struct ViewBuilder {
     view: View,
+    faces: Faces,
     local_from_scan: Pose,
     lattice: Option<Lattice>,
     extent: Option<Extent>,
@@ -42,7 +43,7 @@ pub struct ViewBuilder {
     /// Of dense scans, one of each square of pixels is enough to fill the cells of the images, and one of larger squares
     /// as a point.
     splatted: Squares,
-    kept: Squares,
+    kept: Option<Squares>,
 }
 
 /// Squares of 2^skip by 2^skip pixels of a tile, of which each gives one point.
@@ -78,13 +79,13 @@ impl Squares {
 
 impl ViewBuilder {
     /// An empty view of `region` from `scan`; `extent` is what the scan covers of its lattice, if known. Each
-    /// 2^`thin`-th row and column of its points is kept.
+    /// 2^`thin`-th row and column of its points is kept; none of them without it.
     #[must_use]
     pub fn new(
         scan: &Scan,
         region: &Region,
         extent: Option<Extent>,
-        thin: u32,
+        thin: Option<u32>,
         settings: &ViewSettings,
     ) -> Self {
         let local_from_world =
@@ -94,13 +95,15 @@ impl ViewBuilder {
         let beam_step = scan.lattice.map_or(0.0, |l| l.row_step.max(l.col_step));
         let focal = scanner.map_or(0.0, |s| focal(&s, region, beam_step, settings));
         let images = scanner.map_or_else(Vec::new, |s| cameras(&s, region, focal));
+        let faces = Faces::new(&images);
         let skip = lattice_skip(scan, focal);
-        let thin = if scan.lattice.is_some() { thin } else { 0 };
+        let thin = thin.map(|thin| if scan.lattice.is_some() { thin } else { 0 });
         let cones = scanner.map(|s| cones(&s, region, &local_from_scan));
         let view =
             View { scan: scan.id, mask: scan.mask, scanner, beam_step, images, points: Vec::new() };
         Self {
             view,
+            faces,
             local_from_scan,
             lattice: scan.lattice,
             extent,
@@ -108,7 +111,7 @@ impl ViewBuilder {
             cones,
             empty_window: settings.empty_window,
             splatted: Squares::new(skip),
-            kept: Squares::new(skip.max(thin).min(MAX_SKIP)),
+            kept: thin.map(|thin| Squares::new(skip.max(thin).min(MAX_SKIP))),
         }
     }
 
@@ -151,7 +154,7 @@ impl ViewBuilder {
     /// Adds the points of a tile; of a dense scan, one of each square of pixels.
     pub fn add(&mut self, tile: &Tile) {
         self.splatted.clear();
-        self.kept.clear();
+        self.kept.iter_mut().for_each(Squares::clear);
         let local_from_scan = rows(&self.local_from_scan);
         let cameras: Vec<_> = self
             .view
@@ -160,16 +163,18 @@ impl ViewBuilder {
             .map(|image| rows(&(image.camera_from_local() * self.local_from_scan)))
             .collect();
         for (i, p) in tile.xyz.iter().enumerate() {
-            if self.splatted.take(tile.pixel[i]) {
-                for (image, camera_from_scan) in self.view.images.iter_mut().zip(&cameras) {
-                    image.splat(transform(camera_from_scan, *p));
-                }
-            }
-            if !self.kept.take(tile.pixel[i]) {
+            let splats = self.splatted.take(tile.pixel[i]);
+            let keeps = self.kept.as_mut().is_some_and(|kept| kept.take(tile.pixel[i]));
+            if !splats && !keeps {
                 continue;
             }
             let local = transform(&local_from_scan, *p);
-            if self.bounds.contains(local.map(f64::from)) {
+            if splats {
+                for &at in self.faces.towards(local) {
+                    self.view.images[at].splat(transform(&cameras[at], *p));
+                }
+            }
+            if keeps && self.bounds.contains(local.map(f64::from)) {
                 let place = tile.first_place + u64::from(tile.place[i]);
                 self.view.points.push(ViewPoint { xyz: local, place });
             }
@@ -274,18 +279,19 @@ fn cameras(scanner: &Point, region: &Region, focal: f64) -> Vec<DepthImage> {
         }
     }
     let axes = [Vector::x(), Vector::y(), Vector::z()];
+    let corners = region.bounds.grown(BESIDE).corners().map(Point::from);
     axes.iter()
         .flat_map(|a| [*a, -a])
         .filter(|a| {
-            // The face sees the region only if some corner lies before its widened pyramid.
+            // A face does not see a box that is all on the far side of one side of its pyramid.
             let camera_from_local = look_at(scanner, a);
-            let inside = region.bounds.grown(0.05).contains(scanner.coords.into());
-            inside
-                || region
-                    .bounds
-                    .corners()
-                    .iter()
-                    .any(|c| (camera_from_local * Point::from(*c)).z > 0.0)
+            let seen = corners.map(|c| camera_from_local * c);
+            let on = |is_in: fn(&Point) -> bool| seen.iter().any(is_in);
+            on(|c| c.z > 0.0)
+                && on(|c| c.x <= c.z)
+                && on(|c| -c.x <= c.z)
+                && on(|c| c.y <= c.z)
+                && on(|c| -c.y <= c.z)
         })
         .map(|a| DepthImage::new(look_at(scanner, &a), 1.0, focal))
         .collect()

@@ -22,7 +22,7 @@ pub use hang::{Hanging, hang};
 pub use register::{Registration, Surfaces};
 pub use sight::{Sight, Watch};
 pub use space::{see, stand};
-pub use tally::{Seen, Tally};
+pub use tally::{Seen, Tally, Tallying};
 pub use things::{Thing, ThingChange, ThingSettings, things};
 pub use unseen::{Unseen, unseen};
 

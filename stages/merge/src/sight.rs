@@ -1,7 +1,8 @@
 //! A place and the views of some scans in; whether their beams went through it, ended on it, or never got there, out.
 
 use contract::{Region, View};
-use geometry::depth::{DepthImage, Look};
+use geometry::Faces;
+use geometry::depth::Look;
 
 /// A beam that ended so far behind a place went through it, metres.
 const BEYOND: f32 = 0.04;
@@ -35,13 +36,14 @@ pub enum Sight {
 /// Scans that are asked.
 pub struct Watch<'a> {
     region: &'a Region,
-    views: &'a [View],
+    views: Vec<(&'a View, Faces)>,
 }
 
 impl<'a> Watch<'a> {
     /// Views of a region.
     #[must_use]
     pub fn new(region: &'a Region, views: &'a [View]) -> Self {
+        let views = views.iter().map(|view| (view, Faces::new(&view.images))).collect();
         Self { region, views }
     }
 
@@ -56,9 +58,10 @@ impl<'a> Watch<'a> {
     /// What each scan that looked there has.
     fn looks(&self, world: [f64; 3]) -> impl Iterator<Item = (&View, Look)> + '_ {
         let p: [f32; 3] = std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32);
-        // The images of one view share out the directions.
-        let of = move |image: &DepthImage| image.look_at(p, FOOTPRINT);
-        self.views.iter().filter_map(move |view| Some((view, view.images.iter().find_map(of)?)))
+        self.views.iter().filter_map(move |(view, faces)| {
+            let of = |&i: &usize| view.images[i].look_at(p, FOOTPRINT);
+            Some((*view, faces.towards(p).iter().find_map(of)?))
+        })
     }
 
     /// What the scans say of a place in the world: the strongest of what each of them says.
@@ -68,7 +71,7 @@ impl<'a> Watch<'a> {
         for (_, look) in self.looks(world) {
             let is_on = |range: f32| (range - look.range).abs() <= ON;
             let says = if is_on(look.near) || is_on(look.far) {
-                Sight::Onto
+                return Sight::Onto;
             } else if look.around.is_finite() && look.around - look.range > BEYOND {
                 Sight::Through
             } else if look.far < look.range {
@@ -89,7 +92,7 @@ mod tests {
     use super::*;
     use contract::{MaskId, ScanId};
     use geometry::depth::Empty;
-    use geometry::{Aabb, Point, Pose};
+    use geometry::{Aabb, DepthImage, Point, Pose};
 
     /// A plate 3 m ahead that another surface stands `behind`, seen through a gap in it.
     fn view(behind: f32) -> View {

@@ -52,6 +52,65 @@ struct Count {
     area: f64,
 }
 
+impl Count {
+    fn join(&mut self, other: &Self) {
+        self.n_points += other.n_points;
+        self.n_empty += other.n_empty;
+        self.n_pierced += other.n_pierced;
+        self.n_unseen += other.n_unseen;
+        self.area += other.area;
+    }
+}
+
+/// Points that are still to be counted by voxel: neighbours in a scan mostly are in the same one, and cost no search for it.
+#[derive(Debug, Default)]
+pub struct Tallying {
+    runs: Vec<(Cell, Count)>,
+    robots: Vec<Cell>,
+}
+
+impl Tallying {
+    /// Adds a point that stands still, and for so much area across its beam, m²; and what the other session has at its place.
+    #[inline]
+    pub fn add(&mut self, world: [f64; 3], area: f64, seen: Seen) {
+        let cell = Tally::cell(world);
+        let point = Count {
+            n_points: 1,
+            n_empty: u32::from(matches!(seen, Seen::Nothing { .. })),
+            n_pierced: u32::from(seen == Seen::Nothing { is_pierced: true }),
+            n_unseen: u32::from(seen == Seen::Not),
+            area,
+        };
+        match self.runs.last_mut() {
+            Some((last, count)) if *last == cell => count.join(&point),
+            _ => self.runs.push((cell, point)),
+        }
+    }
+
+    /// Adds a point of a robot or of what hangs on it.
+    #[inline]
+    pub fn add_robot(&mut self, world: [f64; 3]) {
+        let cell = Tally::cell(world);
+        if self.robots.last() != Some(&cell) {
+            self.robots.push(cell);
+        }
+    }
+
+    /// All of them by voxel.
+    #[must_use]
+    pub fn finish(mut self) -> Tally {
+        // Stable: areas are added in the order of the points.
+        self.runs.sort_by_key(|run| run.0);
+        let same = self.runs.chunk_by(|a, b| a.0 == b.0);
+        let cells = same.map(|runs| {
+            let mut all = runs[0].1;
+            runs[1..].iter().for_each(|run| all.join(&run.1));
+            (runs[0].0, all)
+        });
+        Tally { cells: cells.collect(), robots: self.robots.into_iter().collect() }
+    }
+}
+
 impl Tally {
     /// Face of a voxel, m².
     pub const FACE: f64 = EDGE * EDGE;
@@ -75,30 +134,10 @@ impl Tally {
         Self::middles(&solid.map(|(cell, _)| *cell).collect::<Vec<_>>())
     }
 
-    /// Adds a point that stands still, and for so much area across its beam, m²; and what the other session has at its place.
-    pub fn add(&mut self, world: [f64; 3], area: f64, seen: Seen) {
-        let cell = self.cells.entry(Self::cell(world)).or_default();
-        cell.n_points += 1;
-        cell.n_empty += u32::from(matches!(seen, Seen::Nothing { .. }));
-        cell.n_pierced += u32::from(seen == Seen::Nothing { is_pierced: true });
-        cell.n_unseen += u32::from(seen == Seen::Not);
-        cell.area += area;
-    }
-
-    /// Adds a point of a robot or of what hangs on it.
-    pub fn add_robot(&mut self, world: [f64; 3]) {
-        self.robots.insert(Self::cell(world));
-    }
-
     /// Adds all of another.
     pub fn join(&mut self, other: Self) {
         for (cell, count) in other.cells {
-            let own = self.cells.entry(cell).or_default();
-            own.n_points += count.n_points;
-            own.n_empty += count.n_empty;
-            own.n_pierced += count.n_pierced;
-            own.n_unseen += count.n_unseen;
-            own.area += count.area;
+            self.cells.entry(cell).or_default().join(&count);
         }
         self.robots.extend(other.robots);
     }

@@ -47,11 +47,11 @@ pub fn unseen(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Unseen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tally::Seen;
+    use crate::tally::{Seen, Tallying};
 
     #[test]
     fn a_cabinet_that_no_new_beam_reached_is_said_to_be_so() {
-        let (mut then, mut now) = (Tally::default(), Tally::default());
+        let (mut then, mut now) = (Tallying::default(), Tallying::default());
         for (i, j) in (0..40).flat_map(|i| (0..90).map(move |j| (i, j))) {
             let (y, z) = (0.02 * f64::from(i), 0.02 * f64::from(j));
             then.add([2.0, y, z], 4e-4, Seen::Not);
@@ -60,7 +60,7 @@ mod tests {
             // No new beam ended on these very places, but others did beside them.
             now.add([8.02, y, z], 4e-4, Seen::Something);
         }
-        let found = unseen(&then, &now, &ThingSettings::default());
+        let found = unseen(&then.finish(), &now.finish(), &ThingSettings::default());
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].bounds.contains([2.0, 0.4, 0.9]));
         assert_eq!(found[0].n_points, 3600);

@@ -88,43 +88,53 @@ impl Field {
     /// Spreads to every cell the sample nearest to its middle, by sweeps over neighbours.
     fn spread(&mut self) {
         let n = self.starts.len() - 1;
-        let mut nearest = vec![u32::MAX; n];
-        let mut far = vec![f32::INFINITY; n];
-        for cell in 0..n {
-            if self.starts[cell] < self.starts[cell + 1] {
-                nearest[cell] = self.starts[cell];
-                far[cell] =
-                    length(minus(self.middle(cell), self.points[self.starts[cell] as usize]));
+        // Squared distance, and sample; none as yet where it is infinite.
+        let mut nearest = vec![(f32::INFINITY, u32::MAX); n];
+        for (cell, own) in nearest.iter_mut().enumerate() {
+            let first = self.starts[cell];
+            if first < self.starts[cell + 1] {
+                *own = (square(minus(self.middle(cell), self.points[first as usize])), first);
             }
         }
         // Two rounds there and back carry the nearest sample around every corner of a solid body.
         for round in 0..4 {
-            for step in 0..n {
-                let cell = if round % 2 == 0 { step } else { n - 1 - step };
-                self.relax(cell, round % 2 == 0, &mut nearest, &mut far);
-            }
+            self.sweep(round % 2 == 0, &mut nearest);
         }
-        self.far = far;
+        self.far = nearest.into_iter().map(|own| own.0.sqrt()).collect();
     }
 
-    fn relax(&self, cell: usize, forward: bool, nearest: &mut [u32], far: &mut [f32]) {
-        let at = self.coordinates(cell).map(|v| v as i64);
-        let middle = self.middle(cell);
-        for (n, offset) in (0..27).map(|n| (n, [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1])) {
-            // The half of the neighbours that this sweep has already visited.
-            if n == 13 || (n < 13) != forward {
-                continue;
-            }
-            let Some(other) = self.neighbour(at, offset) else {
-                continue;
-            };
-            if nearest[other] == u32::MAX {
-                continue;
-            }
-            let distance = length(minus(middle, self.points[nearest[other] as usize]));
-            if distance < far[cell] {
-                far[cell] = distance;
-                nearest[cell] = nearest[other];
+    /// Goes over all cells, last first or first first, and asks those neighbours that it has visited already.
+    fn sweep(&self, forward: bool, nearest: &mut [(f32, u32)]) {
+        let [w, h, d] = self.size.map(|s| s as i64);
+        let turned = |i: i64, n: i64| if forward { i } else { n - 1 - i };
+        // The half of the neighbours that this sweep has visited, and how far off they are in memory.
+        let offsets = (0..27_i64).map(|n| [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1]).enumerate();
+        let visited = offsets.filter(|(n, _)| *n != 13 && (*n < 13) == forward);
+        let visited: Vec<([i64; 3], i64)> =
+            visited.map(|(_, o)| (o, (o[2] * h + o[1]) * w + o[0])).collect();
+        for (z, y) in (0..d).flat_map(|z| (0..h).map(move |y| (turned(z, d), turned(y, h)))) {
+            let is_inner = y > 0 && y < h - 1 && z > 0 && z < d - 1;
+            for x in (0..w).map(|x| turned(x, w)) {
+                let cell = (z * h + y) * w + x;
+                let is_inner = is_inner && x > 0 && x < w - 1;
+                let is_in = |o: &[i64; 3]| {
+                    is_inner
+                        || (0..w).contains(&(x + o[0]))
+                            && (0..h).contains(&(y + o[1]))
+                            && (0..d).contains(&(z + o[2]))
+                };
+                let middle = self.middle_of([x, y, z].map(|v| v as usize));
+                let mut best = nearest[cell as usize];
+                for (_, step) in visited.iter().filter(|(o, _)| is_in(o)) {
+                    let (known, sample) = nearest[(cell + step) as usize];
+                    if known < f32::INFINITY && sample != best.1 {
+                        let own = square(minus(middle, self.points[sample as usize]));
+                        if own < best.0 {
+                            best = (own, sample);
+                        }
+                    }
+                }
+                nearest[cell as usize] = best;
             }
         }
     }
@@ -200,14 +210,11 @@ impl Field {
     }
 
     fn middle(&self, index: usize) -> [f32; 3] {
-        let at = self.coordinates(index);
-        [0, 1, 2].map(|i| self.min[i] + (at[i] as f32 + 0.5) * self.edge)
+        self.middle_of(self.coordinates(index))
     }
 
-    fn neighbour(&self, at: [i64; 3], offset: [i64; 3]) -> Option<usize> {
-        let to = [0, 1, 2].map(|i| at[i] + offset[i]);
-        let inside = (0..3).all(|i| to[i] >= 0 && to[i] < self.size[i] as i64);
-        inside.then(|| self.index(to.map(|v| v as usize)))
+    fn middle_of(&self, at: [usize; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|i| self.min[i] + (at[i] as f32 + 0.5) * self.edge)
     }
 }
 
@@ -215,8 +222,8 @@ fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-fn length(v: [f32; 3]) -> f32 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+fn square(v: [f32; 3]) -> f32 {
+    v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
 }
 
 #[cfg(test)]

@@ -1,0 +1,106 @@
+//! The depth images of one scanner in; for a place, those of them that may show it, out: where they are the faces of a cube,
+//! mostly one, found without asking any.
+
+use crate::DepthImage;
+
+/// Which images of a scanner lie towards a place.
+#[derive(Debug, Clone)]
+pub struct Faces {
+    scanner: [f32; 3],
+    all: Vec<usize>,
+    /// By axis and its side (−x, +x, −y, …): the image that looks along it. Empty where images are no faces of a cube.
+    by_side: Option<[Vec<usize>; 6]>,
+    /// A place whose largest offset from the scanner is so many times the next is on one face alone: rasters end up to half
+    /// a cell beyond their edge.
+    apart: f32,
+}
+
+impl Faces {
+    /// Of images of one scanner.
+    #[must_use]
+    pub fn new(images: &[DepthImage]) -> Self {
+        let scanner = images.first().map_or([0.0; 3], |i| i.scanner().coords.cast::<f32>().into());
+        let mut by_side: [Vec<usize>; 6] = Default::default();
+        let mut is_cube = images.len() > 1;
+        for (i, image) in images.iter().enumerate() {
+            let along = image.rows[2];
+            let side = (0..6).find(|side| along[side / 2] * sign(*side) > 0.999_99);
+            is_cube &= side.is_some_and(|side| by_side[side].is_empty());
+            side.into_iter().for_each(|side| by_side[side].push(i));
+        }
+        let focal = images.iter().map(DepthImage::focal).fold(f32::INFINITY, f32::min);
+        Self {
+            scanner,
+            all: (0..images.len()).collect(),
+            by_side: is_cube.then_some(by_side),
+            apart: 1.0 + 1.0 / focal.max(1.0),
+        }
+    }
+
+    /// The images, by their numbers, that a place of the local frame may be on; it is on no other.
+    #[inline]
+    #[must_use]
+    pub fn towards(&self, local: [f32; 3]) -> &[usize] {
+        let Some(by_side) = &self.by_side else { return &self.all };
+        let d: [f32; 3] = std::array::from_fn(|i| local[i] - self.scanner[i]);
+        let a = d.map(f32::abs);
+        let axis = if a[0] >= a[1] && a[0] >= a[2] { 0 } else { 1 + usize::from(a[2] > a[1]) };
+        let next = a[(axis + 1) % 3].max(a[(axis + 2) % 3]);
+        if a[axis] <= next * self.apart {
+            return &self.all;
+        }
+        &by_side[2 * axis + usize::from(d[axis] > 0.0)]
+    }
+}
+
+fn sign(side: usize) -> f32 {
+    if side % 2 == 1 { 1.0 } else { -1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::{Empty, transform};
+    use crate::{Point, Pose, Vector};
+    use nalgebra::{Rotation3, Translation3, UnitQuaternion};
+
+    fn cube(scanner: Point, n_faces: usize) -> Vec<DepthImage> {
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        let along = axes.iter().flat_map(|a| [*a, -a]).take(n_faces);
+        let image = |along: Vector| {
+            let up = if along.z.abs() > 0.9 { Vector::x() } else { Vector::z() };
+            let rotation = Rotation3::look_at_lh(&along, &up);
+            let turned = UnitQuaternion::from_rotation_matrix(&rotation);
+            let camera_from_local = Pose::from_parts(Translation3::identity(), turned)
+                * Pose::from_parts(Translation3::from(-scanner.coords), UnitQuaternion::identity());
+            let mut image = DepthImage::new(camera_from_local, 1.0, 30.3);
+            image.finish(0, |_| Empty::NoReturn);
+            image
+        };
+        along.map(image).collect()
+    }
+
+    #[test]
+    fn no_image_shows_a_place_that_it_is_not_asked_for() {
+        let mut random = 1_u64;
+        let mut next = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 40) as f32 / (1 << 24) as f32 - 0.5
+        };
+        for n_faces in [1, 5, 6] {
+            let images = cube(Point::new(0.3, -2.0, 1.5), n_faces);
+            let faces = Faces::new(&images);
+            let mut n_asked = 0;
+            for _ in 0..20_000 {
+                let p = [next() * 9.0, next() * 9.0, next() * 9.0];
+                let asked = faces.towards(p);
+                n_asked += asked.len();
+                for (i, image) in images.iter().enumerate().filter(|(i, _)| !asked.contains(i)) {
+                    let camera = transform(&image.rows, p);
+                    assert!(image.look(camera, 0.0).is_none(), "{p:?} is on image {i}");
+                }
+            }
+            assert!(n_faces == 1 || n_asked < 26_000, "{n_asked}");
+        }
+    }
+}

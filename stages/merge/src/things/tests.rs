@@ -1,0 +1,118 @@
+//! Voxels of drawn things in; which of them moved, went and came, out.
+
+use super::*;
+use crate::tally::{Seen, Tallying};
+
+fn found(then: Tallying, now: Tallying) -> Vec<Thing> {
+    things(&then.finish(), &now.finish(), &ThingSettings::default())
+}
+
+/// A box's surface, five points a voxel.
+fn solid(tally: &mut Tallying, min: [f64; 3], size: [f64; 3], is_empty: bool) {
+    let n = size.map(|s| (s / 0.02) as i32);
+    for i in 0..=n[0] {
+        for j in 0..=n[1] {
+            for k in 0..=n[2] {
+                let rim =
+                    [(i, n[0]), (j, n[1]), (k, n[2])].iter().any(|(v, n)| *v == 0 || v == n);
+                if rim {
+                    let at = [i, j, k].map(|v| 0.02 * f64::from(v));
+                    let p = [min[0] + at[0], min[1] + at[1], min[2] + at[2]];
+                    let nothing = Seen::Nothing { is_pierced: false };
+                    tally.add(p, 4e-4, if is_empty { nothing } else { Seen::Something });
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pallet_moves_a_barrel_goes_and_a_crate_comes() {
+    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    // A cabinet stays; the other session saw surfaces there.
+    solid(&mut then, [5.0, 5.0, 0.02], [0.8, 0.6, 1.8], false);
+    solid(&mut now, [5.0, 5.0, 0.02], [0.8, 0.6, 1.8], false);
+    solid(&mut then, [1.0, 1.0, 0.02], [1.2, 0.8, 0.6], true);
+    solid(&mut now, [3.0, 1.0, 0.02], [0.8, 1.2, 0.6], true);
+    solid(&mut then, [1.0, 6.0, 0.02], [0.6, 0.6, 0.9], true);
+    solid(&mut now, [8.0, 1.0, 0.02], [0.3, 0.3, 0.4], true);
+    let found = found(then, now);
+    let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
+    assert_eq!(kinds, [ThingChange::Moved, ThingChange::Gone, ThingChange::Appeared]);
+    let shift = found[0].shift.expect("a shift");
+    assert!((shift[0] - 1.8).abs() < 0.06 && (shift[1] - 0.2).abs() < 0.06, "{shift:?}");
+}
+
+#[test]
+fn a_thing_pushed_by_less_than_its_length_moved_as_a_whole() {
+    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    // Where it stands in both sessions nothing was seen empty.
+    let parts = [(&mut then, 1.0, 0.4, 1.4, 0.8), (&mut now, 2.2, 0.4, 1.4, 0.8)];
+    for (tally, own, own_length, shared, shared_length) in parts {
+        solid(tally, [own, 1.0, 0.02], [own_length, 0.8, 0.6], true);
+        solid(tally, [shared, 1.0, 0.02], [shared_length, 0.8, 0.6], false);
+    }
+    let found = found(then, now);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].change, ThingChange::Moved);
+    let shift = found[0].shift.expect("a shift");
+    assert!((shift[0] - 0.4).abs() < 0.06, "{shift:?}");
+}
+
+#[test]
+fn a_thing_of_which_beams_graze_the_top_is_one() {
+    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    solid(&mut then, [1.0, 1.0, 0.02], [1.2, 1.0, 0.7], true);
+    // Two sides are seen in part, and rows of the top, 14 cm apart.
+    solid(&mut now, [5.0, 1.0, 0.02], [0.1, 0.4, 0.7], true);
+    solid(&mut now, [5.0, 1.9, 0.02], [0.3, 0.1, 0.7], true);
+    for row in 1..=8 {
+        for i in 0..10 {
+            let (x, y) = (5.01 + 0.14 * f64::from(row), 1.05 + 0.1 * f64::from(i));
+            now.add([x, y, 0.71], 4e-4, Seen::Nothing { is_pierced: false });
+        }
+    }
+    let found = found(then, now);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].change, ThingChange::Moved);
+}
+
+#[test]
+fn one_side_of_a_thing_is_enough_to_know_it_by_and_a_barrel_is_none() {
+    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.0, 0.66], true);
+    solid(&mut then, [1.0, 6.0, 0.02], [0.9, 0.9, 0.86], true);
+    // Its long side, and a strip of its top.
+    solid(&mut now, [5.0, 1.0, 0.02], [1.2, 0.36, 0.66], true);
+    let found = found(then, now);
+    let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
+    assert_eq!(kinds, [ThingChange::Moved, ThingChange::Gone]);
+    assert!(found[1].then.expect("bounds").contains([1.4, 6.4, 0.5]));
+}
+
+#[test]
+fn wires_that_a_nearer_scanner_sees_are_no_change() {
+    let (then, mut now) = (Tallying::default(), Tallying::default());
+    for (scan, wire) in (0..4).flat_map(|scan| (0..12).map(move |wire| (scan, wire))) {
+        for i in 0..400 {
+            let at = [0.0025 * f64::from(i), 1.0, 0.05 * f64::from(wire) + 0.02];
+            now.add(at, 3.7e-5, Seen::Nothing { is_pierced: scan > 0 });
+        }
+    }
+    assert!(found(then, now).is_empty());
+}
+
+#[test]
+fn what_is_near_a_robot_is_the_robots() {
+    let (mut then, now) = (Tallying::default(), Tallying::default());
+    solid(&mut then, [1.0, 1.0, 0.5], [0.2, 0.2, 0.2], true);
+    for i in 0..60 {
+        then.add_robot([1.25, 1.0 + 0.005 * f64::from(i), 0.6]);
+    }
+    let (then, now) = (then.finish(), now.finish());
+    let n_found = |robot_margin: f64| {
+        things(&then, &now, &ThingSettings { robot_margin, ..Default::default() }).len()
+    };
+    assert_eq!(n_found(0.3), 0);
+    assert_eq!(n_found(0.0), 1);
+}
