@@ -7,8 +7,9 @@ use crate::report::tiles;
 use crate::store::Store;
 use contract::{Label, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
 use export::MaskReader;
-use geometry::{Aabb, Point};
+use geometry::{Aabb, Point, Vector};
 use merge::{Seen, Sight, Surfaces, Tally, Tallying, Watch};
+use nalgebra::Matrix3;
 use std::collections::BTreeSet;
 
 /// Of so many points one tells the surfaces: a tenth of a voxel's points is enough for its plane.
@@ -199,8 +200,9 @@ impl Map for Sample<'_> {
         let (scan, mask) = self.0.scan(&tile);
         let old = &self.0.before[mask.0 as usize];
         let mut out = Surfaces::default();
+        let in_world = World::from(scan);
         for i in (0..tile.len()).step_by(SAMPLE) {
-            let world = world(scan, tile.xyz[i]);
+            let world = in_world.of(tile.xyz[i]);
             let place = tile.first_place + u64::from(tile.place[i]);
             if self.0.cell.contains(world) && old.binary_search(&place).is_err() {
                 out.add(world);
@@ -226,19 +228,23 @@ impl Map for Look<'_> {
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Looked> {
         let (scan, mask) = self.past.scan(&tile);
         let old = &self.past.before[mask.0 as usize];
+        let is_new = |place: u64| old.is_empty() || old.binary_search(&place).is_err();
         let (mut places, mut worlds) = (Vec::new(), Vec::new());
+        let in_world = World::from(scan);
         for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
-            let (world, place) = (world(scan, *xyz), tile.first_place + u64::from(*place));
-            if self.past.cell.contains(world) && old.binary_search(&place).is_err() {
+            let (world, place) = (in_world.of(*xyz), tile.first_place + u64::from(*place));
+            if self.past.cell.contains(world) && is_new(place) {
                 places.push(place);
                 worlds.push(world);
             }
         }
         let labels = self.past.labels(mask, &places)?;
+        let mut sights = Vec::new();
+        self.watch.look_all(&worlds, &mut sights);
         let mut out = Looked { mask: mask.0, ..Looked::default() };
         let mut tallying = Tallying::default();
-        for ((place, world), label) in places.into_iter().zip(worlds).zip(labels) {
-            let sight = self.watch.look(world);
+        let points = places.into_iter().zip(worlds).zip(labels.into_iter().zip(sights));
+        for ((place, world), (label, sight)) in points {
             match sight {
                 Sight::Onto => out.onto.push(place),
                 Sight::Through => out.through.push((place, Tally::cell(world))),
@@ -276,9 +282,23 @@ pub(crate) fn area(scan: &Scan, world: [f64; 3]) -> f64 {
     (lattice.row_step * range) * (lattice.col_step * range)
 }
 
-/// A point of a scan in the world, metres.
-pub(crate) fn world(scan: &Scan, xyz: [f32; 3]) -> [f64; 3] {
-    (scan.world_from_scan * Point::from(xyz.map(f64::from))).coords.into()
+/// Points of a scan in the world.
+pub(crate) struct World {
+    rotation: Matrix3<f64>,
+    shift: Vector,
+}
+
+impl World {
+    pub(crate) fn from(scan: &Scan) -> Self {
+        let pose = &scan.world_from_scan;
+        Self { rotation: *pose.rotation.to_rotation_matrix().matrix(), shift: pose.translation.vector }
+    }
+
+    /// A point of the scan in the world, metres.
+    #[inline]
+    pub(crate) fn of(&self, xyz: [f32; 3]) -> [f64; 3] {
+        (self.rotation * Vector::from(xyz.map(f64::from)) + self.shift).into()
+    }
 }
 
 impl Weigh for Sampled {

@@ -1,6 +1,6 @@
 //! Points of the new scans in; how far each scan is off the plant, and what stands still in the cell now, out.
 
-use super::past::{area, seen, world};
+use super::past::{World, area, seen};
 use crate::engine::Engine;
 use crate::labelling::Near;
 use crate::report::tiles;
@@ -28,7 +28,8 @@ pub(crate) fn register(
         let mut points = Vec::new();
         for &i in entries() {
             let tile = store.tile(i)?;
-            let worlds = tile.xyz.iter().step_by(step).map(|p| world(scan, *p));
+            let in_world = World::from(scan);
+            let worlds = tile.xyz.iter().step_by(step).map(|p| in_world.of(*p));
             points.extend(worlds.filter(|p| cell.contains(*p)));
         }
         Ok(surfaces.register(&points, &Point::from(cell.center().coords)))
@@ -72,21 +73,25 @@ impl Map for Present<'_> {
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Tallied> {
         let scan = &self.scans[tile.at.scan.0 as usize];
         let mut out = Tallying::default();
+        let in_world = World::from(scan);
+        let mut fixed = Vec::new();
         for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
-            let world = world(scan, *xyz);
+            let world = in_world.of(*xyz);
             if !self.cell.contains(world) {
                 continue;
             }
             let known = self.near.label(scan.mask, tile.first_place + u64::from(*place));
             let label: Label = known.unwrap_or_else(|| self.ground.label(world));
             match label.kind {
-                PointKind::Fixed => {
-                    let seen = seen(self.watch.look(world), self.own, world);
-                    out.add(world, area(scan, world), seen);
-                }
+                PointKind::Fixed => fixed.push(world),
                 PointKind::Link | PointKind::Attachment => out.add_robot(world),
                 PointKind::Floor | PointKind::Uncertain => {}
             }
+        }
+        let mut sights = Vec::new();
+        self.watch.look_all(&fixed, &mut sights);
+        for (world, sight) in fixed.into_iter().zip(sights) {
+            out.add(world, area(scan, world), seen(sight, self.own, world));
         }
         Ok(Tallied(out.finish()))
     }

@@ -119,19 +119,23 @@ impl Written<'_, '_> {
         self.robots.changed.contains(&robot) || self.robots.gone.contains(&robot)
     }
 
-    /// Whether a point of the earlier result is still part of the plant, as the new scans see it.
-    fn stays(&self, point: &OldPoint, watch: &Watch<'_>, gone: &BTreeSet<[i32; 3]>) -> bool {
-        if point.label.moves() && self.stands_otherwise(point.label.robot) {
-            return false;
+    /// Which points of the earlier result are still part of the plant, as the new scans see it.
+    fn stay(&self, points: &[OldPoint], watch: &Watch<'_>, gone: &BTreeSet<[i32; 3]>) -> Vec<bool> {
+        let left = |p: &OldPoint| p.label.moves() && self.stands_otherwise(p.label.robot);
+        let mut stays: Vec<bool> = points.iter().map(|p| !left(p)).collect();
+        let is_here = |i: &usize| stays[*i] && self.session.past.cell.contains(points[*i].world);
+        let here: Vec<usize> = (0..points.len()).filter(is_here).collect();
+        let worlds: Vec<[f64; 3]> = here.iter().map(|&i| points[i].world).collect();
+        let mut sights = Vec::new();
+        watch.look_all(&worlds, &mut sights);
+        for ((i, world), sight) in here.into_iter().zip(worlds).zip(sights) {
+            stays[i] = match sight {
+                Sight::Onto => false,
+                Sight::Through => !gone.contains(&Tally::cell(world)),
+                Sight::Close | Sight::Hidden | Sight::Unseen => true,
+            };
         }
-        if !self.session.past.cell.contains(point.world) {
-            return true;
-        }
-        match watch.look(point.world) {
-            Sight::Onto => false,
-            Sight::Through => !gone.contains(&Tally::cell(point.world)),
-            Sight::Close | Sight::Hidden | Sight::Unseen => true,
-        }
+        stays
     }
 
     /// Tiles that the cell touches, and the cloud of all that moves: what is left of the old points, and the new ones.
@@ -166,7 +170,7 @@ impl Written<'_, '_> {
         let sums = engine.fan_out("tiles", all.clone(), |(name, [old, new])| {
             let (old, new) =
                 (old.then(|| self.base.out.join(&name)), new.then(|| scratch.join(&name)));
-            let stays = |point: &OldPoint| self.stays(point, &watch, gone);
+            let stays = |points: &[OldPoint]| self.stay(points, &watch, gone);
             refill([old.as_deref(), new.as_deref()], &next.join(&name), &las, stays)
         })?;
         let fixed = ["las", "laz"].map(|end| format!("clouds/fixed.{end}"));

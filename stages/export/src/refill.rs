@@ -22,8 +22,8 @@ pub struct OldPoint {
     pub label: Label,
 }
 
-/// Writes `to` from the points of `old` that `keep` wants and all of `new`; both are tiles of ours with records as `las` has
-/// them. `None`, and no file, where nothing is left.
+/// Writes `to` from the points of `old` that `keep` wants (it is asked piece by piece, and answers for each point) and all of
+/// `new`; both are tiles of ours with records as `las` has them. `None`, and no file, where nothing is left.
 ///
 /// # Errors
 /// A tile that is not one of ours or cannot be read; what [`LasWriter`] says.
@@ -31,7 +31,7 @@ pub fn refill(
     [old, new]: [Option<&Path>; 2],
     to: &Path,
     las: &LasSettings,
-    keep: impl Fn(&OldPoint) -> bool + Sync,
+    keep: impl Fn(&[OldPoint]) -> Vec<bool>,
 ) -> Result<Option<LasSummary>> {
     let mut writer = LasWriter::create(to, las.clone())?;
     let (mut n, mut bytes, record_len) = (0, Vec::new(), las.record_len());
@@ -39,12 +39,14 @@ pub fn refill(
         let Some(path) = path else { continue };
         let mut tile = Tile::open(path, las)?;
         while let Some(records) = tile.piece(&mut bytes)? {
+            let old = |record: &[u8]| point(record, las);
+            let stays = is_old.then(|| {
+                keep(&records.chunks_exact(record_len).map(old).collect::<Vec<OldPoint>>())
+            });
             let (mut extent, mut kept) = (Extent::default(), 0);
-            for from in (0..records.len()).step_by(record_len) {
-                let record = &records[from..from + record_len];
-                let steps = [0, 4, 8].map(|at| int(record, at));
-                if !is_old || keep(&point(record, steps, las)) {
-                    extent.add(steps);
+            for (i, from) in (0..records.len()).step_by(record_len).enumerate() {
+                if stays.as_ref().is_none_or(|stays| stays[i]) {
+                    extent.add(steps(&records[from..from + record_len]));
                     if kept < from {
                         records.copy_within(from..from + record_len, kept);
                     }
@@ -60,12 +62,14 @@ pub fn refill(
     if n == 0 { Ok(None) } else { writer.finish().map(Some) }
 }
 
-fn int(record: &[u8], at: usize) -> i32 {
-    i32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
+/// Coordinates as the record has them.
+fn steps(record: &[u8]) -> [i32; 3] {
+    let int = |at: usize| [record[at], record[at + 1], record[at + 2], record[at + 3]];
+    [0, 4, 8].map(|at| i32::from_le_bytes(int(at)))
 }
 
-fn point(record: &[u8], steps: [i32; 3], las: &LasSettings) -> OldPoint {
-    let q = &las.quantum;
+fn point(record: &[u8], las: &LasSettings) -> OldPoint {
+    let (q, steps) = (&las.quantum, steps(record));
     let world = std::array::from_fn(|i| f64::from(steps[i]) * q.scale[i] + q.offset[i]);
     let kind = CLASSES.iter().find(|c| c.1 == record[16]).map_or(PointKind::Uncertain, |c| c.0);
     let at = if las.with_color { 36 } else { 30 };

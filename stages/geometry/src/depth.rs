@@ -170,12 +170,12 @@ impl DepthImage {
         if camera[2] <= 0.0 {
             return None;
         }
-        let cells = footprint * self.focal / camera[2];
+        let inverse = self.focal / camera[2];
+        let cells = footprint * inverse;
         // floor(log2) by the exponent bits; below one cell is level 0.
         let level = ((cells.max(1.0).to_bits() >> 23) as usize - 127).min(self.levels.len() - 1);
         let scale = 1.0 / (1u32 << level) as f32;
         let base = &self.levels[0];
-        let inverse = self.focal / camera[2];
         let u = camera[0] * inverse + 0.5 * base.width as f32;
         let v = camera[1] * inverse + 0.5 * base.height as f32;
         if !(u >= 0.0 && v >= 0.0 && u < base.width as f32 && v < base.height as f32) {

@@ -25,8 +25,10 @@ const MIN_NEW: usize = 3;
 const MIN_CELLS: usize = 50;
 /// Standard deviations that are expected of a scan's place before it is looked at: metres, radians.
 const PRIOR: [f64; 2] = [0.02, 0.003];
-/// Rounds of weights; the last ones change nothing that can be measured.
+/// Most rounds of weights.
 const ROUNDS: usize = 12;
+/// A step this small ends it: metres, radians.
+const SETTLED: f64 = 1e-7;
 /// Tukey's constant, and the median's ratio to a standard deviation.
 const TUKEY: f64 = 4.685;
 const FROM_MEDIAN: f64 = 1.4826;
@@ -106,6 +108,9 @@ impl Surfaces {
             n_surfaces = told.len();
             sigma = step.1;
             pose = motion(&step.0, about) * pose;
+            if step.0.amax() < SETTLED {
+                break;
+            }
         }
         let rms = rms.map(Option::unwrap_or_default);
         Some(Registration { plant_from_stated: pose, sigma, n_surfaces, rms })
@@ -130,22 +135,39 @@ fn total(pose: &Pose, about: &Point) -> Vector6<f64> {
 }
 
 fn told(planes: &BTreeMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -> Vec<Told> {
-    let mut sums: BTreeMap<[i32; 3], (usize, f64, Vector)> = BTreeMap::new();
+    // Neighbours among the points are mostly in one voxel, and ask once for its plane and its place among the sums.
+    let mut sums: BTreeMap<[i32; 3], usize> = BTreeMap::new();
+    let mut told: Vec<(usize, Told)> = Vec::new();
+    let mut last: Option<([i32; 3], Option<(&Plane, usize)>)> = None;
     for p in points {
         let p = (pose * Point::from(*p)).coords;
         let cell = cell(&p.into());
-        let Some(plane) = planes.get(&cell) else { continue };
+        let known = match last {
+            Some((same, known)) if same == cell => known,
+            _ => planes.get(&cell).map(|plane| {
+                let at = *sums.entry(cell).or_insert_with(|| {
+                    let (normal, at) = (plane.normal, Vector::zeros());
+                    told.push((0, Told { distance: 0.0, normal, at }));
+                    told.len() - 1
+                });
+                (plane, at)
+            }),
+        };
+        last = Some((cell, known));
+        let Some((plane, at)) = known else { continue };
         let distance = plane.distance(&p);
         if distance.abs() < GATE {
-            let sum = sums.entry(cell).or_insert((0, 0.0, Vector::zeros()));
-            *sum = (sum.0 + 1, sum.1 + distance, sum.2 + p);
+            let (n, sum) = &mut told[at];
+            *n += 1;
+            sum.distance += distance;
+            sum.at += p;
         }
     }
-    let many = sums.into_iter().filter(|(_, sum)| sum.0 >= MIN_NEW);
-    let mean = |(cell, (n, distance, at)): ([i32; 3], (usize, f64, Vector))| Told {
-        distance: distance / n as f64,
-        normal: planes[&cell].normal,
-        at: at / n as f64,
+    let many = told.into_iter().filter(|(n, _)| *n >= MIN_NEW);
+    let mean = |(n, sum): (usize, Told)| Told {
+        distance: sum.distance / n as f64,
+        at: sum.at / n as f64,
+        ..sum
     };
     many.map(mean).collect()
 }

@@ -57,7 +57,7 @@ impl<'a> Watch<'a> {
 
     /// What each scan that looked there has.
     fn looks(&self, world: [f64; 3]) -> impl Iterator<Item = (&View, Look)> + '_ {
-        let p: [f32; 3] = std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32);
+        let p = self.local(world);
         self.views.iter().filter_map(move |(view, faces)| {
             let of = |&i: &usize| view.images[i].look_at(p, FOOTPRINT);
             Some((*view, faces.towards(p).iter().find_map(of)?))
@@ -67,23 +67,46 @@ impl<'a> Watch<'a> {
     /// What the scans say of a place in the world: the strongest of what each of them says.
     #[must_use]
     pub fn look(&self, world: [f64; 3]) -> Sight {
-        let mut best = Sight::Unseen;
-        for (_, look) in self.looks(world) {
-            let is_on = |range: f32| (range - look.range).abs() <= ON;
-            let says = if is_on(look.near) || is_on(look.far) {
-                return Sight::Onto;
-            } else if look.around.is_finite() && look.around - look.range > BEYOND {
-                Sight::Through
-            } else if look.far < look.range {
-                Sight::Hidden
-            } else if look.far.is_finite() {
-                Sight::Close
-            } else {
-                Sight::Unseen
-            };
-            best = best.max(says);
+        self.looks(world).map(|(_, look)| Sight::of(&look)).max().unwrap_or_default()
+    }
+
+    /// The same of many places, scan after scan: an image stays in the cache while neighbours are asked for.
+    pub fn look_all(&self, world: &[[f64; 3]], out: &mut Vec<Sight>) {
+        out.clear();
+        out.resize(world.len(), Sight::Unseen);
+        for (view, faces) in &self.views {
+            for (world, best) in world.iter().zip(out.iter_mut()) {
+                if *best == Sight::Onto {
+                    continue;
+                }
+                let p = self.local(*world);
+                let of = |&i: &usize| view.images[i].look_at(p, FOOTPRINT);
+                let look = faces.towards(p).iter().find_map(of);
+                *best = (*best).max(look.map_or(Sight::Unseen, |look| Sight::of(&look)));
+            }
         }
-        best
+    }
+
+    fn local(&self, world: [f64; 3]) -> [f32; 3] {
+        std::array::from_fn(|i| (world[i] - self.region.origin[i]) as f32)
+    }
+}
+
+impl Sight {
+    #[inline]
+    fn of(look: &Look) -> Self {
+        let is_on = |range: f32| (range - look.range).abs() <= ON;
+        if is_on(look.near) || is_on(look.far) {
+            Self::Onto
+        } else if look.around.is_finite() && look.around - look.range > BEYOND {
+            Self::Through
+        } else if look.far < look.range {
+            Self::Hidden
+        } else if look.far.is_finite() {
+            Self::Close
+        } else {
+            Self::Unseen
+        }
     }
 }
 
