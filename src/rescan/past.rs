@@ -128,21 +128,24 @@ impl<'a> Past<'a> {
     }
 
     /// Labels of a tile's points.
-    fn labels(&self, mask: MaskId, places: &[u64]) -> Result<Vec<Label>> {
+    fn labels(&self, mask: MaskId, places: &[u64], labels: &mut Vec<Label>) -> Result<()> {
         let mask = &self.masks[mask.0 as usize];
         let of = |first: u64, last: u64| mask.range(first, (last - first + 1) as usize);
-        let (first, last) =
-            places.iter().fold((u64::MAX, 0), |(a, b), &p| (a.min(p), b.max(p)));
+        labels.clear();
+        let (first, last) = places.iter().fold((u64::MAX, 0), |(a, b), &p| (a.min(p), b.max(p)));
         if first > last {
-            return Ok(Vec::new());
+            return Ok(());
         }
+        labels.resize(places.len(), Label::UNCERTAIN);
         if (last - first) / SPARSE <= places.len() as u64 {
             let read = of(first, last)?;
-            return places.iter().map(|&p| read.label((p - first) as usize)).collect();
+            for (label, place) in labels.iter_mut().zip(places) {
+                *label = read.label((place - first) as usize)?;
+            }
+            return Ok(());
         }
         let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_unstable_by_key(|&i| places[i]);
-        let mut labels = vec![Label::UNCERTAIN; places.len()];
         for group in order.chunk_by(|&a, &b| places[b] - places[a] < GAP) {
             let first = places[group[0]];
             let read = of(first, places[group[group.len() - 1]])?;
@@ -150,7 +153,7 @@ impl<'a> Past<'a> {
                 labels[i] = read.label((places[i] - first) as usize)?;
             }
         }
-        Ok(labels)
+        Ok(())
     }
 }
 
@@ -212,6 +215,15 @@ impl Map for Sample<'_> {
     }
 }
 
+/// The points of a tile that are asked for; kept from tile to tile, since fresh memory costs more than what is done with it.
+#[derive(Default)]
+struct Asked {
+    places: Vec<u64>,
+    worlds: Vec<[f64; 3]>,
+    labels: Vec<Label>,
+    sights: Vec<Sight>,
+}
+
 /// The map that asks the new scans.
 struct Look<'a> {
     past: &'a Past<'a>,
@@ -223,13 +235,15 @@ struct Look<'a> {
 impl Map for Look<'_> {
     type In = Tile;
     type Out = Looked;
-    type Scratch = ();
+    type Scratch = Asked;
 
-    fn apply(&self, tile: Tile, (): &mut ()) -> Result<Looked> {
+    fn apply(&self, tile: Tile, asked: &mut Asked) -> Result<Looked> {
         let (scan, mask) = self.past.scan(&tile);
         let old = &self.past.before[mask.0 as usize];
         let is_new = |place: u64| old.is_empty() || old.binary_search(&place).is_err();
-        let (mut places, mut worlds) = (Vec::new(), Vec::new());
+        let Asked { places, worlds, labels, sights } = asked;
+        places.clear();
+        worlds.clear();
         let in_world = World::from(scan);
         for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
             let (world, place) = (in_world.of(*xyz), tile.first_place + u64::from(*place));
@@ -238,13 +252,12 @@ impl Map for Look<'_> {
                 worlds.push(world);
             }
         }
-        let labels = self.past.labels(mask, &places)?;
-        let mut sights = Vec::new();
-        self.watch.look_all(&worlds, &mut sights);
+        self.past.labels(mask, places, labels)?;
+        self.watch.look_all(worlds, sights);
         let mut out = Looked { mask: mask.0, ..Looked::default() };
         let mut tallying = Tallying::default();
-        let points = places.into_iter().zip(worlds).zip(labels.into_iter().zip(sights));
-        for ((place, world), (label, sight)) in points {
+        let points = places.iter().zip(&*worlds).zip(labels.iter().zip(&*sights));
+        for ((&place, &world), (label, &sight)) in points {
             match sight {
                 Sight::Onto => out.onto.push(place),
                 Sight::Through => out.through.push((place, Tally::cell(world))),

@@ -10,8 +10,8 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Records that are read at a time.
-const PIECE: u64 = 1 << 15;
+/// Records that are read at a time: what is made of them stays in a processor's own cache.
+const PIECE: u64 = 1 << 12;
 
 /// A point of an earlier result.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,14 +34,17 @@ pub fn refill(
     keep: impl Fn(&[OldPoint]) -> Vec<bool>,
 ) -> Result<Option<LasSummary>> {
     let mut writer = LasWriter::create(to, las.clone())?;
-    let (mut n, mut bytes, record_len) = (0, Vec::new(), las.record_len());
+    let (mut n, record_len) = (0, las.record_len());
+    let (mut bytes, mut points) = (Vec::new(), Vec::new());
     for (path, is_old) in [(old, true), (new, false)] {
         let Some(path) = path else { continue };
         let mut tile = Tile::open(path, las)?;
         while let Some(records) = tile.piece(&mut bytes)? {
             let old = |record: &[u8]| point(record, las);
             let stays = is_old.then(|| {
-                keep(&records.chunks_exact(record_len).map(old).collect::<Vec<OldPoint>>())
+                points.clear();
+                points.extend(records.chunks_exact(record_len).map(old));
+                keep(&points)
             });
             let (mut extent, mut kept) = (Extent::default(), 0);
             for (i, from) in (0..records.len()).step_by(record_len).enumerate() {
