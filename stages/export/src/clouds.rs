@@ -1,7 +1,7 @@
 //! Packed strips in, in any order; spatial tiles, and robots and fixed things apart, out.
 //!
-//! Tiles are as many as the plant is large, so none of them keeps a file open: records wait in memory, bounded in
-//! bytes, and full tiles are appended to their files.
+//! Tiles are as many as the plant is large, so none of them keeps a file open: records wait in blocks of memory, bounded in
+//! number, and full tiles are appended to their files.
 
 use crate::atomic::part_of;
 use crate::las::{LasSummary, LasWriter, bounds, head};
@@ -12,11 +12,15 @@ use crate::summed::{BodySum, FileSum};
 use contract::{Error, Fan, Result};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{ErrorKind, IoSlice, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// A tile with so many waiting bytes is appended to its file: one call to the system for a hundred thousand points.
 const FULL_BYTES: usize = 4 << 20;
+/// Blocks in which records wait, bytes. They are used again and again: fresh memory costs as much as copying into it.
+const BLOCK_BYTES: usize = 128 << 10;
+/// Fewest blocks, however little memory there is.
+const MIN_BLOCKS: usize = 4;
 
 /// What [`Clouds`] wrote.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,14 +41,36 @@ impl Written {
     }
 }
 
+/// Memory of the records that wait.
+struct Blocks {
+    empty: Vec<Vec<u8>>,
+    /// Of which there may be at most so many more.
+    left: usize,
+}
+
+impl Blocks {
+    fn new(bytes: usize) -> Self {
+        Self { empty: Vec::new(), left: (bytes / BLOCK_BYTES).max(MIN_BLOCKS) }
+    }
+
+    /// An empty block; `None` where all are in use.
+    fn take(&mut self) -> Option<Vec<u8>> {
+        let known = self.empty.pop();
+        if known.is_none() && self.left > 0 {
+            self.left -= 1;
+            return Some(Vec::with_capacity(BLOCK_BYTES));
+        }
+        known
+    }
+}
+
 /// Writes labelled clouds under `OUT/tiles` and `OUT/clouds`.
 pub struct Clouds {
     out: PathBuf,
     las: LasSettings,
     settings: Settings,
     tiles: BTreeMap<[i32; 2], Spool>,
-    /// Capacity of all waiting records, bytes.
-    waiting: usize,
+    blocks: Blocks,
     robots: LasWriter,
     fixed: Option<LasWriter>,
 }
@@ -65,7 +91,8 @@ impl Clouds {
                 .map_err(|e| Error::of_file("folder cannot be made", &folder, e))?;
         }
         let (tiles, settings) = (BTreeMap::new(), *settings);
-        Ok(Self { out: out.to_path_buf(), las, settings, tiles, waiting: 0, robots, fixed })
+        let blocks = Blocks::new(settings.waiting_bytes);
+        Ok(Self { out: out.to_path_buf(), las, settings, tiles, blocks, robots, fixed })
     }
 
     /// What workers pack strips with.
@@ -93,32 +120,22 @@ impl Clouds {
         Ok(())
     }
 
-    fn spool(&mut self, run: &Run, records: &[u8]) -> Result<()> {
-        let at = run.tile;
-        let spool = self.tiles.entry(at).or_insert_with(|| {
-            Spool::new(self.out.join(format!("tiles/{}_{}.{}", at[1], at[0], ending(&self.las))))
-        });
-        let before = spool.records.capacity();
-        spool.records.extend_from_slice(records);
+    fn spool(&mut self, run: &Run, mut records: &[u8]) -> Result<()> {
+        let (at, las) = (run.tile, &self.las);
+        let path = || self.out.join(format!("tiles/{}_{}.{}", at[1], at[0], ending(las)));
+        let spool = self.tiles.entry(at).or_insert_with(|| Spool::new(path()));
         spool.extent.join(&run.extent);
-        self.waiting += spool.records.capacity() - before;
-        if spool.records.len() >= FULL_BYTES {
-            self.waiting -= spool.append(&self.las)?;
-        }
-        if self.waiting >= self.settings.waiting_bytes { self.relieve() } else { Ok(()) }
-    }
-
-    /// Appends the fullest tiles to their files until half of the memory is free.
-    fn relieve(&mut self) -> Result<()> {
-        let mut fullest: Vec<([i32; 2], usize)> =
-            self.tiles.iter().map(|(at, s)| (*at, s.records.len())).collect();
-        fullest.sort_by_key(|(at, n)| (std::cmp::Reverse(*n), *at));
-        for (at, _) in fullest {
-            if self.waiting <= self.settings.waiting_bytes / 2 {
+        while let Some(spool) = self.tiles.get_mut(&at) {
+            records = spool.fill(records);
+            if spool.n_bytes() >= FULL_BYTES {
+                spool.append(las, &mut self.blocks)?;
+            }
+            if records.is_empty() {
                 break;
             }
-            if let Some(spool) = self.tiles.get_mut(&at) {
-                self.waiting -= spool.append(&self.las)?;
+            match self.blocks.take() {
+                Some(block) => spool.blocks.push(block),
+                None => relieve(&mut self.tiles, &mut self.blocks, las)?,
             }
         }
         Ok(())
@@ -126,13 +143,35 @@ impl Clouds {
 
     /// Finishes all files, tiles side by side.
     pub fn finish(self, fan: &impl Fan) -> Result<Written> {
-        let Self { las, tiles, robots, fixed, .. } = self;
+        let Self { las, tiles, robots, fixed, blocks, .. } = self;
+        drop(blocks);
         let robots = Some(robots.finish()?);
         let fixed = fixed.map(LasWriter::finish).transpose()?;
         let spools = tiles.into_values().collect();
         let tiles = fan.fan(spools, |spool: Spool| spool.finish(&las));
         Ok(Written { tiles: tiles.into_iter().collect::<Result<_>>()?, robots, fixed })
     }
+}
+
+/// Appends the fullest tiles to their files until half of the blocks are free.
+fn relieve(
+    tiles: &mut BTreeMap<[i32; 2], Spool>,
+    blocks: &mut Blocks,
+    las: &LasSettings,
+) -> Result<()> {
+    let mut fullest: Vec<([i32; 2], usize)> =
+        tiles.iter().map(|(at, spool)| (*at, spool.blocks.len())).collect();
+    fullest.sort_by_key(|(at, n)| (std::cmp::Reverse(*n), *at));
+    let n_blocks: usize = fullest.iter().map(|(_, n)| n).sum();
+    for (at, _) in fullest {
+        if 2 * blocks.empty.len() > n_blocks {
+            break;
+        }
+        if let Some(spool) = tiles.get_mut(&at) {
+            spool.append(las, blocks)?;
+        }
+    }
+    Ok(())
 }
 
 fn ending(las: &LasSettings) -> &'static str {
@@ -144,7 +183,8 @@ struct Spool {
     path: PathBuf,
     /// Where records go: the LAS file to be; for LAZ, bare records that are compressed at the end.
     part: PathBuf,
-    records: Vec<u8>,
+    /// Records that wait, all blocks but the last full.
+    blocks: Vec<Vec<u8>>,
     extent: Extent,
     body: BodySum,
     is_begun: bool,
@@ -154,11 +194,24 @@ impl Spool {
     fn new(path: PathBuf) -> Self {
         let part = part_of(&path.with_extension("records"));
         let (extent, body) = (Extent::default(), BodySum::default());
-        Self { path, part, records: Vec::new(), extent, body, is_begun: false }
+        Self { path, part, blocks: Vec::new(), extent, body, is_begun: false }
     }
 
-    /// Appends what waits; returns how much memory that freed.
-    fn append(&mut self, las: &LasSettings) -> Result<usize> {
+    /// Bytes that wait.
+    fn n_bytes(&self) -> usize {
+        self.blocks.iter().map(Vec::len).sum()
+    }
+
+    /// Takes as many records as the last block has room for; returns the others. A record may lie in two blocks.
+    fn fill<'a>(&mut self, records: &'a [u8]) -> &'a [u8] {
+        let Some(last) = self.blocks.last_mut() else { return records };
+        let (now, later) = records.split_at(records.len().min(BLOCK_BYTES - last.len()));
+        last.extend_from_slice(now);
+        later
+    }
+
+    /// Appends what waits, and gives its blocks back.
+    fn append(&mut self, las: &LasSettings, blocks: &mut Blocks) -> Result<()> {
         let failed = |e| Error::of_file("tile cannot be written", &self.part, e);
         let begin = !self.is_begun;
         let mut options = OpenOptions::new();
@@ -172,15 +225,27 @@ impl Spool {
         if begin && !las.compress {
             file.write_all(&head(las, &Extent::default())?).map_err(failed)?;
         }
-        file.write_all(&self.records).map_err(failed)?;
-        self.body.add(&self.records);
+        let mut all: Vec<IoSlice<'_>> = self.blocks.iter().map(|b| IoSlice::new(b)).collect();
+        let mut left = all.as_mut_slice();
+        while left.iter().any(|slice| !slice.is_empty()) {
+            match file.write_vectored(left) {
+                Ok(0) => return Err(failed(ErrorKind::WriteZero.into())),
+                Ok(n) => IoSlice::advance_slices(&mut left, n),
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(failed(e)),
+            }
+        }
+        self.blocks.iter().for_each(|block| self.body.add(block));
         self.is_begun = true;
-        // Capacity counts as memory: what is not full yet may stay so for long.
-        Ok(std::mem::take(&mut self.records).capacity())
+        for mut block in self.blocks.drain(..) {
+            block.clear();
+            blocks.empty.push(block);
+        }
+        Ok(())
     }
 
     fn finish(mut self, las: &LasSettings) -> Result<LasSummary> {
-        self.append(las)?;
+        self.append(las, &mut Blocks::new(0))?;
         if las.compress { self.compress(las) } else { self.seal(las) }
     }
 
