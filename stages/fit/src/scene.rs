@@ -88,16 +88,13 @@ impl<'a> Scene<'a> {
             let few = thin.iter().map(|&i| points[i as usize].p).collect();
             Cloud::new(few, CLOUD.0, CLOUD.1)
         });
-        let scouts = View::scouts(views, region);
-        let scouts = Evidence {
-            images: scouts.into_iter().flat_map(|v| &v.images).collect(),
-            cloud: cloud.clone(),
-        };
+        let scouts = View::scouts(views, region).into_iter().flat_map(|view| &view.images);
+        let scouts = Evidence::new(&scouts.collect::<Vec<_>>(), cloud.clone());
         let noise = noise::of(views, &points, &thin).max(settings.min_noise);
         Self {
             region,
             views: views.to_vec(),
-            evidence: Evidence { images, cloud },
+            evidence: Evidence::new(&images, cloud),
             scouts,
             noise,
             points,

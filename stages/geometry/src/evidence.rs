@@ -2,15 +2,15 @@
 //! Surface samples in; a [`Probe`] out. The one place where "is it there?" is answered.
 
 use crate::probe::{Probe, probe};
-use crate::{DepthImage, NearestField, Pose};
+use crate::{DepthImage, Eye, NearestField, Pose};
 
 /// Everything that was measured in a region.
 #[derive(Debug, Clone, Default)]
 pub struct Evidence<'a> {
-    /// Images of the scans whose scanner is known.
-    pub images: Vec<&'a DepthImage>,
+    /// Scans whose scanner is known.
+    eyes: Vec<Eye<'a>>,
     /// Points of the scans whose scanner is not known.
-    pub cloud: Option<Cloud>,
+    cloud: Option<Cloud>,
 }
 
 /// Points without beams: they can say "something is here", never "nothing is here".
@@ -33,7 +33,19 @@ impl Cloud {
 /// surface of a body is usually seen from somewhere, so absence must cost something.
 const ABSENT_PRICE: f32 = 0.4;
 
-impl Evidence<'_> {
+impl<'a> Evidence<'a> {
+    /// Of images, those of one scanner one after the other, and of points without beams.
+    #[must_use]
+    pub fn new(images: &[&'a DepthImage], cloud: Option<Cloud>) -> Self {
+        Self { eyes: Eye::all(images), cloud }
+    }
+
+    /// The scans whose scanner is known.
+    #[must_use]
+    pub fn eyes(&self) -> &[Eye<'a>] {
+        &self.eyes
+    }
+
     /// Judges surface samples (`points` with outward `normals`, frame of the body) with the body at
     /// `local_from_body`, to within `tolerance` metres.
     #[must_use]
@@ -45,17 +57,17 @@ impl Evidence<'_> {
         tolerance: f32,
     ) -> Probe {
         match &self.cloud {
-            Some(cloud) if self.images.is_empty() => {
+            Some(cloud) if self.eyes.is_empty() => {
                 cloud.probe(points, local_from_body, tolerance)
             }
-            _ => probe(&self.images, points, normals, local_from_body, tolerance),
+            _ => probe(&self.eyes, points, normals, local_from_body, tolerance),
         }
     }
 
     /// Whether anything here can prove that space is free.
     #[must_use]
     pub fn has_beams(&self) -> bool {
-        !self.images.is_empty()
+        !self.eyes.is_empty()
     }
 }
 

@@ -1,7 +1,47 @@
-//! The depth images of one scanner in; for a place, those of them that may show it, out: where they are the faces of a cube,
-//! mostly one, found without asking any.
+//! The depth images of one scanner in; for a place, those of them that may show it, and what it saw there, out: where they are
+//! the faces of a cube, mostly one is asked.
 
 use crate::DepthImage;
+use crate::depth::Look;
+
+/// A scanner with its images.
+#[derive(Debug, Clone)]
+pub struct Eye<'a> {
+    images: Vec<&'a DepthImage>,
+    faces: Faces,
+}
+
+impl<'a> Eye<'a> {
+    /// A scanner with all of its images.
+    #[must_use]
+    pub fn new(images: impl IntoIterator<Item = &'a DepthImage>) -> Self {
+        let images: Vec<&DepthImage> = images.into_iter().collect();
+        let faces = Faces::new(images.iter().copied());
+        Self { images, faces }
+    }
+
+    /// Scanners whose images stand one after the other.
+    pub fn all(images: &[&'a DepthImage]) -> Vec<Self> {
+        let own = images.chunk_by(|a, b| a.scanner == b.scanner);
+        own.map(|images| Self::new(images.iter().copied())).collect()
+    }
+
+    /// Where it stands, local frame, metres.
+    #[inline]
+    #[must_use]
+    pub fn at(&self) -> [f32; 3] {
+        self.faces.scanner
+    }
+
+    /// What its beams found at a place of the local frame, in a cell about `footprint` metres wide; `None` where nothing is
+    /// known.
+    #[inline]
+    #[must_use]
+    pub fn look(&self, local: [f32; 3], footprint: f32) -> Option<Look> {
+        let images = self.faces.towards(local).iter();
+        images.map(|&i| self.images[i]).find_map(|image| image.look_at(local, footprint))
+    }
+}
 
 /// Which images of a scanner lie towards a place.
 #[derive(Debug, Clone)]
@@ -18,7 +58,8 @@ pub struct Faces {
 impl Faces {
     /// Of images of one scanner.
     #[must_use]
-    pub fn new(images: &[DepthImage]) -> Self {
+    pub fn new<'i>(images: impl IntoIterator<Item = &'i DepthImage>) -> Self {
+        let images: Vec<&DepthImage> = images.into_iter().collect();
         let scanner = images.first().map_or([0.0; 3], |i| i.scanner().coords.cast::<f32>().into());
         let mut by_side: [Vec<usize>; 6] = Default::default();
         let mut is_cube = images.len() > 1;
@@ -28,7 +69,7 @@ impl Faces {
             is_cube &= side.is_some_and(|side| by_side[side].is_empty());
             side.into_iter().for_each(|side| by_side[side].push(i));
         }
-        let focal = images.iter().map(DepthImage::focal).fold(f32::INFINITY, f32::min);
+        let focal = images.iter().map(|image| image.focal()).fold(f32::INFINITY, f32::min);
         Self {
             scanner,
             all: (0..images.len()).collect(),

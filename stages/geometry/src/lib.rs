@@ -17,7 +17,7 @@ pub mod robust;
 pub use aabb::Aabb;
 pub use depth::DepthImage;
 pub use evidence::Evidence;
-pub use faces::Faces;
+pub use faces::{Eye, Faces};
 pub use field::NearestField;
 pub use plane::{Moments, Plane};
 pub use probe::Probe;

@@ -1,8 +1,8 @@
 //! Judging a surface by the beams. Depth images and surface samples in; out comes whether a beam ended on each sample,
 //! went through it, or never got there.
 
-use crate::Pose;
-use crate::depth::{DepthImage, Rows, rows, transform};
+use crate::depth::{rotate, rows, transform};
+use crate::{Eye, Pose};
 
 /// Weight of a beam that did not come back, against one that hit something behind: black paint and glancing
 /// steel swallow beams too.
@@ -70,45 +70,6 @@ impl Probe {
     }
 }
 
-/// The images as a body sees them: each with its camera's frame from the body's, and by scanner (where it stands in the
-/// body's frame) which of them are its own.
-struct Seeing<'a> {
-    cameras: Vec<(&'a DepthImage, Rows)>,
-    scanners: Vec<([f32; 3], std::ops::Range<usize>)>,
-}
-
-impl<'a> Seeing<'a> {
-    /// The images of one scanner being neighbours.
-    fn new(images: &[&'a DepthImage], local_from_body: &Pose) -> Self {
-        let body_from_local = local_from_body.inverse();
-        let to_local = rows(local_from_body);
-        let camera = |image: &&'a DepthImage| (*image, after(&image.rows, &to_local));
-        let mut scanners: Vec<([f32; 3], std::ops::Range<usize>)> = Vec::new();
-        let mut last = None;
-        for (i, image) in images.iter().enumerate() {
-            match scanners.last_mut() {
-                Some((_, own)) if last == Some(image.scanner) => own.end = i + 1,
-                _ => {
-                    let at = (body_from_local * image.scanner).coords.cast::<f32>().into();
-                    scanners.push((at, i..i + 1));
-                }
-            }
-            last = Some(image.scanner);
-        }
-        Self { cameras: images.iter().map(camera).collect(), scanners }
-    }
-}
-
-/// `a_from_c` of `a_from_b` and `b_from_c`.
-fn after(a: &Rows, b: &Rows) -> Rows {
-    std::array::from_fn(|r| {
-        std::array::from_fn(|c| {
-            let turned = a[r][0] * b[0][c] + a[r][1] * b[1][c] + a[r][2] * b[2][c];
-            if c == 3 { turned + a[r][3] } else { turned }
-        })
-    })
-}
-
 /// Price of a sample seen through, against one on the surface (fit.md §4d).
 const SEEN_THROUGH_PRICE: f32 = 1.5;
 /// Price of a sample that no scan could judge: small, so that hiding is not rewarded (fit.md §4d).
@@ -118,17 +79,19 @@ pub const HIDDEN_PRICE: f32 = 0.1;
 /// `local_from_body`: one beam through a sample in any scan outweighs any match in another (fit.md §4d).
 #[must_use]
 pub fn probe(
-    images: &[&DepthImage],
+    eyes: &[Eye<'_>],
     points: &[[f32; 3]],
     normals: &[[f32; 3]],
     local_from_body: &Pose,
     tolerance: f32,
 ) -> Probe {
-    let Seeing { cameras, scanners } = Seeing::new(images, local_from_body);
+    let (to_local, per_tolerance) = (rows(local_from_body), 1.0 / tolerance);
     let mut out = Probe { n: points.len() as u32, ..Probe::default() };
     for (p, n) in points.iter().zip(normals) {
+        let (p, n) = (transform(&to_local, *p), rotate(&to_local, *n));
         let (mut through, mut on) = (0.0_f32, 0.0_f32);
-        for (at, own) in &scanners {
+        for eye in eyes {
+            let at = eye.at();
             let ray = [at[0] - p[0], at[1] - p[1], at[2] - p[2]];
             let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
             // A beam through a body enters by a front face: back faces tell nothing new.
@@ -139,17 +102,13 @@ pub fn probe(
             if along * along < MIN_FACING * MIN_FACING * far {
                 continue;
             }
-            let mut looks = cameras[own.clone()].iter().filter_map(|(image, camera_from_body)| {
-                image.look(transform(camera_from_body, *p), 0.5 * tolerance)
-            });
-            // The images of one scanner share out the directions.
-            let Some(look) = looks.next() else { continue };
+            let Some(look) = eye.look(p, 0.5 * tolerance) else { continue };
             let ahead = look.around - look.range;
             if ahead > tolerance {
                 let v = if ahead == f32::INFINITY {
                     NO_RETURN_WEIGHT
                 } else {
-                    ((ahead - tolerance) / tolerance).min(1.0)
+                    ((ahead - tolerance) * per_tolerance).min(1.0)
                 };
                 through = through.max(v);
                 if through >= 1.0 {
@@ -158,7 +117,7 @@ pub fn probe(
                 }
             } else {
                 let off = (look.near - look.range).abs().min((look.far - look.range).abs());
-                on = on.max(1.0 - off / tolerance);
+                on = on.max(1.0 - off * per_tolerance);
             }
         }
         out.count(through, on);
@@ -169,8 +128,8 @@ pub fn probe(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Vector;
     use crate::depth::Empty;
+    use crate::{DepthImage, Vector};
 
     /// A wall at z = 5 in front of the camera, with a 1 m plate at z = 3.
     fn image() -> DepthImage {
@@ -192,7 +151,7 @@ mod tests {
         let (points, normals) = (vec![[0.0, 0.0, 0.0]; 1], vec![[0.0, 0.0, -1.0]; 1]);
         let at = |z: f64| {
             let pose = Pose::from_parts(Vector::new(0.0, 0.0, z).into(), Default::default());
-            probe(&[&image], &points, &normals, &pose, 0.04)
+            probe(&[Eye::new([&image])], &points, &normals, &pose, 0.04)
         };
         let on = at(3.0);
         assert_eq!((on.n_on, on.n_through), (1, 0));

@@ -2,7 +2,6 @@
 //! and all base poses of a search instead of once for each sample.
 
 use contract::{Fan, Region, View};
-use geometry::depth::{rows, transform};
 use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
 use geometry::{Aabb, Evidence, Pose, Probe, Vector};
 use std::sync::OnceLock;
@@ -94,7 +93,7 @@ impl<'a> Sight<'a> {
     #[must_use]
     pub fn apart(mut self) -> Self {
         let with_beams = self.views.iter().filter(|v| !v.images.is_empty());
-        let alone = |v: &'a View| Evidence { images: v.images.iter().collect(), cloud: None };
+        let alone = |v: &'a View| Evidence::new(&v.images.iter().collect::<Vec<_>>(), None);
         self.each = with_beams.map(alone).collect();
         self.spots.clone_from(&self.all_spots);
         self
@@ -212,18 +211,14 @@ impl Volume {
         let edge = EDGE.max((content / MAX_CELLS).cbrt() as f32);
         let n = size.map(|s| (s / f64::from(edge)).ceil().max(1.0) as usize);
         let min = region.bounds.min.map(|v| v as f32);
-        let images: Vec<_> =
-            evidence.images.iter().map(|i| (*i, rows(i.camera_from_local()))).collect();
         let layer = |k: usize| -> Vec<Cell> {
             let place = |at: usize| {
                 let middle = |i: usize, of: usize| min[i] + (of as f32 + 0.5) * edge;
                 let p = [middle(0, at % n[0]), middle(1, at / n[0]), middle(2, k)];
                 let mut cell = Known::default();
-                for (image, camera_from_local) in &images {
-                    if let Some(look) = image.look(transform(camera_from_local, p), edge) {
-                        cell.add(look.around - look.range, look.near - look.range);
-                        cell.add(look.around - look.range, look.far - look.range);
-                    }
+                for look in evidence.eyes().iter().filter_map(|eye| eye.look(p, edge)) {
+                    cell.add(look.around - look.range, look.near - look.range);
+                    cell.add(look.around - look.range, look.far - look.range);
                 }
                 cell.packed()
             };

@@ -1,7 +1,7 @@
 //! A place and the views of some scans in; whether their beams went through it, ended on it, or never got there, out.
 
 use contract::{Region, View};
-use geometry::Faces;
+use geometry::Eye;
 use geometry::depth::Look;
 
 /// A beam that ended so far behind a place went through it, metres.
@@ -36,14 +36,14 @@ pub enum Sight {
 /// Scans that are asked.
 pub struct Watch<'a> {
     region: &'a Region,
-    views: Vec<(&'a View, Faces)>,
+    views: Vec<(&'a View, Eye<'a>)>,
 }
 
 impl<'a> Watch<'a> {
     /// Views of a region.
     #[must_use]
     pub fn new(region: &'a Region, views: &'a [View]) -> Self {
-        let views = views.iter().map(|view| (view, Faces::new(&view.images))).collect();
+        let views = views.iter().map(|view| (view, Eye::new(&view.images))).collect();
         Self { region, views }
     }
 
@@ -58,10 +58,7 @@ impl<'a> Watch<'a> {
     /// What each scan that looked there has.
     fn looks(&self, world: [f64; 3]) -> impl Iterator<Item = (&View, Look)> + '_ {
         let p = self.local(world);
-        self.views.iter().filter_map(move |(view, faces)| {
-            let of = |&i: &usize| view.images[i].look_at(p, FOOTPRINT);
-            Some((*view, faces.towards(p).iter().find_map(of)?))
-        })
+        self.views.iter().filter_map(move |(view, eye)| Some((*view, eye.look(p, FOOTPRINT)?)))
     }
 
     /// What the scans say of a place in the world: the strongest of what each of them says.
@@ -74,14 +71,12 @@ impl<'a> Watch<'a> {
     pub fn look_all(&self, world: &[[f64; 3]], out: &mut Vec<Sight>) {
         out.clear();
         out.resize(world.len(), Sight::Unseen);
-        for (view, faces) in &self.views {
+        for (_, eye) in &self.views {
             for (world, best) in world.iter().zip(out.iter_mut()) {
                 if *best == Sight::Onto {
                     continue;
                 }
-                let p = self.local(*world);
-                let of = |&i: &usize| view.images[i].look_at(p, FOOTPRINT);
-                let look = faces.towards(p).iter().find_map(of);
+                let look = eye.look(self.local(*world), FOOTPRINT);
                 *best = (*best).max(look.map_or(Sight::Unseen, |look| Sight::of(&look)));
             }
         }

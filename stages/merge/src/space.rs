@@ -5,7 +5,7 @@
 //! back proves nothing.
 
 use contract::{Region, Space, SpaceKind, View};
-use geometry::{Aabb, Faces, Pose};
+use geometry::{Aabb, Eye, Pose};
 use robot::Model;
 
 /// Half the diagonal of a cube of edge 1: a beam that ends this far beyond a voxel's middle has left it.
@@ -17,19 +17,18 @@ pub fn see(space: &mut Space, region: &Region, views: &[View]) {
     let grid = *space.grid();
     let (edge, first) = (grid.edge, grid.first);
     let beyond = (HALF_DIAGONAL * edge + BEYOND) as f32;
-    let views: Vec<(&View, Faces)> = views.iter().map(|v| (v, Faces::new(&v.images))).collect();
+    let eyes: Vec<Eye<'_>> = views.iter().map(|view| Eye::new(&view.images)).collect();
     for (at, voxel) in space.voxels_mut().iter_mut().enumerate() {
         let cell = grid.cell(at);
         let p: [f32; 3] = std::array::from_fn(|i| {
             let middle = ((first[i] + cell[i] as i64) as f64 + 0.5) * edge;
             (middle - region.origin[i]) as f32
         });
-        let is_passed = |(view, faces): &(&View, Faces)| {
-            let of = |&i: &usize| view.images[i].look_at(p, 0.5 * edge as f32);
-            let look = faces.towards(p).iter().find_map(of);
+        let is_passed = |eye: &Eye<'_>| {
+            let look = eye.look(p, 0.5 * edge as f32);
             look.is_some_and(|l| l.far.is_finite() && l.far > l.range + beyond)
         };
-        if views.iter().any(is_passed) {
+        if eyes.iter().any(is_passed) {
             *voxel = SpaceKind::Free;
         }
     }
