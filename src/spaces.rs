@@ -33,8 +33,7 @@ pub(crate) fn around(
         let grid = SpaceGrid::over(&bounds, edge);
         let region = region(&base, &grid.bounds());
         let min_cell = grid.edge / CELLS_PER_EDGE;
-        let views =
-            search.images(&region, &ViewSettings { min_cell, ..settings.view.clone() })?;
+        let views = search.images(&region, &ViewSettings { min_cell, ..settings.view.clone() })?;
         if views.iter().all(|v| v.images.is_empty()) {
             return Ok(None);
         }

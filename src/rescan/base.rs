@@ -107,7 +107,7 @@ impl Base {
     pub(crate) fn superseded(&self) -> Result<Vec<Vec<u64>>> {
         let read = |s: &ScanLabels| {
             let file = s.superseded.as_ref();
-            file.map_or(Ok(Vec::new()), |name| read_places(&self.out.join(name)))
+            file.map_or(Ok(Vec::new()), |name| read_places(&self.out.join(name), s.n_points))
         };
         self.result.labels.scans.iter().map(read).collect()
     }

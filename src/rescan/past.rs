@@ -304,7 +304,10 @@ pub(crate) struct World {
 impl World {
     pub(crate) fn from(scan: &Scan) -> Self {
         let pose = &scan.world_from_scan;
-        Self { rotation: *pose.rotation.to_rotation_matrix().matrix(), shift: pose.translation.vector }
+        Self {
+            rotation: *pose.rotation.to_rotation_matrix().matrix(),
+            shift: pose.translation.vector,
+        }
     }
 
     /// A point of the scan in the world, metres.

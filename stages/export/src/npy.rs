@@ -66,17 +66,22 @@ pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Resul
     Ok(bytes)
 }
 
-/// All of a list of places (u64) that [`NpyWriter`] wrote.
+/// All of a list of places (u64, ascending) in a mask of `n_points` entries that [`NpyWriter`] wrote.
 ///
 /// # Errors
-/// A file that cannot be read, or is none of ours.
-pub fn read_places(path: &Path) -> Result<Vec<u64>> {
+/// A file that cannot be read, or whose places do not ascend or are none of the mask's.
+pub fn read_places(path: &Path, n_points: u64) -> Result<Vec<u64>> {
     let n_bytes =
         std::fs::metadata(path).map_err(|e| Error::of_file("list cannot be read", path, e))?.len();
     let n = n_bytes.saturating_sub(HEADER as u64) / 8;
     let bytes = read_bytes(path, 0, n as usize, 8)?;
     let (whole, _) = bytes.as_chunks::<8>();
-    Ok(whole.iter().map(|b| u64::from_le_bytes(*b)).collect())
+    let places: Vec<u64> = whole.iter().map(|b| u64::from_le_bytes(*b)).collect();
+    let is_whole = places.is_sorted() && places.last().is_none_or(|last| *last < n_points);
+    is_whole.then_some(places).ok_or_else(|| {
+        let what = format!("the list is none of places among {n_points} points");
+        Error::bad_input(what).at(path.display()).hint("run the whole plant again")
+    })
 }
 
 /// Writes an array piece by piece.

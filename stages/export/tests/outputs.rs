@@ -371,3 +371,18 @@ fn how_fast_clouds_and_scans_are_written() {
     eprintln!("e57: {:.2} M points/s", 3.0 / start.elapsed().as_secs_f64());
     std::fs::remove_dir_all(out).expect("cleared");
 }
+
+#[test]
+fn a_list_of_places_that_a_mask_does_not_have_is_refused() {
+    let path = folder("places").join("0.superseded.npy");
+    let write = |places: &[u64]| {
+        let mut list = NpyWriter::<u64>::create(&path).expect("opens");
+        list.push(places).expect("writes");
+        list.finish().expect("ends");
+    };
+    write(&[1, 5, 9]);
+    assert_eq!(read_places(&path, 10).expect("reads"), [1, 5, 9]);
+    assert!(read_places(&path, 9).is_err());
+    write(&[5, 1]);
+    assert!(read_places(&path, 10).is_err());
+}

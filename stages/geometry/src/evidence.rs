@@ -57,9 +57,7 @@ impl<'a> Evidence<'a> {
         tolerance: f32,
     ) -> Probe {
         match &self.cloud {
-            Some(cloud) if self.eyes.is_empty() => {
-                cloud.probe(points, local_from_body, tolerance)
-            }
+            Some(cloud) if self.eyes.is_empty() => cloud.probe(points, local_from_body, tolerance),
             _ => probe(&self.eyes, points, normals, local_from_body, tolerance),
         }
     }

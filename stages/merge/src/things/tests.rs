@@ -13,8 +13,7 @@ fn solid(tally: &mut Tallying, min: [f64; 3], size: [f64; 3], is_empty: bool) {
     for i in 0..=n[0] {
         for j in 0..=n[1] {
             for k in 0..=n[2] {
-                let rim =
-                    [(i, n[0]), (j, n[1]), (k, n[2])].iter().any(|(v, n)| *v == 0 || v == n);
+                let rim = [(i, n[0]), (j, n[1]), (k, n[2])].iter().any(|(v, n)| *v == 0 || v == n);
                 if rim {
                     let at = [i, j, k].map(|v| 0.02 * f64::from(v));
                     let p = [min[0] + at[0], min[1] + at[1], min[2] + at[2]];
