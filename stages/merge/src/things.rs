@@ -28,6 +28,10 @@ const WIDER: [f64; 2] = [1.4, 6.0];
 /// How much the sizes of a thing may differ between two sessions, which see other sides of it, but both its top: metres, and
 /// share of its sides and of its height.
 const SAME_SIZE: (f64, [f64; 3]) = (0.12, [0.2, 0.2, 0.1]);
+/// What has no more than this share of a thing's height, and its top as high as that one's, to so many metres, and the same
+/// sides, is its top seen over something that hides the rest.
+const FLAT: f64 = 0.5;
+const SAME_TOP: f64 = 0.08;
 
 /// What is tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -237,7 +241,10 @@ fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<(usize, usize, [Aabb; 2])> {
     let pairs = (0..gone.len()).flat_map(|i| (0..filled.len()).map(move |j| (i, j)));
     let alike = pairs.filter_map(|(i, j)| {
         let (was, is) = (&gone[i], &filled[j]);
-        let pair = |then: &Aabb, now: &Aabb| (unlike(then, now), i, j, [*then, *now]);
+        let pair = |then: &Aabb, now: &Aabb| {
+            let [then, now] = [lowered(then, now), lowered(now, then)];
+            (unlike(&then, &now), i, j, [then, now])
+        };
         let others = was.boxes().flat_map(|then| is.boxes().map(move |now| pair(then, now)));
         // Whole first: the two strips of a thing that was pushed a little are alike as well.
         let whole = was.whole.zip(is.whole).map(|(then, now)| pair(&then, &now));
@@ -266,16 +273,39 @@ fn thing(change: ThingChange, was: Option<&Piece>, is: Option<&Piece>) -> Thing 
     Thing { change, then, now, shift: None, volume, n_points, gone, filled }
 }
 
+/// A box that may be the top of another one, of which one session saw no more: then down to where the other stands.
+fn lowered(top: &Aabb, other: &Aabb) -> Aabb {
+    let is_flat = top.size()[2] < FLAT * other.size()[2];
+    let is_as_high = (top.max[2] - other.max[2]).abs() <= SAME_TOP;
+    let mut out = *top;
+    if is_flat && is_as_high {
+        out.min[2] = other.min[2];
+        let is_alike = (0..2).all(|i| off(&sides(&out), &sides(other), i) <= 1.0);
+        return if is_alike { out } else { *top };
+    }
+    out
+}
+
+/// Shorter and longer side on the ground, and height, metres.
+fn sides(bounds: &Aabb) -> [f64; 3] {
+    let [w, d, h] = bounds.size();
+    [w.min(d), w.max(d), h]
+}
+
+/// How much they may differ, metres, and do, in parts of that.
+fn same(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
+    SAME_SIZE.0.max(SAME_SIZE.1[i] * a[i].max(b[i]))
+}
+
+fn off(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
+    (a[i] - b[i]).abs() / same(a, b, i)
+}
+
 /// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may be one thing, of which
 /// one session saw less than the other.
 fn unlike(a: &Aabb, b: &Aabb) -> f64 {
-    let sorted = |x: &Aabb| {
-        let [w, d, h] = x.size();
-        [w.min(d), w.max(d), h]
-    };
-    let (a, b) = (sorted(a), sorted(b));
-    let same = |i: usize| SAME_SIZE.0.max(SAME_SIZE.1[i] * a[i].max(b[i]));
-    let off = |i: usize| (a[i] - b[i]).abs() / same(i);
+    let (a, b) = (sides(a), sides(b));
+    let (same, off) = (|i: usize| same(&a, &b, i), |i: usize| off(&a, &b, i));
     // The smaller one within the larger one, and no small part of it.
     let (small, large) = if a[0] * a[1] < b[0] * b[1] { (a, b) } else { (b, a) };
     let beyond = |i: usize| (small[i] - large[i]) / same(i);

@@ -115,3 +115,17 @@ fn what_is_near_a_robot_is_the_robots() {
     assert_eq!(n_found(0.3), 0);
     assert_eq!(n_found(0.0), 1);
 }
+
+#[test]
+fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
+    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    solid(&mut then, [1.0, 1.0, 0.02], [1.2, 0.8, 0.7], true);
+    solid(&mut then, [1.0, 6.0, 0.02], [0.6, 0.6, 0.5], true);
+    solid(&mut now, [5.0, 1.0, 0.62], [1.2, 0.8, 0.1], true);
+    let found = found(then, now);
+    let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
+    assert_eq!(kinds, [ThingChange::Moved, ThingChange::Gone]);
+    let shift = found[0].shift.expect("a shift");
+    assert!((shift[0] - 4.0).abs() < 0.06 && shift[2].abs() < 0.06, "{shift:?}");
+    assert!(found[1].then.expect("bounds").contains([1.3, 6.3, 0.3]));
+}
