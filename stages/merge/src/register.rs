@@ -138,22 +138,21 @@ fn told(planes: &BTreeMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) ->
     // Neighbours among the points are mostly in one voxel, and ask once for its plane and its place among the sums.
     let mut sums: BTreeMap<[i32; 3], usize> = BTreeMap::new();
     let mut told: Vec<(usize, Told)> = Vec::new();
-    let mut last: Option<([i32; 3], Option<(&Plane, usize)>)> = None;
+    let (mut last, mut known): (Option<[i32; 3]>, Option<(&Plane, usize)>) = (None, None);
     for p in points {
         let p = (pose * Point::from(*p)).coords;
         let cell = cell(&p.into());
-        let known = match last {
-            Some((same, known)) if same == cell => known,
-            _ => planes.get(&cell).map(|plane| {
+        if last != Some(cell) {
+            last = Some(cell);
+            known = planes.get(&cell).map(|plane| {
                 let at = *sums.entry(cell).or_insert_with(|| {
                     let (normal, at) = (plane.normal, Vector::zeros());
                     told.push((0, Told { distance: 0.0, normal, at }));
                     told.len() - 1
                 });
                 (plane, at)
-            }),
-        };
-        last = Some((cell, known));
+            });
+        }
         let Some((plane, at)) = known else { continue };
         let distance = plane.distance(&p);
         if distance.abs() < GATE {
