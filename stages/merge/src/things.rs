@@ -277,11 +277,10 @@ fn thing(change: ThingChange, was: Option<&Piece>, is: Option<&Piece>) -> Thing 
 fn lowered(top: &Aabb, other: &Aabb) -> Aabb {
     let is_flat = top.size()[2] < FLAT * other.size()[2];
     let is_as_high = (top.max[2] - other.max[2]).abs() <= SAME_TOP;
+    let is_alike = (0..2).all(|i| off(&sides(top), &sides(other), i) <= 1.0);
     let mut out = *top;
-    if is_flat && is_as_high {
+    if is_flat && is_as_high && is_alike {
         out.min[2] = other.min[2];
-        let is_alike = (0..2).all(|i| off(&sides(&out), &sides(other), i) <= 1.0);
-        return if is_alike { out } else { *top };
     }
     out
 }
@@ -292,11 +291,12 @@ fn sides(bounds: &Aabb) -> [f64; 3] {
     [w.min(d), w.max(d), h]
 }
 
-/// How much they may differ, metres, and do, in parts of that.
+/// How much a side may differ, metres.
 fn same(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
     SAME_SIZE.0.max(SAME_SIZE.1[i] * a[i].max(b[i]))
 }
 
+/// How much it does, in parts of that.
 fn off(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
     (a[i] - b[i]).abs() / same(a, b, i)
 }

@@ -35,11 +35,13 @@ fn a_pallet_moves_a_barrel_goes_and_a_crate_comes() {
     solid(&mut now, [3.0, 1.0, 0.02], [0.8, 1.2, 0.6], true);
     solid(&mut then, [1.0, 6.0, 0.02], [0.6, 0.6, 0.9], true);
     solid(&mut now, [8.0, 1.0, 0.02], [0.3, 0.3, 0.4], true);
-    let found = found(then, now);
+    let (then, now) = (then.finish(), now.finish());
+    let found = things(&then, &now, &ThingSettings::default());
     let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
     assert_eq!(kinds, [ThingChange::Moved, ThingChange::Gone, ThingChange::Appeared]);
     let shift = found[0].shift.expect("a shift");
     assert!((shift[0] - 1.8).abs() < 0.06 && (shift[1] - 0.2).abs() < 0.06, "{shift:?}");
+    assert!(things(&then, &then, &ThingSettings::default()).is_empty());
 }
 
 #[test]
