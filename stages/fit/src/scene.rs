@@ -2,7 +2,7 @@
 
 use contract::{Fan, InstallationPlane, Region, View};
 use geometry::evidence::Cloud;
-use geometry::{Evidence, Plane, Point, Pose, Vector};
+use geometry::{Evidence, Eye, Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use crate::{Settings, noise};
@@ -83,18 +83,17 @@ impl<'a> Scene<'a> {
             thin.extend(few.into_iter().map(|i| first + i));
             points.extend(own);
         }
-        let images = views.iter().flat_map(|v| &v.images).collect::<Vec<_>>();
-        let cloud = images.is_empty().then(|| {
+        let cloud = views.iter().all(|view| view.images.is_empty()).then(|| {
             let few = thin.iter().map(|&i| points[i as usize].p).collect();
             Cloud::new(few, CLOUD.0, CLOUD.1)
         });
-        let scouts = View::scouts(views, region).into_iter().flat_map(|view| &view.images);
-        let scouts = Evidence::new(&scouts.collect::<Vec<_>>(), cloud.clone());
+        let scouts = View::scouts(views, region);
+        let scouts = Evidence::new(scouts.iter().map(|v| Eye::new(&v.images)), cloud.clone());
         let noise = noise::of(views, &points, &thin).max(settings.min_noise);
         Self {
             region,
             views: views.to_vec(),
-            evidence: Evidence::new(&images, cloud),
+            evidence: Evidence::new(views.iter().map(|v| Eye::new(&v.images)), cloud),
             scouts,
             noise,
             points,

@@ -2,7 +2,7 @@
 //! Surface samples in; a [`Probe`] out. The one place where "is it there?" is answered.
 
 use crate::probe::{Probe, probe};
-use crate::{DepthImage, Eye, NearestField, Pose};
+use crate::{Eye, NearestField, Pose};
 
 /// Everything that was measured in a region.
 #[derive(Debug, Clone, Default)]
@@ -34,10 +34,10 @@ impl Cloud {
 const ABSENT_PRICE: f32 = 0.4;
 
 impl<'a> Evidence<'a> {
-    /// Of images, those of one scanner one after the other, and of points without beams.
+    /// Of scans whose scanner is known, those with images, and of points without beams.
     #[must_use]
-    pub fn new(images: &[&'a DepthImage], cloud: Option<Cloud>) -> Self {
-        Self { eyes: Eye::all(images), cloud }
+    pub fn new(eyes: impl IntoIterator<Item = Eye<'a>>, cloud: Option<Cloud>) -> Self {
+        Self { eyes: eyes.into_iter().filter(|eye| !eye.is_blind()).collect(), cloud }
     }
 
     /// The scans whose scanner is known.

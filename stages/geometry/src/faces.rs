@@ -20,10 +20,9 @@ impl<'a> Eye<'a> {
         Self { images, faces }
     }
 
-    /// Scanners whose images stand one after the other.
-    pub fn all(images: &[&'a DepthImage]) -> Vec<Self> {
-        let own = images.chunk_by(|a, b| a.scanner == b.scanner);
-        own.map(|images| Self::new(images.iter().copied())).collect()
+    /// Whether it has no image.
+    pub(crate) fn is_blind(&self) -> bool {
+        self.images.is_empty()
     }
 
     /// Where it stands, local frame, metres.

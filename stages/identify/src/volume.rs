@@ -3,7 +3,7 @@
 
 use contract::{Fan, Region, View};
 use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
-use geometry::{Aabb, Evidence, Pose, Probe, Vector};
+use geometry::{Aabb, Evidence, Eye, Pose, Probe, Vector};
 use std::sync::OnceLock;
 
 use crate::graded::{Graded, HIDDEN, SCORE_UNIT, Stencil};
@@ -93,7 +93,7 @@ impl<'a> Sight<'a> {
     #[must_use]
     pub fn apart(mut self) -> Self {
         let with_beams = self.views.iter().filter(|v| !v.images.is_empty());
-        let alone = |v: &'a View| Evidence::new(&v.images.iter().collect::<Vec<_>>(), None);
+        let alone = |v: &'a View| Evidence::new([Eye::new(&v.images)], None);
         self.each = with_beams.map(alone).collect();
         self.spots.clone_from(&self.all_spots);
         self
