@@ -257,7 +257,7 @@ impl<'a> Labelling<'a> {
         engine.each(chosen.to_vec(), |i| {
             let fit = &self.fits[i];
             let model = &self.models[fit.model];
-            Ok(RobotPicture::new(i as i16, model, &poses(fit, model)))
+            Ok(RobotPicture::new(i as i16, model, &poses(fit, model), &AllThreads))
         })
     }
 

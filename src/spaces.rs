@@ -1,7 +1,7 @@
 //! Fits and what the scans saw about them in; around each robot, which space was seen free, which it fills itself and
 //! which nobody has seen, out. Points are marked into it while they are labelled.
 
-use crate::engine::Engine;
+use crate::engine::{AllThreads, Engine};
 use crate::job::Settings;
 use crate::search::Search;
 use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind};
@@ -38,7 +38,7 @@ pub(crate) fn around(
             return Ok(None);
         }
         let mut space = Space::unknown(grid);
-        merge::see(&mut space, &region, &views);
+        merge::see(&mut space, &region, &views, &AllThreads);
         merge::stand(&mut space, model, &poses(fit, model));
         Ok(Some(space))
     })

@@ -34,6 +34,11 @@ impl Surfaces {
     pub(crate) fn new(scans: &[Scan], settings: &lattice::Settings) -> Self {
         Self(Summarise::new(scans, settings))
     }
+
+    /// The same without planes: for where floor and walls are known.
+    pub(crate) fn without_planes(self) -> Self {
+        Self(self.0.without_planes())
+    }
 }
 
 impl Gather {

@@ -35,31 +35,45 @@ pub(crate) fn dress(
     engine: &Engine,
 ) -> Result<Vec<Fit>> {
     let fits = branch(fits, models);
-    let tools: Vec<usize> = (0..models.len()).filter(|&i| models[i].is_tool()).collect();
-    if tools.is_empty() {
+    let known: &[Model] = models;
+    if !known.iter().any(Model::is_tool) {
         return Ok(fits);
     }
-    let known: &[Model] = models;
     let dressed = engine.fan_out("tools", fits, |fit| {
-        // Of a robot that moved, the scans of one posture may show too little of a tool.
-        if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
-            return Ok((fit, None));
-        }
         let find = || {
             let dressed = search.with_scene(&fit, regions, |scene, settings| {
-                dress_one(&fit, (known, &tools, search.shelf()), scene, settings)
+                dress_one(&fit, (known, search.shelf()), scene, settings)
             })?;
             Ok(dressed.flatten())
         };
-        let (together, [tool, flange], mount) =
-            match search.or_find(&format!("tool of {fit:?}"), find)? {
-                Some(dressed) => dressed,
-                None => return Ok((fit, None)),
-            };
-        let both = known[fit.model].with_tool(&known[tool], flange, mount);
-        Ok((together, Some(both)))
+        let dressed = search.or_find(&format!("tool of {fit:?}"), find)?;
+        Ok(own(fit, dressed, known))
     })?;
     Ok(adopt(dressed, models))
+}
+
+/// The same for fits of one scene.
+pub(crate) fn dress_in(
+    scene: &Scene<'_>,
+    fits: Vec<Fit>,
+    models: &mut Vec<Model>,
+    (shelf, settings): (&Shelf<'_>, &Settings),
+) -> Vec<Fit> {
+    let fits = branch(fits, models);
+    let known: &[Model] = models;
+    let dressed = fits.into_iter().map(|fit| {
+        let dressed = dress_one(&fit, (known, shelf), scene, settings);
+        own(fit, dressed, known)
+    });
+    let dressed = dressed.collect();
+    adopt(dressed, models)
+}
+
+/// The fit with the tool that was found, and the model of both.
+fn own(fit: Fit, dressed: Option<Dressed>, models: &[Model]) -> (Fit, Option<Model>) {
+    let Some((together, [tool, flange], mount)) = dressed else { return (fit, None) };
+    let both = models[fit.model].with_tool(&models[tool], flange, mount);
+    (together, Some(both))
 }
 
 /// A fit of arm and tool, the tool's number in the library and the link that it hangs on, and its turn about it, radians.
@@ -80,10 +94,14 @@ pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) ->
 /// One arm: the tool that explains most, if one is there.
 fn dress_one(
     fit: &Fit,
-    (models, tools, shelf): (&[Model], &[usize], &Shelf<'_>),
+    (models, shelf): (&[Model], &Shelf<'_>),
     scene: &Scene<'_>,
     settings: &Settings,
 ) -> Option<Dressed> {
+    // Of a robot that moved, the scans of one posture may show too little of a tool.
+    if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
+        return None;
+    }
     let arm = &models[fit.model];
     // An arm whose loops stand otherwise has the links of its name.
     let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);
@@ -91,7 +109,7 @@ fn dress_one(
     let n_arm = arm.free.len();
     let mut best: Option<([usize; 2], Tooled)> = None;
     for flange in arm.flanges() {
-        for &tool in tools {
+        for tool in (0..models.len()).filter(|&i| models[i].is_tool()) {
             let both = arm.with_tool(&models[tool], flange, 0.0);
             let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
             let own = [n_arm, arm.links.len()];

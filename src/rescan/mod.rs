@@ -93,7 +93,8 @@ pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
 
     // Robots and things of the cell, then and now.
     let shelf = Shelf::new(&library.models);
-    let session = Session::new(&base, &sources, (&past, &new), &shelf, settings, engine)?;
+    let known = (&base.state.floor, robots::hang(&fits, &past.cell));
+    let session = Session::new(known, &sources, (&past, &new), &shelf, settings, engine)?;
     let (robots, labels) = session.compare((&mut fits, &mut models), engine)?;
 
     // New masks and records of the new scans, tiles of the cell anew, all the rest as it was.

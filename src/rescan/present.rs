@@ -7,7 +7,7 @@ use crate::report::tiles;
 use crate::store::Store;
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
 use geometry::{Aabb, Point};
-use merge::{Registration, Surfaces, Tally, Tallying, Watch};
+use merge::{Planes, Registration, Sight, Tally, Tallying, Watch};
 use segment::Ground;
 
 /// Points of a scan that are laid on the plant's surfaces, about.
@@ -15,7 +15,7 @@ const N_LAID: u64 = 100_000;
 
 /// How each new scan, from the number `first` on, is off the plant; none where too little of what stood is seen.
 pub(crate) fn register(
-    surfaces: &Surfaces,
+    planes: &Planes,
     (scans, first): (&[Scan], usize),
     (store, cell): (&Store, &Aabb),
     engine: &Engine,
@@ -32,7 +32,7 @@ pub(crate) fn register(
             let worlds = tile.xyz.iter().step_by(step).map(|p| in_world.of(*p));
             points.extend(worlds.filter(|p| cell.contains(*p)));
         }
-        Ok(surfaces.register(&points, &Point::from(cell.center().coords)))
+        Ok(planes.register(&points, &Point::from(cell.center().coords)))
     })
 }
 
@@ -42,6 +42,8 @@ pub(crate) struct Present<'a> {
     pub(crate) near: &'a Near,
     pub(crate) ground: &'a Ground,
     pub(crate) cell: Aabb,
+    /// What stood there: only beside it the earlier scans are asked.
+    pub(crate) then: &'a Tally,
     /// Earlier scans.
     pub(crate) watch: &'a Watch<'a>,
     /// The new ones.
@@ -74,7 +76,8 @@ impl Map for Present<'_> {
         let scan = &self.scans[tile.at.scan.0 as usize];
         let mut out = Tallying::default();
         let in_world = World::from(scan);
-        let mut fixed = Vec::new();
+        // Neighbours are mostly in one voxel, and ask once whether something stood there.
+        let (mut last, mut stood) = (None, false);
         for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
             let world = in_world.of(*xyz);
             if !self.cell.contains(world) {
@@ -83,15 +86,17 @@ impl Map for Present<'_> {
             let known = self.near.label(scan.mask, tile.first_place + u64::from(*place));
             let label: Label = known.unwrap_or_else(|| self.ground.label(world));
             match label.kind {
-                PointKind::Fixed => fixed.push(world),
+                PointKind::Fixed => {
+                    let cell = Tally::cell(world);
+                    if last != Some(cell) {
+                        (last, stood) = (Some(cell), self.then.has_some(&cell));
+                    }
+                    let sight = if stood { Sight::Onto } else { self.watch.look(world) };
+                    out.add(world, area(scan, world), seen(sight, self.own, world));
+                }
                 PointKind::Link | PointKind::Attachment => out.add_robot(world),
                 PointKind::Floor | PointKind::Uncertain => {}
             }
-        }
-        let mut sights = Vec::new();
-        self.watch.look_all(&fixed, &mut sights);
-        for (world, sight) in fixed.into_iter().zip(sights) {
-            out.add(world, area(scan, world), seen(sight, self.own, world));
         }
         Ok(Tallied(out.finish()))
     }

@@ -1,11 +1,10 @@
 //! A robot of the earlier result, and what the new scans saw, in; how it stands now, or that it is gone, out.
 
-use crate::engine::Engine;
 use crate::search::Search;
 use crate::spaces::{poses, reach};
-use crate::tools::dress;
+use crate::tools::dress_in;
 use contract::{Error, Fit, Region, Result, Verdict};
-use geometry::{Aabb, Point};
+use geometry::{Aabb, Point, Vector};
 use merge::{Sight, Watch};
 use robot::{Library, Model};
 
@@ -21,6 +20,9 @@ const CONTRADICTED: f64 = 0.25;
 const GONE: f64 = 0.6;
 /// A base farther from the old one is another robot's, metres.
 const SAME_PLACE: f64 = 0.5;
+
+/// Cosine of the tilt from which on a robot stands on no floor.
+const UPRIGHT: f64 = 0.9;
 
 /// How a robot stands now.
 pub(crate) enum Now {
@@ -86,12 +88,19 @@ pub(crate) fn bounds(fit: &Fit, model: &Model) -> Aabb {
     out
 }
 
+/// Whether robots about a cell hang on walls or ceilings.
+pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
+    let about = cell.grown(SAME_PLACE);
+    let here = |f: &&Fit| about.contains(f.world_from_base.translation.vector.into());
+    let up = |f: &Fit| (f.world_from_base.rotation * Vector::z()).z;
+    fits.iter().filter(here).any(|fit| up(fit) < UPRIGHT)
+}
+
 /// Looks at one robot again; `regions` are those of the new scans. The model is its own, where it is none of the library.
 pub(crate) fn look(
     before: &Fit,
     models: &[Model],
     (search, watch, regions): (&Search<'_, '_>, &Watch<'_>, &[Region]),
-    engine: &Engine,
 ) -> Result<(Now, Option<Model>)> {
     let model = &models[before.model];
     let said = said(before, model, watch);
@@ -99,7 +108,9 @@ pub(crate) fn look(
         return Ok((if said.through < STANDS { Now::Unseen } else { Now::Open }, None));
     }
     let near = home(before, model, regions);
+    // Where the new scans see through much of how it stood, it stands otherwise: that is told from its base alone.
     if before.calibration.is_none()
+        && said.through <= CONTRADICTED
         && let Some(fit) = search.again(&near, before, model)?
     {
         let is_same = !crate::changes::stands_otherwise(before, &fit);
@@ -111,28 +122,43 @@ pub(crate) fn look(
     if said.through < STANDS && before.verdict != Verdict::Refused {
         return Ok((Now::Unseen, None));
     }
-    // Its arm may have left what stands about its base.
-    let region = reach(before, model);
-    let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
-    let mut found: Vec<Fit> =
-        search.on_base(&region, bare, &before.world_from_base)?.into_iter().collect();
-    if found.iter().all(|f| f.verdict != Verdict::Trusted) {
-        found.extend(search.region(&near)?);
-        found = fit::choose(found, models);
-    }
-    let base = before.world_from_base.translation.vector;
-    found.retain(|fit| (fit.world_from_base.translation.vector - base).norm() < SAME_PLACE);
-    let mut own = if found.is_empty() { Vec::new() } else { models.to_vec() };
-    let dressed = dress(found, &mut own, (search, &[region]), engine)?;
-    Ok(match dressed.into_iter().max_by(|a, b| a.verdict.cmp(&b.verdict)) {
+    let (found, own) = anew(before, models, (search, &near))?;
+    Ok(match found {
         Some(fit) => {
-            let dressed = (fit.model >= models.len()).then(|| own.swap_remove(fit.model));
+            let dressed = (fit.model >= models.len()).then_some(own).flatten();
             (Now::Anew(Box::new(fit)), dressed)
         }
         None if said.foot > GONE => (Now::Gone, None),
         None if said.through > CONTRADICTED => (Now::Lost, None),
         None => (Now::Open, None),
     })
+}
+
+/// A robot that does not stand as it stood, searched anew at its place; with the model of its own.
+fn anew(
+    before: &Fit,
+    models: &[Model],
+    (search, near): (&Search<'_, '_>, &Region),
+) -> Result<(Option<Fit>, Option<Model>)> {
+    let world_from_base = &before.world_from_base;
+    let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
+    // Its arm may have left what stands about its base.
+    let region = reach(before, &models[before.model]);
+    search.in_scene(&region, |scene, settings| {
+        let mut found: Vec<Fit> =
+            search.on_base(scene, bare, world_from_base).into_iter().collect();
+        if found.iter().all(|f| f.verdict != Verdict::Trusted) {
+            found.extend(search.region(near)?);
+            found = fit::choose(found, models);
+        }
+        let base = world_from_base.translation.vector;
+        found.retain(|fit| (fit.world_from_base.translation.vector - base).norm() < SAME_PLACE);
+        let mut own = if found.is_empty() { Vec::new() } else { models.to_vec() };
+        let dressed = dress_in(scene, found, &mut own, (search.shelf(), settings));
+        let best = dressed.into_iter().max_by(|a, b| a.verdict.cmp(&b.verdict));
+        let model = best.as_ref().and_then(|fit| own.get(fit.model).cloned());
+        Ok((best, model))
+    })?
 }
 
 /// The region of the new scans that a robot stands in; all that it can get to, where it stands in none.

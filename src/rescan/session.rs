@@ -5,14 +5,16 @@ use super::base::Base;
 use super::past::{Looked, Past};
 use super::present::{self, Present};
 use super::robots::{Now, bounds as robot_bounds, look};
-use crate::engine::Engine;
+use crate::engine::{AllThreads, Engine};
 use crate::job::Settings;
 use crate::labelling::{Labelling, Near};
 use crate::search::{Search, Shelf};
 use crate::spaces::{reach, region};
 use crate::store::Store;
 use crate::surfaces::{Gather, Ground, Surfaces};
-use contract::{Cluster, Error, Fit, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View};
+use contract::{
+    Cluster, Error, Fit, Floor, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View,
+};
 use geometry::{Aabb, Pose};
 use ingest::Sources;
 use lattice::ViewSettings;
@@ -40,6 +42,7 @@ pub(crate) struct Session<'a> {
     pub(crate) past: &'a Past<'a>,
     pub(crate) store: &'a Store,
     pub(crate) ground: Ground,
+    floor: &'a Floor,
     pub(crate) clusters: Vec<Cluster>,
     pub(crate) settings: &'a Settings,
     pub(crate) cell: Region,
@@ -134,9 +137,9 @@ pub(crate) fn register(
     new: &Store,
     engine: &Engine,
 ) -> Result<Vec<Option<Registration>>> {
-    let surfaces = past.surfaces(engine)?;
+    let planes = past.surfaces(engine)?.planes();
     let first = past.scans.len();
-    let found = present::register(&surfaces, (&sources.scans, first), (new, &past.cell), engine)?;
+    let found = present::register(&planes, (&sources.scans, first), (new, &past.cell), engine)?;
     for (scan, found) in sources.scans[first..].iter_mut().zip(&found) {
         if let Some(found) = found {
             scan.world_from_scan = found.plant_from_stated * scan.world_from_scan;
@@ -146,9 +149,10 @@ pub(crate) fn register(
 }
 
 impl<'a> Session<'a> {
-    /// Looks at the cell through earlier and new scans.
+    /// Looks at the cell through earlier and new scans; `floor` is that of the plant, and `hang` says whether robots of the
+    /// cell hang on walls or ceilings.
     pub(crate) fn new(
-        base: &Base,
+        (floor, hang): (&'a Floor, bool),
         sources: &'a Sources,
         (past, store): (&'a Past<'a>, &'a Store),
         shelf: &'a Shelf<'a>,
@@ -156,15 +160,7 @@ impl<'a> Session<'a> {
         engine: &Engine,
     ) -> Result<Self> {
         let scans = &sources.scans;
-        let (surfaces, gather) =
-            (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
-        let mut ground =
-            engine.pass(crate::report::tiles("surfaces", store), store.tiles(), |f| {
-                f.map(&surfaces).fold(&gather)
-            })?;
-        if !base.state.floor.levels.is_empty() {
-            ground.surfaces.floor = base.state.floor.clone();
-        }
+        let ground = ground(floor, hang, (sources, store), settings, engine)?;
         let clusters =
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let cell = region(&past.cell.center(), &past.cell);
@@ -179,6 +175,7 @@ impl<'a> Session<'a> {
             past,
             store,
             ground,
+            floor,
             clusters,
             settings,
             cell,
@@ -232,7 +229,7 @@ impl<'a> Session<'a> {
             |i: &usize| fits[*i].verdict != Verdict::Refused && bounds[*i].touches(&self.past.cell);
         let here: Vec<usize> = (0..fits.len()).filter(here).collect();
         let looked = engine.fan_out("fit", here.clone(), |i| {
-            look(&fits[i], models, (&search, &watch, &regions), engine)
+            look(&fits[i], models, (&search, &watch, &regions))
         })?;
         for (i, (now, own)) in here.into_iter().zip(looked) {
             let bounds = bounds[i];
@@ -285,18 +282,24 @@ impl<'a> Session<'a> {
         let labelling = self.labelling(&own, models);
         let near = labelling.near_robots(self.store, engine)?;
         let (watch, old_watch) = (self.watch(), Watch::new(&self.cell, &self.old_views));
+        let (then, looked) = self.past.look([&watch, &old_watch], engine)?;
         let present = Present {
             scans: &self.sources.scans,
             near: &near,
             ground: labelling.ground(),
             cell: self.past.cell,
+            then: &then,
             watch: &old_watch,
             own: &watch,
         };
         let now = present.tally(self.store, engine)?;
-        let (then, looked) = self.past.look([&watch, &old_watch], engine)?;
-        let things = things(&then, &now, &self.settings.things);
-        let unseen = merge::unseen(&then, &now, &self.settings.things);
+        let settings = &self.settings.things;
+        let (things, unseen) = engine.pool()?.install(|| {
+            rayon::join(
+                || things(&then, &now, settings, &AllThreads),
+                || merge::unseen(&then, &now, settings),
+            )
+        });
         Ok(Labels { near, looked, things, unseen, now })
     }
 
@@ -326,7 +329,6 @@ impl<'a> Session<'a> {
         (fits, models): (&[Fit], &mut Vec<Model>),
         engine: &Engine,
     ) -> Result<Vec<Fit>> {
-        let search = self.search();
         let like =
             |size: [f64; 3]| size[2] >= ROBOT_LIKE[0] && size.iter().any(|s| *s >= ROBOT_LIKE[1]);
         // What stood elsewhere before, in the same shape, is none.
@@ -336,6 +338,13 @@ impl<'a> Session<'a> {
             .filter(|bounds| like(bounds.size()))
             .map(|bounds| region(&bounds.center(), &bounds.grown(ABOUT)))
             .collect();
+        if regions.is_empty() {
+            return Ok(Vec::new());
+        }
+        // A new one may hang on a wall.
+        let walls = ground(self.floor, true, (self.sources, self.store), self.settings, engine)?;
+        let (scans, settings) = (&self.sources.scans, self.settings);
+        let search = Search::new(self.shelf, scans, self.store, &walls, settings);
         let found = engine.fan_out("search", regions.clone(), |region| search.region(&region))?;
         let found = found.into_iter().flatten().collect();
         let is_new = |fit: &Fit| {
@@ -354,6 +363,28 @@ impl<'a> Session<'a> {
         let moved = registered.iter().map(|r| r.map(|r| r.plant_from_stated));
         std::iter::repeat_n(None, first).chain(moved).collect()
     }
+}
+
+/// What the new scans cover and what they found occupied; with their walls where those are asked for, and all of their
+/// planes where the plant has no floor.
+fn ground(
+    floor: &Floor,
+    with_walls: bool,
+    (sources, store): (&Sources, &Store),
+    settings: &Settings,
+    engine: &Engine,
+) -> Result<Ground> {
+    let is_known = !floor.levels.is_empty();
+    let surfaces = Surfaces::new(&sources.scans, &settings.lattice);
+    let surfaces = if is_known && !with_walls { surfaces.without_planes() } else { surfaces };
+    let gather = Gather::new(&sources.scans, &settings.floor);
+    let mut ground = engine.pass(crate::report::tiles("surfaces", store), store.tiles(), |f| {
+        f.map(&surfaces).fold(&gather)
+    })?;
+    if is_known {
+        ground.surfaces.floor = floor.clone();
+    }
+    Ok(ground)
 }
 
 /// What the earlier scans cover, as far as they are asked.

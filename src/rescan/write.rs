@@ -14,6 +14,7 @@ use export::{FileSum, MaskFiles, NpyWriter, OldPoint, refill};
 use geometry::Aabb;
 use merge::{Registration, Sight, Tally, ThingChange, Watch};
 use robot::Model;
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -45,24 +46,24 @@ impl Written<'_, '_> {
     ) -> Result<Out> {
         let next = room.next();
         let scratch = room.scratch();
-        let mut done = self.label(registered, (next, &scratch), engine)?;
         let gone = self.gone();
-        let superseded = self
-            .session
-            .past
-            .superseded(&self.labels.looked, &gone, |robot| self.stands_otherwise(robot));
-        let touched = self.tiles(&gone, (next, &scratch), engine)?;
+        // Places of old points are listed while the new ones are labelled and tiles are written.
+        let lists = || self.lists(&gone, next);
+        let rest = || {
+            let done = self.label(registered, (next, &scratch), engine)?;
+            Ok((done, self.tiles(&gone, (next, &scratch), engine)?))
+        };
+        let (lists, (mut done, touched)) = engine.beside("lists", lists, rest)?;
         let mut written: BTreeSet<String> = touched.names;
-        done.sums.extend(touched.sums);
-        let lists = self.lists(&superseded, next, &mut written, &mut done.sums)?;
+        written.extend(lists.grown);
+        done.sums.extend(touched.sums.into_iter().chain(lists.sums));
         let _ = std::fs::remove_dir_all(&scratch);
         let said = Said {
             found: self,
             done: &done,
             registered,
-            lists: &lists,
-            n_superseded: superseded.iter().map(|l| l.len() as u64).sum::<u64>()
-                - self.session.past.n_before(),
+            lists: &lists.names,
+            n_superseded: lists.n_superseded - self.session.past.n_before(),
         };
         let outcome = said.finish(sums, next)?;
         written.extend(say::NAMES.map(String::from));
@@ -165,7 +166,13 @@ impl Written<'_, '_> {
         }
         let robots = format!("clouds/robots.{ending}");
         names.insert(robots.clone(), [self.base.has(&robots), scratch.join(&robots).is_file()]);
-        let all: Vec<(String, [bool; 2])> = names.into_iter().collect();
+        let mut all: Vec<(String, [bool; 2])> = names.into_iter().collect();
+        // The largest first: none is left that one thread writes alone while others wait.
+        let n_bytes = |path: &Path| path.metadata().map_or(0, |m| m.len());
+        all.sort_by_cached_key(|(name, _)| {
+            let n_bytes = n_bytes(&self.base.out.join(name)) + n_bytes(&scratch.join(name));
+            (Reverse(n_bytes), name.clone())
+        });
         let watch = self.session.watch();
         let sums = engine.fan_out("tiles", all.clone(), |(name, [old, new])| {
             let (old, new) =
@@ -179,32 +186,39 @@ impl Written<'_, '_> {
         Ok(Touched { names, sums })
     }
 
-    /// Lists of the places of old points that are superseded, of masks whose list grew; the name of each mask's list.
-    fn lists(
-        &self,
-        superseded: &[Vec<u64>],
-        next: &Path,
-        written: &mut BTreeSet<String>,
-        sums: &mut Vec<FileSum>,
-    ) -> Result<Vec<Option<String>>> {
-        let mut names = Vec::new();
+    /// Writes lists of the places of old points that are superseded, of masks whose list grew.
+    fn lists(&self, gone: &BTreeSet<[i32; 3]>, next: &Path) -> Result<Lists> {
+        let past = self.session.past;
+        let superseded =
+            past.superseded(&self.labels.looked, gone, |robot| self.stands_otherwise(robot));
+        let mut out = Lists::default();
         for (i, places) in superseded.iter().enumerate() {
             let before = &self.base.result.labels.scans[i].superseded;
             let name = MaskFiles::superseded(MaskId(i as u32));
             if places.is_empty() {
-                names.push(None);
+                out.names.push(None);
                 continue;
             }
-            if before.is_none() || self.session.past.n_of(i) != places.len() {
+            out.n_superseded += places.len() as u64;
+            if before.is_none() || past.n_of(i) != places.len() {
                 let mut list = NpyWriter::<u64>::create(next.join(&name))?;
                 list.push(places)?;
-                sums.push(list.finish()?);
-                written.insert(name.clone());
+                out.sums.push(list.finish()?);
+                out.grown.push(name.clone());
             }
-            names.push(Some(name));
+            out.names.push(Some(name));
         }
-        Ok(names)
+        Ok(out)
     }
+}
+
+/// Lists of superseded places: of each mask the name, those that grew, and how many places all of them have.
+#[derive(Default)]
+struct Lists {
+    names: Vec<Option<String>>,
+    grown: Vec<String>,
+    sums: Vec<FileSum>,
+    n_superseded: u64,
 }
 
 struct Touched {

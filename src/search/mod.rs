@@ -302,35 +302,38 @@ impl<'a, 'm> Search<'a, 'm> {
         before: &Fit,
         model: &Model,
     ) -> Result<Option<Fit>> {
-        let views = self.views(region)?;
-        let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
         let known = |name: &str| self.shelf.models.iter().position(|m| m.name == name);
         let tool = before.tool.as_ref().map(|tool| tool.model.as_str());
         let parts = [before.model_name.as_str()].into_iter().chain(tool).filter_map(known);
         let parts: Vec<&Prepared<'_>> = parts.map(|part| self.shelf.prepared(part)).collect();
         let prepared = Prepared::joined(&parts, (before.model, model));
-        Ok(fit::again(before, &prepared, &scene, &self.settings.fit, &AllThreads))
+        self.in_scene(region, |scene, settings| {
+            fit::again(before, &prepared, scene, settings, &AllThreads)
+        })
     }
 
-    /// The fit of a model on a base that is known.
-    pub(crate) fn on_base(
-        &self,
-        region: &Region,
-        model: usize,
-        base: &Pose,
-    ) -> Result<Option<Fit>> {
-        let views = self.views(region)?;
-        let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
+    /// The fit of a model on a base that is known, in the scene of the region about it.
+    pub(crate) fn on_base(&self, scene: &Scene<'_>, model: usize, base: &Pose) -> Option<Fit> {
+        let bounds = scene.region.world_bounds();
         let normal = base.rotation * Vector::z();
         let offset = normal.dot(&base.translation.vector);
         let plane = Plane { normal, offset };
-        let bounds = region.world_bounds();
         let plane = InstallationPlane { plane, bounds, area: 1.0, is_floor: false };
         let candidate = Candidate { model, bounds, plane, bases: vec![(*base, 1.0)], group: 0 };
         let prepared = self.shelf.prepared(model);
-        Ok(fit::fit(&candidate, prepared, &scene, &self.settings.fit, &AllThreads))
+        fit::fit(&candidate, prepared, scene, &self.settings.fit, &AllThreads)
+    }
+
+    /// Does something with the scene of a region.
+    pub(crate) fn in_scene<T>(
+        &self,
+        region: &Region,
+        work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
+    ) -> Result<T> {
+        let views = self.views(region)?;
+        let planes = self.planes(region);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
+        Ok(work(&scene, &self.settings.fit))
     }
 
     /// Ceilings, walls and tilted plates about the region.
@@ -349,11 +352,7 @@ impl<'a, 'm> Search<'a, 'm> {
     ) -> Result<Option<T>> {
         let at = fit.world_from_base.translation.vector;
         let home = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(at.into()));
-        let Some(region) = home else { return Ok(None) };
-        let views = self.views(region)?;
-        let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
-        Ok(Some(work(&scene, &self.settings.fit)))
+        home.map(|region| self.in_scene(region, work)).transpose()
     }
 
     /// Where the refinement of a model alone ends from each of the starts.
@@ -363,13 +362,11 @@ impl<'a, 'm> Search<'a, 'm> {
         model: usize,
         starts: &[(Pose, Vec<f64>)],
     ) -> Result<Vec<(Pose, Vec<f64>)>> {
-        let views = self.views(region)?;
-        let planes = self.planes(region);
-        let settings = &self.settings.fit;
-        let scene = Scene::new(region, &views, &planes, settings, &AllThreads);
         let prepared = self.shelf.prepared(model);
-        let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, &scene, settings, (&s.0, &s.1));
-        Ok(starts.par_iter().map(end).collect())
+        self.in_scene(region, |scene, settings| {
+            let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, scene, settings, (&s.0, &s.1));
+            starts.par_iter().map(end).collect()
+        })
     }
 
     /// Planes that a robot of this region may stand on; heights guessed all over the region where the plant has no

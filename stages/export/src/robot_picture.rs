@@ -2,7 +2,7 @@
 //! with the posture's outline over them out. An outline beside its points is a wrong posture, at a glance.
 
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, link_color};
-use contract::{Label, PointKind};
+use contract::{Fan, Label, PointKind};
 use geometry::depth::{Rows, rows, transform};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
@@ -50,7 +50,7 @@ const NOTHING: Shown = Shown { depth: f32::INFINITY, link: u16::MAX, normal: [0.
 impl RobotPicture {
     /// The views of the robot with this index in the labels, its links standing at `world_from_link`.
     #[must_use]
-    pub fn new(robot: i16, model: &Model, world_from_link: &[Pose]) -> Self {
+    pub fn new(robot: i16, model: &Model, world_from_link: &[Pose], fan: &impl Fan) -> Self {
         let mut bounds = Aabb::EMPTY;
         for (link, pose) in model.links.iter().zip(world_from_link) {
             for corner in link.bounds.corners() {
@@ -67,12 +67,11 @@ impl RobotPicture {
             ("top", -90.0, 90.0),
             ("oblique", 40.0, 30.0),
         ];
-        let mut views: Vec<View> = views
-            .map(|(name, turn, tilt): (_, f64, f64)| View::new(name, turn, tilt, &shown))
-            .into();
-        for view in &mut views {
+        let views = fan.fan(views.into(), |(name, turn, tilt): (_, f64, f64)| {
+            let mut view = View::new(name, turn, tilt, &shown);
             view.outline(model, world_from_link);
-        }
+            view
+        });
         let links = model.links.iter().map(|link| link.name.clone()).collect();
         Self { robot, bounds: shown.grown(AROUND), links, views }
     }

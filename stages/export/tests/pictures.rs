@@ -41,7 +41,7 @@ fn pictures_show_robots_where_they_stand() {
     };
     let base = Pose::translation(400_003.0, 5_000_002.0, 100.0);
     let poses = [base, base * Pose::new(Vector::new(0.0, 0.0, 0.52), Vector::y() * 0.8)];
-    let mut views = RobotPicture::new(0, &model, &poses);
+    let mut views = RobotPicture::new(0, &model, &poses, &contract::OneByOne);
     let bounds =
         Aabb { min: [399_995.0, 4_999_995.0, 100.0], max: [400_012.0, 5_000_009.0, 103.0] };
     let plan = PlanPicture::new(&bounds);

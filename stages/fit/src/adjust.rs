@@ -267,7 +267,7 @@ impl Adjust<'_> {
                 robot: &robot,
                 scan,
                 view: pair.view,
-                patch: prepared.links[pair.link].patches[pair.facet] as usize,
+                patch: prepared.links[pair.link].patch(pair.facet),
                 weight,
                 influence,
                 r: pair.r,

@@ -12,6 +12,8 @@ const FINE: (f32, f32) = (0.007, 0.032);
 const VOXEL: f32 = 1.4;
 /// … but no more voxels than about so many.
 const MAX_VOXELS: f64 = 5e5;
+/// Edge of a patch, metres: within it a model's error of shape is about the same (fit.md §4g: 12–15 cm).
+const PATCH: f32 = 0.13;
 /// Samples within a cube of this edge, metres, are neighbours in memory: some twenty of them.
 const NEAR: f32 = 0.016;
 
@@ -28,6 +30,10 @@ pub(crate) struct Facet {
 #[derive(Debug, Default)]
 pub(crate) struct Fields {
     pub(crate) facets: Vec<Facet>,
+    /// Patch of each facet.
+    pub(crate) patches: Vec<u32>,
+    /// Of each patch: the side that it looks to (two for each axis of the link's frame).
+    pub(crate) sides: Vec<u8>,
     /// Reaches far, from few samples: for the first iterations.
     pub(crate) coarse: NearestField,
     /// Exact, reaches 3 cm: for the last ones.
@@ -47,7 +53,8 @@ impl Fields {
         let few: Vec<[f32; 3]> = first.iter().map(|&at| all[at as usize]).collect();
         let coarse = NearestField::new(&few, COARSE.0, COARSE.1).renumbered(&first);
         let fine = NearestField::new(&all, voxel(link), FINE.1);
-        Self { facets, coarse, fine }
+        let (patches, sides) = patches(&facets);
+        Self { facets, patches, sides, coarse, fine }
     }
 }
 
@@ -55,6 +62,22 @@ impl Fields {
 fn voxel(link: &Link) -> f32 {
     let volume: f64 = link.bounds.grown(2.0 * f64::from(FINE.1)).size().iter().product();
     (VOXEL * link.cad.spacing).max((volume / MAX_VOXELS).cbrt() as f32).min(FINE.0)
+}
+
+/// Cuts a surface into patches: cells of the link's frame, apart by the side they look to.
+fn patches(facets: &[Facet]) -> (Vec<u32>, Vec<u8>) {
+    let key = |facet: &Facet| {
+        let n = facet.n;
+        let side = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
+        let cell = facet.x.map(|v| (v / PATCH).floor() as i32);
+        (side as u8 * 2 + u8::from(n[side] < 0.0), cell)
+    };
+    let each: Vec<_> = facets.iter().map(key).collect();
+    let mut keys = each.clone();
+    keys.sort_unstable();
+    keys.dedup();
+    let at = |k| keys.partition_point(|other| other < k) as u32;
+    (each.iter().map(at).collect(), keys.iter().map(|key| key.0).collect())
 }
 
 /// The samples along a curve that fills space (Morton's).

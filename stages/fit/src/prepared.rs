@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::beam::Hypothesis;
 use crate::face::Face;
-use crate::facets::{Facet, Fields};
+use crate::facets::Fields;
 use crate::placed::Ball;
 
 /// A model made ready for fitting.
@@ -48,8 +48,16 @@ pub(crate) struct PreparedLink {
     pub(crate) weight: f64,
     /// Outer area, m².
     pub(crate) area: f64,
-    /// Patch of each facet, counted over all links.
-    pub(crate) patches: Vec<u32>,
+    /// Patches of the links before it.
+    pub(crate) first_patch: usize,
+}
+
+impl PreparedLink {
+    /// The patch of a facet, counted over all links.
+    #[inline]
+    pub(crate) fn patch(&self, facet: usize) -> usize {
+        self.first_patch + self.fields.patches[facet] as usize
+    }
 }
 
 impl<'a> Prepared<'a> {
@@ -69,13 +77,15 @@ impl<'a> Prepared<'a> {
     }
 
     fn of((index, model): (usize, &'a Model), fields: impl Iterator<Item = Arc<Fields>>) -> Self {
-        let links = model.links.iter().zip(fields).map(|(link, fields)| {
+        // One group of patches for each link and side.
+        let mut patch_groups = Vec::new();
+        let links = model.links.iter().zip(fields).enumerate().map(|(l, (link, fields))| {
             let area = f64::from(link.cad.area);
-            let ball = Ball::of(link);
-            PreparedLink { fields, ball, weight: area.sqrt(), area, patches: Vec::new() }
+            let (ball, weight, first_patch) = (Ball::of(link), area.sqrt(), patch_groups.len());
+            patch_groups.extend(fields.sides.iter().map(|side| l as u32 * 6 + u32::from(*side)));
+            PreparedLink { fields, ball, weight, area, first_patch }
         });
-        let mut links: Vec<_> = links.collect();
-        let patch_groups = patches(&mut links);
+        let links: Vec<_> = links.collect();
         let n_free = model.free.len();
         let depends = dependencies(model);
         let mut placed_by = vec![Vec::new(); n_free];
@@ -159,32 +169,6 @@ impl<'a> Prepared<'a> {
         let n = n.min(cad.points.len());
         (&cad.points[..n], &cad.normals[..n])
     }
-}
-
-/// Edge of a patch, metres: within it a model's error of shape is about the same (fit.md §4g: 12–15 cm).
-const PATCH: f32 = 0.13;
-
-/// Cuts the surface of each link into patches: cells of its frame, apart by the side they look to. Returns the group
-/// of each patch.
-fn patches(links: &mut [PreparedLink]) -> Vec<u32> {
-    let mut groups = Vec::new();
-    for (l, link) in links.iter_mut().enumerate() {
-        let facets = &link.fields.facets;
-        let key = |facet: &Facet| {
-            let n = facet.n;
-            let side = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
-            (side * 2 + usize::from(n[side] < 0.0), facet.x.map(|v| (v / PATCH).floor() as i32))
-        };
-        let mut keys: Vec<_> = facets.iter().map(key).collect();
-        let each = keys.clone();
-        keys.sort_unstable();
-        keys.dedup();
-        let first = groups.len();
-        let at = |k| (first + keys.partition_point(|other| other < k)) as u32;
-        link.patches = each.iter().map(at).collect();
-        groups.extend(keys.iter().map(|k| (l * 6 + k.0) as u32));
-    }
-    groups
 }
 
 /// For each link, for each free joint: whether it moves the link (at a posture where no two effects cancel).

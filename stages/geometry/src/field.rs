@@ -15,6 +15,19 @@ pub struct NearestField {
     cells: Vec<u32>,
 }
 
+/// What a voxel knows while samples spread: squared distance of its middle from its sample, the sample's index + 1, and
+/// whether it is still to tell its six neighbours. The border of the grid lies beyond reach and never is.
+#[derive(Clone, Copy)]
+struct Nearest {
+    d2: f32,
+    sample: u32,
+    waits: bool,
+}
+
+impl Nearest {
+    const NONE: Self = Self { d2: f32::INFINITY, sample: 0, waits: false };
+}
+
 impl NearestField {
     /// A field of voxels with this `edge` that reaches `reach` metres from the samples.
     #[must_use]
@@ -49,37 +62,56 @@ impl NearestField {
 
     /// Spreads each sample from its own voxel outwards, ring by ring, while it is nearer than what is there.
     fn fill(&mut self, points: &[[f32; 3]], edge: f32, reach: f32) {
-        // Squared distance of each voxel's middle from its sample, for as long as samples spread.
-        let mut nearest = vec![f32::INFINITY; self.cells.len()];
-        let mut ring: Vec<[u32; 3]> = Vec::new();
+        let mut nearest = vec![Nearest::NONE; self.cells.len()];
+        let mut ring: Vec<u32> = Vec::new();
         for (i, p) in points.iter().enumerate() {
             let Some(index) = self.index(*p) else { continue };
             let (at, d2) = (self.at(index), distance2(*p, self.middle(index, edge)));
-            if self.cells[at] == 0 {
-                ring.push(index);
+            let own = &mut nearest[at];
+            if own.sample == 0 {
+                ring.push(at as u32);
             }
-            if d2 < nearest[at] {
-                (self.cells[at], nearest[at]) = (i as u32 + 1, d2);
+            if d2 < own.d2 {
+                *own = Nearest { d2, sample: i as u32 + 1, waits: true };
             }
         }
-        let reach2 = reach * reach;
-        let mut next = Vec::new();
+        let (reach2, mut next) = (reach * reach, Vec::new());
+        let strides = [1, self.size[0], self.size[0] * self.size[1]];
         while !ring.is_empty() {
-            for &index in &ring {
-                let sample = self.cells[self.at(index)];
-                let from = points[sample as usize - 1];
-                for neighbour in around(index) {
-                    let at = self.at(neighbour);
-                    let d2 = distance2(from, self.middle(neighbour, edge));
-                    if d2 <= reach2 && d2 < nearest[at] {
-                        (self.cells[at], nearest[at]) = (sample, d2);
-                        next.push(neighbour);
+            for at in ring.drain(..).map(|at| at as usize) {
+                nearest[at].waits = false;
+                let sample = nearest[at].sample;
+                let (from, middle) =
+                    (points[sample as usize - 1], self.middle(self.place(at), edge));
+                // Not what is kept of it: rounding would add up on the way.
+                let own_d2 = distance2(from, middle);
+                for axis in 0..3 {
+                    // |v ± e|² = |v|² ± 2·v·e + e²
+                    let across = 2.0 * edge * (middle[axis] - from[axis]);
+                    let both = [(at - strides[axis], -across), (at + strides[axis], across)];
+                    for (at, more) in both {
+                        let (own, d2) = (&mut nearest[at], own_d2 + more + edge * edge);
+                        if d2 <= reach2 && d2 < own.d2 && own.sample != sample {
+                            if !own.waits {
+                                next.push(at as u32);
+                            }
+                            *own = Nearest { d2, sample, waits: true };
+                        }
                     }
                 }
             }
             std::mem::swap(&mut ring, &mut next);
-            next.clear();
         }
+        for (cell, own) in self.cells.iter_mut().zip(&nearest) {
+            *cell = own.sample;
+        }
+    }
+
+    /// The voxel at a place of `cells`.
+    #[inline]
+    fn place(&self, at: usize) -> [u32; 3] {
+        let (row, x) = (at / self.size[0], at % self.size[0]);
+        [x, row % self.size[1], row / self.size[1]].map(|v| v as u32)
     }
 
     #[inline]
@@ -125,11 +157,6 @@ impl NearestField {
     pub fn weight_bytes(&self) -> usize {
         self.cells.len() * 4
     }
-}
-
-/// The six neighbours across faces. The border of the grid lies beyond reach and is never left.
-fn around([x, y, z]: [u32; 3]) -> [[u32; 3]; 6] {
-    [[x - 1, y, z], [x + 1, y, z], [x, y - 1, z], [x, y + 1, z], [x, y, z - 1], [x, y, z + 1]]
 }
 
 #[inline]

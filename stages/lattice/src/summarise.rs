@@ -14,6 +14,7 @@ use contract::{Error, Kind, Map, Occupancy, Result, Scan, Tile, TileSummary};
 pub struct Summarise {
     scans: Vec<Scan>,
     settings: Settings,
+    with_planes: bool,
 }
 
 impl Summarise {
@@ -22,7 +23,13 @@ impl Summarise {
     pub fn new(scans: &[Scan], settings: &Settings) -> Self {
         let mut scans = scans.to_vec();
         scans.sort_by_key(|scan| scan.id);
-        Self { scans, settings: *settings }
+        Self { scans, settings: *settings, with_planes: true }
+    }
+
+    /// The same without patches, which are most of the work: for where the planes are known.
+    #[must_use]
+    pub fn without_planes(self) -> Self {
+        Self { with_planes: false, ..self }
     }
 }
 
@@ -53,18 +60,24 @@ impl Map for Summarise {
         let rows = world_rows(&scan.world_from_scan);
         let n_points = tile.len() as u64;
         let Some(lattice) = &scan.lattice else {
-            let patches = voxels::patches(&tile, scan, &mut scratch.surface, settings);
+            let patches = self
+                .with_planes
+                .then(|| voxels::patches(&tile, scan, &mut scratch.surface, settings));
+            let patches = patches.unwrap_or_default();
             let occupancy = scratch.counter.count(&tile.xyz, &rows, settings.voxel);
             return Ok(TileSummary { n_points, n_veils: 0, patches, occupancy });
         };
         let skip = Raster::dense(&tile, lattice, settings.spacing);
         scratch.raster.fill(&tile, lattice, skip, settings);
-        scratch.normals.fill(&scratch.raster, settings);
-        scratch.regions.fill(&scratch.raster, &scratch.normals, settings);
-        let patches = patches(&scratch.raster, &scratch.regions, scan, settings);
+        let mut found = Vec::new();
+        if self.with_planes {
+            scratch.normals.fill(&scratch.raster, settings);
+            scratch.regions.fill(&scratch.raster, &scratch.normals, settings);
+            found = patches(&scratch.raster, &scratch.regions, scan, settings);
+        }
         let occupancy = self.occupancy(&tile, &rows, scratch);
         let n_veils = scratch.raster.veils.len() as u64;
-        Ok(TileSummary { n_points, n_veils, patches, occupancy })
+        Ok(TileSummary { n_points, n_veils, patches: found, occupancy })
     }
 }
 

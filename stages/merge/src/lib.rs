@@ -19,7 +19,7 @@ mod unseen;
 
 pub use attach::{Attach, Attached, Group};
 pub use hang::{Hanging, hang};
-pub use register::{Registration, Surfaces};
+pub use register::{Planes, Registration, Surfaces};
 pub use sight::{Sight, Watch};
 pub use space::{see, stand};
 pub use tally::{Seen, Tally, Tallying};

@@ -6,7 +6,8 @@
 
 use geometry::{Moments, Plane, Point, Pose, Vector};
 use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector6};
-use std::collections::BTreeMap;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 /// Edge of a voxel, metres: a hundred points of a common scan, and still flat where a machine is.
 const EDGE: f64 = 0.10;
@@ -33,10 +34,16 @@ const SETTLED: f64 = 1e-7;
 const TUKEY: f64 = 4.685;
 const FROM_MEDIAN: f64 = 1.4826;
 
-/// Points of a plant by voxel.
+/// Points of a plant by voxel. Nothing depends on the order of the voxels.
 #[derive(Debug, Clone, Default)]
 pub struct Surfaces {
-    cells: BTreeMap<[i32; 3], Moments>,
+    cells: HashMap<[i32; 3], Moments>,
+}
+
+/// The planes through them, where they are flat.
+#[derive(Debug, Clone)]
+pub struct Planes {
+    cells: HashMap<[i32; 3], Plane>,
 }
 
 /// How far a scan is off the plant.
@@ -69,35 +76,33 @@ impl Surfaces {
 
     /// Adds those of others.
     pub fn join(&mut self, other: Self) {
-        for (cell, moments) in other.cells {
-            match self.cells.entry(cell) {
-                std::collections::btree_map::Entry::Vacant(slot) => drop(slot.insert(moments)),
-                std::collections::btree_map::Entry::Occupied(mut own) => {
-                    own.get_mut().join(&moments)
-                }
-            }
-        }
+        other.cells.into_iter().for_each(|(cell, moments)| match self.cells.entry(cell) {
+            Entry::Vacant(slot) => drop(slot.insert(moments)),
+            Entry::Occupied(mut own) => own.get_mut().join(&moments),
+        });
     }
 
-    fn planes(&self) -> BTreeMap<[i32; 3], Plane> {
+    /// Those that are planes.
+    #[must_use]
+    pub fn planes(&self) -> Planes {
         let flat = self.cells.iter().filter_map(|(cell, moments)| {
-            let fit = moments.plane()?;
-            let is_flat =
-                moments.n >= MIN_POINTS && fit.rms <= MAX_RMS && fit.spread[1] >= MIN_SPREAD;
+            let fit = (moments.n >= MIN_POINTS).then(|| moments.plane()).flatten()?;
+            let is_flat = fit.rms <= MAX_RMS && fit.spread[1] >= MIN_SPREAD;
             is_flat.then_some((*cell, fit.plane))
         });
-        flat.collect()
+        Planes { cells: flat.collect() }
     }
+}
 
+impl Planes {
     /// The rigid motion that lays points of a scan (its stated world, metres) on the planes, turned about `about`; `None`
     /// where too few of them lie on any.
     #[must_use]
     pub fn register(&self, points: &[[f64; 3]], about: &Point) -> Option<Registration> {
-        let planes = self.planes();
         let (mut pose, mut sigma, mut rms) = (Pose::identity(), [0.0; 6], [None; 2]);
         let mut n_surfaces = 0;
         for _ in 0..ROUNDS {
-            let told = told(&planes, points, &pose);
+            let told = told(&self.cells, points, &pose);
             if told.len() < MIN_CELLS {
                 return None;
             }
@@ -134,9 +139,9 @@ fn total(pose: &Pose, about: &Point) -> Vector6<f64> {
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-fn told(planes: &BTreeMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -> Vec<Told> {
+fn told(planes: &HashMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -> Vec<Told> {
     // Neighbours among the points are mostly in one voxel, and ask once for its plane and its place among the sums.
-    let mut sums: BTreeMap<[i32; 3], usize> = BTreeMap::new();
+    let mut sums: HashMap<[i32; 3], usize> = HashMap::new();
     let mut told: Vec<(usize, Told)> = Vec::new();
     let (mut last, mut known): (Option<[i32; 3]>, Option<(&Plane, usize)>) = (None, None);
     for p in points {
@@ -238,7 +243,7 @@ mod tests {
             room(1.0).iter().map(|p| (off * Point::from(*p)).coords.into()).collect();
         // A quarter of one wall was pushed by 3 cm: it must not count.
         seen.iter_mut().filter(|p| p[0] > 3.3 && p[1] < 0.9).for_each(|p| p[0] += 0.03);
-        let found = surfaces.register(&seen, &about).expect("enough walls");
+        let found = surfaces.planes().register(&seen, &about).expect("enough walls");
         let left = total(&(found.plant_from_stated * off), &about);
         for i in 0..6 {
             assert!(left[i].abs() < 3e-4, "{i}: {left:?}");
@@ -249,6 +254,6 @@ mod tests {
             );
         }
         assert!(found.rms[1] < 0.002 && found.rms[0] > found.rms[1], "{:?}", found.rms);
-        assert!(surfaces.register(&seen[..20], &about).is_none());
+        assert!(surfaces.planes().register(&seen[..20], &about).is_none());
     }
 }

@@ -4,7 +4,7 @@
 //! What a robot hides is unknown, not free: a voxel is free only where a beam went on beyond it. A beam that did not come
 //! back proves nothing.
 
-use contract::{Region, Space, SpaceKind, View};
+use contract::{Fan, Region, Space, SpaceKind, View};
 use geometry::{Aabb, Eye, Pose};
 use robot::Model;
 
@@ -12,13 +12,16 @@ use robot::Model;
 const HALF_DIAGONAL: f64 = 0.866;
 /// Range noise and rounding that a beam must go beyond that, metres.
 const BEYOND: f64 = 0.01;
+/// Voxels that are looked at by one thread.
+const PIECE: usize = 1 << 14;
+
 /// Frees every voxel that a beam of the views (of `region`) went through.
-pub fn see(space: &mut Space, region: &Region, views: &[View]) {
+pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &impl Fan) {
     let grid = *space.grid();
     let (edge, first) = (grid.edge, grid.first);
     let beyond = (HALF_DIAGONAL * edge + BEYOND) as f32;
     let eyes: Vec<Eye<'_>> = views.iter().map(|view| Eye::new(&view.images)).collect();
-    for (at, voxel) in space.voxels_mut().iter_mut().enumerate() {
+    let is_free = |at: usize| {
         let cell = grid.cell(at);
         let p: [f32; 3] = std::array::from_fn(|i| {
             let middle = ((first[i] + cell[i] as i64) as f64 + 0.5) * edge;
@@ -28,10 +31,16 @@ pub fn see(space: &mut Space, region: &Region, views: &[View]) {
             let look = eye.look(p, 0.5 * edge as f32);
             look.is_some_and(|l| l.far.is_finite() && l.far > l.range + beyond)
         };
-        if eyes.iter().any(is_passed) {
-            *voxel = SpaceKind::Free;
+        eyes.iter().any(is_passed)
+    };
+    let pieces = space.voxels_mut().chunks_mut(PIECE).enumerate().collect();
+    fan.fan(pieces, |(n, voxels): (usize, &mut [SpaceKind])| {
+        for (i, voxel) in voxels.iter_mut().enumerate() {
+            if is_free(n * PIECE + i) {
+                *voxel = SpaceKind::Free;
+            }
         }
-    }
+    });
 }
 
 /// Fills the body of a robot that stands with its links at `world_from_links`: what its surface encloses.
@@ -101,7 +110,7 @@ fn fill(space: &mut Space, body: &Aabb, surface: &[usize]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::{MaskId, ScanId, SpaceGrid};
+    use contract::{MaskId, OneByOne, ScanId, SpaceGrid};
     use geometry::depth::Empty;
     use geometry::{DepthImage, Point};
 
@@ -137,7 +146,7 @@ mod tests {
         let bounds = Aabb { min: [0.5, -1.0, -0.5], max: [5.0, 1.0, 0.5] };
         let region = Region { origin: Point::origin(), bounds };
         let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));
-        see(&mut space, &region, &[view()]);
+        see(&mut space, &region, &[view()], &OneByOne);
         let at = |space: &Space, p| space.voxels()[space.grid().index(p).expect("inside")];
         assert_eq!(at(&space, [3.0, -0.5, 0.0]), SpaceKind::Free);
         assert_eq!(at(&space, [1.5, 0.3, 0.0]), SpaceKind::Free);

@@ -3,6 +3,7 @@
 
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 
 /// A voxel of a world: `floor(p / edge)`.
 pub(crate) type Cell = [i32; 3];
@@ -142,8 +143,16 @@ impl Tally {
         self.robots.extend(other.robots);
     }
 
-    pub(crate) fn has_robot(&self, cell: &Cell) -> bool {
-        self.robots.contains(cell)
+    /// Whether a voxel within so many steps holds points of a robot.
+    pub(crate) fn has_robot_near(&self, cell: &Cell, reach: i32) -> bool {
+        columns(cell, reach).any(|column| self.robots.range(column).next().is_some())
+    }
+
+    /// Whether a voxel or one beside it holds points: what the other session has there, it has here as well.
+    #[must_use]
+    pub fn has_some(&self, cell: &Cell) -> bool {
+        self.cells.contains_key(cell)
+            || columns(cell, 1).any(|column| self.cells.range(column).next().is_some())
     }
 
     pub(crate) fn is_solid(&self, cell: &Cell) -> bool {
@@ -171,9 +180,8 @@ impl Tally {
     /// Voxels of which so many points are enough, in and beside which the other session has none.
     fn alone(&self, other: &Self, n: impl Fn(&Count) -> u32) -> BTreeSet<Cell> {
         let is_enough = |c: &Count| f64::from(n(c)) >= MIN_SHARE * f64::from(c.n_points);
-        let has_some = |cell: &Cell| around(cell, 1).any(|c| other.cells.contains_key(&c));
         let full = self.cells.iter().filter(|(_, c)| is_enough(c));
-        full.map(|(cell, _)| *cell).filter(|cell| !has_some(cell)).collect()
+        full.map(|(cell, _)| *cell).filter(|cell| !other.has_some(cell)).collect()
     }
 
     /// Share of the faces of some voxels that their points stand for.
@@ -194,6 +202,13 @@ pub(crate) fn around(cell: &Cell, reach: i32) -> impl Iterator<Item = Cell> {
     let ([x, y, z], r) = (*cell, reach);
     (-r..=r)
         .flat_map(move |i| (-r..=r).flat_map(move |j| (-r..=r).map(move |k| [x + i, y + j, z + k])))
+}
+
+/// The same as runs along the last axis, along which voxels are in order.
+fn columns(cell: &Cell, reach: i32) -> impl Iterator<Item = RangeInclusive<Cell>> {
+    let ([x, y, z], r) = (*cell, reach);
+    let column = move |i, j| [x + i, y + j, z - r]..=[x + i, y + j, z + r];
+    (-r..=r).flat_map(move |i| (-r..=r).map(move |j| column(i, j)))
 }
 
 /// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is new and belongs to it.

@@ -2,7 +2,8 @@
 //! and moved out.
 
 use crate::parted::parted;
-use crate::tally::{Cell, EDGE, REACH, Tally, around, bounds, connected};
+use crate::tally::{Cell, EDGE, REACH, Tally, bounds, connected};
+use contract::Fan;
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -111,7 +112,7 @@ impl Tally {
         let mut left: BTreeSet<Cell> = thin.iter().copied().filter(|c| self.is_solid(c)).collect();
         let margin = (settings.robot_margin / EDGE).ceil() as i32;
         let is_near =
-            |cell: &Cell| around(cell, margin).any(|c| self.has_robot(&c) || other.has_robot(&c));
+            |cell: &Cell| self.has_robot_near(cell, margin) || other.has_robot_near(cell, margin);
         let mut out = Vec::new();
         while let Some(first) = left.pop_first() {
             let cells = connected(first, REACH, |c| left.remove(c), usize::MAX);
@@ -212,12 +213,13 @@ impl Tally {
 
 /// What differs between two sessions: things that moved, then those that went, then those that appeared, each by size.
 #[must_use]
-pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Thing> {
+pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings, fan: &impl Fan) -> Vec<Thing> {
     let by_size = |mut pieces: Vec<Piece>| {
         pieces.sort_by_key(|p| std::cmp::Reverse(p.cells.len()));
         pieces
     };
-    let pieces = [then.pieces(now, settings), now.pieces(then, settings)];
+    let pieces =
+        fan.fan(vec![(then, now), (now, then)], |(own, other)| own.pieces(other, settings));
     let gone = by_size(then.apart(&pieces[0], &pieces[1], settings));
     let filled = by_size(now.apart(&pieces[1], &pieces[0], settings));
     let moved = moved(&gone, &filled);

@@ -2,9 +2,10 @@
 
 use super::*;
 use crate::tally::{Seen, Tallying};
+use contract::OneByOne;
 
 fn found(then: Tallying, now: Tallying) -> Vec<Thing> {
-    things(&then.finish(), &now.finish(), &ThingSettings::default())
+    things(&then.finish(), &now.finish(), &ThingSettings::default(), &OneByOne)
 }
 
 /// A box's surface, five points a voxel.
@@ -36,12 +37,12 @@ fn a_pallet_moves_a_barrel_goes_and_a_crate_comes() {
     solid(&mut then, [1.0, 6.0, 0.02], [0.6, 0.6, 0.9], true);
     solid(&mut now, [8.0, 1.0, 0.02], [0.3, 0.3, 0.4], true);
     let (then, now) = (then.finish(), now.finish());
-    let found = things(&then, &now, &ThingSettings::default());
+    let found = things(&then, &now, &ThingSettings::default(), &OneByOne);
     let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
     assert_eq!(kinds, [ThingChange::Moved, ThingChange::Gone, ThingChange::Appeared]);
     let shift = found[0].shift.expect("a shift");
     assert!((shift[0] - 1.8).abs() < 0.06 && (shift[1] - 0.2).abs() < 0.06, "{shift:?}");
-    assert!(things(&then, &then, &ThingSettings::default()).is_empty());
+    assert!(things(&then, &then, &ThingSettings::default(), &OneByOne).is_empty());
 }
 
 #[test]
@@ -112,7 +113,7 @@ fn what_is_near_a_robot_is_the_robots() {
     }
     let (then, now) = (then.finish(), now.finish());
     let n_found = |robot_margin: f64| {
-        things(&then, &now, &ThingSettings { robot_margin, ..Default::default() }).len()
+        things(&then, &now, &ThingSettings { robot_margin, ..Default::default() }, &OneByOne).len()
     };
     assert_eq!(n_found(0.3), 0);
     assert_eq!(n_found(0.0), 1);
