@@ -2,6 +2,7 @@
 //! them are superseded, out.
 
 use super::base::Base;
+use super::fate::Fates;
 use crate::engine::{Engine, Task};
 use crate::report::tiles;
 use crate::store::Store;
@@ -12,8 +13,10 @@ use merge::{Seen, Sight, Surfaces, Tally, Tallying, Watch};
 use nalgebra::Matrix3;
 use std::collections::BTreeSet;
 
-/// Of so many points one tells the surfaces: a tenth of a voxel's points is enough for its plane.
-const SAMPLE: usize = 5;
+/// One of so many points tells the surfaces, and of many points more are passed over, so that about so many do: a tenth of a
+/// voxel's points is enough for its plane.
+const SAMPLE: u64 = 5;
+const N_SAMPLED: u64 = 2_000_000;
 /// Places so far apart are read from the mask one after the other.
 const GAP: u64 = 1 << 14;
 
@@ -57,7 +60,8 @@ impl<'a> Past<'a> {
 
     /// The surfaces of what stood there.
     pub(crate) fn surfaces(&self, engine: &Engine) -> Result<Surfaces> {
-        let (mut all, sample) = (Surfaces::default(), Sample(self));
+        let step = (self.n_points() / N_SAMPLED).max(SAMPLE) as usize;
+        let (mut all, sample) = (Surfaces::default(), Sample { past: self, step });
         engine.pass(self.task("register"), self.store.tiles_of(self.tiles.clone()), |f| {
             f.map(&sample).for_each(|own| {
                 all.join(own.0);
@@ -67,14 +71,16 @@ impl<'a> Past<'a> {
         Ok(all)
     }
 
-    /// Asks the new scans about every point, and the earlier ones where those saw nothing.
+    /// Asks the new scans about every point, and the earlier ones where those saw nothing; what stood there by voxel, what is
+    /// said of each tile, and what becomes of the points.
     pub(crate) fn look(
         &self,
         [watch, own]: [&Watch<'_>; 2],
         engine: &Engine,
-    ) -> Result<(Tally, Vec<Looked>)> {
+    ) -> Result<(Tally, Vec<Looked>, Fates)> {
         let (mut tally, mut all) = (Tally::default(), Vec::new());
-        let look = Look { past: self, watch, own };
+        let fates = Fates::of(&self.cell);
+        let look = Look { past: self, watch, own, fates: &fates };
         engine.pass(self.task("compare"), self.store.tiles_of(self.tiles.clone()), |f| {
             f.map(&look).for_each(|mut looked| {
                 tally.join(std::mem::take(&mut looked.tally));
@@ -82,7 +88,7 @@ impl<'a> Past<'a> {
                 Ok(())
             })
         })?;
-        Ok((tally, all))
+        Ok((tally, all, fates))
     }
 
     /// All places that are superseded now, by mask, ascending: those that were measured anew, those of things that are gone,
@@ -115,10 +121,14 @@ impl<'a> Past<'a> {
         self.before.iter().map(|places| places.len() as u64).sum()
     }
 
+    /// Points of the tiles that the cell touches.
+    fn n_points(&self) -> u64 {
+        self.tiles.iter().map(|&i| self.store.entries()[i].n_points).sum()
+    }
+
     fn task(&self, name: &str) -> Task {
-        let n_points = self.tiles.iter().map(|&i| self.store.entries()[i].n_points).sum();
-        let amount =
-            crate::progress::Amount { items: self.tiles.len() as u64, points: n_points, bytes: 0 };
+        let items = self.tiles.len() as u64;
+        let amount = crate::progress::Amount { items, points: self.n_points(), bytes: 0 };
         tiles(name, self.store).of(amount)
     }
 
@@ -190,7 +200,10 @@ impl Places {
 }
 
 /// The map that gathers surfaces.
-struct Sample<'a>(&'a Past<'a>);
+struct Sample<'a> {
+    past: &'a Past<'a>,
+    step: usize,
+}
 
 struct Sampled(Surfaces);
 
@@ -200,14 +213,14 @@ impl Map for Sample<'_> {
     type Scratch = ();
 
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Sampled> {
-        let (scan, mask) = self.0.scan(&tile);
-        let old = &self.0.before[mask.0 as usize];
+        let (scan, mask) = self.past.scan(&tile);
+        let old = &self.past.before[mask.0 as usize];
         let mut out = Surfaces::default();
         let in_world = World::from(scan);
-        for i in (0..tile.len()).step_by(SAMPLE) {
+        for i in (0..tile.len()).step_by(self.step) {
             let world = in_world.of(tile.xyz[i]);
             let place = tile.first_place + u64::from(tile.place[i]);
-            if self.0.cell.contains(world) && old.binary_search(&place).is_err() {
+            if self.past.cell.contains(world) && old.binary_search(&place).is_err() {
                 out.add(world);
             }
         }
@@ -230,6 +243,7 @@ struct Look<'a> {
     watch: &'a Watch<'a>,
     /// Of the earlier scans.
     own: &'a Watch<'a>,
+    fates: &'a Fates,
 }
 
 impl Map for Look<'_> {
@@ -258,9 +272,11 @@ impl Map for Look<'_> {
         let mut tallying = Tallying::default();
         let points = places.iter().zip(&*worlds).zip(labels.iter().zip(&*sights));
         for ((&place, &world), (label, &sight)) in points {
+            let voxel = Tally::cell(world);
+            self.fates.add(voxel, sight);
             match sight {
                 Sight::Onto => out.onto.push(place),
-                Sight::Through => out.through.push((place, Tally::cell(world))),
+                Sight::Through => out.through.push((place, voxel)),
                 Sight::Close | Sight::Hidden | Sight::Unseen => {}
             }
             match label.kind {

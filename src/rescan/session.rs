@@ -2,6 +2,7 @@
 
 use super::Cell;
 use super::base::Base;
+use super::fate::Fates;
 use super::past::{Looked, Past};
 use super::present::{self, Present};
 use super::robots::{Now, bounds as robot_bounds, look};
@@ -79,6 +80,7 @@ impl Robots {
 pub(crate) struct Labels {
     pub(crate) near: Near,
     pub(crate) looked: Vec<Looked>,
+    pub(crate) fates: Fates,
     pub(crate) things: Vec<Thing>,
     /// What stood in the cell and was not looked at.
     pub(crate) unseen: Vec<Unseen>,
@@ -282,7 +284,7 @@ impl<'a> Session<'a> {
         let labelling = self.labelling(&own, models);
         let near = labelling.near_robots(self.store, engine)?;
         let (watch, old_watch) = (self.watch(), Watch::new(&self.cell, &self.old_views));
-        let (then, looked) = self.past.look([&watch, &old_watch], engine)?;
+        let (then, looked, fates) = self.past.look([&watch, &old_watch], engine)?;
         let present = Present {
             scans: &self.sources.scans,
             near: &near,
@@ -300,7 +302,7 @@ impl<'a> Session<'a> {
                 || merge::unseen(&then, &now, settings),
             )
         });
-        Ok(Labels { near, looked, things, unseen, now })
+        Ok(Labels { near, looked, fates, things, unseen, now })
     }
 
     /// The fits, those refused that the new scans have no say in: they give no labels here.

@@ -124,10 +124,20 @@ impl Written<'_, '_> {
     fn stay(&self, points: &[OldPoint], watch: &Watch<'_>, gone: &BTreeSet<[i32; 3]>) -> Vec<bool> {
         let left = |p: &OldPoint| p.label.moves() && self.stands_otherwise(p.label.robot);
         let mut stays: Vec<bool> = points.iter().map(|p| !left(p)).collect();
-        let is_here = |i: &usize| stays[*i] && self.session.past.cell.contains(points[*i].world);
-        let here: Vec<usize> = (0..points.len()).filter(is_here).collect();
-        let worlds: Vec<[f64; 3]> = here.iter().map(|&i| points[i].world).collect();
-        let mut sights = Vec::new();
+        let (mut here, mut worlds, mut sights) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, point) in points.iter().enumerate() {
+            if !stays[i] || !self.session.past.cell.contains(point.world) {
+                continue;
+            }
+            let voxel = Tally::cell(point.world);
+            match self.labels.fates.stays(voxel, || gone.contains(&voxel)) {
+                Some(all) => stays[i] = all,
+                None => {
+                    here.push(i);
+                    worlds.push(point.world);
+                }
+            }
+        }
         watch.look_all(&worlds, &mut sights);
         for ((i, world), sight) in here.into_iter().zip(worlds).zip(sights) {
             stays[i] = match sight {

@@ -5,7 +5,7 @@
 pub struct Settings {
     /// Whether all points are written with their labels, in spatial tiles (`tiles/`).
     pub tiles: bool,
-    /// Edge of a tile, metres: 10 m is a robot cell.
+    /// Edge of a tile, metres: half a robot cell, so that a rescan of one rewrites little beside it.
     pub tile_edge: f64,
     /// Whether all that does not move is written as one cloud too (`clouds/fixed`). It is what most planners read, and
     /// twice the disk; a plant is read by tiles, whose classes tell the same.
@@ -22,7 +22,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             tiles: true,
-            tile_edge: 10.0,
+            tile_edge: 5.0,
             fixed_cloud: true,
             bodies: false,
             compress: false,

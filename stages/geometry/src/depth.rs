@@ -226,41 +226,43 @@ impl Level {
         inside.then(|| (v as usize * self.width + u as usize, range))
     }
 
-    /// Cells that are empty with all their neighbours within `window` cells: a separable running maximum.
+    /// Cells that are empty with all their neighbours within `window` cells: a separable running maximum, row by row.
     fn open_cells(&self, window: i32) -> Vec<bool> {
-        let w = usize::try_from(window).unwrap_or(0);
-        let hit: Vec<bool> = self.cells.iter().map(|c| !c[0].is_nan()).collect();
-        let mut near_hit = vec![false; hit.len()];
-        for v in 0..self.height {
-            let row = &hit[v * self.width..(v + 1) * self.width];
-            for u in 0..self.width {
-                near_hit[v * self.width + u] =
-                    row[u.saturating_sub(w)..(u + w + 1).min(self.width)].contains(&true);
+        let (window, width) = (usize::try_from(window).unwrap_or(0), self.width);
+        let mut near_hit = vec![false; self.cells.len()];
+        let mut hit = vec![false; width];
+        for (row, near) in self.cells.chunks(width).zip(near_hit.chunks_mut(width)) {
+            hit.iter_mut().zip(row).for_each(|(hit, cell)| *hit = !cell[0].is_nan());
+            for by in 0..=window.min(width) {
+                near[by..].iter_mut().zip(&hit).for_each(|(near, hit)| *near |= *hit);
+                near.iter_mut().zip(&hit[by..]).for_each(|(near, hit)| *near |= *hit);
             }
         }
-        (0..hit.len())
-            .map(|at| {
-                let (u, v) = (at % self.width, at / self.width);
-                !(v.saturating_sub(w)..(v + w + 1).min(self.height))
-                    .any(|v| near_hit[v * self.width + u])
-            })
-            .collect()
+        let mut open = vec![true; self.cells.len()];
+        for (v, own) in open.chunks_mut(width).enumerate() {
+            let rows = v.saturating_sub(window)..(v + window + 1).min(self.height);
+            for near in near_hit[rows.start * width..rows.end * width].chunks(width) {
+                own.iter_mut().zip(near).for_each(|(open, near)| *open &= !*near);
+            }
+        }
+        open
     }
 
     fn halved(&self) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mut cells = vec![[f32::NAN; 3]; width * height];
-        for v in 0..self.height {
-            for u in 0..self.width {
-                let from = self.cells[v * self.width + u];
-                let to = &mut cells[(v / 2) * width + u / 2];
-                // No return must not hide a hit from `far`; it stays only where the whole cell is empty.
-                to[0] = to[0].min(from[0]);
-                to[1] = match (to[1].is_finite(), from[1].is_finite()) {
-                    (true, false) => to[1],
-                    (false, true) => from[1],
-                    _ => to[1].max(from[1]),
-                };
+        for (v, row) in self.cells.chunks(self.width).enumerate() {
+            let out = &mut cells[v / 2 * width..(v / 2 + 1) * width];
+            for (pair, to) in row.chunks(2).zip(out) {
+                for from in pair {
+                    to[0] = to[0].min(from[0]);
+                    // No return must not hide a hit from `far`; it stays only where the whole cell is empty.
+                    to[1] = match (to[1].is_finite(), from[1].is_finite()) {
+                        (true, false) => to[1],
+                        (false, true) => from[1],
+                        _ => to[1].max(from[1]),
+                    };
+                }
             }
         }
         Self { width, height, cells }
@@ -268,20 +270,23 @@ impl Level {
 
     /// Fills `around`.
     fn look_around(&mut self) {
+        let width = self.width;
         let mut across = vec![f32::NAN; self.cells.len()];
-        for (row, out) in self.cells.chunks(self.width).zip(across.chunks_mut(self.width)) {
-            for u in 0..row.len() {
-                let near = &row[u.saturating_sub(1)..(u + 2).min(row.len())];
-                // `min` passes NaN over: unknown neighbours say nothing.
-                out[u] = near.iter().fold(f32::NAN, |a, c| a.min(c[0]));
-            }
+        let mut near = vec![f32::NAN; width];
+        // `min` passes NaN over: unknown neighbours say nothing.
+        for (row, out) in self.cells.chunks(width).zip(across.chunks_mut(width)) {
+            near.iter_mut().zip(row).for_each(|(near, cell)| *near = cell[0]);
+            out.copy_from_slice(&near);
+            out[1..].iter_mut().zip(&near).for_each(|(least, near)| *least = least.min(*near));
+            out.iter_mut().zip(&near[1..]).for_each(|(least, near)| *least = least.min(*near));
         }
-        for v in 0..self.height {
-            for u in 0..self.width {
-                let near = v.saturating_sub(1)..(v + 2).min(self.height);
-                let least = near.fold(f32::NAN, |a, w| a.min(across[w * self.width + u]));
-                self.cells[v * self.width + u][2] = least;
+        for (v, row) in self.cells.chunks_mut(width).enumerate() {
+            let rows = v.saturating_sub(1)..(v + 2).min(self.height);
+            near.fill(f32::NAN);
+            for across in across[rows.start * width..rows.end * width].chunks(width) {
+                near.iter_mut().zip(across).for_each(|(least, own)| *least = least.min(*own));
             }
+            row.iter_mut().zip(&near).for_each(|(cell, least)| cell[2] = *least);
         }
     }
 }

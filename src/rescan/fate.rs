@@ -1,0 +1,98 @@
+//! What the new scans say of each old point in a cell in; by voxel, whether all of its points stay or all of them go, out: where
+//! one or the other is so, the records of those points need not be asked for one by one again.
+
+use geometry::Aabb;
+use merge::{Sight, Tally};
+use std::sync::atomic::{AtomicU8, Ordering};
+
+/// Most voxels that are kept, one byte each: a hall of 60 x 60 x 8 m. Of larger cells each point is asked for again.
+const MAX_VOXELS: usize = 1 << 28;
+/// A point in the voxel stays; the new scans measured what one is of; they saw through the place of one.
+const STAYS: u8 = 1;
+const ONTO: u8 = 2;
+const THROUGH: u8 = 4;
+
+/// Fates of the old points by voxel ([`Tally::cell`]).
+pub(crate) struct Fates {
+    first: [i32; 3],
+    size: [usize; 3],
+    /// x fastest.
+    voxels: Vec<AtomicU8>,
+}
+
+impl Fates {
+    /// None known yet.
+    pub(crate) fn of(cell: &Aabb) -> Self {
+        let (first, last) = (Tally::cell(cell.min), Tally::cell(cell.max));
+        let size = [0, 1, 2].map(|i| usize::try_from(last[i] - first[i] + 1).unwrap_or(0));
+        let n = size.iter().try_fold(1_usize, |n, s| n.checked_mul(*s));
+        let n = n.filter(|n| *n <= MAX_VOXELS).unwrap_or(0);
+        Self { first, size, voxels: (0..n).map(|_| AtomicU8::new(0)).collect() }
+    }
+
+    /// Says what the new scans have at an old point's place.
+    #[inline]
+    pub(crate) fn add(&self, voxel: [i32; 3], sight: Sight) {
+        let fate = match sight {
+            Sight::Onto => ONTO,
+            Sight::Through => THROUGH,
+            Sight::Close | Sight::Hidden | Sight::Unseen => STAYS,
+        };
+        if let Some(own) = self.at(voxel)
+            && own.load(Ordering::Relaxed) & fate == 0
+        {
+            own.fetch_or(fate, Ordering::Relaxed);
+        }
+    }
+
+    /// Whether all points of a voxel stay, or none; `is_gone`: what stood in it is no longer there. `None` where that
+    /// depends on the point.
+    pub(crate) fn stays(&self, voxel: [i32; 3], is_gone: impl Fn() -> bool) -> Option<bool> {
+        let fate = self.at(voxel)?.load(Ordering::Relaxed);
+        let through = match fate & THROUGH {
+            0 => 0,
+            _ if is_gone() => ONTO,
+            _ => STAYS,
+        };
+        match fate & !THROUGH | through {
+            STAYS => Some(true),
+            ONTO => Some(false),
+            _ => None,
+        }
+    }
+
+    #[inline]
+    fn at(&self, voxel: [i32; 3]) -> Option<&AtomicU8> {
+        let [x, y, z] = [0, 1, 2].map(|i| voxel[i].wrapping_sub(self.first[i]) as u32 as usize);
+        let [w, h, d] = self.size;
+        let is_in = x < w && y < h && z < d;
+        is_in.then(|| self.voxels.get((z * h + y) * w + x)).flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_voxels_of_one_fate_have_one() {
+        let cell = Aabb { min: [-1.0, 2.0, 0.0], max: [3.0, 4.0, 2.5] };
+        let fates = Fates::of(&cell);
+        let voxel = |k: i32| Tally::cell([-0.97 + 0.05 * f64::from(k), 3.1, 2.49]);
+        for (k, sights) in [
+            (0, vec![Sight::Onto, Sight::Onto]),
+            (1, vec![Sight::Hidden, Sight::Unseen, Sight::Close]),
+            (2, vec![Sight::Onto, Sight::Hidden]),
+            (3, vec![Sight::Through]),
+            (4, vec![Sight::Through, Sight::Onto]),
+        ] {
+            sights.into_iter().for_each(|sight| fates.add(voxel(k), sight));
+        }
+        let said = |is_gone: bool| [0, 1, 2, 3, 4, 5].map(|k| fates.stays(voxel(k), || is_gone));
+        let both = [Some(false), Some(true), None];
+        assert_eq!(said(true), [both, [Some(false), Some(false), None]].concat()[..]);
+        assert_eq!(said(false), [both, [Some(true), None, None]].concat()[..]);
+        assert_eq!(fates.stays(Tally::cell([9.0, 3.0, 1.0]), || true), None);
+        assert_eq!(fates.stays(Tally::cell([-1.1, 3.0, 1.0]), || true), None);
+    }
+}
