@@ -54,6 +54,28 @@ pub fn transform(m: &Rows, p: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2] + m[r][3])
 }
 
+/// Places that are asked about together.
+pub const LANES: usize = 16;
+
+/// Coordinates of [`LANES`] places, axis by axis: what is reckoned of all of them is so in vector registers.
+pub type Lanes = [[f32; LANES]; 3];
+
+/// Places as lanes, the last one in those that are left over; at least one, at most [`LANES`].
+#[inline]
+#[must_use]
+pub fn lanes(places: &[[f32; 3]]) -> Lanes {
+    std::array::from_fn(|axis| std::array::from_fn(|i| places[i.min(places.len() - 1)][axis]))
+}
+
+/// Applies [`Rows`] to places, each as [`transform`] does.
+#[inline]
+#[must_use]
+pub fn transform_lanes(m: &Rows, p: &Lanes) -> Lanes {
+    let one =
+        |r: usize, i: usize| m[r][0] * p[0][i] + m[r][1] * p[1][i] + m[r][2] * p[2][i] + m[r][3];
+    std::array::from_fn(|r| std::array::from_fn(|i| one(r, i)))
+}
+
 /// Applies the rotation of [`Rows`] to a direction.
 #[inline]
 #[must_use]
@@ -102,6 +124,19 @@ impl DepthImage {
             let cell = &mut level.cells[at];
             // `min`/`max` of f32 pass NaN over, which is what an empty cell needs.
             *cell = [cell[0].min(range), cell[1].max(range), f32::NAN];
+        }
+    }
+
+    /// The same for the first `n` of some lanes.
+    #[inline]
+    pub fn splat_lanes(&mut self, camera: &Lanes, n: usize) {
+        let focal = self.focal;
+        let level = &mut self.levels[0];
+        let (at, range) = level.find_lanes(focal, camera);
+        for (at, range) in at.into_iter().zip(range).take(n) {
+            if let Some(cell) = level.cells.get_mut(at as usize) {
+                *cell = [cell[0].min(range), cell[1].max(range), f32::NAN];
+            }
         }
     }
 
@@ -170,25 +205,52 @@ impl DepthImage {
         if camera[2] <= 0.0 {
             return None;
         }
-        let inverse = self.focal / camera[2];
-        let cells = footprint * inverse;
+        let (base, inverse) = (&self.levels[0], self.focal / camera[2]);
+        let u = camera[0] * inverse + 0.5 * base.width as f32;
+        let v = camera[1] * inverse + 0.5 * base.height as f32;
+        let [near, far, around] = self.cell([u, v], footprint * inverse)?;
+        let range = (camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]).sqrt();
+        Some(Look { near, far, around, range })
+    }
+
+    /// What is known at a place of the raster, in a cell of the level above that is about `cells` wide.
+    #[inline]
+    fn cell(&self, [u, v]: [f32; 2], cells: f32) -> Option<[f32; 3]> {
         // floor(log2) by the exponent bits; below one cell is level 0.
         let level = ((cells.max(1.0).to_bits() >> 23) as usize - 127).min(self.levels.len() - 1);
         let scale = 1.0 / (1u32 << level) as f32;
         let base = &self.levels[0];
-        let u = camera[0] * inverse + 0.5 * base.width as f32;
-        let v = camera[1] * inverse + 0.5 * base.height as f32;
         if !(u >= 0.0 && v >= 0.0 && u < base.width as f32 && v < base.height as f32) {
             return None;
         }
         let l = &self.levels[level];
-        let at = (v * scale) as usize * l.width + (u * scale) as usize;
-        let [near, far, around] = l.cells[at];
-        if near.is_nan() {
-            return None;
+        let cell = l.cells[(v * scale) as usize * l.width + (u * scale) as usize];
+        (!cell[0].is_nan()).then_some(cell)
+    }
+
+    /// The same as [`DepthImage::look`] for lanes of the camera frame.
+    #[inline]
+    #[must_use]
+    pub fn look_lanes(&self, camera: &Lanes, footprint: f32) -> [Option<Look>; LANES] {
+        let base = &self.levels[0];
+        let (cx, cy) = (0.5 * base.width as f32, 0.5 * base.height as f32);
+        let mut all = [[0.0_f32; LANES]; 4];
+        let [x, y, z] = camera;
+        for i in 0..LANES {
+            let inverse = self.focal / z[i];
+            all[0][i] = inverse;
+            all[1][i] = x[i] * inverse + cx;
+            all[2][i] = y[i] * inverse + cy;
+            all[3][i] = (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
         }
-        let range = (camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]).sqrt();
-        Some(Look { near, far, around, range })
+        let [inverse, u, v, range] = all;
+        std::array::from_fn(|i| {
+            if z[i] <= 0.0 {
+                return None;
+            }
+            let [near, far, around] = self.cell([u[i], v[i]], footprint * inverse[i])?;
+            Some(Look { near, far, around, range: range[i] })
+        })
     }
 
     /// The same for a point of the local frame.
@@ -224,6 +286,23 @@ impl Level {
         let inside = u >= 0.0 && v >= 0.0 && u < self.width as f32 && v < self.height as f32;
         let range = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
         inside.then(|| (v as usize * self.width + u as usize, range))
+    }
+
+    /// The same for lanes; `u32::MAX` outside.
+    #[inline]
+    fn find_lanes(&self, focal: f32, [x, y, z]: &Lanes) -> ([u32; LANES], [f32; LANES]) {
+        let (width, height) = (self.width as f32, self.height as f32);
+        let (mut at, mut range) = ([u32::MAX; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let inverse = focal / z[i];
+            let (u, v) = (x[i] * inverse + 0.5 * width, y[i] * inverse + 0.5 * height);
+            let is_in = z[i] > 1e-3 && u >= 0.0 && v >= 0.0 && u < width && v < height;
+            let cell =
+                (v as i32 as u32).wrapping_mul(self.width as u32).wrapping_add(u as i32 as u32);
+            at[i] = if is_in { cell } else { u32::MAX };
+            range[i] = (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
+        }
+        (at, range)
     }
 
     /// Cells that are empty with all their neighbours within `window` cells: a separable running maximum, row by row.

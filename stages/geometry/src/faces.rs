@@ -2,7 +2,7 @@
 //! the faces of a cube, mostly one is asked.
 
 use crate::DepthImage;
-use crate::depth::Look;
+use crate::depth::{LANES, Lanes, Look, transform_lanes};
 
 /// A scanner with its images.
 #[derive(Debug, Clone)]
@@ -30,6 +30,16 @@ impl<'a> Eye<'a> {
     #[must_use]
     pub fn at(&self) -> [f32; 3] {
         self.faces.scanner
+    }
+
+    /// The same as [`Eye::look`] for places of the local frame.
+    #[inline]
+    #[must_use]
+    pub fn look_lanes(&self, local: &Lanes, footprint: f32) -> [Option<Look>; LANES] {
+        if let Some(image) = self.faces.of_all(local).map(|i| self.images[i]) {
+            return image.look_lanes(&transform_lanes(&image.rows, local), footprint);
+        }
+        std::array::from_fn(|i| self.look([local[0][i], local[1][i], local[2][i]], footprint))
     }
 
     /// What its beams found at a place of the local frame, in a cell about `footprint` metres wide; `None` where nothing is
@@ -91,6 +101,28 @@ impl Faces {
         }
         &by_side[2 * axis + usize::from(d[axis] > 0.0)]
     }
+
+    /// The one image that all of some places may be on, where there is one.
+    #[inline]
+    #[must_use]
+    pub fn of_all(&self, local: &Lanes) -> Option<usize> {
+        let &[one] = self.towards([local[0][0], local[1][0], local[2][0]]) else { return None };
+        if self.by_side.is_none() {
+            return Some(one);
+        }
+        let d = [0, 1, 2].map(|axis| local[axis].map(|v| v - self.scanner[axis]));
+        let first = d.map(|d| d[0]);
+        let a = first.map(f32::abs);
+        let axis = if a[0] >= a[1] && a[0] >= a[2] { 0 } else { 1 + usize::from(a[2] > a[1]) };
+        let way = first[axis].signum();
+        let (along, others) = (&d[axis], [&d[(axis + 1) % 3], &d[(axis + 2) % 3]]);
+        let mut all = true;
+        for i in 0..LANES {
+            let next = others[0][i].abs().max(others[1][i].abs());
+            all &= way * along[i] > next * self.apart;
+        }
+        all.then_some(one)
+    }
 }
 
 fn sign(side: usize) -> f32 {
@@ -100,7 +132,7 @@ fn sign(side: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::depth::{Empty, transform};
+    use crate::depth::{Empty, lanes, transform};
     use crate::{Point, Pose, Vector};
     use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 
@@ -141,6 +173,49 @@ mod tests {
                 }
             }
             assert!(n_faces == 1 || n_asked < 26_000, "{n_asked}");
+        }
+    }
+
+    #[test]
+    fn places_asked_together_are_seen_as_one_by_one() {
+        let mut random = 7_u64;
+        let mut next = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 40) as f32 / (1 << 24) as f32 - 0.5
+        };
+        for n_faces in [1, 5, 6] {
+            let scanner = Point::new(0.3, -2.0, 1.5);
+            let [mut one, mut together] = [0, 1].map(|_| cube(scanner, n_faces));
+            let faces = Faces::new(&one);
+            let mut n_shared = 0;
+            for spread in [9.0, 0.3].repeat(300) {
+                let at = [next() * 9.0, next() * 9.0, next() * 9.0];
+                let places: Vec<[f32; 3]> =
+                    (0..LANES).map(|_| at.map(|v| v + spread * next())).collect();
+                let places = lanes(&places[..1 + (next().abs() * 30.0) as usize]);
+                let Some(image) = faces.of_all(&places) else { continue };
+                n_shared += 1;
+                let camera = transform_lanes(&one[image].rows, &places);
+                for i in 0..LANES {
+                    let place = places.map(|axis| axis[i]);
+                    assert_eq!(faces.towards(place), [image]);
+                    one[image].splat(transform(&together[image].rows, place));
+                }
+                together[image].splat_lanes(&camera, LANES);
+            }
+            assert!(n_shared > 100, "{n_shared}");
+            for image in one.iter_mut().chain(&mut together) {
+                image.finish(1, |_| Empty::NoReturn);
+            }
+            let (one, together) = (Eye::new(&one), Eye::new(&together));
+            for spread in [9.0, 0.3].repeat(2000) {
+                let at = [next() * 9.0, next() * 9.0, next() * 9.0];
+                let places: Vec<[f32; 3]> =
+                    (0..LANES).map(|_| at.map(|v| v + spread * next())).collect();
+                let each: Vec<Option<Look>> =
+                    places.iter().map(|place| one.look(*place, 0.05)).collect();
+                assert_eq!(together.look_lanes(&lanes(&places), 0.05)[..], each[..]);
+            }
         }
     }
 }

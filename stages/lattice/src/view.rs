@@ -1,7 +1,7 @@
 //! Tiles of one scan in; out comes the scan's view of a region: depth images towards it, and its points inside.
 
 use contract::{Lattice, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, View, ViewPoint};
-use geometry::depth::{Empty, rows, transform};
+use geometry::depth::{Empty, LANES, Rows, lanes, rows, transform, transform_lanes};
 use geometry::{DepthImage, Faces, Point, Pose, Vector};
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 
@@ -162,21 +162,41 @@ impl ViewBuilder {
             .iter()
             .map(|image| rows(&(image.camera_from_local() * self.local_from_scan)))
             .collect();
+        let (mut some, mut n) = ([[0.0; 3]; LANES], 0);
         for (i, p) in tile.xyz.iter().enumerate() {
-            let splats = self.splatted.take(tile.pixel[i]);
-            let keeps = self.kept.as_mut().is_some_and(|kept| kept.take(tile.pixel[i]));
-            if !splats && !keeps {
+            if self.splatted.take(tile.pixel[i]) {
+                some[n] = *p;
+                n += 1;
+                if n == LANES {
+                    self.splat(&some, (&local_from_scan, &cameras));
+                    n = 0;
+                }
+            }
+            if !self.kept.as_mut().is_some_and(|kept| kept.take(tile.pixel[i])) {
                 continue;
             }
             let local = transform(&local_from_scan, *p);
-            if splats {
-                for &at in self.faces.towards(local) {
-                    self.view.images[at].splat(transform(&cameras[at], *p));
-                }
-            }
-            if keeps && self.bounds.contains(local.map(f64::from)) {
+            if self.bounds.contains(local.map(f64::from)) {
                 let place = tile.first_place + u64::from(tile.place[i]);
                 self.view.points.push(ViewPoint { xyz: local, place });
+            }
+        }
+        if n > 0 {
+            self.splat(&some[..n], (&local_from_scan, &cameras));
+        }
+    }
+
+    /// Marks a few points of the scan in the images.
+    fn splat(&mut self, points: &[[f32; 3]], (local_from_scan, cameras): (&Rows, &[Rows])) {
+        let all = lanes(points);
+        if let Some(at) = self.faces.of_all(&transform_lanes(local_from_scan, &all)) {
+            let camera = transform_lanes(&cameras[at], &all);
+            self.view.images[at].splat_lanes(&camera, points.len());
+            return;
+        }
+        for p in points {
+            for &at in self.faces.towards(transform(local_from_scan, *p)) {
+                self.view.images[at].splat(transform(&cameras[at], *p));
             }
         }
     }

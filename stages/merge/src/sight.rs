@@ -2,7 +2,7 @@
 
 use contract::{Region, View};
 use geometry::Eye;
-use geometry::depth::Look;
+use geometry::depth::{LANES, Look, lanes};
 
 /// A beam that ended so far behind a place went through it, metres.
 const BEYOND: f32 = 0.04;
@@ -71,14 +71,20 @@ impl<'a> Watch<'a> {
     pub fn look_all(&self, world: &[[f64; 3]], out: &mut Vec<Sight>) {
         out.clear();
         out.resize(world.len(), Sight::Unseen);
+        // Places of which it is not known yet that something is there.
+        let mut open: Vec<u32> = (0..world.len() as u32).collect();
         for (_, eye) in &self.views {
-            for (world, best) in world.iter().zip(out.iter_mut()) {
-                if *best == Sight::Onto {
-                    continue;
+            for some in open.chunks(LANES) {
+                let mut places = [[0.0; 3]; LANES];
+                let at = |&i: &u32| self.local(world[i as usize]);
+                places.iter_mut().zip(some).for_each(|(place, i)| *place = at(i));
+                let looks = eye.look_lanes(&lanes(&places[..some.len()]), FOOTPRINT);
+                for (&i, look) in some.iter().zip(looks) {
+                    let best = &mut out[i as usize];
+                    *best = (*best).max(look.map_or(Sight::Unseen, |look| Sight::of(&look)));
                 }
-                let look = eye.look(self.local(*world), FOOTPRINT);
-                *best = (*best).max(look.map_or(Sight::Unseen, |look| Sight::of(&look)));
             }
+            open.retain(|&i| out[i as usize] != Sight::Onto);
         }
     }
 
