@@ -100,6 +100,34 @@ pub(crate) struct MaskCount {
     pub(crate) n_moving: u64,
 }
 
+/// Masks and clouds that are written; the files of robots are still to be.
+pub(crate) struct Streamed<'l> {
+    labelling: &'l Labelling<'l>,
+    near: &'l Near,
+    /// By fit.
+    spaces: Vec<Option<Space>>,
+    /// Fits whose files are to be written, with their pictures.
+    robots: Vec<(usize, RobotPicture)>,
+    out: &'l Path,
+    done: Done,
+}
+
+impl Streamed<'_> {
+    /// Writes the files of robots.
+    pub(crate) fn finish(mut self, engine: &Engine) -> Result<Done> {
+        let shown = self.robots.iter().map(|(i, picture)| (*i, picture)).collect();
+        let written = engine.each(shown, |(i, picture)| {
+            let space = self.spaces[i].as_ref();
+            self.labelling.write_robot(i, &self.near.hanging[i], (space, picture), self.out)
+        })?;
+        for ((i, _), (space, names)) in self.robots.iter().zip(written) {
+            self.done.spaces[*i] = space;
+            self.done.pictures.extend(names);
+        }
+        Ok(self.done)
+    }
+}
+
 impl<'a> Labelling<'a> {
     pub(crate) fn new(
         fits: &'a [Fit],
@@ -157,14 +185,14 @@ impl<'a> Labelling<'a> {
         Ok(Near { labels: near, hanging: merge::hang(&attached, self.fits, self.models) })
     }
 
-    /// Streams every input once more and writes its labels.
-    pub(crate) fn write(
-        &self,
-        (near, mut spaces): (&Near, Vec<Option<Space>>),
+    /// Streams every input once more and writes its labels, clouds to another folder; then what is said of robots.
+    pub(crate) fn write<'l>(
+        &'l self,
+        (near, mut spaces): (&'l Near, Vec<Option<Space>>),
         scope: &Scope,
-        (out, clouds_out): (&Path, &Path),
+        (out, clouds_out): (&'l Path, &Path),
         engine: &Engine,
-    ) -> Result<Done> {
+    ) -> Result<Streamed<'l>> {
         let las = scope.las.clone().unwrap_or_else(|| self.las());
         let waiting_bytes = self.export.waiting_bytes.min(SPOOLED * engine.channel_bytes);
         let export = export::Settings { waiting_bytes, ..self.export };
@@ -208,18 +236,12 @@ impl<'a> Labelling<'a> {
             pictures.push(self.draw_plan(&plan, input.id, out)?);
         }
         let (masks, mut sums) = masks.finish()?;
-        let mut said = vec![None; self.fits.len()];
-        let shown = chosen.iter().copied().zip(&robots).collect();
-        let written = engine.each(shown, |(i, picture)| {
-            self.write_robot(i, &near.hanging[i], (spaces[i].as_ref(), picture), out)
-        })?;
-        for (i, (space, names)) in chosen.into_iter().zip(written) {
-            said[i] = space;
-            pictures.extend(names);
-        }
         let clouds = engine.pool()?.install(|| clouds.finish(&AllThreads))?;
         sums.extend(clouds.sums().cloned());
-        Ok(Done { clouds, masks, pictures, spaces: said, sums, las })
+        let said = vec![None; self.fits.len()];
+        let done = Done { clouds, masks, pictures, spaces: said, sums, las };
+        let robots = chosen.into_iter().zip(robots).collect();
+        Ok(Streamed { labelling: self, near, spaces, robots, out, done })
     }
 
     /// The files of one robot: model, space, pictures; what is said of its space, and the pictures' names.

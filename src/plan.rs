@@ -92,8 +92,9 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     // write.
     let spaces = spaces::around(&fits, &models, (&search, settings), engine)?;
     drop(shelf);
-    let written =
-        labelling.write((&near, spaces), &Scope::default(), (room.next(), room.next()), engine)?;
+    let written = labelling
+        .write((&near, spaces), &Scope::default(), (room.next(), room.next()), engine)?
+        .finish(engine)?;
     let mut outcome = Report {
         sums: &sums,
         sources: &sources,

@@ -6,7 +6,7 @@ use super::say::{self, Said};
 use super::session::{Labels, Robots, Session};
 use crate::engine::Engine;
 use crate::job::{Outcome, Room};
-use crate::labelling::{Done, Scope};
+use crate::labelling::{Labelling, Scope, Streamed};
 use crate::report::id;
 use crate::reuse::{OutputFile, Sums};
 use contract::{Fit, MaskId, Result, Space};
@@ -49,9 +49,12 @@ impl Written<'_, '_> {
         let gone = self.gone();
         // Places of old points are listed while the new ones are labelled and tiles are written.
         let lists = || self.lists(&gone, next);
+        let own = self.session.own_fits(self.fits, self.robots);
+        let labelling = self.session.labelling(&own, self.models);
         let rest = || {
-            let done = self.label(registered, (next, &scratch), engine)?;
-            Ok((done, self.tiles(&gone, (next, &scratch), engine)?))
+            let streamed = self.label((&own, &labelling), registered, (next, &scratch), engine)?;
+            let tiles = || self.tiles(&gone, (next, &scratch), engine);
+            engine.beside("files of robots", || streamed.finish(engine), tiles)
         };
         let (lists, (mut done, touched)) = engine.beside("lists", lists, rest)?;
         let mut written: BTreeSet<String> = touched.names;
@@ -78,16 +81,16 @@ impl Written<'_, '_> {
         Ok(Out { outcome, known, n_shared })
     }
 
-    /// Masks of the new scans, clouds of their points in the cell, and files of robots that stand otherwise.
-    fn label(
-        &self,
+    /// Masks of the new scans, clouds of their points in the cell; and files of robots that stand otherwise, still to be
+    /// written.
+    fn label<'l>(
+        &'l self,
+        (own, labelling): (&[Fit], &'l Labelling<'l>),
         registered: &[Option<Registration>],
-        (next, scratch): (&Path, &Path),
+        (next, scratch): (&'l Path, &Path),
         engine: &Engine,
-    ) -> Result<Done> {
+    ) -> Result<Streamed<'l>> {
         let session = self.session;
-        let own = session.own_fits(self.fits, self.robots);
-        let labelling = session.labelling(&own, self.models);
         let changed = &self.robots.changed;
         let mut spaces: Vec<Option<Space>> = vec![None; own.len()];
         let seen: Vec<Fit> = changed.iter().map(|&i| own[i].clone()).collect();
