@@ -40,6 +40,9 @@ pub(crate) fn dress(
         return Ok(fits);
     }
     let dressed = engine.fan_out("tools", fits, |fit| {
+        if !tells_tools(&fit) {
+            return Ok((fit, None));
+        }
         let find = || {
             let dressed = search.with_scene(&fit, regions, |scene, settings| {
                 dress_one(&fit, (known, search.shelf()), scene, settings)
@@ -62,11 +65,17 @@ pub(crate) fn dress_in(
     let fits = branch(fits, models);
     let known: &[Model] = models;
     let dressed = fits.into_iter().map(|fit| {
-        let dressed = dress_one(&fit, (known, shelf), scene, settings);
+        let dress = || dress_one(&fit, (known, shelf), scene, settings);
+        let dressed = tells_tools(&fit).then(dress).flatten();
         own(fit, dressed, known)
     });
     let dressed = dressed.collect();
     adopt(dressed, models)
+}
+
+/// Whether tools are looked for: of a robot that moved, the scans of one posture may show too little of one.
+fn tells_tools(fit: &Fit) -> bool {
+    fit.verdict != Verdict::Refused && fit.stands_in.is_empty()
 }
 
 /// The fit with the tool that was found, and the model of both.
@@ -98,10 +107,6 @@ fn dress_one(
     scene: &Scene<'_>,
     settings: &Settings,
 ) -> Option<Dressed> {
-    // Of a robot that moved, the scans of one posture may show too little of a tool.
-    if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
-        return None;
-    }
     let arm = &models[fit.model];
     // An arm whose loops stand otherwise has the links of its name.
     let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);

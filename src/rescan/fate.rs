@@ -5,8 +5,8 @@ use geometry::Aabb;
 use merge::{Sight, Tally};
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Most voxels that are kept, one byte each: a hall of 60 x 60 x 8 m. Of larger cells each point is asked for again.
-const MAX_VOXELS: usize = 1 << 28;
+/// Most voxels that are kept, one byte each: 30 x 30 x 9 m. Of larger cells each point is asked for again.
+const MAX_VOXELS: usize = 1 << 26;
 /// A point in the voxel stays; the new scans measured what one is of; they saw through the place of one.
 const STAYS: u8 = 1;
 const ONTO: u8 = 2;
@@ -24,7 +24,8 @@ impl Fates {
     /// None known yet.
     pub(crate) fn of(cell: &Aabb) -> Self {
         let (first, last) = (Tally::cell(cell.min), Tally::cell(cell.max));
-        let size = [0, 1, 2].map(|i| usize::try_from(last[i] - first[i] + 1).unwrap_or(0));
+        let n = |i: usize| i64::from(last[i]) - i64::from(first[i]) + 1;
+        let size = [0, 1, 2].map(|i| usize::try_from(n(i)).unwrap_or(0));
         let n = size.iter().try_fold(1_usize, |n, s| n.checked_mul(*s));
         let n = n.filter(|n| *n <= MAX_VOXELS).unwrap_or(0);
         Self { first, size, voxels: (0..n).map(|_| AtomicU8::new(0)).collect() }

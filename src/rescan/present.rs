@@ -42,7 +42,7 @@ pub(crate) struct Present<'a> {
     pub(crate) near: &'a Near,
     pub(crate) ground: &'a Ground,
     pub(crate) cell: Aabb,
-    /// What stood there: only beside it the earlier scans are asked.
+    /// What stood there: the earlier scans are asked only where nothing of it is near.
     pub(crate) then: &'a Tally,
     /// Earlier scans.
     pub(crate) watch: &'a Watch<'a>,

@@ -122,24 +122,20 @@ pub(crate) fn look(
     if said.through < STANDS && before.verdict != Verdict::Refused {
         return Ok((Now::Unseen, None));
     }
-    let (found, own) = anew(before, models, (search, &near))?;
-    Ok(match found {
-        Some(fit) => {
-            let dressed = (fit.model >= models.len()).then_some(own).flatten();
-            (Now::Anew(Box::new(fit)), dressed)
-        }
+    Ok(match anew(before, models, (search, &near))? {
+        Some((fit, own)) => (Now::Anew(Box::new(fit)), own),
         None if said.foot > GONE => (Now::Gone, None),
         None if said.through > CONTRADICTED => (Now::Lost, None),
         None => (Now::Open, None),
     })
 }
 
-/// A robot that does not stand as it stood, searched anew at its place; with the model of its own.
+/// A robot that does not stand as it stood, searched anew at its place; with the model of its own, where it has one.
 fn anew(
     before: &Fit,
     models: &[Model],
     (search, near): (&Search<'_, '_>, &Region),
-) -> Result<(Option<Fit>, Option<Model>)> {
+) -> Result<Option<(Fit, Option<Model>)>> {
     let world_from_base = &before.world_from_base;
     let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
     // Its arm may have left what stands about its base.
@@ -156,8 +152,11 @@ fn anew(
         let mut own = if found.is_empty() { Vec::new() } else { models.to_vec() };
         let dressed = dress_in(scene, found, &mut own, (search.shelf(), settings));
         let best = dressed.into_iter().max_by(|a, b| a.verdict.cmp(&b.verdict));
-        let model = best.as_ref().and_then(|fit| own.get(fit.model).cloned());
-        Ok((best, model))
+        Ok(best.map(|fit| {
+            let is_own = fit.model >= models.len();
+            let model = is_own.then(|| own.swap_remove(fit.model));
+            (fit, model)
+        }))
     })?
 }
 
