@@ -17,6 +17,9 @@ const SURE: f64 = 5.0;
 /// Least differences that count: a joint, radians (0.1°) or metres; the place of a base, metres, since two sessions are
 /// registered to within millimetres; its direction, radians (0.15°).
 const LEAST_JOINT: f64 = 0.001_75;
+/// Joints of two trusted postures that are known less well than joints ought to be, and have no other values, radians: up to this
+/// standard deviation (2°) they tell a change of at least so much (2°).
+const ROUGH: f64 = 0.035;
 const LEAST_SHIFT: f64 = 0.010;
 const LEAST_TURN: f64 = 0.002_6;
 
@@ -69,7 +72,7 @@ pub struct RobotChange {
     pub base_shift: Option<[f64; 3]>,
     /// Turn of its base, radians.
     pub base_turn: Option<f64>,
-    /// Joints that both results determine.
+    /// Joints that both results determine, and those known roughly that differ by far more than that.
     pub joints: Vec<JointChange>,
     /// Joints that one of them leaves open.
     pub not_compared: Vec<String>,
@@ -165,13 +168,15 @@ fn compared(a: &RobotEntry, b: &RobotEntry) -> RobotChange {
         return out;
     }
     for (name, _) in &b.joints.0 {
-        let Some(then) = known(a, name) else {
-            out.not_compared.push(name.clone());
-            continue;
-        };
-        match known(b, name) {
-            Some(now) => out.joints.push(joint(name, then, now, b.slides.contains(name))),
-            None => out.not_compared.push(name.clone()),
+        let slides = b.slides.contains(name);
+        match known(a, name).zip(known(b, name)) {
+            Some((then, now)) => out.joints.push(joint(name, then, now, slides)),
+            None => match rough(a, b, name).map(|[then, now]| joint(name, then, now, slides)) {
+                Some(joint) if joint.is_change && joint.change.abs() > ROUGH => {
+                    out.joints.push(joint);
+                }
+                _ => out.not_compared.push(name.clone()),
+            },
         }
     }
     let wide =
@@ -188,9 +193,25 @@ fn compared(a: &RobotEntry, b: &RobotEntry) -> RobotChange {
 
 /// Value and standard deviation of a joint that a result determines.
 fn known(robot: &RobotEntry, name: &str) -> Option<[f64; 2]> {
-    let of = |places: &[(String, f64)]| places.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
     let determined = robot.determined.0.iter().find(|(n, _)| n == name).is_none_or(|(_, d)| *d);
-    of(&robot.joints.0).zip(of(&robot.sigma.0)).filter(|_| determined).map(|(v, s)| [v, s])
+    value(robot, name).filter(|_| determined)
+}
+
+/// The same then and now of a joint that turns and that two trusted postures know roughly.
+fn rough(then: &RobotEntry, now: &RobotEntry, name: &str) -> Option<[[f64; 2]; 2]> {
+    let is_one = |r: &RobotEntry| {
+        r.verdict == Verdict::Trusted.word()
+            && !r.slides.iter().any(|joint| joint == name)
+            && r.equivalents.0.iter().all(|(joint, _)| joint != name)
+    };
+    let of = |r| value(r, name).filter(|[_, sigma]| *sigma <= ROUGH && is_one(r));
+    Some([of(then)?, of(now)?])
+}
+
+/// Value and standard deviation of a joint.
+fn value(robot: &RobotEntry, name: &str) -> Option<[f64; 2]> {
+    let of = |places: &[(String, f64)]| places.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+    of(&robot.joints.0).zip(of(&robot.sigma.0)).map(|(v, s)| [v, s])
 }
 
 fn joint(name: &str, then: [f64; 2], now: [f64; 2], slides: bool) -> JointChange {
@@ -308,5 +329,25 @@ mod tests {
         let then = result(vec![robot("R1", "m", 0.0, 0.5)]);
         let now = result(vec![robot("R1", "m", 0.05, 0.5)]);
         assert_eq!(changes(&then, &now)[0].change, Change::Moved);
+    }
+    #[test]
+    fn a_joint_that_both_know_roughly_tells_a_change_of_many_degrees() {
+        let roughly = |flange: f64, sigma: f64, also: &[f64]| {
+            let mut robot = robot("R1", "m", 0.0, 0.5);
+            robot.joints.0.iter_mut().filter(|j| j.0 == "flange").for_each(|j| j.1 = flange);
+            robot.sigma.0.iter_mut().filter(|j| j.0 == "flange").for_each(|j| j.1 = sigma);
+            robot.equivalents.0 =
+                if also.is_empty() { Vec::new() } else { vec![("flange".into(), also.to_vec())] };
+            result(vec![robot])
+        };
+        let then = roughly(0.3, 0.01, &[]);
+        let far = changes(&then, &roughly(0.5, 0.01, &[])).remove(0);
+        assert_eq!((far.change, far.not_compared.len()), (Change::Moved, 0));
+        for near_or_unsure in
+            [roughly(0.33, 0.01, &[]), roughly(0.5, 0.05, &[]), roughly(0.5, 0.01, &[1.5])]
+        {
+            let same = changes(&then, &near_or_unsure).remove(0);
+            assert_eq!((same.change, same.not_compared), (Change::Same, vec!["flange".to_owned()]));
+        }
     }
 }

@@ -28,8 +28,8 @@ const UPRIGHT: f64 = 0.9;
 pub(crate) enum Now {
     /// As found by the new scans.
     Found(Box<Fit>),
-    /// They contradict how it stood; it was searched anew, and found so.
-    Anew(Box<Fit>),
+    /// It was searched anew, and found so; and whether they contradict how it stood.
+    Anew(Box<Fit>, bool),
     /// It stands no longer there.
     Gone,
     /// The new scans saw too little of it; what they saw does not contradict that it stands as it stood.
@@ -123,7 +123,7 @@ pub(crate) fn look(
         return Ok((Now::Unseen, None));
     }
     Ok(match anew(before, models, (search, &near))? {
-        Some((fit, own)) => (Now::Anew(Box::new(fit)), own),
+        Some((fit, own)) => (Now::Anew(Box::new(fit), said.through > CONTRADICTED), own),
         None if said.foot > GONE => (Now::Gone, None),
         None if said.through > CONTRADICTED => (Now::Lost, None),
         None => (Now::Open, None),

@@ -147,6 +147,14 @@ impl Said<'_, '_> {
         let looked: Vec<String> = self.found.robots.compared().into_iter().map(id).collect();
         let mut all = changes(&self.found.base.result, result);
         all.retain(|c| c.then.iter().chain(&c.now).any(|id| looked.contains(id)));
+        // Where joints are left open, others alone do not say that a robot stands as it stood when beams went through it.
+        let contradicted: Vec<String> =
+            self.found.robots.contradicted.iter().copied().map(id).collect();
+        let open =
+            all.iter_mut().filter(|c| c.change == Change::Same && !c.not_compared.is_empty());
+        for robot in open.filter(|c| c.now.iter().any(|id| contradicted.contains(id))) {
+            robot.change = Change::Moved;
+        }
         all
     }
 

@@ -60,6 +60,8 @@ pub(crate) struct Robots {
     pub(crate) in_cell: Vec<usize>,
     /// Stand otherwise, are of another model, or are new; or stand nobody knows how.
     pub(crate) changed: Vec<usize>,
+    /// Those of them of which the new scans contradict how they stood.
+    pub(crate) contradicted: Vec<usize>,
     /// Are gone.
     pub(crate) gone: Vec<usize>,
     /// The new scans saw too little of them; and those of them that label points by how they stood.
@@ -235,14 +237,17 @@ impl<'a> Session<'a> {
         })?;
         for (i, (now, own)) in here.into_iter().zip(looked) {
             let bounds = bounds[i];
-            let is_anew = matches!(now, Now::Anew(_));
+            let is_anew = matches!(now, Now::Anew(..));
+            if matches!(now, Now::Anew(_, true)) {
+                out.contradicted.push(i);
+            }
             match now {
                 Now::Unseen => {
                     out.unseen.push(i);
                     out.as_it_stood.push(i);
                 }
                 Now::Open => out.unseen.push(i),
-                Now::Found(mut fit) | Now::Anew(mut fit) => {
+                Now::Found(mut fit) | Now::Anew(mut fit, _) => {
                     if let Some(own) = own {
                         fit.model = models.len();
                         models.push(own);

@@ -99,6 +99,17 @@ struct Piece {
 }
 
 impl Piece {
+    /// Several as one; `None` of none.
+    fn of<'p>(pieces: impl Iterator<Item = &'p Self>) -> Option<Self> {
+        pieces.cloned().reduce(|mut all, more| {
+            all.cells.extend(more.cells);
+            all.cells.sort_unstable();
+            all.n_points += more.n_points;
+            all.bounds = all.bounds.union(&more.bounds);
+            all
+        })
+    }
+
     /// Bounds that the thing may have.
     fn boxes(&self) -> impl Iterator<Item = &Aabb> {
         self.whole.iter().chain([&self.wide, &self.bounds])
@@ -222,24 +233,58 @@ pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings, fan: &impl Fa
         fan.fan(vec![(then, now), (now, then)], |(own, other)| own.pieces(other, settings));
     let gone = by_size(then.apart(&pieces[0], &pieces[1], settings));
     let filled = by_size(now.apart(&pieces[1], &pieces[0], settings));
-    let moved = moved(&gone, &filled);
-    let one = |(was, is, [then, now]): &(usize, usize, [Aabb; 2])| Thing {
-        then: Some(*then),
-        now: Some(*now),
-        shift: Some((now.center() - then.center()).into()),
-        ..thing(ThingChange::Moved, Some(&gone[*was]), Some(&filled[*is]))
+    let mut moved = moved(&gone, &filled);
+    complete(&mut moved, [&gone, &filled]);
+    let one = |pair: &Pair| {
+        let [was, is] = [(&gone, &pair.parts[0]), (&filled, &pair.parts[1])]
+            .map(|(all, parts)| Piece::of(parts.iter().map(|i| &all[*i])));
+        let [then, now] = pair.boxes;
+        Thing {
+            then: Some(then),
+            now: Some(now),
+            shift: Some((now.center() - then.center()).into()),
+            ..thing(ThingChange::Moved, was.as_ref(), is.as_ref())
+        }
     };
     let mut out: Vec<Thing> = moved.iter().map(one).collect();
-    let left = gone.iter().enumerate().filter(|(i, _)| moved.iter().all(|m| m.0 != *i));
-    out.extend(left.map(|(_, was)| thing(ThingChange::Gone, Some(was), None)));
-    let left = filled.iter().enumerate().filter(|(i, _)| moved.iter().all(|m| m.1 != *i));
-    out.extend(left.map(|(_, is)| thing(ThingChange::Appeared, None, Some(is))));
+    let is_left = |side: usize, i: usize| moved.iter().all(|m| !m.parts[side].contains(&i));
+    let went = gone.iter().enumerate().filter(|(i, _)| is_left(0, *i));
+    out.extend(went.map(|(_, was)| thing(ThingChange::Gone, Some(was), None)));
+    let came = filled.iter().enumerate().filter(|(i, _)| is_left(1, *i));
+    out.extend(came.map(|(_, is)| thing(ThingChange::Appeared, None, Some(is))));
     out
+}
+
+/// A thing that stands elsewhere: changes that it is made of, then and now, and its bounds.
+struct Pair {
+    parts: [Vec<usize>; 2],
+    boxes: [Aabb; 2],
+}
+
+/// Adds to things of which one session saw pieces apart from each other what makes them as large as the other one saw them.
+fn complete(moved: &mut [Pair], pieces: [&[Piece]; 2]) {
+    for at in 0..moved.len() {
+        for side in 0..2 {
+            for (i, piece) in pieces[side].iter().enumerate() {
+                if moved.iter().any(|pair| pair.parts[side].contains(&i)) {
+                    continue;
+                }
+                let pair = &mut moved[at];
+                let (own, other) = (pair.boxes[side], pair.boxes[1 - side]);
+                let with = own.union(&piece.bounds);
+                let [before, after] = [&own, &with].map(|b| farthest_off(b, &other));
+                if after <= 1.0 && after < before {
+                    pair.boxes[side] = with;
+                    pair.parts[side].push(i);
+                }
+            }
+        }
+    }
 }
 
 /// Which of those that went stands elsewhere and the bounds there and here, the most alike first chosen: a barrel must not take
 /// a pallet's new place.
-fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<(usize, usize, [Aabb; 2])> {
+fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<Pair> {
     let pairs = (0..gone.len()).flat_map(|i| (0..filled.len()).map(move |j| (i, j)));
     let alike = pairs.filter_map(|(i, j)| {
         let (was, is) = (&gone[i], &filled[j]);
@@ -255,13 +300,13 @@ fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<(usize, usize, [Aabb; 2])> {
     });
     let mut alike: Vec<_> = alike.collect();
     alike.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut out: Vec<(usize, usize, [Aabb; 2])> = Vec::new();
+    let mut out: Vec<Pair> = Vec::new();
     for (_, i, j, boxes) in alike {
-        if out.iter().all(|(was, is, _)| *was != i && *is != j) {
-            out.push((i, j, boxes));
+        if out.iter().all(|pair| pair.parts[0] != [i] && pair.parts[1] != [j]) {
+            out.push(Pair { parts: [vec![i], vec![j]], boxes });
         }
     }
-    out.sort_by_key(|(was, ..)| *was);
+    out.sort_by_key(|pair| pair.parts[0][0]);
     out
 }
 
@@ -301,6 +346,12 @@ fn same(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
 /// How much it does, in parts of that.
 fn off(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
     (a[i] - b[i]).abs() / same(a, b, i)
+}
+
+/// How much the side that differs most does.
+fn farthest_off(a: &Aabb, b: &Aabb) -> f64 {
+    let (a, b) = (sides(a), sides(b));
+    (0..3).map(|i| off(&a, &b, i)).fold(0.0, f64::max)
 }
 
 /// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may be one thing, of which

@@ -132,3 +132,19 @@ fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
     assert!((shift[0] - 4.0).abs() < 0.06 && shift[2].abs() < 0.06, "{shift:?}");
     assert!(found[1].then.expect("bounds").contains([1.3, 6.3, 0.3]));
 }
+
+#[test]
+fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
+    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    solid(&mut then, [1.0, 1.0, 0.02], [1.3, 0.9, 0.73], true);
+    // Rows of beams graze its top: one end is seen whole, of the other an edge. Something else came beside it.
+    solid(&mut now, [5.0, 1.0, 0.02], [0.7, 0.85, 0.73], true);
+    solid(&mut now, [6.1, 1.1, 0.27], [0.2, 0.7, 0.48], true);
+    solid(&mut now, [5.0, 2.4, 0.02], [0.3, 0.3, 0.4], true);
+    let found = found(then, now);
+    let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
+    assert_eq!(kinds, [ThingChange::Moved, ThingChange::Appeared]);
+    let shift = found[0].shift.expect("a shift");
+    assert!((shift[0] - 4.0).abs() < 0.06 && shift[1].abs() < 0.06, "{shift:?}");
+    assert!(found[1].now.expect("bounds").contains([5.1, 2.5, 0.2]));
+}
