@@ -4,15 +4,15 @@
 //! labels by place. Then each input is streamed once more: a point's label is that of the list, or else that of its
 //! place alone (floor or fixed).
 
-use crate::engine::{AllThreads, Engine, Task};
+use crate::engine::{AllThreads, Engine, Hand, Handed, Task};
 use crate::job::Settings;
 use crate::store::Store;
 use contract::{
     Cluster, Fit, Floor, Fold, InputId, Label, MaskId, PlaceRun, Result, Space, TileLabels,
 };
 use export::{
-    Clouds, FileSum, LasSettings, PlanPicture, Quantum, RobotPicture, SpaceEntry, Written,
-    write_space,
+    Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Tiles,
+    Written, write_space,
 };
 use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
@@ -22,7 +22,7 @@ use segment::{Ground, Segment};
 use std::path::Path;
 
 use crate::bodies::Bodies;
-use crate::labelled::LabelStrip;
+use crate::labelled::{LabelStrip, Labelled};
 use crate::masks::Masks;
 use crate::report::id;
 use crate::spaces::poses;
@@ -196,52 +196,78 @@ impl<'a> Labelling<'a> {
         let las = scope.las.clone().unwrap_or_else(|| self.las());
         let waiting_bytes = self.export.waiting_bytes.min(SPOOLED * engine.channel_bytes);
         let export = export::Settings { waiting_bytes, ..self.export };
-        let mut clouds = Clouds::create(clouds_out, &las, &export)?;
+        let records = export.records(&las);
+        let mut tiles = Tiles::create(clouds_out, &records, &export)?;
+        let mut clouds = Clouds::create(clouds_out, &records, &export)?;
         let mut masks = Masks::new(out, self.sources.opened_masks());
         let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
         let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
         let mut robots: Vec<RobotPicture> = self.robot_pictures(&chosen, engine)?;
-        let mut pictures = Vec::new();
         let grids: Vec<_> =
             spaces.iter().map(|s| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()))).collect();
         let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
-        for input in self.sources.opened() {
-            let plan = PlanPicture::new(&self.bounds_of(input.id));
-            let label = LabelStrip {
-                near: &near.labels,
-                ground: &self.ground,
-                scans: &self.sources.scans,
-                grids: &grids,
-                shown: &shown,
-                plan: &plan,
-                pack: clouds.pack(),
-                cell: scope.cell,
-                moved: &scope.moved,
-                bodies: self.bodies.as_ref(),
-            };
-            let task = Task::new("write").of(crate::report::amount(self.sources, input.id));
-            let strips = self.sources.strips(input.id, Want::Everything)?;
-            engine.pass(task, strips, |f| {
-                f.map(&label).for_each(|strip| {
-                    masks.add(&strip)?;
-                    for (space, voxel, kind) in strip.spots {
+        let pack = Pack::of_clouds(&records, &export);
+        // Tiles are as many bytes as masks and clouds: each has a thread that copies them to their files.
+        let apart = |strips: Handed<'_, Labelled>| {
+            for strip in strips {
+                let strip = strip?;
+                masks.add(&strip)?;
+                clouds.add(&strip.packed)?;
+            }
+            Ok((masks.finish()?, clouds.finish()?))
+        };
+        let along = |hand: Hand<'_, Labelled>| {
+            let mut pictures = Vec::new();
+            for input in self.sources.opened() {
+                let plan = PlanPicture::new(&self.bounds_of(input.id));
+                let label = LabelStrip {
+                    near: &near.labels,
+                    ground: &self.ground,
+                    scans: &self.sources.scans,
+                    grids: &grids,
+                    shown: &shown,
+                    plan: &plan,
+                    pack: pack.clone(),
+                    cell: scope.cell,
+                    moved: &scope.moved,
+                    bodies: self.bodies.as_ref(),
+                };
+                self.each_strip(input.id, &label, engine, |mut strip| {
+                    for (space, voxel, kind) in strip.spots.drain(..) {
                         spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));
                     }
-                    for (robot, point, label) in strip.shown {
+                    for (robot, point, label) in strip.shown.drain(..) {
                         robots[robot].add(point, label);
                     }
-                    clouds.add(&strip.packed)
-                })
-            })?;
-            pictures.push(self.draw_plan(&plan, input.id, out)?);
-        }
-        let (masks, mut sums) = masks.finish()?;
-        let clouds = engine.pool()?.install(|| clouds.finish(&AllThreads))?;
+                    tiles.iter_mut().try_for_each(|tiles| tiles.add(&strip.packed))?;
+                    hand(strip)
+                })?;
+                pictures.push(self.draw_plan(&plan, input.id, out)?);
+            }
+            let finish = |tiles: Tiles| engine.pool()?.install(|| tiles.finish(&AllThreads));
+            Ok((tiles.map(finish).transpose()?.unwrap_or_default(), pictures))
+        };
+        let (((masks, mut sums), (moving, fixed)), (tiles, pictures)) =
+            engine.handing("clouds", apart, along)?;
+        let clouds = Written { tiles, robots: moving, fixed };
         sums.extend(clouds.sums().cloned());
         let said = vec![None; self.fits.len()];
         let done = Done { clouds, masks, pictures, spaces: said, sums, las };
         let robots = chosen.into_iter().zip(robots).collect();
         Ok(Streamed { labelling: self, near, spaces, robots, out, done })
+    }
+
+    /// Streams an input once more; labelled strips in the order of the file.
+    fn each_strip(
+        &self,
+        input: InputId,
+        label: &LabelStrip<'_>,
+        engine: &Engine,
+        sink: impl FnMut(Labelled) -> Result<()>,
+    ) -> Result<()> {
+        let task = Task::new("write").of(crate::report::amount(self.sources, input));
+        let strips = self.sources.strips(input, Want::Everything)?;
+        engine.pass(task, strips, |f| f.map(label).for_each(sink))
     }
 
     /// The files of one robot: model, space, pictures; what is said of its space, and the pictures' names.

@@ -9,6 +9,7 @@
 //! | a panic in a step ends the run as `Kind::Bug` | caught per item |
 //! | dropping a flow stops its source | the consumer's end tells the producers when it goes, all the way up |
 
+mod aside;
 mod cancel;
 mod edge;
 mod flow;
@@ -24,6 +25,7 @@ use rayon::prelude::*;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+pub use aside::{Hand, Handed};
 pub use cancel::Cancel;
 pub use flow::Flow;
 
@@ -175,25 +177,6 @@ impl Engine {
         let f = |(at, item): (usize, T)| guarded("small work", at as u64, || f(item));
         let items = items.into_iter().enumerate().collect();
         self.pool()?.install(|| AllThreads.fan(items, f)).into_iter().collect()
-    }
-
-    /// Does `aside` on a thread of its own while `work` is done on this one; the error of the work goes first.
-    ///
-    /// # Errors
-    /// Those of both; a panic of either is a bug.
-    pub fn beside<T: Send, U>(
-        &self,
-        name: &str,
-        aside: impl FnOnce() -> Result<T> + Send,
-        work: impl FnOnce() -> Result<U>,
-    ) -> Result<(T, U)> {
-        std::thread::scope(|scope| {
-            let aside = scope.spawn(|| guarded(name, 0, aside));
-            let done = guarded(name, 0, work);
-            let lost = || Err(Error::new(Kind::Bug, format!("{name} was lost")));
-            let aside = aside.join().unwrap_or_else(|_| lost());
-            done.and_then(|done| Ok((aside?, done)))
-        })
     }
 
     /// The pool of [`Engine::fan_out`], for steps that use rayon by themselves.

@@ -324,3 +324,64 @@ fn progress_counts_what_came_from_the_source() {
     assert_eq!((reports[0].name.as_str(), reports[0].n_items, reports[0].bytes), ("read", 70, 560));
     assert_eq!((reports[1].name.as_str(), reports[1].n_items), ("fit", 5));
 }
+
+#[test]
+fn what_is_handed_over_comes_in_order_and_bounded() {
+    let live = Arc::new(Live::default());
+    let mut engine = Engine::new(2);
+    engine.channel_bytes = 100;
+    let (seen, n) = engine
+        .handing(
+            "aside",
+            |items: Handed<'_, Heavy>| {
+                items.map(|item| item.map(|i| i.value)).collect::<Result<Vec<_>>>()
+            },
+            |hand| {
+                (0..500).try_for_each(|i| hand(Heavy::new(i, 30, &live)))?;
+                Ok(500)
+            },
+        )
+        .expect("both end");
+    assert_eq!((seen, n), ((0..500).collect(), 500));
+    // What the channel holds, one that waits for it and one that is being taken.
+    assert!(
+        live.peak.load(Ordering::SeqCst) <= 160,
+        "{live_peak}",
+        live_peak = live.peak.load(Ordering::SeqCst)
+    );
+    assert_eq!(live.now.load(Ordering::SeqCst), 0);
+}
+
+#[test]
+fn the_side_that_fails_first_says_why() {
+    let engine = Engine::new(2);
+    let failed = |what: &str| Error::new(Kind::Io, what.to_owned());
+    let is = |e: Error, what: &str| assert!(e.to_string().contains(what), "{e}");
+    let all = |items: Handed<'_, Number>| items.map(|i| i.map(|_| 1)).sum::<Result<u32>>();
+    // The one that hands over fails: the other side does not take what came for all.
+    let whole = AtomicBool::new(false);
+    let aside = |items: Handed<'_, Number>| {
+        let n = all(items)?;
+        whole.store(true, Ordering::SeqCst);
+        Ok(n)
+    };
+    let work = |hand: Hand<'_, Number>| {
+        hand(Number(1))?;
+        Err::<(), _>(failed("disk of the work"))
+    };
+    is(engine.handing("aside", aside, work).expect_err("fails"), "disk of the work");
+    assert!(!whole.load(Ordering::SeqCst));
+    // The other side fails, by itself or by a panic, early or after the last item.
+    let work = |hand: Hand<'_, Number>| (0..1000).try_for_each(|i| hand(Number(i)));
+    let few = |_: Handed<'_, Number>| Err::<(), _>(failed("disk of the other"));
+    is(engine.handing("aside", few, work).expect_err("fails"), "disk of the other");
+    let late = |items: Handed<'_, Number>| {
+        all(items)?;
+        Err::<(), _>(failed("no sync"))
+    };
+    is(engine.handing("aside", late, work).expect_err("fails"), "no sync");
+    let panics = |_: Handed<'_, Number>| -> Result<()> { panic!("no such thing") };
+    is(engine.handing("aside", panics, work).expect_err("fails"), "no such thing");
+    let idle = |_: Handed<'_, Number>| Ok(());
+    assert_eq!(engine.handing("aside", idle, work).expect_err("fails").kind(), Kind::Bug);
+}

@@ -28,6 +28,7 @@ mod settings;
 mod space;
 mod summed;
 mod table;
+mod tiles;
 
 pub use atomic::AtomicFile;
 pub use calibration::{CalibrationEntry, FrameEntry};
@@ -56,3 +57,4 @@ pub use settings::Settings;
 pub use space::{SpaceEntry, write_space};
 pub use summed::FileSum;
 pub use table::write_table;
+pub use tiles::Tiles;

@@ -55,6 +55,16 @@ impl Packed {
     pub fn weight_bytes(&self) -> usize {
         self.bytes.len() + size_of_val(&*self.runs)
     }
+
+    /// Its runs, each with its records, whose length is given, bytes.
+    pub(crate) fn runs(&self, record_len: usize) -> impl Iterator<Item = (&Run, &[u8])> {
+        let mut rest = &*self.bytes;
+        self.runs.iter().map(move |run| {
+            let (own, later) = rest.split_at(run.extent.n as usize * record_len);
+            rest = later;
+            (run, own)
+        })
+    }
 }
 
 /// Turns points into records.
@@ -78,8 +88,9 @@ impl Pack {
         Self { las: las.clone(), tile_edge: None, with_fixed: true, class_of_kind }
     }
 
-    /// For the clouds that are asked for.
-    pub(crate) fn of_clouds(las: &LasSettings, settings: &Settings) -> Self {
+    /// For the tiles and clouds that are asked for.
+    #[must_use]
+    pub fn of_clouds(las: &LasSettings, settings: &Settings) -> Self {
         Self {
             tile_edge: settings.tiles.then_some(settings.tile_edge),
             with_fixed: settings.tiles || settings.fixed_cloud,

@@ -94,6 +94,11 @@ impl LasSettings {
         if self.with_color { 7 } else { 6 }
     }
 
+    /// How names of its files end.
+    pub(crate) fn ending(&self) -> &'static str {
+        if self.compress { "laz" } else { "las" }
+    }
+
     /// Length of a record, bytes.
     #[must_use]
     pub fn record_len(&self) -> usize {

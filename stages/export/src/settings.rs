@@ -1,5 +1,7 @@
 //! What can be tuned in writing; defaults in, no file knows another number.
 
+use crate::record::LasSettings;
+
 /// Tunables of this room.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -28,5 +30,13 @@ impl Default for Settings {
             compress: false,
             waiting_bytes: 64 << 20,
         }
+    }
+}
+
+impl Settings {
+    /// What records of tiles and clouds hold that are otherwise as `las` says.
+    #[must_use]
+    pub fn records(&self, las: &LasSettings) -> LasSettings {
+        LasSettings { compress: self.compress, with_bodies: self.bodies, ..las.clone() }
     }
 }

@@ -55,8 +55,10 @@ fn clouds(
         Aabb { min: [399_985.0, 4_999_988.0, 100.0], max: [400_015.0, 5_000_012.0, 103.0] };
     let las = LasSettings { with_color, ..LasSettings::new(Quantum::around(&around)) };
     let settings = Settings { compress, waiting_bytes, ..Settings::default() };
+    let las = settings.records(&las);
     let mut clouds = Clouds::create(out, &las, &settings).expect("create");
-    let pack = clouds.pack();
+    let mut tiles = Tiles::create(out, &las, &settings).expect("create").expect("asked");
+    let pack = Pack::of_clouds(&las, &settings);
     // Strips of a length that divides nothing.
     let all: Vec<usize> = (0..n).collect();
     for strip in all.chunks(1013) {
@@ -71,9 +73,13 @@ fn clouds(
             source_id: &strip.iter().map(|&i| source_id(i)).collect::<Vec<_>>(),
             ..PointColumns::default()
         };
-        clouds.add(&pack.pack(&points).expect("packs")).expect("adds");
+        let packed = pack.pack(&points).expect("packs");
+        tiles.add(&packed).expect("adds");
+        clouds.add(&packed).expect("adds");
     }
-    clouds.finish(&contract::OneByOne).expect("finish")
+    let tiles = tiles.finish(&contract::OneByOne).expect("finish");
+    let (robots, fixed) = clouds.finish().expect("finish");
+    Written { tiles, robots, fixed }
 }
 
 fn read(path: &Path) -> (las::Header, Vec<las::Point>) {
@@ -124,7 +130,7 @@ fn tiles_hold_every_point_once_whatever_the_memory_and_compression() {
         let names: Vec<_> =
             std::fs::read_dir(out.join("tiles")).expect("folder").flatten().collect();
         assert_eq!(names.len(), written.tiles.len(), "nothing half-written is left");
-        let (robots, fixed) = (written.robots.expect("asked"), written.fixed.expect("asked"));
+        let (robots, fixed) = (written.robots, written.fixed.expect("asked"));
         assert_eq!(robots.n_points + fixed.n_points, N as u64);
         assert_eq!(read(&robots.path).1.len(), N * 3 / 10);
     }
@@ -135,17 +141,17 @@ fn bodies_are_an_extra_field_behind_labels() {
     let out = folder("bodies");
     let las = LasSettings::new(Quantum { scale: [1e-3; 3], offset: [0.0; 3] });
     let settings = Settings { bodies: true, fixed_cloud: false, ..Settings::default() };
-    let mut clouds = Clouds::create(&out, &las, &settings).expect("create");
+    let las = settings.records(&las);
+    let mut tiles = Tiles::create(&out, &las, &settings).expect("create").expect("asked");
     let points = PointColumns {
         world: &[[1.0; 3], [2.0; 3]],
         labels: &[label(6), Label::FLOOR],
         body: &[70_000, 0],
         ..PointColumns::default()
     };
-    clouds.add(&clouds.pack().pack(&points).expect("packs")).expect("adds");
-    let written = clouds.finish(&contract::OneByOne).expect("finish");
-    assert!(written.fixed.is_none());
-    let (_, points) = read(&written.tiles[0].path);
+    tiles.add(&Pack::of_clouds(&las, &settings).pack(&points).expect("packs")).expect("adds");
+    let written = tiles.finish(&contract::OneByOne).expect("finish");
+    let (_, points) = read(&written[0].path);
     let mut extra: Vec<_> = points.iter().map(|p| p.extra_bytes.clone()).collect();
     extra.sort();
     assert_eq!(extra, [vec![0; 8], vec![1, 0, 1, 0, 0x70, 0x11, 1, 0]]);
