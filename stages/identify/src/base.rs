@@ -12,7 +12,7 @@ use robot::Model;
 use crate::first::First;
 use crate::graded::Stencil;
 use crate::sites::GUESS_STEP;
-use crate::trial::{Trial, base_link, best, coarse_yaw, prefix};
+use crate::trial::{QUOTA, Trial, base_link, best, coarse_yaw, prefix};
 use crate::volume::Sight;
 
 /// What is tuned.
@@ -160,16 +160,17 @@ impl<'a> BaseSearch<'a> {
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
         let cells = self.n_cells();
-        best(&mut trials, self.settings.keep_feet * cells, step * 0.9, yaw_step * 0.9);
+        best(&mut trials, (self.settings.keep_feet * cells, QUOTA), step * 0.9, yaw_step * 0.9);
         // Half of a cell has the height of a foot: what stands on it tells sooner than a closer look.
         let tolerance = self.coarse_tolerance();
         let mut trials = fan.fan(trials, |t| self.glance_at_first(&local[t.plane], t, tolerance));
-        best(&mut trials, self.settings.keep_coarse * cells, step * 0.9, yaw_step * 0.9);
+        best(&mut trials, (self.settings.keep_coarse * cells, QUOTA), step * 0.9, yaw_step * 0.9);
         self.drop_hopeless(&mut trials, SHORT.0);
-        let keep = self.settings.keep_middle * cells;
+        let keep = (self.settings.keep_middle * cells, QUOTA);
         let mut trials = self.finer(&local, &trials, (step / 2.0, yaw_step / 2.0, 2, keep), fan);
         self.drop_hopeless(&mut trials, SHORT.1);
-        let keep = self.settings.max_places * cells * self.settings.bases_per_place;
+        let per_place = self.settings.bases_per_place;
+        let keep = (self.settings.max_places * cells * per_place, per_place);
         let trials = self.finer(&local, &trials, (step / 4.0, yaw_step / 5.0, 1, keep), fan);
         self.group(planes, &local, &trials)
     }
@@ -326,7 +327,7 @@ impl<'a> BaseSearch<'a> {
         &self,
         planes: &[Plane],
         trials: &[Trial],
-        (step, yaw_step, rise, keep): (f64, f64, isize, usize),
+        (step, yaw_step, rise, (keep, quota)): (f64, f64, isize, (usize, usize)),
         fan: &impl Fan,
     ) -> Vec<Trial> {
         let tolerance = (step * 1.5).clamp(0.025, 0.08) as f32;
@@ -359,9 +360,9 @@ impl<'a> BaseSearch<'a> {
             near
         };
         let mut out: Vec<Trial> = fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
-        best(&mut out, keep * 2, step * 0.6, yaw_step * 0.6);
+        best(&mut out, (2 * keep, 2 * quota), step * 0.6, yaw_step * 0.6);
         let mut out = fan.fan(out, |t| self.with_first(&planes[t.plane], t, tolerance));
-        best(&mut out, keep, step * 0.6, yaw_step * 0.6);
+        best(&mut out, (keep, quota), step * 0.6, yaw_step * 0.6);
         out
     }
 

@@ -4,10 +4,12 @@ use geometry::Probe;
 use geometry::probe::HIDDEN_PRICE;
 use robot::Model;
 
-/// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw leaves room for others.
-const QUOTA: usize = 8;
-/// Radius of such a place in steps of the search.
-const PLACE_STEPS: f64 = 2.5;
+/// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw leaves room for others, which
+/// fewer scans see.
+pub(crate) const QUOTA: usize = 8;
+/// Radius of such a place, metres: the same at all levels, else a place would be many at the finest.
+const PLACE: f64 = 0.2;
+
 /// A base pose under test.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Trial {
@@ -58,8 +60,14 @@ pub(crate) fn prefix(model: &Model, link: usize, n: usize) -> (&[[f32; 3]], &[[f
     (&cad.points[..n], &cad.normals[..n])
 }
 
-/// Sorts best first and keeps up to `keep` that differ from every better one by a step in place or yaw.
-pub(crate) fn best(trials: &mut Vec<Trial>, keep: usize, step: f64, yaw_step: f64) {
+/// Sorts best first and keeps up to `keep`, up to `quota` of one place, that differ from every better one by a step in place or
+/// yaw.
+pub(crate) fn best(
+    trials: &mut Vec<Trial>,
+    (keep, quota): (usize, usize),
+    step: f64,
+    yaw_step: f64,
+) {
     trials.sort_by(|a, b| {
         b.score
             .total_cmp(&a.score)
@@ -75,9 +83,9 @@ pub(crate) fn best(trials: &mut Vec<Trial>, keep: usize, step: f64, yaw_step: f6
         }
         let here = |k: &&Trial| {
             let (dx, dy) = (k.x - trial.x, k.y - trial.y);
-            k.plane == trial.plane && dx * dx + dy * dy < (PLACE_STEPS * step).powi(2)
+            k.plane == trial.plane && dx * dx + dy * dy < PLACE * PLACE
         };
-        if kept.iter().filter(here).count() >= QUOTA {
+        if kept.iter().filter(here).count() >= quota {
             continue;
         }
         let twin = kept.iter().any(|k| {
