@@ -3,7 +3,7 @@
 
 use super::cases::{Case, CaseRow, Cases};
 use super::robots_of;
-use crate::compare::Agreement;
+use crate::compare::{Agreement, RobotAgreement};
 use crate::engine::Engine;
 use crate::job::{Job, Means};
 use crate::rescan::{Cell, Wish, rescan};
@@ -62,6 +62,8 @@ struct Row {
     unseen: bool,
     /// Changes that are none, in words.
     invented: Vec<String>,
+    /// Robots that were found, and all of the plant.
+    n_robots: [usize; 2],
     /// Largest error of a determined joint of the robot that moved, degrees: rescan, and a run of the new scans alone.
     joint: [f64; 2],
     /// F1 of moving points in the cell, likewise.
@@ -140,6 +142,9 @@ fn case(
         plan::run(&alone, engine)?;
         found.push(Agreement::of(&alone.out, &new.join("truth"))?);
     }
+    let robots = &found[0].robots;
+    let is_found = |r: &&RobotAgreement| r.found.as_ref().is_some_and(|f| f.is_right);
+    row.n_robots = [robots.iter().filter(is_found).count(), robots.len()];
     (row.joint, row.f1) = ([f64::NAN; 2], [f64::NAN; 2]);
     for (i, agreement) in found.iter().enumerate() {
         row.joint[i] = joint(agreement);
@@ -249,7 +254,7 @@ impl CaseRow for Row {
         }
         let yes = |b: bool| if b { "found" } else { "MISSED" };
         format!(
-            "{}: {:.1} M points and {:.1} M new: {:.1} s, again {:.1} s ({:.1} %); robot {}, pallet {}, barrel {}, {} invented {:?}; joint {}°, F1 {}, registration left {:.1} to {:.1} mm, {} of {} tiles the same",
+            "{}: {:.1} M points and {:.1} M new: {:.1} s, again {:.1} s ({:.1} %); robot {}, pallet {}, barrel {}, {} invented {:?}; joint {}°, F1 {}, registration left {:.1} to {:.1} mm, {} of {} tiles the same, {} of {} robots",
             self.seed,
             self.n_points as f64 * 1e-6,
             self.n_new as f64 * 1e-6,
@@ -267,6 +272,8 @@ impl CaseRow for Row {
             1e3 * self.left[1],
             self.n_same[0],
             self.n_same[1],
+            self.n_robots[0],
+            self.n_robots[1],
         )
     }
 }
@@ -282,13 +289,13 @@ fn alone([own, alone]: [f64; 2], digits: usize) -> String {
 
 fn table(rows: &[Row]) -> String {
     let mut out = String::from(
-        "| seed | points, new | whole s | again s | share | robot, pallet, barrel | invented | joint ° | F1 | tiles the same |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        "| seed | points, new | whole s | again s | share | robot, pallet, barrel | invented | joint ° | F1 | tiles the same | robots |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for row in rows.iter().filter(|r| r.failed.is_none()) {
         let n = [row.robot, row.pallet, row.barrel].iter().filter(|b| **b).count();
         let _ = writeln!(
             out,
-            "| {} | {:.1} M, {:.1} M | {:.1} | {:.1} | {:.1} % | {n} of 3 | {} | {} | {} | {} of {} |",
+            "| {} | {:.1} M, {:.1} M | {:.1} | {:.1} | {:.1} % | {n} of 3 | {} | {} | {} | {} of {} | {} of {} |",
             row.seed,
             row.n_points as f64 * 1e-6,
             row.n_new as f64 * 1e-6,
@@ -300,6 +307,8 @@ fn table(rows: &[Row]) -> String {
             alone(row.f1, 4),
             row.n_same[0],
             row.n_same[1],
+            row.n_robots[0],
+            row.n_robots[1],
         );
     }
     for row in rows.iter().filter(|r| r.failed.is_some() || !r.invented.is_empty()) {

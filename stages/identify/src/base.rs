@@ -67,6 +67,8 @@ const COARSE_REACH: f64 = 1.3;
 const SHORT: (f64, f64) = (0.4, 0.6);
 /// Base poses of a place that are asked whether they look like the robot.
 const N_LIKE: usize = 4;
+/// Steps that a pose may go beyond its neighbours while it gets better.
+const CLIMB: usize = 3;
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
@@ -331,30 +333,42 @@ impl<'a> BaseSearch<'a> {
         fan: &impl Fan,
     ) -> Vec<Trial> {
         let tolerance = (step * 1.5).clamp(0.025, 0.08) as f32;
-        let around = |trial: Trial| -> Vec<Trial> {
-            let look = |t: &Trial, n: usize| {
-                let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
-                self.sight.glance(prefix(self.model, self.base, n), &pose, tolerance)
-            };
-            let levels = if self.is_guess { -1..2 } else { 0..1 };
-            let all = levels.flat_map(|level| (0..27_i32).map(move |n| (level * rise, n)));
-            let on_plane = |(level, n): (isize, i32)| {
+        let look = |t: &Trial, n: usize| {
+            let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
+            self.sight.glance(prefix(self.model, self.base, n), &pose, tolerance)
+        };
+        let levels = if self.is_guess { -1..2 } else { 0..1 };
+        let neighbours = |trial: &Trial| -> Vec<Trial> {
+            let all = levels.clone().flat_map(|level| (0..27_i32).map(move |n| (level * rise, n)));
+            let near = all.filter_map(|(level, n)| {
                 let plane = trial.plane.checked_add_signed(level).filter(|p| *p < planes.len())?;
-                Some((plane, n))
-            };
-            let near = all.filter_map(on_plane).map(|(plane, n)| {
                 let (i, j, k) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-                let mut next = Trial { plane, ..trial };
+                let mut next = Trial { plane, ..*trial };
                 next.x += f64::from(i) * step;
                 next.y += f64::from(j) * step;
                 next.yaw += f64::from(k) * yaw_step;
                 next.score = look(&next, self.settings.n_fine / 4);
-                next
+                Some(next)
             });
-            let mut near: Vec<Trial> = near.collect();
+            near.collect()
+        };
+        let around = |trial: Trial| -> Vec<Trial> {
+            let mut near = neighbours(&trial);
+            let top = |near: &[Trial]| {
+                near.iter().copied().max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(trial)
+            };
+            let mut best = top(&near);
+            // The coarse level may have taken what stands beside the place for it: go where it gets better.
+            for _ in 0..CLIMB {
+                let farther = neighbours(&best);
+                let next = top(&farther);
+                if next.score <= best.score {
+                    break;
+                }
+                (near, best) = (farther, next);
+            }
             // A few samples tell most neighbours to be worse.
-            let top = near.iter().map(|t| t.score).fold(f64::NEG_INFINITY, f64::max);
-            near.retain(|t| t.score >= top - LAG);
+            near.retain(|t| t.score >= best.score - LAG);
             near.iter_mut()
                 .for_each(|t| t.score = self.joined(look(t, self.settings.n_fine), t.first));
             near

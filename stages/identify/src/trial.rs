@@ -6,7 +6,7 @@ use robot::Model;
 
 /// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw leaves room for others, which
 /// fewer scans see.
-pub(crate) const QUOTA: usize = 8;
+pub(crate) const QUOTA: usize = 16;
 /// Radius of such a place, metres: the same at all levels, else a place would be many at the finest.
 const PLACE: f64 = 0.2;
 

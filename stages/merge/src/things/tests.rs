@@ -148,3 +148,21 @@ fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
     assert!((shift[0] - 4.0).abs() < 0.06 && shift[1].abs() < 0.06, "{shift:?}");
     assert!(found[1].now.expect("bounds").contains([5.1, 2.5, 0.2]));
 }
+
+/// A sheet that stands upright, of which so many of ten points are pierced.
+fn sheet(tally: &mut Tallying, n_pierced: i32) {
+    for (i, j) in (0..40).flat_map(|i| (0..20).map(move |j| (i, j))) {
+        let is_pierced = (i + j) % 10 < n_pierced;
+        let at = [1.01, 1.0 + 0.02 * f64::from(i), 1.0 + 0.02 * f64::from(j)];
+        tally.add(at, 4e-4, Seen::Nothing { is_pierced });
+    }
+}
+
+#[test]
+fn a_sheet_that_beams_go_through_is_of_a_fence() {
+    for (n_pierced, n_things) in [(0, 1), (1, 0)] {
+        let mut then = Tallying::default();
+        sheet(&mut then, n_pierced);
+        assert_eq!(found(then, Tallying::default()).len(), n_things, "{n_pierced} of 10");
+    }
+}
