@@ -1,5 +1,5 @@
 //! A strip in; its labels, its records for the clouds, and what pictures and spaces take of it, out: the map of the second
-//! pass, so that the one thread that writes has only to copy.
+//! pass, so that those that write have only to copy.
 
 use crate::bodies::Bodies;
 use crate::spaces::{Spot, spots};

@@ -9,6 +9,7 @@ use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
+use crate::climb::Grid;
 use crate::first::First;
 use crate::graded::Stencil;
 use crate::sites::GUESS_STEP;
@@ -67,15 +68,10 @@ const COARSE_REACH: f64 = 1.3;
 const SHORT: (f64, f64) = (0.4, 0.6);
 /// Base poses of a place that are asked whether they look like the robot.
 const N_LIKE: usize = 4;
-/// Steps that a pose may go beyond its neighbours while it gets better.
-const CLIMB: usize = 3;
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
 const MAX_CELLS: usize = 6;
-
-/// Mean score on a quarter of the samples by which a pose may lag behind the best and still be looked at closely.
-pub(crate) const LAG: f64 = 0.15;
 
 /// The search for one model's base in one region.
 #[derive(Debug)]
@@ -94,7 +90,7 @@ pub struct BaseSearch<'a> {
     /// The first link that moves and has a surface.
     pub(crate) first: Option<First>,
     /// Whether the planes are guesses, one close above the other.
-    is_guess: bool,
+    pub(crate) is_guess: bool,
     /// Lowest mean score of base and first link that counts.
     min_score: f64,
 }
@@ -169,11 +165,13 @@ impl<'a> BaseSearch<'a> {
         best(&mut trials, (self.settings.keep_coarse * cells, QUOTA), step * 0.9, yaw_step * 0.9);
         self.drop_hopeless(&mut trials, SHORT.0);
         let keep = (self.settings.keep_middle * cells, QUOTA);
-        let mut trials = self.finer(&local, &trials, (step / 2.0, yaw_step / 2.0, 2, keep), fan);
+        let grid = Grid { step: step / 2.0, yaw: yaw_step / 2.0, rise: 2 };
+        let mut trials = self.finer(&local, &trials, (grid, keep), fan);
         self.drop_hopeless(&mut trials, SHORT.1);
         let per_place = self.settings.bases_per_place;
         let keep = (self.settings.max_places * cells * per_place, per_place);
-        let trials = self.finer(&local, &trials, (step / 4.0, yaw_step / 5.0, 1, keep), fan);
+        let grid = Grid { step: step / 4.0, yaw: yaw_step / 5.0, rise: 1 };
+        let trials = self.finer(&local, &trials, (grid, keep), fan);
         self.group(planes, &local, &trials)
     }
 
@@ -320,63 +318,6 @@ impl<'a> BaseSearch<'a> {
                 }
             }
         }
-        out
-    }
-
-    /// Tries the neighbours of each trial on a grid of half the spacing, with base and first link; of guessed heights those
-    /// `rise` planes up and down.
-    fn finer(
-        &self,
-        planes: &[Plane],
-        trials: &[Trial],
-        (step, yaw_step, rise, (keep, quota)): (f64, f64, isize, (usize, usize)),
-        fan: &impl Fan,
-    ) -> Vec<Trial> {
-        let tolerance = (step * 1.5).clamp(0.025, 0.08) as f32;
-        let look = |t: &Trial, n: usize| {
-            let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
-            self.sight.glance(prefix(self.model, self.base, n), &pose, tolerance)
-        };
-        let levels = if self.is_guess { -1..2 } else { 0..1 };
-        let neighbours = |trial: &Trial| -> Vec<Trial> {
-            let all = levels.clone().flat_map(|level| (0..27_i32).map(move |n| (level * rise, n)));
-            let near = all.filter_map(|(level, n)| {
-                let plane = trial.plane.checked_add_signed(level).filter(|p| *p < planes.len())?;
-                let (i, j, k) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-                let mut next = Trial { plane, ..*trial };
-                next.x += f64::from(i) * step;
-                next.y += f64::from(j) * step;
-                next.yaw += f64::from(k) * yaw_step;
-                next.score = look(&next, self.settings.n_fine / 4);
-                Some(next)
-            });
-            near.collect()
-        };
-        let around = |trial: Trial| -> Vec<Trial> {
-            let mut near = neighbours(&trial);
-            let top = |near: &[Trial]| {
-                near.iter().copied().max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(trial)
-            };
-            let mut best = top(&near);
-            // The coarse level may have taken what stands beside the place for it: go where it gets better.
-            for _ in 0..CLIMB {
-                let farther = neighbours(&best);
-                let next = top(&farther);
-                if next.score <= best.score {
-                    break;
-                }
-                (near, best) = (farther, next);
-            }
-            // A few samples tell most neighbours to be worse.
-            near.retain(|t| t.score >= best.score - LAG);
-            near.iter_mut()
-                .for_each(|t| t.score = self.joined(look(t, self.settings.n_fine), t.first));
-            near
-        };
-        let mut out: Vec<Trial> = fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
-        best(&mut out, (2 * keep, 2 * quota), step * 0.6, yaw_step * 0.6);
-        let mut out = fan.fan(out, |t| self.with_first(&planes[t.plane], t, tolerance));
-        best(&mut out, (keep, quota), step * 0.6, yaw_step * 0.6);
         out
     }
 

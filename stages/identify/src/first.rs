@@ -4,7 +4,8 @@
 use geometry::{Plane, Pose, Probe};
 use robot::Model;
 
-use crate::base::{BaseSearch, LAG};
+use crate::base::BaseSearch;
+use crate::climb::LAG;
 use crate::trial::{Trial, first_moving, of_judged, prefix};
 
 /// Tolerances at which base and first link are judged in the end, metres: half a step of the finest grid.

@@ -5,6 +5,7 @@
 
 mod base;
 mod bodies;
+mod climb;
 mod first;
 mod graded;
 mod sites;
