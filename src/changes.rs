@@ -62,6 +62,8 @@ pub struct JointChange {
 pub struct RobotChange {
     /// Its id in the first result.
     pub then: Option<String>,
+    /// The first result has it not, though its scans show it.
+    pub was_missed: bool,
     /// Its id in the second.
     pub now: Option<String>,
     /// Model now, or then if it is gone.
@@ -115,8 +117,17 @@ pub fn changes(then: &ResultFile, now: &ResultFile) -> Vec<RobotChange> {
 
 /// Whether a robot stands otherwise, or is known better.
 pub(crate) fn stands_otherwise(then: &Fit, now: &Fit) -> bool {
-    let entry = |fit: &Fit| RobotEntry::new("", fit, &[], None);
-    now.verdict > then.verdict || compared(&entry(then), &entry(now)).change != Change::Same
+    now.verdict > then.verdict || of_fits("", then, now).change != Change::Same
+}
+
+/// A robot that the first result missed, though its scans show how it stood.
+pub(crate) fn of_missed(id: &str, then: &Fit, now: &Fit) -> RobotChange {
+    RobotChange { then: None, was_missed: true, ..of_fits(id, then, now) }
+}
+
+fn of_fits(id: &str, then: &Fit, now: &Fit) -> RobotChange {
+    let entry = |fit: &Fit| RobotEntry::new(id, fit, &[], None);
+    compared(&entry(then), &entry(now))
 }
 
 impl Change {
@@ -138,6 +149,7 @@ fn alone(robot: &RobotEntry, change: Change) -> RobotChange {
     let is_gone = change == Change::Gone;
     RobotChange {
         then: id.clone().filter(|_| is_gone),
+        was_missed: false,
         now: id.filter(|_| !is_gone),
         model: robot.model.clone(),
         change,
@@ -153,6 +165,7 @@ fn compared(a: &RobotEntry, b: &RobotEntry) -> RobotChange {
     let (base_shift, base_turn) = (shift(a, b), turn(a, b));
     let mut out = RobotChange {
         then: Some(a.id.clone()),
+        was_missed: false,
         now: Some(b.id.clone()),
         model: b.model.clone(),
         change: Change::Same,
@@ -252,6 +265,8 @@ pub fn words(changes: &[RobotChange]) -> String {
             Change::Gone => "is gone".into(),
         };
         let (then, now) = (id(&robot.then), id(&robot.now));
+        let what =
+            if robot.was_missed { format!("{what} (the earlier result missed it)") } else { what };
         let _ = writeln!(text, "{then} -> {now} {}: {what}", robot.model);
         if robot.change == Change::Moved {
             let [x, y, z] = robot.base_shift.unwrap_or_default().map(|v| v * 1e3);

@@ -3,6 +3,7 @@
 
 mod base;
 mod fate;
+mod newcomers;
 mod past;
 mod present;
 mod robots;

@@ -4,6 +4,7 @@
 use super::base::Base;
 use super::fate::Fates;
 use crate::engine::{Engine, Task};
+use crate::labelling::Near;
 use crate::report::tiles;
 use crate::store::Store;
 use contract::{Label, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
@@ -44,6 +45,8 @@ pub(crate) struct Looked {
     through: Vec<(u64, [i32; 3])>,
     /// Places that belong to robots.
     robots: Vec<(u64, i16)>,
+    /// Voxels of robots that the earlier result missed.
+    missed: BTreeSet<[i32; 3]>,
     tally: Tally,
 }
 
@@ -76,11 +79,12 @@ impl<'a> Past<'a> {
     pub(crate) fn look(
         &self,
         [watch, own]: [&Watch<'_>; 2],
+        missed: Option<&Near>,
         engine: &Engine,
     ) -> Result<(Tally, Vec<Looked>, Fates)> {
         let (mut tally, mut all) = (Tally::default(), Vec::new());
         let fates = Fates::of(&self.cell);
-        let look = Look { past: self, watch, own, fates: &fates };
+        let look = Look { past: self, watch, own, missed, fates: &fates };
         engine.pass(self.task("compare"), self.store.tiles_of(self.tiles.clone()), |f| {
             f.map(&look).for_each(|mut looked| {
                 tally.join(std::mem::take(&mut looked.tally));
@@ -109,6 +113,11 @@ impl<'a> Past<'a> {
             left.for_each(|(place, _)| own.add(*place));
         }
         all.iter().map(Places::sorted).collect()
+    }
+
+    /// Voxels of robots that the earlier result missed: what the new scans see through of them is gone.
+    pub(crate) fn missed(looked: &[Looked]) -> impl Iterator<Item = &[i32; 3]> {
+        looked.iter().flat_map(|tile| &tile.missed)
     }
 
     /// How many of one mask were superseded before.
@@ -243,6 +252,8 @@ struct Look<'a> {
     watch: &'a Watch<'a>,
     /// Of the earlier scans.
     own: &'a Watch<'a>,
+    /// Labels of robots that the earlier result missed.
+    missed: Option<&'a Near>,
     fates: &'a Fates,
 }
 
@@ -278,6 +289,12 @@ impl Map for Look<'_> {
                 Sight::Onto => out.onto.push(place),
                 Sight::Through => out.through.push((place, voxel)),
                 Sight::Close | Sight::Hidden | Sight::Unseen => {}
+            }
+            let missed = self.missed.and_then(|near| near.label(mask, place));
+            if missed.is_some_and(|label| label.moves()) {
+                out.missed.insert(voxel);
+                tallying.add_robot(world);
+                continue;
             }
             match label.kind {
                 PointKind::Fixed => {

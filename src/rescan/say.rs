@@ -2,7 +2,7 @@
 //! people, out.
 
 use super::write::Written;
-use crate::changes::{Change, RobotChange, changes, words};
+use crate::changes::{Change, RobotChange, changes, of_missed, words};
 use crate::job::Outcome;
 use crate::labelling::Done;
 use crate::report::{id, input_entry, robot_entry};
@@ -147,6 +147,12 @@ impl Said<'_, '_> {
         let looked: Vec<String> = self.found.robots.compared().into_iter().map(id).collect();
         let mut all = changes(&self.found.base.result, result);
         all.retain(|c| c.then.iter().chain(&c.now).any(|id| looked.contains(id)));
+        for (i, stood) in &self.found.robots.missed {
+            let (own, id) = (&self.found.fits[*i], id(*i));
+            all.iter_mut()
+                .filter(|c| c.now.as_ref() == Some(&id))
+                .for_each(|c| *c = of_missed(&id, stood, own));
+        }
         // Where joints are left open, others alone do not say that a robot stands as it stood when beams went through it.
         let contradicted: Vec<String> =
             self.found.robots.contradicted.iter().copied().map(id).collect();

@@ -19,7 +19,7 @@ use contract::{
 use geometry::{Aabb, Pose};
 use ingest::Sources;
 use lattice::ViewSettings;
-use merge::{Registration, Tally, Thing, ThingChange, Unseen, Watch, things};
+use merge::{Registration, Tally, Thing, Unseen, Watch, things};
 use robot::Model;
 use std::collections::BTreeSet;
 
@@ -32,25 +32,22 @@ const CELL_SPACING: f64 = 0.025;
 const LOOK_CELL: f64 = 0.3 / 400.0;
 /// Earlier scans that are asked what was there: those with most points in the cell.
 const MAX_ASKED: usize = 6;
-/// Smallest height and largest edge of a new thing that may be a robot, metres.
-const ROBOT_LIKE: [f64; 2] = [0.4, 0.5];
-/// Room about such a thing, metres.
-const ABOUT: f64 = 0.3;
-
 /// All that is asked while a cell is compared.
 pub(crate) struct Session<'a> {
     pub(crate) sources: &'a Sources,
     pub(crate) past: &'a Past<'a>,
     pub(crate) store: &'a Store,
     pub(crate) ground: Ground,
-    floor: &'a Floor,
+    pub(crate) floor: &'a Floor,
     pub(crate) clusters: Vec<Cluster>,
     pub(crate) settings: &'a Settings,
     pub(crate) cell: Region,
-    shelf: &'a Shelf<'a>,
+    pub(crate) shelf: &'a Shelf<'a>,
+    /// What the earlier scans cover, as far as they are asked.
+    pub(crate) old_ground: Ground,
     /// What the new scans and the earlier ones saw of the cell.
-    new_views: Vec<View>,
-    old_views: Vec<View>,
+    pub(crate) new_views: Vec<View>,
+    pub(crate) old_views: Vec<View>,
 }
 
 /// Robots of the plant after the comparison.
@@ -69,6 +66,8 @@ pub(crate) struct Robots {
     pub(crate) as_it_stood: Vec<usize>,
     /// Bounds of robots as they stood that do no longer stand so.
     pub(crate) left: Vec<Aabb>,
+    /// Robots that the earlier result missed, though its scans show them; and how they stood then.
+    pub(crate) missed: Vec<(usize, Fit)>,
 }
 
 impl Robots {
@@ -184,6 +183,7 @@ impl<'a> Session<'a> {
             settings,
             cell,
             shelf,
+            old_ground,
             new_views,
             old_views,
         })
@@ -209,11 +209,7 @@ impl<'a> Session<'a> {
         let mut labels = self.labels((fits, models), &robots, engine)?;
         let appeared = self.new_robots(&labels, (fits, models), engine)?;
         if !appeared.is_empty() {
-            for fit in appeared {
-                robots.in_cell.push(fits.len());
-                robots.changed.push(fits.len());
-                fits.push(fit);
-            }
+            self.join(appeared, (fits, models), &mut robots, engine)?;
             labels = self.labels((fits, models), &robots, engine)?;
         }
         Ok((robots, labels))
@@ -289,7 +285,9 @@ impl<'a> Session<'a> {
         let labelling = self.labelling(&own, models);
         let near = labelling.near_robots(self.store, engine)?;
         let (watch, old_watch) = (self.watch(), Watch::new(&self.cell, &self.old_views));
-        let (then, looked, fates) = self.past.look([&watch, &old_watch], engine)?;
+        let missed = self.missed((fits, models), robots, engine)?;
+        let (then, looked, fates) =
+            self.past.look([&watch, &old_watch], missed.as_ref(), engine)?;
         let present = Present {
             scans: &self.sources.scans,
             near: &near,
@@ -329,41 +327,6 @@ impl<'a> Session<'a> {
         Labelling::new(fits, models, self.sources, ground, self.settings)
     }
 
-    /// Robots among the things that appeared.
-    fn new_robots(
-        &self,
-        labels: &Labels,
-        (fits, models): (&[Fit], &mut Vec<Model>),
-        engine: &Engine,
-    ) -> Result<Vec<Fit>> {
-        let like =
-            |size: [f64; 3]| size[2] >= ROBOT_LIKE[0] && size.iter().any(|s| *s >= ROBOT_LIKE[1]);
-        // What stood elsewhere before, in the same shape, is none.
-        let new = labels.things.iter().filter(|thing| thing.change == ThingChange::Appeared);
-        let bounds = new.filter_map(|thing| thing.now);
-        let regions: Vec<Region> = bounds
-            .filter(|bounds| like(bounds.size()))
-            .map(|bounds| region(&bounds.center(), &bounds.grown(ABOUT)))
-            .collect();
-        if regions.is_empty() {
-            return Ok(Vec::new());
-        }
-        // A new one may hang on a wall.
-        let walls = ground(self.floor, true, (self.sources, self.store), self.settings, engine)?;
-        let (scans, settings) = (&self.sources.scans, self.settings);
-        let search = Search::new(self.shelf, scans, self.store, &walls, settings);
-        let found = engine.fan_out("search", regions.clone(), |region| search.region(&region))?;
-        let found = found.into_iter().flatten().collect();
-        let is_new = |fit: &Fit| {
-            let at = fit.world_from_base.translation.vector;
-            let known = fits.iter().filter(|f| f.verdict != Verdict::Refused);
-            known.into_iter().all(|f| (f.world_from_base.translation.vector - at).norm() > 0.5)
-        };
-        let mut chosen = fit::choose(found, models);
-        chosen.retain(is_new);
-        crate::tools::dress(chosen, models, (&search, &regions), engine)
-    }
-
     /// By scan: what takes back how far it was off, where its file states coordinates of the world.
     pub(crate) fn moved(&self, registered: &[Option<Registration>]) -> Vec<Option<Pose>> {
         let first = self.past.scans.len();
@@ -374,7 +337,7 @@ impl<'a> Session<'a> {
 
 /// What the new scans cover and what they found occupied; with their walls where those are asked for, and all of their
 /// planes where the plant has no floor.
-fn ground(
+pub(crate) fn ground(
     floor: &Floor,
     with_walls: bool,
     (sources, store): (&Sources, &Store),

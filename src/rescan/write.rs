@@ -2,6 +2,7 @@
 //! result that joins them, out.
 
 use super::base::Base;
+use super::past::Past;
 use super::say::{self, Said};
 use super::session::{Labels, Robots, Session};
 use crate::engine::Engine;
@@ -107,7 +108,7 @@ impl Written<'_, '_> {
         labelling.write((&self.labels.near, spaces), &scope, (next, scratch), engine)
     }
 
-    /// Voxels of things that are gone, and those next to them.
+    /// Voxels of things that are gone and of robots that the earlier result missed, and those next to them.
     fn gone(&self) -> BTreeSet<[i32; 3]> {
         let things = self.labels.things.iter().filter(|t| t.change != ThingChange::Appeared);
         let near = |c: &[i32; 3]| {
@@ -115,7 +116,8 @@ impl Written<'_, '_> {
             let steps = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
             steps.map(|[i, j, k]| [x + i, y + j, z + k]).collect::<Vec<_>>()
         };
-        things.flat_map(|t| &t.gone).flat_map(near).collect()
+        let missed = Past::missed(&self.labels.looked);
+        things.flat_map(|t| &t.gone).chain(missed).flat_map(near).collect()
     }
 
     fn stands_otherwise(&self, robot: i16) -> bool {
