@@ -113,10 +113,15 @@ pub(crate) fn look(
         && said.through <= CONTRADICTED
         && let Some(fit) = search.again(&near, before, model)?
     {
-        let is_same = !crate::changes::stands_otherwise(before, &fit);
-        if fit.verdict == Verdict::Trusted || is_same && fit.verdict != Verdict::Refused {
-            let verdict = if is_same { fit.verdict.max(before.verdict) } else { fit.verdict };
-            return Ok((Now::Found(Box::new(Fit { verdict, ..fit })), None));
+        // What is known of how it stood counts for how it stands, but only where all of that is seen again.
+        let sure = Fit { verdict: fit.verdict.max(before.verdict), ..fit.clone() };
+        let is_same = !crate::changes::stands_otherwise(before, &sure) && knows(&fit, before);
+        match fit.verdict {
+            Verdict::Trusted if !is_same => return Ok((Now::Found(Box::new(fit)), None)),
+            Verdict::Trusted | Verdict::Doubtful if is_same => {
+                return Ok((Now::Found(Box::new(sure)), None));
+            }
+            _ => {}
         }
     }
     if said.through < STANDS && before.verdict != Verdict::Refused {
@@ -128,6 +133,12 @@ pub(crate) fn look(
         None if said.through > CONTRADICTED => (Now::Lost, None),
         None => (Now::Open, None),
     })
+}
+
+/// Whether the points of one fit determine all joints that those of another do.
+fn knows(fit: &Fit, other: &Fit) -> bool {
+    let mut joints = fit.joints.iter().zip(&other.joints);
+    joints.all(|(own, other)| own.determined || !other.determined)
 }
 
 /// A robot that does not stand as it stood, searched anew at its place; with the model of its own, where it has one.

@@ -161,6 +161,12 @@ impl Said<'_, '_> {
         for robot in open.filter(|c| c.now.iter().any(|id| contradicted.contains(id))) {
             robot.change = Change::Moved;
         }
+        let lost: Vec<String> = self.found.robots.lost.iter().copied().map(id).collect();
+        for robot in all.iter_mut().filter(|c| c.now.iter().any(|id| lost.contains(id))) {
+            robot.change = Change::Moved;
+            let joints = robot.joints.drain(..).map(|joint| joint.joint);
+            robot.not_compared.splice(0..0, joints);
+        }
         all
     }
 

@@ -59,6 +59,8 @@ pub(crate) struct Robots {
     pub(crate) changed: Vec<usize>,
     /// Those of them of which the new scans contradict how they stood.
     pub(crate) contradicted: Vec<usize>,
+    /// Those of which the new scans contradict that and show no other posture.
+    pub(crate) lost: Vec<usize>,
     /// Are gone.
     pub(crate) gone: Vec<usize>,
     /// The new scans saw too little of them; and those of them that label points by how they stood.
@@ -264,6 +266,7 @@ impl<'a> Session<'a> {
                 // Labels by a posture that is none could take a fixed thing for a link: it gives none.
                 Now::Lost => {
                     out.changed.push(i);
+                    out.lost.push(i);
                     out.left.push(bounds);
                     fits[i].verdict = Verdict::Doubtful;
                     let why = "the new scans contradict this posture and show no other";

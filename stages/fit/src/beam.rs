@@ -3,6 +3,7 @@
 
 use contract::Fan;
 use geometry::Pose;
+use geometry::probe::HIDDEN_PRICE;
 
 use crate::{Prepared, Scene, Settings};
 
@@ -28,6 +29,9 @@ pub(crate) struct Beam<'a> {
     pub(crate) tolerance: f64,
 }
 
+/// Mean score of the links placed so far down to which a search goes on: half of what it is where no beam reached any of them, as
+/// a bench or the arm itself may hide a foot.
+const MOST_HIDDEN: f64 = 0.5 * HIDDEN_PRICE as f64;
 /// Tolerance where what carries the searched links is fitted already, metres (fit.md §4e).
 const FITTED: f64 = 0.02;
 
@@ -71,8 +75,8 @@ impl Beam<'_> {
         first: usize,
         fan: &impl Fan,
     ) -> Vec<Hypothesis> {
-        let tolerance = self.tolerance as f32;
-        for free in first..self.prepared.placed_by.len() {
+        let (tolerance, n) = (self.tolerance as f32, self.prepared.placed_by.len());
+        for free in first..n {
             if self.prepared.placed_by[free].is_empty() {
                 continue;
             }
@@ -87,12 +91,19 @@ impl Beam<'_> {
             next.extend(rest);
             sort(&mut next);
             // Not one hypothesis explains more than the beams contradict: no robot of this model stands here.
-            if next.first().is_none_or(|h| h.score <= 0.0) {
+            let least = if free + 1 < n { -MOST_HIDDEN * self.weight(free) } else { 0.0 };
+            if next.first().is_none_or(|h| h.score <= least) {
                 return Vec::new();
             }
             beam = next;
         }
         beam
+    }
+
+    /// Weight of all links that the joints up to one place.
+    fn weight(&self, upto: usize) -> f64 {
+        let placed = self.prepared.placed_by[..=upto].iter().flatten();
+        self.prepared.fixed.iter().chain(placed).map(|&l| self.prepared.links[l].weight).sum()
     }
 
     /// Weighted score of some links.
