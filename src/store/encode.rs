@@ -58,20 +58,33 @@ impl Map for Encode {
     type Out = Encoded;
     type Scratch = PixelOrder;
 
-    fn apply(&self, part: Part, order: &mut PixelOrder) -> Result<Encoded> {
-        let mut records = part.records;
+    fn apply(&self, mut part: Part, order: &mut PixelOrder) -> Result<Encoded> {
+        Ok(self.encode(&mut part, order, Vec::new()))
+    }
+}
+
+impl Encode {
+    /// The tile of some points, its bytes in memory that was used before.
+    pub(super) fn encode(
+        &self,
+        part: &mut Part,
+        order: &mut PixelOrder,
+        mut bytes: Vec<u8>,
+    ) -> Encoded {
+        let records = &mut part.records;
         if !records.is_sorted_by_key(Record::place) {
             records.sort_unstable_by_key(Record::place);
         }
-        let bounds = self.bounds(part.at.scan.0, &records);
+        let bounds = self.bounds(part.at.scan.0, records);
         let first_place = records.first().map_or(0, Record::place);
         let n = records.len();
         let [xyz_at, place_at, pixel_at, end] = layout(n as u64).map(|v| v as usize);
-        let mut bytes = vec![0; end];
+        bytes.clear();
+        bytes.resize(end, 0);
         let (xyz, rest) = bytes[xyz_at..].split_at_mut(place_at);
         let (place, pixel) = rest.split_at_mut(pixel_at - place_at);
-        order.begin(&records);
-        for r in &records {
+        order.begin(records);
+        for r in &*records {
             let at = order.next(r);
             xyz[12 * at..12 * at + 12].copy_from_slice(bytemuck::bytes_of(&r.xyz));
             let less = (r.place() - first_place) as u32;
@@ -86,7 +99,7 @@ impl Map for Encode {
             offset: 0,
             checksum: crc32c::crc32c(&bytes),
         };
-        Ok(Encoded { entry, bytes })
+        Encoded { entry, bytes }
     }
 }
 

@@ -30,12 +30,11 @@ impl TileFile {
     }
 
     /// Appends a tile; returns its entry.
-    pub(super) fn append(&mut self, encoded: Encoded) -> Result<TileEntry> {
-        let Encoded { mut entry, bytes } = encoded;
-        entry.offset = self.len;
-        self.len += bytes.len() as u64;
+    pub(super) fn append(&mut self, encoded: &Encoded) -> Result<TileEntry> {
+        let entry = TileEntry { offset: self.len, ..encoded.entry };
+        self.len += encoded.bytes.len() as u64;
         self.file
-            .write_all(&bytes)
+            .write_all(&encoded.bytes)
             .map_err(|e| Error::of_file("a tile cannot be written", &self.path, e))?;
         Ok(entry)
     }

@@ -10,6 +10,7 @@ mod record;
 mod scatter;
 mod sink;
 mod spill;
+mod straight;
 #[cfg(test)]
 mod tests;
 mod writer;
@@ -20,6 +21,7 @@ use geometry::Aabb;
 use map::FileMap;
 use std::ops::Range;
 use std::path::Path;
+use straight::Straight;
 
 pub use catalogue::TileEntry;
 pub use scatter::{Scatter, Scattered};
@@ -35,8 +37,18 @@ const TILES: &str = "tiles.bin";
 /// A store that is whole: tiles by place, in the order of [`TileAt`], whatever way they came in.
 pub struct Store {
     entries: Vec<TileEntry>,
-    /// Its folders, each with the place of its first entry.
-    parts: Vec<(usize, FileMap)>,
+    /// Its folders.
+    parts: Vec<Part>,
+}
+
+/// One folder.
+struct Part {
+    /// Place of its first entry.
+    first: usize,
+    /// Its tiles, for those that are asked for again and again …
+    map: FileMap,
+    /// … and to read all of them once.
+    straight: Straight,
 }
 
 impl Store {
@@ -56,7 +68,8 @@ impl Store {
         if bytes.len() as u64 != n_tile_bytes || !bytes.starts_with(&catalogue::tiles_header()) {
             return Err(broken("the tiles are not those of the catalogue").at(path.display()));
         }
-        Ok(Self { entries, parts: vec![(0, map)] })
+        let straight = Straight::open(&path)?;
+        Ok(Self { entries, parts: vec![Part { first: 0, map, straight }] })
     }
 
     /// Stores of scans that follow one another, as one.
@@ -68,7 +81,8 @@ impl Store {
             debug_assert!(
                 all.entries.last().zip(store.entries.first()).is_none_or(|(a, b)| a.at < b.at)
             );
-            all.parts.extend(store.parts.into_iter().map(|(at, map)| (start + at, map)));
+            let parts = store.parts.into_iter();
+            all.parts.extend(parts.map(|part| Part { first: start + part.first, ..part }));
             all.entries.extend(store.entries);
         }
         all
@@ -92,26 +106,34 @@ impl Store {
     /// # Panics
     /// Where there is no such entry.
     pub fn tile(&self, i: usize) -> Result<Tile> {
+        let (part, Range { start, end }) = self.place(i);
+        let tile = self.checked(i, &part.map.bytes()[start..end]);
+        part.map.has_read(end - start);
+        tile
+    }
+
+    /// A tile from its bytes.
+    fn checked(&self, i: usize, bytes: &[u8]) -> Result<Tile> {
         let entry = &self.entries[i];
-        let (start, n) = (entry.offset as usize, encode::layout(entry.n_points)[3] as usize);
-        let part = self.parts.partition_point(|part| part.0 <= i);
-        let map = &self.parts[part - 1].1;
-        let bytes = &map.bytes()[start..start + n];
         if crc32c::crc32c(bytes) != entry.checksum {
             let at = entry.at;
             return Err(broken("the tile is damaged: its checksum is not what it should be")
                 .at(format!("store, scan {}, tile {} {}", at.scan.0, at.row, at.col)));
         }
-        let tile = encode::decode(entry, bytes);
-        map.has_read(n);
-        Ok(tile)
+        Ok(encode::decode(entry, bytes))
+    }
+
+    /// Where the bytes of a tile lie.
+    fn place(&self, i: usize) -> (&Part, Range<usize>) {
+        let entry = &self.entries[i];
+        let part = self.parts.partition_point(|part| part.first <= i);
+        let (start, n) = (entry.offset as usize, encode::layout(entry.n_points)[3] as usize);
+        (&self.parts[part - 1], start..start + n)
     }
 
     fn will_need(&self, i: usize) {
-        let entry = &self.entries[i];
-        let part = self.parts.partition_point(|part| part.0 <= i);
-        let n = encode::layout(entry.n_points)[3] as usize;
-        self.parts[part - 1].1.will_need(entry.offset as usize, n);
+        let (part, Range { start, end }) = self.place(i);
+        part.map.will_need(start, end - start);
     }
 
     /// Indices of the tile at `at`: none where it holds no point, mostly one, several where it has parts.
@@ -127,9 +149,12 @@ impl Store {
         (0..self.entries.len()).filter(|&i| self.entries[i].bounds.touches(bounds)).collect()
     }
 
-    /// All tiles in order: a source for a pass.
+    /// All tiles in order, each read once: a source for a pass.
     pub fn tiles(&self) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
-        self.tiles_of((0..self.entries.len()).collect())
+        (0..self.entries.len()).map(|i| {
+            let (part, Range { start, end }) = self.place(i);
+            part.straight.with(start, end - start, |bytes| self.checked(i, bytes))?
+        })
     }
 
     /// These tiles in the given order: a source for a pass.

@@ -21,8 +21,8 @@ use std::sync::Arc;
 /// Most points of one tile: bounds what a worker holds. A square of ground of a dense cloud, or a lattice far coarser
 /// than its scan, may have more; then several tiles stand at the same [`TileAt`], cut in the order of places.
 pub const TILE_POINTS: usize = 1 << 21;
-/// Most room that a tile gets before it needs it, points: that of a scan with about a point a pixel.
-const USUAL_POINTS: usize = 1 << 16;
+/// Most room that a tile gets before it needs it, points: that of a scan with a point a pixel and a few more.
+const USUAL_POINTS: usize = (1 << 16) + (1 << 13);
 /// Records that go to disk at once, bytes: some tens of tiles, and little beside what gathers.
 const BATCH_BYTES: usize = 48 << 20;
 
@@ -33,7 +33,7 @@ pub struct TileSink {
     /// Where the tile of a scan, row and column has its buffer; never iterated.
     places: HashMap<(u32, [u32; 2]), usize>,
     buffers: Vec<Buffer>,
-    /// Points in all buffers, bytes.
+    /// Room of all buffers, bytes.
     bytes: usize,
     /// Most points that a tile had when it was written: room for the next ones, so that they need not grow.
     usual: usize,
@@ -115,11 +115,12 @@ impl TileSink {
             let place = self.place(strip.scan.0, run.tile);
             let buffer = &mut self.buffers[place];
             if buffer.records.capacity() == 0 {
-                buffer.records.reserve_exact(self.usual.max(run.n));
+                buffer.records = self.writer.room();
+                self.bytes += buffer.records.capacity() * Record::BYTES;
             }
+            self.bytes += buffer.make_room(run.n, self.usual);
             buffer.add(&strip.records[start..start + run.n]);
             buffer.touched = self.n_strips;
-            self.bytes += run.n * Record::BYTES;
             start += run.n;
         }
         self.n_points += strip.records.len() as u64;
@@ -147,7 +148,7 @@ impl TileSink {
             }
             let buffer = &mut self.buffers[i];
             let records = std::mem::take(&mut buffer.records);
-            self.bytes -= records.len() * Record::BYTES;
+            self.bytes -= records.capacity() * Record::BYTES;
             self.usual = self.usual.max(records.len().min(USUAL_POINTS));
             // Points have come back to it, or are too many for one tile: the end decides.
             let early = !buffer.comes_back()
@@ -183,7 +184,7 @@ impl TileSink {
         let early = early.then(|| file.early()).transpose()?;
         engine.pass(task, Parts::new(left, spill, early), |flow| {
             flow.map(&*encode).for_each(|encoded: Encoded| {
-                entries.push(file.append(encoded)?);
+                entries.push(file.append(&encoded)?);
                 Ok(())
             })
         })?;
@@ -216,6 +217,17 @@ impl Buffer {
         self.last_place = last.place();
         self.n_points += records.len();
         self.records.extend_from_slice(records);
+    }
+
+    /// Makes room for `n` more points, at first for `usual`; bytes that this takes. It grows by a quarter: what waits is
+    /// most of the memory of a run.
+    fn make_room(&mut self, n: usize, usual: usize) -> usize {
+        let (len, before) = (self.records.len(), self.records.capacity());
+        if len + n > before {
+            let more = if before == 0 { usual } else { len / 4 };
+            self.records.reserve_exact(more.max(n));
+        }
+        (self.records.capacity() - before) * Record::BYTES
     }
 
     /// Whether some of it was brought to disk before.

@@ -4,9 +4,9 @@ use super::catalogue::TileEntry;
 use super::encode::Encode;
 use super::file::TileFile;
 use super::parts::Part;
-use super::record::PixelOrder;
-use contract::{Error, Kind, Map, Result};
-use crossbeam::channel::{Receiver, Sender, bounded};
+use super::record::{PixelOrder, Record};
+use contract::{Error, Kind, Result};
+use crossbeam::channel::{Receiver, Sender, bounded, unbounded};
 use std::sync::Arc;
 use std::thread::{Builder, JoinHandle};
 
@@ -18,6 +18,8 @@ type Written = (TileFile, Vec<(usize, TileEntry)>);
 /// A thread that encodes tiles and appends them to a file.
 pub(super) struct Writer {
     batches: Option<Sender<Batch>>,
+    /// Memory of records that are written: fresh memory costs as much as what is done with it.
+    free: Receiver<Vec<Record>>,
     thread: Option<JoinHandle<Result<Written>>>,
 }
 
@@ -26,11 +28,17 @@ impl Writer {
         // One batch waits while another is written: memory is bounded by both.
         let (batches, taken) = bounded(1);
         let encode = Arc::clone(encode);
+        let (give, free) = unbounded();
         let thread = Builder::new()
             .name("store writer".into())
-            .spawn(move || work(file, &encode, &taken))
+            .spawn(move || work(file, &encode, &taken, &give))
             .map_err(|e| Error::new(Kind::Io, "a thread could not be started").because(e))?;
-        Ok(Self { batches: Some(batches), thread: Some(thread) })
+        Ok(Self { batches: Some(batches), free, thread: Some(thread) })
+    }
+
+    /// Memory that was used before; none where there is none.
+    pub(super) fn room(&self) -> Vec<Record> {
+        self.free.try_recv().unwrap_or_default()
     }
 
     /// Hands a batch over; waits where the disk is slower than the points come.
@@ -55,11 +63,21 @@ impl Writer {
     }
 }
 
-fn work(mut file: TileFile, encode: &Encode, batches: &Receiver<Batch>) -> Result<Written> {
-    let mut order = PixelOrder::default();
+fn work(
+    mut file: TileFile,
+    encode: &Encode,
+    batches: &Receiver<Batch>,
+    free: &Sender<Vec<Record>>,
+) -> Result<Written> {
+    let (mut order, mut bytes) = (PixelOrder::default(), Vec::new());
     let mut written = Vec::new();
-    for (i, part) in batches.iter().flatten() {
-        written.push((i, file.append(encode.apply(part, &mut order)?)?));
+    for (i, mut part) in batches.iter().flatten() {
+        let encoded = encode.encode(&mut part, &mut order, bytes);
+        written.push((i, file.append(&encoded)?));
+        bytes = encoded.bytes;
+        part.records.clear();
+        // The sink is at its end where nobody wants it.
+        let _ = free.send(part.records);
     }
     Ok((file, written))
 }

@@ -1,19 +1,26 @@
 //! Files that exist whole or not at all: bytes in; a temporary name until the end, then a sync and a rename.
 
+use crate::block::{self, Block};
 use contract::{Error, Result};
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Ending of a file that is not yet whole.
 pub const PART: &str = "part";
 
-/// A file that takes its own name only when it is committed; dropped before, it is removed.
-#[derive(Debug)]
+/// Bytes that are gathered before they go to a file: disks write pieces of this size at nearly their full rate.
+const GATHER: usize = 1 << 19;
+
+/// A file that takes its own name only when it is committed; dropped before, it is removed. What is written is gathered, and
+/// goes to disk past the system's cache as long as it is one long stream.
 pub struct AtomicFile {
     file: Option<File>,
     part: PathBuf,
     path: PathBuf,
+    waiting: Block,
+    /// Whether the file is written past the cache; `None` before the first piece, that of a small file is its last.
+    direct: Option<bool>,
 }
 
 impl AtomicFile {
@@ -32,7 +39,8 @@ impl AtomicFile {
             .truncate(true)
             .open(&part)
             .map_err(|e| Error::of_file("file cannot be made", &part, e))?;
-        Ok(Self { file: Some(file), part, path })
+        let (file, waiting) = (Some(file), Block::default());
+        Ok(Self { file, part, path, waiting, direct: None })
     }
 
     /// The name that it will have.
@@ -42,14 +50,17 @@ impl AtomicFile {
     }
 
     /// The file once more, for reading what was written so far.
-    pub fn again(&self) -> std::io::Result<File> {
+    pub fn again(&mut self) -> std::io::Result<File> {
+        self.settle()?;
         File::open(&self.part)
     }
 
     /// Brings the bytes to disk, then gives the file its name, replacing what had it.
     pub fn commit(mut self) -> Result<()> {
+        let settled = self.settle();
         let file = self.file.take().expect("taken only here and on drop");
-        let done = file.sync_all().and_then(|()| std::fs::rename(&self.part, &self.path));
+        let done = settled.and_then(|()| file.sync_all());
+        let done = done.and_then(|()| std::fs::rename(&self.part, &self.path));
         done.map_err(|e| Error::of_file("file cannot be finished", &self.path, e))?;
         // The new name itself must survive a power cut; where folders cannot be opened (Windows) it does anyway.
         if let Some(folder) = self.path.parent().and_then(|f| File::open(f).ok()) {
@@ -60,6 +71,24 @@ impl AtomicFile {
 
     fn file(&mut self) -> &mut File {
         self.file.as_mut().expect("taken only by commit and drop")
+    }
+
+    /// Writes what waits: whole pages past the cache, as long as there were no others before.
+    fn write_waiting(&mut self) -> std::io::Result<()> {
+        let Self { file: Some(file), waiting, direct, .. } = self else { return Ok(()) };
+        let direct = direct.get_or_insert_with(|| block::set_direct(file, true));
+        let written = block::write_all(file, &mut [IoSlice::new(waiting.bytes())], direct);
+        waiting.clear();
+        written
+    }
+
+    /// Writes all that waits; from now on through the cache, since what follows begins anywhere.
+    fn settle(&mut self) -> std::io::Result<()> {
+        if self.direct == Some(true) {
+            let _ = block::set_direct(self.file(), false);
+        }
+        self.direct = Some(false);
+        self.write_waiting()
     }
 }
 
@@ -89,22 +118,29 @@ impl Drop for AtomicFile {
 
 impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.file().write(bytes)
+        let left = self.waiting.fill(bytes, GATHER).len();
+        if self.waiting.bytes().len() == GATHER {
+            self.write_waiting()?;
+        }
+        Ok(bytes.len() - left)
     }
 
+    /// Nothing: what waits goes to the file when it is read, when it is much, and at the end.
     fn flush(&mut self) -> std::io::Result<()> {
-        self.file().flush()
+        Ok(())
     }
 }
 
 impl Read for AtomicFile {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        self.settle()?;
         self.file().read(bytes)
     }
 }
 
 impl Seek for AtomicFile {
     fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.settle()?;
         self.file().seek(to)
     }
 }

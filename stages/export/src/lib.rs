@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod atomic;
+pub mod block;
 mod calibration;
 mod canvas;
 mod change_picture;

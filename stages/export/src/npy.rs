@@ -3,7 +3,7 @@
 use crate::summed::{FileSum, SummedFile};
 use contract::{Error, Result};
 use std::fs::File;
-use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// A type of array element.
@@ -86,7 +86,7 @@ pub fn read_places(path: &Path, n_points: u64) -> Result<Vec<u64>> {
 
 /// Writes an array piece by piece.
 pub struct NpyWriter<T> {
-    file: BufWriter<SummedFile>,
+    file: SummedFile,
     path: PathBuf,
     bytes: Vec<u8>,
     n: u64,
@@ -98,7 +98,6 @@ impl<T: Element> NpyWriter<T> {
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
         let file = SummedFile::create(&path, &header::<T>("(0,)"))?;
-        let file = BufWriter::with_capacity(1 << 18, file);
         Ok(Self { file, path, bytes: Vec::new(), n: 0, element: std::marker::PhantomData })
     }
 
@@ -139,11 +138,7 @@ impl<T: Element> NpyWriter<T> {
     }
 
     fn end(self, shape: &str) -> Result<FileSum> {
-        let file = self
-            .file
-            .into_inner()
-            .map_err(|e| Error::of_file("array cannot be finished", &self.path, e.into_error()))?;
-        file.finish(&header::<T>(shape))
+        self.file.finish(&header::<T>(shape))
     }
 }
 

@@ -4,6 +4,7 @@
 //! number, and full tiles are appended to their files.
 
 use crate::atomic::part_of;
+use crate::block::{self, Block};
 use crate::las::{LasSummary, LasWriter, bounds, head};
 use crate::pack::{Packed, Run};
 use crate::record::{Extent, LasSettings};
@@ -11,8 +12,9 @@ use crate::settings::Settings;
 use crate::summed::BodySum;
 use contract::{Error, Fan, Result};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, IoSlice, Read, Seek, SeekFrom, Write};
+use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// A tile with so many waiting bytes is appended to its file: one call to the system for a hundred thousand points.
@@ -24,7 +26,7 @@ const MIN_BLOCKS: usize = 4;
 
 /// Memory of the records that wait.
 struct Blocks {
-    empty: Vec<Vec<u8>>,
+    empty: Vec<Block>,
     /// Of which there may be at most so many more.
     left: usize,
 }
@@ -35,11 +37,11 @@ impl Blocks {
     }
 
     /// An empty block; `None` where all are in use.
-    fn take(&mut self) -> Option<Vec<u8>> {
+    fn take(&mut self) -> Option<Block> {
         let known = self.empty.pop();
         if known.is_none() && self.left > 0 {
             self.left -= 1;
-            return Some(Vec::with_capacity(BLOCK_BYTES));
+            return Some(Block::default());
         }
         known
     }
@@ -81,19 +83,22 @@ impl Tiles {
     fn spool(&mut self, run: &Run, mut records: &[u8]) -> Result<()> {
         let (at, las) = (run.tile, &self.las);
         let path = || self.out.join(format!("tiles/{}_{}.{}", at[1], at[0], las.ending()));
-        let spool = self.tiles.entry(at).or_insert_with(|| Spool::new(path()));
+        let spool = match self.tiles.entry(at) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(new) => new.insert(Spool::new(path(), las)?),
+        };
         spool.extent.join(&run.extent);
         while let Some(spool) = self.tiles.get_mut(&at) {
             records = spool.fill(records);
             if spool.n_bytes() >= FULL_BYTES {
-                spool.append(las, &mut self.blocks)?;
+                spool.append(&mut self.blocks, spool.blocks.len())?;
             }
             if records.is_empty() {
                 break;
             }
             match self.blocks.take() {
                 Some(block) => spool.blocks.push(block),
-                None => relieve(&mut self.tiles, &mut self.blocks, las)?,
+                None => relieve(&mut self.tiles, &mut self.blocks)?,
             }
         }
         Ok(())
@@ -111,22 +116,18 @@ impl Tiles {
     }
 }
 
-/// Appends the fullest tiles to their files until half of the blocks are free.
-fn relieve(
-    tiles: &mut BTreeMap<[i32; 2], Spool>,
-    blocks: &mut Blocks,
-    las: &LasSettings,
-) -> Result<()> {
+/// Appends the fullest tiles to their files until half of the blocks are free: full blocks, as long as there are some.
+fn relieve(tiles: &mut BTreeMap<[i32; 2], Spool>, blocks: &mut Blocks) -> Result<()> {
     let mut fullest: Vec<([i32; 2], usize)> =
         tiles.iter().map(|(at, spool)| (*at, spool.blocks.len())).collect();
     fullest.sort_by_key(|(at, n)| (std::cmp::Reverse(*n), *at));
     let n_blocks: usize = fullest.iter().map(|(_, n)| n).sum();
-    for (at, _) in fullest {
+    for (at, _) in fullest.into_iter().filter(|(_, n)| *n > 0) {
         if 2 * blocks.empty.len() > n_blocks {
             break;
         }
         if let Some(spool) = tiles.get_mut(&at) {
-            spool.append(las, blocks)?;
+            spool.append(blocks, (spool.blocks.len() - 1).max(1))?;
         }
     }
     Ok(())
@@ -137,69 +138,77 @@ struct Spool {
     path: PathBuf,
     /// Where records go: the LAS file to be; for LAZ, bare records that are compressed at the end.
     part: PathBuf,
-    /// Records that wait, all blocks but the last full.
-    blocks: Vec<Vec<u8>>,
+    /// Bytes that wait, all blocks but the last full.
+    blocks: Vec<Block>,
     extent: Extent,
     body: BodySum,
+    /// What the file begins with: room for its header, bytes; and what of that is not written yet.
+    head: Vec<u8>,
+    n_head: usize,
     is_begun: bool,
+    /// Whether the file is written past the system's cache, as it is while only full blocks are.
+    direct: bool,
 }
 
 impl Spool {
-    fn new(path: PathBuf) -> Self {
+    fn new(path: PathBuf, las: &LasSettings) -> Result<Self> {
         let part = part_of(&path.with_extension("records"));
-        let (extent, body) = (Extent::default(), BodySum::default());
-        Self { path, part, blocks: Vec::new(), extent, body, is_begun: false }
+        let head = if las.compress { Vec::new() } else { head(las, &Extent::default())? };
+        let (extent, body, n_head) = (Extent::default(), BodySum::default(), head.len());
+        let blocks = Vec::new();
+        Ok(Self { path, part, blocks, extent, body, head, n_head, is_begun: false, direct: true })
     }
 
     /// Bytes that wait.
     fn n_bytes(&self) -> usize {
-        self.blocks.iter().map(Vec::len).sum()
+        self.blocks.iter().map(|block| block.bytes().len()).sum()
     }
 
     /// Takes as many records as the last block has room for; returns the others. A record may lie in two blocks.
     fn fill<'a>(&mut self, records: &'a [u8]) -> &'a [u8] {
         let Some(last) = self.blocks.last_mut() else { return records };
-        let (now, later) = records.split_at(records.len().min(BLOCK_BYTES - last.len()));
-        last.extend_from_slice(now);
-        later
+        if !self.head.is_empty() {
+            let head = std::mem::take(&mut self.head);
+            last.fill(&head, BLOCK_BYTES);
+        }
+        last.fill(records, BLOCK_BYTES)
     }
 
-    /// Appends what waits, and gives its blocks back.
-    fn append(&mut self, las: &LasSettings, blocks: &mut Blocks) -> Result<()> {
-        let failed = |e| Error::of_file("tile cannot be written", &self.part, e);
-        let begin = !self.is_begun;
-        let mut options = OpenOptions::new();
-        // The first time, what an earlier run left behind goes.
-        let options = if begin {
-            options.write(true).create(true).truncate(true)
-        } else {
-            options.append(true)
-        };
-        let mut file = options.open(&self.part).map_err(failed)?;
-        if begin && !las.compress {
-            file.write_all(&head(las, &Extent::default())?).map_err(failed)?;
-        }
-        let mut all: Vec<IoSlice<'_>> = self.blocks.iter().map(|b| IoSlice::new(b)).collect();
-        let mut left = all.as_mut_slice();
-        while left.iter().any(|slice| !slice.is_empty()) {
-            match file.write_vectored(left) {
-                Ok(0) => return Err(failed(ErrorKind::WriteZero.into())),
-                Ok(n) => IoSlice::advance_slices(&mut left, n),
-                Err(e) if e.kind() == ErrorKind::Interrupted => {}
-                Err(e) => return Err(failed(e)),
-            }
-        }
-        self.blocks.iter().for_each(|block| self.body.add(block));
+    /// Appends the first `n` blocks that wait, and gives them back.
+    fn append(&mut self, blocks: &mut Blocks, n: usize) -> Result<()> {
+        let first = &self.blocks[..n];
+        self.direct &= first.iter().all(|block| block.bytes().len() == BLOCK_BYTES);
+        let written = self.open().and_then(|mut file| {
+            self.direct = self.direct && block::set_direct(&file, true);
+            let mut all: Vec<IoSlice<'_>> =
+                first.iter().map(|block| IoSlice::new(block.bytes())).collect();
+            block::write_all(&mut file, &mut all, &mut self.direct)
+        });
+        written.map_err(|e| Error::of_file("tile cannot be written", &self.part, e))?;
         self.is_begun = true;
-        for mut block in self.blocks.drain(..) {
+        for mut block in self.blocks.drain(..n) {
+            let n_head = self.n_head.min(block.bytes().len());
+            self.body.add(&block.bytes()[n_head..]);
+            self.n_head -= n_head;
             block.clear();
             blocks.empty.push(block);
         }
         Ok(())
     }
 
+    /// The file, to be written from its end on; the first time, what an earlier run left behind goes.
+    fn open(&self) -> std::io::Result<File> {
+        let mut options = OpenOptions::new();
+        if self.is_begun {
+            options.append(true).open(&self.part)
+        } else {
+            options.write(true).create(true).truncate(true).open(&self.part)
+        }
+    }
+
     fn finish(mut self, las: &LasSettings) -> Result<LasSummary> {
-        self.append(las, &mut Blocks::new(0))?;
+        let n = self.blocks.len();
+        self.append(&mut Blocks::new(0), n)?;
         if las.compress { self.compress(las) } else { self.seal(las) }
     }
 
