@@ -92,6 +92,18 @@ impl Engine {
         Self { cancel: self.cancel.clone(), ..Self::new(self.n_workers) }
     }
 
+    /// One like it, for work that waits for the disk half of its time: with twice the threads.
+    #[must_use]
+    pub(crate) fn for_disks(&self) -> Self {
+        Self {
+            n_workers: 2 * self.n_workers,
+            channel_bytes: self.channel_bytes,
+            cancel: self.cancel.clone(),
+            progress: self.progress.clone(),
+            pool: OnceLock::new(),
+        }
+    }
+
     /// Runs one pass: a source, some maps, one fold or sink.
     ///
     /// `source` is read on a thread of its own; its errors take part in the order of errors.

@@ -189,7 +189,7 @@ impl Written<'_, '_> {
             (Reverse(n_bytes), name.clone())
         });
         let watch = self.session.watch();
-        let sums = engine.fan_out("tiles", all.clone(), |(name, [old, new])| {
+        let sums = engine.for_disks().fan_out("tiles", all.clone(), |(name, [old, new])| {
             let (old, new) =
                 (old.then(|| self.base.out.join(&name)), new.then(|| scratch.join(&name)));
             let stays = |points: &[OldPoint]| self.stay(points, &watch, gone);

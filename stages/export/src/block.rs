@@ -6,7 +6,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use std::fs::File;
-use std::io::{Error, ErrorKind, IoSlice, Result, Write};
+use std::io::{Error, ErrorKind, IoSlice, Read, Result, Seek, SeekFrom, Write};
 
 /// Bytes that memory and places of a file are aligned to: a multiple of the sectors of all common disks.
 pub const PAGE: usize = 4096;
@@ -101,9 +101,76 @@ pub(crate) fn write_all(
     Ok(())
 }
 
+/// Bytes that are read at once: disks give pieces of this size at nearly their full rate.
+const AT_ONCE: usize = 1 << 19;
+
+/// Reads a file straight on, past the system's cache where that can be.
+pub(crate) struct Straight {
+    file: File,
+    block: Block,
+    /// Bytes of the block that were given out.
+    n_given: usize,
+}
+
+impl Straight {
+    /// From a place of the file on.
+    pub(crate) fn new(mut file: File, start: u64) -> Result<Self> {
+        let n_given = start as usize % PAGE;
+        file.seek(SeekFrom::Start(start - n_given as u64))?;
+        let _ = set_direct(&file, true);
+        let mut straight = Self { file, block: Block::default(), n_given: 0 };
+        straight.next()?;
+        straight.n_given = n_given.min(straight.block.n_bytes);
+        Ok(straight)
+    }
+
+    fn next(&mut self) -> Result<()> {
+        let (room, mut n) = (self.block.room(AT_ONCE), 0);
+        while n < AT_ONCE {
+            match self.file.read(&mut room[n..]) {
+                Ok(0) => break,
+                Ok(more) => n += more,
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(e),
+            }
+        }
+        (self.block.n_bytes, self.n_given) = (n, 0);
+        Ok(())
+    }
+}
+
+impl Read for Straight {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize> {
+        if self.n_given == self.block.n_bytes {
+            self.next()?;
+        }
+        let left = &self.block.bytes()[self.n_given..];
+        let n = left.len().min(bytes.len());
+        bytes[..n].copy_from_slice(&left[..n]);
+        self.n_given += n;
+        Ok(n)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn files_are_read_from_anywhere_to_their_end() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("file");
+        let bytes: Vec<u8> = (0..2 * AT_ONCE + 77).map(|i| (i % 251) as u8).collect();
+        std::fs::write(&path, &bytes).expect("writes");
+        for start in [0, 1, PAGE, AT_ONCE - 1, AT_ONCE + 3 * PAGE + 5, bytes.len(), bytes.len() + 9]
+        {
+            let file = File::open(&path).expect("opens");
+            let mut read = Vec::new();
+            let mut straight = Straight::new(file, start as u64).expect("begins");
+            straight.read_to_end(&mut read).expect("reads");
+            assert!(read == bytes[start.min(bytes.len())..], "from {start}");
+        }
+    }
 
     #[test]
     fn blocks_hold_what_they_were_filled_with() {

@@ -1,6 +1,7 @@
 //! A spatial tile of an earlier result and one of new points in; the tile without the old points that are superseded, the
 //! new ones behind them, out. Records stay as they are, byte for byte.
 
+use crate::block::Straight;
 use crate::las::{LasSummary, LasWriter, head};
 use crate::record::{CLASSES, Extent, LasSettings};
 use contract::{Error, Label, PointKind, Result};
@@ -89,7 +90,7 @@ struct Tile<'a> {
 }
 
 enum Records {
-    Plain(BufReader<File>),
+    Plain(Straight),
     Compressed(Box<LasZipDecompressor<'static, BufReader<File>>>),
 }
 
@@ -111,13 +112,13 @@ impl<'a> Tile<'a> {
             return Err(foreign());
         }
         let left = header.large_file.map_or(0, |large| large.number_of_point_records);
-        file.seek(SeekFrom::Start(expected as u64)).map_err(failed)?;
         let records = if las.compress {
+            file.seek(SeekFrom::Start(expected as u64)).map_err(failed)?;
             let laz = crate::las::laz_vlr(las);
             let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;
             Records::Compressed(Box::new(reader))
         } else {
-            Records::Plain(file)
+            Records::Plain(Straight::new(file.into_inner(), expected as u64).map_err(failed)?)
         };
         Ok(Self { path, records, record_len: las.record_len(), left })
     }

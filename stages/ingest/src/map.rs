@@ -16,9 +16,20 @@ const GIVEN_BACK: usize = 32 << 20;
 /// Pages of the largest systems: what is given back begins and ends at their bounds.
 const PAGE: usize = 1 << 16;
 
+/// A file larger than this part of the machine's memory leaves the system's cache behind its reader: it would be gone before
+/// it is read once more, and pages that the cache has to find anew cost more than reading does.
+#[cfg(target_os = "linux")]
+const CACHED: usize = 4;
+/// So far behind the reader, bytes: another may sum the file up beside him.
+#[cfg(target_os = "linux")]
+const BEHIND: usize = 512 << 20;
+
 /// A read-only map of a whole file.
 pub(crate) struct Mapped {
     map: Mmap,
+    /// To be taken out of the system's cache once it is read.
+    #[cfg(target_os = "linux")]
+    leaving: Option<File>,
     watch: guard::Watch,
 }
 
@@ -32,7 +43,12 @@ pub(crate) fn map(path: &Path) -> Result<Mapped> {
     // another process that shortens the file while it is read: `guard` takes care of that.
     let map = unsafe { Mmap::map(&file)? };
     let watch = guard::Watch::over(&map);
-    Ok(Mapped { map, watch })
+    Ok(Mapped {
+        #[cfg(target_os = "linux")]
+        leaving: (map.len() > guard::memory_bytes() / CACHED).then_some(file),
+        map,
+        watch,
+    })
 }
 
 impl Mapped {
@@ -73,6 +89,12 @@ impl Mapped {
         let _ = advised;
         if !next.is_empty() {
             let _ = self.map.advise_range(memmap2::Advice::WillNeed, next.start, next.len());
+        }
+        #[cfg(target_os = "linux")]
+        if let (Some(file), Some(end)) = (&self.leaving, range.end.checked_sub(BEHIND)) {
+            let start = range.start.saturating_sub(BEHIND);
+            let n = std::num::NonZero::new((end - start) as u64);
+            let _ = rustix::fs::fadvise(file, start as u64, n, rustix::fs::Advice::DontNeed);
         }
     }
 }
@@ -156,6 +178,16 @@ mod guard {
                 slot.begin.store(0, SeqCst);
             }
         }
+    }
+
+    /// Memory of the machine, bytes; very large where the system does not tell.
+    #[cfg(target_os = "linux")]
+    pub(super) fn memory_bytes() -> usize {
+        // SAFETY: plain calls that only return numbers.
+        let [pages, page] =
+            unsafe { [libc::sysconf(libc::_SC_PHYS_PAGES), libc::sysconf(libc::_SC_PAGESIZE)] };
+        let bytes = usize::try_from(pages).ok().zip(usize::try_from(page).ok());
+        bytes.map_or(usize::MAX, |(pages, page)| pages.saturating_mul(page))
     }
 
     fn install() {
