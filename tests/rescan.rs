@@ -135,6 +135,37 @@ fn a_rescanned_cell_is_brought_up_to_date() {
     goes_on(&plant, &out);
 }
 
+#[test]
+fn a_robot_that_the_earlier_result_missed_did_not_appear() {
+    let plant = Plant::new();
+    let review = format!("[[robot]]\nat = {:?}\nverdict = \"reject\"\n", plant.robot);
+    std::fs::write(plant.path("review.toml"), review).expect("writes");
+    let args = ["run", "then/scans.e57", "--robots", "robots", "--out", "blind"];
+    let blind = plant.run(&[&args[..], &["--review", "review.toml"]].concat());
+    assert!(blind.status.success(), "{}", String::from_utf8_lossy(&blind.stderr));
+    let n_robots = |name: &str| {
+        let all = export::ResultFile::read(&plant.path(name)).expect("a result").robots;
+        all.iter().filter(|robot| robot.verdict != "refused").count()
+    };
+    assert_eq!(n_robots("blind") + 1, n_robots("base"));
+
+    // Its scans show how it stood, though: it is said to have moved from there.
+    rescan(&plant.wish("blind", "again"), &Engine::new(2)).expect("the rescan ends well");
+    let changes = changes(&plant.path("again"));
+    let robots = changes["robots"].as_array().expect("robots");
+    let others: Vec<_> = robots.iter().filter(|r| r["change"]["kind"] != "same").collect();
+    assert!(others.len() == 1 && others[0]["was_missed"] == true, "{robots:#?}");
+    assert!(others[0]["change"]["kind"] == "moved" && others[0]["then"].is_null(), "{robots:#?}");
+    let things = changes["things"].as_array().expect("things");
+    let kinds: Vec<_> = things.iter().filter_map(|t| t["change"].as_str()).collect();
+    assert_eq!(kinds, ["moved", "gone"], "{things:#?}");
+    let truth = plant.path("now/truth");
+    let agreement = Agreement::of_session(&plant.path("again"), &truth, plant.n_masks);
+    let agreement = agreement.expect("compares");
+    assert!(agreement.robots.iter().all(|r| r.found.as_ref().is_some_and(|f| f.is_right)));
+    assert!(agreement.f1() > F1, "{}", agreement.f1());
+}
+
 /// Rescans of rescans, and what is refused.
 fn goes_on(plant: &Plant, out: &Path) {
     let said = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();

@@ -8,13 +8,19 @@ use crate::labelling::{Labelling, Near};
 use crate::search::Search;
 use crate::spaces::region;
 use contract::{Fit, Region, Result, Verdict};
-use merge::{ThingChange, Watch};
+use geometry::Aabb;
+use merge::{Thing, Watch};
 use robot::Model;
 
 /// Smallest height and largest edge of a new thing that may be a robot, metres.
 const ROBOT_LIKE: [f64; 2] = [0.4, 0.5];
-/// Room about such a thing, metres.
-const ABOUT: f64 = 0.3;
+/// Room about such a thing, metres; and about one that does not stand on the floor, since the arm of a robot whose foot stood still
+/// is a thing by itself.
+const ABOUT: [f64; 2] = [0.3, 1.0];
+/// What moved up or down by more than this may be no thing that somebody pushed, but an arm in place of one, metres.
+const LIFTED: f64 = 0.2;
+/// What begins less high above the floor stands on it, metres.
+const STANDS: f64 = 0.2;
 
 impl Session<'_> {
     /// Robots among the things that appeared.
@@ -26,12 +32,15 @@ impl Session<'_> {
     ) -> Result<Vec<Fit>> {
         let like =
             |size: [f64; 3]| size[2] >= ROBOT_LIKE[0] && size.iter().any(|s| *s >= ROBOT_LIKE[1]);
-        // What stood elsewhere before, in the same shape, is none.
-        let new = labels.things.iter().filter(|thing| thing.change == ThingChange::Appeared);
-        let bounds = new.filter_map(|thing| thing.now);
+        // What stood elsewhere before, in the same shape and at the same height, is none.
+        let is_lifted = |thing: &&Thing| match (thing.then, thing.now) {
+            (Some(then), Some(now)) => (then.min[2] - now.min[2]).abs() > LIFTED,
+            (then, _) => then.is_none(),
+        };
+        let bounds = labels.things.iter().filter(is_lifted).filter_map(|thing| thing.now);
         let regions: Vec<Region> = bounds
             .filter(|bounds| like(bounds.size()))
-            .map(|bounds| region(&bounds.center(), &bounds.grown(ABOUT)))
+            .map(|bounds| region(&bounds.center(), &self.about(&bounds)))
             .collect();
         if regions.is_empty() {
             return Ok(Vec::new());
@@ -50,6 +59,17 @@ impl Session<'_> {
         let mut chosen = fit::choose(found, models);
         chosen.retain(is_new);
         crate::tools::dress(chosen, models, (&search, &regions), engine)
+    }
+
+    /// Where the robot may stand that a new thing is part of.
+    fn about(&self, thing: &Aabb) -> Aabb {
+        let [x, y, z] = [0, 1, 2].map(|i| 0.5 * (thing.min[i] + thing.max[i]));
+        let height = self.floor.height_above([x, y, z], 0.0);
+        let bottom = height.map_or(thing.min[2], |height| z - height);
+        let stands = thing.min[2] - bottom < STANDS;
+        let mut about = thing.grown(if stands { ABOUT[0] } else { ABOUT[1] });
+        about.min[2] = about.min[2].min(bottom - ABOUT[0]);
+        about
     }
 
     /// Takes newcomers among the robots of the cell.
