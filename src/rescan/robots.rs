@@ -96,6 +96,9 @@ pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
     fits.iter().filter(here).any(|fit| up(fit) < UPRIGHT)
 }
 
+/// No robot of a library reaches farther than this from its base, but for those on rails, metres.
+const FAR_REACH: f64 = 4.0;
+
 /// Looks at one robot again; `regions` are those of the new scans. The model is its own, where it is none of the library.
 pub(crate) fn look(
     before: &Fit,
@@ -151,15 +154,16 @@ fn anew(
     let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
     // Its arm may have left what stands about its base.
     let region = reach(before, &models[before.model]);
+    let base = Point::from(world_from_base.translation.vector);
+    let is_here = |at: &Point| (at - base).norm() < SAME_PLACE;
     search.in_scene(&region, |scene, settings| {
         let mut found: Vec<Fit> =
             search.on_base(scene, bare, world_from_base).into_iter().collect();
         if found.iter().all(|f| f.verdict != Verdict::Trusted) {
-            found.extend(search.region(near)?);
+            found.extend(search.region_where(&beside(near, base), is_here)?);
             found = fit::choose(found, models);
         }
-        let base = world_from_base.translation.vector;
-        found.retain(|fit| (fit.world_from_base.translation.vector - base).norm() < SAME_PLACE);
+        found.retain(|fit| is_here(&fit.world_from_base.translation.vector.into()));
         let mut own = if found.is_empty() { Vec::new() } else { models.to_vec() };
         let dressed = dress_in(scene, found, &mut own, (search.shelf(), settings));
         let best = dressed.into_iter().max_by(|a, b| a.verdict.cmp(&b.verdict));
@@ -169,6 +173,16 @@ fn anew(
             (fit, model)
         }))
     })?
+}
+
+/// The part of a region that a robot on a base may take.
+fn beside(region: &Region, base: Point) -> Region {
+    let mut bounds = region.world_bounds();
+    for i in 0..2 {
+        bounds.min[i] = bounds.min[i].max(base[i] - FAR_REACH);
+        bounds.max[i] = bounds.max[i].min(base[i] + FAR_REACH);
+    }
+    crate::spaces::region(&bounds.center(), &bounds)
 }
 
 /// The region of the new scans that a robot stands in; all that it can get to, where it stands in none.

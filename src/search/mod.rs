@@ -139,6 +139,16 @@ impl<'a, 'm> Search<'a, 'm> {
 
     /// Fits of all models in one region, whatever their verdict.
     pub(crate) fn region(&self, region: &Region) -> Result<Vec<Fit>> {
+        self.region_where(region, |_| true)
+    }
+
+    /// The same for those whose bases are wanted.
+    pub(crate) fn region_where(
+        &self,
+        region: &Region,
+        wants: impl Fn(&Point) -> bool,
+    ) -> Result<Vec<Fit>> {
+        let is_wanted = |c: &Candidate| c.bases.first().is_some_and(|b| wants(&base(&b.0)));
         let views = self.views(region)?;
         let planes = self.planes(region);
         let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
@@ -150,14 +160,15 @@ impl<'a, 'm> Search<'a, 'm> {
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
         let mut sight = Sight::new(region, &views, (&scene.evidence, &scene.scouts), &AllThreads);
-        let candidates =
+        let mut candidates =
             self.piece((region, "candidates"), || self.candidates(&sight, &planes, 0.0))?;
+        candidates.retain(is_wanted);
         let mut fits = self.fits(&scene, &candidates)?;
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
             let find = || self.candidates(&sight, &self.mounts(region), MIN_MOUNT_SCORE);
             let mut hung = self.piece((region, "mounts"), find)?;
-            hung.retain(|c| self.is_above_floor(c));
+            hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
             fits.extend(self.fits(&scene, &few(hung))?);
         }
         fits.extend(self.on_stands(&scene, &mut sight, &fits)?);

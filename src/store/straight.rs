@@ -2,7 +2,7 @@
 //! cache, would only push out of it what is read again.
 
 use contract::{Error, Result};
-use export::block::{Block, PAGE, set_direct};
+use export::block::{Block, PAGE, read_all, set_direct};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -47,16 +47,8 @@ impl Straight {
 
     /// Reads as much as there is; returns how much that was.
     fn read(&self, first: usize, room: &mut [u8]) -> std::io::Result<usize> {
-        let mut n = 0;
-        while n < room.len() {
-            match read_at(&self.file, &mut room[n..], (first + n) as u64) {
-                Ok(0) => break,
-                Ok(more) => n += more,
-                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(e) => return Err(e),
-            }
-        }
-        Ok(n)
+        let at = |n: usize| (first + n) as u64;
+        read_all(&self.file, room, |room, n| read_at(&self.file, room, at(n)))
     }
 
     fn free(&self) -> std::sync::MutexGuard<'_, Vec<Block>> {

@@ -101,6 +101,31 @@ pub(crate) fn write_all(
     Ok(())
 }
 
+/// Reads as much as there is room for, or as there is; returns how much that was. Where the file is direct, and its system takes
+/// that back, through the cache.
+///
+/// # Errors
+/// What the reads say.
+pub fn read_all(
+    file: &File,
+    room: &mut [u8],
+    mut read: impl FnMut(&mut [u8], usize) -> Result<usize>,
+) -> Result<usize> {
+    let (mut n, mut may_be_direct) = (0, true);
+    while n < room.len() {
+        match read(&mut room[n..], n) {
+            Ok(0) => break,
+            Ok(more) => n += more,
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(e) if e.kind() == ErrorKind::InvalidInput && may_be_direct => {
+                may_be_direct = set_direct(file, false);
+            }
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(n)
+}
+
 /// Bytes that are read at once: disks give pieces of this size at nearly their full rate.
 const AT_ONCE: usize = 1 << 19;
 
@@ -125,16 +150,9 @@ impl Straight {
     }
 
     fn next(&mut self) -> Result<()> {
-        let (room, mut n) = (self.block.room(AT_ONCE), 0);
-        while n < AT_ONCE {
-            match self.file.read(&mut room[n..]) {
-                Ok(0) => break,
-                Ok(more) => n += more,
-                Err(e) if e.kind() == ErrorKind::Interrupted => {}
-                Err(e) => return Err(e),
-            }
-        }
-        (self.block.n_bytes, self.n_given) = (n, 0);
+        let Self { file, block, .. } = self;
+        let n = read_all(file, block.room(AT_ONCE), |room, _| (&*file).read(room))?;
+        (block.n_bytes, self.n_given) = (n, 0);
         Ok(())
     }
 }
