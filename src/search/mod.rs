@@ -178,6 +178,7 @@ impl<'a, 'm> Search<'a, 'm> {
             let sights = Sights { region, views: &views, floors: &planes };
             fits.extend(self.moved(&fits, (&feet, &gone), &sights));
         }
+        fits.retain(|fit| wants(&base(&fit.world_from_base)));
         Ok(fits)
     }
 

@@ -1,6 +1,7 @@
 //! A file of ours in, pieces of it out, past the system's cache where that can be: what is read once, and is larger than any
 //! cache, would only push out of it what is read again.
 
+use super::catalogue::broken;
 use contract::{Error, Result};
 use export::block::{Block, PAGE, read_all, set_direct};
 use std::fs::File;
@@ -34,11 +35,9 @@ impl Straight {
         let mut block = self.free().pop().unwrap_or_default();
         let first = start / PAGE * PAGE;
         let read = self.read(first, block.room((start + n).next_multiple_of(PAGE) - first));
-        if read.map_err(|e| Error::of_file("the tiles cannot be read", &self.path, e))?
-            < start + n - first
-        {
-            let what = "the tiles are cut short: run again, and they are made anew";
-            return Err(Error::bad_input(what).at(self.path.display()));
+        let read = read.map_err(|e| Error::of_file("the tiles cannot be read", &self.path, e))?;
+        if read < start + n - first {
+            return Err(broken("the tiles are cut short").at(self.path.display()));
         }
         let done = work(&block.bytes()[start - first..start - first + n]);
         self.free().push(block);

@@ -60,8 +60,8 @@ impl Block {
     }
 }
 
-/// Whether writes to an open file go past the system's cache from now on. They do nowhere but on Linux, and there not on all
-/// file systems.
+/// Has an open file written and read past the system's cache from now on, or through it again; whether it is past it now. It never is
+/// but on Linux, and there not on all file systems.
 #[must_use]
 pub fn set_direct(file: &File, is_direct: bool) -> bool {
     #[cfg(target_os = "linux")]
