@@ -2,6 +2,7 @@
 //! and what changed, out. What the new scans do not touch is shared with the earlier result, byte for byte.
 
 mod base;
+mod exchanged;
 mod fate;
 mod newcomers;
 mod past;

@@ -107,7 +107,7 @@ impl Session<'_> {
             self.settings,
         );
         let watch = Watch::new(&self.cell, &self.old_views);
-        let (then, own) = look(now, models, (&search, &watch, &[]))?;
+        let (then, own) = look(now, models, (&search, [&watch, &self.watch()], &[]))?;
         Ok(match then {
             Now::Found(fit) | Now::Anew(fit, _) => Some((*fit, own)),
             Now::Gone | Now::Unseen | Now::Open | Now::Lost => None,

@@ -1,5 +1,6 @@
 //! A robot of the earlier result, and what the new scans saw, in; how it stands now, or that it is gone, out.
 
+use super::exchanged::is_the_same;
 use crate::search::Search;
 use crate::spaces::{poses, reach};
 use crate::tools::dress_in;
@@ -99,11 +100,11 @@ pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
 /// No robot of a library reaches farther than this from its base, but for those on rails, metres.
 const FAR_REACH: f64 = 4.0;
 
-/// Looks at one robot again; `regions` are those of the new scans. The model is its own, where it is none of the library.
+/// Looks at one robot again, through the scans of this session and of the other; `regions` are those of this one. The model is its own, where it is none of the library.
 pub(crate) fn look(
     before: &Fit,
     models: &[Model],
-    (search, watch, regions): (&Search<'_, '_>, &Watch<'_>, &[Region]),
+    (search, [watch, other_session], regions): (&Search<'_, '_>, [&Watch<'_>; 2], &[Region]),
 ) -> Result<(Now, Option<Model>)> {
     let model = &models[before.model];
     let said = said(before, model, watch);
@@ -130,7 +131,7 @@ pub(crate) fn look(
     if said.through < STANDS && before.verdict != Verdict::Refused {
         return Ok((Now::Unseen, None));
     }
-    Ok(match anew(before, models, (search, &near))? {
+    Ok(match anew(before, models, (search, other_session, &near))? {
         Some((fit, own)) => (Now::Anew(Box::new(fit), said.through > CONTRADICTED), own),
         None if said.foot > GONE => (Now::Gone, None),
         None if said.through > CONTRADICTED => (Now::Lost, None),
@@ -148,7 +149,7 @@ fn knows(fit: &Fit, other: &Fit) -> bool {
 fn anew(
     before: &Fit,
     models: &[Model],
-    (search, near): (&Search<'_, '_>, &Region),
+    (search, other_session, near): (&Search<'_, '_>, &Watch<'_>, &Region),
 ) -> Result<Option<(Fit, Option<Model>)>> {
     let world_from_base = &before.world_from_base;
     let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
@@ -159,7 +160,7 @@ fn anew(
     search.in_scene(&region, |scene, settings| {
         let mut found: Vec<Fit> =
             search.on_base(scene, bare, world_from_base).into_iter().collect();
-        if found.iter().all(|f| f.verdict != Verdict::Trusted) {
+        if !found.iter().any(|f| is_the_same(f, &models[bare], scene, other_session)) {
             found.extend(search.region_where(&beside(near, base), is_here)?);
             found = fit::choose(found, models);
         }

@@ -224,6 +224,7 @@ impl<'a> Session<'a> {
     ) -> Result<Robots> {
         let mut out = Robots::default();
         let (search, watch) = (self.search(), self.watch());
+        let old_watch = Watch::new(&self.cell, &self.old_views);
         let regions = identify::regions(&self.clusters, &self.settings.region);
         let bounds: Vec<Aabb> =
             fits.iter().map(|fit| robot_bounds(fit, &models[fit.model])).collect();
@@ -231,7 +232,7 @@ impl<'a> Session<'a> {
             |i: &usize| fits[*i].verdict != Verdict::Refused && bounds[*i].touches(&self.past.cell);
         let here: Vec<usize> = (0..fits.len()).filter(here).collect();
         let looked = engine.fan_out("fit", here.clone(), |i| {
-            look(&fits[i], models, (&search, &watch, &regions))
+            look(&fits[i], models, (&search, [&watch, &old_watch], &regions))
         })?;
         for (i, (now, own)) in here.into_iter().zip(looked) {
             let bounds = bounds[i];

@@ -44,3 +44,4 @@ pub use settings::{Method, Settings};
 pub use solve::{again, converge, fit};
 pub use stays::{Sights, stays};
 pub use tool::{Tooled, bolt, fit_tool, try_tool};
+pub use verdict::is_uncontradicted;

@@ -109,6 +109,15 @@ impl<'a> Scene<'a> {
         [self.thin.iter().copied().filter(near).collect(), all]
     }
 
+    /// Thinned points within `reach` metres of a place, world, metres.
+    #[must_use]
+    pub fn places(&self, place: &Point, reach: f64) -> Vec<Point> {
+        let world_from_local = self.world_from_local();
+        let [thin, _] = self.within(&(world_from_local.inverse() * place), reach);
+        let at = |i: u32| Point::from(self.points[i as usize].p.map(f64::from));
+        thin.into_iter().map(|i| world_from_local * at(i)).collect()
+    }
+
     /// World from the region's local frame.
     #[must_use]
     pub fn world_from_local(&self) -> Pose {

@@ -30,6 +30,8 @@ const MAX_OPEN_RMS: f64 = 0.006;
 const KNOWN_SIGMA: f64 = 0.0175;
 /// Smallest share of the surface that must have been judged.
 const SEEN: f64 = 0.12;
+/// Share of a link's surface that beams must have judged for what they went through to count.
+const MIN_SEEN: f64 = 0.02;
 /// Fewest points on the links that a joint moves.
 const JOINT_POINTS: usize = 30;
 /// Play of a stop: a degree for joints that turn, a millimetre for those that slide.
@@ -56,7 +58,7 @@ pub(crate) fn pass(
     grade(v > VIOLATION.1, v > VIOLATION.0, &mut refusals, &mut doubts, || {
         format!("beams went through {:.0} % of the judged surface", v * 100.0)
     });
-    for link in fit.links.iter().filter(|l| l.seen > 0.02) {
+    for link in fit.links.iter().filter(|l| l.seen > MIN_SEEN) {
         let v = link.violated;
         grade(v > LINK_VIOLATION.1, v > LINK_VIOLATION.0, &mut refusals, &mut doubts, || {
             format!("beams went through {:.0} % of link '{}'", v * 100.0, link.name)
@@ -116,6 +118,17 @@ pub(crate) fn pass(
     fit.reasons = refusals;
     fit.reasons.extend(doubts);
     fit.reasons.extend(notes);
+}
+
+/// Whether nothing that was measured speaks against a fit: if it is doubtful, then because too little of it was seen.
+#[must_use]
+pub fn is_uncontradicted(fit: &Fit, scene: &Scene<'_>) -> bool {
+    let is_pierced =
+        |l: &contract::LinkEvidence| l.seen > MIN_SEEN && l.violated > LINK_VIOLATION.0;
+    fit.verdict != Verdict::Refused
+        && fit.score >= SCORE.0
+        && fit.rms <= POOR_RMS.0 * scene.noise + POOR_RMS.1
+        && !fit.links.iter().any(is_pierced)
 }
 
 /// How far a joint stands beyond what its limit and the play of its stop allow, radians or metres.
