@@ -33,13 +33,15 @@ pub struct Formats {
     pub e57: bool,
     /// `scans.las`.
     pub las: bool,
+    /// Its points in 20 bytes instead of 30: LAS format 0.
+    pub short: bool,
     /// `truth/labels` and `truth/las/labels`.
     pub labels: bool,
 }
 
 impl Formats {
     /// All.
-    pub const ALL: Self = Self { e57: true, las: true, labels: true };
+    pub const ALL: Self = Self { e57: true, las: true, short: false, labels: true };
 }
 
 /// Scans a scene into `out`; returns the truth with its counts.
@@ -83,6 +85,7 @@ impl Files {
             let near = Aabb::of(frames.map(|f| f.world_from_scan.translation.vector.into()));
             let mut settings = LasSettings::new(Quantum::around(&near));
             settings.with_labels = false;
+            settings.short = formats.short;
             LasWriter::create(out.join("scans.las"), settings)
         });
         let labels = formats.labels;

@@ -45,6 +45,8 @@ pub struct ThroughputBench {
 pub enum Scanned {
     /// LAS 1.4, format 6: 30 bytes a point
     Las,
+    /// LAS 1.4, format 0: 20 bytes a point
+    Las20,
     /// E57, bit-packed, with rows and columns
     E57,
 }
@@ -112,7 +114,7 @@ fn run(
     let dir = bench.out.join(format!("{size}"));
     let scans = dir.join("scans");
     let input = scans.join(match bench.format {
-        Scanned::Las => "scans.las",
+        Scanned::Las | Scanned::Las20 => "scans.las",
         Scanned::E57 => "scans.e57",
     });
     // The scanners' poses are the last to be written before the truth: with them all is there.
@@ -161,12 +163,13 @@ fn scan(
     };
     let scene = simulate::plant(&plant, &models)?;
     atomic::write(&made(scans)?.join("scene.toml"), scene.to_toml()?.as_bytes())?;
-    let las = bench.format == Scanned::Las;
+    let las = bench.format != Scanned::E57;
+    let short = bench.format == Scanned::Las20;
     let truth = scan_scene(
         &scene,
         &models,
         scans,
-        Formats { las, e57: !las, labels: bench.truth },
+        Formats { las, short, e57: !las, labels: bench.truth },
         engine,
     )?;
     Ok(truth.scans.iter().map(|s| s.n_points).sum())

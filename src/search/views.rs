@@ -63,11 +63,10 @@ impl Search<'_, '_> {
             }
         }
         let mut builder = ViewBuilder::new(scan, region, extent, thin, settings);
-        for (i, entry) in self.store.entries().iter().enumerate() {
-            if builder.wants(entry.at) {
-                builder.add(&self.store.tile(i)?);
-            }
-        }
+        let entries = self.store.entries().iter().enumerate();
+        let wanted: Vec<usize> =
+            entries.filter(|(_, entry)| builder.wants(entry.at)).map(|(i, _)| i).collect();
+        self.store.look_at(&wanted, |tile| builder.add(tile))?;
         let view = builder.finish();
         Ok((!view.points.is_empty() || !view.images.is_empty()).then_some(view))
     }

@@ -6,7 +6,7 @@
 use super::catalogue::{ALIGN, TileEntry};
 use super::parts::Part;
 use super::record::{PixelOrder, Record};
-use contract::{Map, Result, Scan, Tile, Weigh};
+use contract::{Map, Result, Scan, Tile, TilePoints, Weigh};
 use geometry::{Aabb, Pose};
 
 #[cfg(target_endian = "big")]
@@ -110,16 +110,22 @@ pub(super) fn layout(n: u64) -> [u64; 4] {
     [0, place, pixel, (pixel + 2 * n).next_multiple_of(ALIGN)]
 }
 
-/// Copies a tile out of its (aligned) bytes, which have the length that [`layout`] says.
-pub(super) fn decode(entry: &TileEntry, bytes: &[u8]) -> Tile {
+/// The points of a tile in its (aligned) bytes, which have the length that [`layout`] says.
+pub(super) fn points<'a>(entry: &TileEntry, bytes: &'a [u8]) -> TilePoints<'a> {
     let n = entry.n_points as usize;
     let [_, place, pixel, _] = layout(entry.n_points).map(|v| v as usize);
-    Tile {
+    TilePoints {
         at: entry.at,
         first_place: entry.first_place,
-        xyz: bytemuck::cast_slice(&bytes[..12 * n]).to_vec(),
-        place: bytemuck::cast_slice(&bytes[place..place + 4 * n]).to_vec(),
-        pixel: bytemuck::cast_slice(&bytes[pixel..pixel + 2 * n]).to_vec(),
-        bounds: entry.bounds,
+        xyz: bytemuck::cast_slice(&bytes[..12 * n]),
+        place: bytemuck::cast_slice(&bytes[place..place + 4 * n]),
+        pixel: bytemuck::cast_slice(&bytes[pixel..pixel + 2 * n]),
     }
+}
+
+/// The same, copied out.
+pub(super) fn decode(entry: &TileEntry, bytes: &[u8]) -> Tile {
+    let TilePoints { at, first_place, place, pixel, xyz } = points(entry, bytes);
+    let (place, pixel, xyz) = (place.to_vec(), pixel.to_vec(), xyz.to_vec());
+    Tile { at, first_place, place, pixel, xyz, bounds: entry.bounds }
 }

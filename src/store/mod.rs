@@ -16,11 +16,12 @@ mod tests;
 mod writer;
 
 use catalogue::broken;
-use contract::{Result, Scan, Tile, TileAt, Weigh};
+use contract::{Result, Scan, Tile, TileAt, TilePoints, Weigh};
 use geometry::Aabb;
 use map::FileMap;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use straight::Straight;
 
 pub use catalogue::TileEntry;
@@ -37,6 +38,8 @@ const TILES: &str = "tiles.bin";
 /// A store that is whole: tiles by place, in the order of [`TileAt`], whatever way they came in.
 pub struct Store {
     entries: Vec<TileEntry>,
+    /// Which of them were read and found whole: a tile is read for each region that sees it.
+    is_whole: Vec<AtomicBool>,
     /// Its folders.
     parts: Vec<Part>,
 }
@@ -69,13 +72,14 @@ impl Store {
             return Err(broken("the tiles are not those of the catalogue").at(path.display()));
         }
         let straight = Straight::open(&path)?;
-        Ok(Self { entries, parts: vec![Part { first: 0, map, straight }] })
+        let is_whole = entries.iter().map(|_| AtomicBool::new(false)).collect();
+        Ok(Self { entries, is_whole, parts: vec![Part { first: 0, map, straight }] })
     }
 
     /// Stores of scans that follow one another, as one.
     #[must_use]
     pub fn join(stores: Vec<Self>) -> Self {
-        let mut all = Self { entries: Vec::new(), parts: Vec::new() };
+        let mut all = Self { entries: Vec::new(), is_whole: Vec::new(), parts: Vec::new() };
         for store in stores {
             let start = all.entries.len();
             debug_assert!(
@@ -84,6 +88,7 @@ impl Store {
             let parts = store.parts.into_iter();
             all.parts.extend(parts.map(|part| Part { first: start + part.first, ..part }));
             all.entries.extend(store.entries);
+            all.is_whole.extend(store.is_whole);
         }
         all
     }
@@ -101,26 +106,46 @@ impl Store {
         self.entries.iter().map(|e| e.n_points).sum()
     }
 
-    /// Tile `i` of [`Store::entries`], copied out and checked.
+    /// Tile `i` of [`Store::entries`], copied out; checked where it is read for the first time.
     ///
     /// # Panics
     /// Where there is no such entry.
     pub fn tile(&self, i: usize) -> Result<Tile> {
         let (part, Range { start, end }) = self.place(i);
-        let tile = self.checked(i, &part.map.bytes()[start..end]);
+        let bytes = &part.map.bytes()[start..end];
+        self.check(i, bytes)?;
+        let tile = encode::decode(&self.entries[i], bytes);
         part.map.has_read(end - start);
-        tile
+        Ok(tile)
     }
 
-    /// A tile from its bytes.
-    fn checked(&self, i: usize, bytes: &[u8]) -> Result<Tile> {
-        let entry = &self.entries[i];
+    /// Does something with the points of each of these tiles, in the given order and without a copy.
+    pub fn look_at(&self, indices: &[usize], mut work: impl FnMut(&TilePoints<'_>)) -> Result<()> {
+        indices.iter().take(AHEAD).for_each(|&i| self.will_need(i));
+        for (k, &i) in indices.iter().enumerate() {
+            indices.get(k + AHEAD).into_iter().for_each(|&i| self.will_need(i));
+            let (part, Range { start, end }) = self.place(i);
+            let bytes = &part.map.bytes()[start..end];
+            self.check(i, bytes)?;
+            work(&encode::points(&self.entries[i], bytes));
+            part.map.has_read(end - start);
+        }
+        Ok(())
+    }
+
+    /// Compares the bytes of a tile with its checksum, once.
+    fn check(&self, i: usize, bytes: &[u8]) -> Result<()> {
+        let (entry, is_whole) = (&self.entries[i], &self.is_whole[i]);
+        if is_whole.load(Ordering::Relaxed) {
+            return Ok(());
+        }
         if crc32c::crc32c(bytes) != entry.checksum {
             let at = entry.at;
             return Err(broken("the tile is damaged: its checksum is not what it should be")
                 .at(format!("store, scan {}, tile {} {}", at.scan.0, at.row, at.col)));
         }
-        Ok(encode::decode(entry, bytes))
+        is_whole.store(true, Ordering::Relaxed);
+        Ok(())
     }
 
     /// Where the bytes of a tile lie.
@@ -153,7 +178,11 @@ impl Store {
     pub fn tiles(&self) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
         (0..self.entries.len()).map(|i| {
             let (part, Range { start, end }) = self.place(i);
-            part.straight.with(start, end - start, |bytes| self.checked(i, bytes))?
+            let tile = |bytes: &[u8]| {
+                self.check(i, bytes)?;
+                Ok(encode::decode(&self.entries[i], bytes))
+            };
+            part.straight.with(start, end - start, tile)?
         })
     }
 

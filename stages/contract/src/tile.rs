@@ -35,6 +35,21 @@ pub struct Tile {
     pub bounds: Aabb,
 }
 
+/// The points of a [`Tile`] where they lie, not copied.
+#[derive(Debug, Clone, Copy)]
+pub struct TilePoints<'a> {
+    /// As in [`Tile`].
+    pub at: TileAt,
+    /// As in [`Tile`].
+    pub first_place: u64,
+    /// As in [`Tile`].
+    pub place: &'a [u32],
+    /// As in [`Tile`].
+    pub pixel: &'a [u16],
+    /// As in [`Tile`].
+    pub xyz: &'a [[f32; 3]],
+}
+
 impl Tile {
     /// Edge of a ground cell of a scan without lattice, metres.
     pub const GROUND_CELL: f32 = 0.05;
@@ -51,6 +66,13 @@ impl Tile {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.xyz.is_empty()
+    }
+
+    /// Its points.
+    #[must_use]
+    pub fn points(&self) -> TilePoints<'_> {
+        let Self { at, first_place, place, pixel, xyz, .. } = self;
+        TilePoints { at: *at, first_place: *first_place, place, pixel, xyz }
     }
 
     /// Pixel of the whole lattice of point `i`.

@@ -154,11 +154,14 @@ pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     let bounds =
         if extent.n > 0 { bounds(settings, extent) } else { Aabb { min: [0.0; 3], max: [0.0; 3] } };
     let version = las::Version::new(1, 4);
+    // The older formats say it in the older field, too, where it fits.
+    let short = u32::try_from(extent.n).ok().filter(|_| settings.short);
     let header_size = version.header_size();
     let mut by_return = [0; 15];
     by_return[0] = extent.n;
     let header = raw::Header {
-        global_encoding: WKT | if settings.standard_gps_time { STANDARD_TIME } else { 0 },
+        global_encoding: if settings.short { 0 } else { WKT }
+            | if settings.standard_gps_time { STANDARD_TIME } else { 0 },
         version,
         system_identifier: text("EXTRACTION"),
         generating_software: text(concat!("stillpoint ", env!("CARGO_PKG_VERSION"))),
@@ -179,6 +182,8 @@ pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
         min_y: bounds.min[1],
         max_z: bounds.max[2],
         min_z: bounds.min[2],
+        number_of_point_records: short.unwrap_or(0),
+        number_of_points_by_return: [short.unwrap_or(0), 0, 0, 0, 0],
         large_file: Some(raw::header::LargeFile {
             number_of_point_records: extent.n,
             number_of_points_by_return: by_return,

@@ -131,10 +131,15 @@ impl Pack {
         if let Some(intensity) = points.intensity.get(i) {
             record[12..14].copy_from_slice(&intensity.to_le_bytes());
         }
+        let source = points.source_id.get(i).copied().unwrap_or(points.scan).to_le_bytes();
         // Return 1 of 1.
+        if self.las.short {
+            record[14] = 0b00_001_001;
+            record[18..20].copy_from_slice(&source);
+            return;
+        }
         record[14] = 0x11;
-        let source = points.source_id.get(i).copied().unwrap_or(points.scan);
-        record[20..22].copy_from_slice(&source.to_le_bytes());
+        record[20..22].copy_from_slice(&source);
         if let Some(time) = points.gps_time.get(i) {
             record[22..30].copy_from_slice(&time.to_le_bytes());
         }

@@ -65,6 +65,8 @@ pub struct LasSettings {
     pub with_labels: bool,
     /// With the extra field `BodyId`.
     pub with_bodies: bool,
+    /// Format 0 instead: 20 bytes a point with place, intensity and source, and nothing else of all this.
+    pub short: bool,
     /// Compressed (LAZ).
     pub compress: bool,
     /// GPS times are adjusted standard time, as in the input's header.
@@ -82,6 +84,7 @@ impl LasSettings {
             with_color: false,
             with_labels: true,
             with_bodies: false,
+            short: false,
             compress: false,
             standard_gps_time: false,
             vlrs: Vec::new(),
@@ -91,7 +94,11 @@ impl LasSettings {
     /// LAS point format.
     #[must_use]
     pub fn format(&self) -> u8 {
-        if self.with_color { 7 } else { 6 }
+        match self {
+            Self { short: true, .. } => 0,
+            Self { with_color: true, .. } => 7,
+            _ => 6,
+        }
     }
 
     /// How names of its files end.
@@ -102,11 +109,18 @@ impl LasSettings {
     /// Length of a record, bytes.
     #[must_use]
     pub fn record_len(&self) -> usize {
-        30 + if self.with_color { 6 } else { 0 } + self.extra_len()
+        match self.format() {
+            0 => 20,
+            7 => 36 + self.extra_len(),
+            _ => 30 + self.extra_len(),
+        }
     }
 
     /// Length of our extra fields, bytes: two u16 for robot and link, a u32 for the body.
     pub(crate) fn extra_len(&self) -> usize {
+        if self.short {
+            return 0;
+        }
         4 * (usize::from(self.with_labels) + usize::from(self.with_bodies))
     }
 }

@@ -13,7 +13,7 @@ use crate::climb::Grid;
 use crate::first::First;
 use crate::graded::Stencil;
 use crate::sites::GUESS_STEP;
-use crate::trial::{QUOTA, Trial, base_link, best, coarse_yaw, prefix};
+use crate::trial::{QUOTA, Said, Trial, base_link, best, coarse_yaw, prefix};
 use crate::volume::Sight;
 
 /// What is tuned.
@@ -177,7 +177,7 @@ impl<'a> BaseSearch<'a> {
 
     /// Drops trials that score less than a share of what they need in the end.
     fn drop_hopeless(&self, trials: &mut Vec<Trial>, share: f64) {
-        trials.retain(|t| t.score >= share * self.min_score);
+        trials.retain(|t| t.said.score >= share * self.min_score);
     }
 
     /// How many robot cells the region may hold, at least one: the more, the more places must go on.
@@ -230,9 +230,9 @@ impl<'a> BaseSearch<'a> {
         let frame = local.frame();
         let place = |(x, y): (f64, f64)| -> Vec<Trial> {
             let shift = frame * Vector::new(x - start.0, y - start.1, 0.0);
-            let score = |k: usize, n_samples: usize| {
+            let ask = |k: usize, n_samples: usize| {
                 let known = stencils.as_ref().map(|s| &s[k]);
-                let known = known.and_then(|s| s.mean(shift.cast::<f32>().into(), n_samples));
+                let known = known.and_then(|s| s.ask(shift.cast::<f32>().into(), n_samples));
                 known.unwrap_or_else(|| {
                     let mut pose = turned(k);
                     pose.translation.vector += shift;
@@ -241,7 +241,7 @@ impl<'a> BaseSearch<'a> {
             };
             // A few samples at every other yaw tell most places to be hopeless, and most yaws of the others.
             let few: Vec<f64> =
-                (0..n).step_by(2).map(|k| score(k, self.settings.n_coarse / 4)).collect();
+                (0..n).step_by(2).map(|k| ask(k, self.settings.n_coarse / 4).score).collect();
             let top = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
             if top < HOPELESS {
                 return Vec::new();
@@ -250,9 +250,10 @@ impl<'a> BaseSearch<'a> {
                 few[k / 2 % few.len()].max(few[k.div_ceil(2) % few.len()]) >= top - YAW_LAG
             };
             let all = (0..n).filter(|k| is_open(*k)).filter_map(|k| {
-                let score = score(k, self.settings.n_coarse);
+                let said = ask(k, self.settings.n_coarse);
                 let yaw = k as f64 * coarse_yaw();
-                (score > 0.0).then_some(Trial { x, y, yaw, plane: at, score, first: 0.0 })
+                let first = Said::default();
+                (said.score > 0.0).then_some(Trial { x, y, yaw, plane: at, said, first })
             });
             all.collect()
         };
@@ -326,10 +327,10 @@ impl<'a> BaseSearch<'a> {
         plane: &Plane,
         trial: &Trial,
         (tolerance, n): (f32, usize),
-    ) -> f64 {
+    ) -> Said {
         let cad = prefix(self.model, self.base, n);
         let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
-        self.sight.mean(&self.sight.evidence.probe(cad.0, cad.1, &pose, tolerance))
+        self.sight.said(&self.sight.evidence.probe(cad.0, cad.1, &pose, tolerance))
     }
 
     /// The base standing on the plane at a place (its own coordinates), turned by `yaw` about the plane's normal.
@@ -347,7 +348,7 @@ impl<'a> BaseSearch<'a> {
         trials: &[Trial],
     ) -> Vec<Candidate> {
         let mut places: Vec<Vec<&Trial>> = Vec::new();
-        for trial in trials.iter().filter(|t| t.score >= self.min_score) {
+        for trial in trials.iter().filter(|t| t.said.score >= self.min_score) {
             let radius = self.settings.place_radius;
             let at = |t: &Trial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
             let here = at(trial);
@@ -363,6 +364,7 @@ impl<'a> BaseSearch<'a> {
                 None => {}
             }
         }
+        places.iter_mut().for_each(|p| p.sort_by(|a, b| b.said.score.total_cmp(&a.said.score)));
         // The best of a place may be the right place turned wrongly.
         places.retain(|place| {
             place.iter().take(N_LIKE).any(|trial| self.is_like(&local[trial.plane], trial))
@@ -382,7 +384,7 @@ impl<'a> BaseSearch<'a> {
                     .iter()
                     .map(|t| {
                         let pose = self.pose(&local[t.plane], t.x, t.y, t.yaw);
-                        (world_from_local * pose, t.score)
+                        (world_from_local * pose, t.said.score)
                     })
                     .collect(),
                 group: 0,

@@ -5,7 +5,7 @@ use contract::Fan;
 use geometry::Plane;
 
 use crate::base::BaseSearch;
-use crate::trial::{Trial, best, prefix};
+use crate::trial::{Said, Trial, best, prefix};
 
 /// Steps that a pose may go beyond its neighbours while it gets better.
 const CLIMB: usize = 3;
@@ -39,7 +39,7 @@ impl BaseSearch<'_> {
         let around = |trial: Trial| -> Vec<Trial> {
             let mut near = self.climb(planes, &trial, &grid);
             for t in &mut near {
-                t.score =
+                t.said =
                     self.joined(self.look(planes, t, self.settings.n_fine, tolerance), t.first);
             }
             near
@@ -55,20 +55,21 @@ impl BaseSearch<'_> {
     /// have taken what stands beside a place for it.
     fn climb(&self, planes: &[Plane], trial: &Trial, grid: &Grid) -> Vec<Trial> {
         let top = |near: &[Trial]| {
-            near.iter().copied().max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(*trial)
+            let better = |a: &Trial, b: &Trial| a.said.score.total_cmp(&b.said.score);
+            near.iter().copied().max_by(better).unwrap_or(*trial)
         };
         let mut near = self.neighbours(planes, trial, grid);
         let mut best = top(&near);
         for _ in 0..CLIMB {
             let farther = self.neighbours(planes, &best, grid);
             let next = top(&farther);
-            if next.score <= best.score {
+            if next.said.score <= best.said.score {
                 break;
             }
             (near, best) = (farther, next);
         }
         // A few samples tell most neighbours to be worse.
-        near.retain(|t| t.score >= best.score - LAG);
+        near.retain(|t| t.said.score >= best.said.score - LAG);
         near
     }
 
@@ -83,14 +84,14 @@ impl BaseSearch<'_> {
             next.x += f64::from(i) * grid.step;
             next.y += f64::from(j) * grid.step;
             next.yaw += f64::from(k) * grid.yaw;
-            next.score = self.look(planes, &next, self.settings.n_fine / 4, grid.tolerance());
+            next.said = self.look(planes, &next, self.settings.n_fine / 4, grid.tolerance());
             Some(next)
         });
         near.collect()
     }
 
     /// What some samples of the base say at a glance.
-    fn look(&self, planes: &[Plane], t: &Trial, n_samples: usize, tolerance: f32) -> f64 {
+    fn look(&self, planes: &[Plane], t: &Trial, n_samples: usize, tolerance: f32) -> Said {
         let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
         self.sight.glance(prefix(self.model, self.base, n_samples), &pose, tolerance)
     }

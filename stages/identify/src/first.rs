@@ -6,7 +6,7 @@ use robot::Model;
 
 use crate::base::BaseSearch;
 use crate::climb::LAG;
-use crate::trial::{Trial, first_moving, of_judged, prefix};
+use crate::trial::{Said, Trial, first_moving, of_judged, prefix};
 
 /// Tolerances at which base and first link are judged in the end, metres: half a step of the finest grid.
 const JUDGE: (f32, f32) = (0.04, 0.06);
@@ -78,23 +78,23 @@ impl BaseSearch<'_> {
     /// The trial with the score of the base and of the first moving link at its best joint value.
     pub(crate) fn with_first(&self, plane: &Plane, trial: Trial, tolerance: f32) -> Trial {
         let own = self.score_base(plane, &trial, (tolerance, self.settings.n_fine));
-        let Some(of_first) = &self.first else { return Trial { score: own, ..trial } };
+        let Some(of_first) = &self.first else { return Trial { said: own, ..trial } };
         let tolerance = tolerance * 1.5;
         let first = if self.sight.each.is_empty() {
             let cad = prefix(self.model, of_first.link, self.settings.n_coarse);
             let (poses, few) = self.sweep(plane, &trial, of_first, tolerance);
             let least = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - LAG;
             let full = poses.iter().zip(&few).filter(|(_, few)| **few >= least);
-            let score =
-                |p: &Pose| self.sight.mean(&self.sight.evidence.probe(cad.0, cad.1, p, tolerance));
-            full.map(|(p, _)| score(p)).fold(f64::NEG_INFINITY, f64::max)
+            let said =
+                |p: &Pose| self.sight.said(&self.sight.evidence.probe(cad.0, cad.1, p, tolerance));
+            highest(full.map(|(p, _)| said(p)))
         } else {
             let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
             let probe = self.first_apart(&local_from_base, of_first, tolerance);
             // Each scan sees less than half of it.
-            of_judged(&probe) * (2.0 * f64::from(probe.seen())).min(1.0)
+            Said::of(&probe, of_judged(&probe) * (2.0 * f64::from(probe.seen())).min(1.0))
         };
-        Trial { score: self.joined(own, first), first, ..trial }
+        Trial { said: self.joined(own, first), first, ..trial }
     }
 
     /// The same at a glance, to whatever score the base has already.
@@ -106,16 +106,17 @@ impl BaseSearch<'_> {
         let (poses, few) = self.sweep(plane, &trial, of_first, tolerance);
         let mut best: Vec<usize> = (0..few.len()).collect();
         best.sort_by(|a, b| few[*b].total_cmp(&few[*a]));
-        let score = |k: &usize| self.sight.glance(cad, &poses[*k], tolerance);
-        let first = best.iter().take(N_GLANCES).map(score).fold(f64::NEG_INFINITY, f64::max);
-        Trial { score: self.joined(trial.score, first), first, ..trial }
+        let said = |k: &usize| self.sight.glance(cad, &poses[*k], tolerance);
+        let first = highest(best.iter().take(N_GLANCES).map(said));
+        Trial { said: self.joined(trial.said, first), first, ..trial }
     }
 
-    /// The mean score of the base and the first link, each with the root of its area.
-    pub(crate) fn joined(&self, base: f64, first: f64) -> f64 {
+    /// What base and first link say, each with the root of its area.
+    pub(crate) fn joined(&self, base: Said, first: Said) -> Said {
         let weight = |l: usize| f64::from(self.model.links[l].cad.area).sqrt();
         let weights = (weight(self.base), self.first.as_ref().map_or(0.0, |f| weight(f.link)));
-        (weights.0 * base + weights.1 * first) / (weights.0 + weights.1)
+        let mean = |a: f64, b: f64| (weights.0 * a + weights.1 * b) / (weights.0 + weights.1);
+        Said { score: mean(base.score, first.score), seen: mean(base.seen, first.seen) }
     }
 
     /// Poses of the first link over its joint, and what a few samples say of each: most are hopeless.
@@ -128,7 +129,7 @@ impl BaseSearch<'_> {
     ) -> (Vec<Pose>, Vec<f64>) {
         let poses = first.poses(&self.pose(plane, trial.x, trial.y, trial.yaw));
         let some = prefix(self.model, first.link, self.settings.n_coarse / 4);
-        let few = |pose: &Pose| self.sight.glance(some, pose, tolerance);
+        let few = |pose: &Pose| self.sight.glance(some, pose, tolerance).score;
         let few = poses.iter().map(few).collect();
         (poses, few)
     }
@@ -145,4 +146,10 @@ impl BaseSearch<'_> {
         }
         sum
     }
+}
+
+/// What the pose says that scores most.
+fn highest(all: impl Iterator<Item = Said>) -> Said {
+    let nothing = Said { score: f64::NEG_INFINITY, seen: 0.0 };
+    all.fold(nothing, |best, said| if said.score > best.score { said } else { best })
 }

@@ -1,13 +1,16 @@
 //! A grid of scores and the samples of a body in; out comes the mean score of the samples at a pose, in whole numbers: one
 //! look-up and one addition a sample.
 
+use crate::trial::Said;
 use geometry::Pose;
 use geometry::depth::{Rows, rows, transform};
 
-/// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten are hidden.
-pub(crate) const HIDDEN: f32 = 0.03;
 /// Unit of the scores in a grid: the price of a hidden sample is two of them, that of one seen through a hundred.
 pub(crate) const SCORE_UNIT: f32 = 0.015;
+/// Score of a cell that no beam could judge; no other scores just this.
+pub(crate) const UNJUDGED: i8 = -2;
+/// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten are hidden.
+pub(crate) const HIDDEN: f32 = UNJUDGED as f32 * -SCORE_UNIT;
 
 /// What each cell of a region scores at some tolerance.
 #[derive(Debug, Clone, Copy)]
@@ -43,17 +46,16 @@ impl<'a> Graded<'a> {
         m
     }
 
-    /// Mean score of samples (frame of the body) with the body at a pose; what lies outside of the grid is hidden.
-    pub(crate) fn mean(&self, points: &[[f32; 3]], local_from_body: &Pose) -> f64 {
+    /// What samples (frame of the body) say with the body at a pose; what lies outside of the grid is hidden.
+    pub(crate) fn ask(&self, points: &[[f32; 3]], local_from_body: &Pose) -> Said {
         let m = self.cells_from(local_from_body);
-        let hidden = (-HIDDEN / SCORE_UNIT).round() as i32;
         let score = |p: &[f32; 3]| {
             let at = transform(&m, *p);
             let is_inside = (0..3).all(|i| at[i] >= 0.0 && at[i] < self.n[i] as f32);
             let place = || self.place(at.map(|v| v as i32)) as usize;
-            if is_inside { i32::from(self.scores[place()]) } else { hidden }
+            if is_inside { self.scores[place()] } else { UNJUDGED }
         };
-        mean(points.iter().map(score).sum(), points.len())
+        said(points.iter().map(score), points.len())
     }
 
     /// The samples of a body at a pose, which is where it is moved from.
@@ -77,9 +79,9 @@ impl<'a> Graded<'a> {
 }
 
 impl Stencil<'_> {
-    /// Mean score of the first `n` samples with the body moved by `shift` (local, metres), to the nearest cell; `None` where
-    /// some of them would lie outside of the grid.
-    pub(crate) fn mean(&self, shift: [f32; 3], n: usize) -> Option<f64> {
+    /// What the first `n` samples say with the body moved by `shift` (local, metres), to the nearest cell; `None` where some of
+    /// them would lie outside of the grid.
+    pub(crate) fn ask(&self, shift: [f32; 3], n: usize) -> Option<Said> {
         let grid = &self.grid;
         let by = shift.map(|v| (v / grid.edge).round() as i32);
         let is_inside =
@@ -87,14 +89,18 @@ impl Stencil<'_> {
         is_inside.then(|| {
             let step = grid.place(by);
             let places = &self.places[..n.min(self.places.len())];
-            let sum = places.iter().map(|p| i32::from(grid.scores[(p + step) as usize])).sum();
-            mean(sum, places.len())
+            said(places.iter().map(|p| grid.scores[(p + step) as usize]), places.len())
         })
     }
 }
 
-fn mean(sum: i32, n: usize) -> f64 {
-    f64::from(sum) * f64::from(SCORE_UNIT) / n.max(1) as f64
+fn said(scores: impl Iterator<Item = i8>, n: usize) -> Said {
+    let add = |(sum, n_seen): (i32, i32), score: i8| {
+        (sum + i32::from(score), n_seen + i32::from(score != UNJUDGED))
+    };
+    let (sum, n_seen) = scores.fold((0, 0), add);
+    let n = n.max(1) as f64;
+    Said { score: f64::from(sum) * f64::from(SCORE_UNIT) / n, seen: f64::from(n_seen) / n }
 }
 
 #[cfg(test)]
@@ -111,11 +117,11 @@ mod tests {
         let stencil = grid.stencil(&points, &at(0.0, 0.0, 0.0));
         for (i, j, k) in [(0, 0, 0), (3, -1, 2), (7, 9, -1)] {
             let by = [i, j, k].map(|n| f64::from(n) * 0.03);
-            let moved = grid.mean(&points, &at(by[0], by[1], by[2]));
-            assert_eq!(stencil.mean(by.map(|v| v as f32), 3), Some(moved), "{by:?}");
+            let moved = grid.ask(&points, &at(by[0], by[1], by[2]));
+            assert_eq!(stencil.ask(by.map(|v| v as f32), 3), Some(moved), "{by:?}");
         }
-        assert_eq!(stencil.mean([1.0, 0.0, 0.0], 3), None);
-        let outside = grid.mean(&points, &at(9.0, 0.0, 0.0));
+        assert_eq!(stencil.ask([1.0, 0.0, 0.0], 3), None);
+        let outside = grid.ask(&points, &at(9.0, 0.0, 0.0)).score;
         assert!((outside + f64::from(HIDDEN)).abs() < 1e-6, "{outside}");
     }
 }

@@ -18,10 +18,36 @@ pub(crate) struct Trial {
     pub(crate) yaw: f64,
     pub(crate) plane: usize,
     /// Of the base, joined with that of the first moving link once it was looked at.
-    pub(crate) score: f64,
-    /// Of the first moving link alone, at the place that this one was refined from; 0 before.
-    pub(crate) first: f64,
+    pub(crate) said: Said,
+    /// Of the first moving link alone, at the place that this one was refined from; nothing before.
+    pub(crate) first: Said,
 }
+
+/// What samples of a body at a pose say.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Said {
+    /// Mean score of all, those that no beam could judge at their price.
+    pub(crate) score: f64,
+    /// Share of them that beams could judge.
+    pub(crate) seen: f64,
+}
+
+impl Said {
+    /// Of a probe whose mean score is known.
+    pub(crate) fn of(probe: &Probe, score: f64) -> Self {
+        Self { score, seen: f64::from(probe.seen()) }
+    }
+
+    /// By which poses are told better from worse until few are left: between the mean score of all samples, by which what all
+    /// scans see of a cabinet outdoes what one of them sees of a robot, and that of the judged, by which a corner of anything
+    /// does.
+    pub(crate) fn rank(&self) -> f64 {
+        self.score / self.seen.max(LEAST_SEEN).sqrt()
+    }
+}
+
+/// Share of samples below which ever fewer count for ever less.
+const LEAST_SEEN: f64 = 0.1;
 
 /// Mean score of the samples that could be judged.
 pub(crate) fn of_judged(probe: &Probe) -> f64 {
@@ -69,8 +95,9 @@ pub(crate) fn best(
     yaw_step: f64,
 ) {
     trials.sort_by(|a, b| {
-        b.score
-            .total_cmp(&a.score)
+        b.said
+            .rank()
+            .total_cmp(&a.said.rank())
             .then(a.plane.cmp(&b.plane))
             .then(a.x.total_cmp(&b.x))
             .then(a.y.total_cmp(&b.y))

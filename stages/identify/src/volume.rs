@@ -6,7 +6,8 @@ use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
 use geometry::{Aabb, Evidence, Eye, Pose, Probe, Vector};
 use std::sync::OnceLock;
 
-use crate::graded::{Graded, HIDDEN, SCORE_UNIT, Stencil};
+use crate::graded::{Graded, HIDDEN, SCORE_UNIT, Stencil, UNJUDGED};
+use crate::trial::Said;
 
 /// Edge of a cell, and of the cubes of points, metres: half of the finest tolerance that is asked of it.
 const EDGE: f32 = 0.03;
@@ -45,8 +46,12 @@ impl Cell {
         };
         let mut probe = Probe::default();
         probe.count(through, on);
-        let score = if probe.n_seen > 0 { probe.score } else { -HIDDEN };
-        (score / SCORE_UNIT).round() as i8
+        match (probe.score / SCORE_UNIT).round() as i8 {
+            _ if probe.n_seen == 0 => UNJUDGED,
+            // Only what is hidden scores this.
+            UNJUDGED => UNJUDGED - 1,
+            score => score,
+        }
     }
 }
 
@@ -118,17 +123,17 @@ impl<'a> Sight<'a> {
         &self.spots
     }
 
-    /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: their mean score,
-    /// from the grid where the tolerance allows.
+    /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: from the grid where
+    /// the tolerance allows.
     pub(crate) fn glance(
         &self,
         (points, normals): (&[[f32; 3]], &[[f32; 3]]),
         local_from_body: &Pose,
         tolerance: f32,
-    ) -> f64 {
+    ) -> Said {
         match self.graded(tolerance) {
-            Some(graded) => graded.mean(points, local_from_body),
-            None => self.mean(&self.evidence.probe(points, normals, local_from_body, tolerance)),
+            Some(graded) => graded.ask(points, local_from_body),
+            None => self.said(&self.evidence.probe(points, normals, local_from_body, tolerance)),
         }
     }
 
@@ -157,6 +162,11 @@ impl<'a> Sight<'a> {
     pub(crate) fn in_cells(&self, length: f64) -> f64 {
         let edge = self.volume.as_ref().map_or(f64::INFINITY, |volume| f64::from(volume.edge));
         if edge <= length { (length / edge).floor() * edge } else { length }
+    }
+
+    /// What a probe of them says.
+    pub(crate) fn said(&self, probe: &Probe) -> Said {
+        Said::of(probe, self.mean(probe))
     }
 
     /// Mean score of the samples, hidden ones at their price for a base.

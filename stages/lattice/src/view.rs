@@ -1,6 +1,8 @@
 //! Tiles of one scan in; out comes the scan's view of a region: depth images towards it, and its points inside.
 
-use contract::{Lattice, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, View, ViewPoint};
+use contract::{
+    Lattice, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, TilePoints, View, ViewPoint,
+};
 use geometry::depth::{Empty, LANES, Rows, lanes, rows, transform, transform_lanes};
 use geometry::{DepthImage, Faces, Point, Pose, Vector};
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
@@ -152,7 +154,7 @@ impl ViewBuilder {
     }
 
     /// Adds the points of a tile; of a dense scan, one of each square of pixels.
-    pub fn add(&mut self, tile: &Tile) {
+    pub fn add(&mut self, tile: &TilePoints<'_>) {
         self.splatted.clear();
         self.kept.iter_mut().for_each(Squares::clear);
         let local_from_scan = rows(&self.local_from_scan);
