@@ -71,6 +71,10 @@ const MIN_STANDING: f64 = 1.2;
 const BOX_MARGIN: f64 = 0.08;
 /// Places on walls, ceilings and such stands that are looked at for each model.
 const MAX_MOUNTS: usize = 2;
+/// So many times the base poses are looked at where a region is searched for what is left over; and so many places for each
+/// model.
+const BREADTH: usize = 3;
+const MAX_LEFT_OVER: usize = 4;
 /// What hangs on a wall keeps its base so far above the floor, metres.
 const FLOOR_SLACK: f64 = 0.05;
 /// A base farther below a floor belongs to a lower level, metres.
@@ -161,25 +165,41 @@ impl<'a, 'm> Search<'a, 'm> {
         }
         let mut sight = Sight::new(region, &views, (&scene.evidence, &scene.scouts), &AllThreads);
         let mut candidates =
-            self.piece((region, "candidates"), || self.candidates(&sight, &planes, 0.0))?;
+            self.piece((region, "candidates"), || self.candidates(&sight, &planes, (0.0, 1)))?;
         candidates.retain(is_wanted);
         let mut fits = self.fits(&scene, &candidates)?;
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
-            let find = || self.candidates(&sight, &self.mounts(region), MIN_MOUNT_SCORE);
+            let find = || self.candidates(&sight, &self.mounts(region), (MIN_MOUNT_SCORE, 1));
             let mut hung = self.piece((region, "mounts"), find)?;
             hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
-            fits.extend(self.fits(&scene, &few(hung))?);
+            fits.extend(self.fits(&scene, &few(hung, MAX_MOUNTS))?);
         }
+        fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits)?);
         fits.extend(self.on_stands(&scene, &mut sight, &fits)?);
         let gone = lattice::disagreement(&views, &AllThreads);
         if gone.len() >= MIN_GONE {
-            let feet = self.candidates(&sight.apart(), &planes, 0.0);
+            let feet = self.candidates(&sight.apart(), &planes, (0.0, 1));
             let sights = Sights { region, views: &views, floors: &planes };
             fits.extend(self.moved(&fits, (&feet, &gone), &sights));
         }
         fits.retain(|fit| wants(&base(&fit.world_from_base)));
         Ok(fits)
+    }
+
+    /// Fits of robots that less is seen of than of what stands about those that were found: without that, more bases of each
+    /// model are looked at.
+    fn left_over(
+        &self,
+        scene: &Scene<'_>,
+        (sight, planes): (&mut Sight<'_>, &[InstallationPlane]),
+        fits: &[Fit],
+    ) -> Result<Vec<Fit>> {
+        let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
+        let find = || self.candidates(sight, planes, (0.0, BREADTH));
+        let mut found = self.piece((scene.region, "left over"), find)?;
+        found.retain(|c| is_apart(c, &feet));
+        self.fits(scene, &few(found, MAX_LEFT_OVER))
     }
 
     /// Fits of robots that hide all of the stand under their feet: where much is left that no trusted robot explains, all
@@ -191,29 +211,34 @@ impl<'a, 'm> Search<'a, 'm> {
         fits: &[Fit],
     ) -> Result<Vec<Fit>> {
         let region = scene.region;
-        // Without beams nothing contradicts a wrong height.
-        if !scene.evidence.has_beams() {
-            return Ok(Vec::new());
-        }
         let at = region.origin;
         let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
-        let floor = height.map(|h| at.z - h);
-        let trusted = fits.iter().filter(|f| f.verdict == Verdict::Trusted);
-        let feet: Vec<Point> = trusted.clone().map(|f| base(&f.world_from_base)).collect();
-        let taken: Vec<Aabb> =
-            trusted.flat_map(|f| boxes(f, &self.shelf.models[f.model])).collect();
-        let Some(floor) = floor.filter(|_| sight.pass_over(&taken, MIN_STANDING) >= MIN_LEFT)
-        else {
-            return Ok(Vec::new());
-        };
+        let Some(floor) = height.map(|h| at.z - h) else { return Ok(Vec::new()) };
+        let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
         let planes = identify::stand_planes(&region.world_bounds(), floor);
-        let find = || self.candidates(sight, &planes, MIN_STAND_SCORE);
+        let find = || self.candidates(sight, &planes, (MIN_STAND_SCORE, 1));
         let mut found = self.piece((region, "stands"), find)?;
-        found.retain(|c| {
-            let here = base(&c.bases[0].0);
-            !feet.iter().any(|at| (at - here).norm() < SAME_BASE)
-        });
-        self.fits(scene, &few(found))
+        found.retain(|c| is_apart(c, &feet));
+        self.fits(scene, &few(found, MAX_MOUNTS))
+    }
+
+    /// Lets only points count that are on no trusted robot; returns the bases of those robots where much is left, `None`
+    /// where little is.
+    fn pass_over(
+        &self,
+        scene: &Scene<'_>,
+        sight: &mut Sight<'_>,
+        fits: &[Fit],
+    ) -> Option<Vec<Point>> {
+        // Without beams nothing contradicts a wrong base.
+        if !scene.evidence.has_beams() {
+            return None;
+        }
+        let trusted = || fits.iter().filter(|f| f.verdict == Verdict::Trusted);
+        let taken: Vec<Aabb> =
+            trusted().flat_map(|f| boxes(f, &self.shelf.models[f.model])).collect();
+        let is_much = sight.pass_over(&taken, MIN_STANDING) >= MIN_LEFT;
+        is_much.then(|| trusted().map(|f| base(&f.world_from_base)).collect())
     }
 
     /// Where robots of all models may stand on some planes, best base first, those that score so much.
@@ -221,14 +246,14 @@ impl<'a, 'm> Search<'a, 'm> {
         &self,
         sight: &Sight<'_>,
         planes: &[InstallationPlane],
-        min_score: f64,
+        (min_score, breadth): (f64, usize),
     ) -> Vec<Candidate> {
         let guessed = planes.iter().all(InstallationPlane::is_guess);
         let search = |index: usize| {
             let model = (index, &self.shelf.models[index]);
             let search = BaseSearch::new(model, sight, &self.settings.identify);
             let search = search.map(|s| if guessed { s.on_guesses() } else { s });
-            let search = search.map(|s| s.at_least(min_score));
+            let search = search.map(|s| s.at_least(min_score).broad(breadth));
             search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default()
         };
         let models = (0..self.shelf.models.len()).into_par_iter();
@@ -395,13 +420,19 @@ impl<'a, 'm> Search<'a, 'm> {
     }
 }
 
+/// Whether a candidate stands at none of these bases.
+fn is_apart(candidate: &Candidate, feet: &[Point]) -> bool {
+    let here = base(&candidate.bases[0].0);
+    !feet.iter().any(|at| (at - here).norm() < SAME_BASE)
+}
+
 /// The best candidates of each model, few.
-fn few(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+fn few(mut candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
     let mut n: BTreeMap<usize, usize> = BTreeMap::new();
     candidates.retain(|c| {
         let n = n.entry(c.model).or_default();
         *n += 1;
-        *n <= MAX_MOUNTS
+        *n <= most
     });
     candidates
 }

@@ -231,26 +231,34 @@ impl DepthImage {
     /// The same as [`DepthImage::look`] for lanes of the camera frame.
     #[inline]
     #[must_use]
-    pub fn look_lanes(&self, camera: &Lanes, footprint: f32) -> [Option<Look>; LANES] {
+    pub fn look_lanes(&self, camera: &Lanes, footprint: f32) -> Looks {
         let base = &self.levels[0];
-        let (cx, cy) = (0.5 * base.width as f32, 0.5 * base.height as f32);
-        let mut all = [[0.0_f32; LANES]; 4];
+        let (width, height) = (base.width as f32, base.height as f32);
+        let most = self.levels.len() as u32 - 1;
+        let mut out = Looks::NOTHING;
+        let mut at = [[0_u32; LANES]; 3];
         let [x, y, z] = camera;
+        // One loop without branches, so that it becomes vector instructions; then one of look-ups.
         for i in 0..LANES {
             let inverse = self.focal / z[i];
-            all[0][i] = inverse;
-            all[1][i] = x[i] * inverse + cx;
-            all[2][i] = y[i] * inverse + cy;
-            all[3][i] = (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
+            let (u, v) = (x[i] * inverse + 0.5 * width, y[i] * inverse + 0.5 * height);
+            // As in `cell`.
+            let cells = (footprint * inverse).max(1.0);
+            let level = ((cells.to_bits() >> 23) - 127).min(most);
+            let scale = f32::from_bits((127 - level) << 23);
+            let is_in = z[i] > 0.0 && u >= 0.0 && v >= 0.0 && u < width && v < height;
+            at[0][i] = if is_in { level } else { u32::MAX };
+            at[1][i] = (u * scale) as i32 as u32;
+            at[2][i] = (v * scale) as i32 as u32;
+            out.range[i] = (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
         }
-        let [inverse, u, v, range] = all;
-        std::array::from_fn(|i| {
-            if z[i] <= 0.0 {
-                return None;
-            }
-            let [near, far, around] = self.cell([u[i], v[i]], footprint * inverse[i])?;
-            Some(Look { near, far, around, range: range[i] })
-        })
+        let [level, u, v] = at;
+        for i in 0..LANES {
+            let Some(level) = self.levels.get(level[i] as usize) else { continue };
+            let [near, far, around] = level.cells[v[i] as usize * level.width + u[i] as usize];
+            (out.near[i], out.far[i], out.around[i]) = (near, far, around);
+        }
+        out
     }
 
     /// The same for a point of the local frame.
@@ -272,6 +280,44 @@ pub struct Look {
     pub around: f32,
     /// Range of the point itself, metres.
     pub range: f32,
+}
+
+/// What the beams found in the directions of lanes; as in [`Look`].
+#[derive(Debug, Clone, Copy)]
+pub struct Looks {
+    /// NaN where nothing is known.
+    pub near: [f32; LANES],
+    /// Without meaning there, as the next.
+    pub far: [f32; LANES],
+    /// As in [`Look`].
+    pub around: [f32; LANES],
+    /// As in [`Look`].
+    pub range: [f32; LANES],
+}
+
+impl Looks {
+    /// Nothing is known anywhere.
+    pub(crate) const NOTHING: Self = Self {
+        near: [f32::NAN; LANES],
+        far: [f32::NAN; LANES],
+        around: [f32::NAN; LANES],
+        range: [0.0; LANES],
+    };
+
+    /// Of one lane; `None` where nothing is known.
+    #[inline]
+    #[must_use]
+    pub fn get(&self, i: usize) -> Option<Look> {
+        let [near, far, around] = [self.near[i], self.far[i], self.around[i]];
+        (!near.is_nan()).then_some(Look { near, far, around, range: self.range[i] })
+    }
+
+    /// Sets one lane.
+    #[inline]
+    pub(crate) fn set(&mut self, i: usize, look: &Look) {
+        let Look { near, far, around, range } = *look;
+        (self.near[i], self.far[i], self.around[i], self.range[i]) = (near, far, around, range);
+    }
 }
 
 impl Level {

@@ -2,7 +2,7 @@
 //! the faces of a cube, mostly one is asked.
 
 use crate::DepthImage;
-use crate::depth::{LANES, Lanes, Look, transform_lanes};
+use crate::depth::{LANES, Lanes, Look, Looks, transform_lanes};
 
 /// A scanner with its images.
 #[derive(Debug, Clone)]
@@ -35,11 +35,16 @@ impl<'a> Eye<'a> {
     /// The same as [`Eye::look`] for places of the local frame.
     #[inline]
     #[must_use]
-    pub fn look_lanes(&self, local: &Lanes, footprint: f32) -> [Option<Look>; LANES] {
+    pub fn look_lanes(&self, local: &Lanes, footprint: f32) -> Looks {
         if let Some(image) = self.faces.of_all(local).map(|i| self.images[i]) {
             return image.look_lanes(&transform_lanes(&image.rows, local), footprint);
         }
-        std::array::from_fn(|i| self.look([local[0][i], local[1][i], local[2][i]], footprint))
+        let mut out = Looks::NOTHING;
+        for i in 0..LANES {
+            let look = self.look([local[0][i], local[1][i], local[2][i]], footprint);
+            look.iter().for_each(|look| out.set(i, look));
+        }
+        out
     }
 
     /// What its beams found at a place of the local frame, in a cell about `footprint` metres wide; `None` where nothing is
@@ -214,7 +219,8 @@ mod tests {
                     (0..LANES).map(|_| at.map(|v| v + spread * next())).collect();
                 let each: Vec<Option<Look>> =
                     places.iter().map(|place| one.look(*place, 0.05)).collect();
-                assert_eq!(together.look_lanes(&lanes(&places), 0.05)[..], each[..]);
+                let looks = together.look_lanes(&lanes(&places), 0.05);
+                assert_eq!((0..LANES).map(|i| looks.get(i)).collect::<Vec<_>>(), each);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Judging a surface by the beams. Depth images and surface samples in; out comes whether a beam ended on each sample,
 //! went through it, or never got there.
 
-use crate::depth::{rotate, rows, transform};
+use crate::depth::{LANES, Looks, Rows, rotate, rows, transform};
 use crate::{Eye, Pose};
 
 /// Weight of a beam that did not come back, against one that hit something behind: black paint and glancing
@@ -85,44 +85,103 @@ pub fn probe(
     local_from_body: &Pose,
     tolerance: f32,
 ) -> Probe {
-    let (to_local, per_tolerance) = (rows(local_from_body), 1.0 / tolerance);
+    let to_local = rows(local_from_body);
     let mut out = Probe { n: points.len() as u32, ..Probe::default() };
-    for (p, n) in points.iter().zip(normals) {
-        let (p, n) = (transform(&to_local, *p), rotate(&to_local, *n));
-        let (mut through, mut on) = (0.0_f32, 0.0_f32);
-        for eye in eyes {
-            let at = eye.at();
-            let ray = [at[0] - p[0], at[1] - p[1], at[2] - p[2]];
-            let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
-            // A beam through a body enters by a front face: back faces tell nothing new.
-            if along <= 0.0 {
-                continue;
-            }
-            let far = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
-            if along * along < MIN_FACING * MIN_FACING * far {
-                continue;
-            }
-            let Some(look) = eye.look(p, 0.5 * tolerance) else { continue };
-            let ahead = look.around - look.range;
-            if ahead > tolerance {
-                let v = if ahead == f32::INFINITY {
-                    NO_RETURN_WEIGHT
-                } else {
-                    ((ahead - tolerance) * per_tolerance).min(1.0)
-                };
-                through = through.max(v);
-                if through >= 1.0 {
-                    // No other scan can make it worse or better.
-                    break;
-                }
-            } else {
-                let off = (look.near - look.range).abs().min((look.far - look.range).abs());
-                on = on.max(1.0 - off * per_tolerance);
-            }
-        }
-        out.count(through, on);
+    for (points, normals) in points.chunks(BLOCK).zip(normals.chunks(BLOCK)) {
+        let mut block = Block::new(&to_local, points, normals);
+        eyes.iter().for_each(|eye| block.ask(eye, tolerance));
+        (0..points.len()).for_each(|i| out.count(block.through[i], block.on[i]));
     }
     out
+}
+
+/// Samples that are judged together: what is reckoned of all of them becomes vector instructions.
+const BLOCK: usize = 80;
+
+/// Samples in the local frame, and what is known of them so far.
+struct Block {
+    n: usize,
+    p: [[f32; BLOCK]; 3],
+    normal: [[f32; BLOCK]; 3],
+    /// How far beams went through each, and how well one ends on it, 0..1.
+    through: [f32; BLOCK],
+    on: [f32; BLOCK],
+}
+
+impl Block {
+    #[inline]
+    fn new(to_local: &Rows, points: &[[f32; 3]], normals: &[[f32; 3]]) -> Self {
+        let zero = [[0.0; BLOCK]; 3];
+        let (n, through, on) = (points.len(), [0.0; BLOCK], [0.0; BLOCK]);
+        let mut out = Self { n, p: zero, normal: zero, through, on };
+        for (i, (p, normal)) in points.iter().zip(normals).enumerate() {
+            let (p, normal) = (transform(to_local, *p), rotate(to_local, *normal));
+            for axis in 0..3 {
+                (out.p[axis][i], out.normal[axis][i]) = (p[axis], normal[axis]);
+            }
+        }
+        out
+    }
+
+    /// Adds what one scanner saw.
+    #[inline]
+    fn ask(&mut self, eye: &Eye<'_>, tolerance: f32) {
+        let mut which = [0_u8; BLOCK + 1];
+        let n = self.facing(eye.at(), &mut which);
+        for some in which[..n].chunks(LANES) {
+            let place = |lane: usize| usize::from(some[lane.min(some.len() - 1)]);
+            let at: [usize; LANES] = std::array::from_fn(place);
+            let local = [0, 1, 2].map(|axis| at.map(|i| self.p[axis][i]));
+            let (through, on) = said(&eye.look_lanes(&local, 0.5 * tolerance), tolerance);
+            for (lane, &i) in some.iter().enumerate() {
+                let i = usize::from(i);
+                self.through[i] = self.through[i].max(through[lane]);
+                self.on[i] = self.on[i].max(on[lane]);
+            }
+        }
+    }
+
+    /// Which samples turn a front face to a scanner, without those that beams went wholly through: no other scan can make
+    /// them worse or better. Returns how many.
+    #[inline]
+    fn facing(&self, at: [f32; 3], which: &mut [u8; BLOCK + 1]) -> usize {
+        let (p, normal) = (&self.p, &self.normal);
+        let mut is_facing = [false; BLOCK];
+        // The bound tells the compiler that no index is beyond the arrays.
+        for i in 0..self.n.min(BLOCK) {
+            let ray = [at[0] - p[0][i], at[1] - p[1][i], at[2] - p[2][i]];
+            let along = normal[0][i] * ray[0] + normal[1][i] * ray[1] + normal[2][i] * ray[2];
+            let far = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
+            // A beam through a body enters by a front face: back faces tell nothing new.
+            let is_front = along > 0.0 && along * along >= MIN_FACING * MIN_FACING * far;
+            is_facing[i] = is_front && self.through[i] < 1.0;
+        }
+        let mut n = 0;
+        for (i, is_facing) in is_facing.iter().enumerate().take(self.n) {
+            which[n] = i as u8;
+            n += usize::from(*is_facing);
+        }
+        n
+    }
+}
+
+/// How far beams went through places, and how well one ends on them, 0..1; neither where nothing is known.
+#[inline]
+fn said(looks: &Looks, tolerance: f32) -> ([f32; LANES], [f32; LANES]) {
+    let (mut through, mut on) = ([0.0; LANES], [0.0; LANES]);
+    let per_tolerance = 1.0 / tolerance;
+    for i in 0..LANES {
+        let [near, far, range] = [looks.near[i], looks.far[i], looks.range[i]];
+        let ahead = looks.around[i] - range;
+        let gone = ((ahead - tolerance) * per_tolerance).min(1.0);
+        let gone = if ahead == f32::INFINITY { NO_RETURN_WEIGHT } else { gone };
+        let off = (near - range).abs().min((far - range).abs());
+        // What is not known is NaN: it is neither, though beams beside it went on.
+        let is_through = ahead > tolerance && !near.is_nan();
+        through[i] = if is_through { gone } else { 0.0 };
+        on[i] = if is_through { 0.0 } else { (1.0 - off * per_tolerance).max(0.0) };
+    }
+    (through, on)
 }
 
 #[cfg(test)]
@@ -160,5 +219,74 @@ mod tests {
         assert_eq!((through.n_on, through.n_through), (0, 1));
         let hidden = at(3.5);
         assert_eq!((hidden.n_seen, hidden.n_on), (0, 0));
+    }
+
+    /// One sample after the other, each asked of one scanner after the other.
+    fn one_by_one(
+        eyes: &[Eye<'_>],
+        (points, normals): (&[[f32; 3]], &[[f32; 3]]),
+        pose: &Pose,
+        tolerance: f32,
+    ) -> Probe {
+        let (to_local, per_tolerance) = (rows(pose), 1.0 / tolerance);
+        let mut out = Probe { n: points.len() as u32, ..Probe::default() };
+        for (p, n) in points.iter().zip(normals) {
+            let (p, n) = (transform(&to_local, *p), rotate(&to_local, *n));
+            let (mut through, mut on) = (0.0_f32, 0.0_f32);
+            for eye in eyes {
+                let ray: [f32; 3] = std::array::from_fn(|i| eye.at()[i] - p[i]);
+                let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+                let along = dot(n, ray);
+                let is_front =
+                    along > 0.0 && along * along >= MIN_FACING * MIN_FACING * dot(ray, ray);
+                let Some(look) = eye.look(p, 0.5 * tolerance).filter(|_| is_front) else {
+                    continue;
+                };
+                let ahead = look.around - look.range;
+                if ahead == f32::INFINITY {
+                    through = through.max(NO_RETURN_WEIGHT);
+                } else if ahead > tolerance {
+                    through = through.max(((ahead - tolerance) * per_tolerance).min(1.0));
+                } else {
+                    let off = (look.near - look.range).abs().min((look.far - look.range).abs());
+                    on = on.max(1.0 - off * per_tolerance);
+                }
+            }
+            out.count(through, on);
+        }
+        out
+    }
+
+    #[test]
+    fn samples_judged_together_are_judged_as_one_by_one() {
+        let mut random = 3_u64;
+        let mut next = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 40) as f32 / (1 << 24) as f32 - 0.5
+        };
+        let image = |x: f64, next: &mut dyn FnMut() -> f32| {
+            let pose = Pose::translation(x, 0.0, 0.0);
+            let mut image = DepthImage::new(pose, 0.7, 90.0);
+            for _ in 0..9000 {
+                let z = 4.0 + 2.0 * next();
+                image.splat([1.3 * next() * z, 1.3 * next() * z, z]);
+            }
+            image.finish(1, |d| if d[0] > 0.2 { Empty::Unknown } else { Empty::NoReturn });
+            image
+        };
+        let images = [0.0, 0.6, -0.9].map(|x| image(x, &mut next));
+        let eyes: Vec<Eye<'_>> = images.iter().map(|image| Eye::new([image])).collect();
+        for n in [1, 15, 16, 130, 300] {
+            for tolerance in [0.02, 0.1, 0.4] {
+                let mut place = || [3.0 * next(), 3.0 * next(), 4.0 + 3.0 * next()];
+                let points: Vec<[f32; 3]> = (0..n).map(|_| place()).collect();
+                let normals: Vec<[f32; 3]> = (0..n).map(|_| [next(), next(), next()]).collect();
+                let pose = Pose::rotation(Vector::new(0.1, 0.2, 0.3));
+                let together = probe(&eyes, &points, &normals, &pose, tolerance);
+                let each = one_by_one(&eyes, (&points, &normals), &pose, tolerance);
+                assert_eq!(together, each);
+                assert!(n < 16 || each.n_seen > 0);
+            }
+        }
     }
 }

@@ -93,6 +93,8 @@ pub struct BaseSearch<'a> {
     pub(crate) is_guess: bool,
     /// Lowest mean score of base and first link that counts.
     min_score: f64,
+    /// So many times the usual number of base poses are kept at each level.
+    breadth: usize,
 }
 
 impl<'a> BaseSearch<'a> {
@@ -132,6 +134,7 @@ impl<'a> BaseSearch<'a> {
             first,
             is_guess,
             min_score: settings.min_score,
+            breadth: 1,
         })
     }
 
@@ -139,6 +142,12 @@ impl<'a> BaseSearch<'a> {
     #[must_use]
     pub fn on_guesses(self) -> Self {
         Self { is_guess: true, ..self }
+    }
+
+    /// The same with so many times the base poses at each level.
+    #[must_use]
+    pub fn broad(self, breadth: usize) -> Self {
+        Self { breadth, ..self }
     }
 
     /// The same for bases that score so much at least.
@@ -157,7 +166,7 @@ impl<'a> BaseSearch<'a> {
         }
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
-        let cells = self.n_cells();
+        let cells = self.breadth * self.n_cells();
         best(&mut trials, (self.settings.keep_feet * cells, QUOTA), step * 0.9, yaw_step * 0.9);
         // Half of a cell has the height of a foot: what stands on it tells sooner than a closer look.
         let tolerance = self.coarse_tolerance();

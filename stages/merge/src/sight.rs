@@ -79,9 +79,10 @@ impl<'a> Watch<'a> {
                 let at = |&i: &u32| self.local(world[i as usize]);
                 places.iter_mut().zip(some).for_each(|(place, i)| *place = at(i));
                 let looks = eye.look_lanes(&lanes(&places[..some.len()]), FOOTPRINT);
-                for (&i, look) in some.iter().zip(looks) {
+                for (k, &i) in some.iter().enumerate() {
                     let best = &mut out[i as usize];
-                    *best = (*best).max(look.map_or(Sight::Unseen, |look| Sight::of(&look)));
+                    *best =
+                        (*best).max(looks.get(k).map_or(Sight::Unseen, |look| Sight::of(&look)));
                 }
             }
             open.retain(|&i| out[i as usize] != Sight::Onto);
