@@ -1,6 +1,7 @@
 //! A region in, the fits of all models in it out: reads the tiles that the region's views need, and sends every model
 //! of the library through base search and fit.
 
+mod harder;
 mod views;
 
 use crate::engine::AllThreads;
@@ -16,7 +17,6 @@ use rayon::prelude::*;
 use robot::Model;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 /// A library with what fits of its models need, made when the first of them asks for it.
@@ -59,24 +59,6 @@ pub(crate) struct Search<'a, 'm> {
     kept: Option<&'a Kept>,
 }
 
-/// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls, and few carry robots.
-const MIN_MOUNT_SCORE: f64 = 0.15;
-/// The same of a base on a stand of which nothing is seen.
-const MIN_STAND_SCORE: f64 = 0.10;
-/// Such stands are looked for where at least so many points are left over, so far above the region's lowest, metres: a
-/// stand and an arm.
-const MIN_LEFT: usize = 500;
-const MIN_STANDING: f64 = 1.2;
-/// How far beyond the box of a link points may be its own, metres.
-const BOX_MARGIN: f64 = 0.08;
-/// Places on walls, ceilings and such stands that are looked at for each model.
-const MAX_MOUNTS: usize = 2;
-/// So many times the base poses are looked at where a region is searched for what is left over; and so many places for each
-/// model.
-const BREADTH: usize = 3;
-const MAX_LEFT_OVER: usize = 4;
-/// What hangs on a wall keeps its base so far above the floor, metres.
-const FLOOR_SLACK: f64 = 0.05;
 /// A base farther below a floor belongs to a lower level, metres.
 const MAX_SUNK: f64 = 2.0;
 /// Candidates that are fitted at the same time; then it is asked which others they make needless.
@@ -85,13 +67,6 @@ const BATCH: usize = 6;
 const SAME_BASE: f64 = 0.35;
 /// Share of the score of a trusted robot's base below which another base at its place is needless.
 const FAR_WORSE: f64 = 0.7;
-/// Score of a base from which on it is asked whether its robot moved between scans, and so many of a region are.
-const MIN_FOOT: f64 = 0.12;
-const MAX_FEET: usize = 8;
-/// Share of what was here and gone that must be within its reach: two robots may have moved.
-const GONE_IN_REACH: f64 = 0.3;
-/// Cells of what was here for one scan and gone for another from which on a robot may have moved: a small arm has 100.
-const MIN_GONE: usize = 80;
 
 impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn new(
@@ -170,75 +145,14 @@ impl<'a, 'm> Search<'a, 'm> {
         let mut fits = self.fits(&scene, &candidates)?;
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
-            let find = || self.candidates(&sight, &self.mounts(region), (MIN_MOUNT_SCORE, 1));
-            let mut hung = self.piece((region, "mounts"), find)?;
-            hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
-            fits.extend(self.fits(&scene, &few(hung, MAX_MOUNTS))?);
+            fits.extend(self.on_mounts(&scene, &sight, &is_wanted)?);
         }
-        fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits)?);
-        fits.extend(self.on_stands(&scene, &mut sight, &fits)?);
-        let gone = lattice::disagreement(&views, &AllThreads);
-        if gone.len() >= MIN_GONE {
-            let feet = self.candidates(&sight.apart(), &planes, (0.0, 1));
-            let sights = Sights { region, views: &views, floors: &planes };
-            fits.extend(self.moved(&fits, (&feet, &gone), &sights));
-        }
+        fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits, &is_wanted)?);
+        fits.extend(self.on_stands(&scene, &mut sight, &fits, &is_wanted)?);
+        let sights = Sights { region, views: &views, floors: &planes };
+        fits.extend(self.moved(&fits, sight, &sights));
         fits.retain(|fit| wants(&base(&fit.world_from_base)));
         Ok(fits)
-    }
-
-    /// Fits of robots that less is seen of than of what stands about those that were found: without that, more bases of each
-    /// model are looked at.
-    fn left_over(
-        &self,
-        scene: &Scene<'_>,
-        (sight, planes): (&mut Sight<'_>, &[InstallationPlane]),
-        fits: &[Fit],
-    ) -> Result<Vec<Fit>> {
-        let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
-        let find = || self.candidates(sight, planes, (0.0, BREADTH));
-        let mut found = self.piece((scene.region, "left over"), find)?;
-        found.retain(|c| is_apart(c, &feet));
-        self.fits(scene, &few(found, MAX_LEFT_OVER))
-    }
-
-    /// Fits of robots that hide all of the stand under their feet: where much is left that no trusted robot explains, all
-    /// heights are tried.
-    fn on_stands(
-        &self,
-        scene: &Scene<'_>,
-        sight: &mut Sight<'_>,
-        fits: &[Fit],
-    ) -> Result<Vec<Fit>> {
-        let region = scene.region;
-        let at = region.origin;
-        let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
-        let Some(floor) = height.map(|h| at.z - h) else { return Ok(Vec::new()) };
-        let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
-        let planes = identify::stand_planes(&region.world_bounds(), floor);
-        let find = || self.candidates(sight, &planes, (MIN_STAND_SCORE, 1));
-        let mut found = self.piece((region, "stands"), find)?;
-        found.retain(|c| is_apart(c, &feet));
-        self.fits(scene, &few(found, MAX_MOUNTS))
-    }
-
-    /// Lets only points count that are on no trusted robot; returns the bases of those robots where much is left, `None`
-    /// where little is.
-    fn pass_over(
-        &self,
-        scene: &Scene<'_>,
-        sight: &mut Sight<'_>,
-        fits: &[Fit],
-    ) -> Option<Vec<Point>> {
-        // Without beams nothing contradicts a wrong base.
-        if !scene.evidence.has_beams() {
-            return None;
-        }
-        let trusted = || fits.iter().filter(|f| f.verdict == Verdict::Trusted);
-        let taken: Vec<Aabb> =
-            trusted().flat_map(|f| boxes(f, &self.shelf.models[f.model])).collect();
-        let is_much = sight.pass_over(&taken, MIN_STANDING) >= MIN_LEFT;
-        is_much.then(|| trusted().map(|f| base(&f.world_from_base)).collect())
     }
 
     /// Where robots of all models may stand on some planes, best base first, those that score so much.
@@ -296,42 +210,6 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(out)
     }
 
-    /// Robots that moved between scans: where no robot is trusted, but something stands like a robot's foot within whose
-    /// reach things were here and gone (region's frame).
-    fn moved(
-        &self,
-        fits: &[Fit],
-        (feet, gone): (&[Candidate], &[[f32; 3]]),
-        sights: &Sights<'_>,
-    ) -> Vec<Fit> {
-        let mut out: Vec<Fit> = Vec::new();
-        let in_reach = |candidate: &&Candidate| {
-            let here = base(&candidate.bases[0].0) - sights.region.origin.coords;
-            let reach = self.shelf.prepared(candidate.model).reach();
-            let near = |p: &&[f32; 3]| (Point::from(p.map(f64::from)) - here).norm() < reach;
-            gone.iter().filter(near).count() as f64 >= GONE_IN_REACH * gone.len() as f64
-        };
-        let feet = feet.iter().filter(|c| c.bases[0].1 >= MIN_FOOT).filter(in_reach);
-        for candidate in feet.take(MAX_FEET) {
-            let here = base(&candidate.bases[0].0);
-            let trusted = fits.iter().chain(&out).filter(|f| f.verdict == Verdict::Trusted);
-            if trusted.map(|f| base(&f.world_from_base)).any(|at| (at - here).norm() < SAME_BASE) {
-                continue;
-            }
-            let prepared = self.shelf.prepared(candidate.model);
-            let settings = &self.settings.fit;
-            out.extend(fit::stays(candidate, prepared, sights, settings, &AllThreads));
-        }
-        out
-    }
-
-    /// Whether no base of a candidate reaches into the floor.
-    fn is_above_floor(&self, candidate: &Candidate) -> bool {
-        let at = candidate.bases[0].0.translation.vector;
-        let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
-        height.is_none_or(|h| h > FLOOR_SLACK)
-    }
-
     /// The fit of a robot that stands in a region as an earlier one had it; `None` where it does not.
     pub(crate) fn again(
         &self,
@@ -373,13 +251,6 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(work(&scene, &self.settings.fit))
     }
 
-    /// Ceilings, walls and tilted plates about the region.
-    fn mounts(&self, region: &Region) -> Vec<InstallationPlane> {
-        let world = region.world_bounds().grown(0.3);
-        let sides = self.ground.surfaces.sides.iter();
-        floor::mounts(&sides.filter(|p| p.bounds.touches(&world)).collect::<Vec<_>>())
-    }
-
     /// Does something with the scene that a fit stands in; `None` where it stands in none of the regions.
     pub(crate) fn with_scene<T>(
         &self,
@@ -418,37 +289,6 @@ impl<'a, 'm> Search<'a, 'm> {
         }
         floor.planes.iter().filter(|p| p.bounds.grown(0.3).touches(&world)).cloned().collect()
     }
-}
-
-/// Whether a candidate stands at none of these bases.
-fn is_apart(candidate: &Candidate, feet: &[Point]) -> bool {
-    let here = base(&candidate.bases[0].0);
-    !feet.iter().any(|at| (at - here).norm() < SAME_BASE)
-}
-
-/// The best candidates of each model, few.
-fn few(mut candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
-    let mut n: BTreeMap<usize, usize> = BTreeMap::new();
-    candidates.retain(|c| {
-        let n = n.entry(c.model).or_default();
-        *n += 1;
-        *n <= most
-    });
-    candidates
-}
-
-/// Boxes of the links of a robot, world, metres.
-fn boxes(fit: &Fit, model: &Model) -> Vec<Aabb> {
-    let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
-    let poses = model.poses(&posture);
-    let links = model.links.iter().zip(&poses).filter(|(link, _)| !link.bounds.is_empty());
-    let bounds = links.map(|(link, pose)| {
-        let mut all = Aabb::EMPTY;
-        let corners = link.bounds.corners().map(Point::from);
-        corners.iter().for_each(|c| all.add((fit.world_from_base * pose * c).into()));
-        all.grown(BOX_MARGIN)
-    });
-    bounds.collect()
 }
 
 fn base(world_from_base: &Pose) -> Point {

@@ -1,0 +1,182 @@
+//! A region and the fits of what stands plainly in it in; the fits of what is harder to find out: on walls and ceilings, behind
+//! other things, on stands that nobody sees, moved between scans.
+
+use super::{MAX_SUNK, SAME_BASE, Search, base};
+use crate::engine::AllThreads;
+use contract::{Candidate, Fit, InstallationPlane, Region, Result, Verdict};
+use fit::{Scene, Sights};
+use geometry::{Aabb, Point};
+use identify::Sight;
+use robot::Model;
+use std::collections::BTreeMap;
+
+/// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls, and few carry robots.
+const MIN_MOUNT_SCORE: f64 = 0.15;
+/// The same of a base on a stand of which nothing is seen.
+const MIN_STAND_SCORE: f64 = 0.10;
+/// Such stands are looked for where at least so many points are left over, so far above the region's lowest, metres: a
+/// stand and an arm.
+const MIN_LEFT: usize = 500;
+const MIN_STANDING: f64 = 1.2;
+/// How far beyond the box of a link points may be its own, metres.
+const BOX_MARGIN: f64 = 0.08;
+/// Places on walls, ceilings and such stands that are looked at for each model.
+const MAX_MOUNTS: usize = 2;
+/// So many times the base poses are looked at where a region is searched for what is left over; and so many places for each
+/// model.
+const BREADTH: usize = 3;
+const MAX_LEFT_OVER: usize = 4;
+/// What hangs on a wall keeps its base so far above the floor, metres.
+const FLOOR_SLACK: f64 = 0.05;
+/// Score of a base from which on it is asked whether its robot moved between scans, and so many of a region are.
+const MIN_FOOT: f64 = 0.12;
+const MAX_FEET: usize = 8;
+/// Share of what was here and gone that must be within its reach: two robots may have moved.
+const GONE_IN_REACH: f64 = 0.3;
+/// Cells of what was here for one scan and gone for another from which on a robot may have moved: a small arm has 100.
+const MIN_GONE: usize = 80;
+
+impl Search<'_, '_> {
+    /// Fits of robots on ceilings, walls and tilted plates.
+    pub(super) fn on_mounts(
+        &self,
+        scene: &Scene<'_>,
+        sight: &Sight<'_>,
+        is_wanted: &impl Fn(&Candidate) -> bool,
+    ) -> Result<Vec<Fit>> {
+        let find = || self.candidates(sight, &self.mounts(scene.region), (MIN_MOUNT_SCORE, 1));
+        let mut hung = self.piece((scene.region, "mounts"), find)?;
+        hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
+        self.fits(scene, &few(hung, MAX_MOUNTS))
+    }
+
+    /// Ceilings, walls and tilted plates about the region.
+    fn mounts(&self, region: &Region) -> Vec<InstallationPlane> {
+        let world = region.world_bounds().grown(0.3);
+        let sides = self.ground.surfaces.sides.iter();
+        floor::mounts(&sides.filter(|p| p.bounds.touches(&world)).collect::<Vec<_>>())
+    }
+
+    /// Whether no base of a candidate reaches into the floor.
+    fn is_above_floor(&self, candidate: &Candidate) -> bool {
+        let at = candidate.bases[0].0.translation.vector;
+        let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
+        height.is_none_or(|h| h > FLOOR_SLACK)
+    }
+
+    /// Fits of robots that less is seen of than of what stands about those that were found: without that, more bases of each
+    /// model are looked at.
+    pub(super) fn left_over(
+        &self,
+        scene: &Scene<'_>,
+        (sight, planes): (&mut Sight<'_>, &[InstallationPlane]),
+        fits: &[Fit],
+        is_wanted: &impl Fn(&Candidate) -> bool,
+    ) -> Result<Vec<Fit>> {
+        let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
+        let find = || self.candidates(sight, planes, (0.0, BREADTH));
+        let mut found = self.piece((scene.region, "left over"), find)?;
+        found.retain(|c| is_apart(c, &feet) && is_wanted(c));
+        self.fits(scene, &few(found, MAX_LEFT_OVER))
+    }
+
+    /// Fits of robots that hide all of the stand under their feet: where much is left that no trusted robot explains, all
+    /// heights are tried.
+    pub(super) fn on_stands(
+        &self,
+        scene: &Scene<'_>,
+        sight: &mut Sight<'_>,
+        fits: &[Fit],
+        is_wanted: &impl Fn(&Candidate) -> bool,
+    ) -> Result<Vec<Fit>> {
+        let region = scene.region;
+        let at = region.origin;
+        let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
+        let Some(floor) = height.map(|h| at.z - h) else { return Ok(Vec::new()) };
+        let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
+        let planes = identify::stand_planes(&region.world_bounds(), floor);
+        let find = || self.candidates(sight, &planes, (MIN_STAND_SCORE, 1));
+        let mut found = self.piece((region, "stands"), find)?;
+        found.retain(|c| is_apart(c, &feet) && is_wanted(c));
+        self.fits(scene, &few(found, MAX_MOUNTS))
+    }
+
+    /// Lets only points count that are on no trusted robot; returns the bases of those robots where much is left, `None`
+    /// where little is.
+    fn pass_over(
+        &self,
+        scene: &Scene<'_>,
+        sight: &mut Sight<'_>,
+        fits: &[Fit],
+    ) -> Option<Vec<Point>> {
+        // Without beams nothing contradicts a wrong base.
+        if !scene.evidence.has_beams() {
+            return None;
+        }
+        let trusted = || fits.iter().filter(|f| f.verdict == Verdict::Trusted);
+        let taken: Vec<Aabb> =
+            trusted().flat_map(|f| boxes(f, &self.shelf.models[f.model])).collect();
+        let is_much = sight.pass_over(&taken, MIN_STANDING) >= MIN_LEFT;
+        is_much.then(|| trusted().map(|f| base(&f.world_from_base)).collect())
+    }
+
+    /// Robots that moved between scans: where no robot is trusted, but something stands like a robot's foot within whose
+    /// reach things were here and gone (region's frame).
+    pub(super) fn moved(&self, fits: &[Fit], sight: Sight<'_>, sights: &Sights<'_>) -> Vec<Fit> {
+        let gone = lattice::disagreement(sights.views, &AllThreads);
+        if gone.len() < MIN_GONE {
+            return Vec::new();
+        }
+        let feet = self.candidates(&sight.apart(), sights.floors, (0.0, 1));
+        let mut out: Vec<Fit> = Vec::new();
+        let in_reach = |candidate: &&Candidate| {
+            let here = base(&candidate.bases[0].0) - sights.region.origin.coords;
+            let reach = self.shelf.prepared(candidate.model).reach();
+            let near = |p: &&[f32; 3]| (Point::from(p.map(f64::from)) - here).norm() < reach;
+            gone.iter().filter(near).count() as f64 >= GONE_IN_REACH * gone.len() as f64
+        };
+        let feet = feet.iter().filter(|c| c.bases[0].1 >= MIN_FOOT).filter(in_reach);
+        for candidate in feet.take(MAX_FEET) {
+            let here = base(&candidate.bases[0].0);
+            let trusted = fits.iter().chain(&out).filter(|f| f.verdict == Verdict::Trusted);
+            if trusted.map(|f| base(&f.world_from_base)).any(|at| (at - here).norm() < SAME_BASE) {
+                continue;
+            }
+            let prepared = self.shelf.prepared(candidate.model);
+            let settings = &self.settings.fit;
+            out.extend(fit::stays(candidate, prepared, sights, settings, &AllThreads));
+        }
+        out
+    }
+}
+
+/// Whether a candidate stands at none of these bases.
+fn is_apart(candidate: &Candidate, feet: &[Point]) -> bool {
+    let here = base(&candidate.bases[0].0);
+    !feet.iter().any(|at| (at - here).norm() < SAME_BASE)
+}
+
+/// The best candidates of each model, few.
+fn few(mut candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
+    let mut n: BTreeMap<usize, usize> = BTreeMap::new();
+    candidates.retain(|c| {
+        let n = n.entry(c.model).or_default();
+        *n += 1;
+        *n <= most
+    });
+    candidates
+}
+
+/// Boxes of the links of a robot, world, metres.
+fn boxes(fit: &Fit, model: &Model) -> Vec<Aabb> {
+    let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
+    let poses = model.poses(&posture);
+    let links = model.links.iter().zip(&poses).filter(|(link, _)| !link.bounds.is_empty());
+    let bounds = links.map(|(link, pose)| {
+        let mut all = Aabb::EMPTY;
+        let corners = link.bounds.corners().map(Point::from);
+        corners.iter().for_each(|c| all.add((fit.world_from_base * pose * c).into()));
+        all.grown(BOX_MARGIN)
+    });
+    bounds.collect()
+}
