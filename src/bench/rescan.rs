@@ -120,6 +120,7 @@ fn case(
         let scans = dir.join(name);
         std::fs::create_dir_all(&scans).map_err(|e| Error::from(e).at(scans.display()))?;
         let truth = scan_scene(scene, &models, &scans, formats, engine)?;
+        on_disk(&scans.join("scans.e57"))?;
         Ok::<_, Error>((scans, truth.scans.iter().map(|s| s.n_points).sum::<u64>()))
     };
     let ((old, n_points), (new, n_new)) = (scanned(&then, "then")?, scanned(&now, "now")?);
@@ -153,6 +154,12 @@ fn case(
     judge(row, (&then, &now), &wish.job.out)?;
     row.n_same = same(&whole.out, &wish.job.out)?;
     Ok(())
+}
+
+/// Waits until a file is on its disk: what is measured next must not wait for it.
+fn on_disk(path: &Path) -> Result<()> {
+    let synced = std::fs::File::open(path).and_then(|file| file.sync_all());
+    synced.map_err(|e| Error::from(e).at(path.display()))
 }
 
 /// Largest error of a determined joint of the robot that moved, degrees.
