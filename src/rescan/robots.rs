@@ -5,6 +5,7 @@ use crate::search::Search;
 use crate::spaces::{poses, reach};
 use crate::tools::dress_in;
 use contract::{Error, Fit, Region, Result, Verdict};
+use fit::Scene;
 use geometry::{Aabb, Point, Vector};
 use merge::{Sight, Watch};
 use robot::{Library, Model};
@@ -158,10 +159,23 @@ fn anew(
     let base = Point::from(world_from_base.translation.vector);
     let is_here = |at: &Point| (at - base).norm() < SAME_PLACE;
     search.in_scene(&region, |scene, settings| {
-        let mut found: Vec<Fit> =
-            search.on_base(scene, bare, world_from_base).into_iter().collect();
-        if !found.iter().any(|f| is_the_same(f, &models[bare], scene, other_session)) {
+        let on_base = |scene: &Scene<'_>| {
+            let fit = search.on_base(scene, bare, world_from_base);
+            let is_same = |f: &Fit| is_the_same(f, &models[bare], scene, other_session);
+            fit.map(|fit| (is_same(&fit), fit))
+        };
+        let mut tried: Vec<(bool, Fit)> = on_base(scene).into_iter().collect();
+        let is_clear = |tried: &[(bool, Fit)]| tried.iter().any(|(is_same, _)| *is_same);
+        if !is_clear(&tried) {
+            // What stands about its base alone is looked at more closely.
+            tried.extend(search.in_scene(&beside(near, base), |scene, _| on_base(scene))?);
+        }
+        let is_clear = is_clear(&tried);
+        let mut found: Vec<Fit> = tried.into_iter().map(|(_, fit)| fit).collect();
+        if !is_clear {
             found.extend(search.region_where(&beside(near, base), is_here)?);
+        }
+        if found.len() > 1 {
             found = fit::choose(found, models);
         }
         found.retain(|fit| is_here(&fit.world_from_base.translation.vector.into()));
