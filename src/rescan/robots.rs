@@ -101,7 +101,8 @@ pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
 /// No robot of a library reaches farther than this from its base, but for those on rails, metres.
 const FAR_REACH: f64 = 4.0;
 
-/// Looks at one robot again, through the scans of this session and of the other; `regions` are those of this one. The model is its own, where it is none of the library.
+/// Looks at one robot again, through the scans of this session and of the other; `regions` are those of this one. The model is its
+/// own, where it is none of the library.
 pub(crate) fn look(
     before: &Fit,
     models: &[Model],
