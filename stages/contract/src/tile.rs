@@ -68,13 +68,6 @@ impl Tile {
         self.xyz.is_empty()
     }
 
-    /// Its points.
-    #[must_use]
-    pub fn points(&self) -> TilePoints<'_> {
-        let Self { at, first_place, place, pixel, xyz, .. } = self;
-        TilePoints { at: *at, first_place: *first_place, place, pixel, xyz }
-    }
-
     /// Pixel of the whole lattice of point `i`.
     #[must_use]
     pub fn pixel_at(&self, i: usize) -> Pixel {
