@@ -12,8 +12,9 @@ use robot::Model;
 const ABOUT_FOOT: f64 = 0.3;
 /// How far beyond the boxes of its links points are a robot's own: hoses, covers, metres.
 const OWN: f64 = 0.08;
-/// Share of what is new within its reach that need not be its own: a tool, a box that was put there.
-const MAX_STRANGE: f64 = 0.3;
+/// Share of what is new within its reach that need not be its own: a tool, a box that was put there. Of robots that only
+/// moved, in halls with other things moved about them, it was up to a half.
+const MAX_STRANGE: f64 = 0.5;
 /// Points that are looked at.
 const ASKED: usize = 4000;
 

@@ -109,6 +109,64 @@ impl Lattice {
         let scan = self.lattice_from_scan.inverse() * nalgebra::Vector3::from(lattice);
         [scan.x, scan.y, scan.z]
     }
+
+    /// The directions of a rectangle of pixels: `[first row, last row, first column, last column]`.
+    #[must_use]
+    pub fn window(&self, [first_row, last_row, first_col, last_col]: [u32; 4]) -> Window {
+        use std::f64::consts::{FRAC_PI_2, PI};
+        let elevation = |row: f64| self.first_elevation + row * self.row_step;
+        let azimuth = |col: f64| self.first_azimuth + col * self.col_step;
+        let low = elevation(f64::from(first_row) - 0.5);
+        let high = elevation(f64::from(last_row) + 0.5);
+        let sides = [azimuth(f64::from(first_col) - 0.5), azimuth(f64::from(last_col) + 0.5)];
+        let turn = self.lattice_from_scan.to_rotation_matrix();
+        let row = |i: usize| [0, 1, 2].map(|k| turn.matrix()[(i, k)] as f32);
+        Window {
+            lattice_from_scan: [row(0), row(1), row(2)],
+            sines: [
+                if low <= -FRAC_PI_2 { f32::NEG_INFINITY } else { low.sin() as f32 },
+                if high >= FRAC_PI_2 { f32::INFINITY } else { high.sin() as f32 },
+            ],
+            sides: sides.map(|a| [a.cos() as f32, a.sin() as f32]),
+            is_wide: sides[1] - sides[0] > PI,
+            is_round: last_col - first_col + 1 >= self.n_cols,
+        }
+    }
+}
+
+/// The directions of a rectangle of pixels, told without an angle being reckoned.
+#[derive(Debug, Clone, Copy)]
+pub struct Window {
+    lattice_from_scan: [[f32; 3]; 3],
+    /// Of the lowest and the highest elevation.
+    sines: [f32; 2],
+    /// Where its columns begin and end: directions in the lattice's plane.
+    sides: [[f32; 2]; 2],
+    /// More than half a turn, and a whole one.
+    is_wide: bool,
+    is_round: bool,
+}
+
+impl Window {
+    /// Whether a direction of the scan frame, of any length, is in it.
+    #[inline]
+    #[must_use]
+    pub fn holds(&self, scan: [f32; 3]) -> bool {
+        let [x, y, z] =
+            self.lattice_from_scan.map(|r| r[0] * scan[0] + r[1] * scan[1] + r[2] * scan[2]);
+        let range = (x * x + y * y + z * z).sqrt();
+        if !(z >= self.sines[0] * range && z < self.sines[1] * range) {
+            return false;
+        }
+        let [first, last] = self.sides.map(|[cos, sin]| cos * y - sin * x);
+        let (is_past_first, is_before_last) = (first >= 0.0, last < 0.0);
+        self.is_round
+            || if self.is_wide {
+                is_past_first || is_before_last
+            } else {
+                is_past_first && is_before_last
+            }
+    }
 }
 
 /// `floor(value + ½)`, without the call into the mathematics library that `f64::floor` is on a plain x86-64.
@@ -140,6 +198,36 @@ mod tests {
         for up in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [-1.0, -1e-9, 0.0]] {
             let (at, _) = lattice.pixel(up);
             assert!(at.row < lattice.n_rows && at.col < lattice.n_cols);
+        }
+    }
+
+    #[test]
+    fn a_window_holds_the_directions_of_its_pixels() {
+        let lattice = Lattice {
+            lattice_from_scan: UnitQuaternion::from_euler_angles(0.3, -0.2, 1.1),
+            ..Lattice::new(0.01, 0.007, 0.003, 0.1)
+        };
+        let (rows, cols) = (lattice.n_rows, lattice.n_cols);
+        let windows = [
+            [100, 200, 30, 90],
+            [100, 200, 30, 700],
+            [0, rows - 1, 5, 6],
+            [40, rows - 1, 0, cols - 1],
+            [0, 30, 500, cols - 1],
+        ];
+        for extent in windows {
+            let [r0, r1, c0, c1] = extent;
+            let window = lattice.window(extent);
+            for (row, col) in (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))) {
+                let at = Pixel { row, col };
+                let d = lattice.direction(at).map(|v| (v * 7.0) as f32);
+                // Near the poles a pixel has no side.
+                if lattice.pixel(d).0 != at {
+                    continue;
+                }
+                let is_in = (r0..=r1).contains(&row) && (c0..=c1).contains(&col);
+                assert_eq!(window.holds(d), is_in, "{at:?} in {extent:?}");
+            }
         }
     }
 }

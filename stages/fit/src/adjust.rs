@@ -14,9 +14,8 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use crate::Settings;
 use crate::beam::Hypothesis;
 use crate::calibrate::Frames;
-use crate::facets::Facet;
 use crate::normal::{N_SCAN, Normal, Row};
-use crate::placed::{Near, Placed};
+use crate::pairs::{Pair, Pairing};
 use crate::refine::{CHUNK, Refine};
 
 /// How a scan differs from its stated pose, as far as the points near a robot tell.
@@ -85,27 +84,6 @@ const N_ROUNDS: usize = 7;
 const SMALL_STEP: f64 = 0.04;
 /// Tukey's constant: 95 % efficient for normal errors.
 const TUKEY: f64 = 4.685;
-/// Beam direction noise of a common scanner, radians (19″; fit.md §3.2).
-const ANGLE_NOISE: f64 = 9e-5;
-/// What sampling of the model and rounding leave at least, metres, one sigma.
-const SURFACE_NOISE: f64 = 3e-4;
-/// Where no scanner is known a point is as uncertain in every direction.
-const NO_BEAM: Vector = Vector::new(0.0, 0.0, 0.0);
-
-/// A point matched with the facet that it most likely lies on, local frame.
-struct Pair {
-    link: usize,
-    facet: usize,
-    view: usize,
-    /// The point, corrected by its scan's error.
-    p: Vector,
-    n: Vector,
-    /// From the scanner to the point, unit length; zero where unknown.
-    ray: Vector,
-    /// Variance of the point's distance from the surface, m².
-    variance: f64,
-    r: f64,
-}
 
 /// Where the adjustment stands.
 pub(crate) struct State {
@@ -144,11 +122,10 @@ impl Adjust<'_> {
         let mut state = start;
         let mut round = 0;
         loop {
-            let pairs = self.pairs(&state, points, gate, fan);
-            let normal = self.normal(&state, &pairs, gate, fan);
+            let (normal, tallies) = self.sums(&state, points, gate, fan);
             let solved = (round < N_ROUNDS).then(|| normal.solve()).flatten();
             let Some(step) = solved else {
-                return self.finish(state, &pairs, &normal);
+                return self.finish(state, &tallies, &normal);
             };
             self.apply(&mut state, &step);
             round += 1;
@@ -160,79 +137,25 @@ impl Adjust<'_> {
 
     /// Normal equations at a state, the places of the joints among the unknowns.
     pub(crate) fn at(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> Normal {
-        self.normal(state, &self.pairs(state, points, gate, fan), gate, fan)
+        self.sums(state, points, gate, fan).0
     }
 
-    /// The points with their facets at the state.
-    fn pairs(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> Vec<Pair> {
-        let refine = self.refine;
-        let scene = refine.scene;
-        let poses = refine.local_from_links(&state.hypothesis);
-        let placed = Placed::all(refine.prepared, &state.hypothesis, gate);
-        let scanners: Vec<Option<Point>> =
-            (0..scene.views.len()).map(|v| scene.scanner(v as u16)).collect();
-        let turns: Vec<UnitQuaternion<f64>> =
-            state.scans.iter().map(|s| UnitQuaternion::from_scaled_axis(s.turn)).collect();
-        let sigma2 = scene.noise * scene.noise;
-        let pair = |&i: &u32| {
-            let m = &scene.points[i as usize];
-            let view = usize::from(m.view);
-            let raw = Vector::from(m.p.map(f64::from));
-            let (p, ray, range) = match &scanners[view] {
-                Some(scanner) => {
-                    let error = &state.scans[view];
-                    let beam = raw - scanner.coords;
-                    let ray = beam.normalize();
-                    let p = scanner.coords + turns[view] * (beam - ray * error.bias) + error.shift;
-                    (p, turns[view] * ray, beam.norm())
-                }
-                None => (raw, NO_BEAM, 0.0),
-            };
-            let Near { link, facet, distance } = placed.nearest(p.map(|v| v as f32).into())?;
-            if distance > gate {
-                return None;
-            }
-            let Facet { x, n } = refine.prepared.links[link].fields.facets[facet];
-            let n = poses[link].rotation * Vector::from(n.map(f64::from));
-            let x = poses[link] * Point::from(x.map(f64::from));
-            let r = n.dot(&(p - x.coords));
-            // Beside the surface's edge its plane means nothing.
-            let beside = (distance * distance - r * r).max(0.0).sqrt();
-            if beside > refine.beside(link) {
-                return None;
-            }
-            let facing = -n.dot(&ray);
-            // A facet that faces away from the scanner cannot have given this point.
-            if range > 0.0 && facing <= MIN_FACING {
-                return None;
-            }
-            let variance = if range > 0.0 {
-                let across = (range * ANGLE_NOISE).powi(2) * (1.0 - facing * facing);
-                sigma2 * facing * facing + across + SURFACE_NOISE * SURFACE_NOISE
-            } else {
-                sigma2
-            };
-            Some(Pair { link, facet, view, p, n, ray, variance, r })
-        };
+    /// Normal equations of the points at a state with all priors, patches taken out; and what is said of each link.
+    fn sums(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> (Normal, Tallies) {
+        let pairing = Pairing::new(self.refine, state, gate);
         let chunks = points.chunks(CHUNK).collect();
-        let found =
-            fan.fan(chunks, |chunk: &[u32]| chunk.iter().filter_map(pair).collect::<Vec<_>>());
-        found.into_iter().flatten().collect()
-    }
-
-    /// Normal equations of the pairs with all priors, patches taken out. Updates nothing.
-    fn normal(&self, state: &State, pairs: &[Pair], gate: f64, fan: &impl Fan) -> Normal {
-        let chunks = pairs.chunks(2 * CHUNK).collect();
-        let sums = fan.fan(chunks, |chunk: &[Pair]| self.sums(state, chunk, gate));
-        let empty = || self.sums(state, &[], gate);
-        let mut normal = sums.into_iter().reduce(Normal::join).unwrap_or_else(empty);
+        let sums = fan.fan(chunks, |chunk: &[u32]| self.sums_of(&pairing, chunk));
+        let join = |(a, own): (Normal, Tallies), (b, later)| (a.join(b), own.join(&later));
+        let empty = || self.sums_of(&pairing, &[]);
+        let (mut normal, tallies) = sums.into_iter().reduce(join).unwrap_or_else(empty);
         normal.close();
         self.add_priors(state, &mut normal);
-        normal
+        (normal, tallies)
     }
 
-    /// The sums of some pairs.
-    fn sums(&self, state: &State, pairs: &[Pair], gate: f64) -> Normal {
+    /// The sums of some points.
+    fn sums_of(&self, pairing: &Pairing<'_>, points: &[u32]) -> (Normal, Tallies) {
+        let (state, gate) = (pairing.state, pairing.gate);
         let h = &state.hypothesis;
         let prepared = self.refine.prepared;
         let kinematics = prepared.model.kinematics(&h.posture);
@@ -241,12 +164,11 @@ impl Adjust<'_> {
         let n_robot = n_posed + 6 * self.frames.len();
         let frames = Frames::new(prepared.model, &kinematics, self.frames);
         let mut normal = Normal::new(n_robot, self.refine.scene.views.len(), prepared.n_patches);
-        let scanners: Vec<Vector> = (0..self.refine.scene.views.len())
-            .map(|v| self.refine.scene.scanner(v as u16).map_or_else(Vector::zeros, |s| s.coords))
-            .collect();
+        let mut tallies = Tallies(vec![(0, 0.0); prepared.links.len()]);
         let slack = state.patch_sigma * state.patch_sigma;
         let mut robot = vec![0.0; n_robot];
-        for pair in pairs {
+        for pair in points.iter().filter_map(|&i| pairing.pair(i)) {
+            tallies.add(&pair);
             let scale = (TUKEY * (pair.variance + slack).sqrt()).min(gate);
             let kernel = robust::tukey(pair.r, scale);
             let weight = kernel / pair.variance;
@@ -260,7 +182,7 @@ impl Adjust<'_> {
             let n = base_from_local.rotation * pair.n;
             self.refine.row(&q.coords, &n, &kinematics.twists[pair.link], &mut robot[..n_posed]);
             frames.row(pair.link, &q.coords, &n, &mut robot[n_posed..]);
-            let lever = (pair.p - scanners[pair.view]).cross(&pair.n);
+            let lever = pair.beam.cross(&pair.n);
             let scan =
                 [pair.n.x, pair.n.y, pair.n.z, lever.x, lever.y, lever.z, -pair.n.dot(&pair.ray)];
             normal.add(&Row {
@@ -273,7 +195,7 @@ impl Adjust<'_> {
                 r: pair.r,
             });
         }
-        normal
+        (normal, tallies)
     }
 
     fn add_priors(&self, state: &State, normal: &mut Normal) {
@@ -307,14 +229,9 @@ impl Adjust<'_> {
         }
     }
 
-    fn finish(&self, state: State, pairs: &[Pair], normal: &Normal) -> Adjusted {
-        let n_links = self.refine.prepared.links.len();
-        let (mut n_points, mut rr) = (vec![0_usize; n_links], vec![0.0; n_links]);
-        for pair in pairs {
-            n_points[pair.link] += 1;
-            rr[pair.link] += pair.r * pair.r;
-        }
-        let link_rms = (0..n_links).map(|l| (rr[l] / n_points[l].max(1) as f64).sqrt()).collect();
+    fn finish(&self, state: State, tallies: &Tallies, normal: &Normal) -> Adjusted {
+        let n_points = tallies.0.iter().map(|(n, _)| *n).collect();
+        let link_rms = tallies.0.iter().map(|(n, rr)| (rr / (*n).max(1) as f64).sqrt()).collect();
         Adjusted {
             covariance: normal.covariance(&self.refine.prepared.patch_groups),
             hypothesis: state.hypothesis,
@@ -326,5 +243,21 @@ impl Adjust<'_> {
     }
 }
 
-/// Cosine below which a beam cannot have come from a facet's front.
-const MIN_FACING: f64 = 0.05;
+/// For each link: points within the gate, and the sum of the squares of their distances, m².
+struct Tallies(Vec<(usize, f64)>);
+
+impl Tallies {
+    fn add(&mut self, pair: &Pair) {
+        let (n, rr) = &mut self.0[pair.link];
+        *n += 1;
+        *rr += pair.r * pair.r;
+    }
+
+    fn join(mut self, later: &Self) -> Self {
+        for ((n, rr), (other_n, other_rr)) in self.0.iter_mut().zip(&later.0) {
+            *n += other_n;
+            *rr += other_rr;
+        }
+        self
+    }
+}

@@ -19,6 +19,7 @@ mod judge;
 mod mount;
 mod noise;
 mod normal;
+mod pairs;
 pub mod paper;
 mod placed;
 mod prepared;

@@ -1,36 +1,17 @@
 //! A posture in; its links with a surface where they stand, and for any point the nearest facet of them, out.
 //!
-//! Most links are far from most points: a ball about each tells, eight at a time, before their fields are asked.
+//! Most links are far from most points: the boxes of their fields tell, eight at a time, before the fields are asked.
 
-use geometry::Point;
 use geometry::depth::{Rows, transform};
-use robot::Link;
+use geometry::{NearestField, Pose};
 
 use crate::Prepared;
 use crate::beam::Hypothesis;
+use crate::facets::Fields;
 use crate::refine::FINE_REACH;
 
 /// Links that are asked together.
 const N_LANES: usize = 8;
-
-/// A ball that holds every place from which a link's fields know a sample.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Ball {
-    /// Middle, link frame, metres.
-    center: [f64; 3],
-    /// Of the link's surface, metres.
-    radius: f64,
-}
-
-impl Ball {
-    /// Of the samples of a link.
-    pub(crate) fn of(link: &Link) -> Self {
-        let center = link.bounds.center();
-        let far = |p: &[f32; 3]| (Point::from(p.map(f64::from)) - center).norm();
-        let radius = link.cad.points.iter().map(far).fold(0.0, f64::max);
-        Self { center: center.coords.into(), radius }
-    }
-}
 
 /// A facet of a link next to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,26 +27,57 @@ pub(crate) struct Near {
 pub(crate) struct Placed<'a> {
     prepared: &'a Prepared<'a>,
     links: Vec<(usize, Rows)>,
-    balls: Vec<Balls>,
+    boxes: Vec<Boxes>,
     is_fine: bool,
 }
 
-/// Balls of eight links: x, y, z of their middles, and their squared radii; radii of lanes that hold none are −1.
+/// The grids of eight links' fields: a point's place in them, in voxels, and how many they have on each axis; none in lanes
+/// that hold none.
 #[derive(Debug, Clone, Copy)]
-struct Balls([[f32; N_LANES]; 4]);
+struct Boxes {
+    voxel_from_local: [[[f32; N_LANES]; 4]; 3],
+    size: [[f32; N_LANES]; 3],
+}
 
-impl Balls {
-    /// Bit by bit, in which of the balls a point is.
-    #[inline]
-    fn hold(&self, p: [f32; 3]) -> u8 {
-        let [x, y, z, r2] = &self.0;
-        let mut d2 = [0.0_f32; N_LANES];
-        for k in 0..N_LANES {
-            let d = [x[k] - p[0], y[k] - p[1], z[k] - p[2]];
-            d2[k] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+/// Places in eight grids, axis by axis, in voxels.
+type Places = [[f32; N_LANES]; 3];
+
+impl Boxes {
+    const NONE: Self =
+        Self { voxel_from_local: [[[0.0; N_LANES]; 4]; 3], size: [[-1.0; N_LANES]; 3] };
+
+    /// Puts a field, whose link stands so, into a lane.
+    fn set(&mut self, lane: usize, field: &NearestField, link_from_local: &Pose) {
+        let (origin, inverse_edge) = field.grid();
+        let rows = geometry::depth::rows(link_from_local);
+        for axis in 0..3 {
+            let [x, y, z, t] = rows[axis];
+            let row = [x, y, z, t - origin[axis]].map(|v| v * inverse_edge);
+            (0..4).for_each(|i| self.voxel_from_local[axis][i][lane] = row[i]);
+            self.size[axis][lane] = field.size()[axis] as f32;
         }
-        (0..N_LANES).fold(0, |bits, k| bits | u8::from(d2[k] <= r2[k]) << k)
     }
+
+    /// Where a point is in each grid; bit by bit, in which of them it is.
+    #[inline]
+    fn hold(&self, p: [f32; 3]) -> (u8, Places) {
+        let mut places = [[0.0_f32; N_LANES]; 3];
+        let mut is_in = [true; N_LANES];
+        for axis in 0..3 {
+            let [x, y, z, t] = &self.voxel_from_local[axis];
+            for k in 0..N_LANES {
+                let v = x[k] * p[0] + y[k] * p[1] + z[k] * p[2] + t[k];
+                places[axis][k] = v;
+                is_in[k] &= v >= 0.0 && v < self.size[axis][k];
+            }
+        }
+        ((0..N_LANES).fold(0, |bits, k| bits | u8::from(is_in[k]) << k), places)
+    }
+}
+
+/// The field that serves a gate.
+fn field(fields: &Fields, is_fine: bool) -> &NearestField {
+    if is_fine { &fields.fine } else { &fields.coarse }
 }
 
 impl<'a> Placed<'a> {
@@ -80,24 +92,16 @@ impl<'a> Placed<'a> {
         let mut links = prepared.frames(h);
         links.retain(|(l, _)| chosen(*l));
         let poses = prepared.model.poses(&h.posture);
-        let ball = |l: usize| {
-            let own = &prepared.links[l];
-            let center = h.local_from_base * poses[l] * Point::from(own.ball.center);
-            let field = if is_fine { &own.fields.fine } else { &own.fields.coarse };
-            let radius = own.ball.radius + field.reach();
-            ([center.x as f32, center.y as f32, center.z as f32], (radius * radius) as f32)
-        };
         let eight = |links: &[(usize, Rows)]| {
-            let mut out = Balls([[-1.0; N_LANES]; 4]);
-            for (k, (l, _)) in links.iter().enumerate() {
-                let (center, r2) = ball(*l);
-                (0..3).for_each(|i| out.0[i][k] = center[i]);
-                out.0[3][k] = r2;
+            let mut out = Boxes::NONE;
+            for (lane, (l, _)) in links.iter().enumerate() {
+                let link_from_local = (h.local_from_base * poses[*l]).inverse();
+                out.set(lane, field(&prepared.links[*l].fields, is_fine), &link_from_local);
             }
             out
         };
-        let balls = links.chunks(N_LANES).map(eight).collect();
-        Self { prepared, links, balls, is_fine }
+        let boxes = links.chunks(N_LANES).map(eight).collect();
+        Self { prepared, links, boxes, is_fine }
     }
 
     /// All links with a surface.
@@ -108,16 +112,15 @@ impl<'a> Placed<'a> {
     /// For each link whose field knows a facet near a point: the link, the facet, and the point in the link's frame.
     #[inline]
     pub(crate) fn each(&self, point: [f32; 3], mut take: impl FnMut(usize, usize, [f32; 3])) {
-        for (balls, links) in self.balls.iter().zip(self.links.chunks(N_LANES)) {
-            let mut bits = balls.hold(point);
+        for (boxes, links) in self.boxes.iter().zip(self.links.chunks(N_LANES)) {
+            let (mut bits, [x, y, z]) = boxes.hold(point);
             while bits != 0 {
-                let (link, link_from_local) = &links[bits.trailing_zeros() as usize];
+                let lane = bits.trailing_zeros() as usize;
+                let (link, link_from_local) = &links[lane];
                 bits &= bits - 1;
-                let p = transform(link_from_local, point);
-                let fields = &self.prepared.links[*link].fields;
-                let field = if self.is_fine { &fields.fine } else { &fields.coarse };
-                if let Some(facet) = field.nearest(p) {
-                    take(*link, facet, p);
+                let field = field(&self.prepared.links[*link].fields, self.is_fine);
+                if let Some(facet) = field.in_voxel([x[lane], y[lane], z[lane]].map(|v| v as u32)) {
+                    take(*link, facet, transform(link_from_local, point));
                 }
             }
         }

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use crate::beam::Hypothesis;
 use crate::face::Face;
 use crate::facets::Fields;
-use crate::placed::Ball;
 
 /// A model made ready for fitting.
 #[derive(Debug)]
@@ -43,7 +42,6 @@ pub struct Prepared<'a> {
 pub(crate) struct PreparedLink {
     /// Shared by all models that have the link.
     pub(crate) fields: Arc<Fields>,
-    pub(crate) ball: Ball,
     /// √area, m: weight of the link in a total score.
     pub(crate) weight: f64,
     /// Outer area, m².
@@ -81,9 +79,9 @@ impl<'a> Prepared<'a> {
         let mut patch_groups = Vec::new();
         let links = model.links.iter().zip(fields).enumerate().map(|(l, (link, fields))| {
             let area = f64::from(link.cad.area);
-            let (ball, weight, first_patch) = (Ball::of(link), area.sqrt(), patch_groups.len());
+            let (weight, first_patch) = (area.sqrt(), patch_groups.len());
             patch_groups.extend(fields.sides.iter().map(|side| l as u32 * 6 + u32::from(*side)));
-            PreparedLink { fields, ball, weight, area, first_patch }
+            PreparedLink { fields, weight, area, first_patch }
         });
         let links: Vec<_> = links.collect();
         let n_free = model.free.len();

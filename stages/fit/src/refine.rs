@@ -55,13 +55,39 @@ pub(crate) const FINE_REACH: f64 = 0.026;
 /// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
 const BESIDE: (f64, f64) = (1.6, 1.5);
 
+/// The same where points are few.
+const FEW: usize = 2048;
+
 /// Sums of one link's part of the normal equations.
 struct Sums {
+    /// Its lower triangle until all are joined.
     h: DMatrix<f64>,
     g: DVector<f64>,
     n: usize,
-    weight: f64,
-    rr: f64,
+}
+
+impl Sums {
+    fn new(n: usize) -> Self {
+        Self { h: DMatrix::zeros(n, n), g: DVector::zeros(n), n: 0 }
+    }
+
+    /// Adds a residual with its derivatives and weight.
+    fn add(&mut self, row: &[f64], r: f64, weight: f64) {
+        self.n += 1;
+        let n = row.len();
+        for a in (0..n).filter(|a| row[*a] != 0.0) {
+            let wa = weight * row[a];
+            self.g[a] += wa * r;
+            let column = &mut self.h.as_mut_slice()[a * n + a..(a + 1) * n];
+            column.iter_mut().zip(&row[a..]).for_each(|(h, b)| *h += wa * b);
+        }
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.h += &other.h;
+        self.g += &other.g;
+        self.n += other.n;
+    }
 }
 
 /// The refinement of one model in one scene.
@@ -84,11 +110,17 @@ struct Match {
 }
 
 impl Refine<'_> {
-    /// Runs the rounds on the points with these indices (all where `None`).
-    pub(crate) fn run(&self, start: &Hypothesis, points: &[u32], rounds: &[Round]) -> Hypothesis {
+    /// Runs the rounds on the points with these indices.
+    pub(crate) fn run(
+        &self,
+        start: &Hypothesis,
+        points: &[u32],
+        rounds: &[Round],
+        fan: &impl Fan,
+    ) -> Hypothesis {
         let mut h = start.clone();
         for round in rounds {
-            let sums = self.sums(&h, points, round.gate);
+            let sums = self.sums(&h, points, round.gate, fan);
             let Some(step) = self.step(&h, &sums, round) else { break };
             self.apply(&mut h, &step);
         }
@@ -111,17 +143,16 @@ impl Refine<'_> {
             .iter()
             .map(|(l, _)| self.prepared.model.links[*l].bounds.grown(gate.max(0.05) * 1.7))
             .collect();
+        let is_about = |p: [f32; 3]| {
+            links.iter().zip(&grown).any(|((_, frame), bounds)| {
+                bounds.contains(geometry::depth::transform(frame, p).map(f64::from))
+            })
+        };
         let stratum = |i: u32| -> Option<usize> {
-            let m = &self.scene.points[i as usize];
-            let near = links.iter().zip(&grown).any(|((_, frame), bounds)| {
-                bounds.contains(geometry::depth::transform(frame, m.p).map(f64::from))
-            });
-            if !near {
-                return None;
-            }
-            match placed.nearest(m.p) {
+            let p = self.scene.points[i as usize].p;
+            match placed.nearest(p) {
                 Some(near) if near.distance <= gate => Some(near.link),
-                _ => (gate > FINE_REACH).then_some(n_strata - 1),
+                _ => (gate > FINE_REACH && is_about(p)).then_some(n_strata - 1),
             }
         };
         let sorted = fan.fan(points.chunks(CHUNK).collect(), |chunk: &[u32]| {
@@ -145,42 +176,39 @@ impl Refine<'_> {
         out
     }
 
-    /// Matches of the points within the gate, in their order.
-    fn matches(&self, h: &Hypothesis, points: &[u32], gate: f64) -> Vec<Match> {
+    /// What matches points with the facets of the model as it stands, within the gate.
+    fn matching(&self, h: &Hypothesis, gate: f64) -> impl Fn(&u32) -> Option<Match> + Sync + '_ {
         let poses = self.prepared.model.poses(&h.posture);
         let base_from_local = h.local_from_base.inverse();
         let placed = Placed::all(self.prepared, h, gate);
         let scanners: Vec<_> =
             (0..self.scene.views.len()).map(|v| self.scene.scanner(v as u16)).collect();
-        points
-            .iter()
-            .filter_map(|&i| {
-                let m = &self.scene.points[i as usize];
-                let Near { link, facet, distance } = placed.nearest(m.p)?;
-                if distance > gate {
+        move |&i| {
+            let m = &self.scene.points[i as usize];
+            let Near { link, facet, distance } = placed.nearest(m.p)?;
+            if distance > gate {
+                return None;
+            }
+            let pose = &poses[link];
+            let facet = &self.prepared.links[link].fields.facets[facet];
+            let n = pose.rotation * Vector::from(facet.n.map(f64::from));
+            let q = base_from_local * geometry::Point::from(m.p.map(f64::from));
+            let x = pose * geometry::Point::from(facet.x.map(f64::from));
+            let r = n.dot(&(q - x));
+            // Beside the surface's edge its plane means nothing: what hangs on a flange is wider than it.
+            let beside = (distance * distance - r * r).max(0.0).sqrt();
+            if gate < FINE_REACH && beside > self.beside(link).max(0.33 * gate) {
+                return None;
+            }
+            // A facet that faces away from the scanner cannot have given this point.
+            if let Some(scanner) = &scanners[usize::from(m.view)] {
+                let ray = (base_from_local * scanner) - q;
+                if n.dot(&ray) <= 0.05 * ray.norm() {
                     return None;
                 }
-                let pose = &poses[link];
-                let facet = &self.prepared.links[link].fields.facets[facet];
-                let n = pose.rotation * Vector::from(facet.n.map(f64::from));
-                let q = base_from_local * geometry::Point::from(m.p.map(f64::from));
-                let x = pose * geometry::Point::from(facet.x.map(f64::from));
-                let r = n.dot(&(q - x));
-                // Beside the surface's edge its plane means nothing: what hangs on a flange is wider than it.
-                let beside = (distance * distance - r * r).max(0.0).sqrt();
-                if gate < FINE_REACH && beside > self.beside(link).max(0.33 * gate) {
-                    return None;
-                }
-                // A facet that faces away from the scanner cannot have given this point.
-                if let Some(scanner) = &scanners[usize::from(m.view)] {
-                    let ray = (base_from_local * scanner) - q;
-                    if n.dot(&ray) <= 0.05 * ray.norm() {
-                        return None;
-                    }
-                }
-                Some(Match { link, q: q.coords, n, r })
-            })
-            .collect()
+            }
+            Some(Match { link, q: q.coords, n, r })
+        }
     }
 
     /// How far beside its nearest sample a point of a link may lie, metres.
@@ -210,35 +238,24 @@ impl Refine<'_> {
     }
 
     /// Normal equations by link.
-    fn sums(&self, h: &Hypothesis, points: &[u32], gate: f64) -> Vec<Sums> {
+    fn sums(&self, h: &Hypothesis, points: &[u32], gate: f64, fan: &impl Fan) -> Vec<Sums> {
+        let matching = self.matching(h, gate);
         let kinematics = self.prepared.model.kinematics(&h.posture);
         let n = 6 + h.posture.len();
-        let mut sums: Vec<Sums> = (0..self.prepared.links.len())
-            .map(|_| Sums {
-                h: DMatrix::zeros(n, n),
-                g: DVector::zeros(n),
-                n: 0,
-                weight: 0.0,
-                rr: 0.0,
-            })
-            .collect();
-        let mut row = vec![0.0; n];
-        for m in self.matches(h, points, gate) {
-            let w = robust::tukey(m.r, gate);
-            self.row(&m.q, &m.n, &kinematics.twists[m.link], &mut row);
-            let s = &mut sums[m.link];
-            s.n += 1;
-            s.weight += w;
-            s.rr += w * m.r * m.r;
-            for a in 0..n {
-                if row[a] == 0.0 {
-                    continue;
-                }
-                let wa = w * row[a];
-                s.g[a] += wa * m.r;
-                let column = &mut s.h.as_mut_slice()[a * n + a..(a + 1) * n];
-                column.iter_mut().zip(&row[a..]).for_each(|(h, b)| *h += wa * b);
+        let n_links = self.prepared.links.len();
+        let chunks = points.chunks(FEW).collect();
+        let found = fan.fan(chunks, |chunk: &[u32]| {
+            let mut sums: Vec<Sums> = (0..n_links).map(|_| Sums::new(n)).collect();
+            let mut row = vec![0.0; n];
+            for m in chunk.iter().filter_map(&matching) {
+                self.row(&m.q, &m.n, &kinematics.twists[m.link], &mut row);
+                sums[m.link].add(&row, m.r, robust::tukey(m.r, gate));
             }
+            sums
+        });
+        let mut sums: Vec<Sums> = (0..n_links).map(|_| Sums::new(n)).collect();
+        for own in &found {
+            sums.iter_mut().zip(own).for_each(|(sum, own)| sum.join(own));
         }
         for s in &mut sums {
             s.h.fill_upper_triangle_with_lower_triangle();
@@ -343,8 +360,9 @@ impl Refine<'_> {
 
     /// Robust standard deviation of the residuals within a gate, metres.
     pub(crate) fn noise(&self, h: &Hypothesis, points: &[u32], gate: f64) -> f64 {
+        let matching = self.matching(h, gate);
         let mut residuals: Vec<f64> =
-            self.matches(h, points, gate).iter().map(|m| m.r.abs()).collect();
+            points.iter().filter_map(matching).map(|m| m.r.abs()).collect();
         robust::median(&mut residuals).map_or(gate, |m| 1.4826 * m)
     }
 }

@@ -200,7 +200,7 @@ fn sway(
         })
     });
     let all = std::iter::once(h.clone()).chain(turned).collect();
-    let ends: Vec<Hypothesis> = fan.fan(all, |h| fine(refine, &h, near));
+    let ends: Vec<Hypothesis> = fan.fan(all, |h| fine(refine, &h, near, fan));
     // Where it ended at something worse, it is no value that the joint may stand at.
     let as_good = |end: &&Hypothesis| refine.worsening(&ends[0], end, near) < EQUAL;
     for end in ends[1..].iter().filter(as_good) {

@@ -44,11 +44,12 @@ pub(crate) fn best_of(
 ) -> Settled {
     let mut rivals = near_rivals((beam, refine), others, &best, near);
     rivals.extend(fan.fan(beam.flips(&best.0.hypothesis), |flipped| {
-        polish(refine, &roughly(refine, &flipped, near, &COARSE_ROUNDS[3..]), near)
+        polish(refine, &roughly(refine, &flipped, near, &COARSE_ROUNDS[3..], fan), near, fan)
     }));
     let (best, rest) = compare(refine, best, rivals, (near, all), fan);
     others.extend(rest);
-    let bends = fan.fan(refine.bends(&best.0.hypothesis, near, fan), |h| polish(refine, &h, near));
+    let bends =
+        fan.fan(refine.bends(&best.0.hypothesis, near, fan), |h| polish(refine, &h, near, fan));
     let rivals = near_rivals((beam, refine), &bends, &best, near);
     others.extend(bends);
     let (best, rest) = compare(refine, best, rivals, (near, all), fan);

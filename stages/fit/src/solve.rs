@@ -59,7 +59,7 @@ pub fn fit(
     let closer = beam.fitted();
     let found = beam.run(&bases, fan);
     let refined = rough(&beam, &refine, found, &near, fan);
-    let mut polished = fan.fan(refined, |h| polish(&refine, &h, &near));
+    let mut polished = fan.fan(refined, |h| polish(&refine, &h, &near, fan));
     sort(&mut polished);
     for round in [Look::Again, Look::Others] {
         let Some((best, judgement)) = polished.first() else { break };
@@ -71,8 +71,8 @@ pub fn fit(
             Look::Others => closer.alternatives(best, fan),
         };
         polished.extend(fan.fan(more, |h| {
-            let h = roughly(&refine, &h, &near, &COARSE_ROUNDS[3..]);
-            polish(&refine, &h, &near)
+            let h = roughly(&refine, &h, &near, &COARSE_ROUNDS[3..], fan);
+            polish(&refine, &h, &near, fan)
         }));
         sort(&mut polished);
     }
@@ -111,7 +111,8 @@ pub fn again(
     };
     let base = Point::from(start.local_from_base.translation.vector);
     let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
-    let polished = polish(&refine, &roughly(&refine, &start, &near, &COARSE_ROUNDS[3..]), &near);
+    let polished =
+        polish(&refine, &roughly(&refine, &start, &near, &COARSE_ROUNDS[3..], fan), &near, fan);
     if polished.1.score < settings.min_score || polished.1.violation > settings.max_violation {
         return None;
     }
@@ -145,7 +146,7 @@ pub(crate) fn quick(
     let search = Beam::new(refine.prepared, refine.scene, &quick);
     let refine = Refine { settings: &quick, prior: refine.prior, ..*refine };
     let best = rough(&search, &refine, search.run(bases, fan), near, fan).into_iter().next();
-    best.map(|h| polish(&refine, &h, near))
+    best.map(|h| polish(&refine, &h, near, fan))
 }
 
 fn hopeless(scene: &Scene<'_>) -> f64 {
@@ -203,7 +204,8 @@ pub fn converge(
     };
     let base = Point::from(h.local_from_base.translation.vector);
     let [near, _] = scene.within(&base, prepared.reach + NEAR_MARGIN);
-    let (end, _) = polish(&refine, &roughly(&refine, &h, &near, &COARSE_ROUNDS), &near);
+    let (end, _) =
+        polish(&refine, &roughly(&refine, &h, &near, &COARSE_ROUNDS, &OneByOne), &near, &OneByOne);
     (world_from_local * end.local_from_base, end.posture)
 }
 
@@ -295,7 +297,7 @@ fn rough(
     let mut out: Vec<(Hypothesis, f64)> = Vec::new();
     let last = found.first().map_or(0, |h| h.posture.len().saturating_sub(1));
     let found = beam.varied(found, settings.n_refine);
-    for h in fan.fan(found, |h| roughly(refine, &h, near, &COARSE_ROUNDS)) {
+    for h in fan.fan(found, |h| roughly(refine, &h, near, &COARSE_ROUNDS, fan)) {
         if out.iter().any(|(k, _)| beam.alike(k, &h, last, 0.7)) {
             continue;
         }
@@ -313,11 +315,12 @@ pub(crate) fn roughly(
     h: &Hypothesis,
     near: &[u32],
     rounds: &[Round],
+    fan: &impl Fan,
 ) -> Hypothesis {
     let step = near.len().div_ceil(COARSE_NEAR).max(1);
     let near: Vec<u32> = near.iter().copied().step_by(step).collect();
-    let few = refine.stratified(h, &near, (rounds[0].gate, COARSE_CAP), &OneByOne);
-    refine.run(h, &few, rounds)
+    let few = refine.stratified(h, &near, (rounds[0].gate, COARSE_CAP), fan);
+    refine.run(h, &few, rounds, fan)
 }
 
 /// Points of a link in the fine rounds: enough to hold its pose to a tenth of a millimetre, which tells hypotheses
@@ -328,19 +331,29 @@ const POLISH_CAP: usize = 2000;
 pub(crate) type Polished = (Hypothesis, Judgement);
 
 /// Fine rounds, then the judgement.
-pub(crate) fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> Polished {
-    let h = fine(refine, h, near);
+pub(crate) fn polish(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    near: &[u32],
+    fan: &impl Fan,
+) -> Polished {
+    let h = fine(refine, h, near, fan);
     let judgement = judged(refine, &h);
     (h, judgement)
 }
 
 /// Fine rounds on thinned points, with the gate that the noise asks for.
-pub(crate) fn fine(refine: &Refine<'_>, h: &Hypothesis, near: &[u32]) -> Hypothesis {
-    let few = refine.stratified(h, near, (FINE_GATE, POLISH_CAP), &OneByOne);
-    let h = refine.run(h, &few, &FINE_ROUNDS[..3]);
+pub(crate) fn fine(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    near: &[u32],
+    fan: &impl Fan,
+) -> Hypothesis {
+    let few = refine.stratified(h, near, (FINE_GATE, POLISH_CAP), fan);
+    let h = refine.run(h, &few, &FINE_ROUNDS[..3], fan);
     let gate = (LAST_GATE.0 * refine.noise(&h, &few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
     let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect();
-    refine.run(&h, &few, &rounds)
+    refine.run(&h, &few, &rounds, fan)
 }
 
 /// Frame on the installation plane with z along its normal, at the height of the base's origin.

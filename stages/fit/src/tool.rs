@@ -81,7 +81,7 @@ pub fn bolt(
 ) -> Vec<Bolt> {
     let refine = Refine { prepared: tooled, scene, settings, prior: None };
     let [near, _] = near(start, tooled, scene);
-    let (h, _) = polish(&refine, &hypothesis(start, scene), &near);
+    let (h, _) = polish(&refine, &hypothesis(start, scene), &near, fan);
     refine.bolts(&h, &near, flange, holes, fan)
 }
 
@@ -105,7 +105,7 @@ pub fn fit_tool(
         *value = low + (*value + TAU * f64::from(k) / f64::from(N_TURNS) - low).rem_euclid(TAU);
         (*value <= high).then_some(h)
     });
-    let mut others = fan.fan(turned.collect(), |h| polish(&refine, &h, &near));
+    let mut others = fan.fan(turned.collect(), |h| polish(&refine, &h, &near, fan));
     // Sides that look alike from afar differ in a bolt or a finger.
     let worse = |other: &Polished| refine.worsening(&settled.0.hypothesis, &other.0, &near);
     let all_worse: Vec<f64> = others.iter().map(worse).collect();

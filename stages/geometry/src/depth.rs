@@ -5,6 +5,7 @@
 //! Each cell keeps the nearest and the farthest hit, so that a silhouette does not average robot and background.
 
 use crate::Pose;
+use crate::level::Level;
 
 /// What a cell without a hit means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,16 +26,6 @@ pub struct DepthImage {
     /// Cells of level 0 per unit tangent.
     focal: f32,
     levels: Vec<Level>,
-}
-
-#[derive(Debug, Clone)]
-struct Level {
-    width: usize,
-    height: usize,
-    /// `[near, far, around]` in metres; NaN unknown, +∞ no return. Row-major. `around` is the smallest `near` of a cell
-    /// and its eight neighbours: at a silhouette the beams of one cell may all have missed a body that those of its
-    /// neighbour hit.
-    cells: Vec<[f32; 3]>,
 }
 
 /// `a_from_b` as three rows of four f32, for inner loops.
@@ -146,13 +137,10 @@ impl DepthImage {
         let focal = self.focal;
         let base = &mut self.levels[0];
         let (cx, cy) = (0.5 * base.width as f32, 0.5 * base.height as f32);
-        let open = base.open_cells(window);
-        for (at, _) in open.iter().enumerate().filter(|(_, open)| **open) {
-            let (u, v) = ((at % base.width) as f32 + 0.5, (at / base.width) as f32 + 0.5);
-            if empty([(u - cx) / focal, (v - cy) / focal, 1.0]) == Empty::NoReturn {
-                base.cells[at] = [f32::INFINITY; 3];
-            }
-        }
+        base.each_open(window, |u, v| {
+            let (u, v) = (u as f32 + 0.5, v as f32 + 0.5);
+            empty([(u - cx) / focal, (v - cy) / focal, 1.0]) == Empty::NoReturn
+        });
         self.build_levels();
     }
 
@@ -317,101 +305,5 @@ impl Looks {
     pub(crate) fn set(&mut self, i: usize, look: &Look) {
         let Look { near, far, around, range } = *look;
         (self.near[i], self.far[i], self.around[i], self.range[i]) = (near, far, around, range);
-    }
-}
-
-impl Level {
-    #[inline]
-    fn find(&self, focal: f32, p: [f32; 3]) -> Option<(usize, f32)> {
-        if p[2] <= 1e-3 {
-            return None;
-        }
-        let inverse = focal / p[2];
-        let u = p[0] * inverse + 0.5 * self.width as f32;
-        let v = p[1] * inverse + 0.5 * self.height as f32;
-        let inside = u >= 0.0 && v >= 0.0 && u < self.width as f32 && v < self.height as f32;
-        let range = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
-        inside.then(|| (v as usize * self.width + u as usize, range))
-    }
-
-    /// The same for lanes; `u32::MAX` outside.
-    #[inline]
-    fn find_lanes(&self, focal: f32, [x, y, z]: &Lanes) -> ([u32; LANES], [f32; LANES]) {
-        let (width, height) = (self.width as f32, self.height as f32);
-        let (mut at, mut range) = ([u32::MAX; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            let inverse = focal / z[i];
-            let (u, v) = (x[i] * inverse + 0.5 * width, y[i] * inverse + 0.5 * height);
-            let is_in = z[i] > 1e-3 && u >= 0.0 && v >= 0.0 && u < width && v < height;
-            let cell =
-                (v as i32 as u32).wrapping_mul(self.width as u32).wrapping_add(u as i32 as u32);
-            at[i] = if is_in { cell } else { u32::MAX };
-            range[i] = (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
-        }
-        (at, range)
-    }
-
-    /// Cells that are empty with all their neighbours within `window` cells: a separable running maximum, row by row.
-    fn open_cells(&self, window: i32) -> Vec<bool> {
-        let (window, width) = (usize::try_from(window).unwrap_or(0), self.width);
-        let mut near_hit = vec![false; self.cells.len()];
-        let mut hit = vec![false; width];
-        for (row, near) in self.cells.chunks(width).zip(near_hit.chunks_mut(width)) {
-            hit.iter_mut().zip(row).for_each(|(hit, cell)| *hit = !cell[0].is_nan());
-            for by in 0..=window.min(width) {
-                near[by..].iter_mut().zip(&hit).for_each(|(near, hit)| *near |= *hit);
-                near.iter_mut().zip(&hit[by..]).for_each(|(near, hit)| *near |= *hit);
-            }
-        }
-        let mut open = vec![true; self.cells.len()];
-        for (v, own) in open.chunks_mut(width).enumerate() {
-            let rows = v.saturating_sub(window)..(v + window + 1).min(self.height);
-            for near in near_hit[rows.start * width..rows.end * width].chunks(width) {
-                own.iter_mut().zip(near).for_each(|(open, near)| *open &= !*near);
-            }
-        }
-        open
-    }
-
-    fn halved(&self) -> Self {
-        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
-        let mut cells = vec![[f32::NAN; 3]; width * height];
-        for (v, row) in self.cells.chunks(self.width).enumerate() {
-            let out = &mut cells[v / 2 * width..(v / 2 + 1) * width];
-            for (pair, to) in row.chunks(2).zip(out) {
-                for from in pair {
-                    to[0] = to[0].min(from[0]);
-                    // No return must not hide a hit from `far`; it stays only where the whole cell is empty.
-                    to[1] = match (to[1].is_finite(), from[1].is_finite()) {
-                        (true, false) => to[1],
-                        (false, true) => from[1],
-                        _ => to[1].max(from[1]),
-                    };
-                }
-            }
-        }
-        Self { width, height, cells }
-    }
-
-    /// Fills `around`.
-    fn look_around(&mut self) {
-        let width = self.width;
-        let mut across = vec![f32::NAN; self.cells.len()];
-        let mut near = vec![f32::NAN; width];
-        // `min` passes NaN over: unknown neighbours say nothing.
-        for (row, out) in self.cells.chunks(width).zip(across.chunks_mut(width)) {
-            near.iter_mut().zip(row).for_each(|(near, cell)| *near = cell[0]);
-            out.copy_from_slice(&near);
-            out[1..].iter_mut().zip(&near).for_each(|(least, near)| *least = least.min(*near));
-            out.iter_mut().zip(&near[1..]).for_each(|(least, near)| *least = least.min(*near));
-        }
-        for (v, row) in self.cells.chunks_mut(width).enumerate() {
-            let rows = v.saturating_sub(1)..(v + 2).min(self.height);
-            near.fill(f32::NAN);
-            for across in across[rows.start * width..rows.end * width].chunks(width) {
-                near.iter_mut().zip(across).for_each(|(least, own)| *least = least.min(*own));
-            }
-            row.iter_mut().zip(&near).for_each(|(cell, least)| cell[2] = *least);
-        }
     }
 }

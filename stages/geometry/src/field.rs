@@ -9,24 +9,18 @@ pub struct NearestField {
     origin: [f32; 3],
     inverse_edge: f32,
     size: [usize; 3],
-    /// Farthest place from a sample that knows it, metres.
-    reach: f32,
-    /// Index of the nearest sample + 1; 0 beyond reach. x fastest.
+    /// Bricks on each axis, see [`BRICK`].
+    bricks: [usize; 3],
+    /// Index of the nearest sample + 1 (below 2³¹); 0 beyond reach. Brick after brick, x fastest.
     cells: Vec<u32>,
 }
 
-/// What a voxel knows while samples spread: squared distance of its middle from its sample, the sample's index + 1, and
-/// whether it is still to tell its six neighbours. The border of the grid lies beyond reach and never is.
-#[derive(Clone, Copy)]
-struct Nearest {
-    d2: f32,
-    sample: u32,
-    waits: bool,
-}
+/// Voxels across a brick, as a power of two: neighbours in space are neighbours in memory, on one page of it mostly.
+const BRICK: u32 = 3;
+const IN_BRICK: u32 = (1 << BRICK) - 1;
 
-impl Nearest {
-    const NONE: Self = Self { d2: f32::INFINITY, sample: 0, waits: false };
-}
+/// In a cell while samples spread: it is still to tell its six neighbours.
+const WAITS: u32 = 1 << 31;
 
 impl NearestField {
     /// A field of voxels with this `edge` that reaches `reach` metres from the samples.
@@ -40,12 +34,13 @@ impl NearestField {
         let margin = f64::from(reach + 2.0 * edge);
         let bounds = bounds.grown(margin);
         let size = bounds.size().map(|s| (s / f64::from(edge)).ceil() as usize + 1);
+        let bricks = size.map(|n| n.div_ceil(1 << BRICK));
         let mut field = Self {
             origin: bounds.min.map(|v| v as f32),
             inverse_edge: 1.0 / edge,
             size,
-            reach: reach + edge,
-            cells: vec![0; size[0] * size[1] * size[2]],
+            bricks,
+            cells: vec![0; bricks.iter().product::<usize>() << (3 * BRICK)],
         };
         field.fill(points, edge, reach);
         field
@@ -60,63 +55,73 @@ impl NearestField {
         self
     }
 
-    /// Spreads each sample from its own voxel outwards, ring by ring, while it is nearer than what is there.
+    /// Spreads each sample from its own voxel outwards, ring by ring, while it is nearer than what is there. The border of the
+    /// grid lies beyond reach and is never told.
     fn fill(&mut self, points: &[[f32; 3]], edge: f32, reach: f32) {
-        let mut nearest = vec![Nearest::NONE; self.cells.len()];
-        let mut ring: Vec<u32> = Vec::new();
+        // How much nearer to its sample than `limit` each voxel's middle is, in squares: 0, as fresh memory has it, where none
+        // is; so memory of bricks beyond reach is never touched.
+        let mut nearer = vec![0.0; self.cells.len()];
+        let limit = reach * reach + edge * edge;
+        // Places, not numbers: these would have to be divided for each voxel.
+        let mut ring: Vec<[u32; 3]> = Vec::new();
         for (i, p) in points.iter().enumerate() {
             let Some(index) = self.index(*p) else { continue };
-            let (at, d2) = (self.at(index), distance2(*p, self.middle(index, edge)));
-            let own = &mut nearest[at];
-            if own.sample == 0 {
-                ring.push(at as u32);
+            let at = self.at(index);
+            let by = limit - distance2(*p, self.middle(index, edge));
+            if self.cells[at] == 0 {
+                ring.push(index);
             }
-            if d2 < own.d2 {
-                *own = Nearest { d2, sample: i as u32 + 1, waits: true };
+            if by > nearer[at] {
+                (nearer[at], self.cells[at]) = (by, (i as u32 + 1) | WAITS);
             }
         }
-        let (reach2, mut next) = (reach * reach, Vec::new());
-        let strides = [1, self.size[0], self.size[0] * self.size[1]];
+        let mut next = Vec::new();
+        let steps = self.steps();
         while !ring.is_empty() {
-            for at in ring.drain(..).map(|at| at as usize) {
-                nearest[at].waits = false;
-                let sample = nearest[at].sample;
-                let (from, middle) =
-                    (points[sample as usize - 1], self.middle(self.place(at), edge));
+            for index in ring.drain(..) {
+                let at = self.at(index);
+                let sample = self.cells[at] & !WAITS;
+                self.cells[at] = sample;
+                let (from, middle) = (points[sample as usize - 1], self.middle(index, edge));
                 // Not what is kept of it: rounding would add up on the way.
-                let own_d2 = distance2(from, middle);
+                let own = limit - distance2(from, middle);
                 for axis in 0..3 {
                     // |v ± e|² = |v|² ± 2·v·e + e²
                     let across = 2.0 * edge * (middle[axis] - from[axis]);
-                    let both = [(at - strides[axis], -across), (at + strides[axis], across)];
-                    for (at, more) in both {
-                        let (own, d2) = (&mut nearest[at], own_d2 + more + edge * edge);
-                        if d2 <= reach2 && d2 < own.d2 && own.sample != sample {
-                            if !own.waits {
-                                next.push(at as u32);
+                    let step =
+                        |to: u32| at + steps[axis][to as usize] - steps[axis][index[axis] as usize];
+                    for (to, more) in [(index[axis] - 1, -across), (index[axis] + 1, across)] {
+                        let (at, by) = (step(to), own - more - edge * edge);
+                        let other = self.cells[at];
+                        if by >= edge * edge && by > nearer[at] && other & !WAITS != sample {
+                            if other & WAITS == 0 {
+                                let mut index = index;
+                                index[axis] = to;
+                                next.push(index);
                             }
-                            *own = Nearest { d2, sample, waits: true };
+                            (nearer[at], self.cells[at]) = (by, sample | WAITS);
                         }
                     }
                 }
             }
             std::mem::swap(&mut ring, &mut next);
         }
-        for (cell, own) in self.cells.iter_mut().zip(&nearest) {
-            *cell = own.sample;
-        }
     }
 
-    /// The voxel at a place of `cells`.
-    #[inline]
-    fn place(&self, at: usize) -> [u32; 3] {
-        let (row, x) = (at / self.size[0], at % self.size[0]);
-        [x, row % self.size[1], row / self.size[1]].map(|v| v as u32)
+    /// What each place on each axis adds to [`NearestField::at`].
+    fn steps(&self) -> [Vec<usize>; 3] {
+        std::array::from_fn(|axis| {
+            let place = |v: u32| std::array::from_fn(|i| if i == axis { v } else { 0 });
+            (0..self.size[axis] as u32).map(|v| self.at(place(v))).collect()
+        })
     }
 
     #[inline]
     fn at(&self, [x, y, z]: [u32; 3]) -> usize {
-        (z as usize * self.size[1] + y as usize) * self.size[0] + x as usize
+        let [bx, by, bz] = [x, y, z].map(|v| (v >> BRICK) as usize);
+        let [x, y, z] = [x, y, z].map(|v| (v & IN_BRICK) as usize);
+        let brick = (bz * self.bricks[1] + by) * self.bricks[0] + bx;
+        ((brick << BRICK | z) << BRICK | y) << BRICK | x
     }
 
     #[inline]
@@ -146,10 +151,23 @@ impl NearestField {
         (self.cells[at] as usize).checked_sub(1)
     }
 
-    /// No place farther than this from all samples knows one, metres.
+    /// Where its grid begins, metres, and how many voxels there are in a metre.
     #[must_use]
-    pub fn reach(&self) -> f64 {
-        f64::from(self.reach)
+    pub fn grid(&self) -> ([f32; 3], f32) {
+        (self.origin, self.inverse_edge)
+    }
+
+    /// Voxels on each axis.
+    #[must_use]
+    pub fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
+    /// The same as [`NearestField::nearest`] for any place in a voxel of the grid; `None` outside.
+    #[inline]
+    #[must_use]
+    pub fn in_voxel(&self, index: [u32; 3]) -> Option<usize> {
+        (*self.cells.get(self.at(index))? as usize).checked_sub(1)
     }
 
     /// Bytes kept.

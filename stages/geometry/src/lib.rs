@@ -9,6 +9,7 @@ pub mod direction;
 pub mod evidence;
 pub mod faces;
 pub mod field;
+mod level;
 pub mod narrow;
 pub mod plane;
 pub mod probe;

@@ -89,7 +89,7 @@ impl<'a> Sight<'a> {
         fan: &impl Fan,
     ) -> Self {
         let volume = Volume::new(region, all, fan);
-        let all_spots = spots(views);
+        let all_spots = spots(views, fan);
         let (each, spots) = (Vec::new(), all_spots.clone());
         Self { region, views, evidence: scouts, volume, each, all_spots, spots }
     }
@@ -177,18 +177,44 @@ impl<'a> Sight<'a> {
     }
 }
 
+/// Points of a cube: their sum, metres, and how many they are.
+type Sum = (u64, [f64; 3], u32);
+
 /// The points of all views, cube by cube.
-fn spots(views: &[View]) -> Vec<Spot> {
-    let points: Vec<[f32; 3]> = views.iter().flat_map(|v| &v.points).map(|p| p.xyz).collect();
-    let cubes = points.iter().map(cube).zip(0..);
-    let mut order: Vec<(u64, u32)> = cubes.collect();
-    order.sort_unstable();
-    let spot = |own: &[(u64, u32)]| {
-        let n = own.len() as f32;
-        let mean = |i: usize| own.iter().map(|(_, at)| points[*at as usize][i] / n).sum();
-        Spot { at: std::array::from_fn(mean), n_points: own.len() as u32 }
+fn spots(views: &[View], fan: &impl Fan) -> Vec<Spot> {
+    // Beams beside each other mostly end in one cube: there are far fewer runs of points than points.
+    let of_view = |view: &View| {
+        let mut runs: Vec<Sum> = Vec::new();
+        for p in view.points.iter().map(|p| p.xyz) {
+            let (cube, at) = (cube(&p), p.map(f64::from));
+            match runs.last_mut() {
+                Some(run) if run.0 == cube => add(run, &(cube, at, 1)),
+                _ => runs.push((cube, at, 1)),
+            }
+        }
+        joined(runs)
     };
-    order.chunk_by(|a, b| a.0 == b.0).map(spot).collect()
+    let all = fan.fan(views.iter().collect(), of_view).concat();
+    let mean = |(_, sum, n): &Sum| sum.map(|v| (v / f64::from(*n)) as f32);
+    joined(all).iter().map(|own| Spot { at: mean(own), n_points: own.2 }).collect()
+}
+
+/// One sum for each cube, in the order of the cubes.
+fn joined(mut sums: Vec<Sum>) -> Vec<Sum> {
+    sums.sort_by_key(|own| own.0);
+    sums.dedup_by(|later, first| {
+        let is_same = later.0 == first.0;
+        if is_same {
+            add(first, later);
+        }
+        is_same
+    });
+    sums
+}
+
+fn add((_, sum, n): &mut Sum, (_, more, n_more): &Sum) {
+    sum.iter_mut().zip(more).for_each(|(sum, v)| *sum += v);
+    *n += n_more;
 }
 
 /// The cube of a place in a region's frame, in the order of x, y, z: 21 bits each, 60 km either way.

@@ -210,14 +210,11 @@ impl ViewBuilder {
         let scan_from_local = self.local_from_scan.inverse();
         for image in &mut self.view.images {
             let scan_from_camera = rows(&(scan_from_local * image.camera_from_local().inverse()));
-            let (lattice, extent) = (self.lattice, self.extent);
-            let covered = move |camera: [f32; 3]| {
-                let (Some(lattice), Some([r0, r1, c0, c1])) = (lattice, extent) else {
-                    return false;
-                };
-                let d = geometry::depth::rotate(&scan_from_camera, camera);
-                let pixel = lattice.pixel(d).0;
-                (r0..=r1).contains(&pixel.row) && (c0..=c1).contains(&pixel.col)
+            let window =
+                self.lattice.zip(self.extent).map(|(lattice, extent)| lattice.window(extent));
+            let covered = |camera: [f32; 3]| {
+                let direction = geometry::depth::rotate(&scan_from_camera, camera);
+                window.is_some_and(|window| window.holds(direction))
             };
             image.finish(self.empty_window, |direction| {
                 if covered(direction) { Empty::NoReturn } else { Empty::Unknown }

@@ -1,5 +1,6 @@
 //! A link's CAD cloud as a grid: a place in the link's frame in, distance to the nearest surface and its normal out.
 
+use geometry::NearestField;
 use robot::CadCloud;
 
 /// Smallest edge of a cell, metres: with samples every 5 mm a cell holds about sixteen.
@@ -18,8 +19,8 @@ pub(crate) struct Field {
     starts: Vec<u32>,
     points: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
-    /// Distance of the cell's middle from the nearest sample, metres.
-    far: Vec<f32>,
+    /// About which sample is the nearest.
+    nearest: NearestField,
     /// Distance along the surface to the next sample that still counts as none, metres.
     tangent: f32,
 }
@@ -57,11 +58,11 @@ impl Field {
             starts: vec![0; size[0] * size[1] * size[2] + 1],
             points: Vec::new(),
             normals: Vec::new(),
-            far: Vec::new(),
+            nearest: NearestField::default(),
             tangent: 0.75 * cad.spacing + 0.001,
         };
         field.fill(cad);
-        field.spread();
+        field.nearest = NearestField::new(&field.points, edge, FIELD_REACH);
         Some(field)
     }
 
@@ -85,76 +86,17 @@ impl Field {
         }
     }
 
-    /// Spreads to every cell the sample nearest to its middle, by sweeps over neighbours.
-    fn spread(&mut self) {
-        let n = self.starts.len() - 1;
-        // Squared distance, and sample; none as yet where it is infinite.
-        let mut nearest = vec![(f32::INFINITY, u32::MAX); n];
-        for (cell, own) in nearest.iter_mut().enumerate() {
-            let first = self.starts[cell];
-            if first < self.starts[cell + 1] {
-                *own = (square(minus(self.middle(cell), self.points[first as usize])), first);
-            }
-        }
-        // Two rounds there and back carry the nearest sample around every corner of a solid body.
-        for round in 0..4 {
-            self.sweep(round % 2 == 0, &mut nearest);
-        }
-        self.far = nearest.into_iter().map(|own| own.0.sqrt()).collect();
-    }
-
-    /// Goes over all cells, last first or first first, and asks those neighbours that it has visited already.
-    fn sweep(&self, forward: bool, nearest: &mut [(f32, u32)]) {
-        let [w, h, d] = self.size.map(|s| s as i64);
-        let turned = |i: i64, n: i64| if forward { i } else { n - 1 - i };
-        // The half of the neighbours that this sweep has visited, and how far off they are in memory.
-        let offsets = (0..27_i64).map(|n| [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1]).enumerate();
-        let visited = offsets.filter(|(n, _)| *n != 13 && (*n < 13) == forward);
-        let visited: Vec<([i64; 3], i64)> =
-            visited.map(|(_, o)| (o, (o[2] * h + o[1]) * w + o[0])).collect();
-        for (z, y) in (0..d).flat_map(|z| (0..h).map(move |y| (turned(z, d), turned(y, h)))) {
-            let is_inner = y > 0 && y < h - 1 && z > 0 && z < d - 1;
-            for x in (0..w).map(|x| turned(x, w)) {
-                let cell = (z * h + y) * w + x;
-                let is_inner = is_inner && x > 0 && x < w - 1;
-                let is_in = |o: &[i64; 3]| {
-                    is_inner
-                        || (0..w).contains(&(x + o[0]))
-                            && (0..h).contains(&(y + o[1]))
-                            && (0..d).contains(&(z + o[2]))
-                };
-                let middle = self.middle_of([x, y, z].map(|v| v as usize));
-                let mut best = nearest[cell as usize];
-                for (_, step) in visited.iter().filter(|(o, _)| is_in(o)) {
-                    let (known, sample) = nearest[(cell + step) as usize];
-                    if known < f32::INFINITY && sample != best.1 {
-                        let own = square(minus(middle, self.points[sample as usize]));
-                        if own < best.0 {
-                            best = (own, sample);
-                        }
-                    }
-                }
-                nearest[cell as usize] = best;
-            }
-        }
-    }
-
     /// The nearest place on the surface, where it is within a cell's edge; else `Err` of the rough distance, metres,
-    /// infinite outside the grid.
+    /// infinite beyond reach.
     pub(crate) fn near(&self, p: [f32; 3]) -> Result<Near, f32> {
-        let inside = (0..3).all(|i| {
-            let v = p[i] - self.min[i];
-            v >= 0.0 && v < self.size[i] as f32 * self.edge
-        });
-        if !inside {
-            return Err(f32::INFINITY);
-        }
-        let cell = self.cell(p);
-        let rough = self.far[self.index(cell)];
-        // A cell's middle is at most 0.87 edges from `p`; farther than two edges there is nothing near.
-        if rough > 2.0 * self.edge {
+        let Some(sample) = self.nearest.nearest(p) else { return Err(f32::INFINITY) };
+        let rough = square(minus(p, self.points[sample])).sqrt();
+        // The middle of a cell is at most 0.87 edges from `p`: a sample within one edge of that is 1.87 from the middle, so
+        // the middle's own is no farther from it, nor 2.74 from `p`.
+        if rough > 2.75 * self.edge {
             return Err(rough);
         }
+        let cell = self.cell(p);
         let at = cell.map(|v| v as i64);
         let mut best = (f32::INFINITY, 0);
         for offset in (0..9).map(|n| [0, n % 3 - 1, n / 3 - 1]) {
@@ -202,19 +144,6 @@ impl Field {
 
     fn index(&self, cell: [usize; 3]) -> usize {
         (cell[2] * self.size[1] + cell[1]) * self.size[0] + cell[0]
-    }
-
-    fn coordinates(&self, index: usize) -> [usize; 3] {
-        let row = index / self.size[0];
-        [index % self.size[0], row % self.size[1], row / self.size[1]]
-    }
-
-    fn middle(&self, index: usize) -> [f32; 3] {
-        self.middle_of(self.coordinates(index))
-    }
-
-    fn middle_of(&self, at: [usize; 3]) -> [f32; 3] {
-        [0, 1, 2].map(|i| self.min[i] + (at[i] as f32 + 0.5) * self.edge)
     }
 }
 
