@@ -30,7 +30,7 @@ pub(crate) fn calibrate(
             return Ok((fit, None));
         }
         let found = search.with_scene(&fit, regions, |scene, settings| {
-            let prepared = Prepared::new(fit.model, &known[fit.model]);
+            let prepared = Prepared::new(fit.model, &known[fit.model], &AllThreads);
             fit::calibrate(&fit, &prepared, scene, settings, &AllThreads)
         })?;
         Ok(found.map_or((fit, None), |(model, fit)| (fit, Some(model))))

@@ -43,34 +43,33 @@ pub(crate) fn dress(
         if !tells_tools(&fit) {
             return Ok((fit, None));
         }
+        let arm = &known[fit.model];
         let find = || {
             let dressed = search.with_scene(&fit, regions, |scene, settings| {
-                dress_one(&fit, (known, search.shelf()), scene, settings)
+                dress_one(&fit, arm, (known, search.shelf()), scene, settings)
             })?;
             Ok(dressed.flatten())
         };
         let dressed = search.or_find(&format!("tool of {fit:?}"), find)?;
-        Ok(own(fit, dressed, known))
+        Ok(own(fit, arm, dressed, known))
     })?;
     Ok(adopt(dressed, models))
 }
 
-/// The same for fits of one scene.
+/// The same for a fit of one scene; with the model that it is of, where that is none of these.
 pub(crate) fn dress_in(
     scene: &Scene<'_>,
-    fits: Vec<Fit>,
-    models: &mut Vec<Model>,
+    fit: Fit,
+    models: &[Model],
     (shelf, settings): (&Shelf<'_>, &Settings),
-) -> Vec<Fit> {
-    let fits = branch(fits, models);
-    let known: &[Model] = models;
-    let dressed = fits.into_iter().map(|fit| {
-        let dress = || dress_one(&fit, (known, shelf), scene, settings);
-        let dressed = tells_tools(&fit).then(dress).flatten();
-        own(fit, dressed, known)
-    });
-    let dressed = dressed.collect();
-    adopt(dressed, models)
+) -> (Fit, Option<Model>) {
+    let has_other = !fit.other_branches.is_empty();
+    let branched = has_other.then(|| models[fit.model].with_other_branches(&fit.other_branches));
+    let arm = branched.as_ref().unwrap_or(&models[fit.model]);
+    let dress = || dress_one(&fit, arm, (models, shelf), scene, settings);
+    let dressed = tells_tools(&fit).then(dress).flatten();
+    let (fit, tooled) = own(fit, arm, dressed, models);
+    (fit, tooled.or(branched))
 }
 
 /// Whether tools are looked for: of a robot that moved, the scans of one posture may show too little of one.
@@ -79,10 +78,9 @@ fn tells_tools(fit: &Fit) -> bool {
 }
 
 /// The fit with the tool that was found, and the model of both.
-fn own(fit: Fit, dressed: Option<Dressed>, models: &[Model]) -> (Fit, Option<Model>) {
+fn own(fit: Fit, arm: &Model, dressed: Option<Dressed>, models: &[Model]) -> (Fit, Option<Model>) {
     let Some((together, [tool, flange], mount)) = dressed else { return (fit, None) };
-    let both = models[fit.model].with_tool(&models[tool], flange, mount);
-    (together, Some(both))
+    (together, Some(arm.with_tool(&models[tool], flange, mount)))
 }
 
 /// A fit of arm and tool, the tool's number in the library and the link that it hangs on, and its turn about it, radians.
@@ -103,11 +101,11 @@ pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) ->
 /// One arm: the tool that explains most, if one is there.
 fn dress_one(
     fit: &Fit,
+    arm: &Model,
     (models, shelf): (&[Model], &Shelf<'_>),
     scene: &Scene<'_>,
     settings: &Settings,
 ) -> Option<Dressed> {
-    let arm = &models[fit.model];
     // An arm whose loops stand otherwise has the links of its name.
     let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);
     let bare = shelf.prepared(bare);

@@ -104,7 +104,8 @@ impl Cell {
             sink.add(&scatter.apply(strip, &mut ())?)?;
         }
         let store = sink.finish(engine, means.store_bytes())?;
-        shelf.prepare();
+        let names = shelf.models().iter().map(|m| m.name.as_str()).collect();
+        engine.pool()?.install(|| shelf.prepare(&names));
         let (surfaces, gather) =
             (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
         let ground = engine.pass("surfaces", store.tiles(), |f| f.map(&surfaces).fold(&gather))?;

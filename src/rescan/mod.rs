@@ -6,6 +6,7 @@ mod exchanged;
 mod fate;
 mod newcomers;
 mod past;
+mod places;
 mod present;
 mod robots;
 mod say;

@@ -3,6 +3,7 @@
 
 use super::base::Base;
 use super::fate::Fates;
+use super::places::Places;
 use crate::engine::{Engine, Task};
 use crate::labelling::Near;
 use crate::report::tiles;
@@ -30,17 +31,27 @@ pub(crate) struct Past<'a> {
     pub(crate) store: &'a Store,
     pub(crate) cell: Aabb,
     masks: Vec<MaskReader>,
-    /// By mask: places that were superseded before.
+    /// By mask: places that were superseded before, and how many points it has.
     before: Vec<Vec<u64>>,
+    n_points: Vec<u64>,
     tiles: Vec<usize>,
+}
+
+/// What the new scans say of the earlier points.
+pub(crate) struct Compared {
+    /// What stood there, by voxel.
+    pub(crate) then: Tally,
+    tiles: Vec<Looked>,
+    /// What becomes of them.
+    pub(crate) fates: Fates,
+    /// By mask: places where they saw a surface: it was measured anew.
+    anew: Vec<Places>,
 }
 
 /// What the new scans say of the points of one tile.
 #[derive(Default)]
-pub(crate) struct Looked {
+struct Looked {
     mask: u32,
-    /// Places where they saw a surface: it was measured anew.
-    onto: Vec<u64>,
     /// Places that their beams went through, with their voxels.
     through: Vec<(u64, [i32; 3])>,
     /// Places that belong to robots.
@@ -58,7 +69,8 @@ impl<'a> Past<'a> {
         cell: Aabb,
     ) -> Result<Self> {
         let (masks, before) = (base.masks(), base.superseded()?);
-        Ok(Self { scans, store, cell, masks, before, tiles: store.touching(&cell) })
+        let n_points = base.result.labels.scans.iter().map(|s| s.n_points).collect();
+        Ok(Self { scans, store, cell, masks, before, n_points, tiles: store.touching(&cell) })
     }
 
     /// The surfaces of what stood there.
@@ -74,50 +86,53 @@ impl<'a> Past<'a> {
         Ok(all)
     }
 
-    /// Asks the new scans about every point, and the earlier ones where those saw nothing; what stood there by voxel, what is
-    /// said of each tile, and what becomes of the points.
+    /// Asks the new scans about every point, and the earlier ones where those saw nothing.
     pub(crate) fn look(
         &self,
         [watch, own]: [&Watch<'_>; 2],
         missed: Option<&Near>,
         engine: &Engine,
-    ) -> Result<(Tally, Vec<Looked>, Fates)> {
-        let (mut tally, mut all) = (Tally::default(), Vec::new());
+    ) -> Result<Compared> {
+        let (mut then, mut tiles) = (Tally::default(), Vec::new());
         let fates = Fates::of(&self.cell);
-        let look = Look { past: self, watch, own, missed, fates: &fates };
+        let anew: Vec<Places> = self.n_points.iter().map(|n| Places::of(*n)).collect();
+        let look = Look { past: self, watch, own, missed, fates: &fates, anew: &anew };
         engine.pass(self.task("compare"), self.store.tiles_of(self.tiles.clone()), |f| {
             f.map(&look).for_each(|mut looked| {
-                tally.join(std::mem::take(&mut looked.tally));
-                all.push(looked);
+                then.join(std::mem::take(&mut looked.tally));
+                tiles.push(looked);
                 Ok(())
             })
         })?;
-        Ok((tally, all, fates))
+        Ok(Compared { then, tiles, fates, anew })
     }
 
-    /// All places that are superseded now, by mask, ascending: those that were measured anew, those of things that are gone,
-    /// and those of robots that stand otherwise.
-    pub(crate) fn superseded(
+    /// All places that are superseded now, by mask: those that were before, those that were measured anew, those of things
+    /// that are gone, and those of robots that stand otherwise.
+    pub(crate) fn superseded<'c>(
         &self,
-        looked: &[Looked],
+        compared: &'c Compared,
         gone: &BTreeSet<[i32; 3]>,
         stands_otherwise: impl Fn(i16) -> bool,
-    ) -> Vec<Vec<u64>> {
-        let mut all: Vec<Places> = self.before.iter().map(|b| Places::of(b)).collect();
-        for tile in looked {
-            let own = &mut all[tile.mask as usize];
-            tile.onto.iter().for_each(|place| own.add(*place));
+    ) -> &'c [Places] {
+        let all = &compared.anew;
+        for (own, before) in all.iter().zip(&self.before).filter(|(_, b)| !b.is_empty()) {
+            let mut own = own.adding();
+            before.iter().for_each(|place| own.add(*place));
+        }
+        for tile in &compared.tiles {
+            let mut own = all[tile.mask as usize].adding();
             let away = tile.through.iter().filter(|(_, cell)| gone.contains(cell));
             away.for_each(|(place, _)| own.add(*place));
             let left = tile.robots.iter().filter(|(_, robot)| stands_otherwise(*robot));
             left.for_each(|(place, _)| own.add(*place));
         }
-        all.iter().map(Places::sorted).collect()
+        all
     }
 
     /// Voxels of robots that the earlier result missed: what the new scans see through of them is gone.
-    pub(crate) fn missed(looked: &[Looked]) -> impl Iterator<Item = &[i32; 3]> {
-        looked.iter().flat_map(|tile| &tile.missed)
+    pub(crate) fn missed(compared: &Compared) -> impl Iterator<Item = &[i32; 3]> {
+        compared.tiles.iter().flat_map(|tile| &tile.missed)
     }
 
     /// How many of one mask were superseded before.
@@ -176,38 +191,6 @@ impl<'a> Past<'a> {
     }
 }
 
-/// Places of a mask, one bit each: millions of them are in order without being sorted.
-struct Places(Vec<u64>);
-
-impl Places {
-    fn of(places: &[u64]) -> Self {
-        let mut out = Self(Vec::new());
-        places.iter().for_each(|place| out.add(*place));
-        out
-    }
-
-    fn add(&mut self, place: u64) {
-        let at = (place / 64) as usize;
-        if at >= self.0.len() {
-            self.0.resize((at + 1).next_power_of_two(), 0);
-        }
-        self.0[at] |= 1 << (place % 64);
-    }
-
-    /// All of them, ascending.
-    fn sorted(&self) -> Vec<u64> {
-        let mut out = Vec::with_capacity(self.0.iter().map(|w| w.count_ones() as usize).sum());
-        for (at, &word) in self.0.iter().enumerate() {
-            let mut left = word;
-            while left != 0 {
-                out.push(at as u64 * 64 + u64::from(left.trailing_zeros()));
-                left &= left - 1;
-            }
-        }
-        out
-    }
-}
-
 /// The map that gathers surfaces.
 struct Sample<'a> {
     past: &'a Past<'a>,
@@ -255,6 +238,7 @@ struct Look<'a> {
     /// Labels of robots that the earlier result missed.
     missed: Option<&'a Near>,
     fates: &'a Fates,
+    anew: &'a [Places],
 }
 
 impl Map for Look<'_> {
@@ -281,12 +265,13 @@ impl Map for Look<'_> {
         self.watch.look_all(worlds, sights);
         let mut out = Looked { mask: mask.0, ..Looked::default() };
         let mut tallying = Tallying::default();
+        let mut anew = self.anew[mask.0 as usize].adding();
         let points = places.iter().zip(&*worlds).zip(labels.iter().zip(&*sights));
         for ((&place, &world), (label, &sight)) in points {
             let voxel = Tally::cell(world);
             self.fates.add(voxel, sight);
             match sight {
-                Sight::Onto => out.onto.push(place),
+                Sight::Onto => anew.add(place),
                 Sight::Through => out.through.push((place, voxel)),
                 Sight::Close | Sight::Hidden | Sight::Unseen => {}
             }
@@ -362,7 +347,7 @@ impl Weigh for Sampled {
 
 impl Weigh for Looked {
     fn weight_bytes(&self) -> usize {
-        size_of_val(&*self.onto) + size_of_val(&*self.through) + size_of_val(&*self.robots)
+        size_of_val(&*self.through) + size_of_val(&*self.robots)
     }
 
     fn n_points(&self) -> u64 {

@@ -180,14 +180,9 @@ fn anew(
             found = fit::choose(found, models);
         }
         found.retain(|fit| is_here(&fit.world_from_base.translation.vector.into()));
-        let mut own = if found.is_empty() { Vec::new() } else { models.to_vec() };
-        let dressed = dress_in(scene, found, &mut own, (search.shelf(), settings));
-        let best = dressed.into_iter().max_by(|a, b| a.verdict.cmp(&b.verdict));
-        Ok(best.map(|fit| {
-            let is_own = fit.model >= models.len();
-            let model = is_own.then(|| own.swap_remove(fit.model));
-            (fit, model)
-        }))
+        let dressed =
+            found.into_iter().map(|fit| dress_in(scene, fit, models, (search.shelf(), settings)));
+        Ok(dressed.max_by(|(a, _), (b, _)| a.verdict.cmp(&b.verdict)))
     })?
 }
 

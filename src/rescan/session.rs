@@ -2,8 +2,7 @@
 
 use super::Cell;
 use super::base::Base;
-use super::fate::Fates;
-use super::past::{Looked, Past};
+use super::past::{Compared, Past};
 use super::present::{self, Present};
 use super::robots::{Now, bounds as robot_bounds, look};
 use crate::engine::{AllThreads, Engine};
@@ -82,8 +81,7 @@ impl Robots {
 /// Labels and differences.
 pub(crate) struct Labels {
     pub(crate) near: Near,
-    pub(crate) looked: Vec<Looked>,
-    pub(crate) fates: Fates,
+    pub(crate) compared: Compared,
     pub(crate) things: Vec<Thing>,
     /// What stood in the cell and was not looked at.
     pub(crate) unseen: Vec<Unseen>,
@@ -231,6 +229,12 @@ impl<'a> Session<'a> {
         let here =
             |i: &usize| fits[*i].verdict != Verdict::Refused && bounds[*i].touches(&self.past.cell);
         let here: Vec<usize> = (0..fits.len()).filter(here).collect();
+        let names = here.iter().flat_map(|&i| {
+            let tool = fits[i].tool.as_ref().map(|tool| tool.model.as_str());
+            [fits[i].model_name.as_str()].into_iter().chain(tool)
+        });
+        let names = names.collect();
+        engine.pool()?.install(|| self.shelf.prepare(&names));
         let looked = engine.fan_out("fit", here.clone(), |i| {
             look(&fits[i], models, (&search, [&watch, &old_watch], &regions))
         })?;
@@ -290,14 +294,14 @@ impl<'a> Session<'a> {
         let near = labelling.near_robots(self.store, engine)?;
         let (watch, old_watch) = (self.watch(), Watch::new(&self.cell, &self.old_views));
         let missed = self.missed((fits, models), robots, engine)?;
-        let (then, looked, fates) =
-            self.past.look([&watch, &old_watch], missed.as_ref(), engine)?;
+        let compared = self.past.look([&watch, &old_watch], missed.as_ref(), engine)?;
+        let then = &compared.then;
         let present = Present {
             scans: &self.sources.scans,
             near: &near,
             ground: labelling.ground(),
             cell: self.past.cell,
-            then: &then,
+            then,
             watch: &old_watch,
             own: &watch,
         };
@@ -305,11 +309,11 @@ impl<'a> Session<'a> {
         let settings = &self.settings.things;
         let (things, unseen) = engine.pool()?.install(|| {
             rayon::join(
-                || things(&then, &now, settings, &AllThreads),
-                || merge::unseen(&then, &now, settings),
+                || things(then, &now, settings, &AllThreads),
+                || merge::unseen(then, &now, settings),
             )
         });
-        Ok(Labels { near, looked, fates, things, unseen, now })
+        Ok(Labels { near, compared, things, unseen, now })
     }
 
     /// The fits, those refused that the new scans have no say in: they give no labels here.

@@ -116,7 +116,7 @@ impl Written<'_, '_> {
             let steps = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
             steps.map(|[i, j, k]| [x + i, y + j, z + k]).collect::<Vec<_>>()
         };
-        let missed = Past::missed(&self.labels.looked);
+        let missed = Past::missed(&self.labels.compared);
         things.flat_map(|t| &t.gone).chain(missed).flat_map(near).collect()
     }
 
@@ -135,7 +135,7 @@ impl Written<'_, '_> {
                 continue;
             }
             let voxel = Tally::cell(point.world);
-            match self.labels.fates.stays(voxel, || gone.contains(&voxel)) {
+            match self.labels.compared.fates.stays(voxel, || gone.contains(&voxel)) {
                 Some(all) => stays[i] = all,
                 None => {
                     here.push(i);
@@ -205,19 +205,20 @@ impl Written<'_, '_> {
     fn lists(&self, gone: &BTreeSet<[i32; 3]>, next: &Path) -> Result<Lists> {
         let past = self.session.past;
         let superseded =
-            past.superseded(&self.labels.looked, gone, |robot| self.stands_otherwise(robot));
+            past.superseded(&self.labels.compared, gone, |robot| self.stands_otherwise(robot));
         let mut out = Lists::default();
         for (i, places) in superseded.iter().enumerate() {
             let before = &self.base.result.labels.scans[i].superseded;
             let name = MaskFiles::superseded(MaskId(i as u32));
-            if places.is_empty() {
+            let n = places.len();
+            if n == 0 {
                 out.names.push(None);
                 continue;
             }
-            out.n_superseded += places.len() as u64;
-            if before.is_none() || past.n_of(i) != places.len() {
+            out.n_superseded += n;
+            if before.is_none() || past.n_of(i) as u64 != n {
                 let mut list = NpyWriter::<u64>::create(next.join(&name))?;
-                list.push(places)?;
+                places.each(|some| list.push(some))?;
                 out.sums.push(list.finish()?);
                 out.grown.push(name.clone());
             }

@@ -9,7 +9,7 @@ use crate::job::Settings;
 use crate::reuse::Kept;
 use crate::store::Store;
 use crate::surfaces::Ground;
-use contract::{Candidate, Fit, InstallationPlane, Region, Result, Scan, Verdict};
+use contract::{Candidate, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
 use fit::{Method, Prepared, Scene, Sights};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use identify::{BaseSearch, Sight};
@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use robot::Model;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 /// A library with what fits of its models need, made when the first of them asks for it.
@@ -35,16 +36,19 @@ impl<'a> Shelf<'a> {
         self.models
     }
 
-    /// Makes all of it now.
-    pub(crate) fn prepare(&self) {
-        (0..self.models.len()).into_par_iter().for_each(|i| {
-            self.prepared(i);
-        });
+    /// Makes what these models need now, link by link on all threads of the pool.
+    pub(crate) fn prepare(&self, names: &BTreeSet<&str>) {
+        for (i, own) in self.prepared.iter().enumerate() {
+            if own.get().is_none() && names.contains(self.models[i].name.as_str()) {
+                // Where another thread was first, that one stays.
+                own.set(Prepared::new(i, &self.models[i], &AllThreads)).ok();
+            }
+        }
     }
 
     /// Serial inside: a thread that waits for it never holds up its own work.
     pub(crate) fn prepared(&self, index: usize) -> &Prepared<'a> {
-        self.prepared[index].get_or_init(|| Prepared::new(index, &self.models[index]))
+        self.prepared[index].get_or_init(|| Prepared::new(index, &self.models[index], &OneByOne))
     }
 }
 

@@ -54,6 +54,7 @@ impl Face {
 mod tests {
     use super::*;
     use crate::Prepared;
+    use contract::OneByOne;
 
     /// A post whose flange turns about z, so far above its middle, metres; `kind` of the joint.
     fn model(height: f64, kind: &str) -> Model {
@@ -78,7 +79,7 @@ mod tests {
     fn what_lies_in_front_of_a_flange_may_hang_on_it() {
         for (height, way) in [(0.6, 1.0_f32), (-0.6, -1.0)] {
             let model = model(height, "revolute");
-            let face = Prepared::new(0, &model).face.expect("a face");
+            let face = Prepared::new(0, &model, &OneByOne).face.expect("a face");
             assert_eq!(model.links[face.link].name, "flange");
             assert!(face.is_held([0.08, 0.0, way * 0.03]), "a gripper wider than the flange");
             assert!(!face.is_held([0.08, 0.0, way * -0.01]), "beside the wrist");
@@ -87,6 +88,6 @@ mod tests {
 
     #[test]
     fn a_carriage_has_no_face() {
-        assert!(Prepared::new(0, &model(0.6, "prismatic")).face.is_none());
+        assert!(Prepared::new(0, &model(0.6, "prismatic"), &OneByOne).face.is_none());
     }
 }

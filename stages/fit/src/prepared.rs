@@ -1,6 +1,7 @@
 //! A model in; out comes what every fit of it needs: nearest-sample fields, search samples, and which link is placed
 //! by which joint. Made once per model, shared by all its fits.
 
+use contract::Fan;
 use geometry::Point;
 use geometry::depth::Rows;
 use robot::Model;
@@ -61,9 +62,9 @@ impl PreparedLink {
 impl<'a> Prepared<'a> {
     /// Prepares model `index` of the library.
     #[must_use]
-    pub fn new(index: usize, model: &'a Model) -> Self {
-        let fields = model.links.iter().map(|link| Arc::new(Fields::new(link)));
-        Self::of((index, model), fields)
+    pub fn new(index: usize, model: &'a Model, fan: &impl Fan) -> Self {
+        let fields = fan.fan(model.links.iter().collect(), |link| Arc::new(Fields::new(link)));
+        Self::of((index, model), fields.into_iter())
     }
 
     /// Prepares a model whose links are those of others, one after the other (an arm, and a tool on it), from what is known

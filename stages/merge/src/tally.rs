@@ -10,6 +10,8 @@ pub(crate) type Cell = [i32; 3];
 
 /// Edge of a voxel, metres.
 pub(crate) const EDGE: f64 = 0.05;
+/// Voxels in a metre: a product is cheaper than a quotient.
+const PER_METRE: f64 = 1.0 / EDGE;
 /// Voxels so many steps apart are of one thing.
 pub(crate) const REACH: i32 = 2;
 /// Fewest points that make a voxel solid.
@@ -119,7 +121,7 @@ impl Tally {
     /// The voxel of a place.
     #[must_use]
     pub fn cell(world: [f64; 3]) -> Cell {
-        world.map(|v| (v / EDGE).floor() as i32)
+        world.map(|v| (v * PER_METRE).floor() as i32)
     }
 
     /// Middles of voxels, world, metres.
