@@ -3,13 +3,13 @@
 
 use super::cases::{Case, CaseRow, Cases};
 use super::robots_of;
+use super::watch::{command, watch};
 use crate::compare::{Agreement, RobotAgreement};
 use crate::engine::Engine;
-use crate::job::{Job, Means};
-use crate::rescan::{Cell, Wish, rescan};
+use crate::job::Means;
+use crate::library;
 use crate::reuse::Manifest;
 use crate::scanning::{Formats, scan_scene};
-use crate::{library, plan};
 use contract::{Error, Result};
 use geometry::Vector;
 use serde::Serialize;
@@ -17,7 +17,6 @@ use simulate::{Plant, Scene, sessions};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// What is drawn.
 #[derive(Debug, Clone)]
@@ -125,23 +124,22 @@ fn case(
     };
     let ((old, n_points), (new, n_new)) = (scanned(&then, "then")?, scanned(&now, "now")?);
     (row.n_points, row.n_new) = (n_points, n_new);
-    let job = |scans: &Path, out: &str| {
-        Job::new(vec![scans.join("scans.e57")], robots.to_path_buf(), dir.join(out), means.clone())
+    // Each as a process of its own, as a user starts them.
+    let run = |name: &str, scans: &Path, out: &str, more: &[String]| {
+        let out = dir.join(out);
+        let mut all = command(name, &scans.join("scans.e57"), (robots, &out), means)?;
+        all.extend_from_slice(more);
+        Ok::<_, Error>((watch(&all)?.seconds, out))
     };
-    let started = Instant::now();
-    let whole = job(&old, "base");
-    plan::run(&whole, engine)?;
-    row.seconds[0] = started.elapsed().as_secs_f64();
-    let started = Instant::now();
-    let wish = Wish { base: whole.out.clone(), cell: Cell::Seen, job: job(&new, "again") };
-    rescan(&wish, engine)?;
-    row.seconds[1] = started.elapsed().as_secs_f64();
-    let mut found =
-        vec![Agreement::of_session(&wish.job.out, &new.join("truth"), then.scanners.len())?];
+    let (seconds, base) = run("run", &old, "base", &[])?;
+    row.seconds[0] = seconds;
+    let (seconds, again) =
+        run("rescan", &new, "again", &["--base".into(), base.display().to_string()])?;
+    row.seconds[1] = seconds;
+    let mut found = vec![Agreement::of_session(&again, &new.join("truth"), then.scanners.len())?];
     if bench.alone {
-        let alone = job(&new, "alone");
-        plan::run(&alone, engine)?;
-        found.push(Agreement::of(&alone.out, &new.join("truth"))?);
+        let (_, alone) = run("run", &new, "alone", &[])?;
+        found.push(Agreement::of(&alone, &new.join("truth"))?);
     }
     let robots = &found[0].robots;
     let is_found = |r: &&RobotAgreement| r.found.as_ref().is_some_and(|f| f.is_right);
@@ -151,8 +149,8 @@ fn case(
         row.joint[i] = joint(agreement);
         row.f1[i] = agreement.f1();
     }
-    judge(row, (&then, &now), &wish.job.out)?;
-    row.n_same = same(&whole.out, &wish.job.out)?;
+    judge(row, (&then, &now), &again)?;
+    row.n_same = same(&base, &again)?;
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 //! own; points a second of every stage beside what the machine can do, and resident memory, out.
 
 use super::limits::{Copied, copy, forget, memory};
-use super::watch::{Watched, watch};
+use super::watch::{Watched, command, watch};
 use crate::engine::Engine;
 use crate::job::{Means, memory_words};
 use crate::scanning::{Formats, scan_scene};
@@ -206,24 +206,9 @@ fn arguments(
     out: &Path,
     means: &Means,
 ) -> Result<Vec<String>> {
-    let text = |path: &Path| path.display().to_string();
-    let mut out: Vec<String> = vec![
-        "run".into(),
-        text(input),
-        "--robots".into(),
-        text(robots),
-        "--out".into(),
-        text(out),
-        "--memory".into(),
-        means.memory_bytes.to_string(),
-        "--threads".into(),
-        means.n_threads.to_string(),
-    ];
+    let mut out = command("run", input, (robots, out), means)?;
     if input.extension().is_some_and(|e| e == "las") {
-        out.extend(["--scanners".into(), text(&scans.join("scanners.toml"))]);
-    }
-    for (key, value) in means.settings.all() {
-        out.extend(["--set".into(), format!("{key}={value}")]);
+        out.extend(["--scanners".into(), scans.join("scanners.toml").display().to_string()]);
     }
     Ok(out)
 }

@@ -1,8 +1,10 @@
 //! A command of this program in; how long it took, stage by stage, and how much memory it had resident, out.
 
+use crate::job::Means;
 use contract::{Error, Kind, Result};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -28,6 +30,32 @@ pub(super) struct Watched {
     pub(super) own_bytes: u64,
     /// Time of processors, seconds.
     pub(super) cpu_seconds: f64,
+}
+
+/// The command line of a measured run, with the means of this one.
+pub(super) fn command(
+    name: &str,
+    input: &Path,
+    (robots, out): (&Path, &Path),
+    means: &Means,
+) -> Result<Vec<String>> {
+    let text = |path: &Path| path.display().to_string();
+    let mut all: Vec<String> = vec![
+        name.into(),
+        text(input),
+        "--robots".into(),
+        text(robots),
+        "--out".into(),
+        text(out),
+        "--memory".into(),
+        means.memory_bytes.to_string(),
+        "--threads".into(),
+        means.n_threads.to_string(),
+    ];
+    for (key, value) in means.settings.all() {
+        all.extend(["--set".into(), format!("{key}={value}")]);
+    }
+    Ok(all)
 }
 
 /// Runs this program with these arguments and watches it.

@@ -220,15 +220,19 @@ pub(crate) fn settle(
     fan: &impl Fan,
 ) -> Settled {
     let variance = refine.scene.noise * refine.scene.noise;
-    let (mut best, mut judgement) = adjust(refine, h, all, fan);
+    let (points, gate) = adjusted_points(refine, h, all, fan);
+    let adjust = Adjust { refine, frames: &[] };
+    let mut best = adjust.run(h, &points, gate, fan);
     let mut spins = refine.spins(&best.hypothesis, near, variance, fan);
     let better: Vec<(usize, f64)> = spins.iter().map(|s| (s.joint, s.values[0])).collect();
     if better.iter().any(|(j, v)| is_other(best.hypothesis.posture[*j], *v)) {
-        let mut h = best.hypothesis.clone();
-        better.iter().for_each(|(j, v)| h.posture[*j] = *v);
-        (best, judgement) = adjust(refine, &h, all, fan);
+        // The same points of the same links; what is known of the scans stays.
+        let mut state = best.state();
+        better.iter().for_each(|(j, v)| state.hypothesis.posture[*j] = *v);
+        best = adjust.run_from(state, &points, gate, fan);
         spins = refine.spins(&best.hypothesis, near, variance, fan);
     }
+    let judgement = judged(refine, &best.hypothesis);
     (best, judgement, spins)
 }
 
@@ -248,19 +252,6 @@ enum Look {
 
 fn sort(polished: &mut [Polished]) {
     polished.sort_by(|a, b| b.1.explained.total_cmp(&a.1.explained));
-}
-
-/// The last word: all unknowns, those of the scans too, on all points.
-fn adjust(
-    refine: &Refine<'_>,
-    h: &Hypothesis,
-    all: &[u32],
-    fan: &impl Fan,
-) -> (Adjusted, Judgement) {
-    let (points, gate) = adjusted_points(refine, h, all, fan);
-    let done = Adjust { refine, frames: &[] }.run(h, &points, gate, fan);
-    let judgement = judged(refine, &done.hypothesis);
-    (done, judgement)
 }
 
 /// Points that an adjustment is made of, and its gate, metres.
@@ -349,11 +340,25 @@ pub(crate) fn fine(
     near: &[u32],
     fan: &impl Fan,
 ) -> Hypothesis {
-    let few = refine.stratified(h, near, (FINE_GATE, POLISH_CAP), fan);
-    let h = refine.run(h, &few, &FINE_ROUNDS[..3], fan);
-    let gate = (LAST_GATE.0 * refine.noise(&h, &few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
+    fine_on(refine, h, &few(refine, h, near, fan), fan)
+}
+
+/// Points for that.
+pub(crate) fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<u32> {
+    refine.stratified(h, near, (FINE_GATE, POLISH_CAP), fan)
+}
+
+/// The same on points that are chosen.
+pub(crate) fn fine_on(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    few: &[u32],
+    fan: &impl Fan,
+) -> Hypothesis {
+    let h = refine.run(h, few, &FINE_ROUNDS[..3], fan);
+    let gate = (LAST_GATE.0 * refine.noise(&h, few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
     let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect();
-    refine.run(&h, &few, &rounds, fan)
+    refine.run(&h, few, &rounds, fan)
 }
 
 /// Frame on the installation plane with z along its normal, at the height of the base's origin.
