@@ -174,7 +174,7 @@ fn anew(
         let is_clear = is_clear(&tried);
         let mut found: Vec<Fit> = tried.into_iter().map(|(_, fit)| fit).collect();
         if !is_clear {
-            found.extend(search.region_where(&beside(near, base), is_here)?);
+            found.extend(search.region_about(&beside(near, base), Some((base, SAME_PLACE)))?);
         }
         if found.len() > 1 {
             found = fit::choose(found, models);

@@ -71,12 +71,11 @@ impl Search<'_, '_> {
         scene: &Scene<'_>,
         (sight, planes): (&mut Sight<'_>, &[InstallationPlane]),
         fits: &[Fit],
-        is_wanted: &impl Fn(&Candidate) -> bool,
     ) -> Result<Vec<Fit>> {
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
         let find = || self.candidates(sight, planes, (0.0, BREADTH));
         let mut found = self.piece((scene.region, "left over"), find)?;
-        found.retain(|c| is_apart(c, &feet) && is_wanted(c));
+        found.retain(|c| is_apart(c, &feet));
         self.fits(scene, &few(found, MAX_LEFT_OVER))
     }
 

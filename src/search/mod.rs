@@ -67,6 +67,8 @@ pub(crate) struct Search<'a, 'm> {
 const MAX_SUNK: f64 = 2.0;
 /// Candidates that are fitted at the same time; then it is asked which others they make needless.
 const BATCH: usize = 6;
+/// What is looked at of a robot to find its base reaches no farther from it, metres: foot and shoulder.
+const FOOT: f64 = 1.5;
 /// Bases nearer than this are at one place, metres.
 const SAME_BASE: f64 = 0.35;
 /// Share of the score of a trusted robot's base below which another base at its place is needless.
@@ -122,15 +124,16 @@ impl<'a, 'm> Search<'a, 'm> {
 
     /// Fits of all models in one region, whatever their verdict.
     pub(crate) fn region(&self, region: &Region) -> Result<Vec<Fit>> {
-        self.region_where(region, |_| true)
+        self.region_about(region, None)
     }
 
-    /// The same for those whose bases are wanted.
-    pub(crate) fn region_where(
+    /// The same for those whose bases are so near a place (world, metres), where one is given.
+    pub(crate) fn region_about(
         &self,
         region: &Region,
-        wants: impl Fn(&Point) -> bool,
+        about: Option<(Point, f64)>,
     ) -> Result<Vec<Fit>> {
+        let wants = |at: &Point| about.is_none_or(|(place, radius)| (at - place).norm() < radius);
         let is_wanted = |c: &Candidate| c.bases.first().is_some_and(|b| wants(&base(&b.0)));
         let views = self.views(region)?;
         let planes = self.planes(region);
@@ -142,7 +145,8 @@ impl<'a, 'm> Search<'a, 'm> {
             let fit = |m: usize| fit::paper::fit(self.shelf.prepared(m), &scene, &planes, means);
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
-        let mut sight = Sight::new(region, &views, (&scene.evidence, &scene.scouts), &AllThreads);
+        let feet = about.map_or(*region, |(place, radius)| feet(region, &place, radius));
+        let mut sight = Sight::new(&feet, &views, (&scene.evidence, &scene.scouts), &AllThreads);
         let mut candidates =
             self.piece((region, "candidates"), || self.candidates(&sight, &planes, (0.0, 1)))?;
         candidates.retain(is_wanted);
@@ -151,7 +155,10 @@ impl<'a, 'm> Search<'a, 'm> {
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
             fits.extend(self.on_mounts(&scene, &sight, &is_wanted)?);
         }
-        fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits, &is_wanted)?);
+        // At one place all that could be left over was looked at already.
+        if about.is_none() {
+            fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits)?);
+        }
         fits.extend(self.on_stands(&scene, &mut sight, &fits, &is_wanted)?);
         let sights = Sights { region, views: &views, floors: &planes };
         fits.extend(self.moved(&fits, sight, &sights));
@@ -293,6 +300,17 @@ impl<'a, 'm> Search<'a, 'm> {
         }
         floor.planes.iter().filter(|p| p.bounds.grown(0.3).touches(&world)).cloned().collect()
     }
+}
+
+/// The part of a region in which bases are looked for that stand so near a place.
+fn feet(region: &Region, place: &Point, radius: f64) -> Region {
+    let (at, reach) = (place - region.origin, radius + FOOT);
+    let mut bounds = region.bounds;
+    for i in 0..2 {
+        bounds.min[i] = bounds.min[i].max(at[i] - reach);
+        bounds.max[i] = bounds.max[i].min(at[i] + reach);
+    }
+    Region { bounds, ..*region }
 }
 
 fn base(world_from_base: &Pose) -> Point {
