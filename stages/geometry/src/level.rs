@@ -3,6 +3,7 @@
 
 use crate::depth::{LANES, Lanes};
 
+/// A raster of nearest and farthest ranges at one resolution.
 #[derive(Debug, Clone)]
 pub(crate) struct Level {
     pub(crate) width: usize,
@@ -14,6 +15,7 @@ pub(crate) struct Level {
 }
 
 impl Level {
+    /// The cell of a hit given in the camera frame, and its range, metres; `None` outside of the raster.
     #[inline]
     pub(crate) fn find(&self, focal: f32, p: [f32; 3]) -> Option<(usize, f32)> {
         if p[2] <= 1e-3 {
@@ -84,6 +86,7 @@ impl Level {
         }
     }
 
+    /// The next coarser level, without `around`.
     pub(crate) fn halved(&self) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mut cells = vec![[f32::NAN; 3]; width * height];
