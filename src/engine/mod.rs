@@ -167,13 +167,18 @@ impl Engine {
             }
             Some(out)
         };
-        let all: Vec<Option<Result<U>>> = self
-            .pool()?
-            .install(|| items.into_par_iter().enumerate().with_max_len(1).map(one).collect());
+        // Begun in their order, each by the next free thread: where the largest are first, no thread ends long after the others.
+        let mut all: Vec<(usize, Option<Result<U>>)> = self.pool()?.install(|| {
+            let items = items.into_iter().enumerate().par_bridge();
+            items.map(|(at, item)| (at, one((at, item)))).collect()
+        });
+        all.sort_unstable_by_key(|(at, _)| *at);
         stage.finish();
         // A skipped item stands after an error, and `collect` stops at that.
         all.into_iter()
-            .map(|out| out.unwrap_or_else(|| Err(Error::new(Kind::Bug, "an item was skipped"))))
+            .map(|(_, out)| {
+                out.unwrap_or_else(|| Err(Error::new(Kind::Bug, "an item was skipped")))
+            })
             .collect()
     }
 

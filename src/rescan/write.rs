@@ -130,12 +130,19 @@ impl Written<'_, '_> {
         let left = |p: &OldPoint| p.label.moves() && self.stands_otherwise(p.label.robot);
         let mut stays: Vec<bool> = points.iter().map(|p| !left(p)).collect();
         let (mut here, mut worlds, mut sights) = (Vec::new(), Vec::new(), Vec::new());
+        // Neighbours are mostly in one voxel.
+        let mut last = None;
         for (i, point) in points.iter().enumerate() {
             if !stays[i] || !self.session.past.cell.contains(point.world) {
                 continue;
             }
             let voxel = Tally::cell(point.world);
-            match self.labels.compared.fates.stays(voxel, || gone.contains(&voxel)) {
+            let fate = match last {
+                Some((at, fate)) if at == voxel => fate,
+                _ => self.labels.compared.fates.stays(voxel, || gone.contains(&voxel)),
+            };
+            last = Some((voxel, fate));
+            match fate {
                 Some(all) => stays[i] = all,
                 None => {
                     here.push(i);

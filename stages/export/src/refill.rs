@@ -9,8 +9,19 @@ use las::raw;
 use laz::LasZipDecompressor;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::Path;
 
+/// What points of each class are.
+const KINDS: [PointKind; 256] = {
+    let mut kinds = [PointKind::Uncertain; 256];
+    let mut i = 0;
+    while i < CLASSES.len() {
+        kinds[CLASSES[i].1 as usize] = CLASSES[i].0;
+        i += 1;
+    }
+    kinds
+};
 /// Records that are read at a time: what is made of them stays in a processor's own cache.
 const PIECE: u64 = 1 << 12;
 
@@ -48,14 +59,14 @@ pub fn refill(
                 keep(&points)
             });
             let (mut extent, mut kept) = (Extent::default(), 0);
-            for (i, from) in (0..records.len()).step_by(record_len).enumerate() {
-                if stays.as_ref().is_none_or(|stays| stays[i]) {
-                    extent.add(steps(&records[from..from + record_len]));
-                    if kept < from {
-                        records.copy_within(from..from + record_len, kept);
-                    }
-                    kept += record_len;
+            for run in runs(stays.as_deref(), records.len() / record_len) {
+                let bytes = run.start * record_len..run.end * record_len;
+                records[bytes.clone()].chunks_exact(record_len).for_each(|r| extent.add(steps(r)));
+                let n_bytes = bytes.len();
+                if kept < bytes.start {
+                    records.copy_within(bytes, kept);
                 }
+                kept += n_bytes;
             }
             n += extent.n;
             if extent.n > 0 {
@@ -66,16 +77,29 @@ pub fn refill(
     if n == 0 { Ok(None) } else { writer.finish().map(Some) }
 }
 
+/// Runs of records that stay; all of them where nobody says which.
+fn runs(stays: Option<&[bool]>, n: usize) -> Vec<Range<usize>> {
+    let Some(stays) = stays else { return vec![0..n] };
+    let mut at = 0;
+    let runs = stays.chunk_by(|a, b| a == b).map(|run| {
+        at += run.len();
+        (run[0], at - run.len()..at)
+    });
+    runs.filter(|(stays, _)| *stays).map(|(_, run)| run).collect()
+}
+
 /// Coordinates as the record has them.
+#[inline]
 fn steps(record: &[u8]) -> [i32; 3] {
     let int = |at: usize| [record[at], record[at + 1], record[at + 2], record[at + 3]];
     [0, 4, 8].map(|at| i32::from_le_bytes(int(at)))
 }
 
+#[inline]
 fn point(record: &[u8], las: &LasSettings) -> OldPoint {
     let (q, steps) = (&las.quantum, steps(record));
     let world = std::array::from_fn(|i| f64::from(steps[i]) * q.scale[i] + q.offset[i]);
-    let kind = CLASSES.iter().find(|c| c.1 == record[16]).map_or(PointKind::Uncertain, |c| c.0);
+    let kind = KINDS[usize::from(record[16])];
     let at = if las.with_color { 36 } else { 30 };
     let index = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]).wrapping_sub(1) as i16;
     OldPoint { world, label: Label { kind, robot: index(at), link: index(at + 2) } }

@@ -12,7 +12,7 @@ use crate::beam::Hypothesis;
 use crate::judge::{Judgement, evidence};
 use crate::refine::Refine;
 use crate::rivals::lead;
-use crate::solve::{Polished, Settled, few, fine_on};
+use crate::solve::{Polished, Settled, few, last_rounds};
 use crate::spin::Spin;
 use crate::verdict;
 
@@ -202,7 +202,8 @@ fn sway(
     let all = std::iter::once(h.clone()).chain(turned).collect();
     // They differ in a flange: the points about the arm are the same.
     let few = few(refine, h, near, fan);
-    let ends: Vec<Hypothesis> = fan.fan(all, |h| fine_on(refine, &h, &few, fan));
+    let rounds = last_rounds(refine, h, &few);
+    let ends: Vec<Hypothesis> = fan.fan(all, |h| refine.run(&h, &few, &rounds, fan));
     // Where it ended at something worse, it is no value that the joint may stand at.
     let as_good = |end: &&Hypothesis| refine.worsening(&ends[0], end, near) < EQUAL;
     for end in ends[1..].iter().filter(as_good) {

@@ -349,16 +349,20 @@ pub(crate) fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl 
 }
 
 /// The same on points that are chosen.
-pub(crate) fn fine_on(
+fn fine_on(
     refine: &Refine<'_>,
     h: &Hypothesis,
     few: &[u32],
     fan: &impl Fan,
 ) -> Hypothesis {
     let h = refine.run(h, few, &FINE_ROUNDS[..3], fan);
-    let gate = (LAST_GATE.0 * refine.noise(&h, few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
-    let rounds: Vec<_> = FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect();
-    refine.run(&h, few, &rounds, fan)
+    refine.run(&h, few, &last_rounds(refine, &h, few), fan)
+}
+
+/// The rounds that end at a posture, from one that is nearly it: with the gate that the noise there asks for.
+pub(crate) fn last_rounds(refine: &Refine<'_>, h: &Hypothesis, few: &[u32]) -> Vec<Round> {
+    let gate = (LAST_GATE.0 * refine.noise(h, few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
+    FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect()
 }
 
 /// Frame on the installation plane with z along its normal, at the height of the base's origin.

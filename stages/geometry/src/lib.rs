@@ -14,6 +14,7 @@ pub mod narrow;
 pub mod plane;
 pub mod probe;
 pub mod robust;
+mod spread;
 
 pub use aabb::Aabb;
 pub use depth::DepthImage;

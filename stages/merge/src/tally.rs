@@ -119,6 +119,7 @@ impl Tally {
     pub const FACE: f64 = EDGE * EDGE;
 
     /// The voxel of a place.
+    #[inline]
     #[must_use]
     pub fn cell(world: [f64; 3]) -> Cell {
         world.map(|v| (v * PER_METRE).floor() as i32)

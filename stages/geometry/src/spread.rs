@@ -1,0 +1,302 @@
+//! Samples and a grid in; voxel row by voxel row, the nearest sample to each voxel's middle out.
+//!
+//! Axis after axis, as exact distance transforms go (Felzenszwalb and Huttenlocher, Theory of Computing 8, 2012): the nearest of a
+//! row's samples, of these the nearest of a plane's rows, of these the nearest of all planes. Eight voxels of a row are judged
+//! together, and rows in order of their distance until none can be nearer.
+
+use wide::f32x8;
+
+/// Voxels of a row that are judged together.
+pub(crate) const N_LANES: usize = 8;
+
+/// Where voxels lie.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Grid {
+    /// Where the first voxel begins, metres.
+    pub(crate) origin: [f32; 3],
+    /// Of a voxel, metres.
+    pub(crate) edge: f32,
+    /// Voxels in a metre.
+    pub(crate) inverse_edge: f32,
+    /// Voxels on each axis.
+    pub(crate) size: [usize; 3],
+}
+
+impl Grid {
+    /// The middles of `n` voxels along `axis`, metres.
+    fn middles(&self, axis: usize, n: usize) -> Vec<f32> {
+        (0..n).map(|place| self.origin[axis] + (place as f32 + 0.5) * self.edge).collect()
+    }
+
+    /// The voxel of a place; `None` outside.
+    #[inline]
+    pub(crate) fn index(&self, p: [f32; 3]) -> Option<[u32; 3]> {
+        let mut index = [0; 3];
+        for i in 0..3 {
+            let v = (p[i] - self.origin[i]) * self.inverse_edge;
+            if !(v >= 0.0 && v < self.size[i] as f32) {
+                return None;
+            }
+            index[i] = v as u32;
+        }
+        Some(index)
+    }
+}
+
+/// The nearest samples known so far of eight voxels beside each other: x, y, z, and their numbers + 1 as bits, so that all
+/// four are chosen by the same comparison.
+type Eight = [f32x8; 4];
+
+/// No sample: so far away that its squared distance (1e18 m²) is beyond any reach.
+const NONE: Eight = [FAR, FAR, FAR, f32x8::ZERO];
+const FAR: f32x8 = f32x8::splat(1e9);
+
+/// The numbers + 1 of eight samples.
+fn numbers(eight: &Eight) -> [u32; N_LANES] {
+    eight[3].to_array().map(f32::to_bits)
+}
+
+/// Voxels of one plane.
+struct Plane {
+    eights: Vec<Eight>,
+    /// Whether any of eight voxels has a sample.
+    is_told: Vec<bool>,
+}
+
+impl Plane {
+    fn new(n: usize) -> Self {
+        Self { eights: vec![NONE; n], is_told: vec![false; n] }
+    }
+
+    fn line(&self, y: usize, n_eights: usize) -> Told<'_> {
+        let row = y * n_eights..(y + 1) * n_eights;
+        (&self.eights[row.clone()], &self.is_told[row])
+    }
+
+    fn clear(&mut self) {
+        let told = self.is_told.iter_mut().zip(&mut self.eights).filter(|(is_told, _)| **is_told);
+        told.for_each(|(is_told, eight)| (*is_told, *eight) = (false, NONE));
+    }
+}
+
+/// A row of a plane: its eights, and which of them have a sample.
+type Told<'a> = (&'a [Eight], &'a [bool]);
+
+/// A row whose samples are at least so far away from another row, m².
+struct Line<'a> {
+    beyond2: f32,
+    eights: &'a [Eight],
+    is_told: &'a [bool],
+}
+
+/// A sample that is the nearest of its own voxel to the voxel's middle.
+struct Seed {
+    /// Row of the grid: `z * size.y + y`.
+    row: usize,
+    x: usize,
+    sample: u32,
+}
+
+/// What is on its way: see [`spread`].
+struct Spread<'a> {
+    points: &'a [[f32; 3]],
+    grid: Grid,
+    /// Squared reach, m².
+    limit: f32,
+    /// Planes or rows on either side that can hold a sample within reach.
+    n_rings: usize,
+    /// Eights of a row.
+    n_eights: usize,
+    /// Middles of voxels on each axis, metres; of x up to the end of the last eight.
+    middles: [Vec<f32>; 3],
+}
+
+/// Tells `take` the nearest samples (number + 1; 0 beyond `reach` metres) of eight voxels, for the row `[y, z]` and the first
+/// voxel's `x`; only where one of the eight has any. Lanes past the end of a row are told too.
+pub(crate) fn spread(
+    points: &[[f32; 3]],
+    grid: Grid,
+    reach: f32,
+    mut take: impl FnMut([u32; 3], &[u32; N_LANES]),
+) {
+    let [n_x, n_y, n_z] = grid.size;
+    let limit = reach * reach;
+    let n_rings = (reach / grid.edge + 0.5) as usize;
+    let n_eights = n_x.div_ceil(N_LANES);
+    let middles = [n_eights * N_LANES, n_y, n_z];
+    let middles = [0, 1, 2].map(|axis| grid.middles(axis, middles[axis]));
+    let it = Spread { points, grid, limit, n_rings, n_eights, middles };
+    let seeds = it.seeds();
+    let n_planes = 2 * n_rings + 1;
+    let n = n_y * it.n_eights;
+    let mut rows = Plane::new(n);
+    let mut planes: Vec<Plane> = (0..n_planes).map(|_| Plane::new(n)).collect();
+    let mut from = 0;
+    for z in 0..n_z + n_rings {
+        let plane = &mut planes[z % n_planes];
+        plane.clear();
+        let to = from + seeds[from..].partition_point(|seed| seed.row < (z + 1) * n_y);
+        if to > from {
+            rows.clear();
+            it.along_rows(&seeds[from..to], z, &mut rows);
+            it.across_rows(&rows, z, plane);
+        }
+        from = to;
+        if let Some(z) = z.checked_sub(n_rings) {
+            it.across_planes(&planes, z, &mut take);
+        }
+    }
+}
+
+impl Spread<'_> {
+    /// One sample a voxel, in the order of the voxels.
+    fn seeds(&self) -> Vec<Seed> {
+        let [n_x, n_y, _] = self.grid.size;
+        let key = |(i, p): (u32, &[f32; 3])| {
+            let [x, y, z] = self.grid.index(*p)?.map(|v| v as usize);
+            Some((((z * n_y + y) * n_x + x) as u64) << 32 | u64::from(i))
+        };
+        let mut keys: Vec<u64> = (0..).zip(self.points).filter_map(key).collect();
+        keys.sort_unstable();
+        let nearest = |same: &[u64]| {
+            let voxel = (same[0] >> 32) as usize;
+            let (row, x) = (voxel / n_x, voxel % n_x);
+            let first = same[0] as u32;
+            let seed = |sample| Seed { row, x, sample };
+            if same.len() == 1 {
+                return seed(first);
+            }
+            let distance2 = |key: &u64| self.distance2(*key as u32, [x, row % n_y, row / n_y]);
+            let nearer = |a: (f32, u32), b: (f32, u32)| if b.0 < a.0 { b } else { a };
+            seed(
+                same.iter()
+                    .map(|key| (distance2(key), *key as u32))
+                    .fold((f32::INFINITY, first), nearer)
+                    .1,
+            )
+        };
+        keys.chunk_by(|a, b| a >> 32 == b >> 32).map(nearest).collect()
+    }
+
+    /// From a sample to a voxel's middle, m².
+    fn distance2(&self, sample: u32, place: [usize; 3]) -> f32 {
+        let p = self.points[sample as usize];
+        (0..3).map(|i| p[i] - self.middles[i][place[i]]).map(|d| d * d).sum()
+    }
+
+    /// The nearest of a row's own samples, for each row of the plane.
+    fn along_rows(&self, seeds: &[Seed], z: usize, rows: &mut Plane) {
+        let n_y = self.grid.size[1];
+        let mut best = vec![FAR; self.n_eights];
+        for seeds in seeds.chunk_by(|a, b| a.row == b.row) {
+            let y = seeds[0].row % n_y;
+            best.fill(f32x8::splat(self.limit));
+            for (i, seed) in seeds.iter().enumerate() {
+                // Beyond its neighbours these are nearer.
+                let before = i.checked_sub(1).map_or(0, |i| seeds[i].x);
+                let after = seeds.get(i + 1).map_or(self.grid.size[0] - 1, |seed| seed.x);
+                let first = before.max(seed.x.saturating_sub(self.n_rings));
+                let last = after.min(seed.x + self.n_rings);
+                let [px, py, pz] = self.points[seed.sample as usize];
+                let new = [px, py, pz, f32::from_bits(seed.sample + 1)].map(f32x8::splat);
+                for eight in first / N_LANES..=last / N_LANES {
+                    let at = y * self.n_eights + eight;
+                    let middles = self.middles_of([eight, y, z]);
+                    rows.is_told[at] |=
+                        keep_nearer(middles, &new, &mut best[eight], &mut rows.eights[at]);
+                }
+            }
+        }
+    }
+
+    /// Of the rows' nearest samples, the nearest of the plane.
+    fn across_rows(&self, rows: &Plane, z: usize, plane: &mut Plane) {
+        let mut lines = Vec::new();
+        for y in 0..self.grid.size[1] {
+            self.outwards(&mut lines, y, self.grid.size[1], |y| rows.line(y, self.n_eights));
+            for eight in 0..self.n_eights {
+                if let Some(kept) = self.nearest(&lines, [eight, y, z]) {
+                    let at = y * self.n_eights + eight;
+                    (plane.eights[at], plane.is_told[at]) = (kept, true);
+                }
+            }
+        }
+    }
+
+    /// Of the planes' nearest samples, the nearest of all.
+    fn across_planes(
+        &self,
+        planes: &[Plane],
+        z: usize,
+        take: &mut impl FnMut([u32; 3], &[u32; N_LANES]),
+    ) {
+        let mut lines = Vec::new();
+        for y in 0..self.grid.size[1] {
+            let line = |z: usize| planes[z % planes.len()].line(y, self.n_eights);
+            self.outwards(&mut lines, z, self.grid.size[2], line);
+            for eight in 0..self.n_eights {
+                if let Some(kept) = self.nearest(&lines, [eight, y, z]) {
+                    take([eight * N_LANES, y, z].map(|v| v as u32), &numbers(&kept));
+                }
+            }
+        }
+    }
+
+    /// The lines at `place`, then those on either side of it among `n`, ring by ring.
+    fn outwards<'b>(
+        &self,
+        lines: &mut Vec<Line<'b>>,
+        place: usize,
+        n: usize,
+        line: impl Fn(usize) -> Told<'b>,
+    ) {
+        lines.clear();
+        for ring in 0..=self.n_rings {
+            let beyond = (ring as f32 - 0.5).max(0.0) * self.grid.edge;
+            let sides = [place.checked_sub(ring), (ring > 0).then_some(place + ring)];
+            for at in sides.into_iter().flatten().filter(|at| *at < n) {
+                let (eights, is_told) = line(at);
+                if is_told.contains(&true) {
+                    lines.push(Line { beyond2: beyond * beyond, eights, is_told });
+                }
+            }
+        }
+    }
+
+    /// The middles of eight voxels.
+    #[inline]
+    fn middles_of(&self, [eight, y, z]: [usize; 3]) -> [f32x8; 3] {
+        let lanes = &self.middles[0][eight * N_LANES..(eight + 1) * N_LANES];
+        let x = f32x8::new(std::array::from_fn(|lane| lanes[lane]));
+        [x, f32x8::splat(self.middles[1][y]), f32x8::splat(self.middles[2][z])]
+    }
+
+    /// The nearest samples to eight voxels of those that lines know; `None` where no voxel has any.
+    #[inline]
+    fn nearest(&self, lines: &[Line], place: [usize; 3]) -> Option<Eight> {
+        let middles = self.middles_of(place);
+        let (mut best, mut kept, mut is_told) = (f32x8::splat(self.limit), NONE, false);
+        for line in lines {
+            if best.simd_le(f32x8::splat(line.beyond2)).all() {
+                break;
+            }
+            if line.is_told[place[0]] {
+                is_told |= keep_nearer(middles, &line.eights[place[0]], &mut best, &mut kept);
+            }
+        }
+        is_told.then_some(kept)
+    }
+}
+
+/// Keeps those of eight samples that are nearer to eight voxels' middles than the best so far, m²; whether any is.
+#[inline]
+fn keep_nearer(middles: [f32x8; 3], new: &Eight, best: &mut f32x8, kept: &mut Eight) -> bool {
+    let [dx, dy, dz] = [0, 1, 2].map(|i| new[i] - middles[i]);
+    let d2 = dx * dx + dy * dy + dz * dz;
+    let is_nearer = d2.simd_lt(*best);
+    *best = is_nearer.select(d2, *best);
+    for (kept, new) in kept.iter_mut().zip(new) {
+        *kept = is_nearer.select(*new, *kept);
+    }
+    is_nearer.any()
+}
