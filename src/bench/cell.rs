@@ -1,7 +1,7 @@
 //! A scene in; its scans in memory, and what the main job's own stages find in them, out.
 
 use crate::calibrate::calibrate;
-use crate::engine::Engine;
+use crate::engine::{AllThreads, Engine};
 use crate::job::{Means, Settings};
 use crate::search::{Search, Shelf};
 use crate::store::{Scatter, Store};
@@ -105,7 +105,7 @@ impl Cell {
         }
         let store = sink.finish(engine, means.store_bytes())?;
         let names = shelf.models().iter().map(|m| m.name.as_str()).collect();
-        engine.pool()?.install(|| shelf.prepare(&names));
+        engine.pool()?.install(|| shelf.prepare(&names, &AllThreads));
         let (surfaces, gather) =
             (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
         let ground = engine.pass("surfaces", store.tiles(), |f| f.map(&surfaces).fold(&gather))?;

@@ -92,11 +92,12 @@ impl Engine {
         Self { cancel: self.cancel.clone(), ..Self::new(self.n_workers) }
     }
 
-    /// One like it, for work that waits for the disk half of its time: with twice the threads.
+    /// One like it, for work that waits for the disk most of its time: with four times the threads, since a disk reads and writes
+    /// several files at once faster than one after the other.
     #[must_use]
     pub(crate) fn for_disks(&self) -> Self {
         Self {
-            n_workers: 2 * self.n_workers,
+            n_workers: 4 * self.n_workers,
             channel_bytes: self.channel_bytes,
             cancel: self.cancel.clone(),
             progress: self.progress.clone(),

@@ -24,7 +24,7 @@ use crate::reuse::{self, Kept, Key, Manifest, Sums};
 use crate::search::Shelf;
 use crate::store::Store;
 use base::Base;
-use contract::{Error, Input, Kind, Result};
+use contract::{Error, Input, Kind, OneByOne, Result};
 use geometry::Aabb;
 use ingest::Scanners;
 use past::Past;
@@ -93,12 +93,23 @@ pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
     let cell = session::bounds(&wish.cell, &base, (&fits, &models), (&sources, &new))?;
     let scans = base.state.scans.clone();
     let past = Past::new(&base, &scans, &old, cell)?;
-    let registered = session::register(&past, &mut sources, &new, engine)?;
+    let shelf = Shelf::new(&library.models);
+    let names = session::known((&fits, &models), &cell);
+    let floor = (&base.state.floor, robots::hang(&fits, &past.cell));
+    let known = || {
+        shelf.prepare(&names, &OneByOne);
+        Ok(())
+    };
+    let (laid, between) = (&mut sources, (&past, &new));
+    let on_shelf = &shelf;
+    // Reading waits for disks and for itself: what fits of the cell's robots need is made meanwhile.
+    let ((), (registered, session)) = engine.beside("models", known, move || {
+        let registered = session::register(between, laid, engine)?;
+        let session = Session::new(floor, laid, between, on_shelf, settings, engine)?;
+        Ok((registered, session))
+    })?;
 
     // Robots and things of the cell, then and now.
-    let shelf = Shelf::new(&library.models);
-    let known = (&base.state.floor, robots::hang(&fits, &past.cell));
-    let session = Session::new(known, &sources, (&past, &new), &shelf, settings, engine)?;
     let (robots, labels) = session.compare((&mut fits, &mut models), engine)?;
 
     // New masks and records of the new scans, tiles of the cell anew, all the rest as it was.

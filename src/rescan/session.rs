@@ -133,11 +133,27 @@ pub(crate) fn bounds(
     Ok(cell)
 }
 
+/// Robots of the plant that reach into the cell, by place among the fits, and what they filled.
+fn here((fits, models): (&[Fit], &[Model]), cell: &Aabb) -> Vec<(usize, Aabb)> {
+    let bounds = |(i, fit): (usize, &Fit)| (i, robot_bounds(fit, &models[fit.model]));
+    let all = fits.iter().enumerate().filter(|(_, fit)| fit.verdict != Verdict::Refused);
+    all.map(bounds).filter(|(_, bounds)| bounds.touches(cell)).collect()
+}
+
+/// Their models, with tools.
+pub(crate) fn known<'f>((fits, models): (&'f [Fit], &[Model]), cell: &Aabb) -> BTreeSet<&'f str> {
+    let here = here((fits, models), cell).into_iter().map(|(i, _)| &fits[i]);
+    let names = here.flat_map(|fit| {
+        let tool = fit.tool.as_ref().map(|tool| tool.model.as_str());
+        [fit.model_name.as_str()].into_iter().chain(tool)
+    });
+    names.collect()
+}
+
 /// Lays the new scans on what stood in the cell; returns how far each was off.
 pub(crate) fn register(
-    past: &Past<'_>,
+    (past, new): (&Past<'_>, &Store),
     sources: &mut Sources,
-    new: &Store,
     engine: &Engine,
 ) -> Result<Vec<Option<Registration>>> {
     let planes = past.surfaces(engine)?.planes();
@@ -224,22 +240,11 @@ impl<'a> Session<'a> {
         let (search, watch) = (self.search(), self.watch());
         let old_watch = Watch::new(&self.cell, &self.old_views);
         let regions = identify::regions(&self.clusters, &self.settings.region);
-        let bounds: Vec<Aabb> =
-            fits.iter().map(|fit| robot_bounds(fit, &models[fit.model])).collect();
-        let here =
-            |i: &usize| fits[*i].verdict != Verdict::Refused && bounds[*i].touches(&self.past.cell);
-        let here: Vec<usize> = (0..fits.len()).filter(here).collect();
-        let names = here.iter().flat_map(|&i| {
-            let tool = fits[i].tool.as_ref().map(|tool| tool.model.as_str());
-            [fits[i].model_name.as_str()].into_iter().chain(tool)
-        });
-        let names = names.collect();
-        engine.pool()?.install(|| self.shelf.prepare(&names));
-        let looked = engine.fan_out("fit", here.clone(), |i| {
+        let here = here((fits, models), &self.past.cell);
+        let looked = engine.fan_out("fit", here.clone(), |(i, _)| {
             look(&fits[i], models, (&search, [&watch, &old_watch], &regions))
         })?;
-        for (i, (now, own)) in here.into_iter().zip(looked) {
-            let bounds = bounds[i];
+        for ((i, bounds), (now, own)) in here.into_iter().zip(looked) {
             let is_anew = matches!(now, Now::Anew(..));
             if matches!(now, Now::Anew(_, true)) {
                 out.contradicted.push(i);

@@ -9,7 +9,7 @@ use crate::job::Settings;
 use crate::reuse::Kept;
 use crate::store::Store;
 use crate::surfaces::Ground;
-use contract::{Candidate, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
+use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
 use fit::{Method, Prepared, Scene, Sights};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use identify::{BaseSearch, Sight};
@@ -36,12 +36,12 @@ impl<'a> Shelf<'a> {
         self.models
     }
 
-    /// Makes what these models need now, link by link on all threads of the pool.
-    pub(crate) fn prepare(&self, names: &BTreeSet<&str>) {
+    /// Makes what these models need now.
+    pub(crate) fn prepare(&self, names: &BTreeSet<&str>, fan: &impl Fan) {
         for (i, own) in self.prepared.iter().enumerate() {
             if own.get().is_none() && names.contains(self.models[i].name.as_str()) {
                 // Where another thread was first, that one stays.
-                own.set(Prepared::new(i, &self.models[i], &AllThreads)).ok();
+                own.set(Prepared::new(i, &self.models[i], fan)).ok();
             }
         }
     }

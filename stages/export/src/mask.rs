@@ -129,6 +129,7 @@ impl MaskRange<'_> {
     ///
     /// # Errors
     /// A kind that is none.
+    #[inline]
     pub fn label(&self, i: usize) -> Result<Label> {
         let broken = || Error::bad_input(format!("there is no kind \"{}\"", self.kind[i]));
         let kind = PointKind::of(self.kind[i]).ok_or_else(|| broken().at(self.path.display()))?;

@@ -349,12 +349,7 @@ pub(crate) fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl 
 }
 
 /// The same on points that are chosen.
-fn fine_on(
-    refine: &Refine<'_>,
-    h: &Hypothesis,
-    few: &[u32],
-    fan: &impl Fan,
-) -> Hypothesis {
+fn fine_on(refine: &Refine<'_>, h: &Hypothesis, few: &[u32], fan: &impl Fan) -> Hypothesis {
     let h = refine.run(h, few, &FINE_ROUNDS[..3], fan);
     refine.run(&h, few, &last_rounds(refine, &h, few), fan)
 }

@@ -89,7 +89,7 @@ struct Line<'a> {
     is_told: &'a [bool],
 }
 
-/// A sample that is the nearest of its own voxel to the voxel's middle.
+/// A sample and the voxel that it is in.
 struct Seed {
     /// Row of the grid: `z * size.y + y`.
     row: usize,
@@ -149,7 +149,7 @@ pub(crate) fn spread(
 }
 
 impl Spread<'_> {
-    /// One sample a voxel, in the order of the voxels.
+    /// All samples, in the order of their voxels.
     fn seeds(&self) -> Vec<Seed> {
         let [n_x, n_y, _] = self.grid.size;
         let key = |(i, p): (u32, &[f32; 3])| {
@@ -158,30 +158,11 @@ impl Spread<'_> {
         };
         let mut keys: Vec<u64> = (0..).zip(self.points).filter_map(key).collect();
         keys.sort_unstable();
-        let nearest = |same: &[u64]| {
-            let voxel = (same[0] >> 32) as usize;
-            let (row, x) = (voxel / n_x, voxel % n_x);
-            let first = same[0] as u32;
-            let seed = |sample| Seed { row, x, sample };
-            if same.len() == 1 {
-                return seed(first);
-            }
-            let distance2 = |key: &u64| self.distance2(*key as u32, [x, row % n_y, row / n_y]);
-            let nearer = |a: (f32, u32), b: (f32, u32)| if b.0 < a.0 { b } else { a };
-            seed(
-                same.iter()
-                    .map(|key| (distance2(key), *key as u32))
-                    .fold((f32::INFINITY, first), nearer)
-                    .1,
-            )
+        let seed = |key: u64| {
+            let voxel = (key >> 32) as usize;
+            Seed { row: voxel / n_x, x: voxel % n_x, sample: key as u32 }
         };
-        keys.chunk_by(|a, b| a >> 32 == b >> 32).map(nearest).collect()
-    }
-
-    /// From a sample to a voxel's middle, m².
-    fn distance2(&self, sample: u32, place: [usize; 3]) -> f32 {
-        let p = self.points[sample as usize];
-        (0..3).map(|i| p[i] - self.middles[i][place[i]]).map(|d| d * d).sum()
+        keys.into_iter().map(seed).collect()
     }
 
     /// The nearest of a row's own samples, for each row of the plane.
@@ -191,20 +172,25 @@ impl Spread<'_> {
         for seeds in seeds.chunk_by(|a, b| a.row == b.row) {
             let y = seeds[0].row % n_y;
             best.fill(f32x8::splat(self.limit));
-            for (i, seed) in seeds.iter().enumerate() {
+            let mut before = 0;
+            let mut left = seeds;
+            while let Some(x) = left.first().map(|seed| seed.x) {
+                let (here, others) = left.split_at(left.partition_point(|seed| seed.x == x));
                 // Beyond its neighbours these are nearer.
-                let before = i.checked_sub(1).map_or(0, |i| seeds[i].x);
-                let after = seeds.get(i + 1).map_or(self.grid.size[0] - 1, |seed| seed.x);
-                let first = before.max(seed.x.saturating_sub(self.n_rings));
-                let last = after.min(seed.x + self.n_rings);
-                let [px, py, pz] = self.points[seed.sample as usize];
-                let new = [px, py, pz, f32::from_bits(seed.sample + 1)].map(f32x8::splat);
+                let after = others.first().map_or(self.grid.size[0] - 1, |seed| seed.x);
+                let first = before.max(x.saturating_sub(self.n_rings));
+                let last = after.min(x + self.n_rings);
                 for eight in first / N_LANES..=last / N_LANES {
                     let at = y * self.n_eights + eight;
                     let middles = self.middles_of([eight, y, z]);
-                    rows.is_told[at] |=
-                        keep_nearer(middles, &new, &mut best[eight], &mut rows.eights[at]);
+                    for seed in here {
+                        let [px, py, pz] = self.points[seed.sample as usize];
+                        let new = [px, py, pz, f32::from_bits(seed.sample + 1)].map(f32x8::splat);
+                        rows.is_told[at] |=
+                            keep_nearer(middles, &new, &mut best[eight], &mut rows.eights[at]);
+                    }
                 }
+                (before, left) = (x, others);
             }
         }
     }
