@@ -79,7 +79,7 @@ pub fn refill(
 
 /// Runs of records that stay; all of them where nobody says which.
 fn runs(stays: Option<&[bool]>, n: usize) -> Vec<Range<usize>> {
-    let Some(stays) = stays else { return vec![0..n] };
+    let Some(stays) = stays else { return std::iter::once(0..n).collect() };
     let mut at = 0;
     let runs = stays.chunk_by(|a, b| a == b).map(|run| {
         at += run.len();
