@@ -11,8 +11,8 @@ use contract::{
     Cluster, Fit, Floor, Fold, InputId, Label, MaskId, PlaceRun, Result, Space, TileLabels,
 };
 use export::{
-    Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Tiles,
-    Written, write_space,
+    Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Spool,
+    Tiles, Written, write_space,
 };
 use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
@@ -57,6 +57,8 @@ pub(crate) struct Scope {
     pub(crate) moved: Vec<Option<Pose>>,
     /// What records hold, where clouds are to be like others.
     pub(crate) las: Option<LasSettings>,
+    /// Whether spatial tiles are left open: something else comes into them.
+    pub(crate) leaves_open: bool,
 }
 
 /// What is known of points near robots.
@@ -108,11 +110,18 @@ pub(crate) struct Streamed<'l> {
     spaces: Vec<Option<Space>>,
     /// Fits whose files are to be written, with their pictures.
     robots: Vec<(usize, RobotPicture)>,
+    /// Tiles that were left open.
+    open: Vec<Spool>,
     out: &'l Path,
     done: Done,
 }
 
 impl Streamed<'_> {
+    /// The tiles that were left open.
+    pub(crate) fn take_open(&mut self) -> Vec<Spool> {
+        std::mem::take(&mut self.open)
+    }
+
     /// Writes the files of robots.
     pub(crate) fn finish(mut self, engine: &Engine) -> Result<Done> {
         let shown = self.robots.iter().map(|(i, picture)| (*i, picture)).collect();
@@ -185,7 +194,7 @@ impl<'a> Labelling<'a> {
         Ok(Near { labels: near, hanging: merge::hang(&attached, self.fits, self.models) })
     }
 
-    /// Streams every input once more and writes its labels, clouds to another folder; then what is said of robots.
+    /// Streams every input once more and writes its labels and tiles, clouds to another folder; then what is said of robots.
     pub(crate) fn write<'l>(
         &'l self,
         (near, mut spaces): (&'l Near, Vec<Option<Space>>),
@@ -197,7 +206,7 @@ impl<'a> Labelling<'a> {
         let waiting_bytes = self.export.waiting_bytes.min(SPOOLED * engine.channel_bytes);
         let export = export::Settings { waiting_bytes, ..self.export };
         let records = export.records(&las);
-        let mut tiles = Tiles::create(clouds_out, &records, &export)?;
+        let mut tiles = Tiles::create(out, &records, &export)?;
         let mut clouds = Clouds::create(clouds_out, &records, &export)?;
         let mut masks = Masks::new(out, self.sources.opened_masks());
         let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
@@ -244,17 +253,21 @@ impl<'a> Labelling<'a> {
                 })?;
                 pictures.push(self.draw_plan(&plan, input.id, out)?);
             }
-            let finish = |tiles: Tiles| engine.pool()?.install(|| tiles.finish(&AllThreads));
-            Ok((tiles.map(finish).transpose()?.unwrap_or_default(), pictures))
+            let Some(tiles) = tiles else { return Ok((Vec::new(), Vec::new(), pictures)) };
+            if scope.leaves_open {
+                return Ok((Vec::new(), tiles.open(), pictures));
+            }
+            let finished = engine.pool()?.install(|| tiles.finish(&AllThreads))?;
+            Ok((finished, Vec::new(), pictures))
         };
-        let (((masks, mut sums), (moving, fixed)), (tiles, pictures)) =
+        let (((masks, mut sums), (moving, fixed)), (tiles, open, pictures)) =
             engine.handing("clouds", apart, along)?;
         let clouds = Written { tiles, robots: moving, fixed };
         sums.extend(clouds.sums().cloned());
         let said = vec![None; self.fits.len()];
         let done = Done { clouds, masks, pictures, spaces: said, sums, las };
         let robots = chosen.into_iter().zip(robots).collect();
-        Ok(Streamed { labelling: self, near, spaces, robots, out, done })
+        Ok(Streamed { labelling: self, near, spaces, robots, open, out, done })
     }
 
     /// Streams an input once more; labelled strips in the order of the file.

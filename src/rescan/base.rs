@@ -6,6 +6,7 @@ use crate::reuse::{Manifest, OutputFile};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
 use export::{MaskReader, ResultFile, ScanLabels, read_places};
+use geometry::Aabb;
 use std::path::{Path, PathBuf};
 
 /// An earlier result that is whole.
@@ -87,14 +88,20 @@ impl Base {
         self.files.iter().any(|file| file.path == path)
     }
 
-    /// Names of its spatial tiles, as row and column, relative to its folder.
-    pub(crate) fn tiles(&self) -> Vec<(String, [i32; 2])> {
-        let at = |file: &OutputFile| {
-            let name = file.path.strip_prefix("tiles/")?;
-            let (x, y) = name.split_once('.')?.0.split_once('_')?;
-            Some((file.path.clone(), [y.parse().ok()?, x.parse().ok()?]))
+    /// Names of its spatial tiles that some boxes touch, relative to its folder.
+    pub(crate) fn tiles(&self, touched: &[&Aabb]) -> Vec<String> {
+        let Some(edge) = self.state.records.tile_edge() else { return Vec::new() };
+        let corner = |name: &str| {
+            let (x, y) = name.strip_prefix("tiles/")?.split_once('.')?.0.split_once('_')?;
+            let [x, y]: [i32; 2] = [x.parse().ok()?, y.parse().ok()?];
+            Some([x, y].map(|i| f64::from(i) * edge))
         };
-        self.files.iter().filter_map(at).collect()
+        let is_touched = |at: [f64; 2]| {
+            let touches = |b: &&Aabb| (0..2).all(|i| b.max[i] >= at[i] && b.min[i] <= at[i] + edge);
+            touched.iter().any(touches)
+        };
+        let names = self.files.iter().map(|file| &file.path);
+        names.filter(|name| corner(name).is_some_and(is_touched)).cloned().collect()
     }
 
     /// Reads labels of each of its masks.

@@ -10,9 +10,8 @@ use crate::report::tiles;
 use crate::store::Store;
 use contract::{Label, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
 use export::MaskReader;
-use geometry::{Aabb, Point, Vector};
+use geometry::{Aabb, Point};
 use merge::{Seen, Sight, Surfaces, Tally, Tallying, Watch};
-use nalgebra::Matrix3;
 use std::collections::BTreeSet;
 
 /// One of so many points tells the surfaces, and of many points more are passed over, so that about so many do: a tenth of a
@@ -166,10 +165,9 @@ impl<'a> Past<'a> {
         let mask = &self.masks[mask.0 as usize];
         let of = |first: u64, last: u64| mask.range(first, (last - first + 1) as usize);
         labels.clear();
-        let (first, last) = places.iter().fold((u64::MAX, 0), |(a, b), &p| (a.min(p), b.max(p)));
-        if first > last {
+        let (Some(&first), Some(&last)) = (places.iter().min(), places.iter().max()) else {
             return Ok(());
-        }
+        };
         labels.resize(places.len(), Label::UNCERTAIN);
         if (last - first) / SPARSE <= places.len() as u64 {
             let read = of(first, last)?;
@@ -309,29 +307,31 @@ pub(crate) fn seen(sight: Sight, own: &Watch<'_>, world: [f64; 3]) -> Seen {
 /// Area across its beam that a point stands for, m²: that of its pixel, or of a voxel's share where no scanner is known.
 pub(crate) fn area(scan: &Scan, world: [f64; 3]) -> f64 {
     let Some(lattice) = &scan.lattice else { return Tally::FACE };
-    let range = (Point::from(world) - Point::from(scan.world_from_scan.translation.vector)).norm();
-    (lattice.row_step * range) * (lattice.col_step * range)
+    let beam = Point::from(world) - Point::from(scan.world_from_scan.translation.vector);
+    lattice.row_step * lattice.col_step * beam.norm_squared()
 }
 
 /// Points of a scan in the world.
 pub(crate) struct World {
-    rotation: Matrix3<f64>,
-    shift: Vector,
+    /// Rotation, by row.
+    rotation: [[f64; 3]; 3],
+    shift: [f64; 3],
 }
 
 impl World {
     pub(crate) fn from(scan: &Scan) -> Self {
         let pose = &scan.world_from_scan;
-        Self {
-            rotation: *pose.rotation.to_rotation_matrix().matrix(),
-            shift: pose.translation.vector,
-        }
+        let rotation = pose.rotation.to_rotation_matrix().matrix().transpose();
+        Self { rotation: rotation.into(), shift: pose.translation.vector.into() }
     }
 
     /// A point of the scan in the world, metres.
     #[inline]
-    pub(crate) fn of(&self, xyz: [f32; 3]) -> [f64; 3] {
-        (self.rotation * Vector::from(xyz.map(f64::from)) + self.shift).into()
+    pub(crate) fn of(&self, [x, y, z]: [f32; 3]) -> [f64; 3] {
+        let ([x, y, z], Self { rotation: r, shift }) =
+            ([f64::from(x), f64::from(y), f64::from(z)], self);
+        let one = |i: usize| r[i][0] * x + r[i][1] * y + r[i][2] * z + shift[i];
+        [one(0), one(1), one(2)]
     }
 }
 

@@ -11,7 +11,7 @@ use crate::labelling::{Labelling, Scope, Streamed};
 use crate::report::id;
 use crate::reuse::{OutputFile, Sums};
 use contract::{Fit, MaskId, Result, Space};
-use export::{FileSum, MaskFiles, NpyWriter, OldPoint, refill};
+use export::{FileSum, MaskFiles, NpyWriter, OldPoint, Spool};
 use geometry::Aabb;
 use merge::{Registration, Sight, Tally, ThingChange, Watch};
 use robot::Model;
@@ -53,8 +53,10 @@ impl Written<'_, '_> {
         let own = self.session.own_fits(self.fits, self.robots);
         let labelling = self.session.labelling(&own, self.models);
         let rest = || {
-            let streamed = self.label((&own, &labelling), registered, (next, &scratch), engine)?;
-            let tiles = || self.tiles(&gone, (next, &scratch), engine);
+            let mut streamed =
+                self.label((&own, &labelling), registered, (next, &scratch), engine)?;
+            let open = streamed.take_open();
+            let tiles = || self.tiles(open, &gone, (next, &scratch), engine);
             engine.beside("files of robots", || streamed.finish(engine), tiles)
         };
         let (lists, (mut done, touched)) = engine.beside("lists", lists, rest)?;
@@ -104,6 +106,7 @@ impl Written<'_, '_> {
             cell: Some(session.past.cell),
             moved: session.moved(registered),
             las: Some(self.base.state.records.las()),
+            leaves_open: true,
         };
         labelling.write((&self.labels.near, spaces), &scope, (next, scratch), engine)
     }
@@ -161,49 +164,49 @@ impl Written<'_, '_> {
         stays
     }
 
-    /// Tiles that the cell touches, and the cloud of all that moves: what is left of the old points, and the new ones.
+    /// Tiles that the cell touches, and the cloud of all that moves: behind the new points of each (those of `open` are in it
+    /// already) comes what is left of the old ones.
     fn tiles(
         &self,
+        open: Vec<Spool>,
         gone: &BTreeSet<[i32; 3]>,
         (next, scratch): (&Path, &Path),
         engine: &Engine,
     ) -> Result<Touched> {
         let las = self.base.state.records.las();
-        let ending = if las.compress { "laz" } else { "las" };
-        let mut names: BTreeMap<String, [bool; 2]> = BTreeMap::new();
+        let robots = format!("clouds/robots.{}", las.ending());
         let touched = self.robots.left.iter().chain([&self.session.past.cell]);
         let touched: Vec<&Aabb> = touched.collect();
-        if let Some(edge) = self.base.state.records.tile_edge() {
-            for (name, [row, col]) in self.base.tiles() {
-                let at = [col, row].map(|i| f64::from(i) * edge);
-                let is_touched =
-                    |b: &&Aabb| (0..2).all(|i| b.max[i] >= at[i] && b.min[i] <= at[i] + edge);
-                if touched.iter().any(is_touched) {
-                    names.entry(name).or_default()[0] = true;
-                }
+        let mut tiles: BTreeMap<PathBuf, Spool> =
+            open.into_iter().map(|tile| (tile.path().to_path_buf(), tile)).collect();
+        for name in self.base.tiles(&touched).into_iter().chain([robots.clone()]) {
+            let path = next.join(&name);
+            if !tiles.contains_key(&path) {
+                tiles.insert(path.clone(), Spool::create(path, &las)?);
             }
         }
-        for name in files(&scratch.join("tiles")) {
-            names.entry(format!("tiles/{name}")).or_default()[1] = true;
-        }
-        let robots = format!("clouds/robots.{ending}");
-        names.insert(robots.clone(), [self.base.has(&robots), scratch.join(&robots).is_file()]);
-        let mut all: Vec<(String, [bool; 2])> = names.into_iter().collect();
+        let name = |path: &Path| path.strip_prefix(next).unwrap_or(path).display().to_string();
+        let mut all: Vec<(String, Spool)> =
+            tiles.into_iter().map(|(path, tile)| (name(&path), tile)).collect();
+        let names: BTreeSet<String> = all.iter().map(|(name, _)| name.clone()).collect();
         // The largest first: none is left that one thread writes alone while others wait.
-        let n_bytes = |path: &Path| path.metadata().map_or(0, |m| m.len());
-        all.sort_by_cached_key(|(name, _)| {
-            let n_bytes = n_bytes(&self.base.out.join(name)) + n_bytes(&scratch.join(name));
-            (Reverse(n_bytes), name.clone())
-        });
+        let n_bytes = |name: &str| self.base.out.join(name).metadata().map_or(0, |m| m.len());
+        all.sort_by_cached_key(|(name, _)| (Reverse(n_bytes(name)), name.clone()));
         let watch = self.session.watch();
-        let sums = engine.for_disks().fan_out("tiles", all.clone(), |(name, [old, new])| {
-            let (old, new) =
-                (old.then(|| self.base.out.join(&name)), new.then(|| scratch.join(&name)));
-            let stays = |points: &[OldPoint]| self.stay(points, &watch, gone);
-            refill([old.as_deref(), new.as_deref()], &next.join(&name), &las, stays)
+        let sums = engine.for_disks().fan_out("tiles", all, |(name, mut tile)| {
+            let new = scratch.join(&name);
+            if new.is_file() {
+                tile.take_from(&new, |points| vec![true; points.len()])?;
+            }
+            if self.base.has(&name) {
+                let stays = |points: &[OldPoint]| self.stay(points, &watch, gone);
+                tile.take_from(&self.base.out.join(&name), stays)?;
+            }
+            let is_left = tile.n_points() > 0;
+            is_left.then(|| tile.finish()).transpose()
         })?;
         let fixed = ["las", "laz"].map(|end| format!("clouds/fixed.{end}"));
-        let names = all.into_iter().map(|(name, _)| name).chain(fixed).collect();
+        let names = names.into_iter().chain(fixed).collect();
         let sums = sums.into_iter().flatten().filter_map(|summary| summary.sum).collect();
         Ok(Touched { names, sums })
     }
@@ -256,17 +259,4 @@ fn is_of(path: &str, robots: &[String]) -> bool {
             || path == format!("pictures/{id}.png")
             || path == format!("pictures/{id}_evidence.png")
     })
-}
-
-/// Names of the files of a folder, sorted.
-fn files(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let paths: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.is_file()).collect();
-    let mut names: Vec<String> = paths
-        .iter()
-        .filter_map(|p| p.file_name())
-        .map(|n| n.to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
 }

@@ -27,6 +27,7 @@ mod robot_picture;
 mod session;
 mod settings;
 mod space;
+mod spool;
 mod summed;
 mod table;
 mod tiles;
@@ -46,7 +47,7 @@ pub use pack::{Pack, Packed, PointColumns};
 pub use places::Places;
 pub use plan_picture::PlanPicture;
 pub use record::{LasSettings, Quantum, RawVlr, class_of};
-pub use refill::{OldPoint, refill};
+pub use refill::OldPoint;
 pub use result::{
     BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
     SCHEMA, ScanLabels, StageEntry, TipPose,
@@ -56,6 +57,7 @@ pub use robot_picture::RobotPicture;
 pub use session::{RegistrationEntry, RescanEntry};
 pub use settings::Settings;
 pub use space::{SpaceEntry, write_space};
+pub use spool::Spool;
 pub use summed::FileSum;
 pub use table::write_table;
 pub use tiles::Tiles;

@@ -102,7 +102,8 @@ impl LasSettings {
     }
 
     /// How names of its files end.
-    pub(crate) fn ending(&self) -> &'static str {
+    #[must_use]
+    pub fn ending(&self) -> &'static str {
         if self.compress { "laz" } else { "las" }
     }
 

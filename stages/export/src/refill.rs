@@ -1,9 +1,10 @@
-//! A spatial tile of an earlier result and one of new points in; the tile without the old points that are superseded, the
-//! new ones behind them, out. Records stay as they are, byte for byte.
+//! A spatial tile of an earlier result in; its points that are not superseded out, behind the new ones of a tile that is being
+//! written. Records stay as they are, byte for byte.
 
 use crate::block::Straight;
-use crate::las::{LasSummary, LasWriter, head};
+use crate::las::head;
 use crate::record::{CLASSES, Extent, LasSettings};
+use crate::spool::{Blocks, Spool};
 use contract::{Error, Label, PointKind, Result};
 use las::raw;
 use laz::LasZipDecompressor;
@@ -25,6 +26,9 @@ const KINDS: [PointKind; 256] = {
 /// Records that are read at a time: what is made of them stays in a processor's own cache.
 const PIECE: u64 = 1 << 12;
 
+/// Bytes that wait for a tile.
+const WAITING: usize = 1 << 20;
+
 /// A point of an earlier result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OldPoint {
@@ -34,75 +38,59 @@ pub struct OldPoint {
     pub label: Label,
 }
 
-/// Writes `to` from the points of `old` that `keep` wants (it is asked piece by piece, and answers for each point) and all of
-/// `new`; both are tiles of ours with records as `las` has them. `None`, and no file, where nothing is left.
-///
-/// # Errors
-/// A tile that is not one of ours or cannot be read; what [`LasWriter`] says.
-pub fn refill(
-    [old, new]: [Option<&Path>; 2],
-    to: &Path,
-    las: &LasSettings,
-    keep: impl Fn(&[OldPoint]) -> Vec<bool>,
-) -> Result<Option<LasSummary>> {
-    let mut writer = LasWriter::create(to, las.clone())?;
-    let (mut n, record_len) = (0, las.record_len());
-    let (mut bytes, mut points) = (Vec::new(), Vec::new());
-    for (path, is_old) in [(old, true), (new, false)] {
-        let Some(path) = path else { continue };
-        let mut tile = Tile::open(path, las)?;
+impl Spool {
+    /// Adds the points of a tile of ours, with records as its own, that `keep` wants: it is asked piece by piece, and answers for
+    /// each point.
+    ///
+    /// # Errors
+    /// A tile that is not one of ours or cannot be read; a file that cannot be written.
+    pub fn take_from(&mut self, old: &Path, keep: impl Fn(&[OldPoint]) -> Vec<bool>) -> Result<()> {
+        let las = self.las().clone();
+        let (record_len, mut blocks) = (las.record_len(), Blocks::new(WAITING));
+        let (mut bytes, mut points) = (Vec::new(), Vec::new());
+        let mut tile = Tile::open(old, &las)?;
         while let Some(records) = tile.piece(&mut bytes)? {
-            let old = |record: &[u8]| point(record, las);
-            let stays = is_old.then(|| {
-                points.clear();
-                points.extend(records.chunks_exact(record_len).map(old));
-                keep(&points)
-            });
-            let (mut extent, mut kept) = (Extent::default(), 0);
-            for run in runs(stays.as_deref(), records.len() / record_len) {
-                let bytes = run.start * record_len..run.end * record_len;
-                records[bytes.clone()].chunks_exact(record_len).for_each(|r| extent.add(steps(r)));
-                let n_bytes = bytes.len();
-                if kept < bytes.start {
-                    records.copy_within(bytes, kept);
-                }
-                kept += n_bytes;
-            }
-            n += extent.n;
-            if extent.n > 0 {
-                writer.push_records(&records[..kept], &extent)?;
+            points.clear();
+            points.extend(records.chunks_exact(record_len).map(|record| point(record, &las)));
+            for run in runs(&keep(&points)) {
+                let run = &records[run.start * record_len..run.end * record_len];
+                let mut extent = Extent::default();
+                run.chunks_exact(record_len).for_each(|record| extent.add(steps(record)));
+                self.push(run, &extent, &mut blocks)?;
             }
         }
+        Ok(())
     }
-    if n == 0 { Ok(None) } else { writer.finish().map(Some) }
 }
 
-/// Runs of records that stay; all of them where nobody says which.
-fn runs(stays: Option<&[bool]>, n: usize) -> Vec<Range<usize>> {
-    let Some(stays) = stays else { return std::iter::once(0..n).collect() };
+/// Runs of records that stay.
+fn runs(stays: &[bool]) -> impl Iterator<Item = Range<usize>> {
     let mut at = 0;
-    let runs = stays.chunk_by(|a, b| a == b).map(|run| {
+    let runs = stays.chunk_by(|a, b| a == b).map(move |run| {
         at += run.len();
         (run[0], at - run.len()..at)
     });
-    runs.filter(|(stays, _)| *stays).map(|(_, run)| run).collect()
+    runs.filter(|(stays, _)| *stays).map(|(_, run)| run)
 }
 
 /// Coordinates as the record has them.
 #[inline]
 fn steps(record: &[u8]) -> [i32; 3] {
-    let int = |at: usize| [record[at], record[at + 1], record[at + 2], record[at + 3]];
-    [0, 4, 8].map(|at| i32::from_le_bytes(int(at)))
+    let int = |at: usize| {
+        i32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
+    };
+    [int(0), int(4), int(8)]
 }
 
 #[inline]
 fn point(record: &[u8], las: &LasSettings) -> OldPoint {
     let (q, steps) = (&las.quantum, steps(record));
-    let world = std::array::from_fn(|i| f64::from(steps[i]) * q.scale[i] + q.offset[i]);
+    let metres = |i: usize| f64::from(steps[i]) * q.scale[i] + q.offset[i];
     let kind = KINDS[usize::from(record[16])];
     let at = if las.with_color { 36 } else { 30 };
     let index = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]).wrapping_sub(1) as i16;
-    OldPoint { world, label: Label { kind, robot: index(at), link: index(at + 2) } }
+    let label = Label { kind, robot: index(at), link: index(at + 2) };
+    OldPoint { world: [metres(0), metres(1), metres(2)], label }
 }
 
 /// A tile that is read piece by piece.
@@ -148,7 +136,7 @@ impl<'a> Tile<'a> {
     }
 
     /// The next records, read into `bytes`; `None` behind the last.
-    fn piece<'b>(&mut self, bytes: &'b mut Vec<u8>) -> Result<Option<&'b mut [u8]>> {
+    fn piece<'b>(&mut self, bytes: &'b mut Vec<u8>) -> Result<Option<&'b [u8]>> {
         let n = self.left.min(PIECE);
         if n == 0 {
             return Ok(None);

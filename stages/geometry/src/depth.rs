@@ -55,16 +55,26 @@ pub type Lanes = [[f32; LANES]; 3];
 #[inline]
 #[must_use]
 pub fn lanes(places: &[[f32; 3]]) -> Lanes {
-    std::array::from_fn(|axis| std::array::from_fn(|i| places[i.min(places.len() - 1)][axis]))
+    // A loop is inlined where arrays made of closures are not.
+    let mut out = [[0.0; LANES]; 3];
+    for i in 0..LANES {
+        let place = places[i.min(places.len() - 1)];
+        (out[0][i], out[1][i], out[2][i]) = (place[0], place[1], place[2]);
+    }
+    out
 }
 
 /// Applies [`Rows`] to places, each as [`transform`] does.
 #[inline]
 #[must_use]
 pub fn transform_lanes(m: &Rows, p: &Lanes) -> Lanes {
-    let one =
-        |r: usize, i: usize| m[r][0] * p[0][i] + m[r][1] * p[1][i] + m[r][2] * p[2][i] + m[r][3];
-    std::array::from_fn(|r| std::array::from_fn(|i| one(r, i)))
+    let mut out = [[0.0; LANES]; 3];
+    for (to, m) in out.iter_mut().zip(m) {
+        for i in 0..LANES {
+            to[i] = m[0] * p[0][i] + m[1] * p[1][i] + m[2] * p[2][i] + m[3];
+        }
+    }
+    out
 }
 
 /// Applies the rotation of [`Rows`] to a direction.

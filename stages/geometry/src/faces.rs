@@ -115,16 +115,17 @@ impl Faces {
         if self.by_side.is_none() {
             return Some(one);
         }
-        let d = [0, 1, 2].map(|axis| local[axis].map(|v| v - self.scanner[axis]));
-        let first = d.map(|d| d[0]);
+        let at = self.scanner;
+        let first = [local[0][0] - at[0], local[1][0] - at[1], local[2][0] - at[2]];
         let a = first.map(f32::abs);
         let axis = if a[0] >= a[1] && a[0] >= a[2] { 0 } else { 1 + usize::from(a[2] > a[1]) };
         let way = first[axis].signum();
-        let (along, others) = (&d[axis], [&d[(axis + 1) % 3], &d[(axis + 2) % 3]]);
+        let others = [(axis + 1) % 3, (axis + 2) % 3];
+        let off = |axis: usize, i: usize| local[axis][i] - at[axis];
         let mut all = true;
         for i in 0..LANES {
-            let next = others[0][i].abs().max(others[1][i].abs());
-            all &= way * along[i] > next * self.apart;
+            let next = off(others[0], i).abs().max(off(others[1], i).abs());
+            all &= way * off(axis, i) > next * self.apart;
         }
         all.then_some(one)
     }

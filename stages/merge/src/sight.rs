@@ -72,20 +72,20 @@ impl<'a> Watch<'a> {
         out.clear();
         out.resize(world.len(), Sight::Unseen);
         // Places of which it is not known yet that something is there.
-        let mut open: Vec<u32> = (0..world.len() as u32).collect();
+        let mut open: Vec<(u32, [f32; 3])> =
+            (0..).zip(world).map(|(i, world)| (i, self.local(*world))).collect();
         for (_, eye) in &self.views {
             for some in open.chunks(LANES) {
                 let mut places = [[0.0; 3]; LANES];
-                let at = |&i: &u32| self.local(world[i as usize]);
-                places.iter_mut().zip(some).for_each(|(place, i)| *place = at(i));
+                places.iter_mut().zip(some).for_each(|(place, (_, local))| *place = *local);
                 let looks = eye.look_lanes(&lanes(&places[..some.len()]), FOOTPRINT);
-                for (k, &i) in some.iter().enumerate() {
-                    let best = &mut out[i as usize];
+                for (k, (i, _)) in some.iter().enumerate() {
+                    let best = &mut out[*i as usize];
                     *best =
                         (*best).max(looks.get(k).map_or(Sight::Unseen, |look| Sight::of(&look)));
                 }
             }
-            open.retain(|&i| out[i as usize] != Sight::Onto);
+            open.retain(|(i, _)| out[*i as usize] != Sight::Onto);
         }
     }
 

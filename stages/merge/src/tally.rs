@@ -122,7 +122,8 @@ impl Tally {
     #[inline]
     #[must_use]
     pub fn cell(world: [f64; 3]) -> Cell {
-        world.map(|v| (v * PER_METRE).floor() as i32)
+        let step = |v: f64| (v * PER_METRE).floor() as i32;
+        [step(world[0]), step(world[1]), step(world[2])]
     }
 
     /// Middles of voxels, world, metres.

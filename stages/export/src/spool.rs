@@ -1,0 +1,214 @@
+//! Records in, piece by piece; one spatial tile out. It keeps no file open: records wait in blocks of memory and are appended.
+
+use crate::atomic::part_of;
+use crate::block::{self, Block};
+use crate::las::{LasSummary, LasWriter, bounds, head};
+use crate::record::{Extent, LasSettings};
+use crate::summed::BodySum;
+use contract::{Error, Result};
+use std::fs::{File, OpenOptions};
+use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Blocks in which records wait, bytes. They are used again and again: fresh memory costs as much as copying into it.
+const BLOCK_BYTES: usize = 128 << 10;
+/// Fewest blocks, however little memory there is.
+const MIN_BLOCKS: usize = 4;
+
+/// Memory of the records that wait.
+pub(crate) struct Blocks {
+    pub(crate) empty: Vec<Block>,
+    /// Of which there may be at most so many more.
+    left: usize,
+}
+
+impl Blocks {
+    pub(crate) fn new(bytes: usize) -> Self {
+        Self { empty: Vec::new(), left: (bytes / BLOCK_BYTES).max(MIN_BLOCKS) }
+    }
+
+    /// An empty block; `None` where all are in use.
+    pub(crate) fn take(&mut self) -> Option<Block> {
+        let known = self.empty.pop();
+        if known.is_none() && self.left > 0 {
+            self.left -= 1;
+            return Some(Block::default());
+        }
+        known
+    }
+}
+
+/// A tile that grows by appending.
+pub struct Spool {
+    path: PathBuf,
+    las: LasSettings,
+    /// Where records go: the LAS file to be; for LAZ, bare records that are compressed at the end.
+    part: PathBuf,
+    /// Bytes that wait, all blocks but the last full.
+    pub(crate) blocks: Vec<Block>,
+    pub(crate) extent: Extent,
+    body: BodySum,
+    /// What the file begins with: room for its header, bytes; and what of that is not written yet.
+    head: Vec<u8>,
+    n_head: usize,
+    is_begun: bool,
+    /// Whether the file is written past the system's cache, as it is while only full blocks are.
+    direct: bool,
+}
+
+impl Spool {
+    /// A tile without points, of records as `las` has them.
+    ///
+    /// # Errors
+    /// Settings that make no header.
+    pub fn create(path: PathBuf, las: &LasSettings) -> Result<Self> {
+        let part = part_of(&path.with_extension("records"));
+        let head = if las.compress { Vec::new() } else { head(las, &Extent::default())? };
+        let (extent, body, n_head) = (Extent::default(), BodySum::default(), head.len());
+        let (las, blocks) = (las.clone(), Vec::new());
+        let (is_begun, direct) = (false, true);
+        Ok(Self { path, las, part, blocks, extent, body, head, n_head, is_begun, direct })
+    }
+
+    /// The name that it will have.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What its records hold.
+    pub(crate) fn las(&self) -> &LasSettings {
+        &self.las
+    }
+
+    /// Its points.
+    #[must_use]
+    pub fn n_points(&self) -> u64 {
+        self.extent.n
+    }
+
+    /// Adds records behind all others; `blocks` is memory in which they wait.
+    pub(crate) fn push(
+        &mut self,
+        mut records: &[u8],
+        extent: &Extent,
+        blocks: &mut Blocks,
+    ) -> Result<()> {
+        self.extent.join(extent);
+        loop {
+            records = self.fill(records);
+            if records.is_empty() {
+                return Ok(());
+            }
+            match blocks.take() {
+                Some(block) => self.blocks.push(block),
+                // All of them are full.
+                None => self.append(blocks, self.blocks.len())?,
+            }
+        }
+    }
+
+    /// Bytes that wait.
+    pub(crate) fn n_bytes(&self) -> usize {
+        self.blocks.iter().map(|block| block.bytes().len()).sum()
+    }
+
+    /// Takes as many records as the last block has room for; returns the others. A record may lie in two blocks.
+    pub(crate) fn fill<'a>(&mut self, records: &'a [u8]) -> &'a [u8] {
+        let Some(last) = self.blocks.last_mut() else { return records };
+        if !self.head.is_empty() {
+            let head = std::mem::take(&mut self.head);
+            last.fill(&head, BLOCK_BYTES);
+        }
+        last.fill(records, BLOCK_BYTES)
+    }
+
+    /// Appends the first `n` blocks that wait, and gives them back.
+    pub(crate) fn append(&mut self, blocks: &mut Blocks, n: usize) -> Result<()> {
+        let first = &self.blocks[..n];
+        self.direct &= first.iter().all(|block| block.bytes().len() == BLOCK_BYTES);
+        let written = self.open().and_then(|mut file| {
+            self.direct = self.direct && block::set_direct(&file, true);
+            let mut all: Vec<IoSlice<'_>> =
+                first.iter().map(|block| IoSlice::new(block.bytes())).collect();
+            block::write_all(&mut file, &mut all, &mut self.direct)
+        });
+        written.map_err(|e| Error::of_file("tile cannot be written", &self.part, e))?;
+        self.is_begun = true;
+        for mut block in self.blocks.drain(..n) {
+            let n_head = self.n_head.min(block.bytes().len());
+            self.body.add(&block.bytes()[n_head..]);
+            self.n_head -= n_head;
+            block.clear();
+            blocks.empty.push(block);
+        }
+        Ok(())
+    }
+
+    /// The file, to be written from its end on; the first time, what an earlier run left behind goes.
+    fn open(&self) -> std::io::Result<File> {
+        let mut options = OpenOptions::new();
+        if self.is_begun {
+            options.append(true).open(&self.part)
+        } else {
+            self.part.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+            options.write(true).create(true).truncate(true).open(&self.part)
+        }
+    }
+
+    /// Brings it to disk and gives it its name.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn finish(mut self) -> Result<LasSummary> {
+        let n = self.blocks.len();
+        self.append(&mut Blocks::new(0), n)?;
+        if self.las.compress { self.compress() } else { self.seal() }
+    }
+
+    /// Writes the header and gives the file its name.
+    fn seal(&self) -> Result<LasSummary> {
+        let head = head(&self.las, &self.extent)?;
+        let sealed = OpenOptions::new().write(true).open(&self.part).and_then(|mut file| {
+            file.seek(SeekFrom::Start(0))?;
+            file.write_all(&head)?;
+            file.sync_all()?;
+            std::fs::rename(&self.part, &self.path)
+        });
+        sealed.map_err(|e| Error::of_file("tile cannot be finished", &self.path, e))?;
+        Ok(LasSummary {
+            path: self.path.clone(),
+            n_points: self.extent.n,
+            bounds: bounds(&self.las, &self.extent),
+            sum: Some(self.body.behind(&head, &self.path)),
+        })
+    }
+
+    /// Compresses the spooled records.
+    fn compress(&self) -> Result<LasSummary> {
+        let las = &self.las;
+        let failed = |e| Error::of_file("tile cannot be read again", &self.part, e);
+        let mut writer = LasWriter::create(&self.path, las.clone())?;
+        let mut file = File::open(&self.part).map_err(failed)?;
+        // All of it with the first piece.
+        let mut extent = self.extent;
+        let mut left = self.extent.n as usize * las.record_len();
+        let mut piece = vec![0; 8192 * las.record_len()];
+        while left > 0 {
+            let n = left.min(piece.len());
+            file.read_exact(&mut piece[..n]).map_err(failed)?;
+            writer.push_records(&piece[..n], &extent)?;
+            (left, extent) = (left - n, Extent::default());
+        }
+        writer.finish()
+    }
+}
+
+impl Drop for Spool {
+    fn drop(&mut self) {
+        if self.is_begun {
+            // After a rename there is nothing left; a leftover that refuses to go never had a final name.
+            let _ = std::fs::remove_file(&self.part);
+        }
+    }
+}
