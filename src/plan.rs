@@ -55,7 +55,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
     let grounds = Kept::new(room.fits(), sums.ground(&tiles, settings));
     let ground = grounds.or_find("ground", || {
-        engine.pass(crate::report::tiles("surfaces", &store), store.tiles(), |f| {
+        let source = store.tiles(|entry| surfaces.skip(entry));
+        engine.pass(crate::report::tiles("surfaces", &store), source, |f| {
             f.map(&surfaces).fold(&gather)
         })
     })?;

@@ -1,6 +1,7 @@
 //! Tiles in; what the scans cover, floor and occupied space out: the lattice stage's map and the floor stage's fold,
 //! joined so that one pass over the tiles serves both.
 
+use crate::store::TileEntry;
 use contract::{Fold, Map, Result, Scan, ScanId, TILE_SIDE, Tile, TileSummary, Weigh};
 use lattice::{Extent, Summarise};
 use serde::{Deserialize, Serialize};
@@ -33,6 +34,11 @@ pub(crate) struct Ground {
 impl Surfaces {
     pub(crate) fn new(scans: &[Scan], settings: &lattice::Settings) -> Self {
         Self(Summarise::new(scans, settings))
+    }
+
+    /// How much of a tile of the store may be left out.
+    pub(crate) fn skip(&self, entry: &TileEntry) -> u32 {
+        self.0.skip(entry.at.scan, entry.range)
     }
 
     /// The same without planes: for where floor and walls are known.

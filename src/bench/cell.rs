@@ -108,7 +108,8 @@ impl Cell {
         engine.pool()?.install(|| shelf.prepare(&names, &AllThreads));
         let (surfaces, gather) =
             (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
-        let ground = engine.pass("surfaces", store.tiles(), |f| f.map(&surfaces).fold(&gather))?;
+        let source = store.tiles(|entry| surfaces.skip(entry));
+        let ground = engine.pass("surfaces", source, |f| f.map(&surfaces).fold(&gather))?;
         let clusters =
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let regions = identify::regions(&clusters, &settings.region);

@@ -8,7 +8,7 @@ use crate::engine::{Engine, Task};
 use crate::labelling::Near;
 use crate::report::tiles;
 use crate::store::Store;
-use contract::{Label, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
+use contract::{Label, MAX_SKIP, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
 use export::MaskReader;
 use geometry::{Aabb, Point};
 use merge::{Seen, Sight, Surfaces, Tally, Tallying, Watch};
@@ -74,9 +74,10 @@ impl<'a> Past<'a> {
 
     /// The surfaces of what stood there.
     pub(crate) fn surfaces(&self, engine: &Engine) -> Result<Surfaces> {
-        let step = (self.n_points() / N_SAMPLED).max(SAMPLE) as usize;
+        let (skip, step) = sampled((self.n_points() / N_SAMPLED).max(SAMPLE));
         let (mut all, sample) = (Surfaces::default(), Sample { past: self, step });
-        engine.pass(self.task("register"), self.store.tiles_of(self.tiles.clone()), |f| {
+        let source = self.store.tiles_once(self.tiles.clone(), skip);
+        engine.pass(self.task("register"), source, |f| {
             f.map(&sample).for_each(|own| {
                 all.join(own.0);
                 Ok(())
@@ -96,7 +97,8 @@ impl<'a> Past<'a> {
         let fates = Fates::of(&self.cell);
         let anew: Vec<Places> = self.n_points.iter().map(|n| Places::of(*n)).collect();
         let look = Look { past: self, watch, own, missed, fates: &fates, anew: &anew };
-        engine.pass(self.task("compare"), self.store.tiles_of(self.tiles.clone()), |f| {
+        let source = self.store.tiles_once(self.tiles.clone(), 0);
+        engine.pass(self.task("compare"), source, |f| {
             f.map(&look).for_each(|mut looked| {
                 then.join(std::mem::take(&mut looked.tally));
                 tiles.push(looked);
@@ -187,6 +189,12 @@ impl<'a> Past<'a> {
         }
         Ok(())
     }
+}
+
+/// How one of so many points is read: what is left out of each tile (see [`Tile::skip`]), and one of how many of the others.
+pub(crate) fn sampled(of: u64) -> (u32, usize) {
+    let skip = (of.max(1).ilog2() / 2).min(MAX_SKIP);
+    (skip, (of >> (2 * skip)) as usize)
 }
 
 /// The map that gathers surfaces.

@@ -1,6 +1,6 @@
 //! Points of the new scans in; how far each scan is off the plant, and what stands still in the cell now, out.
 
-use super::past::{World, area, seen};
+use super::past::{World, area, sampled, seen};
 use crate::engine::Engine;
 use crate::labelling::Near;
 use crate::report::tiles;
@@ -24,10 +24,10 @@ pub(crate) fn register(
     engine.fan_out("register", scans[first..].iter().collect(), |scan| {
         let entries = || touching.iter().filter(|&&i| store.entries()[i].at.scan == scan.id);
         let n: u64 = entries().map(|&i| store.entries()[i].n_points).sum();
-        let step = (n / N_LAID).max(1) as usize;
+        let (skip, step) = sampled((n / N_LAID).max(1));
         let mut points = Vec::new();
         for &i in entries() {
-            let tile = store.tile(i)?;
+            let tile = store.tile(i, skip)?;
             let in_world = World::from(scan);
             let worlds = tile.xyz.iter().step_by(step).map(|p| in_world.of(*p));
             points.extend(worlds.filter(|p| cell.contains(*p)));
@@ -56,7 +56,7 @@ pub(crate) struct Tallied(Tally);
 impl Present<'_> {
     pub(crate) fn tally(&self, store: &Store, engine: &Engine) -> Result<Tally> {
         let mut all = Tally::default();
-        let source = store.tiles_of(store.touching(&self.cell));
+        let source = store.tiles_once(store.touching(&self.cell), 0);
         engine.pass(tiles("compare", store), source, |f| {
             f.map(self).for_each(|own| {
                 all.join(own.0);

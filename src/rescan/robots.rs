@@ -6,7 +6,7 @@ use crate::spaces::{poses, reach};
 use crate::tools::dress_in;
 use contract::{Error, Fit, Region, Result, Verdict};
 use fit::Scene;
-use geometry::{Aabb, Point, Vector};
+use geometry::{Aabb, Point, Pose, Vector};
 use merge::{Sight, Watch};
 use robot::{Library, Model};
 
@@ -22,6 +22,11 @@ const CONTRADICTED: f64 = 0.25;
 const GONE: f64 = 0.6;
 /// A base farther from the old one is another robot's, metres.
 const SAME_PLACE: f64 = 0.5;
+
+/// A link that turns by more against its base than this, radians, is none of its foot; and one whose corners are no farther from
+/// where they were than this, metres, stays: two sessions are registered to within millimetres.
+const FOOT_TURNS: f64 = 0.001_75;
+const STAYS: f64 = 0.005;
 
 /// Cosine of the tilt from which on a robot stands on no floor.
 const UPRIGHT: f64 = 0.9;
@@ -123,6 +128,9 @@ pub(crate) fn look(
         let sure = Fit { verdict: fit.verdict.max(before.verdict), ..fit.clone() };
         let is_same = !crate::changes::stands_otherwise(before, &sure) && knows(&fit, before);
         match fit.verdict {
+            Verdict::Trusted | Verdict::Doubtful if only_foot_turns(before, &fit, model) => {
+                return Ok((Now::Found(Box::new(before.clone())), None));
+            }
             Verdict::Trusted if !is_same => return Ok((Now::Found(Box::new(fit)), None)),
             Verdict::Trusted | Verdict::Doubtful if is_same => {
                 return Ok((Now::Found(Box::new(sure)), None));
@@ -139,6 +147,28 @@ pub(crate) fn look(
         None if said.through > CONTRADICTED => (Now::Lost, None),
         None => (Now::Open, None),
     })
+}
+
+/// Whether two postures differ in nothing but how the foot stands under links that stay where they are. Of a round foot that few
+/// points show, the turn trades with the first joint: that the one was undone by the other is no change that anybody makes.
+fn only_foot_turns(then: &Fit, now: &Fit, model: &Model) -> bool {
+    let bounds: Vec<Aabb> = model.links.iter().map(|link| link.bounds).collect();
+    let stood = |fit: &Fit| (fit.world_from_base, poses(fit, model));
+    is_foot_alone([&stood(then), &stood(now)], &bounds)
+}
+
+/// The same of bases and links, then and now, and the links' bounds.
+fn is_foot_alone([then, now]: [&(Pose, Vec<Pose>); 2], bounds: &[Aabb]) -> bool {
+    let own =
+        |(base, links): &(Pose, Vec<Pose>), l: usize| base.rotation.inverse() * links[l].rotation;
+    let turns = |l: &usize| own(then, *l).angle_to(&own(now, *l)) > FOOT_TURNS;
+    let stays = |l: usize| {
+        let shift = |c: [f64; 3]| (then.1[l] * Point::from(c) - now.1[l] * Point::from(c)).norm();
+        bounds[l].corners().into_iter().all(|corner| shift(corner) <= STAYS)
+    };
+    let with_shape = (0..bounds.len()).filter(|l| !bounds[*l].is_empty());
+    let (moved, foot): (Vec<usize>, Vec<usize>) = with_shape.partition(turns);
+    !moved.is_empty() && !foot.is_empty() && moved.into_iter().all(stays)
 }
 
 /// Whether the points of one fit determine all joints that those of another do.
@@ -224,5 +254,28 @@ fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> Said {
         judged: judged as f64 / n.max(1) as f64,
         through: through as f64 / judged.max(1) as f64,
         foot: foot.unwrap_or(0.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_foot_that_turns_under_an_arm_that_stays_is_no_change() {
+        let up = |angle: f64, z: f64| Pose::new([0.0, 0.0, z].into(), [0.0, 0.0, angle].into());
+        let stood = |yaw: f64, joint: f64| {
+            let base = Pose::new([3.0, 1.0, 0.0].into(), [0.0, 0.0, yaw].into());
+            (base, vec![base, base * up(joint, 0.4)])
+        };
+        let foot = Aabb { min: [-0.2, -0.2, 0.0], max: [0.2, 0.2, 0.4] };
+        let arm = Aabb { min: [-0.2, -0.2, 0.0], max: [1.2, 0.2, 0.6] };
+        let is_alone = |yaw: f64, joint: f64| {
+            is_foot_alone([&stood(0.3, 0.5), &stood(0.3 + yaw, 0.5 + joint)], &[foot, arm])
+        };
+        assert!(is_alone(-0.061, 0.062));
+        // The arm has moved, with its foot or alone; or nothing turns.
+        assert!(!is_alone(-0.061, 0.075) && !is_alone(0.0, 0.062) && !is_alone(-0.061, 0.0));
+        assert!(!is_alone(0.0, 0.0));
     }
 }

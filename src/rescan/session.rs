@@ -361,7 +361,8 @@ pub(crate) fn ground(
     let surfaces = Surfaces::new(&sources.scans, &settings.lattice);
     let surfaces = if is_known && !with_walls { surfaces.without_planes() } else { surfaces };
     let gather = Gather::new(&sources.scans, &settings.floor);
-    let mut ground = engine.pass(crate::report::tiles("surfaces", store), store.tiles(), |f| {
+    let source = store.tiles(|entry| surfaces.skip(entry));
+    let mut ground = engine.pass(crate::report::tiles("surfaces", store), source, |f| {
         f.map(&surfaces).fold(&gather)
     })?;
     if is_known {

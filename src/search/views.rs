@@ -66,7 +66,7 @@ impl Search<'_, '_> {
         let entries = self.store.entries().iter().enumerate();
         let wanted: Vec<usize> =
             entries.filter(|(_, entry)| builder.wants(entry.at)).map(|(i, _)| i).collect();
-        self.store.look_at(&wanted, |tile| builder.add(tile))?;
+        self.store.look_at(&wanted, builder.skip(), |tile| builder.add(tile))?;
         let view = builder.finish();
         Ok((!view.points.is_empty() || !view.images.is_empty()).then_some(view))
     }

@@ -4,6 +4,7 @@
 //! `rkyv` archive of exactly that length, and nothing more: `rkyv` may read trailing bytes as another answer.
 
 use super::encode::layout;
+use super::record::N_LEVELS;
 use contract::{Error, Result, ScanId, TileAt};
 use export::atomic;
 use geometry::Aabb;
@@ -15,7 +16,7 @@ pub(super) const HEADER_BYTES: u64 = 64;
 /// Tiles and their arrays begin at multiples of this, bytes: a cache line, and more than any cast needs.
 pub(super) const ALIGN: u64 = 64;
 /// Grows with any change of either file.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const CATALOGUE_MAGIC: &[u8; 8] = b"STILLCAT";
 const TILES_MAGIC: &[u8; 8] = b"STILLTIL";
 
@@ -30,20 +31,33 @@ pub struct TileEntry {
     pub first_place: u64,
     /// Bounds of its points in the world, metres.
     pub bounds: Aabb,
+    /// About four of five of its points are no farther than this from the origin of their scan, metres; 0 where it has but few.
+    pub range: f32,
     /// Where its bytes begin in the tile file.
     pub(super) offset: u64,
-    /// CRC-32C of its bytes.
-    pub(super) checksum: u32,
+    /// Points of each level, coarsest first …
+    pub(super) n_of: [u32; N_LEVELS],
+    /// … and CRC-32C of its bytes.
+    pub(super) checksums: [u32; N_LEVELS],
+}
+
+impl TileEntry {
+    /// Length of its coarsest levels, bytes.
+    pub(super) fn n_bytes(&self, n_levels: usize) -> u64 {
+        self.n_of.iter().take(n_levels).map(|n| layout(u64::from(*n))[3]).sum()
+    }
 }
 
 /// A [`TileEntry`] in the archive.
 #[derive(Archive, Serialize, Deserialize)]
 struct Row {
     at: [u32; 3],
-    checksum: u32,
+    n_of: [u32; N_LEVELS],
+    checksums: [u32; N_LEVELS],
     n_points: u64,
     first_place: u64,
     offset: u64,
+    range: f32,
     bounds: [[f64; 3]; 2],
 }
 
@@ -73,10 +87,12 @@ pub(super) fn write(
 ) -> Result<()> {
     let rows = entries.iter().map(|e| Row {
         at: [e.at.scan.0 - first, e.at.row, e.at.col],
-        checksum: e.checksum,
+        n_of: e.n_of,
+        checksums: e.checksums,
         n_points: e.n_points,
         first_place: e.first_place,
         offset: e.offset,
+        range: e.range,
         bounds: [e.bounds.min, e.bounds.max],
     });
     let rows = Rows { n_tile_bytes, rows: rows.collect() };
@@ -134,7 +150,8 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
         let [scan, tile_row, col] = row.at;
         let at = TileAt { scan: ScanId(scan), row: tile_row, col };
         let sorted = entries.last().is_none_or(|e| (e.at, e.first_place) < (at, row.first_place));
-        if !sorted || row.n_points > rows.n_tile_bytes || !row.offset.is_multiple_of(ALIGN) {
+        let n_points: u64 = row.n_of.iter().map(|n| u64::from(*n)).sum();
+        if !sorted || row.n_points != n_points || !row.offset.is_multiple_of(ALIGN) {
             return torn("the catalogue contradicts itself");
         }
         entries.push(TileEntry {
@@ -142,13 +159,15 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
             n_points: row.n_points,
             first_place: row.first_place,
             bounds: Aabb { min: row.bounds[0], max: row.bounds[1] },
+            range: row.range,
             offset: row.offset,
-            checksum: row.checksum,
+            n_of: row.n_of,
+            checksums: row.checksums,
         });
     }
     // In the order of the file no tile begins before the one before it ends; gaps are tiles that were written twice.
     let mut spans: Vec<(u64, u64)> =
-        entries.iter().map(|e| (e.offset, layout(e.n_points)[3])).collect();
+        entries.iter().map(|e| (e.offset, e.n_bytes(N_LEVELS))).collect();
     spans.sort_unstable();
     let mut end = Some(HEADER_BYTES);
     for (offset, n) in spans {
@@ -176,12 +195,14 @@ mod tests {
                 let entry = TileEntry {
                     at: TileAt { scan: ScanId(i / 2), row: 3, col: i },
                     n_points: u64::from(i) * 100,
+                    n_of: [i, 9 * i, 20 * i, 70 * i],
                     first_place: 7,
                     bounds: Aabb::of([[1.0, 2.0, f64::from(i)]]),
+                    range: 2.5,
                     offset,
-                    checksum: 9 + i,
+                    checksums: [9 + i, 8, 7, i],
                 };
-                offset += layout(entry.n_points)[3];
+                offset += entry.n_bytes(N_LEVELS);
                 entry
             })
             .collect()
@@ -191,7 +212,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("catalogue");
         let entries = entries();
-        let end = entries[4].offset + layout(400)[3];
+        let end = entries[4].offset + entries[4].n_bytes(N_LEVELS);
         write(&path, &entries, end, 0).expect("writes");
         assert!(read(&path, 0).expect("reads") == (entries, end));
         std::fs::read(path).expect("a file")

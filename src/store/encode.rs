@@ -1,13 +1,14 @@
 //! Points of one tile in, its bytes on disk and its catalogue entry out; and back.
 //!
-//! Three little-endian arrays, each padded with zeros to 64 bytes: xyz (f32 × 3), place (u32, less the tile's first
-//! place), pixel (u16).
+//! By level, coarsest first, three little-endian arrays, each padded with zeros to 64 bytes: xyz (f32 × 3), place (u32, less
+//! the tile's first place), pixel (u16). Who can do with a part of a dense tile reads its beginning.
 
 use super::catalogue::{ALIGN, TileEntry};
 use super::parts::Part;
-use super::record::{PixelOrder, Record};
+use super::record::{N_LEVELS, N_PIXELS, PixelOrder, Record};
 use contract::{Map, Result, Scan, Tile, TilePoints, Weigh};
 use geometry::{Aabb, Pose};
+use std::ops::Range;
 
 #[cfg(target_endian = "big")]
 compile_error!("the store casts little-endian arrays");
@@ -77,55 +78,112 @@ impl Encode {
         }
         let bounds = self.bounds(part.at.scan.0, records);
         let first_place = records.first().map_or(0, Record::place);
-        let n = records.len();
-        let [xyz_at, place_at, pixel_at, end] = layout(n as u64).map(|v| v as usize);
+        let n_of = order.begin(records);
+        let blocks = blocks(&n_of);
         bytes.clear();
-        bytes.resize(end, 0);
-        let (xyz, rest) = bytes[xyz_at..].split_at_mut(place_at);
-        let (place, pixel) = rest.split_at_mut(pixel_at - place_at);
-        order.begin(records);
+        bytes.resize(blocks[N_LEVELS - 1].end, 0);
+        let arrays: [[usize; 3]; N_LEVELS] = std::array::from_fn(|level| {
+            let [xyz, place, pixel, _] = layout(u64::from(n_of[level]));
+            [xyz, place, pixel].map(|at| blocks[level].start + at as usize)
+        });
         for r in &*records {
-            let at = order.next(r);
-            xyz[12 * at..12 * at + 12].copy_from_slice(bytemuck::bytes_of(&r.xyz));
-            let less = (r.place() - first_place) as u32;
-            place[4 * at..4 * at + 4].copy_from_slice(&less.to_le_bytes());
-            pixel[2 * at..2 * at + 2].copy_from_slice(&r.pixel.to_le_bytes());
+            let (level, at) = order.next(r);
+            let [xyz, place, pixel] = arrays[level];
+            let mut put = |at: usize, of: &[u8]| bytes[at..at + of.len()].copy_from_slice(of);
+            put(xyz + 12 * at, bytemuck::bytes_of(&r.xyz));
+            put(place + 4 * at, &((r.place() - first_place) as u32).to_le_bytes());
+            put(pixel + 2 * at, &r.pixel.to_le_bytes());
         }
         let entry = TileEntry {
             at: part.at,
-            n_points: n as u64,
+            n_points: records.len() as u64,
             first_place,
             bounds,
+            range: range(records),
             offset: 0,
-            checksum: crc32c::crc32c(&bytes),
+            n_of,
+            checksums: blocks.map(|block| crc32c::crc32c(&bytes[block])),
         };
         Encoded { entry, bytes }
     }
 }
 
-/// Offsets of the three arrays and of the end, for `n` points.
+/// Points whose range tells how far a tile is.
+const PROBES: usize = 64;
+/// Share of them that are no farther.
+const NEARER: f64 = 0.8;
+
+/// How far most records are from the origin of their scan, metres; 0 where they are too few to tell.
+fn range(records: &[Record]) -> f32 {
+    let step = (records.len() / PROBES).max(1);
+    let range = |r: &Record| r.xyz.iter().map(|v| v * v).sum::<f32>().sqrt();
+    let mut ranges: Vec<f32> = records.iter().step_by(step).map(range).collect();
+    if ranges.len() < PROBES / 2 {
+        return 0.0;
+    }
+    let at = ((ranges.len() - 1) as f64 * NEARER) as usize;
+    *ranges.select_nth_unstable_by(at, f32::total_cmp).1
+}
+
+/// Offsets of the three arrays and of the end, for `n` points of a level.
 pub(super) fn layout(n: u64) -> [u64; 4] {
     let place = (12 * n).next_multiple_of(ALIGN);
     let pixel = (place + 4 * n).next_multiple_of(ALIGN);
     [0, place, pixel, (pixel + 2 * n).next_multiple_of(ALIGN)]
 }
 
-/// The points of a tile in its (aligned) bytes, which have the length that [`layout`] says.
-pub(super) fn points<'a>(entry: &TileEntry, bytes: &'a [u8]) -> TilePoints<'a> {
-    let n = entry.n_points as usize;
-    let [_, place, pixel, _] = layout(entry.n_points).map(|v| v as usize);
+/// Where each level lies in the bytes of a tile.
+pub(super) fn blocks(n_of: &[u32; N_LEVELS]) -> [Range<usize>; N_LEVELS] {
+    let mut end = 0;
+    n_of.map(|n| {
+        let start = end;
+        end += layout(u64::from(n))[3] as usize;
+        start..end
+    })
+}
+
+/// The points of a level of a tile in its (aligned) bytes, which have the length that [`layout`] says.
+pub(super) fn points<'a>(entry: &TileEntry, level: usize, bytes: &'a [u8]) -> TilePoints<'a> {
+    let n = entry.n_of[level] as usize;
+    let [_, place, pixel, _] = layout(n as u64).map(|v| v as usize);
     TilePoints {
         at: entry.at,
         first_place: entry.first_place,
         xyz: bytemuck::cast_slice(&bytes[..12 * n]),
         place: bytemuck::cast_slice(&bytes[place..place + 4 * n]),
         pixel: bytemuck::cast_slice(&bytes[pixel..pixel + 2 * n]),
+        skip: (N_LEVELS - 1 - level) as u32,
     }
 }
 
-/// The same, copied out.
-pub(super) fn decode(entry: &TileEntry, bytes: &[u8]) -> Tile {
-    let TilePoints { at, first_place, place, pixel, xyz } = points(entry, bytes);
-    let (place, pixel, xyz) = (place.to_vec(), pixel.to_vec(), xyz.to_vec());
-    Tile { at, first_place, place, pixel, xyz, bounds: entry.bounds }
+/// The coarsest levels of a tile, so many as lie in its (aligned) bytes, copied out and sorted by pixel.
+pub(super) fn decode(entry: &TileEntry, n_levels: usize, bytes: &[u8]) -> Tile {
+    let blocks = blocks(&entry.n_of);
+    let levels: Vec<TilePoints<'_>> =
+        (0..n_levels).map(|l| points(entry, l, &bytes[blocks[l].clone()])).collect();
+    let n = levels.iter().map(|level| level.pixel.len()).sum();
+    let mut tile = Tile {
+        at: entry.at,
+        first_place: entry.first_place,
+        place: vec![0; n],
+        pixel: vec![0; n],
+        xyz: vec![[0.0; 3]; n],
+        bounds: entry.bounds,
+        skip: (N_LEVELS - n_levels) as u32,
+        n_all: entry.n_points,
+    };
+    // A counting sort. Points of one pixel are of one level, in the order of their places.
+    let mut next = vec![0_u32; N_PIXELS];
+    levels.iter().flat_map(|level| level.pixel).for_each(|pixel| next[usize::from(*pixel)] += 1);
+    let mut sum = 0;
+    next.iter_mut().for_each(|n| sum += std::mem::replace(n, sum));
+    for level in levels {
+        for ((pixel, place), xyz) in level.pixel.iter().zip(level.place).zip(level.xyz) {
+            let next = &mut next[usize::from(*pixel)];
+            let at = *next as usize;
+            *next += 1;
+            (tile.pixel[at], tile.place[at], tile.xyz[at]) = (*pixel, *place, *xyz);
+        }
+    }
+    tile
 }

@@ -1,7 +1,8 @@
 //! Encoded tiles in, one after the other in a file, out; and tiles of it back while it is still being written.
 
 use super::catalogue::{self, TileEntry};
-use super::encode::{Encoded, layout};
+use super::encode::Encoded;
+use super::record::N_LEVELS;
 use contract::{Error, Result};
 use export::AtomicFile;
 use std::fs::File;
@@ -54,7 +55,7 @@ impl TileFile {
 impl Early {
     /// The bytes of a tile.
     pub(super) fn read(&mut self, entry: &TileEntry) -> Result<Vec<u8>> {
-        let mut bytes = vec![0; layout(entry.n_points)[3] as usize];
+        let mut bytes = vec![0; entry.n_bytes(N_LEVELS) as usize];
         let read = self.file.seek(SeekFrom::Start(entry.offset));
         read.and_then(|_| self.file.read_exact(&mut bytes))
             .map_err(|e| Error::of_file("a tile cannot be read again", &self.path, e))?;

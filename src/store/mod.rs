@@ -16,12 +16,13 @@ mod tests;
 mod writer;
 
 use catalogue::broken;
-use contract::{Result, Scan, Tile, TileAt, TilePoints, Weigh};
+use contract::{MAX_SKIP, Result, Scan, Tile, TileAt, TilePoints, Weigh};
 use geometry::Aabb;
 use map::FileMap;
+use record::N_LEVELS;
 use std::ops::Range;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 use straight::Straight;
 
 pub use catalogue::TileEntry;
@@ -38,8 +39,8 @@ const TILES: &str = "tiles.bin";
 /// A store that is whole: tiles by place, in the order of [`TileAt`], whatever way they came in.
 pub struct Store {
     entries: Vec<TileEntry>,
-    /// Which of them were read and found whole: a tile is read for each region that sees it.
-    is_whole: Vec<AtomicBool>,
+    /// Which of their levels were read and found whole, a bit each: a tile is read for each region that sees it.
+    is_whole: Vec<AtomicU8>,
     /// Its folders.
     parts: Vec<Part>,
 }
@@ -72,7 +73,7 @@ impl Store {
             return Err(broken("the tiles are not those of the catalogue").at(path.display()));
         }
         let straight = Straight::open(&path)?;
-        let is_whole = entries.iter().map(|_| AtomicBool::new(false)).collect();
+        let is_whole = entries.iter().map(|_| AtomicU8::new(0)).collect();
         Ok(Self { entries, is_whole, parts: vec![Part { first: 0, map, straight }] })
     }
 
@@ -106,58 +107,71 @@ impl Store {
         self.entries.iter().map(|e| e.n_points).sum()
     }
 
-    /// Tile `i` of [`Store::entries`], copied out; checked where it is read for the first time.
+    /// Tile `i` of [`Store::entries`], copied out, with all of its points or less (see [`Tile::skip`]); checked where it is
+    /// read for the first time.
     ///
     /// # Panics
     /// Where there is no such entry.
-    pub fn tile(&self, i: usize) -> Result<Tile> {
-        let (part, Range { start, end }) = self.place(i);
+    pub fn tile(&self, i: usize, skip: u32) -> Result<Tile> {
+        let n_levels = n_levels(skip);
+        let (part, Range { start, end }) = self.place(i, n_levels);
         let bytes = &part.map.bytes()[start..end];
-        self.check(i, bytes)?;
-        let tile = encode::decode(&self.entries[i], bytes);
+        self.check(i, n_levels, bytes)?;
+        let tile = encode::decode(&self.entries[i], n_levels, bytes);
         part.map.has_read(end - start);
         Ok(tile)
     }
 
-    /// Does something with the points of each of these tiles, in the given order and without a copy.
-    pub fn look_at(&self, indices: &[usize], mut work: impl FnMut(&TilePoints<'_>)) -> Result<()> {
-        indices.iter().take(AHEAD).for_each(|&i| self.will_need(i));
+    /// Does something with the points of each of these tiles, with those of a tile level by level, the coarsest first; in the given
+    /// order and without a copy. Levels of less than `skip` are not read.
+    pub fn look_at(
+        &self,
+        indices: &[usize],
+        skip: u32,
+        mut work: impl FnMut(&TilePoints<'_>),
+    ) -> Result<()> {
+        let n_levels = n_levels(skip);
+        indices.iter().take(AHEAD).for_each(|&i| self.will_need(i, n_levels));
         for (k, &i) in indices.iter().enumerate() {
-            indices.get(k + AHEAD).into_iter().for_each(|&i| self.will_need(i));
-            let (part, Range { start, end }) = self.place(i);
+            indices.get(k + AHEAD).into_iter().for_each(|&i| self.will_need(i, n_levels));
+            let (part, Range { start, end }) = self.place(i, n_levels);
             let bytes = &part.map.bytes()[start..end];
-            self.check(i, bytes)?;
-            work(&encode::points(&self.entries[i], bytes));
+            self.check(i, n_levels, bytes)?;
+            let entry = &self.entries[i];
+            for (level, block) in encode::blocks(&entry.n_of).into_iter().take(n_levels).enumerate()
+            {
+                work(&encode::points(entry, level, &bytes[block]));
+            }
             part.map.has_read(end - start);
         }
         Ok(())
     }
 
-    /// Compares the bytes of a tile with its checksum, once.
-    fn check(&self, i: usize, bytes: &[u8]) -> Result<()> {
+    /// Compares the bytes of a tile's coarsest levels with their checksums, each once.
+    fn check(&self, i: usize, n_levels: usize, bytes: &[u8]) -> Result<()> {
         let (entry, is_whole) = (&self.entries[i], &self.is_whole[i]);
-        if is_whole.load(Ordering::Relaxed) {
-            return Ok(());
+        let known = is_whole.load(Ordering::Relaxed);
+        for (level, block) in encode::blocks(&entry.n_of).into_iter().take(n_levels).enumerate() {
+            if known & 1 << level == 0 && crc32c::crc32c(&bytes[block]) != entry.checksums[level] {
+                let at = entry.at;
+                return Err(broken("the tile is damaged: its checksum is not what it should be")
+                    .at(format!("store, scan {}, tile {} {}", at.scan.0, at.row, at.col)));
+            }
+            is_whole.fetch_or(1 << level, Ordering::Relaxed);
         }
-        if crc32c::crc32c(bytes) != entry.checksum {
-            let at = entry.at;
-            return Err(broken("the tile is damaged: its checksum is not what it should be")
-                .at(format!("store, scan {}, tile {} {}", at.scan.0, at.row, at.col)));
-        }
-        is_whole.store(true, Ordering::Relaxed);
         Ok(())
     }
 
-    /// Where the bytes of a tile lie.
-    fn place(&self, i: usize) -> (&Part, Range<usize>) {
+    /// Where the bytes of a tile's coarsest levels lie.
+    fn place(&self, i: usize, n_levels: usize) -> (&Part, Range<usize>) {
         let entry = &self.entries[i];
         let part = self.parts.partition_point(|part| part.first <= i);
-        let (start, n) = (entry.offset as usize, encode::layout(entry.n_points)[3] as usize);
+        let (start, n) = (entry.offset as usize, entry.n_bytes(n_levels) as usize);
         (&self.parts[part - 1], start..start + n)
     }
 
-    fn will_need(&self, i: usize) {
-        let (part, Range { start, end }) = self.place(i);
+    fn will_need(&self, i: usize, n_levels: usize) {
+        let (part, Range { start, end }) = self.place(i, n_levels);
         part.map.will_need(start, end - start);
     }
 
@@ -174,31 +188,52 @@ impl Store {
         (0..self.entries.len()).filter(|&i| self.entries[i].bounds.touches(bounds)).collect()
     }
 
-    /// All tiles in order, each read once: a source for a pass.
-    pub fn tiles(&self) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
-        (0..self.entries.len()).map(|i| {
-            let (part, Range { start, end }) = self.place(i);
-            let tile = |bytes: &[u8]| {
-                self.check(i, bytes)?;
-                Ok(encode::decode(&self.entries[i], bytes))
-            };
-            part.straight.with(start, end - start, tile)?
-        })
+    /// All tiles in order, each read once, past the system's cache: a source for a pass. `skip` says how much of each is left out
+    /// (see [`Tile::skip`]).
+    pub fn tiles<'s>(
+        &'s self,
+        skip: impl Fn(&TileEntry) -> u32 + Send + 's,
+    ) -> impl Iterator<Item = Result<Tile>> + Send + 's {
+        self.entries.iter().enumerate().map(move |(i, entry)| self.straight(i, skip(entry)))
     }
 
-    /// These tiles in the given order: a source for a pass.
+    /// These tiles, each read once, past the system's cache: a source for a pass.
+    pub fn tiles_once(
+        &self,
+        indices: Vec<usize>,
+        skip: u32,
+    ) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
+        indices.into_iter().map(move |i| self.straight(i, skip))
+    }
+
+    fn straight(&self, i: usize, skip: u32) -> Result<Tile> {
+        let n_levels = n_levels(skip);
+        let (part, Range { start, end }) = self.place(i, n_levels);
+        let tile = |bytes: &[u8]| {
+            self.check(i, n_levels, bytes)?;
+            Ok(encode::decode(&self.entries[i], n_levels, bytes))
+        };
+        part.straight.with(start, end - start, tile)?
+    }
+
+    /// These tiles in the given order, for those that are asked for again and again: a source for a pass.
     pub fn tiles_of(&self, indices: Vec<usize>) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
         let mut ahead = indices.clone().into_iter();
         for i in ahead.by_ref().take(AHEAD) {
-            self.will_need(i);
+            self.will_need(i, N_LEVELS);
         }
         indices.into_iter().map(move |i| {
             if let Some(next) = ahead.next() {
-                self.will_need(next);
+                self.will_need(next, N_LEVELS);
             }
-            self.tile(i)
+            self.tile(i, 0)
         })
     }
+}
+
+/// Levels that are read where so much is left out.
+fn n_levels(skip: u32) -> usize {
+    (MAX_SKIP - skip.min(MAX_SKIP)) as usize + 1
 }
 
 impl Weigh for TileEntry {

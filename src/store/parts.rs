@@ -3,7 +3,7 @@
 
 use super::encode::decode;
 use super::file::Early;
-use super::record::Record;
+use super::record::{N_LEVELS, Record};
 use super::sink::{Buffer, TILE_POINTS};
 use super::spill::{Segment, Spill};
 use contract::{Result, TileAt, Weigh};
@@ -85,7 +85,7 @@ impl Parts {
         let mut ahead = Vec::new();
         for entry in &written {
             let file = self.early.as_mut().expect("a tile was written to a file");
-            let tile = decode(entry, &file.read(entry)?);
+            let tile = decode(entry, N_LEVELS, &file.read(entry)?);
             ahead.extend((0..tile.len()).map(|i| {
                 let place = tile.first_place + u64::from(tile.place[i]);
                 Record::new(tile.xyz[i], place, tile.pixel[i])

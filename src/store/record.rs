@@ -1,6 +1,7 @@
 //! A point on its way into a tile: what the spill file holds, 20 bytes a point.
 
 use bytemuck::{Pod, Zeroable};
+use contract::{MAX_SKIP, TILE_SIDE};
 
 /// Coordinates, place in the mask (48 bits) and pixel within the tile.
 #[repr(C)]
@@ -31,60 +32,112 @@ impl Record {
     }
 }
 
-/// Where each record of a tile goes when they are sorted by pixel: a counting sort, which keeps the order that they
-/// have already (that of places).
+/// Levels of a tile, coarsest first: the points of a level and of all before it are those of the first pixel with points of
+/// each square of 2^(number of levels after it) by as many pixels.
+pub(super) const N_LEVELS: usize = MAX_SKIP as usize + 1;
+/// Pixels of a tile.
+pub(super) const N_PIXELS: usize = (TILE_SIDE * TILE_SIDE) as usize;
+
+/// Where each record of a tile goes: into the block of its level, sorted by pixel in a counting sort, which keeps the order
+/// that they have already (that of places).
 pub(super) struct PixelOrder {
+    /// By pixel: its level, and the place there of its next record.
+    level: Vec<u8>,
     next: Vec<u32>,
+    /// By step above single pixels and by square: whether a pixel with points was met in it.
+    taken: [Vec<bool>; MAX_SKIP as usize],
 }
 
 impl Default for PixelOrder {
     fn default() -> Self {
-        Self { next: vec![0; 1 << 16] }
+        let squares = |step: usize| vec![false; N_PIXELS >> (2 * (step + 1))];
+        let taken = std::array::from_fn(squares);
+        Self { level: vec![0; N_PIXELS], next: vec![0; N_PIXELS], taken }
     }
 }
 
 impl PixelOrder {
-    /// Counts the records of one tile.
-    pub(super) fn begin(&mut self, records: &[Record]) {
+    /// Counts the records of one tile; how many of them each level has.
+    pub(super) fn begin(&mut self, records: &[Record]) -> [u32; N_LEVELS] {
         self.next.fill(0);
+        self.taken.iter_mut().for_each(|taken| taken.fill(false));
         for r in records {
             self.next[usize::from(r.pixel)] += 1;
         }
-        let mut sum = 0;
-        for n in &mut self.next {
-            sum += std::mem::replace(n, sum);
+        let mut n_of = [0; N_LEVELS];
+        for pixel in 0..N_PIXELS {
+            let n = self.next[pixel];
+            if n == 0 {
+                continue;
+            }
+            let level = MAX_SKIP as usize - self.n_first(pixel);
+            self.level[pixel] = level as u8;
+            self.next[pixel] = n_of[level];
+            n_of[level] += n;
         }
+        n_of
     }
 
-    /// The place of the next record; to be asked once for each, in their order.
+    /// Of how many squares of growing size, from 2 x 2 pixels on, a pixel is the first that has points.
+    fn n_first(&mut self, pixel: usize) -> usize {
+        let side = TILE_SIDE as usize;
+        let (row, col) = (pixel / side, pixel % side);
+        let is_first = |(step, taken): (usize, &mut Vec<bool>)| {
+            let step = step + 1;
+            let square = (row >> step) * (side >> step) + (col >> step);
+            !std::mem::replace(&mut taken[square], true)
+        };
+        // A square that was met lies in larger ones that were.
+        self.taken.iter_mut().enumerate().map(is_first).take_while(|first| *first).count()
+    }
+
+    /// Level and place there of the next record; to be asked once for each, in their order.
     #[inline]
-    pub(super) fn next(&mut self, record: &Record) -> usize {
-        let at = &mut self.next[usize::from(record.pixel)];
+    pub(super) fn next(&mut self, record: &Record) -> (usize, usize) {
+        let pixel = usize::from(record.pixel);
+        let at = &mut self.next[pixel];
         *at += 1;
-        *at as usize - 1
+        (usize::from(self.level[pixel]), *at as usize - 1)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::{BTreeMap, BTreeSet};
+
+    /// The level of each of some pixels, by asking each square for its first one.
+    fn levels(pixels: &BTreeSet<u16>) -> BTreeMap<u16, usize> {
+        let square = |pixel: u16, step: u32| ((pixel >> 8) >> step, (pixel & 255) >> step);
+        let is_first = |pixel: u16, step: u32| {
+            pixels.iter().find(|p| square(**p, step) == square(pixel, step)) == Some(&pixel)
+        };
+        let n_first = |pixel: u16| (1..=MAX_SKIP).filter(|step| is_first(pixel, *step)).count();
+        pixels.iter().map(|&pixel| (pixel, MAX_SKIP as usize - n_first(pixel))).collect()
+    }
 
     #[test]
-    fn counting_sort_equals_a_sort_by_key() {
+    fn records_are_sorted_by_level_pixel_and_place() {
+        let random = |i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 20;
         let records: Vec<Record> = (0..5000_u64)
             .map(|i| {
-                let x = i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 20;
-                Record::new([x as f32, 0.0, 1.0], i << 21, (x % 700) as u16)
+                let (x, row, col) = (random(i), random(i + 7777) % 40, random(i + 99_999) % 50);
+                Record::new([x as f32, 0.0, 1.0], i << 21, (row * 256 + col) as u16)
             })
             .collect();
+        let level = levels(&records.iter().map(|r| r.pixel).collect());
         let mut expected = records.clone();
-        expected.sort_by_key(|r| (r.pixel, r.place()));
+        expected.sort_by_key(|r| (level[&r.pixel], r.pixel, r.place()));
+        let n_of: [u32; N_LEVELS] =
+            std::array::from_fn(|l| records.iter().filter(|r| level[&r.pixel] == l).count() as u32);
         let mut order = PixelOrder::default();
         for _ in 0..2 {
+            assert_eq!(order.begin(&records), n_of);
+            let start = |level: usize| n_of[..level].iter().sum::<u32>() as usize;
             let mut sorted = vec![Record::zeroed(); records.len()];
-            order.begin(&records);
             for r in &records {
-                sorted[order.next(r)] = *r;
+                let (level, at) = order.next(r);
+                sorted[start(level) + at] = *r;
             }
             assert!(sorted == expected);
         }

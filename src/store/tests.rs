@@ -78,7 +78,7 @@ fn build(dir: &Path, strips: Vec<Strip>, budget_bytes: usize, n_workers: usize) 
 
 /// All tiles; where they lie in the file is nobody's business.
 fn tiles(store: &Store) -> Vec<Tile> {
-    store.tiles().map(|tile| tile.expect("whole")).collect()
+    store.tiles(|_| 0).map(|tile| tile.expect("whole")).collect()
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn every_point_is_in_its_tile_with_its_place() {
     let scans = scans();
     let wholes = [0, 1, 2].map(|s| strip(s, 0, SCAN_POINTS));
     let mut seen = [0; 3];
-    for (i, tile) in store.tiles().enumerate() {
+    for (i, tile) in store.tiles(|_| 0).enumerate() {
         let tile = tile.expect("whole");
         let entry = store.entries()[i];
         assert_eq!((entry.at, entry.n_points), (tile.at, tile.len() as u64));
@@ -140,11 +140,35 @@ fn every_point_is_in_its_tile_with_its_place() {
 }
 
 #[test]
+fn of_a_part_of_a_tile_each_square_has_one_pixel() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (store, _) = build(dir.path(), strips(4096), 500_000, 2);
+    for skip in 0..=MAX_SKIP {
+        for (i, from_all) in store.tiles(|_| skip).enumerate() {
+            let whole = store.tile(i, 0).expect("whole");
+            let expected = whole.thinned(skip);
+            assert!(from_all.expect("whole") == expected);
+            assert!(store.tile(i, skip).expect("whole") == expected);
+            let mut places = Vec::new();
+            let look = |level: &TilePoints<'_>| {
+                assert!(level.skip >= skip && level.pixel.is_sorted());
+                places.extend_from_slice(level.place);
+            };
+            store.look_at(&[i], skip, look).expect("whole");
+            places.sort_unstable();
+            let mut known = expected.place;
+            known.sort_unstable();
+            assert_eq!(places, known);
+        }
+    }
+}
+
+#[test]
 fn ground_squares_of_a_scan_without_lattice() {
     let dir = tempfile::tempdir().expect("a folder");
     let (store, _) = build(dir.path(), vec![strip(2, 0, 5000)], usize::MAX, 1);
     let offset = i64::from(TILE_SIDE) * Tile::GROUND_OFFSET;
-    for tile in store.tiles() {
+    for tile in store.tiles(|_| 0) {
         let tile = tile.expect("whole");
         for k in 0..tile.len() {
             let at = tile.pixel_at(k);
@@ -194,15 +218,20 @@ fn a_crowded_tile_comes_in_parts() {
 fn damage_is_named() {
     let dir = tempfile::tempdir().expect("a folder");
     let (store, _) = build(dir.path(), strips(9000), usize::MAX, 1);
+    let entry = store.entries()[0];
+    let finest = (0..N_LEVELS).rfind(|&level| entry.n_of[level] > 0).expect("points");
+    let fine = entry.offset + encode::blocks(&entry.n_of)[finest].start as u64;
     drop(store);
     let tiles = dir.path().join(TILES);
     let mut file = std::fs::OpenOptions::new().write(true).open(&tiles).expect("a file");
-    file.seek(SeekFrom::Start(1000)).and_then(|_| file.write_all(&[0xab])).expect("writes");
+    file.seek(SeekFrom::Start(fine)).and_then(|_| file.write_all(&[0xab])).expect("writes");
     let store = Store::open(dir.path(), 0, 1 << 20).expect("opens");
-    let error = store.tile(0).expect_err("damaged");
+    let error = store.tile(0, 0).expect_err("damaged");
     assert_eq!(error.kind(), Kind::BadInput);
     assert!(error.to_string().starts_with("store, scan 0, tile"), "{error}");
-    assert!(store.tile(1).is_ok());
+    // Who reads no more than the part that is whole does not mind.
+    let coarse = (N_LEVELS - finest) as u32;
+    assert!(finest > 0 && store.tile(0, coarse).is_ok() && store.tile(1, 0).is_ok());
     drop(store);
     file.set_len(5000).expect("cuts");
     assert!(Store::open(dir.path(), 0, 1 << 20).is_err());

@@ -2,9 +2,12 @@
 
 use crate::{Pixel, ScanId, Weigh};
 use geometry::Aabb;
+use std::collections::BTreeMap;
 
 /// Pixels along each side of a tile.
 pub const TILE_SIDE: u32 = 256;
+/// Most that can be left out of a tile: of each 8 × 8 pixels one stays.
+pub const MAX_SKIP: u32 = 3;
 
 /// Which rectangle of which scan. For a scan without lattice: which square of the ground, 256 × 256 cells of 0.05 m
 /// about the scan's origin, row from y, column from x, both offset by 2²⁰ tiles so that they stay positive.
@@ -18,7 +21,7 @@ pub struct TileAt {
     pub col: u32,
 }
 
-/// All points of one tile, sorted by pixel, then by place in the mask.
+/// Points of one tile, sorted by pixel, then by place in the mask: all of them, or of each square of pixels those of one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tile {
     /// Where it lies.
@@ -31,11 +34,16 @@ pub struct Tile {
     pub pixel: Vec<u16>,
     /// Scan frame, metres.
     pub xyz: Vec<[f32; 3]>,
-    /// Bounds of the points in the world, metres.
+    /// Bounds of all of its points in the world, metres.
     pub bounds: Aabb,
+    /// Of each square of 2^`skip` by 2^`skip` pixels only the points of the first pixel that has some are here …
+    pub skip: u32,
+    /// … of so many that the tile has.
+    pub n_all: u64,
 }
 
-/// The points of a [`Tile`] where they lie, not copied.
+/// Points of a tile where they lie, not copied: those of pixels that are the first ones with points in their squares of
+/// 2^`skip` by 2^`skip` pixels, and not in larger ones (of 2^[`MAX_SKIP`] at most).
 #[derive(Debug, Clone, Copy)]
 pub struct TilePoints<'a> {
     /// As in [`Tile`].
@@ -48,6 +56,8 @@ pub struct TilePoints<'a> {
     pub pixel: &'a [u16],
     /// As in [`Tile`].
     pub xyz: &'a [[f32; 3]],
+    /// See above.
+    pub skip: u32,
 }
 
 impl Tile {
@@ -68,6 +78,25 @@ impl Tile {
         self.xyz.is_empty()
     }
 
+    /// The same of which more is left out.
+    #[must_use]
+    pub fn thinned(&self, skip: u32) -> Self {
+        let square = |pixel: u16| ((pixel >> 8) >> skip, (pixel & 255) >> skip);
+        let mut first = BTreeMap::new();
+        for &pixel in &self.pixel {
+            first.entry(square(pixel)).or_insert(pixel);
+        }
+        let stays = |i: &usize| first[&square(self.pixel[*i])] == self.pixel[*i];
+        let stays: Vec<usize> = (0..self.len()).filter(stays).collect();
+        Self {
+            place: stays.iter().map(|&i| self.place[i]).collect(),
+            pixel: stays.iter().map(|&i| self.pixel[i]).collect(),
+            xyz: stays.iter().map(|&i| self.xyz[i]).collect(),
+            skip: self.skip.max(skip),
+            ..*self
+        }
+    }
+
     /// Pixel of the whole lattice of point `i`.
     #[must_use]
     pub fn pixel_at(&self, i: usize) -> Pixel {
@@ -85,6 +114,6 @@ impl Weigh for Tile {
     }
 
     fn n_points(&self) -> u64 {
-        self.len() as u64
+        self.n_all
     }
 }

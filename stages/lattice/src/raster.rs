@@ -7,10 +7,6 @@ use contract::{Lattice, TILE_SIDE, Tile};
 
 /// Most that is skipped of a dense tile: every fourth row and column is read, a sixteenth of the pixels.
 const MAX_SKIP: u32 = 2;
-/// Points whose range tells how dense a tile is.
-const PROBES: usize = 64;
-/// Share of the probes that must be dense enough.
-const DENSE_SHARE: f64 = 0.8;
 /// A pixel without a return.
 pub(crate) const NONE: u32 = u32::MAX;
 
@@ -94,19 +90,12 @@ impl Raster {
         (row >> self.skip) * self.side + (col >> self.skip)
     }
 
-    /// How much of a tile may be skipped: as much as leaves its points no farther from each other than `spacing`. A scan ten
-    /// times as dense tells no more of floors and clusters, but takes ten times as long.
-    pub(crate) fn dense(tile: &Tile, lattice: &Lattice, spacing: f64) -> u32 {
-        let step = (tile.len() / PROBES).max(1);
-        let range = |p: &[f32; 3]| (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
-        let mut ranges: Vec<f32> = tile.xyz.iter().step_by(step).map(range).collect();
-        if ranges.len() < PROBES / 2 {
-            return 0;
-        }
-        let at = ((ranges.len() - 1) as f64 * DENSE_SHARE) as usize;
-        let range = f64::from(*ranges.select_nth_unstable_by(at, f32::total_cmp).1);
-        let across = range * lattice.row_step.max(lattice.col_step);
-        (0..=MAX_SKIP).rfind(|&skip| across * f64::from(1 << skip) <= spacing).unwrap_or(0)
+    /// How much of a tile may be skipped whose points are no farther than `range`: as much as leaves them no farther from each
+    /// other than `spacing`, metres. A scan ten times as dense tells no more of floors and clusters, but takes ten times as long.
+    pub(crate) fn skip(range: f32, lattice: &Lattice, spacing: f64) -> u32 {
+        let across = f64::from(range) * lattice.row_step.max(lattice.col_step);
+        let is_dense = |skip: &u32| across > 0.0 && across * f64::from(1 << skip) <= spacing;
+        (0..=MAX_SKIP).rfind(is_dense).unwrap_or(0)
     }
 
     /// Finds the veils and empties their pixels.

@@ -7,7 +7,7 @@ use crate::patch::{WorldRows, patches, world_rows};
 use crate::raster::{NONE, Raster};
 use crate::regions::Regions;
 use crate::voxels::{self, Surface};
-use contract::{Error, Kind, Map, Occupancy, Result, Scan, Tile, TileSummary};
+use contract::{Error, Kind, Map, Occupancy, Result, Scan, ScanId, Tile, TileSummary};
 
 /// Makes the summary of each tile.
 #[derive(Debug, Clone)]
@@ -24,6 +24,15 @@ impl Summarise {
         let mut scans = scans.to_vec();
         scans.sort_by_key(|scan| scan.id);
         Self { scans, settings: *settings, with_planes: true }
+    }
+
+    /// How much of a tile of a scan may be left out (see [`Tile::skip`]) whose points are mostly no farther than `range` from the
+    /// scanner, metres; nothing where that is not known (0).
+    #[must_use]
+    pub fn skip(&self, scan: ScanId, range: f32) -> u32 {
+        let at = self.scans.binary_search_by_key(&scan, |scan| scan.id);
+        let lattice = at.ok().and_then(|at| self.scans[at].lattice);
+        lattice.map_or(0, |lattice| Raster::skip(range, &lattice, self.settings.spacing))
     }
 
     /// The same without patches, which are most of the work: for where the planes are known.
@@ -58,7 +67,7 @@ impl Map for Summarise {
         let scan = &self.scans[at];
         let settings = &self.settings;
         let rows = world_rows(&scan.world_from_scan);
-        let n_points = tile.len() as u64;
+        let n_points = tile.n_all;
         let Some(lattice) = &scan.lattice else {
             let patches = self
                 .with_planes
@@ -67,8 +76,7 @@ impl Map for Summarise {
             let occupancy = scratch.counter.count(&tile.xyz, &rows, settings.voxel);
             return Ok(TileSummary { n_points, n_veils: 0, patches, occupancy });
         };
-        let skip = Raster::dense(&tile, lattice, settings.spacing);
-        scratch.raster.fill(&tile, lattice, skip, settings);
+        scratch.raster.fill(&tile, lattice, tile.skip, settings);
         let mut found = Vec::new();
         if self.with_planes {
             scratch.normals.fill(&scratch.raster, settings);

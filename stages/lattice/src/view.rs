@@ -1,7 +1,7 @@
 //! Tiles of one scan in; out comes the scan's view of a region: depth images towards it, and its points inside.
 
 use contract::{
-    Lattice, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, TilePoints, View, ViewPoint,
+    Lattice, MAX_SKIP, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, TilePoints, View, ViewPoint,
 };
 use geometry::depth::{Empty, LANES, Rows, lanes, rows, transform, transform_lanes};
 use geometry::{DepthImage, Faces, Point, Pose, Vector};
@@ -42,41 +42,10 @@ pub struct ViewBuilder {
     /// Cones from the scanner that together hold the region; none without scanner.
     cones: Option<Vec<Cone>>,
     empty_window: i32,
-    /// Of dense scans, one of each square of pixels is enough to fill the cells of the images, and one of larger squares
-    /// as a point.
-    splatted: Squares,
-    kept: Option<Squares>,
-}
-
-/// Squares of 2^skip by 2^skip pixels of a tile, of which each gives one point.
-#[derive(Debug, Default)]
-struct Squares {
+    /// Of dense scans, one of each square of so many pixels (see [`Tile::skip`]) is enough to fill the cells of the images, and one
+    /// of larger squares as a point.
     skip: u32,
-    taken: Vec<bool>,
-}
-
-impl Squares {
-    fn new(skip: u32) -> Self {
-        Self { skip, taken: Vec::new() }
-    }
-
-    /// Forgets the tile before.
-    fn clear(&mut self) {
-        let side = if self.skip > 0 { TILE_SIDE >> self.skip } else { 0 };
-        self.taken.clear();
-        self.taken.resize((side * side) as usize, false);
-    }
-
-    /// Whether a pixel's point is the first of its square.
-    #[inline]
-    fn take(&mut self, pixel: u16) -> bool {
-        if self.skip == 0 {
-            return true;
-        }
-        let (row, col) = (u32::from(pixel) / TILE_SIDE, u32::from(pixel) % TILE_SIDE);
-        let square = (row >> self.skip) * (TILE_SIDE >> self.skip) + (col >> self.skip);
-        !std::mem::replace(&mut self.taken[square as usize], true)
-    }
+    kept: Option<u32>,
 }
 
 impl ViewBuilder {
@@ -112,8 +81,8 @@ impl ViewBuilder {
             bounds: region.bounds,
             cones,
             empty_window: settings.empty_window,
-            splatted: Squares::new(skip),
-            kept: thin.map(|thin| Squares::new(skip.max(thin).min(MAX_SKIP))),
+            skip,
+            kept: thin.map(|thin| skip.max(thin).min(MAX_SKIP)),
         }
     }
 
@@ -153,10 +122,14 @@ impl ViewBuilder {
             && y + side >= self.bounds.min[1]
     }
 
-    /// Adds the points of a tile; of a dense scan, one of each square of pixels.
+    /// How much of each tile may be left out.
+    #[must_use]
+    pub fn skip(&self) -> u32 {
+        self.skip
+    }
+
+    /// Adds points of a tile, as the store has them by level.
     pub fn add(&mut self, tile: &TilePoints<'_>) {
-        self.splatted.clear();
-        self.kept.iter_mut().for_each(Squares::clear);
         let local_from_scan = rows(&self.local_from_scan);
         let cameras: Vec<_> = self
             .view
@@ -164,27 +137,18 @@ impl ViewBuilder {
             .iter()
             .map(|image| rows(&(image.camera_from_local() * self.local_from_scan)))
             .collect();
-        let (mut some, mut n) = ([[0.0; 3]; LANES], 0);
-        for (i, p) in tile.xyz.iter().enumerate() {
-            if self.splatted.take(tile.pixel[i]) {
-                some[n] = *p;
-                n += 1;
-                if n == LANES {
-                    self.splat(&some, (&local_from_scan, &cameras));
-                    n = 0;
-                }
-            }
-            if !self.kept.as_mut().is_some_and(|kept| kept.take(tile.pixel[i])) {
-                continue;
-            }
+        for some in tile.xyz.chunks(LANES) {
+            self.splat(some, (&local_from_scan, &cameras));
+        }
+        if self.kept.is_none_or(|kept| tile.skip < kept) {
+            return;
+        }
+        for (p, place) in tile.xyz.iter().zip(tile.place) {
             let local = transform(&local_from_scan, *p);
             if self.bounds.contains(local.map(f64::from)) {
-                let place = tile.first_place + u64::from(tile.place[i]);
+                let place = tile.first_place + u64::from(*place);
                 self.view.points.push(ViewPoint { xyz: local, place });
             }
-        }
-        if n > 0 {
-            self.splat(&some[..n], (&local_from_scan, &cameras));
         }
     }
 
@@ -272,8 +236,6 @@ fn focal(scanner: &Point, region: &Region, beam_step: f64, settings: &ViewSettin
 
 /// Fewest beams across a cell that leave no holes in the image of a regular scan.
 const LEAST_BEAMS: f64 = 1.3;
-/// Most that is skipped: every eighth row and column is read.
-const MAX_SKIP: u32 = 3;
 
 /// How much of a scan may be skipped where its beams are far denser than cells.
 fn lattice_skip(scan: &Scan, focal: f64) -> u32 {

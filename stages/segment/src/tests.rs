@@ -186,7 +186,19 @@ fn shoot(bricks: &[Brick], scan: &Scan) -> Vec<Shot> {
             let (tile, truths) = tiles.entry((tr, tc)).or_insert_with(|| {
                 let at = TileAt { scan: ScanId(0), row: tr, col: tc };
                 let (place, pixel, xyz) = (Vec::new(), Vec::new(), Vec::new());
-                (Tile { at, first_place: 0, place, pixel, xyz, bounds: Aabb::EMPTY }, Vec::new())
+                (
+                    Tile {
+                        at,
+                        first_place: 0,
+                        place,
+                        pixel,
+                        xyz,
+                        bounds: Aabb::EMPTY,
+                        skip: 0,
+                        n_all: 0,
+                    },
+                    Vec::new(),
+                )
             });
             let world = scan.world_from_scan * Point::from(p.map(f64::from));
             tile.bounds.add([world.x, world.y, world.z]);
@@ -352,6 +364,8 @@ fn points_of_a_real_robot_go_to_their_links() {
         pixel: Vec::new(),
         xyz: Vec::new(),
         bounds: Aabb::EMPTY,
+        skip: 0,
+        n_all: 0,
     };
     for (link, pose) in poses.iter().enumerate() {
         for (p, n) in

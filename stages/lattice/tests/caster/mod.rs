@@ -143,6 +143,8 @@ impl Scene {
                 pixel: Vec::new(),
                 xyz: Vec::new(),
                 bounds: Aabb::EMPTY,
+                skip: 0,
+                n_all: 0,
             },
             shape: Vec::new(),
             veil: Vec::new(),
@@ -189,6 +191,7 @@ impl Scene {
             range += sigma * random.normal();
             let p = direction(i0 + i, j0 + j, 0.0, 0.0) * range;
             out.tile.place.push(out.tile.place.len() as u32);
+            out.tile.n_all += 1;
             out.tile.pixel.push(((i - 1) * 256 + (j - 1)) as u16);
             out.tile.xyz.push([p.x as f32, p.y as f32, p.z as f32]);
             let w = scan.world_from_scan * Point::from(p);
