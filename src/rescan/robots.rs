@@ -23,8 +23,8 @@ const GONE: f64 = 0.6;
 /// A base farther from the old one is another robot's, metres.
 const SAME_PLACE: f64 = 0.5;
 
-/// A link that turns by more against its base than this, radians, is none of its foot; and one whose corners are no farther from
-/// where they were than this, metres, stays: two sessions are registered to within millimetres.
+/// A link that turns by more against its base than this, radians, is none of its foot; one that turns by no more in the world, and
+/// whose corners are no farther from where they were than this, metres, stays: two sessions are registered to within millimetres.
 const FOOT_TURNS: f64 = 0.001_75;
 const STAYS: f64 = 0.005;
 
@@ -164,7 +164,9 @@ fn is_foot_alone([then, now]: [&(Pose, Vec<Pose>); 2], bounds: &[Aabb]) -> bool 
     let turns = |l: &usize| own(then, *l).angle_to(&own(now, *l)) > FOOT_TURNS;
     let stays = |l: usize| {
         let shift = |c: [f64; 3]| (then.1[l] * Point::from(c) - now.1[l] * Point::from(c)).norm();
-        bounds[l].corners().into_iter().all(|corner| shift(corner) <= STAYS)
+        // A small link, of a wrist, can turn far while its corners hardly move.
+        then.1[l].rotation.angle_to(&now.1[l].rotation) <= FOOT_TURNS
+            && bounds[l].corners().into_iter().all(|corner| shift(corner) <= STAYS)
     };
     let with_shape = (0..bounds.len()).filter(|l| !bounds[*l].is_empty());
     let (moved, foot): (Vec<usize>, Vec<usize>) = with_shape.partition(turns);
@@ -277,5 +279,8 @@ mod tests {
         // The arm has moved, with its foot or alone; or nothing turns.
         assert!(!is_alone(-0.061, 0.075) && !is_alone(0.0, 0.062) && !is_alone(-0.061, 0.0));
         assert!(!is_alone(0.0, 0.0));
+        // A flange that turns by 3° moves its corners by 2 mm, and has moved.
+        let flange = Aabb { min: [-0.03, -0.03, 0.0], max: [0.03, 0.03, 0.02] };
+        assert!(!is_foot_alone([&stood(0.3, 0.5), &stood(0.3, 0.552)], &[foot, flange]));
     }
 }

@@ -179,7 +179,7 @@ impl Written<'_, '_> {
         let touched: Vec<&Aabb> = touched.collect();
         let mut tiles: BTreeMap<PathBuf, Spool> =
             open.into_iter().map(|tile| (tile.path().to_path_buf(), tile)).collect();
-        for name in self.base.tiles(&touched).into_iter().chain([robots.clone()]) {
+        for name in self.base.tiles(&touched).into_iter().chain([robots]) {
             let path = next.join(&name);
             if !tiles.contains_key(&path) {
                 tiles.insert(path.clone(), Spool::create(path, &las)?);
