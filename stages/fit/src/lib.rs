@@ -15,6 +15,7 @@ mod calibrate;
 mod choose;
 mod face;
 mod facets;
+mod foot;
 mod judge;
 mod mount;
 mod noise;

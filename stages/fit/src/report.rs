@@ -55,7 +55,8 @@ pub(crate) fn report(
         })
         .collect();
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut open, mut spread) = open_joints(best, &rivals);
+    let own = refine.with_foot(h, best.covariance.clone(), near, fan);
+    let (mut open, mut spread) = open_joints(&own, h, &rivals);
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
     for s in spins {
         // Any value of the run, each as likely.
@@ -66,7 +67,7 @@ pub(crate) fn report(
         let own = h.posture[s.joint];
         spread[s.joint] = s.values.iter().map(|v| angle(v - own)).fold(spread[s.joint], f64::max);
     }
-    let mut covariance = in_world_axes(&best.covariance, &h.local_from_base);
+    let mut covariance = in_world_axes(&own, &h.local_from_base);
     for (j, sway) in sway(refine, h, &several, near, fan).into_iter().enumerate() {
         covariance[(6 + j, 6 + j)] += sway * sway;
     }
@@ -110,7 +111,7 @@ pub(crate) fn report(
         explained: judgement.explained,
         rms: rms(best),
         surface_sigma: best.patch_sigma,
-        tip_sigma: tip_sigma(model, h, &best.covariance),
+        tip_sigma: tip_sigma(model, h, &own),
         scans: scans(refine, best),
         links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
         runner_up: others.map(|rival| runner_up(model, judgement, rival)).next(),
@@ -157,11 +158,14 @@ fn scans(refine: &Refine<'_>, best: &Adjusted) -> Vec<ScanShift> {
 /// For each joint, whether the points leave it open: by its standard deviation, or because a posture that differs in
 /// this joint and few others explains the points as well (a flange with six bolts, a wrist seen from nowhere); and how
 /// far away the farthest such value is, radians.
-fn open_joints(best: &Adjusted, rivals: &[(f64, &Polished)]) -> (Vec<bool>, Vec<f64>) {
-    let h = &best.hypothesis;
+fn open_joints(
+    covariance: &DMatrix<f64>,
+    h: &Hypothesis,
+    rivals: &[(f64, &Polished)],
+) -> (Vec<bool>, Vec<f64>) {
     let n = h.posture.len();
     let mut open: Vec<bool> =
-        (0..n).map(|j| best.covariance[(6 + j, 6 + j)] >= OPEN_SIGMA.powi(2)).collect();
+        (0..n).map(|j| covariance[(6 + j, 6 + j)] >= OPEN_SIGMA.powi(2)).collect();
     let mut spread = vec![0.0_f64; n];
     for (_, (other, _)) in rivals.iter().filter(|(margin, _)| *margin < EQUAL) {
         let apart: Vec<bool> = (0..n).map(|j| turn(h, other, j) > OTHER).collect();

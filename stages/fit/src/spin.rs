@@ -26,7 +26,7 @@ pub(crate) struct Spin {
 
 /// How far the run of values around `own` reaches, up or down, whose costs are within the limit; it may begin a little
 /// beside `own`, to which all points drew it, not those of the sweep alone.
-fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
+pub(crate) fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
     let mut offsets: Vec<(f64, f64)> = costs.iter().map(|c| (c.0 - own, c.1)).collect();
     offsets.sort_by(|a, b| a.0.total_cmp(&b.0));
     let is_beside = |c: &&(f64, f64)| c.1 > limit && c.0.abs() <= APART;

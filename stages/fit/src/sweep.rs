@@ -13,7 +13,7 @@ const STEP: f64 = 0.003;
 /// Largest step, radians: 1°.
 const MAX_STEP: f64 = 0.0175;
 /// Points farther than this from everything count as if they were so far, metres.
-const CAP: f32 = 0.015;
+pub(crate) const CAP: f32 = 0.015;
 /// Points in front of the flange's face count as if they were no farther, metres: something may hang there.
 const HELD: f32 = 0.5 * CAP;
 /// Points within this of the swept links take part, metres.

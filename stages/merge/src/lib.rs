@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod attach;
+mod closed;
 mod graph;
 mod hang;
 mod parted;

@@ -53,6 +53,8 @@ struct Count {
     n_unseen: u32,
     /// That the points stand for, across their beams, m².
     area: f64,
+    /// Points, and the same, of the scan that has most of them there.
+    most: (u32, f64),
 }
 
 impl Count {
@@ -62,10 +64,13 @@ impl Count {
         self.n_pierced += other.n_pierced;
         self.n_unseen += other.n_unseen;
         self.area += other.area;
+        if self.most < other.most {
+            self.most = other.most;
+        }
     }
 }
 
-/// Points that are still to be counted by voxel: neighbours in a scan mostly are in the same one, and cost no search for it.
+/// Points of one scan that are still to be counted by voxel: neighbours in a scan mostly are in the same one, and cost no search for it.
 #[derive(Debug, Default)]
 pub struct Tallying {
     runs: Vec<(Cell, Count)>,
@@ -83,6 +88,7 @@ impl Tallying {
             n_pierced: u32::from(seen == Seen::Nothing { is_pierced: true }),
             n_unseen: u32::from(seen == Seen::Not),
             area,
+            most: (0, 0.0),
         };
         match self.runs.last_mut() {
             Some((last, count)) if *last == cell => count.join(&point),
@@ -108,7 +114,7 @@ impl Tallying {
         let cells = same.map(|runs| {
             let mut all = runs[0].1;
             runs[1..].iter().for_each(|run| all.join(&run.1));
-            (runs[0].0, all)
+            (runs[0].0, Count { most: (all.n_points, all.area), ..all })
         });
         Tally { cells: cells.collect(), robots: self.robots.into_iter().collect() }
     }
@@ -130,6 +136,12 @@ impl Tally {
     #[must_use]
     pub fn middles(cells: &[Cell]) -> Vec<[f64; 3]> {
         cells.iter().map(|c| c.map(|i| (f64::from(i) + 0.5) * EDGE)).collect()
+    }
+
+    /// All voxels with points.
+    #[cfg(test)]
+    pub(crate) fn cells(&self) -> impl Iterator<Item = &Cell> {
+        self.cells.keys()
     }
 
     /// Middles of the voxels in which something stands.
@@ -191,6 +203,12 @@ impl Tally {
     /// Share of the faces of some voxels that their points stand for.
     pub(crate) fn cover(&self, cells: &[Cell]) -> f64 {
         let area: f64 = cells.iter().map(|c| self.cells[c].area).sum();
+        area / (cells.len() as f64 * Self::FACE)
+    }
+
+    /// The same of the points of one scan, in each voxel of that which has most of them there.
+    pub(crate) fn cover_by_one(&self, cells: &[Cell]) -> f64 {
+        let area: f64 = cells.iter().map(|c| self.cells[c].most.1).sum();
         area / (cells.len() as f64 * Self::FACE)
     }
 

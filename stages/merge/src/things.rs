@@ -7,20 +7,7 @@ use contract::Fan;
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Share of a voxel's face that its points stand for, over all voxels of a change. Solid things make 0.6 and more even where
-/// they are seen askew; veils at edges 0.1, and a mesh of 4 mm wires 50 mm apart, which other beams go through, 0.16 and as
-/// much as 0.32 where beams are as wide as its wires.
-const MIN_COVER: f64 = 0.4;
-/// The same of what no beams of its own session go through, seen from askew from nearby: 0.37 of a pallet's top and sides.
-const MIN_CLOSED: f64 = 0.25;
-/// Share of the points of a change at whose places other beams of their own session may have gone on: past an edge, but
-/// not between wires, of which enough scans together cover a fence.
-const MAX_PIERCED: f64 = 0.3;
-/// The same of what is as thin as a fence, where scans from afar may cover it all, and of what is closed.
-const MAX_PIERCED_SHEET: f64 = 0.05;
-/// Largest thickness of such a sheet, voxels.
-const SHEET: i32 = 2;
-/// The same of voxels with fewer points: rows of beams that only graze a thing lie that far apart.
+/// Voxels with few points that are so many steps apart are of one thing: rows of beams that only graze it lie that far apart.
 const THIN_REACH: i32 = 3;
 /// A thing of which at least this share changed is looked at whole.
 const WHOLE: f64 = 0.2;
@@ -184,18 +171,6 @@ impl Tally {
             && self.n_points(cells) >= u64::from(settings.min_points)
             && size >= settings.min_size
             && self.is_closed(cells)
-    }
-
-    /// Whether some voxels are of something that beams do not go through.
-    fn is_closed(&self, cells: &[Cell]) -> bool {
-        let (cover, pierced) = (self.cover(cells), self.pierced(cells));
-        let is_tight = pierced <= MAX_PIERCED_SHEET;
-        let may_be_mesh = bounds(cells).size().iter().any(|s| *s < (f64::from(SHEET) + 0.5) * EDGE);
-        match cover {
-            MIN_COVER.. => pierced <= MAX_PIERCED && (is_tight || !may_be_mesh),
-            MIN_CLOSED.. => is_tight && !may_be_mesh,
-            _ => false,
-        }
     }
 
     /// One of two that stand side by side: what is about it is the other.
