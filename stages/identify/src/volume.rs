@@ -2,6 +2,7 @@
 //! and all base poses of a search instead of once for each sample.
 
 use contract::{Fan, Region, View};
+use geometry::depth::{LANES, Look, lanes};
 use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
 use geometry::{Aabb, Evidence, Eye, Pose, Probe, Vector};
 use std::sync::OnceLock;
@@ -247,19 +248,23 @@ impl Volume {
         let edge = EDGE.max((content / MAX_CELLS).cbrt() as f32);
         let n = size.map(|s| (s / f64::from(edge)).ceil().max(1.0) as usize);
         let min = region.bounds.min.map(|v| v as f32);
-        let layer = |k: usize| -> Vec<Cell> {
-            let place = |at: usize| {
-                let middle = |i: usize, of: usize| min[i] + (of as f32 + 0.5) * edge;
-                let p = [middle(0, at % n[0]), middle(1, at / n[0]), middle(2, k)];
-                let mut cell = Known::default();
-                for look in evidence.eyes().iter().filter_map(|eye| eye.look(p, edge)) {
-                    cell.add(look.around - look.range, look.near - look.range);
-                    cell.add(look.around - look.range, look.far - look.range);
+        let middle = |i: usize, of: usize| min[i] + (of as f32 + 0.5) * edge;
+        // Cells beside each other are asked together.
+        let row = |j: usize, k: usize| {
+            let starts = (0..n[0]).step_by(LANES);
+            starts.flat_map(move |first| {
+                let place = |lane: usize| [middle(0, first + lane), middle(1, j), middle(2, k)];
+                let local = lanes(&std::array::from_fn::<_, LANES, _>(place));
+                let mut known = [Known::default(); LANES];
+                for looks in evidence.eyes().iter().map(|eye| eye.look_lanes(&local, edge)) {
+                    for (lane, known) in known.iter_mut().enumerate() {
+                        looks.get(lane).iter().for_each(|look| known.add_look(look));
+                    }
                 }
-                cell.packed()
-            };
-            (0..n[0] * n[1]).map(place).collect()
+                known.map(|known| known.packed()).into_iter().take(n[0] - first)
+            })
         };
+        let layer = |k: usize| -> Vec<Cell> { (0..n[1]).flat_map(|j| row(j, k)).collect() };
         let cells = fan.fan((0..n[2]).collect(), layer).concat();
         Some(Self { min, edge, n, cells, scores: Default::default() })
     }
@@ -301,6 +306,11 @@ impl Default for Known {
 }
 
 impl Known {
+    fn add_look(&mut self, look: &Look) {
+        self.add(look.around - look.range, look.near - look.range);
+        self.add(look.around - look.range, look.far - look.range);
+    }
+
     fn add(&mut self, ahead: f32, off: f32) {
         if ahead == f32::INFINITY {
             self.is_silent = true;

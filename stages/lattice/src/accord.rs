@@ -9,19 +9,21 @@ use geometry::narrow::floor_i32;
 const BLIND: f32 = 0.5;
 /// Half-width (cells) of the window about such matter in which missing returns mean nothing.
 const DOUBT_WINDOW: i32 = 3;
-/// Points of each other scan that are asked, at most.
+/// Points of each scan that are asked, at most, and of all of them: more scans show the same things again.
 const N_ASKED: usize = 100_000;
+const N_ASKED_OF_ALL: usize = 600_000;
+
+/// Every how many of a scan's points are asked.
+fn step(view: &View, n_views: usize) -> usize {
+    (view.points.len() / (N_ASKED_OF_ALL / n_views).clamp(1, N_ASKED)).max(1)
+}
 
 /// Lets the views of a region check each other's missing returns: where one scan measured matter, the silence of another
 /// is no free space (a scanner behind a near post, black or shiny surfaces).
 pub fn agree(views: &mut [View], fan: &impl Fan) {
-    let matter: Vec<Vec<[f32; 3]>> = views
-        .iter()
-        .map(|view| {
-            let step = (view.points.len() / N_ASKED).max(1);
-            view.points.iter().step_by(step).map(|p| p.xyz).collect()
-        })
-        .collect();
+    let n = views.len();
+    let asked = |view: &View| view.points.iter().step_by(step(view, n)).map(|p| p.xyz).collect();
+    let matter: Vec<Vec<[f32; 3]>> = views.iter().map(asked).collect();
     let doubt = |(own, view): (usize, &mut View)| {
         for image in &mut view.images {
             let camera_from_local = rows(image.camera_from_local());
@@ -57,7 +59,7 @@ pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
                 look.is_some_and(|l| l.around.is_finite() && l.around - l.range > BEYOND)
             })
         };
-        let step = (views[own].points.len() / N_ASKED).max(1);
+        let step = step(&views[own], views.len());
         let asked = views[own].points.iter().step_by(step).map(|point| point.xyz);
         asked.filter(is_gone).map(|p| p.map(|v| floor_i32(f64::from(v / CELL)))).collect()
     };
