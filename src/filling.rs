@@ -2,6 +2,7 @@
 
 use crate::engine::{Engine, Task};
 use crate::job::Means;
+use crate::reading::Reading;
 use crate::reuse::{Key, Pace, Sums};
 use crate::store::{Scatter, Store};
 use contract::{Error, Input, Kind, Result, Weigh};
@@ -76,23 +77,23 @@ impl<'a> Filling<'a> {
         let mut sink = Store::create(dir, scans, first, self.means.ingest_bytes())?;
         let scatter = Scatter::new(scans);
         let amount = crate::report::amount(self.sources, input.id);
+        let reading = Reading { sources: self.sources, input, want: Want::Coordinates };
         let pace = Pace::of(amount.points);
         let lead = pace.lead();
+        let mut tree = sums.tree(input).filter(|_| self.sources.file(input.id).is_some());
         let ingest = || {
-            let strips = self.sources.strips(input.id, Want::Coordinates)?;
-            self.engine.pass(Task::new("ingest").of(amount), strips, |f| {
-                f.map(&scatter).for_each(|s| {
-                    lead.has_decoded(s.n_points());
-                    sink.add(&s)
-                })
+            let task = Task::new("ingest").of(amount);
+            reading.each(task, &scatter, tree.as_mut(), self.engine, |strip| {
+                lead.has_decoded(strip.n_points());
+                sink.add(&strip)
             })?;
             lead.end();
-            Ok(())
+            tree.take().map_or(Ok(()), |tree| sums.take(input, tree))
         };
-        if sums.input(input).is_none() {
-            self.engine.beside("digest", || sums.read(input, &pace), ingest)?;
-        } else {
+        if sums.input(input).is_some() || self.sources.file(input.id).is_some() {
             ingest()?;
+        } else {
+            self.engine.beside("digest", || sums.read(input, &pace), ingest)?;
         }
         sums.check(input)?;
         sink.finish(self.engine, resident_bytes).map(drop)

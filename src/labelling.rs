@@ -8,7 +8,7 @@ use crate::engine::{AllThreads, Engine, Hand, Handed, Task};
 use crate::job::Settings;
 use crate::store::Store;
 use contract::{
-    Cluster, Fit, Floor, Fold, InputId, Label, MaskId, PlaceRun, Result, Space, TileLabels,
+    Cluster, Fit, Floor, Fold, Input, InputId, Label, MaskId, PlaceRun, Result, Space, TileLabels,
 };
 use export::{
     Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Spool,
@@ -24,6 +24,7 @@ use std::path::Path;
 use crate::bodies::Bodies;
 use crate::labelled::{LabelStrip, Labelled};
 use crate::masks::Masks;
+use crate::reading::Reading;
 use crate::report::id;
 use crate::spaces::poses;
 
@@ -241,7 +242,7 @@ impl<'a> Labelling<'a> {
                     moved: &scope.moved,
                     bodies: self.bodies.as_ref(),
                 };
-                self.each_strip(input.id, &label, engine, |mut strip| {
+                self.each_strip(input, &label, engine, |mut strip| {
                     for (space, voxel, kind) in strip.spots.drain(..) {
                         spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));
                     }
@@ -273,14 +274,14 @@ impl<'a> Labelling<'a> {
     /// Streams an input once more; labelled strips in the order of the file.
     fn each_strip(
         &self,
-        input: InputId,
+        input: &Input,
         label: &LabelStrip<'_>,
         engine: &Engine,
         sink: impl FnMut(Labelled) -> Result<()>,
     ) -> Result<()> {
-        let task = Task::new("write").of(crate::report::amount(self.sources, input));
-        let strips = self.sources.strips(input, Want::Everything)?;
-        engine.pass(task, strips, |f| f.map(label).for_each(sink))
+        let task = Task::new("write").of(crate::report::amount(self.sources, input.id));
+        let reading = Reading { sources: self.sources, input, want: Want::Everything };
+        reading.each(task, label, None, engine, sink)
     }
 
     /// The files of one robot: model, space, pictures; what is said of its space, and the pictures' names.

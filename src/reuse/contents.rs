@@ -93,11 +93,17 @@ impl Contents {
     pub(super) fn read(&self, path: &Path, sum: Sum, pace: &Pace) -> Result<String> {
         let stamp = Stamp::of(path)?;
         let digest = sum.of_file(path, pace)?;
+        self.take(path, stamp, &digest)?;
+        Ok(digest)
+    }
+
+    /// Takes the digest of a file that was read since it had this stamp; refuses one that was changed meanwhile.
+    pub(super) fn take(&self, path: &Path, stamp: Stamp, digest: &str) -> Result<()> {
         stamp.check(path)?;
         if stamp.is_settled() {
-            self.lock().insert(name(path)?, Seen { stamp, digest: digest.clone() });
+            self.lock().insert(name(path)?, Seen { stamp, digest: digest.to_owned() });
         }
-        Ok(digest)
+        Ok(())
     }
 
     /// Digest of names and bytes of all files below a folder, in the order of their names.
@@ -124,6 +130,11 @@ impl Stamp {
     pub(super) fn of(path: &Path) -> Result<Self> {
         let meta = std::fs::metadata(path).map_err(|e| Error::from(e).at(path.display()))?;
         Ok(Self { n_bytes: meta.len(), changed: changed(&meta), number: number(&meta) })
+    }
+
+    /// Length of the file.
+    pub(super) fn n_bytes(&self) -> u64 {
+        self.n_bytes
     }
 
     /// Refuses a file that is not what it was.

@@ -7,13 +7,14 @@
 mod contents;
 mod kept;
 mod manifest;
+mod tree;
 
 pub use manifest::{Checked, Manifest, OutputFile, check};
 
 use crate::engine::Engine;
 use crate::job::{Job, Room, Settings};
 use contents::{Contents, Stamp, Sum};
-use contract::{Input, Result, Scan};
+use contract::{Error, Input, Kind, Result, Scan};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
@@ -21,6 +22,7 @@ use std::sync::OnceLock;
 
 pub(crate) use contents::Pace;
 pub(crate) use kept::{Kept, read, written};
+pub(crate) use tree::{Part, Tree};
 
 /// A digest of what a piece is made from, as 32 hexadecimal digits: the name of its file.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -102,6 +104,23 @@ impl Sums {
     pub(crate) fn read(&self, input: &Input, pace: &Pace) -> Result<()> {
         let at = self.at(input);
         let digest = self.contents.read(&self.files[at].0, Sum::Blake3, pace)?;
+        let _ = self.inputs[at].set(digest);
+        self.contents.keep()
+    }
+
+    /// The tree of an input whose digest is not known, for who reads it in pieces.
+    pub(crate) fn tree(&self, input: &Input) -> Option<Tree> {
+        self.input(input).is_none().then(|| Tree::new(self.files[self.at(input)].1.n_bytes()))
+    }
+
+    /// Takes what an input came to that was read in pieces.
+    pub(crate) fn take(&self, input: &Input, tree: Tree) -> Result<()> {
+        let at = self.at(input);
+        let (path, stamp) = &self.files[at];
+        let digest =
+            tree.finish().ok_or_else(|| Error::new(Kind::Bug, "a file was not summed up"))?;
+        let digest = Sum::Blake3.word(&digest.to_hex());
+        self.contents.take(path, *stamp, &digest)?;
         let _ = self.inputs[at].set(digest);
         self.contents.keep()
     }

@@ -10,20 +10,20 @@ mod record;
 mod scatter;
 mod sink;
 mod spill;
-mod straight;
 #[cfg(test)]
 mod tests;
 mod writer;
 
+use crate::straight::Straight;
 use catalogue::broken;
-use contract::{MAX_SKIP, Result, Scan, Tile, TileAt, TilePoints, Weigh};
+use contract::{Error, MAX_SKIP, Result, Scan, Tile, TileAt, TilePoints, Weigh};
 use geometry::Aabb;
 use map::FileMap;
 use record::N_LEVELS;
+use std::fs::File;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
-use straight::Straight;
 
 pub use catalogue::TileEntry;
 pub use scatter::{Scatter, Scattered};
@@ -49,6 +49,8 @@ pub struct Store {
 struct Part {
     /// Place of its first entry.
     first: usize,
+    /// Its file of tiles.
+    path: PathBuf,
     /// Its tiles, for those that are asked for again and again …
     map: FileMap,
     /// … and to read all of them once.
@@ -72,9 +74,11 @@ impl Store {
         if bytes.len() as u64 != n_tile_bytes || !bytes.starts_with(&catalogue::tiles_header()) {
             return Err(broken("the tiles are not those of the catalogue").at(path.display()));
         }
-        let straight = Straight::open(&path)?;
+        let file = File::open(&path);
+        let file = file.map_err(|e| Error::of_file("the tiles cannot be opened", &path, e))?;
+        let straight = Straight::past_cache(file);
         let is_whole = entries.iter().map(|_| AtomicU8::new(0)).collect();
-        Ok(Self { entries, is_whole, parts: vec![Part { first: 0, map, straight }] })
+        Ok(Self { entries, is_whole, parts: vec![Part { first: 0, path, map, straight }] })
     }
 
     /// Stores of scans that follow one another, as one.
@@ -209,11 +213,13 @@ impl Store {
     fn straight(&self, i: usize, skip: u32) -> Result<Tile> {
         let n_levels = n_levels(skip);
         let (part, Range { start, end }) = self.place(i, n_levels);
-        let tile = |bytes: &[u8]| {
-            self.check(i, n_levels, bytes)?;
-            Ok(encode::decode(&self.entries[i], n_levels, bytes))
-        };
-        part.straight.with(start, end - start, tile)?
+        let bytes = part.straight.read(start as u64, end - start);
+        let bytes = bytes.map_err(|e| Error::of_file("the tiles cannot be read", &part.path, e))?;
+        if bytes.len() < end - start {
+            return Err(broken("the tiles are cut short").at(part.path.display()));
+        }
+        self.check(i, n_levels, &bytes)?;
+        Ok(encode::decode(&self.entries[i], n_levels, &bytes))
     }
 
     /// These tiles in the given order, for those that are asked for again and again: a source for a pass.

@@ -1,7 +1,7 @@
 //! For tests: reads files whole, keeps places and world coordinates, and breaks copies of files.
 
 use crate::Settings;
-use crate::reader::{Reader, Want};
+use crate::reader::{self, Reader, Want};
 use contract::{Attributes, Result};
 use geometry::Point;
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ impl Read {
 /// Reads all scans of an open file, and checks what holds for every strip of every file.
 pub(crate) fn read_all(reader: &dyn Reader, want: Want, settings: &Settings) -> Result<Vec<Read>> {
     let mut out = vec![Read::default(); reader.scans().len()];
-    for strip in reader.strips(want)? {
+    for strip in reader::strips(reader, want)? {
         let strip = strip?;
         assert!(strip.xyz.len() <= settings.strip_points);
         assert_eq!(strip.place.len(), strip.xyz.len());

@@ -9,7 +9,7 @@ mod stream;
 mod strips;
 
 use crate::Settings;
-use crate::reader::{MaskSeed, RawStrips, Reader, Sampled, ScanSeed, Want};
+use crate::reader::{MaskSeed, Reader, Reading, Sampled, ScanSeed, Want};
 use ::e57::E57Reader;
 use contract::{Error, Format, Kind, Result};
 use pages::{PAGE, Pages};
@@ -77,8 +77,8 @@ impl Reader for E57File {
             .map_err(|e| e.at(format!("scan \"{}\"", self.scans[scan].name)))
     }
 
-    fn strips(&self, want: Want) -> Result<RawStrips<'_>> {
-        Ok(Box::new(strips::Strips::new(self, want)))
+    fn read(&self, want: Want) -> Result<Reading<'_>> {
+        Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
     }
 
     fn has_color(&self) -> bool {

@@ -1,22 +1,16 @@
-//! LAS and LAZ files in (versions 1.0 to 1.4, point formats 0 to 10); scans and strips out. Points come from a
-//! memory map, or from the decompressor, as runs of records; no object is made for a point.
+//! LAS and LAZ files in (versions 1.0 to 1.4, point formats 0 to 10); scans and strips out. Points come as runs of records, as
+//! they lie in the file or from the decompressor; no object is made for a point.
 
 use crate::las_header::LasHeader;
 use crate::las_record::Decoder;
 use crate::las_scans::{self, LasScanner};
 use crate::laz::{Laz, Stream};
 use crate::map::{Mapped, map};
-use crate::reader::{MaskSeed, RawStrip, RawStrips, Reader, Sampled, ScanSeed, Want};
+use crate::reader::{Extent, MaskSeed, RawStrip, Reader, Reading, Sampled, ScanSeed, Want};
 use crate::settings::Settings;
 use contract::{Error, Format, Result};
 use std::borrow::Cow;
-use std::collections::VecDeque;
 use std::path::Path;
-
-/// Compressed pieces that are decompressed at once: enough for eight cores, 16 MB of records.
-const PIECES_AT_ONCE: usize = 8;
-/// Memory of the records that are decompressed at once, bytes.
-const RECORDS_AT_ONCE: usize = 32 << 20;
 
 /// The records of a file, whichever way they are stored.
 pub(crate) struct Records {
@@ -46,7 +40,7 @@ impl Records {
         if laz.pieces.is_empty() {
             return Ok((0, Cow::Owned(laz.stream(&self.map)?.next(n)?)));
         }
-        let mut at = laz.pieces.partition_point(|p| p.first + p.n_points <= first);
+        let mut at = laz.piece_of(first);
         let start = laz.pieces.get(at).map_or(first, |p| p.first);
         let mut records = Vec::new();
         let mut left = n;
@@ -61,8 +55,23 @@ impl Records {
     /// Where [`Records::run`] would start.
     pub(crate) fn start(&self, first: u64) -> u64 {
         let Some(laz) = &self.laz else { return first };
-        let at = laz.pieces.partition_point(|p| p.first + p.n_points <= first);
-        laz.pieces.get(at).map_or(0, |p| p.first)
+        laz.pieces.get(laz.piece_of(first)).map_or(0, |p| p.first)
+    }
+
+    /// Runs of records that can be read by themselves, of so many points where they are not compressed, and all that lies between
+    /// them; none where they are one stream.
+    fn extents(&self, n: usize) -> Option<Box<dyn Iterator<Item = Extent> + Send + '_>> {
+        let (header, n_bytes) = (&self.header, self.map.len() as u64);
+        let Some(laz) = &self.laz else {
+            let at = |place: u64| header.points_at as u64 + place * header.record_len as u64;
+            let runs = (0..header.n_points).step_by(n).map(move |first| {
+                let n_points = (n as u64).min(header.n_points - first);
+                Extent { bytes: at(first)..at(first + n_points), first, n_points }
+            });
+            return Some(Box::new(Extent::cover(runs, n_bytes)));
+        };
+        let is_stream = laz.pieces.is_empty();
+        (!is_stream).then(|| Box::new(Extent::cover(laz.pieces.iter().cloned(), n_bytes)) as _)
     }
 
     /// Records of an uncompressed file. In range, since the count was checked against the file's length.
@@ -120,10 +129,6 @@ impl Reader for Las {
         Some((header.scale, header.offset))
     }
 
-    fn check(&self) -> Result<()> {
-        self.records.map.check()
-    }
-
     fn masks(&self) -> &[MaskSeed] {
         &self.masks
     }
@@ -163,19 +168,28 @@ impl Reader for Las {
         Ok(sample)
     }
 
-    fn strips(&self, want: Want) -> Result<RawStrips<'_>> {
-        Ok(Box::new(Strips {
-            las: self,
-            want,
-            place: 0,
-            piece: 0,
-            stream: None,
-            records: Cow::Borrowed(&[]),
-            used: 0,
-            ready: VecDeque::new(),
-            given: 0,
-            failed: false,
-        }))
+    fn read(&self, want: Want) -> Result<Reading<'_>> {
+        let streamed = || {
+            let records = Streamed { las: self, want, place: 0, stream: None, has_failed: false };
+            Reading::Straight(Box::new(records.flat_map(std::convert::identity)))
+        };
+        Ok(self.records.extents(self.strip_points).map_or_else(streamed, Reading::ByExtent))
+    }
+
+    fn decode(&self, extent: &Extent, bytes: &[u8], want: Want) -> Result<Vec<RawStrip>> {
+        if extent.n_points == 0 {
+            return Ok(Vec::new());
+        }
+        let Some(laz) = &self.records.laz else {
+            return Ok(self.strips_of(bytes, extent.first, want));
+        };
+        let records = laz.decompress(bytes, extent, want)?;
+        self.check_bounds(&records, extent.first)?;
+        Ok(self.strips_of(&records, extent.first, want))
+    }
+
+    fn mapped(&self) -> Option<&Mapped> {
+        Some(&self.records.map)
     }
 
     fn facts(&self) -> Vec<(String, String)> {
@@ -206,132 +220,79 @@ impl Reader for Las {
     }
 }
 
-/// The strips of one file, in its order.
-struct Strips<'a> {
-    las: &'a Las,
-    want: Want,
-    /// Place of the first record that is not loaded yet.
-    place: u64,
-    piece: usize,
-    stream: Option<Stream<'a>>,
-    /// Records that are loaded, and how many of their bytes went out.
-    records: Cow<'a, [u8]>,
-    used: usize,
-    ready: VecDeque<RawStrip>,
-    /// Bytes of the map that were given back.
-    given: usize,
-    failed: bool,
-}
-
-impl<'a> Strips<'a> {
-    /// Loads the next run of records; false at the end.
-    fn load(&mut self) -> Result<bool> {
-        let las = self.las;
-        let n_points = las.records.header.n_points;
-        if self.place >= n_points {
-            return Ok(false);
-        }
-        let header = &las.records.header;
-        let read = match &las.records.laz {
-            None => header.points_at + self.place as usize * header.record_len,
-            Some(laz) => laz.pieces.get(self.piece).map_or(0, |piece| piece.at),
-        };
-        las.records.map.passed(read, &mut self.given);
-        let n = usize::try_from(n_points - self.place).unwrap_or(usize::MAX).min(las.strip_points);
-        self.records = match &las.records.laz {
-            None => Cow::Borrowed(las.records.mapped(self.place, n)),
-            Some(laz) if laz.pieces.is_empty() => {
-                if self.stream.is_none() {
-                    self.stream = Some(laz.stream(&las.records.map)?);
-                }
-                let stream = self.stream.as_mut().expect("made above");
-                Cow::Owned(stream.next(n).map_err(|e| e.at(format!("point {}", self.place)))?)
-            }
-            Some(laz) => {
-                let group = self.group(laz);
-                Cow::Owned(laz.pieces(&las.records.map, group, self.want)?)
-            }
-        };
-        self.used = 0;
-        self.place += (self.records.len() / las.records.header.record_len) as u64;
-        if las.records.header.compressed {
-            self.check_bounds()?;
-        }
-        Ok(true)
-    }
-
-    /// The next pieces that are decompressed together.
-    fn group(&mut self, laz: &'a Laz) -> &'a [crate::laz::Piece] {
-        let first = self.piece;
-        let mut n_bytes = 0;
-        while let Some(piece) = laz.pieces.get(self.piece) {
-            n_bytes += piece.n_points as usize * self.las.records.header.record_len;
-            let joins = self.piece == first
-                || (self.piece - first < PIECES_AT_ONCE
-                    && n_bytes <= RECORDS_AT_ONCE
-                    && piece.follows(&laz.pieces[self.piece - 1]));
-            if !joins {
-                break;
-            }
-            self.piece += 1;
-        }
-        &laz.pieces[first..self.piece]
+impl Las {
+    /// The strips of a run of records, of which the first has the place `first`.
+    fn strips_of(&self, records: &[u8], first: u64, want: Want) -> Vec<RawStrip> {
+        let runs = records.chunks(self.strip_points * self.records.header.record_len);
+        let places = (first..).step_by(self.strip_points);
+        runs.zip(places).flat_map(|(run, first)| self.decoder.decode(run, first, want)).collect()
     }
 
     /// A damaged compressed run decodes without complaint, into nonsense: tell by the stated bounds, where these
     /// were found to be right.
-    fn check_bounds(&self) -> Result<()> {
-        let header = &self.las.records.header;
-        let (Some(bounds), true) = (&header.bounds, self.las.bounds_hold) else {
+    fn check_bounds(&self, records: &[u8], first: u64) -> Result<()> {
+        let header = &self.records.header;
+        let (Some(bounds), true) = (&header.bounds, self.bounds_hold) else {
             return Ok(());
         };
         let bounds = las_scans::grown(bounds, header);
-        let n = self.records.len() / header.record_len;
-        let outside = self
-            .records
+        let n = records.len() / header.record_len;
+        let outside = records
             .chunks_exact(header.record_len)
-            .filter(|r| !bounds.contains(self.las.decoder.world(r)))
+            .filter(|r| !bounds.contains(self.decoder.world(r)))
             .count();
         if outside * 2 > n {
             return Err(Error::bad_input(format!(
                 "points decompress to places outside the bounds that the file states, \"{outside}\" of {n}"
             ))
-            .at(format!("points {} to {}", self.place - n as u64, self.place))
+            .at(format!("points {first} to {}", first + n as u64))
             .hint("the file is damaged; copy or compress it again"));
         }
         Ok(())
     }
 }
 
-impl Iterator for Strips<'_> {
-    type Item = Result<RawStrip>;
+/// The strips of a file whose compressed records are one stream, run by run.
+struct Streamed<'a> {
+    las: &'a Las,
+    want: Want,
+    /// Place of the first record that is not decompressed yet.
+    place: u64,
+    stream: Option<Stream<'a>>,
+    has_failed: bool,
+}
+
+impl Streamed<'_> {
+    /// The next run; nothing at the end.
+    fn run(&mut self) -> Result<Option<Vec<RawStrip>>> {
+        let (las, first) = (self.las, self.place);
+        let left = las.records.header.n_points - first;
+        let n = usize::try_from(left).unwrap_or(usize::MAX).min(las.strip_points);
+        let (Some(laz), true) = (&las.records.laz, n > 0) else { return Ok(None) };
+        let stream = match &mut self.stream {
+            Some(stream) => stream,
+            None => self.stream.insert(laz.stream(&las.records.map)?),
+        };
+        let records = stream.next(n).map_err(|e| e.at(format!("point {first}")))?;
+        las.check_bounds(&records, first)?;
+        self.place += n as u64;
+        Ok(Some(las.strips_of(&records, first, self.want)))
+    }
+}
+
+impl Iterator for Streamed<'_> {
+    type Item = Vec<Result<RawStrip>>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let record_len = self.las.records.header.record_len;
-        while !self.failed {
-            if let Some(strip) = self.ready.pop_front() {
-                return Some(Ok(strip));
-            }
-            if self.used < self.records.len() {
-                let end = (self.used + self.las.strip_points * record_len).min(self.records.len());
-                let first = self.place - ((self.records.len() - self.used) / record_len) as u64;
-                self.ready.extend(self.las.decoder.decode(
-                    &self.records[self.used..end],
-                    first,
-                    self.want,
-                ));
-                self.used = end;
-                continue;
-            }
-            match self.load() {
-                Ok(true) => {}
-                Ok(false) => return None,
-                Err(error) => {
-                    self.failed = true;
-                    return Some(Err(error));
-                }
+        if self.has_failed {
+            return None;
+        }
+        match self.run() {
+            Ok(strips) => Some(strips?.into_iter().map(Ok).collect()),
+            Err(error) => {
+                self.has_failed = true;
+                Some(vec![Err(error)])
             }
         }
-        None
     }
 }

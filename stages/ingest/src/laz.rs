@@ -2,37 +2,19 @@
 //! believe (chunk table, layer sizes, counts) is checked against the bytes present before it sees them.
 
 use crate::las_header::LasHeader;
-use crate::reader::Want;
+use crate::reader::{Extent, Want};
 use crate::settings::Settings;
 use contract::{Error, Kind, Result};
 use laz::laszip::{ChunkTable, ChunkTableEntry, CompressorType};
 use laz::{DecompressionSelection, LasZipDecompressor, LazItemRecordBuilder, LazItemType, LazVlr};
 use std::io::Cursor;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// No real piece is compressed more than this many times; a larger claim would only cost memory.
 const MAX_RATIO: u64 = 250;
 /// Records of a piece that are believed whatever its size: 50,000 equal points take next to nothing. Bytes.
 const SMALL_PIECE: u64 = 4 << 20;
-
-/// One independently compressed run of points (LAZ calls it a chunk).
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Piece {
-    /// Bytes from the start of the file.
-    pub(crate) at: usize,
-    n_bytes: usize,
-    /// Place of its first point.
-    pub(crate) first: u64,
-    /// Number of points.
-    pub(crate) n_points: u64,
-}
-
-impl Piece {
-    /// Whether this one starts where `earlier` ends, so that both can be handed over as one run of bytes.
-    pub(crate) fn follows(&self, earlier: &Self) -> bool {
-        self.at == earlier.at + earlier.n_bytes
-    }
-}
 
 /// How the points of a LAZ file are to be decompressed.
 #[derive(Debug, Clone)]
@@ -42,8 +24,9 @@ pub(crate) struct Laz {
     points_at: usize,
     n_points: u64,
     layered: bool,
-    /// Empty where the file is one stream that can only be read from its start.
-    pub(crate) pieces: Vec<Piece>,
+    /// Independently compressed runs of points (LAZ calls them chunks); empty where the file is one stream that can only be read
+    /// from its start.
+    pub(crate) pieces: Vec<Extent>,
 }
 
 fn damaged(what: impl Into<String>) -> Error {
@@ -93,7 +76,7 @@ impl Laz {
             && !self.vlr.uses_variable_size_chunks()
     }
 
-    fn read_table(&self, data: &[u8]) -> Result<Vec<Piece>> {
+    fn read_table(&self, data: &[u8]) -> Result<Vec<Extent>> {
         let start = self.points_at + ChunkTable::OFFSET_SIZE;
         let table_at = self.table_at(data)?;
         let header = data
@@ -131,7 +114,7 @@ impl Laz {
         table: impl Iterator<Item = ChunkTableEntry>,
         start: usize,
         end: usize,
-    ) -> Result<Vec<Piece>> {
+    ) -> Result<Vec<Extent>> {
         let (mut at, mut first) = (start, 0_u64);
         let mut pieces = Vec::new();
         for (i, entry) in table.enumerate() {
@@ -149,7 +132,7 @@ impl Laz {
                     "{n_bytes} bytes of chunk {i} cannot hold \"{n_points}\" points"
                 )));
             }
-            pieces.push(Piece { at, n_bytes, first, n_points });
+            pieces.push(Extent { bytes: at as u64..(at + n_bytes) as u64, first, n_points });
             at += n_bytes;
             first += n_points;
         }
@@ -174,54 +157,38 @@ impl Laz {
         stated.ok_or_else(|| damaged("the chunk table is missing or lies outside the file"))
     }
 
-    /// Decompresses the first `n` points of a piece.
-    pub(crate) fn head(&self, data: &[u8], piece: &Piece, n: usize) -> Result<Vec<u8>> {
-        let part = Piece { n_points: piece.n_points.min(n as u64), ..*piece };
-        self.pieces(data, &[part], Want::Everything)
+    /// The number of the piece that holds the point at a place, or behind which it would come.
+    pub(crate) fn piece_of(&self, place: u64) -> usize {
+        self.pieces.partition_point(|p| p.first + p.n_points <= place)
     }
 
-    /// Decompresses whole pieces that follow one another, in parallel where there are several.
-    pub(crate) fn pieces(&self, data: &[u8], pieces: &[Piece], want: Want) -> Result<Vec<u8>> {
-        let (Some(first), Some(last)) = (pieces.first(), pieces.last()) else {
-            return Ok(Vec::new());
-        };
-        for piece in pieces {
-            self.check_layers(data, piece)
-                .map_err(|e| e.at(format!("chunk at byte {}, point {}", piece.at, piece.first)))?;
-        }
-        let compressed = &data[first.at..last.at + last.n_bytes];
-        let table: Vec<_> = pieces
-            .iter()
-            .map(|p| ChunkTableEntry { point_count: p.n_points, byte_count: p.n_bytes as u64 })
-            .collect();
-        let n_points: u64 = pieces.iter().map(|p| p.n_points).sum();
-        let mut records = vec![0; n_points as usize * self.record_len];
+    /// Decompresses the first `n` points of a piece.
+    pub(crate) fn head(&self, data: &[u8], piece: &Extent, n: usize) -> Result<Vec<u8>> {
+        let part = Extent { n_points: piece.n_points.min(n as u64), ..piece.clone() };
+        self.decompress(part.of(data), &part, Want::Everything)
+    }
+
+    /// Decompresses a piece from its bytes.
+    pub(crate) fn decompress(&self, bytes: &[u8], piece: &Extent, want: Want) -> Result<Vec<u8>> {
+        let Extent { bytes: Range { start, .. }, first, n_points } = piece;
+        let end = first + n_points;
+        let place = || format!("chunk at byte {start}, points {first} to {end}");
+        self.check_layers(bytes, *n_points).map_err(|e| e.at(place()))?;
+        let mut records = vec![0; *n_points as usize * self.record_len];
+        let table = [ChunkTableEntry { point_count: *n_points, byte_count: bytes.len() as u64 }];
         guarded("decompressing", || {
-            laz::par_decompress_selective(
-                compressed,
-                &mut records,
-                &self.vlr,
-                &table,
-                selection(want),
-            )
+            let (vlr, fields) = (&self.vlr, selection(want));
+            laz::par_decompress_selective(bytes, &mut records, vlr, &table, fields)
         })
-        .map_err(|e| {
-            e.at(format!(
-                "chunk at byte {}, points {} to {}",
-                first.at,
-                first.first,
-                last.first + last.n_points
-            ))
-        })?;
+        .map_err(|e| e.at(place()))?;
         Ok(records)
     }
 
     /// Layered pieces say how long each layer is, and the decoder allocates what they say: check it first.
-    fn check_layers(&self, data: &[u8], piece: &Piece) -> Result<()> {
+    fn check_layers(&self, bytes: &[u8], n_expected: u64) -> Result<()> {
         if !self.layered {
             return Ok(());
         }
-        let bytes = &data[piece.at..piece.at + piece.n_bytes];
         let n_layers: usize = self.vlr.items().iter().map(|i| layers(i.item_type())).sum();
         let head = self.record_len + 4 + 4 * n_layers;
         if bytes.len() < head {
@@ -234,10 +201,9 @@ impl Laz {
             u64::from(u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
         };
         let n_points = number(self.record_len);
-        if n_points < piece.n_points {
+        if n_points < n_expected {
             return Err(damaged(format!(
-                "{} points are expected, the chunk has \"{n_points}\"",
-                piece.n_points
+                "{n_expected} points are expected, the chunk has \"{n_points}\""
             )));
         }
         let total: u64 = (0..n_layers).map(|i| number(self.record_len + 4 + 4 * i)).sum();

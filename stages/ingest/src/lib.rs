@@ -13,6 +13,7 @@ mod las_record;
 mod las_scans;
 mod laz;
 mod map;
+mod poses;
 mod ptx;
 mod raster;
 mod raster_free;
@@ -26,7 +27,7 @@ mod text;
 pub use inspect::{
     BoundsText, Description, Fact, LatticeText, PoseText, ScanDescription, describe,
 };
-pub use reader::Want;
+pub use reader::{Extent, Want};
 pub use scanners::{Scanner, Scanners};
 pub use settings::Settings;
-pub use sources::{Before, Sources, Strips, open, open_after};
+pub use sources::{Before, Piece, Pieces, Sources, Strips, open, open_after};

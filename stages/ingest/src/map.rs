@@ -8,28 +8,14 @@
 use contract::{Error, Result};
 use memmap2::Mmap;
 use std::fs::File;
-use std::ops::{Deref, Range};
+use std::ops::Deref;
 use std::path::Path;
-
-/// Bytes that are given back to the system at a time: pages that were read count as resident memory of the program.
-const GIVEN_BACK: usize = 32 << 20;
-/// Pages of the largest systems: what is given back begins and ends at their bounds.
-const PAGE: usize = 1 << 16;
-
-/// A file larger than this part of the machine's memory leaves the system's cache behind its reader: it would be gone before
-/// it is read once more, and pages that the cache has to find anew cost more than reading does.
-#[cfg(target_os = "linux")]
-const CACHED: usize = 4;
-/// So far behind the reader, bytes: another may sum the file up beside him.
-#[cfg(target_os = "linux")]
-const BEHIND: usize = 512 << 20;
 
 /// A read-only map of a whole file.
 pub(crate) struct Mapped {
     map: Mmap,
-    /// To be taken out of the system's cache once it is read.
-    #[cfg(target_os = "linux")]
-    leaving: Option<File>,
+    /// The same file, to be read otherwise.
+    file: File,
     watch: guard::Watch,
 }
 
@@ -43,15 +29,15 @@ pub(crate) fn map(path: &Path) -> Result<Mapped> {
     // another process that shortens the file while it is read: `guard` takes care of that.
     let map = unsafe { Mmap::map(&file)? };
     let watch = guard::Watch::over(&map);
-    Ok(Mapped {
-        #[cfg(target_os = "linux")]
-        leaving: (map.len() > guard::memory_bytes() / CACHED).then_some(file),
-        map,
-        watch,
-    })
+    Ok(Mapped { map, file, watch })
 }
 
 impl Mapped {
+    /// The file that is mapped, whatever has its name by now.
+    pub(crate) fn file(&self) -> &File {
+        &self.file
+    }
+
     /// Whether all that was read of it was there.
     ///
     /// # Errors
@@ -62,40 +48,6 @@ impl Mapped {
         }
         Err(Error::bad_input("the file was cut short or went away while it was read")
             .hint("start again once it is whole"))
-    }
-
-    /// To be told how far a reader of consecutive bytes has come; `given` is what it has given back so far.
-    pub(crate) fn passed(&self, to: usize, given: &mut usize) {
-        if to >= *given + GIVEN_BACK {
-            let end = to / PAGE * PAGE;
-            self.turn(*given..end);
-            *given = end;
-        }
-    }
-
-    #[cfg(not(unix))]
-    fn turn(&self, _: Range<usize>) {}
-
-    /// Gives back a range, and has the system read what comes after it: disks are slow to answer, not to read.
-    #[cfg(unix)]
-    fn turn(&self, range: Range<usize>) {
-        // SAFETY: the map is read-only and of a file: a page that is dropped is read again, with the same bytes.
-        let advised = unsafe {
-            let dont_need = memmap2::UncheckedAdvice::DontNeed;
-            self.map.unchecked_advise_range(dont_need, range.start, range.len())
-        };
-        let next = range.end + GIVEN_BACK..(range.end + 2 * GIVEN_BACK).min(self.map.len());
-        // Advice only: where the system does not take it, the pages stay until it needs them, or come when asked for.
-        let _ = advised;
-        if !next.is_empty() {
-            let _ = self.map.advise_range(memmap2::Advice::WillNeed, next.start, next.len());
-        }
-        #[cfg(target_os = "linux")]
-        if let (Some(file), Some(end)) = (&self.leaving, range.end.checked_sub(BEHIND)) {
-            let start = range.start.saturating_sub(BEHIND);
-            let n = std::num::NonZero::new((end - start) as u64);
-            let _ = rustix::fs::fadvise(file, start as u64, n, rustix::fs::Advice::DontNeed);
-        }
     }
 }
 
@@ -178,16 +130,6 @@ mod guard {
                 slot.begin.store(0, SeqCst);
             }
         }
-    }
-
-    /// Memory of the machine, bytes; very large where the system does not tell.
-    #[cfg(target_os = "linux")]
-    pub(super) fn memory_bytes() -> usize {
-        // SAFETY: plain calls that only return numbers.
-        let [pages, page] =
-            unsafe { [libc::sysconf(libc::_SC_PHYS_PAGES), libc::sysconf(libc::_SC_PAGESIZE)] };
-        let bytes = usize::try_from(pages).ok().zip(usize::try_from(page).ok());
-        bytes.map_or(usize::MAX, |(pages, page)| pages.saturating_mul(page))
     }
 
     fn install() {

@@ -8,7 +8,7 @@ mod tests;
 
 use crate::Settings;
 use crate::frame::Frame;
-use crate::reader::{MaskSeed, RawStrips, Reader, Sampled, ScanSeed, Want};
+use crate::reader::{MaskSeed, Reader, Reading, Sampled, ScanSeed, Want};
 use contract::{Format, Result};
 use std::path::{Path, PathBuf};
 
@@ -83,8 +83,8 @@ impl Reader for PtxFile {
         strips::sample(self, scan, n)
     }
 
-    fn strips(&self, want: Want) -> Result<RawStrips<'_>> {
-        Ok(Box::new(strips::Strips::new(self, want)))
+    fn read(&self, want: Want) -> Result<Reading<'_>> {
+        Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
     }
 
     fn has_color(&self) -> bool {

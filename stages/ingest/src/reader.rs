@@ -1,7 +1,9 @@
 //! What every format gives: its masks and scans, a sample of each scan, and its points as strips in file order.
 
-use contract::{Attributes, Format, Result};
+use crate::map::Mapped;
+use contract::{Attributes, Error, Format, Kind, Result};
 use geometry::{Aabb, Pose};
+use std::ops::Range;
 
 /// How much of each point is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,6 +74,52 @@ pub(crate) struct RawStrip {
 /// Strips of one file, in its order.
 pub(crate) type RawStrips<'a> = Box<dyn Iterator<Item = Result<RawStrip>> + Send + 'a>;
 
+/// Consecutive bytes of a file that are points by themselves, so that any thread may read them; or that hold none. Extents
+/// cover a file from its first byte to its last.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Extent {
+    /// Where its bytes lie in the file.
+    pub bytes: Range<u64>,
+    /// Place of its first point.
+    pub(crate) first: u64,
+    /// Number of its points.
+    pub n_points: u64,
+}
+
+/// Bytes without points that are read at once, at most.
+const GAP: usize = 1 << 20;
+
+impl Extent {
+    /// Its bytes in those of the file.
+    pub(crate) fn of<'a>(&self, file: &'a [u8]) -> &'a [u8] {
+        &file[self.bytes.start as usize..self.bytes.end as usize]
+    }
+
+    /// Extents with points, and what lies before, between and behind them in a file of so many bytes.
+    pub(crate) fn cover(
+        points: impl Iterator<Item = Self>,
+        n_bytes: u64,
+    ) -> impl Iterator<Item = Self> {
+        let none = |bytes| Self { bytes, first: 0, n_points: 0 };
+        let mut at = 0;
+        let all = points.chain([none(n_bytes..n_bytes)]).flat_map(move |next| {
+            let end = next.bytes.start;
+            let starts = (at..end).step_by(GAP);
+            at = next.bytes.end;
+            starts.map(move |start| none(start..end.min(start + GAP as u64))).chain([next])
+        });
+        all.filter(|extent| !extent.bytes.is_empty())
+    }
+}
+
+/// How a file is read, in its order.
+pub(crate) enum Reading<'a> {
+    /// From its beginning on.
+    Straight(RawStrips<'a>),
+    /// By extents, each of which is decoded by itself.
+    ByExtent(Box<dyn Iterator<Item = Extent> + Send + 'a>),
+}
+
 /// An open file: headers read and checked, points not yet.
 pub(crate) trait Reader: Send + Sync {
     /// What it is.
@@ -83,7 +131,16 @@ pub(crate) trait Reader: Send + Sync {
     /// Up to `n` valid points of a scan, as runs of neighbours in file order spread over the scan.
     fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>>;
     /// All valid points in file order. Ends with an error, never with a silent end, where the file is broken.
-    fn strips(&self, want: Want) -> Result<RawStrips<'_>>;
+    fn read(&self, want: Want) -> Result<Reading<'_>>;
+    /// The points of an extent, from its bytes.
+    fn decode(&self, extent: &Extent, _bytes: &[u8], _want: Want) -> Result<Vec<RawStrip>> {
+        let what = format!("bytes {:?} were given to a format without extents", extent.bytes);
+        Err(Error::new(Kind::Bug, what))
+    }
+    /// Its bytes, where it is mapped.
+    fn mapped(&self) -> Option<&Mapped> {
+        None
+    }
     /// Whether points have colour.
     fn has_color(&self) -> bool;
     /// Scale and offset of its coordinates, metres, where they are whole multiples of a step (LAS).
@@ -92,8 +149,52 @@ pub(crate) trait Reader: Send + Sync {
     }
     /// Whether all that was read so far was really there: a mapped file may have been cut short.
     fn check(&self) -> Result<()> {
-        Ok(())
+        self.mapped().map_or(Ok(()), Mapped::check)
     }
     /// What the file says of itself, as `(name, value)` pairs for `inspect`.
     fn facts(&self) -> Vec<(String, String)>;
+}
+
+/// The strips of a file on this thread, whichever way it is read.
+pub(crate) fn strips(reader: &dyn Reader, want: Want) -> Result<RawStrips<'_>> {
+    let extents = match reader.read(want)? {
+        Reading::Straight(strips) => return Ok(strips),
+        Reading::ByExtent(extents) => extents,
+    };
+    let decode = move |extent: Extent| {
+        let bytes = reader.mapped().map_or(&[][..], |map| extent.of(map));
+        match reader.decode(&extent, bytes, want) {
+            Ok(strips) => strips.into_iter().map(Ok).collect(),
+            Err(error) => vec![Err(error)],
+        }
+    };
+    // An error is the end.
+    let mut has_failed = false;
+    let until = move |strip: &Result<RawStrip>| {
+        let goes_on = !has_failed;
+        has_failed |= strip.is_err();
+        goes_on
+    };
+    Ok(Box::new(extents.flat_map(decode).take_while(until)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn extents_cover_a_file() {
+        let points = |bytes: Range<u64>| Extent { bytes, first: 3, n_points: 5 };
+        let gap = GAP as u64;
+        let all = [points(2 * gap + 7..2 * gap + 9), points(2 * gap + 9..3 * gap)];
+        let of =
+            |n_bytes: u64| -> Vec<Extent> { Extent::cover(all.iter().cloned(), n_bytes).collect() };
+        let covered = of(3 * gap + 1);
+        assert!(covered.iter().zip(&covered[1..]).all(|(a, b)| a.bytes.end == b.bytes.start));
+        assert_eq!((covered[0].bytes.start, covered.len()), (0, 6));
+        assert_eq!(covered[5].bytes, 3 * gap..3 * gap + 1);
+        assert!(covered.iter().all(|e| e.bytes.end - e.bytes.start <= gap));
+        assert_eq!(of(3 * gap).len(), 5);
+        assert_eq!(covered.iter().map(|e| e.n_points).sum::<u64>(), 10);
+    }
 }

@@ -3,19 +3,31 @@
 
 use crate::format::detect;
 use crate::las::Las;
-use crate::las_scans::LasScanner;
+use crate::poses::Poses;
 use crate::raster::{self, Raster, Steps};
-use crate::reader::{RawStrip, Reader, Sampled, ScanSeed, Want};
-use crate::scanners::{Scanner, Scanners};
+use crate::reader::{self, Extent, RawStrip, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::scanners::Scanners;
 use crate::settings::Settings;
 use contract::{
-    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip,
+    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
 };
 use geometry::Pose;
 use std::path::{Path, PathBuf};
 
 /// Strips of one input, in its order.
 pub type Strips<'a> = Box<dyn Iterator<Item = Result<Strip>> + Send + 'a>;
+
+/// What an input is read by.
+#[derive(Debug)]
+pub enum Piece {
+    /// Points, of a format that is read from its beginning on.
+    Strip(Strip),
+    /// Bytes that whoever reads them hands to [`Sources::decode`].
+    Extent(Extent),
+}
+
+/// Pieces of one input, in its order.
+pub type Pieces<'a> = Box<dyn Iterator<Item = Result<Piece>> + Send + 'a>;
 
 /// Open inputs: headers read and checked, points not yet.
 pub struct Sources {
@@ -103,23 +115,64 @@ pub fn open_after(
 }
 
 impl Sources {
-    /// The points of an input, in its order; with everything that the file says of them, or coordinates only.
+    /// The points of an input, in its order, read on the thread that asks; with everything that the file says of them, or coordinates
+    /// only.
     ///
     /// # Errors
     /// An input that does not exist. Errors of the iterator name file and place; it ends after the first.
     pub fn strips(&self, input: InputId, want: Want) -> Result<Strips<'_>> {
+        let (file, path) = self.open(input)?;
+        let strips = reader::strips(&*file.reader, want).map_err(|e| e.at(path.display()))?;
+        Ok(Box::new(strips.map(move |strip| {
+            file.whole(strip).map(|raw| file.number(raw)).map_err(|e| e.at(path.display()))
+        })))
+    }
+
+    /// The same in pieces that many threads may read and decode.
+    ///
+    /// # Errors
+    /// As [`Sources::strips`].
+    pub fn pieces(&self, input: InputId, want: Want) -> Result<Pieces<'_>> {
+        let (file, path) = self.open(input)?;
+        Ok(match file.reader.read(want).map_err(|e| e.at(path.display()))? {
+            Reading::ByExtent(extents) => Box::new(extents.map(Piece::Extent).map(Ok)),
+            Reading::Straight(strips) => Box::new(strips.map(move |strip| {
+                let strip = file.whole(strip).map(|raw| Piece::Strip(file.number(raw)));
+                strip.map_err(|e| e.at(path.display()))
+            })),
+        })
+    }
+
+    /// The points of an extent of an input, from its bytes.
+    ///
+    /// # Errors
+    /// What is wrong with them, with file and place.
+    pub fn decode(
+        &self,
+        input: InputId,
+        extent: &Extent,
+        bytes: &[u8],
+        want: Want,
+    ) -> Result<Vec<Strip>> {
+        let (file, path) = self.open(input)?;
+        let strips = file.reader.decode(extent, bytes, want).map_err(|e| e.at(path.display()))?;
+        Ok(strips.into_iter().map(|raw| file.number(raw)).collect())
+    }
+
+    /// The file of an input, whatever has its name by now, where its pieces are extents.
+    #[must_use]
+    pub fn file(&self, input: InputId) -> Option<&std::fs::File> {
+        let (file, _) = self.open(input).ok()?;
+        let by_extent = matches!(file.reader.read(Want::Coordinates), Ok(Reading::ByExtent(_)));
+        file.reader.mapped().filter(|_| by_extent).map(crate::map::Mapped::file)
+    }
+
+    /// An open input and its path.
+    fn open(&self, input: InputId) -> Result<(&File, &Path)> {
         let at = input.0 as usize;
         let open = at.checked_sub(self.n_before[0]).and_then(|at| self.files.get(at));
-        let (Some(file), Some(known)) = (open, self.inputs.get(at)) else {
-            return Err(Error::new(Kind::Bug, format!("there is no input \"{at}\"")));
-        };
-        let path = &known.path;
-        let strips = file.reader.strips(want).map_err(|e| e.at(path.display()))?;
-        // A file that was cut short reads as zeros from there: that it was goes before what its reader makes of them.
-        Ok(Box::new(strips.map(move |strip| {
-            let whole = file.reader.check().and(strip);
-            whole.map(|raw| file.number(raw)).map_err(|error| error.at(path.display()))
-        })))
+        let known = open.zip(self.inputs.get(at)).map(|(file, known)| (file, &*known.path));
+        known.ok_or_else(|| Error::new(Kind::Bug, format!("there is no input \"{at}\"")))
     }
 
     /// The inputs that are open.
@@ -235,7 +288,29 @@ impl Sources {
     }
 }
 
+impl Weigh for Piece {
+    fn weight_bytes(&self) -> usize {
+        match self {
+            Self::Strip(strip) => strip.weight_bytes(),
+            Self::Extent(extent) => (extent.bytes.end - extent.bytes.start) as usize,
+        }
+    }
+
+    fn n_points(&self) -> u64 {
+        match self {
+            Self::Strip(strip) => strip.n_points(),
+            Self::Extent(extent) => extent.n_points,
+        }
+    }
+}
+
 impl File {
+    /// What came of reading, if the file was whole all along: one that was cut short reads as zeros from there, and that it was
+    /// goes before what its reader makes of them.
+    fn whole<T>(&self, read: Result<T>) -> Result<T> {
+        self.reader.check().and(read)
+    }
+
     fn number(&self, mut raw: RawStrip) -> Strip {
         let seed: &ScanSeed = &self.reader.scans()[raw.scan];
         if let Some(new_from_file) = &self.moved[raw.scan] {
@@ -283,89 +358,4 @@ fn open_file(path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<
         Format::Ptx => crate::ptx::open(path, settings),
         Format::Las | Format::Laz => Ok(Box::new(Las::open(path, &poses.of_las(path), settings)?)),
     }
-}
-
-/// The scanners that the user gave, and which of them were of use.
-struct Poses<'a> {
-    entries: &'a [Scanner],
-    used: Vec<bool>,
-    /// Names of the inputs without suffix.
-    stems: Vec<String>,
-    /// Whether there are several inputs, so that an entry may be meant for another one.
-    several: bool,
-}
-
-impl<'a> Poses<'a> {
-    fn new(scanners: &'a Scanners, paths: &[PathBuf]) -> Self {
-        Self {
-            entries: &scanners.entries,
-            used: vec![false; scanners.entries.len()],
-            stems: paths.iter().map(|p| stem(p)).collect(),
-            several: paths.len() > 1,
-        }
-    }
-
-    fn by_scan_name(&mut self, name: &str) -> Option<Pose> {
-        let at = self.entries.iter().position(|e| e.name.as_deref() == Some(name))?;
-        self.used[at] = true;
-        Some(self.entries[at].world_from_scan)
-    }
-
-    /// The scanners of a LAS or LAZ file: entries of its name; else those with a source id whose name is not that of
-    /// another input; else the only entry there is.
-    fn of_las(&mut self, path: &Path) -> Vec<LasScanner> {
-        let stem = stem(path);
-        let named = |e: &Scanner| e.name.as_deref() == Some(stem.as_str());
-        let for_another = |e: &Scanner| e.name.as_ref().is_some_and(|n| self.stems.contains(n));
-        let by_id = |e: &Scanner| e.point_source_id.is_some() && !for_another(e);
-        let only =
-            |e: &Scanner| self.entries.len() == 1 && e.point_source_id.is_none() && !for_another(e);
-        let whole = |e: &Scanner| named(e) && e.point_source_id.is_none();
-        let chosen: Vec<usize> = match self.entries.iter().position(whole) {
-            Some(at) => vec![at],
-            None => {
-                let fits =
-                    |e: &Scanner| (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e);
-                (0..self.entries.len()).filter(|i| fits(&self.entries[*i])).collect()
-            }
-        };
-        let mut scanners: Vec<LasScanner> = Vec::new();
-        for at in chosen {
-            let entry = &self.entries[at];
-            self.used[at] = true;
-            // An entry of this file's name goes before one that only shares the id.
-            let twin = scanners.iter().position(|s| s.source_id == entry.point_source_id);
-            let scanner = LasScanner {
-                source_id: entry.point_source_id,
-                name: entry.name.clone(),
-                pose: entry.world_from_scan,
-                may_be_elsewhere: self.several && !named(entry),
-            };
-            match twin {
-                Some(twin) if named(entry) => scanners[twin] = scanner,
-                Some(_) => {}
-                None => scanners.push(scanner),
-            }
-        }
-        scanners
-    }
-
-    fn unused(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        for (i, entry) in self.entries.iter().enumerate().filter(|(i, _)| !self.used[*i]) {
-            let id = entry
-                .point_source_id
-                .map_or_else(String::new, |id| format!(", point_source_id {id}"));
-            let name = entry.name.as_deref().unwrap_or("no name");
-            warnings.push(format!(
-                "scanner {} ({name}{id}) of --scanners matches no scan and no file",
-                i + 1
-            ));
-        }
-        warnings
-    }
-}
-
-fn stem(path: &Path) -> String {
-    path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned())
 }

@@ -1,0 +1,91 @@
+//! The scanners of `--scanners` in; those that are meant for a scan or a LAS file out, and which of them nobody asked for.
+
+use crate::las_scans::LasScanner;
+use crate::scanners::{Scanner, Scanners};
+use geometry::Pose;
+use std::path::{Path, PathBuf};
+
+/// The scanners that the user gave, and which of them were of use.
+pub(crate) struct Poses<'a> {
+    entries: &'a [Scanner],
+    used: Vec<bool>,
+    /// Names of the inputs without suffix.
+    stems: Vec<String>,
+    /// Whether there are several inputs, so that an entry may be meant for another one.
+    several: bool,
+}
+
+impl<'a> Poses<'a> {
+    pub(crate) fn new(scanners: &'a Scanners, paths: &[PathBuf]) -> Self {
+        Self {
+            entries: &scanners.entries,
+            used: vec![false; scanners.entries.len()],
+            stems: paths.iter().map(|p| stem(p)).collect(),
+            several: paths.len() > 1,
+        }
+    }
+
+    pub(crate) fn by_scan_name(&mut self, name: &str) -> Option<Pose> {
+        let at = self.entries.iter().position(|e| e.name.as_deref() == Some(name))?;
+        self.used[at] = true;
+        Some(self.entries[at].world_from_scan)
+    }
+
+    /// The scanners of a LAS or LAZ file: entries of its name; else those with a source id whose name is not that of
+    /// another input; else the only entry there is.
+    pub(crate) fn of_las(&mut self, path: &Path) -> Vec<LasScanner> {
+        let stem = stem(path);
+        let named = |e: &Scanner| e.name.as_deref() == Some(stem.as_str());
+        let for_another = |e: &Scanner| e.name.as_ref().is_some_and(|n| self.stems.contains(n));
+        let by_id = |e: &Scanner| e.point_source_id.is_some() && !for_another(e);
+        let only =
+            |e: &Scanner| self.entries.len() == 1 && e.point_source_id.is_none() && !for_another(e);
+        let whole = |e: &Scanner| named(e) && e.point_source_id.is_none();
+        let chosen: Vec<usize> = match self.entries.iter().position(whole) {
+            Some(at) => vec![at],
+            None => {
+                let fits =
+                    |e: &Scanner| (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e);
+                (0..self.entries.len()).filter(|i| fits(&self.entries[*i])).collect()
+            }
+        };
+        let mut scanners: Vec<LasScanner> = Vec::new();
+        for at in chosen {
+            let entry = &self.entries[at];
+            self.used[at] = true;
+            // An entry of this file's name goes before one that only shares the id.
+            let twin = scanners.iter().position(|s| s.source_id == entry.point_source_id);
+            let scanner = LasScanner {
+                source_id: entry.point_source_id,
+                name: entry.name.clone(),
+                pose: entry.world_from_scan,
+                may_be_elsewhere: self.several && !named(entry),
+            };
+            match twin {
+                Some(twin) if named(entry) => scanners[twin] = scanner,
+                Some(_) => {}
+                None => scanners.push(scanner),
+            }
+        }
+        scanners
+    }
+
+    pub(crate) fn unused(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for (i, entry) in self.entries.iter().enumerate().filter(|(i, _)| !self.used[*i]) {
+            let id = entry
+                .point_source_id
+                .map_or_else(String::new, |id| format!(", point_source_id {id}"));
+            let name = entry.name.as_deref().unwrap_or("no name");
+            warnings.push(format!(
+                "scanner {} ({name}{id}) of --scanners matches no scan and no file",
+                i + 1
+            ));
+        }
+        warnings
+    }
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned())
+}
