@@ -27,6 +27,9 @@ const SAME_SIZE: (f64, [f64; 3]) = (0.12, [0.2, 0.2, 0.1]);
 const FLAT: f64 = 0.5;
 const SAME_TOP: f64 = 0.08;
 
+/// So near each other are the ends of a thing of which something before it hides the middle, metres.
+const BESIDE: f64 = 0.1;
+
 /// What is tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThingSettings {
@@ -265,13 +268,27 @@ fn complete(moved: &mut [Pair], pieces: [&[Piece]; 2]) {
                 let (own, other) = (pair.boxes[side], pair.boxes[1 - side]);
                 let with = own.union(&piece.bounds);
                 let [before, after] = [&own, &with].map(|b| farthest_off(b, &other));
-                if after <= 1.0 && after < before {
+                let is_rest = after <= 1.0 && after < before;
+                if is_rest || is_end(&piece.bounds, &own, &other) {
                     pair.boxes[side] = with;
                     pair.parts[side].push(i);
                 }
             }
         }
     }
+}
+
+/// Whether a piece is an end of a thing of which `own` was seen, where the other session saw `other`: beside it, as high as it, and
+/// both together are more like that one, and no larger. A thing that was turned has other bounds.
+fn is_end(piece: &Aabb, own: &Aabb, other: &Aabb) -> bool {
+    let with = sides(&own.union(piece));
+    let (own_sides, other) = (sides(own), sides(other));
+    let is_within = (0..3).all(|i| with[i] - other[i] <= same(&with, &other, i));
+    let all_off = |a: &[f64; 3]| (0..3).map(|i| off(a, &other, i)).sum::<f64>();
+    own.grown(BESIDE).touches(piece)
+        && (piece.max[2] - own.max[2]).abs() <= SAME_TOP
+        && is_within
+        && all_off(&with) < all_off(&own_sides)
 }
 
 /// Which of those that went stands elsewhere and the bounds there and here, the most alike first chosen: a barrel must not take

@@ -149,6 +149,21 @@ fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
     assert!(found[1].now.expect("bounds").contains([5.1, 2.5, 0.2]));
 }
 
+#[test]
+fn an_end_beside_a_thing_that_was_turned_is_its_own() {
+    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.4, 0.73], true);
+    // Turned, it has narrower bounds; a post hides a strip of it. A lower thing beside it is another one.
+    solid(&mut now, [5.0, 1.0, 0.02], [1.1, 1.0, 0.73], true);
+    solid(&mut now, [6.2, 1.2, 0.02], [0.25, 0.4, 0.73], true);
+    solid(&mut now, [4.5, 1.2, 0.02], [0.25, 0.3, 0.4], true);
+    let found = found(then, now);
+    let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
+    assert_eq!(kinds, [ThingChange::Moved, ThingChange::Appeared]);
+    assert!((found[0].now.expect("bounds").max[0] - 6.45).abs() < 0.06);
+    assert!(found[1].now.expect("bounds").contains([4.6, 1.3, 0.2]));
+}
+
 /// A sheet that stands upright, of which so many of ten points are pierced.
 fn sheet(tally: &mut Tallying, n_pierced: i32) {
     for (i, j) in (0..40).flat_map(|i| (0..20).map(move |j| (i, j))) {
