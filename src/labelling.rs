@@ -177,8 +177,9 @@ impl<'a> Labelling<'a> {
         let task = Task::new("segment").of(crate::progress::Amount::items(tiles.len() as u64));
         let mut sum = self.attach.empty();
         let mut labelled: Vec<TileLabels> = Vec::new();
-        engine.pass(task, store.tiles_of(tiles), |f| {
-            f.map(&segment).for_each(|mut tile| {
+        let reads = store.reads();
+        engine.pass(task, store.picks_again(tiles), |f| {
+            f.map(&reads).map(&segment).for_each(|mut tile| {
                 self.attach.add(&mut sum, std::mem::take(&mut tile.voxels))?;
                 labelled.push(tile);
                 Ok(())
@@ -227,9 +228,12 @@ impl<'a> Labelling<'a> {
             Ok((masks.finish()?, clouds.finish()?))
         };
         let along = |hand: Hand<'_, Labelled>| {
-            let mut pictures = Vec::new();
+            let (disks, mut pictures) = (engine.disks()?, Vec::new());
             for input in self.sources.opened() {
-                let plan = PlanPicture::new(&self.bounds_of(input.id));
+                let plan = PlanPicture::new(
+                    &self.bounds_of(input.id),
+                    crate::report::amount(self.sources, input.id).points,
+                );
                 let label = LabelStrip {
                     near: &near.labels,
                     ground: &self.ground,
@@ -249,7 +253,7 @@ impl<'a> Labelling<'a> {
                     for (robot, point, label) in strip.shown.drain(..) {
                         robots[robot].add(point, label);
                     }
-                    tiles.iter_mut().try_for_each(|tiles| tiles.add(&strip.packed))?;
+                    tiles.iter_mut().try_for_each(|tiles| tiles.add(&strip.packed, &disks))?;
                     hand(strip)
                 })?;
                 pictures.push(self.draw_plan(&plan, input.id, out)?);

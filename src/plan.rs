@@ -55,9 +55,9 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
     let grounds = Kept::new(room.fits(), sums.ground(&tiles, settings));
     let ground = grounds.or_find("ground", || {
-        let source = store.tiles(|entry| surfaces.skip(entry));
+        let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
         engine.pass(crate::report::tiles("surfaces", &store), source, |f| {
-            f.map(&surfaces).fold(&gather)
+            f.map(&reads).map(&surfaces).fold(&gather)
         })
     })?;
     let clusters =

@@ -108,8 +108,9 @@ impl Cell {
         engine.pool()?.install(|| shelf.prepare(&names, &AllThreads));
         let (surfaces, gather) =
             (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
-        let source = store.tiles(|entry| surfaces.skip(entry));
-        let ground = engine.pass("surfaces", source, |f| f.map(&surfaces).fold(&gather))?;
+        let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
+        let ground =
+            engine.pass("surfaces", source, |f| f.map(&reads).map(&surfaces).fold(&gather))?;
         let clusters =
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let regions = identify::regions(&clusters, &settings.region);

@@ -197,6 +197,16 @@ impl Engine {
         self.pool()?.install(|| AllThreads.fan(items, f)).into_iter().collect()
     }
 
+    /// Threads for pieces of a step that wait for the disk most of their time.
+    ///
+    /// # Errors
+    /// Threads that the system does not start.
+    pub(crate) fn disks(&self) -> Result<Threads> {
+        let engine = self.for_disks();
+        engine.pool()?;
+        Ok(Threads(engine.pool))
+    }
+
     /// The pool of [`Engine::fan_out`], for steps that use rayon by themselves.
     pub fn pool(&self) -> Result<&rayon::ThreadPool> {
         if let Some(pool) = self.pool.get() {
@@ -208,6 +218,19 @@ impl Engine {
             .build()
             .map_err(|e| Error::new(Kind::Io, "threads could not be started").because(e))?;
         Ok(self.pool.get_or_init(|| pool))
+    }
+}
+
+/// The pieces of a step on threads of their own.
+pub(crate) struct Threads(OnceLock<rayon::ThreadPool>);
+
+impl Fan for Threads {
+    fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
+        let work = || AllThreads.fan(items, work);
+        match self.0.get() {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
     }
 }
 

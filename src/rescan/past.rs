@@ -76,9 +76,10 @@ impl<'a> Past<'a> {
     pub(crate) fn surfaces(&self, engine: &Engine) -> Result<Surfaces> {
         let (skip, step) = sampled((self.n_points() / N_SAMPLED).max(SAMPLE));
         let (mut all, sample) = (Surfaces::default(), Sample { past: self, step });
-        let source = self.store.tiles_once(self.tiles.clone(), skip);
+        let source = self.store.picks_once(self.tiles.clone(), skip);
+        let reads = self.store.reads();
         engine.pass(self.task("register"), source, |f| {
-            f.map(&sample).for_each(|own| {
+            f.map(&reads).map(&sample).for_each(|own| {
                 all.join(own.0);
                 Ok(())
             })
@@ -97,9 +98,10 @@ impl<'a> Past<'a> {
         let fates = Fates::of(&self.cell);
         let anew: Vec<Places> = self.n_points.iter().map(|n| Places::of(*n)).collect();
         let look = Look { past: self, watch, own, missed, fates: &fates, anew: &anew };
-        let source = self.store.tiles_once(self.tiles.clone(), 0);
+        let source = self.store.picks_once(self.tiles.clone(), 0);
+        let reads = self.store.reads();
         engine.pass(self.task("compare"), source, |f| {
-            f.map(&look).for_each(|mut looked| {
+            f.map(&reads).map(&look).for_each(|mut looked| {
                 then.join(std::mem::take(&mut looked.tally));
                 tiles.push(looked);
                 Ok(())

@@ -56,9 +56,10 @@ pub(crate) struct Tallied(Tally);
 impl Present<'_> {
     pub(crate) fn tally(&self, store: &Store, engine: &Engine) -> Result<Tally> {
         let mut all = Tally::default();
-        let source = store.tiles_once(store.touching(&self.cell), 0);
+        let source = store.picks_once(store.touching(&self.cell), 0);
+        let reads = store.reads();
         engine.pass(tiles("compare", store), source, |f| {
-            f.map(self).for_each(|own| {
+            f.map(&reads).map(self).for_each(|own| {
                 all.join(own.0);
                 Ok(())
             })

@@ -361,9 +361,9 @@ pub(crate) fn ground(
     let surfaces = Surfaces::new(&sources.scans, &settings.lattice);
     let surfaces = if is_known && !with_walls { surfaces.without_planes() } else { surfaces };
     let gather = Gather::new(&sources.scans, &settings.floor);
-    let source = store.tiles(|entry| surfaces.skip(entry));
+    let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
     let mut ground = engine.pass(crate::report::tiles("surfaces", store), source, |f| {
-        f.map(&surfaces).fold(&gather)
+        f.map(&reads).map(&surfaces).fold(&gather)
     })?;
     if is_known {
         ground.surfaces.floor = floor.clone();

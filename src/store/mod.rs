@@ -16,7 +16,7 @@ mod writer;
 
 use crate::straight::Straight;
 use catalogue::broken;
-use contract::{Error, MAX_SKIP, Result, Scan, Tile, TileAt, TilePoints, Weigh};
+use contract::{Error, MAX_SKIP, Map, Result, Scan, Tile, TileAt, TilePoints, Weigh};
 use geometry::Aabb;
 use map::FileMap;
 use record::N_LEVELS;
@@ -192,26 +192,60 @@ impl Store {
         (0..self.entries.len()).filter(|&i| self.entries[i].bounds.touches(bounds)).collect()
     }
 
-    /// All tiles in order, each read once, past the system's cache: a source for a pass. `skip` says how much of each is left out
-    /// (see [`Tile::skip`]).
-    pub fn tiles<'s>(
+    /// All tiles in order, each to be read once, past the system's cache: a source for a pass, whose first map is
+    /// [`Store::reads`]. `skip` says how much of each is left out (see [`Tile::skip`]).
+    pub fn picks<'s>(
         &'s self,
         skip: impl Fn(&TileEntry) -> u32 + Send + 's,
-    ) -> impl Iterator<Item = Result<Tile>> + Send + 's {
-        self.entries.iter().enumerate().map(move |(i, entry)| self.straight(i, skip(entry)))
+    ) -> impl Iterator<Item = Result<Pick>> + Send + 's {
+        let pick = move |(i, entry)| self.pick(i, skip(entry), true);
+        self.entries.iter().enumerate().map(pick)
     }
 
-    /// These tiles, each read once, past the system's cache: a source for a pass.
-    pub fn tiles_once(
+    /// The same of these tiles.
+    pub fn picks_once(
         &self,
         indices: Vec<usize>,
         skip: u32,
-    ) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
-        indices.into_iter().map(move |i| self.straight(i, skip))
+    ) -> impl Iterator<Item = Result<Pick>> + Send + '_ {
+        indices.into_iter().map(move |i| self.pick(i, skip, true))
     }
 
-    fn straight(&self, i: usize, skip: u32) -> Result<Tile> {
+    /// The same of these tiles, for those that are asked for again and again: the system reads them ahead.
+    pub fn picks_again(
+        &self,
+        indices: Vec<usize>,
+    ) -> impl Iterator<Item = Result<Pick>> + Send + '_ {
+        indices.into_iter().map(move |i| {
+            self.will_need(i, N_LEVELS);
+            self.pick(i, 0, false)
+        })
+    }
+
+    fn pick(&self, i: usize, skip: u32, once: bool) -> Result<Pick> {
+        let entry = &self.entries[i];
         let n_levels = n_levels(skip);
+        Ok(Pick {
+            i,
+            skip,
+            once,
+            n_points: entry.n_points,
+            n_bytes: entry.n_bytes(n_levels) as usize,
+        })
+    }
+
+    /// Reads tiles on the workers of a pass.
+    #[must_use]
+    pub fn reads(&self) -> Reads<'_> {
+        Reads(self)
+    }
+
+    /// A tile that was picked, checked where it is read for the first time.
+    pub fn read(&self, pick: &Pick) -> Result<Tile> {
+        if !pick.once {
+            return self.tile(pick.i, pick.skip);
+        }
+        let (i, n_levels) = (pick.i, n_levels(pick.skip));
         let (part, Range { start, end }) = self.place(i, n_levels);
         let bytes = part.straight.read(start as u64, end - start);
         let bytes = bytes.map_err(|e| Error::of_file("the tiles cannot be read", &part.path, e))?;
@@ -221,19 +255,39 @@ impl Store {
         self.check(i, n_levels, &bytes)?;
         Ok(encode::decode(&self.entries[i], n_levels, &bytes))
     }
+}
 
-    /// These tiles in the given order, for those that are asked for again and again: a source for a pass.
-    pub fn tiles_of(&self, indices: Vec<usize>) -> impl Iterator<Item = Result<Tile>> + Send + '_ {
-        let mut ahead = indices.clone().into_iter();
-        for i in ahead.by_ref().take(AHEAD) {
-            self.will_need(i, N_LEVELS);
-        }
-        indices.into_iter().map(move |i| {
-            if let Some(next) = ahead.next() {
-                self.will_need(next, N_LEVELS);
-            }
-            self.tile(i, 0)
-        })
+/// A tile that is to be read.
+#[derive(Debug, Clone, Copy)]
+pub struct Pick {
+    i: usize,
+    skip: u32,
+    /// Whether nobody reads it again soon.
+    once: bool,
+    n_points: u64,
+    n_bytes: usize,
+}
+
+impl Weigh for Pick {
+    fn weight_bytes(&self) -> usize {
+        self.n_bytes
+    }
+
+    fn n_points(&self) -> u64 {
+        self.n_points
+    }
+}
+
+/// Picked tiles in, read ones out.
+pub struct Reads<'s>(&'s Store);
+
+impl Map for Reads<'_> {
+    type In = Pick;
+    type Out = Tile;
+    type Scratch = ();
+
+    fn apply(&self, pick: Pick, (): &mut ()) -> Result<Tile> {
+        self.0.read(&pick)
     }
 }
 

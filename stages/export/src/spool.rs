@@ -108,11 +108,6 @@ impl Spool {
         }
     }
 
-    /// Bytes that wait.
-    pub(crate) fn n_bytes(&self) -> usize {
-        self.blocks.iter().map(|block| block.bytes().len()).sum()
-    }
-
     /// Takes as many records as the last block has room for; returns the others. A record may lie in two blocks.
     pub(crate) fn fill<'a>(&mut self, records: &'a [u8]) -> &'a [u8] {
         let Some(last) = self.blocks.last_mut() else { return records };
@@ -125,6 +120,12 @@ impl Spool {
 
     /// Appends the first `n` blocks that wait, and gives them back.
     pub(crate) fn append(&mut self, blocks: &mut Blocks, n: usize) -> Result<()> {
+        blocks.empty.extend(self.write(n)?);
+        Ok(())
+    }
+
+    /// The same; returns them.
+    pub(crate) fn write(&mut self, n: usize) -> Result<Vec<Block>> {
         let first = &self.blocks[..n];
         self.direct &= first.iter().all(|block| block.bytes().len() == BLOCK_BYTES);
         let written = self.open().and_then(|mut file| {
@@ -135,14 +136,14 @@ impl Spool {
         });
         written.map_err(|e| Error::of_file("tile cannot be written", &self.part, e))?;
         self.is_begun = true;
-        for mut block in self.blocks.drain(..n) {
+        let mut written: Vec<Block> = self.blocks.drain(..n).collect();
+        for block in &mut written {
             let n_head = self.n_head.min(block.bytes().len());
             self.body.add(&block.bytes()[n_head..]);
             self.n_head -= n_head;
             block.clear();
-            blocks.empty.push(block);
         }
-        Ok(())
+        Ok(written)
     }
 
     /// The file, to be written from its end on; the first time, what an earlier run left behind goes.

@@ -13,8 +13,6 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 
-/// A tile with so many waiting bytes is appended to its file: one call to the system for a hundred thousand points.
-const FULL_BYTES: usize = 4 << 20;
 /// Writes labelled points under `OUT/tiles`.
 pub struct Tiles {
     out: PathBuf,
@@ -39,16 +37,16 @@ impl Tiles {
         Ok(Some(Self { out: out.to_path_buf(), las: las.clone(), tiles: BTreeMap::new(), blocks }))
     }
 
-    /// Adds a packed strip.
+    /// Adds a packed strip; where no more records may wait, those of some tiles are written by `fan`.
     ///
     /// # Errors
     /// A tile that cannot be written.
-    pub fn add(&mut self, packed: &Packed) -> Result<()> {
+    pub fn add(&mut self, packed: &Packed, fan: &impl Fan) -> Result<()> {
         let mut runs = packed.runs(self.las.record_len());
-        runs.try_for_each(|(run, records)| self.spool(run, records))
+        runs.try_for_each(|(run, records)| self.spool(run, records, fan))
     }
 
-    fn spool(&mut self, run: &Run, mut records: &[u8]) -> Result<()> {
+    fn spool(&mut self, run: &Run, mut records: &[u8], fan: &impl Fan) -> Result<()> {
         let (at, las) = (run.tile, &self.las);
         let path = || self.out.join(format!("tiles/{}_{}.{}", at[1], at[0], las.ending()));
         let spool = match self.tiles.entry(at) {
@@ -58,15 +56,12 @@ impl Tiles {
         spool.extent.join(&run.extent);
         while let Some(spool) = self.tiles.get_mut(&at) {
             records = spool.fill(records);
-            if spool.n_bytes() >= FULL_BYTES {
-                spool.append(&mut self.blocks, spool.blocks.len())?;
-            }
             if records.is_empty() {
                 break;
             }
             match self.blocks.take() {
                 Some(block) => spool.blocks.push(block),
-                None => relieve(&mut self.tiles, &mut self.blocks)?,
+                None => relieve(&mut self.tiles, &mut self.blocks, fan)?,
             }
         }
         Ok(())
@@ -87,19 +82,33 @@ impl Tiles {
     }
 }
 
-/// Appends the fullest tiles to their files until half of the blocks are free: full blocks, as long as there are some.
-fn relieve(tiles: &mut BTreeMap<[i32; 2], Spool>, blocks: &mut Blocks) -> Result<()> {
+/// Appends the fullest tiles to their files, side by side, until half of the blocks are free: full blocks, as long as there are
+/// some.
+fn relieve(
+    tiles: &mut BTreeMap<[i32; 2], Spool>,
+    blocks: &mut Blocks,
+    fan: &impl Fan,
+) -> Result<()> {
     let mut fullest: Vec<([i32; 2], usize)> =
-        tiles.iter().map(|(at, spool)| (*at, spool.blocks.len())).collect();
+        tiles.iter().map(|(at, spool)| (*at, spool.blocks.len())).filter(|(_, n)| *n > 0).collect();
     fullest.sort_by_key(|(at, n)| (std::cmp::Reverse(*n), *at));
     let n_blocks: usize = fullest.iter().map(|(_, n)| n).sum();
-    for (at, _) in fullest.into_iter().filter(|(_, n)| *n > 0) {
-        if 2 * blocks.empty.len() > n_blocks {
+    let (mut n_free, mut full) = (blocks.empty.len(), Vec::new());
+    for (at, n_waiting) in fullest {
+        if 2 * n_free > n_blocks {
             break;
         }
-        if let Some(spool) = tiles.get_mut(&at) {
-            spool.append(blocks, (spool.blocks.len() - 1).max(1))?;
-        }
+        let n = (n_waiting - 1).max(1);
+        n_free += n;
+        full.extend(tiles.remove(&at).map(|spool| (at, spool, n)));
+    }
+    let write = |(at, mut spool, n): ([i32; 2], Spool, usize)| {
+        spool.write(n).map(|written| (at, spool, written))
+    };
+    for written in fan.fan(full, write) {
+        let (at, spool, written) = written?;
+        blocks.empty.extend(written);
+        tiles.insert(at, spool);
     }
     Ok(())
 }

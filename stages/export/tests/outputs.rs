@@ -74,7 +74,7 @@ fn clouds(
             ..PointColumns::default()
         };
         let packed = pack.pack(&points).expect("packs");
-        tiles.add(&packed).expect("adds");
+        tiles.add(&packed, &contract::OneByOne).expect("adds");
         clouds.add(&packed).expect("adds");
     }
     let tiles = tiles.finish(&contract::OneByOne).expect("finish");
@@ -149,7 +149,8 @@ fn bodies_are_an_extra_field_behind_labels() {
         body: &[70_000, 0],
         ..PointColumns::default()
     };
-    tiles.add(&Pack::of_clouds(&las, &settings).pack(&points).expect("packs")).expect("adds");
+    let packed = Pack::of_clouds(&las, &settings).pack(&points).expect("packs");
+    tiles.add(&packed, &contract::OneByOne).expect("adds");
     let written = tiles.finish(&contract::OneByOne).expect("finish");
     let (_, points) = read(&written[0].path);
     let mut extra: Vec<_> = points.iter().map(|p| p.extra_bytes.clone()).collect();
