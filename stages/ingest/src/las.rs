@@ -171,7 +171,7 @@ impl Reader for Las {
     fn read(&self, want: Want) -> Result<Reading<'_>> {
         let streamed = || {
             let records = Streamed { las: self, want, place: 0, stream: None, has_failed: false };
-            Reading::Straight(Box::new(records.flat_map(std::convert::identity)))
+            Reading::Straight(Box::new(records.flatten()))
         };
         Ok(self.records.extents(self.strip_points).map_or_else(streamed, Reading::ByExtent))
     }
