@@ -2,9 +2,9 @@
 //! where nobody knows its digest; others make points of them.
 
 use crate::engine::{Engine, Task};
-use crate::reuse::Tree;
+use crate::reuse::{Part, Tree};
 use crate::straight::{Lent, Straight};
-use contract::{Error, Input, Map, Result, Strip, Weigh};
+use contract::{Error, Input, Kind, Map, Result, Strip, Weigh};
 use ingest::{Extent, Piece, Sources, Want};
 
 /// Inputs that are larger than this in all are read past the system's cache, bytes: smaller ones it may still hold when they are
@@ -82,7 +82,7 @@ struct Load<'a> {
 /// A piece whose bytes are there.
 enum Loaded<'a> {
     Strip(Strip),
-    Extent(Extent, Lent<'a>, Vec<crate::reuse::Part>),
+    Extent(Extent, Lent<'a>, Vec<Part>),
     /// Bytes without points that nobody asked for.
     Nothing,
 }
@@ -93,14 +93,14 @@ impl<'a> Map for Load<'a> {
     type Scratch = ();
 
     fn apply(&self, piece: Piece, (): &mut ()) -> Result<Loaded<'a>> {
+        let is_asked = |extent: &Extent| extent.n_points > 0 || self.n_bytes.is_some();
         let (extent, file) = match (piece, self.file) {
             (Piece::Strip(strip), _) => return Ok(Loaded::Strip(strip)),
-            (Piece::Extent(extent), Some(file))
-                if extent.n_points > 0 || self.n_bytes.is_some() =>
-            {
-                (extent, file)
+            (Piece::Extent(extent), _) if !is_asked(&extent) => return Ok(Loaded::Nothing),
+            (Piece::Extent(extent), Some(file)) => (extent, file),
+            (Piece::Extent(_), None) => {
+                return Err(Error::new(Kind::Bug, "there is no file to read a piece from"));
             }
-            _ => return Ok(Loaded::Nothing),
         };
         let start = extent.bytes.start;
         let own = self.n_bytes.map(|n_bytes| Tree::own(&extent.bytes, n_bytes));
@@ -146,7 +146,7 @@ struct OfStrips<'a, M> {
 
 impl<'a, M: Map<In = Strip>> Map for OfStrips<'a, M> {
     type In = Loaded<'a>;
-    type Out = (Many<M::Out>, Many<crate::reuse::Part>);
+    type Out = (Many<M::Out>, Many<Part>);
     type Scratch = M::Scratch;
 
     fn apply(&self, loaded: Loaded<'a>, scratch: &mut M::Scratch) -> Result<Self::Out> {
