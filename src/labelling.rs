@@ -230,10 +230,7 @@ impl<'a> Labelling<'a> {
         let along = |hand: Hand<'_, Labelled>| {
             let (disks, mut pictures) = (engine.disks()?, Vec::new());
             for input in self.sources.opened() {
-                let plan = PlanPicture::new(
-                    &self.bounds_of(input.id),
-                    crate::report::amount(self.sources, input.id).points,
-                );
+                let plan = PlanPicture::new(&self.bounds_of(input.id));
                 let label = LabelStrip {
                     near: &near.labels,
                     ground: &self.ground,

@@ -11,8 +11,6 @@ const MIN_CELL: f64 = 0.05;
 const MAX_SIDE: f64 = 2400.0;
 /// Fewest pixels along the longer side of the picture; small cells are drawn larger.
 const MIN_PIXELS: usize = 900;
-/// Points of a cell, on average, that are enough to tell its colour.
-const POINTS_A_CELL: u64 = 64;
 /// Room about the plan, pixels.
 const MARGIN: i64 = 24;
 
@@ -26,8 +24,6 @@ pub struct PlanPicture {
     width: usize,
     height: usize,
     cells: Vec<Cell>,
-    /// Of so many points one is counted.
-    step: usize,
 }
 
 #[derive(Debug, Default)]
@@ -41,19 +37,16 @@ struct Cell {
 }
 
 impl PlanPicture {
-    /// A plan of these bounds of the world, for about so many points (0 where that is not known); points outside are passed over, and
-    /// of very many some are.
+    /// A plan of these bounds of the world; points outside are passed over.
     #[must_use]
-    pub fn new(bounds: &Aabb, n_points: u64) -> Self {
+    pub fn new(bounds: &Aabb) -> Self {
         let known = !bounds.is_empty()
             && (0..2).all(|i| bounds.min[i].is_finite() && bounds.max[i].is_finite());
         let bounds = if known { *bounds } else { Aabb { min: [0.0; 3], max: [1.0; 3] } };
         let size = bounds.size();
         let cell = MIN_CELL.max(size[0].max(size[1]) / MAX_SIDE);
         let [width, height] = [0, 1].map(|i| ((size[i] / cell).floor() as usize).max(1) + 1);
-        let enough = POINTS_A_CELL * (width * height) as u64;
         Self {
-            step: usize::try_from(n_points / enough).unwrap_or(1).max(1),
             min: [bounds.min[0], bounds.min[1]],
             cell,
             per_metre: 1.0 / cell,
@@ -68,7 +61,7 @@ impl PlanPicture {
         // Neighbours mostly fall into the same cell: they are counted together.
         let mut last = (None, Label::FIXED);
         let mut n = 0;
-        for (p, label) in world.iter().zip(labels).step_by(self.step) {
+        for (p, label) in world.iter().zip(labels) {
             let now = (self.at([p[0], p[1]]), *label);
             if now != last {
                 self.count(last, n);

@@ -1,7 +1,7 @@
 //! Packed strips in, in any order; spatial tiles of all points out.
 //!
 //! Tiles are as many as the plant is large, so none of them keeps a file open: records wait in blocks of memory, bounded in
-//! number, and full tiles are appended to their files.
+//! number, and where none is left those of the fullest tiles are appended to their files, side by side.
 
 use crate::las::LasSummary;
 use crate::pack::{Packed, Run};

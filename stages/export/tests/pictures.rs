@@ -44,7 +44,7 @@ fn pictures_show_robots_where_they_stand() {
     let mut views = RobotPicture::new(0, &model, &poses, &contract::OneByOne);
     let bounds =
         Aabb { min: [399_995.0, 4_999_995.0, 100.0], max: [400_012.0, 5_000_009.0, 103.0] };
-    let plan = PlanPicture::new(&bounds, 0);
+    let plan = PlanPicture::new(&bounds);
     let mut add = |world: [f64; 3], label: Label| {
         plan.add(&[world], &[label]);
         views.add(world, label);
