@@ -92,6 +92,8 @@ pub struct FloorLevel {
     pub plane: Plane,
     /// RMS of its cells' heights about the mean plane, metres (waviness).
     pub waviness: f64,
+    /// How far its points lie off its heights, metres, one sigma: noise, registration, and waves smaller than a cell.
+    pub scatter: f64,
     /// Area, m².
     pub area: f64,
     /// Edge of a cell of the height map, metres.

@@ -155,7 +155,7 @@ fn search(
     let pieces = pieces(patches, wanted, settings);
     let crate::levels::Levels { floor: found, ceilings } =
         levels(pieces, patches, &columns, scanners, settings);
-    let levels: Vec<_> = found.iter().map(|level| describe(level, settings)).collect();
+    let levels: Vec<_> = found.iter().map(|level| describe(level, patches, settings)).collect();
     let may_carry: Vec<PlanePatch> = patches
         .iter()
         .enumerate()

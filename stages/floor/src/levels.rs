@@ -202,7 +202,11 @@ fn weight(level: &Level, patches: &[PlanePatch], wanted: impl Fn(&PlanePatch) ->
 }
 
 /// The level as others see it: mean plane and height map.
-pub(crate) fn describe(level: &Level, settings: &Settings) -> FloorLevel {
+pub(crate) fn describe(
+    level: &Level,
+    patches: &[PlanePatch],
+    settings: &Settings,
+) -> FloorLevel {
     let cell = settings.height_cell;
     let mut offs: Vec<([i32; 2], f64)> = level
         .nodes
@@ -223,5 +227,32 @@ pub(crate) fn describe(level: &Level, settings: &Settings) -> FloorLevel {
             (same[0].0, height(&level.plane, x, y) + off)
         })
         .collect();
-    FloorLevel { plane: level.plane, waviness: level.waviness, area: level.area(), cell, heights }
+    let (plane, waviness, area) = (level.plane, level.waviness, level.area());
+    let mut out = FloorLevel { plane, waviness, scatter: 0.0, area, cell, heights };
+    out.scatter = scatter(&out, level.patches.iter().map(|&i| &patches[i]));
+    out
+}
+
+/// Share of a level's points whose scatter counts: the others lie on what was joined to it, plates and cables.
+const SCATTERED: f64 = 0.9;
+
+/// How far points lie off the heights of a level, metres, one sigma: cell by cell, within their patches and with them.
+fn scatter<'a>(level: &FloorLevel, patches: impl Iterator<Item = &'a PlanePatch>) -> f64 {
+    let mut offs: Vec<(f64, u32)> = Vec::new();
+    for patch in patches {
+        for &(cell, n, sum) in &patch.ground {
+            let at = Node { cell, z: sum / f64::from(n.max(1)), n }.place();
+            let off = level.height(at.x, at.y).map(|height| at.z - height);
+            offs.extend(off.map(|off| (off.hypot(patch.rms), n)));
+        }
+    }
+    offs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f64 = offs.iter().map(|o| f64::from(o.1)).sum();
+    let mut below = 0.0;
+    let is_below = |o: &&(f64, u32)| {
+        below += f64::from(o.1);
+        below < SCATTERED * all
+    };
+    let n = offs.iter().take_while(is_below).count();
+    offs.get(n).map_or(0.0, |o| o.0)
 }

@@ -117,6 +117,8 @@ fn tilted_wavy_floor_with_a_larger_ceiling_tables_and_a_ring() {
     );
     let level = &floor.levels[0];
     assert!(level.area > 35.0 && level.waviness < 0.008, "{} {}", level.area, level.waviness);
+    // Noise of 2 mm, two scans 4 mm apart, and what waves inside a cell.
+    assert!((0.003..0.006).contains(&level.scatter), "{}", level.scatter);
     for (x, y) in [(-2.5, 0.5), (2.5, 2.2), (3.2, -2.0), (1.0, 1.0)] {
         let off = level.height(x, y).expect("known floor") - wavy(x, y);
         assert!(off.abs() < 0.009, "{off} at {x} {y}");
@@ -142,6 +144,8 @@ fn two_levels_and_no_third() {
     heights.sort_by(f64::total_cmp);
     assert_eq!(heights.len(), 2, "{heights:?}");
     assert!(heights[0].abs() < 0.005 && (heights[1] - 0.6).abs() < 0.005);
+    let scatters: Vec<f64> = floor.levels.iter().map(|l| l.scatter).collect();
+    assert!(scatters.iter().all(|s| (0.0019..0.0025).contains(s)), "{scatters:?}");
     assert!(floor.height_above([4.0, 0.0, 1.0], 0.1).is_some_and(|h| (h - 0.4).abs() < 0.01));
 }
 

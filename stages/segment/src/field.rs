@@ -2,6 +2,7 @@
 
 use geometry::NearestField;
 use robot::CadCloud;
+use std::ops::Range;
 
 /// Smallest edge of a cell, metres: with samples every 5 mm a cell holds about sixteen.
 const MIN_EDGE: f32 = 0.02;
@@ -9,6 +10,12 @@ const MIN_EDGE: f32 = 0.02;
 pub(crate) const FIELD_REACH: f32 = 0.16;
 /// Most cells of a grid; a larger link gets larger cells.
 const MAX_CELLS: f32 = 2.0e6;
+
+/// Rows of cells about a place, the nearest first: most samples of the others need not be looked at.
+const ROWS: [(isize, isize); 9] =
+    [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
+/// What distances to cells may be off, metres: they are a few metres long at most, and reckoned to seven digits.
+const ROUNDED: f32 = 1e-5;
 
 /// Samples sorted into cells, and for each cell how far it is from the surface.
 pub(crate) struct Field {
@@ -96,36 +103,60 @@ impl Field {
         if rough > 2.75 * self.edge {
             return Err(rough);
         }
-        let cell = self.cell(p);
-        let at = cell.map(|v| v as i64);
-        let mut best = (f32::INFINITY, 0);
-        for offset in (0..9).map(|n| [0, n % 3 - 1, n / 3 - 1]) {
-            let (y, z) = (at[1] + offset[1], at[2] + offset[2]);
-            if y < 0 || z < 0 || y >= self.size[1] as i64 || z >= self.size[2] as i64 {
+        let (cell, mut best) = (self.cell(p), (f32::INFINITY, 0));
+        let gaps = self.gaps(p, cell);
+        // A sample so far off is no nearer across the surface than that without the tangent's length.
+        let is_beyond = |square: f32, best: f32| {
+            let reach = square.sqrt() - self.tangent - ROUNDED;
+            reach > 0.0 && reach * reach > best
+        };
+        for (dy, dz) in ROWS {
+            let (y, z) = (cell[1].wrapping_add_signed(dy), cell[2].wrapping_add_signed(dz));
+            let aside = gap(gaps[1], dy) + gap(gaps[2], dz);
+            if y >= self.size[1] || z >= self.size[2] || is_beyond(aside, best.0) {
                 continue;
             }
-            // Cells along x are neighbours in memory: three of them are one run of samples.
-            let row = (z as usize * self.size[1] + y as usize) * self.size[0];
-            let first = row + cell[0].saturating_sub(1);
-            let last = row + (cell[0] + 1).min(self.size[0] - 1);
-            for i in self.starts[first] as usize..self.starts[last + 1] as usize {
-                let d = minus(p, self.points[i]);
-                let n = self.normals[i];
-                let across = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
-                let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                let along = (square - across * across).max(0.0).sqrt();
-                let over = (along - self.tangent).max(0.0);
-                let metric = across * across + over * over;
-                if metric < best.0 {
-                    best = (metric, i);
-                }
-            }
+            // Cells along x are neighbours in memory: up to three of them are one run of samples.
+            let row = (z * self.size[1] + y) * self.size[0];
+            let is_left = cell[0] > 0 && !is_beyond(aside + gaps[0][0], best.0);
+            let is_right = cell[0] + 1 < self.size[0] && !is_beyond(aside + gaps[0][1], best.0);
+            let first = row + cell[0] - usize::from(is_left);
+            let last = row + cell[0] + usize::from(is_right);
+            let run = self.starts[first] as usize..self.starts[last + 1] as usize;
+            best = self.nearest_of(p, run, best);
         }
         if best.0.is_finite() {
             Ok(Near { distance: best.0.sqrt(), normal: self.normals[best.1] })
         } else {
             Err(rough)
         }
+    }
+
+    /// The nearest of a run of samples, where one is nearer than `best`: squared distance and sample.
+    fn nearest_of(&self, p: [f32; 3], run: Range<usize>, mut best: (f32, usize)) -> (f32, usize) {
+        let samples = self.points[run.clone()].iter().zip(&self.normals[run.clone()]);
+        for (i, (point, n)) in run.zip(samples) {
+            let d = minus(p, *point);
+            let across = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+            if across * across >= best.0 {
+                continue;
+            }
+            let along = (square(d) - across * across).max(0.0).sqrt();
+            let over = (along - self.tangent).max(0.0);
+            let metric = across * across + over * over;
+            if metric < best.0 {
+                best = (metric, i);
+            }
+        }
+        best
+    }
+
+    /// On each axis, squared distances to the neighbours of the cell that a place lies in, the lower first, square metres.
+    fn gaps(&self, p: [f32; 3], cell: [usize; 3]) -> [[f32; 2]; 3] {
+        std::array::from_fn(|i| {
+            let low = self.min[i] + cell[i] as f32 * self.edge;
+            [p[i] - low, low + self.edge - p[i]].map(|gap| gap.max(0.0).powi(2))
+        })
     }
 
     /// Every `step`-th sample and its normal.
@@ -144,6 +175,15 @@ impl Field {
 
     fn index(&self, cell: [usize; 3]) -> usize {
         (cell[2] * self.size[1] + cell[1]) * self.size[0] + cell[0]
+    }
+}
+
+/// Of the squared distances to both neighbours, that to the one on this side; none to the cell itself.
+fn gap(gaps: [f32; 2], side: isize) -> f32 {
+    match side {
+        0 => 0.0,
+        1.. => gaps[1],
+        _ => gaps[0],
     }
 }
 
@@ -182,5 +222,30 @@ mod tests {
         assert!((rough - 0.1).abs() < 0.03, "{rough}");
         assert_eq!(field.near([0.0, 0.0, 1.0]).expect_err("outside"), f32::INFINITY);
         assert!(Field::new(&CadCloud::default()).is_none());
+    }
+
+    #[test]
+    fn no_sample_that_is_passed_over_is_nearer() {
+        // A ball: every direction, and thin enough samples that tangents matter.
+        let points: Vec<[f32; 3]> = (0..4000)
+            .map(|i| {
+                let (z, turn) = (1.0 - (i as f32 + 0.5) / 2000.0, i as f32 * 2.399_963);
+                let r = (1.0 - z * z).sqrt();
+                [r * turn.cos(), r * turn.sin(), z].map(|v| 0.1 * v)
+            })
+            .collect();
+        let normals = points.iter().map(|p| p.map(|v| v / 0.1)).collect();
+        let cad = CadCloud { points, normals, spacing: 0.006, area: 0.126 };
+        let field = Field::new(&cad).expect("has samples");
+        let mut n_near = 0;
+        for i in 0..4000 {
+            let (a, b, c) = (i % 16, i / 16 % 16, i / 256);
+            let p = [a, b, c].map(|v| 0.017 * v as f32 - 0.13);
+            let Ok(near) = field.near(p) else { continue };
+            n_near += 1;
+            let best = field.nearest_of(p, 0..field.len(), (f32::INFINITY, 0));
+            assert!(near.distance <= best.0.sqrt() || best.0.sqrt() > field.edge, "{p:?}");
+        }
+        assert!(n_near > 500, "{n_near}");
     }
 }

@@ -6,17 +6,27 @@ use geometry::narrow::{floor_i32, local_f32};
 
 /// Largest dense raster, cells: 4 km² at 0.5 m. A level with stray cells farther apart is looked up by search.
 const MAX_CELLS: i64 = 1 << 24;
+/// Half thickness of a floor in multiples of what its points scatter: one point in 30,000 lies beyond …
+const SCATTERS: f64 = 4.0;
+/// … and at least so much, metres: dust and paint.
+const MIN_BAND: f64 = 0.005;
 
 /// The floor, prepared for a look-up at every point of the plant.
 #[derive(Debug, Clone)]
 pub struct Ground {
     levels: Vec<Level>,
-    band: f64,
     depth: f64,
 }
 
 #[derive(Debug, Clone)]
-enum Level {
+struct Level {
+    heights: Heights,
+    /// Half thickness above its heights, metres.
+    band: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Heights {
     Dense(Raster),
     Sparse(FloorLevel),
 }
@@ -42,11 +52,12 @@ impl Ground {
         let levels = floor.levels.iter().filter(|level| !level.heights.is_empty());
         Self {
             levels: levels
-                .map(|level| {
-                    Raster::new(level).map_or_else(|| Level::Sparse(level.clone()), Level::Dense)
+                .map(|level| Level {
+                    heights: Raster::new(level)
+                        .map_or_else(|| Heights::Sparse(level.clone()), Heights::Dense),
+                    band: (SCATTERS * level.scatter).max(MIN_BAND).min(settings.floor_band),
                 })
                 .collect(),
-            band: settings.floor_band,
             depth: settings.floor_depth,
         }
     }
@@ -58,9 +69,9 @@ impl Ground {
     pub fn height_above(&self, world: [f64; 3]) -> Option<f64> {
         let mut best: Option<f64> = None;
         for level in &self.levels {
-            let floor = match level {
-                Level::Dense(raster) => raster.height(world[0], world[1]),
-                Level::Sparse(level) => level.height(world[0], world[1]),
+            let floor = match &level.heights {
+                Heights::Dense(raster) => raster.height(world[0], world[1]),
+                Heights::Sparse(level) => level.height(world[0], world[1]),
             };
             if let Some(above) = floor.map(|h| world[2] - h).filter(|h| *h >= -self.depth) {
                 best = Some(best.map_or(above, |b| b.min(above)));
@@ -73,17 +84,17 @@ impl Ground {
     #[inline]
     #[must_use]
     pub fn is_floor(&self, world: [f64; 3]) -> bool {
-        let is_on = |floor: Option<f64>| {
-            floor.is_some_and(|h| (-self.depth..=self.band).contains(&(world[2] - h)))
+        let is_on = |band: f64, floor: Option<f64>| {
+            floor.is_some_and(|h| (-self.depth..=band).contains(&(world[2] - h)))
         };
-        self.levels.iter().any(|level| match level {
+        self.levels.iter().any(|level| match &level.heights {
             // Most points of a plant are far above the floor, or under the ceiling.
-            Level::Dense(raster) => {
-                world[2] - self.band <= raster.span[1]
+            Heights::Dense(raster) => {
+                world[2] - level.band <= raster.span[1]
                     && world[2] + self.depth >= raster.span[0]
-                    && is_on(raster.height(world[0], world[1]))
+                    && is_on(level.band, raster.height(world[0], world[1]))
             }
-            Level::Sparse(level) => is_on(level.height(world[0], world[1])),
+            Heights::Sparse(own) => is_on(level.band, own.height(world[0], world[1])),
         })
     }
 
@@ -207,7 +218,8 @@ mod tests {
         }
         let normal = Vector::new(0.0, -0.01, 1.0).normalize();
         let plane = Plane { normal, offset: normal.z * 100.0 };
-        let level = FloorLevel { plane, waviness: 0.007, area: 100.0, cell, heights };
+        let (waviness, scatter, area) = (0.007, 0.003, 100.0);
+        let level = FloorLevel { plane, waviness, scatter, area, cell, heights };
         let floor = Floor { levels: vec![level], planes: Vec::new() };
         let ground = Ground::new(&floor, &Settings::default());
         for (x, y) in [(0.1, 0.2), (-3.3, 4.1), (4.2, -4.4)] {

@@ -22,7 +22,7 @@ pub struct Settings {
     pub min_gate: f64,
     /// Largest such distance, metres: beyond it a hose may lie on the link.
     pub max_gate: f64,
-    /// Half thickness of the floor above its height map, metres: 3σ and waviness inside a cell.
+    /// Largest half thickness of the floor above its height map, metres: else four times what its points scatter.
     pub floor_band: f64,
     /// How far below the floor a point still counts as floor, metres (mixed pixels, reflections).
     pub floor_depth: f64,

@@ -179,7 +179,7 @@ impl Segment {
             at_border: inset < BORDER,
             grounded: height.is_some_and(|h| h < GROUNDED),
         };
-        let is_floor = height.is_some_and(|h| h <= self.settings.floor_band);
+        let is_floor = self.ground.is_floor(world);
         if let Some((gates, s, distance, surface)) = best.filter(|b| b.0 <= 2.0) {
             let found = touch(s.at, distance);
             // A stand's top goes on beside the foot, within its gate.

@@ -130,7 +130,7 @@ fn floor() -> Floor {
     let cells = (-40..40).flat_map(|i| (-40..40).map(move |j| ([i, j], 0.0)));
     let plane = Plane { normal: Vector::z(), offset: 0.0 };
     let level =
-        FloorLevel { plane, waviness: 0.0, area: 400.0, cell: 0.25, heights: cells.collect() };
+        FloorLevel { plane, waviness: 0.0, scatter: 0.002, area: 400.0, cell: 0.25, heights: cells.collect() };
     Floor { levels: vec![level], planes: Vec::new() }
 }
 
