@@ -28,7 +28,8 @@ fn floor(height: impl Fn(f64, f64) -> f64) -> Floor {
         }
     }
     let plane = Plane { normal: Vector::z(), offset: 0.0 };
-    let level = FloorLevel { plane, waviness: 0.005, scatter: 0.002, area: 400.0, cell: 1.0, heights };
+    let level =
+        FloorLevel { plane, waviness: 0.005, scatter: 0.002, area: 400.0, cell: 1.0, heights };
     Floor { levels: vec![level], planes: Vec::new() }
 }
 

@@ -202,11 +202,7 @@ fn weight(level: &Level, patches: &[PlanePatch], wanted: impl Fn(&PlanePatch) ->
 }
 
 /// The level as others see it: mean plane and height map.
-pub(crate) fn describe(
-    level: &Level,
-    patches: &[PlanePatch],
-    settings: &Settings,
-) -> FloorLevel {
+pub(crate) fn describe(level: &Level, patches: &[PlanePatch], settings: &Settings) -> FloorLevel {
     let cell = settings.height_cell;
     let mut offs: Vec<([i32; 2], f64)> = level
         .nodes

@@ -129,8 +129,14 @@ fn fit(world_from_base: Pose, q: f64) -> Fit {
 fn floor() -> Floor {
     let cells = (-40..40).flat_map(|i| (-40..40).map(move |j| ([i, j], 0.0)));
     let plane = Plane { normal: Vector::z(), offset: 0.0 };
-    let level =
-        FloorLevel { plane, waviness: 0.0, scatter: 0.002, area: 400.0, cell: 0.25, heights: cells.collect() };
+    let level = FloorLevel {
+        plane,
+        waviness: 0.0,
+        scatter: 0.002,
+        area: 400.0,
+        cell: 0.25,
+        heights: cells.collect(),
+    };
     Floor { levels: vec![level], planes: Vec::new() }
 }
 
