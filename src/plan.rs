@@ -2,7 +2,7 @@
 //! decides order.
 
 use crate::calibrate::calibrate;
-use crate::engine::{AllThreads, Engine};
+use crate::engine::{AllThreads, Engine, Task};
 use crate::estimate::Estimate;
 use crate::filling::Filling;
 use crate::job::{Job, Outcome};
@@ -70,7 +70,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let (kept, pieces) = (of_plant(), of_plant());
     let search = Search::new(&shelf, scans, &store, &ground, settings).keeping(&pieces);
     let failures = Failures::of(job);
-    let fits = engine.fan_out("fit", regions.clone(), |region| {
+    let fitting = Task::new("fit").one_by_one(job.means.is_narrow());
+    let fits = engine.fan_out(fitting, regions.clone(), |region| {
         let find = || kept.or_find(&format!("{region:?}"), || search.region(&region));
         failures.spare(&region, find)
     })?;

@@ -50,13 +50,21 @@ pub struct Engine {
 pub struct Task {
     name: String,
     total: Amount,
+    one_by_one: bool,
 }
 
 impl Task {
     /// A task of unknown size.
     #[must_use]
     pub fn new(name: impl Into<String>) -> Self {
-        Self { name: name.into(), total: Amount::default() }
+        Self { name: name.into(), total: Amount::default(), one_by_one: false }
+    }
+
+    /// Does its items one after the other, each on all threads: where two at once take more memory than there is.
+    #[must_use]
+    pub fn one_by_one(mut self, one_by_one: bool) -> Self {
+        self.one_by_one = one_by_one;
+        self
     }
 
     /// Says how much it has to do; zero means not known.
@@ -168,10 +176,14 @@ impl Engine {
             }
             Some(out)
         };
+        let items = items.into_iter().enumerate();
         // Begun in their order, each by the next free thread: where the largest are first, no thread ends long after the others.
         let mut all: Vec<(usize, Option<Result<U>>)> = self.pool()?.install(|| {
-            let items = items.into_iter().enumerate().par_bridge();
-            items.map(|(at, item)| (at, one((at, item)))).collect()
+            let work = |(at, item)| (at, one((at, item)));
+            if task.one_by_one {
+                return items.map(work).collect();
+            }
+            items.par_bridge().map(work).collect()
         });
         all.sort_unstable_by_key(|(at, _)| *at);
         stage.finish();

@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 
 /// Memory of a run where none is asked for, bytes: half of a small office machine.
 pub const MEMORY_BYTES: u64 = 4 << 30;
+/// Memory below which regions are searched one after the other, bytes.
+const NARROW_BYTES: u64 = 3 << 29;
 /// Least memory that a run is tried with, bytes: program, library of robots and one strip a worker.
 pub const LEAST_MEMORY_BYTES: u64 = 256 << 20;
 /// What program and robot library take, bytes, before any point is read.
@@ -164,6 +166,12 @@ impl Means {
     #[must_use]
     pub fn channel_bytes(&self) -> usize {
         usize::try_from(self.memory_bytes / 128).unwrap_or(usize::MAX).clamp(1 << 20, CHANNEL_BYTES)
+    }
+
+    /// Whether there is too little memory for two regions at once: twenty scans of one take half a gigabyte.
+    #[must_use]
+    pub fn is_narrow(&self) -> bool {
+        self.memory_bytes < NARROW_BYTES
     }
 
     fn checked(self) -> Result<Self> {

@@ -23,6 +23,9 @@ use std::sync::Arc;
 pub const TILE_POINTS: usize = 1 << 21;
 /// Most room that a tile gets before it needs it, points: that of a scan with a point a pixel and a few more.
 const USUAL_POINTS: usize = (1 << 16) + (1 << 13);
+/// Memory of that room, bytes; as much of the budget as this share may be free and wait for the next tiles.
+const USUAL_BYTES: usize = USUAL_POINTS * Record::BYTES;
+const FREE_SHARE: usize = 4;
 /// Records that go to disk at once, bytes: some tens of tiles, and little beside what gathers.
 const BATCH_BYTES: usize = 48 << 20;
 
@@ -81,7 +84,7 @@ impl TileSink {
         let file = TileFile::create(&dir.join(TILES))?;
         Ok(Self {
             dir: dir.to_owned(),
-            writer: Writer::start(file, &encode)?,
+            writer: Writer::start(file, &encode, budget_bytes / FREE_SHARE / USUAL_BYTES)?,
             encode,
             places: HashMap::new(),
             buffers: Vec::new(),

@@ -24,17 +24,18 @@ const WAITING: usize = 2;
 /// Threads that encode tiles and append them to a file.
 pub(super) struct Writer {
     batches: Option<Sender<Batch>>,
-    /// Memory of records that are written: fresh memory costs as much as what is done with it.
+    /// Memory of records that are written, no more than is of use: fresh memory costs as much as what is done with it.
     free: Receiver<Vec<Record>>,
     thread: Option<JoinHandle<Result<Written>>>,
 }
 
 impl Writer {
-    pub(super) fn start(file: TileFile, encode: &Arc<Encode>) -> Result<Self> {
+    /// Starts them; the memory of so many tiles is kept to be used again.
+    pub(super) fn start(file: TileFile, encode: &Arc<Encode>, n_free: usize) -> Result<Self> {
         // One batch waits while another is written: memory is bounded by both.
         let (batches, taken) = bounded(1);
         let encode = Arc::clone(encode);
-        let (give, free) = unbounded();
+        let (give, free) = bounded(n_free);
         let thread = Builder::new()
             .name("store writer".into())
             .spawn(move || work(file, &encode, &taken, &give))
@@ -116,8 +117,8 @@ fn encode_all(
         let room = rooms.try_recv().unwrap_or_default();
         let encoded = encode.encode(&mut part, &mut order, room);
         part.records.clear();
-        // The sink is at its end where nobody wants it.
-        let _ = free.send(part.records);
+        // The sink has enough, or is at its end, where nobody takes it.
+        let _ = free.try_send(part.records);
         if done.send((i, encoded)).is_err() {
             return;
         }
