@@ -23,9 +23,8 @@ use std::sync::Arc;
 pub const TILE_POINTS: usize = 1 << 21;
 /// Most room that a tile gets before it needs it, points: that of a scan with a point a pixel and a few more.
 const USUAL_POINTS: usize = (1 << 16) + (1 << 13);
-/// Memory of that room, bytes; as much of the budget as this share may be free and wait for the next tiles.
-const USUAL_BYTES: usize = USUAL_POINTS * Record::BYTES;
-const FREE_SHARE: usize = 4;
+/// Tiles of which the memory may be free and wait for the next ones, at most: no scan has more at work in one column.
+const MAX_FREE: usize = 128;
 /// Records that go to disk at once, bytes: some tens of tiles, and little beside what gathers.
 const BATCH_BYTES: usize = 48 << 20;
 
@@ -84,7 +83,7 @@ impl TileSink {
         let file = TileFile::create(&dir.join(TILES))?;
         Ok(Self {
             dir: dir.to_owned(),
-            writer: Writer::start(file, &encode, budget_bytes / FREE_SHARE / USUAL_BYTES)?,
+            writer: Writer::start(file, &encode, n_free(budget_bytes))?,
             encode,
             places: HashMap::new(),
             buffers: Vec::new(),
@@ -196,6 +195,11 @@ impl TileSink {
         catalogue::write(&dir.join(CATALOGUE), &entries, n_tile_bytes, first)?;
         Store::open(&dir, first, open_bytes)
     }
+}
+
+/// Tiles of which the memory may be free: a quarter of the budget, where each takes what most do.
+fn n_free(budget_bytes: usize) -> usize {
+    (budget_bytes / 4 / (USUAL_POINTS * Record::BYTES)).min(MAX_FREE)
 }
 
 impl Buffer {
