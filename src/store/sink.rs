@@ -23,7 +23,7 @@ use std::sync::Arc;
 pub const TILE_POINTS: usize = 1 << 21;
 /// Most room that a tile gets before it needs it, points: that of a scan with a point a pixel and a few more.
 const USUAL_POINTS: usize = (1 << 16) + (1 << 13);
-/// Tiles of which the memory may be free and wait for the next ones, at most: no scan has more at work in one column.
+/// Tiles of which the memory may be free and wait for the next ones, at most, however large the budget.
 const MAX_FREE: usize = 128;
 /// Records that go to disk at once, bytes: some tens of tiles, and little beside what gathers.
 const BATCH_BYTES: usize = 48 << 20;
