@@ -7,7 +7,7 @@ use crate::job::Outcome;
 use crate::labelling::Done;
 use crate::report::{id, input_entry, robot_entry};
 use crate::reuse::Sums;
-use contract::{Error, Kind, Result, Verdict};
+use contract::{Error, Kind, Result};
 use export::{
     ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
     draw_changes, write_table,
@@ -56,7 +56,7 @@ impl Said<'_, '_> {
             .map_err(|e| Error::new(Kind::Bug, "changes cannot be written").because(e))?;
         export::atomic::write(&next.join("changes.json"), (text + "\n").as_bytes())?;
         export::atomic::write(&next.join("changes.csv"), self.csv(&robots).as_bytes())?;
-        self.draw().write(&next.join("pictures/changes.png"))?;
+        self.draw(&robots).write(&next.join("pictures/changes.png"))?;
         result.write(next)?;
         let summary = self.summary(&robots);
         Ok(Outcome { summary, warnings: result.warnings, ..Outcome::default() })
@@ -216,7 +216,7 @@ impl Said<'_, '_> {
         format!("{:.3},{:.3},{:.3}", p.x, p.y, p.z)
     }
 
-    fn draw(&self) -> export::Canvas {
+    fn draw(&self, changes: &[RobotChange]) -> export::Canvas {
         let things = self.found.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
             name: format!("T{} {}", k + 1, word(thing.change)),
             gone: merge::Tally::middles(&thing.gone),
@@ -225,12 +225,10 @@ impl Said<'_, '_> {
         });
         let robots = self.found.robots.compared().into_iter().map(|i| {
             let p = self.found.fits[i].world_from_base.translation.vector;
-            let changed = self.found.robots.changed.contains(&i);
-            let word = match self.found.fits[i].verdict {
-                Verdict::Refused => " gone",
-                _ if changed => " changed",
-                _ => "",
-            };
+            let own = Some(id(i));
+            let change = changes.iter().find(|c| c.now == own || c.now.is_none() && c.then == own);
+            let word = change.map(|c| &c.change).filter(|c| **c != Change::Same);
+            let word = word.map_or_else(String::new, |change| format!(" {}", change.word()));
             (format!("{}{word}", id(i)), [p.x, p.y])
         });
         let unseen = self.found.labels.unseen.iter().flat_map(|region| &region.cells);
