@@ -19,6 +19,7 @@ use ingest::{Sources, Want};
 use merge::{Attach, Hanging};
 use robot::Model;
 use segment::{Ground, Segment};
+use std::ops::Range;
 use std::path::Path;
 
 use crate::bodies::Bodies;
@@ -71,11 +72,38 @@ pub(crate) struct Near {
 }
 
 impl Near {
+    /// The labels of one mask, for places of which many are neighbours.
+    pub(crate) fn of(&self, mask: MaskId) -> NearOf<'_> {
+        NearOf { runs: &self.labels[mask.0 as usize], last: 0..0, label: None }
+    }
+}
+
+/// Labels of points near robots, of one mask.
+pub(crate) struct NearOf<'a> {
+    runs: &'a [PlaceRun<Label>],
+    /// Places that are labelled as the last one that was asked for.
+    last: Range<u64>,
+    label: Option<Label>,
+}
+
+impl NearOf<'_> {
     /// The label of a point near a robot.
-    pub(crate) fn label(&self, mask: MaskId, place: u64) -> Option<Label> {
-        let runs = &self.labels[mask.0 as usize];
-        let run = runs.get(runs.partition_point(|run| run.end() <= place))?;
-        (run.first <= place).then_some(run.what)
+    #[inline]
+    pub(crate) fn label(&mut self, place: u64) -> Option<Label> {
+        if !self.last.contains(&place) {
+            self.find(place);
+        }
+        self.label
+    }
+
+    fn find(&mut self, place: u64) {
+        let next = self.runs.partition_point(|run| run.end() <= place);
+        let before = next.checked_sub(1).map_or(0, |before| self.runs[before].end());
+        (self.last, self.label) = match self.runs.get(next) {
+            Some(run) if run.first <= place => (run.first..run.end(), Some(run.what)),
+            Some(run) => (before..run.first, None),
+            None => (before..u64::MAX, None),
+        };
     }
 }
 

@@ -6,6 +6,7 @@ use robot::{JointKind, Model};
 use simulate::random::Random;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Waves that are added up.
 const N_WAVES: usize = 3;
@@ -24,7 +25,7 @@ pub(super) fn warp(model: &mut Model, amplitude: f64, seed: u64) {
                 (k, random.between(0.0, TAU))
             })
             .collect();
-        let mesh = &mut link.mesh;
+        let mesh = Arc::make_mut(&mut link.mesh);
         let mut places: BTreeMap<[i32; 3], usize> = BTreeMap::new();
         let corner: Vec<usize> = mesh
             .vertices

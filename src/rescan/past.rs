@@ -274,6 +274,7 @@ impl Map for Look<'_> {
         let mut out = Looked { mask: mask.0, ..Looked::default() };
         let mut tallying = Tallying::default();
         let mut anew = self.anew[mask.0 as usize].adding();
+        let mut missed = self.missed.map(|near| near.of(mask));
         let points = places.iter().zip(&*worlds).zip(labels.iter().zip(&*sights));
         for ((&place, &world), (label, &sight)) in points {
             let voxel = Tally::cell(world);
@@ -283,8 +284,8 @@ impl Map for Look<'_> {
                 Sight::Through => out.through.push((place, voxel)),
                 Sight::Close | Sight::Hidden | Sight::Unseen => {}
             }
-            let missed = self.missed.and_then(|near| near.label(mask, place));
-            if missed.is_some_and(|label| label.moves()) {
+            let is_missed = missed.as_mut().and_then(|near| near.label(place));
+            if is_missed.is_some_and(|label| label.moves()) {
                 out.missed.insert(voxel);
                 tallying.add_robot(world);
                 continue;

@@ -76,7 +76,7 @@ impl Map for Present<'_> {
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Tallied> {
         let scan = &self.scans[tile.at.scan.0 as usize];
         let mut out = Tallying::default();
-        let in_world = World::from(scan);
+        let (in_world, mut near) = (World::from(scan), self.near.of(scan.mask));
         // Neighbours are mostly in one voxel, and ask once whether something stood there.
         let (mut last, mut stood) = (None, false);
         for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
@@ -84,7 +84,7 @@ impl Map for Present<'_> {
             if !self.cell.contains(world) {
                 continue;
             }
-            let known = self.near.label(scan.mask, tile.first_place + u64::from(*place));
+            let known = near.label(tile.first_place + u64::from(*place));
             let label: Label = known.unwrap_or_else(|| self.ground.label(world));
             match label.kind {
                 PointKind::Fixed => {

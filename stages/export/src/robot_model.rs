@@ -31,7 +31,7 @@ pub fn write_robot(
     for (l, link) in model.links.iter().enumerate() {
         let mut bodies = Vec::new();
         if !link.mesh.triangles.is_empty() {
-            bodies.push((names[l].clone(), &link.mesh));
+            bodies.push((names[l].clone(), &*link.mesh));
         }
         let pieces = hanging.get(&l).into_iter().flatten().enumerate();
         bodies.extend(pieces.map(|(k, mesh)| (format!("{}_hanging_{k}", names[l]), mesh)));

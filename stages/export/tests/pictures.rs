@@ -3,8 +3,9 @@
 use contract::{Label, PointKind};
 use export::*;
 use geometry::{Aabb, Point, Pose, Vector};
-use robot::{CadCloud, Link, Mesh, Model, Role};
+use robot::{Link, Mesh, Model, Role};
 use std::path::Path;
+use std::sync::Arc;
 
 /// A box mesh, wound outward.
 fn brick(min: [f32; 3], max: [f32; 3]) -> Mesh {
@@ -22,8 +23,8 @@ fn pictures_show_robots_where_they_stand() {
         name: name.into(),
         role: Role::Main,
         parent_joint: None,
-        mesh: brick(min, max),
-        cad: CadCloud::default(),
+        mesh: brick(min, max).into(),
+        cad: Arc::default(),
         bounds: Aabb { min: min.map(f64::from), max: max.map(f64::from) },
     };
     let model = Model {

@@ -6,7 +6,7 @@
 
 use geometry::{Moments, Plane, Point, Pose, Vector};
 use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector6};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use std::collections::hash_map::Entry;
 
 /// Edge of a voxel, metres: a hundred points of a common scan, and still flat where a machine is.
@@ -28,8 +28,8 @@ const MIN_CELLS: usize = 50;
 const PRIOR: [f64; 2] = [0.02, 0.003];
 /// Most rounds of weights.
 const ROUNDS: usize = 12;
-/// A step this small ends it: metres, radians.
-const SETTLED: f64 = 1e-7;
+/// A step this small ends it: metres, radians. A micrometre is a hundredth of what is known of the shift.
+const SETTLED: f64 = 1e-6;
 /// Tukey's constant, and the median's ratio to a standard deviation.
 const TUKEY: f64 = 4.685;
 const FROM_MEDIAN: f64 = 1.4826;
@@ -37,13 +37,13 @@ const FROM_MEDIAN: f64 = 1.4826;
 /// Points of a plant by voxel. Nothing depends on the order of the voxels.
 #[derive(Debug, Clone, Default)]
 pub struct Surfaces {
-    cells: HashMap<[i32; 3], Moments>,
+    cells: FxHashMap<[i32; 3], Moments>,
 }
 
 /// The planes through them, where they are flat.
 #[derive(Debug, Clone)]
 pub struct Planes {
-    cells: HashMap<[i32; 3], Plane>,
+    cells: FxHashMap<[i32; 3], Plane>,
 }
 
 /// How far a scan is off the plant.
@@ -139,9 +139,9 @@ fn total(pose: &Pose, about: &Point) -> Vector6<f64> {
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-fn told(planes: &HashMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -> Vec<Told> {
+fn told(planes: &FxHashMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -> Vec<Told> {
     // Neighbours among the points are mostly in one voxel, and ask once for its plane and its place among the sums.
-    let mut sums: HashMap<[i32; 3], usize> = HashMap::new();
+    let mut sums: FxHashMap<[i32; 3], usize> = FxHashMap::default();
     let mut told: Vec<(usize, Told)> = Vec::new();
     let (mut last, mut known): (Option<[i32; 3]>, Option<(&Plane, usize)>) = (None, None);
     for p in points {

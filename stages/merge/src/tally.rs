@@ -2,7 +2,8 @@
 //! which of them something stands, which of them changed, and how much of them is covered.
 
 use geometry::Aabb;
-use std::collections::{BTreeMap, BTreeSet};
+use rustc_hash::FxHashMap;
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 /// A voxel of a world: `floor(p / edge)`.
@@ -19,10 +20,11 @@ pub(crate) const MIN_POINTS: u32 = 3;
 /// Share of a voxel's points whose places the other session must have seen empty, or not at all.
 const MIN_SHARE: f64 = 0.6;
 
-/// Points of one session by voxel: how many, and at how many places of theirs the other session saw nothing.
+/// Points of one session by voxel: how many, and at how many places of theirs the other session saw nothing. Nothing depends on
+/// the order of the voxels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tally {
-    cells: BTreeMap<Cell, Count>,
+    cells: FxHashMap<Cell, Count>,
     /// Voxels with points of robots and what hangs on them.
     robots: BTreeSet<Cell>,
 }
@@ -73,7 +75,8 @@ impl Count {
 /// Points of one scan that are still to be counted by voxel: neighbours in a scan mostly are in the same one, and cost no search for it.
 #[derive(Debug, Default)]
 pub struct Tallying {
-    runs: Vec<(Cell, Count)>,
+    cells: FxHashMap<Cell, Count>,
+    last: Option<(Cell, Count)>,
     robots: Vec<Cell>,
 }
 
@@ -90,9 +93,18 @@ impl Tallying {
             area,
             most: (0, 0.0),
         };
-        match self.runs.last_mut() {
+        match &mut self.last {
             Some((last, count)) if *last == cell => count.join(&point),
-            _ => self.runs.push((cell, point)),
+            last => {
+                let whole = last.replace((cell, point));
+                self.join(whole);
+            }
+        }
+    }
+
+    fn join(&mut self, run: Option<(Cell, Count)>) {
+        if let Some((cell, count)) = run {
+            self.cells.entry(cell).or_default().join(&count);
         }
     }
 
@@ -108,15 +120,10 @@ impl Tallying {
     /// All of them by voxel.
     #[must_use]
     pub fn finish(mut self) -> Tally {
-        // Stable: areas are added in the order of the points.
-        self.runs.sort_by_key(|run| run.0);
-        let same = self.runs.chunk_by(|a, b| a.0 == b.0);
-        let cells = same.map(|runs| {
-            let mut all = runs[0].1;
-            runs[1..].iter().for_each(|run| all.join(&run.1));
-            (runs[0].0, Count { most: (all.n_points, all.area), ..all })
-        });
-        Tally { cells: cells.collect(), robots: self.robots.into_iter().collect() }
+        let last = self.last.take();
+        self.join(last);
+        self.cells.values_mut().for_each(|all| all.most = (all.n_points, all.area));
+        Tally { cells: self.cells, robots: self.robots.into_iter().collect() }
     }
 }
 
@@ -148,14 +155,15 @@ impl Tally {
     #[must_use]
     pub fn solid(&self) -> Vec<[f64; 3]> {
         let solid = self.cells.iter().filter(|(_, c)| c.n_points >= MIN_POINTS);
-        Self::middles(&solid.map(|(cell, _)| *cell).collect::<Vec<_>>())
+        let mut solid: Vec<Cell> = solid.map(|(cell, _)| *cell).collect();
+        solid.sort_unstable();
+        Self::middles(&solid)
     }
 
     /// Adds all of another.
     pub fn join(&mut self, other: Self) {
-        for (cell, count) in other.cells {
-            self.cells.entry(cell).or_default().join(&count);
-        }
+        let all = other.cells.into_iter();
+        all.for_each(|(cell, count)| self.cells.entry(cell).or_default().join(&count));
         self.robots.extend(other.robots);
     }
 
@@ -167,8 +175,7 @@ impl Tally {
     /// Whether a voxel or one beside it holds points: what the other session has there, it has here as well.
     #[must_use]
     pub fn has_some(&self, cell: &Cell) -> bool {
-        self.cells.contains_key(cell)
-            || columns(cell, 1).any(|column| self.cells.range(column).next().is_some())
+        self.cells.contains_key(cell) || around(cell, 1).any(|cell| self.cells.contains_key(&cell))
     }
 
     pub(crate) fn is_solid(&self, cell: &Cell) -> bool {

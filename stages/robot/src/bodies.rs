@@ -8,6 +8,7 @@ use crate::resolve::Roots;
 use crate::tree::Tree;
 use crate::urdf::{Body, Shape};
 use geometry::Aabb;
+use std::sync::Arc;
 
 /// A link larger than this is drawn in millimetres, metres.
 const LARGEST_LINK: f64 = 30.0;
@@ -24,25 +25,24 @@ impl Bodies<'_> {
         let mut any = false;
         for (link, raw) in tree.links.iter_mut().zip(&tree.raw_links) {
             let place = format!("{file}: link {}", link.name);
+            let mesh = Arc::make_mut(&mut link.mesh);
             for body in &raw.visuals {
-                self.body(&mut link.mesh, body, &place, findings);
+                self.body(mesh, body, &place, findings);
             }
-            if link.mesh.triangles.is_empty() && !raw.collisions.is_empty() {
+            if mesh.triangles.is_empty() && !raw.collisions.is_empty() {
                 for body in &raw.collisions {
-                    self.body(&mut link.mesh, body, &place, findings);
+                    self.body(mesh, body, &place, findings);
                 }
-                if !link.mesh.triangles.is_empty() {
+                if !mesh.triangles.is_empty() {
                     let what = "has no visual; its collision mesh stands in and may be a hull";
                     findings.warn(&place, what, "add a visual");
                 }
             }
-            if link.mesh.triangles.is_empty()
-                && !(raw.visuals.is_empty() && raw.collisions.is_empty())
-            {
+            if mesh.triangles.is_empty() && !(raw.visuals.is_empty() && raw.collisions.is_empty()) {
                 findings.warn(&place, "has no surface", "mend its visual");
             }
-            any |= !link.mesh.triangles.is_empty();
-            link.bounds = Aabb::of(link.mesh.vertices.iter().map(|p| p.map(f64::from)));
+            any |= !mesh.triangles.is_empty();
+            link.bounds = Aabb::of(mesh.vertices.iter().map(|p| p.map(f64::from)));
             let size = link.bounds.size().into_iter().fold(0.0, f64::max);
             if size > LARGEST_LINK {
                 let what = format!("is larger than any robot's link, metres \"{size:.1}\"");

@@ -79,7 +79,7 @@ impl Model {
             |link: &Link| cloud::sample(&link.mesh, settings.spacing, settings.max_samples);
         let clouds = fan.fan(links, sample);
         for (link, cloud) in self.links.iter_mut().zip(clouds) {
-            link.cad = cloud;
+            link.cad = cloud.into();
         }
     }
 }

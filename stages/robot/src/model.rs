@@ -4,6 +4,7 @@ use crate::loops::ClosedLoop;
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Triangles of a link in the link's frame, metres; all visuals of the link together.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -50,10 +51,10 @@ pub struct Link {
     pub role: Role,
     /// The joint that carries it; `None` for the root.
     pub parent_joint: Option<usize>,
-    /// Its surface; empty for frames without a body.
-    pub mesh: Mesh,
+    /// Its surface; empty for frames without a body. Shared by copies of the model, as are its samples.
+    pub mesh: Arc<Mesh>,
     /// Samples of its outer surface; empty where the mesh is.
-    pub cad: CadCloud,
+    pub cad: Arc<CadCloud>,
     /// Bounds of the mesh in the link's frame, metres.
     pub bounds: Aabb,
 }

@@ -2,7 +2,7 @@
 //! moves each joint.
 
 use crate::finding::Findings;
-use crate::model::{Joint, JointKind, Link, Mesh, Motion, Role};
+use crate::model::{Joint, JointKind, Link, Motion, Role};
 use crate::urdf::{Description, RawJoint, RawLink};
 use geometry::{Aabb, Vector};
 use nalgebra::Unit;
@@ -188,7 +188,7 @@ impl Tree {
                 name: raw_link.name.clone(),
                 role: Role::Main,
                 parent_joint,
-                mesh: Mesh::default(),
+                mesh: Default::default(),
                 cad: Default::default(),
                 bounds: Aabb::EMPTY,
             });

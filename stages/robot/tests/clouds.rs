@@ -15,7 +15,7 @@ fn load(text: &str) -> Model {
 
 fn body(shapes: &str) -> CadCloud {
     let model = load(&format!("<robot name='r'><link name='base'>{shapes}</link></robot>"));
-    model.links[0].cad.clone()
+    model.links[0].cad.as_ref().clone()
 }
 
 const SPHERE: &str = "<visual><geometry><sphere radius='0.3'/></geometry></visual>";

@@ -6,8 +6,9 @@ use contract::{
     PlaceRun, PointKind, Scan, ScanId, Tile, TileAt, Verdict,
 };
 use geometry::{Aabb, Plane, Point, Pose, Vector};
-use robot::{CadCloud, Joint, JointKind, Link, Mesh, Model, Motion, Role};
+use robot::{CadCloud, Joint, JointKind, Link, Model, Motion, Role};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A box, in the frame of a link: half sizes about its middle, metres.
 struct Brick {
@@ -74,8 +75,8 @@ fn link(name: &str, parent_joint: Option<usize>, middle: [f64; 3], half: [f64; 3
         name: name.into(),
         role: Role::Main,
         parent_joint,
-        mesh: Mesh::default(),
-        cad: CadCloud { points, normals, spacing: 0.005, area: 1.0 },
+        mesh: Arc::default(),
+        cad: CadCloud { points, normals, spacing: 0.005, area: 1.0 }.into(),
         bounds: Aabb { min, max },
     }
 }

@@ -3,15 +3,16 @@
 use super::*;
 use contract::JointFit;
 use geometry::{Aabb, Pose, Vector};
-use robot::{CadCloud, Joint, Link, Mesh, Role};
+use robot::{Joint, Link, Role};
+use std::sync::Arc;
 
 fn model() -> Model {
     let link = |name: &str, parent_joint| Link {
         name: name.into(),
         role: Role::Main,
         parent_joint,
-        mesh: Mesh::default(),
-        cad: CadCloud::default(),
+        mesh: Arc::default(),
+        cad: Arc::default(),
         bounds: Aabb::EMPTY,
     };
     let joint = Joint {

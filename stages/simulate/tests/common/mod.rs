@@ -2,8 +2,9 @@
 
 use geometry::{Aabb, Pose, Vector};
 use nalgebra::Unit;
-use robot::{CadCloud, Joint, JointKind, Link, Mesh, Model, Motion, Role};
+use robot::{Joint, JointKind, Link, Mesh, Model, Motion, Role};
 use simulate::solid::cuboid;
+use std::sync::Arc;
 
 /// A foot of 0.4 m and, on a joint about z at its top, an arm of 1 m along x.
 pub(crate) fn two_boxes() -> Model {
@@ -12,8 +13,8 @@ pub(crate) fn two_boxes() -> Model {
         role: Role::Main,
         parent_joint,
         bounds: Aabb::of(mesh.vertices.iter().map(|v| v.map(f64::from))),
-        mesh,
-        cad: CadCloud::default(),
+        mesh: mesh.into(),
+        cad: Arc::default(),
     };
     Model {
         name: "two_boxes".into(),
