@@ -87,8 +87,13 @@ def check_cloud(path):
     return {int(c): int((classes == c).sum()) for c in np.unique(classes)}
 
 
+def files_of(out, folder):
+    """The clouds of a folder, without the one that holds all of them once more."""
+    return sorted(p for p in (out / folder).glob("*.la[sz]") if not p.name.endswith(".copc.laz"))
+
+
 def check_clouds(out, folder, counts):
-    files = sorted(p for p in (out / folder).glob("*.la[sz]"))
+    files = files_of(out, folder)
     total = {}
     for path in files:
         for value, n in check_cloud(path).items():
@@ -100,6 +105,32 @@ def check_clouds(out, folder, counts):
         n_cloud = total.get(KINDS[kind], 0)
         whole = n_cloud == n if kind != 255 else n_cloud <= n
         check(not files or whole, f"{folder}: {n_cloud} points of kind {kind}, mask has {n}")
+
+
+def check_copc(out, pdal):
+    """The COPC file, where there is one, holds all points of the tiles, and fewer of them at a coarser resolution."""
+    import laspy
+
+    path = out / "clouds/plant.copc.laz"
+    if not path.is_file():
+        return
+
+    def lines(cloud):
+        names = ("X", "Y", "Z", "intensity", "classification", "point_source_id", "gps_time", "RobotId", "LinkId")
+        columns = np.stack([np.asarray(cloud[name], dtype=np.float64) for name in names], axis=1)
+        return columns[np.lexsort(columns.T)]
+
+    with laspy.CopcReader.open(path) as file:
+        whole, coarse = file.query(), file.query(resolution=file.copc_info.spacing)
+    tiles = [lines(laspy.read(tile)) for tile in files_of(out, "tiles")]
+    tiles = np.concatenate(tiles) if tiles else np.zeros((0, 9))
+    same = np.array_equal(lines(whole), tiles[np.lexsort(tiles.T)])
+    check(same, f"{path}: {len(whole)} points are not the {len(tiles)} of the tiles")
+    check(0 < len(coarse) <= len(whole), f"{path}: {len(coarse)} points at the coarsest")
+    seen.append(f"COPC: {len(whole)} points, {len(coarse)} of them at the coarsest")
+    if shutil.which(pdal[0]):
+        counted = pdal_stats(pdal, path, ["--driver=readers.copc"]).get("X", {}).get("count")
+        check(counted == len(whole), f"{path}: PDAL sees {counted} points, laspy {len(whole)}")
 
 
 def check_e57(files):
@@ -140,7 +171,7 @@ def pdal_stats(pdal, path, options):
 
 def check_pdal(out, folder, counts, pdal):
     """PDAL sees as many points of each class as the masks have, and our extra fields."""
-    files = sorted((out / folder).glob("*.la[sz]"))
+    files = files_of(out, folder)
     n_points, classes = 0, set()
     for path in files:
         fields = pdal_stats(pdal, path, ["--readers.las.use_eb_vlr=true"])
@@ -179,6 +210,7 @@ def main():
     counts = check_masks(out, result)
     check_clouds(out, "tiles", counts)
     check_clouds(out, "clouds", counts)
+    check_copc(out, pdal)
     check_e57(sorted(out.rglob("*.e57")) + given.e57)
     if shutil.which(pdal[0]):
         for folder in ("tiles", "clouds"):

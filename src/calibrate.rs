@@ -1,7 +1,7 @@
 //! Fits in; the same with the places of their joints estimated, and the models so corrected, out: for robots that their
 //! models fit poorly, where it is asked for. And results of several such runs in; one corrected model out.
 
-use crate::engine::{AllThreads, Engine};
+use crate::engine::{AllThreads, Engine, Task};
 use crate::search::Search;
 use crate::tools::adopt;
 use contract::{Calibration, Error, Fit, Kind, Region, Result, Verdict};
@@ -24,7 +24,7 @@ pub(crate) fn calibrate(
     engine: &Engine,
 ) -> Result<Vec<Fit>> {
     let known: &[Model] = models;
-    let done = engine.fan_out("calibrate", fits, |fit| {
+    let done = engine.fan_out(Task::new("calibrate").large(), fits, |fit| {
         // All scans are asked here, of which a robot that moved stands only in some.
         if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
             return Ok((fit, None));

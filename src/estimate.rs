@@ -18,6 +18,9 @@ const LABEL_BYTES: u64 = 5;
 const COMPRESSED: f64 = 0.35;
 /// Bytes of a point in a cloud, without and with colour.
 const CLOUD_BYTES: [u64; 2] = [34, 40];
+/// Bytes of a point that wait on disk while a COPC file is made, and points that one thread makes of it in a second.
+const COPC_BYTES: u64 = 40;
+const COPC: f64 = 0.9e6;
 /// Bytes of a point in a text file, about.
 const TEXT_BYTES: u64 = 45;
 /// Pictures, models, voxels and lists, bytes for each model of the library: more robots stand in large plants.
@@ -33,6 +36,9 @@ const SEARCH: [f64; 2] = [0.2, 0.9];
 const PROGRAM_BYTES: u64 = 160 << 20;
 const MODEL_BYTES: u64 = 24 << 20;
 const POINT_BYTES: u64 = 40;
+/// What is kept of each scan while a robot is searched, however little memory there is, bytes: a billion points of 20 scans took
+/// 0.8 GiB under 512 MiB.
+const SCAN_BYTES: u64 = 28 << 20;
 
 /// What a job will take.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,7 +47,7 @@ pub struct Estimate {
     pub n_points: u64,
     /// Models that are tried.
     pub n_models: usize,
-    /// Resident memory at most, bytes: never above `--memory`.
+    /// Resident memory at most, bytes: not above `--memory`, but where even one region of all scans takes more.
     pub memory_bytes: u64,
     /// Disk for the store, bytes, where it is not there already.
     pub store_bytes: u64,
@@ -153,12 +159,16 @@ impl Estimate {
         let n_clouds = u64::from(export.tiles) + u64::from(export.fixed_cloud);
         let share = if export.compress { COMPRESSED } else { 1.0 };
         let clouds = ((n_clouds * (cloud + body)) as f64 * share).ceil() as u64;
-        let labelled = n.saturating_mul(LABEL_BYTES + clouds);
-        let memory = n.saturating_mul(POINT_BYTES).saturating_add(PROGRAM_BYTES);
+        let copc = if export.copc { COPC_BYTES + (cloud as f64 * COMPRESSED) as u64 } else { 0 };
+        let labelled = n.saturating_mul(LABEL_BYTES + clouds + copc);
+        seconds += if export.copc { n as f64 / COPC } else { 0.0 };
+        let base = PROGRAM_BYTES + models * MODEL_BYTES;
+        let memory = n.saturating_mul(POINT_BYTES).saturating_add(base);
+        let least = base.saturating_add(SCAN_BYTES.saturating_mul(sources.scans.len() as u64));
         Self {
             n_points: n,
             n_models,
-            memory_bytes: memory.saturating_add(models * MODEL_BYTES).min(job.means.memory_bytes),
+            memory_bytes: memory.min(job.means.memory_bytes.max(least)),
             store_bytes: n_new.saturating_mul(STORE_BYTES),
             output_bytes: labelled.saturating_add(models * EXTRA_BYTES),
             free_bytes: free(&job.out),

@@ -7,6 +7,7 @@ pub mod calibrate;
 pub mod changes;
 pub mod cli;
 pub mod compare;
+mod copc;
 pub mod demo;
 pub mod engine;
 pub mod estimate;

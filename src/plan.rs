@@ -2,6 +2,7 @@
 //! decides order.
 
 use crate::calibrate::calibrate;
+use crate::copc;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::estimate::Estimate;
 use crate::filling::Filling;
@@ -70,8 +71,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let (kept, pieces) = (of_plant(), of_plant());
     let search = Search::new(&shelf, scans, &store, &ground, settings).keeping(&pieces);
     let failures = Failures::of(job);
-    let fitting = Task::new("fit").one_by_one(job.means.is_narrow());
-    let fits = engine.fan_out(fitting, regions.clone(), |region| {
+    let fits = engine.fan_out(Task::new("fit").large(), regions.clone(), |region| {
         let find = || kept.or_find(&format!("{region:?}"), || search.region(&region));
         failures.spare(&region, find)
     })?;
@@ -97,6 +97,9 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let written = labelling
         .write((&near, spaces), &Scope::default(), (room.next(), room.next()), engine)?
         .finish(engine)?;
+    if settings.export.copc {
+        copc::write(room.next(), &room.scratch(), engine)?;
+    }
     let mut outcome = Report {
         sums: &sums,
         sources: &sources,

@@ -12,7 +12,7 @@
 //!
 //! The file is the user's and is given again with every run, so what it says survives reruns.
 
-use crate::engine::{AllThreads, Engine};
+use crate::engine::{AllThreads, Engine, Task};
 use crate::search::Search;
 use contract::{Error, Fit, JointFit, Region, Result, Verdict};
 use geometry::{Point, Pose};
@@ -108,12 +108,16 @@ impl Review {
         let given = self.places.iter().filter(|place| !place.joints.is_empty());
         let starts: Vec<(&Place, Fit)> =
             given.filter_map(|place| Some((place, place.start(&fits, models)?))).collect();
-        let found = engine.fan_out("review", starts.iter().collect(), |(_, start)| {
-            search.with_scene(start, regions, |scene, settings| {
-                let prepared = search.shelf().prepared(start.model);
-                fit::again(start, prepared, scene, settings, &AllThreads)
-            })
-        })?;
+        let found = engine.fan_out(
+            Task::new("review").large(),
+            starts.iter().collect(),
+            |(_, start)| {
+                search.with_scene(start, regions, |scene, settings| {
+                    let prepared = search.shelf().prepared(start.model);
+                    fit::again(start, prepared, scene, settings, &AllThreads)
+                })
+            },
+        )?;
         let mut warnings = Vec::new();
         for ((place, start), fit) in starts.iter().zip(found) {
             match fit.flatten() {

@@ -1,7 +1,7 @@
 //! Fits and what the scans saw about them in; around each robot, which space was seen free, which it fills itself and
 //! which nobody has seen, out. Points are marked into it while they are labelled.
 
-use crate::engine::{AllThreads, Engine};
+use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use crate::search::Search;
 use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind};
@@ -25,7 +25,7 @@ pub(crate) fn around(
     if !settings.merge.space {
         return Ok(vec![None; fits.len()]);
     }
-    engine.fan_out("space", fits.iter().collect(), |fit| {
+    engine.fan_out(Task::new("space").large(), fits.iter().collect(), |fit| {
         let model = &models[fit.model];
         let base: Point = fit.world_from_base.translation.vector.into();
         let edge = settings.merge.space_edge;

@@ -1,7 +1,7 @@
 //! Fits of arms and a library with tools in; fits of arms with what hangs on their flanges out, and the models that
 //! these fits are of.
 
-use crate::engine::{AllThreads, Engine};
+use crate::engine::{AllThreads, Engine, Task};
 use crate::search::{Search, Shelf};
 use contract::{Fit, Mounted, Region, Result, Verdict};
 use fit::{Prepared, Scene, Settings, Tooled};
@@ -39,7 +39,7 @@ pub(crate) fn dress(
     if !known.iter().any(Model::is_tool) {
         return Ok(fits);
     }
-    let dressed = engine.fan_out("tools", fits, |fit| {
+    let dressed = engine.fan_out(Task::new("tools").large(), fits, |fit| {
         if !tells_tools(&fit) {
             return Ok((fit, None));
         }

@@ -37,7 +37,7 @@ fn shim(dir: &Path) -> Option<PathBuf> {
 fn command(dir: &Path, out: &str, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
     command.current_dir(dir).args(["run", "scans/scans.e57", "--robots", "robots", "--out", out]);
-    command.args(["--progress", "none", "--set", "export.tile_edge=5"]).args(more);
+    command.args(["--progress", "none", "--set", "export.copc=true"]).args(more);
     command
 }
 

@@ -56,7 +56,8 @@ impl Plant {
     }
 
     fn job(&self, scans: &str, out: &str) -> Job {
-        let means = Means::of(&Given::default()).expect("defaults hold");
+        let given = Given { set: vec!["export.copc=true".into()], ..Given::default() };
+        let means = Means::of(&given).expect("it can be set");
         let inputs = vec![self.path(scans).join("scans.e57")];
         Job::new(inputs, self.path("robots"), self.path(out), means)
     }
@@ -70,6 +71,12 @@ impl Plant {
         command.current_dir(self.dir.path()).args(["--progress", "none"]).args(args);
         command.output().expect("the program starts")
     }
+}
+
+/// Points that a LAS 1.4 file says it holds.
+fn n_points(path: &Path) -> u64 {
+    let bytes = std::fs::read(path).expect("a file");
+    u64::from_le_bytes(bytes[247..255].try_into().expect("eight bytes"))
 }
 
 fn changes(out: &Path) -> serde_json::Value {
@@ -132,6 +139,14 @@ fn a_rescanned_cell_is_brought_up_to_date() {
         files.into_iter().find(|f| f.path == "labels/0.kind.npy").expect("a mask").digest
     };
     assert_eq!(digest(&plant.path("base")), digest(&out));
+    // The cloud of the whole plant holds what its tiles hold: it is made again.
+    let held = |out: &Path| {
+        let tiles = std::fs::read_dir(out.join("tiles")).expect("a folder").flatten();
+        let in_tiles: u64 = tiles.map(|tile| n_points(&tile.path())).sum();
+        assert_eq!(n_points(&out.join(export::COPC)), in_tiles);
+        in_tiles
+    };
+    assert_ne!(held(&plant.path("base")), held(&out));
     goes_on(&plant, &out);
 }
 

@@ -273,6 +273,7 @@ impl Common {
     pub(super) fn engine(&self, means: &Means) -> Result<Engine> {
         let mut engine = Engine::new(means.n_threads);
         engine.channel_bytes = means.channel_bytes();
+        engine.is_narrow = means.is_narrow();
         engine.progress = Progress::new(self.progress.unwrap_or_else(Mode::fitting));
         engine.cancel.on_ctrl_c()?;
         // Libraries that use rayon by themselves keep to the same number; a pool made earlier (tests) is kept.

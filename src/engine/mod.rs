@@ -38,6 +38,8 @@ pub struct Engine {
     pub n_workers: usize,
     /// What each channel between two steps of a pass may keep, bytes.
     pub channel_bytes: usize,
+    /// Whether there is memory for one large item at a time only (see [`Task::large`]).
+    pub is_narrow: bool,
     /// Ends the run early.
     pub cancel: Cancel,
     /// Told how far the run is.
@@ -50,20 +52,21 @@ pub struct Engine {
 pub struct Task {
     name: String,
     total: Amount,
-    one_by_one: bool,
+    is_large: bool,
 }
 
 impl Task {
     /// A task of unknown size.
     #[must_use]
     pub fn new(name: impl Into<String>) -> Self {
-        Self { name: name.into(), total: Amount::default(), one_by_one: false }
+        Self { name: name.into(), total: Amount::default(), is_large: false }
     }
 
-    /// Does its items one after the other, each on all threads: where two at once take more memory than there is.
+    /// Its items take much memory each, as all that scans see of a region does: where there is little, they are done one after
+    /// the other, each on all threads.
     #[must_use]
-    pub fn one_by_one(mut self, one_by_one: bool) -> Self {
-        self.one_by_one = one_by_one;
+    pub fn large(mut self) -> Self {
+        self.is_large = true;
         self
     }
 
@@ -88,6 +91,7 @@ impl Engine {
         Self {
             n_workers: n_workers.max(1),
             channel_bytes: CHANNEL_BYTES,
+            is_narrow: false,
             cancel: Cancel::new(),
             progress: Progress::silent(),
             pool: OnceLock::new(),
@@ -107,6 +111,7 @@ impl Engine {
         Self {
             n_workers: 4 * self.n_workers,
             channel_bytes: self.channel_bytes,
+            is_narrow: self.is_narrow,
             cancel: self.cancel.clone(),
             progress: self.progress.clone(),
             pool: OnceLock::new(),
@@ -180,7 +185,7 @@ impl Engine {
         // Begun in their order, each by the next free thread: where the largest are first, no thread ends long after the others.
         let mut all: Vec<(usize, Option<Result<U>>)> = self.pool()?.install(|| {
             let work = |(at, item)| (at, one((at, item)));
-            if task.one_by_one {
+            if task.is_large && self.is_narrow {
                 return items.map(work).collect();
             }
             items.par_bridge().map(work).collect()

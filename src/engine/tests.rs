@@ -318,13 +318,14 @@ fn fan_out_may_use_rayon_inside() {
 #[test]
 fn one_by_one_no_item_begins_before_the_last_one_ends() {
     let at_work = AtomicUsize::new(0);
-    let sums =
-        engine(4, 1000).fan_out(Task::new("fit").one_by_one(true), (0..20).collect(), |i: u64| {
-            assert_eq!(at_work.fetch_add(1, Ordering::SeqCst), 0);
-            let sum: u64 = (0..=i).into_par_iter().sum();
-            at_work.fetch_sub(1, Ordering::SeqCst);
-            Ok(sum)
-        });
+    let mut engine = engine(4, 1000);
+    engine.is_narrow = true;
+    let sums = engine.fan_out(Task::new("fit").large(), (0..20).collect(), |i: u64| {
+        assert_eq!(at_work.fetch_add(1, Ordering::SeqCst), 0);
+        let sum: u64 = (0..=i).into_par_iter().sum();
+        at_work.fetch_sub(1, Ordering::SeqCst);
+        Ok(sum)
+    });
     assert_eq!(sums.expect("no error"), (0..20).map(|i| i * (i + 1) / 2).collect::<Vec<u64>>());
 }
 

@@ -189,6 +189,11 @@ impl Means {
             )
             .hint("raise --memory"));
         }
+        let export = &self.settings.export;
+        if export.copc && !export.tiles {
+            let what = "export.copc needs export.tiles: the COPC file is made of the tiles";
+            return Err(usage(what).hint("leave export.tiles as it is"));
+        }
         Ok(self)
     }
 
@@ -314,6 +319,8 @@ mod tests {
             assert!(error.to_string().contains(says), "{error}");
         }
         assert_eq!(with(&["memory=1MiB"]).expect_err("small").kind(), Kind::OverBudget);
+        let error = with(&["export.copc=true", "export.tiles=false"]).expect_err("no tiles");
+        assert!(error.to_string().contains("export.tiles"), "{error}");
         assert!(with(&["fit.bean=3"]).expect_err("typo").to_string().contains("beam"));
     }
 

@@ -96,7 +96,7 @@ settings! {
         min_size, min_voxels, min_points, robot_margin,
     }
     export: export::Settings {
-        tiles, tile_edge, fixed_cloud, bodies, compress, waiting_bytes,
+        tiles, tile_edge, fixed_cloud, bodies, copc, compress, waiting_bytes,
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::robots::{Now, bounds, look};
 use super::session::{Labels, Robots, Session, ground};
-use crate::engine::Engine;
+use crate::engine::{Engine, Task};
 use crate::labelling::{Labelling, Near};
 use crate::search::Search;
 use crate::spaces::region;
@@ -49,7 +49,9 @@ impl Session<'_> {
         let walls = ground(self.floor, true, (self.sources, self.store), self.settings, engine)?;
         let (scans, settings) = (&self.sources.scans, self.settings);
         let search = Search::new(self.shelf, scans, self.store, &walls, settings);
-        let found = engine.fan_out("search", regions.clone(), |region| search.region(&region))?;
+        let found = engine.fan_out(Task::new("search").large(), regions.clone(), |region| {
+            search.region(&region)
+        })?;
         let found = found.into_iter().flatten().collect();
         let is_new = |fit: &Fit| {
             let at = fit.world_from_base.translation.vector;
@@ -80,7 +82,8 @@ impl Session<'_> {
         robots: &mut Robots,
         engine: &Engine,
     ) -> Result<()> {
-        let stood = engine.fan_out("fit", appeared.clone(), |fit| self.stood(&fit, models))?;
+        let stood = engine
+            .fan_out(Task::new("fit").large(), appeared.clone(), |fit| self.stood(&fit, models))?;
         for (fit, stood) in appeared.into_iter().zip(stood) {
             robots.in_cell.push(fits.len());
             robots.changed.push(fits.len());

@@ -5,7 +5,7 @@ use super::base::Base;
 use super::past::{Compared, Past};
 use super::present::{self, Present};
 use super::robots::{Now, bounds as robot_bounds, look};
-use crate::engine::{AllThreads, Engine};
+use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use crate::labelling::{Labelling, Near};
 use crate::search::{Search, Shelf};
@@ -187,7 +187,8 @@ impl<'a> Session<'a> {
         let old_ground = asked(past, scans.len());
         let old = Search::new(shelf, scans, past.store, &old_ground, settings);
         let new = Search::new(shelf, scans, store, &ground, settings);
-        let views = engine.fan_out("views", vec![&old, &new], |s| s.images(&cell, &fine))?;
+        let views = engine
+            .fan_out(Task::new("views").large(), vec![&old, &new], |s| s.images(&cell, &fine))?;
         let [old_views, new_views] = <[_; 2]>::try_from(views).unwrap_or_default();
         Ok(Self {
             sources,
@@ -241,7 +242,7 @@ impl<'a> Session<'a> {
         let old_watch = Watch::new(&self.cell, &self.old_views);
         let regions = identify::regions(&self.clusters, &self.settings.region);
         let here = here((fits, models), &self.past.cell);
-        let looked = engine.fan_out("fit", here.clone(), |(i, _)| {
+        let looked = engine.fan_out(Task::new("fit").large(), here.clone(), |(i, _)| {
             look(&fits[i], models, (&search, [&watch, &old_watch], &regions))
         })?;
         for ((i, bounds), (now, own)) in here.into_iter().zip(looked) {

@@ -5,13 +5,14 @@ use super::base::Base;
 use super::past::Past;
 use super::say::{self, Said};
 use super::session::{Labels, Robots, Session};
+use crate::copc;
 use crate::engine::Engine;
 use crate::job::{Outcome, Room};
 use crate::labelling::{Labelling, Scope, Streamed};
 use crate::report::id;
 use crate::reuse::{OutputFile, Sums};
 use contract::{Fit, MaskId, Result, Space};
-use export::{FileSum, MaskFiles, NpyWriter, OldPoint, Spool};
+use export::{COPC, FileSum, MaskFiles, NpyWriter, OldPoint, Spool};
 use geometry::Aabb;
 use merge::{Registration, Sight, Tally, ThingChange, Watch};
 use robot::Model;
@@ -75,8 +76,13 @@ impl Written<'_, '_> {
         written.extend(say::NAMES.map(String::from));
         let rewritten = self.robots.changed.iter().chain(&self.robots.gone);
         let folders: Vec<String> = rewritten.map(|&i| id(i)).collect();
+        let has_copc = self.base.has(COPC);
+        written.extend(has_copc.then(|| COPC.to_string()));
         let is_new = |path: &str| written.contains(path) || is_of(path, &folders);
         let shared = self.base.share_files(next, is_new)?;
+        if has_copc {
+            copc::write(next, &scratch, engine)?;
+        }
         let fresh = done.sums.iter().filter(|sum| sum.path.starts_with(next));
         let mut known: Vec<OutputFile> = fresh.map(|sum| OutputFile::of(next, sum)).collect();
         let n_shared = [shared.len(), shared.len() + known.len()];

@@ -49,6 +49,11 @@ impl AtomicFile {
         &self.path
     }
 
+    /// The name that it has until then, for those who write by name.
+    pub(crate) fn part(&self) -> &Path {
+        &self.part
+    }
+
     /// The file once more, for reading what was written so far.
     pub fn again(&mut self) -> std::io::Result<File> {
         self.settle()?;

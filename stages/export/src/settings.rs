@@ -14,6 +14,9 @@ pub struct Settings {
     pub fixed_cloud: bool,
     /// Whether records hold the number of the connected body that a point belongs to (`BodyId`).
     pub bodies: bool,
+    /// Whether all points are written as one COPC file too (`clouds/plant.copc.laz`), made of the tiles: an octree that viewers
+    /// load piece by piece.
+    pub copc: bool,
     /// Whether clouds are compressed (LAZ): a quarter of the disk, at a tenth of the speed.
     pub compress: bool,
     /// Records that wait in memory for their tile, bytes.
@@ -27,6 +30,7 @@ impl Default for Settings {
             tile_edge: 5.0,
             fixed_cloud: true,
             bodies: false,
+            copc: false,
             compress: false,
             waiting_bytes: 64 << 20,
         }

@@ -136,6 +136,55 @@ fn tiles_hold_every_point_once_whatever_the_memory_and_compression() {
     }
 }
 
+/// Says nothing, and never stops.
+struct Quiet;
+
+impl CopcSteps for Quiet {
+    fn begins(&self, _: &'static str, _: u64) {}
+    fn is_at(&self, _: u64) {}
+    fn ends(&self) -> contract::Result<()> {
+        Ok(())
+    }
+}
+
+fn copc(out: &Path, n_threads: usize) -> bool {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
+    let write = || write_copc(out, &out.join("scratch"), &std::sync::Arc::new(Quiet));
+    pool.install(write).expect("writes")
+}
+
+#[test]
+fn tiles_make_one_copc_file_the_same_for_any_number_of_threads() {
+    let n = 700_000;
+    let mut files = Vec::new();
+    for (n_threads, compress) in [(1, false), (2, false), (3, true)] {
+        let out = folder(&format!("copc_{n_threads}"));
+        let written = clouds(&out, n, [compress, true], 1 << 20);
+        assert!(copc(&out, n_threads));
+        files.push(std::fs::read(out.join(COPC)).expect("reads"));
+        assert!(files[0] == files[files.len() - 1], "{n_threads} threads");
+        assert_eq!(std::fs::read_dir(out.join("scratch")).expect("lists").count(), 0);
+        let (header, points) = read(&out.join(COPC));
+        let vlr = &header.vlrs()[0];
+        assert_eq!((vlr.user_id.as_str(), vlr.record_id), ("copc", 1));
+        assert!(header.date().is_none());
+        let line = |p: las::Point| {
+            let i = (p.gps_time.expect("has time") * 1000.0).round() as i64;
+            let color = p.color.expect("has color");
+            let ids = (p.intensity, p.point_source_id, u8::from(p.classification), p.extra_bytes);
+            (i, [p.x, p.y, p.z].map(f64::to_bits), [color.red, color.green, color.blue], ids)
+        };
+        let mut whole: Vec<_> = points.into_iter().map(line).collect();
+        let of_tiles = written.tiles.iter().flat_map(|tile| read(&tile.path).1);
+        let mut tiles: Vec<_> = of_tiles.map(line).collect();
+        whole.sort();
+        tiles.sort();
+        assert_eq!(whole.len(), n);
+        assert!(whole == tiles);
+    }
+    assert!(!copc(&folder("copc_of_nothing"), 1));
+}
+
 #[test]
 fn bodies_are_an_extra_field_behind_labels() {
     let out = folder("bodies");
@@ -293,6 +342,7 @@ fn sample(out: &Path) {
         .collect();
     write_table(out, &robots).expect("table");
     write_e57(&out.join("scans.e57"));
+    assert!(copc(out, 2));
     let result = ResultFile {
         schema: SCHEMA.into(),
         version: "0.1.0".into(),
