@@ -84,6 +84,9 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     if settings.fit.calibrate {
         fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
     }
+    if settings.fit.together {
+        fit::together(&mut fits, &models, (scans, None), &settings.fit);
+    }
 
     // Tiles near robots once more: which points are links, which hang on them.
     let floor = &ground.surfaces.floor;

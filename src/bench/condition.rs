@@ -76,7 +76,7 @@ pub(super) const PLAIN: Condition = Condition {
 /// Perturbations of the basin's curve, degrees (fit.md §6.4).
 const PERTURBED_DEG: [f64; 7] = [2.0, 5.0, 8.0, 12.0, 16.0, 20.0, 30.0];
 /// Errors of a usual registration (fit.md §5, T3).
-const REGISTRATION: [f64; 3] = [0.002, 0.01, 0.001];
+pub(super) const REGISTRATION: [f64; 3] = [0.002, 0.01, 0.001];
 
 /// A robot that its model fits poorly: shifts of joints, metres, and turns, degrees.
 const FRAMES: [f64; 2] = [0.002, 0.1];

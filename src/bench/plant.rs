@@ -14,6 +14,8 @@ use contract::{Error, Kind, Result};
 use export::atomic;
 use robot::Model;
 use serde::Serialize;
+use simulate::random::Random;
+use simulate::scene::{Registration, Scanner};
 use simulate::{Plant, Scene};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -55,6 +57,8 @@ enum Drawing {
     Plant(Plant),
     /// A plant: the models of its robots are left out of the library.
     Strange(Plant),
+    /// A plant whose scans are registered as scans usually are.
+    Shifted(Plant),
     /// One robot in clutter, bolted to such a thing.
     Hung(Place),
 }
@@ -64,6 +68,11 @@ impl Drawing {
         match self {
             Self::Plant(plant) | Self::Strange(plant) => {
                 simulate::plant(&Plant { seed, ..plant.clone() }, models)
+            }
+            Self::Shifted(plant) => {
+                let mut scene = simulate::plant(&Plant { seed, ..plant.clone() }, models)?;
+                scene.scanners.iter_mut().enumerate().for_each(|(k, s)| shift(s, seed, k));
+                Ok(scene)
             }
             Self::Hung(mount) => {
                 let robots: Vec<usize> =
@@ -76,6 +85,18 @@ impl Drawing {
             }
         }
     }
+}
+
+/// Gives a scanner errors of registration and range.
+fn shift(scanner: &mut Scanner, seed: u64, k: usize) {
+    let mut random = Random::keyed(&[seed, k as u64, 0x5E]);
+    let mut normal = |sigma: f64| sigma * random.normals()[0];
+    let [shift, turn, bias] = condition::REGISTRATION;
+    scanner.registration = Registration {
+        xyz: [normal(shift), normal(shift), normal(shift)],
+        rpy_deg: [normal(turn), normal(turn), normal(turn)],
+    };
+    scanner.range_bias = normal(bias);
 }
 
 /// A suite: name, number of cases, and what the k-th is drawn from.
@@ -94,6 +115,7 @@ const SUITES: &[Suite] = &[
     ("empty", 20, |_| Drawing::Plant(Plant { n_robots: 0, n_scanners: 3, ..CELL })),
     (STRANGERS, 10, |_| Drawing::Strange(Plant { n_robots: 1, n_scanners: 4, ..CELL })),
     ("moved", 20, |_| Drawing::Plant(Plant { n_robots: 2, n_scanners: 6, moves: true, ..CELL })),
+    ("registered", 10, |_| Drawing::Shifted(Plant { n_robots: 4, n_scanners: 6, ..CELL })),
     ("mounts", 12, |k| Drawing::Hung([Place::Ceiling, Place::Wall, Place::Tilted][k % 3])),
 ];
 

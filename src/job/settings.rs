@@ -77,7 +77,7 @@ settings! {
     }
     fit: fit::Settings {
         method, beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
-        max_points, floor_band, min_noise, plane_sigma, scan_sigma, calibrate, frame_sigma, determined_sigma,
+        max_points, floor_band, min_noise, plane_sigma, scan_sigma, together, calibrate, frame_sigma, determined_sigma,
         min_score, max_violation,
     }
     paper: fit::paper::PaperSettings {

@@ -87,6 +87,20 @@ pub struct ScanShift {
     pub range_bias: f64,
 }
 
+/// What a robot's points say of the errors of the scans that see it, for others that the same scans see: of each scan its shift,
+/// metres, its turn about its scanner, radians, both world axes, and its range bias, metres: seven values, scan after scan.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ScanShare {
+    /// Whose.
+    pub scans: Vec<crate::ScanId>,
+    /// Errors as this robot alone tells them, with the prior.
+    pub errors: Vec<f64>,
+    /// Information of its points alone, prior left out, row-major.
+    pub information: Vec<f64>,
+    /// By how much base twist (world axes at the base: translation, rotation) and joints give way to each of them, row-major.
+    pub gain: Vec<f64>,
+}
+
 /// Another posture that explains the points as well.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Equal {
@@ -189,6 +203,8 @@ pub struct Fit {
     pub tip_sigma: f64,
     /// How the scans stand to one another, as far as the points of the robot tell.
     pub scans: Vec<ScanShift>,
+    /// The same for others; nothing where a scanner is unknown.
+    pub share: Option<ScanShare>,
     /// One for each link of the model, in its order.
     pub links: Vec<LinkEvidence>,
     /// Scans in which it stands so, if it moved between scans; else empty: in all of them.

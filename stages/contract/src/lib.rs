@@ -19,8 +19,8 @@ mod view;
 pub use candidate::{Candidate, Cluster, Voxel};
 pub use error::{Error, Kind, Result};
 pub use fit::{
-    Calibration, Equal, Fit, JointFit, JointFrame, LinkEvidence, Mounted, RunnerUp, ScanShift,
-    Verdict,
+    Calibration, Equal, Fit, JointFit, JointFrame, LinkEvidence, Mounted, RunnerUp, ScanShare,
+    ScanShift, Verdict,
 };
 pub use label::{Label, PointKind};
 pub use lattice::{Lattice, Pixel};

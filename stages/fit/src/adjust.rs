@@ -34,7 +34,7 @@ impl ScanError {
         Self { shift: Vector::new(0.0, 0.0, 0.0), turn: Vector::new(0.0, 0.0, 0.0), bias: 0.0 };
 
     /// The values in the order of the unknowns.
-    fn values(&self) -> [f64; N_SCAN] {
+    pub(crate) fn values(&self) -> [f64; N_SCAN] {
         let (t, w) = (self.shift, self.turn);
         [t.x, t.y, t.z, w.x, w.y, w.z, self.bias]
     }
@@ -54,6 +54,8 @@ pub(crate) struct Adjusted {
     pub(crate) covariance: DMatrix<f64>,
     /// One for each view.
     pub(crate) scans: Vec<ScanError>,
+    /// How the robot gives way to those, and what its points say of them (see [`Normal::shared`]).
+    pub(crate) shared: Option<[DMatrix<f64>; 2]>,
     /// How far the model's surface is off, standard deviation over its patches, metres.
     pub(crate) patch_sigma: f64,
     /// Points within the gate, for each link.
@@ -204,11 +206,10 @@ impl Adjust<'_> {
         let (mut hessian, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
         self.refine.add_priors(h, &mut hessian, &mut gradient);
         normal.add_robot_prior(&hessian, &gradient);
-        let [shift, turn, bias] = self.settings().scan_sigma;
+        let priors = scan_priors(self.settings());
         for (view, error) in state.scans.iter().enumerate() {
             for (i, value) in error.values().into_iter().enumerate() {
-                let sigma = [shift, shift, shift, turn, turn, turn, bias][i];
-                normal.add_scan_prior(view, i, value, sigma);
+                normal.add_scan_prior(view, i, value, priors[i]);
             }
         }
     }
@@ -236,11 +237,18 @@ impl Adjust<'_> {
             covariance: normal.covariance(&self.refine.prepared.patch_groups),
             hypothesis: state.hypothesis,
             scans: state.scans,
+            shared: normal.shared(&scan_priors(self.settings())),
             patch_sigma: normal.patch_sigma(),
             n_points,
             link_rms,
         }
     }
+}
+
+/// Weights of what is known of a scan's errors beforehand, m⁻² and rad⁻².
+pub(crate) fn scan_priors(settings: &Settings) -> [f64; N_SCAN] {
+    let [shift, turn, bias] = settings.scan_sigma.map(|sigma| 1.0 / (sigma * sigma));
+    [shift, shift, shift, turn, turn, turn, bias]
 }
 
 /// For each link: points within the gate, and the sum of the squares of their distances, m².

@@ -216,8 +216,11 @@ impl Normal {
         rows += gradient;
     }
 
-    pub(crate) fn add_scan_prior(&mut self, view: usize, i: usize, value: f64, sigma: f64) {
-        self.add_prior(self.n_robot + view * N_SCAN + i, value, sigma);
+    /// One error of a scan is known to be zero, as much as `weight` says; it has the value.
+    pub(crate) fn add_scan_prior(&mut self, view: usize, i: usize, value: f64, weight: f64) {
+        let at = self.n_robot + view * N_SCAN + i;
+        self.hessian[(at, at)] += weight;
+        self.gradient[at] += weight * value;
     }
 
     /// One unknown is known to be zero, give or take; it has the value.
@@ -290,6 +293,21 @@ impl Normal {
             wide.ger(ALIKE * self.sigma2, &moved, &moved, 1.0);
         }
         wide.view((0, 0), (n_robot, n_robot)).into_owned()
+    }
+
+    /// What the residuals say of the scans' errors whatever the robot does, without the priors (of each of the seven, m⁻² or
+    /// rad⁻²), and how the robot gives way to each of them.
+    pub(crate) fn shared(&self, priors: &[f64; N_SCAN]) -> Option<[DMatrix<f64>; 2]> {
+        let (n, n_scans) = (self.n_robot, self.n - self.n_robot);
+        let robot = self.hessian.view((0, 0), (n, n)).into_owned().cholesky()?;
+        let both = self.hessian.view((0, n), (n, n_scans)).into_owned();
+        let gain = -robot.solve(&both);
+        let mut information =
+            self.hessian.view((n, n), (n_scans, n_scans)) + both.transpose() * &gain;
+        (0..n_scans).for_each(|i| information[(i, i)] -= priors[i % N_SCAN]);
+        // As in the covariance: residuals may be larger than noise and patches make them, and alike.
+        let scale = (self.chi2 / self.n_rows.max(1) as f64).max(1.0) * self.kernel_factor();
+        Some([gain, information / scale])
     }
 
     /// Gradient for a unit offset of all patches of each group together.

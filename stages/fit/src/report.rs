@@ -1,7 +1,7 @@
 //! The adjusted posture, the others that were looked at, and what the beams say in; out comes the fit as it is reported:
 //! values with their standard deviations, which joints are open, rivals, equals, verdict.
 
-use contract::{Equal, Fan, Fit, JointFit, RunnerUp, ScanShift};
+use contract::{Equal, Fan, Fit, JointFit, RunnerUp, ScanShare, ScanShift};
 use geometry::{Pose, Vector};
 use nalgebra::{DMatrix, DVector};
 use robot::{Model, Motion};
@@ -111,8 +111,9 @@ pub(crate) fn report(
         explained: judgement.explained,
         rms: rms(best),
         surface_sigma: best.patch_sigma,
-        tip_sigma: tip_sigma(model, h, &own),
+        tip_sigma: tip_sigma(model, &h.posture, &own),
         scans: scans(refine, best),
+        share: share(refine, best),
         links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
         runner_up: others.map(|rival| runner_up(model, judgement, rival)).next(),
         equals: same.take(N_EQUALS).map(equal).chain(spun).collect(),
@@ -153,6 +154,20 @@ fn scans(refine: &Refine<'_>, best: &Adjusted) -> Vec<ScanShift> {
             })
         })
         .collect()
+}
+
+/// The same for others that these scans see.
+fn share(refine: &Refine<'_>, best: &Adjusted) -> Option<ScanShare> {
+    let views = &refine.scene.views;
+    let [gain, information] = best.shared.as_ref()?;
+    let is_known = views.iter().all(|view| view.scanner.is_some());
+    let turn = world_from_base(gain.nrows(), &best.hypothesis.local_from_base);
+    is_known.then(|| ScanShare {
+        scans: views.iter().map(|view| view.scan).collect(),
+        errors: best.scans.iter().flat_map(|error| error.values()).collect(),
+        information: information.transpose().as_slice().to_vec(),
+        gain: (turn * gain).transpose().as_slice().to_vec(),
+    })
 }
 
 /// For each joint, whether the points leave it open: by its standard deviation, or because a posture that differs in
@@ -262,11 +277,11 @@ fn whole_turns(model: &Model, posture: &[f64], joint: usize) -> (f64, Vec<f64>) 
 }
 
 /// Standard deviation of the tip of the main chain in the base's frame, metres.
-fn tip_sigma(model: &Model, h: &Hypothesis, covariance: &DMatrix<f64>) -> f64 {
+pub(crate) fn tip_sigma(model: &Model, posture: &[f64], covariance: &DMatrix<f64>) -> f64 {
     let Some(link) = model.main_chain.last().map(|&j| model.joints[j].child) else { return 0.0 };
-    let kinematics = model.kinematics(&h.posture);
+    let kinematics = model.kinematics(posture);
     let tip = kinematics.base_from_link[link].translation.vector;
-    let n = h.posture.len();
+    let n = posture.len();
     let mut moves = DMatrix::zeros(3, n);
     for (j, t) in kinematics.twists[link].iter().enumerate() {
         let v = Vector::new(t[0], t[1], t[2]) + Vector::new(t[3], t[4], t[5]).cross(&tip);
@@ -278,10 +293,16 @@ fn tip_sigma(model: &Model, h: &Hypothesis, covariance: &DMatrix<f64>) -> f64 {
 
 /// The covariance with the base's twist turned from base axes to world axes.
 fn in_world_axes(covariance: &DMatrix<f64>, local_from_base: &Pose) -> DMatrix<f64> {
+    let turn = world_from_base(covariance.nrows(), local_from_base);
+    &turn * covariance * turn.transpose()
+}
+
+/// Turns a base twist, with joints behind it, from base axes to world axes.
+fn world_from_base(n: usize, local_from_base: &Pose) -> DMatrix<f64> {
     let turn = local_from_base.rotation.to_rotation_matrix();
-    let mut world_from_base = DMatrix::identity(covariance.nrows(), covariance.ncols());
+    let mut out = DMatrix::identity(n, n);
     for block in [0, 3] {
-        world_from_base.fixed_view_mut::<3, 3>(block, block).copy_from(turn.matrix());
+        out.fixed_view_mut::<3, 3>(block, block).copy_from(turn.matrix());
     }
-    &world_from_base * covariance * world_from_base.transpose()
+    out
 }

@@ -45,6 +45,8 @@ pub struct Settings {
     /// Standard deviations of a scan's errors of registration and range: shift on each axis, metres, turn about each
     /// axis, radians (0.02°), range bias, metres (fit.md §4g).
     pub scan_sigma: [f64; 3],
+    /// Whether robots tell one another of the errors of scans that see several of them.
+    pub together: bool,
     /// Whether the places of the joints on their links are estimated, too: for robots that their models fit poorly.
     pub calibrate: bool,
     /// How far a joint may be from where its model has it, one sigma: shift on each axis, metres, turn about each axis,
@@ -77,6 +79,7 @@ impl Default for Settings {
             min_noise: 0.0015,
             plane_sigma: [0.004, 0.006],
             scan_sigma: [0.003, 0.000_35, 0.001],
+            together: true,
             calibrate: false,
             frame_sigma: [0.003, 0.0026],
             determined_sigma: 0.000_75,
