@@ -85,7 +85,8 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
         fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
     }
     if settings.fit.together {
-        fit::together(&mut fits, &models, (scans, None), &settings.fit);
+        let still = &ground.surfaces.overlaps;
+        fit::together(&mut fits, &models, (scans, still), &settings.fit);
     }
 
     // Tiles near robots once more: which points are links, which hang on them.

@@ -115,7 +115,9 @@ const SUITES: &[Suite] = &[
     ("empty", 20, |_| Drawing::Plant(Plant { n_robots: 0, n_scanners: 3, ..CELL })),
     (STRANGERS, 10, |_| Drawing::Strange(Plant { n_robots: 1, n_scanners: 4, ..CELL })),
     ("moved", 20, |_| Drawing::Plant(Plant { n_robots: 2, n_scanners: 6, moves: true, ..CELL })),
-    ("registered", 10, |_| Drawing::Shifted(Plant { n_robots: 4, n_scanners: 6, ..CELL })),
+    ("registered", 10, |k| {
+        Drawing::Shifted(Plant { n_robots: [4, 1][k % 2], n_scanners: [6, 4][k % 2], ..CELL })
+    }),
     ("mounts", 12, |k| Drawing::Hung([Place::Ceiling, Place::Wall, Place::Tilted][k % 3])),
 ];
 

@@ -29,6 +29,8 @@ pub use scan::{Format, Input, InputId, Mask, MaskId, Scan, ScanId};
 pub use space::{Space, SpaceGrid, SpaceKind};
 pub use step::{Fan, Fold, Map, OneByOne, Weigh};
 pub use strip::{Attributes, Strip};
-pub use surface::{Floor, FloorLevel, InstallationPlane, Occupancy, PlanePatch, TileSummary};
+pub use surface::{
+    Floor, FloorLevel, InstallationPlane, Occupancy, Overlap, PlanePatch, TileSummary,
+};
 pub use tile::{MAX_SKIP, TILE_SIDE, Tile, TileAt, TilePoints};
 pub use view::{Region, View, ViewPoint};

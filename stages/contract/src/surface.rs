@@ -24,6 +24,15 @@ pub struct PlanePatch {
     pub ground: Vec<([i32; 2], u32, f64)>,
 }
 
+/// A piece of surface that several scans saw.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Overlap {
+    /// Its normal, to the scanners, world, unit length.
+    pub normal: [f64; 3],
+    /// Where each of them has it: middle of its points, world, metres.
+    pub seen: Vec<(ScanId, [f64; 3])>,
+}
+
 /// Occupied voxels with the number of points in each: sorted by (z, y, x), each voxel once.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Occupancy {

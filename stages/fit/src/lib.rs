@@ -46,6 +46,6 @@ pub use scene::Scene;
 pub use settings::{Method, Settings};
 pub use solve::{again, converge, fit};
 pub use stays::{Sights, stays};
-pub use together::{Told, together};
+pub use together::together;
 pub use tool::{Tooled, bolt, fit_tool, try_tool};
 pub use verdict::is_uncontradicted;

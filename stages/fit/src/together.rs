@@ -6,7 +6,7 @@
 //! all robots but for what is each robot's own (its paint, the shape of its castings): `e_i = e + d_i`, `d_i ~ N(0, D_i)`. What the
 //! others say of `e` then takes the place of the prior of `e_i`, and no point is looked at again.
 
-use contract::{Fit, Scan, ScanId, ScanShare, Verdict};
+use contract::{Fit, Overlap, Scan, ScanId, ScanShare, Verdict};
 use geometry::Vector;
 use nalgebra::{DMatrix, DVector, UnitQuaternion};
 use robot::Model;
@@ -18,6 +18,8 @@ use crate::report::tip_sigma;
 
 /// What is a robot's own, one sigma: shift, metres, turn, radians, range bias, metres; its surface comes to the first.
 const OWN: [f64; 3] = [0.000_3, 0.000_02, 0.000_5];
+/// How flat a piece of floor or wall is, and how well a scan has its middle, metres, one sigma.
+const FLAT: f64 = 0.002;
 /// Share of a prior's variance that this may be.
 const MOST_OWN: f64 = 0.5;
 /// A robot that others would move farther than this is none of whose scans err as theirs do, or is no robot: metres, radians.
@@ -28,8 +30,7 @@ const MAX_WORSE: f64 = 2.0;
 const LEAST_LEFT: f64 = 0.05;
 
 /// What one thing says of the errors that scans have everywhere: information and its vector, seven values a scan.
-#[derive(Debug, Clone)]
-pub struct Told {
+struct Told {
     scans: Vec<ScanId>,
     information: DMatrix<f64>,
     vector: DVector<f64>,
@@ -46,11 +47,12 @@ struct Own {
     apart: [f64; N_SCAN],
 }
 
-/// Brings robots up to date with what others, and `still` things, say of their scans; those that stand in all scans only.
+/// Brings robots up to date with what others, and pieces of surface that stand still, say of their scans; those that stand in
+/// all scans only.
 pub fn together(
     fits: &mut [Fit],
     models: &[Model],
-    (scans, still): (&[Scan], Option<&Told>),
+    (scans, still): (&[Scan], &[Overlap]),
     settings: &Settings,
 ) {
     let priors = scan_priors(settings);
@@ -64,7 +66,8 @@ pub fn together(
     for (i, fit) in fits.iter_mut().enumerate() {
         let Some(own) = &own[i] else { continue };
         let others = told.iter().enumerate().filter(|(j, _)| *j != i);
-        let others = others.filter_map(|(_, told)| told.as_ref()).chain(still);
+        let still = Told::by_surfaces(still, scans, &own.scans);
+        let others = others.filter_map(|(_, told)| told.as_ref()).chain(&still);
         if let Some(new) = own.among(others, &priors) {
             new.bring(fit, own, &models[fit.model], scans);
         }
@@ -85,10 +88,7 @@ impl Own {
         let information = without_negative(DMatrix::from_row_slice(n, n, information));
         let mut vector = &information * &errors;
         (0..n).for_each(|k| vector[k] += priors[k % N_SCAN] * errors[k]);
-        let [shift, turn, bias] = OWN.map(|sigma| sigma * sigma);
-        let shift = shift + fit.surface_sigma * fit.surface_sigma;
-        let apart = [shift, shift, shift, turn, turn, turn, bias];
-        let apart = std::array::from_fn(|k| apart[k].min(MOST_OWN / priors[k]));
+        let apart = apart(fit.surface_sigma, Some(priors));
         let gain = DMatrix::from_row_slice(n_robot, n, gain);
         Some(Self { scans: scans.clone(), errors, information, vector, gain, apart })
     }
@@ -132,6 +132,50 @@ impl Own {
 }
 
 impl Told {
+    /// What pieces of surface say of some scans: each is at an unknown place on which those that saw it agree.
+    fn by_surfaces(still: &[Overlap], all: &[Scan], scans: &[ScanId]) -> Option<Self> {
+        let scanner = |id: &ScanId| {
+            let scan = all.iter().find(|scan| scan.id == *id)?;
+            Some(scan.world_from_scan.translation.vector)
+        };
+        let scanners: Vec<Vector> = scans.iter().map(scanner).collect::<Option<_>>()?;
+        let n = scans.len() * N_SCAN;
+        let (mut information, mut vector) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for piece in still {
+            let normal = Vector::from(piece.normal);
+            let row = |(id, at): &(ScanId, [f64; 3])| {
+                let k = scans.iter().position(|own| own == id)?;
+                let (at, beam) = (Vector::from(*at), Vector::from(*at) - scanners[k]);
+                let lever = beam.cross(&normal);
+                let along = -normal.dot(&beam.normalize());
+                let [x, y, z] = normal.into();
+                Some((k, [x, y, z, lever.x, lever.y, lever.z, along], normal.dot(&at)))
+            };
+            let rows: Vec<(usize, [f64; N_SCAN], f64)> =
+                piece.seen.iter().filter_map(row).collect();
+            if rows.len() < 2 {
+                continue;
+            }
+            // About their mean: where the piece is, nobody knows.
+            let share = 1.0 / rows.len() as f64;
+            let middle = rows.iter().map(|row| row.2).sum::<f64>() * share;
+            let mut mean = DVector::<f64>::zeros(n);
+            for (k, row, _) in &rows {
+                (0..N_SCAN).for_each(|v| mean[k * N_SCAN + v] += row[v] * share);
+            }
+            for (k, row, r) in &rows {
+                let mut own = -mean.clone();
+                (0..N_SCAN).for_each(|v| own[k * N_SCAN + v] += row[v]);
+                let weight = 1.0 / (FLAT * FLAT);
+                information.ger(weight, &own, &own, 1.0);
+                vector.axpy(-weight * (r - middle), &own, 1.0);
+            }
+        }
+        let apart = apart(0.0, None);
+        (information.amax() > 0.0)
+            .then(|| Self::softened(scans.to_vec(), &information, &vector, &apart))
+    }
+
     /// Of what is told about errors that are a thing's own by so much (variances).
     fn softened(
         scans: Vec<ScanId>,
@@ -202,9 +246,11 @@ struct New {
 }
 
 impl New {
-    /// Brings a fit up to date; one that would move too far stays as it is.
+    /// Brings a fit up to date; one that would move too far stays as it is, and so does a joint that nothing determines.
     fn bring(&self, fit: &mut Fit, own: &Own, model: &Model, scans: &[Scan]) {
-        let step = &own.gain * &self.step;
+        let mut step = &own.gain * &self.step;
+        let joints = fit.joints.iter().enumerate();
+        joints.filter(|(_, joint)| !joint.determined).for_each(|(j, _)| step[6 + j] = 0.0);
         if step.amax() > MAX_STEP {
             return;
         }
@@ -254,6 +300,14 @@ impl New {
     }
 }
 
+/// Variances of what is a thing's own, whose surface is off by so much, metres.
+fn apart(surface_sigma: f64, priors: Option<&[f64; N_SCAN]>) -> [f64; N_SCAN] {
+    let [shift, turn, bias] = OWN.map(|sigma| sigma * sigma);
+    let shift = shift + surface_sigma * surface_sigma;
+    let all = [shift, shift, shift, turn, turn, turn, bias];
+    std::array::from_fn(|k| priors.map_or(all[k], |p| all[k].min(MOST_OWN / p[k])))
+}
+
 /// Values of a scan, again for each of them.
 fn repeated(values: &[f64; N_SCAN], n: usize) -> DVector<f64> {
     DVector::from_fn(n, |k, _| values[k % N_SCAN])
@@ -265,3 +319,6 @@ fn without_negative(matrix: DMatrix<f64>) -> DMatrix<f64> {
     eigen.eigenvalues.iter_mut().for_each(|v| *v = v.max(0.0));
     eigen.recompose()
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,10 +4,12 @@ use crate::Settings;
 use crate::column::Columns;
 use crate::levels::{describe, levels};
 use crate::mounts::MIN_PATCH;
+use crate::overlap::Overlaps;
 use crate::pieces::pieces;
 use crate::stands::stands;
 use contract::{
-    Floor, Fold, InstallationPlane, Occupancy, PlanePatch, Result, Scan, ScanId, TileSummary,
+    Floor, Fold, InstallationPlane, Occupancy, Overlap, PlanePatch, Result, Scan, ScanId,
+    TileSummary,
 };
 use geometry::{Aabb, Vector};
 use serde::{Deserialize, Serialize};
@@ -27,6 +29,7 @@ pub struct Sum {
     patches: Vec<PlanePatch>,
     /// Those that do not face up.
     sides: Vec<PlanePatch>,
+    overlaps: Overlaps,
     /// Each at least twice the size of the next, so that all of them are merged in n·log n.
     occupancies: Vec<Occupancy>,
 }
@@ -40,6 +43,8 @@ pub struct Ground {
     pub occupancy: Occupancy,
     /// Patches of walls, ceilings and slopes, in the order of their tiles: what [`mounts`](fn@crate::mounts) is asked about.
     pub sides: Vec<PlanePatch>,
+    /// Pieces of floor, walls and whatever else is flat that several scans saw.
+    pub overlaps: Vec<Overlap>,
     /// Number of points.
     pub n_points: u64,
     /// Points taken for veils.
@@ -95,6 +100,7 @@ impl Fold for Find {
         sum.n_points += item.n_points;
         sum.n_veils += item.n_veils;
         for patch in item.patches {
+            sum.overlaps.add(&patch);
             if faces_up(&patch, &self.settings) {
                 sum.patches.push(patch);
             } else if patch.area >= MIN_PATCH {
@@ -110,6 +116,7 @@ impl Fold for Find {
         earlier.n_veils += later.n_veils;
         earlier.patches.extend(later.patches);
         earlier.sides.extend(later.sides);
+        earlier.overlaps.join(later.overlaps);
         for occupancy in later.occupancies {
             earlier.push(occupancy);
         }
@@ -122,8 +129,9 @@ impl Fold for Find {
         }
         let occupancy = sum.occupancies.pop().unwrap_or_default();
         let floor = search(&sum.patches, &occupancy, &self.scanners, &self.settings);
-        let Sum { sides, n_points, n_veils, .. } = sum;
-        Ok(Ground { floor, occupancy, sides, n_points, n_veils })
+        let Sum { sides, overlaps, n_points, n_veils, .. } = sum;
+        let overlaps = overlaps.finish();
+        Ok(Ground { floor, occupancy, sides, overlaps, n_points, n_veils })
     }
 }
 

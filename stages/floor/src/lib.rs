@@ -6,6 +6,7 @@ mod column;
 mod find;
 mod levels;
 mod mounts;
+mod overlap;
 mod pieces;
 mod settings;
 mod stands;
