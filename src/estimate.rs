@@ -37,8 +37,9 @@ const PROGRAM_BYTES: u64 = 160 << 20;
 const MODEL_BYTES: u64 = 24 << 20;
 const POINT_BYTES: u64 = 40;
 /// What is kept of each scan while a robot is searched, however little memory there is, bytes: a billion points of 20 scans took
-/// 0.8 GiB under 512 MiB.
+/// 0.8 GiB under 512 MiB. No more of them than about so many see a place.
 const SCAN_BYTES: u64 = 28 << 20;
+const SCANS: u64 = 24;
 
 /// What a job will take.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -164,7 +165,7 @@ impl Estimate {
         seconds += if export.copc { n as f64 / COPC } else { 0.0 };
         let base = PROGRAM_BYTES + models * MODEL_BYTES;
         let memory = n.saturating_mul(POINT_BYTES).saturating_add(base);
-        let least = base.saturating_add(SCAN_BYTES.saturating_mul(sources.scans.len() as u64));
+        let least = base + SCAN_BYTES * SCANS.min(sources.scans.len() as u64);
         Self {
             n_points: n,
             n_models,
