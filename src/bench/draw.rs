@@ -344,12 +344,8 @@ fn scanners(scene: &mut Scene, c: &Condition, reach: [f64; 2], random: &mut Rand
         let up = ((reach[1] + 0.4 - z) / near).atan().to_degrees().clamp(5.0, 85.0);
         let down = (z / near).atan().to_degrees().clamp(10.0, 60.0);
         let yaw = (a + std::f64::consts::PI).rem_euclid(TAU).to_degrees();
-        let mut normal = |sigma: f64| random.normals()[0] * sigma;
         let [shift, angle, bias] = c.registration;
-        let registration = Registration {
-            xyz: [normal(shift), normal(shift), normal(shift)],
-            rpy_deg: [normal(angle), normal(angle), normal(angle)],
-        };
+        let registration = Registration::drawn([shift, angle], random);
         scene.scanners.push(Scanner {
             name: format!("scan_{}", k + 1),
             position: [x, y, z],
@@ -361,7 +357,7 @@ fn scanners(scene: &mut Scene, c: &Condition, reach: [f64; 2], random: &mut Rand
                 n_beams: None,
             },
             noise: c.noise,
-            range_bias: normal(bias),
+            range_bias: random.normals()[0] * bias,
             mixed: c.mixed.then(Mixed::default),
             registration,
             ..Scanner::default()

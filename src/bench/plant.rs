@@ -90,13 +90,9 @@ impl Drawing {
 /// Gives a scanner errors of registration and range.
 fn shift(scanner: &mut Scanner, seed: u64, k: usize) {
     let mut random = Random::keyed(&[seed, k as u64, 0x5E]);
-    let mut normal = |sigma: f64| sigma * random.normals()[0];
     let [shift, turn, bias] = condition::REGISTRATION;
-    scanner.registration = Registration {
-        xyz: [normal(shift), normal(shift), normal(shift)],
-        rpy_deg: [normal(turn), normal(turn), normal(turn)],
-    };
-    scanner.range_bias = normal(bias);
+    scanner.registration = Registration::drawn([shift, turn], &mut random);
+    scanner.range_bias = bias * random.normals()[0];
 }
 
 /// A suite: name, number of cases, and what the k-th is drawn from.

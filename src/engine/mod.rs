@@ -98,10 +98,15 @@ impl Engine {
         }
     }
 
-    /// One like it that shows nothing and is cancelled with it.
+    /// One like it, with as little memory, that shows nothing and is cancelled with it.
     #[must_use]
     pub fn quiet(&self) -> Self {
-        Self { cancel: self.cancel.clone(), ..Self::new(self.n_workers) }
+        Self {
+            channel_bytes: self.channel_bytes,
+            is_narrow: self.is_narrow,
+            cancel: self.cancel.clone(),
+            ..Self::new(self.n_workers)
+        }
     }
 
     /// One like it, for work that waits for the disk most of its time: with four times the threads, since a disk reads and writes

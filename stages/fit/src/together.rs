@@ -58,11 +58,9 @@ pub fn together(
     let priors = scan_priors(settings);
     let own: Vec<Option<Own>> = fits.iter().map(|fit| Own::of(fit, &priors)).collect();
     let is_sure = |fit: &Fit| fit.verdict == Verdict::Trusted;
-    let told: Vec<Option<Told>> = own
-        .iter()
-        .zip(&*fits)
-        .map(|(own, fit)| own.as_ref().filter(|_| is_sure(fit)).map(|own| own.told()))
-        .collect();
+    let told = own.iter().zip(&*fits);
+    let told = told.map(|(own, fit)| own.as_ref().filter(|_| is_sure(fit))?.told());
+    let told: Vec<Option<Told>> = told.collect();
     for (i, fit) in fits.iter_mut().enumerate() {
         let Some(own) = &own[i] else { continue };
         let others = told.iter().enumerate().filter(|(j, _)| *j != i);
@@ -94,7 +92,7 @@ impl Own {
     }
 
     /// What it says of the errors that the scans have everywhere.
-    fn told(&self) -> Told {
+    fn told(&self) -> Option<Told> {
         Told::softened(self.scans.clone(), &self.information, &self.vector, &self.apart)
     }
 
@@ -157,23 +155,24 @@ impl Told {
                 continue;
             }
             // About their mean: where the piece is, nobody knows.
-            let share = 1.0 / rows.len() as f64;
+            let (weight, share) = (1.0 / (FLAT * FLAT), 1.0 / rows.len() as f64);
             let middle = rows.iter().map(|row| row.2).sum::<f64>() * share;
-            let mut mean = DVector::<f64>::zeros(n);
-            for (k, row, _) in &rows {
-                (0..N_SCAN).for_each(|v| mean[k * N_SCAN + v] += row[v] * share);
-            }
             for (k, row, r) in &rows {
-                let mut own = -mean.clone();
-                (0..N_SCAN).for_each(|v| own[k * N_SCAN + v] += row[v]);
-                let weight = 1.0 / (FLAT * FLAT);
-                information.ger(weight, &own, &own, 1.0);
-                vector.axpy(-weight * (r - middle), &own, 1.0);
+                for (v, value) in row.iter().enumerate() {
+                    let at = k * N_SCAN + v;
+                    vector[at] -= weight * value * (r - middle);
+                    for (l, other, _) in &rows {
+                        let factor = weight * value * (f64::from(u8::from(k == l)) - share);
+                        let mut block = information.view_mut((at, l * N_SCAN), (1, N_SCAN));
+                        block.iter_mut().zip(other).for_each(|(sum, v)| *sum += factor * v);
+                    }
+                }
             }
         }
-        let apart = apart(0.0, None);
-        (information.amax() > 0.0)
-            .then(|| Self::softened(scans.to_vec(), &information, &vector, &apart))
+        if information.amax() <= 0.0 {
+            return None;
+        }
+        Self::softened(scans.to_vec(), &information, &vector, &apart(0.0, None))
     }
 
     /// Of what is told about errors that are a thing's own by so much (variances).
@@ -182,20 +181,12 @@ impl Told {
         information: &DMatrix<f64>,
         vector: &DVector<f64>,
         apart: &[f64; N_SCAN],
-    ) -> Self {
-        let n = vector.len();
-        let weights = repeated(&apart.map(|variance| 1.0 / variance), n);
+    ) -> Option<Self> {
+        let weights = repeated(&apart.map(|variance| 1.0 / variance), vector.len());
         let own = DMatrix::from_diagonal(&weights);
-        let Some(both) = (information + &own).cholesky() else {
-            return Self {
-                scans: Vec::new(),
-                information: DMatrix::zeros(0, 0),
-                vector: DVector::zeros(0),
-            };
-        };
-        let share = &own * both.inverse();
-        let information = &own - &share * &own;
-        Self { scans, vector: share * vector, information: without_negative(information) }
+        let share = &own * (information + &own).cholesky()?.inverse();
+        let information = without_negative(&own - &share * &own);
+        Some(Self { scans, vector: share * vector, information })
     }
 
     /// Adds what is told of some scans, the others of it known as priors say; whether it tells of any of them.
@@ -277,11 +268,16 @@ impl New {
             joint.sigma = shrunk(joint.sigma, 6 + j);
         }
         fit.covariance = new.transpose().as_slice().to_vec();
-        let base = fit.world_from_base.translation.vector;
+        self.shift_scans(fit, own, scans);
         let twist = Vector::new(step[3], step[4], step[5]);
         fit.world_from_base.translation.vector += Vector::new(step[0], step[1], step[2]);
         fit.world_from_base.rotation =
             UnitQuaternion::from_scaled_axis(twist) * fit.world_from_base.rotation;
+    }
+
+    /// What is said of the scans near the robot, about its base as it stood.
+    fn shift_scans(&self, fit: &mut Fit, own: &Own, scans: &[Scan]) {
+        let base = fit.world_from_base.translation.vector;
         for shift in &mut fit.scans {
             let (Some(k), Some(scan)) = (
                 own.scans.iter().position(|scan| *scan == shift.scan),

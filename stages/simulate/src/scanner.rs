@@ -1,5 +1,6 @@
 //! What a scanner is: its place, raster, range and errors. Numbers in a scene file in; directions of beams out.
 
+use crate::random::Random;
 use contract::{Error, Result};
 use geometry::{Pose, Vector};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
@@ -156,6 +157,15 @@ pub struct Registration {
     pub xyz: [f64; 3],
     /// Roll, pitch, yaw, degrees.
     pub rpy_deg: [f64; 3],
+}
+
+impl Registration {
+    /// One that is drawn: standard deviations of the shift on each axis, metres, and of the turn about each, degrees.
+    #[must_use]
+    pub fn drawn([shift, turn]: [f64; 2], random: &mut Random) -> Self {
+        let mut three = |sigma: f64| [(); 3].map(|()| sigma * random.normals()[0]);
+        Self { xyz: three(shift), rpy_deg: three(turn) }
+    }
 }
 
 impl Scanner {

@@ -97,11 +97,7 @@ fn new_scanners(
         let z = scene.ground(xy[0], xy[1]) + random.between(1.6, 2.2);
         let mut out = scanner(format!("again_{}", k + 1), [xy[0], xy[1], z], raster);
         out.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];
-        let mut normal = |sigma: f64| sigma * random.normals()[0];
-        out.registration = Registration {
-            xyz: [normal(OFF[0]), normal(OFF[0]), normal(OFF[0])],
-            rpy_deg: [normal(OFF[1]), normal(OFF[1]), normal(OFF[1])],
-        };
+        out.registration = Registration::drawn(OFF, random);
         out
     };
     Ok(places.into_iter().enumerate().map(one).collect())

@@ -27,7 +27,7 @@ fn own(share: f64) -> Own {
 fn a_robot_that_others_say_nothing_to_stays() {
     let robot = own(0.5);
     assert!(robot.among(std::iter::empty(), &PRIORS).is_none());
-    let strangers = Told { scans: vec![ScanId(4)], ..own(0.5).told() };
+    let strangers = Told { scans: vec![ScanId(4)], ..own(0.5).told().expect("it tells") };
     let of_one = |m: &DMatrix<f64>| m.view((0, 0), (N_SCAN, N_SCAN)).into_owned();
     let information = of_one(&strangers.information);
     let vector = strangers.vector.rows(0, N_SCAN).into_owned();
@@ -38,7 +38,7 @@ fn a_robot_that_others_say_nothing_to_stays() {
 #[test]
 fn what_several_say_alike_is_known_better_and_moves_nobody() {
     let robot = own(0.2);
-    let told = own(0.7).told();
+    let told = own(0.7).told().expect("it tells");
     let new = robot.among([&told].into_iter(), &PRIORS).expect("it is told something");
     assert!(new.step.amax() < 2e-4, "{}", new.step);
     let mut row = DVector::zeros(2 * N_SCAN);
