@@ -3,7 +3,7 @@
 nobody disturbs, and whether the outputs are the same bytes.
 
     stillpoint bench throughput --points 20M --robots ROBOTS --keep --out hall
-    scripts/kills.py --inputs hall/20000000/scans.las --scanners hall/20000000/scanners.toml --robots ROBOTS --kills 200
+    scripts/kills.py --inputs hall/20000000/scans/scans.las --scanners hall/20000000/scans/scanners.toml --robots ROBOTS --kills 200
 
 Each chain begins with an empty folder. Its runs are killed (SIGKILL) after a random time, evenly drawn from the length of an
 undisturbed run, until one of them ends before. Work is what all runs of a chain took, by the clock and in processor time: the one feels whatever
