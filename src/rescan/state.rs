@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file.
 const NAME: &str = "plant.bin";
 /// What the file begins with: its format.
-const FORMAT: &[u8] = b"stillpoint.plant/3\n";
+const FORMAT: &[u8] = b"stillpoint.plant/4\n";
 
 /// Scans, floor and robots of a plant as a run found them.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -73,6 +73,8 @@ const FOOT: f64 = 1.5;
 const SAME_BASE: f64 = 0.35;
 /// Share of the score of a trusted robot's base below which another base at its place is needless.
 const FAR_WORSE: f64 = 0.7;
+/// So many times the base poses are looked at where heights are guessed: each place is there at many.
+const GUESS_BREADTH: usize = 8;
 
 impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn new(
@@ -178,6 +180,7 @@ impl<'a, 'm> Search<'a, 'm> {
             let model = (index, &self.shelf.models[index]);
             let search = BaseSearch::new(model, sight, &self.settings.identify);
             let search = search.map(|s| if guessed { s.on_guesses() } else { s });
+            let breadth = if guessed { breadth.max(GUESS_BREADTH) } else { breadth };
             let search = search.map(|s| s.at_least(min_score).broad(breadth));
             search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default()
         };

@@ -26,6 +26,9 @@ pub struct Lattice {
     pub n_rows: u32,
     /// Number of columns of a full turn.
     pub n_cols: u32,
+    /// Whether a camera took the points, whose pixels are only nearly regular in angles, and whose depths err alike over a
+    /// hand's width.
+    pub is_camera: bool,
 }
 
 /// A pixel of a lattice.
@@ -56,6 +59,7 @@ impl Lattice {
             first_azimuth,
             n_rows: n_rows as u32 + 1,
             n_cols: n_cols as u32,
+            is_camera: false,
         }
     }
 

@@ -41,6 +41,8 @@ pub struct View {
     pub scanner: Option<Point>,
     /// Angle between neighbouring beams, radians; 0 where unknown.
     pub beam_step: f64,
+    /// Whether a camera took it: neighbouring points err alike.
+    pub is_camera: bool,
     /// Depth images that together cover the region.
     pub images: Vec<DepthImage>,
     /// The scan's points inside the region's bounds, sorted by place.

@@ -173,12 +173,13 @@ impl Adjust<'_> {
             tallies.add(&pair);
             let scale = (TUKEY * (pair.variance + slack).sqrt()).min(gate);
             let kernel = robust::tukey(pair.r, scale);
-            let weight = kernel / pair.variance;
+            let variance = self.refine.scene.n_alike * pair.variance;
+            let weight = kernel / variance;
             if weight <= 0.0 {
                 continue;
             }
             let u2 = (pair.r / scale).powi(2);
-            let slope = (1.0 - u2) * (1.0 - 5.0 * u2) / pair.variance;
+            let slope = (1.0 - u2) * (1.0 - 5.0 * u2) / variance;
             let influence = [(weight * pair.r).powi(2), slope];
             let q = base_from_local * Point::from(pair.p);
             let n = base_from_local.rotation * pair.n;

@@ -99,7 +99,8 @@ impl<'a> Pairing<'a> {
         if range > 0.0 && facing <= MIN_FACING {
             return None;
         }
-        let variance = if range > 0.0 {
+        // A camera's errors are no jitter along the beam: what it sees from the side is off as far as the rest.
+        let variance = if range > 0.0 && !self.refine.scene.views[view].is_camera {
             let across = (range * ANGLE_NOISE).powi(2) * (1.0 - facing * facing);
             self.sigma2 * facing * facing + across + SURFACE_NOISE * SURFACE_NOISE
         } else {

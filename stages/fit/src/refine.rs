@@ -95,8 +95,17 @@ pub(crate) struct Refine<'a> {
     pub(crate) prepared: &'a Prepared<'a>,
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) settings: &'a Settings,
-    /// Prior of the base: it stands on this plane (local frame pose of a frame with z = normal).
-    pub(crate) prior: Option<Pose>,
+    /// What is known of the base beforehand.
+    pub(crate) prior: Option<Prior>,
+}
+
+/// The base stands upright on a plane.
+#[derive(Clone, Copy)]
+pub(crate) struct Prior {
+    /// Frame on the plane, z = normal, local frame.
+    pub(crate) local_from_plane: Pose,
+    /// Standard deviations of height, metres, and tilt, radians.
+    pub(crate) sigma: [f64; 2],
 }
 
 /// A point with the facet of the model that is nearest to it, base frame.
@@ -279,8 +288,9 @@ impl Refine<'_> {
             gradient += &s.g * factor;
         }
         let sigma = (round.gate / 3.0).max(self.settings.min_noise);
-        hessian /= sigma * sigma;
-        gradient /= sigma * sigma;
+        let variance = self.scene.n_alike * sigma * sigma;
+        hessian /= variance;
+        gradient /= variance;
         self.add_priors(h, &mut hessian, &mut gradient);
         let delta = hessian.cholesky()?.solve(&-gradient);
         // A step beyond half a radian or half a metre has left the linear range: shorten it.
@@ -313,9 +323,9 @@ impl Refine<'_> {
         }
         if let Some(prior) = &self.prior {
             // Height over the plane and tilt against it, of the base as it stands, in base axes.
-            let plane_from_base = prior.inverse() * h.local_from_base;
+            let plane_from_base = prior.local_from_plane.inverse() * h.local_from_base;
             let up = plane_from_base.rotation.inverse() * Vector::z();
-            let [ws, wt] = self.settings.plane_sigma.map(|s| 1.0 / (s * s));
+            let [ws, wt] = prior.sigma.map(|s| 1.0 / (s * s));
             let height = plane_from_base.translation.z;
             for a in 0..3 {
                 gradient[a] += ws * height * up[a];

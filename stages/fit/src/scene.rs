@@ -28,6 +28,8 @@ pub struct Scene<'a> {
     pub scouts: Evidence<'a>,
     /// Noise of the ranges as the points themselves show it, metres, one sigma; not below the settings' least.
     pub(crate) noise: f64,
+    /// So many points err alike: 1 where each errs by itself.
+    pub(crate) n_alike: f64,
     /// All points that are not on a floor.
     pub(crate) points: Vec<Measured>,
     /// Indices into `points`, one a grid cell and view.
@@ -89,13 +91,16 @@ impl<'a> Scene<'a> {
         });
         let scouts = View::scouts(views, region);
         let scouts = Evidence::new(scouts.iter().map(|v| Eye::new(&v.images)), cloud.clone());
-        let noise = noise::of(views, &points, &thin).max(settings.min_noise);
+        let is_camera = views.iter().any(|view| view.is_camera);
+        let least = if is_camera { settings.camera_noise } else { settings.min_noise };
+        let noise = noise::of(views, &points, &thin).max(least);
         Self {
             region,
             views: views.to_vec(),
             evidence: Evidence::new(views.iter().map(|v| Eye::new(&v.images)), cloud),
             scouts,
             noise,
+            n_alike: if is_camera { settings.camera_alike } else { 1.0 },
             points,
             thin,
         }

@@ -39,9 +39,16 @@ pub struct Settings {
     pub floor_band: f64,
     /// Range noise that is assumed at least, metres, one sigma.
     pub min_noise: f64,
+    /// The same of depth cameras, which err by half a percent of the metre or two from which they see arms, alike over a
+    /// link's width: what is even over a hand's width shows a part of that.
+    pub camera_noise: f64,
+    /// So many of its points err alike: those of a hand's width.
+    pub camera_alike: f64,
     /// Standard deviation of the base about the installation plane, metres and radians: feet are shimmed and floors
     /// wavy.
     pub plane_sigma: [f64; 2],
+    /// The same where no plane is in view: any height, but upright as plumb as people bolt robots down.
+    pub guess_sigma: [f64; 2],
     /// Standard deviations of a scan's errors of registration and range: shift on each axis, metres, turn about each
     /// axis, radians (0.02°), range bias, metres (fit.md §4g).
     pub scan_sigma: [f64; 3],
@@ -77,7 +84,10 @@ impl Default for Settings {
             max_points: 150_000,
             floor_band: 0.008,
             min_noise: 0.0015,
+            camera_noise: 0.006,
+            camera_alike: 100.0,
             plane_sigma: [0.004, 0.006],
+            guess_sigma: [1.0, 0.01],
             scan_sigma: [0.003, 0.000_35, 0.001],
             together: true,
             calibrate: false,

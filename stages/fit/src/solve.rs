@@ -9,7 +9,7 @@ use crate::beam::{Beam, Hypothesis};
 use crate::branch::branches;
 use crate::calibrate::doubt;
 use crate::judge::{Judgement, judge};
-use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Refine, Round};
+use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Prior, Refine, Round};
 use crate::report::report;
 use crate::rivals::best_of;
 use crate::spin::Spin;
@@ -46,8 +46,7 @@ pub fn fit(
     let local_from_world = scene.world_from_local().inverse();
     let bases: Vec<Pose> =
         candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
-    let is_seen = candidate.plane.area > 0.0;
-    let prior = is_seen.then(|| prior(candidate, &local_from_world));
+    let prior = Some(prior(candidate, &local_from_world, settings));
     let refine = Refine { prepared, scene, settings, prior };
     let base = bases.first().map_or_else(Point::origin, |b| Point::from(b.translation.vector));
     let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
@@ -360,9 +359,12 @@ pub(crate) fn last_rounds(refine: &Refine<'_>, h: &Hypothesis, few: &[u32]) -> V
     FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect()
 }
 
-/// Frame on the installation plane with z along its normal, at the height of the base's origin.
-fn prior(candidate: &Candidate, local_from_world: &Pose) -> Pose {
+/// The installation plane, at the height of the base's origin.
+fn prior(candidate: &Candidate, local_from_world: &Pose, settings: &Settings) -> Prior {
     // The candidate's bases already stand on the plane: the first one tells the height of the origin above it.
     let base = candidate.bases.first().map_or_else(Pose::identity, |b| local_from_world * b.0);
-    Pose::from_parts(Translation3::from(base.translation.vector), candidate.plane.plane.frame())
+    let (at, turn) = (Translation3::from(base.translation.vector), candidate.plane.plane.frame());
+    let is_guess = candidate.plane.is_guess();
+    let sigma = if is_guess { settings.guess_sigma } else { settings.plane_sigma };
+    Prior { local_from_plane: Pose::from_parts(at, turn), sigma }
 }

@@ -79,7 +79,8 @@ pub(crate) fn pass(
         )
     };
     // A surface that fits badly and leaves the posture open may be anything.
-    let is_bad = fit.rms > BAD_RMS.0 * scene.noise + BAD_RMS.1 || fit.rms > MAX_OPEN_RMS;
+    let is_bad = fit.rms > BAD_RMS.0 * scene.noise + BAD_RMS.1
+        || fit.rms > MAX_OPEN_RMS.max(1.5 * scene.noise);
     let is_poor = fit.rms > POOR_RMS.0 * scene.noise + POOR_RMS.1;
     let is_anything = fit.rms > ANYTHING_RMS.max(1.5 * scene.noise);
     let is_wrong = is_anything || is_poor && judgement.score < POOR_SCORE;

@@ -13,6 +13,7 @@ mod las_record;
 mod las_scans;
 mod laz;
 mod map;
+mod picture;
 mod poses;
 mod ptx;
 mod raster;

@@ -1,6 +1,7 @@
 //! A sample of a scan's points in; the angular raster that suits it out: from native rows and columns where they are
 //! regular, else from the directions of the points. Never finer than about one point a pixel.
 
+use crate::picture::is_picture;
 use crate::raster_free;
 use crate::raster_native;
 use crate::reader::Sampled;
@@ -46,14 +47,19 @@ pub(crate) fn estimate(
     if sample.len() < MIN_POINTS {
         return None;
     }
+    let is_camera = is_picture(&sample);
+    let with = |grid: &Grid, steps| {
+        let lattice = Lattice { is_camera, ..lattice(grid, settings) };
+        Some(Raster { lattice, steps })
+    };
     let native = raster_native::fit(&sample);
     if let Some(native) = native.filter(|n| n.rms < MAX_IRREGULAR) {
         let regular = native.rms < settings.max_native_rms;
         let steps = if regular { Steps::Native } else { Steps::Irregular };
-        return Some(Raster { lattice: lattice(&native.grid, settings), steps });
+        return with(&native.grid, steps);
     }
     let grid = raster_free::fit(&sample, n_total)?;
-    Some(Raster { lattice: lattice(&grid, settings), steps: Steps::Directions })
+    with(&grid, Steps::Directions)
 }
 
 /// Steps and one pixel's middle, about one axis; radians.

@@ -55,6 +55,8 @@ pub struct Before {
 }
 
 /// Said of a scan whose scanner is known and whose raster is not.
+/// What is said of a scan that a camera took.
+const CAMERA: &str = "taken by a depth camera: its points err by half a percent of their range, alike over a hand's width";
 const NO_RASTER: &str = "too few points to tell the raster: no free-space evidence from this scan";
 
 /// One open file.
@@ -342,8 +344,12 @@ impl File {
         }
         let n_points = stated_points.or(self.reader.scans()[i].likely_points);
         let raster = raster::estimate(&sample, n_points, settings);
-        let is_odd = raster.is_none() && !sample.is_empty();
-        Ok((raster, is_odd.then_some(NO_RASTER)))
+        let note = match &raster {
+            None if !sample.is_empty() => Some(NO_RASTER),
+            Some(raster) if raster.lattice.is_camera => Some(CAMERA),
+            _ => None,
+        };
+        Ok((raster, note))
     }
 }
 

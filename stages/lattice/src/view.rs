@@ -70,8 +70,9 @@ impl ViewBuilder {
         let skip = lattice_skip(scan, focal);
         let thin = thin.map(|thin| if scan.lattice.is_some() { thin } else { 0 });
         let cones = scanner.map(|s| cones(&s, region, &local_from_scan));
-        let view =
-            View { scan: scan.id, mask: scan.mask, scanner, beam_step, images, points: Vec::new() };
+        let (id, mask, points) = (scan.id, scan.mask, Vec::new());
+        let is_camera = scan.lattice.is_some_and(|l| l.is_camera);
+        let view = View { scan: id, mask, scanner, beam_step, is_camera, images, points };
         Self {
             view,
             faces,

@@ -130,7 +130,8 @@ mod tests {
         image.finish(2, |_| Empty::Unknown);
         let (scanner, images) = (Some(Point::origin()), vec![image]);
         let (scan, mask, beam_step) = (ScanId(0), MaskId(0), 0.002);
-        View { scan, mask, scanner, beam_step, images, points: Vec::new() }
+        let (is_camera, points) = (false, Vec::new());
+        View { scan, mask, scanner, beam_step, is_camera, images, points }
     }
 
     #[test]

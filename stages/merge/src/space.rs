@@ -136,6 +136,7 @@ mod tests {
             mask: MaskId(0),
             scanner: Some(Point::origin()),
             beam_step: 0.0025,
+            is_camera: false,
             images: vec![image],
             points: Vec::new(),
         }
