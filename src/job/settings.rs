@@ -77,8 +77,8 @@ settings! {
     }
     fit: fit::Settings {
         method, beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
-        max_points, floor_band, min_noise, plane_sigma, scan_sigma, together, calibrate, frame_sigma, determined_sigma,
-        min_score, max_violation,
+        max_points, floor_band, min_noise, camera_noise, camera_alike, plane_sigma, guess_sigma,
+        scan_sigma, together, calibrate, frame_sigma, determined_sigma, min_score, max_violation,
     }
     paper: fit::paper::PaperSettings {
         voxel, n_neighbours, max_edge, foot_low, foot_high, max_height, geodesic_slack, max_bases,
