@@ -15,6 +15,9 @@ const ANGLE_NOISE: f64 = 9e-5;
 const SURFACE_NOISE: f64 = 3e-4;
 /// Cosine below which a beam cannot have come from a facet's front.
 const MIN_FACING: f64 = 0.05;
+/// Most looks for the facet that a beam ends on, and how near to it is near enough, metres.
+const MAX_LOOKS: usize = 6;
+const CLOSE: f64 = 1e-4;
 /// Where no scanner is known a point is as uncertain in every direction.
 const NO_BEAM: Vector = Vector::new(0.0, 0.0, 0.0);
 
@@ -80,17 +83,18 @@ impl<'a> Pairing<'a> {
         } else {
             (raw, NO_BEAM, 0.0)
         };
-        let Near { link, facet, distance } = self.placed.nearest(p.map(|v| v as f32).into())?;
-        if distance > self.gate {
+        let is_camera = self.refine.scene.views[view].is_camera;
+        let look = |at: &Vector| self.nearest(at);
+        let hit =
+            if range > 0.0 && !is_camera { along(look, (&p, &ray), self.gate)? } else { look(&p)? };
+        let Hit { link, facet, n, x, at } = hit;
+        let r = n.dot(&(p - x));
+        if r.abs() > self.gate {
             return None;
         }
-        let pose = &self.poses[link];
-        let Facet { x, n } = self.refine.prepared.links[link].fields.facets[facet];
-        let n = pose.rotation * Vector::from(n.map(f64::from));
-        let x = pose * Point::from(x.map(f64::from));
-        let r = n.dot(&(p - x.coords));
         // Beside the surface's edge its plane means nothing.
-        let beside = (distance * distance - r * r).max(0.0).sqrt();
+        let off = at - x;
+        let beside = (off.norm_squared() - n.dot(&off).powi(2)).max(0.0).sqrt();
         if beside > self.refine.beside(link) {
             return None;
         }
@@ -100,12 +104,126 @@ impl<'a> Pairing<'a> {
             return None;
         }
         // A camera's errors are no jitter along the beam: what it sees from the side is off as far as the rest.
-        let variance = if range > 0.0 && !self.refine.scene.views[view].is_camera {
+        let variance = if range > 0.0 && !is_camera {
             let across = (range * ANGLE_NOISE).powi(2) * (1.0 - facing * facing);
             self.sigma2 * facing * facing + across + SURFACE_NOISE * SURFACE_NOISE
         } else {
             self.sigma2
         };
         Some(Pair { link, facet, view, p, n, ray, beam: p - scanner, variance, r })
+    }
+
+    /// The facet nearest to a place.
+    fn nearest(&self, at: &Vector) -> Option<Hit> {
+        let Near { link, facet, .. } = self.placed.nearest(at.map(|v| v as f32).into())?;
+        let Facet { x, n } = self.refine.prepared.links[link].fields.facets[facet];
+        let pose = &self.poses[link];
+        let n = pose.rotation * Vector::from(n.map(f64::from));
+        let x = (pose * Point::from(x.map(f64::from))).coords;
+        Some(Hit { link, facet, n, x, at: *at })
+    }
+}
+
+/// The facet that a beam ends on near a point of it, from what looks for the nearest one: noise moves points along their beams,
+/// past edges and round bends, so that the nearest facet is not always the one that was measured.
+fn along(
+    look: impl Fn(&Vector) -> Option<Hit>,
+    (p, ray): (&Vector, &Vector),
+    gate: f64,
+) -> Option<Hit> {
+    let (mut t, mut last) = (0.0, None);
+    let mut is_afresh = false;
+    for _ in 0..MAX_LOOKS {
+        let hit = look(&(p + ray * t))?;
+        let facing = -hit.n.dot(ray);
+        if facing <= MIN_FACING {
+            // Behind the surface or along it: from before it, once.
+            if is_afresh {
+                return None;
+            }
+            (t, is_afresh, last) = (-gate, true, None);
+            continue;
+        }
+        let off = hit.n.dot(&(hit.at - hit.x)) / facing;
+        let is_same = last == Some((hit.link, hit.facet));
+        if is_same || off.abs() < CLOSE {
+            return Some(hit);
+        }
+        last = Some((hit.link, hit.facet));
+        t += off;
+        if t.abs() > 2.0 * gate {
+            return None;
+        }
+    }
+    None
+}
+
+/// A place on the model's surface.
+struct Hit {
+    link: usize,
+    facet: usize,
+    /// The facet's normal and middle, local frame.
+    n: Vector,
+    x: Vector,
+    /// Where it was looked for.
+    at: Vector,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The nearest of some facets, each with its normal and middle.
+    fn nearest(facets: &[[Vector; 2]]) -> impl Fn(&Vector) -> Option<Hit> + '_ {
+        move |at| {
+            let apart = |i: &usize| (facets[*i][1] - at).norm_squared();
+            let facet = (0..facets.len()).min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+            let [n, x] = facets[facet];
+            Some(Hit { link: 0, facet, n, x, at: *at })
+        }
+    }
+
+    #[test]
+    fn a_point_behind_an_edge_belongs_to_the_face_that_its_beam_met() {
+        // A block's front (x = 0, below z = 0) and its top, a sample each 4 mm; the beam comes from before and a little above.
+        let places = (0..20).flat_map(|i| (-20..20).map(move |j| (i, j)));
+        let place = |(i, j): (i32, i32)| [0.002 + 0.004 * f64::from(i), 0.004 * f64::from(j)];
+        let both = places.map(place).flat_map(|[deep, y]| {
+            [[-Vector::x(), Vector::new(0.0, y, -deep)], [Vector::z(), Vector::new(deep, y, 0.0)]]
+        });
+        let facets: Vec<[Vector; 2]> = both.collect();
+        let look = nearest(&facets);
+        let (p, ray) = (Vector::new(0.007, 0.001, -0.003), Vector::new(1.0, 0.0, -0.1).normalize());
+        assert_eq!(look(&p).expect("a facet").n, Vector::z());
+        let hit = along(&look, (&p, &ray), 0.02).expect("the beam ends on the block");
+        assert_eq!(hit.n, -Vector::x());
+        // A beam that passes above ends on nothing.
+        let above = Vector::new(-0.002, 0.0, 0.012);
+        assert!(along(&look, (&above, &Vector::x()), 0.02).is_none());
+    }
+
+    #[test]
+    fn noise_along_the_beam_pushes_no_round_surface() {
+        const RADIUS: f64 = 0.05;
+        let around = (0..2000).map(|k| f64::from(k) * std::f64::consts::TAU / 2000.0);
+        let facets: Vec<[Vector; 2]> =
+            around.map(|a| Vector::new(a.cos(), a.sin(), 0.0)).map(|n| [n, n * RADIUS]).collect();
+        let look = nearest(&facets);
+        let ray = -Vector::x();
+        let mean = |hit: &dyn Fn(&Vector) -> Option<Hit>| {
+            // Beams that end 30 to 38 mm beside the axis, 4 mm too long and too short.
+            let beams = (0..200).flat_map(|k| [-0.004, 0.004].map(|noise| (k, noise)));
+            let points = beams.map(|(k, noise)| {
+                let y: f64 = 0.030 + 0.000_04 * f64::from(k);
+                Vector::new((RADIUS * RADIUS - y * y).sqrt() + noise, y, 0.0)
+            });
+            let off = points.filter_map(|p| hit(&p).map(|hit| hit.n.dot(&(p - hit.x))));
+            let all: Vec<f64> = off.collect();
+            all.iter().sum::<f64>() / all.len() as f64
+        };
+        let beside = mean(&|p| look(p));
+        let ended = mean(&|p| along(&look, (p, &ray), 0.02));
+        assert!(beside > 5e-5, "the nearest facets are {beside} m off on average");
+        assert!(ended.abs() < 1e-5, "those along the beams {ended} m");
     }
 }

@@ -81,7 +81,7 @@ impl Default for Settings {
             n_refine: 10,
             n_polish: 3,
             thin: 0.012,
-            max_points: 150_000,
+            max_points: 100_000,
             floor_band: 0.008,
             min_noise: 0.0015,
             camera_noise: 0.006,
