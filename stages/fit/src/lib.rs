@@ -22,6 +22,7 @@ mod noise;
 mod normal;
 mod pairs;
 pub mod paper;
+mod pierced;
 mod placed;
 mod prepared;
 mod refine;

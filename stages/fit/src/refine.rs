@@ -3,7 +3,8 @@
 //!
 //! Residual of a point q (base frame) at the facet (x, n) of a link: `r = n·(q − x)`. A joint moves the facet with
 //! the twist (v, w), so `∂r/∂θ = −(n·v + w·(q × n))`: exact, since x and n both move. The base moves the point's
-//! image the other way. Sums run in the order of the points: the same bits on any machine with IEEE arithmetic.
+//! image the other way. In the rounds with wide gates surface that beams went through gives way along them, too
+//! (`pierced`). Sums run in the order of the points: the same bits on any machine with IEEE arithmetic.
 
 use contract::Fan;
 use geometry::{Pose, Vector, robust};
@@ -109,13 +110,13 @@ pub(crate) struct Prior {
 }
 
 /// A point with the facet of the model that is nearest to it, base frame.
-struct Match {
-    link: usize,
+pub(crate) struct Match {
+    pub(crate) link: usize,
     /// Point, base frame.
-    q: Vector,
+    pub(crate) q: Vector,
     /// Normal, base frame.
-    n: Vector,
-    r: f64,
+    pub(crate) n: Vector,
+    pub(crate) r: f64,
 }
 
 impl Refine<'_> {
@@ -263,6 +264,11 @@ impl Refine<'_> {
             sums
         });
         let mut sums: Vec<Sums> = (0..n_links).map(|_| Sums::new(n)).collect();
+        let mut row = vec![0.0; n];
+        for m in self.pierced(h, gate) {
+            self.row(&m.q, &m.n, &kinematics.twists[m.link], &mut row);
+            sums[m.link].add(&row, m.r, robust::tukey(m.r, gate));
+        }
         for own in &found {
             sums.iter_mut().zip(own).for_each(|(sum, own)| sum.join(own));
         }
