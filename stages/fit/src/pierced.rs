@@ -10,8 +10,10 @@ use crate::refine::{Match, Refine};
 
 /// Samples of a link that are asked: as many as tell a hypothesis in the search.
 const N_SAMPLES: usize = 100;
-/// A surface counts as pierced from this share of the gate on: what is nearer is the points' business.
+/// A surface counts as pierced from this share of the gate on: what is nearer is the points' business …
 const DEEP: f64 = 0.25;
+/// … but not from less than so many times the noise.
+const NOISES: f64 = 4.0;
 /// Gates below this hold only what is on the surface already, metres.
 const MIN_GATE: f64 = 0.03;
 
@@ -22,7 +24,7 @@ impl Refine<'_> {
         if gate < MIN_GATE {
             return out;
         }
-        let tolerance = (DEEP * gate) as f32;
+        let tolerance = (DEEP * gate).max(NOISES * self.scene.noise) as f32;
         let base_from_local = h.local_from_base.inverse();
         for (link, pose) in self.local_from_links(h).iter().enumerate() {
             let to_local = rows(pose);
