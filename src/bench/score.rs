@@ -206,7 +206,7 @@ pub(super) fn score(
         && fit.tool.as_ref().map(|t| t.model.as_str()) == tool
         && row.base[0] < RIGHT_BASE
         && (0..row.joints.len()).all(|j| {
-            is_right(&row.joints[j], j, fit, &drawn.posture)
+            is_right(&row.joints[j], j, fit)
                 || mount.is_some_and(|m| bolted_elsewhere(m, j, fit, &drawn.posture))
         });
     row
@@ -241,7 +241,7 @@ fn bolted_elsewhere(mount: &Mount, joint: usize, fit: &Fit, posture: &[f64]) -> 
 }
 
 /// Whether what is claimed of a joint holds.
-fn is_right(joint: &JointRow, index: usize, fit: &Fit, posture: &[f64]) -> bool {
+fn is_right(joint: &JointRow, index: usize, fit: &Fit) -> bool {
     let near = |e: f64| (e - (e / TAU).round() * TAU).abs() < RIGHT;
     if near(joint.error) {
         return true;
@@ -251,7 +251,7 @@ fn is_right(joint: &JointRow, index: usize, fit: &Fit, posture: &[f64]) -> bool 
     }
     joint.sigma >= OPEN
         || joint.error.abs() < RIGHT_SIGMAS * joint.sigma
-        || fit.equals.iter().any(|e| near(e.posture[index] - posture[index]))
+        || fit.equals.iter().any(|e| near(joint.error + e.posture[index] - fit.joints[index].value))
 }
 
 /// Errors of the links that follow through loops.
