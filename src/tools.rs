@@ -127,7 +127,7 @@ fn dress_one(
     let both = arm.with_tool(&models[tool], flange, 0.0);
     let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
     let holes = holes();
-    let way = arm.mount_axis(flange).1;
+    let way = arm.mount(flange).1;
     let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
     let bolts = fit::bolt(&start, (&prepared, n_arm - 1), &turns, scene, settings, &AllThreads);
     // Where the flange does not tell, the first hole has it, and the last joint takes up the rest.

@@ -91,7 +91,7 @@ pub(super) fn mount(case: &Case, models: &[Model]) -> Option<Mount> {
     let tool = tools[any(&mut random, tools.len())];
     // Holes of usual bolt circles.
     let turn = any(&mut random, 8) as f64 * TAU / 8.0;
-    let way = models[case.model].mount_axis(flange(&models[case.model])).1;
+    let way = models[case.model].mount(flange(&models[case.model])).1;
     Some(Mount { tool, turn, way, n_arm: models[case.model].free.len() })
 }
 

@@ -3,6 +3,7 @@
 use crate::finding::Findings;
 use crate::load::Settings;
 use crate::mesh;
+use crate::model::JointKind;
 use crate::reading::{file_name, read_bytes};
 use crate::resolve::Roots;
 use crate::tree::Tree;
@@ -23,14 +24,17 @@ impl Bodies<'_> {
     /// Reads the meshes of all links.
     pub(crate) fn read(&self, tree: &mut Tree, file: &str, findings: &mut Findings) {
         let mut any = false;
-        for (link, raw) in tree.links.iter_mut().zip(&tree.raw_links) {
+        let shown = shown(tree);
+        for ((link, raw), shown) in tree.links.iter_mut().zip(&tree.raw_links).zip(shown) {
             let place = format!("{file}: link {}", link.name);
             let mesh = Arc::make_mut(&mut link.mesh);
             for body in &raw.visuals {
                 self.body(mesh, body, &place, findings);
             }
-            if mesh.triangles.is_empty() && !raw.collisions.is_empty() {
-                for body in &raw.collisions {
+            let is_padding = shown && raw.visuals.is_empty();
+            let collisions = if is_padding { &[][..] } else { &raw.collisions[..] };
+            if mesh.triangles.is_empty() && !collisions.is_empty() {
+                for body in collisions {
                     self.body(mesh, body, &place, findings);
                 }
                 if !mesh.triangles.is_empty() {
@@ -38,7 +42,7 @@ impl Bodies<'_> {
                     findings.warn(&place, what, "add a visual");
                 }
             }
-            if mesh.triangles.is_empty() && !(raw.visuals.is_empty() && raw.collisions.is_empty()) {
+            if mesh.triangles.is_empty() && !(raw.visuals.is_empty() && collisions.is_empty()) {
                 findings.warn(&place, "has no surface", "mend its visual");
             }
             any |= !mesh.triangles.is_empty();
@@ -133,4 +137,21 @@ impl Bodies<'_> {
             }
         }
     }
+}
+
+/// Which links are rigid with one that has a visual: their own collision bodies are capsules about that, drawn for checks of
+/// collisions, and no surface that a scan could show.
+fn shown(tree: &Tree) -> Vec<bool> {
+    let mut leader: Vec<usize> = (0..tree.links.len()).collect();
+    for l in 0..leader.len() {
+        let joint = tree.links[l].parent_joint.map(|j| &tree.joints[j]);
+        if let Some(joint) = joint.filter(|joint| joint.kind == JointKind::Fixed) {
+            leader[l] = leader[joint.parent];
+        }
+    }
+    let mut is_shown = vec![false; leader.len()];
+    for (l, raw) in tree.raw_links.iter().enumerate() {
+        is_shown[leader[l]] |= !raw.visuals.is_empty();
+    }
+    leader.into_iter().map(|l| is_shown[l]).collect()
 }

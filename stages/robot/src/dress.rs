@@ -2,7 +2,8 @@
 
 use crate::model::{Joint, JointKind, Link, Model, Motion, Role};
 use geometry::{Pose, Vector};
-use nalgebra::Unit;
+use nalgebra::{Translation3, UnitQuaternion};
+use std::f64::consts::PI;
 
 /// Frames that tools are bolted to, by convention (ROS-Industrial, REP 199), best first.
 const FLANGES: [&str; 3] = ["tool0", "flange", "tool"];
@@ -45,27 +46,33 @@ impl Model {
         out
     }
 
-    /// The axis that a tool on this link is turned about: that of the robot's last joint, in the link's frame, in the
-    /// direction of the frame's own axis that is next to it; and whether the joint turns the same way (1) or the other
-    /// (−1).
+    /// How a tool stands on this link before it is turned: its z along the axis of the robot's last joint, away from the
+    /// body that carries the link, whichever way the link's own frame looks; and whether that joint turns the same way
+    /// about z (1) or the other (−1).
     #[must_use]
-    pub fn mount_axis(&self, flange: usize) -> (Unit<Vector>, f64) {
+    pub fn mount(&self, flange: usize) -> (UnitQuaternion<f64>, f64) {
         let poses = self.poses(&self.home());
-        let mut at = flange;
-        while let Some(j) = self.links[at].parent_joint {
-            let joint = &self.joints[j];
-            if joint.kind != JointKind::Fixed {
-                let axis = poses[flange].inverse() * (poses[at] * joint.axis.into_inner());
-                let way = axis[axis.iamax()].signum();
-                return (Unit::new_normalize(axis * way), way);
-            }
-            at = joint.parent;
-        }
-        (Vector::z_axis(), 1.0)
+        let flange_from_world = poses[flange].inverse();
+        let up = |l: &usize| self.links[*l].parent_joint.map(|j| self.joints[j].parent);
+        let carriers = || std::iter::successors(Some(flange), up);
+        let turns = |l: &usize| {
+            let joint = &self.joints[self.links[*l].parent_joint?];
+            let axis = flange_from_world * (poses[*l] * joint.axis.into_inner());
+            (joint.kind != JointKind::Fixed).then_some(axis)
+        };
+        let axis = carriers().find_map(|l| turns(&l)).unwrap_or_else(Vector::z);
+        let body = carriers().find(|l| !self.links[*l].bounds.is_empty());
+        let inward = body.map_or_else(Vector::zeros, |l| {
+            (flange_from_world * (poses[l] * self.links[l].bounds.center())).coords
+        });
+        let way = if inward.dot(&axis) > 0.0 { -1.0 } else { 1.0 };
+        let turn = UnitQuaternion::rotation_between(&Vector::z(), &(axis * way))
+            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector::x_axis(), PI));
+        (turn, way)
     }
 
-    /// This robot with a tool's root link on one of its links, turned by `mount` about [`Self::mount_axis`], radians. A
-    /// joint of the tool whose name the robot has already gets the tool's before it; its joints come after the robot's own.
+    /// This robot with a tool's root link on one of its links, as [`Self::mount`] has it and turned by `mount` about its own
+    /// z, radians. A joint of the tool whose name the robot has already gets the tool's before it; its joints come after the robot's own.
     ///
     /// # Panics
     /// If there is no such link.
@@ -95,9 +102,9 @@ impl Model {
             kind: JointKind::Fixed,
             parent: flange,
             child: n_links,
-            parent_from_joint: Pose::new(
-                Vector::zeros(),
-                self.mount_axis(flange).0.into_inner() * mount,
+            parent_from_joint: Pose::from_parts(
+                Translation3::identity(),
+                self.mount(flange).0 * UnitQuaternion::from_axis_angle(&Vector::z_axis(), mount),
             ),
             axis: Vector::z_axis(),
             limits: None,

@@ -57,6 +57,26 @@ fn broken_urdfs_are_named() {
 }
 
 #[test]
+fn capsules_about_a_link_that_has_a_visual_are_no_surface() {
+    let body = "<collision><geometry><cylinder radius='0.2' length='0.5'/></geometry></collision>";
+    let capsule = format!("<link name='capsule'>{body}</link>");
+    let arm = |kind: &str| {
+        let two = link("a") + &link("b") + &capsule;
+        let limit = if kind == "fixed" { "" } else { LIMIT };
+        let moving = joint("j", "revolute", "a", "b", "0 0 1", LIMIT);
+        robot(&(two + &moving + &joint("k", kind, "b", "capsule", "0 0 1", limit)))
+    };
+    for (kind, stands_in) in [("fixed", false), ("revolute", true)] {
+        let folder = Folder::new().with("robot.urdf", arm(kind));
+        let (model, findings) = folder.load();
+        let capsule = &model.links[model.link("capsule").unwrap()];
+        assert_eq!(!capsule.mesh.triangles.is_empty(), stands_in, "{kind}");
+        assert_eq!(!capsule.bounds.is_empty(), stands_in, "{kind}");
+        assert_eq!(findings.iter().any(|f| f.what.contains("stands in")), stands_in, "{kind}");
+    }
+}
+
+#[test]
 fn deep_nesting_does_not_overflow() {
     let deep = format!("<robot>{}{}</robot>", "<x>".repeat(100_000), "</x>".repeat(100_000));
     says(&Folder::new().with("robot.urdf", deep), "");

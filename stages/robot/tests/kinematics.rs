@@ -278,6 +278,20 @@ fn a_tool_on_a_flange_moves_as_its_own_chain_does_there() {
 }
 
 #[test]
+fn a_tool_looks_away_from_the_arm_whichever_way_the_frame_of_its_flange_looks() {
+    let z = geometry::Vector::z();
+    for (name, ahead) in [
+        ("abb_irb4600_20_250", [0.0, 0.0, 1.0]),
+        ("fanuc_r2000ic_165f", [1.0, 0.0, 0.0]), // its only frame is a REP 199 `flange`, x ahead
+        ("yaskawa_mpl80", [0.0, 0.0, -1.0]),     // its tool0 looks into the wrist
+    ] {
+        let Some(model) = looped(name, "") else { return };
+        let (turn, _) = model.mount(model.flanges()[0]);
+        assert!((turn * z - geometry::Vector::from(ahead)).norm() < 1e-9, "{name}");
+    }
+}
+
+#[test]
 fn newton_agrees_with_the_closed_forms() {
     for (name, sheet) in RPR.iter().chain(RRR) {
         let Some(exact) = looped(name, sheet) else {

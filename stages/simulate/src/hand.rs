@@ -1,10 +1,8 @@
 //! A robot's model in; a tool on its flange, and a part that the tool holds, out.
 
 use crate::scene::{Carried, Tool, ToolShape, pose};
-use geometry::{Point, Vector};
-use nalgebra::UnitQuaternion;
+use geometry::Point;
 use robot::Model;
-use std::f64::consts::PI;
 
 /// A tool of a length, metres, that stands on a flange of a model and points away from the arm.
 #[must_use]
@@ -27,17 +25,8 @@ pub fn part_in(tool: &Tool, robot: &str, size: [f64; 3]) -> Carried {
     }
 }
 
-/// Roll, pitch and yaw, degrees, that turn +z to where a flange looks: along the last joint, away from the last body.
+/// Roll, pitch and yaw, degrees, that turn +z to where a flange looks.
 fn outward(model: &Model, flange: usize) -> [f64; 3] {
-    let (axis, _) = model.mount_axis(flange);
-    let poses = model.poses(&model.home());
-    let body = (0..model.links.len()).rev().find(|&l| !model.links[l].bounds.is_empty());
-    let inward = body.map_or_else(Point::origin, |l| {
-        poses[flange].inverse() * (poses[l] * model.links[l].bounds.center())
-    });
-    let away = if inward.coords.dot(&axis) > 0.0 { -axis.into_inner() } else { axis.into_inner() };
-    let turn = UnitQuaternion::rotation_between(&Vector::z(), &away)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector::x_axis(), PI));
-    let (roll, pitch, yaw) = turn.euler_angles();
+    let (roll, pitch, yaw) = model.mount(flange).0.euler_angles();
     [roll, pitch, yaw].map(f64::to_degrees)
 }
