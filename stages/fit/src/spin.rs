@@ -14,6 +14,10 @@ const APART: f64 = 0.052;
 /// 3 % of the squares is less than what real castings differ by.
 pub(crate) const AS_GOOD: (f64, f64) = (0.03, 30.0);
 
+/// Another place where the points fit best is as good if it is no more clearly worse, see [`Sweep::clearly_worse`]: of flanges
+/// that bolts make look alike the right one was worse by up to 1.8; what is not alike by 3 and more.
+const TWIN: f64 = 2.5;
+
 /// Values of one joint.
 #[derive(Debug, Clone)]
 pub(crate) struct Spin {
@@ -66,7 +70,7 @@ impl Refine<'_> {
         let first = if high - low > TAU { h.posture[joint] - span / 2.0 } else { low };
         let cost = |value: f64| sweep.cost(&[&sweep.distances(value, &sweep.moved)]) / variance;
         let values = (0..=n).map(|k| first + span * k as f64 / n as f64);
-        let values = values.chain([h.posture[joint]]).collect();
+        let values: Vec<f64> = values.chain([h.posture[joint]]).collect();
         let costs: Vec<(f64, f64)> = fan.fan(values, |value| (value, cost(value)));
         let best = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
         let limit = best + (AS_GOOD.0 * best).max(AS_GOOD.1);
@@ -74,7 +78,14 @@ impl Refine<'_> {
         // A tool is held by more than its outline: within its own valley the covariance tells.
         let is_bare = sweep.moved.len() == self.prepared.placed_by[joint].len();
         let extent = if is_bare || extent > APART { extent } else { 0.0 };
-        let mut good: Vec<(f64, f64)> = costs.into_iter().filter(|c| c.1 <= limit).collect();
+        let least = costs.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        let is_twin = |k: usize| {
+            let [own, up, down] = [k, (k + 1).min(n), k.saturating_sub(1)].map(|k| costs[k].1);
+            own <= up && own <= down && sweep.clearly_worse(costs[k].0, least) < TWIN
+        };
+        let is_good = |k: &usize| costs[*k].1 <= limit || *k <= n && is_twin(*k);
+        let mut good: Vec<(f64, f64)> =
+            (0..costs.len()).filter(is_good).map(|k| costs[k]).collect();
         good.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut values: Vec<f64> = Vec::new();
         for (value, _) in good {

@@ -74,10 +74,25 @@ impl<'a> Sweep<'a> {
         self.refine.distances(&self.at(value), &self.points, |l| links.contains(&l))
     }
 
-    /// Sum of the squared distances to the nearest of what stands still and what is turned, m².
-    pub(crate) fn cost(&self, turned: &[&[f32]]) -> f64 {
+    /// Squared distances to the nearest of what stands still and what is turned, m².
+    pub(crate) fn squares(&self, turned: &[&[f32]]) -> impl Iterator<Item = f64> {
         let least = |i: usize| turned.iter().map(|d| d[i]).fold(self.still[i], f32::min);
-        (0..self.points.len()).map(|i| f64::from(least(i)).powi(2)).sum()
+        (0..self.points.len()).map(move |i| f64::from(least(i)).powi(2))
+    }
+
+    /// Their sum, m².
+    pub(crate) fn cost(&self, turned: &[&[f32]]) -> f64 {
+        self.squares(turned).sum()
+    }
+
+    /// How clearly a value of the joint is worse than another: what its squares exceed the other's by, over what that
+    /// would be if each point's excess were chance: a few strays say nothing, many points that agree much.
+    pub(crate) fn clearly_worse(&self, value: f64, than: f64) -> f64 {
+        let [other, best] = [value, than].map(|v| self.distances(v, &self.moved));
+        let (other, best) = ([other.as_slice()], [best.as_slice()]);
+        let excess = self.squares(&other).zip(self.squares(&best)).map(|(o, b)| o - b);
+        let [sum, squares] = excess.fold([0.0, 0.0], |s, d| [s[0] + d, s[1] + d * d]);
+        if squares > 0.0 { sum / squares.sqrt() } else { 0.0 }
     }
 
     /// The same where the joint has a value, and something may hang on the flange.
