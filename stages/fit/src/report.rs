@@ -14,7 +14,7 @@ use crate::refine::Refine;
 use crate::rivals::lead;
 use crate::solve::{Polished, Settled, few, last_rounds};
 use crate::spin::Spin;
-use crate::verdict;
+use crate::verdict::{self, RIVAL};
 
 /// Margin up to which another posture counts as equally good.
 const EQUAL: f64 = 0.03;
@@ -72,6 +72,11 @@ pub(crate) fn report(
         covariance[(6 + j, 6 + j)] += sway * sway;
     }
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+    // A wrist that may be flipped is not known, however narrow either answer is.
+    let is_elsewhere = |j: usize| {
+        let differs = |(m, (other, _)): &(f64, &Polished)| *m < RIVAL && turn(other, h, j) > OTHER;
+        !prepared.leaf[j] && rivals.iter().any(differs)
+    };
     let joints = (0..h.posture.len()).map(|j| {
         let (value, equivalents) = whole_turns(model, &h.posture, j);
         // The width of one of several values is not how well the joint is known.
@@ -80,7 +85,7 @@ pub(crate) fn report(
             name: model.joints[model.free[j]].name.clone(),
             value,
             sigma,
-            determined: !open[j] && sigma < refine.settings.determined_sigma,
+            determined: !open[j] && !is_elsewhere(j) && sigma < refine.settings.determined_sigma,
             equivalents,
         }
     });

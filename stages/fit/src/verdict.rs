@@ -39,7 +39,7 @@ const STOP_PLAY: (f64, f64) = (0.0175, 0.001);
 /// Most values of a joint that are named.
 const MAX_VALUES: usize = 3;
 /// A runner-up that the beams prefer less clearly than this makes the best doubtful.
-const RIVAL: f64 = 0.12;
+pub(crate) const RIVAL: f64 = 0.12;
 
 /// Sets verdict and reasons from what stands in the fit and the judgement.
 pub(crate) fn pass(
