@@ -21,9 +21,10 @@ const JUDGE_TOLERANCE: (f64, f64) = (0.012, 0.04);
 /// Gate of the last rounds in multiples of the noise found, and its bounds, metres.
 const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
 
-/// Score of the best posture so far below which no other wrist makes it a robot, where beams tell and where only points
-/// do. Of 26 robots none had less than 0.73 after the quick look, other things up to 0.41.
-const HOPELESS_SCORE: (f64, f64) = (0.35, 0.1);
+/// Score of the best posture so far below which no other wrist makes it a robot: where beams tell, where they are a camera's,
+/// which bends surfaces, and where only points do. Of 250 robots among clutter, behind fences, with noise of 10 mm, none
+/// had less than 0.58 after the quick look; half of what small arms find in clutter has less than 0.45.
+const HOPELESS_SCORE: [f64; 3] = [0.50, 0.35, 0.1];
 /// How far beyond its reach points may still be the robot's, metres: an error of the base.
 pub(crate) const NEAR_MARGIN: f64 = 0.15;
 /// Points of a link in the coarse rounds: enough to hold its pose to a millimetre.
@@ -149,7 +150,12 @@ pub(crate) fn quick(
 }
 
 fn hopeless(scene: &Scene<'_>) -> f64 {
-    if scene.evidence.has_beams() { HOPELESS_SCORE.0 } else { HOPELESS_SCORE.1 }
+    let [scanner, camera, points] = HOPELESS_SCORE;
+    match (scene.evidence.has_beams(), scene.views.iter().any(|view| view.is_camera)) {
+        (true, false) => scanner,
+        (true, true) => camera,
+        (false, _) => points,
+    }
 }
 
 /// The report, with what does not fit.
