@@ -23,7 +23,7 @@ pub(super) fn errors(rows: &[Row]) -> String {
         [1e-4, 1e-3, 1e-2, 1e-1, 1.0].iter().map(|e| (x(*e), format!("{e}°"))).collect();
     let series = suites(rows).into_iter().map(|suite| {
         let own = rows.iter().filter(|r| r.suite == suite && r.right);
-        let errors = own.flat_map(|r| r.determined().map(|j| j.error.abs().to_degrees()));
+        let errors = own.flat_map(|r| r.turning().map(|j| j.error.abs().to_degrees()));
         let errors = errors.collect();
         (suite, errors)
     });

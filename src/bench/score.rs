@@ -35,6 +35,8 @@ pub(super) struct JointRow {
     pub(super) error: f64,
     pub(super) sigma: f64,
     pub(super) determined: bool,
+    /// Whether it slides: error and deviation are metres.
+    pub(super) slides: bool,
 }
 
 /// One case.
@@ -99,11 +101,16 @@ impl Row {
 
     /// Largest error of the joints said to be determined, radians.
     pub(super) fn worst(&self) -> f64 {
-        self.determined().map(|j| j.error.abs()).fold(0.0, f64::max)
+        self.turning().map(|j| j.error.abs()).fold(0.0, f64::max)
     }
 
     pub(super) fn determined(&self) -> impl Iterator<Item = &JointRow> {
         self.joints.iter().filter(|j| j.determined)
+    }
+
+    /// Those of them that turn.
+    pub(super) fn turning(&self) -> impl Iterator<Item = &JointRow> {
+        self.determined().filter(|j| !j.slides)
     }
 
     /// The refinement alone: which starts came home. What a wrist of round parts leaves open does not count.
@@ -228,6 +235,7 @@ fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) 
             error: whole(error),
             sigma: joint.sigma,
             determined: joint.determined,
+            slides,
         }
     });
     each.collect()

@@ -1,6 +1,6 @@
 //! Rows in; tables of what is measured otherwise than by suites out: the source's Table 1, closed loops, the basin.
 
-use super::score::Row;
+use super::score::{JointRow, Row};
 use contract::{Calibration, JointFrame};
 use geometry::Pose;
 use std::fmt::Write as _;
@@ -38,7 +38,7 @@ fn table_1(rows: &[Row]) -> String {
         let (source, ours) = (of("source"), of("paper"));
         let _ = writeln!(
             out,
-            "\nErrors in the protocol of the method's source (its Table 1), °: {model}\n"
+            "\nErrors in the protocol of the method's source (its Table 1), ° (of what slides mm): {model}\n"
         );
         out.push_str("| joint |");
         for k in 1..=source.len() {
@@ -56,9 +56,9 @@ fn table_1(rows: &[Row]) -> String {
                 let _ = write!(
                     out,
                     " {} | {} | {} | {} |",
-                    degrees(joint.and_then(|j| j.rough)),
-                    degrees(joint.map(|j| j.error)),
-                    degrees(here.map(|j| j.error)),
+                    error(joint, |j| j.rough),
+                    error(joint, |j| Some(j.error)),
+                    error(here, |j| Some(j.error)),
                     printed.map_or_else(String::new, |[a, b]| format!("{a} / {b}")),
                 );
             }
@@ -122,7 +122,7 @@ fn calibration(rows: &[Row]) -> String {
             let errors = rows
                 .iter()
                 .filter(|r| r.suite == suite && r.model == model)
-                .flat_map(|r| r.determined());
+                .flat_map(|r| r.turning());
             rms(errors.map(|j| j.error)).to_degrees()
         };
         let _ = writeln!(
@@ -198,6 +198,11 @@ fn models(rows: &[Row], suite: &str) -> Vec<String> {
     out
 }
 
-fn degrees(angle: Option<f64>) -> String {
-    angle.map_or_else(|| "–".into(), |v| format!("{:.3}", v.to_degrees()))
+fn error(joint: Option<&JointRow>, of: impl Fn(&JointRow) -> Option<f64>) -> String {
+    let text = |joint: &JointRow| {
+        let value = of(joint)?;
+        let turns = || format!("{:.3}", value.to_degrees());
+        Some(if joint.slides { format!("{:.3} mm", value * 1e3) } else { turns() })
+    };
+    joint.and_then(text).unwrap_or_else(|| "–".into())
 }
