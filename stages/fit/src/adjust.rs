@@ -77,6 +77,8 @@ pub(crate) struct Adjust<'a> {
     pub(crate) refine: &'a Refine<'a>,
     /// Joints whose places on their links are unknowns, too, in [`Self::at`].
     pub(crate) frames: &'a [usize],
+    /// Whether points lie on the mesh, or on the planes of its samples: for what is only compared these will do.
+    pub(crate) on_mesh: bool,
 }
 
 /// Rounds of the adjustment; the last ones change nothing but the patches' share.
@@ -123,6 +125,9 @@ impl Adjust<'_> {
     ) -> Adjusted {
         let mut state = start;
         let mut round = 0;
+        if self.on_mesh {
+            self.refine.prepared.make_triangles(fan);
+        }
         loop {
             let (normal, tallies) = self.sums(&state, points, gate, fan);
             let solved = (round < N_ROUNDS).then(|| normal.solve()).flatten();
@@ -144,7 +149,7 @@ impl Adjust<'_> {
 
     /// Normal equations of the points at a state with all priors, patches taken out; and what is said of each link.
     fn sums(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> (Normal, Tallies) {
-        let pairing = Pairing::new(self.refine, state, gate);
+        let pairing = Pairing::new(self.refine, state, (gate, self.on_mesh));
         let chunks = points.chunks(CHUNK).collect();
         let sums = fan.fan(chunks, |chunk: &[u32]| self.sums_of(&pairing, chunk));
         let join = |(a, own): (Normal, Tallies), (b, later)| (a.join(b), own.join(&later));

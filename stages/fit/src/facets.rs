@@ -3,6 +3,9 @@
 
 use geometry::NearestField;
 use robot::{CadCloud, Link};
+use std::sync::OnceLock;
+
+use crate::exact::Triangles;
 
 /// Coarse field: reach covers the first gate (120 mm, fit.md §6.4), voxels a fifth of it.
 const COARSE: (f32, f32, usize) = (0.025, 0.15, 2500);
@@ -38,6 +41,8 @@ pub(crate) struct Fields {
     pub(crate) coarse: NearestField,
     /// Exact, reaches 3 cm: for the last ones.
     pub(crate) fine: NearestField,
+    /// The surface itself, made when it is first asked for.
+    triangles: OnceLock<Triangles>,
 }
 
 impl Fields {
@@ -54,7 +59,12 @@ impl Fields {
         let coarse = NearestField::new(&few, COARSE.0, COARSE.1).renumbered(&first);
         let fine = NearestField::new(&all, voxel(link), FINE.1);
         let (patches, sides) = patches(&facets);
-        Self { facets, patches, sides, coarse, fine }
+        Self { facets, patches, sides, coarse, fine, triangles: OnceLock::new() }
+    }
+
+    /// The triangles of the link's mesh.
+    pub(crate) fn triangles(&self, link: &Link) -> &Triangles {
+        self.triangles.get_or_init(|| Triangles::new(&link.mesh))
     }
 }
 

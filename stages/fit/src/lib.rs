@@ -13,6 +13,7 @@ mod bend;
 mod branch;
 mod calibrate;
 mod choose;
+mod exact;
 mod face;
 mod facets;
 mod foot;

@@ -11,7 +11,7 @@ use crate::refine::Refine;
 
 /// Beam direction noise of a common scanner, radians (19″; fit.md §3.2).
 const ANGLE_NOISE: f64 = 9e-5;
-/// What sampling of the model and rounding leave at least, metres, one sigma.
+/// What tessellation of the model and rounding leave at least, metres, one sigma.
 const SURFACE_NOISE: f64 = 3e-4;
 /// Cosine below which a beam cannot have come from a facet's front.
 const MIN_FACING: f64 = 0.05;
@@ -44,6 +44,8 @@ pub(crate) struct Pairing<'a> {
     pub(crate) state: &'a State,
     /// Farthest distance of a point from the surface, metres.
     pub(crate) gate: f64,
+    /// Whether points lie on the mesh, or on the planes of its samples.
+    on_mesh: bool,
     poses: Vec<Pose>,
     placed: Placed<'a>,
     scanners: Vec<Option<Point>>,
@@ -53,13 +55,18 @@ pub(crate) struct Pairing<'a> {
 }
 
 impl<'a> Pairing<'a> {
-    pub(crate) fn new(refine: &'a Refine<'a>, state: &'a State, gate: f64) -> Self {
+    pub(crate) fn new(
+        refine: &'a Refine<'a>,
+        state: &'a State,
+        (gate, on_mesh): (f64, bool),
+    ) -> Self {
         let scene = refine.scene;
         let turn = |e: &crate::adjust::ScanError| UnitQuaternion::from_scaled_axis(e.turn);
         Self {
             refine,
             state,
             gate,
+            on_mesh,
             poses: refine.local_from_links(&state.hypothesis),
             placed: Placed::all(refine.prepared, &state.hypothesis, gate),
             scanners: (0..scene.views.len()).map(|v| scene.scanner(v as u16)).collect(),
@@ -87,7 +94,8 @@ impl<'a> Pairing<'a> {
         let look = |at: &Vector| self.nearest(at);
         let hit =
             if range > 0.0 && !is_camera { along(look, (&p, &ray), self.gate)? } else { look(&p)? };
-        let Hit { link, facet, n, x, at } = hit;
+        let is_exact = self.on_mesh && range > 0.0 && !is_camera;
+        let Hit { link, facet, n, x, at } = if is_exact { self.met(hit, &ray) } else { hit };
         let r = n.dot(&(p - x));
         if r.abs() > self.gate {
             return None;
@@ -111,6 +119,19 @@ impl<'a> Pairing<'a> {
             self.sigma2
         };
         Some(Pair { link, facet, view, p, n, ray, beam: p - scanner, variance, r })
+    }
+
+    /// The place where a beam that ends on a facet meets the mesh.
+    fn met(&self, hit: Hit, ray: &Vector) -> Hit {
+        let (link, pose) = (hit.link, &self.poses[hit.link]);
+        let on_plane = hit.at + ray * (hit.n.dot(&(hit.x - hit.at)) / hit.n.dot(ray));
+        let at = pose.inverse_transform_point(&on_plane.into()).coords;
+        let ray = pose.inverse_transform_vector(ray);
+        let own = &self.refine.prepared.model.links[link];
+        let triangles = self.refine.prepared.links[link].fields.triangles(own);
+        let Some(met) = triangles.meet(&own.mesh, &at, &ray) else { return hit };
+        let x = (pose * Point::from(met.x)).coords;
+        Hit { n: pose.rotation * met.n, x, at: x, ..hit }
     }
 
     /// The facet nearest to a place.

@@ -124,6 +124,13 @@ impl<'a> Prepared<'a> {
         }
     }
 
+    /// Makes what tells where beams meet the links' meshes, where it is not there yet.
+    pub(crate) fn make_triangles(&self, fan: &impl Fan) {
+        fan.fan((0..self.links.len()).collect(), |l| {
+            self.links[l].fields.triangles(&self.model.links[l]);
+        });
+    }
+
     /// The same for a model that differs in where its joints are, not in its links.
     pub(crate) fn moved<'b>(&self, model: &'b Model) -> Prepared<'b> {
         Prepared {

@@ -159,7 +159,7 @@ fn hopeless(scene: &Scene<'_>) -> f64 {
 }
 
 /// The report, with what does not fit.
-fn finish(
+pub(crate) fn finish(
     refine: &Refine<'_>,
     mut best: Settled,
     others: &[Polished],
@@ -173,18 +173,16 @@ fn finish(
     fit
 }
 
-/// The answer once more, on as many points as pay: only what is reported is worth them, not what it is chosen from.
+/// The answer once more, on the mesh itself and on as many points as pay: only what is reported is worth them, not what it
+/// is chosen from.
 fn sharpen(refine: &Refine<'_>, (best, judgement, _): &mut Settled, all: &[u32], fan: &impl Fan) {
-    let n_used: usize = best.n_points.iter().sum();
     let settings =
         Settings { max_points: SHARPER * refine.settings.max_points, ..refine.settings.clone() };
     let refine = Refine { settings: &settings, ..*refine };
     let (points, gate) = adjusted_points(&refine, &best.hypothesis, all, fan);
-    if points.len() > n_used + n_used / 2 {
-        let start = best.state();
-        *best = Adjust { refine: &refine, frames: &[] }.run_from(start, &points, gate, fan);
-        *judgement = judged(&refine, &best.hypothesis);
-    }
+    let adjust = Adjust { refine: &refine, frames: &[], on_mesh: true };
+    *best = adjust.run_from(best.state(), &points, gate, fan);
+    *judgement = judged(&refine, &best.hypothesis);
 }
 
 /// So many times the points of the adjustment are in the last one: with more, what is not noise (registration, shape) is
@@ -226,7 +224,7 @@ pub(crate) fn settle(
 ) -> Settled {
     let variance = refine.scene.noise * refine.scene.noise;
     let (points, gate) = adjusted_points(refine, h, all, fan);
-    let adjust = Adjust { refine, frames: &[] };
+    let adjust = Adjust { refine, frames: &[], on_mesh: false };
     let mut best = adjust.run(h, &points, gate, fan);
     let mut spins = refine.spins(&best.hypothesis, near, variance, fan);
     let better: Vec<(usize, f64)> = spins.iter().map(|s| (s.joint, s.values[0])).collect();

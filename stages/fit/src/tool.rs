@@ -9,9 +9,9 @@ use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, judge};
 use crate::mount::Bolt;
 use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, Polished, polish, settle};
+use crate::solve::{NEAR_MARGIN, Polished, finish, polish, settle};
 use crate::sweep::MIN_POINTS;
-use crate::{Prepared, Scene, Settings, report};
+use crate::{Prepared, Scene, Settings};
 
 /// Score of the tool's links from which on it is there: tools that are there have 0.69 and more, others that are taken
 /// for them up to 0.67.
@@ -115,7 +115,7 @@ pub fn fit_tool(
         let before = std::mem::replace(&mut settled, other);
         others.push((before.0.hypothesis, before.1));
     }
-    report::report(&refine, &settled, &others, &near, fan)
+    finish(&refine, settled, &others, (&near, &all), fan)
 }
 
 fn hypothesis(start: &Tooled, scene: &Scene<'_>) -> Hypothesis {
