@@ -42,8 +42,7 @@ fn line(out: &mut String, name: &str, rows: &[&Row]) {
     let n = |what: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| what(r)).count();
     let trusted = |r: &Row| r.verdict == "trusted";
     let right: Vec<&Row> = rows.iter().copied().filter(|r| r.right).collect();
-    let errors: Vec<f64> =
-        degrees(&right, |r| r.turning().map(|j| j.error.to_degrees()).collect());
+    let errors: Vec<f64> = degrees(&right, |r| r.turning().map(|j| j.error.to_degrees()).collect());
     let z: Vec<f64> = degrees(&right, |r| r.determined().map(|j| j.error / j.sigma).collect());
     let rms = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len().max(1) as f64).sqrt();
     let largest = |v: &[f64]| v.iter().fold(0.0_f64, |a, b| a.max(b.abs()));

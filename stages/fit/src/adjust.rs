@@ -15,7 +15,7 @@ use crate::Settings;
 use crate::beam::Hypothesis;
 use crate::calibrate::Frames;
 use crate::normal::{N_SCAN, Normal, Row};
-use crate::pairs::{Pair, Pairing};
+use crate::pairs::{Known, Pair, Pairing};
 use crate::refine::{CHUNK, Refine};
 
 /// How a scan differs from its stated pose, as far as the points near a robot tell.
@@ -128,8 +128,9 @@ impl Adjust<'_> {
         if self.on_mesh {
             self.refine.prepared.make_triangles(fan);
         }
+        let mut known = vec![None; points.len()];
         loop {
-            let (normal, tallies) = self.sums(&state, points, gate, fan);
+            let (normal, tallies) = self.sums(&state, (points, &mut known), gate, fan);
             let solved = (round < N_ROUNDS).then(|| normal.solve()).flatten();
             let Some(step) = solved else {
                 return self.finish(state, &tallies, &normal);
@@ -144,16 +145,23 @@ impl Adjust<'_> {
 
     /// Normal equations at a state, the places of the joints among the unknowns.
     pub(crate) fn at(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> Normal {
-        self.sums(state, points, gate, fan).0
+        self.sums(state, (points, &mut vec![None; points.len()]), gate, fan).0
     }
 
     /// Normal equations of the points at a state with all priors, patches taken out; and what is said of each link.
-    fn sums(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> (Normal, Tallies) {
+    /// What triangles the points lie on is known from a state like this one, and kept.
+    fn sums(
+        &self,
+        state: &State,
+        (points, known): (&[u32], &mut [Option<Known>]),
+        gate: f64,
+        fan: &impl Fan,
+    ) -> (Normal, Tallies) {
         let pairing = Pairing::new(self.refine, state, (gate, self.on_mesh));
-        let chunks = points.chunks(CHUNK).collect();
-        let sums = fan.fan(chunks, |chunk: &[u32]| self.sums_of(&pairing, chunk));
+        let chunks = points.chunks(CHUNK).zip(known.chunks_mut(CHUNK)).collect();
+        let sums = fan.fan(chunks, |chunk| self.sums_of(&pairing, chunk));
         let join = |(a, own): (Normal, Tallies), (b, later)| (a.join(b), own.join(&later));
-        let empty = || self.sums_of(&pairing, &[]);
+        let empty = || self.sums_of(&pairing, (&[], &mut []));
         let (mut normal, tallies) = sums.into_iter().reduce(join).unwrap_or_else(empty);
         normal.close();
         self.add_priors(state, &mut normal);
@@ -161,7 +169,11 @@ impl Adjust<'_> {
     }
 
     /// The sums of some points.
-    fn sums_of(&self, pairing: &Pairing<'_>, points: &[u32]) -> (Normal, Tallies) {
+    fn sums_of(
+        &self,
+        pairing: &Pairing<'_>,
+        (points, known): (&[u32], &mut [Option<Known>]),
+    ) -> (Normal, Tallies) {
         let (state, gate) = (pairing.state, pairing.gate);
         let h = &state.hypothesis;
         let prepared = self.refine.prepared;
@@ -174,7 +186,8 @@ impl Adjust<'_> {
         let mut tallies = Tallies(vec![(0, 0.0); prepared.links.len()]);
         let slack = state.patch_sigma * state.patch_sigma;
         let mut robot = vec![0.0; n_robot];
-        for pair in points.iter().filter_map(|&i| pairing.pair(i)) {
+        let pairs = points.iter().zip(known).filter_map(|(&i, known)| pairing.pair(i, known));
+        for pair in pairs {
             tallies.add(&pair);
             let scale = (TUKEY * (pair.variance + slack).sqrt()).min(gate);
             let kernel = robust::tukey(pair.r, scale);

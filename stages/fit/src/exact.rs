@@ -24,10 +24,11 @@ pub(crate) struct Triangles {
     list: Vec<u32>,
 }
 
-/// A place on a surface, link frame: where, and the normal towards the scanner.
+/// A place on a surface, link frame: where, the normal towards the scanner, and on which triangle.
 pub(crate) struct Met {
     pub(crate) x: Vector,
     pub(crate) n: Vector,
+    pub(crate) triangle: u32,
 }
 
 impl Triangles {
@@ -59,34 +60,47 @@ impl Triangles {
     /// Where a beam (unit length) meets the mesh nearest to a place on the beam, from the side that it comes from; `None`
     /// where it meets nothing nearby.
     pub(crate) fn meet(&self, mesh: &Mesh, at: &Vector, ray: &Vector) -> Option<Met> {
-        let mut best: Option<(f64, Vector)> = None;
+        let mut best: Option<(f64, u32)> = None;
         for &i in self.about(at, ray) {
-            let corner = |k: usize| {
-                Vector::from(
-                    mesh.vertices[mesh.triangles[i as usize][k] as usize].map(f64::from),
-                )
-            };
-            let a = corner(0);
-            let (u, v) = (corner(1) - a, corner(2) - a);
-            let n = u.cross(&v);
-            let facing = n.dot(ray);
-            if facing == 0.0 {
-                continue;
-            }
-            let t = n.dot(&(a - at)) / facing;
-            if t.abs() > best.map_or(SLACK, |b| b.0.abs()) {
-                continue;
-            }
-            // Shares of the two edges in where the beam meets the plane.
-            let w = at + ray * t - a;
-            let whole = n.norm_squared();
-            let (along_u, along_v) = (w.cross(&v).dot(&n) / whole, u.cross(&w).dot(&n) / whole);
-            if along_u >= -SEAM && along_v >= -SEAM && along_u + along_v <= 1.0 + SEAM {
-                best = Some((t, n * -facing.signum()));
+            let least = best.map_or(SLACK, |b| b.0.abs());
+            if let Some(t) = crosses(mesh, i, (at, ray)).filter(|t| t.abs() < least) {
+                best = Some((t, i));
             }
         }
-        best.map(|(t, n)| Met { x: at + ray * t, n: n.normalize() })
+        best.map(|(t, triangle)| Met { x: at + ray * t, n: towards(mesh, triangle, ray), triangle })
     }
+}
+
+/// Where a beam still meets a triangle that it met before, from any place on it.
+pub(crate) fn again(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<Met> {
+    let t = crosses(mesh, triangle, (at, ray))?;
+    Some(Met { x: at + ray * t, n: towards(mesh, triangle, ray), triangle })
+}
+
+fn corners(mesh: &Mesh, triangle: u32) -> [Vector; 3] {
+    let at = |corner: u32| Vector::from(mesh.vertices[corner as usize].map(f64::from));
+    mesh.triangles[triangle as usize].map(at)
+}
+
+/// The unit normal of a triangle towards where a beam comes from.
+fn towards(mesh: &Mesh, triangle: u32, ray: &Vector) -> Vector {
+    let [a, b, c] = corners(mesh, triangle);
+    let n = (b - a).cross(&(c - a));
+    n.normalize() * -n.dot(ray).signum()
+}
+
+/// How far along a beam, from a place on it, it crosses a triangle; `None` where it passes beside it.
+fn crosses(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<f64> {
+    let [a, b, c] = corners(mesh, triangle);
+    let (u, v) = (b - a, c - a);
+    let n = u.cross(&v);
+    let t = n.dot(&(a - at)) / n.dot(ray);
+    // Shares of the two edges in where the beam meets the plane; along it there are none.
+    let w = at + ray * t - a;
+    let whole = n.norm_squared();
+    let (along_u, along_v) = (w.cross(&v).dot(&n) / whole, u.cross(&w).dot(&n) / whole);
+    let is_within = along_u >= -SEAM && along_v >= -SEAM && along_u + along_v <= 1.0 + SEAM;
+    (t.is_finite() && is_within).then_some(t)
 }
 
 impl Triangles {
@@ -110,7 +124,8 @@ fn pieces([a, b, c]: [[f32; 3]; 3], each: &mut impl FnMut([i32; 3], [i32; 3])) {
     let apart = |p: &[f32; 3], q: &[f32; 3]| -> f32 {
         p.iter().zip(q).map(|(x, y)| (x - y) * (x - y)).sum()
     };
-    let edges = [(apart(&a, &b), [a, b, c]), (apart(&b, &c), [b, c, a]), (apart(&c, &a), [c, a, b])];
+    let edges =
+        [(apart(&a, &b), [a, b, c]), (apart(&b, &c), [b, c, a]), (apart(&c, &a), [c, a, b])];
     let longest = edges.into_iter().max_by(|x, y| x.0.total_cmp(&y.0));
     let Some((length, [p, q, other])) = longest.filter(|e| e.0.is_finite()) else { return };
     if length > (2.0 * CELL).powi(2) {

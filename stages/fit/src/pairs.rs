@@ -5,6 +5,7 @@ use geometry::{Point, Pose, Vector};
 use nalgebra::UnitQuaternion;
 
 use crate::adjust::State;
+use crate::exact::{self, Met};
 use crate::facets::Facet;
 use crate::placed::{Near, Placed};
 use crate::refine::Refine;
@@ -36,6 +37,14 @@ pub(crate) struct Pair {
     /// Variance of the point's distance from the surface, m².
     pub(crate) variance: f64,
     pub(crate) r: f64,
+}
+
+/// The triangle that a point's beam met, and the facet beside it.
+#[derive(Clone, Copy)]
+pub(crate) struct Known {
+    link: u32,
+    facet: u32,
+    triangle: u32,
 }
 
 /// The model as it stands at a state, and the scans as they are off.
@@ -75,8 +84,9 @@ impl<'a> Pairing<'a> {
         }
     }
 
-    /// A point of the scene with its facet; `None` where it lies on none.
-    pub(crate) fn pair(&self, point: u32) -> Option<Pair> {
+    /// A point of the scene with its facet; `None` where it lies on none. What triangle its beam met is known from a
+    /// state like this one, or is kept for the next.
+    pub(crate) fn pair(&self, point: u32, known: &mut Option<Known>) -> Option<Pair> {
         let m = &self.refine.scene.points[point as usize];
         let view = usize::from(m.view);
         let raw = Vector::from(m.p.map(f64::from));
@@ -91,11 +101,17 @@ impl<'a> Pairing<'a> {
             (raw, NO_BEAM, 0.0)
         };
         let is_camera = self.refine.scene.views[view].is_camera;
-        let look = |at: &Vector| self.nearest(at);
-        let hit =
-            if range > 0.0 && !is_camera { along(look, (&p, &ray), self.gate)? } else { look(&p)? };
-        let is_exact = self.on_mesh && range > 0.0 && !is_camera;
-        let Hit { link, facet, n, x, at } = if is_exact { self.met(hit, &ray) } else { hit };
+        let is_ray = range > 0.0 && !is_camera;
+        let before = known.and_then(|known| self.again(known, (&p, &ray)));
+        let hit = match before {
+            Some(hit) => hit,
+            None if is_ray => {
+                let hit = along(|at| self.nearest(at), (&p, &ray), self.gate)?;
+                if self.on_mesh { self.met(hit, &ray, known) } else { hit }
+            }
+            None => self.nearest(&p)?,
+        };
+        let Hit { link, facet, n, x, at } = hit;
         let r = n.dot(&(p - x));
         if r.abs() > self.gate {
             return None;
@@ -122,7 +138,7 @@ impl<'a> Pairing<'a> {
     }
 
     /// The place where a beam that ends on a facet meets the mesh.
-    fn met(&self, hit: Hit, ray: &Vector) -> Hit {
+    fn met(&self, hit: Hit, ray: &Vector, known: &mut Option<Known>) -> Hit {
         let (link, pose) = (hit.link, &self.poses[hit.link]);
         let on_plane = hit.at + ray * (hit.n.dot(&(hit.x - hit.at)) / hit.n.dot(ray));
         let at = pose.inverse_transform_point(&on_plane.into()).coords;
@@ -130,8 +146,26 @@ impl<'a> Pairing<'a> {
         let own = &self.refine.prepared.model.links[link];
         let triangles = self.refine.prepared.links[link].fields.triangles(own);
         let Some(met) = triangles.meet(&own.mesh, &at, &ray) else { return hit };
+        let (own, facet) = (link as u32, hit.facet as u32);
+        *known = Some(Known { link: own, facet, triangle: met.triangle });
+        self.placed_at(link, hit.facet, &met)
+    }
+
+    /// The same where it is known which triangle it met.
+    fn again(&self, known: Known, (p, ray): (&Vector, &Vector)) -> Option<Hit> {
+        let link = known.link as usize;
+        let pose = &self.poses[link];
+        let at = pose.inverse_transform_point(&Point::from(*p)).coords;
+        let ray = pose.inverse_transform_vector(ray);
+        let mesh = &self.refine.prepared.model.links[link].mesh;
+        let met = exact::again(mesh, known.triangle, (&at, &ray))?;
+        Some(self.placed_at(link, known.facet as usize, &met))
+    }
+
+    fn placed_at(&self, link: usize, facet: usize, met: &Met) -> Hit {
+        let pose = &self.poses[link];
         let x = (pose * Point::from(met.x)).coords;
-        Hit { n: pose.rotation * met.n, x, at: x, ..hit }
+        Hit { link, facet, n: pose.rotation * met.n, x, at: x }
     }
 
     /// The facet nearest to a place.
