@@ -11,6 +11,8 @@ use std::collections::HashMap;
 const CELL: f32 = 0.008;
 /// How far along a beam the surface may be from where samples have it, metres: half the distance of two samples.
 const SLACK: f64 = 0.003;
+/// Most pieces of a link: ten times those of the finest.
+const MAX_PIECES: f64 = 2e7;
 /// Where on the beam it is asked which cell it passes through, in so many times that.
 const STEPS: [f64; 5] = [0.0, 0.5, -0.5, 1.0, -1.0];
 /// Beams through the seam of two triangles meet one of them: share of a triangle's size.
@@ -32,7 +34,12 @@ pub(crate) struct Met {
 }
 
 impl Triangles {
+    /// None of them where there were too many pieces: of a mesh in the wrong unit, say.
     pub(crate) fn new(mesh: &Mesh) -> Self {
+        let n_pieces: f64 = (0..mesh.triangles.len() as u32).map(|i| n_pieces(mesh, i)).sum();
+        if n_pieces.is_nan() || n_pieces >= MAX_PIECES {
+            return Self::default();
+        }
         let mut entries: Vec<(u64, u32)> = Vec::with_capacity(2 * mesh.triangles.len());
         for (i, corners) in mesh.triangles.iter().enumerate() {
             let corners = corners.map(|c| mesh.vertices[c as usize]);
@@ -47,12 +54,11 @@ impl Triangles {
         entries.sort_unstable();
         entries.dedup();
         let mut cells = HashMap::new();
-        for (at, run) in entries.chunk_by(|a, b| a.0 == b.0).scan(0, |at, run| {
-            let begin = *at;
-            *at += run.len();
-            Some((begin, run))
-        }) {
-            cells.insert(run[0].0, [at as u32, (at + run.len()) as u32]);
+        let mut begin = 0;
+        for run in entries.chunk_by(|a, b| a.0 == b.0) {
+            let end = begin + run.len() as u32;
+            cells.insert(run[0].0, [begin, end]);
+            begin = end;
         }
         Self { cells, list: entries.into_iter().map(|e| e.1).collect() }
     }
@@ -119,6 +125,14 @@ impl Triangles {
     }
 }
 
+/// About how many cells a triangle lies in.
+fn n_pieces(mesh: &Mesh, triangle: u32) -> f64 {
+    let [a, b, c] = corners(mesh, triangle);
+    let cell = f64::from(CELL);
+    let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
+    1.0 + longest / cell + (b - a).cross(&(c - a)).norm() / (cell * cell)
+}
+
 /// Halves a triangle until its pieces are as small as cells; gives the cells of each.
 fn pieces([a, b, c]: [[f32; 3]; 3], each: &mut impl FnMut([i32; 3], [i32; 3])) {
     let apart = |p: &[f32; 3], q: &[f32; 3]| -> f32 {
@@ -177,5 +191,9 @@ mod tests {
         let past = Vector::new(0.0, 0.0, -1.0);
         assert!(triangles.meet(&mesh, &Vector::new(-0.002, 0.3, 0.0), &past).is_none());
         assert!(triangles.meet(&mesh, &Vector::new(3.0, 0.3, 0.0), &down).is_none());
+        // The same in millimetres, taken for metres.
+        let vertices = mesh.vertices.iter().map(|p| p.map(|v| 1000.0 * v)).collect();
+        let large = Mesh { vertices, ..mesh };
+        assert!(Triangles::new(&large).list.is_empty());
     }
 }
