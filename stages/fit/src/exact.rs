@@ -75,6 +75,20 @@ impl Triangles {
         }
         best.map(|(t, triangle)| Met { x: at + ray * t, n: towards(mesh, triangle, ray), triangle })
     }
+
+    /// The triangles in the cells that a beam passes through about a place; some of them more than once.
+    fn about(&self, at: &Vector, ray: &Vector) -> impl Iterator<Item = &u32> {
+        let key_at = |step: f64| {
+            let p = at + ray * (step * SLACK);
+            key(cell([p.x, p.y, p.z].map(|v| v as f32)))
+        };
+        let keys = STEPS.map(key_at);
+        let is_first = move |k: &usize| *k == 0 || !keys[..*k].contains(&keys[*k]);
+        (0..keys.len()).filter(is_first).flat_map(move |k| {
+            let [begin, end] = self.cells.get(&keys[k]).copied().unwrap_or_default();
+            &self.list[begin as usize..end as usize]
+        })
+    }
 }
 
 /// Where a beam still meets a triangle that it met before, from any place on it.
@@ -107,22 +121,6 @@ fn crosses(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<
     let (along_u, along_v) = (w.cross(&v).dot(&n) / whole, u.cross(&w).dot(&n) / whole);
     let is_within = along_u >= -SEAM && along_v >= -SEAM && along_u + along_v <= 1.0 + SEAM;
     (t.is_finite() && is_within).then_some(t)
-}
-
-impl Triangles {
-    /// The triangles in the cells that a beam passes through about a place; some of them more than once.
-    fn about(&self, at: &Vector, ray: &Vector) -> impl Iterator<Item = &u32> {
-        let key_at = |step: f64| {
-            let p = at + ray * (step * SLACK);
-            key(cell([p.x, p.y, p.z].map(|v| v as f32)))
-        };
-        let keys = STEPS.map(key_at);
-        let is_first = move |k: &usize| *k == 0 || !keys[..*k].contains(&keys[*k]);
-        (0..keys.len()).filter(is_first).flat_map(move |k| {
-            let [begin, end] = self.cells.get(&keys[k]).copied().unwrap_or_default();
-            &self.list[begin as usize..end as usize]
-        })
-    }
 }
 
 /// About how many cells a triangle lies in.
