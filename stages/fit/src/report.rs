@@ -55,9 +55,11 @@ pub(crate) fn report(
         })
         .collect();
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let own = refine.with_foot(h, best.covariance.clone(), near, fan);
+    let mut own = refine.with_foot(h, best.covariance.clone(), near, fan);
     let (mut open, mut spread) = open_joints(&own, h, &rivals);
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
+    let mut of_joints = own.view_mut((6, 6), (n - 6, n - 6));
+    of_joints += sway(refine, h, &several, near, fan);
     for s in spins {
         // Any value of the run, each as likely.
         spread[s.joint] = spread[s.joint].max(s.extent / 3.0_f64.sqrt());
@@ -67,10 +69,7 @@ pub(crate) fn report(
         let own = h.posture[s.joint];
         spread[s.joint] = s.values.iter().map(|v| angle(v - own)).fold(spread[s.joint], f64::max);
     }
-    let mut covariance = in_world_axes(&own, &h.local_from_base);
-    for (j, sway) in sway(refine, h, &several, near, fan).into_iter().enumerate() {
-        covariance[(6 + j, 6 + j)] += sway * sway;
-    }
+    let covariance = in_world_axes(&own, &h.local_from_base);
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     // A wrist that may be flipped is not known, however narrow either answer is.
     let is_elsewhere = |j: usize| {
@@ -202,16 +201,17 @@ fn open_joints(
     (open, spread)
 }
 
-/// How far each joint gives way when those that may stand at several values stand at another of theirs, radians or
-/// metres: a flange's bolts pull at the wrist, and which way they pull is as open as the flange.
+/// Covariance of the joints that comes from those that may stand at several values, radians² or metres²: a flange's
+/// bolts pull at the wrist, and which way they pull is as open as the flange. Each value is as likely as the others.
 fn sway(
     refine: &Refine<'_>,
     h: &Hypothesis,
     several: &[&Spin],
     near: &[u32],
     fan: &impl Fan,
-) -> Vec<f64> {
-    let mut out = vec![0.0_f64; h.posture.len()];
+) -> DMatrix<f64> {
+    let n = h.posture.len();
+    let mut out = DMatrix::zeros(n, n);
     if several.is_empty() {
         return out;
     }
@@ -230,12 +230,18 @@ fn sway(
     let ends: Vec<Hypothesis> = fan.fan(all, |h| refine.run(&h, &few, &rounds, fan));
     // Where it ended at something worse, it is no value that the joint may stand at.
     let as_good = |end: &&Hypothesis| refine.worsening(&ends[0], end, near) < EQUAL;
+    let is_swayed: Vec<bool> = (0..n).map(|j| several.iter().all(|s| s.joint != j)).collect();
+    let mut n_ends = 1;
     for end in ends[1..].iter().filter(as_good) {
-        for j in (0..out.len()).filter(|j| several.iter().all(|s| s.joint != *j)) {
-            out[j] = out[j].max(turn(&ends[0], end, j));
-        }
+        let change = |j: usize, _| match is_swayed[j] {
+            true => signed(end.posture[j] - ends[0].posture[j]),
+            false => 0.0,
+        };
+        let away = DVector::from_fn(n, change);
+        out += &away * away.transpose();
+        n_ends += 1;
     }
-    out
+    out / f64::from(n_ends)
 }
 
 /// Difference of a joint between two postures, whole turns taken out, radians.
@@ -243,10 +249,14 @@ fn turn(a: &Hypothesis, b: &Hypothesis, joint: usize) -> f64 {
     angle(a.posture[joint] - b.posture[joint])
 }
 
+/// An angle within half a turn either way, radians.
+fn signed(d: f64) -> f64 {
+    d - TAU * (d / TAU).round()
+}
+
 /// Size of an angle, whole turns taken out, radians.
 fn angle(d: f64) -> f64 {
-    let d = d.rem_euclid(TAU);
-    d.min(TAU - d)
+    signed(d).abs()
 }
 
 /// Whether two postures are different answers, some joints passed over.
