@@ -77,8 +77,6 @@ pub(crate) struct Adjust<'a> {
     pub(crate) refine: &'a Refine<'a>,
     /// Joints whose places on their links are unknowns, too, in [`Self::at`].
     pub(crate) frames: &'a [usize],
-    /// Whether points lie on the mesh, or on the planes of its samples: for what is only compared these will do.
-    pub(crate) on_mesh: bool,
 }
 
 /// Rounds of the adjustment; the last ones change nothing but the patches' share.
@@ -125,9 +123,7 @@ impl Adjust<'_> {
     ) -> Adjusted {
         let mut state = start;
         let mut round = 0;
-        if self.on_mesh {
-            self.refine.prepared.make_triangles(fan);
-        }
+        self.refine.prepared.make_triangles(fan);
         let mut known = vec![None; points.len()];
         loop {
             let (normal, tallies) = self.sums(&state, (points, &mut known), gate, fan);
@@ -157,7 +153,7 @@ impl Adjust<'_> {
         gate: f64,
         fan: &impl Fan,
     ) -> (Normal, Tallies) {
-        let pairing = Pairing::new(self.refine, state, (gate, self.on_mesh));
+        let pairing = Pairing::new(self.refine, state, gate);
         let chunks = points.chunks(CHUNK).zip(known.chunks_mut(CHUNK)).collect();
         let sums = fan.fan(chunks, |chunk| self.sums_of(&pairing, chunk));
         let join = |(a, own): (Normal, Tallies), (b, later)| (a.join(b), own.join(&later));

@@ -72,12 +72,11 @@ fn estimate(
         let refine = Refine { prepared: &own, prior: refine.prior, ..*refine };
         let (points, gate) = adjusted_points(&refine, &h, all, fan);
         let points: Vec<u32> = points.into_iter().step_by(every).collect();
-        let mut done =
-            Adjust { refine: &refine, frames: &[], on_mesh: true }.run(&h, &points, gate, fan);
+        let mut done = Adjust { refine: &refine, frames: &[] }.run(&h, &points, gate, fan);
         h = done.hypothesis.clone();
         let (scans, patch_sigma) = (done.scans.clone(), done.patch_sigma);
         let state = State { hypothesis: h.clone(), scans, patch_sigma };
-        let with_frames = Adjust { refine: &refine, frames: &nominal.free, on_mesh: true };
+        let with_frames = Adjust { refine: &refine, frames: &nominal.free };
         let mut normal = with_frames.at(&state, &points, gate, fan);
         let frames = frames(nominal, &model);
         normal.add_frame_priors(&frames, refine.settings.frame_sigma);

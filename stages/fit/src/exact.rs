@@ -5,14 +5,13 @@
 
 use geometry::Vector;
 use robot::Mesh;
-use std::collections::HashMap;
 
-/// Edge of a cell, metres: a few triangles of a casting.
+/// Least edge of a cell, metres: a few triangles of a casting.
 const CELL: f32 = 0.008;
+/// Most cells of a link, 16 MiB: those of what is larger than a robot's links are larger.
+const MAX_CELLS: f32 = 4e6;
 /// How far along a beam the surface may be from where samples have it, metres: half the distance of two samples.
 const SLACK: f64 = 0.003;
-/// Most pieces of a link: ten times those of the finest.
-const MAX_PIECES: f64 = 2e7;
 /// Where on the beam it is asked which cell it passes through, in so many times that.
 const STEPS: [f64; 5] = [0.0, 0.5, -0.5, 1.0, -1.0];
 /// Beams through the seam of two triangles meet one of them: share of a triangle's size.
@@ -21,9 +20,20 @@ const SEAM: f64 = 1e-4;
 /// Triangles of a mesh by the cells that they lie in.
 #[derive(Debug, Default)]
 pub(crate) struct Triangles {
-    /// Begin and end in `list` of each cell.
-    cells: HashMap<u64, [u32; 2]>,
+    grid: Grid,
+    /// Where each cell begins in `list`; one more for the end of the last.
+    begins: Vec<u32>,
     list: Vec<u32>,
+}
+
+/// Cubes over the bounds of a mesh.
+#[derive(Debug, Default)]
+struct Grid {
+    low: [f32; 3],
+    /// Edge of a cell, metres.
+    edge: f32,
+    /// Cells along x, y, z.
+    n: [usize; 3],
 }
 
 /// A place on a surface, link frame: where, the normal towards the scanner, and on which triangle.
@@ -34,33 +44,22 @@ pub(crate) struct Met {
 }
 
 impl Triangles {
-    /// None of them where there were too many pieces: of a mesh in the wrong unit, say.
     pub(crate) fn new(mesh: &Mesh) -> Self {
-        let n_pieces: f64 = (0..mesh.triangles.len() as u32).map(|i| n_pieces(mesh, i)).sum();
-        if n_pieces.is_nan() || n_pieces >= MAX_PIECES {
-            return Self::default();
+        let Some(grid) = Grid::over(mesh) else { return Self::default() };
+        let n_cells: usize = grid.n.iter().product();
+        // First how many lie in each cell, then which.
+        let mut begins = vec![0_u32; n_cells + 1];
+        grid.each(mesh, |cell, _| begins[cell + 1] += 1);
+        for cell in 0..n_cells {
+            begins[cell + 1] += begins[cell];
         }
-        let mut entries: Vec<(u64, u32)> = Vec::with_capacity(2 * mesh.triangles.len());
-        for (i, corners) in mesh.triangles.iter().enumerate() {
-            let corners = corners.map(|c| mesh.vertices[c as usize]);
-            pieces(corners, &mut |low, high| {
-                for x in low[0]..=high[0] {
-                    for y in low[1]..=high[1] {
-                        entries.extend((low[2]..=high[2]).map(|z| (key([x, y, z]), i as u32)));
-                    }
-                }
-            });
-        }
-        entries.sort_unstable();
-        entries.dedup();
-        let mut cells = HashMap::new();
-        let mut begin = 0;
-        for run in entries.chunk_by(|a, b| a.0 == b.0) {
-            let end = begin + run.len() as u32;
-            cells.insert(run[0].0, [begin, end]);
-            begin = end;
-        }
-        Self { cells, list: entries.into_iter().map(|e| e.1).collect() }
+        let mut list = vec![0; begins[n_cells] as usize];
+        let mut next = begins.clone();
+        grid.each(mesh, |cell, triangle| {
+            list[next[cell] as usize] = triangle;
+            next[cell] += 1;
+        });
+        Self { grid, begins, list }
     }
 
     /// Where a beam (unit length) meets the mesh nearest to a place on the beam, from the side that it comes from; `None`
@@ -78,16 +77,87 @@ impl Triangles {
 
     /// The triangles in the cells that a beam passes through about a place; some of them more than once.
     fn about(&self, at: &Vector, ray: &Vector) -> impl Iterator<Item = &u32> {
-        let key_at = |step: f64| {
+        let cell_at = |step: f64| {
             let p = at + ray * (step * SLACK);
-            key(cell([p.x, p.y, p.z].map(|v| v as f32)))
+            self.grid.holds([p.x, p.y, p.z].map(|v| v as f32))
         };
-        let keys = STEPS.map(key_at);
-        let is_first = move |k: &usize| *k == 0 || !keys[..*k].contains(&keys[*k]);
-        (0..keys.len()).filter(is_first).flat_map(move |k| {
-            let [begin, end] = self.cells.get(&keys[k]).copied().unwrap_or_default();
-            &self.list[begin as usize..end as usize]
+        let cells = STEPS.map(cell_at);
+        let is_first = move |k: &usize| !cells[..*k].contains(&cells[*k]);
+        (0..cells.len()).filter(is_first).filter_map(move |k| cells[k]).flat_map(|cell| {
+            let [begin, end] = [cell, cell + 1].map(|c| self.begins[c] as usize);
+            &self.list[begin..end]
         })
+    }
+}
+
+impl Grid {
+    /// `None` where there is no surface.
+    fn over(mesh: &Mesh) -> Option<Self> {
+        let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
+        for p in &mesh.vertices {
+            low = [0, 1, 2].map(|i| low[i].min(p[i]));
+            high = [0, 1, 2].map(|i| high[i].max(p[i]));
+        }
+        let size = [0, 1, 2].map(|i| high[i] - low[i]);
+        let volume = size.iter().map(|v| v.max(CELL)).product::<f32>();
+        let edge = (volume / MAX_CELLS).cbrt().max(CELL);
+        let n = size.map(|v| (v / edge) as usize + 1);
+        let is_sound = !mesh.triangles.is_empty() && volume.is_finite();
+        is_sound.then_some(Self { low, edge, n })
+    }
+
+    /// The cell along an axis; of what lies beside the grid the nearest one.
+    fn along(&self, axis: usize, v: f32) -> usize {
+        (((v - self.low[axis]) / self.edge) as usize).min(self.n[axis] - 1)
+    }
+
+    /// The cell that a place lies in.
+    fn holds(&self, p: [f32; 3]) -> Option<usize> {
+        let at = [0, 1, 2].map(|i| (p[i] - self.low[i]) / self.edge);
+        let is_inside = (0..3).all(|i| at[i] >= 0.0 && at[i] < self.n[i] as f32);
+        is_inside.then(|| self.index(at.map(|v| v as usize)))
+    }
+
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        (x * self.n[1] + y) * self.n[2] + z
+    }
+
+    /// Each cell that a triangle lies in, once, triangle by triangle.
+    fn each(&self, mesh: &Mesh, mut found: impl FnMut(usize, u32)) {
+        let mut cells: Vec<usize> = Vec::new();
+        for (i, corners) in mesh.triangles.iter().enumerate() {
+            cells.clear();
+            self.pieces(corners.map(|c| mesh.vertices[c as usize]), &mut cells);
+            if cells.len() > 1 {
+                cells.sort_unstable();
+                cells.dedup();
+            }
+            cells.iter().for_each(|cell| found(*cell, i as u32));
+        }
+    }
+
+    /// Halves a triangle until its pieces are as small as cells; adds the cells of each.
+    fn pieces(&self, [a, b, c]: [[f32; 3]; 3], cells: &mut Vec<usize>) {
+        let apart = |p: &[f32; 3], q: &[f32; 3]| -> f32 {
+            p.iter().zip(q).map(|(x, y)| (x - y) * (x - y)).sum()
+        };
+        let edges =
+            [(apart(&a, &b), [a, b, c]), (apart(&b, &c), [b, c, a]), (apart(&c, &a), [c, a, b])];
+        let longest = edges.into_iter().max_by(|x, y| x.0.total_cmp(&y.0));
+        let Some((length, [p, q, other])) = longest.filter(|e| e.0.is_finite()) else { return };
+        if length > (2.0 * self.edge).powi(2) {
+            let middle = [0, 1, 2].map(|i| 0.5 * (p[i] + q[i]));
+            self.pieces([p, middle, other], cells);
+            self.pieces([middle, q, other], cells);
+            return;
+        }
+        let low = [0, 1, 2].map(|i| self.along(i, a[i].min(b[i]).min(c[i])));
+        let high = [0, 1, 2].map(|i| self.along(i, a[i].max(b[i]).max(c[i])));
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                cells.extend((low[2]..=high[2]).map(|z| self.index([x, y, z])));
+            }
+        }
     }
 }
 
@@ -123,43 +193,6 @@ fn crosses(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<
     (t.is_finite() && is_within).then_some(t)
 }
 
-/// About how many cells a triangle lies in.
-fn n_pieces(mesh: &Mesh, triangle: u32) -> f64 {
-    let [a, b, c] = corners(mesh, triangle);
-    let cell = f64::from(CELL);
-    let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
-    1.0 + longest / cell + (b - a).cross(&(c - a)).norm() / (cell * cell)
-}
-
-/// Halves a triangle until its pieces are as small as cells; gives the cells of each.
-fn pieces([a, b, c]: [[f32; 3]; 3], each: &mut impl FnMut([i32; 3], [i32; 3])) {
-    let apart = |p: &[f32; 3], q: &[f32; 3]| -> f32 {
-        p.iter().zip(q).map(|(x, y)| (x - y) * (x - y)).sum()
-    };
-    let edges =
-        [(apart(&a, &b), [a, b, c]), (apart(&b, &c), [b, c, a]), (apart(&c, &a), [c, a, b])];
-    let longest = edges.into_iter().max_by(|x, y| x.0.total_cmp(&y.0));
-    let Some((length, [p, q, other])) = longest.filter(|e| e.0.is_finite()) else { return };
-    if length > (2.0 * CELL).powi(2) {
-        let middle = [0, 1, 2].map(|i| 0.5 * (p[i] + q[i]));
-        pieces([p, middle, other], each);
-        pieces([middle, q, other], each);
-        return;
-    }
-    let low = [0, 1, 2].map(|i| a[i].min(b[i]).min(c[i]));
-    let high = [0, 1, 2].map(|i| a[i].max(b[i]).max(c[i]));
-    each(cell(low), cell(high));
-}
-
-fn cell(p: [f32; 3]) -> [i32; 3] {
-    p.map(|v| (v / CELL).floor() as i32)
-}
-
-/// One number for a cell: 21 bits an axis.
-fn key(cell: [i32; 3]) -> u64 {
-    cell.iter().fold(0, |key, c| key << 21 | u64::from(*c as u32 & 0x1f_ffff))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,9 +222,16 @@ mod tests {
         let past = Vector::new(0.0, 0.0, -1.0);
         assert!(triangles.meet(&mesh, &Vector::new(-0.002, 0.3, 0.0), &past).is_none());
         assert!(triangles.meet(&mesh, &Vector::new(3.0, 0.3, 0.0), &down).is_none());
-        // The same in millimetres, taken for metres.
+        // The same in millimetres, taken for metres: as many cells as memory stands, and the same answer.
         let vertices = mesh.vertices.iter().map(|p| p.map(|v| 1000.0 * v)).collect();
         let large = Mesh { vertices, ..mesh };
-        assert!(Triangles::new(&large).list.is_empty());
+        let triangles = Triangles::new(&large);
+        assert!(triangles.begins.len() < 2 * MAX_CELLS as usize);
+        let at = Vector::new(200.0, 300.0, 0.001);
+        assert!(
+            (triangles.meet(&large, &at, &down).expect("the top").n - Vector::z()).norm() < 1e-6
+        );
+        let nothing = Mesh { vertices: Vec::new(), triangles: Vec::new() };
+        assert!(Triangles::new(&nothing).meet(&nothing, &at, &down).is_none());
     }
 }

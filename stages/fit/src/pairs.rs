@@ -53,8 +53,6 @@ pub(crate) struct Pairing<'a> {
     pub(crate) state: &'a State,
     /// Farthest distance of a point from the surface, metres.
     pub(crate) gate: f64,
-    /// Whether points lie on the mesh, or on the planes of its samples.
-    on_mesh: bool,
     poses: Vec<Pose>,
     placed: Placed<'a>,
     scanners: Vec<Option<Point>>,
@@ -64,18 +62,13 @@ pub(crate) struct Pairing<'a> {
 }
 
 impl<'a> Pairing<'a> {
-    pub(crate) fn new(
-        refine: &'a Refine<'a>,
-        state: &'a State,
-        (gate, on_mesh): (f64, bool),
-    ) -> Self {
+    pub(crate) fn new(refine: &'a Refine<'a>, state: &'a State, gate: f64) -> Self {
         let scene = refine.scene;
         let turn = |e: &crate::adjust::ScanError| UnitQuaternion::from_scaled_axis(e.turn);
         Self {
             refine,
             state,
             gate,
-            on_mesh,
             poses: refine.local_from_links(&state.hypothesis),
             placed: Placed::all(refine.prepared, &state.hypothesis, gate),
             scanners: (0..scene.views.len()).map(|v| scene.scanner(v as u16)).collect(),
@@ -107,7 +100,7 @@ impl<'a> Pairing<'a> {
             Some(hit) => hit,
             None if is_ray => {
                 let hit = along(|at| self.nearest(at), (&p, &ray), self.gate)?;
-                if self.on_mesh { self.met(hit, &ray, known) } else { hit }
+                self.met(hit, &ray, known)
             }
             None => self.nearest(&p)?,
         };

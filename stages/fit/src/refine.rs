@@ -16,7 +16,7 @@ use crate::placed::{Near, Placed};
 use crate::{Prepared, Scene, Settings};
 
 /// One round of the schedule.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Round {
     /// Scale of the robust kernel and gate on the distance, metres.
     pub(crate) gate: f64,
@@ -52,6 +52,10 @@ pub(crate) const FINE_ROUNDS: [Round; 7] = [
 pub(crate) const CHUNK: usize = 8192;
 /// Distance from which the coarse field answers, metres: just inside the fine field's reach.
 pub(crate) const FINE_REACH: f64 = 0.026;
+
+/// A step by less than a tenth of a standard deviation, in every direction, is the last of its kind (squared): steps shrink
+/// threefold a round.
+const SMALL_STEP: f64 = 0.01;
 
 /// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
 const BESIDE: (f64, f64) = (1.6, 1.5);
@@ -129,10 +133,13 @@ impl Refine<'_> {
         fan: &impl Fan,
     ) -> Hypothesis {
         let mut h = start.clone();
-        for round in rounds {
+        let mut rounds = rounds.iter().peekable();
+        while let Some(round) = rounds.next() {
             let sums = self.sums(&h, points, round.gate, fan);
-            let Some(step) = self.step(&h, &sums, round) else { break };
+            let Some((step, deviations)) = self.step(&h, &sums, round) else { break };
             self.apply(&mut h, &step);
+            // The same again would change nothing.
+            while deviations < SMALL_STEP && rounds.next_if_eq(&round).is_some() {}
         }
         h
     }
@@ -278,8 +285,8 @@ impl Refine<'_> {
         sums
     }
 
-    /// Solves for the next step; `None` where the points say nothing.
-    fn step(&self, h: &Hypothesis, sums: &[Sums], round: &Round) -> Option<DVector<f64>> {
+    /// Solves for the next step, with its square in standard deviations; `None` where the points say nothing.
+    fn step(&self, h: &Hypothesis, sums: &[Sums], round: &Round) -> Option<(DVector<f64>, f64)> {
         let n = 6 + h.posture.len();
         let (mut hessian, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let total: f64 = sums.iter().map(|s| s.n as f64).sum();
@@ -298,10 +305,11 @@ impl Refine<'_> {
         hessian /= variance;
         gradient /= variance;
         self.add_priors(h, &mut hessian, &mut gradient);
-        let delta = hessian.cholesky()?.solve(&-gradient);
+        let delta = hessian.cholesky()?.solve(&-&gradient);
+        let deviations = -gradient.dot(&delta);
         // A step beyond half a radian or half a metre has left the linear range: shorten it.
         let longest = delta.amax();
-        Some(if longest > 0.5 { delta * (0.5 / longest) } else { delta })
+        Some((if longest > 0.5 { delta * (0.5 / longest) } else { delta }, deviations))
     }
 
     /// Joint limits, installation plane, and a weak pull to stay where the points say nothing.

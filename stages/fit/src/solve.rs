@@ -180,7 +180,7 @@ fn sharpen(refine: &Refine<'_>, (best, judgement, _): &mut Settled, all: &[u32],
         Settings { max_points: SHARPER * refine.settings.max_points, ..refine.settings.clone() };
     let refine = Refine { settings: &settings, ..*refine };
     let (points, gate) = adjusted_points(&refine, &best.hypothesis, all, fan);
-    let adjust = Adjust { refine: &refine, frames: &[], on_mesh: true };
+    let adjust = Adjust { refine: &refine, frames: &[] };
     *best = adjust.run_from(best.state(), &points, gate, fan);
     *judgement = judged(&refine, &best.hypothesis);
 }
@@ -224,7 +224,7 @@ pub(crate) fn settle(
 ) -> Settled {
     let variance = refine.scene.noise * refine.scene.noise;
     let (points, gate) = adjusted_points(refine, h, all, fan);
-    let adjust = Adjust { refine, frames: &[], on_mesh: false };
+    let adjust = Adjust { refine, frames: &[] };
     let mut best = adjust.run(h, &points, gate, fan);
     let mut spins = refine.spins(&best.hypothesis, near, variance, fan);
     let better: Vec<(usize, f64)> = spins.iter().map(|s| (s.joint, s.values[0])).collect();
