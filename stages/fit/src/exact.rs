@@ -4,16 +4,21 @@
 //! millimetre, and beside an edge it may be that of the other face, millimetres off. The mesh itself knows.
 
 use geometry::Vector;
+use nalgebra::Vector3;
 use robot::Mesh;
 
 /// Least edge of a cell, metres: a few triangles of a casting.
 const CELL: f32 = 0.008;
-/// Most cells of a link, 16 MiB: those of what is larger than a robot's links are larger.
+/// Most cells of a link, 16 MiB, and most entries in them, ten times those of the finest: larger links, and those in the
+/// wrong unit, have larger cells.
 const MAX_CELLS: f32 = 4e6;
+const MAX_ENTRIES: f32 = 2e7;
 /// How far along a beam the surface may be from where samples have it, metres: half the distance of two samples.
 const SLACK: f64 = 0.003;
 /// Where on the beam it is asked which cell it passes through, in so many times that.
 const STEPS: [f64; 5] = [0.0, 0.5, -0.5, 1.0, -1.0];
+/// Slices of a grid overlap by this share of a cell, so that rounding loses no corner.
+const BORDER: f32 = 1e-3;
 /// Beams through the seam of two triangles meet one of them: share of a triangle's size.
 const SEAM: f64 = 1e-4;
 
@@ -65,14 +70,14 @@ impl Triangles {
     /// Where a beam (unit length) meets the mesh nearest to a place on the beam, from the side that it comes from; `None`
     /// where it meets nothing nearby.
     pub(crate) fn meet(&self, mesh: &Mesh, at: &Vector, ray: &Vector) -> Option<Met> {
-        let mut best: Option<(f64, u32)> = None;
+        let mut best: Option<(f64, Vector, u32)> = None;
         for &i in self.about(at, ray) {
             let least = best.map_or(SLACK, |b| b.0.abs());
-            if let Some(t) = crosses(mesh, i, (at, ray)).filter(|t| t.abs() < least) {
-                best = Some((t, i));
+            if let Some((t, n)) = crosses(mesh, i, (at, ray)).filter(|c| c.0.abs() < least) {
+                best = Some((t, n, i));
             }
         }
-        best.map(|(t, triangle)| Met { x: at + ray * t, n: towards(mesh, triangle, ray), triangle })
+        best.map(|(t, n, triangle)| met((at, ray), (t, n), triangle))
     }
 
     /// The triangles in the cells that a beam passes through about a place; some of them more than once.
@@ -99,11 +104,17 @@ impl Grid {
             high = [0, 1, 2].map(|i| high[i].max(p[i]));
         }
         let size = [0, 1, 2].map(|i| high[i] - low[i]);
-        let volume = size.iter().map(|v| v.max(CELL)).product::<f32>();
-        let edge = (volume / MAX_CELLS).cbrt().max(CELL);
-        let n = size.map(|v| (v / edge) as usize + 1);
-        let is_sound = !mesh.triangles.is_empty() && volume.is_finite();
-        is_sound.then_some(Self { low, edge, n })
+        let longest = size.into_iter().fold(0.0, f32::max);
+        let is_sound = !mesh.triangles.is_empty() && size.iter().all(|v| v.is_finite());
+        let cells = |edge: f32| size.map(|v| v / edge + 1.0).iter().product::<f32>();
+        let mut edge = CELL;
+        while is_sound
+            && edge < longest
+            && (cells(edge) > MAX_CELLS || n_entries(mesh, edge) > MAX_ENTRIES)
+        {
+            edge *= 2.0;
+        }
+        is_sound.then(|| Self { low, edge, n: size.map(|v| (v / edge) as usize + 1) })
     }
 
     /// The cell along an axis; of what lies beside the grid the nearest one.
@@ -124,64 +135,90 @@ impl Grid {
 
     /// Each cell that a triangle lies in, once, triangle by triangle.
     fn each(&self, mesh: &Mesh, mut found: impl FnMut(usize, u32)) {
-        let mut cells: Vec<usize> = Vec::new();
         for (i, corners) in mesh.triangles.iter().enumerate() {
-            cells.clear();
-            self.pieces(corners.map(|c| mesh.vertices[c as usize]), &mut cells);
-            if cells.len() > 1 {
-                cells.sort_unstable();
-                cells.dedup();
-            }
-            cells.iter().for_each(|cell| found(*cell, i as u32));
+            let corners = corners.map(|c| mesh.vertices[c as usize]);
+            self.walk(&corners, 0, [0; 3], &mut |cell| found(cell, i as u32));
         }
     }
 
-    /// Halves a triangle until its pieces are as small as cells; adds the cells of each.
-    fn pieces(&self, [a, b, c]: [[f32; 3]; 3], cells: &mut Vec<usize>) {
-        let apart = |p: &[f32; 3], q: &[f32; 3]| -> f32 {
-            p.iter().zip(q).map(|(x, y)| (x - y) * (x - y)).sum()
-        };
-        let edges =
-            [(apart(&a, &b), [a, b, c]), (apart(&b, &c), [b, c, a]), (apart(&c, &a), [c, a, b])];
-        let longest = edges.into_iter().max_by(|x, y| x.0.total_cmp(&y.0));
-        let Some((length, [p, q, other])) = longest.filter(|e| e.0.is_finite()) else { return };
-        if length > (2.0 * self.edge).powi(2) {
-            let middle = [0, 1, 2].map(|i| 0.5 * (p[i] + q[i]));
-            self.pieces([p, middle, other], cells);
-            self.pieces([middle, q, other], cells);
-            return;
-        }
-        let low = [0, 1, 2].map(|i| self.along(i, a[i].min(b[i]).min(c[i])));
-        let high = [0, 1, 2].map(|i| self.along(i, a[i].max(b[i]).max(c[i])));
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                cells.extend((low[2]..=high[2]).map(|z| self.index([x, y, z])));
+    /// The cells of a convex polygon, slice by slice of this axis and the later ones.
+    fn walk(
+        &self,
+        polygon: &[[f32; 3]],
+        axis: usize,
+        mut at: [usize; 3],
+        found: &mut impl FnMut(usize),
+    ) {
+        let on_axis = || polygon.iter().map(|p| p[axis]);
+        let first = self.along(axis, on_axis().fold(f32::INFINITY, f32::min));
+        let last = self.along(axis, on_axis().fold(f32::NEG_INFINITY, f32::max));
+        for slice in first..=last {
+            at[axis] = slice;
+            if axis == 2 {
+                found(self.index(at));
+            } else if first == last {
+                self.walk(polygon, axis + 1, at, found);
+            } else {
+                let low = self.low[axis] + self.edge * (slice as f32 - BORDER);
+                let high = self.low[axis] + self.edge * (slice as f32 + 1.0 + BORDER);
+                let (above, n) = cut(polygon, |p| p[axis] - low);
+                let (part, n) = cut(&above[..n], |p| high - p[axis]);
+                if n > 0 {
+                    self.walk(&part[..n], axis + 1, at, found);
+                }
             }
         }
     }
+}
+
+/// The part of a convex polygon where a linear function is not below 0; a triangle cut on both sides of two axes has at most
+/// seven corners.
+fn cut(polygon: &[[f32; 3]], f: impl Fn([f32; 3]) -> f32) -> ([[f32; 3]; 8], usize) {
+    let (mut out, mut n) = ([[0.0; 3]; 8], 0);
+    // Rounding may make more of what is thinner than it: what is beside those corners is not missed.
+    let mut add = |p| {
+        if n < out.len() {
+            out[n] = p;
+            n += 1;
+        }
+    };
+    for (k, p) in polygon.iter().enumerate() {
+        let q = polygon[(k + 1) % polygon.len()];
+        let (a, b) = (f(*p), f(q));
+        if a >= 0.0 {
+            add(*p);
+        }
+        if (a >= 0.0) != (b >= 0.0) {
+            add([0, 1, 2].map(|i| p[i] + (q[i] - p[i]) * (a / (a - b))));
+        }
+    }
+    (out, n)
+}
+
+/// About how many entries all triangles make in cells of an edge, metres.
+fn n_entries(mesh: &Mesh, edge: f32) -> f32 {
+    let of = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|c| Vector3::from(mesh.vertices[c as usize]) / edge);
+        let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
+        1.0 + longest + (b - a).cross(&(c - a)).norm()
+    };
+    mesh.triangles.iter().map(of).sum()
 }
 
 /// Where a beam still meets a triangle that it met before, from any place on it.
 pub(crate) fn again(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<Met> {
-    let t = crosses(mesh, triangle, (at, ray))?;
-    Some(Met { x: at + ray * t, n: towards(mesh, triangle, ray), triangle })
+    crosses(mesh, triangle, (at, ray)).map(|crossed| met((at, ray), crossed, triangle))
 }
 
-fn corners(mesh: &Mesh, triangle: u32) -> [Vector; 3] {
-    let at = |corner: u32| Vector::from(mesh.vertices[corner as usize].map(f64::from));
-    mesh.triangles[triangle as usize].map(at)
+fn met((at, ray): (&Vector, &Vector), (t, n): (f64, Vector), triangle: u32) -> Met {
+    Met { x: at + ray * t, n: n.normalize() * -n.dot(ray).signum(), triangle }
 }
 
-/// The unit normal of a triangle towards where a beam comes from.
-fn towards(mesh: &Mesh, triangle: u32, ray: &Vector) -> Vector {
-    let [a, b, c] = corners(mesh, triangle);
-    let n = (b - a).cross(&(c - a));
-    n.normalize() * -n.dot(ray).signum()
-}
-
-/// How far along a beam, from a place on it, it crosses a triangle; `None` where it passes beside it.
-fn crosses(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<f64> {
-    let [a, b, c] = corners(mesh, triangle);
+/// How far along a beam, from a place on it, it crosses a triangle, and the triangle's normal, of any length; `None` where it
+/// passes beside it.
+fn crosses(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<(f64, Vector)> {
+    let corner = |corner: u32| Vector::from(mesh.vertices[corner as usize].map(f64::from));
+    let [a, b, c] = mesh.triangles[triangle as usize].map(corner);
     let (u, v) = (b - a, c - a);
     let n = u.cross(&v);
     let t = n.dot(&(a - at)) / n.dot(ray);
@@ -190,7 +227,7 @@ fn crosses(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<
     let whole = n.norm_squared();
     let (along_u, along_v) = (w.cross(&v).dot(&n) / whole, u.cross(&w).dot(&n) / whole);
     let is_within = along_u >= -SEAM && along_v >= -SEAM && along_u + along_v <= 1.0 + SEAM;
-    (t.is_finite() && is_within).then_some(t)
+    (t.is_finite() && is_within).then_some((t, n))
 }
 
 #[cfg(test)]
@@ -226,12 +263,42 @@ mod tests {
         let vertices = mesh.vertices.iter().map(|p| p.map(|v| 1000.0 * v)).collect();
         let large = Mesh { vertices, ..mesh };
         let triangles = Triangles::new(&large);
-        assert!(triangles.begins.len() < 2 * MAX_CELLS as usize);
+        assert!(triangles.begins.len() <= MAX_CELLS as usize + 1);
         let at = Vector::new(200.0, 300.0, 0.001);
         assert!(
             (triangles.meet(&large, &at, &down).expect("the top").n - Vector::z()).norm() < 1e-6
         );
+        // A rod a million kilometres long, of no width.
+        let vertices = vec![[0.0; 3], [1e9, 0.0, 0.0], [0.0, 1e-9, 0.0]];
+        let rod = Mesh { vertices, triangles: vec![[0, 1, 2]] };
+        assert!(Triangles::new(&rod).begins.len() <= MAX_CELLS as usize + 1);
         let nothing = Mesh { vertices: Vec::new(), triangles: Vec::new() };
         assert!(Triangles::new(&nothing).meet(&nothing, &at, &down).is_none());
+    }
+
+    #[test]
+    fn a_triangle_is_in_every_cell_that_it_passes_through() {
+        // Slivers, specks and plates.
+        let mut seed = 7_u32;
+        let mut draw = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / (1 << 24) as f32
+        };
+        for width in [1e-4, 0.003, 0.05, 0.4] {
+            let about: [f32; 3] = std::array::from_fn(|_| draw());
+            let end = std::array::from_fn(|i| about[i] + 0.4 * draw());
+            let other = std::array::from_fn(|i| about[i] + width * draw());
+            let mesh = Mesh { vertices: vec![about, end, other], triangles: vec![[0, 1, 2]] };
+            let triangles = Triangles::new(&mesh);
+            for _ in 0..20_000 {
+                let (u, v) = (draw(), draw());
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let p = std::array::from_fn(|i| {
+                    about[i] + u * (end[i] - about[i]) + v * (other[i] - about[i])
+                });
+                let Some(cell) = triangles.grid.holds(p) else { continue };
+                assert!(triangles.begins[cell] < triangles.begins[cell + 1], "{p:?}");
+            }
+        }
     }
 }

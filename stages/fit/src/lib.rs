@@ -34,6 +34,7 @@ mod settings;
 mod solve;
 mod spin;
 mod stays;
+mod strata;
 mod sweep;
 mod together;
 mod tool;

@@ -144,55 +144,6 @@ impl Refine<'_> {
         h
     }
 
-    /// Of `points`, at most `cap` for each link that is nearest to them, evenly picked, and as many again of those that
-    /// lie near the robot but within no link's field: the large links must not outvote the wrist. Sorted.
-    pub(crate) fn stratified(
-        &self,
-        h: &Hypothesis,
-        points: &[u32],
-        (gate, cap): (f64, usize),
-        fan: &impl Fan,
-    ) -> Vec<u32> {
-        let links = self.prepared.frames(h);
-        let placed = Placed::all(self.prepared, h, gate);
-        let n_strata = self.prepared.links.len() + 1;
-        let grown: Vec<_> = links
-            .iter()
-            .map(|(l, _)| self.prepared.model.links[*l].bounds.grown(gate.max(0.05) * 1.7))
-            .collect();
-        let is_about = |p: [f32; 3]| {
-            links.iter().zip(&grown).any(|((_, frame), bounds)| {
-                bounds.contains(geometry::depth::transform(frame, p).map(f64::from))
-            })
-        };
-        let stratum = |i: u32| -> Option<usize> {
-            let p = self.scene.points[i as usize].p;
-            match placed.nearest(p) {
-                Some(near) if near.distance <= gate => Some(near.link),
-                _ => (gate > FINE_REACH && is_about(p)).then_some(n_strata - 1),
-            }
-        };
-        let sorted = fan.fan(points.chunks(CHUNK).collect(), |chunk: &[u32]| {
-            let mut strata: Vec<Vec<u32>> = vec![Vec::new(); n_strata];
-            for i in chunk {
-                if let Some(at) = stratum(*i) {
-                    strata[at].push(*i);
-                }
-            }
-            strata
-        });
-        let mut out = Vec::new();
-        for at in 0..n_strata {
-            let whole: Vec<u32> =
-                sorted.iter().flat_map(|strata| strata[at].iter().copied()).collect();
-            let n = whole.len();
-            let kept = n.min(cap);
-            out.extend((0..kept).map(|k| whole[k * n / kept]));
-        }
-        out.sort_unstable();
-        out
-    }
-
     /// What matches points with the facets of the model as it stands, within the gate.
     fn matching(&self, h: &Hypothesis, gate: f64) -> impl Fn(&u32) -> Option<Match> + Sync + '_ {
         let poses = self.prepared.model.poses(&h.posture);

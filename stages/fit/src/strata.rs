@@ -1,0 +1,109 @@
+//! Points near a robot as it stands in; out come as many of each link as a fit can use.
+
+use contract::Fan;
+use geometry::Aabb;
+use geometry::depth::{Rows, transform};
+
+use crate::beam::Hypothesis;
+use crate::placed::Placed;
+use crate::refine::{CHUNK, FINE_REACH, Refine};
+
+/// One of so many points is looked at to see of which links there are more than enough.
+const SOME: usize = 4;
+
+impl Refine<'_> {
+    /// Of `points`, at most `cap` for each link that is nearest to them, evenly picked, and as many again of those that
+    /// lie near the robot but within no link's field: the large links must not outvote the wrist. Sorted.
+    pub(crate) fn stratified(
+        &self,
+        h: &Hypothesis,
+        points: &[u32],
+        (gate, cap): (f64, usize),
+        fan: &impl Fan,
+    ) -> Vec<u32> {
+        let strata = Strata::new(self, h, gate);
+        let some: Vec<u32> = points.iter().copied().step_by(SOME).collect();
+        let mut sorted = strata.sort(&some, |_| true, fan);
+        // Of most links these are enough; the others are looked for among the rest.
+        let is_open: Vec<bool> = sorted.iter().map(|own| own.len() < cap).collect();
+        let wanted = Placed::new(self.prepared, h, gate, |l| is_open[l]);
+        let is_wanted = |p| wanted.nearest(p).is_some_and(|near| near.distance <= gate);
+        let beside = is_open[strata.beside()] && gate > FINE_REACH;
+        let rest = (0..points.len()).filter(|i| i % SOME != 0).map(|i| points[i]);
+        let rest = strata.sort(&rest.collect::<Vec<_>>(), |p| beside || is_wanted(p), fan);
+        let mut out = Vec::new();
+        for (at, (own, more)) in sorted.iter_mut().zip(rest).enumerate() {
+            if is_open[at] {
+                own.extend(more);
+                own.sort_unstable();
+            }
+            let n = own.len();
+            let kept = n.min(cap);
+            out.extend((0..kept).map(|k| own[k * n / kept]));
+        }
+        out.sort_unstable();
+        out
+    }
+}
+
+/// Links of a robot as it stands, with what lies about it: points are sorted by them.
+struct Strata<'a> {
+    refine: &'a Refine<'a>,
+    placed: Placed<'a>,
+    /// Bounds about each link, and its frame.
+    about: Vec<(Rows, Aabb)>,
+    gate: f64,
+}
+
+impl<'a> Strata<'a> {
+    fn new(refine: &'a Refine<'a>, h: &Hypothesis, gate: f64) -> Self {
+        let room = gate.max(0.05) * 1.7;
+        let links = refine.prepared.frames(h).into_iter();
+        let about =
+            links.map(|(l, frame)| (frame, refine.prepared.model.links[l].bounds.grown(room)));
+        let placed = Placed::all(refine.prepared, h, gate);
+        Self { refine, placed, about: about.collect(), gate }
+    }
+
+    /// The stratum of what lies about the robot, on none of its links: after those of the links.
+    fn beside(&self) -> usize {
+        self.refine.prepared.links.len()
+    }
+
+    /// The stratum of a place, local frame.
+    fn of(&self, p: [f32; 3]) -> Option<usize> {
+        let is_about = || {
+            let holds = |(frame, bounds): &(Rows, Aabb)| {
+                bounds.contains(transform(frame, p).map(f64::from))
+            };
+            self.about.iter().any(holds)
+        };
+        match self.placed.nearest(p) {
+            Some(near) if near.distance <= self.gate => Some(near.link),
+            _ => (self.gate > FINE_REACH && is_about()).then(|| self.beside()),
+        }
+    }
+
+    /// Those of the points that are wanted, by stratum.
+    fn sort(
+        &self,
+        points: &[u32],
+        is_wanted: impl Fn([f32; 3]) -> bool + Sync,
+        fan: &impl Fan,
+    ) -> Vec<Vec<u32>> {
+        let n_strata = self.beside() + 1;
+        let sorted = fan.fan(points.chunks(CHUNK).collect(), |chunk: &[u32]| {
+            let mut strata: Vec<Vec<u32>> = vec![Vec::new(); n_strata];
+            for i in chunk {
+                let p = self.refine.scene.points[*i as usize].p;
+                if let Some(at) = is_wanted(p).then(|| self.of(p)).flatten() {
+                    strata[at].push(*i);
+                }
+            }
+            strata
+        });
+        let whole =
+            |at: usize| sorted.iter().flat_map(|strata| strata[at].iter().copied()).collect();
+        (0..n_strata).map(whole).collect()
+    }
+}
