@@ -8,6 +8,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::beam::{Beam, Hypothesis, sort};
 use crate::judge::Judgement;
+use crate::turns;
 
 /// Share of the links' and the whole score that an alternative may lack and still be refined.
 const SHORT: f64 = 0.15;
@@ -161,8 +162,8 @@ impl Beam<'_> {
     /// made of may be off.
     fn within_limits(&self, free: usize, value: f64) -> Option<f64> {
         let [low, high] = self.prepared.model.limits(free);
-        let value = low - BEYOND + (value - low + BEYOND).rem_euclid(TAU);
-        (value <= high + BEYOND).then_some(value.clamp(low, high))
+        let value = turns::within(value, [low - BEYOND, high + BEYOND])?;
+        Some(value.clamp(low, high))
     }
 
     /// A new search from the joint before the first link that the beams contradict; nothing where they contradict none.

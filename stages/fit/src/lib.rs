@@ -38,6 +38,7 @@ mod strata;
 mod sweep;
 mod together;
 mod tool;
+mod turns;
 mod verdict;
 mod weak;
 

@@ -9,6 +9,7 @@ use crate::beam::Hypothesis;
 use crate::refine::Refine;
 use crate::spin::AS_GOOD;
 use crate::sweep::Sweep;
+use crate::turns;
 
 /// Turns of the tool that are tried with every hole: the best of those at which the tool alone fits best.
 const N_TURNS: usize = 6;
@@ -73,14 +74,13 @@ impl Refine<'_> {
         fan: &impl Fan,
     ) -> Vec<Bolt> {
         let Some(turning) = Turning::new(self, h, near, flange) else { return Vec::new() };
-        let [low, high] = self.prepared.model.limits(flange);
+        let limits = self.prepared.model.limits(flange);
         let (sweep, variance) = (&turning.sweep, self.scene.noise * self.scene.noise);
         let mut all: Vec<(f64, Bolt)> = Vec::new();
         for turn in turning.turns(fan) {
             let of_tool = sweep.distances(turn, &turning.tool);
             for (hole, by) in holes.iter().enumerate() {
-                let value = low + (turn - by - low).rem_euclid(TAU);
-                if value <= high {
+                if let Some(value) = turns::within(turn - by, limits) {
                     let of_arm = sweep.distances(value, &turning.own);
                     let cost = sweep.cost(&[&of_tool, &of_arm]) / variance;
                     all.push((cost, Bolt { hole, value }));

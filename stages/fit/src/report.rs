@@ -14,6 +14,7 @@ use crate::refine::Refine;
 use crate::rivals::lead;
 use crate::solve::{Polished, Settled, few, last_rounds};
 use crate::spin::Spin;
+use crate::turns;
 use crate::verdict::{self, RIVAL};
 
 /// Margin up to which another posture counts as equally good.
@@ -67,7 +68,8 @@ pub(crate) fn report(
     for s in &several {
         open[s.joint] = true;
         let own = h.posture[s.joint];
-        spread[s.joint] = s.values.iter().map(|v| angle(v - own)).fold(spread[s.joint], f64::max);
+        spread[s.joint] =
+            s.values.iter().map(|v| turns::apart(own, *v)).fold(spread[s.joint], f64::max);
     }
     let covariance = in_world_axes(&own, &h.local_from_base);
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
@@ -234,7 +236,7 @@ fn sway(
     let mut n_ends = 1;
     for end in ends[1..].iter().filter(as_good) {
         let change = |j: usize, _| match is_swayed[j] {
-            true => signed(end.posture[j] - ends[0].posture[j]),
+            true => turns::from_to(ends[0].posture[j], end.posture[j]),
             false => 0.0,
         };
         let away = DVector::from_fn(n, change);
@@ -246,17 +248,7 @@ fn sway(
 
 /// Difference of a joint between two postures, whole turns taken out, radians.
 fn turn(a: &Hypothesis, b: &Hypothesis, joint: usize) -> f64 {
-    angle(a.posture[joint] - b.posture[joint])
-}
-
-/// An angle within half a turn either way, radians.
-fn signed(d: f64) -> f64 {
-    d - TAU * (d / TAU).round()
-}
-
-/// Size of an angle, whole turns taken out, radians.
-fn angle(d: f64) -> f64 {
-    signed(d).abs()
+    turns::apart(a.posture[joint], b.posture[joint])
 }
 
 /// Whether two postures are different answers, some joints passed over.

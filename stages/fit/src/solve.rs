@@ -13,6 +13,7 @@ use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Prior, Refine, Round};
 use crate::report::report;
 use crate::rivals::best_of;
 use crate::spin::Spin;
+use crate::turns;
 use crate::{Prepared, Scene, Settings};
 
 /// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans' own noise, not the
@@ -241,8 +242,7 @@ pub(crate) fn settle(
 
 /// Whether a joint's value is another mode, not the same one found again: 3°.
 fn is_other(a: f64, b: f64) -> bool {
-    let d = (a - b).rem_euclid(std::f64::consts::TAU);
-    d.min(std::f64::consts::TAU - d) > 0.052
+    turns::apart(a, b) > 0.052
 }
 
 /// What is looked for beside a polished posture.

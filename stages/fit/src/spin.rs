@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 use crate::beam::Hypothesis;
 use crate::refine::Refine;
 use crate::sweep::Sweep;
+use crate::turns;
 
 /// Values nearer than this to one another are one, radians: 3°.
 const APART: f64 = 0.052;
@@ -89,38 +90,18 @@ impl Refine<'_> {
         good.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut values: Vec<f64> = Vec::new();
         for (value, _) in good {
-            let apart = |v: &f64| {
-                let d = (value - v).rem_euclid(TAU);
-                d.min(TAU - d) > APART
-            };
-            if values.iter().all(apart) {
-                values.push(within(value, [low, high]));
+            if values.iter().all(|v| turns::apart(*v, value) > APART) {
+                // A little beyond a stop that it cannot be turned back from it stays there.
+                values.push(turns::within(value, [low, high]).unwrap_or(value));
             }
         }
         Some(Spin { joint, values, extent })
     }
 }
 
-/// The same turn within the limits of a joint, where it has one there.
-fn within(value: f64, [low, high]: [f64; 2]) -> f64 {
-    let turned = if value < low { value + TAU } else { value - TAU };
-    if (low..=high).contains(&value) || !(low..=high).contains(&turned) { value } else { turned }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{extent, within};
-    use std::f64::consts::TAU;
-
-    #[test]
-    fn turns_beyond_a_stop_are_taken_a_whole_turn_back() {
-        let limits = [-6.2, 6.2];
-        for (value, is) in [(-8.0, TAU - 8.0), (8.0, 8.0 - TAU), (1.0, 1.0), (-6.1, -6.1)] {
-            assert!((within(value, limits) - is).abs() < 1e-12);
-        }
-        // Half a turn is all that there is: a little beyond a stop stays there.
-        assert!((within(1.6, [-1.5, 1.5]) - 1.6).abs() < 1e-12);
-    }
+    use super::extent;
 
     #[test]
     fn runs_reach_as_far_as_values_are_as_good() {

@@ -11,6 +11,7 @@ use crate::mount::Bolt;
 use crate::refine::Refine;
 use crate::solve::{NEAR_MARGIN, Polished, finish, polish, settle};
 use crate::sweep::MIN_POINTS;
+use crate::turns;
 use crate::{Prepared, Scene, Settings};
 
 /// Score of the tool's links from which on it is there: tools that are there have 0.69 and more, others that are taken
@@ -101,9 +102,9 @@ pub fn fit_tool(
     let turned = (1..N_TURNS).filter_map(|k| {
         let mut h = settled.0.hypothesis.clone();
         let value = h.posture.get_mut(flange)?;
-        let [low, high] = tooled.model.limits(flange);
-        *value = low + (*value + TAU * f64::from(k) / f64::from(N_TURNS) - low).rem_euclid(TAU);
-        (*value <= high).then_some(h)
+        let turned = *value + TAU * f64::from(k) / f64::from(N_TURNS);
+        *value = turns::within(turned, tooled.model.limits(flange))?;
+        Some(h)
     });
     let mut others = fan.fan(turned.collect(), |h| polish(&refine, &h, &near, fan));
     // Sides that look alike from afar differ in a bolt or a finger.

@@ -2,9 +2,9 @@
 
 use contract::{Fit, Verdict};
 use robot::JointKind;
-use std::f64::consts::TAU;
 
 use crate::judge::Judgement;
+use crate::turns;
 use crate::weak::weak;
 use crate::{Prepared, Scene};
 
@@ -147,10 +147,7 @@ fn beyond(prepared: &Prepared<'_>, j: usize, value: f64) -> f64 {
 /// What is said of a joint that the points do not determine.
 fn undetermined(fit: &Fit, j: usize) -> String {
     let joint = &fit.joints[j];
-    let apart = |a: f64, b: f64| {
-        let d = (a - b).rem_euclid(TAU);
-        d.min(TAU - d) > KNOWN_SIGMA
-    };
+    let apart = |a: f64, b: f64| turns::apart(a, b) > KNOWN_SIGMA;
     let mut values: Vec<f64> = Vec::new();
     for value in fit.equals.iter().map(|e| e.posture[j]).filter(|v| apart(*v, joint.value)) {
         if values.len() < MAX_VALUES && values.iter().all(|v| apart(*v, value)) {

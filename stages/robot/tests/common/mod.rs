@@ -1,6 +1,9 @@
 //! What the tests share: the folder of real robots, and models written for one test.
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::print_stderr)]
 
+pub mod sheets;
+
+use geometry::{Point, Vector};
 use robot::{Finding, Model, Settings, Severity};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -132,4 +135,43 @@ pub fn arm(n: usize) -> String {
 
 pub fn robot(inner: &str) -> String {
     format!("<?xml version='1.0'?><robot name='r'>{inner}</robot>")
+}
+
+/// The number of a free joint.
+pub fn free(model: &Model, joint: &str) -> usize {
+    model.free.iter().position(|&j| model.joints[j].name == joint).unwrap()
+}
+
+/// Twists against central differences of poses, at random postures.
+pub fn check_twists(model: &Model, seed: u64) {
+    let mut dice = Dice::new(seed);
+    let step = 1e-6;
+    for _ in 0..4 {
+        let posture = dice.posture(model);
+        let at = model.kinematics(&posture);
+        assert_eq!(at.base_from_link, model.poses(&posture));
+        for k in 0..posture.len() {
+            let moved = |by: f64| {
+                let mut posture = posture.clone();
+                posture[k] += by;
+                model.poses(&posture)
+            };
+            let (before, after) = (moved(-step), moved(step));
+            for (l, link) in model.links.iter().enumerate() {
+                let [a, b, c, d, e, f] = at.twists[l][k];
+                let (v, w) = (Vector::new(a, b, c), Vector::new(d, e, f));
+                for p in [Point::origin(), Point::new(0.3, -0.2, 0.5)] {
+                    let expected = (after[l] * p - before[l] * p) / (2.0 * step);
+                    let got = v + w.cross(&(at.base_from_link[l] * p).coords);
+                    let error = (expected - got).norm();
+                    assert!(
+                        error < 1e-6,
+                        "{} {} free {k}: {expected} {got}",
+                        model.name,
+                        link.name
+                    );
+                }
+            }
+        }
+    }
 }
