@@ -181,20 +181,22 @@ impl Adjust<'_> {
         let mut normal = Normal::new(n_robot, self.refine.scene.views.len(), prepared.n_patches);
         let mut tallies = Tallies(vec![(0, 0.0); prepared.links.len()]);
         let slack = state.patch_sigma * state.patch_sigma;
+        let n_alike = self.refine.scene.n_alike;
         let mut robot = vec![0.0; n_robot];
         let pairs = points.iter().zip(known).filter_map(|(&i, known)| pairing.pair(i, known));
         for pair in pairs {
             tallies.add(&pair);
             let scale = (TUKEY * (pair.variance + slack).sqrt()).min(gate);
             let kernel = robust::tukey(pair.r, scale);
-            let variance = self.refine.scene.n_alike * pair.variance;
+            let variance = n_alike * pair.variance;
             let weight = kernel / variance;
             if weight <= 0.0 {
                 continue;
             }
             let u2 = (pair.r / scale).powi(2);
             let slope = (1.0 - u2) * (1.0 - 5.0 * u2) / variance;
-            let influence = [(weight * pair.r).powi(2), slope];
+            // Where many err alike, their residuals are as large as their own variance.
+            let influence = [n_alike * (weight * pair.r).powi(2), slope];
             let q = base_from_local * Point::from(pair.p);
             let n = base_from_local.rotation * pair.n;
             self.refine.row(&q.coords, &n, &kinematics.twists[pair.link], &mut robot[..n_posed]);

@@ -98,8 +98,8 @@ pub(crate) struct Normal {
     gradient: DVector<f64>,
     patches: Vec<Option<Patch>>,
     batch: Batch,
-    /// Sum of w·r².
-    chi2: f64,
+    /// What the priors add to the normal matrix: how well they are known does not depend on the residuals.
+    priors: DMatrix<f64>,
     /// Sums of the rows' influences, of slopes over variance, and of weights.
     kernel: [f64; 3],
     n_rows: usize,
@@ -116,7 +116,7 @@ impl Normal {
             gradient: DVector::zeros(n),
             patches: vec![None; n_patches],
             batch: Batch::new(n_robot + N_SCAN),
-            chi2: 0.0,
+            priors: DMatrix::zeros(n, n),
             kernel: [0.0; 3],
             n_rows: 0,
             sigma2: 0.0,
@@ -148,7 +148,6 @@ impl Normal {
         let w = row.weight;
         patch.weight += w;
         patch.r += w * row.r;
-        self.chi2 += w * row.r * row.r;
         self.kernel[0] += row.influence[0];
         self.kernel[1] += row.influence[1];
         self.kernel[2] += w;
@@ -175,7 +174,6 @@ impl Normal {
         self.flush();
         later.flush();
         self.hessian += later.hessian;
-        self.chi2 += later.chi2;
         self.n_rows += later.n_rows;
         (0..3).for_each(|i| self.kernel[i] += later.kernel[i]);
         for (own, other) in self.patches.iter_mut().zip(later.patches) {
@@ -210,24 +208,28 @@ impl Normal {
 
     pub(crate) fn add_robot_prior(&mut self, hessian: &DMatrix<f64>, gradient: &DVector<f64>) {
         let n = hessian.nrows();
-        let mut block = self.hessian.view_mut((0, 0), (n, n));
-        block += hessian;
+        for matrix in [&mut self.hessian, &mut self.priors] {
+            let mut block = matrix.view_mut((0, 0), (n, n));
+            block += hessian;
+        }
         let mut rows = self.gradient.rows_mut(0, n);
         rows += gradient;
     }
 
     /// One error of a scan is known to be zero, as much as `weight` says; it has the value.
     pub(crate) fn add_scan_prior(&mut self, view: usize, i: usize, value: f64, weight: f64) {
-        let at = self.n_robot + view * N_SCAN + i;
-        self.hessian[(at, at)] += weight;
-        self.gradient[at] += weight * value;
+        self.add_weight(self.n_robot + view * N_SCAN + i, value, weight);
     }
 
     /// One unknown is known to be zero, give or take; it has the value.
     pub(crate) fn add_prior(&mut self, at: usize, value: f64, sigma: f64) {
-        let w = 1.0 / (sigma * sigma);
-        self.hessian[(at, at)] += w;
-        self.gradient[at] += w * value;
+        self.add_weight(at, value, 1.0 / (sigma * sigma));
+    }
+
+    fn add_weight(&mut self, at: usize, value: f64, weight: f64) {
+        self.hessian[(at, at)] += weight;
+        self.priors[(at, at)] += weight;
+        self.gradient[at] += weight * value;
     }
 
     /// The step to the minimum; `None` where the points say nothing.
@@ -252,15 +254,14 @@ impl Normal {
         self.sigma2.sqrt()
     }
 
-    /// Covariance of base twist and joints: the inverse of the normal matrix, widened in every direction in which the
-    /// residuals of whole groups of patches (`groups[patch]`) pull harder than independent errors would.
+    /// Covariance of base twist and joints: the inverse of the normal matrix, as wide as the residuals are, and wider in
+    /// every direction in which those of whole groups of patches (`groups[patch]`) pull harder than independent errors would.
     pub(crate) fn covariance(&self, groups: &[u32]) -> DMatrix<f64> {
         let n_robot = self.n_robot;
         let Some(cholesky) = self.hessian.clone().cholesky() else {
             return DMatrix::identity(n_robot, n_robot) * 1e3;
         };
-        // Model errors beyond what noise and patches explain, as far as the residuals show them.
-        let scale = (self.chi2 / self.n_rows.max(1) as f64).max(1.0);
+        let [share, stretch] = self.kernel_factors();
         let n_groups = groups.iter().max().map_or(0, |g| *g as usize + 1);
         let mut pulls: Vec<Option<DVector<f64>>> = vec![None; n_groups];
         for (patch, group) in self.patches.iter().zip(groups) {
@@ -283,9 +284,13 @@ impl Normal {
             meat *= count / (count - 1.0);
         }
         let mut eigen = meat.symmetric_eigen();
-        eigen.eigenvalues.iter_mut().for_each(|v| *v = v.max(scale));
-        let mut wide =
-            l_inverse.transpose() * eigen.recompose() * &l_inverse * self.kernel_factor();
+        eigen.eigenvalues.iter_mut().for_each(|v| *v = v.max(share));
+        let mut wide = l_inverse.transpose() * eigen.recompose() * &l_inverse * stretch;
+        // Residuals that are smaller than thought make no prior better known.
+        let known = l_inverse.transpose()
+            * (&l_inverse * &self.priors * l_inverse.transpose())
+            * &l_inverse;
+        wide += known * (1.0 - share * stretch).max(0.0);
         // Errors of shape are alike all over a side of a link, and the fit takes most of that in: its residuals do not
         // show it, so the patches' variance stands for it.
         for push in self.pushes(groups, n_groups).into_iter().flatten() {
@@ -305,9 +310,8 @@ impl Normal {
         let mut information =
             self.hessian.view((n, n), (n_scans, n_scans)) + both.transpose() * &gain;
         (0..n_scans).for_each(|i| information[(i, i)] -= priors[i % N_SCAN]);
-        // As in the covariance: residuals may be larger than noise and patches make them, and alike.
-        let scale = (self.chi2 / self.n_rows.max(1) as f64).max(1.0) * self.kernel_factor();
-        Some([gain, information / scale])
+        let [share, stretch] = self.kernel_factors();
+        Some([gain, information / (share * stretch)])
     }
 
     /// Gradient for a unit offset of all patches of each group together.
@@ -321,18 +325,22 @@ impl Normal {
         out
     }
 
-    /// How much wider the kernel makes errors than its weights say: `Σψ²·Σw / (Σψ′)²`, at least 1. Where noise is not
-    /// small against the gate, points beyond it are missing on both sides.
-    fn kernel_factor(&self) -> f64 {
+    /// What the rows show of their own variance, over what was taken for it: `Σψ²/Σw`; and how much wider the kernel makes
+    /// errors than its weights say: `(Σw/Σψ′)²`. Where noise is not small against the gate, points beyond it are missing on
+    /// both sides.
+    fn kernel_factors(&self) -> [f64; 2] {
         let [influence, slope, weight] = self.kernel;
         if slope <= 0.0 {
-            1.0
-        } else {
-            (influence * weight / (slope * slope)).clamp(1.0, MAX_FACTOR)
+            return [1.0, MAX_FACTOR];
         }
+        let stretch = (weight / slope).powi(2).clamp(1.0, MAX_FACTOR);
+        [(influence / weight).max(MIN_SHARE), stretch]
     }
 }
 
+/// Least share of its stated variance that a point keeps: what is left without noise, of meshes and of rounding, is alike
+/// for many points.
+const MIN_SHARE: f64 = 0.3;
 /// Share of the variance of patches' offsets that is common to a side of a link: castings and hulls are off by waves
 /// longer than a patch.
 const ALIKE: f64 = 0.5;
