@@ -21,6 +21,8 @@ const STEPS: f64 = 1.0;
 const LEAD: f64 = 0.1;
 /// So many are compared.
 const N_RIVALS: usize = 3;
+/// So often is the best one's wrist flipped and bent, where another takes its place.
+const N_LOOKS: usize = 3;
 
 /// How clearly the beams, and the points, prefer a posture to another on the links that stand differently.
 pub(crate) fn lead(
@@ -42,18 +44,29 @@ pub(crate) fn best_of(
     (near, all): (&[u32], &[u32]),
     fan: &impl Fan,
 ) -> Settled {
+    let mut best = best;
     let mut rivals = near_rivals((beam, refine), others, &best, near);
-    rivals.extend(fan.fan(beam.flips(&best.0.hypothesis), |flipped| {
-        polish(refine, &roughly(refine, &flipped, near, &COARSE_ROUNDS[3..], fan), near, fan)
-    }));
-    let (best, rest) = compare(refine, best, rivals, (near, all), fan);
-    others.extend(rest);
-    let bends =
-        fan.fan(refine.bends(&best.0.hypothesis, near, fan), |h| polish(refine, &h, near, fan));
-    let rivals = near_rivals((beam, refine), &bends, &best, near);
-    others.extend(bends);
-    let (best, rest) = compare(refine, best, rivals, (near, all), fan);
-    others.extend(rest);
+    for _ in 0..N_LOOKS {
+        let before = best.0.hypothesis.clone();
+        rivals.extend(fan.fan(beam.flips(&before), |flipped| {
+            polish(refine, &roughly(refine, &flipped, near, &COARSE_ROUNDS[3..], fan), near, fan)
+        }));
+        let (better, rest) = compare(refine, best, rivals, (near, all), fan);
+        others.extend(rest);
+        let bends = refine.bends(&better.0.hypothesis, near, fan);
+        let bends = fan.fan(bends, |h| polish(refine, &h, near, fan));
+        let bent = near_rivals((beam, refine), &bends, &better, near);
+        others.extend(bends);
+        let (better, rest) = compare(refine, better, bent, (near, all), fan);
+        others.extend(rest);
+        best = better;
+        // What took its place has flips of its own.
+        let last = before.posture.len().saturating_sub(2);
+        if beam.alike(&before, &best.0.hypothesis, last, STEPS) {
+            break;
+        }
+        rivals = Vec::new();
+    }
     best
 }
 
