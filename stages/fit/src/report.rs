@@ -32,8 +32,10 @@ const OTHER_BASE: f64 = 0.03;
 /// Most equals that are listed.
 const N_EQUALS: usize = 4;
 
-/// Other values of a joint at which the joints before it are asked how far they give way.
+/// Other values of a joint at which the joints before it are asked how far they give way …
 const N_SWAYS: usize = 8;
+/// … and values all around, where those are fewer.
+const N_AROUND: usize = 5;
 
 /// What is reported of the best, given the others.
 pub(crate) fn report(
@@ -219,9 +221,17 @@ fn sway(
     }
     let turned = several.iter().flat_map(|s| {
         let n = (s.values.len() - 1).min(N_SWAYS);
-        (0..n).map(move |k| &s.values[1 + k * (s.values.len() - 1) / n]).map(|value| {
+        let listed = (0..n).map(|k| s.values[1 + k * (s.values.len() - 1) / n]);
+        // Where joints before it stand otherwise, it may as well stand where here it may not.
+        let around = (n < N_SWAYS).then(|| {
+            let by = |k: usize| h.posture[s.joint] + TAU * k as f64 / (N_AROUND + 1) as f64;
+            let limits = refine.prepared.model.limits(s.joint);
+            (1..=N_AROUND).filter_map(move |k| turns::within(by(k), limits))
+        });
+        let all: Vec<f64> = listed.chain(around.into_iter().flatten()).collect();
+        all.into_iter().map(|value| {
             let mut other = h.clone();
-            other.posture[s.joint] = *value;
+            other.posture[s.joint] = value;
             other
         })
     });
@@ -233,17 +243,20 @@ fn sway(
     // Where it ended at something worse, it is no value that the joint may stand at.
     let as_good = |end: &&Hypothesis| refine.worsening(&ends[0], end, near) < EQUAL;
     let is_swayed: Vec<bool> = (0..n).map(|j| several.iter().all(|s| s.joint != j)).collect();
-    let mut n_ends = 1;
+    let mut modes: Vec<&Hypothesis> = vec![&ends[0]];
     for end in ends[1..].iter().filter(as_good) {
+        if modes.iter().any(|mode| several.iter().all(|s| turn(mode, end, s.joint) < OTHER)) {
+            continue;
+        }
+        modes.push(end);
         let change = |j: usize, _| match is_swayed[j] {
             true => turns::from_to(ends[0].posture[j], end.posture[j]),
             false => 0.0,
         };
         let away = DVector::from_fn(n, change);
         out += &away * away.transpose();
-        n_ends += 1;
     }
-    out / f64::from(n_ends)
+    out / modes.len() as f64
 }
 
 /// Difference of a joint between two postures, whole turns taken out, radians.
