@@ -254,7 +254,7 @@ impl Adjust<'_> {
             covariance: normal.covariance(&self.refine.prepared.patch_groups),
             hypothesis: state.hypothesis,
             scans: state.scans,
-            shared: normal.shared(&scan_priors(self.settings())),
+            shared: normal.shared(),
             patch_sigma: normal.patch_sigma(),
             n_points,
             link_rms,

@@ -3,7 +3,7 @@
 //! A sample stands for all of the surface that is nearer to it than to others: at bends its plane is off by a tenth of a
 //! millimetre, and beside an edge it may be that of the other face, millimetres off. The mesh itself knows.
 
-use geometry::Vector;
+use geometry::{Aabb, Vector};
 use nalgebra::Vector3;
 use robot::Mesh;
 
@@ -98,12 +98,9 @@ impl Triangles {
 impl Grid {
     /// `None` where there is no surface.
     fn over(mesh: &Mesh) -> Option<Self> {
-        let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
-        for p in &mesh.vertices {
-            low = [0, 1, 2].map(|i| low[i].min(p[i]));
-            high = [0, 1, 2].map(|i| high[i].max(p[i]));
-        }
-        let size = [0, 1, 2].map(|i| high[i] - low[i]);
+        let mut bounds = Aabb::EMPTY;
+        mesh.vertices.iter().for_each(|p| bounds.add(p.map(f64::from)));
+        let (low, size) = (bounds.min.map(|v| v as f32), bounds.size().map(|v| v as f32));
         let longest = size.into_iter().fold(0.0, f32::max);
         let is_sound = !mesh.triangles.is_empty() && size.iter().all(|v| v.is_finite());
         let cells = |edge: f32| size.map(|v| v / edge + 1.0).iter().product::<f32>();

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{N_SCAN, Normal};
+use super::Normal;
 
 /// Share of the variance of patches' offsets that is common to a side of a link: castings and hulls are off by waves
 /// longer than a patch.
@@ -59,16 +59,16 @@ impl Normal {
         wide.view((0, 0), (n_robot, n_robot)).into_owned()
     }
 
-    /// What the residuals say of the scans' errors whatever the robot does, without the priors (of each of the seven, m⁻² or
-    /// rad⁻²), and how the robot gives way to each of them.
-    pub(crate) fn shared(&self, priors: &[f64; N_SCAN]) -> Option<[DMatrix<f64>; 2]> {
+    /// What the residuals say of the scans' errors whatever the robot does, without the priors, and how the robot gives way to
+    /// each of them.
+    pub(crate) fn shared(&self) -> Option<[DMatrix<f64>; 2]> {
         let (n, n_scans) = (self.n_robot, self.n - self.n_robot);
         let robot = self.hessian.view((0, 0), (n, n)).into_owned().cholesky()?;
         let both = self.hessian.view((0, n), (n, n_scans)).into_owned();
         let gain = -robot.solve(&both);
-        let mut information =
-            self.hessian.view((n, n), (n_scans, n_scans)) + both.transpose() * &gain;
-        (0..n_scans).for_each(|i| information[(i, i)] -= priors[i % N_SCAN]);
+        let of_scans = |m: &DMatrix<f64>| m.view((n, n), (n_scans, n_scans)).into_owned();
+        let information =
+            of_scans(&self.hessian) + both.transpose() * &gain - of_scans(&self.priors);
         let [share, stretch] = self.kernel_factors();
         Some([gain, information / (share * stretch)])
     }
@@ -99,7 +99,7 @@ impl Normal {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Row;
+    use super::super::{N_SCAN, Row};
     use super::*;
 
     #[test]
