@@ -15,8 +15,9 @@ use crate::Settings;
 use crate::beam::Hypothesis;
 use crate::calibrate::Frames;
 use crate::normal::{N_SCAN, Normal, Row};
-use crate::pairs::{Known, Pair, Pairing};
+use crate::pairs::{Known, Pairing};
 use crate::refine::{CHUNK, Refine};
+use crate::tallies::Tallies;
 
 /// How a scan differs from its stated pose, as far as the points near a robot tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +55,8 @@ pub(crate) struct Adjusted {
     pub(crate) covariance: DMatrix<f64>,
     /// One for each view.
     pub(crate) scans: Vec<ScanError>,
+    /// Noise of the ranges as the residuals show it, metres, one sigma; at most what it started with.
+    pub(crate) noise: f64,
     /// How the robot gives way to those, and what its points say of them (see [`Normal::shared`]).
     pub(crate) shared: Option<[DMatrix<f64>; 2]>,
     /// How far the model's surface is off, standard deviation over its patches, metres.
@@ -68,7 +71,7 @@ impl Adjusted {
     /// Where it stands, to go on from.
     pub(crate) fn state(&self) -> State {
         let (hypothesis, scans) = (self.hypothesis.clone(), self.scans.clone());
-        State { hypothesis, scans, patch_sigma: self.patch_sigma }
+        State { hypothesis, scans, noise: self.noise, patch_sigma: self.patch_sigma }
     }
 }
 
@@ -91,6 +94,8 @@ const TUKEY: f64 = 4.685;
 pub(crate) struct State {
     pub(crate) hypothesis: Hypothesis,
     pub(crate) scans: Vec<ScanError>,
+    /// What is taken for the noise of the ranges, metres, one sigma.
+    pub(crate) noise: f64,
     pub(crate) patch_sigma: f64,
 }
 
@@ -107,9 +112,9 @@ impl Adjust<'_> {
         gate: f64,
         fan: &impl Fan,
     ) -> Adjusted {
-        let n_views = self.refine.scene.views.len();
-        let scans = vec![ScanError::NONE; n_views];
-        let start = State { hypothesis: start.clone(), scans, patch_sigma: 0.0 };
+        let scene = self.refine.scene;
+        let (hypothesis, scans) = (start.clone(), vec![ScanError::NONE; scene.views.len()]);
+        let start = State { hypothesis, scans, noise: scene.noise, patch_sigma: 0.0 };
         self.run_from(start, points, gate, fan)
     }
 
@@ -179,7 +184,7 @@ impl Adjust<'_> {
         let n_robot = n_posed + 6 * self.frames.len();
         let frames = Frames::new(prepared.model, &kinematics, self.frames);
         let mut normal = Normal::new(n_robot, self.refine.scene.views.len(), prepared.n_patches);
-        let mut tallies = Tallies(vec![(0, 0.0); prepared.links.len()]);
+        let mut tallies = Tallies::new(prepared.links.len());
         let slack = state.patch_sigma * state.patch_sigma;
         let n_alike = self.refine.scene.n_alike;
         let mut robot = vec![0.0; n_robot];
@@ -248,16 +253,15 @@ impl Adjust<'_> {
     }
 
     fn finish(&self, state: State, tallies: &Tallies, normal: &Normal) -> Adjusted {
-        let n_points = tallies.0.iter().map(|(n, _)| *n).collect();
-        let link_rms = tallies.0.iter().map(|(n, rr)| (rr / (*n).max(1) as f64).sqrt()).collect();
         Adjusted {
+            noise: state.noise * tallies.scale().min(1.0),
             covariance: normal.covariance(&self.refine.prepared.patch_groups),
             hypothesis: state.hypothesis,
             scans: state.scans,
             shared: normal.shared(),
             patch_sigma: normal.patch_sigma(),
-            n_points,
-            link_rms,
+            n_points: tallies.n_points(),
+            link_rms: tallies.rms(),
         }
     }
 }
@@ -266,23 +270,4 @@ impl Adjust<'_> {
 pub(crate) fn scan_priors(settings: &Settings) -> [f64; N_SCAN] {
     let [shift, turn, bias] = settings.scan_sigma.map(|sigma| 1.0 / (sigma * sigma));
     [shift, shift, shift, turn, turn, turn, bias]
-}
-
-/// For each link: points within the gate, and the sum of the squares of their distances, m².
-struct Tallies(Vec<(usize, f64)>);
-
-impl Tallies {
-    fn add(&mut self, pair: &Pair) {
-        let (n, rr) = &mut self.0[pair.link];
-        *n += 1;
-        *rr += pair.r * pair.r;
-    }
-
-    fn join(mut self, later: &Self) -> Self {
-        for ((n, rr), (other_n, other_rr)) in self.0.iter_mut().zip(&later.0) {
-            *n += other_n;
-            *rr += other_rr;
-        }
-        self
-    }
 }

@@ -74,8 +74,7 @@ fn estimate(
         let points: Vec<u32> = points.into_iter().step_by(every).collect();
         let mut done = Adjust { refine: &refine, frames: &[] }.run(&h, &points, gate, fan);
         h = done.hypothesis.clone();
-        let (scans, patch_sigma) = (done.scans.clone(), done.patch_sigma);
-        let state = State { hypothesis: h.clone(), scans, patch_sigma };
+        let state = done.state();
         let with_frames = Adjust { refine: &refine, frames: &nominal.free };
         let mut normal = with_frames.at(&state, &points, gate, fan);
         let frames = frames(nominal, &model);

@@ -36,6 +36,7 @@ mod spin;
 mod stays;
 mod strata;
 mod sweep;
+mod tallies;
 mod together;
 mod tool;
 mod turns;

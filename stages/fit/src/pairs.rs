@@ -73,7 +73,7 @@ impl<'a> Pairing<'a> {
             placed: Placed::all(refine.prepared, &state.hypothesis, gate),
             scanners: (0..scene.views.len()).map(|v| scene.scanner(v as u16)).collect(),
             turns: state.scans.iter().map(turn).collect(),
-            sigma2: scene.noise * scene.noise,
+            sigma2: state.noise * state.noise,
         }
     }
 

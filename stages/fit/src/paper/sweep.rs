@@ -7,10 +7,19 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use super::Paper;
 use crate::beam::Hypothesis;
 
-/// Samples of a link in a sweep.
-const N_SAMPLES: usize = 120;
-/// Distances count up to this, metres: beyond, one place is as wrong as another.
-const CAP: f64 = 0.05;
+/// How closely a link is looked at.
+#[derive(Clone, Copy)]
+struct Look {
+    /// Samples of it.
+    n_samples: usize,
+    /// Distances count up to this, metres: beyond, one place is as wrong as another.
+    cap: f64,
+}
+
+/// Over all of a joint's range, and round the best.
+const LOOKS: [Look; 2] = [Look { n_samples: 240, cap: 0.05 }, Look { n_samples: 800, cap: 0.02 }];
+/// Of the base.
+const BASE: Look = Look { n_samples: 960, cap: 0.05 };
 /// A sample moves off its surface if a quarter turn takes it farther than this from it, metres.
 const OFF_SURFACE: f32 = 0.012;
 
@@ -20,15 +29,49 @@ impl Paper<'_> {
     pub(super) fn sweep(&self, h: &Hypothesis, joint: usize) -> f64 {
         let next = (joint + 1..h.posture.len()).find(|&j| !self.prepared.placed_by[j].is_empty());
         let ahead = next.filter(|_| self.is_near_symmetric(joint));
+        let mut best: Option<[f64; 2]> = None;
+        let mut before = f64::INFINITY;
+        for (step, look) in self.settings.sweep_step.into_iter().zip(LOOKS) {
+            // Round the best so far, one step of the round before to each side.
+            let own = self.values(joint, best.map(|b| (b[0], 2.0 * before)), step);
+            // The child's own angle needs only be near for its parent's to be told.
+            let child = ahead.map(|next| {
+                (next, self.values(next, best.map(|b| (b[1], 2.0 * before)), 2.0 * step))
+            });
+            let tried = own.into_iter().map(|value| self.tried(h, (joint, value), &child, look));
+            best = tried.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at);
+            before = step;
+        }
+        best.map_or(0.0, |b| b[0])
+    }
+
+    /// Values of a joint in equal steps: all of its range, or near a value.
+    fn values(&self, joint: usize, near: Option<(f64, f64)>, step: f64) -> Vec<f64> {
         let (low, span) = self.span(joint);
-        let [coarse, fine] = self.settings.sweep_step;
-        let n = (span / coarse).ceil().max(1.0) as usize;
-        let cost = |value: f64| self.cost(h, joint, value, ahead);
-        let tried = (0..=n).map(|k| low + span * k as f64 / n as f64);
-        let best = least(tried, &cost);
-        let steps = (coarse / fine).ceil() as i32;
-        let limit = |v: f64| v.clamp(low, low + span);
-        least((-steps..=steps).map(|k| limit(best + f64::from(k) * fine)), &cost)
+        let [from, to] = near.map_or([low, low + span], |(at, reach)| [at - reach, at + reach]);
+        let n = ((to - from) / step).ceil().max(1.0);
+        let value = |k: usize| (from + (to - from) * k as f64 / n).clamp(low, low + span);
+        (0..=n as usize).map(value).collect()
+    }
+
+    /// Mean distance with a joint at a value, and those of the joint and of its child.
+    fn tried(
+        &self,
+        h: &Hypothesis,
+        (joint, value): (usize, f64),
+        child: &Option<(usize, Vec<f64>)>,
+        look: Look,
+    ) -> (f64, [f64; 2]) {
+        let mut trial = h.clone();
+        trial.posture[joint] = value;
+        let own = self.off(&trial, joint, look);
+        let Some((next, values)) = child else { return (own, [value, 0.0]) };
+        let turned = values.iter().map(|&v| {
+            trial.posture[*next] = v;
+            (self.off(&trial, *next, look), v)
+        });
+        let (least, at) = turned.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0.0));
+        (own + least, [value, at])
     }
 
     /// Smallest value and width of a joint's sweep.
@@ -39,49 +82,53 @@ impl Paper<'_> {
         (low, if turns { (high - low).min(TAU) } else { high - low })
     }
 
-    fn cost(&self, h: &Hypothesis, joint: usize, value: f64, ahead: Option<usize>) -> f64 {
-        let mut trial = h.clone();
-        trial.posture[joint] = value;
-        let own = self.off(&trial, joint);
-        let Some(next) = ahead else { return own };
-        let (low, span) = self.span(next);
-        // The child's own angle needs only be near for its parent's to be told.
-        let n = (span / (2.0 * self.settings.sweep_step[0])).ceil().max(1.0) as usize;
-        let child = (0..=n).map(|k| {
-            trial.posture[next] = low + span * k as f64 / n as f64;
-            self.off(&trial, next)
-        });
-        own + child.fold(f64::INFINITY, f64::min)
-    }
-
     /// Mean distance of the visible samples of a joint's links from what was measured, metres.
-    fn off(&self, h: &Hypothesis, joint: usize) -> f64 {
-        let poses = self.prepared.model.poses(&h.posture);
+    fn off(&self, h: &Hypothesis, joint: usize, look: Look) -> f64 {
+        let model = self.prepared.model;
+        let poses = model.poses(&h.posture);
+        let placed = |l: usize| (l, h.local_from_base * poses[l]);
+        let parent = placed(model.joints[model.free[joint]].parent);
         let links = &self.prepared.placed_by[joint];
-        self.off_links(links.iter().map(|&l| (l, h.local_from_base * poses[l])), N_SAMPLES)
+        self.off_links(links.iter().map(|&l| placed(l)), Some(parent), look)
     }
 
     /// That of the base.
     pub(super) fn off_base(&self, local_from_base: &Pose) -> f64 {
-        self.off_links([(self.base, local_from_base * self.base_pose())].into_iter(), 8 * N_SAMPLES)
+        let base = (self.base, local_from_base * self.base_pose());
+        self.off_links([base].into_iter(), None, BASE)
     }
 
-    /// Mean distance of the visible samples of links at poses from what was measured, metres.
-    fn off_links(&self, links: impl Iterator<Item = (usize, Pose)>, n_samples: usize) -> f64 {
+    /// Mean distance of the visible samples of links at poses from what was measured, metres: those that face a scanner and
+    /// are not within the link that carries them.
+    fn off_links(
+        &self,
+        links: impl Iterator<Item = (usize, Pose)>,
+        parent: Option<(usize, Pose)>,
+        look: Look,
+    ) -> f64 {
         let (mut sum, mut n) = (0.0, 0_usize);
+        let is_within = |at: &Point| {
+            parent.is_some_and(|(link, pose)| {
+                let q = pose.inverse_transform_point(at);
+                self.closest(link, &q).is_some_and(|(x, n)| n.dot(&(q - x)) < 0.0)
+            })
+        };
         for (link, pose) in links {
-            let (points, normals) = self.prepared.samples(link, n_samples);
+            let (points, normals) = self.prepared.samples(link, look.n_samples);
             for (p, normal) in points.iter().zip(normals) {
                 let at = pose * Point::from(p.map(f64::from));
+                if is_within(&at) {
+                    continue;
+                }
                 let facing = pose.rotation * Vector::from(normal.map(f64::from));
-                let found = self.lattices.nearest(&at, &facing, self.settings.window, CAP);
+                let found = self.lattices.nearest(&at, &facing, self.settings.window, look.cap);
                 if let Some(d) = found {
                     sum += d;
                     n += 1;
                 }
             }
         }
-        if n == 0 { CAP } else { sum / n as f64 }
+        if n == 0 { look.cap } else { sum / n as f64 }
     }
 
     /// Whether few samples of the joint's links leave their surface in a quarter turn.
@@ -113,8 +160,4 @@ impl Paper<'_> {
         }
         (off as f64) < self.settings.near_symmetric * n as f64
     }
-}
-
-fn least(values: impl Iterator<Item = f64>, cost: &impl Fn(f64) -> f64) -> f64 {
-    values.map(|v| (cost(v), v)).min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |(_, v)| v)
 }
