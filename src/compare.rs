@@ -5,6 +5,7 @@ use export::{ResultFile, RobotEntry};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use simulate::{TrueRobot, Truth};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -63,9 +64,32 @@ pub struct Found {
     pub n_postures: usize,
     /// Error of the base: metres, radians.
     pub base: [f64; 2],
-    /// Name, error (radians or metres; turns of 360° taken out), stated standard deviation, whether it is said to be
-    /// determined by the points.
-    pub joints: Vec<(String, f64, f64, bool)>,
+    /// One for each joint that both name.
+    pub joints: Vec<JointError>,
+}
+
+/// How far a joint's value is off.
+#[derive(Debug, Clone)]
+pub struct JointError {
+    /// Its name.
+    pub name: String,
+    /// Found minus true value, radians or metres; turns of 360° taken out.
+    pub error: f64,
+    /// Stated standard deviation, same unit.
+    pub sigma: f64,
+    /// Whether it is said to be determined by the points.
+    pub determined: bool,
+    /// Whether it slides: its values are metres.
+    pub slides: bool,
+}
+
+impl Found {
+    /// Largest error of a joint that turns and is said to be determined, degrees.
+    #[must_use]
+    pub fn worst_joint_deg(&self) -> f64 {
+        let joints = self.joints.iter().filter(|j| j.determined && !j.slides);
+        joints.map(|j| j.error.abs().to_degrees()).fold(0.0, f64::max)
+    }
 }
 
 impl Agreement {
@@ -200,15 +224,11 @@ impl Agreement {
         if hit == 0.0 { 0.0 } else { 2.0 * hit / (2.0 * hit + missed + invented) }
     }
 
-    /// Largest error of a joint that is said to be determined, degrees (metres × 57 for prismatic ones are left out).
+    /// Largest error of a joint that turns and is said to be determined, over all robots, degrees.
     #[must_use]
     pub fn worst_joint_deg(&self) -> f64 {
         let found = self.robots.iter().filter_map(|r| r.found.as_ref());
-        found
-            .flat_map(|f| &f.joints)
-            .filter(|j| j.3)
-            .map(|j| j.1.abs().to_degrees())
-            .fold(0.0, f64::max)
+        found.map(Found::worst_joint_deg).fold(0.0, f64::max)
     }
 
     /// A table for people.
@@ -230,13 +250,15 @@ impl Agreement {
                 found.base[0] * 1e3,
                 found.base[1].to_degrees()
             );
-            for (name, error, sigma, determined) in &found.joints {
+            for JointError { name, error, sigma, determined, slides } in &found.joints {
                 let note = if *determined { "" } else { "  (not determined by the points)" };
+                let (factor, unit) =
+                    if *slides { (1e3, " mm") } else { (1_f64.to_degrees(), "°") };
                 let _ = writeln!(
                     text,
-                    "             {name:<26} error {:>8.4}°  stated ± {:.4}°{note}",
-                    error.to_degrees(),
-                    sigma.to_degrees()
+                    "             {name:<26} error {:>8.4}{unit}  stated ± {:.4}{unit}{note}",
+                    error * factor,
+                    sigma * factor
                 );
             }
         }
@@ -308,21 +330,23 @@ fn match_robot(
     }
 }
 
-/// Error, stated standard deviation and whether it is said to be determined, of each joint against a true posture.
-fn off(robot: &RobotEntry, truth: &BTreeMap<String, f64>) -> Vec<(String, f64, f64, bool)> {
+/// The joints against a true posture.
+fn off(robot: &RobotEntry, truth: &BTreeMap<String, f64>) -> Vec<JointError> {
     let joints = robot.joints.0.iter().filter_map(|(name, value)| {
         let truth = truth.get(name)?;
         let sigma = robot.sigma.0.iter().find(|s| s.0 == *name)?.1;
         let determined = robot.determined.0.iter().any(|d| d.0 == *name && d.1);
-        let turns = ((value - truth) / std::f64::consts::TAU).round() * std::f64::consts::TAU;
-        Some((name.clone(), value - truth - turns, sigma, determined))
+        let slides = robot.slides.contains(name);
+        let off = value - truth;
+        let error = if slides { off } else { off - (off / TAU).round() * TAU };
+        Some(JointError { name: name.clone(), error, sigma, determined, slides })
     });
     joints.collect()
 }
 
 /// Largest error of a joint that is said to be determined, radians or metres.
-fn worst(joints: &[(String, f64, f64, bool)]) -> f64 {
-    joints.iter().filter(|j| j.3).map(|j| j.1.abs()).fold(0.0, f64::max)
+fn worst(joints: &[JointError]) -> f64 {
+    joints.iter().filter(|j| j.determined).map(|j| j.error.abs()).fold(0.0, f64::max)
 }
 
 fn rotation(wxyz: [f64; 4]) -> UnitQuaternion<f64> {

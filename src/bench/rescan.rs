@@ -4,7 +4,7 @@
 use super::cases::{Case, CaseRow, Cases};
 use super::robots_of;
 use super::watch::{command, watch};
-use crate::compare::{Agreement, RobotAgreement};
+use crate::compare::{Agreement, Found, RobotAgreement};
 use crate::engine::Engine;
 use crate::job::Means;
 use crate::library;
@@ -160,13 +160,10 @@ fn on_disk(path: &Path) -> Result<()> {
     synced.map_err(|e| Error::from(e).at(path.display()))
 }
 
-/// Largest error of a determined joint of the robot that moved, degrees.
+/// Largest error of a determined joint of the robot that moved, degrees; no number where it was not found.
 fn joint(agreement: &Agreement) -> f64 {
     let found = agreement.robots.first().and_then(|robot| robot.found.as_ref());
-    let joints = found.iter().flat_map(|f| &f.joints).filter(|j| j.3);
-    joints
-        .map(|j| j.1.abs().to_degrees())
-        .fold(if found.is_some() { 0.0 } else { f64::NAN }, f64::max)
+    found.map_or(f64::NAN, Found::worst_joint_deg)
 }
 
 /// Compares the list of changes with what was changed.

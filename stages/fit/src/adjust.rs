@@ -253,8 +253,11 @@ impl Adjust<'_> {
     }
 
     fn finish(&self, state: State, tallies: &Tallies, normal: &Normal) -> Adjusted {
+        // Where many err alike, their scatter does not tell how far they are off.
+        let is_alike = self.refine.scene.n_alike > 1.0;
+        let scale = if is_alike { 1.0 } else { tallies.scale().min(1.0) };
         Adjusted {
-            noise: state.noise * tallies.scale().min(1.0),
+            noise: state.noise * scale,
             covariance: normal.covariance(&self.refine.prepared.patch_groups),
             hypothesis: state.hypothesis,
             scans: state.scans,

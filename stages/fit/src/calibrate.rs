@@ -10,7 +10,7 @@ use geometry::{Pose, Vector, robust};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::{JointKind, Kinematics, Model};
 
-use crate::adjust::{Adjust, Adjusted, State};
+use crate::adjust::{Adjust, Adjusted};
 use crate::beam::Hypothesis;
 use crate::normal::Normal;
 use crate::refine::Refine;
