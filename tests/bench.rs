@@ -1,5 +1,5 @@
-//! Cells drawn from seeds, scanned and searched by `bench accuracy`: mounts, closed loops and the source's method are
-//! right in them, and what is written can be read.
+//! Cells drawn from seeds, scanned and searched by `bench accuracy`: mounts, closed loops, scans without noise and the
+//! source's method are right in them, and what is written can be read.
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 use std::path::Path;
@@ -44,6 +44,19 @@ fn robots_hang_from_ceilings_and_walls_and_follow_their_loops() {
         let [turn, shift] = [0, 1].map(|i| row["sub"][i].as_f64().expect("a number"));
         assert!(turn.to_degrees() < 0.1 && shift < 1e-3, "{row:#}");
     }
+}
+
+#[test]
+fn small_arms_are_exact_where_scans_are() {
+    let out = tempfile::tempdir().expect("a folder");
+    let rows = rows(
+        out.path(),
+        &["--suite", "paper", "--model", "arm", "--cases", "1", "--seed", "81010"],
+    );
+    let row = &rows[0];
+    assert_eq!(row["verdict"], "trusted", "{row:#}");
+    // Points beside edges that were matched with another face made it 0.02°.
+    assert!(worst(row) < 0.01, "{row:#}");
 }
 
 #[test]
