@@ -32,12 +32,11 @@ impl Paper<'_> {
         let mut best: Option<[f64; 2]> = None;
         let mut before = f64::INFINITY;
         for (step, look) in self.settings.sweep_step.into_iter().zip(LOOKS) {
-            // Round the best so far, one step of the round before to each side.
-            let own = self.values(joint, best.map(|b| (b[0], 2.0 * before)), step);
+            // Round the best so far, two steps of the round before to each side.
+            let near = |which: usize| best.map(|b| (b[which], 2.0 * before));
+            let own = self.values(joint, near(0), step);
             // The child's own angle needs only be near for its parent's to be told.
-            let child = ahead.map(|next| {
-                (next, self.values(next, best.map(|b| (b[1], 2.0 * before)), 2.0 * step))
-            });
+            let child = ahead.map(|next| (next, self.values(next, near(1), 2.0 * step)));
             let tried = own.into_iter().map(|value| self.tried(h, (joint, value), &child, look));
             best = tried.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at);
             before = step;
