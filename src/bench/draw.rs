@@ -191,7 +191,7 @@ fn plate(
     Some(surface * Pose::from_parts(Translation3::identity(), spin))
 }
 
-/// Starts of the refinement alone, where the case asks for it: every joint and the base off by something.
+/// Starts of the refinement alone, where the case asks for it: the truth, then every joint and the base off by something.
 pub(super) fn starts(case: &Case, drawn: &Drawn) -> Vec<Start> {
     let off = case.condition.perturbed_deg.to_radians();
     if off == 0.0 {
@@ -204,7 +204,8 @@ pub(super) fn starts(case: &Case, drawn: &Drawn) -> Vec<Start> {
         let moved = Pose::new(vector(START_BASE.0), vector(START_BASE.1));
         (drawn.world_from_base * moved, posture)
     };
-    (0..N_STARTS).map(start).collect()
+    let truth = (drawn.world_from_base, drawn.posture.clone());
+    std::iter::once(truth).chain((0..N_STARTS).map(start)).collect()
 }
 
 fn named(model: &Model, posture: &[f64]) -> std::collections::BTreeMap<String, f64> {

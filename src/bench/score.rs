@@ -113,19 +113,18 @@ impl Row {
         self.determined().filter(|j| !j.slides)
     }
 
-    /// The refinement alone: which starts came home. What a wrist of round parts leaves open does not count.
+    /// The refinement alone: which starts came home, to the truth or to where the start at the truth itself ended: a few
+    /// points on a small wrist pull it off. What a wrist of round parts leaves open does not count.
     fn with_ends(mut self, case: &Case, model: &Model, drawn: &Drawn, found: &Found) -> Self {
         let n = model.free.len();
+        let Some(((_, from_truth), ends)) = found.ends.split_first() else { return self };
         let home = |(_, posture): &&Start| {
-            let off = |j: usize| {
-                let e = posture[j] - drawn.posture[j];
-                (e - (e / TAU).round() * TAU).abs()
-            };
-            (0..n.saturating_sub(1)).all(|j| off(j) < RIGHT)
+            let near = |j: usize, other: &[f64]| turns_apart(posture[j], other[j]) < RIGHT;
+            (0..n.saturating_sub(1)).all(|j| near(j, &drawn.posture) || near(j, from_truth))
         };
         self.perturbed_deg = case.condition.perturbed_deg;
-        self.n_starts = found.ends.len();
-        self.n_home = found.ends.iter().filter(home).count();
+        self.n_starts = ends.len();
+        self.n_home = ends.iter().filter(home).count();
         self
     }
 
@@ -157,6 +156,11 @@ impl Row {
         };
         format!("{} {} {}: {what}{invented}", self.suite, self.model, self.seed)
     }
+}
+
+/// How far two values of a joint are apart, whole turns taken out, radians.
+fn turns_apart(a: f64, b: f64) -> f64 {
+    (a - b - ((a - b) / TAU).round() * TAU).abs()
 }
 
 /// The figures of a case.

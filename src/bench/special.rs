@@ -178,7 +178,10 @@ fn basin(rows: &[Row]) -> String {
     if steps.is_empty() {
         return out;
     }
-    out.push_str("\nStarts of the refinement alone that come home (all joints but the last within 0.3°):\n\n");
+    out.push_str(
+        "\nStarts of the refinement alone that come home (all joints but the last within 0.3° of the truth, or of where \
+         the start at it ends):\n\n",
+    );
     out.push_str("| every joint off by up to, ° | starts | home |\n| --- | --- | --- |\n");
     for step in steps {
         let own = || rows.iter().filter(|r| r.n_starts > 0 && r.perturbed_deg == step);
