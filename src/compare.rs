@@ -2,10 +2,10 @@
 
 use contract::{Error, Kind, PointKind, Result};
 use export::{ResultFile, RobotEntry};
+use fit::turns;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use simulate::{TrueRobot, Truth};
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -337,8 +337,7 @@ fn off(robot: &RobotEntry, truth: &BTreeMap<String, f64>) -> Vec<JointError> {
         let sigma = robot.sigma.0.iter().find(|s| s.0 == *name)?.1;
         let determined = robot.determined.0.iter().any(|d| d.0 == *name && d.1);
         let slides = robot.slides.contains(name);
-        let off = value - truth;
-        let error = if slides { off } else { off - (off / TAU).round() * TAU };
+        let error = if slides { value - truth } else { turns::from_to(*truth, *value) };
         Some(JointError { name: name.clone(), error, sigma, determined, slides })
     });
     joints.collect()

@@ -4,10 +4,10 @@ use super::cell::{Found, Start};
 use super::condition::Case;
 use super::draw::{Drawn, Mount};
 use contract::{Calibration, Error, Fit, Verdict};
+use fit::turns;
 use geometry::{Point, Pose};
 use robot::{JointKind, Model, Role};
 use serde::Serialize;
-use std::f64::consts::TAU;
 
 /// A fit farther than this from the true base is not it, metres.
 const SAME_PLACE: f64 = 0.5;
@@ -119,7 +119,7 @@ impl Row {
         let n = model.free.len();
         let Some(((_, from_truth), ends)) = found.ends.split_first() else { return self };
         let home = |(_, posture): &&Start| {
-            let near = |j: usize, other: &[f64]| turns_apart(posture[j], other[j]) < RIGHT;
+            let near = |j: usize, other: &[f64]| turns::apart(posture[j], other[j]) < RIGHT;
             (0..n.saturating_sub(1)).all(|j| near(j, &drawn.posture) || near(j, from_truth))
         };
         self.perturbed_deg = case.condition.perturbed_deg;
@@ -156,11 +156,6 @@ impl Row {
         };
         format!("{} {} {}: {what}{invented}", self.suite, self.model, self.seed)
     }
-}
-
-/// How far two values of a joint are apart, whole turns taken out, radians.
-fn turns_apart(a: f64, b: f64) -> f64 {
-    (a - b - ((a - b) / TAU).round() * TAU).abs()
 }
 
 /// The figures of a case.
@@ -230,7 +225,7 @@ fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) 
         |j: usize| mount.filter(|m| m.n_arm == j + 1).map_or(0.0, |m| m.way * (bolted - m.turn));
     let each = fit.joints.iter().zip(posture).enumerate().map(|(j, (joint, truth))| {
         let slides = model.joints[model.free[j]].kind == JointKind::Prismatic;
-        let whole = |e: f64| if slides { e } else { e - (e / TAU).round() * TAU };
+        let whole = |e: f64| if slides { e } else { turns::from_to(0.0, e) };
         let error = joint.value - truth + turned(j);
         JointRow {
             rough: fit.rough.get(j).map(|v| whole(v - truth)),
@@ -249,12 +244,12 @@ fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) 
 fn bolted_elsewhere(mount: &Mount, joint: usize, fit: &Fit, posture: &[f64]) -> bool {
     let Some(tool) = fit.tool.as_ref().filter(|_| mount.n_arm == joint + 1) else { return false };
     let error = |[hole, value]: &[f64; 2]| value - posture[joint] + mount.way * (hole - mount.turn);
-    tool.alike.iter().map(error).any(|e| (e - (e / TAU).round() * TAU).abs() < NEARLY_RIGHT)
+    tool.alike.iter().map(error).any(|e| turns::apart(e, 0.0) < NEARLY_RIGHT)
 }
 
 /// Whether what is claimed of a joint holds.
 fn is_right(joint: &JointRow, index: usize, fit: &Fit) -> bool {
-    let near = |e: f64| (e - (e / TAU).round() * TAU).abs() < RIGHT;
+    let near = |e: f64| turns::apart(e, 0.0) < RIGHT;
     if near(joint.error) {
         return true;
     }

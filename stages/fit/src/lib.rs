@@ -39,7 +39,7 @@ mod sweep;
 mod tallies;
 mod together;
 mod tool;
-mod turns;
+pub mod turns;
 mod verdict;
 mod weak;
 

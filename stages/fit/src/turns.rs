@@ -3,13 +3,15 @@
 use std::f64::consts::TAU;
 
 /// The turn from one angle to another, at most half a turn either way, radians.
-pub(crate) fn from_to(a: f64, b: f64) -> f64 {
+#[must_use]
+pub fn from_to(a: f64, b: f64) -> f64 {
     let d = b - a;
     d - TAU * (d / TAU).round()
 }
 
 /// Size of that, radians.
-pub(crate) fn apart(a: f64, b: f64) -> f64 {
+#[must_use]
+pub fn apart(a: f64, b: f64) -> f64 {
     from_to(a, b).abs()
 }
 
