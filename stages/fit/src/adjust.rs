@@ -213,7 +213,7 @@ impl Adjust<'_> {
                 robot: &robot,
                 scan,
                 view: pair.view,
-                patch: prepared.links[pair.link].patch(pair.facet),
+                patch: prepared.links[pair.link].patch(pair.patch),
                 weight,
                 influence,
                 r: pair.r,

@@ -1,4 +1,4 @@
-//! A link's mesh in; where a beam meets it near a place on the surface, out.
+//! A link's mesh in; where a beam first meets it near a place, out.
 //!
 //! A sample stands for all of the surface that is nearer to it than to others: at bends its plane is off by a tenth of a
 //! millimetre, and beside an edge it may be that of the other face, millimetres off. The mesh itself knows.
@@ -13,10 +13,6 @@ const CELL: f32 = 0.008;
 /// wrong unit, have larger cells.
 const MAX_CELLS: f32 = 4e6;
 const MAX_ENTRIES: f32 = 2e7;
-/// How far along a beam the surface may be from where samples have it, metres: half the distance of two samples.
-const SLACK: f64 = 0.003;
-/// Where on the beam it is asked which cell it passes through, in so many times that.
-const STEPS: [f64; 5] = [0.0, 0.5, -0.5, 1.0, -1.0];
 /// Slices of a grid overlap by this share of a cell, so that rounding loses no corner.
 const BORDER: f32 = 1e-3;
 /// Beams through the seam of two triangles meet one of them: share of a triangle's size.
@@ -67,31 +63,28 @@ impl Triangles {
         Self { grid, begins, list }
     }
 
-    /// Where a beam (unit length) meets the mesh nearest to a place on the beam, from the side that it comes from; `None`
-    /// where it meets nothing nearby.
-    pub(crate) fn meet(&self, mesh: &Mesh, at: &Vector, ray: &Vector) -> Option<Met> {
+    /// Where a beam (unit length) first meets the mesh on a stretch of it, `from` and `to` metres beyond a place on it; how
+    /// far beyond it that is, and where.
+    pub(crate) fn first(
+        &self,
+        mesh: &Mesh,
+        beam: (&Vector, &Vector),
+        stretch: [f64; 2],
+    ) -> Option<(f64, Met)> {
         let mut best: Option<(f64, Vector, u32)> = None;
-        for &i in self.about(at, ray) {
-            let least = best.map_or(SLACK, |b| b.0.abs());
-            if let Some((t, n)) = crosses(mesh, i, (at, ray)).filter(|c| c.0.abs() < least) {
-                best = Some((t, n, i));
+        for (cell, end) in self.grid.along_beam(beam, stretch) {
+            let [begin, after] = [cell, cell + 1].map(|c| self.begins[c] as usize);
+            for &i in &self.list[begin..after] {
+                let last = best.map_or(stretch[1], |b| b.0);
+                if let Some((t, n)) = crosses(mesh, i, beam).filter(|c| c.0 >= stretch[0] && c.0 < last) {
+                    best = Some((t, n, i));
+                }
+            }
+            if best.is_some_and(|b| b.0 <= end) {
+                break;
             }
         }
-        best.map(|(t, n, triangle)| met((at, ray), (t, n), triangle))
-    }
-
-    /// The triangles in the cells that a beam passes through about a place; some of them more than once.
-    fn about(&self, at: &Vector, ray: &Vector) -> impl Iterator<Item = &u32> {
-        let cell_at = |step: f64| {
-            let p = at + ray * (step * SLACK);
-            self.grid.holds([p.x, p.y, p.z].map(|v| v as f32))
-        };
-        let cells = STEPS.map(cell_at);
-        let is_first = move |k: &usize| !cells[..*k].contains(&cells[*k]);
-        (0..cells.len()).filter(is_first).filter_map(move |k| cells[k]).flat_map(|cell| {
-            let [begin, end] = [cell, cell + 1].map(|c| self.begins[c] as usize);
-            &self.list[begin..end]
-        })
+        best.map(|(t, n, triangle)| (t, met(beam, (t, n), triangle)))
     }
 }
 
@@ -119,11 +112,32 @@ impl Grid {
         (((v - self.low[axis]) / self.edge) as usize).min(self.n[axis] - 1)
     }
 
-    /// The cell that a place lies in.
-    fn holds(&self, p: [f32; 3]) -> Option<usize> {
-        let at = [0, 1, 2].map(|i| (p[i] - self.low[i]) / self.edge);
-        let is_inside = (0..3).all(|i| at[i] >= 0.0 && at[i] < self.n[i] as f32);
-        is_inside.then(|| self.index(at.map(|v| v as usize)))
+    /// The cells that a stretch of a beam passes through, one after the other, and where on the beam each ends (Amanatides
+    /// and Woo 1987).
+    fn along_beam(&self, (at, ray): (&Vector, &Vector), [from, to]: [f64; 2]) -> Walk {
+        let edge = f64::from(self.edge);
+        let start = [0, 1, 2].map(|i| (at[i] - f64::from(self.low[i])) / edge);
+        let (mut begin, mut end) = (from, to);
+        for i in 0..3 {
+            // Along a face of the grid both are infinite or, on it, not a number, which min and max pass over.
+            let sides = [0.0, self.n[i] as f64].map(|side| (side - start[i]) * edge / ray[i]);
+            begin = begin.max(sides[0].min(sides[1]));
+            end = end.min(sides[0].max(sides[1]));
+        }
+        let first = [0, 1, 2].map(|i| (start[i] + begin * ray[i] / edge).floor());
+        let at = [0, 1, 2].map(|i| first[i].clamp(0.0, self.n[i].saturating_sub(1) as f64) as isize);
+        let next = [0, 1, 2].map(|i| {
+            let side = at[i] as f64 + f64::from(u8::from(ray[i] > 0.0));
+            if ray[i] == 0.0 { f64::INFINITY } else { (side - start[i]) * edge / ray[i] }
+        });
+        Walk {
+            n: self.n,
+            at: (begin <= end && self.edge > 0.0).then_some(at),
+            way: [0, 1, 2].map(|i| if ray[i] > 0.0 { 1 } else { -1 }),
+            next,
+            each: [0, 1, 2].map(|i| (edge / ray[i]).abs()),
+            end,
+        }
     }
 
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
@@ -165,6 +179,39 @@ impl Grid {
                 }
             }
         }
+    }
+}
+
+/// Cells of a grid along a beam.
+struct Walk {
+    /// Cells along x, y, z.
+    n: [usize; 3],
+    /// The next one; `None` past the last.
+    at: Option<[isize; 3]>,
+    /// Which way it goes on each axis.
+    way: [isize; 3],
+    /// Where on the beam it enters the next cell on each axis, metres, and how far it is from one to the next.
+    next: [f64; 3],
+    each: [f64; 3],
+    /// Where the stretch ends.
+    end: f64,
+}
+
+impl Iterator for Walk {
+    type Item = (usize, f64);
+
+    #[inline]
+    fn next(&mut self) -> Option<(usize, f64)> {
+        let at = self.at?;
+        let cell = (at[0] as usize * self.n[1] + at[1] as usize) * self.n[2] + at[2] as usize;
+        let axis = (1..3).fold(0, |a, b| if self.next[b] < self.next[a] { b } else { a });
+        let leaves = self.next[axis];
+        let mut after = at;
+        after[axis] += self.way[axis];
+        let is_inside = after[axis] >= 0 && after[axis] < self.n[axis] as isize;
+        self.at = (leaves < self.end && is_inside).then_some(after);
+        self.next[axis] += self.each[axis];
+        Some((cell, leaves))
     }
 }
 

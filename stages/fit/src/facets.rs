@@ -1,7 +1,7 @@
 //! The samples of a link's surface in; out come the same so that neighbours in space are neighbours in memory, and for any
 //! place near the surface which of them is the nearest.
 
-use geometry::NearestField;
+use geometry::{NearestField, Vector};
 use robot::{CadCloud, Link};
 use std::sync::OnceLock;
 
@@ -34,9 +34,9 @@ pub(crate) struct Facet {
 pub(crate) struct Fields {
     pub(crate) facets: Vec<Facet>,
     /// Patch of each facet.
-    pub(crate) patches: Vec<u32>,
-    /// Of each patch: the side that it looks to (two for each axis of the link's frame).
-    pub(crate) sides: Vec<u8>,
+    patches: Vec<u32>,
+    /// The patches, sorted.
+    keys: Vec<PatchKey>,
     /// Reaches far, from few samples: for the first iterations.
     pub(crate) coarse: NearestField,
     /// Exact, reaches 3 cm: for the last ones.
@@ -44,6 +44,9 @@ pub(crate) struct Fields {
     /// The surface itself, made when it is first asked for.
     triangles: OnceLock<Triangles>,
 }
+
+/// What tells a patch: the side that it looks to (two for each axis of the link's frame), and its cell.
+type PatchKey = (u8, [i32; 3]);
 
 impl Fields {
     pub(crate) fn new(link: &Link) -> Self {
@@ -58,8 +61,24 @@ impl Fields {
         let few: Vec<[f32; 3]> = first.iter().map(|&at| all[at as usize]).collect();
         let coarse = NearestField::new(&few, COARSE.0, COARSE.1).renumbered(&first);
         let fine = NearestField::new(&all, voxel(link), FINE.1);
-        let (patches, sides) = patches(&facets);
-        Self { facets, patches, sides, coarse, fine, triangles: OnceLock::new() }
+        let (patches, keys) = patches(&facets);
+        Self { facets, patches, keys, coarse, fine, triangles: OnceLock::new() }
+    }
+
+    /// For each patch the side that it looks to.
+    pub(crate) fn sides(&self) -> impl Iterator<Item = u8> {
+        self.keys.iter().map(|key| key.0)
+    }
+
+    /// The patch of a facet.
+    pub(crate) fn patch(&self, facet: usize) -> u32 {
+        self.patches[facet]
+    }
+
+    /// The patch of a place on the surface, with the normal there; `None` where no sample is on it.
+    pub(crate) fn patch_at(&self, x: &Vector, n: &Vector) -> Option<u32> {
+        let facet = Facet { x: x.map(|v| v as f32).into(), n: n.map(|v| v as f32).into() };
+        self.keys.binary_search(&patch_key(&facet)).ok().map(|at| at as u32)
     }
 
     /// The triangles of the link's mesh.
@@ -75,19 +94,20 @@ fn voxel(link: &Link) -> f32 {
 }
 
 /// Cuts a surface into patches: cells of the link's frame, apart by the side they look to.
-fn patches(facets: &[Facet]) -> (Vec<u32>, Vec<u8>) {
-    let key = |facet: &Facet| {
-        let n = facet.n;
-        let side = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
-        let cell = facet.x.map(|v| (v / PATCH).floor() as i32);
-        (side as u8 * 2 + u8::from(n[side] < 0.0), cell)
-    };
-    let each: Vec<_> = facets.iter().map(key).collect();
+fn patches(facets: &[Facet]) -> (Vec<u32>, Vec<PatchKey>) {
+    let each: Vec<_> = facets.iter().map(patch_key).collect();
     let mut keys = each.clone();
     keys.sort_unstable();
     keys.dedup();
     let at = |k| keys.partition_point(|other| other < k) as u32;
-    (each.iter().map(at).collect(), keys.iter().map(|key| key.0).collect())
+    (each.iter().map(at).collect(), keys)
+}
+
+fn patch_key(facet: &Facet) -> PatchKey {
+    let n = facet.n;
+    let side = (0..3).fold(0, |a, b| if n[b].abs() > n[a].abs() { b } else { a });
+    let cell = facet.x.map(|v| (v / PATCH).floor() as i32);
+    (side as u8 * 2 + u8::from(n[side] < 0.0), cell)
 }
 
 /// The samples along a curve that fills space (Morton's).

@@ -1,5 +1,5 @@
-//! A state of the adjustment in; for each measured point the facet of the model that it most likely lies on, and how far it is
-//! from it, out.
+//! A state of the adjustment in; for each measured point the place on the model's surface that its beam ends on, and how far it
+//! is from there, out.
 
 use geometry::{Point, Pose, Vector};
 use nalgebra::UnitQuaternion;
@@ -16,16 +16,16 @@ const ANGLE_NOISE: f64 = 9e-5;
 const SURFACE_NOISE: f64 = 3e-4;
 /// Cosine below which a beam cannot have come from a facet's front.
 const MIN_FACING: f64 = 0.05;
-/// Most looks for the facet that a beam ends on, and how near to it is near enough, metres.
-const MAX_LOOKS: usize = 6;
-const CLOSE: f64 = 1e-4;
+/// The model's surface must let a beam pass for so many gates before its point.
+const FREE: f64 = 2.0;
 /// Where no scanner is known a point is as uncertain in every direction.
 const NO_BEAM: Vector = Vector::new(0.0, 0.0, 0.0);
 
 /// A point matched with the facet that it most likely lies on, local frame.
 pub(crate) struct Pair {
     pub(crate) link: usize,
-    pub(crate) facet: usize,
+    /// Patch of the link.
+    pub(crate) patch: u32,
     pub(crate) view: usize,
     /// The point, corrected by its scan's error.
     pub(crate) p: Vector,
@@ -39,11 +39,11 @@ pub(crate) struct Pair {
     pub(crate) r: f64,
 }
 
-/// The triangle that a point's beam met, and the facet beside it.
+/// The triangle that a point's beam met, and its patch.
 #[derive(Clone, Copy)]
 pub(crate) struct Known {
     link: u32,
-    facet: u32,
+    patch: u32,
     triangle: u32,
 }
 
@@ -98,21 +98,12 @@ impl<'a> Pairing<'a> {
         let before = known.and_then(|known| self.again(known, (&p, &ray)));
         let hit = match before {
             Some(hit) => hit,
-            None if is_ray => {
-                let hit = along(|at| self.nearest(at), (&p, &ray), self.gate)?;
-                self.met(hit, &ray, known)
-            }
+            None if is_ray => self.first((&p, &ray), known)?,
             None => self.nearest(&p)?,
         };
-        let Hit { link, facet, n, x, at } = hit;
+        let Hit { link, patch, n, x } = hit;
         let r = n.dot(&(p - x));
         if r.abs() > self.gate {
-            return None;
-        }
-        // Beside the surface's edge its plane means nothing.
-        let off = at - x;
-        let beside = (off.norm_squared() - n.dot(&off).powi(2)).max(0.0).sqrt();
-        if beside > self.refine.beside(link) {
             return None;
         }
         let facing = -n.dot(&ray);
@@ -127,21 +118,30 @@ impl<'a> Pairing<'a> {
         } else {
             self.sigma2
         };
-        Some(Pair { link, facet, view, p, n, ray, beam: p - scanner, variance, r })
+        Some(Pair { link, patch, view, p, n, ray, beam: p - scanner, variance, r })
     }
 
-    /// The place where a beam that ends on a facet meets the mesh.
-    fn met(&self, hit: Hit, ray: &Vector, known: &mut Option<Known>) -> Hit {
-        let (link, pose) = (hit.link, &self.poses[hit.link]);
-        let on_plane = hit.at + ray * (hit.n.dot(&(hit.x - hit.at)) / hit.n.dot(ray));
-        let at = pose.inverse_transform_point(&on_plane.into()).coords;
-        let ray = pose.inverse_transform_vector(ray);
-        let own = &self.refine.prepared.model.links[link];
-        let triangles = self.refine.prepared.links[link].fields.triangles(own);
-        let Some(met) = triangles.meet(&own.mesh, &at, &ray) else { return hit };
-        let (own, facet) = (link as u32, hit.facet as u32);
-        *known = Some(Known { link: own, facet, triangle: met.triangle });
-        self.placed_at(link, hit.facet, &met)
+    /// Where a beam first meets the model about a point of it, whichever link: noise moves points along their beams, past
+    /// edges, round bends and behind what hides other surface, so that what is nearest is not always what was measured.
+    fn first(&self, beam: (&Vector, &Vector), known: &mut Option<Known>) -> Option<Hit> {
+        let (p, ray) = beam;
+        let mut best: Option<(f64, usize, Met)> = None;
+        self.placed.each(p.map(|v| v as f32).into(), |link, _, _| {
+            let pose = &self.poses[link];
+            let at = pose.inverse_transform_point(&Point::from(*p)).coords;
+            let ray = pose.inverse_transform_vector(ray);
+            let own = &self.refine.prepared.model.links[link];
+            let triangles = self.refine.prepared.links[link].fields.triangles(own);
+            let end = best.as_ref().map_or(self.gate, |b| b.0);
+            let stretch = [-FREE * self.gate, end];
+            if let Some((t, met)) = triangles.first(&own.mesh, (&at, &ray), stretch) {
+                best = Some((t, link, met));
+            }
+        });
+        let (_, link, met) = best.filter(|(t, ..)| *t >= -self.gate)?;
+        let patch = self.refine.prepared.links[link].fields.patch_at(&met.x, &met.n)?;
+        *known = Some(Known { link: link as u32, patch, triangle: met.triangle });
+        Some(self.placed_at(link, patch, &met))
     }
 
     /// The same where it is known which triangle it met.
@@ -152,126 +152,36 @@ impl<'a> Pairing<'a> {
         let ray = pose.inverse_transform_vector(ray);
         let mesh = &self.refine.prepared.model.links[link].mesh;
         let met = exact::again(mesh, known.triangle, (&at, &ray))?;
-        Some(self.placed_at(link, known.facet as usize, &met))
+        Some(self.placed_at(link, known.patch, &met))
     }
 
-    fn placed_at(&self, link: usize, facet: usize, met: &Met) -> Hit {
+    fn placed_at(&self, link: usize, patch: u32, met: &Met) -> Hit {
         let pose = &self.poses[link];
         let x = (pose * Point::from(met.x)).coords;
-        Hit { link, facet, n: pose.rotation * met.n, x, at: x }
+        Hit { link, patch, n: pose.rotation * met.n, x }
     }
 
-    /// The facet nearest to a place.
+    /// The facet nearest to a place, and not beside the surface's edge, where its plane means nothing.
     fn nearest(&self, at: &Vector) -> Option<Hit> {
         let Near { link, facet, .. } = self.placed.nearest(at.map(|v| v as f32).into())?;
-        let Facet { x, n } = self.refine.prepared.links[link].fields.facets[facet];
+        let fields = &self.refine.prepared.links[link].fields;
+        let Facet { x, n } = fields.facets[facet];
         let pose = &self.poses[link];
         let n = pose.rotation * Vector::from(n.map(f64::from));
         let x = (pose * Point::from(x.map(f64::from))).coords;
-        Some(Hit { link, facet, n, x, at: *at })
+        let off = at - x;
+        let beside = (off.norm_squared() - n.dot(&off).powi(2)).max(0.0).sqrt();
+        let hit = Hit { link, patch: fields.patch(facet), n, x };
+        (beside <= self.refine.beside(link)).then_some(hit)
     }
-}
-
-/// The facet that a beam ends on near a point of it, from what looks for the nearest one: noise moves points along their beams,
-/// past edges and round bends, so that the nearest facet is not always the one that was measured.
-fn along(
-    look: impl Fn(&Vector) -> Option<Hit>,
-    (p, ray): (&Vector, &Vector),
-    gate: f64,
-) -> Option<Hit> {
-    let (mut t, mut last) = (0.0, None);
-    let mut is_afresh = false;
-    for _ in 0..MAX_LOOKS {
-        let hit = look(&(p + ray * t))?;
-        let facing = -hit.n.dot(ray);
-        if facing <= MIN_FACING {
-            // Behind the surface or along it: from before it, once.
-            if is_afresh {
-                return None;
-            }
-            (t, is_afresh, last) = (-gate, true, None);
-            continue;
-        }
-        let off = hit.n.dot(&(hit.at - hit.x)) / facing;
-        let is_same = last == Some((hit.link, hit.facet));
-        if is_same || off.abs() < CLOSE {
-            return Some(hit);
-        }
-        last = Some((hit.link, hit.facet));
-        t += off;
-        if t.abs() > 2.0 * gate {
-            return None;
-        }
-    }
-    None
 }
 
 /// A place on the model's surface.
 struct Hit {
     link: usize,
-    facet: usize,
-    /// The facet's normal and middle, local frame.
+    patch: u32,
+    /// The surface's normal and a point of it, local frame.
     n: Vector,
     x: Vector,
-    /// Where it was looked for.
-    at: Vector,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The nearest of some facets, each with its normal and middle.
-    fn nearest(facets: &[[Vector; 2]]) -> impl Fn(&Vector) -> Option<Hit> + '_ {
-        move |at| {
-            let apart = |i: &usize| (facets[*i][1] - at).norm_squared();
-            let facet = (0..facets.len()).min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
-            let [n, x] = facets[facet];
-            Some(Hit { link: 0, facet, n, x, at: *at })
-        }
-    }
-
-    #[test]
-    fn a_point_behind_an_edge_belongs_to_the_face_that_its_beam_met() {
-        // A block's front (x = 0, below z = 0) and its top, a sample each 4 mm; the beam comes from before and a little above.
-        let places = (0..20).flat_map(|i| (-20..20).map(move |j| (i, j)));
-        let place = |(i, j): (i32, i32)| [0.002 + 0.004 * f64::from(i), 0.004 * f64::from(j)];
-        let both = places.map(place).flat_map(|[deep, y]| {
-            [[-Vector::x(), Vector::new(0.0, y, -deep)], [Vector::z(), Vector::new(deep, y, 0.0)]]
-        });
-        let facets: Vec<[Vector; 2]> = both.collect();
-        let look = nearest(&facets);
-        let (p, ray) = (Vector::new(0.007, 0.001, -0.003), Vector::new(1.0, 0.0, -0.1).normalize());
-        assert_eq!(look(&p).expect("a facet").n, Vector::z());
-        let hit = along(&look, (&p, &ray), 0.02).expect("the beam ends on the block");
-        assert_eq!(hit.n, -Vector::x());
-        // A beam that passes above ends on nothing.
-        let above = Vector::new(-0.002, 0.0, 0.012);
-        assert!(along(&look, (&above, &Vector::x()), 0.02).is_none());
-    }
-
-    #[test]
-    fn noise_along_the_beam_pushes_no_round_surface() {
-        const RADIUS: f64 = 0.05;
-        let around = (0..2000).map(|k| f64::from(k) * std::f64::consts::TAU / 2000.0);
-        let facets: Vec<[Vector; 2]> =
-            around.map(|a| Vector::new(a.cos(), a.sin(), 0.0)).map(|n| [n, n * RADIUS]).collect();
-        let look = nearest(&facets);
-        let ray = -Vector::x();
-        let mean = |hit: &dyn Fn(&Vector) -> Option<Hit>| {
-            // Beams that end 30 to 38 mm beside the axis, 4 mm too long and too short.
-            let beams = (0..200).flat_map(|k| [-0.004, 0.004].map(|noise| (k, noise)));
-            let points = beams.map(|(k, noise)| {
-                let y: f64 = 0.030 + 0.000_04 * f64::from(k);
-                Vector::new((RADIUS * RADIUS - y * y).sqrt() + noise, y, 0.0)
-            });
-            let off = points.filter_map(|p| hit(&p).map(|hit| hit.n.dot(&(p - hit.x))));
-            let all: Vec<f64> = off.collect();
-            all.iter().sum::<f64>() / all.len() as f64
-        };
-        let beside = mean(&|p| look(p));
-        let ended = mean(&|p| along(&look, (p, &ray), 0.02));
-        assert!(beside > 5e-5, "the nearest facets are {beside} m off on average");
-        assert!(ended.abs() < 1e-5, "those along the beams {ended} m");
-    }
-}

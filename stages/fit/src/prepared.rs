@@ -52,10 +52,10 @@ pub(crate) struct PreparedLink {
 }
 
 impl PreparedLink {
-    /// The patch of a facet, counted over all links.
+    /// A patch of this link, counted over all links.
     #[inline]
-    pub(crate) fn patch(&self, facet: usize) -> usize {
-        self.first_patch + self.fields.patches[facet] as usize
+    pub(crate) fn patch(&self, own: u32) -> usize {
+        self.first_patch + own as usize
     }
 }
 
@@ -81,7 +81,7 @@ impl<'a> Prepared<'a> {
         let links = model.links.iter().zip(fields).enumerate().map(|(l, (link, fields))| {
             let area = f64::from(link.cad.area);
             let (weight, first_patch) = (area.sqrt(), patch_groups.len());
-            patch_groups.extend(fields.sides.iter().map(|side| l as u32 * 6 + u32::from(*side)));
+            patch_groups.extend(fields.sides().map(|side| l as u32 * 6 + u32::from(side)));
             PreparedLink { fields, weight, area, first_patch }
         });
         let links: Vec<_> = links.collect();

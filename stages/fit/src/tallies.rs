@@ -70,7 +70,7 @@ mod tests {
         for r in distances {
             let (p, n, ray, beam) = (none, none, none, none);
             let variance = 4e-6;
-            tallies.add(&Pair { link: 0, facet: 0, view: 0, p, n, ray, beam, variance, r });
+            tallies.add(&Pair { link: 0, patch: 0, view: 0, p, n, ray, beam, variance, r });
         }
         tallies
     }
