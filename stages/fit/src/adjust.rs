@@ -11,13 +11,13 @@ use contract::Fan;
 use geometry::{Point, Pose, Vector, robust};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 
-use crate::Settings;
 use crate::beam::Hypothesis;
 use crate::calibrate::Frames;
 use crate::normal::{N_SCAN, Normal, Row};
 use crate::pairs::{Known, Pairing};
 use crate::refine::{CHUNK, Refine};
 use crate::tallies::Tallies;
+use crate::{Scene, Settings};
 
 /// How a scan differs from its stated pose, as far as the points near a robot tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,6 +99,14 @@ pub(crate) struct State {
     pub(crate) patch_sigma: f64,
 }
 
+impl State {
+    /// A posture, before anything is known of the scans' errors.
+    pub(crate) fn at(hypothesis: &Hypothesis, scene: &Scene<'_>) -> Self {
+        let scans = vec![ScanError::NONE; scene.views.len()];
+        Self { hypothesis: hypothesis.clone(), scans, noise: scene.noise, patch_sigma: 0.0 }
+    }
+}
+
 impl Adjust<'_> {
     fn settings(&self) -> &Settings {
         self.refine.settings
@@ -112,10 +120,7 @@ impl Adjust<'_> {
         gate: f64,
         fan: &impl Fan,
     ) -> Adjusted {
-        let scene = self.refine.scene;
-        let (hypothesis, scans) = (start.clone(), vec![ScanError::NONE; scene.views.len()]);
-        let start = State { hypothesis, scans, noise: scene.noise, patch_sigma: 0.0 };
-        self.run_from(start, points, gate, fan)
+        self.run_from(State::at(start, self.refine.scene), points, gate, fan)
     }
 
     /// The same from any state.

@@ -185,3 +185,73 @@ struct Hit {
     x: Vector,
 }
 
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::beam::Hypothesis;
+    use crate::{Prepared, Scene, Settings};
+    use contract::{MaskId, OneByOne, Region, ScanId, View, ViewPoint};
+    use geometry::Aabb;
+
+    /// A cube of 20 cm about the origin, and another link 4 mm within it.
+    fn cubes() -> robot::Model {
+        let body = |name: &str, size: f64| {
+            format!(
+                "<link name='{name}'><visual><geometry><box size='{size} {size} {size}'/></geometry></visual></link>"
+            )
+        };
+        let joint = "<joint name='a' type='revolute'><parent link='outer'/><child link='inner'/><axis xyz='0 0 1'/>\
+                     <limit lower='-3' upper='3' effort='1' velocity='1'/></joint>";
+        let urdf = format!(
+            "<robot name='cubes'>{}{}{joint}</robot>",
+            body("outer", 0.2),
+            body("inner", 0.192)
+        );
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("cubes.urdf");
+        std::fs::write(&path, urdf).expect("is written");
+        robot::Model::load_urdf(&path, "cubes", &robot::Settings::default()).expect("loads").0
+    }
+
+    #[test]
+    fn points_belong_to_what_their_beams_meet_first() {
+        let model = cubes();
+        let prepared = Prepared::new(0, &model, &OneByOne);
+        prepared.make_triangles(&OneByOne);
+        // A scanner 3 m before the front (x = 0.1); ranges 6 mm too short and too long.
+        let scanner = Point::new(3.0, 0.2, 0.4);
+        let places = (-9..=9).flat_map(|y| (-9..=9).map(move |z| (f64::from(y), f64::from(z))));
+        let beams = places.flat_map(|(y, z)| [-0.006, 0.006].map(|off| (y, z, off)));
+        let points = beams.clone().map(|(y, z, off)| {
+            let on_it = Point::new(0.1, 0.01 * y, 0.01 * z);
+            let p = on_it + (on_it - scanner).normalize() * off;
+            ViewPoint { xyz: p.coords.map(|v| v as f32).into(), place: 0 }
+        });
+        let view = View {
+            scan: ScanId(0),
+            mask: MaskId(0),
+            scanner: Some(scanner),
+            beam_step: 0.002,
+            is_camera: false,
+            images: Vec::new(),
+            points: points.collect(),
+        };
+        let region = Region { origin: Point::origin(), bounds: Aabb::EMPTY };
+        let (views, settings) = ([view], Settings::default());
+        let scene = Scene::new(&region, &views, &[], &settings, &OneByOne);
+        let refine =
+            Refine { prepared: &prepared, scene: &scene, settings: &settings, prior: None };
+        let hypothesis =
+            Hypothesis { local_from_base: Pose::identity(), posture: vec![0.0], score: 0.0 };
+        let state = State::at(&hypothesis, &scene);
+        let pairing = Pairing::new(&refine, &state, 0.02);
+        for (i, (y, z, off)) in beams.enumerate() {
+            let mut known = None;
+            let pair = pairing.pair(i as u32, &mut known).expect("it is on the front");
+            assert_eq!((pair.link, pair.n), (0, Vector::x()), "at {y}, {z}, {off}");
+            assert!((pair.r + off * pair.ray.x.abs()).abs() < 1e-6, "{} for {off}", pair.r);
+            let again = pairing.pair(i as u32, &mut known).expect("the same triangle");
+            assert!((again.r - pair.r).abs() < 1e-12 && again.patch == pair.patch);
+        }
+    }
+}
