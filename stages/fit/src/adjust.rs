@@ -149,6 +149,21 @@ impl Adjust<'_> {
         }
     }
 
+    /// One step from a state.
+    pub(crate) fn step(
+        &self,
+        mut state: State,
+        points: (&[u32], &mut [Option<Known>]),
+        gate: f64,
+        fan: &impl Fan,
+    ) -> State {
+        self.refine.prepared.make_triangles(fan);
+        if let Some(step) = self.sums(&state, points, gate, fan).0.solve() {
+            self.apply(&mut state, &step);
+        }
+        state
+    }
+
     /// Normal equations at a state, the places of the joints among the unknowns.
     pub(crate) fn at(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> Normal {
         self.sums(state, (points, &mut vec![None; points.len()]), gate, fan).0

@@ -35,6 +35,7 @@ mod solve;
 mod spin;
 mod stays;
 mod strata;
+mod sway;
 mod sweep;
 mod tallies;
 mod together;

@@ -47,6 +47,12 @@ pub(crate) struct Known {
     triangle: u32,
 }
 
+impl Known {
+    pub(crate) fn link(&self) -> usize {
+        self.link as usize
+    }
+}
+
 /// The model as it stands at a state, and the scans as they are off.
 pub(crate) struct Pairing<'a> {
     refine: &'a Refine<'a>,

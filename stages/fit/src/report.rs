@@ -12,13 +12,14 @@ use crate::beam::Hypothesis;
 use crate::judge::{Judgement, evidence};
 use crate::refine::Refine;
 use crate::rivals::lead;
-use crate::solve::{Polished, Settled, few, last_rounds};
+use crate::solve::{Polished, Settled};
 use crate::spin::Spin;
+use crate::sway::sway;
 use crate::turns;
 use crate::verdict::{self, RIVAL};
 
 /// Margin up to which another posture counts as equally good.
-const EQUAL: f64 = 0.03;
+pub(crate) const EQUAL: f64 = 0.03;
 /// Margin up to which another value of the last joint is listed.
 const NEARLY_EQUAL: f64 = 0.12;
 /// Standard deviation from which on a joint is open: any value within degrees would do, radians.
@@ -29,23 +30,18 @@ const ANY_ANGLE: f64 = 1.813_799_364_234_217_8;
 /// 7° off was better by 0.19 for the beams, and worse by 0.03 for the points.
 const AGAINST: f64 = 3.0;
 /// Joints that differ by more are different answers, radians (2°) or metres.
-const OTHER: f64 = 0.035;
+pub(crate) const OTHER: f64 = 0.035;
 /// Bases farther apart are different answers, metres.
 const OTHER_BASE: f64 = 0.03;
 /// Most equals that are listed.
 const N_EQUALS: usize = 4;
-
-/// Other values of a joint at which the joints before it are asked how far they give way …
-const N_SWAYS: usize = 8;
-/// … and values all around, where those are fewer.
-const N_AROUND: usize = 5;
 
 /// What is reported of the best, given the others.
 pub(crate) fn report(
     refine: &Refine<'_>,
     (best, judgement, spins): &Settled,
     others: &[Polished],
-    near: &[u32],
+    (near, all): (&[u32], &[u32]),
     fan: &impl Fan,
 ) -> Fit {
     let prepared = refine.prepared;
@@ -65,7 +61,7 @@ pub(crate) fn report(
     let (mut open, mut spread) = open_joints(&own, h, &rivals);
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
     let mut of_joints = own.view_mut((6, 6), (n - 6, n - 6));
-    of_joints += sway(refine, h, &several, near, fan);
+    of_joints += sway(refine, best, &several, (near, all), fan);
     for s in spins {
         // Any value of the run, each as likely.
         spread[s.joint] = spread[s.joint].max(s.extent / 3.0_f64.sqrt());
@@ -208,62 +204,8 @@ fn open_joints(
     (open, spread)
 }
 
-/// Covariance of the joints that comes from those that may stand at several values, radians² or metres²: a flange's
-/// bolts pull at the wrist, and which way they pull is as open as the flange. Each value is as likely as the others.
-fn sway(
-    refine: &Refine<'_>,
-    h: &Hypothesis,
-    several: &[&Spin],
-    near: &[u32],
-    fan: &impl Fan,
-) -> DMatrix<f64> {
-    let n = h.posture.len();
-    let mut out = DMatrix::zeros(n, n);
-    if several.is_empty() {
-        return out;
-    }
-    let turned = several.iter().flat_map(|s| {
-        let n = (s.values.len() - 1).min(N_SWAYS);
-        let listed = (0..n).map(|k| s.values[1 + k * (s.values.len() - 1) / n]);
-        // Where joints before it stand otherwise, it may as well stand where here it may not.
-        let around = (n < N_SWAYS).then(|| {
-            let by = |k: usize| h.posture[s.joint] + TAU * k as f64 / (N_AROUND + 1) as f64;
-            let limits = refine.prepared.model.limits(s.joint);
-            (1..=N_AROUND).filter_map(move |k| turns::within(by(k), limits))
-        });
-        let all: Vec<f64> = listed.chain(around.into_iter().flatten()).collect();
-        all.into_iter().map(|value| {
-            let mut other = h.clone();
-            other.posture[s.joint] = value;
-            other
-        })
-    });
-    let all = std::iter::once(h.clone()).chain(turned).collect();
-    // They differ in a flange: the points about the arm are the same.
-    let few = few(refine, h, near, fan);
-    let rounds = last_rounds(refine, h, &few);
-    let ends: Vec<Hypothesis> = fan.fan(all, |h| refine.run(&h, &few, &rounds, fan));
-    // Where it ended at something worse, it is no value that the joint may stand at.
-    let as_good = |end: &&Hypothesis| refine.worsening(&ends[0], end, near) < EQUAL;
-    let is_swayed: Vec<bool> = (0..n).map(|j| several.iter().all(|s| s.joint != j)).collect();
-    let mut modes: Vec<&Hypothesis> = vec![&ends[0]];
-    for end in ends[1..].iter().filter(as_good) {
-        if modes.iter().any(|mode| several.iter().all(|s| turn(mode, end, s.joint) < OTHER)) {
-            continue;
-        }
-        modes.push(end);
-        let change = |j: usize, _| match is_swayed[j] {
-            true => turns::from_to(ends[0].posture[j], end.posture[j]),
-            false => 0.0,
-        };
-        let away = DVector::from_fn(n, change);
-        out += &away * away.transpose();
-    }
-    out / modes.len() as f64
-}
-
 /// Difference of a joint between two postures, whole turns taken out, radians.
-fn turn(a: &Hypothesis, b: &Hypothesis, joint: usize) -> f64 {
+pub(crate) fn turn(a: &Hypothesis, b: &Hypothesis, joint: usize) -> f64 {
     turns::apart(a.posture[joint], b.posture[joint])
 }
 

@@ -169,7 +169,7 @@ pub(crate) fn finish(
 ) -> Fit {
     sharpen(refine, &mut best, all, fan);
     let misfits = doubt(refine, &mut best.0, all, fan);
-    let mut fit = report(refine, &best, others, near, fan);
+    let mut fit = report(refine, &best, others, (near, all), fan);
     fit.reasons.extend(misfits);
     fit
 }
@@ -347,7 +347,7 @@ pub(crate) fn fine(
 }
 
 /// Points for that.
-pub(crate) fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<u32> {
+fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<u32> {
     refine.stratified(h, near, (FINE_GATE, POLISH_CAP), fan)
 }
 
@@ -358,7 +358,7 @@ fn fine_on(refine: &Refine<'_>, h: &Hypothesis, few: &[u32], fan: &impl Fan) -> 
 }
 
 /// The rounds that end at a posture, from one that is nearly it: with the gate that the noise there asks for.
-pub(crate) fn last_rounds(refine: &Refine<'_>, h: &Hypothesis, few: &[u32]) -> Vec<Round> {
+fn last_rounds(refine: &Refine<'_>, h: &Hypothesis, few: &[u32]) -> Vec<Round> {
     let gate = (LAST_GATE.0 * refine.noise(h, few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
     FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect()
 }
