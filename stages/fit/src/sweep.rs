@@ -2,10 +2,10 @@
 //! it turns (fit.md §4e).
 
 use geometry::Point;
+use geometry::depth::transform;
 
 use crate::beam::Hypothesis;
 use crate::facets::Facet;
-use crate::placed::Placed;
 use crate::refine::Refine;
 
 /// Arc between trial values at the joint's lever, metres: finer than the features that tell them apart.
@@ -188,19 +188,24 @@ impl Refine<'_> {
         points: &[u32],
         chosen: impl Fn(usize) -> bool,
     ) -> Vec<f32> {
-        let placed = Placed::new(self.prepared, h, f64::from(CAP), chosen);
-        let of = |&i: &u32| {
-            let mut least = CAP;
-            placed.each(self.scene.points[i as usize].p, |link, at, q| {
-                let spacing = self.prepared.model.links[link].cad.spacing;
-                let Facet { x, n } = self.prepared.links[link].fields.facets[at];
-                let off: f32 = (0..3).map(|k| n[k] * (q[k] - x[k])).sum();
-                let apart: f32 = (0..3).map(|k| (q[k] - x[k]).powi(2)).sum::<f32>().sqrt();
-                // Beyond the edge of a facet its plane means nothing.
-                least = least.min(if apart > 2.0 * spacing + CAP { CAP } else { off.abs() });
-            });
-            least
-        };
-        points.iter().map(of).collect()
+        let places: Vec<_> = points.iter().map(|&i| self.scene.points[i as usize].p).collect();
+        let mut least = vec![CAP; places.len()];
+        // Link by link: a sweep asks one or two of them about the same points again and again.
+        for (link, frame) in self.prepared.frames(h).into_iter().filter(|(l, _)| chosen(*l)) {
+            let fields = &self.prepared.links[link].fields;
+            // Beyond the edge of a facet its plane means nothing.
+            let beside = 2.0 * self.prepared.model.links[link].cad.spacing + CAP;
+            for (p, least) in places.iter().zip(&mut least) {
+                let q = transform(&frame, *p);
+                let Some(at) = fields.fine.nearest(q) else { continue };
+                let Facet { x, n } = fields.facets[at];
+                let apart = [0, 1, 2].map(|k| q[k] - x[k]);
+                if apart.iter().map(|v| v * v).sum::<f32>() <= beside * beside {
+                    let off: f32 = (0..3).map(|k| n[k] * apart[k]).sum();
+                    *least = least.min(off.abs());
+                }
+            }
+        }
+        least
     }
 }
