@@ -136,7 +136,8 @@ impl Adjust<'_> {
         self.refine.prepared.make_triangles(fan);
         let mut known = vec![None; points.len()];
         loop {
-            let (normal, tallies) = self.sums(&state, (points, &mut known), gate, fan);
+            let (sums, tallies) = self.sums(&state, (points, &mut known), gate, fan);
+            let normal = self.closed(&state, sums);
             let solved = (round < N_ROUNDS).then(|| normal.solve()).flatten();
             let Some(step) = solved else {
                 return self.finish(state, &tallies, &normal);
@@ -149,16 +150,9 @@ impl Adjust<'_> {
         }
     }
 
-    /// One step from a state.
-    pub(crate) fn step(
-        &self,
-        mut state: State,
-        points: (&[u32], &mut [Option<Known>]),
-        gate: f64,
-        fan: &impl Fan,
-    ) -> State {
-        self.refine.prepared.make_triangles(fan);
-        if let Some(step) = self.sums(&state, points, gate, fan).0.solve() {
+    /// One step from a state, by what was summed up at it.
+    pub(crate) fn step(&self, mut state: State, sums: Normal) -> State {
+        if let Some(step) = self.closed(&state, sums).solve() {
             self.apply(&mut state, &step);
         }
         state
@@ -166,12 +160,12 @@ impl Adjust<'_> {
 
     /// Normal equations at a state, the places of the joints among the unknowns.
     pub(crate) fn at(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> Normal {
-        self.sums(state, (points, &mut vec![None; points.len()]), gate, fan).0
+        self.closed(state, self.sums(state, (points, &mut vec![None; points.len()]), gate, fan).0)
     }
 
-    /// Normal equations of the points at a state with all priors, patches taken out; and what is said of each link.
-    /// What triangles the points lie on is known from a state like this one, and kept.
-    fn sums(
+    /// Sums of the points at a state, and what is said of each link. What triangles the points lie on is known from a state
+    /// like this one, and kept.
+    pub(crate) fn sums(
         &self,
         state: &State,
         (points, known): (&[u32], &mut [Option<Known>]),
@@ -183,10 +177,14 @@ impl Adjust<'_> {
         let sums = fan.fan(chunks, |chunk| self.sums_of(&pairing, chunk));
         let join = |(a, own): (Normal, Tallies), (b, later)| (a.join(b), own.join(&later));
         let empty = || self.sums_of(&pairing, (&[], &mut []));
-        let (mut normal, tallies) = sums.into_iter().reduce(join).unwrap_or_else(empty);
-        normal.close();
-        self.add_priors(state, &mut normal);
-        (normal, tallies)
+        sums.into_iter().reduce(join).unwrap_or_else(empty)
+    }
+
+    /// Normal equations of what was summed up at a state, patches taken out, with all priors.
+    fn closed(&self, state: &State, mut sums: Normal) -> Normal {
+        sums.close();
+        self.add_priors(state, &mut sums);
+        sums
     }
 
     /// The sums of some points.

@@ -48,7 +48,9 @@ pub fn calibrate(
     let refine = Refine { prepared: &own, ..refine };
     let judgement = judged(&refine, &done.hypothesis);
     let spins = refine.spins(&done.hypothesis, &near, scene.noise * scene.noise, fan);
-    let mut out = report::report(&refine, &(done, judgement, spins), &[], (&near, &all), fan);
+    let (points, gate) = adjusted_points(&refine, &done.hypothesis, &all, fan);
+    let points = (points.as_slice(), gate);
+    let mut out = report::report(&refine, &(done, judgement, spins), &[], (&near, points), fan);
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();
     keep(&mut out, fit, Calibration { frames, prior: settings.frame_sigma, link_rms });
     (model, out)

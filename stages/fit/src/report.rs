@@ -36,12 +36,12 @@ const OTHER_BASE: f64 = 0.03;
 /// Most equals that are listed.
 const N_EQUALS: usize = 4;
 
-/// What is reported of the best, given the others.
+/// What is reported of the best, given the others; `points` are those of its adjustment, and its gate.
 pub(crate) fn report(
     refine: &Refine<'_>,
     (best, judgement, spins): &Settled,
     others: &[Polished],
-    (near, all): (&[u32], &[u32]),
+    (near, points): (&[u32], (&[u32], f64)),
     fan: &impl Fan,
 ) -> Fit {
     let prepared = refine.prepared;
@@ -61,7 +61,7 @@ pub(crate) fn report(
     let (mut open, mut spread) = open_joints(&own, h, &rivals);
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
     let mut of_joints = own.view_mut((6, 6), (n - 6, n - 6));
-    of_joints += sway(refine, best, &several, (near, all), fan);
+    of_joints += sway(refine, best, &several, (near, points), fan);
     for s in spins {
         // Any value of the run, each as likely.
         spread[s.joint] = spread[s.joint].max(s.extent / 3.0_f64.sqrt());

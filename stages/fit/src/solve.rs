@@ -167,16 +167,21 @@ pub(crate) fn finish(
     (near, all): (&[u32], &[u32]),
     fan: &impl Fan,
 ) -> Fit {
-    sharpen(refine, &mut best, all, fan);
+    let (points, gate) = sharpen(refine, &mut best, all, fan);
     let misfits = doubt(refine, &mut best.0, all, fan);
-    let mut fit = report(refine, &best, others, (near, all), fan);
+    let mut fit = report(refine, &best, others, (near, (&points, gate)), fan);
     fit.reasons.extend(misfits);
     fit
 }
 
-/// The answer once more, on the mesh itself and on as many points as pay: only what is reported is worth them, not what it
-/// is chosen from.
-fn sharpen(refine: &Refine<'_>, (best, judgement, _): &mut Settled, all: &[u32], fan: &impl Fan) {
+/// The answer once more, on as many points as pay: only what is reported is worth them, not what it is chosen from. Those
+/// points, and the gate.
+fn sharpen(
+    refine: &Refine<'_>,
+    (best, judgement, _): &mut Settled,
+    all: &[u32],
+    fan: &impl Fan,
+) -> (Vec<u32>, f64) {
     let settings =
         Settings { max_points: SHARPER * refine.settings.max_points, ..refine.settings.clone() };
     let refine = Refine { settings: &settings, ..*refine };
@@ -184,6 +189,7 @@ fn sharpen(refine: &Refine<'_>, (best, judgement, _): &mut Settled, all: &[u32],
     let adjust = Adjust { refine: &refine, frames: &[] };
     *best = adjust.run_from(best.state(), &points, gate, fan);
     *judgement = judged(&refine, &best.hypothesis);
+    (points, gate)
 }
 
 /// So many times the points of the adjustment are in the last one. On the planes of samples more than three times changed

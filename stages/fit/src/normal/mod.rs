@@ -51,7 +51,7 @@ struct Patch {
 const BATCH: usize = 64;
 
 /// Rows of one scan that wait for that.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Batch {
     view: usize,
     n: usize,
@@ -92,7 +92,7 @@ impl Batch {
 }
 
 /// The normal equations.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Normal {
     n_robot: usize,
     n: usize,
