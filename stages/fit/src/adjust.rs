@@ -15,7 +15,8 @@ use crate::beam::Hypothesis;
 use crate::calibrate::Frames;
 use crate::normal::{N_SCAN, Normal, Row};
 use crate::pairs::{Known, Pairing};
-use crate::refine::{CHUNK, Refine};
+use crate::refine::Refine;
+use crate::sampled::Sampled;
 use crate::tallies::Tallies;
 use crate::{Scene, Settings};
 
@@ -112,31 +113,18 @@ impl Adjust<'_> {
         self.refine.settings
     }
 
-    /// Adjusts on the points with these indices, from where nothing is known of the scans' errors.
-    pub(crate) fn run(
-        &self,
-        start: &Hypothesis,
-        points: &[u32],
-        gate: f64,
-        fan: &impl Fan,
-    ) -> Adjusted {
-        self.run_from(State::at(start, self.refine.scene), points, gate, fan)
+    /// Adjusts on some points, from where nothing is known of the scans' errors.
+    pub(crate) fn run(&self, start: &Hypothesis, points: &mut Sampled, fan: &impl Fan) -> Adjusted {
+        self.run_from(State::at(start, self.refine.scene), points, fan)
     }
 
     /// The same from any state.
-    pub(crate) fn run_from(
-        &self,
-        start: State,
-        points: &[u32],
-        gate: f64,
-        fan: &impl Fan,
-    ) -> Adjusted {
+    pub(crate) fn run_from(&self, start: State, points: &mut Sampled, fan: &impl Fan) -> Adjusted {
         let mut state = start;
         let mut round = 0;
         self.refine.prepared.make_triangles(fan);
-        let mut known = vec![None; points.len()];
         loop {
-            let (sums, tallies) = self.sums(&state, (points, &mut known), gate, fan);
+            let (sums, tallies) = self.sums(&state, points, fan);
             let normal = self.closed(&state, sums);
             let solved = (round < N_ROUNDS).then(|| normal.solve()).flatten();
             let Some(step) = solved else {
@@ -159,8 +147,8 @@ impl Adjust<'_> {
     }
 
     /// Normal equations at a state, the places of the joints among the unknowns.
-    pub(crate) fn at(&self, state: &State, points: &[u32], gate: f64, fan: &impl Fan) -> Normal {
-        self.closed(state, self.sums(state, (points, &mut vec![None; points.len()]), gate, fan).0)
+    pub(crate) fn at(&self, state: &State, points: &mut Sampled, fan: &impl Fan) -> Normal {
+        self.closed(state, self.sums(state, points, fan).0)
     }
 
     /// Sums of the points at a state, and what is said of each link. What triangles the points lie on is known from a state
@@ -168,13 +156,11 @@ impl Adjust<'_> {
     pub(crate) fn sums(
         &self,
         state: &State,
-        (points, known): (&[u32], &mut [Option<Known>]),
-        gate: f64,
+        points: &mut Sampled,
         fan: &impl Fan,
     ) -> (Normal, Tallies) {
-        let pairing = Pairing::new(self.refine, state, gate);
-        let chunks = points.chunks(CHUNK).zip(known.chunks_mut(CHUNK)).collect();
-        let sums = fan.fan(chunks, |chunk| self.sums_of(&pairing, chunk));
+        let pairing = Pairing::new(self.refine, state, points.gate);
+        let sums = fan.fan(points.chunks(), |chunk| self.sums_of(&pairing, chunk));
         let join = |(a, own): (Normal, Tallies), (b, later)| (a.join(b), own.join(&later));
         let empty = || self.sums_of(&pairing, (&[], &mut []));
         sums.into_iter().reduce(join).unwrap_or_else(empty)

@@ -14,7 +14,7 @@ use crate::adjust::{Adjust, Adjusted};
 use crate::beam::Hypothesis;
 use crate::normal::Normal;
 use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, adjusted_points, judged};
+use crate::solve::{NEAR_MARGIN, adjusted_points, better, judged};
 use crate::{Prepared, Scene, Settings, report};
 
 /// Steps of the joints' places: each after an adjustment of all the rest.
@@ -43,14 +43,24 @@ pub fn calibrate(
     let base = geometry::Point::from(h.local_from_base.translation.vector);
     let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
     let refine = Refine { prepared, scene, settings, prior: None };
-    let (model, done, frames) = estimate(&refine, &h, &all, 1, fan);
+    let spins = |model: &Model, h: &Hypothesis| {
+        let refine = Refine { prepared: &prepared.moved(model), ..refine };
+        refine.spins(h, &near, scene.noise * scene.noise, fan)
+    };
+    let (mut model, mut done, mut frames) = estimate(&refine, &h, &all, 1, fan);
+    let mut turns = spins(&model, &done.hypothesis);
+    // On joints that are where they are the flange may fit at another turn than on the model's.
+    if let Some(posture) = better(&done.hypothesis.posture, &turns) {
+        let h = Hypothesis { posture, ..done.hypothesis };
+        (model, done, frames) = estimate(&refine, &h, &all, 1, fan);
+        turns = spins(&model, &done.hypothesis);
+    }
     let own = prepared.moved(&model);
     let refine = Refine { prepared: &own, ..refine };
     let judgement = judged(&refine, &done.hypothesis);
-    let spins = refine.spins(&done.hypothesis, &near, scene.noise * scene.noise, fan);
-    let (points, gate) = adjusted_points(&refine, &done.hypothesis, &all, fan);
-    let points = (points.as_slice(), gate);
-    let mut out = report::report(&refine, &(done, judgement, spins), &[], (&near, points), fan);
+    let mut points = adjusted_points(&refine, &done.hypothesis, &all, fan);
+    Adjust { refine: &refine, frames: &[] }.sums(&done.state(), &mut points, fan);
+    let mut out = report::report(&refine, &(done, judgement, turns), &[], (&near, &points), fan);
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();
     keep(&mut out, fit, Calibration { frames, prior: settings.frame_sigma, link_rms });
     (model, out)
@@ -72,13 +82,12 @@ fn estimate(
     loop {
         let own = refine.prepared.moved(&model);
         let refine = Refine { prepared: &own, prior: refine.prior, ..*refine };
-        let (points, gate) = adjusted_points(&refine, &h, all, fan);
-        let points: Vec<u32> = points.into_iter().step_by(every).collect();
-        let mut done = Adjust { refine: &refine, frames: &[] }.run(&h, &points, gate, fan);
+        let mut points = adjusted_points(&refine, &h, all, fan).every(every);
+        let mut done = Adjust { refine: &refine, frames: &[] }.run(&h, &mut points, fan);
         h = done.hypothesis.clone();
         let state = done.state();
         let with_frames = Adjust { refine: &refine, frames: &nominal.free };
-        let mut normal = with_frames.at(&state, &points, gate, fan);
+        let mut normal = with_frames.at(&state, &mut points, fan);
         let frames = frames(nominal, &model);
         normal.add_frame_priors(&frames, refine.settings.frame_sigma);
         let solved = if step < N_STEPS { normal.solve() } else { None };

@@ -29,6 +29,7 @@ mod prepared;
 mod refine;
 mod report;
 mod rivals;
+mod sampled;
 mod scene;
 mod settings;
 mod solve;

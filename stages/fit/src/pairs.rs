@@ -40,7 +40,7 @@ pub(crate) struct Pair {
 }
 
 /// The triangle that a point's beam met, and its patch.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Known {
     link: u32,
     patch: u32,

@@ -12,6 +12,7 @@ use crate::beam::Hypothesis;
 use crate::judge::{Judgement, evidence};
 use crate::refine::Refine;
 use crate::rivals::lead;
+use crate::sampled::Sampled;
 use crate::solve::{Polished, Settled};
 use crate::spin::Spin;
 use crate::sway::sway;
@@ -36,12 +37,12 @@ const OTHER_BASE: f64 = 0.03;
 /// Most equals that are listed.
 const N_EQUALS: usize = 4;
 
-/// What is reported of the best, given the others; `points` are those of its adjustment, and its gate.
+/// What is reported of the best, given the others; `points` are those of its adjustment.
 pub(crate) fn report(
     refine: &Refine<'_>,
     (best, judgement, spins): &Settled,
     others: &[Polished],
-    (near, points): (&[u32], (&[u32], f64)),
+    (near, points): (&[u32], &Sampled),
     fan: &impl Fan,
 ) -> Fit {
     let prepared = refine.prepared;

@@ -12,6 +12,7 @@ use crate::judge::{Judgement, judge};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Prior, Refine, Round};
 use crate::report::report;
 use crate::rivals::best_of;
+use crate::sampled::Sampled;
 use crate::spin::Spin;
 use crate::turns;
 use crate::{Prepared, Scene, Settings};
@@ -167,29 +168,29 @@ pub(crate) fn finish(
     (near, all): (&[u32], &[u32]),
     fan: &impl Fan,
 ) -> Fit {
-    let (points, gate) = sharpen(refine, &mut best, all, fan);
+    let points = sharpen(refine, &mut best, all, fan);
     let misfits = doubt(refine, &mut best.0, all, fan);
-    let mut fit = report(refine, &best, others, (near, (&points, gate)), fan);
+    let mut fit = report(refine, &best, others, (near, &points), fan);
     fit.reasons.extend(misfits);
     fit
 }
 
 /// The answer once more, on as many points as pay: only what is reported is worth them, not what it is chosen from. Those
-/// points, and the gate.
+/// points.
 fn sharpen(
     refine: &Refine<'_>,
     (best, judgement, _): &mut Settled,
     all: &[u32],
     fan: &impl Fan,
-) -> (Vec<u32>, f64) {
+) -> Sampled {
     let settings =
         Settings { max_points: SHARPER * refine.settings.max_points, ..refine.settings.clone() };
     let refine = Refine { settings: &settings, ..*refine };
-    let (points, gate) = adjusted_points(&refine, &best.hypothesis, all, fan);
+    let mut points = adjusted_points(&refine, &best.hypothesis, all, fan);
     let adjust = Adjust { refine: &refine, frames: &[] };
-    *best = adjust.run_from(best.state(), &points, gate, fan);
+    *best = adjust.run_from(best.state(), &mut points, fan);
     *judgement = judged(&refine, &best.hypothesis);
-    (points, gate)
+    points
 }
 
 /// So many times the points of the adjustment are in the last one. On the planes of samples more than three times changed
@@ -230,26 +231,32 @@ pub(crate) fn settle(
     fan: &impl Fan,
 ) -> Settled {
     let variance = refine.scene.noise * refine.scene.noise;
-    let (points, gate) = adjusted_points(refine, h, all, fan);
+    let mut points = adjusted_points(refine, h, all, fan);
     let adjust = Adjust { refine, frames: &[] };
-    let mut best = adjust.run(h, &points, gate, fan);
+    let mut best = adjust.run(h, &mut points, fan);
     let mut spins = refine.spins(&best.hypothesis, near, variance, fan);
-    let better: Vec<(usize, f64)> = spins.iter().map(|s| (s.joint, s.values[0])).collect();
-    if better.iter().any(|(j, v)| is_other(best.hypothesis.posture[*j], *v)) {
+    if let Some(posture) = better(&best.hypothesis.posture, &spins) {
         // The same points of the same links; what is known of the scans stays.
         let mut state = best.state();
-        better.iter().for_each(|(j, v)| state.hypothesis.posture[*j] = *v);
-        best = adjust.run_from(state, &points, gate, fan);
+        state.hypothesis.posture = posture;
+        spins.iter().for_each(|s| points.forget(&refine.prepared.carried(s.joint)));
+        best = adjust.run_from(state, &mut points, fan);
         spins = refine.spins(&best.hypothesis, near, variance, fan);
     }
     let judgement = judged(refine, &best.hypothesis);
     (best, judgement, spins)
 }
 
-/// Whether a joint's value is another mode, not the same one found again: 3°.
-fn is_other(a: f64, b: f64) -> bool {
-    turns::apart(a, b) > 0.052
+/// A posture with the best values of its last joints, where one of them is another mode, not the same one found again.
+pub(crate) fn better(posture: &[f64], spins: &[Spin]) -> Option<Vec<f64>> {
+    let mut out = posture.to_vec();
+    spins.iter().for_each(|s| out[s.joint] = s.values[0]);
+    let is_other = |s: &Spin| turns::apart(posture[s.joint], out[s.joint]) > OTHER_MODE;
+    spins.iter().any(is_other).then_some(out)
 }
+
+/// From so far apart on they are two, radians: 3°.
+const OTHER_MODE: f64 = 0.052;
 
 /// What is looked for beside a polished posture.
 enum Look {
@@ -263,16 +270,16 @@ fn sort(polished: &mut [Polished]) {
     polished.sort_by(|a, b| b.1.explained.total_cmp(&a.1.explained));
 }
 
-/// Points that an adjustment is made of, and its gate, metres.
+/// Points that an adjustment is made of.
 pub(crate) fn adjusted_points(
     refine: &Refine<'_>,
     h: &Hypothesis,
     all: &[u32],
     fan: &impl Fan,
-) -> (Vec<u32>, f64) {
+) -> Sampled {
     let cap = refine.settings.max_points / refine.prepared.model.links.len().max(1);
     let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
-    (refine.stratified(h, all, (gate, cap.max(2000)), fan), gate)
+    Sampled::new(refine.stratified(h, all, (gate, cap.max(2000)), fan), gate)
 }
 
 /// The judgement with the tolerance that the scans' noise asks for.

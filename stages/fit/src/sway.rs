@@ -7,9 +7,9 @@ use std::f64::consts::TAU;
 use crate::adjust::{Adjust, Adjusted};
 use crate::beam::Hypothesis;
 use crate::normal::Normal;
-use crate::pairs::Known;
 use crate::refine::Refine;
 use crate::report::{EQUAL, OTHER, turn};
+use crate::sampled::Sampled;
 use crate::spin::Spin;
 use crate::turns;
 
@@ -20,12 +20,12 @@ const N_AROUND: usize = 5;
 
 /// Covariance of the joints that comes from those that may stand at several values, radians² or metres²: a flange's
 /// bolts pull at the wrist, and which way they pull is as open as the flange. Each value is as likely as the others.
-/// `points` and their gate are those of the adjustment.
+/// `points` are those of the adjustment, as it ended.
 pub(crate) fn sway(
     refine: &Refine<'_>,
     best: &Adjusted,
     several: &[&Spin],
-    (near, (points, gate)): (&[u32], (&[u32], f64)),
+    (near, points): (&[u32], &Sampled),
     fan: &impl Fan,
 ) -> DMatrix<f64> {
     let h = &best.hypothesis;
@@ -34,9 +34,7 @@ pub(crate) fn sway(
     if several.is_empty() {
         return out;
     }
-    let every = points.len().div_ceil(refine.settings.max_points).max(1);
-    let points: Vec<u32> = points.iter().copied().step_by(every).collect();
-    let steps = Steps::new(refine, best, several, (&points, gate), fan);
+    let steps = Steps::new(refine, best, several, points, fan);
     // The same step from where it stands: fewer points end a little beside all of them.
     let own = steps.to(None);
     let ends = fan.fan(turned(refine, h, several), |at| steps.to(Some(at)));
@@ -63,9 +61,8 @@ pub(crate) fn sway(
 struct Steps<'a> {
     adjust: Adjust<'a>,
     best: &'a Adjusted,
-    gate: f64,
     /// Points that may lie on links which those joints turn, and the sums of all others.
-    turning: Vec<u32>,
+    turning: Sampled,
     resting: Normal,
 }
 
@@ -74,22 +71,15 @@ impl<'a> Steps<'a> {
         refine: &'a Refine<'a>,
         best: &'a Adjusted,
         several: &[&Spin],
-        (points, gate): (&[u32], f64),
+        points: &Sampled,
         fan: &impl Fan,
     ) -> Self {
         let adjust = Adjust { refine, frames: &[] };
-        let state = best.state();
-        let mut known = vec![None; points.len()];
-        adjust.sums(&state, (points, &mut known), gate, fan);
         let moved: Vec<usize> =
             several.iter().flat_map(|s| refine.prepared.carried(s.joint)).collect();
-        let rests = |k: &Option<Known>| k.is_some_and(|k| !moved.contains(&k.link()));
-        let pairs = points.iter().copied().zip(known);
-        let (resting, turning): (Vec<_>, Vec<_>) = pairs.partition(|(_, k)| rests(k));
-        let (points, mut known): (Vec<u32>, Vec<_>) = resting.into_iter().unzip();
-        let resting = adjust.sums(&state, (&points, &mut known), gate, fan).0;
-        let turning = turning.into_iter().map(|(point, _)| point).collect();
-        Self { adjust, best, gate, turning, resting }
+        let [mut resting, turning] = points.about(refine.settings.max_points).parted(&moved);
+        let resting = adjust.sums(&best.state(), &mut resting, fan).0;
+        Self { adjust, best, turning, resting }
     }
 
     /// Where it ends, from the posture itself or with another value of a joint.
@@ -98,8 +88,7 @@ impl<'a> Steps<'a> {
         if let Some((joint, value)) = other {
             state.hypothesis.posture[joint] = value;
         }
-        let mut known = vec![None; self.turning.len()];
-        let turning = self.adjust.sums(&state, (&self.turning, &mut known), self.gate, &OneByOne).0;
+        let turning = self.adjust.sums(&state, &mut self.turning.clone(), &OneByOne).0;
         self.adjust.step(state, self.resting.clone().join(turning)).hypothesis
     }
 }

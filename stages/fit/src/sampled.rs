@@ -1,0 +1,53 @@
+//! Points that an adjustment is made of in; the same with what is known of where their beams end, in parts and chunks, out.
+
+use crate::pairs::Known;
+use crate::refine::CHUNK;
+
+/// Points of a scene, with the triangles that their beams met last.
+#[derive(Debug, Clone)]
+pub(crate) struct Sampled {
+    points: Vec<u32>,
+    known: Vec<Option<Known>>,
+    /// No point farther than this from the surface takes part, metres.
+    pub(crate) gate: f64,
+}
+
+impl Sampled {
+    pub(crate) fn new(points: Vec<u32>, gate: f64) -> Self {
+        Self { known: vec![None; points.len()], points, gate }
+    }
+
+    /// One of so many.
+    pub(crate) fn every(&self, step: usize) -> Self {
+        let points = self.points.iter().copied().step_by(step).collect();
+        let known = self.known.iter().copied().step_by(step).collect();
+        Self { points, known, gate: self.gate }
+    }
+
+    /// One of so many that about `n` are left, if there are more.
+    pub(crate) fn about(&self, n: usize) -> Self {
+        self.every((self.points.len() / n.max(1)).max(1))
+    }
+
+    /// What was met on these links is not known any more: they turned.
+    pub(crate) fn forget(&mut self, links: &[usize]) {
+        for known in &mut self.known {
+            *known = known.filter(|k| !links.contains(&k.link()));
+        }
+    }
+
+    /// Those whose beams met other links than these, and the rest, nothing of it known.
+    pub(crate) fn parted(&self, links: &[usize]) -> [Self; 2] {
+        let rests = |k: &Option<Known>| k.is_some_and(|k| !links.contains(&k.link()));
+        let pairs = self.points.iter().copied().zip(self.known.iter().copied());
+        let (resting, others): (Vec<_>, Vec<_>) = pairs.partition(|(_, k)| rests(k));
+        let (points, known) = resting.into_iter().unzip();
+        let others = others.into_iter().map(|(point, _)| point).collect();
+        [Self { points, known, gate: self.gate }, Self::new(others, self.gate)]
+    }
+
+    /// Points that one thread works on at a time, and what is known of them.
+    pub(crate) fn chunks(&mut self) -> Vec<(&[u32], &mut [Option<Known>])> {
+        self.points.chunks(CHUNK).zip(self.known.chunks_mut(CHUNK)).collect()
+    }
+}
