@@ -74,6 +74,10 @@ pub(crate) fn report(
             s.values.iter().map(|v| turns::apart(own, *v)).fold(spread[s.joint], f64::max);
     }
     let covariance = in_world_axes(&own, &h.local_from_base);
+    // Where a joint may stand elsewhere, so may the tip.
+    for (j, spread) in spread.iter().enumerate() {
+        own[(6 + j, 6 + j)] = own[(6 + j, 6 + j)].max(spread * spread);
+    }
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     // A wrist that may be flipped is not known, however narrow either answer is.
     let is_elsewhere = |j: usize| {
