@@ -116,7 +116,7 @@ impl Grid {
 
     /// The cells that a stretch of a beam passes through, one after the other, and where on the beam each ends (Amanatides
     /// and Woo 1987).
-    fn along_beam(&self, (at, ray): (&Vector, &Vector), [from, to]: [f64; 2]) -> Walk {
+    fn along_beam(&self, (at, ray): (&Vector, &Vector), [from, to]: [f64; 2]) -> Walk<'_> {
         let edge = f64::from(self.edge);
         let start = [0, 1, 2].map(|i| (at[i] - f64::from(self.low[i])) / edge);
         let (mut begin, mut end) = (from, to);
@@ -138,7 +138,7 @@ impl Grid {
             if ray[i] == 0.0 { f64::INFINITY } else { (side - start[i]) * edge / ray[i] }
         });
         Walk {
-            n: self.n,
+            grid: self,
             at: (begin <= end && self.edge > 0.0).then_some(at),
             way: [0, 1, 2].map(|i| if ray[i] > 0.0 { 1 } else { -1 }),
             next,
@@ -190,9 +190,8 @@ impl Grid {
 }
 
 /// Cells of a grid along a beam.
-struct Walk {
-    /// Cells along x, y, z.
-    n: [usize; 3],
+struct Walk<'a> {
+    grid: &'a Grid,
     /// The next one; `None` past the last.
     at: Option<[isize; 3]>,
     /// Which way it goes on each axis.
@@ -204,18 +203,18 @@ struct Walk {
     end: f64,
 }
 
-impl Iterator for Walk {
+impl Iterator for Walk<'_> {
     type Item = (usize, f64);
 
     #[inline]
     fn next(&mut self) -> Option<(usize, f64)> {
         let at = self.at?;
-        let cell = (at[0] as usize * self.n[1] + at[1] as usize) * self.n[2] + at[2] as usize;
+        let cell = self.grid.index(at.map(|v| v as usize));
         let axis = (1..3).fold(0, |a, b| if self.next[b] < self.next[a] { b } else { a });
         let leaves = self.next[axis];
         let mut after = at;
         after[axis] += self.way[axis];
-        let is_inside = after[axis] >= 0 && after[axis] < self.n[axis] as isize;
+        let is_inside = after[axis] >= 0 && after[axis] < self.grid.n[axis] as isize;
         self.at = (leaves < self.end && is_inside).then_some(after);
         self.next[axis] += self.each[axis];
         Some((cell, leaves))

@@ -21,7 +21,7 @@ const FREE: f64 = 2.0;
 /// Where no scanner is known a point is as uncertain in every direction.
 const NO_BEAM: Vector = Vector::new(0.0, 0.0, 0.0);
 
-/// A point matched with the facet that it most likely lies on, local frame.
+/// A point matched with the place on the model's surface that its beam ends on, local frame.
 pub(crate) struct Pair {
     pub(crate) link: usize,
     /// Patch of the link.
@@ -83,7 +83,7 @@ impl<'a> Pairing<'a> {
         }
     }
 
-    /// A point of the scene with its facet; `None` where it lies on none. What triangle its beam met is known from a
+    /// A point of the scene with the surface that it lies on; `None` where it lies on none. What triangle its beam met is known from a
     /// state like this one, or is kept for the next.
     pub(crate) fn pair(&self, point: u32, known: &mut Option<Known>) -> Option<Pair> {
         let m = &self.refine.scene.points[point as usize];
@@ -113,7 +113,7 @@ impl<'a> Pairing<'a> {
             return None;
         }
         let facing = -n.dot(&ray);
-        // A facet that faces away from the scanner cannot have given this point.
+        // Surface that faces away from the scanner, or lies along the beam, cannot have given this point.
         if range > 0.0 && facing <= MIN_FACING {
             return None;
         }
