@@ -33,4 +33,4 @@ pub use surface::{
     Floor, FloorLevel, InstallationPlane, Occupancy, Overlap, PlanePatch, TileSummary,
 };
 pub use tile::{MAX_SKIP, TILE_SIDE, Tile, TileAt, TilePoints};
-pub use view::{Region, View, ViewPoint};
+pub use view::{Region, View};

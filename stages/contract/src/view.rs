@@ -21,15 +21,6 @@ impl Region {
     }
 }
 
-/// A measured point inside a region.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ViewPoint {
-    /// Local frame, metres.
-    pub xyz: [f32; 3],
-    /// Place in the mask.
-    pub place: u64,
-}
-
 /// One scan's view of a region.
 #[derive(Debug, Clone)]
 pub struct View {
@@ -45,8 +36,8 @@ pub struct View {
     pub is_camera: bool,
     /// Depth images that together cover the region.
     pub images: Vec<DepthImage>,
-    /// The scan's points inside the region's bounds, sorted by place.
-    pub points: Vec<ViewPoint>,
+    /// The scan's points inside the region's bounds, local frame, metres: neighbours follow one another.
+    pub points: Vec<[f32; 3]>,
 }
 
 /// Views that a search looks through: more tell it little, and cost it as much as the first.

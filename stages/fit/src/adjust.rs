@@ -81,12 +81,14 @@ pub(crate) struct Adjust<'a> {
     pub(crate) refine: &'a Refine<'a>,
     /// Joints whose places on their links are unknowns, too, in [`Self::at`].
     pub(crate) frames: &'a [usize],
+    /// Joints that need not have come to rest at the end: their values are looked for by themselves.
+    pub(crate) loose: &'a [usize],
 }
 
-/// Rounds of the adjustment; the last ones change nothing but the patches' share.
+/// Most rounds of the adjustment: a flange that the points leave open would wander on for ever.
 const N_ROUNDS: usize = 7;
-/// A step by less than a third of a standard deviation, in every direction, ends the rounds (squared; steps shrink
-/// sevenfold a round): a flange that the points leave open would wander on for ever.
+/// A step by less than a third of a standard deviation, in every direction, is the last one (squared; steps shrink
+/// sevenfold a round).
 const SMALL_STEP: f64 = 0.1;
 /// Tukey's constant: 95 % efficient for normal errors.
 const TUKEY: f64 = 4.685;
@@ -108,7 +110,12 @@ impl State {
     }
 }
 
-impl Adjust<'_> {
+impl<'a> Adjust<'a> {
+    /// Of base and joints.
+    pub(crate) fn new(refine: &'a Refine<'a>) -> Self {
+        Self { refine, frames: &[], loose: &[] }
+    }
+
     fn settings(&self) -> &Settings {
         self.refine.settings
     }
@@ -132,10 +139,15 @@ impl Adjust<'_> {
             };
             self.apply(&mut state, &step);
             round += 1;
-            if normal.deviations(&step) < SMALL_STEP {
-                round = round.max(N_ROUNDS);
+            if normal.deviations(&self.without_loose(step)) < SMALL_STEP {
+                return self.finish(state, &tallies, &normal);
             }
         }
+    }
+
+    fn without_loose(&self, mut step: DVector<f64>) -> DVector<f64> {
+        self.loose.iter().for_each(|j| step[6 + j] = 0.0);
+        step
     }
 
     /// One step from a state, by what was summed up at it.

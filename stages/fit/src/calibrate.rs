@@ -59,7 +59,7 @@ pub fn calibrate(
     let refine = Refine { prepared: &own, ..refine };
     let judgement = judged(&refine, &done.hypothesis);
     let mut points = adjusted_points(&refine, &done.hypothesis, &all, fan);
-    Adjust { refine: &refine, frames: &[] }.sums(&done.state(), &mut points, fan);
+    Adjust::new(&refine).sums(&done.state(), &mut points, fan);
     let mut out = report::report(&refine, &(done, judgement, turns), &[], (&near, &points), fan);
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();
     keep(&mut out, fit, Calibration { frames, prior: settings.frame_sigma, link_rms });
@@ -83,10 +83,10 @@ fn estimate(
         let own = refine.prepared.moved(&model);
         let refine = Refine { prepared: &own, prior: refine.prior, ..*refine };
         let mut points = adjusted_points(&refine, &h, all, fan).every(every);
-        let mut done = Adjust { refine: &refine, frames: &[] }.run(&h, &mut points, fan);
+        let mut done = Adjust::new(&refine).run(&h, &mut points, fan);
         h = done.hypothesis.clone();
         let state = done.state();
-        let with_frames = Adjust { refine: &refine, frames: &nominal.free };
+        let with_frames = Adjust { frames: &nominal.free, ..Adjust::new(&refine) };
         let mut normal = with_frames.at(&state, &mut points, fan);
         let frames = frames(nominal, &model);
         normal.add_frame_priors(&frames, refine.settings.frame_sigma);

@@ -32,7 +32,7 @@ fn between_neighbours(views: &[&View]) -> Option<f64> {
     for view in views {
         let scanner = view.scanner.map(|s| s.coords.cast::<f32>());
         for triple in view.points.windows(3).step_by((view.points.len() / 20_000).max(1)) {
-            let [a, b, c] = [0, 1, 2].map(|i| Vector3::from(triple[i].xyz));
+            let [a, b, c] = [0, 1, 2].map(|i| Vector3::from(triple[i]));
             let along = c - a;
             if along.norm() > 2.0 * NEIGHBOURS || (b - a).norm() > NEIGHBOURS || along.norm() < 1e-4
             {

@@ -196,7 +196,7 @@ mod tests {
     use super::*;
     use crate::beam::Hypothesis;
     use crate::{Prepared, Scene, Settings};
-    use contract::{MaskId, OneByOne, Region, ScanId, View, ViewPoint};
+    use contract::{MaskId, OneByOne, Region, ScanId, View};
     use geometry::Aabb;
 
     /// A cube of 20 cm about the origin, and another link 4 mm within it.
@@ -231,7 +231,7 @@ mod tests {
         let points = beams.clone().map(|(y, z, off)| {
             let on_it = Point::new(0.1, 0.01 * y, 0.01 * z);
             let p = on_it + (on_it - scanner).normalize() * off;
-            ViewPoint { xyz: p.coords.map(|v| v as f32).into(), place: 0 }
+            p.coords.map(|v| v as f32).into()
         });
         let view = View {
             scan: ScanId(0),

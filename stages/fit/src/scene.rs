@@ -4,6 +4,8 @@ use contract::{Fan, InstallationPlane, Region, View};
 use geometry::evidence::Cloud;
 use geometry::{Evidence, Eye, Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use std::collections::HashSet;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use crate::{Settings, noise};
 
@@ -73,9 +75,9 @@ impl<'a> Scene<'a> {
             planes.iter().any(|plane| plane.distance(&q).abs() < settings.floor_band)
         };
         let above = |(view, v): (usize, &View)| {
-            let points = v.points.iter().filter(|p| !on_floor(p.xyz));
+            let points = v.points.iter().filter(|p| !on_floor(**p));
             let points: Vec<Measured> =
-                points.map(|p| Measured { p: p.xyz, view: view as u16 }).collect();
+                points.map(|p| Measured { p: *p, view: view as u16 }).collect();
             let thin = thin(&points, settings.thin as f32);
             (points, thin)
         };
@@ -140,10 +142,27 @@ fn thin(points: &[Measured], edge: f32) -> Vec<u32> {
     // 21 bits an axis: 25 km of 12 mm cells, folded over beyond.
     let cell = |v: f32| u64::from((v / edge).floor() as i32 as u32 & 0x1f_ffff);
     let key = |m: &Measured| cell(m.p[2]) << 42 | cell(m.p[1]) << 21 | cell(m.p[0]);
-    let mut keyed: Vec<_> = points.iter().enumerate().map(|(i, m)| (key(m), i as u32)).collect();
-    keyed.sort_unstable();
-    keyed.dedup_by_key(|k| k.0);
-    let mut out: Vec<u32> = keyed.into_iter().map(|k| k.1).collect();
-    out.sort_unstable();
-    out
+    let mut known = HashSet::with_hasher(BuildHasherDefault::<CellHasher>::default());
+    let mut last = None;
+    let mut is_new = |key| last.replace(key) != Some(key) && known.insert(key);
+    (0..points.len() as u32).filter(|&i| is_new(key(&points[i as usize]))).collect()
+}
+
+/// Spreads the numbers of cells over a table: a product is enough, and far cheaper than what withstands an attack.
+#[derive(Default)]
+struct CellHasher(u64);
+
+impl Hasher for CellHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|b| self.write_u64(u64::from(*b)));
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        // 2⁶⁴ over the golden ratio (Knuth, vol. 3, 6.4); the best bits are the highest, and the table takes the lowest.
+        self.0 = (self.0 ^ key).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
+    }
 }

@@ -187,7 +187,7 @@ fn sharpen(
         Settings { max_points: SHARPER * refine.settings.max_points, ..refine.settings.clone() };
     let refine = Refine { settings: &settings, ..*refine };
     let mut points = adjusted_points(&refine, &best.hypothesis, all, fan);
-    let adjust = Adjust { refine: &refine, frames: &[] };
+    let adjust = Adjust::new(&refine);
     *best = adjust.run_from(best.state(), &mut points, fan);
     *judgement = judged(&refine, &best.hypothesis);
     points
@@ -232,15 +232,21 @@ pub(crate) fn settle(
 ) -> Settled {
     let variance = refine.scene.noise * refine.scene.noise;
     let mut points = adjusted_points(refine, h, all, fan);
-    let adjust = Adjust { refine, frames: &[] };
-    let mut best = adjust.run(h, &mut points, fan);
+    let leaves: Vec<usize> = (0..h.posture.len()).filter(|&j| refine.prepared.leaf[j]).collect();
+    let adjust = Adjust::new(refine);
+    let mut best = Adjust { loose: &leaves, ..adjust }.run(h, &mut points, fan);
     let mut spins = refine.spins(&best.hypothesis, near, variance, fan);
-    if let Some(posture) = better(&best.hypothesis.posture, &spins) {
-        // The same points of the same links; what is known of the scans stays.
-        let mut state = best.state();
-        state.hypothesis.posture = posture;
+    // The same points of the same links; what is known of the scans stays.
+    let mut state = best.state();
+    let other = better(&best.hypothesis.posture, &spins);
+    if let Some(posture) = &other {
+        state.hypothesis.posture.clone_from(posture);
         spins.iter().for_each(|s| points.forget(&refine.prepared.carried(s.joint)));
+    }
+    if !leaves.is_empty() {
         best = adjust.run_from(state, &mut points, fan);
+    }
+    if other.is_some() {
         spins = refine.spins(&best.hypothesis, near, variance, fan);
     }
     let judgement = judged(refine, &best.hypothesis);

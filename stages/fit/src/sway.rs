@@ -74,7 +74,7 @@ impl<'a> Steps<'a> {
         points: &Sampled,
         fan: &impl Fan,
     ) -> Self {
-        let adjust = Adjust { refine, frames: &[] };
+        let adjust = Adjust::new(refine);
         let moved: Vec<usize> =
             several.iter().flat_map(|s| refine.prepared.carried(s.joint)).collect();
         let [mut resting, turning] = points.about(refine.settings.max_points).parted(&moved);

@@ -186,8 +186,8 @@ fn spots(views: &[View], fan: &impl Fan) -> Vec<Spot> {
     // Beams beside each other mostly end in one cube: there are far fewer runs of points than points.
     let of_view = |view: &View| {
         let mut runs: Vec<Sum> = Vec::new();
-        for p in view.points.iter().map(|p| p.xyz) {
-            let (cube, at) = (cube(&p), p.map(f64::from));
+        for p in &view.points {
+            let (cube, at) = (cube(p), p.map(f64::from));
             match runs.last_mut() {
                 Some(run) if run.0 == cube => add(run, &(cube, at, 1)),
                 _ => runs.push((cube, at, 1)),

@@ -22,7 +22,7 @@ fn step(view: &View, n_views: usize) -> usize {
 /// is no free space (a scanner behind a near post, black or shiny surfaces).
 pub fn agree(views: &mut [View], fan: &impl Fan) {
     let n = views.len();
-    let asked = |view: &View| view.points.iter().step_by(step(view, n)).map(|p| p.xyz).collect();
+    let asked = |view: &View| view.points.iter().step_by(step(view, n)).copied().collect();
     let matter: Vec<Vec<[f32; 3]>> = views.iter().map(asked).collect();
     let doubt = |(own, view): (usize, &mut View)| {
         for image in &mut view.images {
@@ -60,8 +60,8 @@ pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
             })
         };
         let step = step(&views[own], views.len());
-        let asked = views[own].points.iter().step_by(step).map(|point| point.xyz);
-        asked.filter(is_gone).map(|p| p.map(|v| floor_i32(f64::from(v / CELL)))).collect()
+        let asked = views[own].points.iter().step_by(step);
+        asked.copied().filter(is_gone).map(|p| p.map(|v| floor_i32(f64::from(v / CELL)))).collect()
     };
     let found: Vec<Vec<[i32; 3]>> = fan.fan((0..views.len()).collect(), gone_of);
     let mut cells: Vec<[i32; 3]> = found.into_iter().flatten().collect();

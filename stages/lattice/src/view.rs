@@ -1,9 +1,7 @@
 //! Tiles of one scan in; out comes the scan's view of a region: depth images towards it, and its points inside.
 
-use contract::{
-    Lattice, MAX_SKIP, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, TilePoints, View, ViewPoint,
-};
-use geometry::depth::{Empty, LANES, Rows, lanes, rows, transform, transform_lanes};
+use contract::{Lattice, MAX_SKIP, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, TilePoints, View};
+use geometry::depth::{Empty, LANES, Lanes, Rows, lanes, rows, transform, transform_lanes};
 use geometry::{DepthImage, Faces, Point, Pose, Vector};
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 
@@ -30,7 +28,7 @@ const MAX_HALF_TANGENT: f64 = 1.6;
 /// Rows and columns of a lattice that a scan covers: `[first row, last row, first column, last column]`.
 pub type Extent = [u32; 4];
 
-/// Gathers one scan's view of a region, tile by tile, in any order.
+/// Gathers one scan's view of a region, tile by tile; in the order of the tiles, so that it is the same each time.
 #[derive(Debug)]
 pub struct ViewBuilder {
     view: View,
@@ -46,6 +44,8 @@ pub struct ViewBuilder {
     /// of larger squares as a point.
     skip: u32,
     kept: Option<u32>,
+    /// Places in the mask of the view's points, where no lattice tells which of them are neighbours.
+    places: Vec<u64>,
 }
 
 impl ViewBuilder {
@@ -84,6 +84,7 @@ impl ViewBuilder {
             empty_window: settings.empty_window,
             skip,
             kept: thin.map(|thin| skip.max(thin).min(MAX_SKIP)),
+            places: Vec::new(),
         }
     }
 
@@ -138,40 +139,54 @@ impl ViewBuilder {
             .iter()
             .map(|image| rows(&(image.camera_from_local() * self.local_from_scan)))
             .collect();
-        for some in tile.xyz.chunks(LANES) {
-            self.splat(some, (&local_from_scan, &cameras));
-        }
-        if self.kept.is_none_or(|kept| tile.skip < kept) {
-            return;
-        }
-        for (p, place) in tile.xyz.iter().zip(tile.place) {
-            let local = transform(&local_from_scan, *p);
-            if self.bounds.contains(local.map(f64::from)) {
-                let place = tile.first_place + u64::from(*place);
-                self.view.points.push(ViewPoint { xyz: local, place });
+        let is_kept = self.kept.is_some_and(|kept| tile.skip >= kept);
+        for (some, places) in tile.xyz.chunks(LANES).zip(tile.place.chunks(LANES)) {
+            let scan = lanes(some);
+            let local = transform_lanes(&local_from_scan, &scan);
+            self.splat(some.len(), (&scan, &local), &cameras);
+            if is_kept {
+                self.keep(&local, places, tile.first_place);
             }
         }
     }
 
-    /// Marks a few points of the scan in the images.
-    fn splat(&mut self, points: &[[f32; 3]], (local_from_scan, cameras): (&Rows, &[Rows])) {
-        let all = lanes(points);
-        if let Some(at) = self.faces.of_all(&transform_lanes(local_from_scan, &all)) {
-            let camera = transform_lanes(&cameras[at], &all);
-            self.view.images[at].splat_lanes(&camera, points.len());
-            return;
-        }
-        for p in points {
-            for &at in self.faces.towards(transform(local_from_scan, *p)) {
-                self.view.images[at].splat(transform(&cameras[at], *p));
+    /// Keeps those of a few points that are in the region.
+    fn keep(&mut self, local: &Lanes, places: &[u32], first_place: u64) {
+        for (i, place) in places.iter().enumerate() {
+            let p = [local[0][i], local[1][i], local[2][i]];
+            if self.bounds.contains(p.map(f64::from)) {
+                self.view.points.push(p);
+                if self.lattice.is_none() {
+                    self.places.push(first_place + u64::from(*place));
+                }
             }
         }
     }
 
-    /// The view, with its empty cells judged and its points in the order of their places.
+    /// Marks a few points, given in the frames of the scan and of the region, in the images.
+    fn splat(&mut self, n: usize, (scan, local): (&Lanes, &Lanes), cameras: &[Rows]) {
+        if let Some(at) = self.faces.of_all(local) {
+            let camera = transform_lanes(&cameras[at], scan);
+            self.view.images[at].splat_lanes(&camera, n);
+            return;
+        }
+        let point = |of: &Lanes, i: usize| [of[0][i], of[1][i], of[2][i]];
+        for i in 0..n {
+            for &at in self.faces.towards(point(local, i)) {
+                self.view.images[at].splat(transform(&cameras[at], point(scan, i)));
+            }
+        }
+    }
+
+    /// The view, with its empty cells judged.
     #[must_use]
     pub fn finish(mut self) -> View {
-        self.view.points.sort_unstable_by_key(|p| p.place);
+        if self.lattice.is_none() {
+            let mut order: Vec<(u64, [f32; 3])> =
+                self.places.into_iter().zip(self.view.points).collect();
+            order.sort_unstable_by_key(|(place, _)| *place);
+            self.view.points = order.into_iter().map(|(_, p)| p).collect();
+        }
         let scan_from_local = self.local_from_scan.inverse();
         for image in &mut self.view.images {
             let scan_from_camera = rows(&(scan_from_local * image.camera_from_local().inverse()));

@@ -245,10 +245,9 @@ impl Normal {
         Some(if longest > MAX_STEP { step * (MAX_STEP / longest) } else { step })
     }
 
-    /// Squared length of a step in stated standard deviations (the Newton decrement): no unknown moves by more than its
-    /// root.
+    /// Squared length of a step in stated standard deviations: no unknown moves by more than its root.
     pub(crate) fn deviations(&self, step: &DVector<f64>) -> f64 {
-        -self.gradient.dot(step)
+        step.dot(&(&self.hessian * step))
     }
 
     /// Standard deviation of the patches' offsets, metres.

@@ -50,11 +50,8 @@ impl Lattice {
             return None;
         }
         let mut step = view.beam_step;
-        let angles: Vec<[f64; 2]> = view
-            .points
-            .iter()
-            .map(|p| angles(&scanner, &Point::from(p.xyz.map(f64::from))))
-            .collect();
+        let angles: Vec<[f64; 2]> =
+            view.points.iter().map(|p| angles(&scanner, &Point::from(p.map(f64::from)))).collect();
         loop {
             let pixel = |a: &[f64; 2]| a.map(|v| (v / step).floor() as i32);
             let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
@@ -74,8 +71,8 @@ impl Lattice {
                 let at = pixel(a);
                 let cell = (at[0] - low[0]) as usize * size[1] + (at[1] - low[1]) as usize;
                 let near = |q: &[f32; 3]| (Point::from(q.map(f64::from)) - scanner).norm_squared();
-                if !cells[cell][0].is_finite() || near(&p.xyz) < near(&cells[cell]) {
-                    cells[cell] = p.xyz;
+                if !cells[cell][0].is_finite() || near(p) < near(&cells[cell]) {
+                    cells[cell] = *p;
                 }
             }
             return Some(Self { scanner, step, low, size, cells });
