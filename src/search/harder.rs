@@ -1,6 +1,7 @@
 //! A region and the fits of what stands plainly in it in; the fits of what is harder to find out: on walls and ceilings, behind
 //! other things, on stands that nobody sees, moved between scans.
 
+use super::tried::Tried;
 use super::{MAX_SUNK, SAME_BASE, Search, base};
 use crate::engine::AllThreads;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Verdict};
@@ -43,11 +44,12 @@ impl Search<'_, '_> {
         scene: &Scene<'_>,
         sight: &Sight<'_>,
         is_wanted: &impl Fn(&Candidate) -> bool,
+        tried: &mut Tried,
     ) -> Result<Vec<Fit>> {
         let find = || self.candidates(sight, &self.mounts(scene.region), (MIN_MOUNT_SCORE, 1));
         let mut hung = self.piece((scene.region, "mounts"), find)?;
         hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
-        self.fits(scene, &few(hung, MAX_MOUNTS))
+        self.fits(scene, &few(hung, MAX_MOUNTS), tried)
     }
 
     /// Ceilings, walls and tilted plates about the region.
@@ -71,12 +73,13 @@ impl Search<'_, '_> {
         scene: &Scene<'_>,
         (sight, planes): (&mut Sight<'_>, &[InstallationPlane]),
         fits: &[Fit],
+        tried: &mut Tried,
     ) -> Result<Vec<Fit>> {
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
         let find = || self.candidates(sight, planes, (0.0, BREADTH));
         let mut found = self.piece((scene.region, "left over"), find)?;
         found.retain(|c| is_apart(c, &feet));
-        self.fits(scene, &few(found, MAX_LEFT_OVER))
+        self.fits(scene, &few(found, MAX_LEFT_OVER), tried)
     }
 
     /// Fits of robots that hide all of the stand under their feet: where much is left that no trusted robot explains, all
@@ -87,6 +90,7 @@ impl Search<'_, '_> {
         sight: &mut Sight<'_>,
         fits: &[Fit],
         is_wanted: &impl Fn(&Candidate) -> bool,
+        tried: &mut Tried,
     ) -> Result<Vec<Fit>> {
         let region = scene.region;
         let at = region.origin;
@@ -97,7 +101,7 @@ impl Search<'_, '_> {
         let find = || self.candidates(sight, &planes, (MIN_STAND_SCORE, 1));
         let mut found = self.piece((region, "stands"), find)?;
         found.retain(|c| is_apart(c, &feet) && is_wanted(c));
-        self.fits(scene, &few(found, MAX_MOUNTS))
+        self.fits(scene, &few(found, MAX_MOUNTS), tried)
     }
 
     /// Lets only points count that are on no trusted robot; returns the bases of those robots where much is left, `None`

@@ -2,6 +2,7 @@
 //! of the library through base search and fit.
 
 mod harder;
+mod tried;
 mod views;
 
 use crate::engine::AllThreads;
@@ -19,6 +20,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
+use tried::Tried;
 
 /// A library with what fits of its models need, made when the first of them asks for it.
 pub(crate) struct Shelf<'a> {
@@ -152,16 +154,17 @@ impl<'a, 'm> Search<'a, 'm> {
         let mut candidates =
             self.piece((region, "candidates"), || self.candidates(&sight, &planes, (0.0, 1)))?;
         candidates.retain(is_wanted);
-        let mut fits = self.fits(&scene, &candidates)?;
+        let mut tried = Tried::default();
+        let mut fits = self.fits(&scene, &candidates, &mut tried)?;
         // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
-            fits.extend(self.on_mounts(&scene, &sight, &is_wanted)?);
+            fits.extend(self.on_mounts(&scene, &sight, &is_wanted, &mut tried)?);
         }
         // At one place all that could be left over was looked at already.
         if about.is_none() {
-            fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits)?);
+            fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits, &mut tried)?);
         }
-        fits.extend(self.on_stands(&scene, &mut sight, &fits, &is_wanted)?);
+        fits.extend(self.on_stands(&scene, &mut sight, &fits, &is_wanted, &mut tried)?);
         let sights = Sights { region, views: &views, floors: &planes };
         fits.extend(self.moved(&fits, sight, &sights));
         fits.retain(|fit| wants(&base(&fit.world_from_base)));
@@ -193,17 +196,24 @@ impl<'a, 'm> Search<'a, 'm> {
     }
 
     /// Fits of candidates, which come best base first: where a robot is trusted, bases that fit the place far worse are
-    /// not tried any more.
-    fn fits(&self, scene: &Scene<'_>, candidates: &[Candidate]) -> Result<Vec<Fit>> {
+    /// not tried any more, nor are those that were tried before.
+    fn fits(
+        &self,
+        scene: &Scene<'_>,
+        candidates: &[Candidate],
+        tried: &mut Tried,
+    ) -> Result<Vec<Fit>> {
         let (mut out, mut taken): (Vec<Fit>, Vec<(Point, f64)>) = (Vec::new(), Vec::new());
-        for batch in candidates.chunks(BATCH) {
-            let is_open = |c: &&Candidate| {
+        let new: Vec<&Candidate> = candidates.iter().filter(|c| !tried.knows(c)).collect();
+        for batch in new.chunks(BATCH) {
+            let is_open = |c: &&&Candidate| {
                 let here = base(&c.bases[0].0);
                 !taken.iter().any(|(at, score)| {
                     (at - here).norm() < SAME_BASE && c.bases[0].1 < FAR_WORSE * score
                 })
             };
-            let open: Vec<&Candidate> = batch.iter().filter(is_open).collect();
+            let open: Vec<&Candidate> = batch.iter().filter(is_open).copied().collect();
+            open.iter().for_each(|c| tried.add(c));
             let fit = |c: &&Candidate| {
                 let find = || {
                     let prepared = self.shelf.prepared(c.model);

@@ -265,19 +265,27 @@ fn met((at, ray): (&Vector, &Vector), (t, n): (f64, Vector), triangle: u32) -> M
 }
 
 /// How far along a beam, from a place on it, it crosses a triangle, and the triangle's normal, of any length; `None` where it
-/// passes beside it.
+/// passes beside it (Möller and Trumbore 1997).
+#[inline]
 fn crosses(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<(f64, Vector)> {
     let corner = |corner: u32| Vector::from(mesh.vertices[corner as usize].map(f64::from));
     let [a, b, c] = mesh.triangles[triangle as usize].map(corner);
-    let (u, v) = (b - a, c - a);
-    let n = u.cross(&v);
-    let t = n.dot(&(a - at)) / n.dot(ray);
-    // Shares of the two edges in where the beam meets the plane; along it there are none.
-    let w = at + ray * t - a;
-    let whole = n.norm_squared();
-    let (along_u, along_v) = (w.cross(&v).dot(&n) / whole, u.cross(&w).dot(&n) / whole);
-    let is_within = along_u >= -SEAM && along_v >= -SEAM && along_u + along_v <= 1.0 + SEAM;
-    (t.is_finite() && is_within).then_some((t, n))
+    let (u, v, w) = (b - a, c - a, at - a);
+    let across = ray.cross(&v);
+    let whole = u.dot(&across);
+    // Shares of the two edges in where the beam meets the plane, the whole of it being 1; along it there are none.
+    let (sign, seam) = (whole.signum(), SEAM * whole.abs());
+    let along_u = w.dot(&across) * sign;
+    if !(along_u >= -seam && along_u <= whole.abs() + seam) {
+        return None;
+    }
+    let beside = w.cross(&u);
+    let along_v = ray.dot(&beside) * sign;
+    if !(along_v >= -seam && along_u + along_v <= whole.abs() + seam) {
+        return None;
+    }
+    let t = v.dot(&beside) / whole;
+    t.is_finite().then(|| (t, u.cross(&v)))
 }
 
 #[cfg(test)]
