@@ -69,6 +69,13 @@ pub(crate) struct Adjusted {
 }
 
 impl Adjusted {
+    /// RMS distance of all points from the surface, metres.
+    pub(crate) fn rms(&self) -> f64 {
+        let total: usize = self.n_points.iter().sum();
+        let squares = self.n_points.iter().zip(&self.link_rms).map(|(n, r)| *n as f64 * r * r);
+        (squares.sum::<f64>() / total.max(1) as f64).sqrt()
+    }
+
     /// Where it stands, to go on from.
     pub(crate) fn state(&self) -> State {
         let (hypothesis, scans) = (self.hypothesis.clone(), self.scans.clone());

@@ -1,7 +1,7 @@
 //! The adjusted posture, the others that were looked at, and what the beams say in; out comes the fit as it is reported:
 //! values with their standard deviations, which joints are open, rivals, equals, verdict.
 
-use contract::{Equal, Fan, Fit, JointFit, RunnerUp, ScanShare, ScanShift};
+use contract::{Equal, Fan, Fit, JointFit, RunnerUp, ScanShare, ScanShift, Verdict};
 use geometry::{Pose, Vector};
 use nalgebra::{DMatrix, DVector};
 use robot::{Model, Motion};
@@ -121,7 +121,7 @@ pub(crate) fn report(
         covariance: (0..n * n).map(|i| covariance[(i / n, i % n)]).collect(),
         score: judgement.score,
         explained: judgement.explained,
-        rms: rms(best),
+        rms: best.rms(),
         surface_sigma: best.patch_sigma,
         tip_sigma: tip_sigma(model, &h.posture, &own),
         scans: scans(refine, best),
@@ -135,6 +135,29 @@ pub(crate) fn report(
     fit
 }
 
+/// What is said of a posture that is refused before it is worth a report: where it stood, and how much it explained.
+pub(crate) fn refused(refine: &Refine<'_>, best: &Adjusted, judgement: &Judgement) -> Fit {
+    let (model, h) = (refine.prepared.model, &best.hypothesis);
+    let joint = |(free, value): (&usize, &f64)| JointFit {
+        name: model.joints[*free].name.clone(),
+        value: *value,
+        sigma: ANY_ANGLE,
+        determined: false,
+        equivalents: Vec::new(),
+    };
+    Fit {
+        model: refine.prepared.index,
+        model_name: model.name.clone(),
+        world_from_base: refine.scene.world_from_local() * h.local_from_base,
+        joints: model.free.iter().zip(&h.posture).map(joint).collect(),
+        score: judgement.score,
+        explained: judgement.explained,
+        rms: best.rms(),
+        verdict: Verdict::Refused,
+        ..Fit::default()
+    }
+}
+
 fn runner_up(model: &Model, best: &Judgement, (margin, (_, other)): &(f64, &Polished)) -> RunnerUp {
     RunnerUp {
         model: model.name.clone(),
@@ -142,13 +165,6 @@ fn runner_up(model: &Model, best: &Judgement, (margin, (_, other)): &(f64, &Poli
         same_model: true,
         margin: *margin,
     }
-}
-
-/// RMS distance of all points from the surface, metres.
-fn rms(best: &Adjusted) -> f64 {
-    let total: usize = best.n_points.iter().sum();
-    let squares = best.n_points.iter().zip(&best.link_rms).map(|(n, r)| *n as f64 * r * r);
-    (squares.sum::<f64>() / total.max(1) as f64).sqrt()
 }
 
 /// What each scan is off, where a scanner is known.

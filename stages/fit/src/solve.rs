@@ -10,11 +10,12 @@ use crate::branch::branches;
 use crate::calibrate::doubt;
 use crate::judge::{Judgement, judge};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Prior, Refine, Round};
-use crate::report::report;
+use crate::report::{refused, report};
 use crate::rivals::best_of;
 use crate::sampled::Sampled;
 use crate::spin::Spin;
 use crate::turns;
+use crate::verdict::is_lost;
 use crate::{Prepared, Scene, Settings};
 
 /// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans' own noise, not the
@@ -83,6 +84,9 @@ pub fn fit(
         return None;
     }
     let best = settle(&refine, best, (&near, &all), fan);
+    if is_lost(&best.0, scene) {
+        return Some(refused(&refine, &best.0, &best.1));
+    }
     let best = best_of(&closer, &refine, best, &mut polished, (&near, &all), fan);
     let other = branches(&refine, &best.0.hypothesis, &best.1, &near);
     let Some((loops, model)) = other else {

@@ -3,6 +3,7 @@
 use contract::{Fit, Verdict};
 use robot::JointKind;
 
+use crate::adjust::Adjusted;
 use crate::judge::Judgement;
 use crate::turns;
 use crate::weak::weak;
@@ -71,7 +72,7 @@ pub(crate) fn pass(
         fit.covariance.get((6 + j) * (n + 1)).map_or(fit.joints[j].sigma, |v| v.max(0.0).sqrt())
     };
     let n_known = (0..fit.joints.len()).filter(|&j| own_sigma(j) < KNOWN_SIGMA).count();
-    let is_open = 2 * n_known <= fit.joints.len();
+    let off = Off::new((fit.rms, scene.noise), [n_known, fit.joints.len()]);
     let words = || {
         format!(
             "its points lie {:.0} mm off its surface, where the scans' noise is {:.0} mm",
@@ -79,13 +80,8 @@ pub(crate) fn pass(
             scene.noise * 1e3
         )
     };
-    // A surface that fits badly and leaves the posture open may be anything.
-    let is_bad = fit.rms > BAD_RMS.0 * scene.noise + BAD_RMS.1
-        || fit.rms > OPEN_RMS.0 * scene.noise + OPEN_RMS.1;
-    let is_poor = fit.rms > POOR_RMS.0 * scene.noise + POOR_RMS.1;
-    let is_anything = fit.rms > ANYTHING_RMS.max(1.5 * scene.noise);
-    let is_wrong = is_anything || is_poor && judgement.score < POOR_SCORE;
-    grade(is_wrong || is_open && is_bad, is_poor, &mut refusals, &mut doubts, words);
+    let is_wrong = off.is_anything || off.is_poor && judgement.score < POOR_SCORE;
+    grade(is_wrong, off.is_poor, &mut refusals, &mut doubts, words);
     if !scene.evidence.has_beams() {
         doubts.push("no scanner position is known, so nothing proves free space".into());
     }
@@ -120,6 +116,36 @@ pub(crate) fn pass(
     fit.reasons = refusals;
     fit.reasons.extend(doubts);
     fit.reasons.extend(notes);
+}
+
+/// How far the points are off a surface.
+struct Off {
+    /// Too far for it to be trusted.
+    is_poor: bool,
+    /// So far that it may be anything.
+    is_anything: bool,
+}
+
+impl Off {
+    /// Of an RMS distance, where the scans have so much noise, metres; so many of the joints are known.
+    fn new((rms, noise): (f64, f64), [n_known, n_joints]: [usize; 2]) -> Self {
+        let is_bad =
+            rms > BAD_RMS.0 * noise + BAD_RMS.1 || rms > OPEN_RMS.0 * noise + OPEN_RMS.1;
+        // A surface that fits badly and leaves the posture open may be anything, too.
+        let is_open = 2 * n_known <= n_joints;
+        Self {
+            is_poor: rms > POOR_RMS.0 * noise + POOR_RMS.1,
+            is_anything: is_open && is_bad || rms > ANYTHING_RMS.max(1.5 * noise),
+        }
+    }
+}
+
+/// Whether what was adjusted is sure to be refused, whatever its wrist: its points are near the model, not on it.
+pub(crate) fn is_lost(best: &Adjusted, scene: &Scene<'_>) -> bool {
+    let n_joints = best.hypothesis.posture.len();
+    let is_known = |j: &usize| best.covariance[(6 + j, 6 + j)] < KNOWN_SIGMA * KNOWN_SIGMA;
+    let n_known = (0..n_joints).filter(is_known).count();
+    Off::new((best.rms(), scene.noise), [n_known, n_joints]).is_anything
 }
 
 /// Whether nothing that was measured speaks against a fit: if it is doubtful, then because too little of it was seen.
