@@ -15,10 +15,8 @@ const LINK_VIOLATION: (f64, f64) = (0.06, 0.30);
 const VIOLATION: (f64, f64) = (0.03, 0.15);
 /// Score below which a fit is not trusted, and below which it is refused.
 const SCORE: (f64, f64) = (0.60, 0.35);
-/// Residual, in multiples of the scans' noise and metres beyond, from which a surface fits too poorly to be trusted …
+/// Residual, in multiples of the scans' noise and metres beyond, from which a surface fits too poorly to be trusted.
 const POOR_RMS: (f64, f64) = (2.0, 0.0015);
-/// … and from which it fits badly.
-const BAD_RMS: (f64, f64) = (2.5, 0.003);
 /// Score below which a surface that fits too poorly is refused: furniture has room for a small arm that is nowhere
 /// quite right.
 const POOR_SCORE: f64 = 0.52;
@@ -129,13 +127,11 @@ struct Off {
 impl Off {
     /// Of an RMS distance, where the scans have so much noise, metres; so many of the joints are known.
     fn new((rms, noise): (f64, f64), [n_known, n_joints]: [usize; 2]) -> Self {
-        let is_bad =
-            rms > BAD_RMS.0 * noise + BAD_RMS.1 || rms > OPEN_RMS.0 * noise + OPEN_RMS.1;
         // A surface that fits badly and leaves the posture open may be anything, too.
-        let is_open = 2 * n_known <= n_joints;
+        let is_open = 2 * n_known <= n_joints && rms > OPEN_RMS.0 * noise + OPEN_RMS.1;
         Self {
             is_poor: rms > POOR_RMS.0 * noise + POOR_RMS.1,
-            is_anything: is_open && is_bad || rms > ANYTHING_RMS.max(1.5 * noise),
+            is_anything: is_open || rms > ANYTHING_RMS.max(1.5 * noise),
         }
     }
 }
@@ -203,5 +199,18 @@ fn grade(
         refusals.push(say());
     } else if doubt {
         doubts.push(say());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_beside_its_points_and_leaves_half_of_its_joints_open_may_be_anything() {
+        let off = |rms: f64, n_known: usize| Off::new((rms, 0.002), [n_known, 6]);
+        assert!(off(0.0055, 3).is_anything && !off(0.0055, 4).is_anything);
+        assert!(!off(0.003, 0).is_anything && !off(0.003, 6).is_poor);
+        assert!(off(0.006, 6).is_poor && off(0.008, 6).is_anything);
     }
 }
