@@ -16,9 +16,9 @@ const MIN_MOUNT_SCORE: f64 = 0.15;
 /// The same of a base on a stand of which nothing is seen.
 const MIN_STAND_SCORE: f64 = 0.10;
 /// Such stands are looked for where at least so many points are left over, so far above the region's lowest, metres: a
-/// stand and an arm.
+/// stand with an arm that may reach down from it; benches and most conveyors are no higher.
 const MIN_LEFT: usize = 500;
-const MIN_STANDING: f64 = 1.2;
+const MIN_STANDING: f64 = 0.9;
 /// How far beyond the box of a link points may be its own, metres.
 const BOX_MARGIN: f64 = 0.08;
 /// Places on walls, ceilings and such stands that are looked at for each model.
