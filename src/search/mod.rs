@@ -206,13 +206,13 @@ impl<'a, 'm> Search<'a, 'm> {
         let (mut out, mut taken): (Vec<Fit>, Vec<(Point, f64)>) = (Vec::new(), Vec::new());
         let new: Vec<&Candidate> = candidates.iter().filter(|c| !tried.knows(c)).collect();
         for batch in new.chunks(BATCH) {
-            let is_open = |c: &&&Candidate| {
+            let is_open = |c: &&Candidate| {
                 let here = base(&c.bases[0].0);
                 !taken.iter().any(|(at, score)| {
                     (at - here).norm() < SAME_BASE && c.bases[0].1 < FAR_WORSE * score
                 })
             };
-            let open: Vec<&Candidate> = batch.iter().filter(is_open).copied().collect();
+            let open: Vec<&Candidate> = batch.iter().copied().filter(is_open).collect();
             open.iter().for_each(|c| tried.add(c));
             let fit = |c: &&Candidate| {
                 let find = || {
