@@ -185,6 +185,21 @@ impl<'a> Adjust<'a> {
         sums.into_iter().reduce(join).unwrap_or_else(empty)
     }
 
+    /// Half the robust squares of all points over their variance; one that lies on nothing counts as much as one at the end
+    /// of the kernel.
+    pub(crate) fn cost(&self, state: &State, points: &Sampled) -> f64 {
+        let pairing = Pairing::new(self.refine, state, points.gate);
+        let slack = state.patch_sigma * state.patch_sigma;
+        let of = |point: &u32| match pairing.pair(*point, &mut None) {
+            Some(pair) => {
+                let variance = pair.variance + slack;
+                robust::tukey_cost(pair.r, kernel_scale(variance, points.gate)) / variance
+            }
+            None => robust::tukey_cost(TUKEY, TUKEY),
+        };
+        points.points().iter().map(of).sum::<f64>() / self.refine.scene.n_alike
+    }
+
     /// Normal equations of what was summed up at a state, patches taken out, with all priors.
     fn closed(&self, state: &State, mut sums: Normal) -> Normal {
         sums.close();
@@ -214,7 +229,7 @@ impl<'a> Adjust<'a> {
         let pairs = points.iter().zip(known).filter_map(|(&i, known)| pairing.pair(i, known));
         for pair in pairs {
             tallies.add(&pair);
-            let scale = (TUKEY * (pair.variance + slack).sqrt()).min(gate);
+            let scale = kernel_scale(pair.variance + slack, gate);
             let kernel = robust::tukey(pair.r, scale);
             let variance = n_alike * pair.variance;
             let weight = kernel / variance;
@@ -290,6 +305,11 @@ impl<'a> Adjust<'a> {
             link_rms: tallies.rms(),
         }
     }
+}
+
+/// From where on the kernel gives no weight to residuals of a variance, m²; metres.
+fn kernel_scale(variance: f64, gate: f64) -> f64 {
+    (TUKEY * variance.sqrt()).min(gate)
 }
 
 /// Weights of what is known of a scan's errors beforehand, m⁻² and rad⁻².

@@ -26,6 +26,7 @@ pub mod paper;
 mod pierced;
 mod placed;
 mod prepared;
+mod profile;
 mod refine;
 mod report;
 mod rivals;

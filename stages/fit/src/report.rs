@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 use crate::adjust::Adjusted;
 use crate::beam::Hypothesis;
 use crate::judge::{Judgement, evidence};
+use crate::profile;
 use crate::refine::Refine;
 use crate::rivals::lead;
 use crate::sampled::Sampled;
@@ -63,6 +64,8 @@ pub(crate) fn report(
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
     let mut of_joints = own.view_mut((6, 6), (n - 6, n - 6));
     of_joints += sway(refine, best, &several, (near, points), fan);
+    let beyond = profile::beyond(refine, best, points, fan);
+    beyond.into_iter().enumerate().for_each(|(j, variance)| of_joints[(j, j)] += variance);
     for s in spins {
         // Any value of the run, each as likely.
         spread[s.joint] = spread[s.joint].max(s.extent / 3.0_f64.sqrt());

@@ -29,6 +29,11 @@ impl Sampled {
         self.every((self.points.len() / n.max(1)).max(1))
     }
 
+    /// Their indices in the scene.
+    pub(crate) fn points(&self) -> &[u32] {
+        &self.points
+    }
+
     /// What was met on these links is not known any more: they turned.
     pub(crate) fn forget(&mut self, links: &[usize]) {
         for known in &mut self.known {

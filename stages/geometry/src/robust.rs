@@ -9,6 +9,15 @@ pub fn tukey(residual: f64, scale: f64) -> f64 {
     if v <= 0.0 { 0.0 } else { v * v }
 }
 
+/// What Tukey's biweight makes of half a square, `∫ w(r) r dr`: `c²/6 (1 − (1 − (r/c)²)³)`, from `c` on the same for all.
+#[inline]
+#[must_use]
+pub fn tukey_cost(residual: f64, scale: f64) -> f64 {
+    let u = residual / scale;
+    let v = (1.0 - u * u).max(0.0);
+    scale * scale / 6.0 * (1.0 - v * v * v)
+}
+
 /// Huber's weight: 1 inside `scale`, `scale/|r|` outside.
 #[inline]
 #[must_use]
