@@ -76,7 +76,7 @@ impl Cell {
 
     fn add(&mut self, scan: usize, columns: &SimColumns, place: &mut u64) {
         let hits: Vec<usize> = (0..columns.len()).filter(|&i| columns.hit[i]).collect();
-        let n_robot = hits.iter().filter(|&&i| columns.label[i].robot >= 0).count();
+        let n_robot = hits.iter().filter(|&&i| columns.label[i].robot == 0).count();
         self.n_robot_points += n_robot;
         self.strips.push(Strip {
             scan: ScanId(scan as u32),

@@ -34,6 +34,10 @@ pub(super) struct Condition {
     pub(super) mixed: bool,
     /// Smooth error of the model's shape, metres, about the largest.
     pub(super) warp: f64,
+    /// Whether a part of one link's surface, a cover, is off.
+    pub(super) uncovered: bool,
+    /// By how much of its size the surface of one link is larger.
+    pub(super) scaled: f64,
     /// How far joints are from where the model has them, one sigma: shift on each axis, metres, turn about each but
     /// their own, degrees.
     pub(super) frames: [f64; 2],
@@ -45,6 +49,10 @@ pub(super) struct Condition {
     pub(super) calibrate: bool,
     /// Share of 0..1 of each kind of clutter being there.
     pub(super) clutter: f64,
+    /// Share of the foot's height that plates about it hide, in a cell fenced in on three sides; 0: none of that.
+    pub(super) hidden: f64,
+    /// Whether the arm of another robot crosses it.
+    pub(super) crossed: bool,
     /// What the robot is bolted to.
     pub(super) mount: Place,
     /// How postures are found.
@@ -63,11 +71,15 @@ pub(super) const PLAIN: Condition = Condition {
     registration: [0.0; 3],
     mixed: false,
     warp: 0.0,
+    uncovered: false,
+    scaled: 0.0,
     frames: [0.0; 2],
     calibrate: false,
     other_branch: false,
     tool: false,
     clutter: 0.0,
+    hidden: 0.0,
+    crossed: false,
     stand: 0.0,
     mount: Place::Floor,
     method: Method::Beam,
@@ -117,8 +129,12 @@ const SUITES: &[Suite] = &[
     ("mixed", 3, |_| Condition { mixed: true, ..PLAIN }),
     ("few", 9, |k| Condition { n_scanners: 3 - k % 3, ..PLAIN }),
     ("clutter", 6, |_| Condition { clutter: 1.0, mixed: true, ..PLAIN }),
+    ("hidden", 6, |k| Condition { hidden: [0.25, 0.5, 0.75][k % 3], mixed: true, ..PLAIN }),
+    ("crossed", 3, |_| Condition { crossed: true, mixed: true, ..PLAIN }),
     ("shape-1.5", 6, |_| Condition { warp: 0.0015, ..PLAIN }),
     ("shape-3", 6, |_| Condition { warp: 0.003, ..PLAIN }),
+    ("cover", 3, |_| Condition { uncovered: true, ..PLAIN }),
+    ("scaled", 3, |_| Condition { scaled: 0.01, ..PLAIN }),
     ("all", 6, |_| Condition {
         n_scanners: 4,
         registration: REGISTRATION,

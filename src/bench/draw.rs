@@ -2,6 +2,7 @@
 
 use super::cell::Start;
 use super::condition::{Case, Condition, Place};
+use super::obstacles::{self, Standing};
 use super::shape;
 use contract::Result;
 use geometry::{Point, Pose, Vector};
@@ -22,6 +23,8 @@ pub(super) struct Drawn {
     pub(super) posture: Vec<f64>,
     /// Loops that stand on the other of their solutions.
     pub(super) other_branches: Vec<usize>,
+    /// Base of another robot beside it, world.
+    pub(super) beside: Option<Vector>,
 }
 
 /// Starts of a case of the basin's curve, and how far their bases are off: metres, radians (fit.md §6.4).
@@ -48,6 +51,12 @@ impl Drawn {
         out[case.model] = out[case.model].with_other_branches(&self.other_branches);
         if case.condition.warp > 0.0 {
             shape::warp(&mut out[case.model], case.condition.warp, case.seed);
+        }
+        if case.condition.uncovered {
+            shape::uncover(&mut out[case.model], case.seed);
+        }
+        if case.condition.scaled != 0.0 {
+            shape::scale(&mut out[case.model], case.condition.scaled, case.seed);
         }
         if case.condition.frames != [0.0; 2] {
             shape::displace(&mut out[case.model], case.condition.frames, case.robot());
@@ -150,9 +159,14 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     let reach = reach(model, &world_from_base, &posture);
     clutter(&mut scene, model, c, reach, &mut random);
     scanners(&mut scene, c, reach, &mut random);
+    let (circle, mut random) = (circle(reach), Random::keyed(&[case.seed, 0x0B5]));
+    let standing = Standing { model, world_from_base, posture: &posture, reach: reach[0], circle };
+    obstacles::hide(&mut scene, &standing, c, &mut random);
+    let cross = || obstacles::cross(&mut scene, &standing, &mut random);
+    let beside = c.crossed.then(cross).transpose()?;
     let has_branch = |at: &usize| c.other_branch && model.has_other_branch(*at, &posture);
     let other_branches = (0..model.loops.len()).find(has_branch).into_iter().collect();
-    Ok(Drawn { scene, world_from_base, posture, other_branches })
+    Ok(Drawn { scene, world_from_base, posture, other_branches, beside })
 }
 
 /// Roll, pitch and yaw, degrees.
@@ -329,10 +343,15 @@ fn bodies(model: &Model) -> Vec<usize> {
     links.filter(|&l| !model.links[l].bounds.is_empty()).collect()
 }
 
+/// Radius of the circle of scanners, metres.
+fn circle(reach: [f64; 2]) -> f64 {
+    CIRCLE.max(reach[0] + 2.5)
+}
+
 /// Scanners on a circle, jittered, each casting only the part of its dome that sees the cell.
 fn scanners(scene: &mut Scene, c: &Condition, reach: [f64; 2], random: &mut Random) {
     let step_deg = (360.0 * (DOME[1] - DOME[0]) / c.n_beams).sqrt();
-    let circle = CIRCLE.max(reach[0] + 2.5);
+    let circle = circle(reach);
     let turn = random.between(0.0, TAU);
     for k in 0..c.n_scanners {
         let a = turn + TAU * (k as f64 + random.between(-0.2, 0.2)) / c.n_scanners as f64;

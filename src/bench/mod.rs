@@ -10,6 +10,7 @@ mod condition;
 mod draw;
 mod growth;
 mod limits;
+mod obstacles;
 pub mod plant;
 mod plot;
 pub mod rescan;

@@ -5,7 +5,7 @@ use super::condition::Case;
 use super::draw::{Drawn, Mount};
 use contract::{Calibration, Error, Fit, Verdict};
 use fit::turns;
-use geometry::{Point, Pose};
+use geometry::{Point, Pose, Vector};
 use robot::{JointKind, Model, Role};
 use serde::Serialize;
 
@@ -173,14 +173,21 @@ pub(super) fn score(
         .iter()
         .filter(|f| f.verdict != Verdict::Refused && apart(f) < SAME_PLACE)
         .min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    // Of the robot beside it nothing is asked.
+    let is_beside = |f: &Fit| {
+        let apart = |b: Vector| (f.world_from_base.translation.vector - b).norm();
+        f.model_name == model.name && drawn.beside.is_some_and(|b| apart(b) < SAME_PLACE)
+    };
+    let is_other = |f: &&Fit| here.is_none_or(|h| !std::ptr::eq(*f, h)) && !is_beside(f);
+    let others: Vec<&Fit> = found.fits.iter().filter(is_other).collect();
     let mut row = Row {
         n_robot_points: found.n_robot_points,
-        n_invented: found.fits.len() - usize::from(here.is_some()),
+        n_invented: others.len(),
         seconds: found.seconds,
         ..Row::new(case, model)
     };
-    let others = found.fits.iter().filter(|f| here.is_none_or(|h| !std::ptr::eq(*f, h)));
     row.invented = others
+        .into_iter()
         .map(|f| format!("{} {}, {:.2} m away", f.verdict.word(), f.model_name, apart(f)))
         .collect();
     if !found.ends.is_empty() {

@@ -12,6 +12,8 @@ use std::sync::Arc;
 const N_WAVES: usize = 3;
 /// Largest wave number on an axis, radians a metre: waves of 0.8 m and longer.
 const WAVE_NUMBER: f64 = 8.0;
+/// Share of a link's size that its cover is deep.
+const COVER: f64 = 0.125;
 /// Vertices of one corner that triangles do not share are one if they agree to this, metres.
 const WELD: f32 = 1e-4;
 
@@ -50,6 +52,47 @@ pub(super) fn warp(model: &mut Model, amplitude: f64, seed: u64) {
             *vertex = [moved.x as f32, moved.y as f32, moved.z as f32];
         }
     }
+}
+
+/// Takes a cover off one link that moves: what lies within an eighth of its size of one of its sides is not there.
+pub(super) fn uncover(model: &mut Model, seed: u64) {
+    let mut random = Random::keyed(&[seed, 0xC0F]);
+    let Some(l) = any_moving(model, &mut random) else { return };
+    let link = &mut model.links[l];
+    let (bounds, size) = (link.bounds, link.bounds.size());
+    let axis = ((random.unit() * 3.0) as usize).min(2);
+    let is_high = random.unit() < 0.5;
+    let mesh = Arc::make_mut(&mut link.mesh);
+    let middle = |t: &[u32; 3]| {
+        t.iter().map(|&i| f64::from(mesh.vertices[i as usize][axis])).sum::<f64>() / 3.0
+    };
+    let depth = |t: &[u32; 3]| match is_high {
+        true => bounds.max[axis] - middle(t),
+        false => middle(t) - bounds.min[axis],
+    };
+    let kept = mesh.triangles.iter().copied().filter(|t| depth(t) > COVER * size[axis]).collect();
+    mesh.triangles = kept;
+}
+
+/// Makes the surface of one link that moves larger about its middle by a share of its size.
+pub(super) fn scale(model: &mut Model, share: f64, seed: u64) {
+    let mut random = Random::keyed(&[seed, 0x5CA]);
+    let Some(l) = any_moving(model, &mut random) else { return };
+    let link = &mut model.links[l];
+    let middle = link.bounds.center();
+    for vertex in &mut Arc::make_mut(&mut link.mesh).vertices {
+        *vertex = [0, 1, 2].map(|i| {
+            let v = f64::from(vertex[i]);
+            (v + share * (v - middle[i])) as f32
+        });
+    }
+}
+
+/// One of the links with a surface, but for the first, which stands.
+fn any_moving(model: &Model, random: &mut Random) -> Option<usize> {
+    let bodies: Vec<usize> =
+        (0..model.links.len()).filter(|&l| !model.links[l].bounds.is_empty()).skip(1).collect();
+    bodies.get((random.unit() * bodies.len() as f64) as usize).copied()
 }
 
 /// Moves the place of each free joint: shift on each axis, metres, turn about each but its own, degrees, one sigma.

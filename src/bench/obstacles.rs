@@ -1,0 +1,167 @@
+//! A drawn robot in; what stands in the way of its scanners as fit.md §5 (T6) has it out: plates about its foot, a conveyor that
+//! touches it, a fence on three sides, another robot whose arm crosses it.
+
+use super::condition::Condition;
+use contract::Result;
+use geometry::{Point, Pose, Vector};
+use nalgebra::{Translation3, UnitQuaternion};
+use robot::Model;
+use simulate::random::Random;
+use simulate::scene::{Cuboid, Fence, Filling, Furniture, RobotPlace};
+use simulate::{Postures, Scene};
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// Plates stand so far from the foot and are so thick, metres.
+const PLATES: [f64; 2] = [0.05, 0.005];
+/// A conveyor's length, width and height, metres: lower than most arms reach.
+const CONVEYOR: [f64; 3] = [1.5, 0.6, 0.4];
+/// Ways that it may lie from the foot.
+const N_WAYS: usize = 12;
+/// Other robots stand so far beyond the reach of the first, metres.
+const BESIDE: [f64; 2] = [0.3, 0.8];
+/// Of so many of their postures the one that comes nearest.
+const N_POSTURES: usize = 6;
+/// Two robots are no nearer than about this, metres …
+const CLEAR: f64 = 0.08;
+/// … and no robot's arm is so near to where scanners stand, metres.
+const ASIDE: f64 = 0.8;
+
+/// The robot as it was drawn.
+pub(super) struct Standing<'a> {
+    pub(super) model: &'a Model,
+    pub(super) world_from_base: Pose,
+    pub(super) posture: &'a [f64],
+    /// How far it reaches from its base, metres.
+    pub(super) reach: f64,
+    /// How far from the origin scanners stand, metres.
+    pub(super) circle: f64,
+}
+
+/// Hides a robot's foot and fences it in, as the condition says.
+pub(super) fn hide(scene: &mut Scene, robot: &Standing<'_>, c: &Condition, random: &mut Random) {
+    if c.hidden == 0.0 {
+        return;
+    }
+    let base = robot.world_from_base.translation.vector;
+    let Some(foot) = robot.model.links.iter().find(|link| !link.bounds.is_empty()) else { return };
+    let size = foot.bounds.size();
+    let (_, _, yaw) = robot.world_from_base.rotation.euler_angles();
+    let middle = robot.world_from_base * foot.bounds.center();
+    let height = c.hidden * size[2];
+    for side in 0..4 {
+        let along = usize::from(side % 2 == 1);
+        let gap = 0.5 * size[along] + PLATES[0];
+        let turn = yaw + FRAC_PI_2 * f64::from(side);
+        let width = size[1 - along] + 2.0 * PLATES[0];
+        scene.boxes.push(Cuboid {
+            name: format!("plate {side}"),
+            xyz: [
+                middle.x + gap * turn.cos(),
+                middle.y + gap * turn.sin(),
+                scene.ground(middle.x, middle.y) + 0.5 * height,
+            ],
+            size: [PLATES[1], width, height],
+            rpy_deg: [0.0, 0.0, turn.rem_euclid(TAU).to_degrees()],
+            reflectance: random.between(0.2, 0.9),
+        });
+    }
+    let gap = 0.5 * size[0].max(size[1]) + PLATES[0] + PLATES[1] + 0.5 * CONVEYOR[0];
+    let first = random.between(0.0, TAU);
+    let ways = (0..N_WAYS).map(|k| first + TAU * k as f64 / N_WAYS as f64);
+    let arm = surface(robot);
+    let in_it = |way: f64| {
+        let at = Translation3::new(middle.x + gap * way.cos(), middle.y + gap * way.sin(), 0.0);
+        let pose = Pose::from_parts(at, UnitQuaternion::from_euler_angles(0.0, 0.0, way));
+        let is_in = |p: &&Point| {
+            let q = pose.inverse() * *p;
+            q.x.abs() < 0.5 * CONVEYOR[0] && q.y.abs() < 0.5 * CONVEYOR[1] && q.z < CONVEYOR[2]
+        };
+        arm.iter().filter(is_in).count()
+    };
+    let way = ways.min_by_key(|way| in_it(*way)).unwrap_or(first);
+    scene.conveyors.push(Furniture {
+        name: "conveyor at the foot".into(),
+        xy: [middle.x + gap * way.cos(), middle.y + gap * way.sin()],
+        yaw_deg: way.rem_euclid(TAU).to_degrees(),
+        size: CONVEYOR,
+    });
+    let (r, turn) = (robot.reach + random.between(0.4, 0.8), random.between(0.0, TAU));
+    let corner = |k: usize| {
+        let a = turn + FRAC_PI_2 * k as f64;
+        [base.x + r * 2.0_f64.sqrt() * a.cos(), base.y + r * 2.0_f64.sqrt() * a.sin()]
+    };
+    for k in 0..3 {
+        scene.fences.push(Fence {
+            name: format!("fence {k}"),
+            from: corner(k),
+            to: corner(k + 1),
+            height: random.between(1.8, 2.2),
+            filling: Filling::Wires,
+        });
+    }
+}
+
+/// Puts another robot of the same model beside one, its arm across it; where its base is.
+///
+/// # Errors
+/// `BadInput` where it has no room.
+pub(super) fn cross(
+    scene: &mut Scene,
+    robot: &Standing<'_>,
+    random: &mut Random,
+) -> Result<Vector> {
+    let (base, way) = (robot.world_from_base.translation.vector, random.between(0.0, TAU));
+    let apart = robot.reach + random.between(BESIDE[0], BESIDE[1]);
+    let (x, y) = (base.x + apart * way.cos(), base.y + apart * way.sin());
+    let z = base.z - scene.ground(base.x, base.y) + scene.ground(x, y);
+    let heading = UnitQuaternion::from_euler_angles(0.0, 0.0, random.between(0.0, TAU));
+    let world_from_base = Pose::from_parts(Translation3::new(x, y, z), heading);
+    let cell = |p: &Point| [p.x, p.y, p.z].map(|v| (v / CLEAR).floor() as i32);
+    let arm = surface(robot);
+    let taken: BTreeSet<[i32; 3]> = arm.iter().map(cell).collect();
+    let is_free = |p: &Point| {
+        let [x, y, z] = cell(p);
+        let mut near = (-1..=1)
+            .flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])));
+        p.z > scene.ground(p.x, p.y) - 0.005
+            && p.x.hypot(p.y) < robot.circle - ASIDE
+            && !near.any(|c| taken.contains(&c))
+    };
+    let postures = Postures::new(robot.model);
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for _ in 0..N_POSTURES {
+        let posture = postures.draw(random, &world_from_base, is_free)?;
+        let other = Standing { world_from_base, posture: &posture, ..*robot };
+        let across = |p: &Point| (p.x - base.x).hypot(p.y - base.y);
+        let nearest = surface(&other).iter().map(across).fold(f64::INFINITY, f64::min);
+        if best.as_ref().is_none_or(|b| nearest < b.0) {
+            best = Some((nearest, posture));
+        }
+    }
+    let (_, _, yaw) = world_from_base.rotation.euler_angles();
+    let names = robot.model.free.iter().map(|&j| robot.model.joints[j].name.clone());
+    let posture: BTreeMap<String, f64> =
+        names.zip(best.map(|b| b.1).into_iter().flatten()).collect();
+    scene.robots.push(RobotPlace {
+        name: "R2".into(),
+        model: robot.model.name.clone(),
+        xyz: [x, y, z],
+        rpy_deg: [0.0, 0.0, yaw.to_degrees()],
+        posture,
+        ..RobotPlace::default()
+    });
+    Ok(world_from_base.translation.vector)
+}
+
+/// Samples of its surface, world.
+fn surface(robot: &Standing<'_>) -> Vec<Point> {
+    let poses = robot.model.poses(robot.posture);
+    let links = robot.model.links.iter().zip(poses);
+    let of = |(link, pose): (&robot::Link, Pose)| {
+        let pose = robot.world_from_base * pose;
+        let points = link.cad.points.iter().step_by(5);
+        points.map(move |p| pose * Point::from(p.map(f64::from))).collect::<Vec<_>>()
+    };
+    links.flat_map(of).collect()
+}
