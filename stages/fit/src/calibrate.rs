@@ -9,12 +9,14 @@ use contract::{Calibration, Fan, Fit, JointFrame};
 use geometry::{Pose, Vector, robust};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::{JointKind, Kinematics, Model};
+use std::f64::consts::PI;
 
 use crate::adjust::{Adjust, Adjusted};
 use crate::beam::Hypothesis;
 use crate::normal::Normal;
 use crate::refine::Refine;
 use crate::solve::{NEAR_MARGIN, adjusted_points, better, judged};
+use crate::spin::Spin;
 use crate::{Prepared, Scene, Settings, report};
 
 /// Steps of the joints' places: each after an adjustment of all the rest.
@@ -55,6 +57,7 @@ pub fn calibrate(
         (model, done, frames) = estimate(&refine, &h, &all, 1, fan);
         turns = spins(&model, &done.hypothesis);
     }
+    open_beside(&refine, &frames, &mut turns);
     let own = prepared.moved(&model);
     let refine = Refine { prepared: &own, ..refine };
     let judgement = judged(&refine, &done.hypothesis);
@@ -115,6 +118,21 @@ fn keep(out: &mut Fit, fit: &Fit, found: Calibration) {
     out.calibration = Some(found);
 }
 
+/// Whether a joint's axis is clearly not where its model has it.
+fn is_beside(frame: &JointFrame) -> bool {
+    let [offset, sigma] = frame.offset();
+    offset > WORTH.1 && offset > CLEAR * sigma
+}
+
+/// A bare flange that is clearly elsewhere fits its bolts at a wrong turn as well as at its own, and a wrong turn puts it
+/// elsewhere: any value may be right.
+fn open_beside(refine: &Refine<'_>, frames: &[JointFrame], spins: &mut [Spin]) {
+    let is_bare = |j: usize| refine.prepared.carried(j).len() == refine.prepared.placed_by[j].len();
+    for spin in spins.iter_mut().filter(|s| is_bare(s.joint) && is_beside(&frames[s.joint])) {
+        spin.extent = PI;
+    }
+}
+
 /// Joints that are clearly elsewhere than their model has them.
 fn words(frames: &[JointFrame]) -> Vec<String> {
     let mut out = Vec::new();
@@ -127,7 +145,7 @@ fn words(frames: &[JointFrame]) -> Vec<String> {
                 frame.name
             ));
         }
-        if offset > WORTH.1 && offset > CLEAR * offset_sigma {
+        if is_beside(frame) {
             let (a, s) = (offset * 1e3, offset_sigma * 1e3);
             out.push(format!(
                 "the axis of joint '{}' runs {a:.1} ± {s:.1} mm beside the model's",
@@ -143,7 +161,7 @@ fn words(frames: &[JointFrame]) -> Vec<String> {
 /// that, and it is said.
 pub(crate) fn doubt(
     refine: &Refine<'_>,
-    best: &mut Adjusted,
+    (best, spins): (&mut Adjusted, &mut [Spin]),
     all: &[u32],
     fan: &impl Fan,
 ) -> Vec<String> {
@@ -151,6 +169,7 @@ pub(crate) fn doubt(
         return Vec::new();
     }
     let (_, moved, frames) = estimate(refine, &best.hypothesis, all, EVERY, fan);
+    open_beside(refine, &frames, spins);
     let words = words(&frames);
     if !words.is_empty() {
         let (was, is) = (&best.hypothesis, &moved.hypothesis);

@@ -173,7 +173,7 @@ pub(crate) fn finish(
     fan: &impl Fan,
 ) -> Fit {
     let points = sharpen(refine, &mut best, all, fan);
-    let misfits = doubt(refine, &mut best.0, all, fan);
+    let misfits = doubt(refine, (&mut best.0, &mut best.2), all, fan);
     let mut fit = report(refine, &best, others, (near, &points), fan);
     fit.reasons.extend(misfits);
     fit

@@ -2,7 +2,7 @@
 //! and first link, out.
 
 use contract::Fan;
-use geometry::Plane;
+use geometry::{Plane, Pose};
 
 use crate::base::BaseSearch;
 use crate::trial::{Said, Trial, best, prefix};
@@ -37,7 +37,8 @@ impl BaseSearch<'_> {
     ) -> Vec<Trial> {
         let (tolerance, apart) = (grid.tolerance(), (grid.step * 0.6, grid.yaw * 0.6));
         let around = |trial: Trial| -> Vec<Trial> {
-            let mut near = self.climb(planes, &trial, &grid);
+            let firsts = self.likely_firsts(&planes[trial.plane], &trial, tolerance);
+            let mut near = self.climb(planes, (&trial, &firsts), &grid);
             for t in &mut near {
                 t.said =
                     self.joined(self.look(planes, t, self.settings.n_fine, tolerance), t.first);
@@ -52,16 +53,22 @@ impl BaseSearch<'_> {
     }
 
     /// The neighbours of the best pose that steps to ever better ones lead to, those that may be as good: the coarse level may
-    /// have taken what stands beside a place for it.
-    fn climb(&self, planes: &[Plane], trial: &Trial, grid: &Grid) -> Vec<Trial> {
+    /// have taken what stands beside a place for it. What hides a foot may look like one: the first link, at its likely poses on
+    /// the root, has a say.
+    fn climb(
+        &self,
+        planes: &[Plane],
+        (trial, firsts): (&Trial, &[Pose]),
+        grid: &Grid,
+    ) -> Vec<Trial> {
         let top = |near: &[Trial]| {
             let better = |a: &Trial, b: &Trial| a.said.score.total_cmp(&b.said.score);
             near.iter().copied().max_by(better).unwrap_or(*trial)
         };
-        let mut near = self.neighbours(planes, trial, grid);
+        let mut near = self.neighbours(planes, (trial, firsts), grid);
         let mut best = top(&near);
         for _ in 0..CLIMB {
-            let farther = self.neighbours(planes, &best, grid);
+            let farther = self.neighbours(planes, (&best, firsts), grid);
             let next = top(&farther);
             if next.said.score <= best.said.score {
                 break;
@@ -73,8 +80,14 @@ impl BaseSearch<'_> {
         near
     }
 
-    /// A pose and those beside it, with what a few samples of the base say; of guessed heights those `rise` planes up and down.
-    fn neighbours(&self, planes: &[Plane], trial: &Trial, grid: &Grid) -> Vec<Trial> {
+    /// A pose and those beside it, with what a few samples of base and first link say; of guessed heights those `rise` planes up
+    /// and down.
+    fn neighbours(
+        &self,
+        planes: &[Plane],
+        (trial, firsts): (&Trial, &[Pose]),
+        grid: &Grid,
+    ) -> Vec<Trial> {
         let levels = if self.is_guess { -1..2 } else { 0..1 };
         let all = levels.flat_map(|level| (0..27_i32).map(move |n| (level * grid.rise, n)));
         let near = all.filter_map(|(level, n)| {
@@ -84,7 +97,11 @@ impl BaseSearch<'_> {
             next.x += f64::from(i) * grid.step;
             next.y += f64::from(j) * grid.step;
             next.yaw += f64::from(k) * grid.yaw;
-            next.said = self.look(planes, &next, self.settings.n_fine / 4, grid.tolerance());
+            let own = self.look(planes, &next, self.settings.n_fine / 4, grid.tolerance());
+            if !firsts.is_empty() {
+                next.first = self.glance_at(&planes[plane], &next, firsts, grid.tolerance());
+            }
+            next.said = self.joined(own, next.first);
             Some(next)
         });
         near.collect()

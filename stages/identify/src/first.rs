@@ -15,6 +15,10 @@ const JUDGE: (f32, f32) = (0.04, 0.06);
 const LIKE: (f64, f64) = (0.5, 0.58);
 /// Values of the first joint that are looked at with all samples at a glance.
 const N_GLANCES: usize = 6;
+/// Of those so many are kept while a base is moved about.
+const N_LIKELY: usize = 3;
+/// The first link is looked at with so many times the base's tolerance: its joint has steps, too.
+const FIRST_REACH: f32 = 1.5;
 /// Step of the first joint, radians.
 const FIRST_STEP: f64 = 0.14;
 
@@ -79,7 +83,7 @@ impl BaseSearch<'_> {
     pub(crate) fn with_first(&self, plane: &Plane, trial: Trial, tolerance: f32) -> Trial {
         let own = self.score_base(plane, &trial, (tolerance, self.settings.n_fine));
         let Some(of_first) = &self.first else { return Trial { said: own, ..trial } };
-        let tolerance = tolerance * 1.5;
+        let tolerance = FIRST_REACH * tolerance;
         let first = if self.sight.each.is_empty() {
             let cad = prefix(self.model, of_first.link, self.settings.n_coarse);
             let (poses, few) = self.sweep(plane, &trial, of_first, tolerance);
@@ -109,6 +113,35 @@ impl BaseSearch<'_> {
         let said = |k: &usize| self.sight.glance(cad, &poses[*k], tolerance);
         let first = highest(best.iter().take(N_GLANCES).map(said));
         Trial { said: self.joined(trial.said, first), first, ..trial }
+    }
+
+    /// Poses of the first link in the root's frame that a few samples of it like best where the robot stands so; none where each
+    /// scan is asked by itself.
+    pub(crate) fn likely_firsts(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> Vec<Pose> {
+        let Some(first) = self.first.as_ref().filter(|_| self.sight.each.is_empty()) else {
+            return Vec::new();
+        };
+        let (_, few) = self.sweep(plane, trial, first, FIRST_REACH * tolerance);
+        let mut best: Vec<usize> = (0..few.len()).collect();
+        best.sort_by(|a, b| few[*b].total_cmp(&few[*a]));
+        best.into_iter().take(N_LIKELY).map(|k| first.root_from_link[k]).collect()
+    }
+
+    /// What a few samples of the first link say at a glance at the best of some poses in the root's frame.
+    pub(crate) fn glance_at(
+        &self,
+        plane: &Plane,
+        trial: &Trial,
+        root_from_links: &[Pose],
+        tolerance: f32,
+    ) -> Said {
+        let Some(first) = &self.first else { return Said::default() };
+        let cad = prefix(self.model, first.link, self.settings.n_coarse / 4);
+        let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
+        let said = |pose: &Pose| {
+            self.sight.glance(cad, &(local_from_root * pose), FIRST_REACH * tolerance)
+        };
+        highest(root_from_links.iter().map(said))
     }
 
     /// What base and first link say, each with the root of its area.
