@@ -83,6 +83,19 @@ fn robots_whose_feet_hide_all_of_their_stands_are_found() {
     }
 }
 
+#[test]
+fn robots_behind_plates_and_beside_others_are_found() {
+    let out = tempfile::tempdir().expect("a folder");
+    let args = ["--suite", "hidden,crossed", "--model", "arm", "--cases", "3", "--seed", "8"];
+    for row in rows(out.path(), &args) {
+        assert_eq!(row["right"], true, "{row:#}");
+        assert_eq!(row["verdict"], "trusted", "{row:#}");
+        assert_eq!(row["n_invented"], 0, "{row:#}");
+        // Plates that hide three quarters of a foot were taken for it, the wrong way round: 753 mm.
+        assert!(row["tip"][0].as_f64().expect("a number") < 0.002, "{row:#}");
+    }
+}
+
 /// Real models, where they are there, by links in a folder of their own.
 #[cfg(unix)]
 #[test]
