@@ -159,11 +159,9 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     let reach = reach(model, &world_from_base, &posture);
     clutter(&mut scene, model, c, reach, &mut random);
     scanners(&mut scene, c, reach, &mut random);
-    let (circle, mut random) = (circle(reach), Random::keyed(&[case.seed, 0x0B5]));
+    let circle = circle(reach);
     let standing = Standing { model, world_from_base, posture: &posture, reach: reach[0], circle };
-    obstacles::hide(&mut scene, &standing, c, &mut random);
-    let cross = || obstacles::cross(&mut scene, &standing, &mut random);
-    let beside = c.crossed.then(cross).transpose()?;
+    let beside = obstacles::add(&mut scene, &standing, case)?;
     let has_branch = |at: &usize| c.other_branch && model.has_other_branch(*at, &posture);
     let other_branches = (0..model.loops.len()).find(has_branch).into_iter().collect();
     Ok(Drawn { scene, world_from_base, posture, other_branches, beside })

@@ -1,7 +1,7 @@
 //! A drawn robot in; what stands in the way of its scanners as fit.md §5 (T6) has it out: plates about its foot, a conveyor that
 //! touches it, a fence on three sides, another robot whose arm crosses it.
 
-use super::condition::Condition;
+use super::condition::{Case, Condition};
 use contract::Result;
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -38,35 +38,59 @@ pub(super) struct Standing<'a> {
     pub(super) circle: f64,
 }
 
-/// Hides a robot's foot and fences it in, as the condition says.
-pub(super) fn hide(scene: &mut Scene, robot: &Standing<'_>, c: &Condition, random: &mut Random) {
-    if c.hidden == 0.0 {
-        return;
+/// Adds what the case's condition says; the base of another robot, world, where it wants one.
+///
+/// # Errors
+/// `BadInput` where that has no room.
+pub(super) fn add(scene: &mut Scene, robot: &Standing<'_>, case: &Case) -> Result<Option<Vector>> {
+    let (c, mut random) = (&case.condition, Random::keyed(&[case.seed, 0x0B5]));
+    if c.hidden > 0.0 {
+        hide(scene, robot, c, &mut random);
     }
-    let base = robot.world_from_base.translation.vector;
+    c.crossed.then(|| cross(scene, robot, &mut random)).transpose()
+}
+
+/// Hides a robot's foot and fences it in, as the condition says.
+fn hide(scene: &mut Scene, robot: &Standing<'_>, c: &Condition, random: &mut Random) {
     let Some(foot) = robot.model.links.iter().find(|link| !link.bounds.is_empty()) else { return };
     let size = foot.bounds.size();
-    let (_, _, yaw) = robot.world_from_base.rotation.euler_angles();
     let middle = robot.world_from_base * foot.bounds.center();
-    let height = c.hidden * size[2];
+    plates(scene, robot, (middle, [size[0], size[1], c.hidden * size[2]]), random);
+    conveyor(scene, robot, (middle, 0.5 * size[0].max(size[1])), random);
+    fences(scene, robot, random);
+}
+
+/// Four plates, of a height, about a foot.
+fn plates(
+    scene: &mut Scene,
+    robot: &Standing<'_>,
+    (middle, size): (Point, [f64; 3]),
+    random: &mut Random,
+) {
+    let (_, _, yaw) = robot.world_from_base.rotation.euler_angles();
+    let z = scene.ground(middle.x, middle.y) + 0.5 * size[2];
     for side in 0..4 {
         let along = usize::from(side % 2 == 1);
         let gap = 0.5 * size[along] + PLATES[0];
-        let turn = yaw + FRAC_PI_2 * f64::from(side);
-        let width = size[1 - along] + 2.0 * PLATES[0];
+        let turn = (yaw + FRAC_PI_2 * f64::from(side)).rem_euclid(TAU);
         scene.boxes.push(Cuboid {
             name: format!("plate {side}"),
-            xyz: [
-                middle.x + gap * turn.cos(),
-                middle.y + gap * turn.sin(),
-                scene.ground(middle.x, middle.y) + 0.5 * height,
-            ],
-            size: [PLATES[1], width, height],
-            rpy_deg: [0.0, 0.0, turn.rem_euclid(TAU).to_degrees()],
+            xyz: [middle.x + gap * turn.cos(), middle.y + gap * turn.sin(), z],
+            size: [PLATES[1], size[1 - along] + 2.0 * PLATES[0], size[2]],
+            rpy_deg: [0.0, 0.0, turn.to_degrees()],
             reflectance: random.between(0.2, 0.9),
         });
     }
-    let gap = 0.5 * size[0].max(size[1]) + PLATES[0] + PLATES[1] + 0.5 * CONVEYOR[0];
+}
+
+/// A conveyor that ends at the plates of a foot of a radius, metres, where the arm is least in its way.
+fn conveyor(
+    scene: &mut Scene,
+    robot: &Standing<'_>,
+    (middle, radius): (Point, f64),
+    random: &mut Random,
+) {
+    let gap = radius + PLATES[0] + PLATES[1] + 0.5 * CONVEYOR[0];
     let first = random.between(0.0, TAU);
     let ways = (0..N_WAYS).map(|k| first + TAU * k as f64 / N_WAYS as f64);
     let arm = surface(robot);
@@ -86,10 +110,16 @@ pub(super) fn hide(scene: &mut Scene, robot: &Standing<'_>, c: &Condition, rando
         yaw_deg: way.rem_euclid(TAU).to_degrees(),
         size: CONVEYOR,
     });
-    let (r, turn) = (robot.reach + random.between(0.4, 0.8), random.between(0.0, TAU));
+}
+
+/// Wires on three sides of a square about the robot.
+fn fences(scene: &mut Scene, robot: &Standing<'_>, random: &mut Random) {
+    let base = robot.world_from_base.translation.vector;
+    let r = (robot.reach + random.between(0.4, 0.8)) * 2.0_f64.sqrt();
+    let turn = random.between(0.0, TAU);
     let corner = |k: usize| {
         let a = turn + FRAC_PI_2 * k as f64;
-        [base.x + r * 2.0_f64.sqrt() * a.cos(), base.y + r * 2.0_f64.sqrt() * a.sin()]
+        [base.x + r * a.cos(), base.y + r * a.sin()]
     };
     for k in 0..3 {
         scene.fences.push(Fence {
@@ -103,14 +133,7 @@ pub(super) fn hide(scene: &mut Scene, robot: &Standing<'_>, c: &Condition, rando
 }
 
 /// Puts another robot of the same model beside one, its arm across it; where its base is.
-///
-/// # Errors
-/// `BadInput` where it has no room.
-pub(super) fn cross(
-    scene: &mut Scene,
-    robot: &Standing<'_>,
-    random: &mut Random,
-) -> Result<Vector> {
+fn cross(scene: &mut Scene, robot: &Standing<'_>, random: &mut Random) -> Result<Vector> {
     let (base, way) = (robot.world_from_base.translation.vector, random.between(0.0, TAU));
     let apart = robot.reach + random.between(BESIDE[0], BESIDE[1]);
     let (x, y) = (base.x + apart * way.cos(), base.y + apart * way.sin());
@@ -129,20 +152,17 @@ pub(super) fn cross(
             && !near.any(|c| taken.contains(&c))
     };
     let postures = Postures::new(robot.model);
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for _ in 0..N_POSTURES {
-        let posture = postures.draw(random, &world_from_base, is_free)?;
-        let other = Standing { world_from_base, posture: &posture, ..*robot };
+    let drawn: Result<Vec<Vec<f64>>> =
+        (0..N_POSTURES).map(|_| postures.draw(random, &world_from_base, is_free)).collect();
+    let nearest = |posture: &Vec<f64>| {
+        let other = Standing { world_from_base, posture, ..*robot };
         let across = |p: &Point| (p.x - base.x).hypot(p.y - base.y);
-        let nearest = surface(&other).iter().map(across).fold(f64::INFINITY, f64::min);
-        if best.as_ref().is_none_or(|b| nearest < b.0) {
-            best = Some((nearest, posture));
-        }
-    }
+        surface(&other).iter().map(across).fold(f64::INFINITY, f64::min)
+    };
+    let best = drawn?.into_iter().min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
     let (_, _, yaw) = world_from_base.rotation.euler_angles();
     let names = robot.model.free.iter().map(|&j| robot.model.joints[j].name.clone());
-    let posture: BTreeMap<String, f64> =
-        names.zip(best.map(|b| b.1).into_iter().flatten()).collect();
+    let posture: BTreeMap<String, f64> = names.zip(best.into_iter().flatten()).collect();
     scene.robots.push(RobotPlace {
         name: "R2".into(),
         model: robot.model.name.clone(),

@@ -173,12 +173,8 @@ pub(super) fn score(
         .iter()
         .filter(|f| f.verdict != Verdict::Refused && apart(f) < SAME_PLACE)
         .min_by(|a, b| apart(a).total_cmp(&apart(b)));
-    // Of the robot beside it nothing is asked.
-    let is_beside = |f: &Fit| {
-        let apart = |b: Vector| (f.world_from_base.translation.vector - b).norm();
-        f.model_name == model.name && drawn.beside.is_some_and(|b| apart(b) < SAME_PLACE)
-    };
-    let is_other = |f: &&Fit| here.is_none_or(|h| !std::ptr::eq(*f, h)) && !is_beside(f);
+    let is_other =
+        |f: &&Fit| here.is_none_or(|h| !std::ptr::eq(*f, h)) && !is_beside(f, model, drawn);
     let others: Vec<&Fit> = found.fits.iter().filter(is_other).collect();
     let mut row = Row {
         n_robot_points: found.n_robot_points,
@@ -223,6 +219,12 @@ pub(super) fn score(
                 || mount.is_some_and(|m| bolted_elsewhere(m, j, fit, &drawn.posture))
         });
     row
+}
+
+/// Whether a fit is that of the other robot of a cell, of which nothing is asked.
+fn is_beside(fit: &Fit, model: &Model, drawn: &Drawn) -> bool {
+    let apart = |base: Vector| (fit.world_from_base.translation.vector - base).norm();
+    fit.model_name == model.name && drawn.beside.is_some_and(|base| apart(base) < SAME_PLACE)
 }
 
 /// The hole that a tool is bolted to and the arm's last joint are one turn: only their sum is compared.
