@@ -96,6 +96,16 @@ fn robots_behind_plates_and_beside_others_are_found() {
     }
 }
 
+#[test]
+fn robots_whose_arms_cross_are_both_kept() {
+    let out = tempfile::tempdir().expect("a folder");
+    let args = ["--suite", "crossed", "--model", "welder", "--seed", "86900"];
+    let rows = rows(out.path(), &[&args[..], &["--first", "1", "--cases", "1"]].concat());
+    // Their boxes share a quarter: one of them was taken for the other's twin, and dropped.
+    assert_eq!(rows[0]["right"], true, "{:#}", rows[0]);
+    assert_eq!(rows[0]["verdict"], "trusted", "{:#}", rows[0]);
+}
+
 /// Real models, where they are there, by links in a folder of their own.
 #[cfg(unix)]
 #[test]

@@ -8,6 +8,10 @@ use robot::Model;
 const OVERLAP: f64 = 0.25;
 /// Bases nearer than this compete whatever their boxes, metres.
 const SAME_BASE: f64 = 0.35;
+/// Two robots that cross share less of their surface than this: boxes about links hold more than the links.
+const CROSSED: f64 = 0.15;
+/// Samples of a link that are asked for that.
+const N_SAMPLES: usize = 200;
 /// A model that explains this share of what the best explains, as well, is alike.
 const ALIKE: f64 = 0.97;
 /// A model of another kind that explains this share of the best makes the best doubtful.
@@ -20,7 +24,9 @@ pub fn choose(mut fits: Vec<Fit>, models: &[Model]) -> Vec<Fit> {
     let mut chosen: Vec<(Fit, Aabb)> = Vec::new();
     for fit in fits {
         let bounds = bounds(&fit, models);
-        let winner = chosen.iter_mut().find(|(w, b)| compete(w, b, &fit, &bounds));
+        let winner = chosen
+            .iter_mut()
+            .find(|(w, b)| compete(w, b, &fit, &bounds) && !stand_apart([w, &fit], models));
         match winner {
             Some((winner, _)) => lose(winner, &fit),
             None => chosen.push((fit, bounds)),
@@ -65,6 +71,40 @@ fn compete(a: &Fit, a_box: &Aabb, b: &Fit, b_box: &Aabb) -> bool {
     };
     let smaller = volume(a_box).min(volume(b_box));
     smaller > 0.0 && volume(&shared) > OVERLAP * smaller
+}
+
+/// Whether two fits are of two robots whose arms cross: both trusted, on bases of their own, and hardly any surface of one is
+/// within a link of the other.
+fn stand_apart(fits: [&Fit; 2], models: &[Model]) -> bool {
+    let [a, b] = fits.map(|f| f.world_from_base.translation.vector);
+    fits.iter().all(|f| f.verdict == Verdict::Trusted)
+        && (a - b).norm() >= SAME_BASE
+        && share_within(fits, models) < CROSSED
+        && share_within([fits[1], fits[0]], models) < CROSSED
+}
+
+/// Share of the surface of the first within boxes about the links of the second.
+fn share_within([own, other]: [&Fit; 2], models: &[Model]) -> f64 {
+    let links = |fit: &Fit| {
+        let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+        let poses = models[fit.model].poses(&posture);
+        poses.into_iter().map(|pose| fit.world_from_base * pose).collect::<Vec<_>>()
+    };
+    let boxes: Vec<_> = models[other.model].links.iter().zip(links(other)).collect();
+    let is_within = |p: Point| {
+        let within = |(link, pose): &(&robot::Link, geometry::Pose)| {
+            link.bounds.contains(pose.inverse_transform_point(&p).coords.into())
+        };
+        boxes.iter().any(within)
+    };
+    let (mut n, mut n_within) = (0_u32, 0_u32);
+    for (link, pose) in models[own.model].links.iter().zip(links(own)) {
+        for p in link.cad.points.iter().take(N_SAMPLES) {
+            n += 1;
+            n_within += u32::from(is_within(pose * Point::from(p.map(f64::from))));
+        }
+    }
+    f64::from(n_within) / f64::from(n.max(1))
 }
 
 /// Notes the loser at the winner: as alike, as runner-up, as a reason for doubt.
