@@ -98,9 +98,10 @@ impl BaseSearch<'_> {
             next.y += f64::from(j) * grid.step;
             next.yaw += f64::from(k) * grid.yaw;
             let own = self.look(planes, &next, self.settings.n_fine / 4, grid.tolerance());
-            if !firsts.is_empty() {
-                next.first = self.glance_at(&planes[plane], &next, firsts, grid.tolerance());
+            if firsts.is_empty() {
+                return Some(Trial { said: own, ..next });
             }
+            next.first = self.glance_at(&planes[plane], &next, firsts, grid.tolerance());
             next.said = self.joined(own, next.first);
             Some(next)
         });

@@ -116,9 +116,11 @@ impl BaseSearch<'_> {
     }
 
     /// Poses of the first link in the root's frame that a few samples of it like best where the robot stands so; none where each
-    /// scan is asked by itself.
+    /// scan is asked by itself, and none on guessed heights: a camera sees too little of it (of twelve frames one was found, four
+    /// without).
     pub(crate) fn likely_firsts(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> Vec<Pose> {
-        let Some(first) = self.first.as_ref().filter(|_| self.sight.each.is_empty()) else {
+        let is_asked = self.sight.each.is_empty() && !self.is_guess;
+        let Some(first) = self.first.as_ref().filter(|_| is_asked) else {
             return Vec::new();
         };
         let (_, few) = self.sweep(plane, trial, first, FIRST_REACH * tolerance);
