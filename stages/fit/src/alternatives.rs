@@ -88,7 +88,12 @@ impl Beam<'_> {
         let moved = self.prepared.carried(free);
         let own = self.score(h, &moved, tolerance);
         let (_, span, n) = self.sweep(free);
-        let far = |value: f64| (value - h.posture[free]).abs() > 2.5 * span / n as f64;
+        let joint = &self.prepared.model.joints[self.prepared.model.free[free]];
+        let apart = |value: f64| match joint.kind {
+            JointKind::Prismatic => (value - h.posture[free]).abs(),
+            _ => turns::apart(value, h.posture[free]),
+        };
+        let far = |value: f64| apart(value) > 2.5 * span / n as f64;
         let least = own - SHORT * (own.abs() + h.score.abs());
         self.peaks(h, free, &moved, tolerance)
             .into_iter()

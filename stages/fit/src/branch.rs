@@ -5,9 +5,8 @@
 use robot::Model;
 
 use crate::beam::Hypothesis;
-use crate::judge::Judgement;
+use crate::judge::{Judgement, judged};
 use crate::refine::Refine;
-use crate::solve::judged;
 
 /// How much better the points and beams must like the other solution: shares of squares and of surface judged.
 const CLEAR: (f64, f64) = (0.1, 0.1);

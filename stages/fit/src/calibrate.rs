@@ -13,9 +13,10 @@ use std::f64::consts::PI;
 
 use crate::adjust::{Adjust, Adjusted};
 use crate::beam::Hypothesis;
+use crate::judge::judged;
 use crate::normal::Normal;
 use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, adjusted_points, better, judged};
+use crate::solve::{NEAR_MARGIN, adjusted_points, better};
 use crate::spin::Spin;
 use crate::{Prepared, Scene, Settings, report};
 

@@ -4,7 +4,12 @@ use contract::LinkEvidence;
 use geometry::{Point, Probe};
 
 use crate::beam::Hypothesis;
+use crate::refine::Refine;
 use crate::{Prepared, Scene, Settings};
+
+/// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans' own noise, not the
+/// fit's.
+const TOLERANCE: (f64, f64) = (0.012, 0.04);
 
 /// Judgement of a posture.
 #[derive(Debug, Clone)]
@@ -21,6 +26,12 @@ pub(crate) struct Judgement {
     pub(crate) violation: f64,
     /// Share of all samples that could be judged, weighted by area.
     pub(crate) seen: f64,
+}
+
+/// The judgement with the tolerance that the scans' noise asks for.
+pub(crate) fn judged(refine: &Refine<'_>, h: &Hypothesis) -> Judgement {
+    let tolerance = (4.0 * refine.scene.noise).clamp(TOLERANCE.0, TOLERANCE.1);
+    judge(refine.prepared, refine.scene, refine.settings, h, tolerance)
 }
 
 /// Judges a posture to within `tolerance` metres.

@@ -15,7 +15,7 @@ use crate::solve::{Polished, Settled, polish, roughly, settle};
 const FLIP_SHORT: f64 = 0.03;
 /// … and any other.
 const SHORT: f64 = 0.01;
-/// Sweep steps within which, in all joints but the last, two postures are one.
+/// Sweep steps within which, in all joints but a last one that turns, two postures are one.
 const STEPS: f64 = 1.0;
 /// How clearly a posture may be worse before it is settled and still be compared.
 const LEAD: f64 = 0.1;
@@ -78,8 +78,10 @@ fn near_rivals(
     near: &[u32],
 ) -> Vec<Polished> {
     let least = judgement.explained - SHORT * judgement.explained.abs();
-    let last = best.hypothesis.posture.len().saturating_sub(2);
-    let is_known = |a: &Hypothesis, b: &Hypothesis| beam.alike(a, b, last, STEPS);
+    let last = best.hypothesis.posture.len().saturating_sub(1);
+    // Other values of a last joint that turns are looked at apart; one that slides closes a gun.
+    let upto = if refine.is_prismatic(last) { last } else { last.saturating_sub(1) };
+    let is_known = |a: &Hypothesis, b: &Hypothesis| beam.alike(a, b, upto, STEPS);
     let mut all: Vec<(f64, &Polished)> = others
         .iter()
         .filter(|p| p.1.explained > least && !is_known(&best.hypothesis, &p.0))

@@ -8,7 +8,7 @@ use crate::adjust::{Adjust, Adjusted};
 use crate::beam::{Beam, Hypothesis};
 use crate::branch::branches;
 use crate::calibrate::doubt;
-use crate::judge::{Judgement, judge};
+use crate::judge::{Judgement, judge, judged};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Prior, Refine, Round};
 use crate::report::{refused, report};
 use crate::rivals::best_of;
@@ -18,9 +18,6 @@ use crate::turns;
 use crate::verdict::is_lost;
 use crate::{Prepared, Scene, Settings};
 
-/// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans' own noise, not the
-/// fit's.
-const JUDGE_TOLERANCE: (f64, f64) = (0.012, 0.04);
 /// Gate of the last rounds in multiples of the noise found, and its bounds, metres.
 const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
 
@@ -74,8 +71,12 @@ pub fn fit(
             Look::Others => closer.alternatives(best, fan),
         };
         polished.extend(fan.fan(more, |h| {
-            let h = roughly(&refine, &h, &near, &COARSE_ROUNDS[3..], fan);
-            polish(&refine, &h, &near, fan)
+            let rough = roughly(&refine, &h, &near, &COARSE_ROUNDS[3..], fan);
+            let rough = polish(&refine, &rough, &near, fan);
+            match round {
+                Look::Again => rough,
+                Look::Others => better_of(rough, polish(&refine, &h, &near, fan)),
+            }
         }));
         sort(&mut polished);
     }
@@ -276,6 +277,12 @@ enum Look {
     Others,
 }
 
+/// The one that explains more. One joint of a fitted arm swept to a peak is less than a step off: what hangs beside its
+/// link must not draw it away within the gates of the coarse rounds.
+fn better_of(rough: Polished, fine: Polished) -> Polished {
+    if fine.1.explained > rough.1.explained { fine } else { rough }
+}
+
 fn sort(polished: &mut [Polished]) {
     polished.sort_by(|a, b| b.1.explained.total_cmp(&a.1.explained));
 }
@@ -290,12 +297,6 @@ pub(crate) fn adjusted_points(
     let cap = refine.settings.max_points / refine.prepared.model.links.len().max(1);
     let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
     Sampled::new(refine.stratified(h, all, (gate, cap.max(2000)), fan), gate)
-}
-
-/// The judgement with the tolerance that the scans' noise asks for.
-pub(crate) fn judged(refine: &Refine<'_>, h: &Hypothesis) -> Judgement {
-    let tolerance = (4.0 * refine.scene.noise).clamp(JUDGE_TOLERANCE.0, JUDGE_TOLERANCE.1);
-    judge(refine.prepared, refine.scene, refine.settings, h, tolerance)
 }
 
 /// No point farther than this from the surface takes part in the adjustment: in multiples of the noise, and its bounds,

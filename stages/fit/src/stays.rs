@@ -5,8 +5,9 @@ use contract::{Candidate, Fan, Fit, InstallationPlane, Region, Verdict, View};
 use geometry::{Point, Pose};
 
 use crate::beam::Hypothesis;
+use crate::judge::judged;
 use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, fit, judged, quick};
+use crate::solve::{NEAR_MARGIN, fit, quick};
 use crate::{Prepared, Scene, Settings};
 
 /// Share of a scan's judged surface of the moving links, explained less contradicted, from which on a posture that another
