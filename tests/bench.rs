@@ -109,6 +109,18 @@ fn robots_whose_arms_cross_are_both_kept() {
 /// Real models, where they are there, by links in a folder of their own.
 #[cfg(unix)]
 #[test]
+fn electrodes_are_found_beside_what_hangs_on_them() {
+    let out = tempfile::tempdir().expect("a folder");
+    let args = ["--suite", "clutter", "--model", "welder", "--seed", "86400", "--cases", "1"];
+    let rows = rows(out.path(), &args);
+    assert_eq!(rows.len(), 1);
+    // A gripper drew the electrode to the end of its slide, 0.14 m away.
+    assert_eq!(rows[0]["verdict"], "trusted", "{:#}", rows[0]);
+    let tip = rows[0]["tip"][0].as_f64().expect("a number");
+    assert!(tip < 1e-3, "{:#}", rows[0]);
+}
+
+#[test]
 fn grippers_are_found_on_real_flanges_and_turned_as_they_hang() {
     let real = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/robots");
     let robots = tempfile::tempdir().expect("a folder");

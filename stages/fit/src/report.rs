@@ -100,7 +100,8 @@ pub(crate) fn report(
         }
     });
     // A flange that may stand otherwise is listed; it makes nobody doubt the robot.
-    let passed: Vec<bool> = open.iter().zip(&prepared.leaf).map(|(o, leaf)| *o || *leaf).collect();
+    let passed = |j: usize| (open[j] || prepared.leaf[j]) && !refine.is_prismatic(j);
+    let passed: Vec<bool> = (0..open.len()).map(passed).collect();
     let others = rivals.iter().filter(|(_, (other, _))| differs(other, h, &passed));
     let equal =
         |(m, (other, _)): &(f64, &Polished)| Equal { posture: other.posture.clone(), margin: *m };

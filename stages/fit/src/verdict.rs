@@ -86,6 +86,8 @@ pub(crate) fn pass(
     if judgement.seen < SEEN {
         doubts.push(format!("only {:.0} % of the surface was seen", judgement.seen * 100.0));
     }
+    let slides =
+        |j: usize| prepared.model.joints[prepared.model.free[j]].kind == JointKind::Prismatic;
     for (j, joint) in fit.joints.iter().enumerate() {
         let n: usize = prepared.carried(j).into_iter().map(|l| fit.links[l].n_points).sum();
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
@@ -93,7 +95,7 @@ pub(crate) fn pass(
         } else if j + 1 < fit.joints.len() && own_sigma(j) > KNOWN_SIGMA {
             doubts.push(format!("the points do not determine joint '{}'", joint.name));
         } else if !joint.determined {
-            notes.push(undetermined(fit, j));
+            notes.push(undetermined(fit, j, slides(j)));
         }
     }
     for (j, joint) in fit.joints.iter().enumerate().filter(|(_, joint)| joint.determined) {
@@ -101,7 +103,8 @@ pub(crate) fn pass(
             doubts.push(format!("joint '{}' stands beyond its limit", joint.name));
         }
     }
-    notes.extend(weak(fit));
+    let turning: Vec<usize> = (0..fit.joints.len()).filter(|&j| !slides(j)).collect();
+    notes.extend(weak(fit, &turning));
     let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
     if rival {
         doubts.push("another posture explains the points nearly as well".into());
@@ -168,7 +171,7 @@ fn beyond(prepared: &Prepared<'_>, j: usize, value: f64) -> f64 {
 }
 
 /// What is said of a joint that the points do not determine.
-fn undetermined(fit: &Fit, j: usize) -> String {
+fn undetermined(fit: &Fit, j: usize, slides: bool) -> String {
     let joint = &fit.joints[j];
     let apart = |a: f64, b: f64| turns::apart(a, b) > KNOWN_SIGMA;
     let mut values: Vec<f64> = Vec::new();
@@ -177,12 +180,19 @@ fn undetermined(fit: &Fit, j: usize) -> String {
             values.push(value);
         }
     }
-    let values: Vec<String> = values.iter().map(|v| format!("{:.1}°", v.to_degrees())).collect();
+    let say = |v: &f64| match slides {
+        true => format!("{:.1} mm", v * 1e3),
+        false => format!("{:.1}°", v.to_degrees()),
+    };
+    let values: Vec<String> = values.iter().map(say).collect();
     if !values.is_empty() {
         format!("joint '{}' may as well stand at {}", joint.name, values.join(", "))
     } else if joint.sigma < KNOWN_SIGMA {
-        let deg = joint.sigma.to_degrees();
-        format!("the points determine joint '{}' only to ± {deg:.2}°", joint.name)
+        let sigma = match slides {
+            true => format!("{:.1} mm", joint.sigma * 1e3),
+            false => format!("{:.2}°", joint.sigma.to_degrees()),
+        };
+        format!("the points determine joint '{}' only to ± {sigma}", joint.name)
     } else {
         format!("the points do not determine joint '{}'", joint.name)
     }

@@ -10,14 +10,14 @@ const OPEN: f64 = 0.09;
 /// Share of the direction from which on an unknown belongs to it.
 const PART: f64 = 0.35;
 
-/// A sentence for the weakest direction, where it joins several unknowns: the base's yaw and the joints.
-pub(crate) fn weak(fit: &Fit) -> Option<String> {
+/// A sentence for the weakest direction, where it joins several unknowns: the base's yaw and the joints that turn.
+pub(crate) fn weak(fit: &Fit, turning: &[usize]) -> Option<String> {
     let n = 6 + fit.joints.len();
     if fit.covariance.len() != n * n {
         return None;
     }
     // The base's turn about the vertical, then the joints.
-    let at: Vec<usize> = (5..n).collect();
+    let at: Vec<usize> = [5].into_iter().chain(turning.iter().map(|j| 6 + j)).collect();
     let block = DMatrix::from_fn(at.len(), at.len(), |i, j| fit.covariance[at[i] * n + at[j]]);
     let eigen = block.symmetric_eigen();
     let weakest = eigen.eigenvalues.imax();
@@ -32,7 +32,7 @@ pub(crate) fn weak(fit: &Fit) -> Option<String> {
         .filter(|(_, v)| v.abs() > PART)
         .map(|(i, _)| match i {
             0 => "the base's yaw".into(),
-            _ => format!("joint '{}'", fit.joints[i - 1].name),
+            _ => format!("joint '{}'", fit.joints[turning[i - 1]].name),
         })
         .collect();
     let (last, first) = parts.split_last()?;
@@ -61,10 +61,10 @@ mod tests {
 
     #[test]
     fn what_trades_off_is_named_and_what_stands_alone_is_not() {
-        let text = weak(&fit(-0.98)).expect("weak");
+        let text = weak(&fit(-0.98), &[0, 1]).expect("weak");
         assert!(text.starts_with("the base's yaw and joint 'a1' trade off"), "{text}");
         let mut alone = fit(0.0);
         alone.covariance[5 * 8 + 5] = 1e-8;
-        assert_eq!(weak(&alone), None);
+        assert_eq!(weak(&alone, &[0, 1]), None);
     }
 }
