@@ -26,8 +26,12 @@ const N_FLANGES: usize = 3;
 const WRIST_STEPS: f64 = 6.0;
 /// So far beyond its limit a mirrored joint is put to its limit, radians: 3°.
 const BEYOND: f64 = 0.052;
-/// Yaws that a base is tried at: every 4°, the arc that its corners move by the tolerance in.
-const N_YAWS: usize = 90;
+/// Yaws that a base is tried at: every 2°, the arc that its corners move by half of the tolerance in.
+const N_YAWS: usize = 180;
+/// Share of the tolerance for that: where the base stands is known.
+const TURNED_TOLERANCE: f64 = 0.5;
+/// Share of its surface by which a yaw may explain less than the one found: the best may lie between two.
+const TURNED_SHORT: f64 = 0.05;
 /// Of those, that many are refined.
 const N_TURNED: usize = 2;
 
@@ -52,7 +56,8 @@ impl Beam<'_> {
             return Vec::new();
         }
         let frame = model.poses(&h.posture)[joint.parent] * joint.parent_from_joint;
-        let tolerance = self.tolerance as f32;
+        let closely = ((TURNED_TOLERANCE * self.tolerance) as f32, self.settings.n_judge);
+        let fixed = &self.prepared.fixed;
         let turn = |k: usize| {
             let angle = TAU * k as f64 / N_YAWS as f64;
             let value = self.within_limits(0, h.posture[0] - angle)?;
@@ -60,13 +65,15 @@ impl Beam<'_> {
             let mut next = h.clone();
             next.local_from_base = h.local_from_base * spun * frame.inverse();
             next.posture[0] = value;
-            Some((self.score(&next, &self.prepared.fixed, tolerance), next))
+            Some((self.score_at(&self.placed(&next, fixed), closely), next))
         };
         let all: Vec<_> = (0..N_YAWS).map(turn).collect();
         let Some((own, _)) = &all[0] else { return Vec::new() };
         let score = |k: usize| all[k % N_YAWS].as_ref().map_or(f64::NEG_INFINITY, |a| a.0);
+        let weight: f64 = fixed.iter().map(|&l| self.prepared.links[l].weight).sum();
+        let least = own - TURNED_SHORT * weight;
         let is_peak = |k: &usize| {
-            score(*k) > score(k + 1) && score(*k) >= score(k + N_YAWS - 1) && score(*k) >= *own
+            score(*k) > score(k + 1) && score(*k) >= score(k + N_YAWS - 1) && score(*k) >= least
         };
         let peaks = (2..N_YAWS - 1).filter(is_peak);
         let mut out: Vec<Hypothesis> = peaks

@@ -112,13 +112,17 @@ impl Beam<'_> {
     }
 
     /// Where some links stand, local frame.
-    fn placed(&self, h: &Hypothesis, links: &[usize]) -> Vec<(usize, Pose)> {
+    pub(crate) fn placed(&self, h: &Hypothesis, links: &[usize]) -> Vec<(usize, Pose)> {
         let poses = self.prepared.model.poses(&h.posture);
         links.iter().map(|&l| (l, h.local_from_base * poses[l])).collect()
     }
 
     /// Weighted score of so many samples of each link.
-    fn score_at(&self, placed: &[(usize, Pose)], (tolerance, n_samples): (f32, usize)) -> f64 {
+    pub(crate) fn score_at(
+        &self,
+        placed: &[(usize, Pose)],
+        (tolerance, n_samples): (f32, usize),
+    ) -> f64 {
         let score = |(l, pose): &(usize, Pose)| {
             let (points, normals) = self.prepared.samples(*l, n_samples);
             let probe = self.scene.scouts.probe(points, normals, pose, tolerance);
