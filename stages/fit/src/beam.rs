@@ -131,6 +131,18 @@ impl Beam<'_> {
         placed.iter().map(score).sum()
     }
 
+    /// All values of a sweep of one joint, each with the score of what it places added.
+    pub(crate) fn every(&self, h: &Hypothesis, free: usize, fan: &impl Fan) -> Vec<Hypothesis> {
+        let (low, span, n) = self.sweep(free);
+        let links = &self.prepared.placed_by[free];
+        fan.fan((0..n).collect(), |k| {
+            let mut next = h.clone();
+            next.posture[free] = low + span * k as f64 / n as f64;
+            next.score += self.score(&next, links, self.tolerance as f32);
+            next
+        })
+    }
+
     /// All local maxima of a sweep of one joint, each with the score of what it places added.
     fn extend(&self, h: &Hypothesis, free: usize, tolerance: f32) -> Vec<Hypothesis> {
         let links = &self.prepared.placed_by[free];

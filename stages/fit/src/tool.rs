@@ -57,7 +57,12 @@ pub fn try_tool(
     let refine = Refine { prepared: tooled, scene, settings, prior: None };
     let base = geometry::Point::from(start.local_from_base.translation.vector);
     let [near, _] = scene.within(&base, tooled.reach + NEAR_MARGIN);
-    let found = beam.resume(vec![start], first, fan);
+    // A round flange and the gripper's round body do not tell how it is turned: its fingers do.
+    let has_joints = tooled.placed_by.len() > n_joints;
+    let found = match has_joints {
+        true => beam.resume(beam.every(&start, first, fan), n_joints, fan),
+        false => beam.resume(vec![start], first, fan),
+    };
     let judged = found.into_iter().take(N_JUDGED).filter_map(|h| {
         let judgement = judge(tooled, scene, settings, &h, TOLERANCE);
         let [explained, judged, whole] = of_tool(tooled, n_links, &judgement);
