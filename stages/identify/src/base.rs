@@ -66,8 +66,6 @@ const COARSE_REACH: f64 = 1.3;
 /// Share of the lowest score that a base must have after the coarse level, and after the next: on coarse grids the right
 /// one scores a little more or less than in the end.
 const SHORT: (f64, f64) = (0.4, 0.6);
-/// Base poses of a place that are asked whether they look like the robot.
-const N_LIKE: usize = 4;
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
@@ -356,28 +354,25 @@ impl<'a> BaseSearch<'a> {
         local: &[Plane],
         trials: &[Trial],
     ) -> Vec<Candidate> {
-        let mut places: Vec<Vec<&Trial>> = Vec::new();
+        let mut places: Vec<Vec<Trial>> = Vec::new();
         for trial in trials.iter().filter(|t| t.said.score >= self.min_score) {
             let radius = self.settings.place_radius;
             let at = |t: &Trial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
             let here = at(trial);
-            let same = places.iter().position(|p| (at(p[0]) - here).norm() < radius);
+            let same = places.iter().position(|p| (at(&p[0]) - here).norm() < radius);
             match same {
                 Some(at) if places[at].len() < self.settings.bases_per_place => {
-                    places[at].push(trial);
+                    places[at].push(*trial);
                 }
                 Some(_) => {}
                 None if places.len() < self.settings.max_places * self.n_cells() => {
-                    places.push(vec![trial])
+                    places.push(vec![*trial])
                 }
                 None => {}
             }
         }
         places.iter_mut().for_each(|p| p.sort_by(|a, b| b.said.score.total_cmp(&a.said.score)));
-        // The best of a place may be the right place turned wrongly.
-        places.retain(|place| {
-            place.iter().take(N_LIKE).any(|trial| self.is_like(&local[trial.plane], trial))
-        });
+        places.retain_mut(|place| self.is_like_any(local, place));
         let world_from_local = Pose::from_parts(
             Translation3::from(self.sight.region.origin.coords),
             UnitQuaternion::identity(),

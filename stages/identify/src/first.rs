@@ -3,6 +3,7 @@
 
 use geometry::{Plane, Pose, Probe};
 use robot::Model;
+use std::f64::consts::TAU;
 
 use crate::base::BaseSearch;
 use crate::climb::LAG;
@@ -13,6 +14,12 @@ const JUDGE: (f32, f32) = (0.04, 0.06);
 /// Mean score of what could be judged: of the worse of base and first link, and of both. Of 125 robots that were found
 /// none is below 0.64 and 0.70.
 const LIKE: (f64, f64) = (0.5, 0.58);
+/// Base poses of a place that are asked for that.
+const N_LIKE: usize = 4;
+/// Share of a foot's surface up to which beams judged little of it.
+const LITTLE: f32 = 0.3;
+/// Yaws that such a foot is tried at: every 5°.
+const N_YAWS: i32 = 72;
 /// Values of the first joint that are looked at with all samples at a glance.
 const N_GLANCES: usize = 6;
 /// Of those so many are kept while a base is moved about.
@@ -35,7 +42,7 @@ impl First {
     pub(crate) fn of(model: &Model) -> Option<Self> {
         let (free, link) = first_moving(model)?;
         let [low, high] = model.limits(free);
-        let span = (high - low).min(std::f64::consts::TAU);
+        let span = (high - low).min(TAU);
         let n = (span / FIRST_STEP).ceil().max(1.0);
         let mut posture = model.home();
         let pose = |k: usize| {
@@ -54,14 +61,12 @@ impl First {
 impl BaseSearch<'_> {
     /// Whether what could be judged of the base and of the first link fits them: much of a cabinet has the height of a
     /// foot, but not its shape.
-    pub(crate) fn is_like(&self, plane: &Plane, trial: &Trial) -> bool {
+    fn is_like(&self, plane: &Plane, trial: &Trial) -> bool {
         if !self.sight.evidence.has_beams() {
             return true;
         }
         let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
-        let cad = prefix(self.model, self.base, self.settings.n_fine);
-        let pose = local_from_root * self.root_from_base;
-        let base = of_judged(&self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.0));
+        let base = of_judged(&self.probe_base(plane, trial));
         if base < LIKE.0 {
             return false;
         }
@@ -77,6 +82,33 @@ impl BaseSearch<'_> {
             best.map_or(base, |probe| of_judged(&probe))
         });
         base.min(first) >= LIKE.0 && 0.5 * (base + first) >= LIKE.1
+    }
+
+    /// Whether a base pose of a place looks like the robot. The best may be the right place turned wrongly: a foot of which plates
+    /// leave little says less of its yaw than what stands on it, so it is turned to where that little fits, and goes first.
+    pub(crate) fn is_like_any(&self, local: &[Plane], place: &mut Vec<Trial>) -> bool {
+        if place.iter().take(N_LIKE).any(|trial| self.is_like(&local[trial.plane], trial)) {
+            return true;
+        }
+        let Some(best) = place.first().copied() else { return false };
+        let plane = &local[best.plane];
+        if !self.sight.each.is_empty() || self.probe_base(plane, &best).seen() > LITTLE {
+            return false;
+        }
+        let turned = (1..N_YAWS).map(|k| {
+            let trial = Trial { yaw: best.yaw + TAU * f64::from(k) / f64::from(N_YAWS), ..best };
+            (of_judged(&self.probe_base(plane, &trial)), trial)
+        });
+        let turned = turned.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, trial)| trial);
+        let found = turned.filter(|trial| self.is_like(plane, trial));
+        found.into_iter().for_each(|trial| place.insert(0, trial));
+        found.is_some()
+    }
+
+    fn probe_base(&self, plane: &Plane, trial: &Trial) -> Probe {
+        let cad = prefix(self.model, self.base, self.settings.n_fine);
+        let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
+        self.sight.evidence.probe(cad.0, cad.1, &pose, JUDGE.0)
     }
 
     /// The trial with the score of the base and of the first moving link at its best joint value.
