@@ -71,12 +71,13 @@ pub fn fit(
             Look::Others => closer.alternatives(best, fan),
         };
         polished.extend(fan.fan(more, |h| {
-            let rough = roughly(&refine, &h, &near, &COARSE_ROUNDS[3..], fan);
-            let rough = polish(&refine, &rough, &near, fan);
-            match round {
-                Look::Again => rough,
-                Look::Others => better_of(rough, polish(&refine, &h, &near, fan)),
-            }
+            // One joint of a fitted arm swept to a peak is less than a step off: what hangs beside its link must not draw it
+            // away within the gates of the coarse rounds.
+            let start = match round {
+                Look::Again => roughly(&refine, &h, &near, &COARSE_ROUNDS[3..], fan),
+                Look::Others => h,
+            };
+            polish(&refine, &start, &near, fan)
         }));
         sort(&mut polished);
     }
@@ -275,12 +276,6 @@ enum Look {
     Again,
     /// Other postures that may explain as much.
     Others,
-}
-
-/// The one that explains more. One joint of a fitted arm swept to a peak is less than a step off: what hangs beside its
-/// link must not draw it away within the gates of the coarse rounds.
-fn better_of(rough: Polished, fine: Polished) -> Polished {
-    if fine.1.explained > rough.1.explained { fine } else { rough }
 }
 
 fn sort(polished: &mut [Polished]) {
