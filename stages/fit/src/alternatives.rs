@@ -32,7 +32,7 @@ const N_YAWS: usize = 180;
 const TURNED_TOLERANCE: f64 = 0.5;
 /// Share of its surface by which a yaw may explain less than the one found: the best may lie between two.
 const TURNED_SHORT: f64 = 0.05;
-/// Of those, that many are refined.
+/// So many of the best are refined.
 const N_TURNED: usize = 2;
 
 impl Beam<'_> {
