@@ -150,6 +150,12 @@ fn dress_one(
     let others = bolts.iter().filter(|b| holes[b.hole] != mount);
     let alike: Vec<[f64; 2]> = others.map(|b| [holes[b.hole], b.value]).collect();
     together.reasons.extend(in_words(&alike));
+    // The tool's place is known, not what of it is the hole's and what the last joint's.
+    let last = &mut together.joints[n_arm - 1];
+    let apart = alike.iter().map(|[_, value]| fit::turns::apart(*value, last.value));
+    let spread = apart.fold(0.0, f64::max);
+    last.determined &= alike.is_empty();
+    last.sigma = last.sigma.max(spread);
     together.tool = Some(Mounted {
         model: models[tool].name.clone(),
         link: arm.links[flange].name.clone(),
