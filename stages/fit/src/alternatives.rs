@@ -52,7 +52,7 @@ impl Beam<'_> {
     fn turned_bases(&self, h: &Hypothesis) -> Vec<Hypothesis> {
         let model = self.prepared.model;
         let joint = &model.joints[model.free[0]];
-        if joint.kind == JointKind::Prismatic || self.prepared.fixed.is_empty() {
+        if self.prepared.slides(0) || self.prepared.fixed.is_empty() {
             return Vec::new();
         }
         let frame = model.poses(&h.posture)[joint.parent] * joint.parent_from_joint;
@@ -95,10 +95,9 @@ impl Beam<'_> {
         let moved = self.prepared.carried(free);
         let own = self.score(h, &moved, tolerance);
         let (_, span, n) = self.sweep(free);
-        let joint = &self.prepared.model.joints[self.prepared.model.free[free]];
-        let apart = |value: f64| match joint.kind {
-            JointKind::Prismatic => (value - h.posture[free]).abs(),
-            _ => turns::apart(value, h.posture[free]),
+        let apart = |value: f64| match self.prepared.slides(free) {
+            true => (value - h.posture[free]).abs(),
+            false => turns::apart(value, h.posture[free]),
         };
         let far = |value: f64| apart(value) > 2.5 * span / n as f64;
         let least = own - SHORT * (own.abs() + h.score.abs());

@@ -158,9 +158,8 @@ impl Beam<'_> {
     /// Start, span and number of steps of a joint's sweep: an arc step moves its samples by the tolerance at most.
     pub(crate) fn sweep(&self, free: usize) -> (f64, f64, usize) {
         let [low, high] = self.prepared.model.limits(free);
-        let joint = &self.prepared.model.joints[self.prepared.model.free[free]];
         let tolerance = self.tolerance;
-        let (span, step) = if joint.kind == robot::JointKind::Prismatic {
+        let (span, step) = if self.prepared.slides(free) {
             (high - low, tolerance / 2.0)
         } else {
             let arc = tolerance / self.prepared.lever[free];

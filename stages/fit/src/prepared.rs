@@ -154,6 +154,11 @@ impl<'a> Prepared<'a> {
         self.reach
     }
 
+    /// Whether a free joint slides.
+    pub(crate) fn slides(&self, joint: usize) -> bool {
+        self.model.joints[self.model.free[joint]].kind == robot::JointKind::Prismatic
+    }
+
     /// Links placed by a joint or a later one: what stands before it does not change with it.
     pub(crate) fn carried(&self, joint: usize) -> Vec<usize> {
         self.placed_by[joint..].iter().flatten().copied().collect()

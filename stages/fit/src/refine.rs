@@ -319,8 +319,7 @@ impl Refine<'_> {
 
     /// Whether a free joint slides.
     pub(crate) fn is_prismatic(&self, joint: usize) -> bool {
-        let model = &self.prepared.model;
-        model.joints[model.free[joint]].kind == JointKind::Prismatic
+        self.prepared.slides(joint)
     }
 
     /// Keeps sliding joints on their way: points along a rod would pull it past its end.

@@ -86,8 +86,6 @@ pub(crate) fn pass(
     if judgement.seen < SEEN {
         doubts.push(format!("only {:.0} % of the surface was seen", judgement.seen * 100.0));
     }
-    let slides =
-        |j: usize| prepared.model.joints[prepared.model.free[j]].kind == JointKind::Prismatic;
     for (j, joint) in fit.joints.iter().enumerate() {
         let n: usize = prepared.carried(j).into_iter().map(|l| fit.links[l].n_points).sum();
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
@@ -95,7 +93,7 @@ pub(crate) fn pass(
         } else if j + 1 < fit.joints.len() && own_sigma(j) > KNOWN_SIGMA {
             doubts.push(format!("the points do not determine joint '{}'", joint.name));
         } else if !joint.determined {
-            notes.push(undetermined(fit, j, slides(j)));
+            notes.push(undetermined(fit, j, prepared.slides(j)));
         }
     }
     for (j, joint) in fit.joints.iter().enumerate().filter(|(_, joint)| joint.determined) {
@@ -103,7 +101,7 @@ pub(crate) fn pass(
             doubts.push(format!("joint '{}' stands beyond its limit", joint.name));
         }
     }
-    let turning: Vec<usize> = (0..fit.joints.len()).filter(|&j| !slides(j)).collect();
+    let turning: Vec<usize> = (0..fit.joints.len()).filter(|&j| !prepared.slides(j)).collect();
     notes.extend(weak(fit, &turning));
     let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
     if rival {

@@ -372,7 +372,7 @@ impl<'a> BaseSearch<'a> {
             }
         }
         places.iter_mut().for_each(|p| p.sort_by(|a, b| b.said.score.total_cmp(&a.said.score)));
-        places.retain_mut(|place| self.is_like_any(local, place));
+        places.retain_mut(|place| self.accept(local, place));
         let world_from_local = Pose::from_parts(
             Translation3::from(self.sight.region.origin.coords),
             UnitQuaternion::identity(),

@@ -84,9 +84,9 @@ impl BaseSearch<'_> {
         base.min(first) >= LIKE.0 && 0.5 * (base + first) >= LIKE.1
     }
 
-    /// Whether a base pose of a place looks like the robot. The best may be the right place turned wrongly: a foot of which plates
+    /// Whether a base pose of a place looks like the robot, perhaps one that is added. The best may be the right place turned wrongly: a foot of which plates
     /// leave little says less of its yaw than what stands on it, so it is turned to where that little fits, and goes first.
-    pub(crate) fn is_like_any(&self, local: &[Plane], place: &mut Vec<Trial>) -> bool {
+    pub(crate) fn accept(&self, local: &[Plane], place: &mut Vec<Trial>) -> bool {
         if place.iter().take(N_LIKE).any(|trial| self.is_like(&local[trial.plane], trial)) {
             return true;
         }
