@@ -94,9 +94,9 @@ pub(crate) struct Adjust<'a> {
 
 /// Most rounds of the adjustment: a flange that the points leave open would wander on for ever.
 const N_ROUNDS: usize = 7;
-/// A step by less than a third of a standard deviation, in every direction, is the last one (squared; steps shrink
-/// sevenfold a round).
-const SMALL_STEP: f64 = 0.1;
+/// The last step is one by less than a third of a standard deviation, in all directions together, or one after which steps that
+/// go on to shrink as they did, mostly sixfold a round, come to less than that.
+const SMALL_STEP: f64 = 0.3;
 /// Tukey's constant: 95 % efficient for normal errors.
 const TUKEY: f64 = 4.685;
 
@@ -135,7 +135,7 @@ impl<'a> Adjust<'a> {
     /// The same from any state.
     pub(crate) fn run_from(&self, start: State, points: &mut Sampled, fan: &impl Fan) -> Adjusted {
         let mut state = start;
-        let mut round = 0;
+        let (mut round, mut before) = (0, 0.0);
         self.refine.prepared.make_triangles(fan);
         loop {
             let (sums, tallies) = self.sums(&state, points, fan);
@@ -146,7 +146,10 @@ impl<'a> Adjust<'a> {
             };
             self.apply(&mut state, &step);
             round += 1;
-            if normal.deviations(&self.without_loose(step)) < SMALL_STEP {
+            let length = normal.deviations(&self.without_loose(step)).sqrt();
+            let left = if length < before { length * length / (before - length) } else { length };
+            before = length;
+            if length.min(left) < SMALL_STEP {
                 return self.finish(state, &tallies, &normal);
             }
         }

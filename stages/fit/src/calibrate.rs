@@ -16,8 +16,9 @@ use crate::beam::Hypothesis;
 use crate::judge::judged;
 use crate::normal::Normal;
 use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, adjusted_points, better};
+use crate::solve::{NEAR_MARGIN, better};
 use crate::spin::Spin;
+use crate::strata::adjusted_points;
 use crate::{Prepared, Scene, Settings, report};
 
 /// Steps of the joints' places: each after an adjustment of all the rest.
@@ -62,7 +63,7 @@ pub fn calibrate(
     let own = prepared.moved(&model);
     let refine = Refine { prepared: &own, ..refine };
     let judgement = judged(&refine, &done.hypothesis);
-    let mut points = adjusted_points(&refine, &done.hypothesis, &all, fan);
+    let mut points = adjusted_points(&refine, &done.hypothesis, (&all, settings.part()), fan);
     Adjust::new(&refine).sums(&done.state(), &mut points, fan);
     let mut out = report::report(&refine, &(done, judgement, turns), &[], (&near, &points), fan);
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();
@@ -86,7 +87,8 @@ fn estimate(
     loop {
         let own = refine.prepared.moved(&model);
         let refine = Refine { prepared: &own, prior: refine.prior, ..*refine };
-        let mut points = adjusted_points(&refine, &h, all, fan).every(every);
+        let mut points =
+            adjusted_points(&refine, &h, (all, refine.settings.part()), fan).every(every);
         let mut done = Adjust::new(&refine).run(&h, &mut points, fan);
         h = done.hypothesis.clone();
         let state = done.state();

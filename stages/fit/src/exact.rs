@@ -49,17 +49,21 @@ impl Triangles {
         let Some(grid) = Grid::over(mesh) else { return Self::default() };
         let n_cells: usize = grid.n.iter().product();
         // First how many lie in each cell, then which.
-        let mut begins = vec![0_u32; n_cells + 1];
-        grid.each(mesh, |cell, _| begins[cell + 1] += 1);
+        let (mut begins, mut entries) = (vec![0_u32; n_cells + 1], Vec::new());
+        grid.each(mesh, |cell, triangle| {
+            begins[cell + 1] += 1;
+            entries.push((cell as u32, triangle));
+        });
         for cell in 0..n_cells {
             begins[cell + 1] += begins[cell];
         }
-        let mut list = vec![0; begins[n_cells] as usize];
+        let mut list = vec![0; entries.len()];
         let mut next = begins.clone();
-        grid.each(mesh, |cell, triangle| {
-            list[next[cell] as usize] = triangle;
-            next[cell] += 1;
-        });
+        for (cell, triangle) in entries {
+            let at = &mut next[cell as usize];
+            list[*at as usize] = triangle;
+            *at += 1;
+        }
         Self { grid, begins, list }
     }
 
@@ -255,13 +259,23 @@ fn n_entries(mesh: &Mesh, edge: f32) -> f32 {
     mesh.triangles.iter().map(of).sum()
 }
 
-/// Where a beam still meets a triangle that it met before, from any place on it.
-pub(crate) fn again(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<Met> {
-    crosses(mesh, triangle, (at, ray)).map(|crossed| met((at, ray), crossed, triangle))
+/// How far beyond a place on it a beam still meets a triangle that it met before, and the normal towards the scanner there.
+#[inline]
+pub(crate) fn again(
+    mesh: &Mesh,
+    triangle: u32,
+    (at, ray): (&Vector, &Vector),
+) -> Option<(f64, Vector)> {
+    crosses(mesh, triangle, (at, ray)).map(|(t, n)| (t, towards(&n, ray)))
 }
 
 fn met((at, ray): (&Vector, &Vector), (t, n): (f64, Vector), triangle: u32) -> Met {
-    Met { x: at + ray * t, n: n.normalize() * -n.dot(ray).signum(), triangle }
+    Met { x: at + ray * t, n: towards(&n, ray), triangle }
+}
+
+/// A normal of any length as one of unit length towards the scanner.
+fn towards(n: &Vector, ray: &Vector) -> Vector {
+    n / (n.norm() * -n.dot(ray).signum())
 }
 
 /// How far along a beam, from a place on it, it crosses a triangle, and the triangle's normal, of any length; `None` where it

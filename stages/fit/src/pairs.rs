@@ -2,7 +2,7 @@
 //! is from there, out.
 
 use geometry::{Point, Pose, Vector};
-use nalgebra::UnitQuaternion;
+use nalgebra::{Matrix3, UnitQuaternion};
 
 use crate::adjust::State;
 use crate::exact::{self, Met};
@@ -53,16 +53,36 @@ impl Known {
     }
 }
 
+/// A frame as a matrix, which turns vectors sooner than a quaternion does.
+struct Frame {
+    rotation: Matrix3<f64>,
+    origin: Vector,
+}
+
+impl Frame {
+    fn of(pose: &Pose) -> Self {
+        let rotation = pose.rotation.to_rotation_matrix().into_inner();
+        Self { rotation, origin: pose.translation.vector }
+    }
+
+    /// A place and a direction in this frame.
+    #[inline]
+    fn inside(&self, (p, ray): (&Vector, &Vector)) -> (Vector, Vector) {
+        (self.rotation.tr_mul(&(p - self.origin)), self.rotation.tr_mul(ray))
+    }
+}
+
 /// The model as it stands at a state, and the scans as they are off.
 pub(crate) struct Pairing<'a> {
     refine: &'a Refine<'a>,
     pub(crate) state: &'a State,
     /// Farthest distance of a point from the surface, metres.
     pub(crate) gate: f64,
-    poses: Vec<Pose>,
+    /// Where the links are, local frame.
+    frames: Vec<Frame>,
     placed: Placed<'a>,
     scanners: Vec<Option<Point>>,
-    turns: Vec<UnitQuaternion<f64>>,
+    turns: Vec<Matrix3<f64>>,
     /// Variance of the points' ranges, m².
     sigma2: f64,
 }
@@ -70,12 +90,14 @@ pub(crate) struct Pairing<'a> {
 impl<'a> Pairing<'a> {
     pub(crate) fn new(refine: &'a Refine<'a>, state: &'a State, gate: f64) -> Self {
         let scene = refine.scene;
-        let turn = |e: &crate::adjust::ScanError| UnitQuaternion::from_scaled_axis(e.turn);
+        let turn = |e: &crate::adjust::ScanError| {
+            UnitQuaternion::from_scaled_axis(e.turn).to_rotation_matrix().into_inner()
+        };
         Self {
             refine,
             state,
             gate,
-            poses: refine.local_from_links(&state.hypothesis),
+            frames: refine.local_from_links(&state.hypothesis).iter().map(Frame::of).collect(),
             placed: Placed::all(refine.prepared, &state.hypothesis, gate),
             scanners: (0..scene.views.len()).map(|v| scene.scanner(v as u16)).collect(),
             turns: state.scans.iter().map(turn).collect(),
@@ -93,9 +115,9 @@ impl<'a> Pairing<'a> {
         let (p, ray, range) = if self.scanners[view].is_some() {
             let error = &self.state.scans[view];
             let beam = raw - scanner;
-            let ray = beam.normalize();
-            let p = scanner + self.turns[view] * (beam - ray * error.bias) + error.shift;
-            (p, self.turns[view] * ray, beam.norm())
+            let range = beam.norm();
+            let ray = self.turns[view] * (beam / range);
+            (scanner + ray * (range - error.bias) + error.shift, ray, range)
         } else {
             (raw, NO_BEAM, 0.0)
         };
@@ -107,8 +129,7 @@ impl<'a> Pairing<'a> {
             None if is_ray => self.first((&p, &ray), known)?,
             None => self.nearest(&p)?,
         };
-        let Hit { link, patch, n, x } = hit;
-        let r = n.dot(&(p - x));
+        let Hit { link, patch, n, r } = hit;
         if r.abs() > self.gate {
             return None;
         }
@@ -133,9 +154,7 @@ impl<'a> Pairing<'a> {
         let (p, ray) = beam;
         let mut best: Option<(f64, usize, Met)> = None;
         self.placed.each(p.map(|v| v as f32).into(), |link, _, _| {
-            let pose = &self.poses[link];
-            let at = pose.inverse_transform_point(&Point::from(*p)).coords;
-            let ray = pose.inverse_transform_vector(ray);
+            let (at, ray) = self.frames[link].inside((p, ray));
             let own = &self.refine.prepared.model.links[link];
             let triangles = self.refine.prepared.links[link].fields.triangles(own);
             let end = best.as_ref().map_or(self.gate, |b| b.0);
@@ -144,27 +163,26 @@ impl<'a> Pairing<'a> {
                 best = Some((t, link, met));
             }
         });
-        let (_, link, met) = best.filter(|(t, ..)| *t >= -self.gate)?;
+        let (t, link, met) = best.filter(|(t, ..)| *t >= -self.gate)?;
         let patch = self.refine.prepared.links[link].fields.patch_at(&met.x, &met.n)?;
         *known = Some(Known { link: link as u32, patch, triangle: met.triangle });
-        Some(self.placed_at(link, patch, &met))
+        Some(self.hit((link, patch), (t, &met.n), ray))
     }
 
     /// The same where it is known which triangle it met.
     fn again(&self, known: Known, (p, ray): (&Vector, &Vector)) -> Option<Hit> {
         let link = known.link as usize;
-        let pose = &self.poses[link];
-        let at = pose.inverse_transform_point(&Point::from(*p)).coords;
-        let ray = pose.inverse_transform_vector(ray);
+        let (at, inside) = self.frames[link].inside((p, ray));
         let mesh = &self.refine.prepared.model.links[link].mesh;
-        let met = exact::again(mesh, known.triangle, (&at, &ray))?;
-        Some(self.placed_at(link, known.patch, &met))
+        let (t, n) = exact::again(mesh, known.triangle, (&at, &inside))?;
+        Some(self.hit((link, known.patch), (t, &n), ray))
     }
 
-    fn placed_at(&self, link: usize, patch: u32, met: &Met) -> Hit {
-        let pose = &self.poses[link];
-        let x = (pose * Point::from(met.x)).coords;
-        Hit { link, patch, n: pose.rotation * met.n, x }
+    /// What a beam meets so far beyond its point, where the surface has a normal, link frame.
+    #[inline]
+    fn hit(&self, (link, patch): (usize, u32), (t, n): (f64, &Vector), ray: &Vector) -> Hit {
+        let n = self.frames[link].rotation * n;
+        Hit { link, patch, n, r: -t * n.dot(ray) }
     }
 
     /// The facet nearest to a place, and not beside the surface's edge, where its plane means nothing.
@@ -172,12 +190,12 @@ impl<'a> Pairing<'a> {
         let Near { link, facet, .. } = self.placed.nearest(at.map(|v| v as f32).into())?;
         let fields = &self.refine.prepared.links[link].fields;
         let Facet { x, n } = fields.facets[facet];
-        let pose = &self.poses[link];
-        let n = pose.rotation * Vector::from(n.map(f64::from));
-        let x = (pose * Point::from(x.map(f64::from))).coords;
-        let off = at - x;
-        let beside = (off.norm_squared() - n.dot(&off).powi(2)).max(0.0).sqrt();
-        let hit = Hit { link, patch: fields.patch(facet), n, x };
+        let Frame { rotation, origin } = &self.frames[link];
+        let n = rotation * Vector::from(n.map(f64::from));
+        let off = at - origin - rotation * Vector::from(x.map(f64::from));
+        let r = n.dot(&off);
+        let beside = (off.norm_squared() - r * r).max(0.0).sqrt();
+        let hit = Hit { link, patch: fields.patch(facet), n, r };
         (beside <= self.refine.beside(link)).then_some(hit)
     }
 }
@@ -186,9 +204,10 @@ impl<'a> Pairing<'a> {
 struct Hit {
     link: usize,
     patch: u32,
-    /// The surface's normal and a point of it, local frame.
+    /// The surface's normal there, local frame.
     n: Vector,
-    x: Vector,
+    /// How far the point is above it, metres.
+    r: f64,
 }
 
 #[cfg(test)]

@@ -50,14 +50,11 @@ pub(crate) fn report(
     let model = prepared.model;
     let h = &best.hypothesis;
     let n = 6 + h.posture.len();
-    let mut rivals: Vec<(f64, &Polished)> = others
-        .iter()
-        .map(|other| {
-            let [by_beams, by_points] = lead(refine, (h, judgement), other, near);
-            // What either of them has against the best counts against it, more than what the other has for it.
-            (by_beams.max(by_points) + AGAINST * by_beams.min(by_points).min(0.0), other)
-        })
-        .collect();
+    let mut rivals: Vec<(f64, &Polished)> = fan.fan(others.iter().collect(), |other| {
+        let [by_beams, by_points] = lead(refine, (h, judgement), other, near);
+        // What either of them has against the best counts against it, more than what the other has for it.
+        (by_beams.max(by_points) + AGAINST * by_beams.min(by_points).min(0.0), other)
+    });
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut own = refine.with_foot(h, best.covariance.clone(), near, fan);
     let (mut open, mut spread) = open_joints(&own, h, &rivals);

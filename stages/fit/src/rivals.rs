@@ -7,8 +7,9 @@
 use contract::Fan;
 
 use crate::beam::{Beam, Hypothesis};
-use crate::judge::{Judgement, margin};
+use crate::judge::{Judgement, margin, moved};
 use crate::refine::{COARSE_ROUNDS, Refine};
+use crate::report::{OTHER, turn};
 use crate::solve::{Polished, Settled, polish, roughly, settle};
 
 /// Share of the surface explained that a flipped posture may lack and still be looked at closely …
@@ -45,7 +46,7 @@ pub(crate) fn best_of(
     fan: &impl Fan,
 ) -> Settled {
     let mut best = best;
-    let mut rivals = near_rivals((beam, refine), others, &best, near);
+    let mut rivals = near_rivals((beam, refine), others, &best, near, fan);
     for _ in 0..N_LOOKS {
         let before = best.0.hypothesis.clone();
         rivals.extend(fan.fan(beam.flips(&before), |flipped| {
@@ -55,7 +56,7 @@ pub(crate) fn best_of(
         others.extend(rest);
         let bends = refine.bends(&better.0.hypothesis, near, fan);
         let bends = fan.fan(bends, |h| polish(refine, &h, near, fan));
-        let bent = near_rivals((beam, refine), &bends, &better, near);
+        let bent = near_rivals((beam, refine), &bends, &better, near, fan);
         others.extend(bends);
         let (better, rest) = compare(refine, better, bent, (near, all), fan);
         others.extend(rest);
@@ -70,24 +71,46 @@ pub(crate) fn best_of(
     best
 }
 
+/// Others, of which those that move no link by as much as postures are compared by are adjusted like the best: polished from
+/// elsewhere a small wrist may be degrees off, on its way to the same posture.
+pub(crate) fn at_rest(
+    refine: &Refine<'_>,
+    (best, ..): &Settled,
+    others: &[Polished],
+    (near, all): (&[u32], &[u32]),
+    fan: &impl Fan,
+) -> Vec<Polished> {
+    let (h, prepared) = (&best.hypothesis, refine.prepared);
+    let is_on_its_way = |other: &Hypothesis| {
+        (0..h.posture.len()).any(|j| !prepared.leaf[j] && turn(h, other, j) > OTHER)
+            && moved([prepared; 2], [h, other]).is_empty()
+    };
+    let at_rest = |other: &Polished| match is_on_its_way(&other.0) {
+        true => end(&settle(refine, &other.0, (near, all), fan)),
+        false => other.clone(),
+    };
+    fan.fan(others.iter().collect(), at_rest)
+}
+
 /// Postures that explain nearly as much and that beams and points together hardly like less, best first, few.
 fn near_rivals(
     (beam, refine): (&Beam<'_>, &Refine<'_>),
     others: &[Polished],
     (best, judgement, _): &Settled,
     near: &[u32],
+    fan: &impl Fan,
 ) -> Vec<Polished> {
     let least = judgement.explained - SHORT * judgement.explained.abs();
     let last = best.hypothesis.posture.len().saturating_sub(1);
     // Other values of a last joint that turns are looked at apart; one that slides closes a gun.
     let upto = if refine.is_prismatic(last) { last } else { last.saturating_sub(1) };
     let is_known = |a: &Hypothesis, b: &Hypothesis| beam.alike(a, b, upto, STEPS);
-    let mut all: Vec<(f64, &Polished)> = others
-        .iter()
-        .filter(|p| p.1.explained > least && !is_known(&best.hypothesis, &p.0))
-        .map(|p| (lead(refine, (&best.hypothesis, judgement), p, near).iter().sum(), p))
-        .filter(|(lead, _)| *lead < LEAD)
-        .collect();
+    let others = others.iter();
+    let others = others.filter(|p| p.1.explained > least && !is_known(&best.hypothesis, &p.0));
+    let mut all: Vec<(f64, &Polished)> = fan.fan(others.collect(), |p| {
+        (lead(refine, (&best.hypothesis, judgement), p, near).iter().sum(), p)
+    });
+    all.retain(|(lead, _)| *lead < LEAD);
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out: Vec<Polished> = Vec::new();
     for (_, other) in all {
@@ -96,6 +119,10 @@ fn near_rivals(
         }
     }
     out
+}
+
+fn end((adjusted, judgement, _): &Settled) -> Polished {
+    (adjusted.hypothesis.clone(), judgement.clone())
 }
 
 /// The best of a posture and others, and the rest.
@@ -114,7 +141,6 @@ fn compare(
             continue;
         }
         let mut other = settle(refine, &polished.0, (near, all), fan);
-        let end = |settled: &Settled| (settled.0.hypothesis.clone(), settled.1.clone());
         let ahead = lead(refine, (&best.0.hypothesis, &best.1), &end(&other), near);
         if ahead.iter().sum::<f64>() < 0.0 {
             std::mem::swap(&mut best, &mut other);

@@ -33,7 +33,8 @@ pub struct Settings {
     pub n_polish: usize,
     /// Edge of the grid that thins points for refinement, metres.
     pub thin: f64,
-    /// Most points in the last iterations of the refinement.
+    /// Most points in the adjustment that is reported. Three hundred thousand left tips of robots with a million and more three
+    /// times as far off.
     pub max_points: usize,
     /// Points nearer than this to the installation plane are not the robot's, metres (3σ of 2 mm noise and more).
     pub floor_band: f64,
@@ -68,6 +69,13 @@ pub struct Settings {
     pub max_violation: f64,
 }
 
+impl Settings {
+    /// Points that are enough for what is asked many times over.
+    pub(crate) fn part(&self) -> usize {
+        self.max_points / 6
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -81,7 +89,7 @@ impl Default for Settings {
             n_refine: 10,
             n_polish: 3,
             thin: 0.012,
-            max_points: 100_000,
+            max_points: 600_000,
             floor_band: 0.008,
             min_noise: 0.0015,
             camera_noise: 0.006,

@@ -11,9 +11,10 @@ use crate::calibrate::doubt;
 use crate::judge::{Judgement, judge, judged};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Prior, Refine, Round};
 use crate::report::{refused, report};
-use crate::rivals::best_of;
+use crate::rivals::{at_rest, best_of};
 use crate::sampled::Sampled;
 use crate::spin::Spin;
+use crate::strata::{adjusted_points, some};
 use crate::turns;
 use crate::verdict::is_lost;
 use crate::{Prepared, Scene, Settings};
@@ -176,7 +177,8 @@ pub(crate) fn finish(
 ) -> Fit {
     let points = sharpen(refine, &mut best, all, fan);
     let misfits = doubt(refine, (&mut best.0, &mut best.2), all, fan);
-    let mut fit = report(refine, &best, others, (near, &points), fan);
+    let others = at_rest(refine, &best, others, (near, all), fan);
+    let mut fit = report(refine, &best, &others, (near, &points), fan);
     fit.reasons.extend(misfits);
     fit
 }
@@ -189,19 +191,12 @@ fn sharpen(
     all: &[u32],
     fan: &impl Fan,
 ) -> Sampled {
-    let settings =
-        Settings { max_points: SHARPER * refine.settings.max_points, ..refine.settings.clone() };
-    let refine = Refine { settings: &settings, ..*refine };
-    let mut points = adjusted_points(&refine, &best.hypothesis, all, fan);
-    let adjust = Adjust::new(&refine);
-    *best = adjust.run_from(best.state(), &mut points, fan);
-    *judgement = judged(&refine, &best.hypothesis);
+    let n = refine.settings.max_points;
+    let mut points = adjusted_points(refine, &best.hypothesis, (all, n), fan);
+    *best = Adjust::new(refine).run_from(best.state(), &mut points, fan);
+    *judgement = judged(refine, &best.hypothesis);
     points
 }
-
-/// So many times the points of the adjustment are in the last one. On the planes of samples more than three times changed
-/// nothing; on the mesh tips of robots with a million points and more are off by a third of what they were with three.
-const SHARPER: usize = 6;
 
 /// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring
 /// how near a search must come.
@@ -237,7 +232,7 @@ pub(crate) fn settle(
     fan: &impl Fan,
 ) -> Settled {
     let variance = refine.scene.noise * refine.scene.noise;
-    let mut points = adjusted_points(refine, h, all, fan);
+    let mut points = adjusted_points(refine, h, (all, refine.settings.max_points / SETTLED), fan);
     let leaves: Vec<usize> = (0..h.posture.len()).filter(|&j| refine.prepared.leaf[j]).collect();
     let adjust = Adjust::new(refine);
     let mut best = Adjust { loose: &leaves, ..adjust }.run(h, &mut points, fan);
@@ -258,6 +253,9 @@ pub(crate) fn settle(
     let judgement = judged(refine, &best.hypothesis);
     (best, judgement, spins)
 }
+
+/// One of so many points of the last adjustment is enough to choose what it is made of.
+const SETTLED: usize = 15;
 
 /// A posture with the best values of its last joints, where one of them is another mode, not the same one found again.
 pub(crate) fn better(posture: &[f64], spins: &[Spin]) -> Option<Vec<f64>> {
@@ -281,22 +279,6 @@ enum Look {
 fn sort(polished: &mut [Polished]) {
     polished.sort_by(|a, b| b.1.explained.total_cmp(&a.1.explained));
 }
-
-/// Points that an adjustment is made of.
-pub(crate) fn adjusted_points(
-    refine: &Refine<'_>,
-    h: &Hypothesis,
-    all: &[u32],
-    fan: &impl Fan,
-) -> Sampled {
-    let cap = refine.settings.max_points / refine.prepared.model.links.len().max(1);
-    let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
-    Sampled::new(refine.stratified(h, all, (gate, cap.max(2000)), fan), gate)
-}
-
-/// No point farther than this from the surface takes part in the adjustment: in multiples of the noise, and its bounds,
-/// metres: what robots differ from their models by and more, within the reach of the fine field.
-const ADJUST_GATE: (f64, f64, f64) = (3.0, 0.02, 0.03);
 
 /// Coarse rounds for the best of the beam; near twins are dropped.
 fn rough(
@@ -330,15 +312,15 @@ pub(crate) fn roughly(
     rounds: &[Round],
     fan: &impl Fan,
 ) -> Hypothesis {
-    let step = near.len().div_ceil(COARSE_NEAR).max(1);
-    let near: Vec<u32> = near.iter().copied().step_by(step).collect();
-    let few = refine.stratified(h, &near, (rounds[0].gate, COARSE_CAP), fan);
+    let few = refine.stratified(h, &some(near, COARSE_NEAR), (rounds[0].gate, COARSE_CAP), fan);
     refine.run(h, &few, rounds, fan)
 }
 
 /// Points of a link in the fine rounds: enough to hold its pose to a tenth of a millimetre, which tells hypotheses
 /// apart.
 const POLISH_CAP: usize = 2000;
+/// Points that are looked at for those, thinned evenly.
+const POLISH_NEAR: usize = 60_000;
 
 /// A posture on thinned points, with what the beams say of it.
 pub(crate) type Polished = (Hypothesis, Judgement);
@@ -367,7 +349,7 @@ pub(crate) fn fine(
 
 /// Points for that.
 fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<u32> {
-    refine.stratified(h, near, (FINE_GATE, POLISH_CAP), fan)
+    refine.stratified(h, &some(near, POLISH_NEAR), (FINE_GATE, POLISH_CAP), fan)
 }
 
 /// The same on points that are chosen.

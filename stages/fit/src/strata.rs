@@ -3,10 +3,12 @@
 use contract::Fan;
 use geometry::Aabb;
 use geometry::depth::{Rows, transform};
+use std::borrow::Cow;
 
 use crate::beam::Hypothesis;
 use crate::placed::Placed;
 use crate::refine::{CHUNK, FINE_REACH, Refine};
+use crate::sampled::Sampled;
 
 /// One of so many points is looked at to see of which links there are more than enough.
 const SOME: usize = 4;
@@ -29,8 +31,11 @@ impl Refine<'_> {
         let wanted = Placed::new(self.prepared, h, gate, |l| is_open[l]);
         let is_wanted = |p| wanted.nearest(p).is_some_and(|near| near.distance <= gate);
         let beside = is_open[strata.beside()] && gate > FINE_REACH;
+        // Where most links are, to ask them first would be to ask twice.
+        let is_most = 2 * is_open.iter().filter(|is_open| **is_open).count() > is_open.len();
         let rest = (0..points.len()).filter(|i| i % SOME != 0).map(|i| points[i]);
-        let rest = strata.sort(&rest.collect::<Vec<_>>(), |p| beside || is_wanted(p), fan);
+        let rest =
+            strata.sort(&rest.collect::<Vec<_>>(), |p| beside || is_most || is_wanted(p), fan);
         let mut out = Vec::new();
         for (at, (own, more)) in sorted.iter_mut().zip(rest).enumerate() {
             if is_open[at] {
@@ -45,6 +50,36 @@ impl Refine<'_> {
         out
     }
 }
+
+/// Points that an adjustment is made of: about so many, of all.
+pub(crate) fn adjusted_points(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    (all, n): (&[u32], usize),
+    fan: &impl Fan,
+) -> Sampled {
+    let cap = (n / refine.prepared.model.links.len().max(1)).max(MIN_CAP);
+    let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
+    let some = some(all, LOOKED_AT * n);
+    Sampled::new(refine.stratified(h, &some, (gate, cap), fan), gate)
+}
+
+/// Least points of a link that are taken, if it has as many.
+const MIN_CAP: usize = 2000;
+/// So many times the points wanted are looked at, at most: a small link has a twentieth of all.
+const LOOKED_AT: usize = 10;
+
+/// About `n` of the points at most, thinned evenly.
+pub(crate) fn some(points: &[u32], n: usize) -> Cow<'_, [u32]> {
+    match points.len().div_ceil(n.max(1)) {
+        0 | 1 => Cow::Borrowed(points),
+        step => points.iter().copied().step_by(step).collect(),
+    }
+}
+
+/// No point farther than this from the surface takes part in the adjustment: in multiples of the noise, and its bounds,
+/// metres: what robots differ from their models by and more, within the reach of the fine field.
+const ADJUST_GATE: (f64, f64, f64) = (3.0, 0.02, 0.03);
 
 /// Links of a robot as it stands, with what lies about it: points are sorted by them.
 struct Strata<'a> {

@@ -77,7 +77,7 @@ impl<'a> Steps<'a> {
         let adjust = Adjust::new(refine);
         let moved: Vec<usize> =
             several.iter().flat_map(|s| refine.prepared.carried(s.joint)).collect();
-        let [mut resting, turning] = points.about(refine.settings.max_points).parted(&moved);
+        let [mut resting, turning] = points.about(refine.settings.part()).parted(&moved);
         let resting = adjust.sums(&best.state(), &mut resting, fan).0;
         Self { adjust, best, turning, resting }
     }
