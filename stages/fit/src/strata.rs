@@ -58,9 +58,10 @@ pub(crate) fn adjusted_points(
     (all, n): (&[u32], usize),
     fan: &impl Fan,
 ) -> Sampled {
-    let cap = (n / refine.prepared.model.links.len().max(1)).max(MIN_CAP);
+    let n_links = refine.prepared.model.links.len().max(1);
+    let cap = (n / n_links).max(MIN_CAP);
     let gate = (ADJUST_GATE.0 * refine.scene.noise).clamp(ADJUST_GATE.1, ADJUST_GATE.2);
-    let some = some(all, LOOKED_AT * n);
+    let some = some(all, n.max(n_links * MIN_CAP).saturating_mul(LOOKED_AT));
     Sampled::new(refine.stratified(h, &some, (gate, cap), fan), gate)
 }
 
