@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 
 fn main() {
     let mut files = vec![PathBuf::from("Cargo.toml"), PathBuf::from("Cargo.lock")];
+    for file in &files {
+        println!("cargo:rerun-if-changed={}", file.display());
+    }
     for room in ["src", "stages"] {
         println!("cargo:rerun-if-changed={room}");
         gather(Path::new(room), &mut files);
@@ -16,6 +19,10 @@ fn main() {
         file.hash(&mut hasher);
         // A file that cannot be read fails the build where it is needed.
         std::fs::read(file).unwrap_or_default().hash(&mut hasher);
+    }
+    // Processors with other vector units round otherwise.
+    for name in ["TARGET", "CARGO_CFG_TARGET_FEATURE"] {
+        std::env::var(name).unwrap_or_default().hash(&mut hasher);
     }
     println!("cargo:rustc-env=STILLPOINT_CODE={:016x}", hasher.finish());
 }

@@ -2,14 +2,14 @@
 //! models fit poorly, where it is asked for. And results of several such runs in; one corrected model out.
 
 use crate::engine::{AllThreads, Engine, Task};
+use crate::folders;
 use crate::search::Search;
 use crate::tools::adopt;
 use contract::{Calibration, Error, Fit, Kind, Region, Result, Verdict};
 use export::atomic;
 use export::{ResultFile, RobotEntry};
 use fit::Prepared;
-use geometry::{Pose, Vector};
-use nalgebra::{Translation3, UnitQuaternion};
+use geometry::Pose;
 use robot::Model;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -137,24 +137,23 @@ impl Together {
     /// Writes the corrected model: the folder of the library's, with the joints of its URDF moved.
     ///
     /// # Errors
-    /// No such model in the library, or a folder that cannot be written.
+    /// No such model in the library, a folder that is there already or cannot be written, or a URDF outside its folder.
     pub fn write(&self, library: &Path, out: &Path) -> Result<()> {
         let from = library.join(&self.model);
-        copy(&from, out)?;
-        let urdf = out.join("robot.urdf");
+        let from = from.canonicalize().map_err(|e| Error::from(e).at(from.display()))?;
+        let urdf = robot::urdf_of(&from)?;
+        let moves: Vec<(String, Pose)> =
+            self.calibration.frames.iter().map(|f| (f.name.clone(), f.moved())).collect();
         let at = |e: Error| e.at(urdf.display());
         let text = std::fs::read_to_string(&urdf).map_err(|e| at(e.into()))?;
-        let moves: Vec<(String, Pose)> = self
-            .calibration
-            .frames
-            .iter()
-            .map(|f| {
-                let turn = UnitQuaternion::from_scaled_axis(Vector::from(f.turn));
-                let shift = Translation3::from(Vector::from(f.shift));
-                (f.name.clone(), Pose::from_parts(shift, turn))
-            })
-            .collect();
-        atomic::write(&urdf, robot::correct(&text, &moves).map_err(at)?.as_bytes())
+        let corrected = robot::correct(&text, &moves).map_err(at)?;
+        let Ok(inside) = urdf.strip_prefix(&from) else {
+            let what = format!("the model's URDF is not in its folder {}", from.display());
+            return Err(at(Error::bad_input(what).hint("copy it there and name it in robot.toml")));
+        };
+        folders::copy_as_new(&from, out, |made| {
+            atomic::write(&made.join(inside), corrected.as_bytes())
+        })
     }
 
     /// For people.
@@ -186,23 +185,4 @@ impl Together {
         let _ = writeln!(text, "corrected model in {}", out.display());
         text
     }
-}
-
-/// Copies a folder with all that is in it.
-pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
-    let at = |path: &Path| {
-        let place = path.display().to_string();
-        move |e: std::io::Error| Error::from(e).at(place.clone())
-    };
-    std::fs::create_dir_all(to).map_err(at(to))?;
-    for entry in std::fs::read_dir(from).map_err(at(from))? {
-        let path = entry.map_err(at(from))?.path();
-        let target = to.join(path.file_name().unwrap_or_default());
-        if path.is_dir() {
-            copy(&path, &target)?;
-        } else {
-            std::fs::copy(&path, &target).map_err(at(&path))?;
-        }
-    }
-    Ok(())
 }

@@ -13,6 +13,7 @@ pub mod engine;
 pub mod estimate;
 pub mod exit;
 mod filling;
+mod folders;
 pub mod history;
 pub mod job;
 mod labelled;

@@ -78,12 +78,13 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let fits = fits.into_iter().flatten().collect();
     let (fits, wrong) = review.correct(fits, (&search, &regions), &library.models, engine)?;
     let (fits, unmet) = review.apply(fits);
-    let fits = fit::choose(fits, &library.models);
+    let fits = fit::choose(fits, &library.models, |fit| review.accepts(fit));
     let mut models = library.models.clone();
     let mut fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
     if settings.fit.calibrate {
         fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
     }
+    review.accept(&mut fits);
     if settings.fit.together {
         let still = &ground.surfaces.overlaps;
         fit::together(&mut fits, &models, (scans, still), &settings.fit);

@@ -67,7 +67,7 @@ impl Report<'_> {
             rescan: None,
         };
         result.write(room.next())?;
-        let partial = !self.left_out.is_empty();
+        let partial = !self.left_out.is_empty() || self.models_left_out().next().is_some();
         Ok(Outcome { summary: self.summary(), warnings, partial, ..Outcome::default() })
     }
 
@@ -84,17 +84,18 @@ impl Report<'_> {
         ]
     }
 
+    /// Why models of the library could not be loaded.
+    fn models_left_out(&self) -> impl Iterator<Item = &robot::Finding> {
+        self.library.findings.iter().filter(|f| f.severity == robot::Severity::Error)
+    }
+
     fn warnings(&self) -> Vec<String> {
         let mut out = self.sources.warnings.clone();
         out.extend(self.left_out.iter().chain(&self.unmet).cloned());
-        for finding in &self.library.findings {
-            if finding.severity == robot::Severity::Error {
-                out.push(format!(
-                    "robot model '{}' is left out: {}: {}",
-                    finding.model, finding.place, finding.what
-                ));
-            }
-        }
+        out.extend(self.models_left_out().map(|finding| {
+            let (model, place, what) = (&finding.model, &finding.place, &finding.what);
+            format!("robot model '{model}' is left out: {place}: {what}")
+        }));
         for scan in self.sources.scans.iter().filter(|s| !s.has_beams()) {
             out.push(format!(
                 "scan '{}': its scanner's position is not known: no proof of free space from it",

@@ -135,7 +135,8 @@ impl Review {
         Ok((fits, warnings))
     }
 
-    /// The fits of all candidates with what is known applied, and a warning for each place where nothing fits it.
+    /// The fits of all candidates with what is known applied: where a robot is accepted, it alone is left. And a warning for each
+    /// place where nothing fits it.
     #[must_use]
     pub fn apply(&self, mut fits: Vec<Fit>) -> (Vec<Fit>, Vec<String>) {
         let mut warnings = Vec::new();
@@ -148,27 +149,39 @@ impl Review {
             if let Some(model) = &place.model {
                 fits.retain(|f| !here(f) || f.model_name == *model);
             }
-            let best = fits
-                .iter_mut()
-                .filter(|f| here(f))
-                .max_by(|a, b| a.explained.total_cmp(&b.explained));
-            match best {
-                Some(fit) if place.verdict == Some(Decision::Accept) => {
-                    if fit.verdict != Verdict::Trusted {
-                        fit.reasons.insert(0, "accepted in review".into());
-                    }
-                    fit.verdict = Verdict::Trusted;
-                }
-                Some(_) => {}
-                None => {
-                    let (what, at) = (place.model.as_deref().unwrap_or("robot"), place.words());
-                    warnings.push(format!(
-                        "the review expects a {what} near {at}, and none was found there"
-                    ));
-                }
+            let Some(best) = place.best(&fits) else {
+                let (what, at) = (place.model.as_deref().unwrap_or("robot"), place.words());
+                warnings.push(format!(
+                    "the review expects a {what} near {at}, and none was found there"
+                ));
+                continue;
+            };
+            if place.verdict == Some(Decision::Accept) {
+                let mut at = 0;
+                fits.retain(|f| {
+                    at += 1;
+                    at - 1 == best || !here(f)
+                });
             }
         }
+        self.accept(&mut fits);
         (fits, warnings)
+    }
+
+    /// Whether somebody accepts a fit.
+    #[must_use]
+    pub fn accepts(&self, fit: &Fit) -> bool {
+        self.places.iter().any(|p| p.verdict == Some(Decision::Accept) && p.has(fit))
+    }
+
+    /// Trusts what is accepted, whatever was found out about it since.
+    pub fn accept(&self, fits: &mut [Fit]) {
+        for fit in fits.iter_mut().filter(|f| self.accepts(f)) {
+            if fit.verdict != Verdict::Trusted {
+                fit.reasons.insert(0, "accepted in review".into());
+            }
+            fit.verdict = Verdict::Trusted;
+        }
     }
 }
 
@@ -178,6 +191,9 @@ impl Place {
         let numbers = self.at.iter().chain([&self.radius]).chain(self.joints.values());
         if !numbers.chain(self.rpy.iter().flatten()).all(|v| v.is_finite()) || self.radius <= 0.0 {
             return Err(format!("a place, radius, joint or turn is no number: {self:?}"));
+        }
+        if self.rpy.is_some() && self.joints.is_empty() {
+            return Err(format!("rpy near {} belongs to no joints: give them, too", self.words()));
         }
         let Some(name) = &self.model else {
             return if self.joints.is_empty() {
@@ -196,6 +212,12 @@ impl Place {
             }
             None => Ok(()),
         }
+    }
+
+    /// The fit that explains most here, by its place in the list.
+    fn best(&self, fits: &[Fit]) -> Option<usize> {
+        let here = fits.iter().enumerate().filter(|(_, f)| self.has(f));
+        here.max_by(|(_, a), (_, b)| a.explained.total_cmp(&b.explained)).map(|(at, _)| at)
     }
 
     /// Whether a fit stands here.
@@ -271,5 +293,15 @@ mod tests {
         assert_eq!(left, [("b", Verdict::Trusted), ("a", Verdict::Doubtful)]);
         assert_eq!(fits[0].reasons, ["accepted in review"]);
         assert_eq!(warnings.len(), 1, "{warnings:?}");
+        // Without a model the best is meant, and its rivals stand back.
+        let review = Review { places: vec![place(0.0, None, Some(Decision::Accept))] };
+        let (mut fits, _) = review.apply(vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.9)]);
+        assert_eq!(fits.len(), 1);
+        assert!(review.accepts(&fits[0]) && fits[0].model_name == "a");
+        // What a tool on its flange brings up since does not undo it.
+        (fits[0].verdict, fits[0].reasons) = (Verdict::Doubtful, vec!["few points".into()]);
+        review.accept(&mut fits);
+        assert_eq!(fits[0].verdict, Verdict::Trusted);
+        assert_eq!(fits[0].reasons, ["accepted in review", "few points"]);
     }
 }

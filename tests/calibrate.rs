@@ -24,8 +24,8 @@ fn stillpoint(args: &[&dyn AsRef<std::ffi::OsStr>]) -> String {
     String::from_utf8_lossy(&done.stdout).into_owned()
 }
 
-/// Two postures of one robot whose third joint is elsewhere, scanned and run; the output folders.
-fn runs(dir: &Path, robots: &Path) -> (Vec<PathBuf>, String) {
+/// A robot whose third joint is elsewhere than its model has it, and the library that it is not quite of.
+fn true_robot(robots: &Path) -> (robot::Model, robot::Library) {
     let mut library =
         robot::Library::load(robots, &robot::Settings::without_clouds()).expect("loads");
     let at = library.model(simulate::demo_robots::PALLETISER).expect("is there");
@@ -33,19 +33,36 @@ fn runs(dir: &Path, robots: &Path) -> (Vec<PathBuf>, String) {
     let joint = model.free[2];
     model.joints[joint].parent_from_joint *=
         geometry::Pose::translation(SHIFT[0], SHIFT[1], SHIFT[2]);
-    let model = library.models[at].clone();
+    (library.models[at].clone(), library)
+}
+
+/// A share of the way through the limits of each joint.
+fn posture(model: &robot::Model, share: f64) -> Vec<f64> {
+    let between = |[low, high]: [f64; 2]| low + (high - low) * share;
+    (0..model.n_free()).map(|j| between(model.limits(j))).collect()
+}
+
+/// The robot scanned; the scans.
+fn scanned(
+    seed: u64,
+    model: &robot::Model,
+    library: &robot::Library,
+    posture: &[f64],
+    dir: &Path,
+) -> PathBuf {
+    let scene = simulate::paper_scene(seed, model, posture, N_BEAMS);
+    scan_scene(&scene, &library.models, dir, Formats::ALL, &Engine::new(2)).expect("scans");
+    dir.join("scans.e57")
+}
+
+/// Two postures of one robot whose third joint is elsewhere, scanned and run; the output folders.
+fn runs(dir: &Path, robots: &Path) -> (Vec<PathBuf>, String) {
+    let (model, library) = true_robot(robots);
     let mut readings = String::new();
     let outs = [0.4, 0.7].map(|share| {
-        let posture: Vec<f64> = (0..model.n_free())
-            .map(|j| {
-                let [low, high] = model.limits(j);
-                low + (high - low) * share
-            })
-            .collect();
-        let scene = simulate::paper_scene(7, &model, &posture, N_BEAMS);
-        let (scans, out) = (dir.join(format!("scans{share}")), dir.join(format!("out{share}")));
-        scan_scene(&scene, &library.models, &scans, Formats::ALL, &Engine::new(2)).expect("scans");
-        let input = scans.join("scans.e57");
+        let posture = posture(&model, share);
+        let out = dir.join(format!("out{share}"));
+        let input = scanned(7, &model, &library, &posture, &dir.join(format!("scans{share}")));
         stillpoint(&[&"run", &input, &"--robots", &robots, &"--out", &out, &"--calibrate"]);
         let _ =
             writeln!(readings, "[[posture]]\nresult = {out:?}\nrobot = \"R1\"\n[posture.joints]");
@@ -94,7 +111,37 @@ fn a_joint_that_is_elsewhere_is_found_and_the_model_corrected() {
         let across = off - axis * off.dot(&axis);
         assert!(across.norm() < 0.0015, "{} {across:?}\n{words}", nominal.joints[joint].name);
     }
+    refuses_to_overwrite(&outs[0], &robots);
+    rescans(dir.path(), &outs[0], &robots);
     let zero = words.lines().find(|l| l.contains("zero off by")).expect("zeros are told");
     let value: f64 = zero.split_whitespace().nth(4).expect("a value").parse().expect("a number");
     assert!((value - ZERO.to_degrees()).abs() < 0.1, "{zero}");
+}
+
+/// The library is never written into.
+fn refuses_to_overwrite(out: &Path, robots: &Path) {
+    let own = robots.join(simulate::demo_robots::PALLETISER);
+    let urdf = std::fs::read(own.join("robot.urdf")).expect("a URDF");
+    for taken in [own.clone(), own.join("corrected")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
+        command.args(["robots", "calibrate"]).arg(out).arg("--robots").arg(robots);
+        let done = command.arg("--out").arg(&taken).output().expect("the program starts");
+        assert_eq!(done.status.code(), Some(2), "{}", String::from_utf8_lossy(&done.stderr));
+    }
+    assert_eq!(std::fs::read(own.join("robot.urdf")).expect("a URDF"), urdf);
+}
+
+/// A rescan knows where the joints of a calibrated robot are: one that did not move is the same.
+fn rescans(dir: &Path, base: &Path, robots: &Path) {
+    let (model, library) = true_robot(robots);
+    let new = scanned(8, &model, &library, &posture(&model, 0.4), &dir.join("new"));
+    let out = dir.join("again");
+    stillpoint(&[&"rescan", &"--base", &base, &new, &"--robots", &robots, &"--out", &out]);
+    let text = std::fs::read_to_string(out.join("changes.json")).expect("a list of changes");
+    let changes: serde_json::Value = serde_json::from_str(&text).expect("it parses");
+    let found = changes["robots"].as_array().expect("robots");
+    assert_eq!(found.len(), 1, "{changes:#}");
+    assert_eq!(found[0]["change"]["kind"], "same", "{changes:#}");
+    let entry = &export::ResultFile::read(&out).expect("a result").robots[0];
+    assert!(entry.calibration.is_some());
 }

@@ -126,7 +126,7 @@ impl Cell {
         let started = Instant::now();
         let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
         let mut models = shelf.models().to_vec();
-        let mut fits = fit::choose(fits.into_iter().flatten().collect(), &models);
+        let mut fits = fit::choose(fits.into_iter().flatten().collect(), &models, |_| false);
         fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
         if settings.fit.calibrate {
             fits = calibrate(fits, &mut models, (&search, &regions), engine)?;

@@ -227,13 +227,13 @@ fn run(
     let job = Job::new(vec![scans.join("scans.e57")], robots, dir.join("result"), means.clone());
     let models_of_job = job.room()?.models();
     if known.kept.exists() {
-        crate::calibrate::copy(&known.kept, &models_of_job)?;
+        crate::folders::copy(&known.kept, &models_of_job)?;
     }
     let started = Instant::now();
     plan::run(&job, engine)?;
     row.seconds = started.elapsed().as_secs_f64();
     if !is_strange && !known.kept.exists() {
-        crate::calibrate::copy(&models_of_job, &known.kept)?;
+        crate::folders::copy(&models_of_job, &known.kept)?;
     }
     let agreement = Agreement::of(&job.out, &scans.join("truth"))?;
     judge(row, &agreement);
@@ -252,7 +252,7 @@ fn link_others(library: &Path, to: &Path, without: &[&str]) -> Result<()> {
         let entry = entry?;
         let name = entry.file_name();
         if entry.path().is_dir() && !without.iter().any(|w| name == **w) {
-            crate::calibrate::copy(&entry.path(), &to.join(&name))?;
+            crate::folders::copy(&entry.path(), &to.join(&name))?;
         }
     }
     Ok(())

@@ -58,7 +58,7 @@ impl Session<'_> {
             let known = fits.iter().filter(|f| f.verdict != Verdict::Refused);
             known.into_iter().all(|f| (f.world_from_base.translation.vector - at).norm() > 0.5)
         };
-        let mut chosen = fit::choose(found, models);
+        let mut chosen = fit::choose(found, models, |_| false);
         chosen.retain(is_new);
         crate::tools::dress(chosen, models, (&search, &regions), engine)
     }

@@ -55,7 +55,7 @@ struct Said {
     foot: f64,
 }
 
-/// The models that earlier fits are of, rebuilt from a library: those with tools or with other loops after its own.
+/// The models that earlier fits are of, rebuilt from a library: those with tools, with other loops or calibrated after its own.
 ///
 /// # Errors
 /// A model that the library no longer has.
@@ -73,8 +73,19 @@ pub(crate) fn models_of(fits: &mut [Fit], library: &Library) -> Result<Vec<Model
             .then(|| models[fit.model].with_other_branches(&fit.other_branches));
         if let Some(tool) = &fit.tool {
             let arm = own.as_ref().unwrap_or(&models[fit.model]);
-            let flange = arm.links.iter().position(|l| l.name == tool.link).unwrap_or(0);
+            let flange = arm.links.iter().position(|l| l.name == tool.link).ok_or_else(|| {
+                let what = format!("model \"{}\" has no link \"{}\"", arm.name, tool.link);
+                Error::bad_input(what).hint("give the library of the earlier run with --robots")
+            })?;
             own = Some(arm.with_tool(&models[known(&tool.model)?], flange, tool.mount));
+        }
+        if let Some(found) = &fit.calibration {
+            let own = own.get_or_insert_with(|| models[fit.model].clone());
+            for joint in &mut own.joints {
+                if let Some(frame) = found.frames.iter().find(|f| f.name == joint.name) {
+                    joint.parent_from_joint *= frame.moved();
+                }
+            }
         }
         if let Some(own) = own {
             fit.model = models.len();
@@ -120,8 +131,7 @@ pub(crate) fn look(
     }
     let near = home(before, model, regions);
     // Where the new scans see through much of how it stood, it stands otherwise: that is told from its base alone.
-    if before.calibration.is_none()
-        && said.through <= CONTRADICTED
+    if said.through <= CONTRADICTED
         && let Some(fit) = search.again(&near, before, model)?
     {
         // What is known of how it stood counts for how it stands, but only where all of that is seen again.
@@ -209,7 +219,7 @@ fn anew(
             found.extend(search.region_about(&beside(near, base), Some((base, SAME_PLACE)))?);
         }
         if found.len() > 1 {
-            found = fit::choose(found, models);
+            found = fit::choose(found, models, |_| false);
         }
         found.retain(|fit| is_here(&fit.world_from_base.translation.vector.into()));
         let dressed =

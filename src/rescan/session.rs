@@ -189,7 +189,9 @@ impl<'a> Session<'a> {
         let new = Search::new(shelf, scans, store, &ground, settings);
         let views = engine
             .fan_out(Task::new("views").large(), vec![&old, &new], |s| s.images(&cell, &fine))?;
-        let [old_views, new_views] = <[_; 2]>::try_from(views).unwrap_or_default();
+        let [old_views, new_views] = views
+            .try_into()
+            .map_err(|_| Error::new(Kind::Bug, "two searches gave other than two views"))?;
         Ok(Self {
             sources,
             past,

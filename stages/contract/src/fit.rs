@@ -1,6 +1,7 @@
 //! A fit: which robot, where, in which posture, and how far to trust it.
 
 use geometry::Pose;
+use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// How far a fit may be trusted.
@@ -141,6 +142,13 @@ pub struct JointFrame {
 }
 
 impl JointFrame {
+    /// The joint's own frame from the model's: what the joint's origin is moved by, joint's frame, metres.
+    #[must_use]
+    pub fn moved(&self) -> Pose {
+        let turn = UnitQuaternion::from_scaled_axis(self.turn.into());
+        Pose::from_parts(Translation3::from(self.shift), turn)
+    }
+
     /// How far its axis leans from the model's, radians, and standard deviation.
     #[must_use]
     pub fn swing(&self) -> [f64; 2] {

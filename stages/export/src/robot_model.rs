@@ -126,9 +126,9 @@ fn yaml(fit: &Fit, model: &Model) -> String {
     let pose = &fit.world_from_base;
     let (p, q) = (pose.translation.vector, pose.rotation);
     let mut text = format!(
-        "# {}: metres and radians\nbase:\n  link: \"{}\"\n  xyz: [{:.6}, {:.6}, {:.6}]\n  quat_wxyz: [{:.9}, {:.9}, {:.9}, {:.9}]\njoints:\n",
+        "# {}: metres and radians\nbase:\n  link: {}\n  xyz: [{:.6}, {:.6}, {:.6}]\n  quat_wxyz: [{:.9}, {:.9}, {:.9}, {:.9}]\njoints:\n",
         fit.verdict.word(),
-        model.links[0].name,
+        quoted(&model.links[0].name),
         p.x,
         p.y,
         p.z,
@@ -138,9 +138,14 @@ fn yaml(fit: &Fit, model: &Model) -> String {
         q.k
     );
     for (j, value) in values(fit, model) {
-        let _ = writeln!(text, "  \"{}\": {value:.9}", model.joints[j].name);
+        let _ = writeln!(text, "  {}: {value:.9}", quoted(&model.joints[j].name));
     }
     text
+}
+
+/// A name as YAML has it between double quotes: what JSON has.
+fn quoted(name: &str) -> String {
+    serde_json::Value::from(name).to_string()
 }
 
 fn csv(fit: &Fit, model: &Model) -> String {

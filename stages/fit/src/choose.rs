@@ -17,23 +17,39 @@ const ALIKE: f64 = 0.97;
 /// A model of another kind that explains this share of the best makes the best doubtful.
 const RIVAL: f64 = 0.90;
 
-/// Chooses among the fits, best explained first; the losers become runners-up of the winners.
+/// Chooses among the fits, best explained first; the losers become runners-up of the winners. A fit that somebody vouches for
+/// (`is_known`) stands before all others, and as it is. A refused fit that explains the most keeps what is doubtful from standing
+/// there, since what stands there is none of them; what is trusted it does not.
 #[must_use]
-pub fn choose(mut fits: Vec<Fit>, models: &[Model]) -> Vec<Fit> {
-    fits.sort_by(|a, b| b.explained.total_cmp(&a.explained).then_with(|| a.model.cmp(&b.model)));
+pub fn choose(mut fits: Vec<Fit>, models: &[Model], is_known: impl Fn(&Fit) -> bool) -> Vec<Fit> {
+    fits.sort_by(|a, b| {
+        let by_points = || b.explained.total_cmp(&a.explained).then_with(|| a.model.cmp(&b.model));
+        is_known(b).cmp(&is_known(a)).then_with(by_points)
+    });
     let mut chosen: Vec<(Fit, Aabb)> = Vec::new();
     for fit in fits {
         let bounds = bounds(&fit, models);
-        let winner = chosen
-            .iter_mut()
-            .find(|(w, b)| compete(w, b, &fit, &bounds) && !stand_apart([w, &fit], models));
-        match winner {
-            Some((winner, _)) => lose(winner, &fit),
+        let competes =
+            |(w, b): &(Fit, Aabb)| compete(w, b, &fit, &bounds) && !stand_apart([w, &fit], models);
+        let stands = |w: &(Fit, Aabb)| w.0.verdict != Verdict::Refused || is_known(&w.0);
+        let winner = chosen.iter().position(|w| stands(w) && competes(w));
+        match winner.or_else(|| chosen.iter().position(competes)) {
+            Some(w) if !stands(&chosen[w]) && fit.verdict == Verdict::Trusted => {
+                let refused = std::mem::replace(&mut chosen[w], (fit, bounds)).0;
+                lose(&mut chosen[w].0, &refused);
+            }
+            Some(w) => {
+                let winner = &mut chosen[w].0;
+                lose(winner, &fit);
+                if !is_known(winner) {
+                    doubt(winner, &fit);
+                }
+            }
             None => chosen.push((fit, bounds)),
         }
     }
-    let mut out: Vec<Fit> = chosen.into_iter().map(|c| c.0).collect();
-    out.retain(|f| f.verdict != Verdict::Refused);
+    let stands = |f: &Fit| f.verdict != Verdict::Refused || is_known(f);
+    let mut out: Vec<Fit> = chosen.into_iter().map(|c| c.0).filter(stands).collect();
     // Named from the south-west on, so that ids do not depend on scores.
     out.sort_by(|a, b| {
         let (p, q) = (a.world_from_base.translation.vector, b.world_from_base.translation.vector);
@@ -107,7 +123,7 @@ fn share_within([own, other]: [&Fit; 2], models: &[Model]) -> f64 {
     f64::from(n_within) / f64::from(n.max(1))
 }
 
-/// Notes the loser at the winner: as alike, as runner-up, as a reason for doubt.
+/// Notes the loser at the winner, as runner-up.
 fn lose(winner: &mut Fit, loser: &Fit) {
     let share = loser.explained / winner.explained;
     let score = share * winner.score;
@@ -119,9 +135,14 @@ fn lose(winner: &mut Fit, loser: &Fit) {
             margin: 1.0 - share,
         });
     }
+}
+
+/// Notes a loser of another model at the winner where it explains nearly as much: as alike, or as a reason for doubt.
+fn doubt(winner: &mut Fit, loser: &Fit) {
     if loser.model == winner.model || loser.verdict == Verdict::Refused {
         return;
     }
+    let share = loser.explained / winner.explained;
     if share > ALIKE {
         winner.alike.push(loser.model_name.clone());
     } else if share > RIVAL && winner.verdict == Verdict::Trusted {
@@ -129,5 +150,43 @@ fn lose(winner: &mut Fit, loser: &Fit) {
         winner
             .reasons
             .push(format!("model '{}' explains the points nearly as well", loser.model_name));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Verdict::{Doubtful, Refused, Trusted};
+
+    /// What stands, of fits on one base, each of a model of its own: verdict and explained surface, m².
+    fn stands(fits: &[(Verdict, f64)], known: Option<usize>) -> Vec<(usize, Verdict)> {
+        let models = vec![Model::default(); fits.len()];
+        let fit = |(model, &(verdict, explained)): (usize, &(Verdict, f64))| {
+            let (world_from_base, score) = (geometry::Pose::identity(), 0.5);
+            Fit { model, verdict, explained, score, world_from_base, ..Fit::default() }
+        };
+        let fits = fits.iter().enumerate().map(fit).collect();
+        let chosen = choose(fits, &models, |f| known == Some(f.model));
+        chosen.iter().map(|f| (f.model, f.verdict)).collect()
+    }
+
+    #[test]
+    fn a_refused_fit_takes_no_place_from_a_trusted_one() {
+        assert_eq!(stands(&[(Refused, 3.0), (Trusted, 2.0)], None), [(1, Trusted)]);
+        assert_eq!(stands(&[(Refused, 3.0), (Doubtful, 2.0)], None), []);
+        assert_eq!(
+            stands(&[(Refused, 3.0), (Trusted, 2.0), (Doubtful, 1.9)], None),
+            [(1, Doubtful)]
+        );
+        assert_eq!(stands(&[(Trusted, 3.0), (Doubtful, 2.8)], None), [(0, Doubtful)]);
+        assert_eq!(stands(&[(Trusted, 3.0), (Trusted, 2.95)], None), [(0, Trusted)]);
+    }
+
+    #[test]
+    fn what_somebody_vouches_for_stands_as_it_is() {
+        let fits = [(Trusted, 3.0), (Trusted, 1.0)];
+        assert_eq!(stands(&fits, Some(1)), [(1, Trusted)]);
+        assert_eq!(stands(&[(Trusted, 3.0), (Trusted, 2.8)], Some(0)), [(0, Trusted)]);
+        assert_eq!(stands(&[(Refused, 3.0), (Trusted, 4.0)], Some(0)), [(0, Refused)]);
     }
 }

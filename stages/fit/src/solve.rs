@@ -127,8 +127,9 @@ pub fn again(
     }
     let best = settle(&refine, &polished.0, (&near, &all), fan);
     let fit = finish(&refine, best, &[polished], (&near, &all), fan);
+    // `prepared` is of the model with all that.
     let (tool, other_branches) = (before.tool.clone(), before.other_branches.clone());
-    Some(Fit { tool, other_branches, ..fit })
+    Some(Fit { tool, other_branches, calibration: before.calibration.clone(), ..fit })
 }
 
 /// Score of a base from which on the search is made at once.

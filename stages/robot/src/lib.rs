@@ -26,7 +26,7 @@ pub use correct::correct;
 pub use finding::{Finding, Severity};
 pub use hull::hull;
 pub use library::Library;
-pub use load::Settings;
+pub use load::{Settings, urdf_of};
 pub use loops::{ClosedLoop, Closure, Form};
 pub use model::{
     CadCloud, Joint, JointKind, Kinematics, Link, Mesh, Model, Motion, Role, Symmetry,

@@ -105,17 +105,38 @@ pub(crate) fn load(
         }
     };
     let sheet = read_sheet(folder, findings)?;
-    let path = match &sheet.urdf {
-        Some(written) => match roots.find(written) {
-            Ok(found) => found.path,
-            Err(what) => {
-                findings.fail("robot.toml: urdf", format!("{what} \"{written}\""), "mend the name");
-                return None;
-            }
-        },
-        None => find_urdf(folder, findings)?,
-    };
+    let path = urdf_in(folder, &sheet, &roots, findings)?;
     Loader { name, roots, settings }.load(&path, &sheet, findings)
+}
+
+/// The URDF file that a model's folder is loaded from.
+///
+/// # Errors
+/// What keeps the model from loading: a `robot.toml` that cannot be read, or no such file.
+pub fn urdf_of(folder: &Path) -> Result<PathBuf> {
+    let mut findings = Findings::new(&file_name(folder));
+    let roots = Roots::new(folder, None).map_err(|e| Error::from(e).at(folder.display()))?;
+    let mut find = || urdf_in(folder, &read_sheet(folder, &mut findings)?, &roots, &mut findings);
+    find().ok_or_else(|| findings.first_error())
+}
+
+/// The one that `robot.toml` names, else `robot.urdf` or the only one.
+fn urdf_in(
+    folder: &Path,
+    sheet: &Sheet,
+    roots: &Roots,
+    findings: &mut Findings,
+) -> Option<PathBuf> {
+    let Some(written) = &sheet.urdf else {
+        return find_urdf(folder, findings);
+    };
+    match roots.find(written) {
+        Ok(found) => Some(found.path),
+        Err(what) => {
+            findings.fail("robot.toml: urdf", format!("{what} \"{written}\""), "mend the name");
+            None
+        }
+    }
 }
 
 fn read_sheet(folder: &Path, findings: &mut Findings) -> Option<Sheet> {

@@ -5,8 +5,8 @@ use crate::field::FIELD_REACH;
 use crate::raster::Raster;
 use crate::{Ground, Settings};
 use contract::{
-    Fan, Fit, Floor, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result,
-    Scan, Tile, TileLabels,
+    Error, Fan, Fit, Floor, Kind, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE,
+    ResidualVoxel, Result, Scan, Tile, TileLabels,
 };
 use geometry::depth::{Rows, rotate, rows, transform};
 use geometry::narrow::floor_i32;
@@ -261,17 +261,16 @@ impl Map for Segment {
     type Scratch = Scratch;
 
     fn apply(&self, tile: Tile, scratch: &mut Scratch) -> Result<TileLabels> {
+        let Some(scan) = self.scans.get(tile.at.scan.0 as usize) else {
+            return Err(Error::new(Kind::Bug, format!("a tile of no scan: {:?}", tile.at)));
+        };
         let empty = TileLabels {
             at: tile.at,
-            mask: contract::MaskId(0),
+            mask: scan.mask,
             labels: Vec::new(),
             residuals: Vec::new(),
             voxels: Vec::new(),
         };
-        let Some(scan) = self.scans.get(tile.at.scan.0 as usize) else {
-            return Ok(empty);
-        };
-        let empty = TileLabels { mask: scan.mask, ..empty };
         let seen = self.seen(&tile, &scan.world_from_scan);
         if seen.is_empty() {
             return Ok(empty);
