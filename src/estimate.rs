@@ -2,9 +2,9 @@
 
 use crate::engine::AllThreads;
 use crate::engine::Engine;
-use crate::job::{Job, Room, Settings, memory_words};
+use crate::job::{Job, OutputDir, Settings, memory_words};
 use crate::library;
-use crate::reuse::Sums;
+use crate::reuse::Digests;
 use contract::{Error, Format, Input, Kind, Result};
 use ingest::{Scanners, Sources};
 use serde::Serialize;
@@ -110,22 +110,22 @@ pub(crate) fn with_missing(error: Error, job: &Job, engine: &Engine) -> Error {
 
 /// What an earlier run has left.
 struct Earlier {
-    room: Room,
-    sums: Sums,
+    output: OutputDir,
+    digests: Digests,
     unchanged: bool,
 }
 
 impl Earlier {
     fn look(job: &Job, engine: &Engine) -> Result<Self> {
-        let room = job.room()?;
-        let sums = Sums::of(job, &room, engine)?;
-        let result = sums.unchanged(job, &room)?;
-        Ok(Self { room, sums, unchanged: result.is_some() })
+        let output = job.output()?;
+        let digests = Digests::of(job, &output, engine)?;
+        let result = digests.unchanged(job, &output)?;
+        Ok(Self { output, digests, unchanged: result.is_some() })
     }
 
     fn has_tiles(&self, input: &Input, sources: &Sources, settings: &Settings) -> bool {
-        let key = self.sums.tiles(input, &sources.scans, settings);
-        key.is_some_and(|key| self.room.has_tiles(&key))
+        let key = self.digests.tiles(input, &sources.scans, settings);
+        key.is_some_and(|key| self.output.has_tiles(&key))
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::engine::{Engine, Task};
 use crate::job::Means;
 use crate::reading::Reading;
-use crate::reuse::{Key, Pace, Sums};
+use crate::reuse::{Digests, Key, Pace};
 use crate::store::{Scatter, Store};
 use contract::{Error, Input, Kind, Result, Weigh};
 use ingest::{Sources, Want};
@@ -41,11 +41,11 @@ impl<'a> Filling<'a> {
 
     /// The tiles of one input and their key. A store that is there and whole is believed; one that is damaged is made
     /// again.
-    pub(crate) fn tiles_of(&self, input: &Input, sums: &Sums) -> Result<(Key, Store)> {
+    pub(crate) fn tiles_of(&self, input: &Input, digests: &Digests) -> Result<(Key, Store)> {
         let scans = &self.sources.scans;
         let first = scans.iter().find(|s| s.input == input.id).map_or(0, |s| s.id.0);
         let resident_bytes = self.means.store_bytes() / self.sources.inputs.len().max(1);
-        let key = || sums.tiles(input, scans, &self.means.settings);
+        let key = || digests.tiles(input, scans, &self.means.settings);
         let [n_kept, n] = self.n_kept.get();
         self.n_kept.set([n_kept, n + 1]);
         let open = |key: &Key| Store::open(&self.folder.join(key.name()), first, resident_bytes);
@@ -54,7 +54,7 @@ impl<'a> Filling<'a> {
             return Ok((key, store));
         }
         let new = self.folder.join(format!("{NEW}{}", input.id.0));
-        self.fill(&new, input, (first, resident_bytes), sums)?;
+        self.fill(&new, input, (first, resident_bytes), digests)?;
         let key = key().ok_or_else(|| Error::new(Kind::Bug, "an input was not read"))?;
         let place = self.folder.join(key.name());
         let _ = std::fs::remove_dir_all(&place);
@@ -69,7 +69,7 @@ impl<'a> Filling<'a> {
         dir: &Path,
         input: &Input,
         (first, resident_bytes): (u32, usize),
-        sums: &Sums,
+        digests: &Digests,
     ) -> Result<()> {
         let scans = &self.sources.scans;
         // What a run that was cut short has left there would go along for ever.
@@ -80,7 +80,7 @@ impl<'a> Filling<'a> {
         let reading = Reading { sources: self.sources, input, want: Want::Coordinates };
         let pace = Pace::of(amount.points);
         let lead = pace.lead();
-        let mut tree = sums.tree(input).filter(|_| self.sources.file(input.id).is_some());
+        let mut tree = digests.tree(input).filter(|_| self.sources.file(input.id).is_some());
         let ingest = || {
             let task = Task::new("ingest").of(amount);
             reading.each(task, &scatter, tree.as_mut(), self.engine, |strip| {
@@ -88,14 +88,14 @@ impl<'a> Filling<'a> {
                 sink.add(&strip)
             })?;
             lead.end();
-            tree.take().map_or(Ok(()), |tree| sums.take(input, tree))
+            tree.take().map_or(Ok(()), |tree| digests.take(input, tree))
         };
-        if sums.input(input).is_some() || self.sources.file(input.id).is_some() {
+        if digests.input(input).is_some() || self.sources.file(input.id).is_some() {
             ingest()?;
         } else {
-            self.engine.beside("digest", || sums.read(input, &pace), ingest)?;
+            self.engine.beside("digest", || digests.read(input, &pace), ingest)?;
         }
-        sums.check(input)?;
+        digests.check(input)?;
         sink.finish(self.engine, resident_bytes).map(drop)
     }
 }

@@ -118,7 +118,7 @@ pub(crate) struct Done {
     /// What is known of the space around each robot.
     pub(crate) spaces: Vec<Option<SpaceEntry>>,
     /// Checksums of the files that are as large as the cloud.
-    pub(crate) sums: Vec<FileSum>,
+    pub(crate) digests: Vec<FileSum>,
     /// What records of the clouds hold.
     pub(crate) las: LasSettings,
 }
@@ -290,12 +290,12 @@ impl<'a> Labelling<'a> {
             let finished = engine.pool()?.install(|| tiles.finish(&AllThreads))?;
             Ok((finished, Vec::new(), pictures))
         };
-        let (((masks, mut sums), (moving, fixed)), (tiles, open, pictures)) =
+        let (((masks, mut digests), (moving, fixed)), (tiles, open, pictures)) =
             engine.handing("clouds", apart, along)?;
         let clouds = Written { tiles, robots: moving, fixed };
-        sums.extend(clouds.sums().cloned());
+        digests.extend(clouds.sums().cloned());
         let said = vec![None; self.fits.len()];
-        let done = Done { clouds, masks, pictures, spaces: said, sums, las };
+        let done = Done { clouds, masks, pictures, spaces: said, digests, las };
         let robots = chosen.into_iter().zip(robots).collect();
         Ok(Streamed { labelling: self, near, spaces, robots, open, out, done })
     }

@@ -1,7 +1,7 @@
 //! A folder in, the robot library out, its models loaded in parallel.
 
 use crate::engine::{AllThreads, Engine};
-use crate::reuse::Kept;
+use crate::reuse::Cache;
 use contract::Result;
 use robot::{Library, Settings};
 use std::path::Path;
@@ -15,7 +15,7 @@ pub(crate) fn count(dir: &Path) -> Result<usize> {
 pub(crate) fn load(
     dir: &Path,
     settings: &Settings,
-    kept: Option<&Kept>,
+    kept: Option<&Cache>,
     engine: &Engine,
 ) -> Result<Library> {
     let (folders, mut library) = Library::open(dir)?;
@@ -30,7 +30,7 @@ pub(crate) fn load(
             Ok((model, findings))
         };
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        kept.map_or_else(load, |kept| kept.or_find(&name, load))
+        kept.map_or_else(load, |kept| kept.get_or_compute(&name, load))
     })?;
     for model in loaded {
         library.add(model);

@@ -50,7 +50,7 @@ impl Masks {
     /// Finishes all masks; what the file states beyond the last point is uncertain.
     pub(crate) fn finish(self) -> Result<(Vec<MaskCount>, Vec<FileSum>)> {
         let Self { out, masks, open, mut counts } = self;
-        let mut sums = Vec::new();
+        let mut digests = Vec::new();
         for ((mask, open), count) in masks.iter().zip(open).zip(&mut counts) {
             let mut open = match open {
                 Some(open) => open,
@@ -61,9 +61,9 @@ impl Masks {
             open.pad(missing)?;
             count.n_points = open.writer.len();
             count.n_dropped = count.n_points - open.n_named;
-            sums.extend(open.writer.finish()?);
+            digests.extend(open.writer.finish()?);
         }
-        Ok((counts, sums))
+        Ok((counts, digests))
     }
 }
 

@@ -6,139 +6,219 @@ use crate::copc;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::estimate::Estimate;
 use crate::filling::Filling;
-use crate::job::{Job, Outcome};
-use crate::labelling::{Labelling, Scope};
+use crate::job::{Job, Outcome, OutputDir, Settings};
+use crate::labelling::{Done, Labelling, Scope};
 use crate::lenient::Failures;
 use crate::library;
 use crate::report::Report;
 use crate::rescan::{Records, State};
-use crate::reuse::{self, Kept, Key, Manifest, OutputFile, Sums};
+use crate::reuse::{self, Cache, Digests, Key, OutputFile};
 use crate::review::Review;
 use crate::search::{Search, Shelf};
 use crate::spaces;
 use crate::store::Store;
-use crate::surfaces::{Gather, Surfaces};
+use crate::surfaces::{Gather, Ground, Surfaces};
 use crate::tools;
-use contract::{Input, Result};
-use ingest::Scanners;
+use contract::{Cluster, Fit, Floor, Input, Region, Result, Scan, Space};
+use ingest::{Scanners, Sources};
+use robot::{Library, Model};
 use std::path::PathBuf;
 
 /// Does the main job.
+///
+/// # Errors
+/// Inputs, library or settings that cannot be used, too little disk, or what a stage ends with.
 pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
-    let settings = &job.means.settings;
-    let room = job.room()?;
-    let sums = Sums::of(job, &room, engine)?;
-    if let Some(manifest) = sums.unchanged(job, &room)? {
+    let output = job.output()?;
+    let digests = Digests::of(job, &output, engine)?;
+    if let Some(manifest) = digests.unchanged(job, &output)? {
         return Ok(manifest.outcome());
     }
-    let shelved = Kept::new(room.models(), sums.models(settings));
-    let library = library::load(&job.robots, &settings.robot, Some(&shelved), engine)?;
-    let read = |path: &PathBuf| Review::read(path, &library.models);
-    let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
-    let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
-    let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
-    let sources = engine.pool()?.install(open)?;
-    let scans = &sources.scans;
-    let has_tiles =
-        |i: &Input| sums.tiles(i, scans, settings).is_some_and(|key| room.has_tiles(&key));
-    Estimate::of(job, &sources, library.models.len(), has_tiles).checked(room.out())?;
+    Run { job, settings: &job.means.settings, output: &output, digests: &digests, engine }.whole()
+}
 
-    // First pass: every point once, from the files into the lattice tiles of the store; inputs whose tiles are there are
-    // not read.
-    let filling = Filling::new(&sources, &job.means, room.tiles(), engine);
-    let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, &sums));
-    let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
-    let store = Store::join(stores);
+/// A run that has something to do.
+struct Run<'a> {
+    job: &'a Job,
+    settings: &'a Settings,
+    output: &'a OutputDir,
+    digests: &'a Digests,
+    engine: &'a Engine,
+}
 
-    // On the tiles: local planes and occupied space, joined over tiles and scans; from here on nothing is as large as
-    // the cloud.
-    let (surfaces, gather) =
-        (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
-    let grounds = Kept::new(room.fits(), sums.ground(&tiles, settings));
-    let ground = grounds.or_find("ground", || {
+/// What is known before any point is read.
+struct Given {
+    library: Library,
+    review: Review,
+    sources: Sources,
+}
+
+/// The robots that were found.
+struct Robots {
+    fits: Vec<Fit>,
+    /// The library's models, and after them those with a tool, other loops or calibrated joints.
+    models: Vec<Model>,
+    /// What of the review could not be, in words.
+    unmet: Vec<String>,
+}
+
+impl Run<'_> {
+    fn whole(&self) -> Result<Outcome> {
+        let &Run { job, settings, output, digests, engine } = self;
+        let models_kept = Cache::new(output.models(), digests.models(settings));
+        let given = self.given(&models_kept)?;
+        let (sources, scans) = (&given.sources, &given.sources.scans);
+
+        // First pass: every point once, from the files into the lattice tiles of the store; inputs whose tiles are there are
+        // not read.
+        let filling = Filling::new(sources, &job.means, output.tiles(), engine);
+        let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, digests));
+        let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
+        let store = Store::join(stores);
+
+        // On the tiles: local planes and occupied space, joined over tiles and scans; from here on nothing is as large as
+        // the cloud.
+        let ground_kept = Cache::new(output.fits(), digests.ground(&tiles, settings));
+        let ground = ground_kept.get_or_compute("ground", || self.ground(scans, &store))?;
+        let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
+        let clusters = cluster::split(space, floor, &settings.cluster);
+        let regions = identify::regions(&clusters, &settings.region);
+
+        // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
+        let of_plant = || Cache::new(output.fits(), digests.fits(&tiles, settings));
+        let (fits_kept, pieces_kept) = (of_plant(), of_plant());
+        let shelf = Shelf::new(&given.library.models);
+        let search = Search::new(&shelf, scans, &store, &ground, settings).keeping(&pieces_kept);
+        let failures = Failures::of(job);
+        let found = engine.fan_out(Task::new("fit").large(), regions.clone(), |region| {
+            let find = || search.region(&region);
+            failures.spare(&region, || fits_kept.get_or_compute(&format!("{region:?}"), find))
+        })?;
+        let found = self.robots(found.concat(), (&search, &regions), (&given, &ground))?;
+        let (fits, models) = (&found.fits, &found.models);
+        let spaces = spaces::around(fits, models, (&search, settings), engine)?;
+        drop(shelf);
+
+        // Tiles near robots once more; then all points.
+        let written = self.label(&found, (sources, &store), (floor, &clusters), spaces)?;
+        let mut outcome = Report {
+            digests,
+            sources,
+            library: &given.library,
+            models,
+            fits,
+            clusters: &clusters,
+            written: &written,
+            unmet: found.unmet,
+            left_out: failures.said(job),
+        }
+        .finish(output)?;
+        self.conclude((found.fits, floor), (sources, &tiles), &written, &outcome)?;
+        output.prune(&tiles, &[&ground_kept, &fits_kept], &models_kept);
+        outcome.reused = reuse::said(&[
+            ("models", models_kept.n_kept()),
+            ("tiles", filling.n_kept()),
+            ("fits", fits_kept.n_kept()),
+        ]);
+        Ok(outcome)
+    }
+
+    /// Reads library and review, opens the scans, and sees that disk and memory are enough.
+    fn given(&self, models_kept: &Cache) -> Result<Given> {
+        let &Run { job, settings, output, digests, engine } = self;
+        let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
+        let read = |path: &PathBuf| Review::read(path, &library.models);
+        let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
+        let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+        let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
+        let sources = engine.pool()?.install(open)?;
+        let has_tiles = |i: &Input| {
+            let key = digests.tiles(i, &sources.scans, settings);
+            key.is_some_and(|key| output.has_tiles(&key))
+        };
+        Estimate::of(job, &sources, library.models.len(), has_tiles).checked(output.out())?;
+        Ok(Given { library, review, sources })
+    }
+
+    /// One pass over the tiles: floor, walls and occupied space.
+    fn ground(&self, scans: &[Scan], store: &Store) -> Result<Ground> {
+        let surfaces = Surfaces::new(scans, &self.settings.lattice);
+        let gather = Gather::new(scans, &self.settings.floor);
         let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
-        engine.pass(crate::report::tiles("surfaces", &store), source, |f| {
+        self.engine.pass(crate::report::tiles("surfaces", store), source, |f| {
             f.map(&reads).map(&surfaces).fold(&gather)
         })
-    })?;
-    let clusters =
-        cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
-    let regions = identify::regions(&clusters, &settings.region);
-
-    // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
-    let shelf = Shelf::new(&library.models);
-    let of_plant = || Kept::new(room.fits(), sums.fits(&tiles, settings));
-    let (kept, pieces) = (of_plant(), of_plant());
-    let search = Search::new(&shelf, scans, &store, &ground, settings).keeping(&pieces);
-    let failures = Failures::of(job);
-    let fits = engine.fan_out(Task::new("fit").large(), regions.clone(), |region| {
-        let find = || kept.or_find(&format!("{region:?}"), || search.region(&region));
-        failures.spare(&region, find)
-    })?;
-    let fits = fits.into_iter().flatten().collect();
-    let (fits, wrong) = review.correct(fits, (&search, &regions), &library.models, engine)?;
-    let (fits, unmet) = review.apply(fits);
-    let fits = fit::choose(fits, &library.models, |fit| review.accepts(fit));
-    let mut models = library.models.clone();
-    let mut fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
-    if settings.fit.calibrate {
-        fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
-    }
-    review.accept(&mut fits);
-    if settings.fit.together {
-        let still = &ground.surfaces.overlaps;
-        fit::together(&mut fits, &models, (scans, still), &settings.fit);
     }
 
-    // Tiles near robots once more: which points are links, which hang on them.
-    let floor = &ground.surfaces.floor;
-    let labelling = Labelling::new(&fits, &models, &sources, (&store, floor, &clusters), settings);
-    let near = labelling.near_robots(&store, engine)?;
+    /// Of all fits those that can stand together, with tools on their flanges, their joints calibrated where that is asked for,
+    /// and agreed on how far the scans are off; all as far as the review lets them.
+    fn robots(
+        &self,
+        found: Vec<Fit>,
+        place: (&Search<'_, '_>, &[Region]),
+        (given, ground): (&Given, &Ground),
+    ) -> Result<Robots> {
+        let (review, settings, mut models) =
+            (&given.review, self.settings, given.library.models.clone());
+        let (fits, wrong) = review.correct(found, place, &models, self.engine)?;
+        let (fits, absent) = review.apply(fits);
+        let fits = fit::choose(fits, &models, |fit| review.accepts(fit));
+        let mut fits = tools::dress(fits, &mut models, place, self.engine)?;
+        if settings.fit.calibrate {
+            fits = calibrate(fits, &mut models, place, self.engine)?;
+        }
+        review.accept(&mut fits);
+        if settings.fit.together {
+            let (scans, still) = (&given.sources.scans[..], &ground.surfaces.overlaps);
+            fit::together(&mut fits, &models, (scans, still), &settings.fit);
+        }
+        Ok(Robots { fits, models, unmet: [wrong, absent].concat() })
+    }
 
-    // What nobody saw around them; second pass: every point once more, in the order of its file, to label and to
-    // write.
-    let spaces = spaces::around(&fits, &models, (&search, settings), engine)?;
-    drop(shelf);
-    let written = labelling
-        .write((&near, spaces), &Scope::default(), (room.next(), room.next()), engine)?
-        .finish(engine)?;
-    if settings.export.copc {
-        copc::write(room.next(), &room.scratch(), engine)?;
+    /// Which points near robots are links, and which hang on them; then the second pass: every point once more, in the order of
+    /// its file, to label and to write, with what nobody saw around the robots.
+    fn label(
+        &self,
+        robots: &Robots,
+        (sources, store): (&Sources, &Store),
+        (floor, clusters): (&Floor, &[Cluster]),
+        spaces: Vec<Option<Space>>,
+    ) -> Result<Done> {
+        let (settings, next, engine) = (self.settings, self.output.next(), self.engine);
+        let ground = (store, floor, clusters);
+        let labelling = Labelling::new(&robots.fits, &robots.models, sources, ground, settings);
+        let near = labelling.near_robots(store, engine)?;
+        let written = labelling
+            .write((&near, spaces), &Scope::default(), (next, next), engine)?
+            .finish(engine)?;
+        if settings.export.copc {
+            copc::write(next, &self.output.scratch(), engine)?;
+        }
+        Ok(written)
     }
-    let mut outcome = Report {
-        sums: &sums,
-        sources: &sources,
-        library: &library,
-        models: &models,
-        fits: &fits,
-        clusters: &clusters,
-        written: &written,
-        unmet: [wrong, unmet].concat(),
-        left_out: failures.said(job),
-    }
-    .finish(&room)?;
 
-    // All is whole, and of the inputs that the run began with: it takes the place of what was there. What this run did not use is not kept.
-    sources.inputs.iter().try_for_each(|input| sums.check(input))?;
-    State {
-        inputs: sources.inputs.clone(),
-        masks: sources.masks.clone(),
-        scans: sources.scans.clone(),
-        tiles: tiles.clone(),
-        floor: ground.surfaces.floor,
-        fits,
-        robots: job.robots.clone(),
-        records: Records::of(&written.las, &settings.export),
+    /// All is whole, and of the inputs that the run began with: it takes the place of what was there.
+    fn conclude(
+        &self,
+        (fits, floor): (Vec<Fit>, &Floor),
+        (sources, tiles): (&Sources, &[Key]),
+        written: &Done,
+        outcome: &Outcome,
+    ) -> Result<()> {
+        let next = self.output.next();
+        sources.inputs.iter().try_for_each(|input| self.digests.check(input))?;
+        State {
+            inputs: sources.inputs.clone(),
+            masks: sources.masks.clone(),
+            scans: sources.scans.clone(),
+            tiles: tiles.to_vec(),
+            floor: floor.clone(),
+            fits,
+            robots: self.job.robots.clone(),
+            records: Records::of(&written.las, &self.settings.export),
+        }
+        .write(next)?;
+        let files = written.digests.iter().map(|sum| OutputFile::of(next, sum)).collect();
+        reuse::publish(self.job, (self.output, self.digests), (outcome, files), self.engine)
     }
-    .write(room.next())?;
-    let known = written.sums.iter().map(|sum| OutputFile::of(room.next(), sum)).collect();
-    Manifest::write(room.next(), sums.whole(job), (&outcome, known), engine)?;
-    sums.remember(&Manifest::publish(room.next(), room.out())?, room.out())?;
-    room.prune(&tiles, &[&grounds, &kept], &shelved);
-    outcome.reused = reuse::said(&[
-        ("models", shelved.n_kept()),
-        ("tiles", filling.n_kept()),
-        ("fits", kept.n_kept()),
-    ]);
-    Ok(outcome)
 }

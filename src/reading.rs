@@ -20,7 +20,7 @@ pub(crate) struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    /// Does `step` to each strip; hands what it makes of them to `sink`, in order. Sums the file up on the way where `tree` wants it and
+    /// Does `step` to each strip; hands what it makes of them to `sink`, in order. Digests the file up on the way where `tree` wants it and
     /// it is read in pieces.
     pub(crate) fn each<M: Map<In = Strip>>(
         &self,

@@ -1,10 +1,10 @@
 //! What a run came to in; `result.json`, the legend of the masks and a summary for people out.
 
 use crate::engine::Task;
-use crate::job::{Outcome, Room};
+use crate::job::{Outcome, OutputDir};
 use crate::labelling::{Done, MaskCount};
 use crate::progress::Amount;
-use crate::reuse::Sums;
+use crate::reuse::Digests;
 use crate::spaces::poses;
 use crate::store::Store;
 use contract::{Cluster, Fit, Format, Input, InputId, Result, Verdict};
@@ -18,7 +18,7 @@ use std::fmt::Write as _;
 
 /// Everything that the result tells.
 pub(crate) struct Report<'a> {
-    pub(crate) sums: &'a Sums,
+    pub(crate) digests: &'a Digests,
     pub(crate) sources: &'a Sources,
     pub(crate) library: &'a Library,
     /// Those that the fits are of: the library's, and arms with tools.
@@ -34,7 +34,7 @@ pub(crate) struct Report<'a> {
 
 impl Report<'_> {
     /// Writes the legend and the result, last of all files.
-    pub(crate) fn finish(&self, room: &Room) -> Result<Outcome> {
+    pub(crate) fn finish(&self, output: &OutputDir) -> Result<Outcome> {
         let robots: Vec<RobotEntry> = self
             .fits
             .iter()
@@ -44,7 +44,7 @@ impl Report<'_> {
                 robot_entry(i, fit, &self.models[fit.model], space)
             })
             .collect();
-        write_table(room.next(), &robots)?;
+        write_table(output.next(), &robots)?;
         let warnings = self.warnings();
         let masks = self.sources.masks.iter().zip(&self.written.masks);
         let labels = Labels {
@@ -60,13 +60,13 @@ impl Report<'_> {
                 .sources
                 .inputs
                 .iter()
-                .map(|i| input_entry(self.sources, i, self.sums, &self.written.masks))
+                .map(|i| input_entry(self.sources, i, self.digests, &self.written.masks))
                 .collect(),
             stages: self.stages(),
             warnings: warnings.clone(),
             rescan: None,
         };
-        result.write(room.next())?;
+        result.write(output.next())?;
         let partial = !self.left_out.is_empty() || self.models_left_out().next().is_some();
         Ok(Outcome { summary: self.summary(), warnings, partial, ..Outcome::default() })
     }
@@ -193,7 +193,7 @@ pub(crate) fn robot_entry(
 pub(crate) fn input_entry(
     sources: &Sources,
     input: &Input,
-    sums: &Sums,
+    digests: &Digests,
     counts: &[MaskCount],
 ) -> InputEntry {
     let scans: Vec<_> = sources.scans.iter().filter(|s| s.input == input.id).collect();
@@ -204,7 +204,7 @@ pub(crate) fn input_entry(
         path: input.path.display().to_string(),
         format: format_word(input.format).into(),
         n_bytes: input.n_bytes,
-        digest: sums.input(input).unwrap_or_default().to_owned(),
+        digest: digests.input(input).unwrap_or_default().to_owned(),
         n_scans: scans.len() as u32,
         n_points,
         n_dropped,

@@ -50,7 +50,7 @@ pub(crate) fn dress(
             })?;
             Ok(dressed.flatten())
         };
-        let dressed = search.or_find(&format!("tool of {fit:?}"), find)?;
+        let dressed = search.get_or_compute(&format!("tool of {fit:?}"), find)?;
         Ok(own(fit, arm, dressed, known))
     })?;
     Ok(adopt(dressed, models))

@@ -8,7 +8,7 @@ use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
 use stillpoint::job::{Given, Job, Means};
 use stillpoint::plan;
-use stillpoint::rescan::{Cell, Wish, rescan};
+use stillpoint::rescan::{Cell, Request, rescan};
 use stillpoint::reuse::{Manifest, check};
 use stillpoint::scanning::{Formats, scan_scene};
 
@@ -62,8 +62,8 @@ impl Plant {
         Job::new(inputs, self.path("robots"), self.path(out), means)
     }
 
-    fn wish(&self, base: &str, out: &str) -> Wish {
-        Wish { base: self.path(base), cell: Cell::Seen, job: self.job("now", out) }
+    fn request(&self, base: &str, out: &str) -> Request {
+        Request { base: self.path(base), cell: Cell::Seen, job: self.job("now", out) }
     }
 
     fn run(&self, args: &[&str]) -> Output {
@@ -88,7 +88,7 @@ fn changes(out: &Path) -> serde_json::Value {
 fn a_rescanned_cell_is_brought_up_to_date() {
     let plant = Plant::new();
     let engine = Engine::new(2);
-    rescan(&plant.wish("base", "again"), &engine).expect("the rescan ends well");
+    rescan(&plant.request("base", "again"), &engine).expect("the rescan ends well");
     let out = plant.path("again");
 
     // What was changed is found, and nothing else.
@@ -165,7 +165,7 @@ fn a_robot_that_the_earlier_result_missed_did_not_appear() {
     assert_eq!(n_robots("blind") + 1, n_robots("base"));
 
     // Its scans show how it stood, though: it is said to have moved from there.
-    rescan(&plant.wish("blind", "again"), &Engine::new(2)).expect("the rescan ends well");
+    rescan(&plant.request("blind", "again"), &Engine::new(2)).expect("the rescan ends well");
     let changes = changes(&plant.path("again"));
     let robots = changes["robots"].as_array().expect("robots");
     let others: Vec<_> = robots.iter().filter(|r| r["change"]["kind"] != "same").collect();
@@ -184,7 +184,7 @@ fn a_robot_that_the_earlier_result_missed_did_not_appear() {
 /// Rescans of rescans, and what is refused.
 fn goes_on(plant: &Plant, out: &Path) {
     let said = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
-    let unchanged = rescan(&plant.wish("base", "again"), &Engine::new(2)).expect("ends well");
+    let unchanged = rescan(&plant.request("base", "again"), &Engine::new(2)).expect("ends well");
     assert!(unchanged.reused[0].starts_with("everything"), "{:?}", unchanged.reused);
     // The new scans are part of it now; neither they nor the same folder can be given again.
     let known = plant.run(&["rescan", "--base", "again", "now/scans.e57", "--out", "third"]);

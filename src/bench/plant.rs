@@ -225,7 +225,7 @@ fn run(
         known.folder.clone()
     };
     let job = Job::new(vec![scans.join("scans.e57")], robots, dir.join("result"), means.clone());
-    let models_of_job = job.room()?.models();
+    let models_of_job = job.output()?.models();
     if known.kept.exists() {
         crate::folders::copy(&known.kept, &models_of_job)?;
     }

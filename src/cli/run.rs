@@ -4,7 +4,7 @@ use super::flags::{Common, PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;
 use crate::engine::Engine;
 use crate::estimate::{estimate, with_missing};
-use crate::rescan::{self, Cell, Wish};
+use crate::rescan::{self, Cell, Request};
 use crate::{exit, job::Job, lenient};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
@@ -37,7 +37,7 @@ pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<
     let means = common.means()?;
     present(&flags.inputs)?;
     let engine = common.engine(&means)?;
-    let wish = Wish {
+    let request = Request {
         base: flags.base.clone(),
         cell: cell(flags)?,
         job: Job {
@@ -50,7 +50,7 @@ pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<
             )
         },
     };
-    let mut outcome = rescan::rescan(&wish, &engine)?;
+    let mut outcome = rescan::rescan(&request, &engine)?;
     let _ = writeln!(outcome.summary, "result in {}", flags.out.join("result.json").display());
     say.outcome(&outcome);
     Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })

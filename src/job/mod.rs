@@ -1,12 +1,12 @@
 //! A job: flags and configuration in, everything that a run needs to know out, checked once.
 
 mod memory;
-mod room;
+mod output;
 mod settings;
 mod value;
 
 pub use memory::{memory_bytes, memory_words};
-pub use room::Room;
+pub use output::OutputDir;
 pub use settings::Settings;
 
 use crate::engine::CHANNEL_BYTES;
@@ -58,7 +58,7 @@ impl Job {
     /// # Errors
     /// Another run is at work in it.
     pub fn hold(out: &Path) -> Result<std::fs::File> {
-        room::hold(out)
+        output::hold(out)
     }
 
     /// Keeps those who would write to an output folder out of it for as long as what is returned lives.
@@ -66,15 +66,15 @@ impl Job {
     /// # Errors
     /// A run is at work in it.
     pub fn hold_shared(out: &Path) -> Result<std::fs::File> {
-        room::hold_shared(out)
+        output::hold_shared(out)
     }
 
     /// Prepares the output folder.
     ///
     /// # Errors
     /// A path that is a file, or that the system refuses.
-    pub fn room(&self) -> Result<Room> {
-        Room::prepare(&self.out)
+    pub fn output(&self) -> Result<OutputDir> {
+        OutputDir::prepare(&self.out)
     }
 }
 

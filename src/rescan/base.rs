@@ -1,7 +1,7 @@
 //! The result that a rescan goes on from: its folder in; what it found, and its files shared with the new result, out.
 
 use super::state::State;
-use crate::job::{Job, Room};
+use crate::job::{Job, OutputDir};
 use crate::reuse::{Manifest, OutputFile};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
@@ -48,20 +48,21 @@ impl Base {
     }
 
     /// Makes its tiles and loaded models those of a new result, too.
-    pub(crate) fn share_store(&self, room: &Room) -> Result<()> {
+    pub(crate) fn share_store(&self, output: &OutputDir) -> Result<()> {
         for key in &self.state.tiles {
-            let (from, to) = (self.tiles_folder().join(key.name()), room.tiles().join(key.name()));
+            let (from, to) =
+                (self.tiles_folder().join(key.name()), output.tiles().join(key.name()));
             if !to.is_dir() {
                 share_folder(&from, &to)?;
             }
         }
-        share_folder(&self.out.join("store").join("models"), &room.models())
+        share_folder(&self.out.join("store").join("models"), &output.models())
     }
 
     /// The store of its scans, as it lies with a new result.
-    pub(crate) fn store(&self, room: &Room, resident_bytes: usize) -> Result<Store> {
+    pub(crate) fn store(&self, output: &OutputDir, resident_bytes: usize) -> Result<Store> {
         let open = |(input, key): (usize, &crate::reuse::Key)| {
-            let place = room.tiles().join(key.name());
+            let place = output.tiles().join(key.name());
             Store::open(&place, self.state.first_scan(input), resident_bytes)
         };
         let stores: Result<Vec<Store>> = self.state.tiles.iter().enumerate().map(open).collect();

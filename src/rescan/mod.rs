@@ -20,7 +20,7 @@ use crate::engine::{AllThreads, Engine};
 use crate::filling::Filling;
 use crate::job::{Job, Outcome};
 use crate::library;
-use crate::reuse::{self, Kept, Key, Manifest, Sums};
+use crate::reuse::{self, Cache, Digests, Key};
 use crate::search::Shelf;
 use crate::store::Store;
 use base::Base;
@@ -34,7 +34,7 @@ use write::Written;
 
 /// What is to be done.
 #[derive(Debug, Clone)]
-pub struct Wish {
+pub struct Request {
     /// Output folder of the result that is gone on from.
     pub base: PathBuf,
     /// Which part of the plant.
@@ -58,18 +58,18 @@ pub enum Cell {
 ///
 /// # Errors
 /// A base that is no whole result, an input that is part of it already; what a run may end with.
-pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
-    let base = Base::open(&wish.base)?;
-    let job = job(wish, &base)?;
+pub fn rescan(request: &Request, engine: &Engine) -> Result<Outcome> {
+    let base = Base::open(&request.base)?;
+    let job = job(request, &base)?;
     let settings = &job.means.settings;
-    let room = job.room()?;
-    let sums = Sums::of(&job, &room, engine)?
-        .after(base.state.inputs.len(), format!("{} {:?}", base.digest, wish.cell));
-    if let Some(manifest) = sums.unchanged(&job, &room)? {
+    let output = job.output()?;
+    let digests = Digests::of(&job, &output, engine)?
+        .after(base.state.inputs.len(), format!("{} {:?}", base.digest, request.cell));
+    if let Some(manifest) = digests.unchanged(&job, &output)? {
         return Ok(manifest.outcome());
     }
-    base.share_store(&room)?;
-    let shelved = Kept::new(room.models(), sums.models(settings));
+    base.share_store(&output)?;
+    let shelved = Cache::new(output.models(), digests.models(settings));
     let library = library::load(&job.robots, &settings.robot, Some(&shelved), engine)?;
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let before = base.state.before();
@@ -80,17 +80,17 @@ pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
     let mut sources = engine.pool()?.install(open)?;
 
     // The new scans into tiles; those of the plant are there.
-    let filling = Filling::new(&sources, &job.means, room.tiles(), engine);
-    let filled = sources.opened().iter().map(|i| filling.tiles_of(i, &sums));
+    let filling = Filling::new(&sources, &job.means, output.tiles(), engine);
+    let filled = sources.opened().iter().map(|i| filling.tiles_of(i, &digests));
     let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
     let n_kept = filling.n_kept();
-    sources.opened().iter().try_for_each(|input| fresh(input, &base, &sums))?;
-    let (old, new) = (base.store(&room, job.means.store_bytes())?, Store::join(stores));
+    sources.opened().iter().try_for_each(|input| fresh(input, &base, &digests))?;
+    let (old, new) = (base.store(&output, job.means.store_bytes())?, Store::join(stores));
 
     // Where the cell is, and how far the new scans are off what stood there: they are taken back by that.
     let mut fits = base.state.fits.clone();
     let mut models = robots::models_of(&mut fits, &library)?;
-    let cell = session::bounds(&wish.cell, &base, (&fits, &models), (&sources, &new))?;
+    let cell = session::bounds(&request.cell, &base, (&fits, &models), (&sources, &new))?;
     let scans = base.state.scans.clone();
     let past = Past::new(&base, &scans, &old, cell)?;
     let shelf = Shelf::new(&library.models);
@@ -121,8 +121,8 @@ pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
         models: &models,
         fits: &fits,
     }
-    .write(&registered, (&room, &sums), engine)?;
-    sources.opened().iter().try_for_each(|input| sums.check(input))?;
+    .write(&registered, (&output, &digests), engine)?;
+    sources.opened().iter().try_for_each(|input| digests.check(input))?;
     let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
     let stays = |i: &usize| !robots.changed.contains(i) && !robots.gone.contains(i);
     for i in (0..base.state.fits.len()).filter(stays) {
@@ -137,10 +137,9 @@ pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
         robots: job.robots.clone(),
         ..base.state.clone()
     };
-    state.write(room.next())?;
-    Manifest::write(room.next(), sums.whole(&job), (&written.outcome, written.known), engine)?;
-    sums.remember(&Manifest::publish(room.next(), room.out())?, room.out())?;
-    room.prune_tiles(&all, &shelved);
+    state.write(output.next())?;
+    reuse::publish(&job, (&output, &digests), (&written.outcome, written.known), engine)?;
+    output.prune_tiles(&all, &shelved);
     let mut outcome = written.outcome;
     outcome.reused = reuse::said(&[
         ("models", shelved.n_kept()),
@@ -151,8 +150,8 @@ pub fn rescan(wish: &Wish, engine: &Engine) -> Result<Outcome> {
 }
 
 /// The job with the base's library and ways of writing.
-fn job(wish: &Wish, base: &Base) -> Result<Job> {
-    let mut job = wish.job.clone();
+fn job(request: &Request, base: &Base) -> Result<Job> {
+    let mut job = request.job.clone();
     if job.robots.as_os_str().is_empty() {
         job.robots.clone_from(&base.state.robots);
     }
@@ -162,7 +161,7 @@ fn job(wish: &Wish, base: &Base) -> Result<Job> {
             .hint("name it with --robots"));
     }
     let same = |a: &Path, b: &Path| std::fs::canonicalize(a).ok() == std::fs::canonicalize(b).ok();
-    if job.out.exists() && same(&job.out, &wish.base) {
+    if job.out.exists() && same(&job.out, &request.base) {
         return Err(Error::new(
             Kind::Usage,
             "a rescan does not write over the result it goes on from",
@@ -175,8 +174,8 @@ fn job(wish: &Wish, base: &Base) -> Result<Job> {
 }
 
 /// Refuses an input that the base was made of.
-fn fresh(input: &Input, base: &Base, sums: &Sums) -> Result<()> {
-    let own = sums.input(input).unwrap_or_default();
+fn fresh(input: &Input, base: &Base, digests: &Digests) -> Result<()> {
+    let own = digests.input(input).unwrap_or_default();
     match base.result.inputs.iter().find(|i| i.digest == own) {
         None => Ok(()),
         Some(known) => {

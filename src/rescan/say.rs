@@ -6,7 +6,7 @@ use crate::changes::{Change, RobotChange, changes, of_missed, words};
 use crate::job::Outcome;
 use crate::labelling::Done;
 use crate::report::{id, input_entry, robot_entry};
-use crate::reuse::Sums;
+use crate::reuse::Digests;
 use contract::{Error, Kind, Result};
 use export::{
     ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
@@ -38,8 +38,8 @@ pub(crate) struct Said<'a, 's> {
 }
 
 impl Said<'_, '_> {
-    pub(crate) fn finish(&self, sums: &Sums, next: &Path) -> Result<Outcome> {
-        let result = self.result(sums);
+    pub(crate) fn finish(&self, digests: &Digests, next: &Path) -> Result<Outcome> {
+        let result = self.result(digests);
         let robots = self.changes(&result);
         write_table(next, &result.robots)?;
         let all = json!({
@@ -63,7 +63,7 @@ impl Said<'_, '_> {
     }
 
     /// The result of the whole plant: entries of what did not change are those of the base.
-    fn result(&self, sums: &Sums) -> ResultFile {
+    fn result(&self, digests: &Digests) -> ResultFile {
         let mut result = self.found.base.result.clone();
         for &i in self.found.robots.changed.iter().chain(&self.found.robots.gone) {
             let space = self.done.spaces[i].clone();
@@ -89,7 +89,7 @@ impl Said<'_, '_> {
         let inputs = sources
             .opened()
             .iter()
-            .map(|input| input_entry(sources, input, sums, &self.done.masks));
+            .map(|input| input_entry(sources, input, digests, &self.done.masks));
         result.inputs.extend(inputs);
         result.warnings.extend(sources.warnings.iter().cloned());
         result.warnings.extend(self.warnings());

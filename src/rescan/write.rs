@@ -7,10 +7,10 @@ use super::say::{self, Said};
 use super::session::{Labels, Robots, Session};
 use crate::copc;
 use crate::engine::Engine;
-use crate::job::{Outcome, Room};
+use crate::job::{Outcome, OutputDir};
 use crate::labelling::{Labelling, Scope, Streamed};
 use crate::report::id;
-use crate::reuse::{OutputFile, Sums};
+use crate::reuse::{Digests, OutputFile};
 use contract::{Fit, MaskId, Result, Space};
 use export::{COPC, FileSum, MaskFiles, NpyWriter, OldPoint, Spool};
 use geometry::Aabb;
@@ -43,11 +43,11 @@ impl Written<'_, '_> {
     pub(crate) fn write(
         &self,
         registered: &[Option<Registration>],
-        (room, sums): (&Room, &Sums),
+        (output, digests): (&OutputDir, &Digests),
         engine: &Engine,
     ) -> Result<Out> {
-        let next = room.next();
-        let scratch = room.scratch();
+        let next = output.next();
+        let scratch = output.scratch();
         let gone = self.gone();
         // Places of old points are listed while the new ones are labelled and tiles are written.
         let lists = || self.lists(&gone, next);
@@ -63,7 +63,7 @@ impl Written<'_, '_> {
         let (lists, (mut done, touched)) = engine.beside("lists", lists, rest)?;
         let mut written: BTreeSet<String> = touched.names;
         written.extend(lists.grown);
-        done.sums.extend(touched.sums.into_iter().chain(lists.sums));
+        done.digests.extend(touched.digests.into_iter().chain(lists.digests));
         let _ = std::fs::remove_dir_all(&scratch);
         let said = Said {
             found: self,
@@ -72,7 +72,7 @@ impl Written<'_, '_> {
             lists: &lists.names,
             n_superseded: lists.n_superseded - self.session.past.n_before(),
         };
-        let outcome = said.finish(sums, next)?;
+        let outcome = said.finish(digests, next)?;
         written.extend(say::NAMES.map(String::from));
         let rewritten = self.robots.changed.iter().chain(&self.robots.gone);
         let folders: Vec<String> = rewritten.map(|&i| id(i)).collect();
@@ -83,7 +83,7 @@ impl Written<'_, '_> {
         if has_copc {
             copc::write(next, &scratch, engine)?;
         }
-        let fresh = done.sums.iter().filter(|sum| sum.path.starts_with(next));
+        let fresh = done.digests.iter().filter(|sum| sum.path.starts_with(next));
         let mut known: Vec<OutputFile> = fresh.map(|sum| OutputFile::of(next, sum)).collect();
         let n_shared = [shared.len(), shared.len() + known.len()];
         known.extend(shared);
@@ -199,7 +199,7 @@ impl Written<'_, '_> {
         let n_bytes = |name: &str| self.base.out.join(name).metadata().map_or(0, |m| m.len());
         all.sort_by_cached_key(|(name, _)| (Reverse(n_bytes(name)), name.clone()));
         let watch = self.session.watch();
-        let sums = engine.for_disks().fan_out("tiles", all, |(name, mut tile)| {
+        let digests = engine.for_disks().fan_out("tiles", all, |(name, mut tile)| {
             let new = scratch.join(&name);
             if new.is_file() {
                 tile.take_from(&new, |points| vec![true; points.len()])?;
@@ -213,8 +213,8 @@ impl Written<'_, '_> {
         })?;
         let fixed = ["las", "laz"].map(|end| format!("clouds/fixed.{end}"));
         let names = names.into_iter().chain(fixed).collect();
-        let sums = sums.into_iter().flatten().filter_map(|summary| summary.sum).collect();
-        Ok(Touched { names, sums })
+        let digests = digests.into_iter().flatten().filter_map(|summary| summary.sum).collect();
+        Ok(Touched { names, digests })
     }
 
     /// Writes lists of the places of old points that are superseded, of masks whose list grew.
@@ -235,7 +235,7 @@ impl Written<'_, '_> {
             if before.is_none() || past.n_of(i) as u64 != n {
                 let mut list = NpyWriter::<u64>::create(next.join(&name))?;
                 places.each(|some| list.push(some))?;
-                out.sums.push(list.finish()?);
+                out.digests.push(list.finish()?);
                 out.grown.push(name.clone());
             }
             out.names.push(Some(name));
@@ -249,13 +249,13 @@ impl Written<'_, '_> {
 struct Lists {
     names: Vec<Option<String>>,
     grown: Vec<String>,
-    sums: Vec<FileSum>,
+    digests: Vec<FileSum>,
     n_superseded: u64,
 }
 
 struct Touched {
     names: BTreeSet<String>,
-    sums: Vec<FileSum>,
+    digests: Vec<FileSum>,
 }
 
 /// Whether a file belongs to one of these robots.

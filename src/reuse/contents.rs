@@ -62,10 +62,10 @@ impl Contents {
     }
 
     /// The digest of a file, read where it is not known.
-    pub(super) fn digest(&self, path: &Path, sum: Sum) -> Result<String> {
-        match self.known(path, sum)? {
+    pub(super) fn digest(&self, path: &Path, algorithm: Algorithm) -> Result<String> {
+        match self.known(path, algorithm)? {
             Some(digest) => Ok(digest),
-            None => self.read(path, sum, &Pace::default()),
+            None => self.read(path, algorithm, &Pace::default()),
         }
     }
 
@@ -77,9 +77,9 @@ impl Contents {
     }
 
     /// The digest of a file that has not changed since it was read.
-    pub(super) fn known(&self, path: &Path, sum: Sum) -> Result<Option<String>> {
+    pub(super) fn known(&self, path: &Path, algorithm: Algorithm) -> Result<Option<String>> {
         let stamp = Stamp::of(path)?;
-        let is_known = |s: &&Seen| s.stamp == stamp && Sum::of(&s.digest) == Some(sum);
+        let is_known = |s: &&Seen| s.stamp == stamp && Algorithm::of(&s.digest) == Some(algorithm);
         Ok(self.lock().get(&name(path)?).filter(is_known).map(|s| s.digest.clone()))
     }
 
@@ -90,9 +90,9 @@ impl Contents {
     }
 
     /// Reads a file, not faster than `pace` allows.
-    pub(super) fn read(&self, path: &Path, sum: Sum, pace: &Pace) -> Result<String> {
+    pub(super) fn read(&self, path: &Path, algorithm: Algorithm, pace: &Pace) -> Result<String> {
         let stamp = Stamp::of(path)?;
-        let digest = sum.of_file(path, pace)?;
+        let digest = algorithm.of_file(path, pace)?;
         self.take(path, stamp, &digest)?;
         Ok(digest)
     }
@@ -116,7 +116,7 @@ impl Contents {
             let name = path.strip_prefix(folder).unwrap_or(path).display().to_string();
             hasher.update(name.as_bytes());
             hasher.update(&[0]);
-            hasher.update(self.digest(path, Sum::Blake3)?.as_bytes());
+            hasher.update(self.digest(path, Algorithm::Blake3)?.as_bytes());
         }
         Ok(format!("blake3:{}", hasher.finalize().to_hex()))
     }
@@ -155,17 +155,19 @@ impl Stamp {
 
 /// How the bytes of a file are summed up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sum {
+pub(super) enum Algorithm {
     /// Names contents: no two files share it.
     Blake3,
     /// Tells damage: what is written bit by bit can be summed bit by bit.
     Crc32c,
 }
 
-impl Sum {
-    /// The kind of a digest as [`Sum::word`] writes it.
+impl Algorithm {
+    /// The kind of a digest as [`Algorithm::word`] writes it.
     pub(super) fn of(digest: &str) -> Option<Self> {
-        [Self::Blake3, Self::Crc32c].into_iter().find(|sum| digest.starts_with(sum.name()))
+        [Self::Blake3, Self::Crc32c]
+            .into_iter()
+            .find(|algorithm| digest.starts_with(algorithm.name()))
     }
 
     fn name(self) -> &'static str {
@@ -316,17 +318,17 @@ mod tests {
         let set = |at| File::options().write(true).open(&path).and_then(|f| f.set_modified(at));
         set(old).expect("a time");
         let contents = Contents::open(dir.path());
-        let one = contents.digest(&path, Sum::Blake3).expect("reads");
+        let one = contents.digest(&path, Algorithm::Blake3).expect("reads");
         contents.keep().expect("writes");
         // Another content under the same length, time and number: believed, not read.
         std::fs::write(&path, b"two").expect("writes");
         set(old).expect("a time");
         let again = Contents::open(dir.path());
-        assert_eq!(again.digest(&path, Sum::Blake3).expect("reads"), one);
+        assert_eq!(again.digest(&path, Algorithm::Blake3).expect("reads"), one);
         // Its time tells: read again.
         set(old + Duration::from_secs(1)).expect("a time");
-        assert_ne!(again.digest(&path, Sum::Blake3).expect("reads"), one);
-        assert!(contents.digest(&dir.path().join("none"), Sum::Blake3).is_err());
+        assert_ne!(again.digest(&path, Algorithm::Blake3).expect("reads"), one);
+        assert!(contents.digest(&dir.path().join("none"), Algorithm::Blake3).is_err());
     }
 
     #[test]
@@ -335,10 +337,10 @@ mod tests {
         let path = dir.path().join("scan.las");
         // Longer than anyone may be ahead; takes no room.
         File::create(&path).and_then(|f| f.set_len(AHEAD + (4 << 20))).expect("writes");
-        let whole = Sum::Crc32c.read(&path).expect("reads");
+        let whole = Algorithm::Crc32c.read(&path).expect("reads");
         let pace = Pace::of(100);
         std::thread::scope(|scope| {
-            let sum = scope.spawn(|| Sum::Crc32c.of_file(&path, &pace));
+            let sum = scope.spawn(|| Algorithm::Crc32c.of_file(&path, &pace));
             let lead = pace.lead();
             lead.has_decoded(50);
             lead.end();
@@ -346,7 +348,7 @@ mod tests {
         });
         let pace = Pace::of(100);
         drop(pace.lead());
-        let error = Sum::Crc32c.of_file(&path, &pace).expect_err("nobody wants it");
+        let error = Algorithm::Crc32c.of_file(&path, &pace).expect_err("nobody wants it");
         assert_eq!(error.kind(), Kind::Cancelled);
     }
 

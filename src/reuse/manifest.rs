@@ -3,7 +3,7 @@
 //! Outputs are written beside the old ones and take their places together: the list is the last to be written there and
 //! the last to move, so that a run that is cut short while they move is finished by the next one.
 
-use super::contents::{Contents, Sum, walk};
+use super::contents::{Algorithm, Contents, walk};
 use crate::engine::Engine;
 use crate::job::Outcome;
 use contract::{Error, Kind, Result};
@@ -61,7 +61,7 @@ impl OutputFile {
     /// A file below `next` whose checksum was taken while it was written.
     pub(crate) fn of(next: &Path, sum: &FileSum) -> Self {
         let (path, n_bytes) = (name(next, &sum.path), sum.n_bytes);
-        Self { path, n_bytes, digest: Sum::Crc32c.word(&format!("{:08x}", sum.crc32c)) }
+        Self { path, n_bytes, digest: Algorithm::Crc32c.word(&format!("{:08x}", sum.crc32c)) }
     }
 }
 
@@ -97,7 +97,7 @@ impl Manifest {
 
     /// Digest of the list of an output folder: it names every byte of the result.
     pub(crate) fn digest(out: &Path) -> Result<String> {
-        Sum::Blake3.read(&out.join(LIST))
+        Algorithm::Blake3.read(&out.join(LIST))
     }
 
     /// Lists what lies in `next`, files that are known as they are `known`, and writes the list there.
@@ -115,7 +115,7 @@ impl Manifest {
             known.iter().map(|f| (f.path.as_str(), f)).collect();
         let files = engine.fan_out("list", paths, |path| {
             let listed = known.get(name(next, &path).as_str()).map(|file| (*file).clone());
-            listed.map_or_else(|| output(next, &path, Sum::Blake3), Ok)
+            listed.map_or_else(|| output(next, &path, Algorithm::Blake3), Ok)
         })?;
         let manifest = Self {
             schema: SCHEMA.into(),
@@ -182,13 +182,13 @@ pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
     let manifest = Manifest::read(out)?;
     let look = |file: &OutputFile| -> Result<Option<String>> {
         let path = out.join(&file.path);
-        let Some(sum) = Sum::of(&file.digest) else {
+        let Some(algorithm) = Algorithm::of(&file.digest) else {
             return Ok(Some(format!(
                 "{}: its checksum is of no kind that is known",
                 path.display()
             )));
         };
-        Ok(match output(out, &path, sum) {
+        Ok(match output(out, &path, algorithm) {
             Ok(now) if now == *file => None,
             Ok(now) if now.n_bytes != file.n_bytes => Some(format!(
                 "{}: {} bytes long, not {}",
@@ -216,7 +216,7 @@ pub(super) fn unchanged(
     }
     let same = |file: &OutputFile| {
         let path = out.join(&file.path);
-        let now = Sum::of(&file.digest).map(|sum| contents.digest(&path, sum));
+        let now = Algorithm::of(&file.digest).map(|algorithm| contents.digest(&path, algorithm));
         now.is_some_and(|digest| digest.is_ok_and(|digest| digest == file.digest))
     };
     let all = manifest.files.iter().all(same);
@@ -224,10 +224,10 @@ pub(super) fn unchanged(
     Ok(all.then_some(manifest))
 }
 
-fn output(root: &Path, path: &Path, sum: Sum) -> Result<OutputFile> {
+fn output(root: &Path, path: &Path, algorithm: Algorithm) -> Result<OutputFile> {
     let failed = |e: std::io::Error| Error::from(e).at(path.display());
     let n_bytes = std::fs::metadata(path).map_err(failed)?.len();
-    Ok(OutputFile { path: name(root, path), n_bytes, digest: sum.read(path)? })
+    Ok(OutputFile { path: name(root, path), n_bytes, digest: algorithm.read(path)? })
 }
 
 /// Path within the folder, with `/` on every system.

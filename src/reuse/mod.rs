@@ -4,24 +4,24 @@
 //! number of threads are no part of it. A piece is looked at before it is believed: a store has its catalogue, kept fits
 //! their checksum, outputs their length and time.
 
+mod cache;
 mod contents;
-mod kept;
 mod manifest;
 mod tree;
 
 pub use manifest::{Checked, Manifest, OutputFile, check};
 
 use crate::engine::Engine;
-use crate::job::{Job, Room, Settings};
-use contents::{Contents, Stamp, Sum};
+use crate::job::{Job, Outcome, OutputDir, Settings};
+use contents::{Algorithm, Contents, Stamp};
 use contract::{Error, Input, Kind, Result, Scan};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+pub(crate) use cache::{Cache, read, written};
 pub(crate) use contents::Pace;
-pub(crate) use kept::{Kept, read, written};
 pub(crate) use tree::{Part, Tree};
 
 /// A digest of what a piece is made from, as 32 hexadecimal digits: the name of its file.
@@ -46,7 +46,7 @@ impl Key {
 }
 
 /// Digests of all that a run reads.
-pub(crate) struct Sums {
+pub(crate) struct Digests {
     contents: Contents,
     /// Of each input; one that nobody has ever read gets its digest while it is decoded.
     inputs: Vec<OnceLock<String>>,
@@ -60,26 +60,37 @@ pub(crate) struct Sums {
     base: String,
 }
 
-impl Sums {
+/// Gives a whole result, whose files lie beside the output folder, its place there, and remembers what was read for it.
+pub(crate) fn publish(
+    job: &Job,
+    (output, digests): (&OutputDir, &Digests),
+    (outcome, files): (&Outcome, Vec<OutputFile>),
+    engine: &Engine,
+) -> Result<()> {
+    Manifest::write(output.next(), digests.whole(job), (outcome, files), engine)?;
+    digests.remember(&Manifest::publish(output.next(), output.out())?, output.out())
+}
+
+impl Digests {
     /// Reads every file of the job once, except those that are known and unchanged since, and inputs that are new.
-    pub(crate) fn of(job: &Job, room: &Room, engine: &Engine) -> Result<Self> {
-        let contents = Contents::open(room.store());
+    pub(crate) fn of(job: &Job, output: &OutputDir, engine: &Engine) -> Result<Self> {
+        let contents = Contents::open(output.store());
         let stamped = |path: &PathBuf| Ok((path.clone(), Stamp::of(path)?));
         let files = job.inputs.iter().map(stamped).collect::<Result<_>>()?;
         let digest = |path: &PathBuf| -> Result<OnceLock<String>> {
             let is_new =
-                contents.known(path, Sum::Blake3)?.is_none() && !contents.may_know(path)?;
+                contents.known(path, Algorithm::Blake3)?.is_none() && !contents.may_know(path)?;
             Ok(if is_new {
                 OnceLock::new()
             } else {
-                OnceLock::from(contents.digest(path, Sum::Blake3)?)
+                OnceLock::from(contents.digest(path, Algorithm::Blake3)?)
             })
         };
         let inputs = engine.fan_out("digest", job.inputs.iter().collect(), digest)?;
         let library = contents.folder(&job.robots)?;
         let others = job.scanners.iter().chain(&job.review);
         let others: Vec<String> =
-            others.map(|p| contents.digest(p, Sum::Blake3)).collect::<Result<_>>()?;
+            others.map(|p| contents.digest(p, Algorithm::Blake3)).collect::<Result<_>>()?;
         contents.keep()?;
         let (others, base) = (others.join(" "), String::new());
         Ok(Self { contents, inputs, files, library, others, first: 0, base })
@@ -103,7 +114,7 @@ impl Sums {
     /// Reads an input whose digest is not known, beside the one who decodes it and tells how far he is.
     pub(crate) fn read(&self, input: &Input, pace: &Pace) -> Result<()> {
         let at = self.at(input);
-        let digest = self.contents.read(&self.files[at].0, Sum::Blake3, pace)?;
+        let digest = self.contents.read(&self.files[at].0, Algorithm::Blake3, pace)?;
         let _ = self.inputs[at].set(digest);
         self.contents.keep()
     }
@@ -119,7 +130,7 @@ impl Sums {
         let (path, stamp) = &self.files[at];
         let digest =
             tree.finish().ok_or_else(|| Error::new(Kind::Bug, "a file was not summed up"))?;
-        let digest = Sum::Blake3.word(&digest.to_hex());
+        let digest = Algorithm::Blake3.word(&digest.to_hex());
         self.contents.take(path, *stamp, &digest)?;
         let _ = self.inputs[at].set(digest);
         self.contents.keep()
@@ -132,9 +143,9 @@ impl Sums {
     }
 
     /// The list of an earlier run, if it was of the same job and its files are what they were.
-    pub(crate) fn unchanged(&self, job: &Job, room: &Room) -> Result<Option<Manifest>> {
+    pub(crate) fn unchanged(&self, job: &Job, output: &OutputDir) -> Result<Option<Manifest>> {
         let key = self.whole(job);
-        key.map_or(Ok(None), |key| manifest::unchanged(&self.contents, room.out(), &key))
+        key.map_or(Ok(None), |key| manifest::unchanged(&self.contents, output.out(), &key))
     }
 
     /// Remembers outputs as they were written, so that the next run need not read them to see that nothing has changed.

@@ -7,7 +7,7 @@ mod views;
 
 use crate::engine::AllThreads;
 use crate::job::Settings;
-use crate::reuse::Kept;
+use crate::reuse::Cache;
 use crate::store::Store;
 use crate::surfaces::Ground;
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
@@ -62,7 +62,7 @@ pub(crate) struct Search<'a, 'm> {
     ground: &'a Ground,
     settings: &'a Settings,
     /// Where what was found of a region piece by piece is kept, for a run that is cut short.
-    kept: Option<&'a Kept>,
+    kept: Option<&'a Cache>,
 }
 
 /// A base farther below a floor belongs to a lower level, metres.
@@ -91,7 +91,7 @@ impl<'a, 'm> Search<'a, 'm> {
 
     /// The same, which keeps what it finds of a region piece by piece.
     #[must_use]
-    pub(crate) fn keeping(self, kept: &'a Kept) -> Self {
+    pub(crate) fn keeping(self, kept: &'a Cache) -> Self {
         Self { kept: Some(kept), ..self }
     }
 
@@ -101,17 +101,17 @@ impl<'a, 'm> Search<'a, 'm> {
         (region, name): (&Region, &str),
         find: impl FnOnce() -> T,
     ) -> Result<T> {
-        self.or_find(&format!("{region:?} {name}"), || Ok(find()))
+        self.get_or_compute(&format!("{region:?} {name}"), || Ok(find()))
     }
 
     /// The piece of that name that is kept, else a new one.
-    pub(crate) fn or_find<T: Serialize + DeserializeOwned>(
+    pub(crate) fn get_or_compute<T: Serialize + DeserializeOwned>(
         &self,
         name: &str,
         find: impl FnOnce() -> Result<T>,
     ) -> Result<T> {
         match self.kept {
-            Some(kept) => kept.or_find(name, find),
+            Some(kept) => kept.get_or_compute(name, find),
             None => find(),
         }
     }

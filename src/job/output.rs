@@ -1,6 +1,6 @@
 //! The output folder of a run: where results go, where they lie until all are whole, and where the store is kept.
 
-use crate::reuse::{Kept, Key, Manifest};
+use crate::reuse::{Cache, Key, Manifest};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
 use export::atomic;
@@ -13,7 +13,7 @@ const SCRATCH: &str = "cell";
 
 /// The output folder, which nobody else writes to meanwhile.
 #[derive(Debug, Clone)]
-pub struct Room {
+pub struct OutputDir {
     out: PathBuf,
     store: PathBuf,
     next: PathBuf,
@@ -21,7 +21,7 @@ pub struct Room {
     _lock: Arc<File>,
 }
 
-impl Room {
+impl OutputDir {
     /// Makes the folder, keeps others out of it, and finishes what an earlier run was cut short in: results that were
     /// whole take their places, others are taken away.
     ///
@@ -52,7 +52,7 @@ impl Room {
         Ok(Self { out: out.to_path_buf(), store, next, _lock: Arc::new(lock) })
     }
 
-    /// Where results are written; at the end they move to [`Room::out`].
+    /// Where results are written; at the end they move to [`OutputDir::out`].
     #[must_use]
     pub fn next(&self) -> &Path {
         &self.next
@@ -88,14 +88,14 @@ impl Room {
     }
 
     /// Takes away tiles, fits and models that the run which has just ended did not use.
-    pub(crate) fn prune(&self, tiles: &[Key], fits: &[&Kept], models: &Kept) {
+    pub(crate) fn prune(&self, tiles: &[Key], fits: &[&Cache], models: &Cache) {
         self.prune_tiles(tiles, models);
         let names: Vec<String> = fits.iter().map(|kept| kept.name()).collect();
         crate::reuse::prune(&self.fits(), &names);
     }
 
     /// The same without fits.
-    pub(crate) fn prune_tiles(&self, tiles: &[Key], models: &Kept) {
+    pub(crate) fn prune_tiles(&self, tiles: &[Key], models: &Cache) {
         let names: Vec<String> = tiles.iter().map(|key| key.name().into()).collect();
         crate::reuse::prune(&self.tiles(), &names);
         crate::reuse::prune(&self.models(), &[models.name()]);

@@ -10,20 +10,20 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Pieces by name, all made from what one key stands for.
-pub(crate) struct Kept {
+pub(crate) struct Cache {
     folder: PathBuf,
     key: Key,
     n_kept: AtomicUsize,
     n_asked: AtomicUsize,
 }
 
-impl Kept {
+impl Cache {
     pub(crate) fn new(folder: PathBuf, key: Key) -> Self {
         Self { folder, key, n_kept: AtomicUsize::new(0), n_asked: AtomicUsize::new(0) }
     }
 
     /// A piece: the one that is kept, else the one that `find` finds, which is then kept.
-    pub(crate) fn or_find<T: Serialize + DeserializeOwned>(
+    pub(crate) fn get_or_compute<T: Serialize + DeserializeOwned>(
         &self,
         name: &str,
         find: impl FnOnce() -> Result<T>,
@@ -82,9 +82,9 @@ mod tests {
     fn what_is_kept_comes_back_bit_for_bit_and_damage_is_found_anew() {
         let fit = Fit { score: 0.1 + 0.2, rms: f64::MIN_POSITIVE, ..Fit::default() };
         let dir = tempfile::tempdir().expect("a folder");
-        let kept = Kept::new(dir.path().into(), Key::of("test", &["a"]));
-        let found = kept.or_find("here", || Ok(vec![fit.clone()])).expect("finds");
-        let again = kept.or_find("here", || unreachable!("it is kept")).expect("reads");
+        let kept = Cache::new(dir.path().into(), Key::of("test", &["a"]));
+        let found = kept.get_or_compute("here", || Ok(vec![fit.clone()])).expect("finds");
+        let again = kept.get_or_compute("here", || unreachable!("it is kept")).expect("reads");
         assert_eq!((found, kept.n_kept()), (again, [1, 2]));
         let path = std::fs::read_dir(dir.path()).expect("lists").next().expect("one").expect("it");
         let mut bytes = std::fs::read(path.path()).expect("reads");
@@ -94,6 +94,9 @@ mod tests {
             bytes[i] ^= 1;
         }
         std::fs::write(path.path(), &bytes[..bytes.len() - 1]).expect("writes");
-        assert_eq!(kept.or_find("here", || Ok(Vec::<Fit>::new())).expect("finds anew"), Vec::new());
+        assert_eq!(
+            kept.get_or_compute("here", || Ok(Vec::<Fit>::new())).expect("finds anew"),
+            Vec::new()
+        );
     }
 }
