@@ -14,13 +14,14 @@ use std::fmt::Write as _;
 const SAME_PLACE: f64 = 0.5;
 /// Standard deviations of a difference from which on it is one: of a plant's hundreds of joints none by chance.
 const SURE: f64 = 5.0;
-/// Least differences that count: a joint, radians (0.1°) or metres; the place of a base, metres, since two sessions are
-/// registered to within millimetres; its direction, radians (0.15°).
+/// Least difference of a joint that counts, radians (0.1°) or metres.
 const LEAST_JOINT: f64 = 0.001_75;
 /// Joints of two trusted postures that are known less well than joints ought to be, and have no other values, radians: up to this
 /// standard deviation (2°) they tell a change of at least so much (2°).
 const ROUGH: f64 = 0.035;
+/// Least shift of a base that counts, metres: two sessions are registered to within millimetres.
 const LEAST_SHIFT: f64 = 0.010;
+/// Least turn of a base that counts, radians (0.15°).
 const LEAST_TURN: f64 = 0.002_6;
 
 /// What became of one robot.

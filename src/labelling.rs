@@ -110,8 +110,7 @@ impl NearOf<'_> {
 /// What was written.
 pub(crate) struct Done {
     pub(crate) clouds: Written,
-    /// For each mask: entries, points that were dropped, and points by kind (fixed, link, attachment, floor,
-    /// uncertain).
+    /// For each mask: entries, points that were dropped, and points that are said to move.
     pub(crate) masks: Vec<MaskCount>,
     /// Pictures, relative to the output folder.
     pub(crate) pictures: Vec<String>,

@@ -258,7 +258,7 @@ impl<'a, 'm> Search<'a, 'm> {
         let offset = normal.dot(&base.translation.vector);
         let plane = Plane { normal, offset };
         let plane = InstallationPlane { plane, bounds, area: 1.0, is_floor: false };
-        let candidate = Candidate { model, bounds, plane, bases: vec![(*base, 1.0)], group: 0 };
+        let candidate = Candidate { model, bounds, plane, bases: vec![(*base, 1.0)] };
         let prepared = self.shelf.prepared(model);
         fit::fit(&candidate, prepared, scene, &self.settings.fit, &AllThreads)
     }

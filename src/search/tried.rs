@@ -48,7 +48,6 @@ mod tests {
                 is_floor: true,
             },
             bases: xs.iter().map(|x| (Pose::translation(*x, 0.0, 0.0), 0.5)).collect(),
-            group: 0,
         };
         let mut tried = Tried::default();
         assert!(!tried.knows(&candidate(0, &[1.0])));

@@ -33,6 +33,4 @@ pub struct Candidate {
     pub plane: InstallationPlane,
     /// Base poses worth a fit, world from base link, best first, with their scores.
     pub bases: Vec<(Pose, f64)>,
-    /// Group of candidates that compete for the same points: at most one per place survives.
-    pub group: u32,
 }

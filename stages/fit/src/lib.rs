@@ -1,7 +1,7 @@
 //! A candidate in, a fit out: which posture, where exactly, how sure.
 //!
 //! The way: beam search over the joints on the depth images (`beam`), joint Gauss–Newton over base and all joints on
-//! the points (`refine`), evidence and covariance (`evidence`, `refine`), verdict in words (`verdict`), and the choice
+//! the points (`refine`), evidence and covariance (`judge`, `report`), verdict in words (`verdict`), and the choice
 //! among candidates that claim the same points (`choose`). Method and maths: fit.md §4d–§4g. Beside it stands the method
 //! of the source, link after link (`paper`).
 #![forbid(unsafe_code)]

@@ -37,16 +37,17 @@ pub(crate) const COARSE_ROUNDS: [Round; 9] = [
     Round { gate: 0.020, balanced: true },
 ];
 
-/// The last rounds, on all points.
-pub(crate) const FINE_ROUNDS: [Round; 7] = [
+/// Those of them from a posture that is off by no more than a step of a sweep.
+pub(crate) const NEAR_ROUNDS: &[Round] = COARSE_ROUNDS.split_at(3).1;
+
+/// The rounds after those, on the fine field; the last ones have the gate that the noise asks for.
+pub(crate) const FINE_ROUNDS: [Round; 3] = [
     Round { gate: 0.025, balanced: true },
     Round { gate: 0.018, balanced: true },
     Round { gate: 0.014, balanced: false },
-    Round { gate: 0.011, balanced: false },
-    Round { gate: 0.010, balanced: false },
-    Round { gate: 0.010, balanced: false },
-    Round { gate: 0.010, balanced: false },
 ];
+/// So many rounds end at a posture.
+pub(crate) const N_LAST_ROUNDS: usize = 4;
 
 /// Points that one thread works on at a time. Sums are taken chunk by chunk, so it does not depend on the threads.
 pub(crate) const CHUNK: usize = 8192;

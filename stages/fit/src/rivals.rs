@@ -8,7 +8,7 @@ use contract::Fan;
 
 use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, margin, moved};
-use crate::refine::{COARSE_ROUNDS, Refine};
+use crate::refine::{NEAR_ROUNDS, Refine};
 use crate::report::{OTHER, turn};
 use crate::solve::{Polished, Settled, polish, roughly, settle};
 
@@ -50,7 +50,7 @@ pub(crate) fn best_of(
     for _ in 0..N_LOOKS {
         let before = best.0.hypothesis.clone();
         rivals.extend(fan.fan(beam.flips(&before), |flipped| {
-            polish(refine, &roughly(refine, &flipped, near, &COARSE_ROUNDS[3..], fan), near, fan)
+            polish(refine, &roughly(refine, &flipped, near, NEAR_ROUNDS, fan), near, fan)
         }));
         let (better, rest) = compare(refine, best, rivals, (near, all), fan);
         others.extend(rest);

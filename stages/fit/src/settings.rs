@@ -15,7 +15,7 @@ pub enum Method {
 pub struct Settings {
     /// How postures are found.
     pub method: Method,
-    /// Hypotheses kept at each joint of the beam. fit.md §6.5: 150 lost none of 60.
+    /// Hypotheses kept at each joint of the beam. fit.md §6.5: 150 lost none of 60; 100 lose at most one of 200.
     pub beam: usize,
     /// Hypotheses that are settled (base and all joints so far shaken) at each joint, best first.
     pub settle: usize,

@@ -9,7 +9,7 @@ use crate::beam::{Beam, Hypothesis};
 use crate::branch::branches;
 use crate::calibrate::doubt;
 use crate::judge::{Judgement, judge, judged};
-use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, Prior, Refine, Round};
+use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, N_LAST_ROUNDS, NEAR_ROUNDS, Prior, Refine, Round};
 use crate::report::{refused, report};
 use crate::rivals::{at_rest, best_of};
 use crate::sampled::Sampled;
@@ -75,7 +75,7 @@ pub fn fit(
             // One joint of a fitted arm swept to a peak is less than a step off: what hangs beside its link must not draw it
             // away within the gates of the coarse rounds.
             let start = match round {
-                Look::Again => roughly(&refine, &h, &near, &COARSE_ROUNDS[3..], fan),
+                Look::Again => roughly(&refine, &h, &near, NEAR_ROUNDS, fan),
                 Look::Others => h,
             };
             polish(&refine, &start, &near, fan)
@@ -120,8 +120,7 @@ pub fn again(
     };
     let base = Point::from(start.local_from_base.translation.vector);
     let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
-    let polished =
-        polish(&refine, &roughly(&refine, &start, &near, &COARSE_ROUNDS[3..], fan), &near, fan);
+    let polished = polish(&refine, &roughly(&refine, &start, &near, NEAR_ROUNDS, fan), &near, fan);
     if polished.1.score < settings.min_score || polished.1.violation > settings.max_violation {
         return None;
     }
@@ -355,14 +354,14 @@ fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec
 
 /// The same on points that are chosen.
 fn fine_on(refine: &Refine<'_>, h: &Hypothesis, few: &[u32], fan: &impl Fan) -> Hypothesis {
-    let h = refine.run(h, few, &FINE_ROUNDS[..3], fan);
+    let h = refine.run(h, few, &FINE_ROUNDS, fan);
     refine.run(&h, few, &last_rounds(refine, &h, few), fan)
 }
 
 /// The rounds that end at a posture, from one that is nearly it: with the gate that the noise there asks for.
 fn last_rounds(refine: &Refine<'_>, h: &Hypothesis, few: &[u32]) -> Vec<Round> {
     let gate = (LAST_GATE.0 * refine.noise(h, few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
-    FINE_ROUNDS[3..].iter().map(|r| Round { gate, ..*r }).collect()
+    vec![Round { gate, balanced: false }; N_LAST_ROUNDS]
 }
 
 /// The installation plane, at the height of the base's origin.

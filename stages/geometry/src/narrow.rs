@@ -1,4 +1,4 @@
-//! Casts that can lose, gathered: each says which range it takes and what happens outside it.
+//! Coordinates in; grid indices and short floats out, each with its range and what happens outside it.
 
 /// A grid index from a coordinate: floor, saturating at the ends of `i32` (NaN gives 0).
 #[inline]
@@ -14,11 +14,4 @@ pub fn floor_i32(value: f64) -> i32 {
 #[must_use]
 pub fn local_f32(value: f64) -> f32 {
     value as f32
-}
-
-/// A count as an index of 32 bits; `None` beyond 4 294 967 295.
-#[inline]
-#[must_use]
-pub fn index_u32(value: usize) -> Option<u32> {
-    u32::try_from(value).ok()
 }

@@ -18,23 +18,6 @@ pub fn tukey_cost(residual: f64, scale: f64) -> f64 {
     scale * scale / 6.0 * (1.0 - v * v * v)
 }
 
-/// Huber's weight: 1 inside `scale`, `scale/|r|` outside.
-#[inline]
-#[must_use]
-pub fn huber(residual: f64, scale: f64) -> f64 {
-    let r = residual.abs();
-    if r <= scale { 1.0 } else { scale / r }
-}
-
-/// Geman–McClure weight `c²/(c + r²)²` with `c = scale²`, as KISS-ICP uses it; 1 at zero.
-#[inline]
-#[must_use]
-pub fn geman_mcclure(residual: f64, scale: f64) -> f64 {
-    let c = scale * scale;
-    let d = c + residual * residual;
-    c * c / (d * d)
-}
-
 /// Median by selection, reordering `values`; `None` for none. NaN sorts last.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     if values.is_empty() {

@@ -56,6 +56,12 @@ impl Default for Settings {
 }
 
 /// Mean score on a quarter of the samples, at the best of every other yaw, below which a place is not looked at any
+/// Heights above a plane at which a foot is looked for, metres: not the plane itself, and no higher than shoulders stand.
+const FOOT_HEIGHTS: std::ops::Range<f64> = 0.03..1.2;
+/// A base may stand where, within this share of its radius, so many cells of the plane have so many points each.
+const ABOUT: f64 = 0.8;
+const MIN_CELLS: usize = 3;
+const MIN_IN_CELL: u32 = 3;
 /// further; and by how much yaws may lag behind that best.
 const HOPELESS: f64 = -0.2;
 const YAW_LAG: f64 = 0.35;
@@ -295,7 +301,7 @@ impl<'a> BaseSearch<'a> {
         for spot in self.sight.spots() {
             let q = to_plane * Vector::from(spot.at.map(f64::from));
             let height = q.z - local.offset;
-            if !(0.03..1.2).contains(&height) {
+            if !FOOT_HEIGHTS.contains(&height) {
                 continue;
             }
             let i = ((q.x - low[0]) / step).round();
@@ -304,8 +310,8 @@ impl<'a> BaseSearch<'a> {
                 count[j as usize * n[0] + i as usize] += spot.n_points;
             }
         }
-        // A base's middle is empty: what counts is points within half its radius on most sides.
-        let r = ((self.radius * 0.8) / step).ceil() as isize;
+        // A base's middle is empty: what counts is points about it.
+        let r = ((self.radius * ABOUT) / step).ceil() as isize;
         let mut out = Vec::new();
         for j in 0..n[1] as isize {
             for i in 0..n[0] as isize {
@@ -315,13 +321,13 @@ impl<'a> BaseSearch<'a> {
                         && b >= 0
                         && (a as usize) < n[0]
                         && (b as usize) < n[1]
-                        && count[b as usize * n[0] + a as usize] > 2
+                        && count[b as usize * n[0] + a as usize] >= MIN_IN_CELL
                 };
                 let near = (-r..=r)
                     .flat_map(|dj| (-r..=r).map(move |di| (di, dj)))
                     .filter(|(di, dj)| di * di + dj * dj <= r * r && filled(*di, *dj))
                     .count();
-                if near >= 3 {
+                if near >= MIN_CELLS {
                     out.push((low[0] + i as f64 * step, low[1] + j as f64 * step));
                 }
             }
@@ -391,7 +397,6 @@ impl<'a> BaseSearch<'a> {
                         (world_from_local * pose, t.said.score)
                     })
                     .collect(),
-                group: 0,
             })
             .collect()
     }

@@ -54,9 +54,9 @@ pub struct Before {
     pub scans: Vec<Scan>,
 }
 
-/// Said of a scan whose scanner is known and whose raster is not.
-/// What is said of a scan that a camera took.
+/// Said of a scan that a camera took.
 const CAMERA: &str = "taken by a depth camera: its points err by half a percent of their range, alike over a hand's width";
+/// Said of a scan whose scanner is known and whose raster is not.
 const NO_RASTER: &str = "too few points to tell the raster: no free-space evidence from this scan";
 
 /// One open file.
