@@ -69,6 +69,7 @@ pub struct Estimate {
 /// # Errors
 /// Inputs or a library that cannot be opened.
 pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
+    job.check_places()?;
     let settings = &job.means.settings;
     // Where no run has been, nothing is there to be used again, and no input need be read to tell.
     let earlier = job.out.join("store").is_dir().then(|| Earlier::look(job, engine)).transpose()?;
@@ -226,11 +227,9 @@ impl std::fmt::Display for Estimate {
 
 /// Points of an input: what it states, else what its length allows.
 fn points(sources: &Sources, input: &Input) -> u64 {
-    let masks = sources.masks.iter().filter(|m| m.input == input.id);
     let scans = sources.scans.iter().filter(|s| s.input == input.id);
-    let in_masks: Option<u64> = masks.map(|m| m.n_points).sum();
     let in_scans: Option<u64> = scans.map(|s| s.stated_points).sum();
-    in_masks.or(in_scans).unwrap_or(input.n_bytes / TEXT_BYTES)
+    sources.n_stated(input.id).or(in_scans).unwrap_or(input.n_bytes / TEXT_BYTES)
 }
 
 /// Bytes that are free where a folder lies, or will.

@@ -240,10 +240,7 @@ impl<'a> Labelling<'a> {
         let mut masks = Masks::new(out, self.sources.opened_masks());
         let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
         let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
-        let mut robots: Vec<RobotPicture> = self.robot_pictures(&chosen, engine)?;
-        let grids: Vec<_> =
-            spaces.iter().map(|s| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()))).collect();
-        let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
+        let mut robots = self.robot_pictures(&chosen, engine)?;
         let pack = Pack::of_clouds(&records, &export);
         // Tiles are as many bytes as masks and clouds: each has a thread that copies them to their files.
         let apart = |strips: Handed<'_, Labelled>| {
@@ -255,33 +252,8 @@ impl<'a> Labelling<'a> {
             Ok((masks.finish()?, clouds.finish()?))
         };
         let along = |hand: Hand<'_, Labelled>| {
-            let (disks, mut pictures) = (engine.disks()?, Vec::new());
-            for input in self.sources.opened() {
-                let plan = PlanPicture::new(&self.bounds_of(input.id));
-                let label = LabelStrip {
-                    near: &near.labels,
-                    ground: &self.ground,
-                    scans: &self.sources.scans,
-                    grids: &grids,
-                    shown: &shown,
-                    plan: &plan,
-                    pack: pack.clone(),
-                    cell: scope.cell,
-                    moved: &scope.moved,
-                    bodies: self.bodies.as_ref(),
-                };
-                self.each_strip(input, &label, engine, |mut strip| {
-                    for (space, voxel, kind) in strip.spots.drain(..) {
-                        spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));
-                    }
-                    for (robot, point, label) in strip.shown.drain(..) {
-                        robots[robot].add(point, label);
-                    }
-                    tiles.iter_mut().try_for_each(|tiles| tiles.add(&strip.packed, &disks))?;
-                    hand(strip)
-                })?;
-                pictures.push(self.draw_plan(&plan, input.id, out)?);
-            }
+            let takers = (&mut spaces[..], &mut robots[..], &mut tiles);
+            let pictures = self.stream((near, scope), takers, &pack, (out, engine), hand)?;
             let Some(tiles) = tiles else { return Ok((Vec::new(), Vec::new(), pictures)) };
             if scope.leaves_open {
                 return Ok((Vec::new(), tiles.open(), pictures));
@@ -297,6 +269,48 @@ impl<'a> Labelling<'a> {
         let done = Done { clouds, masks, pictures, spaces: said, digests, las };
         let robots = chosen.into_iter().zip(robots).collect();
         Ok(Streamed { labelling: self, near, spaces, robots, open, out, done })
+    }
+
+    /// Streams every input once more: into spaces, pictures of robots and tiles, and on to `hand`; names of the plans drawn.
+    fn stream(
+        &self,
+        (near, scope): (&Near, &Scope),
+        (spaces, robots, tiles): (&mut [Option<Space>], &mut [RobotPicture], &mut Option<Tiles>),
+        pack: &Pack,
+        (out, engine): (&Path, &Engine),
+        hand: Hand<'_, Labelled>,
+    ) -> Result<Vec<String>> {
+        let grid = |s: &Option<Space>| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()));
+        let grids: Vec<_> = spaces.iter().map(grid).collect();
+        let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
+        let (disks, mut pictures) = (engine.disks()?, Vec::new());
+        for input in self.sources.opened() {
+            let plan = PlanPicture::new(&self.bounds_of(input.id));
+            let label = LabelStrip {
+                near: &near.labels,
+                ground: &self.ground,
+                scans: &self.sources.scans,
+                grids: &grids,
+                shown: &shown,
+                plan: &plan,
+                pack: pack.clone(),
+                cell: scope.cell,
+                moved: &scope.moved,
+                bodies: self.bodies.as_ref(),
+            };
+            self.each_strip(input, &label, engine, |mut strip| {
+                for (space, voxel, kind) in strip.spots.drain(..) {
+                    spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));
+                }
+                for (robot, point, label) in strip.shown.drain(..) {
+                    robots[robot].add(point, label);
+                }
+                tiles.iter_mut().try_for_each(|tiles| tiles.add(&strip.packed, &disks))?;
+                hand(strip)
+            })?;
+            pictures.push(self.draw_plan(&plan, input.id, out)?);
+        }
+        Ok(pictures)
     }
 
     /// Streams an input once more; labelled strips in the order of the file.

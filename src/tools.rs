@@ -3,7 +3,7 @@
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::search::{Search, Shelf};
-use contract::{Fit, Mounted, Region, Result, Verdict};
+use contract::{Fit, JointFit, Mounted, Region, Result, Verdict};
 use fit::{Prepared, Scene, Settings, Tooled};
 use robot::Model;
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
@@ -110,20 +110,8 @@ fn dress_one(
     let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);
     let bare = shelf.prepared(bare);
     let n_arm = arm.free.len();
-    let mut best: Option<([usize; 2], Tooled)> = None;
-    for flange in arm.flanges() {
-        for tool in (0..models.len()).filter(|&i| models[i].is_tool()) {
-            let both = arm.with_tool(&models[tool], flange, 0.0);
-            let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
-            let own = [n_arm, arm.links.len()];
-            let found = fit::try_tool(fit, (&prepared, own), scene, settings, &AllThreads);
-            let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
-            if let Some(found) = found.filter(better) {
-                best = Some(([tool, flange], found));
-            }
-        }
-    }
-    let ([tool, flange], mut start) = best?;
+    let known = (models, shelf, bare);
+    let ([tool, flange], mut start) = best_tool(fit, arm, known, scene, settings)?;
     let both = arm.with_tool(&models[tool], flange, 0.0);
     let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
     let holes = holes();
@@ -150,12 +138,7 @@ fn dress_one(
     let others = bolts.iter().filter(|b| holes[b.hole] != mount);
     let alike: Vec<[f64; 2]> = others.map(|b| [holes[b.hole], b.value]).collect();
     together.reasons.extend(in_words(&alike));
-    // The tool's place is known, not what of it is the hole's and what the last joint's.
-    let last = &mut together.joints[n_arm - 1];
-    let apart = alike.iter().map(|[_, value]| fit::turns::apart(*value, last.value));
-    let spread = apart.fold(0.0, f64::max);
-    last.determined &= alike.is_empty();
-    last.sigma = last.sigma.max(spread);
+    widen(&mut together.joints[n_arm - 1], &alike);
     together.tool = Some(Mounted {
         model: models[tool].name.clone(),
         link: arm.links[flange].name.clone(),
@@ -166,6 +149,40 @@ fn dress_one(
     together.other_branches = fit.other_branches.clone();
     together.alike = fit.alike.clone();
     Some((together, [tool, flange], mount))
+}
+
+/// The tool that explains most of what hangs on one of the arm's flanges, if one is there: its number and the flange's
+/// link, and where it stands. `bare` is the arm.
+fn best_tool(
+    fit: &Fit,
+    arm: &Model,
+    (models, shelf, bare): (&[Model], &Shelf<'_>, &Prepared<'_>),
+    scene: &Scene<'_>,
+    settings: &Settings,
+) -> Option<([usize; 2], Tooled)> {
+    let own = [arm.free.len(), arm.links.len()];
+    let mut best: Option<([usize; 2], Tooled)> = None;
+    for flange in arm.flanges() {
+        for tool in (0..models.len()).filter(|&i| models[i].is_tool()) {
+            let both = arm.with_tool(&models[tool], flange, 0.0);
+            let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
+            let found = fit::try_tool(fit, (&prepared, own), scene, settings, &AllThreads);
+            let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
+            if let Some(found) = found.filter(better) {
+                best = Some(([tool, flange], found));
+            }
+        }
+    }
+    best
+}
+
+/// The arm's last joint may be as far off as at the other holes, each with the joint's value there, radians: the tool's place
+/// is known, not what of it is the hole's and what the joint's.
+fn widen(last: &mut JointFit, alike: &[[f64; 2]]) {
+    let apart = alike.iter().map(|[_, value]| fit::turns::apart(*value, last.value));
+    let spread = apart.fold(0.0, f64::max);
+    last.determined &= alike.is_empty();
+    last.sigma = last.sigma.max(spread);
 }
 
 /// What is said where a flange looks the same at several holes.

@@ -14,6 +14,8 @@ const MAY_BE_UNSAFE: [&str; 2] = ["src/store/map.rs", "stages/ingest/src/map.rs"
 const MAX_LINES: usize = 450;
 /// Longest file of tests, lines: cases in a row read well.
 const MAX_TEST_LINES: usize = 600;
+/// Longest function, lines, from its `fn` to its closing brace.
+const MAX_FN_LINES: usize = 60;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -89,6 +91,30 @@ fn is_test_module(name: &str) -> bool {
         .any(|parent| fs::read_to_string(parent).is_ok_and(|text| text.contains(&declared)))
 }
 
+/// All functions of a text that rustfmt wrote: name, and lines from the `fn` to the closing brace.
+fn functions(code: &str) -> Vec<(&str, usize)> {
+    const BEFORE: [&str; 5] = ["const", "async", "unsafe", "extern", "\"C\""];
+    let lines: Vec<&str> = code.lines().map(str::trim_end).collect();
+    let mut out = Vec::new();
+    for (at, line) in lines.iter().enumerate() {
+        let head = line.trim_start();
+        let indent = &line[..line.len() - head.len()];
+        let Some((before, after)) = head.split_once("fn ") else { continue };
+        if !before.split_whitespace().all(|w| w.starts_with("pub") || BEFORE.contains(&w)) {
+            continue;
+        }
+        // What ends it stands as far in as it begins: a brace, or a semicolon where it has no body.
+        let is_end = |line: &&str| {
+            let ends = |l: &str| l == "}" || l.ends_with(';') && !l.starts_with(' ');
+            line.strip_prefix(indent).is_some_and(ends)
+        };
+        let rest = lines[at..].iter().position(is_end);
+        let n = if head.ends_with('}') { 1 } else { rest.map_or(lines.len() - at, |n| n + 1) };
+        out.push((after.split(['(', '<']).next().unwrap_or(after), n));
+    }
+    out
+}
+
 fn room(name: &str) -> &str {
     name.split('/').nth(1).unwrap_or(name)
 }
@@ -136,6 +162,19 @@ fn files_open_with_a_sentence_and_stay_short() {
         let most = if is_test { MAX_TEST_LINES } else { MAX_LINES };
         if n > most {
             faults.push(format!("{name} has {n} lines"));
+        }
+    }
+    report(&faults);
+}
+
+#[test]
+fn functions_stay_short() {
+    let mut faults = Vec::new();
+    for (name, text) in all_files() {
+        for (function, n) in functions(&code(&name, &text)) {
+            if n > MAX_FN_LINES {
+                faults.push(format!("{name}: `{function}` has {n} lines"));
+            }
         }
     }
     report(&faults);

@@ -108,17 +108,7 @@ pub(super) fn mount(case: &Case, models: &[Model]) -> Option<Mount> {
 pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     let c = &case.condition;
     let mut random = Random::keyed(&[case.seed, 0xACC]);
-    let mut scene = Scene {
-        seed: case.seed,
-        floor: Some(Floor {
-            size: Some([24.0, 24.0]),
-            tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
-            wave_amplitude: 0.002,
-            wave_length: 5.0,
-            levels: vec![],
-        }),
-        ..Scene::default()
-    };
+    let mut scene = empty(case.seed, &mut random);
     let (stand, side) = match c.mount {
         Place::Pillar => (random.between(PILLAR[0], PILLAR[1]), NARROW * narrower(model)),
         _ if c.stand > 0.0 && random.unit() < 0.5 => (random.between(0.15, c.stand), STAND_SIDE),
@@ -157,7 +147,8 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
         ..RobotPlace::default()
     });
     let reach = reach(model, &world_from_base, &posture);
-    clutter(&mut scene, model, c, reach, &mut random);
+    around(&mut scene, c.clutter, reach[0], &mut random);
+    on_arm(&mut scene, model, c.clutter, reach[0], &mut random);
     scanners(&mut scene, c, reach, &mut random);
     let circle = circle(reach);
     let standing = Standing { model, world_from_base, posture: &posture, reach: reach[0], circle };
@@ -165,6 +156,21 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     let has_branch = |at: &usize| c.other_branch && model.has_other_branch(*at, &posture);
     let other_branches = (0..model.loops.len()).find(has_branch).into_iter().collect();
     Ok(Drawn { scene, world_from_base, posture, other_branches, beside })
+}
+
+/// A scene of this seed with nothing but a floor, as level as floors are.
+fn empty(seed: u64, random: &mut Random) -> Scene {
+    Scene {
+        seed,
+        floor: Some(Floor {
+            size: Some([24.0, 24.0]),
+            tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
+            wave_amplitude: 0.002,
+            wave_length: 5.0,
+            levels: vec![],
+        }),
+        ..Scene::default()
+    }
 }
 
 /// Roll, pitch and yaw, degrees.
@@ -259,17 +265,17 @@ fn reach(model: &Model, world_from_base: &Pose, posture: &[f64]) -> [f64; 2] {
     out
 }
 
-/// Things that stand, hang and lie around, each with the condition's chance.
-fn clutter(scene: &mut Scene, model: &Model, c: &Condition, reach: [f64; 2], random: &mut Random) {
-    let there = |random: &mut Random| random.unit() < c.clutter;
+/// Things that stand around a robot of this reach, metres, each with this chance.
+fn around(scene: &mut Scene, chance: f64, reach: f64, random: &mut Random) {
+    let there = |random: &mut Random| random.unit() < chance;
     // Beside the robot, so far beyond its reach.
-    let around = |random: &mut Random, gap: [f64; 2]| {
-        let (a, radius) = (random.between(0.0, TAU), reach[0] + random.between(gap[0], gap[1]));
+    let beside = |random: &mut Random, gap: [f64; 2]| {
+        let (a, radius) = (random.between(0.0, TAU), reach + random.between(gap[0], gap[1]));
         [radius * a.cos(), radius * a.sin()]
     };
     if there(random) {
         // One straight fence in front, wires as real ones.
-        let (a, r) = (random.between(0.0, TAU), reach[0] + random.between(0.4, 0.8));
+        let (a, r) = (random.between(0.0, TAU), reach + random.between(0.4, 0.8));
         let corner = |t: f64| [r * a.cos() - t * a.sin(), r * a.sin() + t * a.cos()];
         let filling = if random.unit() < 0.8 { Filling::Wires } else { Filling::Panel };
         scene.fences.push(Fence {
@@ -281,7 +287,7 @@ fn clutter(scene: &mut Scene, model: &Model, c: &Condition, reach: [f64; 2], ran
         });
     }
     if there(random) {
-        let xy = around(random, [0.7, 1.0]);
+        let xy = beside(random, [0.7, 1.0]);
         let size = [random.between(1.0, 2.0), 0.6, random.between(0.5, 0.9)];
         scene.conveyors.push(Furniture {
             name: "conveyor".into(),
@@ -291,7 +297,7 @@ fn clutter(scene: &mut Scene, model: &Model, c: &Condition, reach: [f64; 2], ran
         });
     }
     if there(random) {
-        let [x, y] = around(random, [0.6, 1.0]);
+        let [x, y] = beside(random, [0.6, 1.0]);
         let size = [0.5, 0.6, random.between(1.0, 2.0)];
         scene.boxes.push(Cuboid {
             name: "cabinet".into(),
@@ -300,11 +306,16 @@ fn clutter(scene: &mut Scene, model: &Model, c: &Condition, reach: [f64; 2], ran
             rpy_deg: [0.0, 0.0, random.between(0.0, 90.0)],
             reflectance: random.between(0.2, 0.9),
         });
-        let xy = around(random, [0.6, 1.2]);
+        let xy = beside(random, [0.6, 1.2]);
         let height = random.between(2.0, 4.0);
         let section = Section::Round;
         scene.columns.push(Column { name: "post".into(), xy, radius: 0.1, height, section });
     }
+}
+
+/// What the robot carries: cables along its arm, and a gripper with a part, each with this chance.
+fn on_arm(scene: &mut Scene, model: &Model, chance: f64, reach: f64, random: &mut Random) {
+    let there = |random: &mut Random| random.unit() < chance;
     let links = bodies(model);
     if there(random) && links.len() > 3 {
         // A cable along the arm: from the second body to the last but one.
@@ -327,7 +338,7 @@ fn clutter(scene: &mut Scene, model: &Model, c: &Condition, reach: [f64; 2], ran
         }
     }
     if let (true, Some(flange)) = (there(random), model.flanges().first()) {
-        let side = (0.25 * reach[0]).clamp(0.1, 0.4);
+        let side = (0.25 * reach).clamp(0.1, 0.4);
         let gripper = tool_on(model, *flange, ToolShape::Gripper, 0.5 * side);
         scene.carried.push(part_in(&gripper, "R1", [side, 0.7 * side, 0.5 * side]));
         scene.robots[0].tool = Some(gripper);

@@ -11,8 +11,10 @@ use crate::library;
 use crate::reuse::Manifest;
 use crate::scanning::{Formats, scan_scene};
 use contract::{Error, Result};
+use export::ResultFile;
 use geometry::Vector;
 use serde::Serialize;
+use serde_json::Value;
 use simulate::{Plant, Scene, sessions};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -170,12 +172,28 @@ fn joint(agreement: &Agreement) -> f64 {
 fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()> {
     let path = out.join("changes.json");
     let text = std::fs::read_to_string(&path).map_err(|e| Error::from(e).at(path.display()))?;
-    let changes: serde_json::Value = serde_json::from_str(&text)
+    let changes: Value = serde_json::from_str(&text)
         .map_err(|e| Error::bad_input("the changes cannot be read").because(e))?;
     let list = |name: &str| changes[name].as_array().cloned().unwrap_or_default();
+    let result = ResultFile::read(out)?;
+    let barrel = then.columns.iter().find(|c| c.name == "barrel").map(|c| c.xy).unwrap_or_default();
+    judge_robots(row, &list("robots"), now, &result);
+    judge_things(row, &list("things"), (then, now), barrel);
+    row.unseen = list("fixed_not_compared").iter().any(|region| {
+        let inside = |i: usize| {
+            let corner = |k: usize| region["bounds"][k][i].as_f64().unwrap_or(f64::NAN);
+            barrel[i] > corner(0) - SAME_THING && barrel[i] < corner(1) + SAME_THING
+        };
+        inside(0) && inside(1)
+    });
+    row.left = left(&list("scans"), now);
+    Ok(())
+}
+
+/// Robots that are said to differ: the first one moved, no other did.
+fn judge_robots(row: &mut Row, robots: &[Value], now: &Scene, result: &ResultFile) {
     let base = Vector::from(now.robots[0].xyz);
-    let result = export::ResultFile::read(out)?;
-    for robot in list("robots").iter().filter(|r| r["change"]["kind"] != "same") {
+    for robot in robots.iter().filter(|r| r["change"]["kind"] != "same") {
         let id = robot["now"].as_str().or(robot["then"].as_str()).unwrap_or_default();
         let entry = result.robots.iter().find(|r| r.id == id);
         let is_it = entry.is_some_and(|e| (Vector::from(e.base_pose.xyz) - base).norm() < 0.5);
@@ -185,7 +203,11 @@ fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()>
             row.invented.push(format!("{id} {}", robot["change"]["kind"]));
         }
     }
-    let middle = |thing: &serde_json::Value, when: &str| {
+}
+
+/// Things that are said to differ: the pallet is elsewhere now, and the barrel, which stood at this place, is gone.
+fn judge_things(row: &mut Row, things: &[Value], (then, now): (&Scene, &Scene), barrel: [f64; 2]) {
+    let middle = |thing: &Value, when: &str| {
         let corner = |k: usize, i: usize| thing[when][k][i].as_f64();
         let at = |i: usize| Some(0.5 * (corner(0, i)? + corner(1, i)?));
         Some([at(0)?, at(1)?])
@@ -194,11 +216,10 @@ fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()>
         let found = scene.boxes.iter().find(|b| b.name == "pallet");
         found.map(|b| [b.xyz[0], b.xyz[1]]).unwrap_or_default()
     };
-    let barrel = then.columns.iter().find(|c| c.name == "barrel").map(|c| c.xy).unwrap_or_default();
     let is_at = |found: Option<[f64; 2]>, at: [f64; 2]| {
         found.is_some_and(|f| (f[0] - at[0]).hypot(f[1] - at[1]) < SAME_THING)
     };
-    for thing in &list("things") {
+    for thing in things {
         let (was, is) = (middle(thing, "then"), middle(thing, "now"));
         match thing["change"].as_str() {
             Some("moved") if is_at(was, pallet(then)) && is_at(is, pallet(now)) => {
@@ -210,14 +231,11 @@ fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()>
             }
         }
     }
-    row.unseen = list("fixed_not_compared").iter().any(|region| {
-        let inside = |i: usize| {
-            let corner = |k: usize| region["bounds"][k][i].as_f64().unwrap_or(f64::NAN);
-            barrel[i] > corner(0) - SAME_THING && barrel[i] < corner(1) + SAME_THING
-        };
-        inside(0) && inside(1)
-    });
-    let off = list("scans").into_iter().zip(&now.scanners).map(|(found, scanner)| {
+}
+
+/// How far scans are off beyond what was found, metres: least and largest.
+fn left(scans: &[Value], now: &Scene) -> [f64; 2] {
+    let off = scans.iter().zip(&now.scanners).map(|(found, scanner)| {
         let shift = Vector::from([0, 1, 2].map(|i| found["shift"][i].as_f64().unwrap_or(f64::NAN)));
         let real = scanner
             .world_from_scan()
@@ -228,11 +246,7 @@ fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()>
         })
     });
     let off: Vec<f64> = off.collect();
-    row.left = [
-        off.iter().copied().fold(f64::INFINITY, f64::min),
-        off.iter().copied().fold(0.0, f64::max),
-    ];
-    Ok(())
+    [off.iter().copied().fold(f64::INFINITY, f64::min), off.iter().copied().fold(0.0, f64::max)]
 }
 
 /// Tiles of a base that a later result has with the same bytes, and all of them.

@@ -198,13 +198,7 @@ pub(super) fn score(
     row.rms = fit.rms;
     row.margin = fit.runner_up.as_ref().map(|r| r.margin);
     row.reasons = fit.reasons.clone();
-    if let Some(found) = &fit.calibration {
-        let real = drawn.models(models, case).swap_remove(case.model);
-        let moved = |&j: &usize| {
-            model.joints[j].parent_from_joint.inverse() * real.joints[j].parent_from_joint
-        };
-        row.calibration = Some((found.clone(), model.free.iter().map(moved).collect()));
-    }
+    row.calibration = calibration(case, models, drawn, fit);
     if fit.model_name == model.name && fit.joints.len() == model.free.len() {
         row.joints = joints(model, fit, (&drawn.posture, mount));
         displacements(&mut row, model, fit, drawn);
@@ -219,6 +213,20 @@ pub(super) fn score(
                 || mount.is_some_and(|m| bolted_elsewhere(m, j, fit, &drawn.posture))
         });
     row
+}
+
+/// Where a fit found the joints to be and where they are, each as it is from the model, where that was asked for.
+fn calibration(
+    case: &Case,
+    models: &[Model],
+    drawn: &Drawn,
+    fit: &Fit,
+) -> Option<(Calibration, Vec<Pose>)> {
+    let (model, found) = (&models[case.model], fit.calibration.as_ref()?);
+    let real = drawn.models(models, case).swap_remove(case.model);
+    let moved =
+        |&j: &usize| model.joints[j].parent_from_joint.inverse() * real.joints[j].parent_from_joint;
+    Some((found.clone(), model.free.iter().map(moved).collect()))
 }
 
 /// Whether a fit is that of the other robot of a cell, of which nothing is asked.

@@ -2,6 +2,7 @@
 
 mod memory;
 mod output;
+mod places;
 mod settings;
 mod value;
 
@@ -72,8 +73,9 @@ impl Job {
     /// Prepares the output folder.
     ///
     /// # Errors
-    /// A path that is a file, or that the system refuses.
+    /// Something to read that is not there or lies where the job writes; a path that is a file, or that the system refuses.
     pub fn output(&self) -> Result<OutputDir> {
+        self.check_places()?;
         OutputDir::prepare(&self.out)
     }
 }

@@ -18,17 +18,18 @@ pub(crate) use state::{Records, State};
 
 use crate::engine::{AllThreads, Engine};
 use crate::filling::Filling;
-use crate::job::{Job, Outcome};
+use crate::job::{Job, Outcome, OutputDir};
 use crate::library;
-use crate::reuse::{self, Cache, Digests, Key};
+use crate::reuse::{self, Cache, Digests, Key, OutputFile};
 use crate::search::Shelf;
 use crate::store::Store;
 use base::Base;
-use contract::{Error, Input, Kind, OneByOne, Result};
+use contract::{Error, Fit, Input, Kind, OneByOne, Result};
 use geometry::Aabb;
-use ingest::Scanners;
+use ingest::{Scanners, Sources};
 use past::Past;
-use session::Session;
+use robot::Library;
+use session::{Robots, Session};
 use std::path::{Path, PathBuf};
 use write::Written;
 
@@ -61,92 +62,124 @@ pub enum Cell {
 pub fn rescan(request: &Request, engine: &Engine) -> Result<Outcome> {
     let base = Base::open(&request.base)?;
     let job = job(request, &base)?;
-    let settings = &job.means.settings;
     let output = job.output()?;
     let digests = Digests::of(&job, &output, engine)?
         .after(base.state.inputs.len(), format!("{} {:?}", base.digest, request.cell));
     if let Some(manifest) = digests.unchanged(&job, &output)? {
         return Ok(manifest.outcome());
     }
-    base.share_store(&output)?;
-    let shelved = Cache::new(output.models(), digests.models(settings));
-    let library = library::load(&job.robots, &settings.robot, Some(&shelved), engine)?;
-    let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
-    let before = base.state.before();
-    let open = || {
-        let settings = &settings.ingest;
-        ingest::open_after(before, &job.inputs, scanners.as_ref(), settings, &AllThreads)
-    };
-    let mut sources = engine.pool()?.install(open)?;
+    Rescan { base: &base, job: &job, output: &output, digests: &digests, engine }
+        .whole(&request.cell)
+}
 
-    // The new scans into tiles; those of the plant are there.
-    let filling = Filling::new(&sources, &job.means, output.tiles(), engine);
-    let filled = sources.opened().iter().map(|i| filling.tiles_of(i, &digests));
-    let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
-    let n_kept = filling.n_kept();
-    sources.opened().iter().try_for_each(|input| fresh(input, &base, &digests))?;
-    let (old, new) = (base.store(&output, job.means.store_bytes())?, Store::join(stores));
+/// A rescan that has something to do.
+struct Rescan<'a> {
+    base: &'a Base,
+    /// With the base's library and ways of writing.
+    job: &'a Job,
+    output: &'a OutputDir,
+    digests: &'a Digests,
+    engine: &'a Engine,
+}
 
-    // Where the cell is, and how far the new scans are off what stood there: they are taken back by that.
-    let mut fits = base.state.fits.clone();
-    let mut models = robots::models_of(&mut fits, &library)?;
-    let cell = session::bounds(&request.cell, &base, (&fits, &models), (&sources, &new))?;
-    let scans = base.state.scans.clone();
-    let past = Past::new(&base, &scans, &old, cell)?;
-    let shelf = Shelf::new(&library.models);
-    let names = session::known((&fits, &models), &cell);
-    let floor = (&base.state.floor, robots::hang(&fits, &past.cell));
-    let known = || {
-        shelf.prepare(&names, &OneByOne);
-        Ok(())
-    };
-    let (laid, between) = (&mut sources, (&past, &new));
-    let on_shelf = &shelf;
-    // Reading waits for disks and for itself: what fits of the cell's robots need is made meanwhile.
-    let ((), (registered, session)) = engine.beside("models", known, move || {
-        let registered = session::register(between, laid, engine)?;
-        let session = Session::new(floor, laid, between, on_shelf, settings, engine)?;
-        Ok((registered, session))
-    })?;
+impl Rescan<'_> {
+    fn whole(&self, cell: &Cell) -> Result<Outcome> {
+        let &Rescan { base, job, output, digests, engine } = self;
+        let settings = &job.means.settings;
+        base.share_store(output)?;
+        let shelved = Cache::new(output.models(), digests.models(settings));
+        let (library, mut sources) = self.given(&shelved)?;
 
-    // Robots and things of the cell, then and now.
-    let (robots, labels) = session.compare((&mut fits, &mut models), engine)?;
+        // The new scans into tiles; those of the plant are there.
+        let filling = Filling::new(&sources, &job.means, output.tiles(), engine);
+        let filled = sources.opened().iter().map(|i| filling.tiles_of(i, digests));
+        let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
+        let n_kept = filling.n_kept();
+        sources.opened().iter().try_for_each(|input| fresh(input, base, digests))?;
+        let (old, new) = (base.store(output, job.means.store_bytes())?, Store::join(stores));
 
-    // New masks and records of the new scans, tiles of the cell anew, all the rest as it was.
-    let written = Written {
-        base: &base,
-        session: &session,
-        robots: &robots,
-        labels: &labels,
-        models: &models,
-        fits: &fits,
+        // Where the cell is, and how far the new scans are off what stood there: they are taken back by that.
+        let mut fits = base.state.fits.clone();
+        let mut models = robots::models_of(&mut fits, &library)?;
+        let cell = session::bounds(cell, base, (&fits, &models), (&sources, &new))?;
+        let scans = base.state.scans.clone();
+        let past = Past::new(base, &scans, &old, cell)?;
+        let shelf = Shelf::new(&library.models);
+        let names = session::known((&fits, &models), &cell);
+        let floor = (&base.state.floor, robots::hang(&fits, &past.cell));
+        let known = || {
+            shelf.prepare(&names, &OneByOne);
+            Ok(())
+        };
+        let (laid, between) = (&mut sources, (&past, &new));
+        let on_shelf = &shelf;
+        // Reading waits for disks and for itself: what fits of the cell's robots need is made meanwhile.
+        let ((), (registered, session)) = engine.beside("models", known, move || {
+            let registered = session::register(between, laid, engine)?;
+            let session = Session::new(floor, laid, between, on_shelf, settings, engine)?;
+            Ok((registered, session))
+        })?;
+
+        // Robots and things of the cell, then and now.
+        let (robots, labels) = session.compare((&mut fits, &mut models), engine)?;
+
+        // New masks and records of the new scans, tiles of the cell anew, all the rest as it was.
+        let (session, robots) = (&session, &robots);
+        let found =
+            Written { base, session, robots, labels: &labels, models: &models, fits: &fits };
+        let written = found.write(&registered, (output, digests), engine)?;
+        let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
+        let mut outcome = written.outcome;
+        self.conclude((fits, robots), (&sources, &all), (&outcome, written.known))?;
+        output.prune_tiles(&all, &shelved);
+        outcome.reused = reuse::said(&[
+            ("models", shelved.n_kept()),
+            ("tiles of new scans", n_kept),
+            ("files of the earlier result", written.n_shared),
+        ]);
+        Ok(outcome)
     }
-    .write(&registered, (&output, &digests), engine)?;
-    sources.opened().iter().try_for_each(|input| digests.check(input))?;
-    let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
-    let stays = |i: &usize| !robots.changed.contains(i) && !robots.gone.contains(i);
-    for i in (0..base.state.fits.len()).filter(stays) {
-        fits[i].clone_from(&base.state.fits[i]);
+
+    /// Reads the library, and opens the new scans behind those of the base.
+    fn given(&self, shelved: &Cache) -> Result<(Library, Sources)> {
+        let &Rescan { base, job, engine, .. } = self;
+        let settings = &job.means.settings;
+        let library = library::load(&job.robots, &settings.robot, Some(shelved), engine)?;
+        let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+        let before = base.state.before();
+        let open = || {
+            let settings = &settings.ingest;
+            ingest::open_after(before, &job.inputs, scanners.as_ref(), settings, &AllThreads)
+        };
+        Ok((library, engine.pool()?.install(open)?))
     }
-    let state = State {
-        inputs: sources.inputs.clone(),
-        masks: sources.masks.clone(),
-        scans: sources.scans.clone(),
-        tiles: all.clone(),
-        fits,
-        robots: job.robots.clone(),
-        ..base.state.clone()
-    };
-    state.write(output.next())?;
-    reuse::publish(&job, (&output, &digests), (&written.outcome, written.known), engine)?;
-    output.prune_tiles(&all, &shelved);
-    let mut outcome = written.outcome;
-    outcome.reused = reuse::said(&[
-        ("models", shelved.n_kept()),
-        ("tiles of new scans", n_kept),
-        ("files of the earlier result", written.n_shared),
-    ]);
-    Ok(outcome)
+
+    /// All is whole, and of the inputs that the rescan began with: it takes its place. Robots that stand as they stood are
+    /// handed on as the base has them.
+    fn conclude(
+        &self,
+        (mut fits, robots): (Vec<Fit>, &Robots),
+        (sources, tiles): (&Sources, &[Key]),
+        (outcome, known): (&Outcome, Vec<OutputFile>),
+    ) -> Result<()> {
+        let &Rescan { base, job, output, digests, engine } = self;
+        sources.opened().iter().try_for_each(|input| digests.check(input))?;
+        let stays = |i: &usize| !robots.changed.contains(i) && !robots.gone.contains(i);
+        for i in (0..base.state.fits.len()).filter(stays) {
+            fits[i].clone_from(&base.state.fits[i]);
+        }
+        let state = State {
+            inputs: sources.inputs.clone(),
+            masks: sources.masks.clone(),
+            scans: sources.scans.clone(),
+            tiles: tiles.to_vec(),
+            fits,
+            robots: job.robots.clone(),
+            ..base.state.clone()
+        };
+        state.write(output.next())?;
+        reuse::publish(job, (output, digests), (outcome, known), engine)
+    }
 }
 
 /// The job with the base's library and ways of writing.

@@ -265,26 +265,7 @@ impl Said<'_, '_> {
             let _ = writeln!(text, "  {line}");
         }
         for (k, thing) in self.found.labels.things.iter().enumerate() {
-            let at = thing.now.or(thing.then).map(|b| b.center()).unwrap_or_default();
-            let size = thing.now.or(thing.then).map(|b| b.size()).unwrap_or_default();
-            let _ = write!(
-                text,
-                "  T{} {}: {:.2} x {:.2} x {:.2} m at ({:.2}, {:.2}, {:.2}) m",
-                k + 1,
-                word(thing.change),
-                size[0],
-                size[1],
-                size[2],
-                at.x,
-                at.y,
-                at.z
-            );
-            match thing.shift {
-                Some([x, y, z]) => {
-                    let _ = writeln!(text, ", by ({x:.2}, {y:.2}, {z:.2}) m");
-                }
-                None => text.push('\n'),
-            }
+            let _ = writeln!(text, "  {}", in_words(k, thing));
         }
         for &i in &self.found.robots.unseen {
             let _ = writeln!(text, "  {} not compared: the new scans hardly see it", id(i));
@@ -302,6 +283,27 @@ impl Said<'_, '_> {
         let _ = writeln!(text, "{} points of earlier scans superseded", self.n_superseded);
         text
     }
+}
+
+/// What is said of a thing, which is the `k`th.
+fn in_words(k: usize, thing: &Thing) -> String {
+    let at = thing.now.or(thing.then).map(|b| b.center()).unwrap_or_default();
+    let size = thing.now.or(thing.then).map(|b| b.size()).unwrap_or_default();
+    let mut text = format!(
+        "T{} {}: {:.2} x {:.2} x {:.2} m at ({:.2}, {:.2}, {:.2}) m",
+        k + 1,
+        word(thing.change),
+        size[0],
+        size[1],
+        size[2],
+        at.x,
+        at.y,
+        at.z
+    );
+    if let Some([x, y, z]) = thing.shift {
+        let _ = write!(text, ", by ({x:.2}, {y:.2}, {z:.2}) m");
+    }
+    text
 }
 
 fn word(change: ThingChange) -> &'static str {

@@ -134,18 +134,7 @@ pub(crate) fn bounds(settings: &LasSettings, extent: &Extent) -> Aabb {
 
 /// Everything before the first point: header and variable length records. Its length does not depend on `extent`.
 pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
-    let mut records = Vec::new();
-    for vlr in &settings.vlrs {
-        records.push(vlr_of(&vlr.user_id, vlr.record_id, &vlr.description, vlr.data.clone())?);
-    }
-    if settings.extra_len() > 0 {
-        records.push(vlr_of("LASF_Spec", 4, "what points belong to", extra_bytes(settings))?);
-    }
-    if settings.compress {
-        let mut data = Vec::new();
-        laz_vlr(settings).write_to(&mut data)?;
-        records.push(vlr_of(LazVlr::USER_ID, LazVlr::RECORD_ID, LazVlr::DESCRIPTION, data)?);
-    }
+    let records = records(settings)?;
     let mut tail = Vec::new();
     for record in &records {
         record.write_to(&mut tail).map_err(bug)?;
@@ -194,6 +183,23 @@ pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     header.write_to(&mut out).map_err(bug)?;
     out.extend(tail);
     Ok(out)
+}
+
+/// The variable length records: those of the settings, that of the extra bytes, that of the compression.
+fn records(settings: &LasSettings) -> Result<Vec<raw::Vlr>> {
+    let mut records = Vec::new();
+    for vlr in &settings.vlrs {
+        records.push(vlr_of(&vlr.user_id, vlr.record_id, &vlr.description, vlr.data.clone())?);
+    }
+    if settings.extra_len() > 0 {
+        records.push(vlr_of("LASF_Spec", 4, "what points belong to", extra_bytes(settings))?);
+    }
+    if settings.compress {
+        let mut data = Vec::new();
+        laz_vlr(settings).write_to(&mut data)?;
+        records.push(vlr_of(LazVlr::USER_ID, LazVlr::RECORD_ID, LazVlr::DESCRIPTION, data)?);
+    }
+    Ok(records)
 }
 
 fn vlr_of(user_id: &str, record_id: u16, description: &str, data: Vec<u8>) -> Result<raw::Vlr> {

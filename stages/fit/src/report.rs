@@ -38,6 +38,9 @@ const OTHER_BASE: f64 = 0.03;
 /// Most equals that are listed.
 const N_EQUALS: usize = 4;
 
+/// Another posture, and how clearly the best is better.
+type Rival<'a> = (f64, &'a Polished);
+
 /// What is reported of the best, given the others; `points` are those of its adjustment.
 pub(crate) fn report(
     refine: &Refine<'_>,
@@ -50,44 +53,108 @@ pub(crate) fn report(
     let model = prepared.model;
     let h = &best.hypothesis;
     let n = 6 + h.posture.len();
-    let mut rivals: Vec<(f64, &Polished)> = fan.fan(others.iter().collect(), |other| {
-        let [by_beams, by_points] = lead(refine, (h, judgement), other, near);
+    let rivals = ranked(refine, (h, judgement), others, near, fan);
+    // With the base's twist in its own axes.
+    let mut in_base = refine.with_foot(h, best.covariance.clone(), near, fan);
+    let (mut open, mut spread) = open_joints(&in_base, h, &rivals);
+    let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
+    let mut of_joints = in_base.view_mut((6, 6), (n - 6, n - 6));
+    of_joints += sway(refine, best, &several, (near, points), fan);
+    let beyond = profile::beyond(refine, best, points, fan);
+    beyond.into_iter().enumerate().for_each(|(j, variance)| of_joints[(j, j)] += variance);
+    spread_spins(h, (spins, &several), &mut open, &mut spread);
+    let covariance = in_world_axes(&in_base, &h.local_from_base);
+    // Where a joint may stand elsewhere, so may the tip.
+    for (j, spread) in spread.iter().enumerate() {
+        in_base[(6 + j, 6 + j)] = in_base[(6 + j, 6 + j)].max(spread * spread);
+    }
+    // A flange that may stand otherwise is listed; it makes nobody doubt the robot.
+    let passed = |j: usize| (open[j] || prepared.leaf[j]) && !refine.is_prismatic(j);
+    let passed: Vec<bool> = (0..open.len()).map(passed).collect();
+    let other_answer = rivals.iter().find(|(_, (other, _))| differs(other, h, &passed));
+    let mut fit = Fit {
+        model: prepared.index,
+        model_name: model.name.clone(),
+        world_from_base: refine.scene.world_from_local() * h.local_from_base,
+        base_sigma: std::array::from_fn(|i| sigma_of(&covariance, i)),
+        joints: joints(refine, h, &covariance, (&open, &spread), &rivals),
+        covariance: (0..n * n).map(|i| covariance[(i / n, i % n)]).collect(),
+        score: judgement.score,
+        explained: judgement.explained,
+        rms: best.rms(),
+        surface_sigma: best.patch_sigma,
+        tip_sigma: tip_sigma(model, &h.posture, &in_base),
+        scans: scans(refine, best),
+        share: share(refine, best),
+        links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
+        runner_up: other_answer.map(|rival| runner_up(model, judgement, rival)),
+        equals: equals(h, &rivals, &passed, &several),
+        ..Fit::default()
+    };
+    verdict::pass(&mut fit, prepared, refine.scene, judgement);
+    fit
+}
+
+/// The others, the one that the best is least better than first.
+fn ranked<'o>(
+    refine: &Refine<'_>,
+    best: (&Hypothesis, &Judgement),
+    others: &'o [Polished],
+    near: &[u32],
+    fan: &impl Fan,
+) -> Vec<Rival<'o>> {
+    let mut rivals: Vec<Rival<'o>> = fan.fan(others.iter().collect(), |other| {
+        let [by_beams, by_points] = lead(refine, best, other, near);
         // What either of them has against the best counts against it, more than what the other has for it.
         (by_beams.max(by_points) + AGAINST * by_beams.min(by_points).min(0.0), other)
     });
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut own = refine.with_foot(h, best.covariance.clone(), near, fan);
-    let (mut open, mut spread) = open_joints(&own, h, &rivals);
-    let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
-    let mut of_joints = own.view_mut((6, 6), (n - 6, n - 6));
-    of_joints += sway(refine, best, &several, (near, points), fan);
-    let beyond = profile::beyond(refine, best, points, fan);
-    beyond.into_iter().enumerate().for_each(|(j, variance)| of_joints[(j, j)] += variance);
+    rivals
+}
+
+/// Joints that may stand at several values are open; how far away the farthest value is, and how wide a run of values, all as
+/// good, spread, radians or metres.
+fn spread_spins(
+    h: &Hypothesis,
+    (spins, several): (&[Spin], &[&Spin]),
+    open: &mut [bool],
+    spread: &mut [f64],
+) {
     for s in spins {
         // Any value of the run, each as likely.
         spread[s.joint] = spread[s.joint].max(s.extent / 3.0_f64.sqrt());
     }
-    for s in &several {
+    for s in several {
         open[s.joint] = true;
-        let own = h.posture[s.joint];
+        let value = h.posture[s.joint];
         spread[s.joint] =
-            s.values.iter().map(|v| turns::apart(own, *v)).fold(spread[s.joint], f64::max);
+            s.values.iter().map(|v| turns::apart(value, *v)).fold(spread[s.joint], f64::max);
     }
-    let covariance = in_world_axes(&own, &h.local_from_base);
-    // Where a joint may stand elsewhere, so may the tip.
-    for (j, spread) in spread.iter().enumerate() {
-        own[(6 + j, 6 + j)] = own[(6 + j, 6 + j)].max(spread * spread);
-    }
-    let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+}
+
+/// Standard deviation of an entry of the covariance: metres or radians.
+fn sigma_of(covariance: &DMatrix<f64>, i: usize) -> f64 {
+    covariance[(i, i)].max(0.0).sqrt()
+}
+
+/// The joints as they are reported; of each, whether it is open, and how far away the farthest of its other values is.
+fn joints(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    covariance: &DMatrix<f64>,
+    (open, spread): (&[bool], &[f64]),
+    rivals: &[Rival<'_>],
+) -> Vec<JointFit> {
+    let (prepared, model) = (refine.prepared, refine.prepared.model);
     // A wrist that may be flipped is not known, however narrow either answer is.
     let is_elsewhere = |j: usize| {
-        let differs = |(m, (other, _)): &(f64, &Polished)| *m < RIVAL && turn(other, h, j) > OTHER;
+        let differs = |(m, (other, _)): &Rival<'_>| *m < RIVAL && turn(other, h, j) > OTHER;
         !prepared.leaf[j] && rivals.iter().any(differs)
     };
     let joints = (0..h.posture.len()).map(|j| {
         let (value, equivalents) = whole_turns(model, &h.posture, j);
         // The width of one of several values is not how well the joint is known.
-        let sigma = sigma(6 + j).max(spread[j]).min(ANY_ANGLE);
+        let sigma = sigma_of(covariance, 6 + j).max(spread[j]).min(ANY_ANGLE);
         JointFit {
             name: model.joints[model.free[j]].name.clone(),
             value,
@@ -96,16 +163,17 @@ pub(crate) fn report(
             equivalents,
         }
     });
-    // A flange that may stand otherwise is listed; it makes nobody doubt the robot.
-    let passed = |j: usize| (open[j] || prepared.leaf[j]) && !refine.is_prismatic(j);
-    let passed: Vec<bool> = (0..open.len()).map(passed).collect();
-    let others = rivals.iter().filter(|(_, (other, _))| differs(other, h, &passed));
-    let equal =
-        |(m, (other, _)): &(f64, &Polished)| Equal { posture: other.posture.clone(), margin: *m };
+    joints.collect()
+}
+
+/// Postures that explain the points as well: the first few of the rivals, and other values of last joints. Joints that are
+/// passed over make no rival another answer.
+fn equals(h: &Hypothesis, rivals: &[Rival<'_>], passed: &[bool], several: &[&Spin]) -> Vec<Equal> {
     let same = rivals.iter().filter(|(m, (other, _))| {
-        let limit = if differs(other, h, &passed) { EQUAL } else { NEARLY_EQUAL };
-        *m < limit && (0..open.len()).any(|j| turn(other, h, j) > OTHER)
+        let limit = if differs(other, h, passed) { EQUAL } else { NEARLY_EQUAL };
+        *m < limit && (0..passed.len()).any(|j| turn(other, h, j) > OTHER)
     });
+    let equal = |(m, (other, _)): &Rival<'_>| Equal { posture: other.posture.clone(), margin: *m };
     let spun = several.iter().flat_map(|s| {
         s.values[1..].iter().map(|value| {
             let mut posture = h.posture.clone();
@@ -113,27 +181,7 @@ pub(crate) fn report(
             Equal { posture, margin: 0.0 }
         })
     });
-    let mut fit = Fit {
-        model: prepared.index,
-        model_name: model.name.clone(),
-        world_from_base: refine.scene.world_from_local() * h.local_from_base,
-        base_sigma: std::array::from_fn(sigma),
-        joints: joints.collect(),
-        covariance: (0..n * n).map(|i| covariance[(i / n, i % n)]).collect(),
-        score: judgement.score,
-        explained: judgement.explained,
-        rms: best.rms(),
-        surface_sigma: best.patch_sigma,
-        tip_sigma: tip_sigma(model, &h.posture, &own),
-        scans: scans(refine, best),
-        share: share(refine, best),
-        links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
-        runner_up: others.map(|rival| runner_up(model, judgement, rival)).next(),
-        equals: same.take(N_EQUALS).map(equal).chain(spun).collect(),
-        ..Fit::default()
-    };
-    verdict::pass(&mut fit, prepared, refine.scene, judgement);
-    fit
+    same.take(N_EQUALS).map(equal).chain(spun).collect()
 }
 
 /// What is said of a posture that is refused before it is worth a report: where it stood, and how much it explained.
@@ -159,7 +207,7 @@ pub(crate) fn refused(refine: &Refine<'_>, best: &Adjusted, judgement: &Judgemen
     }
 }
 
-fn runner_up(model: &Model, best: &Judgement, (margin, (_, other)): &(f64, &Polished)) -> RunnerUp {
+fn runner_up(model: &Model, best: &Judgement, (margin, (_, other)): &Rival<'_>) -> RunnerUp {
     RunnerUp {
         model: model.name.clone(),
         score: other.explained / best.explained * best.score,
@@ -205,7 +253,7 @@ fn share(refine: &Refine<'_>, best: &Adjusted) -> Option<ScanShare> {
 fn open_joints(
     covariance: &DMatrix<f64>,
     h: &Hypothesis,
-    rivals: &[(f64, &Polished)],
+    rivals: &[Rival<'_>],
 ) -> (Vec<bool>, Vec<f64>) {
     let n = h.posture.len();
     let mut open: Vec<bool> =

@@ -6,6 +6,7 @@ use geometry::{Evidence, Eye, Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::collections::HashSet;
 use std::hash::{BuildHasherDefault, Hasher};
+use std::sync::Arc;
 
 use crate::{Settings, noise};
 
@@ -89,7 +90,7 @@ impl<'a> Scene<'a> {
         }
         let cloud = views.iter().all(|view| view.images.is_empty()).then(|| {
             let few = thin.iter().map(|&i| points[i as usize].p).collect();
-            Cloud::new(few, CLOUD.0, CLOUD.1)
+            Arc::new(Cloud::new(few, CLOUD.0, CLOUD.1))
         });
         let scouts = View::scouts(views, region);
         let scouts = Evidence::new(scouts.iter().map(|v| Eye::new(&v.images)), cloud.clone());

@@ -62,26 +62,7 @@ pub fn fit(
     let refined = rough(&beam, &refine, found, &near, fan);
     let mut polished = fan.fan(refined, |h| polish(&refine, &h, &near, fan));
     sort(&mut polished);
-    for round in [Look::Again, Look::Others] {
-        let Some((best, judgement)) = polished.first() else { break };
-        if judgement.score < hopeless(scene) {
-            return None;
-        }
-        let more = match round {
-            Look::Again => closer.again(best, judgement, fan),
-            Look::Others => closer.alternatives(best, fan),
-        };
-        polished.extend(fan.fan(more, |h| {
-            // One joint of a fitted arm swept to a peak is less than a step off: what hangs beside its link must not draw it
-            // away within the gates of the coarse rounds.
-            let start = match round {
-                Look::Again => roughly(&refine, &h, &near, NEAR_ROUNDS, fan),
-                Look::Others => h,
-            };
-            polish(&refine, &start, &near, fan)
-        }));
-        sort(&mut polished);
-    }
+    look_beside(&closer, &refine, &mut polished, &near, fan)?;
     let (best, judgement) = polished.first()?;
     if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
         return None;
@@ -274,6 +255,37 @@ enum Look {
     Again,
     /// Other postures that may explain as much.
     Others,
+}
+
+/// Adds what is found beside the best of some postures, best first; `None` where it is too poor for a robot.
+fn look_beside(
+    beam: &Beam<'_>,
+    refine: &Refine<'_>,
+    polished: &mut Vec<Polished>,
+    near: &[u32],
+    fan: &impl Fan,
+) -> Option<()> {
+    for look in [Look::Again, Look::Others] {
+        let Some((best, judgement)) = polished.first() else { break };
+        if judgement.score < hopeless(refine.scene) {
+            return None;
+        }
+        let more = match look {
+            Look::Again => beam.again(best, judgement, fan),
+            Look::Others => beam.alternatives(best, fan),
+        };
+        polished.extend(fan.fan(more, |h| {
+            // One joint of a fitted arm swept to a peak is less than a step off: what hangs beside its link must not draw it
+            // away within the gates of the coarse rounds.
+            let start = match look {
+                Look::Again => roughly(refine, &h, near, NEAR_ROUNDS, fan),
+                Look::Others => h,
+            };
+            polish(refine, &start, near, fan)
+        }));
+        sort(polished);
+    }
+    Some(())
 }
 
 fn sort(polished: &mut [Polished]) {

@@ -41,6 +41,26 @@ const MAX_VALUES: usize = 3;
 /// A runner-up that the beams prefer less clearly than this makes the best doubtful.
 pub(crate) const RIVAL: f64 = 0.12;
 
+/// What speaks against a fit, in words.
+#[derive(Default)]
+struct Reasons {
+    refusals: Vec<String>,
+    doubts: Vec<String>,
+    /// Make nobody doubt it.
+    notes: Vec<String>,
+}
+
+impl Reasons {
+    /// Adds one to the refusals, or else to the doubts, where it is one.
+    fn grade(&mut self, refuse: bool, doubt: bool, say: impl Fn() -> String) {
+        if refuse {
+            self.refusals.push(say());
+        } else if doubt {
+            self.doubts.push(say());
+        }
+    }
+}
+
 /// Sets verdict and reasons from what stands in the fit and the judgement.
 pub(crate) fn pass(
     fit: &mut Fit,
@@ -48,28 +68,40 @@ pub(crate) fn pass(
     scene: &Scene<'_>,
     judgement: &Judgement,
 ) {
-    let mut doubts = Vec::new();
-    let mut refusals = Vec::new();
-    let mut notes = Vec::new();
-    grade(judgement.score < SCORE.1, judgement.score < SCORE.0, &mut refusals, &mut doubts, || {
+    let mut reasons = Reasons::default();
+    of_surface(&mut reasons, fit, scene, judgement);
+    of_joints(&mut reasons, fit, prepared);
+    let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
+    if rival {
+        reasons.doubts.push("another posture explains the points nearly as well".into());
+    }
+    let Reasons { refusals, doubts, notes } = reasons;
+    fit.verdict = match (refusals.is_empty(), doubts.is_empty()) {
+        (false, _) => Verdict::Refused,
+        (true, false) => Verdict::Doubtful,
+        (true, true) => Verdict::Trusted,
+    };
+    fit.reasons = refusals;
+    fit.reasons.extend(doubts);
+    fit.reasons.extend(notes);
+}
+
+/// What score, beams and residual say of the surface.
+fn of_surface(reasons: &mut Reasons, fit: &Fit, scene: &Scene<'_>, judgement: &Judgement) {
+    reasons.grade(judgement.score < SCORE.1, judgement.score < SCORE.0, || {
         format!("score {:.2}", judgement.score)
     });
     let v = judgement.violation;
-    grade(v > VIOLATION.1, v > VIOLATION.0, &mut refusals, &mut doubts, || {
+    reasons.grade(v > VIOLATION.1, v > VIOLATION.0, || {
         format!("beams went through {:.0} % of the judged surface", v * 100.0)
     });
     for link in fit.links.iter().filter(|l| l.seen > MIN_SEEN) {
         let v = link.violated;
-        grade(v > LINK_VIOLATION.1, v > LINK_VIOLATION.0, &mut refusals, &mut doubts, || {
+        reasons.grade(v > LINK_VIOLATION.1, v > LINK_VIOLATION.0, || {
             format!("beams went through {:.0} % of link '{}'", v * 100.0, link.name)
         });
     }
-    // A symmetric tool that may stand at several values stands the same at all of them: only what moves it counts.
-    let own_sigma = |j: usize| {
-        let n = 6 + fit.joints.len();
-        fit.covariance.get((6 + j) * (n + 1)).map_or(fit.joints[j].sigma, |v| v.max(0.0).sqrt())
-    };
-    let n_known = (0..fit.joints.len()).filter(|&j| own_sigma(j) < KNOWN_SIGMA).count();
+    let n_known = (0..fit.joints.len()).filter(|&j| own_sigma(fit, j) < KNOWN_SIGMA).count();
     let off = Off::new((fit.rms, scene.noise), [n_known, fit.joints.len()]);
     let words = || {
         format!(
@@ -79,18 +111,24 @@ pub(crate) fn pass(
         )
     };
     let is_wrong = off.is_anything || off.is_poor && judgement.score < POOR_SCORE;
-    grade(is_wrong, off.is_poor, &mut refusals, &mut doubts, words);
+    reasons.grade(is_wrong, off.is_poor, words);
     if !scene.evidence.has_beams() {
-        doubts.push("no scanner position is known, so nothing proves free space".into());
+        reasons.doubts.push("no scanner position is known, so nothing proves free space".into());
     }
     if judgement.seen < SEEN {
-        doubts.push(format!("only {:.0} % of the surface was seen", judgement.seen * 100.0));
+        let seen = judgement.seen * 100.0;
+        reasons.doubts.push(format!("only {seen:.0} % of the surface was seen"));
     }
+}
+
+/// What points, limits and the joints' standard deviations say of the posture.
+fn of_joints(reasons: &mut Reasons, fit: &Fit, prepared: &Prepared<'_>) {
+    let Reasons { doubts, notes, .. } = reasons;
     for (j, joint) in fit.joints.iter().enumerate() {
         let n: usize = prepared.carried(j).into_iter().map(|l| fit.links[l].n_points).sum();
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
             doubts.push(format!("only {n} points on what joint '{}' moves", joint.name));
-        } else if j + 1 < fit.joints.len() && own_sigma(j) > KNOWN_SIGMA {
+        } else if j + 1 < fit.joints.len() && own_sigma(fit, j) > KNOWN_SIGMA {
             doubts.push(format!("the points do not determine joint '{}'", joint.name));
         } else if !joint.determined {
             notes.push(undetermined(fit, j, prepared.slides(j)));
@@ -101,20 +139,19 @@ pub(crate) fn pass(
             doubts.push(format!("joint '{}' stands beyond its limit", joint.name));
         }
     }
+    let n_known = fit.joints.iter().filter(|joint| joint.sigma < KNOWN_SIGMA).count();
+    if 2 * n_known <= fit.joints.len() {
+        doubts.push(format!("{n_known} of {} joints are known", fit.joints.len()));
+    }
     let turning: Vec<usize> = (0..fit.joints.len()).filter(|&j| !prepared.slides(j)).collect();
     notes.extend(weak(fit, &turning));
-    let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
-    if rival {
-        doubts.push("another posture explains the points nearly as well".into());
-    }
-    fit.verdict = match (refusals.is_empty(), doubts.is_empty()) {
-        (false, _) => Verdict::Refused,
-        (true, false) => Verdict::Doubtful,
-        (true, true) => Verdict::Trusted,
-    };
-    fit.reasons = refusals;
-    fit.reasons.extend(doubts);
-    fit.reasons.extend(notes);
+}
+
+/// Standard deviation of a joint by the covariance alone, radians or metres: a symmetric tool that may stand at several values
+/// stands the same at all of them, and only what moves it counts.
+fn own_sigma(fit: &Fit, j: usize) -> f64 {
+    let n = 6 + fit.joints.len();
+    fit.covariance.get((6 + j) * (n + 1)).map_or(fit.joints[j].sigma, |v| v.max(0.0).sqrt())
 }
 
 /// How far the points are off a surface.
@@ -193,20 +230,6 @@ fn undetermined(fit: &Fit, j: usize, slides: bool) -> String {
         format!("the points determine joint '{}' only to ± {sigma}", joint.name)
     } else {
         format!("the points do not determine joint '{}'", joint.name)
-    }
-}
-
-fn grade(
-    refuse: bool,
-    doubt: bool,
-    refusals: &mut Vec<String>,
-    doubts: &mut Vec<String>,
-    say: impl Fn() -> String,
-) {
-    if refuse {
-        refusals.push(say());
-    } else if doubt {
-        doubts.push(say());
     }
 }
 

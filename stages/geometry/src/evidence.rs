@@ -3,6 +3,7 @@
 
 use crate::probe::{Probe, probe};
 use crate::{Eye, NearestField, Pose};
+use std::sync::Arc;
 
 /// Everything that was measured in a region.
 #[derive(Debug, Clone, Default)]
@@ -10,7 +11,7 @@ pub struct Evidence<'a> {
     /// Scans whose scanner is known.
     eyes: Vec<Eye<'a>>,
     /// Points of the scans whose scanner is not known.
-    cloud: Option<Cloud>,
+    cloud: Option<Arc<Cloud>>,
 }
 
 /// Points without beams: they can say "something is here", never "nothing is here".
@@ -36,7 +37,7 @@ const ABSENT_PRICE: f32 = 0.4;
 impl<'a> Evidence<'a> {
     /// Of scans whose scanner is known, those with images, and of points without beams.
     #[must_use]
-    pub fn new(eyes: impl IntoIterator<Item = Eye<'a>>, cloud: Option<Cloud>) -> Self {
+    pub fn new(eyes: impl IntoIterator<Item = Eye<'a>>, cloud: Option<Arc<Cloud>>) -> Self {
         Self { eyes: eyes.into_iter().filter(|eye| !eye.is_blind()).collect(), cloud }
     }
 

@@ -18,8 +18,25 @@ pub struct NearestField {
 const BRICK: u32 = N_LANES.ilog2();
 const IN_BRICK: u32 = (1 << BRICK) - 1;
 
+/// Most voxels of a field: a quarter of a gigabyte.
+pub const MAX_CELLS: f64 = 67e6;
+
+/// The edge, or the least wider one with which bounds take no more than the voxels that are allowed, in whole bricks.
+fn affordable(bounds: &Aabb, mut edge: f32) -> f32 {
+    let brick = |edge: f32| f64::from(edge) * f64::from(1_u32 << BRICK);
+    let n_cells = |edge: f32| {
+        let n = bounds.size().map(|s| (s / brick(edge)).ceil() + 1.0);
+        n.iter().product::<f64>() * f64::from(1_u32 << (3 * BRICK))
+    };
+    while n_cells(edge) > MAX_CELLS {
+        edge *= 1.25;
+    }
+    edge
+}
+
 impl NearestField {
-    /// A field of voxels with this `edge` that reaches `reach` metres from the samples.
+    /// A field of voxels with this `edge` that reaches `reach` metres from the samples; with wider ones where it would take more
+    /// than [`MAX_CELLS`] of them.
     #[must_use]
     pub fn new(points: &[[f32; 3]], edge: f32, reach: f32) -> Self {
         let bounds = Aabb::of(points.iter().map(|p| p.map(f64::from)));
@@ -27,6 +44,7 @@ impl NearestField {
             return Self::default();
         }
         let bounds = bounds.grown(f64::from(reach));
+        let edge = affordable(&bounds, edge);
         let size = bounds.size().map(|s| (s / f64::from(edge)).ceil() as usize + 1);
         let bricks = size.map(|n| n.div_ceil(1 << BRICK));
         let origin = bounds.min.map(|v| v as f32);

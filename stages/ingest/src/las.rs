@@ -103,8 +103,9 @@ impl Las {
         let decoder =
             Decoder::new(&records.header, &poses, found.scan_of_source, settings.max_range);
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let n_points = Some(records.header.n_points);
         Ok(Self {
-            masks: vec![MaskSeed { name, n_points: Some(records.header.n_points) }],
+            masks: vec![MaskSeed { name, n_points, n_stated: n_points }],
             scans: found.scans,
             extents: found.extents,
             bounds_hold: found.bounds_hold,

@@ -192,10 +192,18 @@ impl LasHeader {
                 return Ok(old);
             }
         }
+        let there = room / self.record_len as u64;
         if fits(n) {
+            // A writer that was stopped before it could put the count right leaves less in the header than in the file.
+            if !self.compressed && there > n {
+                return Err(Error::bad_input(format!(
+                    "{there} points are in the file, stated are only \"{n}\""
+                ))
+                .at("header")
+                .hint("the header lies: export the file again, or put the count right"));
+            }
             return Ok(n);
         }
-        let there = room / self.record_len as u64;
         Err(Error::bad_input(format!("only {there} points are in the file, stated are \"{n}\""))
             .at(format!("byte {n_bytes}"))
             .hint("the file is truncated; copy or export it again"))

@@ -116,21 +116,7 @@ pub(crate) fn find(
         let census = census(records)?;
         by_source_id(&mut found, scanners, &census, whole, &stem, seed);
     }
-    for scan in &mut found.scans {
-        let far = look.far_from(scan.world_from_scan.translation.vector, settings.max_range);
-        if far > 0 && !scan.scanner_known {
-            scan.notes.push(format!(
-                "{far} of {} points looked at lie more than {} km from the middle: such points are dropped",
-                look.points.len(),
-                settings.max_range / 1000.0
-            ));
-        }
-        if scan.scanner_known {
-            check_distance(scan, look.middle, settings)?;
-        } else {
-            scan.notes.push(NO_SCANNER.into());
-        }
-    }
+    found.scans.iter_mut().try_for_each(|scan| check_place(scan, &look, settings))?;
     Ok(found)
 }
 
@@ -169,6 +155,23 @@ fn by_source_id(
         found.extents.push(whole);
     }
     found.scan_of_source = scan_of_source;
+}
+
+/// Checks where a scan stands: its scanner where that is known, else how far its points lie apart; notes what is worth it.
+fn check_place(scan: &mut ScanSeed, look: &Look, settings: &Settings) -> Result<()> {
+    if scan.scanner_known {
+        return check_distance(scan, look.middle, settings);
+    }
+    let far = look.far_from(scan.world_from_scan.translation.vector, settings.max_range);
+    if far > 0 {
+        scan.notes.push(format!(
+            "{far} of {} points looked at lie more than {} km from the middle: such points are dropped",
+            look.points.len(),
+            settings.max_range / 1000.0
+        ));
+    }
+    scan.notes.push(NO_SCANNER.into());
+    Ok(())
 }
 
 fn check_distance(

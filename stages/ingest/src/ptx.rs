@@ -49,7 +49,8 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
     };
     for (block, notes) in blocks::find(path)? {
         let name = format!("scan {}", file.blocks.len() + 1);
-        file.masks.push(MaskSeed { name: name.clone(), n_points: Some(block.n_valid) });
+        let n_points = Some(block.n_valid);
+        file.masks.push(MaskSeed { name: name.clone(), n_points, n_stated: n_points });
         file.scans.push(ScanSeed {
             name,
             mask: file.blocks.len(),

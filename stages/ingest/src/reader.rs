@@ -21,6 +21,8 @@ pub(crate) struct MaskSeed {
     pub(crate) name: String,
     /// Valid points, where known without reading them.
     pub(crate) n_points: Option<u64>,
+    /// Points that the file states, those that are not valid with them; of no use but to guess how much there is.
+    pub(crate) n_stated: Option<u64>,
 }
 
 /// A scan of one file, before it has a number over all inputs and a lattice.

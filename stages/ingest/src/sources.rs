@@ -201,6 +201,14 @@ impl Sources {
         self.files.iter().any(|file| file.reader.has_color())
     }
 
+    /// Points that an opened input states, those that are not valid with them; `None` where it states none.
+    #[must_use]
+    pub fn n_stated(&self, input: InputId) -> Option<u64> {
+        let first = self.inputs.len() - self.files.len();
+        let file = self.files.get((input.0 as usize).checked_sub(first)?)?;
+        file.reader.masks().iter().map(|mask| mask.n_stated).sum()
+    }
+
     fn add(&mut self, path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<()> {
         let meta = std::fs::metadata(path)?;
         if meta.is_dir() {

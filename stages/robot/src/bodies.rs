@@ -13,6 +13,10 @@ use std::sync::Arc;
 
 /// A link larger than this is drawn in millimetres, metres.
 const LARGEST_LINK: f64 = 30.0;
+/// Size from which on a link is refused, metres: no beam of a gantry is so long; a hand's width in millimetres is.
+const FAR_TOO_LARGE: f64 = 100.0;
+/// Size below which it is, metres: a millimetre in millimetres is as large.
+const FAR_TOO_SMALL: f64 = 1e-5;
 
 /// Where meshes lie, and how large they may be.
 pub(crate) struct Bodies<'a> {
@@ -48,13 +52,16 @@ impl Bodies<'_> {
             any |= !mesh.triangles.is_empty();
             link.bounds = Aabb::of(mesh.vertices.iter().map(|p| p.map(f64::from)));
             let size = link.bounds.size().into_iter().fold(0.0, f64::max);
-            if size > LARGEST_LINK {
+            let in_millimetres = "if it is drawn in millimetres add scale=\"0.001 0.001 0.001\"";
+            if size > FAR_TOO_LARGE {
+                let what = format!("is far larger than any robot's link, metres \"{size:.1}\"");
+                findings.fail(&place, what, in_millimetres);
+            } else if !mesh.triangles.is_empty() && size < FAR_TOO_SMALL {
+                let what = format!("is too small for any scanner, metres \"{size:e}\"");
+                findings.fail(&place, what, "mend the scale of its mesh");
+            } else if size > LARGEST_LINK {
                 let what = format!("is larger than any robot's link, metres \"{size:.1}\"");
-                findings.warn(
-                    &place,
-                    what,
-                    "if it is drawn in millimetres add scale=\"0.001 0.001 0.001\"",
-                );
+                findings.warn(&place, what, in_millimetres);
             }
         }
         if !any {

@@ -134,37 +134,41 @@ fn check_joints(
             findings.fail(&place, "its axis has no direction", "give an axis such as \"0 0 1\"");
         }
         let follows = joint.mimic.is_some() || passive.contains_key(&joint.name);
-        if joint.limits.is_none() && matches!(joint.kind, T::Revolute | T::Prismatic) && !follows {
-            if joint.kind == T::Prismatic {
-                findings.fail(
-                    &place,
-                    "a prismatic joint without limits",
-                    "add <limit lower=.. upper=../>",
-                );
-            } else {
-                findings.warn(
-                    &place,
-                    "a revolute joint without limits is taken as continuous",
-                    "add a <limit>",
-                );
-            }
+        check_limits(joint, follows, &place, findings);
+    }
+}
+
+/// `follows` says whether another joint or a loop sets it.
+fn check_limits(joint: &RawJoint, follows: bool, place: &str, findings: &mut Findings) {
+    use urdf_rs::JointType as T;
+    if !matches!(joint.kind, T::Revolute | T::Prismatic) {
+        return;
+    }
+    match joint.limits {
+        None if follows => {}
+        None if joint.kind == T::Prismatic => findings.fail(
+            place,
+            "a prismatic joint without limits",
+            "add <limit lower=.. upper=../>",
+        ),
+        None => findings.warn(
+            place,
+            "a revolute joint without limits is taken as continuous",
+            "add a <limit>",
+        ),
+        Some([lower, upper]) if lower > upper => {
+            let what = format!("its lower limit is above the upper \"{lower} > {upper}\"");
+            findings.fail(place, what, "swap them");
         }
-        if let Some([lower, upper]) =
-            joint.limits.filter(|_| matches!(joint.kind, T::Revolute | T::Prismatic))
-        {
-            if lower > upper {
-                let what = format!("its lower limit is above the upper \"{lower} > {upper}\"");
-                findings.fail(&place, what, "swap them");
-            } else if lower == upper && !follows {
-                findings.warn(
-                    &place,
-                    format!("its limits leave no way to move \"{lower}\""),
-                    "make it fixed",
-                );
-            } else if joint.kind == T::Revolute && upper - lower > 100.0 {
-                findings.warn(&place, "its limits look like degrees", "write radians");
-            }
+        Some([lower, upper]) if lower == upper && !follows => findings.warn(
+            place,
+            format!("its limits leave no way to move \"{lower}\""),
+            "make it fixed",
+        ),
+        Some([lower, upper]) if joint.kind == T::Revolute && upper - lower > 100.0 => {
+            findings.warn(place, "its limits look like degrees", "write radians");
         }
+        Some(_) => {}
     }
 }
 

@@ -78,6 +78,16 @@ struct Seen<'a> {
     max: [f32; 3],
 }
 
+/// The links about a point.
+struct About<'a> {
+    /// How far it is within the reach of a link, at most, metres.
+    inset: f32,
+    /// Where fields tell: so many gates away, from which link, its distance, metres, and its surface's normal.
+    best: Option<(f32, &'a Seen<'a>, f32, [f32; 3])>,
+    /// The nearest by field, else by box: both distances, metres.
+    rough: (f32, f32, Option<&'a Seen<'a>>),
+}
+
 fn effectors(model: Option<&Model>) -> Vec<bool> {
     model.map_or_else(Vec::new, |m| m.links.iter().map(|l| l.role == Role::Effector).collect())
 }
@@ -147,28 +157,7 @@ impl Segment {
         world: [f64; 3],
         normal: impl Fn() -> Option<[f32; 3]>,
     ) -> Found {
-        let mut inset = f32::NEG_INFINITY;
-        let mut best: Option<(f32, &Seen, f32, [f32; 3])> = None;
-        let mut rough = (f32::INFINITY, f32::INFINITY, None::<&Seen>);
-        for s in seen {
-            let q = transform(&s.link_from_scan, p);
-            let outside = box_distance(s.min, s.max, q);
-            inset = inset.max(s.link.reach as f32 - outside);
-            let distance = match s.link.field.near(q) {
-                Ok(near) => {
-                    let gates = near.distance / s.link.gate;
-                    if best.is_none_or(|b| gates < b.0) {
-                        best = Some((gates, s, near.distance, near.normal));
-                    }
-                    near.distance
-                }
-                Err(distance) => distance,
-            };
-            // Far from every field the box decides which link is the nearest.
-            if (distance, outside) < (rough.0, rough.1) || rough.2.is_none() {
-                rough = (distance, outside, Some(s));
-            }
-        }
+        let About { inset, best, rough } = about(seen, p);
         let Some(nearest) = rough.2.filter(|_| inset > 0.0) else {
             return Found::Default;
         };
@@ -323,6 +312,33 @@ fn near<'a>(seen: &[Seen<'a>], points: &[[f32; 3]]) -> Vec<Seen<'a>> {
     let is_near =
         |s: &&Seen| box_distance(s.min, s.max, transform(&s.link_from_scan, middle)) <= far;
     seen.iter().filter(is_near).copied().collect()
+}
+
+/// What the fields and boxes of links say of a point.
+#[inline]
+fn about<'a>(seen: &'a [Seen<'a>], p: [f32; 3]) -> About<'a> {
+    let mut out =
+        About { inset: f32::NEG_INFINITY, best: None, rough: (f32::INFINITY, f32::INFINITY, None) };
+    for s in seen {
+        let q = transform(&s.link_from_scan, p);
+        let outside = box_distance(s.min, s.max, q);
+        out.inset = out.inset.max(s.link.reach as f32 - outside);
+        let distance = match s.link.field.near(q) {
+            Ok(near) => {
+                let gates = near.distance / s.link.gate;
+                if out.best.is_none_or(|b| gates < b.0) {
+                    out.best = Some((gates, s, near.distance, near.normal));
+                }
+                near.distance
+            }
+            Err(distance) => distance,
+        };
+        // Far from every field the box decides which link is the nearest.
+        if (distance, outside) < (out.rough.0, out.rough.1) || out.rough.2.is_none() {
+            out.rough = (distance, outside, Some(s));
+        }
+    }
+    out
 }
 
 /// Turns what was found into lists sorted by place and by voxel.

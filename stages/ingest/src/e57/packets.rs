@@ -8,6 +8,8 @@ use e57::Record;
 
 /// Bytes of the header of a section.
 const SECTION_HEADER: u64 = 32;
+/// Kind, flags, length and number of fields of a packet of points, bytes.
+const PACKET_HEADER: usize = 6;
 /// Largest run-ahead of one field before another, bytes. Writers fill packets of 64 KiB with all fields in step.
 const MAX_AHEAD: usize = 16 << 20;
 /// Records that may take no bits at all: a scan whose every field is constant has a handful of points.
@@ -47,7 +49,8 @@ impl Packets {
             .collect::<Result<Vec<_>>>()?;
         if n_records == 0 {
             // Nothing to read; writers leave any offset here.
-            return Ok(Self { pages, at: 0, end: 0, streams, n_left: 0, n_records });
+            let packets = Self { pages, at: 0, end: 0, streams, n_left: 0, n_records };
+            return packets.check_empty(file_offset);
         }
         let start = pages.logical(file_offset)?;
         let header: [u8; SECTION_HEADER as usize] =
@@ -74,6 +77,31 @@ impl Packets {
         let packets = Self { pages, at, end, streams, n_left: n_records, n_records };
         packets.check_count()?;
         Ok(packets)
+    }
+
+    /// Refuses points under an announced count of none; what is no section of points says nothing.
+    fn check_empty(mut self, file_offset: u64) -> Result<Self> {
+        if self.has_bytes(file_offset).unwrap_or(false) {
+            return Err(Error::bad_input("no points are announced, but there are some")
+                .at(format!("byte {file_offset}"))
+                .hint("its header lies: export the file anew"));
+        }
+        Ok(self)
+    }
+
+    /// Whether the first packet of a section holds anything of a field.
+    fn has_bytes(&mut self, file_offset: u64) -> Option<bool> {
+        let start = self.pages.logical(file_offset).ok()?;
+        let header = self.pages.read(start, SECTION_HEADER as usize).ok()?;
+        let first = u64::from_le_bytes(*header.get(16..)?.first_chunk()?);
+        if header[0] != 1 {
+            return None;
+        }
+        let packet = self.pages.logical(first).ok()?;
+        let head = self.pages.read(packet, PACKET_HEADER).ok().filter(|head| head[0] == 1)?;
+        let n_fields = usize::from(u16::from_le_bytes([head[4], head[5]]));
+        let lengths = self.pages.read(packet + PACKET_HEADER as u64, 2 * n_fields).ok()?;
+        Some(n_fields == self.streams.len() && lengths.iter().any(|b| *b > 0))
     }
 
     /// Refuses a count that the section's bytes cannot hold, before anything is sized by it.

@@ -107,7 +107,8 @@ impl E57Scan {
 
     /// The mask of this scan.
     pub(super) fn mask(&self, name: &str) -> MaskSeed {
-        MaskSeed { name: name.into(), n_points: self.n_valid() }
+        let n_stated = Some(self.n_records);
+        MaskSeed { name: name.into(), n_points: self.n_valid(), n_stated }
     }
 
     /// Number of points that the file does not flag as invalid, where that is known without reading them.

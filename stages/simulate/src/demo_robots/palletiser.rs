@@ -24,20 +24,11 @@ const LEVER: f64 = 0.30;
 const LEVER_Y: f64 = 0.20;
 /// Plane of the drive rod, metres.
 const ROD_Y: f64 = 0.265;
+/// Limits of joints that bars hold, radians.
+const FREE: [f64; 2] = [-3.2, 3.2];
 
 pub(super) fn design() -> Design {
     let part = |name, body| Part { name, body: Some(body) };
-    let turn = Hinge::turn;
-    let free = [-3.2, 3.2];
-    let bar_chain = |name, root, link: &'static str, joint, at, body, pin| SubChain {
-        name,
-        kind: "RR",
-        root,
-        parts: vec![Part { name: link, body: Some(body) }],
-        hinges: vec![turn(joint, root, link, at, Y, free)],
-        pin,
-    };
-    let foot_of_a = [0, 1, 2].map(|i| SHOULDER[i] + BAR_A[i]);
     Design {
         name: PALLETISER,
         parts: vec![
@@ -51,51 +42,71 @@ pub(super) fn design() -> Design {
             part("lever", lever()),
             Part { name: "tool0", body: None },
         ],
-        hinges: vec![
-            turn("joint_1", "base_link", "link_1", [0.0, 0.0, NECK], Z, FULL_TURN),
-            turn("joint_2", "link_1", "link_2", SHOULDER, Y, [-0.70, 1.20]),
-            turn("joint_elbow_plate", "link_2", "elbow_plate", [0.0, 0.0, UPPER], Y, free)
-                .following("joint_2", -1.0),
-            turn("joint_3", "elbow_plate", "link_3", [0.0; 3], Y, [-0.35, 1.22]),
-            turn("joint_wrist_plate", "link_3", "wrist_plate", [FORE, 0.0, 0.0], Y, free)
-                .following("joint_3", -1.0),
-            turn("joint_4", "wrist_plate", "link_4", [0.10, 0.0, -0.16], Z, FULL_TURN),
-            Hinge::fixed("joint_tool0", "link_4", "tool0", [0.0, 0.0, -0.045]),
-            turn("joint_lever", "link_1", "lever", [SHOULDER[0], LEVER_Y, SHOULDER[2]], Y, free)
-                .following("joint_3", 1.0),
-        ],
+        hinges: hinges(),
         tip: "tool0",
-        sub_chains: vec![
-            bar_chain(
-                "bar_a",
-                "link_1",
-                "bar_a",
-                "joint_bar_a",
-                foot_of_a,
-                bar([0.0, 0.0], [0.0, UPPER], 0.0, 0.022),
-                ("bar_a", [0.0, 0.0, UPPER], "elbow_plate", BAR_A),
-            ),
-            bar_chain(
-                "bar_b",
-                "elbow_plate",
-                "bar_b",
-                "joint_bar_b",
-                BAR_B,
-                bar([0.0, 0.0], [FORE, 0.0], 0.0, 0.02),
-                ("bar_b", [FORE, 0.0, 0.0], "wrist_plate", BAR_B),
-            ),
-            bar_chain(
-                "drive_rod",
-                "lever",
-                "drive_rod",
-                "joint_drive_rod",
-                [-LEVER, ROD_Y - LEVER_Y, 0.0],
-                bar([0.0, 0.0], [0.0, UPPER], 0.0, 0.026),
-                ("drive_rod", [0.0, 0.0, UPPER], "link_3", [-LEVER, ROD_Y, 0.0]),
-            ),
-        ],
+        sub_chains: bars(),
         effector: None,
     }
+}
+
+/// The joints; those of plates and lever follow the arm's.
+fn hinges() -> Vec<Hinge> {
+    let turn = Hinge::turn;
+    vec![
+        turn("joint_1", "base_link", "link_1", [0.0, 0.0, NECK], Z, FULL_TURN),
+        turn("joint_2", "link_1", "link_2", SHOULDER, Y, [-0.70, 1.20]),
+        turn("joint_elbow_plate", "link_2", "elbow_plate", [0.0, 0.0, UPPER], Y, FREE)
+            .following("joint_2", -1.0),
+        turn("joint_3", "elbow_plate", "link_3", [0.0; 3], Y, [-0.35, 1.22]),
+        turn("joint_wrist_plate", "link_3", "wrist_plate", [FORE, 0.0, 0.0], Y, FREE)
+            .following("joint_3", -1.0),
+        turn("joint_4", "wrist_plate", "link_4", [0.10, 0.0, -0.16], Z, FULL_TURN),
+        Hinge::fixed("joint_tool0", "link_4", "tool0", [0.0, 0.0, -0.045]),
+        turn("joint_lever", "link_1", "lever", [SHOULDER[0], LEVER_Y, SHOULDER[2]], Y, FREE)
+            .following("joint_3", 1.0),
+    ]
+}
+
+/// The bars, each a chain of its own that a pin closes.
+fn bars() -> Vec<SubChain> {
+    let bar_chain = |name, root, link: &'static str, joint, at, body, pin| SubChain {
+        name,
+        kind: "RR",
+        root,
+        parts: vec![Part { name: link, body: Some(body) }],
+        hinges: vec![Hinge::turn(joint, root, link, at, Y, FREE)],
+        pin,
+    };
+    let foot_of_a = [0, 1, 2].map(|i| SHOULDER[i] + BAR_A[i]);
+    vec![
+        bar_chain(
+            "bar_a",
+            "link_1",
+            "bar_a",
+            "joint_bar_a",
+            foot_of_a,
+            bar([0.0, 0.0], [0.0, UPPER], 0.0, 0.022),
+            ("bar_a", [0.0, 0.0, UPPER], "elbow_plate", BAR_A),
+        ),
+        bar_chain(
+            "bar_b",
+            "elbow_plate",
+            "bar_b",
+            "joint_bar_b",
+            BAR_B,
+            bar([0.0, 0.0], [FORE, 0.0], 0.0, 0.02),
+            ("bar_b", [FORE, 0.0, 0.0], "wrist_plate", BAR_B),
+        ),
+        bar_chain(
+            "drive_rod",
+            "lever",
+            "drive_rod",
+            "joint_drive_rod",
+            [-LEVER, ROD_Y - LEVER_Y, 0.0],
+            bar([0.0, 0.0], [0.0, UPPER], 0.0, 0.026),
+            ("drive_rod", [0.0, 0.0, UPPER], "link_3", [-LEVER, ROD_Y, 0.0]),
+        ),
+    ]
 }
 
 fn base() -> Solid {
