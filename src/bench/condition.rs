@@ -85,9 +85,9 @@ pub(super) const PLAIN: Condition = Condition {
     method: Method::Beam,
     perturbed_deg: 0.0,
 };
-/// Perturbations of the basin's curve, degrees (fit.md §6.4).
+/// Perturbations of the basin's curve, degrees (METHOD.md §20).
 const PERTURBED_DEG: [f64; 7] = [2.0, 5.0, 8.0, 12.0, 16.0, 20.0, 30.0];
-/// Errors of a usual registration (fit.md §5, T3).
+/// Errors of a usual registration (METHOD.md §19, T3).
 pub(super) const REGISTRATION: [f64; 3] = [0.002, 0.01, 0.001];
 
 /// A robot that its model fits poorly: shifts of joints, metres, and turns, degrees.
@@ -116,7 +116,7 @@ const CASES_OF_A_ROBOT: u64 = 1000;
 /// A suite: name, number of cases for each model, and the condition of its k-th case.
 type Suite = (&'static str, usize, fn(usize) -> Condition);
 
-/// All suites, in the order of fit.md §5.
+/// All suites, in the order of METHOD.md §19.
 const SUITES: &[Suite] = &[
     ("paper", 3, |_| Condition { n_beams: 5e7, noise: 0.0, ..PLAIN }),
     ("source", 3, |_| Condition { n_beams: 5e7, noise: 0.0, method: Method::Paper, ..PLAIN }),

@@ -27,10 +27,10 @@ pub(super) struct Drawn {
     pub(super) beside: Option<Vector>,
 }
 
-/// Starts of a case of the basin's curve, and how far their bases are off: metres, radians (fit.md §6.4).
+/// Starts of a case of the basin's curve, and how far their bases are off: metres, radians (METHOD.md §20).
 const N_STARTS: usize = 24;
 const START_BASE: (f64, f64) = (0.02, 0.0175);
-/// Radius of the circle of scanners, metres, at least (fit.md §5); larger robots are scanned from farther away.
+/// Radius of the circle of scanners, metres, at least (METHOD.md §19); larger robots are scanned from farther away.
 const CIRCLE: f64 = 5.0;
 /// Height of a scanner, metres.
 const HEIGHT: f64 = 1.6;

@@ -2,7 +2,7 @@
 //!
 //! Each case is drawn from a seed, scanned in memory by the virtual scanner and sent through the same stages as the
 //! main job, from strips of points on: nothing but the scans' points and stated poses goes in. Suites and their goals
-//! follow fit.md §5.
+//! follow METHOD.md §19.
 
 mod cases;
 mod cell;

@@ -1,4 +1,4 @@
-//! A drawn robot in; what stands in the way of its scanners as fit.md §5 (T6) has it out: plates about its foot, a conveyor that
+//! A drawn robot in; what stands in the way of its scanners as METHOD.md §19 (T6) has it out: plates about its foot, a conveyor that
 //! touches it, a fence on three sides, another robot whose arm crosses it.
 
 use super::condition::{Case, Condition};

@@ -1,5 +1,5 @@
 //! A refined posture and its points in; out come base, joints and the scans' own errors in one robust least-squares
-//! adjustment, with a covariance that stays honest when errors of points are alike (fit.md §4g, §6.6).
+//! adjustment, with a covariance that stays honest when errors of points are alike (METHOD.md §11, §14).
 //!
 //! Beside base and joints each scan has a shift, a turn about its scanner and a range bias with priors: scans are
 //! registered to millimetres only, and a fit that does not know that bends the robot. And each patch of the model's

@@ -1,5 +1,5 @@
 //! A fitted posture in; out come other postures worth a look: other values of one joint, the flipped wrist, and a new
-//! search from the joint on from which the beams contradict the links (fit.md §4e).
+//! search from the joint on from which the beams contradict the links (METHOD.md §9).
 
 use contract::Fan;
 use nalgebra::UnitQuaternion;
@@ -12,9 +12,9 @@ use crate::turns;
 
 /// Share of the links' and the whole score that an alternative may lack and still be refined.
 const SHORT: f64 = 0.15;
-/// Share of a link that beams may go through before it is searched anew (fit.md §4e).
+/// Share of a link that beams may go through before it is searched anew (METHOD.md §9).
 const MAX_VIOLATED: f32 = 0.06;
-/// Share of a link's judged surface that must be met, else it is searched anew (fit.md §4e).
+/// Share of a link's judged surface that must be met, else it is searched anew (METHOD.md §9).
 const MIN_MATCHED: f32 = 0.35;
 /// Smallest share of a link's surface that must be judged for that.
 const MIN_SEEN: f32 = 0.05;

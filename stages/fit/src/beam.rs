@@ -1,5 +1,5 @@
 //! Base poses in; out come postures that the beams allow, best first: a beam search along the joints, in which every
-//! local maximum of every sweep competes with all others (fit.md §4d, §4e).
+//! local maximum of every sweep competes with all others (METHOD.md §8, §9).
 
 use contract::Fan;
 use geometry::Pose;
@@ -32,7 +32,7 @@ pub(crate) struct Beam<'a> {
 /// Mean score of the links placed so far down to which a search goes on: half of what it is where no beam reached any of them, as
 /// a bench or the arm itself may hide a foot.
 const MOST_HIDDEN: f64 = 0.5 * HIDDEN_PRICE as f64;
-/// Tolerance where what carries the searched links is fitted already, metres (fit.md §4e).
+/// Tolerance where what carries the searched links is fitted already, metres (METHOD.md §9).
 const FITTED: f64 = 0.02;
 
 impl<'a> Beam<'a> {

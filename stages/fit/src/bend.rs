@@ -1,5 +1,5 @@
 //! An adjusted posture in; out come other values of the joint before its last at which the points fit about as well: a
-//! wrist of which little is seen has many, and what hangs on its flange draws it to some of them (fit.md §4e).
+//! wrist of which little is seen has many, and what hangs on its flange draws it to some of them (METHOD.md §9).
 
 use contract::Fan;
 use std::f64::consts::TAU;

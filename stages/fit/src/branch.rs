@@ -1,5 +1,5 @@
 //! A settled posture in; out come the closed loops that stand on the other of their two solutions, by the points and
-//! beams of their own links (fit.md §4h): limits and closure say which solutions there are, the assembly mode of the zero
+//! beams of their own links (METHOD.md §12): limits and closure say which solutions there are, the assembly mode of the zero
 //! posture stays where the points cannot tell.
 
 use robot::Model;

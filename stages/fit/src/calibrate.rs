@@ -1,5 +1,5 @@
 //! A fit and its points in; out come where the robot's joints really are on their links, as far as the points tell, and
-//! the fit of the robot so corrected (fit.md §4f: swing and offset of axes; §7: link lengths).
+//! the fit of the robot so corrected (METHOD.md §17).
 //!
 //! Each free joint gets a shift and a turn of its frame with a prior beside base, posture and scans in one adjustment;
 //! about (or along) its own axis it gets none, since the joint itself moves there: what a controller's zero is off by
@@ -25,7 +25,7 @@ use crate::{Prepared, Scene, Settings, report};
 const N_STEPS: usize = 4;
 /// Standard deviation of what is not asked, relative to that of the prior.
 const FIXED: f64 = 1e-3;
-/// A joint this far off is worth a word: swing, radians (0.1°), and offset of its axis, metres (fit.md §4f) …
+/// A joint this far off is worth a word: swing, radians (0.1°), and offset of its axis, metres (METHOD.md §17) …
 const WORTH: (f64, f64) = (0.001_75, 0.002);
 /// … if it is so many standard deviations.
 const CLEAR: f64 = 3.0;

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use crate::exact::Triangles;
 
-/// Coarse field: reach covers the first gate (120 mm, fit.md §6.4), voxels a fifth of it.
+/// Coarse field: reach covers the first gate (120 mm, METHOD.md §11), voxels a fifth of it.
 const COARSE: (f32, f32, usize) = (0.025, 0.15, 2500);
 /// Largest voxel and reach of the fine field, metres: the reach of the last gates.
 const FINE: (f32, f32) = (0.007, 0.032);
@@ -15,7 +15,7 @@ const FINE: (f32, f32) = (0.007, 0.032);
 const VOXEL: f32 = 1.4;
 /// … but no more voxels than about so many.
 const MAX_VOXELS: f64 = 5e5;
-/// Edge of a patch, metres: within it a model's error of shape is about the same (fit.md §4g: 12–15 cm).
+/// Edge of a patch, metres: within it a model's error of shape is about the same (METHOD.md §4).
 const PATCH: f32 = 0.13;
 /// Samples within a cube of this edge, metres, are neighbours in memory: some twenty of them.
 const NEAR: f32 = 0.016;

@@ -1,6 +1,6 @@
 //! An adjusted posture in; out comes how far its base may turn under the robot, the first joint turned back, before the points of
 //! the foot say no: a round foot of which little is seen may stand anyhow, and its valley of squares has no slope to tell
-//! the covariance so (fit.md §4e).
+//! the covariance so (METHOD.md §14).
 
 use contract::Fan;
 use geometry::Vector;

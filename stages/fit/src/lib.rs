@@ -2,8 +2,8 @@
 //!
 //! The way: beam search over the joints on the depth images (`beam`), joint Gauss–Newton over base and all joints on
 //! the points (`refine`), evidence and covariance (`judge`, `report`), verdict in words (`verdict`), and the choice
-//! among candidates that claim the same points (`choose`). Method and maths: fit.md §4d–§4g. Beside it stands the method
-//! of the source, link after link (`paper`).
+//! among candidates that claim the same points (`choose`). Method and maths: METHOD.md §8–§14. Beside it stands the method
+//! of the source (METHOD.md §10, §21), link after link (`paper`).
 #![forbid(unsafe_code)]
 
 mod adjust;

@@ -10,7 +10,7 @@ use crate::facets::Facet;
 use crate::placed::{Near, Placed};
 use crate::refine::Refine;
 
-/// Beam direction noise of a common scanner, radians (19″; fit.md §3.2).
+/// Beam direction noise of a common scanner, radians (19″; METHOD.md §3).
 const ANGLE_NOISE: f64 = 9e-5;
 /// What tessellation of the model and rounding leave at least, metres, one sigma.
 const SURFACE_NOISE: f64 = 3e-4;

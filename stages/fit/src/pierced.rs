@@ -1,5 +1,5 @@
 //! A posture in; the places of the model's surface that beams went through, each with where its beam ended, out: the other
-//! way round than points look for the model (CAD to scan, fit.md §4g), with visibility.
+//! way round than points look for the model (CAD to scan, METHOD.md §11), with visibility.
 
 use geometry::Vector;
 use geometry::depth::{rotate, rows, transform};

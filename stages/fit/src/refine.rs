@@ -1,5 +1,5 @@
 //! A posture near the truth and points in; out come base and all joints at the least robust point-to-plane error
-//! (fit.md §4g).
+//! (METHOD.md §11).
 //!
 //! Residual of a point q (base frame) at the facet (x, n) of a link: `r = n·(q − x)`. A joint moves the facet with
 //! the twist (v, w), so `∂r/∂θ = −(n·v + w·(q × n))`: exact, since x and n both move. The base moves the point's
@@ -24,7 +24,7 @@ pub(crate) struct Round {
     pub(crate) balanced: bool,
 }
 
-/// From a beam solution: gates as in fit.md §4g, ending where the fine field takes over.
+/// From a beam solution: gates as in METHOD.md §11, ending where the fine field takes over.
 pub(crate) const COARSE_ROUNDS: [Round; 9] = [
     Round { gate: 0.120, balanced: true },
     Round { gate: 0.120, balanced: true },

@@ -15,7 +15,7 @@ pub enum Method {
 pub struct Settings {
     /// How postures are found.
     pub method: Method,
-    /// Hypotheses kept at each joint of the beam. fit.md §6.5: 150 lost none of 60; 100 lose at most one of 200.
+    /// Hypotheses kept at each joint of the beam. METHOD.md §8: 150 lost none of 60; 100 lose at most one of 200.
     pub beam: usize,
     /// Hypotheses that are settled (base and all joints so far shaken) at each joint, best first.
     pub settle: usize,
@@ -51,7 +51,7 @@ pub struct Settings {
     /// The same where no plane is in view: any height, but upright as plumb as people bolt robots down.
     pub guess_sigma: [f64; 2],
     /// Standard deviations of a scan's errors of registration and range: shift on each axis, metres, turn about each
-    /// axis, radians (0.02°), range bias, metres (fit.md §4g).
+    /// axis, radians (0.02°), range bias, metres (METHOD.md §11).
     pub scan_sigma: [f64; 3],
     /// Whether robots tell one another of the errors of scans that see several of them.
     pub together: bool,

@@ -1,5 +1,5 @@
 //! An adjusted posture in; out come the other values of its last joints at which the points fit as well or better: a
-//! flange with six bolts looks the same every 60°, and only points on its small features tell (fit.md §4e).
+//! flange with six bolts looks the same every 60°, and only points on its small features tell (METHOD.md §9).
 
 use contract::Fan;
 use std::f64::consts::TAU;

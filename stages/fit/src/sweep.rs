@@ -1,5 +1,5 @@
 //! A posture and one of its joints in; out comes how far the points near the links that the joint moves are from the arm as
-//! it turns (fit.md §4e).
+//! it turns (METHOD.md §9).
 
 use geometry::Point;
 use geometry::depth::transform;

@@ -1,5 +1,5 @@
 //! Robots that the same scans see, and what stands still about them, each with what it says of the scans' errors, in; base and
-//! joints of each robot by what all of them say of the scans, out (fit.md §4g).
+//! joints of each robot by what all of them say of the scans, out (METHOD.md §18).
 //!
 //! Near its minimum an adjustment is linear: what a robot's points say of the errors `e_i` of its scans is a normal distribution
 //! (information `Λ_i`, vector `η_i`), and robot and joints give way to them by `x_i = x̂_i + G_i (e_i − ê_i)`. Scans err alike near

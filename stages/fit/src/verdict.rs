@@ -1,4 +1,4 @@
-//! Evidence of a fit in; verdict and reasons in words out (fit.md §4l).
+//! Evidence of a fit in; verdict and reasons in words out (METHOD.md §15).
 
 use contract::{Fit, Verdict};
 use robot::JointKind;

@@ -1,4 +1,4 @@
-//! The covariance of a fit in; which unknowns trade against one another, in words, out (fit.md §4g).
+//! The covariance of a fit in; which unknowns trade against one another, in words, out (METHOD.md §14).
 
 use contract::Fit;
 use nalgebra::DMatrix;

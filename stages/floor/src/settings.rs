@@ -3,7 +3,7 @@
 /// Settings of the floor stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Largest tilt of an installation plane that is not floor, radians: 3° (fit.md §4a).
+    /// Largest tilt of an installation plane that is not floor, radians: 3° (METHOD.md §5).
     pub max_tilt: f64,
     /// Largest tilt of a floor level, radians: 5°, since scanners on carts are not levelled.
     pub max_floor_tilt: f64,

@@ -70,13 +70,13 @@ impl Probe {
     }
 }
 
-/// Price of a sample seen through, against one on the surface (fit.md §4d).
+/// Price of a sample seen through, against one on the surface (METHOD.md §8).
 const SEEN_THROUGH_PRICE: f32 = 1.5;
-/// Price of a sample that no scan could judge: small, so that hiding is not rewarded (fit.md §4d).
+/// Price of a sample that no scan could judge: small, so that hiding is not rewarded (METHOD.md §8).
 pub const HIDDEN_PRICE: f32 = 0.1;
 
 /// Judges surface samples (`points` with outward `normals`, in the frame of a body) with the body at
-/// `local_from_body`: one beam through a sample in any scan outweighs any match in another (fit.md §4d).
+/// `local_from_body`: one beam through a sample in any scan outweighs any match in another (METHOD.md §8).
 #[must_use]
 pub fn probe(
     eyes: &[Eye<'_>],

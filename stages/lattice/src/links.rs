@@ -91,7 +91,7 @@ fn link_one(
         let difference = (range - there).abs();
         let sigma = raster.noise.sigma(mean);
         let across = mean * angle * by as f32;
-        // A surface seen at this incidence cannot step more than that (fit.md §2.1).
+        // A surface seen at this incidence cannot step more than that (METHOD.md §2).
         let mut joined = difference <= across * rule.incidence + 4.243 * sigma;
         if !joined && difference <= across * rule.grazing && room.0 >= by && room.1 >= 2 * by {
             let before = raster.xyzr[step(side, at, back, by)][3];

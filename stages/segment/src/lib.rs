@@ -14,7 +14,7 @@ pub use step::{Scratch, Segment};
 /// What may be tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Standard deviation of a range, metres: 2 mm is a phase scanner on dark steel (fit.md §3.2).
+    /// Standard deviation of a range, metres: 2 mm is a phase scanner on dark steel (METHOD.md §3).
     pub sigma_range: f64,
     /// Standard deviation of a mesh from the real casting, metres.
     pub sigma_cad: f64,

@@ -4,7 +4,7 @@ use contract::{Lattice, TILE_SIDE, Tile};
 
 const SIDE: i32 = TILE_SIDE as i32;
 const EMPTY: u32 = u32::MAX;
-/// Tangent of the steepest incidence at which neighbours still belong to one surface: 80° (fit.md §2.1).
+/// Tangent of the steepest incidence at which neighbours still belong to one surface: 80° (METHOD.md §2).
 const MAX_SLOPE: f32 = 5.67;
 /// Half the width over which a normal is taken, metres: 2 mm of noise then tilts it by about 5°.
 const NORMAL_SPAN: f32 = 0.015;

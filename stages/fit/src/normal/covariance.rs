@@ -1,5 +1,5 @@
 //! Normal equations with all that was added to them in; how well base, joints and the scans' errors are known, out
-//! (fit.md §4g).
+//! (METHOD.md §14).
 
 use nalgebra::{DMatrix, DVector};
 

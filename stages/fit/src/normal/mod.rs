@@ -1,5 +1,5 @@
 //! Residuals with their derivatives in; out come the normal equations of robot and scans with the offsets of the
-//! model's patches taken out in closed form, and their solution (fit.md §4g).
+//! model's patches taken out in closed form, and their solution (METHOD.md §11).
 //!
 //! A patch offset `u ~ N(0, σ_u²)` common to the residuals of patch c: marginalised it gives
 //! `H −= Σ κ_c a_c a_cᵀ`, `g −= Σ κ_c a_c R_c` with `a_c = Σ w J`, `R_c = Σ w r`, `W_c = Σ w`,
@@ -262,7 +262,7 @@ const MIN_ROWS: usize = 30;
 const MAX_STEP: f64 = 0.1;
 
 /// Variance of the patches' offsets, m²: that of their mean residuals beyond what noise explains, each weighted by how
-/// well it is known against an offset of a millimetre (fit.md §4g).
+/// well it is known against an offset of a millimetre (METHOD.md §11).
 fn patch_variance<'a>(patches: impl Iterator<Item = &'a Patch>) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     for patch in patches.filter(|p| p.weight > 0.0) {

@@ -1,5 +1,5 @@
 //! A posture with a joint's rough value in; its value by registration of the joint's links, tied to two points of the
-//! joint's axis, out (the source, Eq. 4.1; fit.md §4f).
+//! joint's axis, out (the source, Eq. 4.1; METHOD.md §10).
 
 use geometry::{Point, Pose, Vector, robust};
 use robot::JointKind;

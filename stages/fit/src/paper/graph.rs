@@ -1,5 +1,5 @@
 //! Points and their heights over a plane in; out come those near the plane along the surface, by Dijkstra's algorithm
-//! on the graph of nearest neighbours (the source, §4; fit.md §4b).
+//! on the graph of nearest neighbours (the source, §3.1; METHOD.md §10).
 
 use geometry::Vector;
 use std::cmp::Reverse;

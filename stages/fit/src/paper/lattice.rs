@@ -1,5 +1,5 @@
 //! Views in; out come angular lattices of their points, on which the point nearest to any place is found by looking at
-//! a few pixels (the source, §5.1).
+//! a few pixels (the source, §4).
 
 use contract::View;
 use geometry::{Point, Vector, direction};

@@ -1,5 +1,5 @@
 //! Points that may be a base, and the base's model, in; out comes where it stands, by boxes in the plane and equal
-//! steps of yaw (the source, §4).
+//! steps of yaw (the source, §3.2).
 
 use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Matrix2, Rotation3, Translation3, Unit, UnitQuaternion, Vector2};
@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::Paper;
 
-/// Eigenvalues of a footprint nearer than this ratio: its axes mean nothing (fit.md §4c).
+/// Eigenvalues of a footprint nearer than this ratio: its axes mean nothing (METHOD.md §10).
 const SQUARE: f64 = 1.3;
 /// Yaws that are searched more finely and registered …
 const N_FINE: usize = 6;

@@ -3,7 +3,7 @@
 /// Tunables of `--method paper`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Edge of the grid that thins points and base for the graph, metres (fit.md §4b).
+    /// Edge of the grid that thins points and base for the graph, metres (METHOD.md §10).
     pub voxel: f64,
     /// Neighbours of a point in the graph.
     pub n_neighbours: usize,

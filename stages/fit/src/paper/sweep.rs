@@ -1,4 +1,4 @@
-//! A posture whose joints before one are set in; that joint's value by a sweep in equal steps out (the source, §5).
+//! A posture whose joints before one are set in; that joint's value by a sweep in equal steps out (the source, §4).
 
 use geometry::{Point, Pose, Vector};
 use robot::JointKind;
