@@ -52,6 +52,25 @@ impl Search<'_, '_> {
         self.fits(scene, &few(hung, MAX_MOUNTS), tried)
     }
 
+    /// Fits of robots that hang beside trusted ones, where much is left that those do not explain.
+    pub(super) fn hung_beside(
+        &self,
+        scene: &Scene<'_>,
+        sight: &mut Sight<'_>,
+        fits: &[Fit],
+        tried: &mut Tried,
+    ) -> Result<Vec<Fit>> {
+        if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
+            // They were asked for in all of the region.
+            return Ok(Vec::new());
+        }
+        let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
+        let find = || self.candidates(sight, &self.mounts(scene.region), (MIN_MOUNT_SCORE, 1));
+        let mut hung = self.piece((scene.region, "mounts beside"), find)?;
+        hung.retain(|c| self.is_above_floor(c) && is_apart(c, &feet));
+        self.fits(scene, &few(hung, MAX_MOUNTS), tried)
+    }
+
     /// Ceilings, walls and tilted plates about the region.
     fn mounts(&self, region: &Region) -> Vec<InstallationPlane> {
         let world = region.world_bounds().grown(0.3);

@@ -163,6 +163,7 @@ impl<'a, 'm> Search<'a, 'm> {
         // At one place all that could be left over was looked at already.
         if about.is_none() {
             fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits, &mut tried)?);
+            fits.extend(self.hung_beside(&scene, &mut sight, &fits, &mut tried)?);
         }
         fits.extend(self.on_stands(&scene, &mut sight, &fits, &is_wanted, &mut tried)?);
         let sights = Sights { region, views: &views, floors: &planes };

@@ -7,15 +7,18 @@ use geometry::{Aabb, Moments, Vector};
 /// Least area of a patch that is kept for this, m²: less says little of where a plane lies.
 pub(crate) const MIN_PATCH: f64 = 0.02;
 /// Least area of such a plane, m²: half a plate of 0.5 m × 0.5 m, the rest hidden by the foot.
-const MIN_AREA: f64 = 0.12;
+const MIN_AREA: f64 = 0.06;
 /// Planes of patches that differ by less are one, metres, and their normals, radians (3°).
 const SAME: (f64, f64) = (0.02, 0.052);
 /// Gap between patches of one plane, metres: what a foot hides.
 const GAP: f64 = 0.5;
-/// Most planes of one place.
+/// Most planes of one place that look down, and of those that do not: a hall has more and larger walls than plates.
 const MOST: usize = 8;
+/// A normal that points so far down is a ceiling's, cosine (45°).
+const DOWN: f64 = -0.7;
 
-/// The largest planes of these patches, largest first; normals to the side that was seen.
+/// The largest planes of these patches, those that look down and the others each largest first; normals to the side that was
+/// seen.
 #[must_use]
 pub fn mounts(patches: &[&PlanePatch]) -> Vec<InstallationPlane> {
     let mut union = Union::new(patches.len());
@@ -33,8 +36,12 @@ pub fn mounts(patches: &[&PlanePatch]) -> Vec<InstallationPlane> {
         .filter_map(|group| plane_of(&group.iter().map(|g| patches[g.1]).collect::<Vec<_>>()))
         .collect();
     out.sort_by(|a, b| b.area.total_cmp(&a.area));
-    out.truncate(MOST);
-    out
+    let (mut down, mut others): (Vec<_>, Vec<_>) =
+        out.into_iter().partition(|p| p.plane.normal.z < DOWN);
+    down.truncate(MOST);
+    others.truncate(MOST);
+    down.extend(others);
+    down
 }
 
 fn one_plane(a: &PlanePatch, b: &PlanePatch) -> bool {

@@ -30,9 +30,11 @@ impl Cloud {
     }
 }
 
-/// Price of a surface sample without a point near it, where no beam can say whether it is hidden: half of the outer
-/// surface of a body is usually seen from somewhere, so absence must cost something.
-const ABSENT_PRICE: f32 = 0.4;
+/// Price of a surface sample without a point near it, where no beam can say whether it is hidden: of a robot two or three
+/// scanners see a third to a half, so absence must cost something, but a right posture must stay above nothing.
+const ABSENT_PRICE: f32 = 0.25;
+/// A point is on a surface sample up to so far beside it, metres: points are thinned to [`Cloud`]'s edge.
+const BESIDE: f32 = 0.02;
 
 impl<'a> Evidence<'a> {
     /// Of scans whose scanner is known, those with images, and of points without beams.
@@ -58,7 +60,9 @@ impl<'a> Evidence<'a> {
         tolerance: f32,
     ) -> Probe {
         match &self.cloud {
-            Some(cloud) if self.eyes.is_empty() => cloud.probe(points, local_from_body, tolerance),
+            Some(cloud) if self.eyes.is_empty() => {
+                cloud.probe((points, normals), local_from_body, tolerance)
+            },
             _ => probe(&self.eyes, points, normals, local_from_body, tolerance),
         }
     }
@@ -71,17 +75,25 @@ impl<'a> Evidence<'a> {
 }
 
 impl Cloud {
-    fn probe(&self, points: &[[f32; 3]], local_from_body: &Pose, tolerance: f32) -> Probe {
+    /// Judges samples by how far the nearest point is off the surface; how far beside says how dense the points are.
+    fn probe(
+        &self,
+        (points, normals): (&[[f32; 3]], &[[f32; 3]]),
+        local_from_body: &Pose,
+        tolerance: f32,
+    ) -> Probe {
         let m = crate::depth::rows(local_from_body);
         let mut out = Probe { n: points.len() as u32, ..Probe::default() };
-        for p in points {
-            let q = crate::depth::transform(&m, *p);
+        for (p, n) in points.iter().zip(normals) {
+            let (q, n) = (crate::depth::transform(&m, *p), crate::depth::rotate(&m, *n));
             let near = self.field.nearest(q).map(|i| {
-                let a = self.points[i];
-                (0..3).map(|k| (a[k] - q[k]) * (a[k] - q[k])).sum::<f32>().sqrt()
+                let off: [f32; 3] = std::array::from_fn(|k| self.points[i][k] - q[k]);
+                let along = off[0] * n[0] + off[1] * n[1] + off[2] * n[2];
+                let square = off.iter().map(|v| v * v).sum::<f32>();
+                (along.abs(), square - along * along)
             });
             match near {
-                Some(d) if d < tolerance => {
+                Some((d, beside)) if d < tolerance && beside < BESIDE * BESIDE => {
                     out.score += 1.0 - d / tolerance;
                     out.n_seen += 1;
                     out.n_on += 1;
