@@ -62,7 +62,7 @@ impl<'a> Evidence<'a> {
         match &self.cloud {
             Some(cloud) if self.eyes.is_empty() => {
                 cloud.probe((points, normals), local_from_body, tolerance)
-            },
+            }
             _ => probe(&self.eyes, points, normals, local_from_body, tolerance),
         }
     }

@@ -3,6 +3,8 @@
 use geometry::Probe;
 use geometry::probe::HIDDEN_PRICE;
 use robot::Model;
+use std::collections::HashMap;
+use std::f64::consts::TAU;
 
 /// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw leaves room for others, which
 /// fewer scans see.
@@ -56,7 +58,7 @@ pub(crate) fn of_judged(probe: &Probe) -> f64 {
 }
 
 pub(crate) fn coarse_yaw() -> f64 {
-    std::f64::consts::TAU / 24.0
+    TAU / 24.0
 }
 
 /// The first link in tree order that has a surface and hangs rigidly on the root.
@@ -104,25 +106,35 @@ pub(crate) fn best(
             .then(a.yaw.total_cmp(&b.yaw))
     });
     let mut kept: Vec<Trial> = Vec::new();
+    // What is near enough to matter lies in the same cell or beside it.
+    let edge = PLACE.max(step);
+    let cell = |t: &Trial| [t.x, t.y].map(|v| (v / edge).floor() as i32);
+    let mut cells: HashMap<(usize, [i32; 2]), Vec<usize>> = HashMap::new();
     for trial in trials.iter() {
         if kept.len() == keep {
             break;
         }
-        let here = |k: &&Trial| {
+        let [i, j] = cell(trial);
+        let about = (-1..=1).flat_map(|a| (-1..=1).map(move |b| [i + a, j + b]));
+        let near: Vec<&Trial> = about
+            .filter_map(|at| cells.get(&(trial.plane, at)))
+            .flat_map(|own| own.iter().map(|k| &kept[*k]))
+            .collect();
+        let here = |k: &&&Trial| {
             let (dx, dy) = (k.x - trial.x, k.y - trial.y);
-            k.plane == trial.plane && dx * dx + dy * dy < PLACE * PLACE
+            dx * dx + dy * dy < PLACE * PLACE
         };
-        if kept.iter().filter(here).count() >= quota {
+        if near.iter().filter(here).count() >= quota {
             continue;
         }
-        let twin = kept.iter().any(|k| {
-            let turn = (k.yaw - trial.yaw).rem_euclid(std::f64::consts::TAU);
-            k.plane == trial.plane
-                && (k.x - trial.x).abs() < step
-                && (k.y - trial.y).abs() < step
-                && turn.min(std::f64::consts::TAU - turn) < yaw_step
-        });
-        if !twin {
+        let is_twin = |k: &&Trial| {
+            (k.x - trial.x).abs() < step && (k.y - trial.y).abs() < step && {
+                let turn = (k.yaw - trial.yaw).rem_euclid(TAU);
+                turn.min(TAU - turn) < yaw_step
+            }
+        };
+        if !near.iter().any(is_twin) {
+            cells.entry((trial.plane, [i, j])).or_default().push(kept.len());
             kept.push(*trial);
         }
     }
