@@ -104,6 +104,7 @@ impl Run<'_> {
         let mut outcome = Report {
             digests,
             sources,
+            store: &store,
             library: &given.library,
             models,
             fits,

@@ -7,7 +7,7 @@ use crate::progress::Amount;
 use crate::reuse::Digests;
 use crate::spaces::poses;
 use crate::store::Store;
-use contract::{Cluster, Fit, Format, Input, InputId, Result, Verdict};
+use contract::{Cluster, Fit, Format, Input, InputId, Result, Scan, Verdict};
 use export::{
     InputEntry, Labels, ResultFile, RobotEntry, SCHEMA, ScanLabels, SpaceEntry, StageEntry,
     write_table,
@@ -20,6 +20,7 @@ use std::fmt::Write as _;
 pub(crate) struct Report<'a> {
     pub(crate) digests: &'a Digests,
     pub(crate) sources: &'a Sources,
+    pub(crate) store: &'a Store,
     pub(crate) library: &'a Library,
     /// Those that the fits are of: the library's, and arms with tools.
     pub(crate) models: &'a [robot::Model],
@@ -84,6 +85,12 @@ impl Report<'_> {
         ]
     }
 
+    /// The scans with points: of a large LAZ file it is not known beforehand whether any are of no scanner that is given.
+    fn scans(&self) -> impl Iterator<Item = &Scan> {
+        let has_points = |scan: &&Scan| self.store.entries().iter().any(|e| e.at.scan == scan.id);
+        self.sources.scans.iter().filter(has_points)
+    }
+
     /// Why models of the library could not be loaded.
     fn models_left_out(&self) -> impl Iterator<Item = &robot::Finding> {
         self.library.findings.iter().filter(|f| f.severity == robot::Severity::Error)
@@ -96,7 +103,7 @@ impl Report<'_> {
             let (model, place, what) = (&finding.model, &finding.place, &finding.what);
             format!("robot model '{model}' is left out: {place}: {what}")
         }));
-        for scan in self.sources.scans.iter().filter(|s| !s.has_beams()) {
+        for scan in self.scans().filter(|s| !s.has_beams()) {
             out.push(format!(
                 "scan '{}': its scanner's position is not known: no proof of free space from it",
                 scan.name
@@ -123,8 +130,7 @@ impl Report<'_> {
 
     fn summary(&self) -> String {
         let mut text = String::new();
-        let _ =
-            writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.sources.scans.len());
+        let _ = writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.scans().count());
         for (i, fit) in self.fits.iter().enumerate() {
             let p = fit.world_from_base.translation.vector;
             let _ = writeln!(

@@ -9,7 +9,7 @@
 //! ```
 
 use crate::atomic;
-use contract::{Fit, Result};
+use contract::{Fit, JointFit, Result};
 use geometry::Pose;
 use robot::{Joint, JointKind, Mesh, Model, Motion};
 use std::collections::BTreeMap;
@@ -138,9 +138,17 @@ fn yaml(fit: &Fit, model: &Model) -> String {
         q.k
     );
     for (j, value) in values(fit, model) {
-        let _ = writeln!(text, "  {}: {value:.9}", quoted(&model.joints[j].name));
+        let open = joint_fit(fit, model, j).filter(|f| !f.determined);
+        let open =
+            open.map_or_else(String::new, |f| format!("  # not determined, ± {:.4}", f.sigma));
+        let _ = writeln!(text, "  {}: {value:.9}{open}", quoted(&model.joints[j].name));
     }
     text
+}
+
+/// What is known of a joint of the model; nothing of one that follows others.
+fn joint_fit<'a>(fit: &'a Fit, model: &Model, joint: usize) -> Option<&'a JointFit> {
+    model.free.iter().position(|&f| f == joint).and_then(|free| fit.joints.get(free))
 }
 
 /// A name as YAML has it between double quotes: what JSON has.
@@ -153,7 +161,7 @@ fn csv(fit: &Fit, model: &Model) -> String {
     for (j, value) in values(fit, model) {
         let joint = &model.joints[j];
         let unit = if joint.kind == JointKind::Prismatic { "m" } else { "rad" };
-        let own = model.free.iter().position(|&f| f == j).and_then(|free| fit.joints.get(free));
+        let own = joint_fit(fit, model, j);
         let told = own.map_or_else(|| ",".into(), |f| format!("{:.9},{}", f.sigma, f.determined));
         let limits = joint.limits.map_or_else(|| ",".into(), |[a, b]| format!("{a:.9},{b:.9}"));
         let name = joint.name.replace('"', "\"\"");

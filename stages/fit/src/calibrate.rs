@@ -214,9 +214,11 @@ fn frames(nominal: &Model, model: &Model) -> Vec<JointFrame> {
 /// Standard deviations of shifts and turns of a joint's frame before any point is looked at: what its joint does itself
 /// it does not.
 fn prior(frame: &JointFrame, [shift, turn]: [f64; 2]) -> [f64; 6] {
+    let along = frame.axis.map(f64::abs);
+    let along = (0..3).max_by(|a, b| along[*a].total_cmp(&along[*b])).unwrap_or(0);
     std::array::from_fn(|i| {
         // Axes of real robots run along an axis of their frame; of others the nearest is taken.
-        let is_own = frame.axis[i % 3].abs() > 0.8 && (i < 3) == frame.slides;
+        let is_own = i % 3 == along && (i < 3) == frame.slides;
         let sigma = if i < 3 { shift } else { turn };
         sigma * if is_own { FIXED } else { 1.0 }
     })

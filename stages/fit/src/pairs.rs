@@ -119,7 +119,8 @@ impl<'a> Pairing<'a> {
             let ray = self.turns[view] * (beam / range);
             (scanner + ray * (range - error.bias) + error.shift, ray, range)
         } else {
-            (raw, NO_BEAM, 0.0)
+            let error = &self.state.scans[view];
+            (self.turns[view] * raw + error.shift, NO_BEAM, 0.0)
         };
         let is_camera = self.refine.scene.views[view].is_camera;
         let is_ray = range > 0.0 && !is_camera;

@@ -36,6 +36,8 @@ const MIN_SEEN: f64 = 0.02;
 const JOINT_POINTS: usize = 30;
 /// Play of a stop: a degree for joints that turn, a millimetre for those that slide.
 const STOP_PLAY: (f64, f64) = (0.0175, 0.001);
+/// Standard deviation from which on the values that are named are but some of those that a joint may have, radians (30°).
+const ANYWHERE: f64 = 0.52;
 /// Most values of a joint that are named.
 const MAX_VALUES: usize = 3;
 /// A runner-up that the beams prefer less clearly than this makes the best doubtful.
@@ -220,7 +222,10 @@ fn undetermined(fit: &Fit, j: usize, slides: bool) -> String {
         false => format!("{:.1}°", v.to_degrees()),
     };
     let values: Vec<String> = values.iter().map(say).collect();
-    if !values.is_empty() {
+    if !values.is_empty() && !slides && joint.sigma > ANYWHERE {
+        let (values, sigma) = (values.join(", "), joint.sigma.to_degrees());
+        format!("joint '{}' may as well stand at {values} or elsewhere (± {sigma:.0}°)", joint.name)
+    } else if !values.is_empty() {
         format!("joint '{}' may as well stand at {}", joint.name, values.join(", "))
     } else if joint.sigma < KNOWN_SIGMA {
         let sigma = match slides {
