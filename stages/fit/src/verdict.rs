@@ -26,12 +26,17 @@ const ANYTHING_RMS: f64 = 0.0072;
 /// refused: a post, a bench and a hose have room for a smooth small arm. What it found there had 4.7 mm and more at a noise
 /// of 2 mm; of 3648 right fits five left so much open, and had 2.6 mm at most there, 7.6 mm at one of 10 mm.
 const OPEN_RMS: (f64, f64) = (1.25, 0.002);
+/// Noise of a scanner from which on more of it is no excuse there, metres: in a corridor scanned with 9 mm, walls and cabinets
+/// had room for four small arms, 9.5 to 11.6 mm off.
+const OPEN_NOISE: f64 = 0.005;
 /// Standard deviation up to which a joint counts as known for that, radians: 1°.
 const KNOWN_SIGMA: f64 = 0.0175;
 /// Smallest share of the surface that must have been judged.
 const SEEN: f64 = 0.12;
 /// Share of a link's surface that beams must have judged for what they went through to count.
 const MIN_SEEN: f64 = 0.02;
+/// Fewest points on a robot: the least of which one was ever right had a thousand.
+const ROBOT_POINTS: usize = 100;
 /// Fewest points on the links that a joint moves.
 const JOINT_POINTS: usize = 30;
 /// Play of a stop: a degree for joints that turn, a millimetre for those that slide.
@@ -103,8 +108,10 @@ fn of_surface(reasons: &mut Reasons, fit: &Fit, scene: &Scene<'_>, judgement: &J
             format!("beams went through {:.0} % of link '{}'", v * 100.0, link.name)
         });
     }
+    let n_points: usize = fit.links.iter().map(|l| l.n_points).sum();
+    reasons.grade(n_points < ROBOT_POINTS, false, || format!("only {n_points} points lie on it"));
     let n_known = (0..fit.joints.len()).filter(|&j| own_sigma(fit, j) < KNOWN_SIGMA).count();
-    let off = Off::new((fit.rms, scene.noise), [n_known, fit.joints.len()]);
+    let off = Off::new((fit.rms, Noise::of(scene)), [n_known, fit.joints.len()]);
     let words = || {
         format!(
             "its points lie {:.0} mm off its surface, where the scans' noise is {:.0} mm",
@@ -156,6 +163,22 @@ fn own_sigma(fit: &Fit, j: usize) -> f64 {
     fit.covariance.get((6 + j) * (n + 1)).map_or(fit.joints[j].sigma, |v| v.max(0.0).sqrt())
 }
 
+/// Noise of the scans, metres.
+#[derive(Clone, Copy)]
+struct Noise {
+    all: f64,
+    /// What of it excuses a robot that leaves its joints open.
+    least: f64,
+}
+
+impl Noise {
+    fn of(scene: &Scene<'_>) -> Self {
+        let is_camera = scene.views.iter().any(|view| view.is_camera);
+        let least = if is_camera { scene.noise } else { scene.noise.min(OPEN_NOISE) };
+        Self { all: scene.noise, least }
+    }
+}
+
 /// How far the points are off a surface.
 struct Off {
     /// Too far for it to be trusted.
@@ -165,13 +188,13 @@ struct Off {
 }
 
 impl Off {
-    /// Of an RMS distance, where the scans have so much noise, metres; so many of the joints are known.
-    fn new((rms, noise): (f64, f64), [n_known, n_joints]: [usize; 2]) -> Self {
+    /// Of an RMS distance, metres, where the scans have so much noise; so many of the joints are known.
+    fn new((rms, noise): (f64, Noise), [n_known, n_joints]: [usize; 2]) -> Self {
         // A surface that fits badly and leaves the posture open may be anything, too.
-        let is_open = 2 * n_known <= n_joints && rms > OPEN_RMS.0 * noise + OPEN_RMS.1;
+        let is_open = 2 * n_known <= n_joints && rms > OPEN_RMS.0 * noise.least + OPEN_RMS.1;
         Self {
-            is_poor: rms > POOR_RMS.0 * noise + POOR_RMS.1,
-            is_anything: is_open || rms > ANYTHING_RMS.max(1.5 * noise),
+            is_poor: rms > POOR_RMS.0 * noise.all + POOR_RMS.1,
+            is_anything: is_open || rms > ANYTHING_RMS.max(1.5 * noise.all),
         }
     }
 }
@@ -181,7 +204,7 @@ pub(crate) fn is_lost(best: &Adjusted, scene: &Scene<'_>) -> bool {
     let n_joints = best.hypothesis.posture.len();
     let is_known = |j: &usize| best.covariance[(6 + j, 6 + j)] < KNOWN_SIGMA * KNOWN_SIGMA;
     let n_known = (0..n_joints).filter(is_known).count();
-    Off::new((best.rms(), scene.noise), [n_known, n_joints]).is_anything
+    Off::new((best.rms(), Noise::of(scene)), [n_known, n_joints]).is_anything
 }
 
 /// Whether nothing that was measured speaks against a fit: if it is doubtful, then because too little of it was seen.
@@ -244,7 +267,9 @@ mod tests {
 
     #[test]
     fn what_lies_beside_its_points_and_leaves_half_of_its_joints_open_may_be_anything() {
-        let off = |rms: f64, n_known: usize| Off::new((rms, 0.002), [n_known, 6]);
+        let off = |rms: f64, n_known: usize| {
+            Off::new((rms, Noise { all: 0.002, least: 0.002 }), [n_known, 6])
+        };
         assert!(off(0.0055, 3).is_anything && !off(0.0055, 4).is_anything);
         assert!(!off(0.003, 0).is_anything && !off(0.003, 6).is_poor);
         assert!(off(0.006, 6).is_poor && off(0.008, 6).is_anything);
