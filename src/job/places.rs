@@ -23,6 +23,9 @@ impl Job {
                 .hint("--robots takes a folder with a folder for each model"));
         }
         for file in self.inputs.iter().chain(others.clone()) {
+            if file.is_dir() {
+                return Err(usage("this is a folder", file).hint("name the files in it"));
+            }
             if !file.is_file() {
                 return Err(usage("there is no such file", file).hint("check the path"));
             }
