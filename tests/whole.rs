@@ -114,6 +114,27 @@ fn space_is_told(out: &Path) {
 }
 
 #[test]
+fn las_without_scanner_positions_finds_it_and_doubts_it_and_a_lying_count_is_refused() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let robots = scene(dir.path());
+    let (scans, out) = (dir.path().join("scans/scans.las"), dir.path().join("out"));
+    run(scans.clone(), None, &robots, out.clone(), 2);
+    let found = export::ResultFile::read(&out).expect("a result").robots;
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].model, simulate::demo_robots::PALLETISER);
+    assert_eq!(found[0].verdict, "doubtful");
+    // Half of the points that are there, as a writer leaves it that was stopped.
+    let mut bytes = std::fs::read(&scans).expect("reads");
+    let n = u64::from_le_bytes(bytes[247..255].try_into().expect("eight bytes"));
+    bytes[247..255].copy_from_slice(&(n / 2).to_le_bytes());
+    bytes[107..111].copy_from_slice(&0_u32.to_le_bytes());
+    std::fs::write(&scans, bytes).expect("writes");
+    let settings = ingest::Settings::default();
+    let error = ingest::open(&[scans], None, &settings, &contract::OneByOne).err().expect("lies");
+    assert_eq!(error.kind(), contract::Kind::BadInput, "{error}");
+}
+
+#[test]
 fn las_with_scanner_positions_finds_the_same_robot() {
     let dir = tempfile::tempdir().expect("a folder");
     let robots = scene(dir.path());

@@ -46,10 +46,7 @@ impl Search<'_, '_> {
         is_wanted: &impl Fn(&Candidate) -> bool,
         tried: &mut Tried,
     ) -> Result<Vec<Fit>> {
-        let find = || self.candidates(sight, &self.mounts(scene.region), (MIN_MOUNT_SCORE, 1));
-        let mut hung = self.piece((scene.region, "mounts"), find)?;
-        hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
-        self.fits(scene, &few(hung, MAX_MOUNTS), tried)
+        self.hung(scene, sight, ("mounts", is_wanted), tried)
     }
 
     /// Fits of robots that hang beside trusted ones, where much is left that those do not explain.
@@ -65,9 +62,20 @@ impl Search<'_, '_> {
             return Ok(Vec::new());
         }
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
+        self.hung(scene, sight, ("mounts beside", &|c: &Candidate| is_apart(c, &feet)), tried)
+    }
+
+    /// Fits on the region's ceilings, walls and tilted plates, of what is wanted of these candidates; kept under a name.
+    fn hung(
+        &self,
+        scene: &Scene<'_>,
+        sight: &Sight<'_>,
+        (name, is_wanted): (&str, &impl Fn(&Candidate) -> bool),
+        tried: &mut Tried,
+    ) -> Result<Vec<Fit>> {
         let find = || self.candidates(sight, &self.mounts(scene.region), (MIN_MOUNT_SCORE, 1));
-        let mut hung = self.piece((scene.region, "mounts beside"), find)?;
-        hung.retain(|c| self.is_above_floor(c) && is_apart(c, &feet));
+        let mut hung = self.piece((scene.region, name), find)?;
+        hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
         self.fits(scene, &few(hung, MAX_MOUNTS), tried)
     }
 
