@@ -73,6 +73,8 @@ const BATCH: usize = 6;
 const FOOT: f64 = 1.5;
 /// Bases nearer than this are at one place, metres.
 const SAME_BASE: f64 = 0.35;
+/// How far beside what is seen of a robot its base may be, metres.
+const FOOT_BESIDE: f64 = 0.3;
 /// Share of the score of a trusted robot's base below which another base at its place is needless.
 const FAR_WORSE: f64 = 0.7;
 /// So many times the base poses are looked at where heights are guessed: each place is there at many.
@@ -283,8 +285,14 @@ impl<'a, 'm> Search<'a, 'm> {
         regions: &[Region],
         work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
     ) -> Result<Option<T>> {
-        let at = fit.world_from_base.translation.vector;
-        let home = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(at.into()));
+        let at = base(&fit.world_from_base);
+        // Large regions overlap: an arm at the border of one is whole in the other.
+        let within = |r: &Region| {
+            let Aabb { min, max } = r.world_bounds();
+            (0..2).map(|i| (at[i] - min[i]).min(max[i] - at[i])).fold(f64::INFINITY, f64::min)
+        };
+        let homes = regions.iter().filter(|r| r.world_bounds().grown(FOOT_BESIDE).contains(at.into()));
+        let home = homes.max_by(|a, b| within(a).total_cmp(&within(b)));
         home.map(|region| self.in_scene(region, work)).transpose()
     }
 

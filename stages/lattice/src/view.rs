@@ -40,9 +40,10 @@ pub struct ViewBuilder {
     /// Cones from the scanner that together hold the region; none without scanner.
     cones: Option<Vec<Cone>>,
     empty_window: i32,
-    /// Of dense scans, one of each square of so many pixels (see [`Tile::skip`]) is enough to fill the cells of the images, and one
-    /// of larger squares as a point.
+    /// Of dense scans, one of each square of so many pixels (see [`Tile::skip`]) is enough to fill the cells of the images and to be
+    /// kept as points.
     skip: u32,
+    /// The same of the points alone; no points without it.
     kept: Option<u32>,
     /// Places in the mask of the view's points, where no lattice tells which of them are neighbours.
     places: Vec<u64>,
@@ -67,8 +68,9 @@ impl ViewBuilder {
         let focal = scanner.map_or(0.0, |s| focal(&s, region, beam_step, settings));
         let images = scanner.map_or_else(Vec::new, |s| cameras(&s, region, focal));
         let faces = Faces::new(&images);
-        let skip = lattice_skip(scan, focal);
-        let thin = thin.map(|thin| if scan.lattice.is_some() { thin } else { 0 });
+        let thin = thin.map(|thin| if scan.lattice.is_some() { thin.min(MAX_SKIP) } else { 0 });
+        // What is kept of the points has to be read, even where that is more than fills the images.
+        let skip = lattice_skip(scan, focal).min(thin.unwrap_or(MAX_SKIP));
         let cones = scanner.map(|s| cones(&s, region, &local_from_scan));
         let (id, mask, points) = (scan.id, scan.mask, Vec::new());
         let is_camera = scan.lattice.is_some_and(|l| l.is_camera);
@@ -83,7 +85,7 @@ impl ViewBuilder {
             cones,
             empty_window: settings.empty_window,
             skip,
-            kept: thin.map(|thin| skip.max(thin).min(MAX_SKIP)),
+            kept: thin,
             places: Vec::new(),
         }
     }
@@ -240,13 +242,17 @@ fn cones(scanner: &Point, region: &Region, local_from_scan: &Pose) -> Vec<Cone> 
     all.unwrap_or_else(|| vec![Cone { axis: Vector::z(), angle: std::f64::consts::PI }])
 }
 
+/// Nothing of a robot is nearer to a scanner, metres, as a rule: from a scanner within a region its cells are as fine as from so
+/// far. At a third of that a robot at 5 m was seen in cells of 5 cm.
+const NEAREST: f64 = 1.0;
+
 /// Cells of an image in one unit of its plane, as fine as beams and settings allow.
 fn focal(scanner: &Point, region: &Region, beam_step: f64, settings: &ViewSettings) -> f64 {
     let outside = |i: usize| {
         let (min, max) = (region.bounds.min[i], region.bounds.max[i]);
         (min - scanner[i]).max(scanner[i] - max).max(0.0).powi(2)
     };
-    let near = (0..3).map(outside).sum::<f64>().sqrt().max(0.3);
+    let near = (0..3).map(outside).sum::<f64>().sqrt().max(NEAREST);
     (1.0 / (settings.beams_per_cell * beam_step.max(1e-5))).min(near / settings.min_cell)
 }
 
