@@ -109,6 +109,7 @@ impl Run<'_> {
             models,
             fits,
             clusters: &clusters,
+            n_regions: regions.len(),
             written: &written,
             unmet: found.unmet,
             left_out: failures.said(job),

@@ -26,6 +26,8 @@ pub(crate) struct Report<'a> {
     pub(crate) models: &'a [robot::Model],
     pub(crate) fits: &'a [Fit],
     pub(crate) clusters: &'a [Cluster],
+    /// Places that were searched for robots.
+    pub(crate) n_regions: usize,
     pub(crate) written: &'a Done,
     /// What the review expects and nobody found.
     pub(crate) unmet: Vec<String>,
@@ -131,6 +133,14 @@ impl Report<'_> {
     fn summary(&self) -> String {
         let mut text = String::new();
         let _ = writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.scans().count());
+        if self.fits.is_empty() {
+            let n_arms = self.library.models.iter().filter(|model| !model.is_tool()).count();
+            let _ = writeln!(
+                text,
+                "  {} place(s) as large as a robot were searched for {n_arms} model(s), and none of them stands there",
+                self.n_regions
+            );
+        }
         for (i, fit) in self.fits.iter().enumerate() {
             let p = fit.world_from_base.translation.vector;
             let _ = writeln!(

@@ -291,7 +291,8 @@ impl<'a, 'm> Search<'a, 'm> {
             let Aabb { min, max } = r.world_bounds();
             (0..2).map(|i| (at[i] - min[i]).min(max[i] - at[i])).fold(f64::INFINITY, f64::min)
         };
-        let homes = regions.iter().filter(|r| r.world_bounds().grown(FOOT_BESIDE).contains(at.into()));
+        let homes =
+            regions.iter().filter(|r| r.world_bounds().grown(FOOT_BESIDE).contains(at.into()));
         let home = homes.max_by(|a, b| within(a).total_cmp(&within(b)));
         home.map(|region| self.in_scene(region, work)).transpose()
     }

@@ -2,8 +2,8 @@
 //! local maximum of every sweep competes with all others (METHOD.md §8, §9).
 
 use contract::Fan;
-use geometry::Pose;
 use geometry::probe::HIDDEN_PRICE;
+use geometry::{Pose, Vector};
 
 use crate::{Prepared, Scene, Settings};
 
@@ -32,6 +32,8 @@ pub(crate) struct Beam<'a> {
 /// Mean score of the links placed so far down to which a search goes on: half of what it is where no beam reached any of them, as
 /// a bench or the arm itself may hide a foot.
 const MOST_HIDDEN: f64 = 0.5 * HIDDEN_PRICE as f64;
+/// A base is turned by half and a quarter of this to settle it, radians: what its foot shows of its yaw.
+const SHAKEN_YAW: f64 = 0.03;
 /// Tolerance where what carries the searched links is fitted already, metres (METHOD.md §9).
 const FITTED: f64 = 0.02;
 
@@ -214,18 +216,16 @@ impl Beam<'_> {
                     h.posture[j] = (h.posture[j] + sign * d).clamp(limits[0], limits[1]);
                 });
             }
+            // Along what it stands on, and about the axis that is upright there.
             let shift = 0.4 * step * self.tolerance;
-            for axis in 0..3 {
+            let shakes = [
+                Pose::translation(shift, 0.0, 0.0),
+                Pose::translation(0.0, shift, 0.0),
+                Pose::rotation(Vector::z() * (step * SHAKEN_YAW)),
+            ];
+            for shake in shakes {
                 self.climb(h, (0, &mut parts), tolerance, |h, sign| {
-                    if axis < 2 {
-                        h.local_from_base.translation.vector[axis] += sign * shift;
-                    } else {
-                        let turn = nalgebra::UnitQuaternion::from_axis_angle(
-                            &nalgebra::Vector3::z_axis(),
-                            sign * step * 0.03,
-                        );
-                        h.local_from_base.rotation = turn * h.local_from_base.rotation;
-                    }
+                    h.local_from_base *= if sign > 0.0 { shake } else { shake.inverse() };
                 });
             }
         }
