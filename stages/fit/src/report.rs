@@ -24,6 +24,9 @@ use crate::verdict::{self, RIVAL};
 pub(crate) const EQUAL: f64 = 0.03;
 /// Margin up to which another value of the last joint is listed.
 const NEARLY_EQUAL: f64 = 0.12;
+/// Margin up to which another value of a slide that closes a tool leaves it open: what the tool holds looks like it where little of
+/// it is seen. Electrodes in plain view led by 0.6 and more, those in a part by 0.17 to 0.6 where they were right, by 0.18 where not.
+const SLIDE_EQUAL: f64 = 0.3;
 /// Standard deviation from which on a joint is open: any value within degrees would do, radians.
 const OPEN_SIGMA: f64 = 0.02;
 /// Standard deviation of an angle of which nothing is known: any value of a whole turn, radians (π/√3).
@@ -56,7 +59,7 @@ pub(crate) fn report(
     let rivals = ranked(refine, (h, judgement), others, near, fan);
     // With the base's twist in its own axes.
     let mut in_base = refine.with_foot(h, best.covariance.clone(), near, fan);
-    let (mut open, mut spread) = open_joints(&in_base, h, &rivals);
+    let (mut open, mut spread) = open_joints(refine, &in_base, h, &rivals);
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
     let mut of_joints = in_base.view_mut((6, 6), (n - 6, n - 6));
     of_joints += sway(refine, best, &several, (near, points), fan);
@@ -88,7 +91,7 @@ pub(crate) fn report(
         share: share(refine, best),
         links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
         runner_up: other_answer.map(|rival| runner_up(model, judgement, rival)),
-        equals: equals(h, &rivals, &passed, &several),
+        equals: equals(refine, h, &rivals, (&passed, &several)),
         ..Fit::default()
     };
     verdict::pass(&mut fit, prepared, refine.scene, judgement);
@@ -168,10 +171,21 @@ fn joints(
 
 /// Postures that explain the points as well: the first few of the rivals, and other values of last joints. Joints that are
 /// passed over make no rival another answer.
-fn equals(h: &Hypothesis, rivals: &[Rival<'_>], passed: &[bool], several: &[&Spin]) -> Vec<Equal> {
+fn equals(
+    refine: &Refine<'_>,
+    h: &Hypothesis,
+    rivals: &[Rival<'_>],
+    (passed, several): (&[bool], &[&Spin]),
+) -> Vec<Equal> {
     let same = rivals.iter().filter(|(m, (other, _))| {
-        let limit = if differs(other, h, passed) { EQUAL } else { NEARLY_EQUAL };
-        *m < limit && (0..passed.len()).any(|j| turn(other, h, j) > OTHER)
+        let mut apart = (0..passed.len()).filter(|&j| turn(other, h, j) > OTHER);
+        let limit = match (apart.next(), apart.next()) {
+            (None, _) => return false,
+            (Some(j), None) if closes(refine, j) => SLIDE_EQUAL,
+            _ if differs(other, h, passed) => EQUAL,
+            _ => NEARLY_EQUAL,
+        };
+        *m < limit
     });
     let equal = |(m, (other, _)): &Rival<'_>| Equal { posture: other.posture.clone(), margin: *m };
     let spun = several.iter().flat_map(|s| {
@@ -251,6 +265,7 @@ fn share(refine: &Refine<'_>, best: &Adjusted) -> Option<ScanShare> {
 /// this joint and few others explains the points as well (a flange with six bolts, a wrist seen from nowhere); and how
 /// far away the farthest such value is, radians.
 fn open_joints(
+    refine: &Refine<'_>,
     covariance: &DMatrix<f64>,
     h: &Hypothesis,
     rivals: &[Rival<'_>],
@@ -259,12 +274,13 @@ fn open_joints(
     let mut open: Vec<bool> =
         (0..n).map(|j| covariance[(6 + j, 6 + j)] >= OPEN_SIGMA.powi(2)).collect();
     let mut spread = vec![0.0_f64; n];
-    for (_, (other, _)) in rivals.iter().filter(|(margin, _)| *margin < EQUAL) {
+    for (margin, (other, _)) in rivals {
         let apart: Vec<bool> = (0..n).map(|j| turn(h, other, j) > OTHER).collect();
         // One joint alone, or the tail of the chain, can be open by symmetry; a flip further up is another answer.
         let first = apart.iter().position(|a| *a).unwrap_or(n);
         let is_alone = apart.iter().filter(|a| **a).count() == 1;
-        if is_alone || (first..n).all(|j| open[j] || j + 1 == n) {
+        let is_equal = *margin < if is_alone && closes(refine, first) { SLIDE_EQUAL } else { EQUAL };
+        if is_equal && (is_alone || (first..n).all(|j| open[j] || j + 1 == n)) {
             for j in (0..n).filter(|&j| apart[j]) {
                 open[j] = true;
                 spread[j] = spread[j].max(turn(h, other, j));
@@ -272,6 +288,11 @@ fn open_joints(
         }
     }
     (open, spread)
+}
+
+/// Whether a joint slides and moves nothing but a part of a tool.
+fn closes(refine: &Refine<'_>, joint: usize) -> bool {
+    refine.prepared.leaf[joint] && refine.is_prismatic(joint)
 }
 
 /// Difference of a joint between two postures, whole turns taken out, radians.

@@ -55,7 +55,8 @@ pub(crate) fn best_of(
         let (better, rest) = compare(refine, best, rivals, (near, all), fan);
         others.extend(rest);
         let bends = refine.bends(&better.0.hypothesis, near, fan);
-        let bends = fan.fan(bends, |h| polish(refine, &h, near, fan));
+        let mut bends = fan.fan(bends, |h| polish(refine, &h, near, fan));
+        bends.extend(refine.slides(&better.0.hypothesis, fan));
         let bent = near_rivals((beam, refine), &bends, &better, near, fan);
         others.extend(bends);
         let (better, rest) = compare(refine, better, bent, (near, all), fan);
