@@ -52,7 +52,8 @@ impl Refine<'_> {
 
     /// Postures with other values of each slide that moves nothing but a tool's part.
     pub(crate) fn slides(&self, h: &Hypothesis, fan: &impl Fan) -> Vec<Polished> {
-        let slides = (0..h.posture.len()).filter(|&j| self.prepared.leaf[j] && self.is_prismatic(j));
+        let slides =
+            (0..h.posture.len()).filter(|&j| self.prepared.leaf[j] && self.is_prismatic(j));
         let others = slides.flat_map(|joint| {
             let [low, high] = self.prepared.model.limits(joint);
             let n = ((high - low) / SLIDE_STEP).ceil().clamp(1.0, MAX_SLIDES);

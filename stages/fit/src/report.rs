@@ -279,7 +279,8 @@ fn open_joints(
         // One joint alone, or the tail of the chain, can be open by symmetry; a flip further up is another answer.
         let first = apart.iter().position(|a| *a).unwrap_or(n);
         let is_alone = apart.iter().filter(|a| **a).count() == 1;
-        let is_equal = *margin < if is_alone && closes(refine, first) { SLIDE_EQUAL } else { EQUAL };
+        let is_equal =
+            *margin < if is_alone && closes(refine, first) { SLIDE_EQUAL } else { EQUAL };
         if is_equal && (is_alone || (first..n).all(|j| open[j] || j + 1 == n)) {
             for j in (0..n).filter(|&j| apart[j]) {
                 open[j] = true;
