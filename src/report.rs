@@ -7,7 +7,7 @@ use crate::progress::Amount;
 use crate::reuse::Digests;
 use crate::spaces::poses;
 use crate::store::Store;
-use contract::{Cluster, Fit, Format, Input, InputId, Result, Scan, Verdict};
+use contract::{Fit, Format, Input, InputId, Result, Scan, Verdict};
 use export::{
     InputEntry, Labels, ResultFile, RobotEntry, SCHEMA, ScanLabels, SpaceEntry, StageEntry,
     write_table,
@@ -25,9 +25,8 @@ pub(crate) struct Report<'a> {
     /// Those that the fits are of: the library's, and arms with tools.
     pub(crate) models: &'a [robot::Model],
     pub(crate) fits: &'a [Fit],
-    pub(crate) clusters: &'a [Cluster],
-    /// Places that were searched for robots.
-    pub(crate) n_regions: usize,
+    /// Bodies above the floor, and the places about them that were searched for robots.
+    pub(crate) n_searched: [usize; 2],
     pub(crate) written: &'a Done,
     /// What the review expects and nobody found.
     pub(crate) unmet: Vec<String>,
@@ -81,8 +80,8 @@ impl Report<'_> {
             |name: &str, n_in: u64, n_out: u64| StageEntry { name: name.into(), n_in, n_out };
         vec![
             entry("ingest", self.sources.inputs.len() as u64, n_points),
-            entry("cluster", n_points, self.clusters.len() as u64),
-            entry("fit", self.clusters.len() as u64, self.fits.len() as u64),
+            entry("cluster", n_points, self.n_searched[0] as u64),
+            entry("fit", self.n_searched[0] as u64, self.fits.len() as u64),
             entry("label", n_points, self.written.masks.iter().map(|m| m.n_moving).sum()),
         ]
     }
@@ -138,7 +137,7 @@ impl Report<'_> {
             let _ = writeln!(
                 text,
                 "  {} place(s) as large as a robot were searched for {n_arms} model(s), and none of them stands there",
-                self.n_regions
+                self.n_searched[1]
             );
         }
         for (i, fit) in self.fits.iter().enumerate() {
