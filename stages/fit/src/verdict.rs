@@ -147,10 +147,8 @@ fn of_surface(
 fn is_aside(model: &Model, link: usize) -> bool {
     let Some(j) = model.links[link].parent_joint else { return false };
     let is_free = matches!(model.joints[j].motion, Motion::Free(_));
-    let is_carrier = |c: &usize| model.joints[*c].child == link;
-    !is_free
-        && model.links[link].role != Role::Effector
-        && !model.main_chain.iter().any(|c| is_carrier(c))
+    let carries = |&c: &usize| model.joints[c].child == link;
+    !is_free && model.links[link].role != Role::Effector && !model.main_chain.iter().any(carries)
 }
 
 /// What points, limits and the joints' standard deviations say of the posture.
