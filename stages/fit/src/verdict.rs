@@ -142,13 +142,15 @@ fn of_surface(
     }
 }
 
-/// Whether a link hangs beside the chain and no joint of its own sets it: rods and cylinders of closed loops, which many models have
-/// fixed. Where one stands says nothing against the arm.
+/// Whether a link hangs beside the chain, fixed or a multiple of a joint: rods and cylinders of closed loops, as models have them that
+/// do not describe the loop. Where such a one stands says nothing against the arm.
 fn is_aside(model: &Model, link: usize) -> bool {
     let Some(j) = model.links[link].parent_joint else { return false };
-    let is_free = matches!(model.joints[j].motion, Motion::Free(_));
+    let is_simplified = matches!(model.joints[j].motion, Motion::Fixed | Motion::Mimic { .. });
     let carries = |&c: &usize| model.joints[c].child == link;
-    !is_free && model.links[link].role != Role::Effector && !model.main_chain.iter().any(carries)
+    is_simplified
+        && model.links[link].role != Role::Effector
+        && !model.main_chain.iter().any(carries)
 }
 
 /// What points, limits and the joints' standard deviations say of the posture.
