@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 
 use crate::beam::Hypothesis;
 use crate::calibrate::Frames;
-use crate::normal::{N_SCAN, Normal, Row};
+use crate::normal::{N_SCAN, Normal, Row, Smoothness};
 use crate::pairs::{Known, Pairing};
 use crate::refine::Refine;
 use crate::sampled::Sampled;
@@ -62,6 +62,8 @@ pub(crate) struct Adjusted {
     pub(crate) shared: Option<[DMatrix<f64>; 2]>,
     /// How far the model's surface is off, standard deviation over its patches, metres.
     pub(crate) patch_sigma: f64,
+    /// How smoothly it is.
+    pub(crate) smoothness: Smoothness,
     /// Points within the gate, for each link.
     pub(crate) n_points: Vec<usize>,
     /// RMS distance of those points, metres, for each link.
@@ -79,7 +81,8 @@ impl Adjusted {
     /// Where it stands, to go on from.
     pub(crate) fn state(&self) -> State {
         let (hypothesis, scans) = (self.hypothesis.clone(), self.scans.clone());
-        State { hypothesis, scans, noise: self.noise, patch_sigma: self.patch_sigma }
+        let smoothness = Some(self.smoothness);
+        State { hypothesis, scans, noise: self.noise, patch_sigma: self.patch_sigma, smoothness }
     }
 }
 
@@ -107,13 +110,16 @@ pub(crate) struct State {
     /// What is taken for the noise of the ranges, metres, one sigma.
     pub(crate) noise: f64,
     pub(crate) patch_sigma: f64,
+    /// How smoothly the model's surface is off; `None`: as the residuals say.
+    pub(crate) smoothness: Option<Smoothness>,
 }
 
 impl State {
     /// A posture, before anything is known of the scans' errors.
     pub(crate) fn at(hypothesis: &Hypothesis, scene: &Scene<'_>) -> Self {
         let scans = vec![ScanError::NONE; scene.views.len()];
-        Self { hypothesis: hypothesis.clone(), scans, noise: scene.noise, patch_sigma: 0.0 }
+        let hypothesis = hypothesis.clone();
+        Self { hypothesis, scans, noise: scene.noise, patch_sigma: 0.0, smoothness: None }
     }
 }
 
@@ -140,6 +146,7 @@ impl<'a> Adjust<'a> {
         loop {
             let (sums, tallies) = self.sums(&state, points, fan);
             let normal = self.closed(&state, sums);
+            state.smoothness = Some(normal.smoothness());
             let solved = (round < N_ROUNDS).then(|| normal.solve()).flatten();
             let Some(step) = solved else {
                 return self.finish(state, &tallies, &normal);
@@ -205,8 +212,8 @@ impl<'a> Adjust<'a> {
 
     /// Normal equations of what was summed up at a state, patches taken out, with all priors.
     fn closed(&self, state: &State, mut sums: Normal) -> Normal {
-        sums.close();
         self.add_priors(state, &mut sums);
+        sums.close(&self.refine.prepared.patches, state.smoothness);
         sums
     }
 
@@ -224,7 +231,8 @@ impl<'a> Adjust<'a> {
         let n_posed = 6 + h.posture.len();
         let n_robot = n_posed + 6 * self.frames.len();
         let frames = Frames::new(prepared.model, &kinematics, self.frames);
-        let mut normal = Normal::new(n_robot, self.refine.scene.views.len(), prepared.n_patches);
+        let mut normal =
+            Normal::new(n_robot, self.refine.scene.views.len(), prepared.patches.len());
         let mut tallies = Tallies::new(prepared.links.len());
         let slack = state.patch_sigma * state.patch_sigma;
         let n_alike = self.refine.scene.n_alike;
@@ -299,11 +307,12 @@ impl<'a> Adjust<'a> {
         let scale = if is_alike { 1.0 } else { tallies.scale().min(1.0) };
         Adjusted {
             noise: state.noise * scale,
-            covariance: normal.covariance(&self.refine.prepared.patch_groups),
+            covariance: normal.covariance(&self.refine.prepared.patches.groups),
             hypothesis: state.hypothesis,
             scans: state.scans,
             shared: normal.shared(),
             patch_sigma: normal.patch_sigma(),
+            smoothness: normal.smoothness(),
             n_points: tallies.n_points(),
             link_rms: tallies.rms(),
         }

@@ -70,6 +70,21 @@ impl Fields {
         self.keys.iter().map(|key| key.0)
     }
 
+    /// Middle and mean normal of each patch.
+    pub(crate) fn places(&self) -> Vec<[f64; 6]> {
+        let mut sums = vec![[0.0_f64; 6]; self.keys.len()];
+        let mut counts = vec![0.0; self.keys.len()];
+        for (facet, &patch) in self.facets.iter().zip(&self.patches) {
+            let values = facet.x.iter().chain(&facet.n);
+            sums[patch as usize].iter_mut().zip(values).for_each(|(s, v)| *s += f64::from(*v));
+            counts[patch as usize] += 1.0;
+        }
+        for (sum, n) in sums.iter_mut().zip(counts) {
+            sum.iter_mut().for_each(|v| *v /= n);
+        }
+        sums
+    }
+
     /// The patch of a facet.
     pub(crate) fn patch(&self, facet: usize) -> u32 {
         self.patches[facet]

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use crate::beam::Hypothesis;
 use crate::face::Face;
 use crate::facets::Fields;
+use crate::normal::{N_SIDES, Patches};
 
 /// A model made ready for fitting.
 #[derive(Debug)]
@@ -32,10 +33,8 @@ pub struct Prepared<'a> {
     pub(crate) leaf: Vec<bool>,
     /// The face of a bare flange.
     pub(crate) face: Option<Face>,
-    /// Number of patches over all links.
-    pub(crate) n_patches: usize,
-    /// For each patch: its group, one for each link and side.
-    pub(crate) patch_groups: Vec<u32>,
+    /// Those of all links.
+    pub(crate) patches: Arc<Patches>,
 }
 
 /// What is kept for a link.
@@ -76,12 +75,12 @@ impl<'a> Prepared<'a> {
     }
 
     fn of((index, model): (usize, &'a Model), fields: impl Iterator<Item = Arc<Fields>>) -> Self {
-        // One group of patches for each link and side.
-        let mut patch_groups = Vec::new();
+        let mut patches = Patches::default();
         let links = model.links.iter().zip(fields).enumerate().map(|(l, (link, fields))| {
             let area = f64::from(link.cad.area);
-            let (weight, first_patch) = (area.sqrt(), patch_groups.len());
-            patch_groups.extend(fields.sides().map(|side| l as u32 * 6 + u32::from(side)));
+            let (weight, first_patch) = (area.sqrt(), patches.len());
+            patches.groups.extend(fields.sides().map(|side| l as u32 * N_SIDES + u32::from(side)));
+            patches.places.extend(fields.places());
             PreparedLink { fields, weight, area, first_patch }
         });
         let links: Vec<_> = links.collect();
@@ -119,8 +118,7 @@ impl<'a> Prepared<'a> {
             lever,
             leaf,
             face,
-            n_patches: patch_groups.len(),
-            patch_groups,
+            patches: Arc::new(patches),
         }
     }
 
@@ -143,8 +141,7 @@ impl<'a> Prepared<'a> {
             lever: self.lever.clone(),
             leaf: self.leaf.clone(),
             face: self.face,
-            n_patches: self.n_patches,
-            patch_groups: self.patch_groups.clone(),
+            patches: Arc::clone(&self.patches),
         }
     }
 

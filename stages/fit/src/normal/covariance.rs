@@ -5,9 +5,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Normal;
 
-/// Share of the variance of patches' offsets that is common to a side of a link: castings and hulls are off by waves
-/// longer than a patch.
-const ALIKE: f64 = 0.5;
 /// Beyond this factor the kernel says nothing any more.
 const MAX_FACTOR: f64 = 4.0;
 /// Least share of its stated variance that a point keeps: what is left without noise, of meshes and of rounding, is alike
@@ -54,7 +51,7 @@ impl Normal {
         // show it, so the patches' variance stands for it.
         for push in self.pushes(groups, n_groups).into_iter().flatten() {
             let moved = &inverse * push;
-            wide.ger(ALIKE * self.sigma2, &moved, &moved, 1.0);
+            wide.ger(self.smoothness.alike() * self.sigma2, &moved, &moved, 1.0);
         }
         wide.view((0, 0), (n_robot, n_robot)).into_owned()
     }
@@ -79,7 +76,7 @@ impl Normal {
         for (patch, group) in self.patches.iter().zip(groups) {
             let Some(patch) = patch else { continue };
             let push = out[*group as usize].get_or_insert_with(|| DVector::zeros(self.n));
-            push.axpy(1.0 / (1.0 + self.sigma2 * patch.weight), &patch.a, 1.0);
+            *push += &patch.a;
         }
         out
     }
@@ -99,7 +96,7 @@ impl Normal {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{N_SCAN, Row};
+    use super::super::{N_SCAN, Patches, Row, Smoothness};
     use super::*;
 
     #[test]
@@ -113,11 +110,12 @@ mod tests {
             let (robot, scan) = (&[1.0], [0.0; N_SCAN]);
             normal.add(&Row { robot, scan, view: 0, patch: i % 2, weight, influence, r });
         }
-        normal.close();
+        let patches = Patches { groups: vec![0, 1], places: vec![[0.0; 6]; 2] };
+        normal.close(&patches, Some(Smoothness::APART));
         let all = n_rows as f64 * weight;
         normal.add_robot_prior(&DMatrix::from_element(1, 1, all), &DVector::zeros(1));
         (0..N_SCAN).for_each(|i| normal.add_scan_prior(0, i, 0.0, 1.0));
-        let variance = normal.covariance(&[0, 1])[(0, 0)];
+        let variance = normal.covariance(&patches.groups)[(0, 0)];
         assert!((variance * all - (0.5 + 1.0) / 4.0).abs() < 1e-9, "{}", variance * all);
     }
 }

@@ -1,13 +1,15 @@
 //! Residuals with their derivatives in; out come the normal equations of robot and scans with the offsets of the
 //! model's patches taken out in closed form, and their solution (METHOD.md §11).
 //!
-//! A patch offset `u ~ N(0, σ_u²)` common to the residuals of patch c: marginalised it gives
-//! `H −= Σ κ_c a_c a_cᵀ`, `g −= Σ κ_c a_c R_c` with `a_c = Σ w J`, `R_c = Σ w r`, `W_c = Σ w`,
-//! `κ_c = σ_u² / (1 + σ_u² W_c)`.
+//! An offset `u_c ~ N(0, σ_u²)` is common to the residuals of patch c; sums over a patch are all that is needed of them:
+//! `a_c = Σ w J`, `R_c = Σ w r`, `W_c = Σ w`.
 
 mod covariance;
+mod shape;
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
+
+pub(crate) use shape::{N_SIDES, Patches, Smoothness};
 
 /// Unknowns of a scan: shift, turn, range bias.
 pub(crate) const N_SCAN: usize = 7;
@@ -37,9 +39,9 @@ fn add(sums: &mut [f64], factor: f64, row: &[f64]) {
 /// Sums over one patch.
 #[derive(Debug, Clone)]
 struct Patch {
-    /// Σ w J.
+    /// Σ w J; once offsets are taken out, what an offset of this patch adds to the gradient.
     a: DVector<f64>,
-    /// Σ w J r.
+    /// Its part of the gradient: Σ w J r, less what offsets explain once they are taken out.
     g: DVector<f64>,
     /// Σ w.
     weight: f64,
@@ -106,6 +108,7 @@ pub(crate) struct Normal {
     kernel: [f64; 3],
     n_rows: usize,
     sigma2: f64,
+    smoothness: Smoothness,
 }
 
 impl Normal {
@@ -122,6 +125,7 @@ impl Normal {
             kernel: [0.0; 3],
             n_rows: 0,
             sigma2: 0.0,
+            smoothness: Smoothness::APART,
         }
     }
 
@@ -193,19 +197,14 @@ impl Normal {
         self
     }
 
-    /// Takes the patches out. Call once, after the last residual, before the priors.
-    pub(crate) fn close(&mut self) {
+    /// Takes the patches' offsets out, as smooth as told, or as is likeliest. Call once, after the last residual and all
+    /// priors.
+    pub(crate) fn close(&mut self, of: &Patches, told: Option<Smoothness>) {
         self.flush();
         self.hessian.fill_upper_triangle_with_lower_triangle();
         self.sigma2 = patch_variance(self.patches.iter().flatten());
-        for patch in self.patches.iter_mut().flatten() {
-            let k = self.sigma2 / (1.0 + self.sigma2 * patch.weight);
-            if k > 0.0 {
-                self.hessian.ger(-k, &patch.a, &patch.a, 1.0);
-                patch.g.axpy(-k * patch.r, &patch.a, 1.0);
-            }
-            self.gradient += &patch.g;
-        }
+        let equations = (&mut self.hessian, &mut self.gradient);
+        self.smoothness = shape::take_out(equations, (&mut self.patches, of), self.sigma2, told);
     }
 
     pub(crate) fn add_robot_prior(&mut self, hessian: &DMatrix<f64>, gradient: &DVector<f64>) {
@@ -253,6 +252,11 @@ impl Normal {
     /// Standard deviation of the patches' offsets, metres.
     pub(crate) fn patch_sigma(&self) -> f64 {
         self.sigma2.sqrt()
+    }
+
+    /// How smooth those are.
+    pub(crate) fn smoothness(&self) -> Smoothness {
+        self.smoothness
     }
 }
 
