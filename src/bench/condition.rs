@@ -34,6 +34,8 @@ pub(super) struct Condition {
     pub(super) mixed: bool,
     /// Smooth error of the model's shape, metres, about the largest.
     pub(super) warp: f64,
+    /// Whether the sides of a link are off each by itself.
+    pub(super) each_side: bool,
     /// Whether a part of one link's surface, a cover, is off.
     pub(super) uncovered: bool,
     /// By how much of its size the surface of one link is larger.
@@ -71,6 +73,7 @@ pub(super) const PLAIN: Condition = Condition {
     registration: [0.0; 3],
     mixed: false,
     warp: 0.0,
+    each_side: false,
     uncovered: false,
     scaled: 0.0,
     frames: [0.0; 2],
@@ -133,6 +136,8 @@ const SUITES: &[Suite] = &[
     ("crossed", 3, |_| Condition { crossed: true, mixed: true, ..PLAIN }),
     ("shape-1.5", 6, |_| Condition { warp: 0.0015, ..PLAIN }),
     ("shape-3", 6, |_| Condition { warp: 0.003, ..PLAIN }),
+    ("sides-1.5", 6, |_| Condition { warp: 0.0015, each_side: true, ..PLAIN }),
+    ("sides-3", 6, |_| Condition { warp: 0.003, each_side: true, ..PLAIN }),
     ("cover", 3, |_| Condition { uncovered: true, ..PLAIN }),
     ("scaled", 3, |_| Condition { scaled: 0.01, ..PLAIN }),
     ("all", 6, |_| Condition {

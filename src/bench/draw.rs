@@ -50,7 +50,8 @@ impl Drawn {
         let mut out = models.to_vec();
         out[case.model] = out[case.model].with_other_branches(&self.other_branches);
         if case.condition.warp > 0.0 {
-            shape::warp(&mut out[case.model], case.condition.warp, case.seed);
+            let condition = &case.condition;
+            shape::warp(&mut out[case.model], condition.warp, condition.each_side, case.seed);
         }
         if case.condition.uncovered {
             shape::uncover(&mut out[case.model], case.seed);

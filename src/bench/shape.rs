@@ -17,16 +17,21 @@ const COVER: f64 = 0.125;
 /// Vertices of one corner that triangles do not share are one if they agree to this, metres.
 const WELD: f32 = 1e-4;
 
-/// Moves the surface of each link along its normals by about `amplitude` metres at most.
-pub(super) fn warp(model: &mut Model, amplitude: f64, seed: u64) {
+/// Moves the surface of each link along its normals by about `amplitude` metres at most: all around it alike, so that it is too
+/// thick here and too thin there, or each of its six sides by itself.
+pub(super) fn warp(model: &mut Model, amplitude: f64, each_side: bool, seed: u64) {
     for (l, link) in model.links.iter_mut().enumerate() {
         let mut random = Random::keyed(&[seed, l as u64, 0x5A]);
-        let waves: Vec<(Vector, f64)> = (0..N_WAVES)
-            .map(|_| {
-                let k = Vector::from_fn(|_, _| random.between(-WAVE_NUMBER, WAVE_NUMBER));
-                (k, random.between(0.0, TAU))
-            })
-            .collect();
+        let fields: Vec<Waves> =
+            (0..if each_side { 6 } else { 1 }).map(|_| Waves::new(&mut random)).collect();
+        let off = |p: &Vector, n: &Vector| -> f64 {
+            let [field] = fields.as_slice() else {
+                // Squares of a normal's parts add up to one.
+                let side = |axis: usize| 2 * axis + usize::from(n[axis] < 0.0);
+                return (0..3).map(|axis| n[axis] * n[axis] * fields[side(axis)].at(p)).sum();
+            };
+            field.at(p)
+        };
         let mesh = Arc::make_mut(&mut link.mesh);
         let mut places: BTreeMap<[i32; 3], usize> = BTreeMap::new();
         let corner: Vec<usize> = mesh
@@ -47,10 +52,26 @@ pub(super) fn warp(model: &mut Model, amplitude: f64, seed: u64) {
         for (vertex, corner) in mesh.vertices.iter_mut().zip(&corner) {
             let Some(n) = normals[*corner].try_normalize(1e-12) else { continue };
             let p = Vector::from(vertex.map(f64::from));
-            let field: f64 = waves.iter().map(|(k, phase)| (k.dot(&p) + phase).sin()).sum();
-            let moved = p + n * (amplitude * field / N_WAVES as f64 * 1.4);
+            let moved = p + n * (amplitude * off(&p, &n));
             *vertex = [moved.x as f32, moved.y as f32, moved.z as f32];
         }
+    }
+}
+
+/// A smooth field, about 1 at most.
+struct Waves([(Vector, f64); N_WAVES]);
+
+impl Waves {
+    fn new(random: &mut Random) -> Self {
+        Self(std::array::from_fn(|_| {
+            let k = Vector::from_fn(|_, _| random.between(-WAVE_NUMBER, WAVE_NUMBER));
+            (k, random.between(0.0, TAU))
+        }))
+    }
+
+    fn at(&self, p: &Vector) -> f64 {
+        let sum: f64 = self.0.iter().map(|(k, phase)| (k.dot(p) + phase).sin()).sum();
+        sum / N_WAVES as f64 * 1.4
     }
 }
 
