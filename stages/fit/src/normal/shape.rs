@@ -52,21 +52,32 @@ impl Smoothness {
 
     /// Share of the patches' variance that is common to a side of a link, and is not in their sums.
     pub(super) fn alike(self) -> f64 {
-        if self == Self::APART { ALIKE } else { ALIKE_SMOOTH }
+        match (self.is_around(), self.is_apart()) {
+            (true, _) => ALIKE_AROUND,
+            (_, true) => ALIKE,
+            _ => ALIKE_SIDES,
+        }
     }
 
     fn is_apart(self) -> bool {
         self == Self::APART
+    }
+
+    /// Whether all sides of a link are off alike.
+    fn is_around(self) -> bool {
+        self.length > 0.0 && self.sides == 0.0
     }
 }
 
 /// What castings, hulls and sheets are looked for as.
 const LENGTHS: [f64; 3] = [0.1, 0.2, 0.4];
 const SIDES: [f64; 2] = [0.0, 1.0];
-/// Of a link whose patches are off apart, by waves that are longer than a patch: what the fit takes in does not show.
+/// Patches are off apart, but castings and hulls by waves that are longer than a patch: what the fit takes in does not show.
 const ALIKE: f64 = 0.5;
-/// Of one that is off smoothly: most of it is in the field.
-const ALIKE_SMOOTH: f64 = 0.08;
+/// Sides are off each by itself, by such waves.
+const ALIKE_SIDES: f64 = 1.0;
+/// All sides are off alike: opposite ones tell how much.
+const ALIKE_AROUND: f64 = 0.06;
 /// Share of the variance of a smooth offset that is a patch's own: a field is not the same all over it.
 const OWN: f64 = 0.02;
 /// Nodes of the field are this near to each patch, in lengths, …
@@ -146,7 +157,7 @@ pub(super) fn take_out(
         let taken = offsets.taken();
         *hessian -= taken.hessian;
         *gradient -= taken.gradient;
-        offsets.write(patches);
+        offsets.write(patches, (smoothness, sigma2));
     }
     smoothness
 }
@@ -309,16 +320,20 @@ impl Offsets<'_> {
     }
 
     /// Each patch gets its part of the gradient that is left, and what an offset of its own adds to it.
-    fn write(&self, patches: &mut [Option<Patch>]) {
+    fn write(&self, patches: &mut [Option<Patch>], (smoothness, sigma2): (Smoothness, f64)) {
         for (c, ([variance, share], [weight, r])) in
             self.own.iter().zip(&self.link.sums).enumerate()
         {
             let Some(patch) = &mut patches[self.link.at[c]] else { continue };
             patch.g.axpy(-share * (variance * r + self.smooth(c)), &patch.a, 1.0);
-            patch.a *= *share;
-            if let Some(field) = &self.field {
-                let column = field.basis.column(c);
-                patch.a.gemv_tr(-share * weight, &field.gain, &column, 1.0);
+            // A field of one side takes in what is common to it, and knows it as badly as without.
+            match self.field.as_ref().filter(|_| smoothness.is_around()) {
+                Some(field) => {
+                    patch.a *= *share;
+                    let column = field.basis.column(c);
+                    patch.a.gemv_tr(-share * weight, &field.gain, &column, 1.0);
+                }
+                None => patch.a /= 1.0 + sigma2 * weight,
             }
         }
     }
