@@ -307,7 +307,7 @@ impl<'a> Adjust<'a> {
         let scale = if is_alike { 1.0 } else { tallies.scale().min(1.0) };
         Adjusted {
             noise: state.noise * scale,
-            covariance: normal.covariance(&self.refine.prepared.patches.groups),
+            covariance: normal.covariance(&self.refine.prepared.patches),
             hypothesis: state.hypothesis,
             scans: state.scans,
             shared: normal.shared(),

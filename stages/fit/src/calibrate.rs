@@ -98,7 +98,7 @@ fn estimate(
         normal.add_frame_priors(&frames, refine.settings.frame_sigma);
         let solved = if step < N_STEPS { normal.solve() } else { None };
         let Some(change) = solved else {
-            let covariance = normal.covariance(&own.patches.groups);
+            let covariance = normal.covariance(&own.patches);
             let n = 6 + h.posture.len();
             done.covariance = covariance.view((0, 0), (n, n)).into_owned();
             let frames = with_sigmas(frames, &covariance);

@@ -3,18 +3,21 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Normal;
+use super::{Normal, Patch, Patches};
 
 /// Beyond this factor the kernel says nothing any more.
 const MAX_FACTOR: f64 = 4.0;
 /// Least share of its stated variance that a point keeps: what is left without noise, of meshes and of rounding, is alike
 /// for many points.
 const MIN_SHARE: f64 = 0.3;
+/// Patches that lie nearer than this to each other along an axis do not rise along it, metres.
+const MIN_SPREAD: f64 = 0.02;
 
 impl Normal {
     /// Covariance of base twist and joints: the inverse of the normal matrix, as wide as the residuals are, and wider in
-    /// every direction in which those of whole groups of patches (`groups[patch]`) pull harder than independent errors would.
-    pub(crate) fn covariance(&self, groups: &[u32]) -> DMatrix<f64> {
+    /// every direction in which those of whole groups of patches pull harder than independent errors would.
+    pub(crate) fn covariance(&self, of: &Patches) -> DMatrix<f64> {
+        let groups = &of.groups;
         let n_robot = self.n_robot;
         let Some(cholesky) = self.hessian.clone().cholesky() else {
             return DMatrix::identity(n_robot, n_robot) * 1e3;
@@ -49,9 +52,9 @@ impl Normal {
         wide += &inverse * &self.priors * &inverse * (1.0 - share * stretch).max(0.0);
         // Errors of shape are alike all over a side of a link, and the fit takes most of that in: its residuals do not
         // show it, so the patches' variance stands for it.
-        for push in self.pushes(groups, n_groups).into_iter().flatten() {
+        for (share, push) in self.pushes(of) {
             let moved = &inverse * push;
-            wide.ger(self.smoothness.alike() * self.sigma2, &moved, &moved, 1.0);
+            wide.ger(share * self.sigma2, &moved, &moved, 1.0);
         }
         wide.view((0, 0), (n_robot, n_robot)).into_owned()
     }
@@ -70,13 +73,31 @@ impl Normal {
         Some([gain, information / (share * stretch)])
     }
 
-    /// Gradient for a unit offset of all patches of each group together.
-    fn pushes(&self, groups: &[u32], n_groups: usize) -> Vec<Option<DVector<f64>>> {
-        let mut out: Vec<Option<DVector<f64>>> = vec![None; n_groups];
-        for (patch, group) in self.patches.iter().zip(groups) {
-            let Some(patch) = patch else { continue };
-            let push = out[*group as usize].get_or_insert_with(|| DVector::zeros(self.n));
-            *push += &patch.a;
+    /// Gradients for offsets that the patches of a group share, of a root mean square of one, and the share of the patches'
+    /// variance that they have: the same for all, and, where each side is off by itself, rising along each axis of the link.
+    fn pushes(&self, of: &Patches) -> Vec<(f64, DVector<f64>)> {
+        let [alike, rising] = self.smoothness.alike();
+        let seen = |(c, patch): (usize, &'_ Option<Patch>)| patch.is_some().then_some(c);
+        let seen: Vec<usize> = self.patches.iter().enumerate().filter_map(seen).collect();
+        let sum = |group: &[usize], offset: &dyn Fn(usize) -> f64| {
+            let mut push = DVector::zeros(self.n);
+            for &c in group {
+                self.patches[c].iter().for_each(|patch| push.axpy(offset(c), &patch.a, 1.0));
+            }
+            push
+        };
+        let mut out = Vec::new();
+        for group in seen.chunk_by(|a, b| of.groups[*a] == of.groups[*b]) {
+            out.push((alike, sum(group, &|_| 1.0)));
+            for axis in (0..3).filter(|_| rising > 0.0) {
+                let along = |c: &usize| of.places[*c][axis];
+                let mean = group.iter().map(along).sum::<f64>() / group.len() as f64;
+                let square = group.iter().map(|c| (along(c) - mean).powi(2)).sum::<f64>();
+                let spread = (square / group.len() as f64).sqrt();
+                if spread > MIN_SPREAD {
+                    out.push((rising, sum(group, &|c| (along(&c) - mean) / spread)));
+                }
+            }
         }
         out
     }
@@ -96,7 +117,7 @@ impl Normal {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{N_SCAN, Patches, Row, Smoothness};
+    use super::super::{N_SCAN, Row, Smoothness};
     use super::*;
 
     #[test]
@@ -115,7 +136,7 @@ mod tests {
         let all = n_rows as f64 * weight;
         normal.add_robot_prior(&DMatrix::from_element(1, 1, all), &DVector::zeros(1));
         (0..N_SCAN).for_each(|i| normal.add_scan_prior(0, i, 0.0, 1.0));
-        let variance = normal.covariance(&patches.groups)[(0, 0)];
+        let variance = normal.covariance(&patches)[(0, 0)];
         assert!((variance * all - (0.5 + 1.0) / 4.0).abs() < 1e-9, "{}", variance * all);
     }
 }

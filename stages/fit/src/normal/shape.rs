@@ -50,8 +50,8 @@ impl Smoothness {
     /// Each patch is off by itself.
     pub(crate) const APART: Self = Self { length: 0.0, sides: 0.0 };
 
-    /// Share of the patches' variance that is common to a side of a link, and is not in their sums.
-    pub(super) fn alike(self) -> f64 {
+    /// Shares of the patches' variance that are common to a side of a link, and that rise along it, and are not in their sums.
+    pub(super) fn alike(self) -> [f64; 2] {
         match (self.is_around(), self.is_apart()) {
             (true, _) => ALIKE_AROUND,
             (_, true) => ALIKE,
@@ -73,11 +73,11 @@ impl Smoothness {
 const LENGTHS: [f64; 3] = [0.1, 0.2, 0.4];
 const SIDES: [f64; 2] = [0.0, 1.0];
 /// Patches are off apart, but castings and hulls by waves that are longer than a patch: what the fit takes in does not show.
-const ALIKE: f64 = 0.5;
+const ALIKE: [f64; 2] = [0.5, 0.25];
 /// Sides are off each by itself, by such waves.
-const ALIKE_SIDES: f64 = 1.0;
+const ALIKE_SIDES: [f64; 2] = [1.0, 0.5];
 /// All sides are off alike: opposite ones tell how much.
-const ALIKE_AROUND: f64 = 0.06;
+const ALIKE_AROUND: [f64; 2] = [0.06, 0.0];
 /// Share of the variance of a smooth offset that is a patch's own: a field is not the same all over it.
 const OWN: f64 = 0.02;
 /// Nodes of the field are this near to each patch, in lengths, …
@@ -152,12 +152,14 @@ pub(super) fn take_out(
         None if sigma2.sqrt() < NO_OFFSET => Smoothness::APART,
         None => likeliest((hessian, gradient), &links, sigma2),
     };
+    // A field of one side would take in what moves the link, and seem to know it.
+    let used = if smoothness.is_around() { smoothness } else { Smoothness::APART };
     for link in &links {
-        let offsets = link.offsets(smoothness, sigma2);
+        let offsets = link.offsets(used, sigma2);
         let taken = offsets.taken();
         *hessian -= taken.hessian;
         *gradient -= taken.gradient;
-        offsets.write(patches, (smoothness, sigma2));
+        offsets.write(patches);
     }
     smoothness
 }
@@ -320,20 +322,16 @@ impl Offsets<'_> {
     }
 
     /// Each patch gets its part of the gradient that is left, and what an offset of its own adds to it.
-    fn write(&self, patches: &mut [Option<Patch>], (smoothness, sigma2): (Smoothness, f64)) {
+    fn write(&self, patches: &mut [Option<Patch>]) {
         for (c, ([variance, share], [weight, r])) in
             self.own.iter().zip(&self.link.sums).enumerate()
         {
             let Some(patch) = &mut patches[self.link.at[c]] else { continue };
             patch.g.axpy(-share * (variance * r + self.smooth(c)), &patch.a, 1.0);
-            // A field of one side takes in what is common to it, and knows it as badly as without.
-            match self.field.as_ref().filter(|_| smoothness.is_around()) {
-                Some(field) => {
-                    patch.a *= *share;
-                    let column = field.basis.column(c);
-                    patch.a.gemv_tr(-share * weight, &field.gain, &column, 1.0);
-                }
-                None => patch.a /= 1.0 + sigma2 * weight,
+            patch.a *= *share;
+            if let Some(field) = &self.field {
+                let column = field.basis.column(c);
+                patch.a.gemv_tr(-share * weight, &field.gain, &column, 1.0);
             }
         }
     }
