@@ -33,7 +33,7 @@ pub struct Prepared<'a> {
     pub(crate) leaf: Vec<bool>,
     /// The face of a bare flange.
     pub(crate) face: Option<Face>,
-    /// Those of all links.
+    /// What errors of the model's shape are told by: patches of all links' surfaces.
     pub(crate) patches: Arc<Patches>,
 }
 
