@@ -7,7 +7,7 @@
 //! themselves: a model is drawn to millimetres only. Both or neither: without the patches scans would be bent to fit a
 //! wrong shape.
 
-use contract::Fan;
+use contract::{Fan, OneByOne};
 use geometry::{Point, Pose, Vector, robust};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 
@@ -115,11 +115,18 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// A posture, before anything is known of the scans' errors.
+    /// A posture, before anything is known of the scans' errors. Patches of the surface are off apart: that is soon reckoned, and
+    /// enough to choose by.
     pub(crate) fn at(hypothesis: &Hypothesis, scene: &Scene<'_>) -> Self {
         let scans = vec![ScanError::NONE; scene.views.len()];
         let hypothesis = hypothesis.clone();
-        Self { hypothesis, scans, noise: scene.noise, patch_sigma: 0.0, smoothness: None }
+        let smoothness = Some(Smoothness::Apart);
+        Self { hypothesis, scans, noise: scene.noise, patch_sigma: 0.0, smoothness }
+    }
+
+    /// The same, with the model's surface off as smoothly as the residuals say.
+    pub(crate) fn open(self) -> Self {
+        Self { smoothness: None, ..self }
     }
 }
 
@@ -145,7 +152,7 @@ impl<'a> Adjust<'a> {
         self.refine.prepared.make_triangles(fan);
         loop {
             let (sums, tallies) = self.sums(&state, points, fan);
-            let normal = self.closed(&state, sums);
+            let normal = self.closed(&state, sums, fan);
             state.smoothness = Some(normal.smoothness());
             let solved = (round < N_ROUNDS).then(|| normal.solve()).flatten();
             let Some(step) = solved else {
@@ -169,7 +176,7 @@ impl<'a> Adjust<'a> {
 
     /// One step from a state, by what was summed up at it.
     pub(crate) fn step(&self, mut state: State, sums: Normal) -> State {
-        if let Some(step) = self.closed(&state, sums).solve() {
+        if let Some(step) = self.closed(&state, sums, &OneByOne).solve() {
             self.apply(&mut state, &step);
         }
         state
@@ -177,7 +184,7 @@ impl<'a> Adjust<'a> {
 
     /// Normal equations at a state, the places of the joints among the unknowns.
     pub(crate) fn at(&self, state: &State, points: &mut Sampled, fan: &impl Fan) -> Normal {
-        self.closed(state, self.sums(state, points, fan).0)
+        self.closed(state, self.sums(state, points, fan).0, fan)
     }
 
     /// Sums of the points at a state, and what is said of each link. What triangles the points lie on is known from a state
@@ -211,9 +218,9 @@ impl<'a> Adjust<'a> {
     }
 
     /// Normal equations of what was summed up at a state, patches taken out, with all priors.
-    fn closed(&self, state: &State, mut sums: Normal) -> Normal {
+    fn closed(&self, state: &State, mut sums: Normal, fan: &impl Fan) -> Normal {
         self.add_priors(state, &mut sums);
-        sums.close(&self.refine.prepared.patches, state.smoothness);
+        sums.close(&self.refine.prepared.patches, state.smoothness, fan);
         sums
     }
 
@@ -255,6 +262,8 @@ impl<'a> Adjust<'a> {
             let n = base_from_local.rotation * pair.n;
             self.refine.row(&q.coords, &n, &kinematics.twists[pair.link], &mut robot[..n_posed]);
             frames.row(pair.link, &q.coords, &n, &mut robot[n_posed..]);
+            let patch = prepared.links[pair.link].patch(pair.patch);
+            let shape = prepared.patches.places[patch].shape(&pairing.inside(&pair));
             let lever = pair.beam.cross(&pair.n);
             let scan =
                 [pair.n.x, pair.n.y, pair.n.z, lever.x, lever.y, lever.z, -pair.n.dot(&pair.ray)];
@@ -262,7 +271,8 @@ impl<'a> Adjust<'a> {
                 robot: &robot,
                 scan,
                 view: pair.view,
-                patch: prepared.links[pair.link].patch(pair.patch),
+                patch,
+                shape,
                 weight,
                 influence,
                 r: pair.r,

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::{JointKind, Kinematics, Model};
 use std::f64::consts::PI;
 
-use crate::adjust::{Adjust, Adjusted};
+use crate::adjust::{Adjust, Adjusted, State};
 use crate::beam::Hypothesis;
 use crate::judge::judged;
 use crate::normal::Normal;
@@ -89,7 +89,8 @@ fn estimate(
         let refine = Refine { prepared: &own, prior: refine.prior, ..*refine };
         let mut points =
             adjusted_points(&refine, &h, (all, refine.settings.part()), fan).every(every);
-        let mut done = Adjust::new(&refine).run(&h, &mut points, fan);
+        let start = State::at(&h, refine.scene).open();
+        let mut done = Adjust::new(&refine).run_from(start, &mut points, fan);
         h = done.hypothesis.clone();
         let state = done.state();
         let with_frames = Adjust { frames: &nominal.free, ..Adjust::new(&refine) };

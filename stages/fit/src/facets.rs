@@ -6,6 +6,7 @@ use robot::{CadCloud, Link};
 use std::sync::OnceLock;
 
 use crate::exact::Triangles;
+use crate::normal::Place;
 
 /// Coarse field: reach covers the first gate (120 mm, METHOD.md §11), voxels a fifth of it.
 const COARSE: (f32, f32, usize) = (0.025, 0.15, 2500);
@@ -17,6 +18,8 @@ const VOXEL: f32 = 1.4;
 const MAX_VOXELS: f64 = 5e5;
 /// Edge of a patch, metres: within it a model's error of shape is about the same (METHOD.md §4).
 const PATCH: f32 = 0.13;
+/// Half of that.
+pub(crate) const HALF_PATCH: f64 = 0.5 * PATCH as f64;
 /// Samples within a cube of this edge, metres, are neighbours in memory: some twenty of them.
 const NEAR: f32 = 0.016;
 
@@ -70,19 +73,16 @@ impl Fields {
         self.keys.iter().map(|key| key.0)
     }
 
-    /// Middle and mean normal of each patch.
-    pub(crate) fn places(&self) -> Vec<[f64; 6]> {
-        let mut sums = vec![[0.0_f64; 6]; self.keys.len()];
+    /// Where each patch lies.
+    pub(crate) fn places(&self) -> Vec<Place> {
+        let mut sums = vec![[Vector::zeros(); 2]; self.keys.len()];
         let mut counts = vec![0.0; self.keys.len()];
         for (facet, &patch) in self.facets.iter().zip(&self.patches) {
-            let values = facet.x.iter().chain(&facet.n);
-            sums[patch as usize].iter_mut().zip(values).for_each(|(s, v)| *s += f64::from(*v));
+            let values = [facet.x, facet.n].map(|v| Vector::from(v.map(f64::from)));
+            sums[patch as usize].iter_mut().zip(values).for_each(|(s, v)| *s += v);
             counts[patch as usize] += 1.0;
         }
-        for (sum, n) in sums.iter_mut().zip(counts) {
-            sum.iter_mut().for_each(|v| *v /= n);
-        }
-        sums
+        sums.iter().zip(counts).map(|([x, n], count)| Place::new(x / count, n / count)).collect()
     }
 
     /// The patch of a facet.

@@ -105,6 +105,13 @@ impl<'a> Pairing<'a> {
         }
     }
 
+    /// A point in the frame of the link that it lies on.
+    #[inline]
+    pub(crate) fn inside(&self, pair: &Pair) -> (Vector, Vector) {
+        let Frame { rotation, origin } = &self.frames[pair.link];
+        (rotation.tr_mul(&(pair.p - origin)), rotation.tr_mul(&pair.n))
+    }
+
     /// A point of the scene with the surface that it lies on; `None` where it lies on none. What triangle its beam met is known from a
     /// state like this one, or is kept for the next.
     pub(crate) fn pair(&self, point: u32, known: &mut Option<Known>) -> Option<Pair> {

@@ -175,7 +175,7 @@ fn sharpen(
 ) -> Sampled {
     let n = refine.settings.max_points;
     let mut points = adjusted_points(refine, &best.hypothesis, (all, n), fan);
-    *best = Adjust::new(refine).run_from(best.state(), &mut points, fan);
+    *best = Adjust::new(refine).run_from(best.state().open(), &mut points, fan);
     *judgement = judged(refine, &best.hypothesis);
     points
 }

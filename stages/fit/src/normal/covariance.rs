@@ -3,15 +3,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Normal, Patch, Patches};
+use super::{Normal, Patches};
 
 /// Beyond this factor the kernel says nothing any more.
 const MAX_FACTOR: f64 = 4.0;
 /// Least share of its stated variance that a point keeps: what is left without noise, of meshes and of rounding, is alike
 /// for many points.
 const MIN_SHARE: f64 = 0.3;
-/// Patches that lie nearer than this to each other along an axis do not rise along it, metres.
-const MIN_SPREAD: f64 = 0.02;
 
 impl Normal {
     /// Covariance of base twist and joints: the inverse of the normal matrix, as wide as the residuals are, and wider in
@@ -50,12 +48,6 @@ impl Normal {
         let mut wide = l_inverse.transpose() * eigen.recompose() * &l_inverse * stretch;
         // Residuals that are smaller than thought make no prior better known.
         wide += &inverse * &self.priors * &inverse * (1.0 - share * stretch).max(0.0);
-        // Errors of shape are alike all over a side of a link, and the fit takes most of that in: its residuals do not
-        // show it, so the patches' variance stands for it.
-        for (share, push) in self.pushes(of) {
-            let moved = &inverse * push;
-            wide.ger(share * self.sigma2, &moved, &moved, 1.0);
-        }
         wide.view((0, 0), (n_robot, n_robot)).into_owned()
     }
 
@@ -73,35 +65,6 @@ impl Normal {
         Some([gain, information / (share * stretch)])
     }
 
-    /// Gradients for offsets that the patches of a group share, of a root mean square of one, and the share of the patches'
-    /// variance that they have: the same for all, and, where each side is off by itself, rising along each axis of the link.
-    fn pushes(&self, of: &Patches) -> Vec<(f64, DVector<f64>)> {
-        let [alike, rising] = self.smoothness.alike();
-        let seen = |(c, patch): (usize, &'_ Option<Patch>)| patch.is_some().then_some(c);
-        let seen: Vec<usize> = self.patches.iter().enumerate().filter_map(seen).collect();
-        let sum = |group: &[usize], offset: &dyn Fn(usize) -> f64| {
-            let mut push = DVector::zeros(self.n);
-            for &c in group {
-                self.patches[c].iter().for_each(|patch| push.axpy(offset(c), &patch.a, 1.0));
-            }
-            push
-        };
-        let mut out = Vec::new();
-        for group in seen.chunk_by(|a, b| of.groups[*a] == of.groups[*b]) {
-            out.push((alike, sum(group, &|_| 1.0)));
-            for axis in (0..3).filter(|_| rising > 0.0) {
-                let along = |c: &usize| of.places[*c][axis];
-                let mean = group.iter().map(along).sum::<f64>() / group.len() as f64;
-                let square = group.iter().map(|c| (along(c) - mean).powi(2)).sum::<f64>();
-                let spread = (square / group.len() as f64).sqrt();
-                if spread > MIN_SPREAD {
-                    out.push((rising, sum(group, &|c| (along(&c) - mean) / spread)));
-                }
-            }
-        }
-        out
-    }
-
     /// What the rows show of their own variance, over what was taken for it: `Σψ²/Σw`; and how much wider the kernel makes
     /// errors than its weights say: `(Σw/Σψ′)²`. Where noise is not small against the gate, points beyond it are missing on
     /// both sides.
@@ -117,8 +80,10 @@ impl Normal {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{N_SCAN, Row, Smoothness};
+    use super::super::{N_SCAN, Place, Row, Shape, Smoothness};
     use super::*;
+    use contract::OneByOne;
+    use nalgebra::Vector3;
 
     #[test]
     fn deviations_are_those_of_the_residuals_and_of_the_prior() {
@@ -129,10 +94,14 @@ mod tests {
             let r = if i / 2 % 2 == 0 { r } else { -r };
             let influence = [(weight * r).powi(2), weight];
             let (robot, scan) = (&[1.0], [0.0; N_SCAN]);
-            normal.add(&Row { robot, scan, view: 0, patch: i % 2, weight, influence, r });
+            let (view, patch, shape) = (0, i % 2, Shape::x());
+            normal.add(&Row { robot, scan, view, patch, shape, weight, influence, r });
         }
-        let patches = Patches { groups: vec![0, 1], places: vec![[0.0; 6]; 2] };
-        normal.close(&patches, Some(Smoothness::APART));
+        let patches = Patches {
+            groups: vec![0, 1],
+            places: vec![Place::new(Vector3::zeros(), Vector3::z()); 2],
+        };
+        normal.close(&patches, Some(Smoothness::Apart), &OneByOne);
         let all = n_rows as f64 * weight;
         normal.add_robot_prior(&DMatrix::from_element(1, 1, all), &DVector::zeros(1));
         (0..N_SCAN).for_each(|i| normal.add_scan_prior(0, i, 0.0, 1.0));

@@ -1,14 +1,17 @@
 //! Residuals with their derivatives in; out come the normal equations of robot and scans with the offsets of the
 //! model's patches taken out in closed form, and their solution (METHOD.md §11).
 //!
-//! An offset `u_c ~ N(0, σ_u²)` is common to the residuals of patch c; sums over a patch are all that is needed of them:
-//! `a_c = Σ w J`, `R_c = Σ w r`, `W_c = Σ w`.
+//! Residuals of patch c have `φ·u_c` in common: it is off as a whole, tilted, and what is on it shifted (`φ`: [`Place::shape`]).
+//! Sums over a patch are all that is needed of them: `A_c = Σ w J φᵀ`, `R_c = Σ w r φ`, `W_c = Σ w φ φᵀ`.
 
 mod covariance;
+mod field;
 mod shape;
 
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use contract::Fan;
+use nalgebra::{DMatrix, DMatrixView, DVector, Dyn, Matrix5, OMatrix, U5, Vector5};
 
+pub(crate) use field::Place;
 pub(crate) use shape::{N_SIDES, Patches, Smoothness};
 
 /// Unknowns of a scan: shift, turn, range bias.
@@ -22,6 +25,8 @@ pub(crate) struct Row<'a> {
     pub(crate) scan: [f64; N_SCAN],
     pub(crate) view: usize,
     pub(crate) patch: usize,
+    /// What it changes by with each way in which that may be off.
+    pub(crate) shape: Shape,
     /// Robust weight over variance, m⁻².
     pub(crate) weight: f64,
     /// Of the robust kernel: square of its influence, and its slope, both over variance.
@@ -39,15 +44,34 @@ fn add(sums: &mut [f64], factor: f64, row: &[f64]) {
 /// Sums over one patch.
 #[derive(Debug, Clone)]
 struct Patch {
-    /// Σ w J; once offsets are taken out, what an offset of this patch adds to the gradient.
-    a: DVector<f64>,
+    /// Σ w J φᵀ.
+    a: Columns,
     /// Its part of the gradient: Σ w J r, less what offsets explain once they are taken out.
     g: DVector<f64>,
-    /// Σ w.
-    weight: f64,
-    /// Σ w r.
-    r: f64,
+    /// Σ w φ φᵀ.
+    weight: Square,
+    /// Σ w r φ.
+    r: Shape,
 }
+
+impl Patch {
+    fn new(n: usize) -> Self {
+        let (a, g) = (Columns::zeros(n), DVector::zeros(n));
+        Self { a, g, weight: Square::zeros(), r: Shape::zeros() }
+    }
+
+    /// Σ w.
+    fn total(&self) -> f64 {
+        self.weight[(0, 0)]
+    }
+}
+
+/// A number for each way in which a patch may be off: an offset, two tilts, two shifts.
+pub(crate) type Shape = Vector5<f64>;
+/// One for each two of them.
+type Square = Matrix5<f64>;
+/// A column for each.
+type Columns = OMatrix<f64, Dyn, U5>;
 
 /// Residuals whose products are added together.
 const BATCH: usize = 64;
@@ -125,7 +149,7 @@ impl Normal {
             kernel: [0.0; 3],
             n_rows: 0,
             sigma2: 0.0,
-            smoothness: Smoothness::APART,
+            smoothness: Smoothness::Apart,
         }
     }
 
@@ -140,20 +164,19 @@ impl Normal {
             self.flush();
         }
         let (n, at) = (self.n_robot, self.n_robot + row.view * N_SCAN);
-        let patch = self.patches[row.patch].get_or_insert_with(|| Patch {
-            a: DVector::zeros(self.n),
-            g: DVector::zeros(self.n),
-            weight: 0.0,
-            r: 0.0,
-        });
+        let patch = self.patches[row.patch].get_or_insert_with(|| Patch::new(self.n));
         let weighted = self.batch.push(row);
-        add(&mut patch.a.as_mut_slice()[..n], 1.0, &weighted[..n]);
-        add(&mut patch.a.as_mut_slice()[at..at + N_SCAN], 1.0, &weighted[n..]);
-        add(&mut patch.g.as_mut_slice()[..n], row.r, &weighted[..n]);
-        add(&mut patch.g.as_mut_slice()[at..at + N_SCAN], row.r, &weighted[n..]);
+        let sum = |sums: &mut [f64], factor: f64| {
+            add(&mut sums[..n], factor, &weighted[..n]);
+            add(&mut sums[at..at + N_SCAN], factor, &weighted[n..]);
+        };
+        let shape = row.shape;
+        let sums = patch.a.as_mut_slice().chunks_exact_mut(self.n);
+        sums.zip(shape.iter()).for_each(|(sums, factor)| sum(sums, *factor));
+        sum(patch.g.as_mut_slice(), row.r);
         let w = row.weight;
-        patch.weight += w;
-        patch.r += w * row.r;
+        patch.weight += shape * (w * shape).transpose();
+        patch.r += shape * (w * row.r);
         self.kernel[0] += row.influence[0];
         self.kernel[1] += row.influence[1];
         self.kernel[2] += w;
@@ -199,12 +222,13 @@ impl Normal {
 
     /// Takes the patches' offsets out, as smooth as told, or as is likeliest. Call once, after the last residual and all
     /// priors.
-    pub(crate) fn close(&mut self, of: &Patches, told: Option<Smoothness>) {
+    pub(crate) fn close(&mut self, of: &Patches, told: Option<Smoothness>, fan: &impl Fan) {
         self.flush();
         self.hessian.fill_upper_triangle_with_lower_triangle();
         self.sigma2 = patch_variance(self.patches.iter().flatten());
         let equations = (&mut self.hessian, &mut self.gradient);
-        self.smoothness = shape::take_out(equations, (&mut self.patches, of), self.sigma2, told);
+        let patches = (self.patches.as_mut_slice(), of);
+        self.smoothness = shape::take_out(equations, patches, self.sigma2, told, fan);
     }
 
     pub(crate) fn add_robot_prior(&mut self, hessian: &DMatrix<f64>, gradient: &DVector<f64>) {
@@ -269,9 +293,9 @@ const MAX_STEP: f64 = 0.1;
 /// well it is known against an offset of a millimetre (METHOD.md §11).
 fn patch_variance<'a>(patches: impl Iterator<Item = &'a Patch>) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
-    for patch in patches.filter(|p| p.weight > 0.0) {
-        let noise2 = 1.0 / patch.weight;
-        let mean = (patch.r / patch.weight).clamp(-MAX_OFFSET, MAX_OFFSET);
+    for patch in patches.filter(|p| p.total() > 0.0) {
+        let noise2 = 1.0 / patch.total();
+        let mean = (patch.r[0] / patch.total()).clamp(-MAX_OFFSET, MAX_OFFSET);
         let weight = (TYPICAL_OFFSET * TYPICAL_OFFSET + noise2).powi(-2);
         sum += weight * (mean * mean - noise2);
         total += weight;
@@ -305,6 +329,7 @@ mod tests {
                 scan,
                 view,
                 patch: i % 3,
+                shape: Shape::x(),
                 weight,
                 influence: [0.0; 2],
                 r: value(99),

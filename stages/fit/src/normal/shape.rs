@@ -1,13 +1,15 @@
-//! Sums of residuals over the patches of a model's surface, and where those lie, in; out come the same sums with the patches'
-//! offsets taken out, smooth over each link as far as the residuals say so (METHOD.md §11.4).
+//! Sums of residuals over the patches of a model's surface, and where those lie, in; out come the same sums with the ways in
+//! which patches may be off taken out, smooth over each link as far as the residuals say so (METHOD.md §11.4).
 //!
-//! An offset is `u_c = φ_c·z + e_c`: a smooth field over its link, a Gaussian process given by its values at a few nodes
+//! A patch is off by `u_c = B_c·z + e_c`: a smooth field over its link, a Gaussian process given by its values at a few nodes
 //! (sparse approximation "FITC" of Snelson and Ghahramani, 2006), and a rest of its own. Both are integrated out.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use contract::Fan;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix};
 use std::ops::Range;
 
-use super::Patch;
+use super::field::{Kernel, N_SMOOTH, Place};
+use super::{Patch, Shape, Square};
 
 /// Sides of a link that its patches look to: two for each axis.
 pub(crate) const N_SIDES: u32 = 6;
@@ -17,8 +19,8 @@ pub(crate) const N_SIDES: u32 = 6;
 pub(crate) struct Patches {
     /// For each patch: its group, one for each link and side ([`N_SIDES`] a link).
     pub(crate) groups: Vec<u32>,
-    /// Middle, metres, and mean normal of each, in the frame of its link.
-    pub(crate) places: Vec<[f64; 6]>,
+    /// Where each lies.
+    pub(crate) places: Vec<Place>,
 }
 
 impl Patches {
@@ -36,56 +38,23 @@ impl Patches {
     }
 }
 
-/// How far offsets of neighbouring patches are alike: their correlation falls as a Gaussian in the distance of their middles and
-/// that of their normals.
+/// How far offsets and tilts of neighbouring patches are alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Smoothness {
-    /// Metres; 0: each patch is off by itself.
-    length: f64,
-    /// Weight of the normals: 0 where a link is too thick or too thin all around, 1 where opposite sides are off apart.
-    sides: f64,
-}
-
-impl Smoothness {
+pub(crate) enum Smoothness {
     /// Each patch is off by itself.
-    pub(crate) const APART: Self = Self { length: 0.0, sides: 0.0 };
-
-    /// Shares of the patches' variance that are common to a side of a link, and that rise along it, and are not in their sums.
-    pub(super) fn alike(self) -> [f64; 2] {
-        match (self.is_around(), self.is_apart()) {
-            (true, _) => ALIKE_AROUND,
-            (_, true) => ALIKE,
-            _ => ALIKE_SIDES,
-        }
-    }
-
-    fn is_apart(self) -> bool {
-        self == Self::APART
-    }
-
-    /// Whether all sides of a link are off alike.
-    fn is_around(self) -> bool {
-        self.length > 0.0 && self.sides == 0.0
-    }
+    Apart,
+    /// A link's patches follow a field over it.
+    Field(Kernel),
 }
 
-/// What castings, hulls and sheets are looked for as.
-const LENGTHS: [f64; 3] = [0.1, 0.2, 0.4];
+/// What castings, hulls and sheets are looked for as: lengths, metres, the middle one first; and whether their sides are off
+/// apart.
+const LENGTHS: [f64; 3] = [0.2, 0.1, 0.4];
 const SIDES: [f64; 2] = [0.0, 1.0];
-/// Patches are off apart, but castings and hulls by waves that are longer than a patch: what the fit takes in does not show.
-const ALIKE: [f64; 2] = [0.5, 0.25];
-/// Sides are off each by itself, by such waves.
-const ALIKE_SIDES: [f64; 2] = [1.0, 0.5];
-/// All sides are off alike: opposite ones tell how much.
-const ALIKE_AROUND: [f64; 2] = [0.06, 0.0];
+/// What is off each patch by itself is so over this length, metres: its tilts are as large as such a field's.
+const ROUGH: Kernel = Kernel { length: 0.1, sides: 1.0 };
 /// Share of the variance of a smooth offset that is a patch's own: a field is not the same all over it.
 const OWN: f64 = 0.02;
-/// Nodes of the field are this near to each patch, in lengths, …
-const NODE_GAP: f64 = 0.8;
-/// … but no more than so many on a link.
-const MAX_NODES: usize = 64;
-/// Added to the nodes' correlation with themselves, for rounding.
-const JITTER: f64 = 1e-6;
 /// Smaller offsets are not worth a choice, metres.
 const NO_OFFSET: f64 = 1e-4;
 
@@ -101,24 +70,39 @@ struct Taken {
 struct Link {
     /// Where they are among all.
     at: Vec<usize>,
-    places: Vec<[f64; 6]>,
-    /// Σ w J, a column for each.
+    places: Vec<Place>,
+    /// Σ w J φᵀ, five columns for each.
     a: DMatrix<f64>,
-    /// Σ w and Σ w r of each.
-    sums: Vec<[f64; 2]>,
+    /// Σ w φ φᵀ and Σ w r φ of each.
+    sums: Vec<(Square, Shape)>,
+}
+
+/// How a patch is off by itself, under one smoothness.
+struct Own {
+    /// Covariance of that with the residuals known: D(1 + WD)⁻¹.
+    known: Square,
+    /// What is left of its sums with that taken out: (1 + WD)⁻¹.
+    left: Square,
+}
+
+impl Own {
+    fn new(variance: &Square, weight: &Square) -> Self {
+        let left = (Square::identity() + weight * variance).try_inverse();
+        let left = left.unwrap_or_else(Square::zeros);
+        Self { known: variance * left, left }
+    }
 }
 
 /// A link's offsets under one smoothness.
 struct Offsets<'a> {
     link: &'a Link,
-    /// For each patch: variance of its own part, and the share of its sums that is left with that taken out.
-    own: Vec<[f64; 2]>,
+    own: Vec<Own>,
     /// The smooth part, where there is one.
     field: Option<Field>,
 }
 
 struct Field {
-    /// Values of the patches for unit values at the nodes: nodes × patches.
+    /// Shapes of the patches for unit values at the nodes: nodes × three for each patch.
     basis: DMatrix<f64>,
     /// Of the values at the nodes, with the residuals.
     precision: Cholesky<f64, Dyn>,
@@ -141,22 +125,23 @@ pub(super) fn take_out(
     (patches, of): (&mut [Option<Patch>], &Patches),
     sigma2: f64,
     told: Option<Smoothness>,
+    fan: &impl Fan,
 ) -> Smoothness {
     patches.iter().flatten().for_each(|patch| *gradient += &patch.g);
     if sigma2 <= 0.0 {
-        return told.unwrap_or(Smoothness::APART);
+        return told.unwrap_or(Smoothness::Apart);
     }
     let links: Vec<Link> = of.links().filter_map(|at| Link::new(patches, of, at)).collect();
     let smoothness = match told {
         Some(told) => told,
-        None if sigma2.sqrt() < NO_OFFSET => Smoothness::APART,
-        None => likeliest((hessian, gradient), &links, sigma2),
+        None if sigma2.sqrt() < NO_OFFSET => Smoothness::Apart,
+        None => likeliest((hessian, gradient), &links, sigma2, fan),
     };
-    // A field of one side would take in what moves the link, and seem to know it.
-    let used = if smoothness.is_around() { smoothness } else { Smoothness::APART };
-    for link in &links {
-        let offsets = link.offsets(used, sigma2);
-        let taken = offsets.taken();
+    let found = fan.fan(links.iter().collect(), |link| {
+        let offsets = link.offsets(smoothness, sigma2);
+        (offsets.taken(), offsets)
+    });
+    for (taken, offsets) in found {
         *hessian -= taken.hessian;
         *gradient -= taken.gradient;
         offsets.write(patches);
@@ -164,182 +149,165 @@ pub(super) fn take_out(
     smoothness
 }
 
-/// The smoothness under which the residuals are likeliest, whatever base, posture and scans are.
+/// The smoothness under which the residuals are likeliest, whatever base, posture and scans are: first whether sides are off
+/// alike, at a middle length, then at which.
 fn likeliest(
-    (hessian, gradient): (&DMatrix<f64>, &DVector<f64>),
+    equations: (&DMatrix<f64>, &DVector<f64>),
     links: &[Link],
     sigma2: f64,
+    fan: &impl Fan,
 ) -> Smoothness {
-    let smooth = LENGTHS
-        .into_iter()
-        .flat_map(|length| SIDES.into_iter().map(move |sides| Smoothness { length, sides }));
-    let mut best = (f64::NEG_INFINITY, Smoothness::APART);
-    for smoothness in std::iter::once(Smoothness::APART).chain(smooth) {
-        let (mut h, mut g, mut evidence) = (hessian.clone(), gradient.clone(), 0.0);
-        for link in links {
-            let taken = link.offsets(smoothness, sigma2).taken();
-            h -= taken.hessian;
-            g -= taken.gradient;
-            evidence += taken.evidence;
-        }
-        let Some(h) = h.cholesky() else { continue };
-        evidence += 0.5 * g.dot(&h.solve(&g)) - 0.5 * log_det(&h);
-        if evidence > best.0 {
-            best = (evidence, smoothness);
-        }
+    let judged = |among: Vec<Smoothness>| {
+        fan.fan(among, |of| (evidence(equations, links, (of, sigma2)), of)).into_iter()
+    };
+    let likelier = |a: (f64, Smoothness), b: (f64, Smoothness)| if b.0 > a.0 { b } else { a };
+    let field = |length, sides| Smoothness::Field(Kernel { length, sides });
+    let [middle, others @ ..] = LENGTHS;
+    let [alike, apart] = SIDES.map(|sides| field(middle, sides));
+    let none = (f64::NEG_INFINITY, Smoothness::Apart);
+    let kind = judged(vec![Smoothness::Apart, alike, apart]).fold(none, likelier);
+    let Smoothness::Field(kernel) = kind.1 else { return Smoothness::Apart };
+    let lengths = others.map(|length| field(length, kernel.sides));
+    judged(lengths.to_vec()).fold(kind, likelier).1
+}
+
+/// How likely the residuals are, as a logarithm, but for what is the same for all.
+fn evidence(
+    (hessian, gradient): (&DMatrix<f64>, &DVector<f64>),
+    links: &[Link],
+    (smoothness, sigma2): (Smoothness, f64),
+) -> f64 {
+    let (mut h, mut g, mut evidence) = (hessian.clone(), gradient.clone(), 0.0);
+    for link in links {
+        let taken = link.offsets(smoothness, sigma2).taken();
+        h -= taken.hessian;
+        g -= taken.gradient;
+        evidence += taken.evidence;
     }
-    best.1
+    let Some(h) = h.cholesky() else { return f64::NEG_INFINITY };
+    evidence + 0.5 * g.dot(&h.solve(&g)) - 0.5 * log_det(&h)
 }
 
 fn log_det(matrix: &Cholesky<f64, Dyn>) -> f64 {
     2.0 * matrix.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>()
 }
 
+/// A matrix of some columns for each patch, with those of each multiplied by a matrix of its own.
+fn each_times<const N: usize, const M: usize>(
+    columns: &DMatrix<f64>,
+    by: impl ExactSizeIterator<Item = SMatrix<f64, N, M>>,
+) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(columns.nrows(), M * by.len());
+    for (c, by) in by.enumerate() {
+        let of = columns.fixed_columns::<N>(N * c);
+        out.fixed_columns_mut::<M>(M * c).gemm(1.0, &of, &by, 0.0);
+    }
+    out
+}
+
 impl Link {
     fn new(patches: &[Option<Patch>], of: &Patches, range: Range<usize>) -> Option<Self> {
         let at: Vec<usize> =
-            range.filter(|&c| patches[c].as_ref().is_some_and(|p| p.weight > 0.0)).collect();
+            range.filter(|&c| patches[c].as_ref().is_some_and(|p| p.total() > 0.0)).collect();
         let own: Vec<&Patch> = at.iter().filter_map(|&c| patches[c].as_ref()).collect();
         if own.is_empty() {
             return None;
         }
-        let columns: Vec<_> = own.iter().map(|p| p.a.column(0)).collect();
+        let columns: Vec<_> = own.iter().flat_map(|p| p.a.column_iter()).collect();
         Some(Self {
             places: at.iter().map(|&c| of.places[c]).collect(),
             at,
             a: DMatrix::from_columns(&columns),
-            sums: own.iter().map(|p| [p.weight, p.r]).collect(),
+            sums: own.iter().map(|p| (p.weight, p.r)).collect(),
         })
     }
 
     fn offsets(&self, smoothness: Smoothness, sigma2: f64) -> Offsets<'_> {
-        let left = |variance: f64, weight: f64| [variance, 1.0 / (1.0 + variance * weight)];
-        if smoothness.is_apart() {
-            let own = self.sums.iter().map(|[weight, _]| left(sigma2, *weight)).collect();
+        let rough = sigma2 * ROUGH.variance();
+        let Smoothness::Field(kernel) = smoothness else {
+            let own = self.sums.iter().map(|(weight, _)| Own::new(&rough, weight)).collect();
             return Offsets { link: self, own, field: None };
-        }
-        let basis = self.basis(smoothness);
-        let own = basis.column_iter().zip(&self.sums).map(|(b, [weight, _])| {
+        };
+        let basis = kernel.basis(&self.places);
+        let smooth = sigma2 * (1.0 - OWN);
+        let own = self.sums.iter().enumerate().map(|(c, (weight, _))| {
+            let of = basis.fixed_columns::<N_SMOOTH>(N_SMOOTH * c);
             // What lies between the nodes is a patch's own, too.
-            let between = (1.0 - b.norm_squared()).max(0.0);
-            left(sigma2 * ((1.0 - OWN) * between + OWN), *weight)
+            let mut between = kernel.variance();
+            let mut smooth_part = between.fixed_view_mut::<N_SMOOTH, N_SMOOTH>(0, 0);
+            smooth_part -= of.tr_mul(&of);
+            Own::new(&(smooth * between + OWN * rough), weight)
         });
-        let own: Vec<[f64; 2]> = own.collect();
-        let prior = 1.0 / (sigma2 * (1.0 - OWN));
-        let field = self.field(basis, &own, prior);
+        let own: Vec<Own> = own.collect();
+        let field = self.field(basis, &own, 1.0 / smooth);
         Offsets { link: self, own, field }
     }
 
-    /// Values of the patches for independent unit values of a field given by its nodes.
-    fn basis(&self, smoothness: Smoothness) -> DMatrix<f64> {
-        let places: Vec<[f64; 6]> = self.places.iter().map(|p| scaled(p, smoothness)).collect();
-        let nodes = nodes(&places);
-        let like = |a: &[f64; 6], b: &[f64; 6]| (-0.5 * apart2(a, b)).exp();
-        let n = nodes.len();
-        let own = DMatrix::from_fn(n, n, |i, j| {
-            like(&nodes[i], &nodes[j]) + if i == j { JITTER } else { 0.0 }
+    fn field(&self, basis: DMatrix<f64>, own: &[Own], prior: f64) -> Option<Field> {
+        let all = || own.iter().zip(&self.sums);
+        let left = |own: &Own| own.left.fixed_rows::<N_SMOOTH>(0).into_owned();
+        let weights = all().map(|(own, (weight, _))| {
+            let weight = left(own) * weight;
+            weight.fixed_columns::<N_SMOOTH>(0).into_owned()
         });
-        let mut basis = DMatrix::from_fn(n, places.len(), |i, c| like(&nodes[i], &places[c]));
-        if let Some(own) = own.cholesky() {
-            own.l_dirty().solve_lower_triangular_mut(&mut basis);
-        }
-        basis
-    }
-
-    fn field(&self, basis: DMatrix<f64>, own: &[[f64; 2]], prior: f64) -> Option<Field> {
-        let mut weighted = basis.clone();
-        let mut left = basis.clone();
-        let mut pull = DVector::zeros(basis.nrows());
-        for (c, ([_, share], [weight, r])) in own.iter().zip(&self.sums).enumerate() {
-            weighted.column_mut(c).scale_mut(share * weight);
-            left.column_mut(c).scale_mut(*share);
-            pull.axpy(share * r, &basis.column(c), 1.0);
-        }
-        let mut precision = weighted * basis.transpose();
+        let across = basis.transpose();
+        let mut precision = each_times(&basis, weights) * &across;
         (0..basis.nrows()).for_each(|i| precision[(i, i)] += prior);
         let precision = precision.cholesky()?;
-        let cross = &self.a * left.transpose();
+        let cross = each_times(&self.a, own.iter().map(|own| left(own).transpose())) * across;
+        let sums = all().flat_map(|(own, (_, r))| (left(own) * r).data.0[0]);
+        let pull = &basis * DVector::from_iterator(basis.ncols(), sums);
         let (gain, values) = (precision.solve(&cross.transpose()), precision.solve(&pull));
         Some(Field { basis, precision, values, gain, cross, prior, pull })
     }
 }
 
-/// A place so that a distance of one is where likeness has fallen to 0.6.
-fn scaled(place: &[f64; 6], smoothness: Smoothness) -> [f64; 6] {
-    let (x, n) = (1.0 / smoothness.length, smoothness.sides.sqrt());
-    std::array::from_fn(|i| place[i] * if i < 3 { x } else { n })
-}
-
-fn apart2(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
-}
-
-/// Places as far from each other as can be, until all are near to one.
-fn nodes(places: &[[f64; 6]]) -> Vec<[f64; 6]> {
-    let mut away = vec![f64::INFINITY; places.len()];
-    let mut nodes: Vec<[f64; 6]> = Vec::new();
-    let mut next = 0;
-    while nodes.len() < MAX_NODES {
-        nodes.push(places[next]);
-        let mut farthest = NODE_GAP * NODE_GAP;
-        let before = nodes.len();
-        for (i, (away, place)) in away.iter_mut().zip(places).enumerate() {
-            *away = away.min(apart2(place, &nodes[before - 1]));
-            if *away > farthest {
-                (farthest, next) = (*away, i);
-            }
-        }
-        if farthest <= NODE_GAP * NODE_GAP {
-            break;
-        }
-    }
-    nodes
-}
-
 impl Offsets<'_> {
-    /// The likeliest offset of the smooth part at a patch.
-    fn smooth(&self, c: usize) -> f64 {
-        self.field.as_ref().map_or(0.0, |field| field.basis.column(c).dot(&field.values))
+    /// The likeliest offset and tilts of a patch, as far as they enter the gradient.
+    fn shape(&self, c: usize) -> Shape {
+        let (own, r) = (&self.own[c], &self.link.sums[c].1);
+        let mut shape = own.known * r;
+        if let Some(field) = &self.field {
+            let smooth = field.basis.fixed_columns::<N_SMOOTH>(N_SMOOTH * c);
+            let left = own.left.fixed_rows::<N_SMOOTH>(0);
+            shape += left.tr_mul(&smooth.tr_mul(&field.values));
+        }
+        shape
     }
 
     fn taken(&self) -> Taken {
         let link = self.link;
-        let mut weighted = link.a.clone();
-        let mut by = DVector::zeros(link.sums.len());
-        let mut evidence = 0.0;
-        for (c, ([variance, share], [_, r])) in self.own.iter().zip(&link.sums).enumerate() {
-            weighted.column_mut(c).scale_mut(variance * share);
-            by[c] = share * (variance * r + self.smooth(c));
-            evidence += 0.5 * (share.ln() + variance * share * r * r);
-        }
+        let by: Vec<f64> = (0..self.own.len()).flat_map(|c| self.shape(c).data.0[0]).collect();
+        let of_own = |(own, (_, r)): (&Own, &(_, Shape))| {
+            0.5 * (own.left.determinant().ln() + r.dot(&(own.known * r)))
+        };
+        let mut evidence: f64 = self.own.iter().zip(&link.sums).map(of_own).sum();
+        let weighted = each_times(&link.a, self.own.iter().map(|own| own.known));
         let mut hessian = weighted * link.a.transpose();
         if let Some(field) = &self.field {
             hessian.gemm(1.0, &field.cross, &field.gain, 1.0);
             evidence += 0.5 * field.pull.dot(&field.values) - 0.5 * log_det(&field.precision);
             evidence += 0.5 * field.prior.ln() * field.values.len() as f64;
         }
-        Taken { hessian, gradient: &link.a * by, evidence }
+        Taken { hessian, gradient: &link.a * DVector::from_vec(by), evidence }
     }
 
-    /// Each patch gets its part of the gradient that is left, and what an offset of its own adds to it.
+    /// Each patch gets its part of the gradient that is left.
     fn write(&self, patches: &mut [Option<Patch>]) {
-        for (c, ([variance, share], [weight, r])) in
-            self.own.iter().zip(&self.link.sums).enumerate()
-        {
-            let Some(patch) = &mut patches[self.link.at[c]] else { continue };
-            patch.g.axpy(-share * (variance * r + self.smooth(c)), &patch.a, 1.0);
-            patch.a *= *share;
-            if let Some(field) = &self.field {
-                let column = field.basis.column(c);
-                patch.a.gemv_tr(-share * weight, &field.gain, &column, 1.0);
-            }
+        for (c, &at) in self.link.at.iter().enumerate() {
+            let Some(patch) = &mut patches[at] else { continue };
+            patch.g.gemv(-1.0, &patch.a, &self.shape(c), 1.0);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Columns;
     use super::*;
+    use crate::facets::HALF_PATCH;
+    use contract::OneByOne;
+    use nalgebra::Vector3;
 
     /// A link of two sides, ten patches each along a line, on which an offset of `wave` lies; one unknown shifts all.
     fn link(wave: impl Fn(usize, f64) -> f64) -> (Vec<Option<Patch>>, Patches) {
@@ -348,18 +316,21 @@ mod tests {
             let (side, x) = (i / 10, (i % 10) as f64 * 0.13);
             let normal = if side == 0 { 1.0 } else { -1.0 };
             let r = weight * wave(side, x);
-            let a = DVector::from_element(1, weight * normal);
-            patches.push(Some(Patch { g: DVector::from_element(1, r * normal), a, weight, r }));
+            let a = Columns::from_row_slice(&[weight * normal, 0.0, 0.0, 0.0, 0.0]);
+            let g = DVector::from_element(1, r * normal);
+            let weight = Square::from_diagonal(&Shape::new(weight, 0.0, 0.0, 0.0, 0.0));
+            patches.push(Some(Patch { g, a, weight, r: Shape::new(r, 0.0, 0.0, 0.0, 0.0) }));
             of.groups.push(side as u32);
-            of.places.push([x, 0.0, 0.05 * normal, 0.0, 0.0, normal]);
+            let x = Vector3::new(x, 0.0, 0.05 * normal);
+            of.places.push(Place::new(x, Vector3::new(0.0, 0.0, normal)));
         }
         (patches, of)
     }
 
     fn chosen((mut patches, of): (Vec<Option<Patch>>, Patches)) -> (Smoothness, f64) {
-        let sums = patches.iter().flatten().map(|p| p.weight).sum::<f64>();
+        let sums = patches.iter().flatten().map(Patch::total).sum::<f64>();
         let (mut h, mut g) = (DMatrix::from_element(1, 1, sums), DVector::zeros(1));
-        let smoothness = take_out((&mut h, &mut g), (&mut patches, &of), 1e-6, None);
+        let smoothness = take_out((&mut h, &mut g), (&mut patches, &of), 1e-6, None, &OneByOne);
         let left: f64 = patches.iter().flatten().map(|p| p.g[0]).sum();
         assert!((left - g[0]).abs() < 1e-6 * sums * 1e-3, "the patches' parts add up");
         (smoothness, -g[0] / h[(0, 0)])
@@ -372,14 +343,18 @@ mod tests {
         let (mut patches, of) = link(|_, x| smooth(x) + 1e-3);
         patches[15..].fill(None);
         let (thick, shift) = chosen((patches, of));
-        assert_eq!(thick.sides, 0.0, "both sides off alike: {thick:?}");
-        assert!(!thick.is_apart() && shift.abs() < 5e-5, "{thick:?} {shift}");
+        let sides = |s: Smoothness| match s {
+            Smoothness::Field(kernel) => Some(kernel.sides),
+            Smoothness::Apart => None,
+        };
+        assert_eq!(sides(thick), Some(0.0), "both sides off alike: {thick:?}");
+        assert!(shift.abs() < 5e-5, "{shift}");
         let (apart, _) =
             chosen(link(|side, x| if side == 0 { smooth(x) } else { -smooth(x + 0.5) }));
-        assert_eq!(apart.sides, 1.0, "each side for itself: {apart:?}");
+        assert_eq!(sides(apart), Some(1.0), "each side for itself: {apart:?}");
         let rough = |i: f64| 2e-3 * ((i * 78.233 + 1.0).sin() * 43_758.545).fract();
         let (rough, _) = chosen(link(|side, x| rough((x / 0.13).round() + 17.0 * side as f64)));
-        assert!(rough.is_apart(), "{rough:?}");
+        assert_eq!(rough, Smoothness::Apart);
     }
 
     #[test]
@@ -388,14 +363,31 @@ mod tests {
         let before = patches.clone();
         let sigma2 = 4e-7;
         let (mut h, mut g) = (DMatrix::zeros(1, 1), DVector::zeros(1));
-        take_out((&mut h, &mut g), (&mut patches, &of), sigma2, Some(Smoothness::APART));
+        take_out((&mut h, &mut g), (&mut patches, &of), sigma2, Some(Smoothness::Apart), &OneByOne);
         let (mut wanted_h, mut wanted_g) = (0.0, 0.0);
         for p in before.iter().flatten() {
-            let k = sigma2 / (1.0 + sigma2 * p.weight);
+            let k = sigma2 / (1.0 + sigma2 * p.total());
             wanted_h -= k * p.a[0] * p.a[0];
-            wanted_g += p.g[0] - k * p.r * p.a[0];
+            wanted_g += p.g[0] - k * p.r[0] * p.a[0];
         }
         assert!((h[(0, 0)] / wanted_h - 1.0).abs() < 1e-12);
         assert!((g[0] / wanted_g - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_patch_holds_a_turn_no_better_than_its_tilt_is_known() {
+        // Even weight over the patch; one unknown turns it about its middle.
+        let (w, sigma2) = (1e12, 1e-6);
+        let weight = Square::from_diagonal(&Shape::new(w, w / 3.0, w / 3.0, 0.0, 0.0));
+        let turn = HALF_PATCH * w / 3.0;
+        let a = Columns::from_row_slice(&[0.0, turn, 0.0, 0.0, 0.0]);
+        let mut patches = vec![Some(Patch { a, g: DVector::zeros(1), weight, r: Shape::zeros() })];
+        let places = vec![Place::new(Vector3::zeros(), Vector3::z())];
+        let of = Patches { groups: vec![0], places };
+        let (mut h, mut g) = (DMatrix::from_element(1, 1, HALF_PATCH * turn), DVector::zeros(1));
+        let told = Some(Smoothness::Apart);
+        take_out((&mut h, &mut g), (&mut patches, &of), sigma2, told, &OneByOne);
+        let known = (h[(0, 0)] * sigma2).sqrt().recip();
+        assert!((known * ROUGH.length - 1.0).abs() < 1e-3, "{known}");
     }
 }
