@@ -105,7 +105,7 @@ impl<'a> Pairing<'a> {
         }
     }
 
-    /// A point in the frame of the link that it lies on.
+    /// A point and the normal where it lies, in the frame of its link.
     #[inline]
     pub(crate) fn inside(&self, pair: &Pair) -> (Vector, Vector) {
         let Frame { rotation, origin } = &self.frames[pair.link];
