@@ -25,7 +25,8 @@ const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
 /// Score of the best posture so far below which no other wrist makes it a robot: where beams tell, where they are a camera's,
 /// which bends surfaces, and where only points do. Of 250 robots among clutter, behind fences, with noise of 10 mm, none
 /// had less than 0.58 after the quick look; one whose balancer its model has fixed had 0.47; half of what small arms find in clutter
-/// has less than 0.45. Arms in depth cameras' clouds had 0.33 and more, what else is there less than 0.23.
+/// has less than 0.45. An arm in a depth camera's cloud had 0.33, thirteen
+/// other places of that cloud at most 0.22.
 const HOPELESS_SCORE: [f64; 3] = [0.45, 0.25, 0.1];
 /// How far beyond its reach points may still be the robot's, metres: an error of the base.
 pub(crate) const NEAR_MARGIN: f64 = 0.15;

@@ -263,7 +263,7 @@ impl Link {
 }
 
 impl Offsets<'_> {
-    /// The likeliest offset and tilts of a patch, as far as they enter the gradient.
+    /// How a patch is likeliest off, as far as that enters the gradient.
     fn shape(&self, c: usize) -> Shape {
         let (own, r) = (&self.own[c], &self.link.sums[c].1);
         let mut shape = own.known * r;
