@@ -129,6 +129,7 @@ const SUITES: &[Suite] = &[
     ("noise-5", 3, |_| Condition { n_beams: 5e7, noise: 0.005, ..PLAIN }),
     ("noise-10", 3, |_| Condition { n_beams: 5e7, noise: 0.010, ..PLAIN }),
     ("registration", 6, |_| Condition { registration: REGISTRATION, n_beams: 2e7, ..PLAIN }),
+    // Beams as in `noise-2`: its errors are told as multiples of those.
     ("mixed", 3, |_| Condition { n_beams: 5e7, mixed: true, ..PLAIN }),
     ("few", 9, |k| Condition { n_scanners: 3 - k % 3, ..PLAIN }),
     ("clutter", 6, |_| Condition { clutter: 1.0, mixed: true, ..PLAIN }),
