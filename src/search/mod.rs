@@ -43,7 +43,9 @@ impl<'a> Shelf<'a> {
         for (i, own) in self.prepared.iter().enumerate() {
             if own.get().is_none() && names.contains(self.models[i].name.as_str()) {
                 // Where another thread was first, that one stays.
-                own.set(Prepared::new(i, &self.models[i], fan)).ok();
+                let prepared = Prepared::new(i, &self.models[i], fan);
+                prepared.make_triangles(fan);
+                own.set(prepared).ok();
             }
         }
     }

@@ -17,6 +17,7 @@ mod exact;
 mod face;
 mod facets;
 mod foot;
+mod footprint;
 mod judge;
 mod mount;
 mod noise;

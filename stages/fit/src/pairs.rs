@@ -159,7 +159,14 @@ impl<'a> Pairing<'a> {
     /// Where a beam first meets the model about a point of it, whichever link: noise moves points along their beams, past
     /// edges, round bends and behind what hides other surface, so that what is nearest is not always what was measured.
     fn first(&self, beam: (&Vector, &Vector), known: &mut Option<Known>) -> Option<Hit> {
-        let (p, ray) = beam;
+        let (t, link, met) = self.meets(beam)?;
+        let patch = self.refine.prepared.links[link].fields.patch_at(&met.x, &met.n)?;
+        *known = Some(Known { link: link as u32, patch, triangle: met.triangle });
+        Some(self.hit((link, patch), (t, &met.n), beam.1))
+    }
+
+    /// How far beyond a place on it a beam first meets the model, on which link, and where; `None` farther from it than the gate.
+    pub(crate) fn meets(&self, (p, ray): (&Vector, &Vector)) -> Option<(f64, usize, Met)> {
         let mut best: Option<(f64, usize, Met)> = None;
         self.placed.each(p.map(|v| v as f32).into(), |link, _, _| {
             let (at, ray) = self.frames[link].inside((p, ray));
@@ -171,10 +178,7 @@ impl<'a> Pairing<'a> {
                 best = Some((t, link, met));
             }
         });
-        let (t, link, met) = best.filter(|(t, ..)| *t >= -self.gate)?;
-        let patch = self.refine.prepared.links[link].fields.patch_at(&met.x, &met.n)?;
-        *known = Some(Known { link: link as u32, patch, triangle: met.triangle });
-        Some(self.hit((link, patch), (t, &met.n), ray))
+        best.filter(|(t, ..)| *t >= -self.gate)
     }
 
     /// The same where it is known which triangle it met.
@@ -219,7 +223,7 @@ struct Hit {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::beam::Hypothesis;
     use crate::{Prepared, Scene, Settings};
@@ -246,17 +250,19 @@ mod tests {
         robot::Model::load_urdf(&path, "cubes", &robot::Settings::default()).expect("loads").0
     }
 
-    #[test]
-    fn points_belong_to_what_their_beams_meet_first() {
+    /// The cubes, and a scanner 3 m before the front (x = 0.1) that measured these places of it (y, z).
+    pub(crate) fn before_front(places: &[[f64; 2]], look: impl Fn(&Refine<'_>, &State)) {
+        seen(places.iter().map(|[y, z]| (*y, *z, 0.0)), look);
+    }
+
+    /// The same with ranges off by so much, metres.
+    fn seen(places: impl Iterator<Item = (f64, f64, f64)>, look: impl Fn(&Refine<'_>, &State)) {
         let model = cubes();
         let prepared = Prepared::new(0, &model, &OneByOne);
         prepared.make_triangles(&OneByOne);
-        // A scanner 3 m before the front (x = 0.1); ranges 6 mm too short and too long.
         let scanner = Point::new(3.0, 0.2, 0.4);
-        let places = (-9..=9).flat_map(|y| (-9..=9).map(move |z| (f64::from(y), f64::from(z))));
-        let beams = places.flat_map(|(y, z)| [-0.006, 0.006].map(|off| (y, z, off)));
-        let points = beams.clone().map(|(y, z, off)| {
-            let on_it = Point::new(0.1, 0.01 * y, 0.01 * z);
+        let points = places.map(|(y, z, off)| {
+            let on_it = Point::new(0.1, y, z);
             let p = on_it + (on_it - scanner).normalize() * off;
             p.coords.map(|v| v as f32).into()
         });
@@ -276,15 +282,24 @@ mod tests {
             Refine { prepared: &prepared, scene: &scene, settings: &settings, prior: None };
         let hypothesis =
             Hypothesis { local_from_base: Pose::identity(), posture: vec![0.0], score: 0.0 };
-        let state = State::at(&hypothesis, &scene);
-        let pairing = Pairing::new(&refine, &state, 0.02);
-        for (i, (y, z, off)) in beams.enumerate() {
-            let mut known = None;
-            let pair = pairing.pair(i as u32, &mut known).expect("it is on the front");
-            assert_eq!((pair.link, pair.n), (0, Vector::x()), "at {y}, {z}, {off}");
-            assert!((pair.r + off * pair.ray.x.abs()).abs() < 1e-6, "{} for {off}", pair.r);
-            let again = pairing.pair(i as u32, &mut known).expect("the same triangle");
-            assert!((again.r - pair.r).abs() < 1e-12 && again.patch == pair.patch);
-        }
+        look(&refine, &State::at(&hypothesis, &scene));
+    }
+
+    #[test]
+    fn points_belong_to_what_their_beams_meet_first() {
+        // Ranges 6 mm too short and too long.
+        let places = (-9..=9).flat_map(|y| (-9..=9).map(move |z| (f64::from(y), f64::from(z))));
+        let beams = places.flat_map(|(y, z)| [-0.006, 0.006].map(|off| (0.01 * y, 0.01 * z, off)));
+        seen(beams.clone(), |refine, state| {
+            let pairing = Pairing::new(refine, state, 0.02);
+            for (i, (y, z, off)) in beams.clone().enumerate() {
+                let mut known = None;
+                let pair = pairing.pair(i as u32, &mut known).expect("it is on the front");
+                assert_eq!((pair.link, pair.n), (0, Vector::x()), "at {y}, {z}, {off}");
+                assert!((pair.r + off * pair.ray.x.abs()).abs() < 1e-6, "{} for {off}", pair.r);
+                let again = pairing.pair(i as u32, &mut known).expect("the same triangle");
+                assert!((again.r - pair.r).abs() < 1e-12 && again.patch == pair.patch);
+            }
+        });
     }
 }

@@ -123,7 +123,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Makes what tells where beams meet the links' meshes, where it is not there yet.
-    pub(crate) fn make_triangles(&self, fan: &impl Fan) {
+    pub fn make_triangles(&self, fan: &impl Fan) {
         fan.fan((0..self.links.len()).collect(), |l| {
             self.links[l].fields.triangles(&self.model.links[l]);
         });

@@ -34,6 +34,13 @@ impl Sampled {
         &self.points
     }
 
+    /// Those that are to be kept.
+    pub(crate) fn keep(self, is_kept: &[bool]) -> Self {
+        let all = self.points.into_iter().zip(self.known).zip(is_kept);
+        let (points, known) = all.filter(|(_, is_kept)| **is_kept).map(|(pair, _)| pair).unzip();
+        Self { points, known, gate: self.gate }
+    }
+
     /// What was met on these links is not known any more: they turned.
     pub(crate) fn forget(&mut self, links: &[usize]) {
         for known in &mut self.known {

@@ -96,7 +96,7 @@ impl<'a> Scene<'a> {
         let scouts = Evidence::new(scouts.iter().map(|v| Eye::new(&v.images)), cloud.clone());
         let is_camera = views.iter().any(|view| view.is_camera);
         let least = if is_camera { settings.camera_noise } else { settings.min_noise };
-        let noise = noise::of(views, &points, &thin).max(least);
+        let noise = noise::of(views, &points, &thin, fan).max(least);
         Self {
             region,
             views: views.to_vec(),

@@ -8,6 +8,7 @@ use crate::adjust::{Adjust, Adjusted};
 use crate::beam::{Beam, Hypothesis};
 use crate::branch::branches;
 use crate::calibrate::doubt;
+use crate::footprint;
 use crate::judge::{Judgement, judge, judged};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, N_LAST_ROUNDS, NEAR_ROUNDS, Prior, Refine, Round};
 use crate::report::{refused, report};
@@ -170,13 +171,17 @@ pub(crate) fn finish(
 /// points.
 fn sharpen(
     refine: &Refine<'_>,
-    (best, judgement, _): &mut Settled,
+    (best, judgement, spins): &mut Settled,
     all: &[u32],
     fan: &impl Fan,
 ) -> Sampled {
     let n = refine.settings.max_points;
-    let mut points = adjusted_points(refine, &best.hypothesis, (all, n), fan);
-    *best = Adjust::new(refine).run_from(best.state().open(), &mut points, fan);
+    let state = best.state().open();
+    let points = adjusted_points(refine, &best.hypothesis, (all, n), fan);
+    let open = spins.iter().filter(|s| s.values.len() > 1);
+    let open: Vec<usize> = open.flat_map(|s| refine.prepared.carried(s.joint)).collect();
+    let mut points = footprint::whole(refine, (&state, &open), points, fan);
+    *best = Adjust::new(refine).run_from(state, &mut points, fan);
     *judgement = judged(refine, &best.hypothesis);
     points
 }

@@ -37,12 +37,14 @@ pub(crate) fn sway(
     let steps = Steps::new(refine, best, several, points, fan);
     // The same step from where it stands: fewer points end a little beside all of them.
     let own = steps.to(None);
-    let ends = fan.fan(turned(refine, h, several), |at| steps.to(Some(at)));
-    // Where it ended at something worse, it is no value that the joint may stand at.
-    let as_good = |end: &&Hypothesis| refine.worsening(&own, end, near) < EQUAL;
+    let ends = fan.fan(turned(refine, h, several), |at| {
+        let end = steps.to(Some(at));
+        // Where it ended at something worse, it is no value that the joint may stand at.
+        (refine.worsening(&own, &end, near) < EQUAL).then_some(end)
+    });
     let is_swayed: Vec<bool> = (0..n).map(|j| several.iter().all(|s| s.joint != j)).collect();
     let mut modes: Vec<&Hypothesis> = vec![&own];
-    for end in ends.iter().filter(as_good) {
+    for end in ends.iter().flatten() {
         if modes.iter().any(|mode| several.iter().all(|s| turn(mode, end, s.joint) < OTHER)) {
             continue;
         }

@@ -167,17 +167,20 @@ impl DepthImage {
     /// Takes back "no return" where others measured matter in that direction (camera frame): beams that ought to have
     /// ended and did not come back (too near, too dark, too shiny) prove no free space, nor do those within `window`
     /// cells of them; nor does any, where a share of `blind` of that matter went unseen.
-    pub fn doubt(&mut self, matter: &[[f32; 3]], window: i32, blind: f32) {
+    pub fn doubt(&mut self, matter: impl Iterator<Item = [f32; 3]>, window: i32, blind: f32) {
         let focal = self.focal;
         let base = &mut self.levels[0];
-        let seen: Vec<usize> =
-            matter.iter().filter_map(|p| base.find(focal, *p)).map(|(at, _)| at).collect();
-        let silent: Vec<usize> =
-            seen.iter().copied().filter(|&at| base.cells[at][0] == f32::INFINITY).collect();
+        let (mut n_seen, mut silent) = (0_usize, Vec::new());
+        for (at, _) in matter.filter_map(|p| base.find(focal, p)) {
+            n_seen += 1;
+            if base.cells[at][0] == f32::INFINITY {
+                silent.push(at);
+            }
+        }
         if silent.is_empty() {
             return;
         }
-        if silent.len() as f32 > blind * seen.len() as f32 {
+        if silent.len() as f32 > blind * n_seen as f32 {
             let all = base.cells.iter_mut().filter(|c| c[0] == f32::INFINITY);
             all.for_each(|c| *c = [f32::NAN; 3]);
         }

@@ -28,10 +28,9 @@ pub fn agree(views: &mut [View], fan: &impl Fan) {
         for image in &mut view.images {
             let camera_from_local = rows(image.camera_from_local());
             let others = matter.iter().enumerate().filter(|(other, _)| *other != own);
-            let seen: Vec<[f32; 3]> = others
-                .flat_map(|(_, points)| points.iter().map(|p| transform(&camera_from_local, *p)))
-                .collect();
-            image.doubt(&seen, DOUBT_WINDOW, BLIND);
+            let seen = others
+                .flat_map(|(_, points)| points.iter().map(|p| transform(&camera_from_local, *p)));
+            image.doubt(seen, DOUBT_WINDOW, BLIND);
         }
     };
     fan.fan(views.iter_mut().enumerate().collect(), doubt);

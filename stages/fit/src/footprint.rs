@@ -1,0 +1,80 @@
+//! Points of an adjustment in; out come the same without those on a flange that may be turned otherwise whose beams, which have a
+//! width, ended on more than one plane.
+//!
+//! What stands out from such a flange is in one place of many; its points pull at the wrist whichever way the flange is turned, and
+//! so does what a scanner makes of beams that end half beside an edge.
+
+use contract::Fan;
+use geometry::Vector;
+use std::f64::consts::TAU;
+
+use crate::adjust::State;
+use crate::pairs::{Known, Pair, Pairing};
+use crate::refine::Refine;
+use crate::sampled::Sampled;
+
+/// Radius of a beam at its scanner, metres, and what it grows by on each metre (METHOD.md §19, T4).
+const RADIUS: (f64, f64) = (0.0011, 0.000_15);
+/// So many places on a beam's rim are looked at.
+const N_RIM: usize = 6;
+/// A beam ends on one plane where its rim is no farther from it, metres: what tessellation of the model leaves (`pairs.rs`).
+const FLAT: f64 = 3e-4;
+
+/// All of the points but those on these links whose beams did not end on one plane.
+pub(crate) fn whole(
+    refine: &Refine<'_>,
+    (state, links): (&State, &[usize]),
+    mut points: Sampled,
+    fan: &impl Fan,
+) -> Sampled {
+    if links.is_empty() {
+        return points;
+    }
+    refine.prepared.make_triangles(fan);
+    let pairing = Pairing::new(refine, state, points.gate);
+    let is_kept = |(point, known): (&u32, &mut Option<Known>)| {
+        let pair = pairing.pair(*point, known).filter(|pair| links.contains(&pair.link));
+        pair.is_none_or(|pair| is_whole(&pairing, &pair))
+    };
+    let is_kept = fan.fan(points.chunks(), |(points, known)| {
+        points.iter().zip(known).map(is_kept).collect::<Vec<bool>>()
+    });
+    points.keep(&is_kept.concat())
+}
+
+/// Whether the rim of the beam that gave a point ended on the plane that its middle met.
+fn is_whole(pairing: &Pairing<'_>, pair: &Pair) -> bool {
+    let range = pair.beam.norm();
+    let radius = RADIUS.0 + RADIUS.1 * range;
+    let u = pair.ray.cross(&Vector::z()).try_normalize(1e-6).unwrap_or_else(Vector::x);
+    let v = pair.ray.cross(&u);
+    (0..N_RIM).all(|k| {
+        let (sin, cos) = (TAU * k as f64 / N_RIM as f64).sin_cos();
+        let beside = (u * cos + v * sin) * radius;
+        let ray = (pair.ray * range + beside) / range.hypot(radius);
+        let met = pairing.meets((&(pair.p + beside), &ray));
+        met.is_some_and(|(t, ..)| (pair.n.dot(&(beside + ray * t)) + pair.r).abs() <= FLAT)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pairs::tests::before_front;
+    use contract::OneByOne;
+
+    #[test]
+    fn beams_that_end_half_beside_an_edge_are_left_out_on_the_links_asked_about() {
+        // On the front of a cube, 3 m from the scanner: beams are 3 mm wide there.
+        let from_edge = [0.0005, 0.001, 0.003, 0.02, 0.1];
+        let places = from_edge.map(|from| [0.1 - from, 0.0]).to_vec();
+        before_front(&places, |refine, state| {
+            let points = || Sampled::new((0..5).collect(), 0.02);
+            let left = |links: &[usize]| {
+                whole(refine, (state, links), points(), &OneByOne).points().to_vec()
+            };
+            assert_eq!(left(&[0]), [2, 3, 4]);
+            assert_eq!(left(&[1]), [0, 1, 2, 3, 4]);
+        });
+    }
+}
