@@ -17,7 +17,7 @@ use crate::sampled::Sampled;
 const RADIUS: (f64, f64) = (0.0011, 0.000_15);
 /// So many places on a beam's rim are looked at.
 const N_RIM: usize = 6;
-/// A beam ends on one plane where its rim is no farther from it, metres: what tessellation of the model leaves (`pairs.rs`).
+/// A beam ended on one plane where its rim is no farther from it, metres: what tessellation of the model leaves (`pairs.rs`).
 const FLAT: f64 = 3e-4;
 
 /// All of the points but those on these links whose beams did not end on one plane.
@@ -34,7 +34,8 @@ pub(crate) fn whole(
     let pairing = Pairing::new(refine, state, points.gate);
     let is_kept = |(point, known): (&u32, &mut Option<Known>)| {
         let pair = pairing.pair(*point, known).filter(|pair| links.contains(&pair.link));
-        pair.is_none_or(|pair| is_whole(&pairing, &pair))
+        // Points without a beam, and those of cameras, met no triangle.
+        known.is_none() || pair.is_none_or(|pair| is_whole(&pairing, &pair))
     };
     let is_kept = fan.fan(points.chunks(), |(points, known)| {
         points.iter().zip(known).map(is_kept).collect::<Vec<bool>>()
@@ -60,7 +61,7 @@ fn is_whole(pairing: &Pairing<'_>, pair: &Pair) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pairs::tests::before_front;
+    use crate::cubes::before_front;
     use contract::OneByOne;
 
     #[test]

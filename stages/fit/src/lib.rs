@@ -13,6 +13,8 @@ mod bend;
 mod branch;
 mod calibrate;
 mod choose;
+#[cfg(test)]
+mod cubes;
 mod exact;
 mod face;
 mod facets;

@@ -12,6 +12,8 @@ use crate::sampled::Sampled;
 
 /// One of so many points is looked at to see of which links there are more than enough.
 const SOME: usize = 4;
+/// Quarters of the points wanted of a link that are as good as all of them: a deviation grows by a seventh at most.
+const ENOUGH: usize = 3;
 
 impl Refine<'_> {
     /// Of `points`, at most `cap` for each link that is nearest to them, evenly picked, and as many again of those that
@@ -27,12 +29,15 @@ impl Refine<'_> {
         let some: Vec<u32> = points.iter().copied().step_by(SOME).collect();
         let mut sorted = strata.sort(&some, |_| true, fan);
         // Of most links these are enough; the others are looked for among the rest.
-        let is_open: Vec<bool> = sorted.iter().map(|own| own.len() < cap).collect();
+        let is_open: Vec<bool> = sorted.iter().map(|own| own.len() < ENOUGH * cap / 4).collect();
         let wanted = Placed::new(self.prepared, h, gate, |l| is_open[l]);
         let is_wanted = |p| wanted.nearest(p).is_some_and(|near| near.distance <= gate);
         let beside = is_open[strata.beside()] && gate > FINE_REACH;
-        // Where most links are, to ask them first would be to ask twice.
-        let is_most = 2 * is_open.iter().filter(|is_open| **is_open).count() > is_open.len();
+        // Where most points are theirs, to ask them first would be to ask twice.
+        let n_of = |open: bool| -> usize {
+            sorted.iter().zip(&is_open).filter(|of| *of.1 == open).map(|of| of.0.len()).sum()
+        };
+        let is_most = n_of(true) > n_of(false);
         let rest = (0..points.len()).filter(|i| i % SOME != 0).map(|i| points[i]);
         let rest =
             strata.sort(&rest.collect::<Vec<_>>(), |p| beside || is_most || is_wanted(p), fan);

@@ -164,17 +164,25 @@ impl DepthImage {
         self.levels.iter_mut().for_each(Level::look_around);
     }
 
-    /// Takes back "no return" where others measured matter in that direction (camera frame): beams that ought to have
+    /// Takes back "no return" where others measured matter in that direction (local frame): beams that ought to have
     /// ended and did not come back (too near, too dark, too shiny) prove no free space, nor do those within `window`
     /// cells of them; nor does any, where a share of `blind` of that matter went unseen.
-    pub fn doubt(&mut self, matter: impl Iterator<Item = [f32; 3]>, window: i32, blind: f32) {
-        let focal = self.focal;
+    pub fn doubt<'m>(
+        &mut self,
+        matter: impl Iterator<Item = &'m [[f32; 3]]>,
+        window: i32,
+        blind: f32,
+    ) {
         let base = &mut self.levels[0];
         let (mut n_seen, mut silent) = (0_usize, Vec::new());
-        for (at, _) in matter.filter_map(|p| base.find(focal, p)) {
-            n_seen += 1;
-            if base.cells[at][0] == f32::INFINITY {
-                silent.push(at);
+        for some in matter.flat_map(|places| places.chunks(LANES)) {
+            let camera = transform_lanes(&self.rows, &lanes(some));
+            for at in base.find_lanes(self.focal, &camera).0.into_iter().take(some.len()) {
+                let Some(cell) = base.cells.get(at as usize) else { continue };
+                n_seen += 1;
+                if cell[0] == f32::INFINITY {
+                    silent.push(at as usize);
+                }
             }
         }
         if silent.is_empty() {

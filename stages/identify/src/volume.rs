@@ -202,7 +202,8 @@ fn spots(views: &[View], fan: &impl Fan) -> Vec<Spot> {
 
 /// One sum for each cube, in the order of the cubes.
 fn joined(mut sums: Vec<Sum>) -> Vec<Sum> {
-    sums.sort_by_key(|own| own.0);
+    // Numbers are moved about sooner than sums.
+    sums.sort_by_cached_key(|own| own.0);
     sums.dedup_by(|later, first| {
         let is_same = later.0 == first.0;
         if is_same {

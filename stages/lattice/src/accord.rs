@@ -26,11 +26,8 @@ pub fn agree(views: &mut [View], fan: &impl Fan) {
     let matter: Vec<Vec<[f32; 3]>> = views.iter().map(asked).collect();
     let doubt = |(own, view): (usize, &mut View)| {
         for image in &mut view.images {
-            let camera_from_local = rows(image.camera_from_local());
             let others = matter.iter().enumerate().filter(|(other, _)| *other != own);
-            let seen = others
-                .flat_map(|(_, points)| points.iter().map(|p| transform(&camera_from_local, *p)));
-            image.doubt(seen, DOUBT_WINDOW, BLIND);
+            image.doubt(others.map(|(_, points)| points.as_slice()), DOUBT_WINDOW, BLIND);
         }
     };
     fan.fan(views.iter_mut().enumerate().collect(), doubt);
