@@ -42,9 +42,9 @@ impl<'a> Shelf<'a> {
     pub(crate) fn prepare(&self, names: &BTreeSet<&str>, fan: &impl Fan) {
         for (i, own) in self.prepared.iter().enumerate() {
             if own.get().is_none() && names.contains(self.models[i].name.as_str()) {
-                // Where another thread was first, that one stays.
                 let prepared = Prepared::new(i, &self.models[i], fan);
                 prepared.make_triangles(fan);
+                // Where another thread was first, that one stays.
                 own.set(prepared).ok();
             }
         }

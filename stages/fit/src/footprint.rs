@@ -13,7 +13,7 @@ use crate::pairs::{Known, Pair, Pairing};
 use crate::refine::Refine;
 use crate::sampled::Sampled;
 
-/// Radius of a beam at its scanner, metres, and what it grows by on each metre (METHOD.md §19, T4).
+/// Radius of a beam at its scanner, metres, and what it grows by on each metre: those of the mixed pixels that are measured (`simulate`).
 const RADIUS: (f64, f64) = (0.0011, 0.000_15);
 /// So many places on a beam's rim are looked at.
 const N_RIM: usize = 6;
