@@ -80,13 +80,14 @@ impl Refine<'_> {
         let is_bare = sweep.moved.len() == self.prepared.placed_by[joint].len();
         let extent = if is_bare || extent > APART { extent } else { 0.0 };
         let least = costs.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        let least = sweep.distances(least, &sweep.moved);
         let is_twin = |k: usize| {
             let [own, up, down] = [k, (k + 1).min(n), k.saturating_sub(1)].map(|k| costs[k].1);
-            own <= up && own <= down && sweep.clearly_worse(costs[k].0, least) < TWIN
+            own <= up && own <= down && sweep.clearly_worse(costs[k].0, &least) < TWIN
         };
-        let is_good = |k: &usize| costs[*k].1 <= limit || *k <= n && is_twin(*k);
-        let mut good: Vec<(f64, f64)> =
-            (0..costs.len()).filter(is_good).map(|k| costs[k]).collect();
+        let is_good = |k: usize| costs[k].1 <= limit || k <= n && is_twin(k);
+        let good = fan.fan((0..costs.len()).collect(), |k| is_good(k).then_some(costs[k]));
+        let mut good: Vec<(f64, f64)> = good.into_iter().flatten().collect();
         good.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut values: Vec<f64> = Vec::new();
         for (value, _) in good {

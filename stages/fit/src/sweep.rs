@@ -85,11 +85,11 @@ impl<'a> Sweep<'a> {
         self.squares(turned).sum()
     }
 
-    /// How clearly a value of the joint is worse than another: what its squares exceed the other's by, over what that
-    /// would be if each point's excess were chance: a few strays say nothing, many points that agree much.
-    pub(crate) fn clearly_worse(&self, value: f64, than: f64) -> f64 {
-        let [other, best] = [value, than].map(|v| self.distances(v, &self.moved));
-        let (other, best) = ([other.as_slice()], [best.as_slice()]);
+    /// How clearly a value of the joint is worse than one whose distances are given: what its squares exceed the other's by,
+    /// over what that would be if each point's excess were chance: a few strays say nothing, many points that agree much.
+    pub(crate) fn clearly_worse(&self, value: f64, than: &[f32]) -> f64 {
+        let own = self.distances(value, &self.moved);
+        let (other, best) = ([own.as_slice()], [than]);
         let excess = self.squares(&other).zip(self.squares(&best)).map(|(o, b)| o - b);
         let [sum, squares] = excess.fold([0.0, 0.0], |s, d| [s[0] + d, s[1] + d * d]);
         if squares > 0.0 { sum / squares.sqrt() } else { 0.0 }
