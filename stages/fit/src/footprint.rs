@@ -8,7 +8,7 @@ use contract::Fan;
 use geometry::Vector;
 use std::f64::consts::TAU;
 
-use crate::adjust::State;
+use crate::adjust::{Adjust, State};
 use crate::pairs::{Known, Pair, Pairing};
 use crate::refine::Refine;
 use crate::sampled::Sampled;
@@ -20,16 +20,29 @@ const N_RIM: usize = 6;
 /// A beam ended on one plane where its rim is no farther from it, metres: what tessellation of the model leaves (`pairs.rs`).
 const FLAT: f64 = 3e-4;
 
-/// All of the points but those on these links whose beams did not end on one plane.
+/// All of the points but those on what these joints turn whose beams did not end on one plane; all of them where without those
+/// another joint is not determined: a wrist of which little else is seen.
 pub(crate) fn whole(
     refine: &Refine<'_>,
-    (state, links): (&State, &[usize]),
+    (state, joints): (&State, &[usize]),
     mut points: Sampled,
     fan: &impl Fan,
 ) -> Sampled {
+    let links: Vec<usize> = joints.iter().flat_map(|&j| refine.prepared.carried(j)).collect();
     if links.is_empty() {
         return points;
     }
+    let whole = on_one_plane(refine, (state, &links), &mut points, fan);
+    if is_held(refine, (state, joints), &whole, fan) { whole } else { points }
+}
+
+/// All of the points but those on these links whose beams did not end on one plane.
+fn on_one_plane(
+    refine: &Refine<'_>,
+    (state, links): (&State, &[usize]),
+    points: &mut Sampled,
+    fan: &impl Fan,
+) -> Sampled {
     refine.prepared.make_triangles(fan);
     let pairing = Pairing::new(refine, state, points.gate);
     let is_kept = |(point, known): (&u32, &mut Option<Known>)| {
@@ -40,7 +53,24 @@ pub(crate) fn whole(
     let is_kept = fan.fan(points.chunks(), |(points, known)| {
         points.iter().zip(known).map(is_kept).collect::<Vec<bool>>()
     });
-    points.keep(&is_kept.concat())
+    points.kept(&is_kept.concat())
+}
+
+/// Whether some points determine all joints but these.
+fn is_held(
+    refine: &Refine<'_>,
+    (state, joints): (&State, &[usize]),
+    points: &Sampled,
+    fan: &impl Fan,
+) -> bool {
+    // A part of them tells.
+    let mut part = points.about(refine.settings.part());
+    let share = part.points().len() as f64 / points.points().len().max(1) as f64;
+    let normal = Adjust::new(refine).at(state, &mut part, fan);
+    let variance = normal.covariance(&refine.prepared.patches) * share;
+    let limit = refine.settings.determined_sigma.powi(2);
+    let mut others = (0..state.hypothesis.posture.len()).filter(|j| !joints.contains(j));
+    others.all(|j| variance[(6 + j, 6 + j)] < limit)
 }
 
 /// Whether the rim of the beam that gave a point ended on the plane that its middle met.
@@ -70,12 +100,24 @@ mod tests {
         let from_edge = [0.0005, 0.001, 0.003, 0.02, 0.1];
         let places = from_edge.map(|from| [0.1 - from, 0.0]).to_vec();
         before_front(&places, |refine, state| {
-            let points = || Sampled::new((0..5).collect(), 0.02);
-            let left = |links: &[usize]| {
-                whole(refine, (state, links), points(), &OneByOne).points().to_vec()
+            let mut points = Sampled::new((0..5).collect(), 0.02);
+            let mut left = |links: &[usize]| {
+                on_one_plane(refine, (state, links), &mut points, &OneByOne).points().to_vec()
             };
             assert_eq!(left(&[0]), [2, 3, 4]);
             assert_eq!(left(&[1]), [0, 1, 2, 3, 4]);
+        });
+    }
+
+    #[test]
+    fn joints_that_nothing_holds_are_told() {
+        // All points lie on the link before the only joint.
+        let places: Vec<[f64; 2]> = (0..60).map(|i| [0.002 * f64::from(i % 10), 0.0]).collect();
+        before_front(&places, |refine, state| {
+            let points = Sampled::new((0..60).collect(), 0.02);
+            let is_held = |open: &[usize]| is_held(refine, (state, open), &points, &OneByOne);
+            assert!(!is_held(&[]));
+            assert!(is_held(&[0]));
         });
     }
 }

@@ -35,8 +35,8 @@ impl Sampled {
     }
 
     /// Those that are to be kept.
-    pub(crate) fn keep(self, is_kept: &[bool]) -> Self {
-        let all = self.points.into_iter().zip(self.known).zip(is_kept);
+    pub(crate) fn kept(&self, is_kept: &[bool]) -> Self {
+        let all = self.points.iter().zip(&self.known).zip(is_kept);
         let (points, known) = all.filter(|(_, is_kept)| **is_kept).map(|(pair, _)| pair).unzip();
         Self { points, known, gate: self.gate }
     }

@@ -176,25 +176,15 @@ fn sharpen(
     fan: &impl Fan,
 ) -> Sampled {
     let n = refine.settings.max_points;
-    let state = best.state().open();
-    let all = adjusted_points(refine, &best.hypothesis, (all, n), fan);
+    let state = best.state();
+    let points = adjusted_points(refine, &best.hypothesis, (all, n), fan);
     let open: Vec<usize> = spins.iter().filter(|s| s.values.len() > 1).map(|s| s.joint).collect();
-    let links: Vec<usize> = open.iter().flat_map(|&j| refine.prepared.carried(j)).collect();
-    let mut points = footprint::whole(refine, (&state, &links), all.clone(), fan);
-    *best = Adjust::new(refine).run_from(state, &mut points, fan);
-    if points.points().len() < all.points().len() && !is_held(refine, best, &open) {
-        points = all;
-        *best = Adjust::new(refine).run_from(best.state().open(), &mut points, fan);
-    }
+    let mut points = footprint::whole(refine, (&state, &open), points, fan);
+    // An open flange need not come to rest.
+    let adjust = Adjust { loose: &open, ..Adjust::new(refine) };
+    *best = adjust.run_from(state.open(), &mut points, fan);
     *judgement = judged(refine, &best.hypothesis);
     points
-}
-
-/// Whether all joints but these are determined.
-fn is_held(refine: &Refine<'_>, best: &Adjusted, open: &[usize]) -> bool {
-    let limit = refine.settings.determined_sigma.powi(2);
-    let mut others = (0..best.hypothesis.posture.len()).filter(|j| !open.contains(j));
-    others.all(|j| best.covariance[(6 + j, 6 + j)] < limit)
 }
 
 /// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring

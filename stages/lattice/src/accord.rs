@@ -2,7 +2,8 @@
 //! prove nothing, and matter where others saw free space, which moved.
 
 use contract::{Fan, View};
-use geometry::depth::{rows, transform};
+use geometry::Eye;
+use geometry::depth::{LANES, Look, lanes};
 use geometry::narrow::floor_i32;
 
 /// Share of the matter measured by other scans that a scanner must have missed for its missing returns to mean nothing.
@@ -47,17 +48,22 @@ const MIN_IN_CELL: usize = 3;
 pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
     let gone_of = |own: usize| {
         let others = views.iter().enumerate().filter(|(other, _)| *other != own);
-        let images = others.flat_map(|(_, v)| &v.images);
-        let images: Vec<_> = images.map(|i| (i, rows(i.camera_from_local()))).collect();
-        let is_gone = |point: &[f32; 3]| {
-            images.iter().any(|(image, camera_from_local)| {
-                let look = image.look(transform(camera_from_local, *point), FOOTPRINT);
-                look.is_some_and(|l| l.around.is_finite() && l.around - l.range > BEYOND)
-            })
-        };
+        let eyes: Vec<Eye<'_>> = others.map(|(_, v)| Eye::new(&v.images)).collect();
         let step = step(&views[own], views.len());
-        let asked = views[own].points.iter().step_by(step);
-        asked.copied().filter(is_gone).map(|p| p.map(|v| floor_i32(f64::from(v / CELL)))).collect()
+        let asked = views[own].points.iter().step_by(step).copied();
+        let mut gone = Vec::new();
+        for some in asked.collect::<Vec<_>>().chunks(LANES) {
+            let local = lanes(some);
+            let mut is_gone = [false; LANES];
+            for looks in eyes.iter().map(|eye| eye.look_lanes(&local, FOOTPRINT)) {
+                for (lane, is_gone) in is_gone.iter_mut().enumerate() {
+                    let beyond = |l: Look| l.around.is_finite() && l.around - l.range > BEYOND;
+                    *is_gone |= looks.get(lane).is_some_and(beyond);
+                }
+            }
+            gone.extend(some.iter().zip(is_gone).filter(|(_, is_gone)| *is_gone).map(|(p, _)| *p));
+        }
+        gone.iter().map(|p| p.map(|v| floor_i32(f64::from(v / CELL)))).collect()
     };
     let found: Vec<Vec<[i32; 3]>> = fan.fan((0..views.len()).collect(), gone_of);
     let mut cells: Vec<[i32; 3]> = found.into_iter().flatten().collect();

@@ -68,7 +68,7 @@ impl Normal {
     /// What the rows show of their own variance, over what was taken for it: `Σψ²/Σw`; and how much wider the kernel makes
     /// errors than its weights say: `(Σw/Σψ′)²`. Where noise is not small against the gate, points beyond it are missing on
     /// both sides.
-    fn kernel_factors(&self) -> [f64; 2] {
+    pub(super) fn kernel_factors(&self) -> [f64; 2] {
         let [influence, slope, weight] = self.kernel;
         if slope <= 0.0 {
             return [1.0, MAX_FACTOR];
