@@ -21,6 +21,8 @@ const SEAM: f64 = 1e-4;
 /// Triangles of a mesh by the cells that they lie in.
 #[derive(Debug, Default)]
 pub(crate) struct Triangles {
+    /// Of each triangle of the mesh, link frame, metres: beside each other in memory, as beams ask for them.
+    corners: Vec<[[f32; 3]; 3]>,
     grid: Grid,
     /// Where each cell begins in `list`; one more for the end of the last.
     begins: Vec<u32>,
@@ -47,6 +49,8 @@ pub(crate) struct Met {
 impl Triangles {
     pub(crate) fn new(mesh: &Mesh) -> Self {
         let Some(grid) = Grid::over(mesh) else { return Self::default() };
+        let corners = |corners: &[u32; 3]| corners.map(|c| mesh.vertices[c as usize]);
+        let corners = mesh.triangles.iter().map(corners).collect();
         let n_cells: usize = grid.n.iter().product();
         // First how many lie in each cell, then which.
         let (mut begins, mut entries) = (vec![0_u32; n_cells + 1], Vec::new());
@@ -64,24 +68,19 @@ impl Triangles {
             list[*at as usize] = triangle;
             *at += 1;
         }
-        Self { grid, begins, list }
+        Self { corners, grid, begins, list }
     }
 
     /// Where a beam (unit length) first meets the mesh on a stretch of it, `from` and `to` metres beyond a place on it; how
     /// far beyond it that is, and where.
-    pub(crate) fn first(
-        &self,
-        mesh: &Mesh,
-        beam: (&Vector, &Vector),
-        stretch: [f64; 2],
-    ) -> Option<(f64, Met)> {
+    pub(crate) fn first(&self, beam: (&Vector, &Vector), stretch: [f64; 2]) -> Option<(f64, Met)> {
         let mut best: Option<(f64, Vector, u32)> = None;
         for (cell, end) in self.grid.along_beam(beam, stretch) {
             let [begin, after] = [cell, cell + 1].map(|c| self.begins[c] as usize);
             for &i in &self.list[begin..after] {
                 let last = best.map_or(stretch[1], |b| b.0);
-                if let Some((t, n)) =
-                    crosses(mesh, i, beam).filter(|c| c.0 >= stretch[0] && c.0 < last)
+                if let Some((t, n)) = crosses(&self.corners[i as usize], beam)
+                    .filter(|c| c.0 >= stretch[0] && c.0 < last)
                 {
                     best = Some((t, n, i));
                 }
@@ -91,6 +90,12 @@ impl Triangles {
             }
         }
         best.map(|(t, n, triangle)| (t, met(beam, (t, n), triangle)))
+    }
+
+    /// How far beyond a place on it a beam still meets a triangle that it met before, and the normal towards the scanner there.
+    #[inline]
+    pub(crate) fn again(&self, triangle: u32, beam: (&Vector, &Vector)) -> Option<(f64, Vector)> {
+        crosses(&self.corners[triangle as usize], beam).map(|(t, n)| (t, towards(&n, beam.1)))
     }
 }
 
@@ -259,16 +264,6 @@ fn n_entries(mesh: &Mesh, edge: f32) -> f32 {
     mesh.triangles.iter().map(of).sum()
 }
 
-/// How far beyond a place on it a beam still meets a triangle that it met before, and the normal towards the scanner there.
-#[inline]
-pub(crate) fn again(
-    mesh: &Mesh,
-    triangle: u32,
-    (at, ray): (&Vector, &Vector),
-) -> Option<(f64, Vector)> {
-    crosses(mesh, triangle, (at, ray)).map(|(t, n)| (t, towards(&n, ray)))
-}
-
 fn met((at, ray): (&Vector, &Vector), (t, n): (f64, Vector), triangle: u32) -> Met {
     Met { x: at + ray * t, n: towards(&n, ray), triangle }
 }
@@ -281,9 +276,8 @@ fn towards(n: &Vector, ray: &Vector) -> Vector {
 /// How far along a beam, from a place on it, it crosses a triangle, and the triangle's normal, of any length; `None` where it
 /// passes beside it (Möller and Trumbore 1997).
 #[inline]
-fn crosses(mesh: &Mesh, triangle: u32, (at, ray): (&Vector, &Vector)) -> Option<(f64, Vector)> {
-    let corner = |corner: u32| Vector::from(mesh.vertices[corner as usize].map(f64::from));
-    let [a, b, c] = mesh.triangles[triangle as usize].map(corner);
+fn crosses(corners: &[[f32; 3]; 3], (at, ray): (&Vector, &Vector)) -> Option<(f64, Vector)> {
+    let [a, b, c] = corners.map(|corner| Vector::from(corner.map(f64::from)));
     let (u, v, w) = (b - a, c - a, at - a);
     let across = ray.cross(&v);
     let whole = u.dot(&across);

@@ -5,7 +5,7 @@ use geometry::{Point, Pose, Vector};
 use nalgebra::{Matrix3, UnitQuaternion};
 
 use crate::adjust::State;
-use crate::exact::{self, Met};
+use crate::exact::Met;
 use crate::facets::Facet;
 use crate::placed::{Near, Placed};
 use crate::refine::Refine;
@@ -174,7 +174,7 @@ impl<'a> Pairing<'a> {
             let triangles = self.refine.prepared.links[link].fields.triangles(own);
             let end = best.as_ref().map_or(self.gate, |b| b.0);
             let stretch = [-FREE * self.gate, end];
-            if let Some((t, met)) = triangles.first(&own.mesh, (&at, &ray), stretch) {
+            if let Some((t, met)) = triangles.first((&at, &ray), stretch) {
                 best = Some((t, link, met));
             }
         });
@@ -185,8 +185,9 @@ impl<'a> Pairing<'a> {
     fn again(&self, known: Known, (p, ray): (&Vector, &Vector)) -> Option<Hit> {
         let link = known.link as usize;
         let (at, inside) = self.frames[link].inside((p, ray));
-        let mesh = &self.refine.prepared.model.links[link].mesh;
-        let (t, n) = exact::again(mesh, known.triangle, (&at, &inside))?;
+        let own = &self.refine.prepared.model.links[link];
+        let triangles = self.refine.prepared.links[link].fields.triangles(own);
+        let (t, n) = triangles.again(known.triangle, (&at, &inside))?;
         Some(self.hit((link, known.patch), (t, &n), ray))
     }
 
