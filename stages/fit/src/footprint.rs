@@ -33,7 +33,8 @@ pub(crate) fn whole(
         return points;
     }
     let whole = on_one_plane(refine, (state, &links), &mut points, fan);
-    if is_held(refine, (state, joints), &whole, fan) { whole } else { points }
+    let is_same = whole.points().len() == points.points().len();
+    if is_same || is_held(refine, (state, joints), &whole, fan) { whole } else { points }
 }
 
 /// All of the points but those on these links whose beams did not end on one plane.

@@ -318,6 +318,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn steps_go_as_far_as_the_curvature_of_the_kernel_says() {
+        // All residuals ask for the same shift; the kernel's slope is a share of its weight.
+        let step = |slope: f64| {
+            let mut normal = Normal::new(1, 1, 1);
+            for _ in 0..100 {
+                let (weight, influence) = (1e4, [1.0, 1e4 * slope]);
+                let (robot, scan, shape) = (&[1.0], [0.0; N_SCAN], Shape::x());
+                let (view, patch, r) = (0, 0, 0.001);
+                normal.add(&Row { robot, scan, view, patch, shape, weight, influence, r });
+            }
+            (0..N_SCAN).for_each(|i| normal.add_scan_prior(0, i, 0.0, 1.0));
+            normal.flush();
+            normal.gradient[0] = 100.0 * 1e4 * 0.001;
+            normal.solve().expect("a step")[0]
+        };
+        for (slope, factor) in [(1.0, 1.0), (1.0 / 1.2, 1.2), (0.5, MAX_STRETCH)] {
+            assert!((step(slope) + 0.001 * factor).abs() < 1e-9, "{} for {slope}", step(slope));
+        }
+    }
+
+    #[test]
     fn batches_of_rows_add_up_as_single_ones_do() {
         let (n_robot, n_views) = (8, 2);
         let n = n_robot + n_views * N_SCAN;
