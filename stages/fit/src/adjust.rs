@@ -254,8 +254,7 @@ impl<'a> Adjust<'a> {
             if weight <= 0.0 {
                 continue;
             }
-            let u2 = (pair.r / scale).powi(2);
-            let slope = (1.0 - u2) * (1.0 - 5.0 * u2) / variance;
+            let slope = robust::tukey_slope(pair.r, scale) / variance;
             // Where many err alike, their residuals are as large as their own variance.
             let influence = [n_alike * (weight * pair.r).powi(2), slope];
             let q = base_from_local * Point::from(pair.p);

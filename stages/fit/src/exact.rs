@@ -21,9 +21,11 @@ const SEAM: f64 = 1e-4;
 /// Triangles of a mesh by the cells that they lie in.
 #[derive(Debug, Default)]
 pub(crate) struct Triangles {
-    /// Of each triangle of the mesh, link frame, metres: beside each other in memory, as beams ask for them.
+    /// Of each triangle, link frame, metres: in memory in the order of the cells, as beams ask for them.
     corners: Vec<[[f32; 3]; 3]>,
     grid: Grid,
+    /// Whether there is any in each cell, 64 of them in a word: most cells on a beam's way are empty.
+    filled: Vec<u64>,
     /// Where each cell begins in `list`; one more for the end of the last.
     begins: Vec<u32>,
     list: Vec<u32>,
@@ -49,8 +51,6 @@ pub(crate) struct Met {
 impl Triangles {
     pub(crate) fn new(mesh: &Mesh) -> Self {
         let Some(grid) = Grid::over(mesh) else { return Self::default() };
-        let corners = |corners: &[u32; 3]| corners.map(|c| mesh.vertices[c as usize]);
-        let corners = mesh.triangles.iter().map(corners).collect();
         let n_cells: usize = grid.n.iter().product();
         // First how many lie in each cell, then which.
         let (mut begins, mut entries) = (vec![0_u32; n_cells + 1], Vec::new());
@@ -68,7 +68,16 @@ impl Triangles {
             list[*at as usize] = triangle;
             *at += 1;
         }
-        Self { corners, grid, begins, list }
+        let corners = in_order(mesh, &mut list);
+        let mut filled = vec![0; n_cells.div_ceil(64)];
+        for cell in (0..n_cells).filter(|&cell| begins[cell] < begins[cell + 1]) {
+            filled[cell / 64] |= 1_u64 << (cell % 64);
+        }
+        Self { corners, grid, filled, begins, list }
+    }
+
+    fn is_empty(&self, cell: usize) -> bool {
+        self.filled[cell / 64] >> (cell % 64) & 1 == 0
     }
 
     /// Where a beam (unit length) first meets the mesh on a stretch of it, `from` and `to` metres beyond a place on it; how
@@ -76,6 +85,9 @@ impl Triangles {
     pub(crate) fn first(&self, beam: (&Vector, &Vector), stretch: [f64; 2]) -> Option<(f64, Met)> {
         let mut best: Option<(f64, Vector, u32)> = None;
         for (cell, end) in self.grid.along_beam(beam, stretch) {
+            if self.is_empty(cell) {
+                continue;
+            }
             let [begin, after] = [cell, cell + 1].map(|c| self.begins[c] as usize);
             for &i in &self.list[begin..after] {
                 let last = best.map_or(stretch[1], |b| b.0);
@@ -97,6 +109,20 @@ impl Triangles {
     pub(crate) fn again(&self, triangle: u32, beam: (&Vector, &Vector)) -> Option<(f64, Vector)> {
         crosses(&self.corners[triangle as usize], beam).map(|(t, n)| (t, towards(&n, beam.1)))
     }
+}
+
+/// Corners of the triangles that a list names, in the order in which it first does; it names them by their places in that then.
+fn in_order(mesh: &Mesh, list: &mut [u32]) -> Vec<[[f32; 3]; 3]> {
+    let mut places = vec![None; mesh.triangles.len()];
+    let mut out = Vec::with_capacity(places.len());
+    for triangle in list {
+        let own = *triangle as usize;
+        *triangle = *places[own].get_or_insert_with(|| {
+            out.push(mesh.triangles[own].map(|c| mesh.vertices[c as usize]));
+            out.len() as u32 - 1
+        });
+    }
+    out
 }
 
 impl Grid {

@@ -21,6 +21,7 @@ mod facets;
 mod foot;
 mod footprint;
 mod judge;
+mod matching;
 mod mount;
 mod noise;
 mod normal;

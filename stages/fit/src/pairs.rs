@@ -168,7 +168,7 @@ impl<'a> Pairing<'a> {
     /// How far beyond a place on it a beam first meets the model, on which link, and where; `None` farther from it than the gate.
     pub(crate) fn meets(&self, (p, ray): (&Vector, &Vector)) -> Option<(f64, usize, Met)> {
         let mut best: Option<(f64, usize, Met)> = None;
-        self.placed.each(p.map(|v| v as f32).into(), |link, _, _| {
+        self.placed.each(p.map(|v| v as f32).into(), |link| {
             let (at, ray) = self.frames[link].inside((p, ray));
             let own = &self.refine.prepared.model.links[link];
             let triangles = self.refine.prepared.links[link].fields.triangles(own);

@@ -6,7 +6,8 @@ use geometry::depth::{rotate, rows, transform};
 use geometry::probe::MIN_FACING;
 
 use crate::beam::Hypothesis;
-use crate::refine::{Match, Refine};
+use crate::matching::Match;
+use crate::refine::Refine;
 
 /// Samples of a link that are asked: as many as tell a hypothesis in the search.
 const N_SAMPLES: usize = 100;

@@ -1,17 +1,13 @@
 //! A posture in; its links with a surface where they stand, and for any point the nearest facet of them, out.
-//!
-//! Most links are far from most points: the boxes of their fields tell, eight at a time, before the fields are asked.
 
-use geometry::depth::{Rows, transform};
+use geometry::depth::{LANES, Lanes, Rows, lanes, rows, transform, transform_lanes};
 use geometry::{NearestField, Pose};
 
 use crate::Prepared;
 use crate::beam::Hypothesis;
 use crate::facets::Fields;
 use crate::refine::FINE_REACH;
-
-/// Links that are asked together.
-const N_LANES: usize = 8;
+use crate::scene::Scene;
 
 /// A facet of a link next to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,59 +21,59 @@ pub(crate) struct Near {
 
 /// Links of a posture, for points in the local frame.
 pub(crate) struct Placed<'a> {
-    prepared: &'a Prepared<'a>,
-    links: Vec<(usize, Rows)>,
-    boxes: Vec<Boxes>,
-    is_fine: bool,
+    links: Vec<Stand<'a>>,
 }
 
-/// The grids of eight links' fields: a point's place in them, in voxels, and how many they have on each axis; none in lanes
-/// that hold none.
-#[derive(Debug, Clone, Copy)]
-struct Boxes {
-    voxel_from_local: [[[f32; N_LANES]; 4]; 3],
-    size: [[f32; N_LANES]; 3],
+/// A link where it stands.
+struct Stand<'a> {
+    link: usize,
+    fields: &'a Fields,
+    /// That of its fields which serves the gate.
+    field: &'a NearestField,
+    link_from_local: Rows,
+    /// In voxels of the field, and how many it has on each axis.
+    voxel_from_local: Rows,
+    size: [f32; 3],
 }
 
-/// Places in eight grids, axis by axis, in voxels.
-type Places = [[f32; N_LANES]; 3];
-
-impl Boxes {
-    const NONE: Self =
-        Self { voxel_from_local: [[[0.0; N_LANES]; 4]; 3], size: [[-1.0; N_LANES]; 3] };
-
-    /// Puts a field, whose link stands so, into a lane.
-    fn set(&mut self, lane: usize, field: &NearestField, link_from_local: &Pose) {
+impl<'a> Stand<'a> {
+    fn new(
+        prepared: &'a Prepared<'_>,
+        (link, link_from_local): (usize, Rows),
+        local_from_link: &Pose,
+        is_fine: bool,
+    ) -> Self {
+        let fields = &prepared.links[link].fields;
+        let field = if is_fine { &fields.fine } else { &fields.coarse };
         let (origin, inverse_edge) = field.grid();
-        let rows = geometry::depth::rows(link_from_local);
-        for axis in 0..3 {
+        let rows = rows(&local_from_link.inverse());
+        let voxel_from_local = [0, 1, 2].map(|axis| {
             let [x, y, z, t] = rows[axis];
-            let row = [x, y, z, t - origin[axis]].map(|v| v * inverse_edge);
-            (0..4).for_each(|i| self.voxel_from_local[axis][i][lane] = row[i]);
-            self.size[axis][lane] = field.size()[axis] as f32;
-        }
+            [x, y, z, t - origin[axis]].map(|v| v * inverse_edge)
+        });
+        let size = field.size().map(|n| n as f32);
+        Self { link, fields, field, link_from_local, voxel_from_local, size }
     }
 
-    /// Where a point is in each grid; bit by bit, in which of them it is.
+    /// Which of some places are within the field, and where in it they are, voxels.
     #[inline]
-    fn hold(&self, p: [f32; 3]) -> (u8, Places) {
-        let mut places = [[0.0_f32; N_LANES]; 3];
-        let mut is_in = [true; N_LANES];
-        for axis in 0..3 {
-            let [x, y, z, t] = &self.voxel_from_local[axis];
-            for k in 0..N_LANES {
-                let v = x[k] * p[0] + y[k] * p[1] + z[k] * p[2] + t[k];
-                places[axis][k] = v;
-                is_in[k] &= v >= 0.0 && v < self.size[axis][k];
+    fn hold(&self, local: &Lanes) -> ([bool; LANES], Lanes) {
+        let at = transform_lanes(&self.voxel_from_local, local);
+        let mut is_in = [true; LANES];
+        for (v, size) in at.iter().zip(self.size) {
+            for i in 0..LANES {
+                is_in[i] &= (v[i] >= 0.0) & (v[i] < size);
             }
         }
-        ((0..N_LANES).fold(0, |bits, k| bits | u8::from(is_in[k]) << k), places)
+        (is_in, at)
     }
-}
 
-/// The field that serves a gate.
-fn field(fields: &Fields, is_fine: bool) -> &NearestField {
-    if is_fine { &fields.fine } else { &fields.coarse }
+    /// Squared distance of a place, local frame, from a facet, m².
+    #[inline]
+    fn distance2(&self, facet: usize, p: [f32; 3]) -> f32 {
+        let (s, p) = (self.fields.facets[facet].x, transform(&self.link_from_local, p));
+        (0..3).map(|i| (s[i] - p[i]) * (s[i] - p[i])).sum()
+    }
 }
 
 impl<'a> Placed<'a> {
@@ -88,20 +84,12 @@ impl<'a> Placed<'a> {
         gate: f64,
         chosen: impl Fn(usize) -> bool,
     ) -> Self {
-        let is_fine = gate < FINE_REACH;
-        let mut links = prepared.frames(h);
-        links.retain(|(l, _)| chosen(*l));
         let poses = prepared.model.poses(&h.posture);
-        let eight = |links: &[(usize, Rows)]| {
-            let mut out = Boxes::NONE;
-            for (lane, (l, _)) in links.iter().enumerate() {
-                let link_from_local = (h.local_from_base * poses[*l]).inverse();
-                out.set(lane, field(&prepared.links[*l].fields, is_fine), &link_from_local);
-            }
-            out
+        let frames = prepared.frames(h).into_iter().filter(|(link, _)| chosen(*link));
+        let stand = |own: (usize, Rows)| {
+            Stand::new(prepared, own, &(h.local_from_base * poses[own.0]), gate < FINE_REACH)
         };
-        let boxes = links.chunks(N_LANES).map(eight).collect();
-        Self { prepared, links, boxes, is_fine }
+        Self { links: frames.map(stand).collect() }
     }
 
     /// All links with a surface.
@@ -109,35 +97,69 @@ impl<'a> Placed<'a> {
         Self::new(prepared, h, gate, |_| true)
     }
 
-    /// For each link whose field knows a facet near a point: the link, the facet, and the point in the link's frame.
+    /// Each link whose field knows a facet near a point.
     #[inline]
-    pub(crate) fn each(&self, point: [f32; 3], mut take: impl FnMut(usize, usize, [f32; 3])) {
-        for (boxes, links) in self.boxes.iter().zip(self.links.chunks(N_LANES)) {
-            let (mut bits, [x, y, z]) = boxes.hold(point);
-            while bits != 0 {
-                let lane = bits.trailing_zeros() as usize;
-                let (link, link_from_local) = &links[lane];
-                bits &= bits - 1;
-                let field = field(&self.prepared.links[*link].fields, self.is_fine);
-                if let Some(facet) = field.in_voxel([x[lane], y[lane], z[lane]].map(|v| v as u32)) {
-                    take(*link, facet, transform(link_from_local, point));
-                }
+    pub(crate) fn each(&self, point: [f32; 3], mut take: impl FnMut(usize)) {
+        for own in &self.links {
+            let at = transform(&own.voxel_from_local, point);
+            let is_in = (0..3).all(|i| at[i] >= 0.0 && at[i] < own.size[i]);
+            if is_in && own.field.in_voxel(at.map(|v| v as u32)).is_some() {
+                take(own.link);
             }
         }
     }
 
     /// The nearest facet over all links to a point.
-    #[inline]
     pub(crate) fn nearest(&self, point: [f32; 3]) -> Option<Near> {
-        let mut best: Option<(usize, usize, f32)> = None;
-        self.each(point, |link, facet, p| {
-            let s = self.prepared.links[link].fields.facets[facet].x;
-            let d2 = (0..3).map(|i| (s[i] - p[i]) * (s[i] - p[i])).sum::<f32>();
-            if best.is_none_or(|b| d2 < b.2) {
-                best = Some((link, facet, d2));
+        self.nearest_of(&[point])[0]
+    }
+
+    /// The same for some points, as many as there are lanes at most: the voxels of all of them are asked for, then the facets of all of
+    /// them, so that they wait for memory together.
+    #[inline]
+    fn nearest_of(&self, points: &[[f32; 3]]) -> [Option<Near>; LANES] {
+        let local = lanes(points);
+        let mut best = [(f32::INFINITY, 0, 0); LANES];
+        for own in &self.links {
+            let (is_in, [x, y, z]) = own.hold(&local);
+            let (mut which, mut facets, mut n) = ([0; LANES + 1], [None; LANES], 0);
+            for (i, is_in) in is_in.into_iter().enumerate().take(points.len()) {
+                which[n] = i;
+                n += usize::from(is_in);
             }
-        });
-        let (link, facet, d2) = best?;
-        Some(Near { link, facet, distance: f64::from(d2).sqrt() })
+            for &i in &which[..n] {
+                facets[i] = own.field.in_voxel([x[i], y[i], z[i]].map(|v| v as u32));
+            }
+            for &i in &which[..n] {
+                let Some(facet) = facets[i] else { continue };
+                let d2 = own.distance2(facet, points[i]);
+                if d2 < best[i].0 {
+                    best[i] = (d2, own.link, facet);
+                }
+            }
+        }
+        best.map(|(d2, link, facet)| {
+            let distance = f64::from(d2).sqrt();
+            distance.is_finite().then_some(Near { link, facet, distance })
+        })
+    }
+
+    /// Points of a scene, each with its place and what is nearest to it.
+    pub(crate) fn nearest_each(
+        &self,
+        scene: &Scene<'_>,
+        points: &[u32],
+        mut take: impl FnMut(u32, [f32; 3], Option<Near>),
+    ) {
+        for some in points.chunks(LANES) {
+            let mut places = [[0.0; 3]; LANES];
+            for (place, i) in places.iter_mut().zip(some) {
+                *place = scene.points[*i as usize].p;
+            }
+            let near = self.nearest_of(&places[..some.len()]);
+            for ((i, place), near) in some.iter().zip(places).zip(near) {
+                take(*i, place, near);
+            }
+        }
     }
 }

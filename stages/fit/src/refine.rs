@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::JointKind;
 
 use crate::beam::Hypothesis;
-use crate::placed::{Near, Placed};
+use crate::matching::Matching;
 use crate::{Prepared, Scene, Settings};
 
 /// One round of the schedule.
@@ -49,8 +49,11 @@ pub(crate) const FINE_ROUNDS: [Round; 3] = [
 /// So many rounds end at a posture.
 pub(crate) const N_LAST_ROUNDS: usize = 4;
 
-/// Points that one thread works on at a time. Sums are taken chunk by chunk, so it does not depend on the threads.
-pub(crate) const CHUNK: usize = 8192;
+/// Points that one thread works on at a time, of `n`: few enough that threads end together, as many as make what is joined after
+/// them worth it. Sums are taken chunk by chunk, so it does not depend on the threads.
+pub(crate) fn chunk(n: usize) -> usize {
+    (n / 32).clamp(1024, 8192)
+}
 /// Distance from which the coarse field answers, metres: just inside the fine field's reach.
 pub(crate) const FINE_REACH: f64 = 0.026;
 
@@ -61,25 +64,27 @@ const SMALL_STEP: f64 = 0.01;
 /// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
 const BESIDE: (f64, f64) = (1.6, 1.5);
 
-/// The same where points are few.
-const FEW: usize = 2048;
-
 /// Sums of one link's part of the normal equations.
 struct Sums {
     /// Its lower triangle until all are joined.
     h: DMatrix<f64>,
     g: DVector<f64>,
     n: usize,
+    /// Sums of the weights, and of the kernel's slopes.
+    kernel: [f64; 2],
 }
 
 impl Sums {
     fn new(n: usize) -> Self {
-        Self { h: DMatrix::zeros(n, n), g: DVector::zeros(n), n: 0 }
+        Self { h: DMatrix::zeros(n, n), g: DVector::zeros(n), n: 0, kernel: [0.0; 2] }
     }
 
-    /// Adds a residual with its derivatives and weight.
-    fn add(&mut self, row: &[f64], r: f64, weight: f64) {
+    /// Adds a residual with its derivatives, by the kernel of a gate.
+    fn add(&mut self, row: &[f64], r: f64, gate: f64) {
+        let weight = robust::tukey(r, gate);
         self.n += 1;
+        self.kernel[0] += weight;
+        self.kernel[1] += robust::tukey_slope(r, gate);
         let n = row.len();
         for a in (0..n).filter(|a| row[*a] != 0.0) {
             let wa = weight * row[a];
@@ -93,6 +98,7 @@ impl Sums {
         self.h += &other.h;
         self.g += &other.g;
         self.n += other.n;
+        (0..2).for_each(|i| self.kernel[i] += other.kernel[i]);
     }
 }
 
@@ -114,16 +120,6 @@ pub(crate) struct Prior {
     pub(crate) sigma: [f64; 2],
 }
 
-/// A point with the facet of the model that is nearest to it, base frame.
-pub(crate) struct Match {
-    pub(crate) link: usize,
-    /// Point, base frame.
-    pub(crate) q: Vector,
-    /// Normal, base frame.
-    pub(crate) n: Vector,
-    pub(crate) r: f64,
-}
-
 impl Refine<'_> {
     /// Runs the rounds on the points with these indices.
     pub(crate) fn run(
@@ -143,41 +139,6 @@ impl Refine<'_> {
             while deviations < SMALL_STEP && rounds.next_if_eq(&round).is_some() {}
         }
         h
-    }
-
-    /// What matches points with the facets of the model as it stands, within the gate.
-    fn matching(&self, h: &Hypothesis, gate: f64) -> impl Fn(&u32) -> Option<Match> + Sync + '_ {
-        let poses = self.prepared.model.poses(&h.posture);
-        let base_from_local = h.local_from_base.inverse();
-        let placed = Placed::all(self.prepared, h, gate);
-        let scanners: Vec<_> =
-            (0..self.scene.views.len()).map(|v| self.scene.scanner(v as u16)).collect();
-        move |&i| {
-            let m = &self.scene.points[i as usize];
-            let Near { link, facet, distance } = placed.nearest(m.p)?;
-            if distance > gate {
-                return None;
-            }
-            let pose = &poses[link];
-            let facet = &self.prepared.links[link].fields.facets[facet];
-            let n = pose.rotation * Vector::from(facet.n.map(f64::from));
-            let q = base_from_local * geometry::Point::from(m.p.map(f64::from));
-            let x = pose * geometry::Point::from(facet.x.map(f64::from));
-            let r = n.dot(&(q - x));
-            // Beside the surface's edge its plane means nothing: what hangs on a flange is wider than it.
-            let beside = (distance * distance - r * r).max(0.0).sqrt();
-            if gate < FINE_REACH && beside > self.beside(link).max(0.33 * gate) {
-                return None;
-            }
-            // A facet that faces away from the scanner cannot have given this point.
-            if let Some(scanner) = &scanners[usize::from(m.view)] {
-                let ray = (base_from_local * scanner) - q;
-                if n.dot(&ray) <= 0.05 * ray.norm() {
-                    return None;
-                }
-            }
-            Some(Match { link, q: q.coords, n, r })
-        }
     }
 
     /// How far beside its nearest sample a point of a link may lie, metres.
@@ -208,25 +169,25 @@ impl Refine<'_> {
 
     /// Normal equations by link.
     fn sums(&self, h: &Hypothesis, points: &[u32], gate: f64, fan: &impl Fan) -> Vec<Sums> {
-        let matching = self.matching(h, gate);
+        let matching = Matching::new(self, h, gate);
         let kinematics = self.prepared.model.kinematics(&h.posture);
         let n = 6 + h.posture.len();
         let n_links = self.prepared.links.len();
-        let chunks = points.chunks(FEW).collect();
+        let chunks = points.chunks(chunk(points.len())).collect();
         let found = fan.fan(chunks, |chunk: &[u32]| {
             let mut sums: Vec<Sums> = (0..n_links).map(|_| Sums::new(n)).collect();
             let mut row = vec![0.0; n];
-            for m in chunk.iter().filter_map(&matching) {
+            matching.each(chunk, |m| {
                 self.row(&m.q, &m.n, &kinematics.twists[m.link], &mut row);
-                sums[m.link].add(&row, m.r, robust::tukey(m.r, gate));
-            }
+                sums[m.link].add(&row, m.r, gate);
+            });
             sums
         });
         let mut sums: Vec<Sums> = (0..n_links).map(|_| Sums::new(n)).collect();
         let mut row = vec![0.0; n];
         for m in self.pierced(h, gate) {
             self.row(&m.q, &m.n, &kinematics.twists[m.link], &mut row);
-            sums[m.link].add(&row, m.r, robust::tukey(m.r, gate));
+            sums[m.link].add(&row, m.r, gate);
         }
         for own in &found {
             sums.iter_mut().zip(own).for_each(|(sum, own)| sum.join(own));
@@ -242,6 +203,7 @@ impl Refine<'_> {
         let n = 6 + h.posture.len();
         let (mut hessian, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let total: f64 = sums.iter().map(|s| s.n as f64).sum();
+        let mut kernel = [0.0; 2];
         let n_links = sums.iter().filter(|s| s.n > 0).count() as f64;
         if total < 30.0 {
             return None;
@@ -251,13 +213,14 @@ impl Refine<'_> {
             let factor = if round.balanced { (total / n_links / s.n as f64).sqrt() } else { 1.0 };
             hessian += &s.h * factor;
             gradient += &s.g * factor;
+            (0..2).for_each(|i| kernel[i] += s.kernel[i] * factor);
         }
         let sigma = (round.gate / 3.0).max(self.settings.min_noise);
         let variance = self.scene.n_alike * sigma * sigma;
         hessian /= variance;
         gradient /= variance;
         self.add_priors(h, &mut hessian, &mut gradient);
-        let delta = hessian.cholesky()?.solve(&-&gradient);
+        let delta = hessian.cholesky()?.solve(&-&gradient) * robust::stretch(kernel[0], kernel[1]);
         let deviations = -gradient.dot(&delta);
         // A step beyond half a radian or half a metre has left the linear range: shorten it.
         let longest = delta.amax();
@@ -335,9 +298,8 @@ impl Refine<'_> {
 
     /// Robust standard deviation of the residuals within a gate, metres.
     pub(crate) fn noise(&self, h: &Hypothesis, points: &[u32], gate: f64) -> f64 {
-        let matching = self.matching(h, gate);
-        let mut residuals: Vec<f64> =
-            points.iter().filter_map(matching).map(|m| m.r.abs()).collect();
+        let mut residuals = Vec::new();
+        Matching::new(self, h, gate).each(points, |m| residuals.push(m.r.abs()));
         robust::median(&mut residuals).map_or(gate, |m| 1.4826 * m)
     }
 }

@@ -1,7 +1,7 @@
 //! Points that an adjustment is made of in; the same with what is known of where their beams end, in parts and chunks, out.
 
 use crate::pairs::Known;
-use crate::refine::CHUNK;
+use crate::refine::chunk;
 
 /// Points of a scene, with the triangles that their beams met last.
 #[derive(Debug, Clone)]
@@ -60,6 +60,7 @@ impl Sampled {
 
     /// Points that one thread works on at a time, and what is known of them.
     pub(crate) fn chunks(&mut self) -> Vec<(&[u32], &mut [Option<Known>])> {
-        self.points.chunks(CHUNK).zip(self.known.chunks_mut(CHUNK)).collect()
+        let n = chunk(self.points.len());
+        self.points.chunks(n).zip(self.known.chunks_mut(n)).collect()
     }
 }

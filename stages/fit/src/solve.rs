@@ -336,9 +336,9 @@ pub(crate) fn roughly(
     refine.run(h, &few, rounds, fan)
 }
 
-/// Points of a link in the fine rounds: enough to hold its pose to a tenth of a millimetre, which tells hypotheses
+/// Points of a link in the fine rounds: enough to hold its pose to a fifth of a millimetre, which tells hypotheses
 /// apart.
-const POLISH_CAP: usize = 2000;
+const POLISH_CAP: usize = 1000;
 /// Points that are looked at for those, thinned evenly.
 const POLISH_NEAR: usize = 60_000;
 

@@ -6,8 +6,8 @@ use geometry::depth::{Rows, transform};
 use std::borrow::Cow;
 
 use crate::beam::Hypothesis;
-use crate::placed::Placed;
-use crate::refine::{CHUNK, FINE_REACH, Refine};
+use crate::placed::{Near, Placed};
+use crate::refine::{FINE_REACH, Refine, chunk};
 use crate::sampled::Sampled;
 
 /// One of so many points is looked at to see of which links there are more than enough.
@@ -27,11 +27,10 @@ impl Refine<'_> {
     ) -> Vec<u32> {
         let strata = Strata::new(self, h, gate);
         let some: Vec<u32> = points.iter().copied().step_by(SOME).collect();
-        let mut sorted = strata.sort(&some, |_| true, fan);
+        let mut sorted = strata.sort(&some, None, fan);
         // Of most links these are enough; the others are looked for among the rest.
         let is_open: Vec<bool> = sorted.iter().map(|own| own.len() < ENOUGH * cap / 4).collect();
         let wanted = Placed::new(self.prepared, h, gate, |l| is_open[l]);
-        let is_wanted = |p| wanted.nearest(p).is_some_and(|near| near.distance <= gate);
         let beside = is_open[strata.beside()] && gate > FINE_REACH;
         // Where most points are theirs, to ask them first would be to ask twice.
         let n_of = |open: bool| -> usize {
@@ -39,8 +38,8 @@ impl Refine<'_> {
         };
         let is_most = n_of(true) > n_of(false);
         let rest = (0..points.len()).filter(|i| i % SOME != 0).map(|i| points[i]);
-        let rest =
-            strata.sort(&rest.collect::<Vec<_>>(), |p| beside || is_most || is_wanted(p), fan);
+        let wanted = (!beside && !is_most).then_some(&wanted);
+        let rest = strata.sort(&rest.collect::<Vec<_>>(), wanted, fan);
         let mut out = Vec::new();
         for (at, (own, more)) in sorted.iter_mut().zip(rest).enumerate() {
             if is_open[at] {
@@ -111,35 +110,39 @@ impl<'a> Strata<'a> {
         self.refine.prepared.links.len()
     }
 
-    /// The stratum of a place, local frame.
-    fn of(&self, p: [f32; 3]) -> Option<usize> {
+    /// The stratum of a place, local frame, and of what is nearest to it.
+    fn of(&self, p: [f32; 3], near: Option<Near>) -> Option<usize> {
         let is_about = || {
             let holds = |(frame, bounds): &(Rows, Aabb)| {
                 bounds.contains(transform(frame, p).map(f64::from))
             };
             self.about.iter().any(holds)
         };
-        match self.placed.nearest(p) {
+        match near {
             Some(near) if near.distance <= self.gate => Some(near.link),
             _ => (self.gate > FINE_REACH && is_about()).then(|| self.beside()),
         }
     }
 
-    /// Those of the points that are wanted, by stratum.
-    fn sort(
-        &self,
-        points: &[u32],
-        is_wanted: impl Fn([f32; 3]) -> bool + Sync,
-        fan: &impl Fan,
-    ) -> Vec<Vec<u32>> {
+    /// The points by stratum; only those near the wanted links, where some are told.
+    fn sort(&self, points: &[u32], wanted: Option<&Placed<'_>>, fan: &impl Fan) -> Vec<Vec<u32>> {
         let n_strata = self.beside() + 1;
-        let sorted = fan.fan(points.chunks(CHUNK).collect(), |chunk: &[u32]| {
+        let sorted = fan.fan(points.chunks(chunk(points.len())).collect(), |chunk: &[u32]| {
             let mut strata: Vec<Vec<u32>> = vec![Vec::new(); n_strata];
-            for i in chunk {
-                let p = self.refine.scene.points[*i as usize].p;
-                if let Some(at) = is_wanted(p).then(|| self.of(p)).flatten() {
-                    strata[at].push(*i);
+            let mut sort = |chunk: &[u32]| {
+                self.placed.nearest_each(self.refine.scene, chunk, |i, p, near| {
+                    self.of(p, near).iter().for_each(|at| strata[*at].push(i));
+                });
+            };
+            match wanted {
+                Some(wanted) => {
+                    let mut kept = Vec::new();
+                    wanted.nearest_each(self.refine.scene, chunk, |i, _, near| {
+                        kept.extend(near.filter(|near| near.distance <= self.gate).map(|_| i));
+                    });
+                    sort(&kept);
                 }
+                None => sort(chunk),
             }
             strata
         });

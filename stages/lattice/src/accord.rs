@@ -38,6 +38,8 @@ pub fn agree(views: &mut [View], fan: &impl Fan) {
 const BEYOND: f32 = 0.10;
 /// Footprint in which they are asked, metres.
 const FOOTPRINT: f32 = 0.03;
+/// Points that one thread asks at a time.
+const N_AT_A_TIME: usize = 8192;
 /// Edge of the cells that contradictions are counted in, metres, and points that make one.
 const CELL: f32 = 0.05;
 const MIN_IN_CELL: usize = 3;
@@ -46,16 +48,22 @@ const MIN_IN_CELL: usize = 3;
 /// moved makes many.
 #[must_use]
 pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
-    let gone_of = |own: usize| {
+    let eyes = |own: usize| {
         let others = views.iter().enumerate().filter(|(other, _)| *other != own);
-        let eyes: Vec<Eye<'_>> = others.map(|(_, v)| Eye::new(&v.images)).collect();
-        let step = step(&views[own], views.len());
-        let asked = views[own].points.iter().step_by(step).copied();
+        others.map(|(_, v)| Eye::new(&v.images)).collect::<Vec<_>>()
+    };
+    let eyes: Vec<Vec<Eye<'_>>> = (0..views.len()).map(eyes).collect();
+    let parts = views.iter().enumerate().flat_map(|(own, view)| {
+        let points = view.points.chunks(N_AT_A_TIME * step(view, views.len()));
+        points.map(move |points| (own, points))
+    });
+    let gone_of = |(own, points): (usize, &[[f32; 3]])| {
+        let asked = points.iter().step_by(step(&views[own], views.len())).copied();
         let mut gone = Vec::new();
         for some in asked.collect::<Vec<_>>().chunks(LANES) {
             let local = lanes(some);
             let mut is_gone = [false; LANES];
-            for looks in eyes.iter().map(|eye| eye.look_lanes(&local, FOOTPRINT)) {
+            for looks in eyes[own].iter().map(|eye| eye.look_lanes(&local, FOOTPRINT)) {
                 for (lane, is_gone) in is_gone.iter_mut().enumerate() {
                     let beyond = |l: Look| l.around.is_finite() && l.around - l.range > BEYOND;
                     *is_gone |= looks.get(lane).is_some_and(beyond);
@@ -65,7 +73,7 @@ pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
         }
         gone.iter().map(|p| p.map(|v| floor_i32(f64::from(v / CELL)))).collect()
     };
-    let found: Vec<Vec<[i32; 3]>> = fan.fan((0..views.len()).collect(), gone_of);
+    let found: Vec<Vec<[i32; 3]>> = fan.fan(parts.collect(), gone_of);
     let mut cells: Vec<[i32; 3]> = found.into_iter().flatten().collect();
     cells.sort_unstable();
     let many = cells.chunk_by(|a, b| a == b).filter(|same| same.len() >= MIN_IN_CELL);

@@ -9,6 +9,7 @@ mod field;
 mod shape;
 
 use contract::Fan;
+use geometry::robust;
 use nalgebra::{DMatrix, DMatrixView, DVector, Dyn, Matrix5, OMatrix, U5, Vector5};
 
 pub(crate) use field::Place;
@@ -262,10 +263,9 @@ impl Normal {
         if self.n_rows < MIN_ROWS {
             return None;
         }
-        let [_, stretch] = self.kernel_factors();
-        // The weights say less of residuals that change than of those that stand: a step by them alone goes five sixths of the way.
+        let [_, slopes, weights] = self.kernel;
         let step = self.hessian.clone().cholesky()?.solve(&-&self.gradient)
-            * stretch.sqrt().min(MAX_STRETCH);
+            * robust::stretch(weights, slopes);
         let longest = step.amax();
         // The posture was near already: a longer step has left the linear range.
         Some(if longest > MAX_STEP { step * (MAX_STEP / longest) } else { step })
@@ -289,8 +289,6 @@ impl Normal {
 
 /// Fewer residuals than this do not hold a robot.
 const MIN_ROWS: usize = 30;
-/// Most that a step by the robust weights is lengthened: normal errors ask for 1.2, priors and wrong points for none.
-const MAX_STRETCH: f64 = 1.25;
 /// Longest step of an adjustment, radians and metres.
 const MAX_STEP: f64 = 0.1;
 
@@ -333,7 +331,7 @@ mod tests {
             normal.gradient[0] = 100.0 * 1e4 * 0.001;
             normal.solve().expect("a step")[0]
         };
-        for (slope, factor) in [(1.0, 1.0), (1.0 / 1.2, 1.2), (0.5, MAX_STRETCH)] {
+        for (slope, factor) in [(1.0, 1.0), (1.0 / 1.2, 1.2), (0.5, 1.25)] {
             assert!((step(slope) + 0.001 * factor).abs() < 1e-9, "{} for {slope}", step(slope));
         }
     }
