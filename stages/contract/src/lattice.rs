@@ -159,17 +159,13 @@ impl Window {
         let [x, y, z] =
             self.lattice_from_scan.map(|r| r[0] * scan[0] + r[1] * scan[1] + r[2] * scan[2]);
         let range = (x * x + y * y + z * z).sqrt();
-        if !(z >= self.sines[0] * range && z < self.sines[1] * range) {
-            return false;
-        }
+        let is_at_height = (z >= self.sines[0] * range) & (z < self.sines[1] * range);
         let [first, last] = self.sides.map(|[cos, sin]| cos * y - sin * x);
         let (is_past_first, is_before_last) = (first >= 0.0, last < 0.0);
-        self.is_round
-            || if self.is_wide {
-                is_past_first || is_before_last
-            } else {
-                is_past_first && is_before_last
-            }
+        // Without branches: many directions are asked about at once.
+        let is_between = is_past_first & is_before_last;
+        let is_either = (is_past_first | is_before_last) & self.is_wide;
+        is_at_height & (self.is_round | is_either | is_between)
     }
 }
 

@@ -196,10 +196,17 @@ impl<'a> Adjust<'a> {
         fan: &impl Fan,
     ) -> (Normal, Tallies) {
         let pairing = Pairing::new(self.refine, state, points.gate);
-        let sums = fan.fan(points.chunks(), |chunk| self.sums_of(&pairing, chunk));
-        let join = |(a, own): (Normal, Tallies), (b, later)| (a.join(b), own.join(&later));
-        let empty = || self.sums_of(&pairing, (&[], &mut []));
-        sums.into_iter().reduce(join).unwrap_or_else(empty)
+        let mut sums = fan.fan(points.chunks(), |chunk| self.sums_of(&pairing, chunk));
+        // Two by two, all pairs at the same time: the same order for any number of threads.
+        while sums.len() > 1 {
+            let mut rest = sums.into_iter();
+            let pairs = std::iter::from_fn(|| rest.next().map(|own| (own, rest.next())));
+            sums = fan.fan(pairs.collect(), |((a, own), other)| match other {
+                Some((b, later)) => (a.join(b), own.join(&later)),
+                None => (a, own),
+            });
+        }
+        sums.pop().unwrap_or_else(|| self.sums_of(&pairing, (&[], &mut [])))
     }
 
     /// Half the robust squares of all points over their variance; one that lies on nothing counts as much as one at the end

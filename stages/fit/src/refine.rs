@@ -52,7 +52,7 @@ pub(crate) const N_LAST_ROUNDS: usize = 4;
 /// Points that one thread works on at a time, of `n`: few enough that threads end together, as many as make what is joined after
 /// them worth it. Sums are taken chunk by chunk, so it does not depend on the threads.
 pub(crate) fn chunk(n: usize) -> usize {
-    (n / 32).clamp(1024, 8192)
+    (n / 16).clamp(1024, 8192)
 }
 /// Distance from which the coarse field answers, metres: just inside the fine field's reach.
 pub(crate) const FINE_REACH: f64 = 0.026;

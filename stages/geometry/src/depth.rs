@@ -143,7 +143,7 @@ impl DepthImage {
 
     /// Says for each cell that is empty with all its neighbours within `window` cells what that means (given the
     /// direction in the camera frame, z = 1), and builds the coarser levels. Call once, after the last splat.
-    pub fn finish(&mut self, window: i32, mut empty: impl FnMut([f32; 3]) -> Empty) {
+    pub fn finish(&mut self, window: i32, empty: impl Fn([f32; 3]) -> Empty) {
         let focal = self.focal;
         let base = &mut self.levels[0];
         let (cx, cy) = (0.5 * base.width as f32, 0.5 * base.height as f32);
