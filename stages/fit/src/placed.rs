@@ -1,7 +1,9 @@
 //! A posture in; its links with a surface where they stand, and for any point the nearest facet of them, out.
+//!
+//! Most of the time goes by waiting for memory: places are looked up together.
 
-use geometry::depth::{LANES, Lanes, Rows, lanes, rows, transform, transform_lanes};
-use geometry::{NearestField, Pose};
+use geometry::NearestField;
+use geometry::depth::{LANES, Lanes, Rows, lanes, transform, transform_lanes};
 
 use crate::Prepared;
 use crate::beam::Hypothesis;
@@ -40,15 +42,13 @@ impl<'a> Stand<'a> {
     fn new(
         prepared: &'a Prepared<'_>,
         (link, link_from_local): (usize, Rows),
-        local_from_link: &Pose,
         is_fine: bool,
     ) -> Self {
         let fields = &prepared.links[link].fields;
         let field = if is_fine { &fields.fine } else { &fields.coarse };
         let (origin, inverse_edge) = field.grid();
-        let rows = rows(&local_from_link.inverse());
         let voxel_from_local = [0, 1, 2].map(|axis| {
-            let [x, y, z, t] = rows[axis];
+            let [x, y, z, t] = link_from_local[axis];
             [x, y, z, t - origin[axis]].map(|v| v * inverse_edge)
         });
         let size = field.size().map(|n| n as f32);
@@ -84,11 +84,8 @@ impl<'a> Placed<'a> {
         gate: f64,
         chosen: impl Fn(usize) -> bool,
     ) -> Self {
-        let poses = prepared.model.poses(&h.posture);
         let frames = prepared.frames(h).into_iter().filter(|(link, _)| chosen(*link));
-        let stand = |own: (usize, Rows)| {
-            Stand::new(prepared, own, &(h.local_from_base * poses[own.0]), gate < FINE_REACH)
-        };
+        let stand = |own: (usize, Rows)| Stand::new(prepared, own, gate < FINE_REACH);
         Self { links: frames.map(stand).collect() }
     }
 
@@ -114,8 +111,7 @@ impl<'a> Placed<'a> {
         self.nearest_of(&[point])[0]
     }
 
-    /// The same for some points, as many as there are lanes at most: the voxels of all of them are asked for, then the facets of all of
-    /// them, so that they wait for memory together.
+    /// The same for some points, as many as there are lanes at most: the voxels of all are asked for, then the facets of all.
     #[inline]
     fn nearest_of(&self, points: &[[f32; 3]]) -> [Option<Near>; LANES] {
         let local = lanes(points);
@@ -161,5 +157,38 @@ impl<'a> Placed<'a> {
                 take(*i, place, near);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cubes::before_front;
+
+    #[test]
+    fn points_looked_up_together_have_the_nearest_facet_of_all() {
+        // Along the front, and beyond its edge out of all fields.
+        let places: Vec<[f64; 2]> = (0..41).map(|i| [0.006 * f64::from(i), 0.03]).collect();
+        before_front(&places, |refine, state| {
+            let placed = Placed::all(refine.prepared, &state.hypothesis, 0.02);
+            let points: Vec<u32> = (0..places.len() as u32).collect();
+            let (mut n, mut n_near) = (0, 0);
+            placed.nearest_each(refine.scene, &points, |i, p, near| {
+                assert_eq!((i, p), (n, refine.scene.points[i as usize].p));
+                assert_eq!(near, placed.nearest(p));
+                n += 1;
+                let Some(near) = near else { return assert!(p[1] > 0.12, "{p:?}") };
+                n_near += 1;
+                let distance = |x: &[f32; 3]| (0..3).map(|k| (x[k] - p[k]).powi(2)).sum::<f32>();
+                let facets = |link: usize| refine.prepared.links[link].fields.facets.iter();
+                let all = (0..2).flat_map(|link| facets(link).map(|f| distance(&f.x)));
+                let least = f64::from(all.fold(f32::INFINITY, f32::min)).sqrt();
+                let own = distance(&refine.prepared.links[near.link].fields.facets[near.facet].x);
+                assert!((f64::from(own).sqrt() - near.distance).abs() < 1e-6);
+                // To within a voxel's diagonal.
+                assert!(near.distance < least + 0.012, "{} {least} at {p:?}", near.distance);
+            });
+            assert!(n == 41 && (17..41).contains(&n_near), "{n_near}");
+        });
     }
 }

@@ -58,7 +58,7 @@ pub(crate) fn chunk(n: usize) -> usize {
 pub(crate) const FINE_REACH: f64 = 0.026;
 
 /// A step by less than a tenth of a standard deviation, in every direction, is the last of its kind (squared): steps shrink
-/// threefold a round.
+/// threefold a round and more.
 const SMALL_STEP: f64 = 0.01;
 
 /// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
