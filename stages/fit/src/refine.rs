@@ -54,6 +54,7 @@ pub(crate) const N_LAST_ROUNDS: usize = 4;
 pub(crate) fn chunk(n: usize) -> usize {
     (n / 16).clamp(1024, 8192)
 }
+
 /// Distance from which the coarse field answers, metres: just inside the fine field's reach.
 pub(crate) const FINE_REACH: f64 = 0.026;
 

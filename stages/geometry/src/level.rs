@@ -74,13 +74,10 @@ impl Level {
                 near.for_each(|(own, near)| *own |= *near);
             }
             // Of all cells, in vector registers, sooner than of each that is open.
-            silent.iter_mut().enumerate().for_each(|(u, silent)| *silent = is_silent(u, v));
-            let row = &mut self.cells[v * width..(v + 1) * width];
-            for (cell, _) in
-                row.iter_mut().zip(silent.iter().zip(&is_near)).filter(|(_, own)| *own.0 & !*own.1)
-            {
-                *cell = [f32::INFINITY; 3];
-            }
+            let open = silent.iter_mut().zip(&is_near).enumerate();
+            open.for_each(|(u, (silent, is_near))| *silent = !*is_near & is_silent(u, v));
+            let row = self.cells[v * width..(v + 1) * width].iter_mut().zip(&silent);
+            row.filter(|own| *own.1).for_each(|(cell, _)| *cell = [f32::INFINITY; 3]);
         }
     }
 

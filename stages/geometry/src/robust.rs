@@ -44,3 +44,22 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     let at = values.len() / 2;
     Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_those_of_the_influence() {
+        let influence = |r: f64| tukey(r, 4.0) * r;
+        for k in -50..=50 {
+            let (r, h) = (0.1 * f64::from(k) + 0.03, 1e-6);
+            let slope = (influence(r + h) - influence(r - h)) / (2.0 * h);
+            assert!((tukey_slope(r, 4.0) - slope).abs() < 1e-6, "{r}");
+        }
+        assert_eq!(
+            [stretch(3.0, 2.8), stretch(3.0, 1.0), stretch(3.0, -1.0)],
+            [3.0 / 2.8, 1.25, 1.25]
+        );
+    }
+}
