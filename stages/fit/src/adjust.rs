@@ -104,6 +104,7 @@ const SMALL_STEP: f64 = 0.3;
 const TUKEY: f64 = 4.685;
 
 /// Where the adjustment stands.
+#[derive(Clone)]
 pub(crate) struct State {
     pub(crate) hypothesis: Hypothesis,
     pub(crate) scans: Vec<ScanError>,

@@ -16,9 +16,11 @@ use crate::beam::Hypothesis;
 use crate::judge::judged;
 use crate::normal::Normal;
 use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, better};
+use crate::settle::better;
+use crate::solve::NEAR_MARGIN;
 use crate::spin::Spin;
 use crate::strata::adjusted_points;
+use crate::wrist::Wrist;
 use crate::{Prepared, Scene, Settings, report};
 
 /// Steps of the joints' places: each after an adjustment of all the rest.
@@ -49,7 +51,7 @@ pub fn calibrate(
     let refine = Refine { prepared, scene, settings, prior: None };
     let spins = |model: &Model, h: &Hypothesis| {
         let refine = Refine { prepared: &prepared.moved(model), ..refine };
-        refine.spins(h, &near, scene.noise * scene.noise, fan)
+        refine.spins(h, &near, fan)
     };
     let (mut model, mut done, mut frames) = estimate(&refine, &h, &all, 1, fan);
     let mut turns = spins(&model, &done.hypothesis);
@@ -65,7 +67,9 @@ pub fn calibrate(
     let judgement = judged(&refine, &done.hypothesis);
     let mut points = adjusted_points(&refine, &done.hypothesis, (&all, settings.part()), fan);
     Adjust::new(&refine).sums(&done.state(), &mut points, fan);
-    let mut out = report::report(&refine, &(done, judgement, turns), &[], (&near, &points), fan);
+    let wrist = Wrist::of(&refine, (&done.state(), &turns), &points, fan);
+    let done = (done, judgement, turns);
+    let mut out = report::report(&refine, &done, &[], (&near, &points), wrist.as_ref(), fan);
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();
     keep(&mut out, fit, Calibration { frames, prior: settings.frame_sigma, link_rms });
     (model, out)

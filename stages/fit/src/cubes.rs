@@ -1,5 +1,5 @@
-//! Places on the front of a cube in; out comes what an adjustment of a robot of two cubes starts from where a scanner measured
-//! them: for tests.
+//! Places on the front of a body in; out comes what an adjustment of a robot of few boxes starts from where a scanner measured them:
+//! for tests.
 
 use contract::{MaskId, OneByOne, Region, ScanId, View};
 use geometry::{Aabb, Point, Pose};
@@ -9,24 +9,55 @@ use crate::beam::Hypothesis;
 use crate::refine::Refine;
 use crate::{Prepared, Scene, Settings};
 
+/// A chain of boxes about their joints: name, size, and place and axis of the joint to the link before.
+fn boxes(links: &[(&str, [[f64; 3]; 3])]) -> robot::Model {
+    let words = |v: &[f64; 3]| v.map(|v| v.to_string()).join(" ");
+    let mut urdf = String::from("<robot name='boxes'>");
+    for (k, (name, [size, at, axis])) in links.iter().enumerate() {
+        let size = words(size);
+        urdf += &format!(
+            "<link name='{name}'><visual><geometry><box size='{size}'/></geometry></visual></link>"
+        );
+        if let Some((parent, ..)) = k.checked_sub(1).map(|k| &links[k]) {
+            let (at, axis) = (words(at), words(axis));
+            urdf += &format!(
+                "<joint name='to_{name}' type='revolute'><origin xyz='{at}'/><parent link='{parent}'/><child link='{name}'/>\
+                 <axis xyz='{axis}'/><limit lower='-3' upper='3' effort='1' velocity='1'/></joint>"
+            );
+        }
+    }
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("boxes.urdf");
+    std::fs::write(&path, urdf + "</robot>").expect("is written");
+    robot::Model::load_urdf(&path, "boxes", &robot::Settings::default()).expect("loads").0
+}
+
 /// A cube of 20 cm about the origin, and another link 4 mm within it.
 fn cubes() -> robot::Model {
-    let body = |name: &str, size: f64| {
-        format!(
-            "<link name='{name}'><visual><geometry><box size='{size} {size} {size}'/></geometry></visual></link>"
-        )
-    };
-    let joint = "<joint name='a' type='revolute'><parent link='outer'/><child link='inner'/><axis xyz='0 0 1'/>\
-                 <limit lower='-3' upper='3' effort='1' velocity='1'/></joint>";
-    let urdf = format!(
-        "<robot name='cubes'>{}{}{joint}</robot>",
-        body("outer", 0.2),
-        body("inner", 0.192)
-    );
-    let dir = tempfile::tempdir().expect("a folder");
-    let path = dir.path().join("cubes.urdf");
-    std::fs::write(&path, urdf).expect("is written");
-    robot::Model::load_urdf(&path, "cubes", &robot::Settings::default()).expect("loads").0
+    let here = [0.0; 3];
+    let (outer, inner) = ([0.2; 3], [0.192; 3]);
+    boxes(&[("outer", [outer, here, here]), ("inner", [inner, here, [0.0, 0.0, 1.0]])])
+}
+
+/// A foot far behind, a knuckle that bends about y, and a plate that turns on it about x: its front is 10 cm before the knuckle.
+fn wrist() -> robot::Model {
+    let (foot, knuckle, plate) = ([0.2; 3], [0.02; 3], [0.02, 0.1, 0.1]);
+    boxes(&[
+        ("foot", [foot, [0.0; 3], [0.0; 3]]),
+        ("knuckle", [knuckle, [0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        ("plate", [plate, [0.09, 0.0, 0.0], [1.0, 0.0, 0.0]]),
+    ])
+}
+
+/// The wrist, straight, and a scanner 3 m before it that measured places of its plate's front (y, z); it is looked at as bent and turned
+/// by so much, radians.
+pub(crate) fn before_plate(
+    places: &[[f64; 2]],
+    posture: [f64; 2],
+    look: impl Fn(&Refine<'_>, &State),
+) {
+    let places = places.iter().map(|[y, z]| (Point::new(0.6, *y, *z), 0.0));
+    measured(&wrist(), places, &posture, look);
 }
 
 /// The cubes, and a scanner 3 m before the front (x = 0.1) that measured these places of it (y, z).
@@ -39,12 +70,19 @@ pub(crate) fn seen(
     places: impl Iterator<Item = (f64, f64, f64)>,
     look: impl Fn(&Refine<'_>, &State),
 ) {
-    let model = cubes();
-    let prepared = Prepared::new(0, &model, &OneByOne);
+    measured(&cubes(), places.map(|(y, z, off)| (Point::new(0.1, y, z), off)), &[0.0], look);
+}
+
+fn measured(
+    model: &robot::Model,
+    places: impl Iterator<Item = (Point, f64)>,
+    posture: &[f64],
+    look: impl Fn(&Refine<'_>, &State),
+) {
+    let prepared = Prepared::new(0, model, &OneByOne);
     prepared.make_triangles(&OneByOne);
     let scanner = Point::new(3.0, 0.2, 0.4);
-    let points = places.map(|(y, z, off)| {
-        let on_it = Point::new(0.1, y, z);
+    let points = places.map(|(on_it, off)| {
         let p = on_it + (on_it - scanner).normalize() * off;
         p.coords.map(|v| v as f32).into()
     });
@@ -62,6 +100,6 @@ pub(crate) fn seen(
     let scene = Scene::new(&region, &views, &[], &settings, &OneByOne);
     let refine = Refine { prepared: &prepared, scene: &scene, settings: &settings, prior: None };
     let hypothesis =
-        Hypothesis { local_from_base: Pose::identity(), posture: vec![0.0], score: 0.0 };
+        Hypothesis { local_from_base: Pose::identity(), posture: posture.to_vec(), score: 0.0 };
     look(&refine, &State::at(&hypothesis, &scene));
 }

@@ -37,6 +37,7 @@ mod rivals;
 mod sampled;
 mod scene;
 mod settings;
+mod settle;
 mod solve;
 mod spin;
 mod stays;
@@ -49,6 +50,7 @@ mod tool;
 pub mod turns;
 mod verdict;
 mod weak;
+mod wrist;
 
 pub use calibrate::{calibrate, combine};
 pub use choose::choose;

@@ -218,10 +218,11 @@ impl Refine<'_> {
         }
         let sigma = (round.gate / 3.0).max(self.settings.min_noise);
         let variance = self.scene.n_alike * sigma * sigma;
-        hessian /= variance;
+        // Priors are squares: they ask for no longer step.
+        hessian /= variance * robust::stretch(kernel[0], kernel[1]);
         gradient /= variance;
         self.add_priors(h, &mut hessian, &mut gradient);
-        let delta = hessian.cholesky()?.solve(&-&gradient) * robust::stretch(kernel[0], kernel[1]);
+        let delta = hessian.cholesky()?.solve(&-&gradient);
         let deviations = -gradient.dot(&delta);
         // A step beyond half a radian or half a metre has left the linear range: shorten it.
         let longest = delta.amax();

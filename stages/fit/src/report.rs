@@ -14,11 +14,13 @@ use crate::profile;
 use crate::refine::Refine;
 use crate::rivals::lead;
 use crate::sampled::Sampled;
-use crate::solve::{Polished, Settled};
+use crate::settle::Settled;
+use crate::solve::Polished;
 use crate::spin::Spin;
 use crate::sway::sway;
 use crate::turns;
 use crate::verdict::{self, RIVAL};
+use crate::wrist::Wrist;
 
 /// Margin up to which another posture counts as equally good.
 pub(crate) const EQUAL: f64 = 0.03;
@@ -50,6 +52,7 @@ pub(crate) fn report(
     (best, judgement, spins): &Settled,
     others: &[Polished],
     (near, points): (&[u32], &Sampled),
+    wrist: Option<&Wrist>,
     fan: &impl Fan,
 ) -> Fit {
     let prepared = refine.prepared;
@@ -65,6 +68,10 @@ pub(crate) fn report(
     of_joints += sway(refine, best, &several, (near, points), fan);
     let beyond = profile::beyond(refine, best, points, fan);
     beyond.into_iter().enumerate().for_each(|(j, variance)| of_joints[(j, j)] += variance);
+    if let Some(wrist) = wrist {
+        let at = (wrist.joint, wrist.joint);
+        of_joints[at] = of_joints[at].max(wrist.variance());
+    }
     spread_spins(h, (spins, &several), &mut open, &mut spread);
     let covariance = in_world_axes(&in_base, &h.local_from_base);
     // Where a joint may stand elsewhere, so may the tip.

@@ -10,7 +10,8 @@ use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, margin, moved};
 use crate::refine::{NEAR_ROUNDS, Refine};
 use crate::report::{OTHER, turn};
-use crate::solve::{Polished, Settled, polish, roughly, settle};
+use crate::settle::{Settled, settle};
+use crate::solve::{Polished, polish, roughly};
 
 /// Share of the surface explained that a flipped posture may lack and still be looked at closely …
 const FLIP_SHORT: f64 = 0.03;

@@ -41,6 +41,14 @@ impl Sampled {
         Self { points, known, gate: self.gate }
     }
 
+    /// These and others, each once, nothing of them known.
+    pub(crate) fn with(&self, others: &Self) -> Self {
+        let mut points: Vec<u32> = self.points.iter().chain(&others.points).copied().collect();
+        points.sort_unstable();
+        points.dedup();
+        Self::new(points, self.gate)
+    }
+
     /// What was met on these links is not known any more: they turned.
     pub(crate) fn forget(&mut self, links: &[usize]) {
         for known in &mut self.known {

@@ -4,19 +4,14 @@ use contract::{Candidate, Fan, Fit, OneByOne};
 use geometry::{Point, Pose};
 use nalgebra::Translation3;
 
-use crate::adjust::{Adjust, Adjusted};
 use crate::beam::{Beam, Hypothesis};
 use crate::branch::branches;
-use crate::calibrate::doubt;
-use crate::footprint;
 use crate::judge::{Judgement, judge, judged};
 use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, N_LAST_ROUNDS, NEAR_ROUNDS, Prior, Refine, Round};
-use crate::report::{refused, report};
-use crate::rivals::{at_rest, best_of};
-use crate::sampled::Sampled;
-use crate::spin::Spin;
-use crate::strata::{adjusted_points, some};
-use crate::turns;
+use crate::report::refused;
+use crate::rivals::best_of;
+use crate::settle::{finish, settle};
+use crate::strata::some;
 use crate::verdict::is_lost;
 use crate::{Prepared, Scene, Settings};
 
@@ -151,42 +146,6 @@ fn hopeless(scene: &Scene<'_>) -> f64 {
     }
 }
 
-/// The report, with what does not fit.
-pub(crate) fn finish(
-    refine: &Refine<'_>,
-    mut best: Settled,
-    others: &[Polished],
-    (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
-) -> Fit {
-    let points = sharpen(refine, &mut best, all, fan);
-    let misfits = doubt(refine, (&mut best.0, &mut best.2), all, fan);
-    let others = at_rest(refine, &best, others, (near, all), fan);
-    let mut fit = report(refine, &best, &others, (near, &points), fan);
-    fit.reasons.extend(misfits);
-    fit
-}
-
-/// The answer once more, on as many points as pay: only what is reported is worth them, not what it is chosen from. Those
-/// points.
-fn sharpen(
-    refine: &Refine<'_>,
-    (best, judgement, spins): &mut Settled,
-    all: &[u32],
-    fan: &impl Fan,
-) -> Sampled {
-    let n = refine.settings.max_points;
-    let state = best.state();
-    let points = adjusted_points(refine, &best.hypothesis, (all, n), fan);
-    let open: Vec<usize> = spins.iter().filter(|s| s.values.len() > 1).map(|s| s.joint).collect();
-    let mut points = footprint::whole(refine, (&state, &open), points, fan);
-    // An open flange need not come to rest.
-    let adjust = Adjust { loose: &open, ..Adjust::new(refine) };
-    *best = adjust.run_from(state.open(), &mut points, fan);
-    *judgement = judged(refine, &best.hypothesis);
-    points
-}
-
 /// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring
 /// how near a search must come.
 #[must_use]
@@ -209,53 +168,6 @@ pub fn converge(
         polish(&refine, &roughly(&refine, &h, &near, &COARSE_ROUNDS, &OneByOne), &near, &OneByOne);
     (world_from_local * end.local_from_base, end.posture)
 }
-
-/// A posture adjusted, with the values that the points leave to its last joints.
-pub(crate) type Settled = (Adjusted, Judgement, Vec<Spin>);
-
-/// Adjusts a posture; where another value of its last joints fits the points better, that one.
-pub(crate) fn settle(
-    refine: &Refine<'_>,
-    h: &Hypothesis,
-    (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
-) -> Settled {
-    let variance = refine.scene.noise * refine.scene.noise;
-    let mut points = adjusted_points(refine, h, (all, refine.settings.max_points / SETTLED), fan);
-    let leaves: Vec<usize> = (0..h.posture.len()).filter(|&j| refine.prepared.leaf[j]).collect();
-    let adjust = Adjust::new(refine);
-    let mut best = Adjust { loose: &leaves, ..adjust }.run(h, &mut points, fan);
-    let mut spins = refine.spins(&best.hypothesis, near, variance, fan);
-    // The same points of the same links; what is known of the scans stays.
-    let mut state = best.state();
-    let other = better(&best.hypothesis.posture, &spins);
-    if let Some(posture) = &other {
-        state.hypothesis.posture.clone_from(posture);
-        spins.iter().for_each(|s| points.forget(&refine.prepared.carried(s.joint)));
-    }
-    if !leaves.is_empty() {
-        best = adjust.run_from(state, &mut points, fan);
-    }
-    if other.is_some() {
-        spins = refine.spins(&best.hypothesis, near, variance, fan);
-    }
-    let judgement = judged(refine, &best.hypothesis);
-    (best, judgement, spins)
-}
-
-/// One of so many points of the last adjustment is enough to choose what it is made of.
-const SETTLED: usize = 15;
-
-/// A posture with the best values of its last joints, where one of them is another mode, not the same one found again.
-pub(crate) fn better(posture: &[f64], spins: &[Spin]) -> Option<Vec<f64>> {
-    let mut out = posture.to_vec();
-    spins.iter().for_each(|s| out[s.joint] = s.values[0]);
-    let is_other = |s: &Spin| turns::apart(posture[s.joint], out[s.joint]) > OTHER_MODE;
-    spins.iter().any(is_other).then_some(out)
-}
-
-/// From so far apart on they are two, radians: 3°.
-const OTHER_MODE: f64 = 0.052;
 
 /// What is looked for beside a polished posture.
 enum Look {

@@ -45,30 +45,19 @@ pub(crate) fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
 
 impl Refine<'_> {
     /// Sweeps each joint that moves nothing but the links that it places and the tool.
-    pub(crate) fn spins(
-        &self,
-        h: &Hypothesis,
-        near: &[u32],
-        variance: f64,
-        fan: &impl Fan,
-    ) -> Vec<Spin> {
+    pub(crate) fn spins(&self, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<Spin> {
         let leaves = (0..h.posture.len()).filter(|&j| self.prepared.leaf[j]);
-        leaves.filter_map(|joint| self.spin(h, near, (joint, variance), fan)).collect()
+        leaves.filter_map(|joint| self.spin(h, near, joint, fan)).collect()
     }
 
-    fn spin(
-        &self,
-        h: &Hypothesis,
-        near: &[u32],
-        (joint, variance): (usize, f64),
-        fan: &impl Fan,
-    ) -> Option<Spin> {
+    fn spin(&self, h: &Hypothesis, near: &[u32], joint: usize, fan: &impl Fan) -> Option<Spin> {
         let sweep = Sweep::new(self, h, near, joint)?;
         let [low, high] = self.prepared.model.limits(joint);
         let span = (high - low).min(TAU);
         let n = sweep.n_values(span);
         // Around the value found, so that it is one of those tried.
         let first = if high - low > TAU { h.posture[joint] - span / 2.0 } else { low };
+        let variance = self.scene.noise * self.scene.noise;
         let cost = |value: f64| sweep.cost(&[&sweep.distances(value, &sweep.moved)]) / variance;
         let values = (0..=n).map(|k| first + span * k as f64 / n as f64);
         let values: Vec<f64> = values.chain([h.posture[joint]]).collect();

@@ -162,16 +162,7 @@ impl Refine<'_> {
 
     /// Points near the links whatever their joint's value: within their sphere about the joint's axis, thinned.
     pub(crate) fn swept(&self, h: &Hypothesis, near: &[u32], moved: &[usize]) -> Vec<u32> {
-        let poses = self.local_from_links(h);
-        let spheres: Vec<(Point, f64)> = moved
-            .iter()
-            .map(|&l| {
-                let bounds = &self.prepared.model.links[l].bounds;
-                let radius = 0.5 * bounds.size().iter().map(|s| s * s).sum::<f64>().sqrt() + NEAR;
-                let middle: Point = bounds.center();
-                (poses[l] * middle, radius)
-            })
-            .collect();
+        let spheres = self.spheres(h, moved);
         let inside = |i: &u32| {
             let p = Point::from(self.scene.points[*i as usize].p.map(f64::from));
             spheres.iter().any(|(c, r)| (p - c).norm() < *r)
@@ -179,6 +170,18 @@ impl Refine<'_> {
         let all: Vec<u32> = near.iter().copied().filter(inside).collect();
         let n = all.len().min(MAX_POINTS);
         (0..n).map(|k| all[k * all.len() / n]).collect()
+    }
+
+    /// Middles and radii of spheres about links, with room for what lies near them, local frame.
+    pub(crate) fn spheres(&self, h: &Hypothesis, links: &[usize]) -> Vec<(Point, f64)> {
+        let poses = self.local_from_links(h);
+        let sphere = |&l: &usize| {
+            let bounds = &self.prepared.model.links[l].bounds;
+            let radius = 0.5 * bounds.size().iter().map(|s| s * s).sum::<f64>().sqrt() + NEAR;
+            let middle: Point = bounds.center();
+            (poses[l] * middle, radius)
+        };
+        links.iter().map(sphere).collect()
     }
 
     /// Distance of each point from the surface of the chosen links along their normals, at most the cap, metres.

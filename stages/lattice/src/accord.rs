@@ -48,11 +48,7 @@ const MIN_IN_CELL: usize = 3;
 /// moved makes many.
 #[must_use]
 pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
-    let eyes = |own: usize| {
-        let others = views.iter().enumerate().filter(|(other, _)| *other != own);
-        others.map(|(_, v)| Eye::new(&v.images)).collect::<Vec<_>>()
-    };
-    let eyes: Vec<Vec<Eye<'_>>> = (0..views.len()).map(eyes).collect();
+    let eyes: Vec<Eye<'_>> = views.iter().map(|v| Eye::new(&v.images)).collect();
     let parts = views.iter().enumerate().flat_map(|(own, view)| {
         let points = view.points.chunks(N_AT_A_TIME * step(view, views.len()));
         points.map(move |points| (own, points))
@@ -63,7 +59,8 @@ pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
         for some in asked.collect::<Vec<_>>().chunks(LANES) {
             let local = lanes(some);
             let mut is_gone = [false; LANES];
-            for looks in eyes[own].iter().map(|eye| eye.look_lanes(&local, FOOTPRINT)) {
+            let others = eyes.iter().enumerate().filter(|(other, _)| *other != own);
+            for looks in others.map(|(_, eye)| eye.look_lanes(&local, FOOTPRINT)) {
                 for (lane, is_gone) in is_gone.iter_mut().enumerate() {
                     let beyond = |l: Look| l.around.is_finite() && l.around - l.range > BEYOND;
                     *is_gone |= looks.get(lane).is_some_and(beyond);

@@ -264,8 +264,10 @@ impl Normal {
             return None;
         }
         let [_, slopes, weights] = self.kernel;
-        let step = self.hessian.clone().cholesky()?.solve(&-&self.gradient)
-            * robust::stretch(weights, slopes);
+        // What points say gives way as the kernel does; priors are squares, and ask for no longer step.
+        let of_points = &self.hessian - &self.priors;
+        let hessian = of_points / robust::stretch(weights, slopes) + &self.priors;
+        let step = hessian.cholesky()?.solve(&-&self.gradient);
         let longest = step.amax();
         // The posture was near already: a longer step has left the linear range.
         Some(if longest > MAX_STEP { step * (MAX_STEP / longest) } else { step })
@@ -318,7 +320,7 @@ mod tests {
     #[test]
     fn steps_go_as_far_as_the_curvature_of_the_kernel_says() {
         // All residuals ask for the same shift; the kernel's slope is a share of its weight.
-        let step = |slope: f64| {
+        let step = |slope: f64, stiff: f64| {
             let mut normal = Normal::new(1, 1, 1);
             for _ in 0..100 {
                 let (weight, influence) = (1e4, [1.0, 1e4 * slope]);
@@ -329,10 +331,18 @@ mod tests {
             (0..N_SCAN).for_each(|i| normal.add_scan_prior(0, i, 0.0, 1.0));
             normal.flush();
             normal.gradient[0] = 100.0 * 1e4 * 0.001;
+            normal.add_weight(0, 0.0, stiff);
             normal.solve().expect("a step")[0]
         };
-        for (slope, factor) in [(1.0, 1.0), (1.0 / 1.2, 1.2), (0.5, 1.25)] {
-            assert!((step(slope) + 0.001 * factor).abs() < 1e-9, "{} for {slope}", step(slope));
+        let slopes = [(1.0, 1.0), (1.0 / 1.2, 1.2), (0.5, 1.25)];
+        for (slope, factor) in slopes {
+            let step = step(slope, 0.0);
+            assert!((step + 0.001 * factor).abs() < 1e-9, "{step} for {slope}");
+        }
+        // A stop as stiff as all the points: what it asks for is no kernel's.
+        for (slope, factor) in slopes {
+            let (step, wanted) = (step(slope, 1e6), -0.001 / (1.0 / factor + 1.0));
+            assert!((step - wanted).abs() < 1e-9, "{step} for {slope}");
         }
     }
 
