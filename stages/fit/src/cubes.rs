@@ -9,11 +9,11 @@ use crate::beam::Hypothesis;
 use crate::refine::Refine;
 use crate::{Prepared, Scene, Settings};
 
-/// A chain of boxes about their joints: name, size, and place and axis of the joint to the link before.
-fn boxes(links: &[(&str, [[f64; 3]; 3])]) -> robot::Model {
+/// A chain of boxes about their joints: name, kind of the joint to the link before, and size, place and axis of that joint.
+fn boxes(links: &[(&str, &str, [[f64; 3]; 3])]) -> robot::Model {
     let words = |v: &[f64; 3]| v.map(|v| v.to_string()).join(" ");
     let mut urdf = String::from("<robot name='boxes'>");
-    for (k, (name, [size, at, axis])) in links.iter().enumerate() {
+    for (k, (name, kind, [size, at, axis])) in links.iter().enumerate() {
         let size = words(size);
         urdf += &format!(
             "<link name='{name}'><visual><geometry><box size='{size}'/></geometry></visual></link>"
@@ -21,7 +21,7 @@ fn boxes(links: &[(&str, [[f64; 3]; 3])]) -> robot::Model {
         if let Some((parent, ..)) = k.checked_sub(1).map(|k| &links[k]) {
             let (at, axis) = (words(at), words(axis));
             urdf += &format!(
-                "<joint name='to_{name}' type='revolute'><origin xyz='{at}'/><parent link='{parent}'/><child link='{name}'/>\
+                "<joint name='to_{name}' type='{kind}'><origin xyz='{at}'/><parent link='{parent}'/><child link='{name}'/>\
                  <axis xyz='{axis}'/><limit lower='-3' upper='3' effort='1' velocity='1'/></joint>"
             );
         }
@@ -32,20 +32,22 @@ fn boxes(links: &[(&str, [[f64; 3]; 3])]) -> robot::Model {
     robot::Model::load_urdf(&path, "boxes", &robot::Settings::default()).expect("loads").0
 }
 
+const TURNS: &str = "revolute";
+
 /// A cube of 20 cm about the origin, and another link 4 mm within it.
 fn cubes() -> robot::Model {
     let here = [0.0; 3];
     let (outer, inner) = ([0.2; 3], [0.192; 3]);
-    boxes(&[("outer", [outer, here, here]), ("inner", [inner, here, [0.0, 0.0, 1.0]])])
+    boxes(&[("outer", "", [outer, here, here]), ("inner", TURNS, [inner, here, [0.0, 0.0, 1.0]])])
 }
 
 /// A foot far behind, a knuckle that bends about y, and a plate that turns on it about x: its front is 10 cm before the knuckle.
 fn wrist() -> robot::Model {
     let (foot, knuckle, plate) = ([0.2; 3], [0.02; 3], [0.02, 0.1, 0.1]);
     boxes(&[
-        ("foot", [foot, [0.0; 3], [0.0; 3]]),
-        ("knuckle", [knuckle, [0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]),
-        ("plate", [plate, [0.09, 0.0, 0.0], [1.0, 0.0, 0.0]]),
+        ("foot", "", [foot, [0.0; 3], [0.0; 3]]),
+        ("knuckle", TURNS, [knuckle, [0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        ("plate", TURNS, [plate, [0.09, 0.0, 0.0], [1.0, 0.0, 0.0]]),
     ])
 }
 
@@ -58,6 +60,17 @@ pub(crate) fn before_plate(
 ) {
     let places = places.iter().map(|[y, z]| (Point::new(0.6, *y, *z), 0.0));
     measured(&wrist(), places, &posture, look);
+}
+
+/// A foot, a plate that turns before it and a jaw that slides on that; nothing of them is measured.
+pub(crate) fn with_jaw(look: impl Fn(&Refine<'_>, &State)) {
+    let (foot, plate, jaw) = ([0.2; 3], [0.02, 0.1, 0.1], [0.02; 3]);
+    let model = boxes(&[
+        ("foot", "", [foot, [0.0; 3], [0.0; 3]]),
+        ("plate", TURNS, [plate, [0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]),
+        ("jaw", "prismatic", [jaw, [0.1, 0.0, 0.0], [1.0, 0.0, 0.0]]),
+    ]);
+    measured(&model, std::iter::empty(), &[0.0, 0.0], look);
 }
 
 /// The cubes, and a scanner 3 m before the front (x = 0.1) that measured these places of it (y, z).

@@ -299,7 +299,7 @@ fn open_joints(
 }
 
 /// Whether a joint slides and moves nothing but a part of a tool.
-fn closes(refine: &Refine<'_>, joint: usize) -> bool {
+pub(crate) fn closes(refine: &Refine<'_>, joint: usize) -> bool {
     refine.prepared.leaf[joint] && refine.is_prismatic(joint)
 }
 

@@ -9,7 +9,7 @@ use contract::Fan;
 use crate::beam::{Beam, Hypothesis};
 use crate::judge::{Judgement, margin, moved};
 use crate::refine::{NEAR_ROUNDS, Refine};
-use crate::report::{OTHER, turn};
+use crate::report::{OTHER, closes, turn};
 use crate::settle::{Settled, settle};
 use crate::solve::{Polished, polish, roughly};
 
@@ -26,7 +26,11 @@ const N_RIVALS: usize = 3;
 /// So often is the best one's wrist flipped and bent, where another takes its place.
 const N_LOOKS: usize = 3;
 
-/// How clearly the beams, and the points, prefer a posture to another on the links that stand differently.
+/// Slides that differ by more stand otherwise, metres.
+const SLID: f64 = 0.01;
+
+/// How clearly the beams, and the points, prefer a posture to another on the links that stand differently. Where only a tool's part slid
+/// the points do not count: they are of what the tool holds as well.
 pub(crate) fn lead(
     refine: &Refine<'_>,
     best: (&Hypothesis, &Judgement),
@@ -34,7 +38,17 @@ pub(crate) fn lead(
     near: &[u32],
 ) -> [f64; 2] {
     let by_beams = margin(refine.prepared, best, (other, judgement));
-    [by_beams, refine.worsening(best.0, other, near)]
+    let by_points = match is_slid(refine, best.0, other) {
+        true => 0.0,
+        false => refine.worsening(best.0, other, near),
+    };
+    [by_beams, by_points]
+}
+
+/// Whether two postures differ in slides of a tool's parts, and in nothing else.
+fn is_slid(refine: &Refine<'_>, a: &Hypothesis, b: &Hypothesis) -> bool {
+    let (slides, rest): (Vec<_>, Vec<_>) = (0..a.posture.len()).partition(|&j| closes(refine, j));
+    slides.iter().any(|&j| turn(a, b, j) > SLID) && rest.iter().all(|&j| turn(a, b, j) <= OTHER)
 }
 
 /// The best of a posture, the others, and what is like it but for its wrist; all the rest joins the others.
@@ -150,4 +164,23 @@ fn compare(
         rest.push(end(&other));
     }
     (best, rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cubes::with_jaw;
+
+    #[test]
+    fn only_a_jaw_that_slid_is_told_by_beams_alone() {
+        with_jaw(|refine, state| {
+            let own = &state.hypothesis;
+            let slid = |posture: [f64; 2]| {
+                let other = Hypothesis { posture: posture.to_vec(), ..own.clone() };
+                is_slid(refine, own, &other)
+            };
+            assert!(slid([0.0, 0.02]) && slid([0.01, -0.02]));
+            assert!(!slid([0.1, 0.02]) && !slid([0.1, 0.0]) && !slid([0.0, 0.005]));
+        });
+    }
 }
