@@ -67,7 +67,7 @@ pub fn calibrate(
     let judgement = judged(&refine, &done.hypothesis);
     let mut points = adjusted_points(&refine, &done.hypothesis, (&all, settings.part()), fan);
     Adjust::new(&refine).sums(&done.state(), &mut points, fan);
-    let wrist = Wrist::of(&refine, (&done.state(), &turns), &points, fan);
+    let wrist = Wrist::of(&refine, (&done, &turns), &points, fan);
     let done = (done, judgement, turns);
     let mut out = report::report(&refine, &done, &[], (&near, &points), wrist.as_ref(), fan);
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();

@@ -90,7 +90,7 @@ fn bent(
 ) -> Option<Wrist> {
     for _ in 0..N_BENT {
         let state = best.0.state();
-        let wrist = Wrist::of(refine, (&state, &best.2), points, fan)?;
+        let wrist = Wrist::of(refine, (&best.0, &best.2), points, fan)?;
         let Some(start) = wrist.better(&state.hypothesis) else { return Some(wrist) };
         let mut other = best.clone();
         other.0.hypothesis = start;
@@ -103,7 +103,7 @@ fn bent(
         other.2 = refine.spins(&other.0.hypothesis, near, fan);
         (*best, *points) = (other, others);
     }
-    Wrist::of(refine, (&best.0.state(), &best.2), points, fan)
+    Wrist::of(refine, (&best.0, &best.2), points, fan)
 }
 
 /// So often at most.

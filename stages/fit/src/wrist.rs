@@ -8,7 +8,7 @@ use contract::Fan;
 use geometry::Point;
 use std::f64::consts::TAU;
 
-use crate::adjust::{Adjust, State};
+use crate::adjust::{Adjust, Adjusted, State};
 use crate::beam::Hypothesis;
 use crate::refine::Refine;
 use crate::sampled::Sampled;
@@ -17,6 +17,8 @@ use crate::turns;
 
 /// More points on what the joint moves hold it, however the flange stands.
 const MAX_POINTS: usize = 3000;
+/// A joint that is stated better than this has one valley, radians (0.1°): those that were elsewhere were stated to 0.25° and more.
+const KNOWN: f64 = 0.001_75;
 /// About so many of them are asked.
 const ASKED: usize = 400;
 /// Bends are tried up to this arc at the joint's lever to either side, and this far apart, metres: the gate of the adjustment, the
@@ -50,8 +52,19 @@ struct Bend {
 }
 
 impl Wrist {
-    /// `None` where the flange is not open, or many points hold the joint before it.
+    /// `None` where the flange is not open, or the joint before it is known.
     pub(crate) fn of(
+        refine: &Refine<'_>,
+        (best, spins): (&Adjusted, &[Spin]),
+        points: &Sampled,
+        fan: &impl Fan,
+    ) -> Option<Self> {
+        let at = 6 + best.hypothesis.posture.len().checked_sub(2)?;
+        let is_known = best.covariance[(at, at)] < KNOWN * KNOWN;
+        if is_known { None } else { Self::at(refine, (&best.state(), spins), points, fan) }
+    }
+
+    fn at(
         refine: &Refine<'_>,
         (state, spins): (&State, &[Spin]),
         points: &Sampled,
@@ -166,7 +179,7 @@ mod tests {
         before_plate(&places, posture, |refine, state| {
             let points = Sampled::new((0..225).collect(), 0.02);
             let spin = Spin { joint: 1, values: vec![posture[1], posture[1] + 1.6], extent: 0.0 };
-            let wrist = Wrist::of(refine, (state, &[spin]), &points, &OneByOne);
+            let wrist = Wrist::at(refine, (state, &[spin]), &points, &OneByOne);
             look(&wrist.expect("a wrist"), &state.hypothesis);
         });
     }
