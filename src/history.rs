@@ -34,6 +34,9 @@ pub struct Session {
 /// A folder that cannot be read, or holds no result.
 pub fn sessions(folder: &Path) -> Result<Vec<Session>> {
     let failed = |e: std::io::Error| Error::from(e).at(folder.display());
+    if !folder.is_dir() {
+        return Err(no_results(folder, "there is no such folder"));
+    }
     let mut found = Vec::new();
     let mut digests = HashMap::new();
     let mut paths = Vec::new();
@@ -50,9 +53,7 @@ pub fn sessions(folder: &Path) -> Result<Vec<Session>> {
         found.push((session(&path, name, &result)?, result.rescan.map(|r| r.base)));
     }
     if found.is_empty() {
-        return Err(Error::new(Kind::Usage, "there is no result in this folder")
-            .at(folder.display())
-            .hint("give the folder that output folders of runs lie in"));
+        return Err(no_results(folder, "there is no result in this folder"));
     }
     let mut left: Vec<Session> = found
         .into_iter()
@@ -70,6 +71,13 @@ pub fn sessions(folder: &Path) -> Result<Vec<Session>> {
         out.push(left.remove(at));
     }
     Ok(out)
+}
+
+/// The error for a folder that holds no results.
+fn no_results(folder: &Path, what: &str) -> Error {
+    Error::new(Kind::Usage, what)
+        .at(folder.display())
+        .hint("give the folder that output folders of runs lie in")
 }
 
 fn session(path: &Path, name: String, result: &ResultFile) -> Result<Session> {

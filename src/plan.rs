@@ -162,8 +162,8 @@ impl Run<'_> {
         let (review, settings, mut models) =
             (&given.review, self.settings, given.library.models.clone());
         let (fits, wrong) = review.correct(found, place, &models, self.engine)?;
-        let (fits, absent) = review.apply(fits);
-        let fits = fit::choose(fits, &models, |fit| review.accepts(fit));
+        let fits = fit::choose(review.apply(fits), &models, |fit| review.accepts(fit));
+        let absent = review.missing(&fits);
         let mut fits = tools::dress(fits, &mut models, place, self.engine)?;
         if settings.fit.calibrate {
             fits = calibrate(fits, &mut models, place, self.engine)?;

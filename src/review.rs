@@ -6,7 +6,7 @@
 //! radius = 0.5                  # how near, metres
 //! model = "kuka_kr10"           # no other model stands here
 //! verdict = "accept"            # or "reject": no robot stands here; left out: as the program finds
-//! joints = { joint_1 = 0.35 }   # near which posture it stands, radians or metres: the fit begins there; others are 0
+//! joints = { joint_1 = 0.35 }   # near which posture it stands, radians or metres: the fit begins there; other joints as found, else 0
 //! rpy = [0.0, 0.0, 1.57]        # with joints: `at` is its base, so turned (URDF, radians); else the base that was found
 //! ```
 //!
@@ -135,11 +135,9 @@ impl Review {
         Ok((fits, warnings))
     }
 
-    /// The fits of all candidates with what is known applied: where a robot is accepted, it alone is left. And a warning for each
-    /// place where nothing fits it.
+    /// The fits of all candidates with what is known applied: where a robot is accepted, it alone is left.
     #[must_use]
-    pub fn apply(&self, mut fits: Vec<Fit>) -> (Vec<Fit>, Vec<String>) {
-        let mut warnings = Vec::new();
+    pub fn apply(&self, mut fits: Vec<Fit>) -> Vec<Fit> {
         for place in &self.places {
             let here = |f: &Fit| place.has(f);
             if place.verdict == Some(Decision::Reject) {
@@ -149,13 +147,7 @@ impl Review {
             if let Some(model) = &place.model {
                 fits.retain(|f| !here(f) || f.model_name == *model);
             }
-            let Some(best) = place.best(&fits) else {
-                let (what, at) = (place.model.as_deref().unwrap_or("robot"), place.words());
-                warnings.push(format!(
-                    "the review expects a {what} near {at}, and none was found there"
-                ));
-                continue;
-            };
+            let Some(best) = place.best(&fits) else { continue };
             if place.verdict == Some(Decision::Accept) {
                 let mut at = 0;
                 fits.retain(|f| {
@@ -165,7 +157,21 @@ impl Review {
             }
         }
         self.accept(&mut fits);
-        (fits, warnings)
+        fits
+    }
+
+    /// A warning for each place where none of the robots that were chosen stands, though one should.
+    #[must_use]
+    pub fn missing(&self, chosen: &[Fit]) -> Vec<String> {
+        let expected = self.places.iter().filter(|p| p.verdict != Some(Decision::Reject));
+        let missing = expected.filter(|place| !chosen.iter().any(|f| place.has(f)));
+        let warning = |place: &Place| {
+            let (what, at) = (place.model.as_deref().unwrap_or("robot"), place.words());
+            format!(
+                "the review expects a {what} near {at}, and none was found there that can stand beside the others"
+            )
+        };
+        missing.map(warning).collect()
     }
 
     /// Whether somebody accepts a fit.
@@ -239,13 +245,12 @@ impl Place {
             }
         };
         let model = &models[index];
+        let found = |name: &str| best?.joints.iter().find(|j| j.name == name).map(|j| j.value);
         let joint = |&joint: &usize| {
             let name = model.joints[joint].name.clone();
-            JointFit {
-                value: self.joints.get(&name).copied().unwrap_or(0.0),
-                name,
-                ..JointFit::default()
-            }
+            let given = self.joints.get(&name).copied();
+            let value = given.or_else(|| found(&name)).unwrap_or(0.0);
+            JointFit { value, name, ..JointFit::default() }
         };
         Some(Fit {
             model: index,
@@ -278,6 +283,43 @@ mod tests {
     }
 
     #[test]
+    fn joints_that_nobody_names_start_where_they_were_found() {
+        let link = |name: &str| {
+            format!(
+                "<link name='{name}'><visual><geometry><box size='0.2 0.1 0.1'/></geometry></visual></link>"
+            )
+        };
+        let joint = |name: &str, parent: &str, child: &str| {
+            format!(
+                "<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/><axis xyz='0 0 1'/>\
+                 <limit lower='-3' upper='3' effort='1' velocity='1'/></joint>"
+            )
+        };
+        let links: String = ["foot", "trunk", "arm"].map(link).concat();
+        let joints = joint("turn", "foot", "trunk") + &joint("bend", "trunk", "arm");
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("arm.urdf");
+        let urdf = format!("<robot name='arm'>{links}{joints}</robot>");
+        std::fs::write(&path, urdf).expect("is written");
+        let models =
+            [Model::load_urdf(&path, "arm", &robot::Settings::default()).expect("loads").0];
+        let value =
+            |name: &str, value: f64| JointFit { name: name.into(), value, ..JointFit::default() };
+        let found =
+            Fit { joints: vec![value("turn", 0.3), value("bend", 0.9)], ..fit("arm", 0.1, 1.0) };
+        let given = Place {
+            joints: BTreeMap::from([("bend".to_string(), -1.2)]),
+            ..place(0.0, Some("arm"), None)
+        };
+        let values = |fits: &[Fit]| {
+            let start = given.start(fits, &models).expect("the model is known");
+            start.joints.iter().map(|j| j.value).collect::<Vec<_>>()
+        };
+        assert_eq!(values(&[found]), [0.3, -1.2]);
+        assert_eq!(values(&[]), [0.0, -1.2]);
+    }
+
+    #[test]
     fn a_person_knows_better() {
         let review = Review {
             places: vec![
@@ -288,14 +330,15 @@ mod tests {
         };
         let fits =
             vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.0), fit("a", 5.1, 3.0), fit("a", 20.0, 1.0)];
-        let (fits, warnings) = review.apply(fits);
+        let fits = review.apply(fits);
         let left: Vec<(&str, Verdict)> = fits.iter().map(|f| (&*f.model_name, f.verdict)).collect();
         assert_eq!(left, [("b", Verdict::Trusted), ("a", Verdict::Doubtful)]);
         assert_eq!(fits[0].reasons, ["accepted in review"]);
-        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        let warnings = review.missing(&fits);
+        assert!(warnings.len() == 1 && warnings[0].contains("(9.00, "), "{warnings:?}");
         // Without a model the best is meant, and its rivals stand back.
         let review = Review { places: vec![place(0.0, None, Some(Decision::Accept))] };
-        let (mut fits, _) = review.apply(vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.9)]);
+        let mut fits = review.apply(vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.9)]);
         assert_eq!(fits.len(), 1);
         assert!(review.accepts(&fits[0]) && fits[0].model_name == "a");
         // What a tool on its flange brings up since does not undo it.

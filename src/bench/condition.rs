@@ -57,6 +57,8 @@ pub(super) struct Condition {
     pub(super) crossed: bool,
     /// What the robot is bolted to.
     pub(super) mount: Place,
+    /// How far the plate of such a place stands out from under the foot, metres; 0: a large one.
+    pub(super) rim: f64,
     /// How postures are found.
     pub(super) method: Method,
     /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0: the whole search.
@@ -85,6 +87,7 @@ pub(super) const PLAIN: Condition = Condition {
     crossed: false,
     stand: 0.0,
     mount: Place::Floor,
+    rim: 0.0,
     method: Method::Beam,
     perturbed_deg: 0.0,
 };
@@ -95,6 +98,9 @@ pub(super) const REGISTRATION: [f64; 3] = [0.002, 0.01, 0.001];
 
 /// A robot that its model fits poorly: shifts of joints, metres, and turns, degrees.
 const FRAMES: [f64; 2] = [0.002, 0.1];
+
+/// A plate no larger than it must be to be bolted on, metres.
+const RIM: f64 = 0.06;
 
 /// One cell to be drawn.
 #[derive(Debug, Clone)]
@@ -156,6 +162,7 @@ const SUITES: &[Suite] = &[
     ("tools", 3, |_| Condition { tool: true, ..PLAIN }),
     ("mounts", 6, |k| Condition {
         mount: [Place::Ceiling, Place::Wall, Place::Tilted][k % 3],
+        rim: [0.0, RIM][k % 2],
         mixed: true,
         ..PLAIN
     }),

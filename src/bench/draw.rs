@@ -199,15 +199,24 @@ fn plate(
     let lean = UnitQuaternion::from_euler_angles(f64::to_radians(lean), 0.0, 0.0);
     let spin = UnitQuaternion::from_euler_angles(0.0, 0.0, random.between(0.0, TAU));
     let surface = Pose::from_parts(Translation3::new(x, y, z), heading * lean);
-    let middle = surface * Pose::translation(0.0, 0.0, -0.5 * PLATE[1]);
+    let turned = surface * Pose::from_parts(Translation3::identity(), spin);
+    let foot = model.links.iter().map(|link| link.bounds).find(|bounds| !bounds.is_empty());
+    let (middle, [a, b]) = match foot.filter(|_| c.rim > 0.0) {
+        Some(foot) => {
+            let (at, size) = (foot.center(), foot.size());
+            (turned * Pose::translation(at.x, at.y, 0.0), [0, 1].map(|i| size[i] + 2.0 * c.rim))
+        }
+        None => (surface, [PLATE[0]; 2]),
+    };
+    let middle = middle * Pose::translation(0.0, 0.0, -0.5 * PLATE[1]);
     scene.boxes.push(Cuboid {
         name: "plate".into(),
         xyz: middle.translation.vector.into(),
-        size: [PLATE[0], PLATE[0], PLATE[1]],
+        size: [a, b, PLATE[1]],
         rpy_deg: rpy_deg(&middle),
         reflectance: 0.5,
     });
-    Some(surface * Pose::from_parts(Translation3::identity(), spin))
+    Some(turned)
 }
 
 /// Starts of the refinement alone, where the case asks for it: the truth, then every joint and the base off by something.

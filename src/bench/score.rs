@@ -250,7 +250,8 @@ fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) 
             truth: *truth,
             error: whole(error),
             sigma: joint.sigma,
-            determined: joint.determined,
+            // The source's method does not say; its table has all joints.
+            determined: joint.determined || !fit.rough.is_empty(),
             slides,
         }
     });

@@ -89,11 +89,11 @@ fn compete(a: &Fit, a_box: &Aabb, b: &Fit, b_box: &Aabb) -> bool {
     smaller > 0.0 && volume(&shared) > OVERLAP * smaller
 }
 
-/// Whether two fits are of two robots whose arms cross: both trusted, on bases of their own, and hardly any surface of one is
-/// within a link of the other.
+/// Whether two fits are of two robots whose arms cross: none refused, on bases of their own, and hardly any surface of one is
+/// within a link of the other. Doubtful ones, too: each of two arms that cross is the other's likeliest other posture.
 fn stand_apart(fits: [&Fit; 2], models: &[Model]) -> bool {
     let [a, b] = fits.map(|f| f.world_from_base.translation.vector);
-    fits.iter().all(|f| f.verdict == Verdict::Trusted)
+    fits.iter().all(|f| f.verdict != Verdict::Refused)
         && (a - b).norm() >= SAME_BASE
         && share_within(fits, models) < CROSSED
         && share_within([fits[1], fits[0]], models) < CROSSED
@@ -157,6 +157,7 @@ fn doubt(winner: &mut Fit, loser: &Fit) {
 mod tests {
     use super::*;
     use Verdict::{Doubtful, Refused, Trusted};
+    use contract::JointFit;
 
     /// What stands, of fits on one base, each of a model of its own: verdict and explained surface, m².
     fn stands(fits: &[(Verdict, f64)], known: Option<usize>) -> Vec<(usize, Verdict)> {
@@ -180,6 +181,25 @@ mod tests {
         );
         assert_eq!(stands(&[(Trusted, 3.0), (Doubtful, 2.8)], None), [(0, Doubtful)]);
         assert_eq!(stands(&[(Trusted, 3.0), (Trusted, 2.95)], None), [(0, Trusted)]);
+    }
+
+    #[test]
+    fn arms_that_cross_are_two_robots_though_both_are_doubtful() {
+        let models = [crate::cubes::bar()];
+        let fit = |x: f64, turn: f64, verdict: Verdict| Fit {
+            verdict,
+            explained: 1.0,
+            joints: vec![JointFit { value: turn, ..JointFit::default() }],
+            world_from_base: geometry::Pose::translation(x, 0.0, 0.0),
+            ..Fit::default()
+        };
+        let n_chosen = |apart: f64, turn: f64, other: Verdict| {
+            choose(vec![fit(0.0, 0.8, Doubtful), fit(apart, turn, other)], &models, |_| false).len()
+        };
+        assert_eq!(n_chosen(0.5, -0.8, Doubtful), 2);
+        // On one base, or where one is refused, there is one.
+        assert_eq!(n_chosen(0.3, -0.8, Doubtful), 1);
+        assert_eq!(n_chosen(0.5, -0.8, Refused), 1);
     }
 
     #[test]

@@ -41,6 +41,15 @@ fn cubes() -> robot::Model {
     boxes(&[("outer", "", [outer, here, here]), ("inner", TURNS, [inner, here, [0.0, 0.0, 1.0]])])
 }
 
+/// A foot, and a bar of 2 m over it that turns about z.
+pub(crate) fn bar() -> robot::Model {
+    let (foot, bar) = ([0.2; 3], [2.0, 0.05, 0.05]);
+    boxes(&[
+        ("foot", "", [foot, [0.0; 3], [0.0; 3]]),
+        ("bar", TURNS, [bar, [0.0, 0.0, 0.15], [0.0, 0.0, 1.0]]),
+    ])
+}
+
 /// A foot far behind, a knuckle that bends about y, and a plate that turns on it about x: its front is 10 cm before the knuckle.
 fn wrist() -> robot::Model {
     let (foot, knuckle, plate) = ([0.2; 3], [0.02; 3], [0.02, 0.1, 0.1]);

@@ -1,6 +1,6 @@
 //! Evidence of a fit in; verdict and reasons in words out (METHOD.md §15).
 
-use contract::{Fit, Verdict};
+use contract::{Fit, JointFit, Verdict};
 use robot::{JointKind, Model, Motion, Role};
 
 use crate::adjust::Adjusted;
@@ -23,7 +23,7 @@ const POOR_SCORE: f64 = 0.52;
 /// Residual of points that fill the gate of the adjustment evenly, metres: of things that are near the model, not on it.
 const ANYTHING_RMS: f64 = 0.0072;
 /// Residual, in multiples of the scans' noise and metres beyond, from which a fit that leaves half of its joints open is
-/// refused: a post, a bench and a hose have room for a smooth small arm. What it found there had 4.7 mm and more at a noise
+/// lost: a post, a bench and a hose have room for a smooth small arm. What it found there had 4.7 mm and more at a noise
 /// of 2 mm; of 3648 right fits five left so much open, and had 2.6 mm at most there, 7.6 mm at one of 10 mm.
 const OPEN_RMS: (f64, f64) = (1.25, 0.002);
 /// Noise of a scanner from which on more of it is no excuse there, metres: in a corridor scanned with 9 mm, walls and cabinets
@@ -80,7 +80,7 @@ pub(crate) fn pass(
 ) {
     let mut reasons = Reasons::default();
     of_surface(&mut reasons, fit, prepared, scene, judgement);
-    of_joints(&mut reasons, fit, prepared);
+    of_joints(&mut reasons, fit, prepared, scene);
     let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
     if rival {
         reasons.doubts.push("another posture explains the points nearly as well".into());
@@ -113,7 +113,11 @@ fn of_surface(
     });
     for (l, link) in fit.links.iter().enumerate().filter(|(_, link)| link.seen > MIN_SEEN) {
         let (v, is_aside) = (link.violated, is_aside(prepared.model, l));
-        reasons.grade(v > LINK_VIOLATION.1 && !is_aside, v > LINK_VIOLATION.0, || {
+        // Where a joint that moves it is not known it stands elsewhere, and the rest of the arm where it was found.
+        let is_moved = |j: &usize| prepared.carried(*j).contains(&l);
+        let is_held =
+            (0..fit.joints.len()).filter(is_moved).all(|j| own_sigma(fit, j) < KNOWN_SIGMA);
+        reasons.grade(v > LINK_VIOLATION.1 && is_held && !is_aside, v > LINK_VIOLATION.0, || {
             let loops = if is_aside { ": a loop that the model lacks may move it" } else { "" };
             format!("beams went through {:.0} % of link '{}'{loops}", v * 100.0, link.name)
         });
@@ -154,8 +158,8 @@ fn is_aside(model: &Model, link: usize) -> bool {
 }
 
 /// What points, limits and the joints' standard deviations say of the posture.
-fn of_joints(reasons: &mut Reasons, fit: &Fit, prepared: &Prepared<'_>) {
-    let Reasons { doubts, notes, .. } = reasons;
+fn of_joints(reasons: &mut Reasons, fit: &Fit, prepared: &Prepared<'_>, scene: &Scene<'_>) {
+    let Reasons { doubts, notes, .. } = &mut *reasons;
     for (j, joint) in fit.joints.iter().enumerate() {
         let n: usize = prepared.carried(j).into_iter().map(|l| fit.links[l].n_points).sum();
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
@@ -166,17 +170,49 @@ fn of_joints(reasons: &mut Reasons, fit: &Fit, prepared: &Prepared<'_>) {
             notes.push(undetermined(fit, j, prepared.slides(j)));
         }
     }
-    for (j, joint) in fit.joints.iter().enumerate().filter(|(_, joint)| joint.determined) {
-        if beyond(prepared, j, joint.value) > 3.0 * joint.sigma {
+    for (j, joint) in fit.joints.iter().enumerate() {
+        // A joint that hardly anything but its stop holds may stand far beyond it.
+        let least = match (joint.determined, prepared.slides(j)) {
+            (true, _) => 3.0 * joint.sigma,
+            (false, false) => 0.0,
+            (false, true) => continue,
+        };
+        if beyond(prepared, j, joint.value) > least {
             doubts.push(format!("joint '{}' stands beyond its limit", joint.name));
         }
     }
-    let n_known = fit.joints.iter().filter(|joint| joint.sigma < KNOWN_SIGMA).count();
-    if 2 * n_known <= fit.joints.len() {
-        doubts.push(format!("{n_known} of {} joints are known", fit.joints.len()));
+    // A robot that is a hundredth smaller than its model leaves all of them open, each by half a degree.
+    if !fit.joints.iter().any(|joint| joint.determined) {
+        doubts.push("the points determine none of its joints closely".into());
     }
+    let [n_known, n_but_last] = n_known(fit);
+    reasons.grade(
+        is_scanned(scene) && leaves_most_open([n_but_last, fit.joints.len()]),
+        2 * n_known <= fit.joints.len(),
+        || format!("{n_known} of {} joints are known", fit.joints.len()),
+    );
     let turning: Vec<usize> = (0..fit.joints.len()).filter(|&j| !prepared.slides(j)).collect();
-    notes.extend(weak(fit, &turning));
+    reasons.notes.extend(weak(fit, &turning));
+}
+
+/// How many joints are known, and how many but the last: a flange may stand anyhow.
+fn n_known(fit: &Fit) -> [usize; 2] {
+    let is_known = |joint: &JointFit| joint.sigma < KNOWN_SIGMA;
+    let n_last = fit.joints.last().map_or(0, |last| usize::from(is_known(last)));
+    let n = fit.joints.iter().filter(|joint| is_known(joint)).count();
+    [n, n - n_last]
+}
+
+/// Whether so few joints but the last are known of so many that it may be anything flat: on walls and jigs stood seven smooth
+/// small arms, of whose six or seven joints two were known at most; of 5488 right fits none had so few. A camera sees half of an
+/// arm, and bends that: of it no more can be asked.
+fn leaves_most_open([n_but_last, n_joints]: [usize; 2]) -> bool {
+    2 * n_but_last + 1 < n_joints
+}
+
+/// Whether what was measured are beams of scanners, which bend nothing.
+fn is_scanned(scene: &Scene<'_>) -> bool {
+    scene.evidence.has_beams() && !scene.views.iter().any(|view| view.is_camera)
 }
 
 /// Standard deviation of a joint by the covariance alone, radians or metres: a symmetric tool that may stand at several values
@@ -315,6 +351,20 @@ mod tests {
         let aside = model.links.iter().enumerate().filter(|(l, _)| is_aside(&model, *l));
         let names: Vec<&str> = aside.map(|(_, link)| link.name.as_str()).collect();
         assert_eq!(names, ["rod"]);
+    }
+
+    #[test]
+    fn what_leaves_most_joints_but_the_last_open_may_be_anything_flat() {
+        let joint = |sigma: f64| JointFit { sigma, ..JointFit::default() };
+        let known = |sigmas: &[f64]| {
+            n_known(&Fit { joints: sigmas.iter().copied().map(joint).collect(), ..Fit::default() })
+        };
+        assert_eq!(known(&[0.1, 0.01, 0.01, 0.1, 1.8, 0.001]), [3, 2]);
+        assert_eq!(known(&[0.001, 0.01, 1.8]), [2, 2]);
+        assert!(leaves_most_open([2, 6]) && !leaves_most_open([3, 6]));
+        assert!(leaves_most_open([2, 7]) && !leaves_most_open([3, 7]));
+        // A turntable that looks the same all around is all last joint.
+        assert!(!leaves_most_open([0, 1]));
     }
 
     #[test]

@@ -6,19 +6,22 @@ use geometry::{Aabb, Moments, Vector};
 
 /// Least area of a patch that is kept for this, m²: less says little of where a plane lies.
 pub(crate) const MIN_PATCH: f64 = 0.02;
-/// Least area of such a plane, m²: half a plate of 0.5 m × 0.5 m, the rest hidden by the foot.
-const MIN_AREA: f64 = 0.06;
+/// Least area of such a plane, m²: half of a rim of 6 cm about the foot of a small arm.
+const MIN_AREA: f64 = 0.03;
 /// Planes of patches that differ by less are one, metres, and their normals, radians (3°).
 const SAME: (f64, f64) = (0.02, 0.052);
 /// Gap between patches of one plane, metres: what a foot hides.
 const GAP: f64 = 0.5;
-/// Most planes of one place that look down, and of those that do not: a hall has more and larger walls than plates.
-const MOST: usize = 8;
+/// Most planes of one place that look down, most that lean, and most of the others: a hall has more and larger walls than plates,
+/// and of a plate that a foot leaves a rim of less is seen than of any cabinet.
+const MOST: [usize; 3] = [8, 12, 8];
 /// A normal that points so far down is a ceiling's, cosine (45°).
 const DOWN: f64 = -0.7;
+/// One that points so far up is a leaning plate's, cosine (10° from upright).
+const LEANS: f64 = 0.17;
 
-/// The largest planes of these patches, those that look down and the others each largest first; normals to the side that was
-/// seen.
+/// The largest planes of these patches: those that look down, those that lean and the others, each largest first; normals to the
+/// side that was seen.
 #[must_use]
 pub fn mounts(patches: &[&PlanePatch]) -> Vec<InstallationPlane> {
     let mut union = Union::new(patches.len());
@@ -36,12 +39,16 @@ pub fn mounts(patches: &[&PlanePatch]) -> Vec<InstallationPlane> {
         .filter_map(|group| plane_of(&group.iter().map(|g| patches[g.1]).collect::<Vec<_>>()))
         .collect();
     out.sort_by(|a, b| b.area.total_cmp(&a.area));
-    let (mut down, mut others): (Vec<_>, Vec<_>) =
-        out.into_iter().partition(|p| p.plane.normal.z < DOWN);
-    down.truncate(MOST);
-    others.truncate(MOST);
-    down.extend(others);
-    down
+    let kinds: [fn(f64) -> bool; 3] =
+        [|z| z < DOWN, |z| z > LEANS, |z| (DOWN..=LEANS).contains(&z)];
+    let largest = |(is_kind, most): (fn(f64) -> bool, usize)| {
+        out.iter()
+            .filter(move |p| is_kind(p.plane.normal.z))
+            .take(most)
+            .cloned()
+            .collect::<Vec<_>>()
+    };
+    kinds.into_iter().zip(MOST).flat_map(largest).collect()
 }
 
 fn one_plane(a: &PlanePatch, b: &PlanePatch) -> bool {
@@ -71,4 +78,41 @@ fn plane_of(members: &[&PlanePatch]) -> Option<InstallationPlane> {
     let plane = moments.plane()?.plane;
     let plane = if plane.normal.dot(&first.plane.normal) < 0.0 { plane.flipped() } else { plane };
     (area >= MIN_AREA).then_some(InstallationPlane { plane, bounds, area, is_floor: false })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::Plane;
+
+    /// A square of a side, metres, at a place, that faces along a normal.
+    fn patch(at: [f64; 3], normal: Vector, side: f64) -> PlanePatch {
+        let frame = Plane { normal, offset: 0.0 }.frame();
+        let (mut moments, mut bounds) = (Moments::new(Vector::zeros()), Aabb::EMPTY);
+        for i in 0..100 {
+            let [x, y] = [i % 10, i / 10].map(|k| side * (f64::from(k) / 9.0 - 0.5));
+            let p = Vector::from(at) + frame * Vector::new(x, y, 0.0);
+            moments.add(&p);
+            bounds.add(p.into());
+        }
+        let (scan, plane) = (ScanId(0), Plane { normal, offset: normal.dot(&Vector::from(at)) });
+        let area = side * side;
+        PlanePatch { scan, plane, moments, rms: 0.002, bounds, area, ground: Vec::new() }
+    }
+
+    #[test]
+    fn the_rim_of_a_leaning_plate_is_kept_among_many_cabinets() {
+        let cabinet =
+            |k: i32| patch([f64::from(k), 3.0 + 0.1 * f64::from(k), 1.0], -Vector::y(), 0.8);
+        let cabinets = (0..20).map(cabinet);
+        let (ceiling, leaning) = (-Vector::z(), Vector::new(0.3_f64.sin(), 0.0, 0.3_f64.cos()));
+        let plate = patch([5.0, 0.0, 0.7], leaning, 0.3);
+        let crumb = patch([9.0, 0.0, 0.7], leaning, 0.15);
+        let patches: Vec<PlanePatch> =
+            cabinets.chain([patch([5.0, 0.0, 4.0], ceiling, 0.5), plate, crumb]).collect();
+        let found = mounts(&patches.iter().collect::<Vec<_>>());
+        let faces = |n: Vector| found.iter().filter(|p| p.plane.normal.dot(&n) > 0.99).count();
+        assert_eq!(found.len(), 10);
+        assert_eq!([faces(ceiling), faces(leaning), faces(-Vector::y())], [1, 1, 8]);
+    }
 }

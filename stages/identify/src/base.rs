@@ -55,13 +55,13 @@ impl Default for Settings {
     }
 }
 
-/// Mean score on a quarter of the samples, at the best of every other yaw, below which a place is not looked at any
 /// Heights above a plane at which a foot is looked for, metres: not the plane itself, and no higher than shoulders stand.
 const FOOT_HEIGHTS: std::ops::Range<f64> = 0.03..1.2;
 /// A base may stand where, within this share of its radius, so many cells of the plane have so many points each.
 const ABOUT: f64 = 0.8;
 const MIN_CELLS: usize = 3;
 const MIN_IN_CELL: u32 = 3;
+/// Mean score on a quarter of the samples, at the best of every other yaw, below which a place is not looked at any
 /// further; and by how much yaws may lag behind that best.
 const HOPELESS: f64 = -0.2;
 const YAW_LAG: f64 = 0.35;

@@ -169,7 +169,8 @@ impl Paper<'_> {
             name: model.joints[model.free[j]].name.clone(),
             value: *value,
             sigma: SIGMA,
-            determined: true,
+            // It does not ask.
+            determined: false,
             ..JointFit::default()
         });
         let none = vec![0; model.links.len()];
