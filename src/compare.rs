@@ -84,10 +84,10 @@ pub struct JointError {
 }
 
 impl Found {
-    /// Largest error of a joint that turns and is said to be determined, degrees.
+    /// Largest error of a joint that turns and is said to be determined, degrees; of all that turn where none is.
     #[must_use]
     pub fn worst_joint_deg(&self) -> f64 {
-        let joints = self.joints.iter().filter(|j| j.determined && !j.slides);
+        let joints = judged(&self.joints).filter(|j| !j.slides);
         joints.map(|j| j.error.abs().to_degrees()).fold(0.0, f64::max)
     }
 }
@@ -343,9 +343,15 @@ fn off(robot: &RobotEntry, truth: &BTreeMap<String, f64>) -> Vec<JointError> {
     joints.collect()
 }
 
-/// Largest error of a joint that is said to be determined, radians or metres.
+/// Largest error of a joint that is said to be determined, radians or metres; of all where none is.
 fn worst(joints: &[JointError]) -> f64 {
-    joints.iter().filter(|j| j.determined).map(|j| j.error.abs()).fold(0.0, f64::max)
+    judged(joints).map(|j| j.error.abs()).fold(0.0, f64::max)
+}
+
+/// The joints that are said to be determined; where none is, all of them.
+fn judged(joints: &[JointError]) -> impl Iterator<Item = &JointError> {
+    let is_none = joints.iter().all(|j| !j.determined);
+    joints.iter().filter(move |j| is_none || j.determined)
 }
 
 fn rotation(wxyz: [f64; 4]) -> UnitQuaternion<f64> {

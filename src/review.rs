@@ -168,7 +168,7 @@ impl Review {
         let warning = |place: &Place| {
             let (what, at) = (place.model.as_deref().unwrap_or("robot"), place.words());
             format!(
-                "the review expects a {what} near {at}, and none was found there that can stand beside the others"
+                "the review expects a {what} near {at}, and none of the robots that were found stands there"
             )
         };
         missing.map(warning).collect()
@@ -223,7 +223,7 @@ impl Place {
     /// The fit that explains most here, by its place in the list.
     fn best(&self, fits: &[Fit]) -> Option<usize> {
         let here = fits.iter().enumerate().filter(|(_, f)| self.has(f));
-        here.max_by(|(_, a), (_, b)| a.explained.total_cmp(&b.explained)).map(|(at, _)| at)
+        here.max_by(|(_, a), (_, b)| by_rank(a, b)).map(|(at, _)| at)
     }
 
     /// Whether a fit stands here.
@@ -236,7 +236,7 @@ impl Place {
     fn start(&self, fits: &[Fit], models: &[Model]) -> Option<Fit> {
         let index = models.iter().position(|m| Some(&m.name) == self.model.as_ref())?;
         let own = fits.iter().filter(|f| f.model == index && self.has(f));
-        let best = own.max_by(|a, b| a.explained.total_cmp(&b.explained));
+        let best = own.max_by(|a, b| by_rank(a, b));
         let turn = |[r, p, y]: [f64; 3]| UnitQuaternion::from_euler_angles(r, p, y);
         let world_from_base = match (self.rpy, best) {
             (None, Some(best)) => best.world_from_base,
@@ -245,6 +245,8 @@ impl Place {
             }
         };
         let model = &models[index];
+        // They belong to the base that was found.
+        let best = best.filter(|_| self.rpy.is_none());
         let found = |name: &str| best?.joints.iter().find(|j| j.name == name).map(|j| j.value);
         let joint = |&joint: &usize| {
             let name = model.joints[joint].name.clone();
@@ -266,6 +268,12 @@ impl Place {
         let [x, y, z] = self.at;
         format!("({x:.2}, {y:.2}, {z:.2})")
     }
+}
+
+/// What is refused stands behind all else, as people are not shown it; then what explains more goes first.
+fn by_rank(a: &Fit, b: &Fit) -> std::cmp::Ordering {
+    let stands = |f: &Fit| f.verdict != Verdict::Refused;
+    stands(a).cmp(&stands(b)).then_with(|| a.explained.total_cmp(&b.explained))
 }
 
 #[cfg(test)]
@@ -341,6 +349,9 @@ mod tests {
         let mut fits = review.apply(vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.9)]);
         assert_eq!(fits.len(), 1);
         assert!(review.accepts(&fits[0]) && fits[0].model_name == "a");
+        // What was refused was shown to nobody.
+        let refused = Fit { verdict: Verdict::Refused, ..fit("a", 0.1, 3.0) };
+        assert_eq!(review.apply(vec![refused, fit("b", -0.1, 1.9)])[0].model_name, "b");
         // What a tool on its flange brings up since does not undo it.
         (fits[0].verdict, fits[0].reasons) = (Verdict::Doubtful, vec!["few points".into()]);
         review.accept(&mut fits);

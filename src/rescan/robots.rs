@@ -224,7 +224,9 @@ fn anew(
         found.retain(|fit| is_here(&fit.world_from_base.translation.vector.into()));
         let dressed =
             found.into_iter().map(|fit| dress_in(scene, fit, models, (search.shelf(), settings)));
-        Ok(dressed.max_by(|(a, _), (b, _)| a.verdict.cmp(&b.verdict)))
+        Ok(dressed.max_by(|(a, _), (b, _)| {
+            a.verdict.cmp(&b.verdict).then_with(|| a.explained.total_cmp(&b.explained))
+        }))
     })?
 }
 

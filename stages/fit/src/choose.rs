@@ -89,11 +89,16 @@ fn compete(a: &Fit, a_box: &Aabb, b: &Fit, b_box: &Aabb) -> bool {
     smaller > 0.0 && volume(&shared) > OVERLAP * smaller
 }
 
-/// Whether two fits are of two robots whose arms cross: none refused, on bases of their own, and hardly any surface of one is
-/// within a link of the other. Doubtful ones, too: each of two arms that cross is the other's likeliest other posture.
+/// Whether two fits are of two robots whose arms cross: on bases of their own, and hardly any surface of one is within a link of
+/// the other. Doubtful ones of one model, too: each of two such arms is the other's likeliest other posture. What is refused
+/// bars nothing that stands apart from it.
 fn stand_apart(fits: [&Fit; 2], models: &[Model]) -> bool {
     let [a, b] = fits.map(|f| f.world_from_base.translation.vector);
-    fits.iter().all(|f| f.verdict != Verdict::Refused)
+    let is = |verdict: Verdict| move |f: &&Fit| f.verdict == verdict;
+    let may_cross = fits.iter().all(is(Verdict::Trusted))
+        || fits.iter().any(is(Verdict::Refused))
+        || fits[0].model == fits[1].model;
+    may_cross
         && (a - b).norm() >= SAME_BASE
         && share_within(fits, models) < CROSSED
         && share_within([fits[1], fits[0]], models) < CROSSED
@@ -185,21 +190,26 @@ mod tests {
 
     #[test]
     fn arms_that_cross_are_two_robots_though_both_are_doubtful() {
-        let models = [crate::cubes::bar()];
-        let fit = |x: f64, turn: f64, verdict: Verdict| Fit {
+        let models = [crate::cubes::bar(), crate::cubes::bar()];
+        let fit = |model: usize, explained: f64, (x, turn, verdict): (f64, f64, Verdict)| Fit {
+            model,
             verdict,
-            explained: 1.0,
+            explained,
             joints: vec![JointFit { value: turn, ..JointFit::default() }],
             world_from_base: geometry::Pose::translation(x, 0.0, 0.0),
             ..Fit::default()
         };
-        let n_chosen = |apart: f64, turn: f64, other: Verdict| {
-            choose(vec![fit(0.0, 0.8, Doubtful), fit(apart, turn, other)], &models, |_| false).len()
+        let n_chosen = |model: usize, explained: f64, other: (f64, f64, Verdict)| {
+            let fits = vec![fit(0, 1.0, (0.0, 0.8, Doubtful)), fit(model, explained, other)];
+            choose(fits, &models, |_| false).len()
         };
-        assert_eq!(n_chosen(0.5, -0.8, Doubtful), 2);
-        // On one base, or where one is refused, there is one.
-        assert_eq!(n_chosen(0.3, -0.8, Doubtful), 1);
-        assert_eq!(n_chosen(0.5, -0.8, Refused), 1);
+        assert_eq!(n_chosen(0, 2.0, (0.5, -0.8, Doubtful)), 2);
+        // On one base, or of two models, there is one.
+        assert_eq!(n_chosen(0, 2.0, (0.3, -0.8, Doubtful)), 1);
+        assert_eq!(n_chosen(1, 2.0, (0.5, -0.8, Doubtful)), 1);
+        // What is refused bars it from its own place only.
+        assert_eq!(n_chosen(1, 2.0, (0.5, -0.8, Refused)), 1);
+        assert_eq!(n_chosen(1, 2.0, (0.3, -0.8, Refused)), 0);
     }
 
     #[test]

@@ -113,11 +113,8 @@ fn of_surface(
     });
     for (l, link) in fit.links.iter().enumerate().filter(|(_, link)| link.seen > MIN_SEEN) {
         let (v, is_aside) = (link.violated, is_aside(prepared.model, l));
-        // Where a joint that moves it is not known it stands elsewhere, and the rest of the arm where it was found.
-        let is_moved = |j: &usize| prepared.carried(*j).contains(&l);
-        let is_held =
-            (0..fit.joints.len()).filter(is_moved).all(|j| own_sigma(fit, j) < KNOWN_SIGMA);
-        reasons.grade(v > LINK_VIOLATION.1 && is_held && !is_aside, v > LINK_VIOLATION.0, || {
+        let refuses = v > LINK_VIOLATION.1 && is_held(fit, prepared, l) && !is_aside;
+        reasons.grade(refuses, v > LINK_VIOLATION.0, || {
             let loops = if is_aside { ": a loop that the model lacks may move it" } else { "" };
             format!("beams went through {:.0} % of link '{}'{loops}", v * 100.0, link.name)
         });
@@ -146,6 +143,17 @@ fn of_surface(
     }
 }
 
+/// Whether the joint that places a link and the one before it are known; else the link may well stand elsewhere, and the rest of
+/// the arm where it was found. A last joint does not count: at each of its values a flange is about where it is.
+fn is_held(fit: &Fit, prepared: &Prepared<'_>, link: usize) -> bool {
+    let n = fit.joints.len();
+    let placed = (0..n).find(|&j| prepared.placed_by[j].contains(&link));
+    placed.is_none_or(|own| {
+        let near = (own.saturating_sub(1)..=own).filter(|j| j + 1 < n);
+        near.into_iter().all(|j| own_sigma(fit, j) < KNOWN_SIGMA)
+    })
+}
+
 /// Whether a link hangs beside the chain, fixed or a multiple of a joint: rods and cylinders of closed loops, as models have them that
 /// do not describe the loop. Where such a one stands says nothing against the arm.
 fn is_aside(model: &Model, link: usize) -> bool {
@@ -172,7 +180,8 @@ fn of_joints(reasons: &mut Reasons, fit: &Fit, prepared: &Prepared<'_>, scene: &
     }
     for (j, joint) in fit.joints.iter().enumerate() {
         // A joint that hardly anything but its stop holds may stand far beyond it.
-        let least = match (joint.determined, prepared.slides(j)) {
+        let is_open = prepared.slides(j) || j + 1 == fit.joints.len();
+        let least = match (joint.determined, is_open) {
             (true, _) => 3.0 * joint.sigma,
             (false, false) => 0.0,
             (false, true) => continue,
