@@ -43,6 +43,11 @@ pub struct Scene<'a> {
 const CLOUD: (f32, f32) = (0.02, 0.10);
 
 impl<'a> Scene<'a> {
+    /// Whether any of it was seen by a depth camera, which bends surfaces.
+    pub(crate) fn has_camera(&self) -> bool {
+        self.views.iter().any(|view| view.is_camera)
+    }
+
     /// Gathers the points above the planes (given in the world) and thins them.
     #[must_use]
     pub fn new(

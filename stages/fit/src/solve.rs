@@ -139,7 +139,7 @@ pub(crate) fn quick(
 
 fn hopeless(scene: &Scene<'_>) -> f64 {
     let [scanner, camera, points] = HOPELESS_SCORE;
-    match (scene.evidence.has_beams(), scene.views.iter().any(|view| view.is_camera)) {
+    match (scene.evidence.has_beams(), scene.has_camera()) {
         (true, false) => scanner,
         (true, true) => camera,
         (false, _) => points,

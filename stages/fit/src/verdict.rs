@@ -149,8 +149,8 @@ fn is_held(fit: &Fit, prepared: &Prepared<'_>, link: usize) -> bool {
     let n = fit.joints.len();
     let placed = (0..n).find(|&j| prepared.placed_by[j].contains(&link));
     placed.is_none_or(|own| {
-        let near = (own.saturating_sub(1)..=own).filter(|j| j + 1 < n);
-        near.into_iter().all(|j| own_sigma(fit, j) < KNOWN_SIGMA)
+        let mut near = (own.saturating_sub(1)..=own).filter(|j| j + 1 < n);
+        near.all(|j| own_sigma(fit, j) < KNOWN_SIGMA)
     })
 }
 
@@ -221,7 +221,7 @@ fn leaves_most_open([n_but_last, n_joints]: [usize; 2]) -> bool {
 
 /// Whether what was measured are beams of scanners, which bend nothing.
 fn is_scanned(scene: &Scene<'_>) -> bool {
-    scene.evidence.has_beams() && !scene.views.iter().any(|view| view.is_camera)
+    scene.evidence.has_beams() && !scene.has_camera()
 }
 
 /// Standard deviation of a joint by the covariance alone, radians or metres: a symmetric tool that may stand at several values
@@ -241,8 +241,7 @@ struct Noise {
 
 impl Noise {
     fn of(scene: &Scene<'_>) -> Self {
-        let is_camera = scene.views.iter().any(|view| view.is_camera);
-        let least = if is_camera { scene.noise } else { scene.noise.min(OPEN_NOISE) };
+        let least = if scene.has_camera() { scene.noise } else { scene.noise.min(OPEN_NOISE) };
         Self { all: scene.noise, least }
     }
 }

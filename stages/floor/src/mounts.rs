@@ -106,7 +106,7 @@ mod tests {
             |k: i32| patch([f64::from(k), 3.0 + 0.1 * f64::from(k), 1.0], -Vector::y(), 0.8);
         let cabinets = (0..20).map(cabinet);
         let (ceiling, leaning) = (-Vector::z(), Vector::new(0.3_f64.sin(), 0.0, 0.3_f64.cos()));
-        let plate = patch([5.0, 0.0, 0.7], leaning, 0.3);
+        let plate = patch([5.0, 0.0, 0.7], leaning, 0.2);
         let crumb = patch([9.0, 0.0, 0.7], leaning, 0.15);
         let patches: Vec<PlanePatch> =
             cabinets.chain([patch([5.0, 0.0, 4.0], ceiling, 0.5), plate, crumb]).collect();
