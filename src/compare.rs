@@ -1,6 +1,7 @@
 //! A result and the truth of its scene in; how far they agree, robot by robot and point by point, out.
 
-use contract::{Error, Kind, PointKind, Result};
+use crate::tally::Tally;
+use contract::{Error, Kind, Label, PointKind, Result};
 use export::{ResultFile, RobotEntry};
 use fit::turns;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -21,21 +22,13 @@ pub struct Agreement {
     pub robots: Vec<RobotAgreement>,
     /// Found robots that no true one explains.
     pub n_invented: usize,
-    /// Points: moving and said to be, moving and not said to be, not moving but said to be, the rest.
-    pub moving: [u64; 4],
-    /// Points of links: with the right robot and link, all that are true links, all that are said to be links.
-    pub links: [u64; 3],
-    /// Points that truly stand still, and those of them that are lost to moving.
-    pub fixed: [u64; 2],
-    /// For each true robot, for each of its links: points with the right robot and link, true ones, and said ones.
-    pub by_link: Vec<Vec<[u64; 3]>>,
+    /// Its points, by what they are and what they are said to be.
+    pub points: Tally,
     /// For each thing of the scene: its points, and those of them that are said to move. Empty where the truth does not
     /// name things.
     pub by_object: Vec<[u64; 2]>,
     /// Names of the things.
     pub objects: Vec<String>,
-    /// Points of attachments: said to be moving (attachment or link), and all.
-    pub attached: [u64; 2],
 }
 
 /// One robot.
@@ -114,17 +107,12 @@ impl Agreement {
         let stands = result.robots.iter().map(|r| r.verdict != "refused");
         let n_invented =
             taken.iter().zip(stands).filter(|(t, stands)| t.is_none() && *stands).count();
-        let by_link = truth.robots.iter().map(|r| vec![[0; 3]; r.links.len()]).collect();
         let mut agreement = Self {
             robots,
             n_invented,
-            moving: [0; 4],
-            links: [0; 3],
-            fixed: [0; 2],
-            by_link,
+            points: Tally::new(truth.robots.iter().map(|r| r.links.len())),
             by_object: vec![[0; 2]; truth.objects.len()],
             objects: truth.objects.clone(),
-            attached: [0; 2],
         };
         for (i, scan) in result.labels.scans[first..].iter().enumerate() {
             let mut ours = Triple::read(out, [&scan.kind, &scan.robot, &scan.link])?;
@@ -154,54 +142,20 @@ impl Agreement {
                 format!("masks have {} entries, the truth {}", ours.kind.len(), theirs.kind.len());
             return Err(Error::new(Kind::Bug, what));
         }
-        let moves = |k: u8| k == PointKind::Link as u8 || k == PointKind::Attachment as u8;
+        let whose = |robot: usize| taken.get(robot).copied().flatten();
         for i in 0..ours.kind.len() {
-            let (own, real) = (moves(ours.kind[i]), moves(theirs.kind[i]));
-            self.moving[match (real, own) {
-                (true, true) => 0,
-                (true, false) => 1,
-                (false, true) => 2,
-                (false, false) => 3,
-            }] += 1;
-            self.fixed[0] += u64::from(!real);
-            self.fixed[1] += u64::from(!real && own);
-            let (link, real_link) =
-                (PointKind::Link as u8 == ours.kind[i], PointKind::Link as u8 == theirs.kind[i]);
-            self.links[1] += u64::from(real_link);
-            self.links[2] += u64::from(link);
-            if theirs.kind[i] == PointKind::Attachment as u8 {
-                self.attached[0] += u64::from(own);
-                self.attached[1] += 1;
-            }
-            let robot =
-                usize::try_from(ours.robot[i]).ok().and_then(|r| taken.get(r).copied().flatten());
-            let at = |robot: Option<usize>, link: i16| robot.zip(usize::try_from(link).ok());
-            let truly = at(usize::try_from(theirs.robot[i]).ok(), theirs.link[i]);
-            let said = at(robot, ours.link[i]);
-            for (which, place, is_link) in [(1, truly, real_link), (2, said, link)] {
-                let count = place.and_then(|(r, l)| self.by_link.get_mut(r)?.get_mut(l));
-                if let Some(count) = count.filter(|_| is_link) {
-                    count[which] += 1;
-                    count[0] += u64::from(which == 1 && link && said == truly);
-                }
-            }
-            if link && real_link {
-                let same = robot == usize::try_from(theirs.robot[i]).ok()
-                    && ours.link[i] == theirs.link[i];
-                self.links[0] += u64::from(same);
-            }
+            self.points.add(ours.label(i), theirs.label(i), whose);
         }
         Ok(())
     }
 
     /// Points of each thing, and those that are said to move.
     fn count_objects(&mut self, ours: &Triple, objects: &[u8]) {
-        for (kind, object) in ours.kind.iter().zip(objects.as_chunks::<2>().0) {
+        for (i, object) in objects.as_chunks::<2>().0.iter().enumerate().take(ours.kind.len()) {
             let at = usize::from(u16::from_le_bytes(*object));
             if let Some(count) = self.by_object.get_mut(at) {
-                let moves = [PointKind::Link as u8, PointKind::Attachment as u8].contains(kind);
                 count[0] += 1;
-                count[1] += u64::from(moves);
+                count[1] += u64::from(ours.label(i).moves());
             }
         }
     }
@@ -209,19 +163,8 @@ impl Agreement {
     /// Intersection over union of each true link of a found robot with at least so many points.
     #[must_use]
     pub fn link_ious(&self, least: u64) -> Vec<f64> {
-        let found = self.robots.iter().zip(&self.by_link).filter(|(r, _)| r.found.is_some());
-        let links = found.flat_map(|(_, links)| links);
-        links
-            .filter(|c| c[1] >= least)
-            .map(|c| c[0] as f64 / (c[1] + c[2] - c[0]).max(1) as f64)
-            .collect()
-    }
-
-    /// Balance of precision and recall of "moves", 0..1.
-    #[must_use]
-    pub fn f1(&self) -> f64 {
-        let [hit, missed, invented, _] = self.moving.map(|n| n as f64);
-        if hit == 0.0 { 0.0 } else { 2.0 * hit / (2.0 * hit + missed + invented) }
+        let found = (0..self.robots.len()).filter(|&r| self.robots[r].found.is_some());
+        found.flat_map(|r| self.points.link_ious(r, least)).collect()
     }
 
     /// Largest error of a joint that turns and is said to be determined, over all robots, degrees.
@@ -262,22 +205,7 @@ impl Agreement {
                 );
             }
         }
-        let share = |a: u64, b: u64| a as f64 / b.max(1) as f64;
-        let [hit, missed, invented, _] = self.moving;
-        let _ = writeln!(
-            text,
-            "moving/fixed: F1 {:.4}, precision {:.4}, recall {:.4}; fixed points lost {:.4} %",
-            self.f1(),
-            share(hit, hit + invented),
-            share(hit, hit + missed),
-            100.0 * share(self.fixed[1], self.fixed[0])
-        );
-        let _ = writeln!(
-            text,
-            "links: {:.2} % of the points said to be links are the right robot's right link; {:.2} % of the true ones found",
-            100.0 * share(self.links[0], self.links[2]),
-            100.0 * share(self.links[0], self.links[1])
-        );
+        text.push_str(&self.points.words());
         if self.n_invented > 0 {
             let _ = writeln!(text, "{} robot(s) INVENTED", self.n_invented);
         }
@@ -379,6 +307,11 @@ impl Triple {
 }
 
 impl Triple {
+    fn label(&self, i: usize) -> Label {
+        let kind = PointKind::of(self.kind[i]).unwrap_or(PointKind::Uncertain);
+        Label { kind, robot: self.robot[i], link: self.link[i] }
+    }
+
     /// Keeps the entries that are marked.
     fn keep(&mut self, marked: &[bool]) {
         fn few<T: Copy>(all: &mut Vec<T>, marked: &[bool]) {

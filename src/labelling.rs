@@ -7,24 +7,22 @@
 use crate::engine::{AllThreads, Engine, Hand, Handed, Task};
 use crate::job::Settings;
 use crate::store::Store;
-use contract::{
-    Cluster, Fit, Floor, Fold, Input, InputId, Label, MaskId, PlaceRun, Result, Space, TileLabels,
-};
+use contract::{Cluster, Fit, Floor, Input, InputId, Result, Space};
 use export::{
     Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Spool,
     Tiles, Written, write_space,
 };
 use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
-use merge::{Attach, Hanging};
+use merge::Hanging;
 use robot::Model;
-use segment::{Ground, Segment};
-use std::ops::Range;
+use segment::Ground;
 use std::path::Path;
 
 use crate::bodies::Bodies;
 use crate::labelled::{LabelStrip, Labelled};
 use crate::masks::Masks;
+use crate::near::Near;
 use crate::reading::Reading;
 use crate::report::id;
 use crate::spaces::poses;
@@ -40,7 +38,7 @@ pub(crate) struct Labelling<'a> {
     floor: &'a Floor,
     ground: Ground,
     settings: segment::Settings,
-    attach: Attach,
+    merge: merge::Settings,
     /// World bounds of each scan's points, metres.
     bounds: Vec<Aabb>,
     export: export::Settings,
@@ -61,50 +59,6 @@ pub(crate) struct Scope {
     pub(crate) las: Option<LasSettings>,
     /// Whether spatial tiles are left open: something else comes into them.
     pub(crate) leaves_open: bool,
-}
-
-/// What is known of points near robots.
-pub(crate) struct Near {
-    /// Their labels: for each mask, by place.
-    labels: Vec<Vec<PlaceRun<Label>>>,
-    /// What hangs on each robot.
-    hanging: Vec<Hanging>,
-}
-
-impl Near {
-    /// The labels of one mask, for places of which many are neighbours.
-    pub(crate) fn of(&self, mask: MaskId) -> NearOf<'_> {
-        NearOf { runs: &self.labels[mask.0 as usize], last: 0..0, label: None }
-    }
-}
-
-/// Labels of points near robots, of one mask.
-pub(crate) struct NearOf<'a> {
-    runs: &'a [PlaceRun<Label>],
-    /// Places that are labelled as the last one that was asked for.
-    last: Range<u64>,
-    label: Option<Label>,
-}
-
-impl NearOf<'_> {
-    /// The label of a point near a robot.
-    #[inline]
-    pub(crate) fn label(&mut self, place: u64) -> Option<Label> {
-        if !self.last.contains(&place) {
-            self.find(place);
-        }
-        self.label
-    }
-
-    fn find(&mut self, place: u64) {
-        let next = self.runs.partition_point(|run| run.end() <= place);
-        let before = next.checked_sub(1).map_or(0, |before| self.runs[before].end());
-        (self.last, self.label) = match self.runs.get(next) {
-            Some(run) if run.first <= place => (run.first..run.end(), Some(run.what)),
-            Some(run) => (before..run.first, None),
-            None => (before..u64::MAX, None),
-        };
-    }
 }
 
 /// What was written.
@@ -174,7 +128,6 @@ impl<'a> Labelling<'a> {
         settings: &Settings,
     ) -> Self {
         let ground = Ground::new(floor, &settings.segment);
-        let attach = Attach::new(fits, models, settings.merge);
         let mut bounds = vec![Aabb::EMPTY; sources.scans.len()];
         for entry in store.entries() {
             let scan = &mut bounds[entry.at.scan.0 as usize];
@@ -182,8 +135,8 @@ impl<'a> Labelling<'a> {
         }
         let export = settings.export;
         let bodies = export.bodies.then(|| Bodies::new(clusters));
-        let settings = settings.segment;
-        Self { fits, models, sources, floor, ground, settings, attach, bounds, export, bodies }
+        let (settings, merge) = (settings.segment, settings.merge);
+        Self { fits, models, sources, floor, ground, settings, merge, bounds, export, bodies }
     }
 
     /// The floor, for the label of a point that is near no robot.
@@ -191,36 +144,11 @@ impl<'a> Labelling<'a> {
         &self.ground
     }
 
-    /// Segments the tiles near robots, and decides over all scans what hangs on them.
+    /// The labels of points near the robots, and what hangs on them.
     pub(crate) fn near_robots(&self, store: &Store, engine: &Engine) -> Result<Near> {
-        let scans = &self.sources.scans;
-        let segment =
-            || Segment::new(self.fits, self.models, self.floor, scans, self.settings, &AllThreads);
-        let segment = engine.pool()?.install(segment);
-        let regions = segment.regions();
-        let mut tiles: Vec<usize> = regions.iter().flat_map(|r| store.touching(r)).collect();
-        tiles.sort_unstable();
-        tiles.dedup();
-        let task = Task::new("segment").of(crate::progress::Amount::items(tiles.len() as u64));
-        let mut sum = self.attach.empty();
-        let mut labelled: Vec<TileLabels> = Vec::new();
-        let reads = store.reads();
-        engine.pass(task, store.picks_again(tiles), |f| {
-            f.map(&reads).map(&segment).for_each(|mut tile| {
-                self.attach.add(&mut sum, std::mem::take(&mut tile.voxels))?;
-                labelled.push(tile);
-                Ok(())
-            })
-        })?;
-        let attached = self.attach.finish(sum)?;
-        let mut near = vec![Vec::new(); self.sources.masks.len()];
-        for tile in labelled {
-            near[tile.mask.0 as usize].extend(tile.settle(|voxel| attached.label(voxel)));
-        }
-        for labels in &mut near {
-            PlaceRun::join(labels);
-        }
-        Ok(Near { labels: near, hanging: merge::hang(&attached, self.fits, self.models) })
+        let seen = (self.sources.scans.as_slice(), self.sources.masks.len());
+        let place = (store, self.floor, seen);
+        Near::find((self.fits, self.models), place, (self.settings, self.merge), engine)
     }
 
     /// Streams every input once more and writes its labels and tiles, clouds to another folder; then what is said of robots.

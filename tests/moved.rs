@@ -43,7 +43,7 @@ fn a_robot_that_moved_between_stations_has_two_postures() {
     let found = robot.found.as_ref().expect("the robot is found");
     assert!(found.is_right, "it is a {}", found.model);
     assert_eq!([robot.n_postures, found.n_postures], [2, 2], "{}", agreement.table());
-    assert!(agreement.f1() > F1, "{}", agreement.table());
+    assert!(agreement.points.f1() > F1, "{}", agreement.table());
     scans_are_shared_out(&out);
 }
 

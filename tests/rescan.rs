@@ -128,7 +128,7 @@ fn a_rescanned_cell_is_brought_up_to_date() {
     assert_eq!(agreement.n_invented, 0, "{}", agreement.table());
     assert!(agreement.robots.iter().all(|r| r.found.as_ref().is_some_and(|f| f.is_right)));
     assert!(agreement.worst_joint_deg() < 0.3, "{}", agreement.table());
-    assert!(agreement.f1() > F1, "{}", agreement.f1());
+    assert!(agreement.points.f1() > F1, "{}", agreement.points.f1());
 
     // All is whole, and masks of the earlier scans are the same files.
     for name in ["base", "again"] {
@@ -178,7 +178,7 @@ fn a_robot_that_the_earlier_result_missed_did_not_appear() {
     let agreement = Agreement::of_session(&plant.path("again"), &truth, plant.n_masks);
     let agreement = agreement.expect("compares");
     assert!(agreement.robots.iter().all(|r| r.found.as_ref().is_some_and(|f| f.is_right)));
-    assert!(agreement.f1() > F1, "{}", agreement.f1());
+    assert!(agreement.points.f1() > F1, "{}", agreement.points.f1());
 }
 
 /// Rescans of rescans, and what is refused.

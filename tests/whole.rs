@@ -79,7 +79,7 @@ fn the_robot_is_found_and_any_number_of_threads_gives_the_same_bytes() {
     assert_eq!(agreement.n_invented, 0);
     assert!(found.base[0] < BASE, "base off by {} m", found.base[0]);
     assert!(agreement.worst_joint_deg() < JOINT_DEG, "{}", agreement.table());
-    assert!(agreement.f1() > 0.97, "{}", agreement.table());
+    assert!(agreement.points.f1() > 0.97, "{}", agreement.table());
     space_is_told(&dir.path().join("out2"));
     let (one, two) = (files(&dir.path().join("out1")), files(&dir.path().join("out2")));
     assert!(one.keys().eq(two.keys()), "the same files");

@@ -3,11 +3,12 @@
 use crate::calibrate::calibrate;
 use crate::engine::{AllThreads, Engine};
 use crate::job::{Means, Settings};
+use crate::near::Near;
 use crate::search::{Search, Shelf};
 use crate::store::{Scatter, Store};
 use crate::surfaces::{Gather, Surfaces};
 use crate::tools;
-use contract::{Fit, InputId, Lattice, Map, MaskId, Region, Result, Scan, ScanId, Strip};
+use contract::{Fit, InputId, Label, Lattice, Map, MaskId, Region, Result, Scan, ScanId, Strip};
 use geometry::Pose;
 use rayon::prelude::*;
 use robot::Model;
@@ -16,11 +17,23 @@ use std::path::Path;
 use std::time::Instant;
 
 /// A cell as its scanners saw it.
+#[derive(Default)]
 pub(super) struct Cell {
     scans: Vec<Scan>,
     strips: Vec<Strip>,
+    /// What each point of each scan truly lies on.
+    truth: Vec<Vec<Real>>,
+    /// For each thing of the scene, whether it is a hose.
+    hoses: Vec<bool>,
     /// Points that truly lie on the robot.
-    pub(super) n_robot_points: usize,
+    n_robot_points: usize,
+}
+
+/// What a point truly lies on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Real {
+    pub(super) label: Label,
+    pub(super) on_hose: bool,
 }
 
 /// What was found, and how long it took.
@@ -32,6 +45,8 @@ pub(super) struct Found {
     pub(super) seconds: f64,
     /// Where the refinement alone ended from each start.
     pub(super) ends: Vec<Start>,
+    /// What the points near robots are said to be, and for each scan what they are.
+    pub(super) labels: Option<(Near, Vec<Vec<Real>>)>,
 }
 
 /// World from base, and a posture.
@@ -44,7 +59,9 @@ impl Cell {
     /// Scans a scene. `models` are the true ones.
     pub(super) fn scan(scene: &Scene, models: &[Model], engine: &Engine) -> Result<Self> {
         let simulator = Simulator::new(scene, models)?;
-        let mut cell = Self { scans: Vec::new(), strips: Vec::new(), n_robot_points: 0 };
+        let is_hose = |thing: &String| thing.starts_with("hose ");
+        let hoses = simulator.truth().objects.iter().map(is_hose).collect();
+        let mut cell = Self { hoses, ..Self::default() };
         for k in 0..simulator.n_scans() {
             let frame = simulator.frame(k);
             let step = frame.raster.step().to_radians();
@@ -66,6 +83,7 @@ impl Cell {
                 let cast = |c: u32| simulator.columns(k, c..(c + COLUMNS).min(frame.n_cols));
                 firsts.into_par_iter().map(cast).collect()
             });
+            cell.truth.push(Vec::new());
             let mut place = 0;
             for c in &columns {
                 cell.add(k, c, &mut place);
@@ -78,6 +96,9 @@ impl Cell {
         let hits: Vec<usize> = (0..columns.len()).filter(|&i| columns.hit[i]).collect();
         let n_robot = hits.iter().filter(|&&i| columns.label[i].robot == 0).count();
         self.n_robot_points += n_robot;
+        let on_hose = |i: usize| self.hoses.get(usize::from(columns.object[i])) == Some(&true);
+        let real = |&i: &usize| Real { label: columns.label[i], on_hose: on_hose(i) };
+        self.truth[scan].extend(hits.iter().map(real));
         self.strips.push(Strip {
             scan: ScanId(scan as u32),
             mask: MaskId(scan as u32),
@@ -132,6 +153,10 @@ impl Cell {
             fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
         }
         let seconds = started.elapsed().as_secs_f64();
-        Ok(Found { fits, n_robot_points: self.n_robot_points, seconds, ends: Vec::new() })
+        let place = (&store, &ground.surfaces.floor, (scans.as_slice(), scans.len()));
+        let near = Near::find((&fits, &models), place, (settings.segment, settings.merge), engine)?;
+        let n_robot_points = self.n_robot_points;
+        let labels = Some((near, self.truth));
+        Ok(Found { fits, n_robot_points, seconds, labels, ..Found::default() })
     }
 }

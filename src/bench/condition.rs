@@ -49,8 +49,10 @@ pub(super) struct Condition {
     pub(super) other_branch: bool,
     /// Whether the places of joints are estimated, too.
     pub(super) calibrate: bool,
-    /// Share of 0..1 of each kind of clutter being there.
+    /// Share of 0..1 of each kind of clutter being there: fence, conveyor, cabinet and post, hoses along the arm.
     pub(super) clutter: f64,
+    /// Share of 0..1 of each thing that a robot may bear besides: a gripper with a part, a dress pack, a rag.
+    pub(super) laden: f64,
     /// Share of the foot's height that plates about it hide, in a cell fenced in on three sides; 0: none of that.
     pub(super) hidden: f64,
     /// Whether the arm of another robot crosses it.
@@ -83,6 +85,7 @@ pub(super) const PLAIN: Condition = Condition {
     other_branch: false,
     tool: false,
     clutter: 0.0,
+    laden: 0.0,
     hidden: 0.0,
     crossed: false,
     stand: 0.0,
@@ -138,7 +141,7 @@ const SUITES: &[Suite] = &[
     // Beams as in `noise-2`: its errors are told as multiples of those.
     ("mixed", 3, |_| Condition { n_beams: 5e7, mixed: true, ..PLAIN }),
     ("few", 9, |k| Condition { n_scanners: 3 - k % 3, ..PLAIN }),
-    ("clutter", 6, |_| Condition { clutter: 1.0, mixed: true, ..PLAIN }),
+    ("clutter", 6, |_| Condition { clutter: 1.0, laden: 1.0, mixed: true, ..PLAIN }),
     ("hidden", 6, |k| Condition { hidden: [0.25, 0.5, 0.75][k % 3], mixed: true, ..PLAIN }),
     ("crossed", 3, |_| Condition { crossed: true, mixed: true, ..PLAIN }),
     ("shape-1.5", 6, |_| Condition { warp: 0.0015, ..PLAIN }),
@@ -172,6 +175,7 @@ const SUITES: &[Suite] = &[
         n_scanners: 6 - k % 5,
         mixed: true,
         clutter: if k % 2 == 0 { 0.0 } else { 0.7 },
+        laden: if k % 2 == 0 { 0.0 } else { 0.7 },
         stand: 0.6,
         ..PLAIN
     }),

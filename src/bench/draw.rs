@@ -1,5 +1,6 @@
 //! A case in; the scene that its seed draws, with the true base and posture, out.
 
+use super::borne;
 use super::cell::Start;
 use super::condition::{Case, Condition, Place};
 use super::obstacles::{self, Standing};
@@ -10,10 +11,10 @@ use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 use simulate::random::Random;
 use simulate::scene::{
-    Anchor, Column, Cuboid, Fence, Filling, Floor, Furniture, Hose, Mixed, Raster, Registration,
-    RobotPlace, Scanner, Section, Stand, StandShape, ToolShape,
+    Column, Cuboid, Fence, Filling, Floor, Furniture, Mixed, Raster, Registration, RobotPlace,
+    Scanner, Section, Stand, StandShape,
 };
-use simulate::{Postures, Scene, part_in, tool_on};
+use simulate::{Postures, Scene};
 use std::f64::consts::TAU;
 
 /// A case, drawn.
@@ -149,7 +150,8 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     });
     let reach = reach(model, &world_from_base, &posture);
     around(&mut scene, c.clutter, reach[0], &mut random);
-    on_arm(&mut scene, model, c.clutter, reach[0], &mut random);
+    borne::hoses(&mut scene, model, c.clutter, &mut random);
+    borne::load(&mut scene, model, (c.laden, reach[0]), &mut random);
     scanners(&mut scene, c, reach, &mut random);
     let circle = circle(reach);
     let standing = Standing { model, world_from_base, posture: &posture, reach: reach[0], circle };
@@ -321,45 +323,6 @@ fn around(scene: &mut Scene, chance: f64, reach: f64, random: &mut Random) {
         let section = Section::Round;
         scene.columns.push(Column { name: "post".into(), xy, radius: 0.1, height, section });
     }
-}
-
-/// What the robot carries: cables along its arm, and a gripper with a part, each with this chance.
-fn on_arm(scene: &mut Scene, model: &Model, chance: f64, reach: f64, random: &mut Random) {
-    let there = |random: &mut Random| random.unit() < chance;
-    let links = bodies(model);
-    if there(random) && links.len() > 3 {
-        // A cable along the arm: from the second body to the last but one.
-        let hang = |l: usize| {
-            let size = model.links[l].bounds.size();
-            let middle = model.links[l].bounds.center();
-            Anchor {
-                robot: Some("R1".into()),
-                link: Some(model.links[l].name.clone()),
-                xyz: [middle.x, middle.y, middle.z + 0.5 * size[2] + 0.03],
-            }
-        };
-        for k in 1..links.len().saturating_sub(2).min(3) {
-            scene.hoses.push(Hose {
-                name: format!("hose {k}"),
-                anchors: vec![hang(links[k]), hang(links[k + 1])],
-                radius: random.between(0.015, 0.025),
-                sag: 0.1,
-            });
-        }
-    }
-    if let (true, Some(flange)) = (there(random), model.flanges().first()) {
-        let side = (0.25 * reach).clamp(0.1, 0.4);
-        let gripper = tool_on(model, *flange, ToolShape::Gripper, 0.5 * side);
-        scene.carried.push(part_in(&gripper, "R1", [side, 0.7 * side, 0.5 * side]));
-        scene.robots[0].tool = Some(gripper);
-    }
-}
-
-/// Links of the main chain that have a surface.
-fn bodies(model: &Model) -> Vec<usize> {
-    let first = model.main_chain.first().map(|&j| model.joints[j].parent);
-    let links = first.into_iter().chain(model.main_chain.iter().map(|&j| model.joints[j].child));
-    links.filter(|&l| !model.links[l].bounds.is_empty()).collect()
 }
 
 /// Radius of the circle of scanners, metres.

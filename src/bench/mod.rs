@@ -4,11 +4,13 @@
 //! main job, from strips of points on: nothing but the scans' points and stated poses goes in. Suites and their goals
 //! follow METHOD.md §19.
 
+mod borne;
 mod cases;
 mod cell;
 mod condition;
 mod draw;
 mod growth;
+mod labels;
 mod limits;
 mod obstacles;
 pub mod plant;

@@ -118,7 +118,7 @@ const SUITES: &[Suite] = &[
 ];
 
 /// A link with fewer points has no say in the median of links.
-const MIN_LINK_POINTS: u64 = 50;
+pub(super) const MIN_LINK_POINTS: u64 = 50;
 /// A thing with fewer points is not asked whether it was lost.
 const MIN_OBJECT_POINTS: u64 = 200;
 
@@ -283,11 +283,11 @@ fn judge(row: &mut Row, agreement: &Agreement) {
         }
     }
     row.worst_joint = agreement.worst_joint_deg();
-    row.f1 = agreement.f1();
+    row.f1 = agreement.points.f1();
     row.ious = agreement.link_ious(MIN_LINK_POINTS);
     let share = |[part, whole]: [u64; 2]| part as f64 / whole.max(1) as f64;
-    row.attached = (agreement.attached[1] > 0).then(|| share(agreement.attached));
-    row.lost = share([agreement.fixed[1], agreement.fixed[0]]);
+    row.attached = (agreement.points.attached[1] > 0).then(|| share(agreement.points.attached));
+    row.lost = share([agreement.points.fixed[1], agreement.points.fixed[0]]);
     let still = agreement.objects.iter().zip(&agreement.by_object).filter(|(name, count)| {
         let moves = ["robot ", "tool of ", "carried ", "hose "];
         count[0] >= MIN_OBJECT_POINTS && !moves.iter().any(|m| name.starts_with(m))

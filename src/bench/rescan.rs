@@ -149,7 +149,7 @@ fn case(
     (row.joint, row.f1) = ([f64::NAN; 2], [f64::NAN; 2]);
     for (i, agreement) in found.iter().enumerate() {
         row.joint[i] = joint(agreement);
-        row.f1[i] = agreement.f1();
+        row.f1[i] = agreement.points.f1();
     }
     judge(row, (&then, &now), &again)?;
     row.n_same = same(&base, &again)?;

@@ -3,6 +3,7 @@
 use super::cell::{Found, Start};
 use super::condition::Case;
 use super::draw::{Drawn, Mount};
+use super::labels::Told;
 use contract::{Calibration, Error, Fit, Verdict};
 use fit::turns;
 use geometry::{Point, Pose, Vector};
@@ -78,6 +79,8 @@ pub(super) struct Row {
     pub(super) margin: Option<f64>,
     pub(super) reasons: Vec<String>,
     pub(super) seconds: f64,
+    /// How well its points are labelled.
+    pub(super) labels: Option<Told>,
     /// Where joints were found to be and where they are, where that was asked for.
     #[serde(skip)]
     pub(super) calibration: Option<(Calibration, Vec<Pose>)>,
@@ -199,6 +202,8 @@ pub(super) fn score(
     row.margin = fit.runner_up.as_ref().map(|r| r.margin);
     row.reasons = fit.reasons.clone();
     row.calibration = calibration(case, models, drawn, fit);
+    let index = found.fits.iter().position(|f| std::ptr::eq(f, fit));
+    row.labels = index.and_then(|here| Told::of(found, here, model.links.len()));
     if fit.model_name == model.name && fit.joints.len() == model.free.len() {
         row.joints = joints(model, fit, (&drawn.posture, mount));
         displacements(&mut row, model, fit, drawn);

@@ -1,5 +1,6 @@
 //! Rows in; the table for people and the one for programs out.
 
+use super::labels::{Told, share_of};
 use super::score::Row;
 use std::fmt::Write as _;
 
@@ -7,9 +8,10 @@ use std::fmt::Write as _;
 pub(super) fn table(rows: &[Row]) -> String {
     let mut out = String::from(
         "| suite | cases | found | model | right | trusted | wrong, trusted | invented | rms ° | max ° | median worst ° \
-         | base mm | tip mm | tip, world mm | surface mm | z rms | z > 3 | s |\n",
+         | base mm | tip mm | tip, world mm | surface mm | z rms | z > 3 \
+         | link IoU | hoses % | lost % | s |\n",
     );
-    out.push_str(&format!("|{}\n", " --- |".repeat(18)));
+    out.push_str(&format!("|{}\n", " --- |".repeat(21)));
     let rows: Vec<&Row> = rows.iter().filter(|r| r.n_starts == 0).collect();
     let mut suites: Vec<&str> = Vec::new();
     for row in &rows {
@@ -26,7 +28,8 @@ pub(super) fn table(rows: &[Row]) -> String {
     line(&mut out, "**whole**", &ours);
     out.push_str(
         "\nErrors of the joints that a fit says the points determine, over the right fits; base, tip (in the base's frame, \
-         and in the world) and 95 % of the surface: medians / largest; z: error over stated standard deviation.\n",
+         and in the world) and 95 % of the surface: medians / largest; z: error over stated standard deviation. Labels, median / worst: intersection over \
+         union of links, share of hoses' points said to move, share of fixed points said to move.\n",
     );
     let wrong: Vec<&Row> = ours.into_iter().filter(|r| !r.right || r.n_invented > 0).collect();
     if !wrong.is_empty() {
@@ -55,7 +58,7 @@ fn line(out: &mut String, name: &str, rows: &[&Row]) {
     let share = z.iter().filter(|z| z.abs() > 3.0).count() as f64 / z.len().max(1) as f64;
     let _ = writeln!(
         out,
-        "| {name} | {} | {} | {} | {} | {} | {} | {} | {:.4} | {:.4} | {:.4} | {} | {} | {} | {} | {:.2} | {:.1} % | {:.1} |",
+        "| {name} | {} | {} | {} | {} | {} | {} | {} | {:.4} | {:.4} | {:.4} | {} | {} | {} | {} | {:.2} | {:.1} % | {} | {} | {} | {:.1} |",
         rows.len(),
         n(&|r| r.found.is_some()),
         n(&|r| r.right_model),
@@ -72,12 +75,34 @@ fn line(out: &mut String, name: &str, rows: &[&Row]) {
         millimetres(&|r| r.surface[1]),
         rms(&z),
         share * 100.0,
+        shares(told(&right, |t| t.links.clone()), f64::min, (1.0, 4)),
+        shares(told(&right, |t| share_of(t.hoses).into_iter().collect()), f64::min, (100.0, 2)),
+        shares(
+            told(&right, |t| share_of([t.fixed[1], t.fixed[0]]).into_iter().collect()),
+            f64::max,
+            (100.0, 4)
+        ),
         median(&mut seconds),
     );
 }
 
 fn degrees(rows: &[&Row], each: impl Fn(&Row) -> Vec<f64>) -> Vec<f64> {
     rows.iter().flat_map(|r| each(r)).collect()
+}
+
+/// Figures of the labels of each case.
+fn told(rows: &[&Row], each: impl Fn(&Told) -> Vec<f64>) -> Vec<f64> {
+    rows.iter().filter_map(|r| r.labels.as_ref()).flat_map(each).collect()
+}
+
+/// Median and worst of shares, as multiples of a factor; a dash where there are none.
+fn shares(
+    mut values: Vec<f64>,
+    worst: impl Fn(f64, f64) -> f64,
+    (factor, digits): (f64, usize),
+) -> String {
+    let Some(end) = values.iter().copied().reduce(worst) else { return "–".into() };
+    format!("{:.digits$} / {:.digits$}", factor * median(&mut values), factor * end)
 }
 
 fn median(values: &mut [f64]) -> f64 {

@@ -4,7 +4,8 @@
 use super::robots::{Now, bounds, look};
 use super::session::{Labels, Robots, Session, ground};
 use crate::engine::{Engine, Task};
-use crate::labelling::{Labelling, Near};
+use crate::labelling::Labelling;
+use crate::near::Near;
 use crate::search::Search;
 use crate::spaces::region;
 use contract::{Fit, Region, Result, Verdict};

@@ -5,7 +5,7 @@ use super::base::Base;
 use super::fate::Fates;
 use super::places::Places;
 use crate::engine::{Engine, Task};
-use crate::labelling::Near;
+use crate::near::Near;
 use crate::report::tiles;
 use crate::store::Store;
 use contract::{Label, MAX_SKIP, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};

@@ -2,7 +2,7 @@
 
 use super::past::{World, area, sampled, seen};
 use crate::engine::Engine;
-use crate::labelling::Near;
+use crate::near::Near;
 use crate::report::tiles;
 use crate::store::Store;
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
