@@ -8,7 +8,9 @@ use crate::search::{Search, Shelf};
 use crate::store::{Scatter, Store};
 use crate::surfaces::{Gather, Surfaces};
 use crate::tools;
-use contract::{Fit, InputId, Label, Lattice, Map, MaskId, Region, Result, Scan, ScanId, Strip};
+use contract::{
+    Fit, InputId, Label, Lattice, Map, MaskId, Region, Result, Scan, ScanId, Strip, Verdict,
+};
 use geometry::Pose;
 use rayon::prelude::*;
 use robot::Model;
@@ -51,6 +53,17 @@ pub(super) struct Found {
 
 /// World from base, and a posture.
 pub(super) type Start = (Pose, Vec<f64>);
+
+/// What is done beside the search.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Then<'a> {
+    /// Nothing.
+    Nothing,
+    /// No search: the first model's refinement alone, from each of these.
+    Converge(&'a [Start]),
+    /// What was found is adjusted once more, from the truth where that is given.
+    Adjust(Option<&'a Start>),
+}
 
 /// Columns cast at a time.
 const COLUMNS: u32 = 32;
@@ -110,11 +123,10 @@ impl Cell {
         *place += hits.len() as u64;
     }
 
-    /// Sends the scans through the stages of the main job, from the store on; the models of the shelf are
-    /// tried, or the first one is refined from the starts where there are any.
+    /// Sends the scans through the stages of the main job, from the store on; the models of the shelf are tried.
     pub(super) fn search(
         self,
-        (shelf, starts): (&Shelf<'_>, &[Start]),
+        (shelf, then): (&Shelf<'_>, Then<'_>),
         dir: &Path,
         (settings, means, engine): (&Settings, &Means, &Engine),
     ) -> Result<Found> {
@@ -136,10 +148,8 @@ impl Cell {
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let regions = identify::regions(&clusters, &settings.region);
         let search = Search::new(shelf, scans, &store, &ground, settings);
-        if let Some(start) = starts.first() {
-            let base = start.0.translation.vector;
-            let apart = |r: &Region| (r.origin.coords - base).norm();
-            let here = regions.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        if let Then::Converge(starts) = then {
+            let here = starts.first().and_then(|start| nearest(&regions, &start.0));
             let ends = here.map_or(Ok(Vec::new()), |region| search.converge(region, 0, starts))?;
             let n_robot_points = self.n_robot_points;
             return Ok(Found { ends, n_robot_points, ..Found::default() });
@@ -152,6 +162,9 @@ impl Cell {
         if settings.fit.calibrate {
             fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
         }
+        if let Then::Adjust(from) = then {
+            fits = adjusted(&fits, from, (&search, &regions), &models)?;
+        }
         let seconds = started.elapsed().as_secs_f64();
         let place = (&store, &ground.surfaces.floor, (scans.as_slice(), scans.len()));
         let near = Near::find((&fits, &models), place, (settings.segment, settings.merge), engine)?;
@@ -159,4 +172,35 @@ impl Cell {
         let labels = Some((near, self.truth));
         Ok(Found { fits, n_robot_points, seconds, labels, ..Found::default() })
     }
+}
+
+/// The region whose middle is nearest to a base.
+fn nearest<'r>(regions: &'r [Region], world_from_base: &Pose) -> Option<&'r Region> {
+    let apart = |r: &Region| (r.origin.coords - world_from_base.translation.vector).norm();
+    regions.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
+}
+
+/// Fits adjusted once more from where they ended, or from a start of the first one's robot; those that hold.
+fn adjusted(
+    fits: &[Fit],
+    from: Option<&Start>,
+    (search, regions): (&Search<'_, '_>, &[Region]),
+    models: &[Model],
+) -> Result<Vec<Fit>> {
+    let mut out = Vec::new();
+    for fit in fits.iter().filter(|fit| fit.verdict != Verdict::Refused) {
+        let mut before = fit.clone();
+        if let Some((world_from_base, posture)) = from {
+            before.world_from_base = *world_from_base;
+            before.joints.iter_mut().zip(posture).for_each(|(joint, q)| joint.value = *q);
+        }
+        if let Some(region) = nearest(regions, &before.world_from_base) {
+            out.extend(search.again(region, &before, &models[fit.model])?);
+        }
+        // The truth is one robot's.
+        if from.is_some() {
+            break;
+        }
+    }
+    Ok(out)
 }

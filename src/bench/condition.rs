@@ -2,7 +2,6 @@
 
 use super::Bench;
 use contract::{Error, Kind, Result};
-use fit::Method;
 use robot::Model;
 
 /// What a robot is bolted to.
@@ -18,6 +17,21 @@ pub(super) enum Place {
     Wall,
     /// A plate that leans by half a right angle at most.
     Tilted,
+}
+
+/// How the robot of a case is found: as the product does, or as a baseline that it is measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// As the product does.
+    Whole,
+    /// Link after link, as the method's source does.
+    Sequential,
+    /// Link after link, then the product's adjustment.
+    SequentialAdjusted,
+    /// As the product does, but that scans are taken to be where they are said to be.
+    ScansHeld,
+    /// The product's adjustment alone, from the truth: no search can do better.
+    FromTruth,
 }
 
 /// What a cell is like and how it is scanned.
@@ -61,8 +75,8 @@ pub(super) struct Condition {
     pub(super) mount: Place,
     /// How far the plate of such a place stands out from under the foot, metres; 0: a large one.
     pub(super) rim: f64,
-    /// How postures are found.
-    pub(super) method: Method,
+    /// How its posture is found.
+    pub(super) way: Way,
     /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0: the whole search.
     pub(super) perturbed_deg: f64,
     /// Height of a stand is drawn up to this, metres; 0: on the floor.
@@ -91,13 +105,16 @@ pub(super) const PLAIN: Condition = Condition {
     stand: 0.0,
     mount: Place::Floor,
     rim: 0.0,
-    method: Method::Beam,
+    way: Way::Whole,
     perturbed_deg: 0.0,
 };
 /// Perturbations of the basin's curve, degrees (METHOD.md §20).
 const PERTURBED_DEG: [f64; 7] = [2.0, 5.0, 8.0, 12.0, 16.0, 20.0, 30.0];
 /// Errors of a usual registration (METHOD.md §19, T3).
 pub(super) const REGISTRATION: [f64; 3] = [0.002, 0.01, 0.001];
+
+/// Scans as they are usually registered.
+const REGISTERED: Condition = Condition { registration: REGISTRATION, n_beams: 2e7, ..PLAIN };
 
 /// A robot that its model fits poorly: shifts of joints, metres, and turns, degrees.
 const FRAMES: [f64; 2] = [0.002, 0.1];
@@ -116,6 +133,11 @@ pub(super) struct Case {
 }
 
 impl Case {
+    /// Whether it is measured beside the product: its figures are not the product's.
+    pub(super) fn is_baseline(&self) -> bool {
+        self.condition.way != Way::Whole
+    }
+
     /// The same for all cases of a model: they are of one robot.
     pub(super) fn robot(&self) -> u64 {
         self.seed / CASES_OF_A_ROBOT
@@ -131,13 +153,18 @@ type Suite = (&'static str, usize, fn(usize) -> Condition);
 /// All suites, in the order of METHOD.md §19.
 const SUITES: &[Suite] = &[
     ("paper", 3, |_| Condition { n_beams: 5e7, noise: 0.0, ..PLAIN }),
-    ("source", 3, |_| Condition { n_beams: 5e7, noise: 0.0, method: Method::Paper, ..PLAIN }),
+    ("source", 3, |_| Condition { n_beams: 5e7, noise: 0.0, way: Way::Sequential, ..PLAIN }),
     ("models", 3, |_| PLAIN),
     ("noise-1", 3, |_| Condition { n_beams: 5e7, noise: 0.001, ..PLAIN }),
     ("noise-2", 3, |_| Condition { n_beams: 5e7, ..PLAIN }),
     ("noise-5", 3, |_| Condition { n_beams: 5e7, noise: 0.005, ..PLAIN }),
     ("noise-10", 3, |_| Condition { n_beams: 5e7, noise: 0.010, ..PLAIN }),
-    ("registration", 6, |_| Condition { registration: REGISTRATION, n_beams: 2e7, ..PLAIN }),
+    ("registration", 6, |_| REGISTERED),
+    // The same cells as in `registration`, by what others do, and by what none can do.
+    ("sequential", 3, |_| Condition { way: Way::Sequential, ..REGISTERED }),
+    ("sequential-adjusted", 3, |_| Condition { way: Way::SequentialAdjusted, ..REGISTERED }),
+    ("scans-held", 3, |_| Condition { way: Way::ScansHeld, ..REGISTERED }),
+    ("from-truth", 3, |_| Condition { way: Way::FromTruth, ..REGISTERED }),
     // Beams as in `noise-2`: its errors are told as multiples of those.
     ("mixed", 3, |_| Condition { n_beams: 5e7, mixed: true, ..PLAIN }),
     ("few", 9, |k| Condition { n_scanners: 3 - k % 3, ..PLAIN }),

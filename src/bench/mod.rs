@@ -27,8 +27,8 @@ use crate::engine::Engine;
 use crate::job::Means;
 use crate::search::Shelf;
 use crate::{demo, library};
-use cell::Cell;
-use condition::{Case, cases};
+use cell::{Cell, Then};
+use condition::{Case, Way, cases};
 use contract::{Error, Kind, Result};
 use export::atomic;
 use fit::Method;
@@ -112,6 +112,9 @@ fn json(rows: &[Row]) -> Result<String> {
         .map_err(|e| Error::new(Kind::Bug, "rows cannot be written").because(e))
 }
 
+/// Standard deviations of scans that are taken to be where they are said to be: a nanometre, a nanoradian.
+const HELD: [f64; 3] = [1e-9; 3];
+
 /// One case; what goes wrong in it is a row, too.
 fn run(
     case: &Case,
@@ -130,13 +133,22 @@ fn run(
         let few = few(case, models, whole_library);
         let cell = Cell::scan(&drawn.scene, &drawn.models(&real, case), engine)?;
         let mut settings = means.settings.clone();
-        if case.condition.method != Method::default() {
-            settings.fit.method = case.condition.method;
+        let truth = (drawn.world_from_base, drawn.posture.clone());
+        let starts = draw::starts(case, &drawn);
+        let then = match case.condition.way {
+            Way::FromTruth => Then::Adjust(Some(&truth)),
+            Way::SequentialAdjusted => Then::Adjust(None),
+            _ if !starts.is_empty() => Then::Converge(&starts),
+            _ => Then::Nothing,
+        };
+        match case.condition.way {
+            Way::Sequential | Way::SequentialAdjusted => settings.fit.method = Method::Paper,
+            Way::ScansHeld => settings.fit.scan_sigma = HELD,
+            Way::Whole | Way::FromTruth => {}
         }
         settings.fit.calibrate |= case.condition.calibrate;
-        let starts = draw::starts(case, &drawn);
         let search =
-            |shelf: &Shelf<'_>| cell.search((shelf, &starts), store, (&settings, means, engine));
+            |shelf: &Shelf<'_>| cell.search((shelf, then), store, (&settings, means, engine));
         let found = match &few {
             Some(few) => search(&Shelf::new(few)),
             None => search(library),

@@ -49,7 +49,7 @@ pub(super) fn reliability(rows: &[Row]) -> String {
 
 fn suites(rows: &[Row]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
-    for row in rows.iter().filter(|r| r.n_starts == 0 && r.suite != "source") {
+    for row in rows.iter().filter(|r| r.n_starts == 0 && !r.is_baseline) {
         if !out.contains(&row.suite) {
             out.push(row.suite.clone());
         }

@@ -44,6 +44,8 @@ pub(super) struct JointRow {
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct Row {
     pub(super) suite: String,
+    /// Whether it is of a method that the product is measured against.
+    pub(super) is_baseline: bool,
     pub(super) model: String,
     pub(super) seed: u64,
     pub(super) n_scanners: usize,
@@ -91,6 +93,7 @@ impl Row {
         Self {
             model: model.name.clone(),
             suite: case.suite.into(),
+            is_baseline: case.is_baseline(),
             seed: case.seed,
             n_scanners: case.condition.n_scanners,
             ..Self::default()

@@ -21,6 +21,7 @@ const N_POSTURES: usize = 3;
 /// All of them that the rows have something for.
 pub(super) fn tables(rows: &[Row]) -> String {
     let mut out = table_1(rows);
+    out.push_str(&baselines(rows));
     out.push_str(&loops(rows));
     out.push_str(&calibration(rows));
     out.push_str(&basin(rows));
@@ -64,6 +65,41 @@ fn table_1(rows: &[Row]) -> String {
             }
             out.push('\n');
         }
+    }
+    out
+}
+
+/// What others reach in the cells of `registration`, and what none can better, over the joints that the product says there
+/// to be determined.
+fn baselines(rows: &[Row]) -> String {
+    let ours: Vec<&Row> = rows.iter().filter(|r| r.suite == "registration" && r.right).collect();
+    let mut out = String::new();
+    for way in ["registration", "sequential", "sequential-adjusted", "scans-held", "from-truth"] {
+        let pairs: Vec<(&Row, &Row)> = rows
+            .iter()
+            .filter(|r| r.suite == way && r.right_model)
+            .filter_map(|r| {
+                Some((r, *ours.iter().find(|o| (&o.model, o.seed) == (&r.model, r.seed))?))
+            })
+            .collect();
+        if pairs.is_empty() || !rows.iter().any(|r| r.is_baseline && r.suite != "source") {
+            continue;
+        }
+        if out.is_empty() {
+            out.push_str("\nIn the cells of `registration`, largest and rms over the joints that are determined there:\n\n");
+            out.push_str("| way | cells | rms ° | largest ° | tip mm, largest |\n| --- | --- | --- | --- | --- |\n");
+        }
+        let errors: Vec<f64> = pairs
+            .iter()
+            .flat_map(|(row, ours)| row.joints.iter().zip(&ours.joints))
+            .filter(|(_, ours)| ours.determined && !ours.slides)
+            .map(|(joint, _)| joint.error.abs().to_degrees())
+            .collect();
+        let rms = rms(errors.iter().copied());
+        let largest = errors.iter().copied().fold(0.0, f64::max);
+        let tip = pairs.iter().map(|(row, _)| row.tip[0] * 1e3).fold(0.0, f64::max);
+        let way = if way == "registration" { "the product" } else { way };
+        let _ = writeln!(out, "| {way} | {} | {rms:.4} | {largest:.4} | {tip:.2} |", pairs.len());
     }
     out
 }

@@ -23,8 +23,8 @@ pub(super) fn table(rows: &[Row]) -> String {
         let own: Vec<&Row> = rows.iter().copied().filter(|r| r.suite == suite).collect();
         line(&mut out, suite, &own);
     }
-    // The baseline's figures are not the product's.
-    let ours: Vec<&Row> = rows.iter().copied().filter(|r| r.suite != "source").collect();
+    // A baseline's figures are not the product's.
+    let ours: Vec<&Row> = rows.iter().copied().filter(|r| !r.is_baseline).collect();
     line(&mut out, "**whole**", &ours);
     out.push_str(
         "\nErrors of the joints that a fit says the points determine, over the right fits; base, tip (in the base's frame, \
@@ -47,7 +47,7 @@ fn line(out: &mut String, name: &str, rows: &[&Row]) {
     let right: Vec<&Row> = rows.iter().copied().filter(|r| r.right).collect();
     let errors: Vec<f64> = degrees(&right, |r| r.turning().map(|j| j.error.to_degrees()).collect());
     let z: Vec<f64> = degrees(&right, |r| r.determined().map(|j| j.error / j.sigma).collect());
-    let rms = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len().max(1) as f64).sqrt();
+    let rms = |v: &[f64]| (v.iter().fold(0.0, |sum, x| sum + x * x) / v.len().max(1) as f64).sqrt();
     let largest = |v: &[f64]| v.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     let millimetres = |what: &dyn Fn(&Row) -> f64| {
         let mut v: Vec<f64> = right.iter().map(|r| what(r) * 1e3).collect();
