@@ -8,11 +8,11 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Writes the file beside the tiles of `out`; `scratch` is a folder that is taken away when the run ends, however it ends.
+/// Writes the file `to` of the tiles of `out`, if there are any, and says whether; `scratch` is a folder that is taken away when the run ends, however it ends.
 ///
 /// # Errors
 /// Files that cannot be read or written; a run that is cancelled.
-pub(crate) fn write(out: &Path, scratch: &Path, engine: &Engine) -> Result<()> {
+pub(crate) fn write(out: &Path, to: &Path, scratch: &Path, engine: &Engine) -> Result<bool> {
     let steps = Arc::new(Steps {
         progress: engine.progress.clone(),
         cancel: engine.cancel.clone(),
@@ -20,11 +20,11 @@ pub(crate) fn write(out: &Path, scratch: &Path, engine: &Engine) -> Result<()> {
         done: AtomicU64::new(0),
     });
     engine.cancel.check()?;
-    let write = || guarded("copc", 0, || export::write_copc(out, scratch, &steps));
+    let write = || guarded("copc", 0, || export::write_copc(out, to, scratch, &steps));
     let written = engine.pool()?.install(write);
     // Of the disk only, and what is left is taken away by the next run.
     let _ = std::fs::remove_dir_all(scratch);
-    written.map(|_| ())
+    written
 }
 
 /// Steps of the conversion as stages of the run.

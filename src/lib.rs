@@ -7,6 +7,7 @@ pub mod calibrate;
 pub mod changes;
 pub mod cli;
 pub mod compare;
+pub mod conversion;
 mod copc;
 pub mod demo;
 pub mod engine;

@@ -20,6 +20,7 @@ use crate::store::Store;
 use crate::surfaces::{Gather, Ground, Surfaces};
 use crate::tools;
 use contract::{Cluster, Fit, Floor, Input, Region, Result, Scan, Space};
+use export::COPC;
 use ingest::{Scanners, Sources};
 use robot::{Library, Model};
 use std::path::PathBuf;
@@ -193,7 +194,7 @@ impl Run<'_> {
             .write((&near, spaces), &Scope::default(), (next, next), engine)?
             .finish(engine)?;
         if settings.export.copc {
-            copc::write(next, &self.output.scratch(), engine)?;
+            copc::write(next, &next.join(COPC), &self.output.scratch(), engine)?;
         }
         Ok(written)
     }

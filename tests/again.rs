@@ -78,9 +78,20 @@ fn what_is_there_is_used_again_and_what_is_not_is_made() {
     assert!(text.contains("tiles: 1 of 1") && text.contains("used again: fits:"), "{text}");
     same(&dir.join("first"), &dir.join("again"));
 
+    // What is made of a result afterwards goes with it.
+    let export = |out: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
+        command.current_dir(dir).args(["export", out, "--to", "ply", "--progress", "none"]);
+        command.output().expect("the program starts")
+    };
+    assert!(export("again").status.success());
+    assert!(dir.join("again/export/fixed.ply").is_file());
+    assert_eq!(export("nothing").status.code(), Some(4));
+
     // A parameter of the fit touches no tiles; a damaged store is made again.
     let refit = said(&run(dir, "again", &["--set", "fit.n_judge=300"]));
     assert!(refit.contains("tiles: 1 of 1") && !refit.contains("fits:"), "{refit}");
+    assert!(!dir.join("again/export").exists());
     for entry in std::fs::read_dir(dir.join("again/store/tiles")).expect("a folder") {
         let path = entry.expect("an entry").path().join("catalogue.rkyv");
         let mut bytes = std::fs::read(&path).expect("a catalogue");

@@ -121,7 +121,7 @@ fn electrodes_are_found_beside_what_hangs_on_them() {
     assert!(tip < 1e-3, "{:#}", rows[0]);
     // What hangs along the arm goes with it; what stands beside it does not.
     let [moving, all] = [0, 1].map(|i| rows[0]["labels"]["hoses"][i].as_f64().expect("a count"));
-    assert!(all > 1000.0 && moving > 0.9 * all, "{:#}", rows[0]);
+    assert!(all > 500.0 && moving > 0.9 * all, "{:#}", rows[0]);
     let [all, lost] = [0, 1].map(|i| rows[0]["labels"]["fixed"][i].as_f64().expect("a count"));
     assert!(all > 1000.0 && lost < 1e-4 * all, "{:#}", rows[0]);
 }
@@ -141,10 +141,14 @@ fn adjusting_from_the_truth_is_no_better_and_going_link_after_link_is_worse() {
     };
     let [ours, sequential, held, from_truth] = [0, 1, 2, 3].map(|i| error(&rows[i]));
     assert!((ours - from_truth).abs() < 0.01, "{ours} {from_truth}");
-    assert!(sequential > 3.0 * ours && held > 3.0 * ours, "{sequential} {held} {ours}");
+    assert!(sequential > 3.0 * ours && sequential < 0.5, "{sequential} {ours}");
+    assert!(held > 3.0 * ours && held < 0.2, "{held} {ours}");
     assert_eq!(rows[1]["is_baseline"], true);
     let text = std::fs::read_to_string(out.path().join("accuracy.md")).expect("is written");
-    assert!(text.contains("| the product | 1 |") && text.contains("| from-truth | 1 |"), "{text}");
+    assert!(
+        text.contains("| the product | 1 of 1 |") && text.contains("| from-truth | 1 of 1 |"),
+        "{text}"
+    );
 }
 
 /// Real models, where they are there, by links in a folder of their own beside what else is in it; whether they are.

@@ -20,9 +20,9 @@ pub(super) struct Told {
 }
 
 impl Told {
-    /// Compares the labels with the truth, where robot 0 is what the fit `here` found, with so many links. Of points of other
-    /// robots nothing is asked.
-    pub(super) fn of(found: &Found, here: usize, n_links: usize) -> Option<Self> {
+    /// Compares the labels with the truth, where robot 0 is what the fit `here` found, if any did, with so many links. Of points
+    /// of other robots nothing is asked.
+    pub(super) fn of(found: &Found, here: Option<usize>, n_links: usize) -> Option<Self> {
         let (near, truth) = found.labels.as_ref()?;
         let mut tally = Tally::new(std::iter::once(n_links));
         let mut hoses = [0; 2];
@@ -30,7 +30,7 @@ impl Told {
             let mut said = near.of(MaskId(scan as u32));
             for (place, real) in points.iter().enumerate().filter(|(_, p)| p.label.robot <= 0) {
                 let said = said.label(place as u64).unwrap_or(Label::FIXED);
-                tally.add(said, real.label, |robot| (robot == here).then_some(0));
+                tally.add(said, real.label, |robot| (Some(robot) == here).then_some(0));
                 if real.on_hose {
                     hoses[0] += u64::from(said.moves());
                     hoses[1] += 1;

@@ -112,8 +112,8 @@ fn json(rows: &[Row]) -> Result<String> {
         .map_err(|e| Error::new(Kind::Bug, "rows cannot be written").because(e))
 }
 
-/// Standard deviations of scans that are taken to be where they are said to be: a nanometre, a nanoradian.
-const HELD: [f64; 3] = [1e-9; 3];
+/// Standard deviations of shift and turn of scans that are taken to be where they are said to be: a nanometre, a nanoradian.
+const HELD: f64 = 1e-9;
 
 /// One case; what goes wrong in it is a row, too.
 fn run(
@@ -143,7 +143,7 @@ fn run(
         };
         match case.condition.way {
             Way::Sequential | Way::SequentialAdjusted => settings.fit.method = Method::Paper,
-            Way::ScansHeld => settings.fit.scan_sigma = HELD,
+            Way::ScansHeld => settings.fit.scan_sigma[..2].fill(HELD),
             Way::Whole | Way::FromTruth => {}
         }
         settings.fit.calibrate |= case.condition.calibrate;

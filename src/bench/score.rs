@@ -195,6 +195,8 @@ pub(super) fn score(
     if !found.ends.is_empty() {
         return row.with_ends(case, model, drawn, found);
     }
+    let index = found.fits.iter().position(|f| here.is_some_and(|fit| std::ptr::eq(f, fit)));
+    row.labels = Told::of(found, index, model.links.len());
     let Some(fit) = here else { return row };
     row.found = Some(fit.model_name.clone());
     row.verdict = fit.verdict.word().into();
@@ -205,8 +207,6 @@ pub(super) fn score(
     row.margin = fit.runner_up.as_ref().map(|r| r.margin);
     row.reasons = fit.reasons.clone();
     row.calibration = calibration(case, models, drawn, fit);
-    let index = found.fits.iter().position(|f| std::ptr::eq(f, fit));
-    row.labels = index.and_then(|here| Told::of(found, here, model.links.len()));
     if fit.model_name == model.name && fit.joints.len() == model.free.len() {
         row.joints = joints(model, fit, (&drawn.posture, mount));
         displacements(&mut row, model, fit, drawn);

@@ -69,37 +69,44 @@ fn table_1(rows: &[Row]) -> String {
     out
 }
 
-/// What others reach in the cells of `registration`, and what none can better, over the joints that the product says there
-/// to be determined.
+/// The ways that are set beside one another, first the product's.
+const WAYS: [&str; 5] =
+    ["registration", "sequential", "sequential-adjusted", "scans-held", "from-truth"];
+
+/// What others reach in the cells of `registration` that all of them were given, and what none can better, over the joints that
+/// the product says there to be determined.
 fn baselines(rows: &[Row]) -> String {
-    let ours: Vec<&Row> = rows.iter().filter(|r| r.suite == "registration" && r.right).collect();
+    let given = |way: &str| rows.iter().any(|r| r.suite == way);
+    let ways: Vec<&str> = WAYS.into_iter().filter(|way| given(way)).collect();
     let mut out = String::new();
-    for way in ["registration", "sequential", "sequential-adjusted", "scans-held", "from-truth"] {
-        let pairs: Vec<(&Row, &Row)> = rows
-            .iter()
-            .filter(|r| r.suite == way && r.right_model)
-            .filter_map(|r| {
-                Some((r, *ours.iter().find(|o| (&o.model, o.seed) == (&r.model, r.seed))?))
-            })
-            .collect();
-        if pairs.is_empty() || !rows.iter().any(|r| r.is_baseline && r.suite != "source") {
-            continue;
-        }
-        if out.is_empty() {
-            out.push_str("\nIn the cells of `registration`, largest and rms over the joints that are determined there:\n\n");
-            out.push_str("| way | cells | rms ° | largest ° | tip mm, largest |\n| --- | --- | --- | --- | --- |\n");
-        }
-        let errors: Vec<f64> = pairs
-            .iter()
-            .flat_map(|(row, ours)| row.joints.iter().zip(&ours.joints))
-            .filter(|(_, ours)| ours.determined && !ours.slides)
-            .map(|(joint, _)| joint.error.abs().to_degrees())
-            .collect();
-        let rms = rms(errors.iter().copied());
+    if ways.len() < 2 || ways[0] != WAYS[0] {
+        return out;
+    }
+    let of = |way: &str, cell: &Row| {
+        rows.iter().find(|r| r.suite == way && r.model == cell.model && r.seed == cell.seed)
+    };
+    let shared = |cell: &&Row| cell.suite == WAYS[0] && ways.iter().all(|w| of(w, cell).is_some());
+    let cells: Vec<&Row> = rows.iter().filter(shared).collect();
+    out.push_str("\nIn the same cells, over the joints that the product says to be determined; found: model and place are right.\n\n");
+    out.push_str(
+        "| way | found | rms ° | largest ° | tip mm, largest |\n| --- | --- | --- | --- | --- |\n",
+    );
+    for way in ways {
+        let pairs = cells.iter().filter_map(|ours| Some((of(way, ours)?, *ours)));
+        let found: Vec<(&Row, &Row)> = pairs.filter(|(row, _)| row.right_model).collect();
+        let joints = found.iter().flat_map(|(row, ours)| row.joints.iter().zip(&ours.joints));
+        let known = joints.filter(|(_, ours)| ours.determined && !ours.slides);
+        let errors: Vec<f64> = known.map(|(joint, _)| joint.error.abs().to_degrees()).collect();
         let largest = errors.iter().copied().fold(0.0, f64::max);
-        let tip = pairs.iter().map(|(row, _)| row.tip[0] * 1e3).fold(0.0, f64::max);
-        let way = if way == "registration" { "the product" } else { way };
-        let _ = writeln!(out, "| {way} | {} | {rms:.4} | {largest:.4} | {tip:.2} |", pairs.len());
+        let tip = found.iter().map(|(row, _)| row.tip[0] * 1e3).fold(0.0, f64::max);
+        let way = if way == WAYS[0] { "the product" } else { way };
+        let _ = writeln!(
+            out,
+            "| {way} | {} of {} | {:.4} | {largest:.4} | {tip:.2} |",
+            found.len(),
+            cells.len(),
+            rms(errors.iter().copied()),
+        );
     }
     out
 }

@@ -78,7 +78,7 @@ fn line(out: &mut String, name: &str, rows: &[&Row]) {
         shares(told(&right, |t| t.links.clone()), f64::min, (1.0, 4)),
         shares(told(&right, |t| share_of(t.hoses).into_iter().collect()), f64::min, (100.0, 2)),
         shares(
-            told(&right, |t| share_of([t.fixed[1], t.fixed[0]]).into_iter().collect()),
+            told(rows, |t| share_of([t.fixed[1], t.fixed[0]]).into_iter().collect()),
             f64::max,
             (100.0, 4)
         ),

@@ -36,6 +36,8 @@ pub(super) enum Command {
     Verify(OutFlags),
     /// What a run came to, once more; robots as cases for a build server with --junit
     Report(ReportFlags),
+    /// A result's points in another format: COPC or PLY
+    Export(ExportFlags),
     /// Which robots differ between two results of one plant: moved, exchanged, appeared, gone
     Diff(DiffFlags),
     /// Which results lie in a folder, which goes on from which, and what each takes; --remove takes one away
@@ -133,6 +135,25 @@ pub(super) struct RescanFlags {
     /// The cell is what these robots of the earlier run reach
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     pub(super) robot: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ExportFlags {
+    /// Output folder of a run
+    #[arg(value_name = "OUT")]
+    pub(super) out: PathBuf,
+    /// Which format; files go to OUT/export, which the next run into OUT takes away
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    pub(super) to: FormatName,
+}
+
+/// What a result's points can be written as.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+pub(super) enum FormatName {
+    /// One LAZ of all points, as an octree that viewers load piece by piece (Potree, QGIS)
+    Copc,
+    /// Two PLY files: what moves, and what stands still (Open3D, MeshLab)
+    Ply,
 }
 
 #[derive(Debug, Args)]

@@ -39,6 +39,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Rescan(flags) => run::rescan(flags, &line.common, &say),
         Command::Verify(flags) => results::verify(flags, &line.common, &say),
         Command::Report(flags) => results::report(flags, &say),
+        Command::Export(flags) => results::export(flags, &line.common, &say),
         Command::Diff(flags) => results::diff(flags, &say),
         Command::History(flags) => results::history(flags, &say),
         Command::Bench(BenchCommand::Accuracy(flags)) => {

@@ -81,7 +81,7 @@ impl Written<'_, '_> {
         let is_new = |path: &str| written.contains(path) || is_of(path, &folders);
         let shared = self.base.share_files(next, is_new)?;
         if has_copc {
-            copc::write(next, &scratch, engine)?;
+            copc::write(next, &next.join(COPC), &scratch, engine)?;
         }
         let fresh = done.digests.iter().filter(|sum| sum.path.starts_with(next));
         let mut known: Vec<OutputFile> = fresh.map(|sum| OutputFile::of(next, sum)).collect();

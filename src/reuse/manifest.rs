@@ -17,6 +17,8 @@ use std::path::{Path, PathBuf};
 const LIST: &str = "manifest.json";
 /// The file that vouches for all others: it goes first and comes last.
 const RESULT: &str = "result.json";
+/// Where files lie that are made of a result afterwards; the list does not name them.
+pub(crate) const EXPORT: &str = "export";
 /// What the list's format is called.
 const SCHEMA: &str = "stillpoint.manifest/1";
 
@@ -149,6 +151,7 @@ impl Manifest {
         for file in old.iter().filter(|file| !stays(&file.path)) {
             remove(&out.join(&file.path))?;
         }
+        forget_exports(out);
         shift(&next.join(RESULT), &out.join(RESULT))?;
         shift(&next.join(LIST), &out.join(LIST))?;
         // Empty folders; where they stay the next run takes them away.
@@ -172,6 +175,16 @@ impl Manifest {
             ],
         }
     }
+}
+
+/// Takes away what was made of the result that was there; nothing else that lies beside it. What cannot be taken away must not keep a
+/// result that is whole from its place.
+fn forget_exports(out: &Path) {
+    let folder = out.join(EXPORT);
+    for name in crate::conversion::names() {
+        let _ = std::fs::remove_file(folder.join(name));
+    }
+    let _ = std::fs::remove_dir(folder);
 }
 
 /// Whether the files of a result are what they were when they were written; all of them are read.

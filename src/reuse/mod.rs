@@ -22,6 +22,7 @@ use std::sync::OnceLock;
 
 pub(crate) use cache::{Cache, read, written};
 pub(crate) use contents::Pace;
+pub(crate) use manifest::EXPORT;
 pub(crate) use tree::{Part, Tree};
 
 /// A digest of what a piece is made from, as 32 hexadecimal digits: the name of its file.

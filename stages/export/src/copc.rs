@@ -33,13 +33,14 @@ pub trait CopcSteps: Send + Sync {
     fn ends(&self) -> Result<()>;
 }
 
-/// Writes [`COPC`] of all tiles under `out`; false where there are none. It keeps files as large as the cloud under `scratch`
+/// Writes a file of all tiles under `out`; false where there are none. It keeps files as large as the cloud under `scratch`
 /// meanwhile, and works on the threads of the pool that it is called in.
 ///
 /// # Errors
 /// Files that cannot be read or written; a step that is to be the last.
 pub fn write_copc(
     out: &Path,
+    to: &Path,
     scratch: &Path,
     steps: &Arc<impl CopcSteps + 'static>,
 ) -> Result<bool> {
@@ -47,7 +48,7 @@ pub fn write_copc(
     if tiles.is_empty() {
         return Ok(false);
     }
-    let path = out.join(COPC);
+    let path = to.to_path_buf();
     let mut file = AtomicFile::create(&path)?;
     std::fs::create_dir_all(scratch)
         .map_err(|e| Error::of_file("folder cannot be made", scratch, e))?;
@@ -78,7 +79,7 @@ pub fn write_copc(
 }
 
 /// The tiles of an output folder, in the order of their names.
-fn tiles(out: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn tiles(out: &Path) -> Result<Vec<PathBuf>> {
     let folder = out.join("tiles");
     let failed = |e| Error::of_file("tiles cannot be listed", &folder, e);
     let listed = match std::fs::read_dir(&folder) {
@@ -89,6 +90,8 @@ fn tiles(out: &Path) -> Result<Vec<PathBuf>> {
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<std::io::Result<Vec<PathBuf>>>()
         .map_err(failed)?;
+    // What systems leave in folders is no tile.
+    tiles.retain(|path| path.extension().is_some_and(|e| e == "las" || e == "laz"));
     tiles.sort();
     Ok(tiles)
 }

@@ -20,6 +20,7 @@ mod octomap;
 mod pack;
 mod places;
 mod plan_picture;
+mod ply;
 mod record;
 mod refill;
 mod result;
@@ -48,6 +49,7 @@ pub use npy::{Element, NpyWriter, read_places};
 pub use pack::{Pack, Packed, PointColumns};
 pub use places::Places;
 pub use plan_picture::PlanPicture;
+pub use ply::{PLY, write_ply};
 pub use record::{LasSettings, Quantum, RawVlr, class_of};
 pub use refill::OldPoint;
 pub use result::{

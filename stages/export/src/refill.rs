@@ -14,7 +14,7 @@ use std::ops::Range;
 use std::path::Path;
 
 /// What points of each class are.
-const KINDS: [PointKind; 256] = {
+pub(crate) const KINDS: [PointKind; 256] = {
     let mut kinds = [PointKind::Uncertain; 256];
     let mut i = 0;
     while i < CLASSES.len() {

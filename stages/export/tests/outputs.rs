@@ -149,7 +149,8 @@ impl CopcSteps for Quiet {
 
 fn copc(out: &Path, n_threads: usize) -> bool {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
-    let write = || write_copc(out, &out.join("scratch"), &std::sync::Arc::new(Quiet));
+    let write =
+        || write_copc(out, &out.join(COPC), &out.join("scratch"), &std::sync::Arc::new(Quiet));
     pool.install(write).expect("writes")
 }
 
@@ -183,6 +184,49 @@ fn tiles_make_one_copc_file_the_same_for_any_number_of_threads() {
         assert!(whole == tiles);
     }
     assert!(!copc(&folder("copc_of_nothing"), 1));
+}
+
+/// The header of a PLY file, and its points' bytes.
+fn ply(path: &Path) -> (String, Vec<[u8; 34]>) {
+    let bytes = std::fs::read(path).expect("reads");
+    let end = b"end_header\n";
+    let at = bytes.windows(end.len()).position(|w| w == end).expect("a header") + end.len();
+    let (points, rest) = bytes[at..].as_chunks::<34>();
+    assert!(rest.is_empty());
+    (String::from_utf8(bytes[..at].to_vec()).expect("text"), points.to_vec())
+}
+
+#[test]
+fn ply_files_hold_each_point_once_moving_and_fixed_apart() {
+    let out = folder("ply");
+    let written = clouds(&out, N, [true, true], 1 << 20);
+    let n = export::write_ply(&out, &out.join("export"), || Ok(()))
+        .expect("writes")
+        .expect("has tiles");
+    assert_eq!(n.iter().sum::<u64>(), N as u64);
+    let mut whole = Vec::new();
+    for (name, n) in export::PLY.iter().zip(n) {
+        let (header, points) = ply(&out.join("export").join(name));
+        assert!(header.contains(&format!("element vertex {n}\n")), "{header}");
+        assert_eq!(points.len() as u64, n);
+        let moves = |p: &[u8; 34]| p[26] == 1 || p[26] == 2;
+        assert!(points.iter().all(|p| moves(p) == (*name == export::PLY[0])));
+        whole.extend(points);
+    }
+    let of_tiles = written.tiles.iter().flat_map(|tile| read(&tile.path).1);
+    let mut tiles: Vec<[u64; 3]> = of_tiles.map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect();
+    let number = |p: &[u8; 34], i: usize| {
+        u64::from_le_bytes(p[8 * i..8 * i + 8].try_into().expect("eight bytes"))
+    };
+    // Colours, as the tiles have them.
+    assert!(whole.iter().any(|p| p[31..] != [0; 3]));
+    let mut found: Vec<[u64; 3]> = whole.iter().map(|p| [0, 1, 2].map(|i| number(p, i))).collect();
+    tiles.sort_unstable();
+    found.sort_unstable();
+    assert!(tiles == found);
+    assert!(
+        export::write_ply(&folder("ply_of_nothing"), &out, || Ok(())).expect("looks").is_none()
+    );
 }
 
 #[test]

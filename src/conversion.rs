@@ -1,0 +1,60 @@
+//! A result that is whole in; its points in another format out, in `OUT/export`, which the next run into OUT takes away.
+
+use crate::copc;
+use crate::engine::Engine;
+use crate::job::Job;
+use crate::progress::Amount;
+use crate::reuse::EXPORT;
+use contract::{Error, Kind, Result};
+use export::{COPC, PLY, ResultFile, write_ply};
+use std::path::{Path, PathBuf};
+
+/// What points can be written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// One LAZ of all points, as an octree that viewers load piece by piece.
+    Copc,
+    /// Two PLY files: what moves, and what stands still.
+    Ply,
+}
+
+/// Names of all files that points are written to.
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    PLY.into_iter().chain([COPC.rsplit('/').next().unwrap_or(COPC)])
+}
+
+/// Writes the points of the result in `out`; the files' paths.
+///
+/// # Errors
+/// No result, or one without tiles; another run at work in it; files that cannot be read or written.
+pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBuf>> {
+    ResultFile::read(out)?;
+    // A result that was copied without its store has nobody at work in it.
+    let _lock = out.join("store").is_dir().then(|| Job::hold(out)).transpose()?;
+    let into = out.join(EXPORT);
+    let written = match format {
+        Format::Copc => {
+            let to = into.join(COPC.rsplit('/').next().unwrap_or(COPC));
+            let written = copc::write(out, &to, &into.join("scratch"), engine);
+            let damaged = |e: Error| match e.kind() {
+                Kind::Bug => {
+                    e.hint("`stillpoint verify` says whether the result's tiles are whole")
+                }
+                _ => e,
+            };
+            written.map_err(damaged)?.then(|| vec![to])
+        }
+        Format::Ply => {
+            let stage = engine.progress.stage("ply", Amount::items(0));
+            let points = write_ply(out, &into, || engine.cancel.check())?;
+            points.iter().for_each(|n| stage.add(0, n.iter().sum(), 0));
+            stage.finish();
+            points.map(|_| PLY.map(|name| into.join(name)).to_vec())
+        }
+    };
+    written.ok_or_else(|| {
+        Error::bad_input("the result has no tiles to read its points from")
+            .at(out.join("tiles").display())
+            .hint("run with --set export.tiles=true")
+    })
+}

@@ -1,0 +1,147 @@
+//! The tiles of a result in; two PLY files of their points out, one of what moves and one of what stands still, for viewers and
+//! libraries that read no LAS (Open3D, MeshLab).
+
+use crate::atomic::AtomicFile;
+use crate::copc::tiles;
+use crate::refill::KINDS;
+use contract::{Error, Kind, PointKind, Result};
+use std::io::{Seek, SeekFrom, Write};
+use std::path::Path;
+
+/// Their names: what moves, what stands still.
+pub const PLY: [&str; 2] = ["robots.ply", "fixed.ply"];
+
+/// Points that are read at a time.
+const PIECE: u64 = 1 << 16;
+/// Length of a header, bytes: a comment makes it so long, so that the number of points can be written last.
+const HEADER: usize = 512;
+
+/// Writes [`PLY`] into a folder, of all tiles under `out`; `told` is asked before each whether to go on. Numbers of points; none
+/// where there are no tiles.
+///
+/// # Errors
+/// Files that cannot be read or written; what `told` says, which ends the work.
+pub fn write_ply(
+    out: &Path,
+    into: &Path,
+    told: impl Fn() -> Result<()>,
+) -> Result<Option<[u64; 2]>> {
+    let tiles = tiles(out)?;
+    if tiles.is_empty() {
+        return Ok(None);
+    }
+    let bad = |e: las::Error, tile: &Path| {
+        Error::bad_input("tile cannot be read")
+            .because(e)
+            .at(tile.display())
+            .hint("`stillpoint verify` says whether the result is whole")
+    };
+    let open = |tile: &Path| las::Reader::from_path(tile).map_err(|e| bad(e, tile));
+    // All tiles of a result have the same records.
+    let has_color = open(&tiles[0])?.header().point_format().has_color;
+    let [moving, fixed] = PLY.map(|name| Ply::create(&into.join(name), has_color));
+    let (mut moving, mut fixed) = (moving?, fixed?);
+    for tile in &tiles {
+        told()?;
+        let bad = |e| bad(e, tile);
+        let mut reader = open(tile)?;
+        loop {
+            let piece = reader.read_points(PIECE).map_err(bad)?;
+            if piece.is_empty() {
+                break;
+            }
+            for point in piece.points() {
+                let point = point.map_err(bad)?;
+                let kind = KINDS[usize::from(u8::from(point.classification))];
+                let moves = matches!(kind, PointKind::Link | PointKind::Attachment);
+                if moves { &mut moving } else { &mut fixed }.add(&point, kind)?;
+            }
+        }
+    }
+    told()?;
+    Ok(Some([moving.finish()?, fixed.finish()?]))
+}
+
+/// A PLY file that is being written.
+struct Ply {
+    file: AtomicFile,
+    n: u64,
+    has_color: bool,
+}
+
+impl Ply {
+    fn create(path: &Path, has_color: bool) -> Result<Self> {
+        let mut ply = Self { file: AtomicFile::create(path)?, n: 0, has_color };
+        ply.write(&header(0, has_color)?)?;
+        Ok(ply)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        let written = self.file.write_all(bytes);
+        written.map_err(|e| Error::of_file("cloud cannot be written", self.file.path(), e))
+    }
+
+    fn add(&mut self, point: &las::Point, kind: PointKind) -> Result<()> {
+        let mut record = [0; RECORD];
+        let numbers = [point.x, point.y, point.z].map(f64::to_le_bytes);
+        record[..24].copy_from_slice(numbers.as_flattened());
+        record[24..26].copy_from_slice(&point.intensity.to_le_bytes());
+        record[26] = kind as u8;
+        // Fields `RobotId` and `LinkId`: numbers from 1 on, 0 for none.
+        let index = |at: usize| {
+            let bytes = point.extra_bytes.get(at..at + 2).unwrap_or(&[0, 0]);
+            u16::from_le_bytes([bytes[0], bytes[1]]).wrapping_sub(1).to_le_bytes()
+        };
+        record[27..31].copy_from_slice([index(0), index(2)].as_flattened());
+        let color = point.color.map_or([0; 3], |c| [c.red, c.green, c.blue]);
+        record[31..].copy_from_slice(&color.map(|v| (v >> 8) as u8));
+        self.n += 1;
+        self.write(&record[..if self.has_color { RECORD } else { 31 }])
+    }
+
+    fn finish(mut self) -> Result<u64> {
+        let sought = self.file.seek(SeekFrom::Start(0));
+        sought.map_err(|e| Error::of_file("cloud cannot be finished", self.file.path(), e))?;
+        let header = header(self.n, self.has_color)?;
+        self.write(&header)?;
+        self.file.commit()?;
+        Ok(self.n)
+    }
+}
+
+/// Length of a point with its colour, bytes.
+const RECORD: usize = 34;
+
+fn header(n: u64, has_color: bool) -> Result<Vec<u8>> {
+    let color = if has_color {
+        "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    } else {
+        ""
+    };
+    let before = "ply\nformat binary_little_endian 1.0\ncomment ";
+    let after = format!(
+        "\nelement vertex {n}\nproperty double x\nproperty double y\nproperty double z\nproperty ushort intensity\n\
+         property uchar kind\nproperty short robot\nproperty short link\n{color}end_header\n"
+    );
+    let room = HEADER.checked_sub(before.len() + after.len());
+    let room = room.ok_or_else(|| Error::new(Kind::Bug, "a PLY header is too long"))?;
+    let comment = "kind: 0 fixed, 1 link, 2 attachment, 3 floor, 255 uncertain; robot, link: as in result.json, -1 none";
+    Ok(format!("{before}{comment:.<room$}{after}").into_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers_of_few_and_many_points_are_as_long() {
+        for (n, has_color) in [(0, true), (1, false), (u64::MAX, true)] {
+            let header = header(n, has_color).expect("fits");
+            assert_eq!(header.len(), HEADER, "{n}");
+            let text = String::from_utf8(header).expect("text");
+            assert!(
+                text.contains(&format!("element vertex {n}\n")) && text.ends_with("end_header\n")
+            );
+        }
+    }
+}
