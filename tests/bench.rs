@@ -151,6 +151,21 @@ fn adjusting_from_the_truth_is_no_better_and_going_link_after_link_is_worse() {
     );
 }
 
+#[test]
+fn robots_whose_joints_are_elsewhere_are_doubted_until_they_are_calibrated() {
+    let out = tempfile::tempdir().expect("a folder");
+    let args =
+        ["--suite", "frames,calibration", "--model", "welder", "--cases", "1", "--seed", "5"];
+    let rows = rows(out.path(), &args);
+    assert_eq!(rows[0]["verdict"], "doubtful", "{:#}", rows[0]);
+    for row in &rows {
+        assert_eq!(row["right"], true, "{row:#}");
+    }
+    // The nominal fit's doubt was of joints that it did not know, and these are known.
+    assert_eq!(rows[1]["verdict"], "trusted", "{:#}", rows[1]);
+    assert!(worst(&rows[1]) < 0.1, "{:#}", rows[1]);
+}
+
 /// Real models, where they are there, by links in a folder of their own beside what else is in it; whether they are.
 #[cfg(unix)]
 fn link_real(names: &[&str], robots: &Path) -> bool {

@@ -5,7 +5,7 @@
 //! about (or along) its own axis it gets none, since the joint itself moves there: what a controller's zero is off by
 //! no scan of one posture can tell.
 
-use contract::{Calibration, Fan, Fit, JointFrame};
+use contract::{Calibration, Fan, Fit, JointFrame, Verdict};
 use geometry::{Pose, Vector, robust};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 use robot::{JointKind, Kinematics, Model};
@@ -21,7 +21,7 @@ use crate::solve::NEAR_MARGIN;
 use crate::spin::Spin;
 use crate::strata::adjusted_points;
 use crate::wrist::Wrist;
-use crate::{Prepared, Scene, Settings, report};
+use crate::{Prepared, Scene, Settings, report, verdict};
 
 /// Steps of the joints' places: each after an adjustment of all the rest.
 const N_STEPS: usize = 4;
@@ -70,6 +70,7 @@ pub fn calibrate(
     let wrist = Wrist::of(&refine, (&done, &turns), &points, fan);
     let done = (done, judgement, turns);
     let mut out = report::report(&refine, &done, &[], (&near, &points), wrist.as_ref(), fan);
+    out.verdict = out.verdict.min(as_known(&Refine { prepared, ..refine }, fit, &h, &out));
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();
     keep(&mut out, fit, Calibration { frames, prior: settings.frame_sigma, link_rms });
     (model, out)
@@ -114,6 +115,22 @@ fn estimate(
     }
 }
 
+/// The verdict on the nominal fit, had its joints been known as well as the calibrated ones are: that they are elsewhere is what it did
+/// not know.
+fn as_known(nominal: &Refine<'_>, fit: &Fit, h: &Hypothesis, calibrated: &Fit) -> Verdict {
+    let judgement = judged(nominal, h);
+    let passed = |mut fit: Fit| {
+        verdict::pass(&mut fit, nominal.prepared, nominal.scene, &judgement);
+        fit.verdict
+    };
+    // Others than the points may have made it doubtful.
+    if fit.verdict < passed(fit.clone()) {
+        return fit.verdict;
+    }
+    let (joints, covariance) = (calibrated.joints.clone(), calibrated.covariance.clone());
+    passed(Fit { joints, covariance, ..fit.clone() })
+}
+
 /// What the nominal fit knows and the calibrated one keeps; and what the calibration found, in words.
 fn keep(out: &mut Fit, fit: &Fit, found: Calibration) {
     out.runner_up.clone_from(&fit.runner_up);
@@ -121,7 +138,6 @@ fn keep(out: &mut Fit, fit: &Fit, found: Calibration) {
     out.alike.clone_from(&fit.alike);
     out.tool.clone_from(&fit.tool);
     out.other_branches.clone_from(&fit.other_branches);
-    out.verdict = out.verdict.min(fit.verdict);
     out.reasons.extend(words(&found.frames));
     out.calibration = Some(found);
 }
