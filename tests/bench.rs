@@ -154,8 +154,7 @@ fn adjusting_from_the_truth_is_no_better_and_going_link_after_link_is_worse() {
 #[test]
 fn robots_whose_joints_are_elsewhere_are_doubted_until_they_are_calibrated() {
     let out = tempfile::tempdir().expect("a folder");
-    let args =
-        ["--suite", "frames,calibration", "--model", "welder", "--cases", "1", "--seed", "5"];
+    let args = ["--suite", "frames,calibration", "--model", "arm", "--cases", "1", "--seed", "5"];
     let rows = rows(out.path(), &args);
     assert_eq!(rows[0]["verdict"], "doubtful", "{:#}", rows[0]);
     for row in &rows {
