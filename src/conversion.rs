@@ -10,17 +10,22 @@ use export::{COPC, PLY, ResultFile, write_ply};
 use std::path::{Path, PathBuf};
 
 /// What points can be written as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
-    /// One LAZ of all points, as an octree that viewers load piece by piece.
+    /// One LAZ of all points, as an octree that viewers load piece by piece (Potree, QGIS)
     Copc,
-    /// Two PLY files: what moves, and what stands still.
+    /// Two PLY files: what moves, and what stands still (Open3D, MeshLab)
     Ply,
 }
 
 /// Names of all files that points are written to.
 pub(crate) fn names() -> impl Iterator<Item = &'static str> {
-    PLY.into_iter().chain([COPC.rsplit('/').next().unwrap_or(COPC)])
+    PLY.into_iter().chain([copc_name()])
+}
+
+/// The name of a COPC file without its folder.
+fn copc_name() -> &'static str {
+    COPC.rsplit('/').next().unwrap_or(COPC)
 }
 
 /// Writes the points of the result in `out`; the files' paths.
@@ -34,7 +39,7 @@ pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBu
     let into = out.join(EXPORT);
     let written = match format {
         Format::Copc => {
-            let to = into.join(COPC.rsplit('/').next().unwrap_or(COPC));
+            let to = into.join(copc_name());
             let written = copc::write(out, &to, &into.join("scratch"), engine);
             let damaged = |e: Error| match e.kind() {
                 Kind::Bug => {

@@ -8,7 +8,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Writes the file `to` of the tiles of `out`, if there are any, and says whether; `scratch` is a folder that is taken away when the run ends, however it ends.
+/// Writes the file `to` of the tiles of `out`, if there are any, and says whether; `scratch` is a folder that is taken away at
+/// the end, however that comes.
 ///
 /// # Errors
 /// Files that cannot be read or written; a run that is cancelled.

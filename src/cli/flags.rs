@@ -2,6 +2,7 @@
 
 use super::bench_flags::BenchCommand;
 use super::say::LogFormat;
+use crate::conversion::Format;
 use crate::engine::Engine;
 use crate::job::{Given, Means};
 use crate::progress::{Mode, Progress};
@@ -144,16 +145,7 @@ pub(super) struct ExportFlags {
     pub(super) out: PathBuf,
     /// Which format; files go to OUT/export, which the next run into OUT takes away
     #[arg(long, value_name = "FORMAT", value_enum)]
-    pub(super) to: FormatName,
-}
-
-/// What a result's points can be written as.
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-pub(super) enum FormatName {
-    /// One LAZ of all points, as an octree that viewers load piece by piece (Potree, QGIS)
-    Copc,
-    /// Two PLY files: what moves, and what stands still (Open3D, MeshLab)
-    Ply,
+    pub(super) to: Format,
 }
 
 #[derive(Debug, Args)]

@@ -1,12 +1,10 @@
 //! `verify`, `report`, `export`, `diff` and `history`: output folders of runs in; whether they are whole, what is in them,
 //! their points in other formats, how they differ and which goes on from which, out.
 
-use super::flags::{
-    Common, DiffFlags, ExportFlags, FormatName, HistoryFlags, OutFlags, ReportFlags,
-};
+use super::flags::{Common, DiffFlags, ExportFlags, HistoryFlags, OutFlags, ReportFlags};
 use super::say::Say;
 use crate::changes::{changes, words};
-use crate::conversion::{Format, convert};
+use crate::conversion::convert;
 use crate::exit;
 use crate::history;
 use crate::job::Outcome;
@@ -46,11 +44,7 @@ pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
 
 pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<u8> {
     let engine = common.engine(&common.means()?)?;
-    let format = match flags.to {
-        FormatName::Copc => Format::Copc,
-        FormatName::Ply => Format::Ply,
-    };
-    let written = convert(&flags.out, format, &engine)?;
+    let written = convert(&flags.out, flags.to, &engine)?;
     let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
     say.result(&names.join("\n"));
     Ok(exit::OK)
