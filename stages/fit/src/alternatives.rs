@@ -101,7 +101,8 @@ impl Beam<'_> {
         };
         let far = |value: f64| apart(value) > 2.5 * span / n as f64;
         let least = own - SHORT * (own.abs() + h.score.abs());
-        self.peaks(h, free, &moved, tolerance)
+        // All that is carried moves farther than what the joint places.
+        self.peaks(h, (free, 1), &moved, tolerance)
             .into_iter()
             .filter(|(value, score)| far(*value) && *score > least)
             .map(|(value, score)| {

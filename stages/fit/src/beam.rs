@@ -1,9 +1,10 @@
 //! Base poses in; out come postures that the beams allow, best first: a beam search along the joints, in which every
-//! local maximum of every sweep competes with all others (METHOD.md §8, §9).
+//! local maximum of every sweep, to within its steps, competes with all others (METHOD.md §8, §9).
 
 use contract::Fan;
 use geometry::probe::HIDDEN_PRICE;
-use geometry::{Pose, Vector};
+use geometry::{Pose, Probe, Vector};
+use std::ops::Range;
 
 use crate::{Prepared, Scene, Settings};
 
@@ -20,6 +21,9 @@ pub(crate) struct Hypothesis {
 /// that mean's standard deviations.
 const HOPELESS: f64 = 0.4;
 
+/// Share of the tolerance by which two steps of a sweep may move samples, so that every second value is enough to find its maxima.
+const FINE_ARC: f64 = 0.67;
+
 /// The search for one model's posture.
 pub(crate) struct Beam<'a> {
     pub(crate) prepared: &'a Prepared<'a>,
@@ -34,6 +38,8 @@ pub(crate) struct Beam<'a> {
 const MOST_HIDDEN: f64 = 0.5 * HIDDEN_PRICE as f64;
 /// A base is turned by half and a quarter of this to settle it, radians: what its foot shows of its yaw.
 const SHAKEN_YAW: f64 = 0.03;
+/// Turning joints with which the base is settled: the small links after those say little of it.
+const N_SHAKEN: usize = 3;
 /// Tolerance where what carries the searched links is fitted already, metres (METHOD.md §9).
 const FITTED: f64 = 0.02;
 
@@ -125,12 +131,33 @@ impl Beam<'_> {
         placed: &[(usize, Pose)],
         (tolerance, n_samples): (f32, usize),
     ) -> f64 {
-        let score = |(l, pose): &(usize, Pose)| {
-            let (points, normals) = self.prepared.samples(*l, n_samples);
-            let probe = self.scene.scouts.probe(points, normals, pose, tolerance);
-            self.prepared.links[*l].weight * f64::from(probe.mean())
+        self.weighted(placed, &self.probes(placed, tolerance, 0..n_samples, &[]))
+    }
+
+    /// What the scans say of the samples of each link, on top of what they say of those before them.
+    fn probes(
+        &self,
+        placed: &[(usize, Pose)],
+        tolerance: f32,
+        which: Range<usize>,
+        before: &[Probe],
+    ) -> Vec<Probe> {
+        let probe = |(at, (link, pose)): (usize, &(usize, Pose))| {
+            let (points, normals) = self.prepared.samples(*link, which.end);
+            let first = which.start.min(points.len());
+            let samples = (&points[first..], &normals[first..]);
+            let before = before.get(at).copied().unwrap_or_default();
+            self.scene.scouts.probe_more(before, samples, pose, tolerance)
         };
-        placed.iter().map(score).sum()
+        placed.iter().enumerate().map(probe).collect()
+    }
+
+    /// Their mean scores, each with the weight of its link.
+    fn weighted(&self, placed: &[(usize, Pose)], probes: &[Probe]) -> f64 {
+        let of = |((link, _), probe): (&(usize, Pose), &Probe)| {
+            self.prepared.links[*link].weight * f64::from(probe.mean())
+        };
+        placed.iter().zip(probes).map(of).sum()
     }
 
     /// All values of a sweep of one joint, each with the score of what it places added.
@@ -154,7 +181,10 @@ impl Beam<'_> {
             next.score += score;
             next
         };
-        self.peaks(h, free, links, tolerance).into_iter().map(extended).collect()
+        self.peaks(h, (free, self.stride(free)), links, tolerance)
+            .into_iter()
+            .map(extended)
+            .collect()
     }
 
     /// Start, span and number of steps of a joint's sweep: an arc step moves its samples by the tolerance at most.
@@ -199,7 +229,7 @@ impl Beam<'_> {
             })
     }
 
-    /// Shakes base and joints set so far, one by one, in halving steps, while the score of all placed links rises:
+    /// Shakes the joints set so far, and the base with the first of them, one by one, in halving steps, while the score of all placed links rises:
     /// errors of a parent must not pile up in its children.
     fn settle(&self, h: &mut Hypothesis, upto: usize) {
         let tolerance = (0.7 * self.tolerance) as f32;
@@ -207,6 +237,8 @@ impl Beam<'_> {
         let placed = |j: usize| &self.prepared.placed_by[j];
         let mut parts: Vec<f64> = vec![self.score(h, &self.prepared.fixed, tolerance)];
         parts.extend((0..=upto).map(|j| self.score(h, placed(j), tolerance)));
+        let turns = |j: &usize| !self.prepared.slides(*j) && !placed(*j).is_empty();
+        let is_shaken = (0..=upto).filter(turns).count() <= N_SHAKEN;
         for step in [0.5, 0.25] {
             for j in (0..=upto).rev() {
                 let (_, span, n) = self.sweep(j);
@@ -215,6 +247,9 @@ impl Beam<'_> {
                 self.climb(h, (j + 1, &mut parts), tolerance, |h, sign| {
                     h.posture[j] = (h.posture[j] + sign * d).clamp(limits[0], limits[1]);
                 });
+            }
+            if !is_shaken {
+                continue;
             }
             // Along what it stands on, and about the axis that is upright there.
             let shift = 0.4 * step * self.tolerance;
@@ -259,40 +294,100 @@ impl Beam<'_> {
         }
     }
 
-    /// Values of a joint at which the score of some links is a local maximum, with that score.
+    /// Values of a joint at which the score of some links is a local maximum, with that score: of every so many values of its sweep,
+    /// and then of those beside each maximum among them.
     pub(crate) fn peaks(
         &self,
         h: &Hypothesis,
-        free: usize,
+        (free, stride): (usize, usize),
         links: &[usize],
         tolerance: f32,
     ) -> Vec<(f64, f64)> {
         let (low, span, n) = self.sweep(free);
+        let value = |k: usize| low + span * k as f64 / n as f64;
         let mut trial = h.clone();
-        let values: Vec<f64> = (0..=n).map(|k| low + span * k as f64 / n as f64).collect();
-        let mut at = |value: &f64| {
-            trial.posture[free] = *value;
+        let mut place = |k: usize| {
+            trial.posture[free] = value(k);
             self.placed(&trial, links)
         };
-        let placed: Vec<_> = values.iter().map(&mut at).collect();
-        let score = |k: usize, n_samples: usize| self.score_at(&placed[k], (tolerance, n_samples));
+        let some: Vec<usize> = (0..n).step_by(stride).chain([n]).collect();
+        let placed: Vec<Vec<(usize, Pose)>> = some.iter().map(|k| place(*k)).collect();
         // A few samples tell most values to be hopeless.
-        let few: Vec<f64> = (0..=n).map(|k| score(k, self.settings.n_search / 4)).collect();
+        let (n_few, n_all) = (self.settings.n_search / 4, self.settings.n_search);
+        let probes = |at: &Vec<_>| self.probes(at, tolerance, 0..n_few, &[]);
+        let probes: Vec<Vec<Probe>> = placed.iter().map(probes).collect();
+        let few: Vec<f64> = placed.iter().zip(&probes).map(|(p, q)| self.weighted(p, q)).collect();
         let weight: f64 = links.iter().map(|&l| self.prepared.links[l].weight).sum();
         let hopeless = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - HOPELESS * weight;
-        let full = |k| if few[k] < hopeless { few[k] } else { score(k, self.settings.n_search) };
-        let scores: Vec<f64> = (0..=n).map(full).collect();
-        (0..=n)
-            .filter(|&k| {
-                few[k] >= hopeless
-                    && (k == 0 || scores[k] > scores[k - 1])
-                    && (k == n || scores[k] >= scores[k + 1])
-            })
-            .map(|k| (values[k], scores[k]))
-            .collect()
+        let full = |i: usize| match few[i] < hopeless {
+            true => few[i],
+            false => {
+                let all = self.probes(&placed[i], tolerance, n_few..n_all, &probes[i]);
+                self.weighted(&placed[i], &all)
+            }
+        };
+        let last = some.len() - 1;
+        let scores: Vec<f64> = (0..=last).map(full).collect();
+        let is_peak = |i: &usize| {
+            few[*i] >= hopeless
+                && (*i == 0 || scores[*i] > scores[i - 1])
+                && (*i == last || scores[*i] >= scores[i + 1])
+        };
+        let mut highest = |i: usize| {
+            let begin = some[i.saturating_sub(1)] + usize::from(i > 0);
+            let end = some[(i + 1).min(last)] - usize::from(i < last);
+            let beside = (begin..=end).filter(|k| *k != some[i]);
+            let beside = beside.map(|k| (k, self.score_at(&place(k), (tolerance, n_all))));
+            let own = (some[i], scores[i]);
+            beside.fold(own, |best, other| if other.1 > best.1 { other } else { best })
+        };
+        let peaks: Vec<usize> = (0..=last).filter(is_peak).collect();
+        peaks.into_iter().map(|i| highest(i)).map(|(k, score)| (value(k), score)).collect()
+    }
+
+    /// Steps from one value of a joint's sweep that is looked at to the next: two where they move the samples of the links that it
+    /// places by less than what those are told apart by.
+    fn stride(&self, free: usize) -> usize {
+        let (_, span, n) = self.sweep(free);
+        let arc = span / n as f64 * self.prepared.lever[free];
+        let is_fine = !self.prepared.slides(free) && 2.0 * arc <= FINE_ARC * self.tolerance;
+        1 + usize::from(is_fine)
     }
 }
 
 pub(crate) fn sort(beam: &mut [Hypothesis]) {
     beam.sort_by(|a, b| b.score.total_cmp(&a.score));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cubes::before_plate;
+
+    #[test]
+    fn every_second_value_leads_to_the_highest_of_all() {
+        let along = |k: usize| 0.09 * (k as f64 / 40.0 - 0.5);
+        let places: Vec<[f64; 2]> = (0..41 * 41).map(|k| [along(k % 41), along(k / 41)]).collect();
+        before_plate(&places, [0.0, 0.0], |refine, state| {
+            let beam = Beam::new(refine.prepared, refine.scene, refine.settings);
+            let (h, tolerance) = (&state.hypothesis, beam.tolerance as f32);
+            let plate = &refine.prepared.placed_by[1];
+            let peaks = beam.peaks(h, (0, 2), plate, tolerance);
+            let (low, span, n) = beam.sweep(0);
+            let score = |k: usize| {
+                let posture = vec![low + span * k as f64 / n as f64, 0.0];
+                beam.score(&Hypothesis { posture, ..h.clone() }, plate, tolerance)
+            };
+            let all: Vec<f64> = (0..=n).map(score).collect();
+            let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let found = peaks.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
+            assert!(highest > 0.0 && (found - highest).abs() < 1e-12, "{found} of {highest}");
+            for (value, score) in &peaks {
+                let k = ((value - low) / span * n as f64).round() as usize;
+                let beside = [k.saturating_sub(1), (k + 1).min(n)];
+                assert!(beside.iter().all(|k| all[*k] <= *score), "{value}");
+            }
+            assert_eq!((beam.stride(0), beam.stride(1)), (2, 2));
+        });
+    }
 }

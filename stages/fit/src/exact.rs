@@ -152,32 +152,34 @@ impl Grid {
     /// The cells that a stretch of a beam passes through, one after the other, and where on the beam each ends (Amanatides
     /// and Woo 1987).
     fn along_beam(&self, (at, ray): (&Vector, &Vector), [from, to]: [f64; 2]) -> Walk<'_> {
+        // Cells in a metre, and how far along the beam one is passed, with its sign: one division an axis.
         let edge = f64::from(self.edge);
-        let start = [0, 1, 2].map(|i| (at[i] - f64::from(self.low[i])) / edge);
+        let (inverse, each) = (1.0 / edge, [0, 1, 2].map(|i| edge / ray[i]));
+        let start = [0, 1, 2].map(|i| (at[i] - f64::from(self.low[i])) * inverse);
         let (mut begin, mut end) = (from, to);
         for i in 0..3 {
             let n = self.n[i] as f64;
             if ray[i] != 0.0 {
-                let sides = [0.0, n].map(|side| (side - start[i]) * edge / ray[i]);
+                let sides = [0.0, n].map(|side| (side - start[i]) * each[i]);
                 begin = begin.max(sides[0].min(sides[1]));
                 end = end.min(sides[0].max(sides[1]));
             } else if !(0.0..=n).contains(&start[i]) {
                 end = f64::NEG_INFINITY;
             }
         }
-        let first = [0, 1, 2].map(|i| (start[i] + begin * ray[i] / edge).floor());
+        let first = [0, 1, 2].map(|i| (start[i] + begin * ray[i] * inverse).floor());
         let at =
             [0, 1, 2].map(|i| first[i].clamp(0.0, self.n[i].saturating_sub(1) as f64) as isize);
         let next = [0, 1, 2].map(|i| {
             let side = at[i] as f64 + f64::from(u8::from(ray[i] > 0.0));
-            if ray[i] == 0.0 { f64::INFINITY } else { (side - start[i]) * edge / ray[i] }
+            if ray[i] == 0.0 { f64::INFINITY } else { (side - start[i]) * each[i] }
         });
         Walk {
             grid: self,
             at: (begin <= end && self.edge > 0.0).then_some(at),
             way: [0, 1, 2].map(|i| if ray[i] > 0.0 { 1 } else { -1 }),
             next,
-            each: [0, 1, 2].map(|i| (edge / ray[i]).abs()),
+            each: each.map(f64::abs),
             end,
         }
     }

@@ -13,6 +13,7 @@ use robot::JointKind;
 
 use crate::beam::Hypothesis;
 use crate::matching::Matching;
+use crate::normal::add_scaled;
 use crate::{Prepared, Scene, Settings};
 
 /// One round of the schedule.
@@ -91,7 +92,7 @@ impl Sums {
             let wa = weight * row[a];
             self.g[a] += wa * r;
             let column = &mut self.h.as_mut_slice()[a * n + a..(a + 1) * n];
-            column.iter_mut().zip(&row[a..]).for_each(|(h, b)| *h += wa * b);
+            add_scaled(column, wa, &row[a..]);
         }
     }
 

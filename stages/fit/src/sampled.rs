@@ -1,7 +1,11 @@
 //! Points that an adjustment is made of in; the same with what is known of where their beams end, in parts and chunks, out.
 
 use crate::pairs::Known;
-use crate::refine::chunk;
+
+/// Chunks that points are summed up in, as far as that leaves so many points in one, at least and at most: each has sums of its own for
+/// hundreds of patches, all of which are joined in the end; more of them end on all threads together.
+const N_CHUNKS: usize = 8;
+const CHUNK: [usize; 2] = [1024, 16_384];
 
 /// Points of a scene, with the triangles that their beams met last.
 #[derive(Debug, Clone)]
@@ -68,7 +72,7 @@ impl Sampled {
 
     /// Points that one thread works on at a time, and what is known of them.
     pub(crate) fn chunks(&mut self) -> Vec<(&[u32], &mut [Option<Known>])> {
-        let n = chunk(self.points.len());
+        let n = self.points.len().div_ceil(N_CHUNKS).clamp(CHUNK[0], CHUNK[1]);
         self.points.chunks(n).zip(self.known.chunks_mut(n)).collect()
     }
 }

@@ -17,7 +17,7 @@ pub struct Settings {
     pub method: Method,
     /// Hypotheses kept at each joint of the beam. METHOD.md §8: 150 lost none of 60; 100 lose at most one of 200.
     pub beam: usize,
-    /// Hypotheses that are settled (base and all joints so far shaken) at each joint, best first.
+    /// Hypotheses that are settled (joints so far shaken, the base with the first of them) at each joint, best first.
     pub settle: usize,
     /// Samples of a link in the beam: the mean of 100 is known to 0.05, less than hypotheses differ by.
     pub n_search: usize,

@@ -50,8 +50,9 @@ pub(crate) fn settle(
     (best, judgement, spins)
 }
 
-/// One of so many points of the last adjustment is enough to choose what it is made of.
-const SETTLED: usize = 15;
+/// A part of the points of the last adjustment is enough to choose what it is made of: one of so many, where that is more than links
+/// have at least.
+const SETTLED: usize = 30;
 
 /// A posture with the best values of its last joints, where one of them is another mode, not the same one found again.
 pub(crate) fn better(posture: &[f64], spins: &[Spin]) -> Option<Vec<f64>> {

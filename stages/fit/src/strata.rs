@@ -44,13 +44,14 @@ impl Refine<'_> {
         for (at, (own, more)) in sorted.iter_mut().zip(rest).enumerate() {
             if is_open[at] {
                 own.extend(more);
-                own.sort_unstable();
+                // Two runs in order, which the stable sort merges.
+                own.sort();
             }
             let n = own.len();
             let kept = n.min(cap);
             out.extend((0..kept).map(|k| own[k * n / kept]));
         }
-        out.sort_unstable();
+        out.sort();
         out
     }
 }

@@ -59,11 +59,23 @@ impl<'a> Evidence<'a> {
         local_from_body: &Pose,
         tolerance: f32,
     ) -> Probe {
+        self.probe_more(Probe::default(), (points, normals), local_from_body, tolerance)
+    }
+
+    /// The same with what was said `before` of other samples of the body: just as if all of them were asked about at once.
+    #[must_use]
+    pub fn probe_more(
+        &self,
+        before: Probe,
+        samples: (&[[f32; 3]], &[[f32; 3]]),
+        local_from_body: &Pose,
+        tolerance: f32,
+    ) -> Probe {
         match &self.cloud {
             Some(cloud) if self.eyes.is_empty() => {
-                cloud.probe((points, normals), local_from_body, tolerance)
+                cloud.probe(before, samples, local_from_body, tolerance)
             }
-            _ => probe(&self.eyes, points, normals, local_from_body, tolerance),
+            _ => probe(&self.eyes, before, samples, local_from_body, tolerance),
         }
     }
 
@@ -78,12 +90,13 @@ impl Cloud {
     /// Judges samples by how far the nearest point is off the surface; how far beside says how dense the points are.
     fn probe(
         &self,
+        before: Probe,
         (points, normals): (&[[f32; 3]], &[[f32; 3]]),
         local_from_body: &Pose,
         tolerance: f32,
     ) -> Probe {
         let m = crate::depth::rows(local_from_body);
-        let mut out = Probe { n: points.len() as u32, ..Probe::default() };
+        let mut out = Probe { n: before.n + points.len() as u32, ..before };
         for (p, n) in points.iter().zip(normals) {
             let (q, n) = (crate::depth::transform(&m, *p), crate::depth::rotate(&m, *n));
             let near = self.field.nearest(q).map(|i| {

@@ -77,16 +77,17 @@ pub const HIDDEN_PRICE: f32 = 0.1;
 
 /// Judges surface samples (`points` with outward `normals`, in the frame of a body) with the body at
 /// `local_from_body`: one beam through a sample in any scan outweighs any match in another (METHOD.md §8).
+/// What is said of other samples `before` is counted already.
 #[must_use]
 pub fn probe(
     eyes: &[Eye<'_>],
-    points: &[[f32; 3]],
-    normals: &[[f32; 3]],
+    before: Probe,
+    (points, normals): (&[[f32; 3]], &[[f32; 3]]),
     local_from_body: &Pose,
     tolerance: f32,
 ) -> Probe {
     let to_local = rows(local_from_body);
-    let mut out = Probe { n: points.len() as u32, ..Probe::default() };
+    let mut out = Probe { n: before.n + points.len() as u32, ..before };
     for (points, normals) in points.chunks(BLOCK).zip(normals.chunks(BLOCK)) {
         let mut block = Block::new(&to_local, points, normals);
         eyes.iter().for_each(|eye| block.ask(eye, tolerance));
@@ -177,7 +178,7 @@ fn said(looks: &Looks, tolerance: f32) -> ([f32; LANES], [f32; LANES]) {
         let gone = if ahead == f32::INFINITY { NO_RETURN_WEIGHT } else { gone };
         let off = (near - range).abs().min((far - range).abs());
         // What is not known is NaN: it is neither, though beams beside it went on.
-        let is_through = ahead > tolerance && !near.is_nan();
+        let is_through = (ahead > tolerance) & !near.is_nan();
         through[i] = if is_through { gone } else { 0.0 };
         on[i] = if is_through { 0.0 } else { (1.0 - off * per_tolerance).max(0.0) };
     }
@@ -189,6 +190,7 @@ mod tests {
     use super::*;
     use crate::depth::Empty;
     use crate::{DepthImage, Vector};
+    use std::ops::Range;
 
     /// A wall at z = 5 in front of the camera, with a 1 m plate at z = 3.
     fn image() -> DepthImage {
@@ -210,7 +212,8 @@ mod tests {
         let (points, normals) = (vec![[0.0, 0.0, 0.0]; 1], vec![[0.0, 0.0, -1.0]; 1]);
         let at = |z: f64| {
             let pose = Pose::from_parts(Vector::new(0.0, 0.0, z).into(), Default::default());
-            probe(&[Eye::new([&image])], &points, &normals, &pose, 0.04)
+            let samples = (points.as_slice(), normals.as_slice());
+            probe(&[Eye::new([&image])], Probe::default(), samples, &pose, 0.04)
         };
         let on = at(3.0);
         assert_eq!((on.n_on, on.n_through), (1, 0));
@@ -282,9 +285,15 @@ mod tests {
                 let points: Vec<[f32; 3]> = (0..n).map(|_| place()).collect();
                 let normals: Vec<[f32; 3]> = (0..n).map(|_| [next(), next(), next()]).collect();
                 let pose = Pose::rotation(Vector::new(0.1, 0.2, 0.3));
-                let together = probe(&eyes, &points, &normals, &pose, tolerance);
+                let of = |before: Probe, which: Range<usize>| {
+                    let samples = (&points[which.clone()], &normals[which]);
+                    probe(&eyes, before, samples, &pose, tolerance)
+                };
+                let together = of(Probe::default(), 0..n);
                 let each = one_by_one(&eyes, (&points, &normals), &pose, tolerance);
                 assert_eq!(together, each);
+                // A part of them, and then the rest.
+                assert_eq!(of(of(Probe::default(), 0..n / 3), n / 3..n), together);
                 assert!(n < 16 || each.n_seen > 0);
             }
         }

@@ -2,7 +2,7 @@
 //! and all base poses of a search instead of once for each sample.
 
 use contract::{Fan, Region, View};
-use geometry::depth::{LANES, Look, lanes};
+use geometry::depth::{LANES, Looks, lanes};
 use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
 use geometry::{Aabb, Evidence, Eye, Pose, Probe, Vector};
 use std::sync::OnceLock;
@@ -193,17 +193,19 @@ fn spots(views: &[View], fan: &impl Fan) -> Vec<Spot> {
                 _ => runs.push((cube, at, 1)),
             }
         }
+        // Numbers are moved about sooner than sums.
+        runs.sort_by_cached_key(|own| own.0);
         joined(runs)
     };
-    let all = fan.fan(views.iter().collect(), of_view).concat();
+    let mut all = fan.fan(views.iter().collect(), of_view).concat();
+    // View by view they are in order: the stable sort merges them.
+    all.sort_by_key(|own| own.0);
     let mean = |(_, sum, n): &Sum| sum.map(|v| (v / f64::from(*n)) as f32);
     joined(all).iter().map(|own| Spot { at: mean(own), n_points: own.2 }).collect()
 }
 
-/// One sum for each cube, in the order of the cubes.
+/// One sum for each cube, of sums in the order of the cubes.
 fn joined(mut sums: Vec<Sum>) -> Vec<Sum> {
-    // Numbers are moved about sooner than sums.
-    sums.sort_by_cached_key(|own| own.0);
     sums.dedup_by(|later, first| {
         let is_same = later.0 == first.0;
         if is_same {
@@ -251,21 +253,19 @@ impl Volume {
         let min = region.bounds.min.map(|v| v as f32);
         let middle = |i: usize, of: usize| min[i] + (of as f32 + 0.5) * edge;
         // Cells beside each other are asked together.
-        let row = |j: usize, k: usize| {
-            let starts = (0..n[0]).step_by(LANES);
-            starts.flat_map(move |first| {
+        let layer = |k: usize| -> Vec<Cell> {
+            let mut layer = Vec::with_capacity(n[0] * n[1]);
+            for (j, first) in (0..n[1]).flat_map(|j| (0..n[0]).step_by(LANES).map(move |i| (j, i)))
+            {
                 let place = |lane: usize| [middle(0, first + lane), middle(1, j), middle(2, k)];
                 let local = lanes(&std::array::from_fn::<_, LANES, _>(place));
-                let mut known = [Known::default(); LANES];
-                for looks in evidence.eyes().iter().map(|eye| eye.look_lanes(&local, edge)) {
-                    for (lane, known) in known.iter_mut().enumerate() {
-                        looks.get(lane).iter().for_each(|look| known.add_look(look));
-                    }
-                }
-                known.map(|known| known.packed()).into_iter().take(n[0] - first)
-            })
+                let mut known = Known::default();
+                evidence.eyes().iter().for_each(|eye| known.add(&eye.look_lanes(&local, edge)));
+                let packed = known.packed();
+                layer.extend_from_slice(&packed[..LANES.min(n[0] - first)]);
+            }
+            layer
         };
-        let layer = |k: usize| -> Vec<Cell> { (0..n[1]).flat_map(|j| row(j, k)).collect() };
         let cells = fan.fan((0..n[2]).collect(), layer).concat();
         Some(Self { min, edge, n, cells, scores: Default::default() })
     }
@@ -292,43 +292,46 @@ impl Volume {
     }
 }
 
-/// What the scans say about one place, being gathered.
+/// What the scans say about places beside each other, being gathered.
 #[derive(Debug, Clone, Copy)]
 struct Known {
-    ahead: f32,
-    off: f32,
-    is_silent: bool,
+    ahead: [f32; LANES],
+    off: [f32; LANES],
+    is_silent: [bool; LANES],
 }
 
 impl Default for Known {
     fn default() -> Self {
-        Self { ahead: 0.0, off: f32::INFINITY, is_silent: false }
+        Self { ahead: [0.0; LANES], off: [f32::INFINITY; LANES], is_silent: [false; LANES] }
     }
 }
 
 impl Known {
-    fn add_look(&mut self, look: &Look) {
-        self.add(look.around - look.range, look.near - look.range);
-        self.add(look.around - look.range, look.far - look.range);
-    }
-
-    fn add(&mut self, ahead: f32, off: f32) {
-        if ahead == f32::INFINITY {
-            self.is_silent = true;
-        } else {
-            self.ahead = self.ahead.max(ahead);
+    #[inline]
+    fn add(&mut self, looks: &Looks) {
+        for i in 0..LANES {
+            let [near, far, range] = [looks.near[i], looks.far[i], looks.range[i]];
+            let is_known = !near.is_nan();
+            let ahead = looks.around[i] - range;
+            let is_silent = ahead == f32::INFINITY;
+            let off = (near - range).abs().min((far - range).abs());
+            self.is_silent[i] |= is_known & is_silent;
+            // `max` and `min` pass NaN over.
+            let ahead = if is_known & !is_silent { ahead } else { f32::NAN };
+            self.ahead[i] = self.ahead[i].max(ahead);
+            self.off[i] = self.off[i].min(if is_known { off } else { f32::NAN });
         }
-        // `min` passes NaN and infinity over.
-        self.off = self.off.min(off.abs());
     }
 
-    fn packed(&self) -> Cell {
+    #[inline]
+    fn packed(&self) -> [Cell; LANES] {
         let units = |v: f32| ((v / UNIT) as u32).min(u32::from(NOTHING) - 1) as u8;
-        let ahead = units(self.ahead);
-        let is_silent = self.is_silent && self.ahead <= 0.0;
-        Cell {
-            ahead: if is_silent { NOTHING } else { ahead },
-            off: if self.off.is_finite() { units(self.off) } else { NOTHING },
-        }
+        std::array::from_fn(|i| {
+            let is_silent = self.is_silent[i] && self.ahead[i] <= 0.0;
+            Cell {
+                ahead: if is_silent { NOTHING } else { units(self.ahead[i]) },
+                off: if self.off[i].is_finite() { units(self.off[i]) } else { NOTHING },
+            }
+        })
     }
 }

@@ -3,7 +3,7 @@
 
 use contract::{Fan, View};
 use geometry::Eye;
-use geometry::depth::{LANES, Look, lanes};
+use geometry::depth::{LANES, lanes};
 use geometry::narrow::floor_i32;
 
 /// Share of the matter measured by other scans that a scanner must have missed for its missing returns to mean nothing.
@@ -61,9 +61,10 @@ pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
             let mut is_gone = [false; LANES];
             let others = eyes.iter().enumerate().filter(|(other, _)| *other != own);
             for looks in others.map(|(_, eye)| eye.look_lanes(&local, FOOTPRINT)) {
-                for (lane, is_gone) in is_gone.iter_mut().enumerate() {
-                    let beyond = |l: Look| l.around.is_finite() && l.around - l.range > BEYOND;
-                    *is_gone |= looks.get(lane).is_some_and(beyond);
+                for (i, is_gone) in is_gone.iter_mut().enumerate() {
+                    let around = looks.around[i];
+                    let is_known = !looks.near[i].is_nan() & around.is_finite();
+                    *is_gone |= is_known & (around - looks.range[i] > BEYOND);
                 }
             }
             gone.extend(some.iter().zip(is_gone).filter(|(_, is_gone)| *is_gone).map(|(p, _)| *p));
