@@ -229,8 +229,8 @@ impl Beam<'_> {
             })
     }
 
-    /// Shakes the joints set so far, and the base with the first of them, one by one, in halving steps, while the score of all placed links rises:
-    /// errors of a parent must not pile up in its children.
+    /// Shakes the joints set so far, and the base with the first of them, one by one, in halving steps, while the score of all
+    /// placed links rises: errors of a parent must not pile up in its children.
     fn settle(&self, h: &mut Hypothesis, upto: usize) {
         let tolerance = (0.7 * self.tolerance) as f32;
         // Scores of the links that each joint places, the base's first: a joint leaves those before it as they are.
