@@ -52,7 +52,7 @@ pub(crate) fn settle(
 
 /// A part of the points of the last adjustment is enough to choose what it is made of: one of so many, where that is more than links
 /// have at least.
-const SETTLED: usize = 30;
+const SETTLED: usize = 15;
 
 /// A posture with the best values of its last joints, where one of them is another mode, not the same one found again.
 pub(crate) fn better(posture: &[f64], spins: &[Spin]) -> Option<Vec<f64>> {
