@@ -5,6 +5,8 @@ use std::process::ExitCode;
 
 /// All is well.
 pub const OK: u8 = 0;
+/// Done, and the answer is no: a path is not free.
+pub const NO: u8 = 1;
 /// Done in part: something was skipped or refused, as the result says.
 pub const PARTIAL: u8 = 3;
 

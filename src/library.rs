@@ -18,7 +18,18 @@ pub(crate) fn load(
     kept: Option<&Cache>,
     engine: &Engine,
 ) -> Result<Library> {
-    let (folders, mut library) = Library::open(dir)?;
+    load_those(dir, |_| true, (settings, kept), engine)
+}
+
+/// The same of those whose names are wanted.
+pub(crate) fn load_those(
+    dir: &Path,
+    is_wanted: impl Fn(&str) -> bool,
+    (settings, kept): (&Settings, Option<&Cache>),
+    engine: &Engine,
+) -> Result<Library> {
+    let (mut folders, mut library) = Library::open(dir)?;
+    folders.retain(|folder| is_wanted(&folder.file_name().unwrap_or_default().to_string_lossy()));
     let loaded = engine.fan_out("robots", folders, |folder| {
         let load = || {
             let bare = Settings { clouds: false, ..*settings };

@@ -5,15 +5,17 @@ use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use crate::search::Search;
 use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind};
-use geometry::{Aabb, Point, Pose};
+use geometry::{Aabb, Point, Pose, Vector};
 use lattice::ViewSettings;
 use robot::Model;
 use std::ops::Range;
 
 /// Depth images need cells this much smaller than the voxels, so that each voxel is looked at through its middle.
 const CELLS_PER_EDGE: f64 = 3.0;
-/// Room below a base that belongs to its robot's space, as a share of its reach: what stands on a pedestal reaches below.
-const BELOW: f64 = 0.5;
+/// Room behind a base that belongs to its robot's space, as a share of its reach: what stands on a pedestal reaches below.
+const BEHIND: f64 = 0.5;
+/// Vertical part of a base's axis from which on its robot stands, or hangs: 60°.
+const UPRIGHT: f64 = 0.5;
 
 /// The spaces of all robots, in the order of the fits; none where no scan says where its beams went.
 pub(crate) fn around(
@@ -29,7 +31,7 @@ pub(crate) fn around(
         let model = &models[fit.model];
         let base: Point = fit.world_from_base.translation.vector.into();
         let edge = settings.merge.space_edge;
-        let bounds = bounds(&base, model.reach()).shared(&search.bounds().grown(edge));
+        let bounds = bounds(fit, model.reach()).shared(&search.bounds().grown(edge));
         let grid = SpaceGrid::over(&bounds, edge);
         let region = region(&base, &grid.bounds());
         let min_cell = grid.edge / CELLS_PER_EDGE;
@@ -47,7 +49,7 @@ pub(crate) fn around(
 /// The region of all that a robot can get to.
 pub(crate) fn reach(fit: &Fit, model: &Model) -> Region {
     let base: Point = fit.world_from_base.translation.vector.into();
-    region(&base, &bounds(&base, model.reach()))
+    region(&base, &bounds(fit, model.reach()))
 }
 
 /// A region of the world, its frame near `middle`.
@@ -57,12 +59,18 @@ pub(crate) fn region(middle: &Point, world: &Aabb) -> Region {
     Region { origin, bounds: Aabb { min: shift(world.min), max: shift(world.max) } }
 }
 
-/// All that a robot can get to, and no more below it than pedestals are high.
-fn bounds(base: &Point, reach: f64) -> Aabb {
+/// All that a robot can get to, and no more behind its foot than pedestals are high: below one that stands, above one that hangs.
+fn bounds(fit: &Fit, reach: f64) -> Aabb {
+    let base = fit.world_from_base.translation.vector;
     let mut out = Aabb::EMPTY;
-    out.add((base.coords.add_scalar(-reach)).into());
-    out.add((base.coords.add_scalar(reach)).into());
-    out.min[2] = base.z - BELOW * reach;
+    out.add(base.add_scalar(-reach).into());
+    out.add(base.add_scalar(reach).into());
+    let up = (fit.world_from_base * Vector::z()).z;
+    if up > UPRIGHT {
+        out.min[2] = base.z - BEHIND * reach;
+    } else if up < -UPRIGHT {
+        out.max[2] = base.z + BEHIND * reach;
+    }
     out
 }
 
@@ -97,4 +105,22 @@ pub(crate) fn spots(
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    #[test]
+    fn a_robot_that_hangs_has_its_space_below() {
+        let at = |tilt: f64| {
+            let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector::x_axis(), tilt);
+            let shift = nalgebra::Translation3::new(0.0, 0.0, 3.0);
+            let fit = Fit { world_from_base: Pose::from_parts(shift, turn), ..Fit::default() };
+            let bounds = bounds(&fit, 2.0);
+            [bounds.min[2], bounds.max[2]]
+        };
+        assert_eq!([at(0.0), at(PI), at(FRAC_PI_2)], [[2.0, 5.0], [1.0, 4.0], [1.0, 5.0]]);
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::bench_flags::BenchCommand;
 use super::say::LogFormat;
+use crate::check::Doubt;
 use crate::conversion::Format;
 use crate::engine::Engine;
 use crate::job::{Given, Means};
@@ -39,6 +40,8 @@ pub(super) enum Command {
     Report(ReportFlags),
     /// A result's points in another format: COPC or PLY
     Export(ExportFlags),
+    /// Whether a path of one robot keeps clear of what was scanned
+    Check(CheckFlags),
     /// Which robots differ between two results of one plant: moved, exchanged, appeared, gone
     Diff(DiffFlags),
     /// Which results lie in a folder, which goes on from which, and what each takes; --remove takes one away
@@ -146,6 +149,34 @@ pub(super) struct ExportFlags {
     /// Which format; files go to OUT/export, which the next run into OUT takes away
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub(super) to: Format,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CheckFlags {
+    /// Output folder of a run
+    #[arg(value_name = "OUT")]
+    pub(super) out: PathBuf,
+    /// The path: CSV with joints' names in its head, or JSON as trajectory_msgs/JointTrajectory; radians and metres
+    #[arg(long, value_name = "FILE")]
+    pub(super) trajectory: PathBuf,
+    /// Whose path it is (else the only robot that has all of its joints)
+    #[arg(long, value_name = "ID")]
+    pub(super) robot: Option<String>,
+    /// What comes nearer to the robot is in its way, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.02)]
+    pub(super) margin: f64,
+    /// Turning joints of the path are in degrees
+    #[arg(long)]
+    pub(super) degrees: bool,
+    /// What a path that passes may leave in doubt
+    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
+    pub(super) allow: Vec<Doubt>,
+    /// Robot library (else that of the run)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// Answer in JSON
+    #[arg(long)]
+    pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -1,21 +1,24 @@
-//! `verify`, `report`, `export`, `diff` and `history`: output folders of runs in; whether they are whole, what is in them,
-//! their points in other formats, how they differ and which goes on from which, out.
+//! `verify`, `report`, `export`, `check`, `diff` and `history`: output folders of runs in; whether they are whole, what is in them,
+//! their points in other formats, whether a path keeps clear of them, how they differ and which goes on from which, out.
 
-use super::flags::{Common, DiffFlags, ExportFlags, HistoryFlags, OutFlags, ReportFlags};
+use super::flags::{
+    CheckFlags, Common, DiffFlags, ExportFlags, HistoryFlags, OutFlags, ReportFlags,
+};
 use super::say::Say;
 use crate::changes::{changes, words};
+use crate::check::{self, Outcome as Clear, Request};
 use crate::conversion::convert;
 use crate::exit;
 use crate::history;
 use crate::job::Outcome;
-use crate::reuse::{Manifest, check};
+use crate::reuse::{self, Manifest};
 use contract::{Error, Kind, Result};
 use export::ResultFile;
 use std::path::Path;
 
 pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8> {
     let engine = common.engine(&common.means()?)?;
-    let checked = check(&flags.out, &engine)?;
+    let checked = reuse::check(&flags.out, &engine)?;
     let n_files = checked.manifest.files.len();
     let n_bytes: u64 = checked.manifest.files.iter().map(|f| f.n_bytes).sum();
     match checked.wrong.split_first() {
@@ -49,6 +52,35 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
     say.result(&names.join("\n"));
     Ok(exit::OK)
 }
+
+/// Exit code 0 where the path is free but for what is allowed, 1 where something is in its way, 3 where that is not known.
+pub(super) fn check_path(flags: &CheckFlags, common: &Common, say: &Say) -> Result<u8> {
+    if !(flags.margin.is_finite() && (0.0..=MAX_MARGIN).contains(&flags.margin)) {
+        return Err(Error::new(Kind::Usage, format!("a margin of {} m is none", flags.margin))
+            .hint(format!("give metres, 0 to {MAX_MARGIN}")));
+    }
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let request = Request {
+        out: flags.out.clone(),
+        trajectory: flags.trajectory.clone(),
+        robot: flags.robot.clone(),
+        robots: flags.robots.clone(),
+        margin: flags.margin,
+        degrees: flags.degrees,
+    };
+    let report = check::check(&request, &means, &engine)?;
+    report.warnings.iter().for_each(|warning| say.warning(warning));
+    say.result(&if flags.json { json(&report.json())? } else { report.words() });
+    Ok(match report.outcome {
+        _ if report.passes(&flags.allow) => exit::OK,
+        Clear::Free | Clear::Open => exit::PARTIAL,
+        Clear::Near | Clear::Blocked => exit::NO,
+    })
+}
+
+/// Largest margin, metres.
+const MAX_MARGIN: f64 = 1.0;
 
 pub(super) fn history(flags: &HistoryFlags, say: &Say) -> Result<u8> {
     for name in &flags.remove {

@@ -91,18 +91,8 @@ impl Base {
 
     /// Names of its spatial tiles that some boxes touch, relative to its folder.
     pub(crate) fn tiles(&self, touched: &[&Aabb]) -> Vec<String> {
-        let Some(edge) = self.state.records.tile_edge() else { return Vec::new() };
-        let corner = |name: &str| {
-            let (x, y) = name.strip_prefix("tiles/")?.split_once('.')?.0.split_once('_')?;
-            let [x, y]: [i32; 2] = [x.parse().ok()?, y.parse().ok()?];
-            Some([x, y].map(|i| f64::from(i) * edge))
-        };
-        let is_touched = |at: [f64; 2]| {
-            let touches = |b: &&Aabb| (0..2).all(|i| b.max[i] >= at[i] && b.min[i] <= at[i] + edge);
-            touched.iter().any(touches)
-        };
-        let names = self.files.iter().map(|file| &file.path);
-        names.filter(|name| corner(name).is_some_and(is_touched)).cloned().collect()
+        let edge = self.state.records.tile_edge();
+        edge.map_or_else(Vec::new, |edge| tiles_of(&self.files, edge, touched))
     }
 
     /// Reads labels of each of its masks.
@@ -119,6 +109,21 @@ impl Base {
         };
         self.result.labels.scans.iter().map(read).collect()
     }
+}
+
+/// Names of spatial tiles of this edge, of all files of a result, that some boxes touch.
+pub(crate) fn tiles_of(files: &[OutputFile], edge: f64, touched: &[&Aabb]) -> Vec<String> {
+    let corner = |name: &str| {
+        let (x, y) = name.strip_prefix("tiles/")?.split_once('.')?.0.split_once('_')?;
+        let [x, y]: [i32; 2] = [x.parse().ok()?, y.parse().ok()?];
+        Some([x, y].map(|i| f64::from(i) * edge))
+    };
+    let is_touched = |at: [f64; 2]| {
+        let touches = |b: &&Aabb| (0..2).all(|i| b.max[i] >= at[i] && b.min[i] <= at[i] + edge);
+        touched.iter().any(touches)
+    };
+    let names = files.iter().map(|file| &file.path);
+    names.filter(|name| corner(name).is_some_and(is_touched)).cloned().collect()
 }
 
 /// Every file of a folder under a second name; links where the system has them.

@@ -14,6 +14,8 @@ mod session;
 mod state;
 mod write;
 
+pub(crate) use base::tiles_of;
+pub(crate) use robots::models_of;
 pub(crate) use state::{Records, State};
 
 use crate::engine::{AllThreads, Engine};

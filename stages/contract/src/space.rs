@@ -81,6 +81,51 @@ impl SpaceGrid {
         let [_, y, z] = self.size;
         [at / (y * z), at / z % y, at % z]
     }
+
+    /// Voxels that cannot be reached from outside of `bounds` without crossing those of a surface: what it encloses. Ascending.
+    #[must_use]
+    pub fn enclosed(&self, bounds: &Aabb, surface: &[usize]) -> Vec<usize> {
+        let cell = |p: [f64; 3], up: bool| -> [usize; 3] {
+            std::array::from_fn(|i| {
+                let at = (p[i] / self.edge).floor() - self.first[i] as f64;
+                let at = if up { at + 2.0 } else { at - 1.0 };
+                at.clamp(0.0, self.size[i] as f64) as usize
+            })
+        };
+        let (low, high) = (cell(bounds.min, false), cell(bounds.max, true));
+        let size: [usize; 3] = std::array::from_fn(|i| high[i].saturating_sub(low[i]));
+        let place = |c: [usize; 3]| (c[0] * size[1] + c[1]) * size[2] + c[2];
+        let mut seen = vec![false; size.iter().product()];
+        for at in surface {
+            let c = self.cell(*at);
+            if (0..3).all(|i| c[i] >= low[i] && c[i] < high[i]) {
+                seen[place(std::array::from_fn(|i| c[i] - low[i]))] = true;
+            }
+        }
+        let is_rim = |c: &[usize; 3]| (0..3).any(|i| c[i] == 0 || c[i] + 1 == size[i]);
+        let all = (0..size[0])
+            .flat_map(|x| (0..size[1]).flat_map(move |y| (0..size[2]).map(move |z| [x, y, z])));
+        let mut open: Vec<[usize; 3]> = all.filter(is_rim).filter(|c| !seen[place(*c)]).collect();
+        open.iter().for_each(|c| seen[place(*c)] = true);
+        while let Some(c) = open.pop() {
+            for axis in 0..3 {
+                for step in [-1_isize, 1] {
+                    let mut next = c;
+                    let Some(to) = c[axis].checked_add_signed(step) else { continue };
+                    next[axis] = to;
+                    if to < size[axis] && !std::mem::replace(&mut seen[place(next)], true) {
+                        open.push(next);
+                    }
+                }
+            }
+        }
+        let enclosed = seen.iter().enumerate().filter(|(_, seen)| !**seen).map(|(at, _)| {
+            let c = [at / (size[1] * size[2]), at / size[2] % size[1], at % size[2]];
+            let c: [usize; 3] = std::array::from_fn(|i| c[i] + low[i]);
+            (c[0] * self.size[1] + c[1]) * self.size[2] + c[2]
+        });
+        enclosed.collect()
+    }
 }
 
 impl Space {

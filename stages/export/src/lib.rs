@@ -51,7 +51,7 @@ pub use places::Places;
 pub use plan_picture::PlanPicture;
 pub use ply::{PLY, write_ply};
 pub use record::{LasSettings, Quantum, RawVlr, class_of};
-pub use refill::OldPoint;
+pub use refill::{OldPoint, read_tile};
 pub use result::{
     BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
     SCHEMA, ScanLabels, StageEntry, TipPose,

@@ -66,6 +66,11 @@ pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Resul
     Ok(bytes)
 }
 
+/// Bytes of the elements of a file that [`NpyWriter`] wrote.
+pub(crate) fn n_bytes(path: &Path) -> std::io::Result<u64> {
+    Ok(std::fs::metadata(path)?.len().saturating_sub(HEADER as u64))
+}
+
 /// All of a list of places (u64, ascending) in a mask of `n_points` entries that [`NpyWriter`] wrote.
 ///
 /// # Errors

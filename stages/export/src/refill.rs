@@ -63,6 +63,25 @@ impl Spool {
     }
 }
 
+/// Hands over the points of a tile of ours, with records as `las` has them, piece by piece.
+///
+/// # Errors
+/// A tile that is not one of ours or cannot be read; what `take` says, which ends the work.
+pub fn read_tile(
+    path: &Path,
+    las: &LasSettings,
+    mut take: impl FnMut(&[OldPoint]) -> Result<()>,
+) -> Result<()> {
+    let (record_len, mut bytes, mut points) = (las.record_len(), Vec::new(), Vec::new());
+    let mut tile = Tile::open(path, las)?;
+    while let Some(records) = tile.piece(&mut bytes)? {
+        points.clear();
+        points.extend(records.chunks_exact(record_len).map(|record| point(record, las)));
+        take(&points)?;
+    }
+    Ok(())
+}
+
 /// Runs of records that stay.
 fn runs(stays: &[bool]) -> impl Iterator<Item = Range<usize>> {
     let mut at = 0;

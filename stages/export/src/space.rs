@@ -6,9 +6,9 @@
 //! robots/R1/unknown.bt     OctoMap: unknown is occupied, all else is free: what a planner must not take for free
 //! ```
 
-use crate::npy::NpyWriter;
+use crate::npy::{self, NpyWriter};
 use crate::octomap::{self, Grid, HALF};
-use contract::{Result, Space, SpaceKind};
+use contract::{Error, Result, Space, SpaceGrid, SpaceKind};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -33,6 +33,35 @@ pub struct SpaceEntry {
     pub unknown_m3: f64,
     /// Volume that beams went through, m³.
     pub free_m3: f64,
+}
+
+impl SpaceEntry {
+    /// Reads its voxels back.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is not of these voxels.
+    pub fn read(&self, out: &Path) -> Result<Space> {
+        let path = out.join(&self.grid);
+        let bad = |what: &str| {
+            let hint = "`stillpoint verify` says whether the result is whole";
+            Error::bad_input(what.to_owned()).at(path.display()).hint(hint)
+        };
+        let first = self.origin.map(|v| (v / self.edge).round() as i64);
+        let grid = SpaceGrid { edge: self.edge, first, size: self.size };
+        let n = self.size.iter().try_fold(1_usize, |n, s| n.checked_mul(*s));
+        // What the list says of its size is believed only where the file is as long.
+        let n = n.filter(|n| npy::n_bytes(&path).is_ok_and(|there| there == *n as u64));
+        let n = n.ok_or_else(|| {
+            bad("the voxels of a robot's space are not as many as they are said to be")
+        })?;
+        let mut space = Space::unknown(grid);
+        for (voxel, byte) in space.voxels_mut().iter_mut().zip(npy::read_bytes(&path, 0, n, 1)?) {
+            let kinds = [SpaceKind::Unknown, SpaceKind::Free, SpaceKind::Fixed, SpaceKind::Robot];
+            let kind = kinds.into_iter().find(|kind| *kind as u8 == byte);
+            *voxel = kind.ok_or_else(|| bad("a voxel of a robot's space is of no kind"))?;
+        }
+        Ok(space)
+    }
 }
 
 /// Writes the space of the robot with this id.

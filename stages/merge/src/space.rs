@@ -45,65 +45,22 @@ pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &impl Fan) {
 
 /// Fills the body of a robot that stands with its links at `world_from_links`: what its surface encloses.
 pub fn stand(space: &mut Space, model: &Model, world_from_links: &[Pose]) {
+    let grid = *space.grid();
     let mut body = Aabb::EMPTY;
     let mut surface = Vec::new();
     for (link, pose) in model.links.iter().zip(world_from_links) {
         for p in &link.cad.points {
             let p = pose * geometry::Point::from(p.map(f64::from));
             body.add(p.coords.into());
-            surface.extend(space.grid().index(p.coords.into()));
+            surface.extend(grid.index(p.coords.into()));
         }
     }
     if surface.is_empty() {
         return;
     }
     surface.iter().for_each(|at| space.voxels_mut()[*at] = SpaceKind::Robot);
-    fill(space, &body, &surface);
-}
-
-/// Gives the robot what cannot be reached from outside `body` without crossing its surface.
-fn fill(space: &mut Space, body: &Aabb, surface: &[usize]) {
-    let grid = *space.grid();
-    let (low, high) = (body.min, body.max);
-    let cell = |p: [f64; 3], up: bool| -> [usize; 3] {
-        std::array::from_fn(|i| {
-            let at = (p[i] / grid.edge).floor() - grid.first[i] as f64;
-            let at = if up { at + 2.0 } else { at - 1.0 };
-            at.clamp(0.0, grid.size[i] as f64) as usize
-        })
-    };
-    let (low, high) = (cell(low, false), cell(high, true));
-    let size: [usize; 3] = std::array::from_fn(|i| high[i].saturating_sub(low[i]));
-    let place = |c: [usize; 3]| (c[0] * size[1] + c[1]) * size[2] + c[2];
-    let mut seen = vec![false; size.iter().product()];
-    for at in surface {
-        let c = grid.cell(*at);
-        if (0..3).all(|i| c[i] >= low[i] && c[i] < high[i]) {
-            seen[place(std::array::from_fn(|i| c[i] - low[i]))] = true;
-        }
-    }
-    let is_rim = |c: &[usize; 3]| (0..3).any(|i| c[i] == 0 || c[i] + 1 == size[i]);
-    let all = (0..size[0])
-        .flat_map(|x| (0..size[1]).flat_map(move |y| (0..size[2]).map(move |z| [x, y, z])));
-    let mut open: Vec<[usize; 3]> = all.filter(is_rim).filter(|c| !seen[place(*c)]).collect();
-    open.iter().for_each(|c| seen[place(*c)] = true);
-    while let Some(c) = open.pop() {
-        for axis in 0..3 {
-            for step in [-1_isize, 1] {
-                let mut next = c;
-                let Some(to) = c[axis].checked_add_signed(step) else { continue };
-                next[axis] = to;
-                if to < size[axis] && !std::mem::replace(&mut seen[place(next)], true) {
-                    open.push(next);
-                }
-            }
-        }
-    }
-    for (at, _) in seen.iter().enumerate().filter(|(_, seen)| !**seen) {
-        let c = [at / (size[1] * size[2]), at / size[2] % size[1], at % size[2]];
-        let c: [usize; 3] = std::array::from_fn(|i| c[i] + low[i]);
-        let index = (c[0] * grid.size[1] + c[1]) * grid.size[2] + c[2];
-        space.voxels_mut()[index] = SpaceKind::Robot;
+    for at in grid.enclosed(&body, &surface) {
+        space.voxels_mut()[at] = SpaceKind::Robot;
     }
 }
 

@@ -1,0 +1,170 @@
+//! What a path came to in; that for people and for programs out.
+
+use super::{Doubt, Outcome, Report};
+use clearance::{Contact, Level, STEP, What};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+
+/// Name and version of what is told to programs.
+const SCHEMA: &str = "stillpoint.check/1";
+/// What is never looked at.
+const NOT_CHECKED: &str =
+    "the robot against itself, other robots in motion, the way to the first waypoint";
+
+impl Outcome {
+    /// As it is written.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Free => "free",
+            Self::Open => "open",
+            Self::Near => "near",
+            Self::Blocked => "blocked",
+        }
+    }
+}
+
+impl Doubt {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Unseen => "unseen",
+            Self::Beside => "beside",
+            Self::AsFound => "as-found",
+            Self::Posture => "posture",
+        }
+    }
+
+    fn why(self) -> &'static str {
+        match self {
+            Self::Unseen => "it leads through space that no beam went through",
+            Self::Beside => {
+                "it leads through uncertain points beside where the robot was found, most of them its own"
+            }
+            Self::AsFound => "parts are as near to something as where the robot was found",
+            Self::Posture => "the robot's posture is not certain",
+        }
+    }
+}
+
+fn level(contact: &Contact) -> &'static str {
+    match contact.level {
+        Level::Unseen => "unseen",
+        Level::Near => "near",
+        Level::Hit => "hit",
+        Level::Inside => "inside",
+    }
+}
+
+impl Report {
+    fn what(&self, what: What) -> String {
+        match what {
+            What::Fixed => "fixed".into(),
+            What::Floor => "floor".into(),
+            What::Uncertain => "uncertain".into(),
+            What::Beside => "uncertain beside it".into(),
+            What::Unseen => "unseen space".into(),
+            What::Robot(number) => {
+                let id = usize::try_from(number).ok().and_then(|at| self.ids.get(at));
+                id.cloned().unwrap_or_default()
+            }
+        }
+    }
+
+    fn part(&self, contact: &Contact) -> String {
+        let link = self.links.get(contact.link).map_or("", |l| l);
+        if contact.hangs { format!("what hangs on {link}") } else { link.to_owned() }
+    }
+
+    /// When a place of the path is reached, seconds.
+    fn time(&self, place: f64) -> Option<f64> {
+        let from = self.times.get(place.floor() as usize)?;
+        let to = self.times.get(place.ceil() as usize)?;
+        Some(from + place.fract() * (to - from))
+    }
+
+    /// For people.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let mut text = format!(
+            "{}: {} waypoints, {} postures at most {:.0} mm apart, margin {:.0} mm\n",
+            self.robot,
+            self.n_waypoints,
+            self.n_postures,
+            STEP * 1e3,
+            self.margin * 1e3
+        );
+        for (place, what) in &self.impossible {
+            let _ = writeln!(text, "  impossible  waypoint {place:.0}: {what}");
+        }
+        let (as_found, anew): (Vec<&Contact>, Vec<&Contact>) =
+            self.contacts.iter().partition(|c| c.as_found);
+        for contact in anew {
+            let near = contact.at.map_or(String::new(), |at| {
+                let [x, y, z] = self.world(&at);
+                format!(", worst at {:.2} near ({x:.3}, {y:.3}, {z:.3})", contact.worst)
+            });
+            let gap = match contact.level {
+                Level::Near => format!(", {:.0} mm or more apart", contact.gap * 1e3),
+                _ => String::new(),
+            };
+            let _ = writeln!(
+                text,
+                "  {:<10}  waypoints {:.2} to {:.2}: {} and {}{gap}{near}",
+                level(contact),
+                contact.from,
+                contact.to,
+                self.part(contact),
+                self.what(contact.what),
+            );
+        }
+        if !as_found.is_empty() {
+            let mut parts: Vec<String> = as_found.iter().map(|c| self.part(c)).collect();
+            parts.sort();
+            parts.dedup();
+            let _ = writeln!(text, "  no nearer than as found: {}", parts.join(", "));
+        }
+        let _ = write!(text, "{}", self.outcome.word());
+        let why: Vec<&str> = self.doubts.iter().map(|d| d.why()).collect();
+        if !why.is_empty() {
+            let _ = write!(text, "; {}", why.join("; "));
+        }
+        let _ = writeln!(text, "\nnot looked at: {NOT_CHECKED}");
+        text
+    }
+
+    /// For programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let contact = |c: &Contact| {
+            json!({
+                "level": level(c),
+                "link": self.links.get(c.link),
+                "hangs": c.hangs,
+                "what": self.what(c.what),
+                "as_found": c.as_found,
+                "from": c.from,
+                "to": c.to,
+                "worst": c.worst,
+                "time": self.time(c.worst),
+                "gap": (c.what != What::Unseen).then_some(c.gap),
+                "at": c.at.map(|at| self.world(&at)),
+                "n_postures": c.n_postures,
+                "n_cells": c.n,
+            })
+        };
+        let impossible = |(at, what): &(f64, String)| json!({ "waypoint": at, "what": what });
+        json!({
+            "schema": SCHEMA,
+            "robot": self.robot,
+            "outcome": self.outcome.word(),
+            "doubts": self.doubts.iter().map(|d| d.word()).collect::<Vec<_>>(),
+            "margin": self.margin,
+            "n_waypoints": self.n_waypoints,
+            "n_postures": self.n_postures,
+            "impossible": self.impossible.iter().map(impossible).collect::<Vec<_>>(),
+            "contacts": self.contacts.iter().map(contact).collect::<Vec<_>>(),
+            "warnings": self.warnings,
+            "not_checked": NOT_CHECKED,
+        })
+    }
+}

@@ -1,0 +1,242 @@
+//! A robot and what hangs on it in; at one posture, which of its parts are near to which obstacles, out.
+
+use crate::Level;
+use crate::obstacles::{Bin, Obstacle, Obstacles, What};
+use crate::path::STEP;
+use crate::shape::{Gap, Shape};
+use contract::Fan;
+use geometry::{Aabb, Point, Pose};
+use robot::{JointKind, Link, Model};
+use std::collections::BTreeMap;
+
+/// Points that hang on the links of a robot, by link, in its frame, metres.
+pub type Hung = BTreeMap<usize, Vec<[f32; 3]>>;
+
+/// Between two postures of a path each part may be so much farther, metres.
+const BETWEEN: f32 = 0.5 * STEP as f32;
+
+/// So near to where it was scanned uncertain points are the robot's own most likely, metres: edges, cables and covers that its model
+/// lacks.
+const BESIDE: f32 = 0.1;
+
+/// A link's surface, or what hangs on it.
+pub(crate) struct Part {
+    pub(crate) link: usize,
+    pub(crate) hangs: bool,
+    bounds: Aabb,
+    shape: Shape,
+}
+
+/// All that moves with the joints of a robot.
+pub struct Body<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) parts: Vec<Part>,
+    margin: f32,
+}
+
+/// A part near to an obstacle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Touch {
+    pub(crate) part: usize,
+    pub(crate) obstacle: usize,
+    pub(crate) level: Level,
+    /// At least so far, metres.
+    pub(crate) gap: f32,
+}
+
+/// All that is near at one posture.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Near {
+    /// By part, then obstacle.
+    pub(crate) touches: Vec<Touch>,
+    /// Parts that reach into space of which nothing is known.
+    pub(crate) outside: Vec<usize>,
+}
+
+impl<'a> Body<'a> {
+    /// The parts of a model that its joints move, and what hangs on them; `margin` is what is near, metres.
+    #[must_use]
+    pub fn new(model: &'a Model, hung: Hung, margin: f64, fan: &impl Fan) -> Self {
+        let margin = margin as f32;
+        let moving: Vec<usize> = (0..model.links.len()).filter(|&l| moves(model, l)).collect();
+        let surfaces = fan.fan(moving.clone(), |link| {
+            let (mesh, bounds) = (&model.links[link].mesh, model.links[link].bounds);
+            let shape = Shape::surface(mesh, &bounds)?;
+            Some(Part { link, hangs: false, bounds, shape })
+        });
+        let mut parts: Vec<Part> = surfaces.into_iter().flatten().collect();
+        for (link, points) in
+            hung.into_iter().filter(|(link, points)| moving.contains(link) && !points.is_empty())
+        {
+            let bounds = Aabb::of(points.iter().map(|p| p.map(f64::from)));
+            let within = margin + BETWEEN + crate::obstacles::CELL as f32;
+            parts.push(Part { link, hangs: true, bounds, shape: Shape::hung(points, within) });
+        }
+        Self { model, parts, margin }
+    }
+
+    /// Bounds of its parts in the frames of their links.
+    pub(crate) fn bounds(&self) -> impl Iterator<Item = (usize, &Aabb)> {
+        self.parts.iter().map(|part| (part.link, &part.bounds))
+    }
+
+    /// Tells those uncertain points apart that lie beside the robot as it was scanned.
+    pub fn set_beside(&self, found: &[f64], around: &mut Obstacles) {
+        let near = self.within(BESIDE, found, around);
+        for touch in near.touches {
+            let obstacle = &mut around.all[touch.obstacle];
+            if obstacle.what == What::Uncertain {
+                obstacle.what = What::Beside;
+            }
+        }
+    }
+
+    /// All that is nearer than the margin at a posture.
+    pub(crate) fn near(&self, posture: &[f64], around: &Obstacles) -> Near {
+        self.within(self.margin, posture, around)
+    }
+
+    fn within(&self, margin: f32, posture: &[f64], around: &Obstacles) -> Near {
+        let poses = self.model.poses(posture);
+        let mut out = Near::default();
+        for (at, part) in self.parts.iter().enumerate() {
+            let base_from_link = &poses[part.link];
+            if around.known.leaves(&part.bounds, base_from_link) {
+                out.outside.push(at);
+            }
+            let link_from_base = Flat::of(&base_from_link.inverse());
+            for bin in &around.bins {
+                let asked = (margin, &link_from_base);
+                self.bin((at, part), (bin, asked), around, &mut out.touches);
+            }
+        }
+        out
+    }
+
+    fn bin(
+        &self,
+        (at, part): (usize, &Part),
+        (bin, (margin, link_from_base)): (&Bin, (f32, &Flat)),
+        around: &Obstacles,
+        touches: &mut Vec<Touch>,
+    ) {
+        let middle = link_from_base.of_point(bin.middle);
+        let within = bin.radius + margin + BETWEEN;
+        if !is_near(&part.bounds, middle, within) {
+            return;
+        }
+        let own = bin.range.clone().zip(&around.all[bin.range.clone()]);
+        // Points tell no more than what they were made for.
+        if part.shape.tells_all() {
+            match part.shape.gap(middle, within) {
+                Gap::Far => return,
+                Gap::Inside => {
+                    touches.extend(own.map(|(obstacle, o)| inside(at, obstacle, o)));
+                    return;
+                }
+                Gap::At(_) => {}
+            }
+        }
+        for (obstacle, o) in own {
+            let p = link_from_base.of_point(o.at);
+            let within = o.radius + margin + BETWEEN;
+            if !is_near(&part.bounds, p, within) {
+                continue;
+            }
+            match part.shape.gap(p, within) {
+                Gap::Far => {}
+                Gap::Inside => touches.push(inside(at, obstacle, o)),
+                Gap::At(gap) => touches.extend(touch((at, obstacle), (o, margin), gap)),
+            }
+        }
+    }
+}
+
+fn touch(
+    (part, obstacle): (usize, usize),
+    (o, margin): (&Obstacle, f32),
+    gap: f32,
+) -> Option<Touch> {
+    let to_ball = gap - o.radius;
+    let level = match o.what {
+        What::Unseen if to_ball <= margin => Level::Unseen,
+        What::Unseen => return None,
+        _ if to_ball <= 0.0 => Level::Hit,
+        _ => Level::Near,
+    };
+    Some(Touch { part, obstacle, level, gap: (to_ball - BETWEEN).max(0.0) })
+}
+
+fn inside(part: usize, obstacle: usize, o: &Obstacle) -> Touch {
+    let level = if o.what == What::Unseen { Level::Unseen } else { Level::Inside };
+    Touch { part, obstacle, level, gap: 0.0 }
+}
+
+/// Bounds of all that can ever be near to a robot, with what hangs on it, frame of its base, metres.
+#[must_use]
+pub fn reach(model: &Model, margin: f64) -> Aabb {
+    let far = |(at, link): (usize, &Link)| {
+        let corners =
+            if link.bounds.is_empty() { Vec::new() } else { link.bounds.corners().to_vec() };
+        let own = corners.into_iter().map(|c| Point::from(c).coords.norm()).fold(0.0, f64::max);
+        own + way(model, at)
+    };
+    let all = model.links.iter().enumerate().map(far).fold(0.0, f64::max) + HUNG + margin;
+    Aabb { min: [-all; 3], max: [all; 3] }
+}
+
+/// What hangs on a robot reaches no farther beyond it, metres: the largest part that a gripper holds.
+const HUNG: f64 = 1.5;
+
+/// Whether a joint that moves lies between the root and a link.
+#[must_use]
+pub fn moves(model: &Model, link: usize) -> bool {
+    let moves = |j: &usize| model.joints[*j].kind != JointKind::Fixed;
+    (0..model.joints.len()).filter(moves).any(|j| model.hangs_on(link, j))
+}
+
+/// The way from the base to a link's frame is never longer, metres.
+fn way(model: &Model, link: usize) -> f64 {
+    let mut length = 0.0;
+    let mut at = link;
+    while let Some(j) = model.links[at].parent_joint {
+        let joint = &model.joints[j];
+        let stroke = match (joint.kind, joint.limits) {
+            (JointKind::Prismatic, Some(limits)) => limits[0].abs().max(limits[1].abs()),
+            _ => 0.0,
+        };
+        length += joint.parent_from_joint.translation.vector.norm() + stroke;
+        at = joint.parent;
+    }
+    length
+}
+
+fn is_near(bounds: &Aabb, p: [f32; 3], within: f32) -> bool {
+    let outside = |i: usize| {
+        let v = f64::from(p[i]);
+        (bounds.min[i] - v).max(v - bounds.max[i]).max(0.0)
+    };
+    (0..3).map(|i| outside(i).powi(2)).sum::<f64>() <= f64::from(within).powi(2)
+}
+
+/// A pose for many points.
+struct Flat {
+    rotation: [[f32; 3]; 3],
+    shift: [f32; 3],
+}
+
+impl Flat {
+    fn of(pose: &Pose) -> Self {
+        let m = pose.rotation.to_rotation_matrix();
+        let rotation = std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)] as f32));
+        Self { rotation, shift: pose.translation.vector.map(|v| v as f32).into() }
+    }
+
+    #[inline]
+    fn of_point(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        std::array::from_fn(|i| {
+            let r = &self.rotation[i];
+            r[0] * x + r[1] * y + r[2] * z + self.shift[i]
+        })
+    }
+}

@@ -1,0 +1,27 @@
+//! A robot, what stands around it and a path of postures in; where on the way it comes near to what, out.
+//!
+//! In doubt it is near: points count as balls that hold all of their cell, and between two postures of the path each part
+//! may be half a step farther.
+#![forbid(unsafe_code)]
+
+mod body;
+mod obstacles;
+mod path;
+mod shape;
+
+pub use body::{Body, Hung, moves, reach};
+pub use obstacles::{CELL, Cells, Known, Obstacles, What};
+pub use path::{Contact, Leg, Looked, STEP, Walk};
+
+/// How a part of a robot stands to an obstacle; what is worse is greater.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// In space that no beam went through.
+    Unseen,
+    /// Nearer than the margin.
+    Near,
+    /// It touches the surface of the part.
+    Hit,
+    /// It lies inside of the part.
+    Inside,
+}

@@ -1,0 +1,206 @@
+//! Points around a robot in, tile by tile; balls that hold them, gathered in bins, out. All in the frame of its base, metres.
+
+use contract::{Space, SpaceKind};
+use geometry::{Aabb, Point, Pose};
+use robot::Model;
+use std::ops::Range;
+
+/// Edge of the cells in which all points are one obstacle, metres: finer than planners' margins, and the floor of a cell in such
+/// cells fits into memory.
+pub const CELL: f64 = 0.004;
+/// Half the diagonal of a cube of edge 1.
+const HALF_DIAGONAL: f64 = 0.8661;
+/// Edge of a bin, metres: about as many cells of a surface as bins about a robot.
+const BIN: f64 = 0.16;
+/// Bits of a cell's place on each axis.
+const BITS: u32 = 20;
+
+/// What an obstacle is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum What {
+    /// Points that stand still.
+    Fixed,
+    /// Points of the floor.
+    Floor,
+    /// Points of which nobody knows.
+    Uncertain,
+    /// Those of them beside where the robot stood when it was scanned: most are its own.
+    Beside,
+    /// Points and surface of the robot with this number.
+    Robot(i16),
+    /// Space that no beam went through.
+    Unseen,
+}
+
+/// A ball.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Obstacle {
+    pub(crate) at: [f32; 3],
+    pub(crate) radius: f32,
+    pub(crate) what: What,
+}
+
+/// Obstacles beside each other.
+#[derive(Debug, Clone)]
+pub(crate) struct Bin {
+    pub(crate) middle: [f32; 3],
+    /// Of a ball about the middle that holds all of them.
+    pub(crate) radius: f32,
+    pub(crate) range: Range<usize>,
+}
+
+/// Cells that hold points, each once for each kind of them.
+#[derive(Debug, Clone, Default)]
+pub struct Cells {
+    /// Corner that places are counted from, metres.
+    corner: [f64; 3],
+    cells: Vec<(u64, What)>,
+}
+
+/// Where beams went, in the frame of the world.
+#[derive(Debug, Clone)]
+pub struct Known {
+    /// World from base.
+    pub world_from_base: Pose,
+    /// Bounds of the space of which anything is known; empty where nothing is.
+    pub bounds: Aabb,
+}
+
+/// All that stands around a robot.
+#[derive(Debug, Clone)]
+pub struct Obstacles {
+    pub(crate) all: Vec<Obstacle>,
+    pub(crate) bins: Vec<Bin>,
+    pub(crate) known: Known,
+}
+
+impl Cells {
+    /// None, of points in `bounds` (frame of the base).
+    #[must_use]
+    pub fn within(bounds: &Aabb) -> Self {
+        Self { corner: bounds.min, cells: Vec::new() }
+    }
+
+    /// Adds a point of the bounds, frame of the base.
+    pub fn add(&mut self, p: [f64; 3], what: What) {
+        let most = f64::from((1_u32 << BITS) - 1);
+        let place = |i: usize| ((p[i] - self.corner[i]) / CELL).clamp(0.0, most) as u64;
+        self.cells.push((place(0) << (2 * BITS) | place(1) << BITS | place(2), what));
+    }
+
+    /// Leaves each cell once. To be called after each tile: only what is kept grows.
+    pub fn settle(&mut self) {
+        self.cells.sort_unstable();
+        self.cells.dedup();
+    }
+
+    /// Adds those of another part of the same bounds.
+    pub fn join(&mut self, other: Self) {
+        self.cells.extend(other.cells);
+        self.settle();
+    }
+
+    fn obstacles(&self) -> impl Iterator<Item = Obstacle> {
+        let mask = (1_u64 << BITS) - 1;
+        self.cells.iter().map(move |&(key, what)| {
+            let cell = [key >> (2 * BITS), key >> BITS & mask, key & mask];
+            let at = |i: usize| (self.corner[i] + (cell[i] as f64 + 0.5) * CELL) as f32;
+            Obstacle { at: [at(0), at(1), at(2)], radius: (HALF_DIAGONAL * CELL) as f32, what }
+        })
+    }
+}
+
+impl Obstacles {
+    /// Those of the cells, of other robots (number, model, base of this one from their links) and of the space that no beam went
+    /// through, as far as it is known.
+    #[must_use]
+    pub fn new(
+        cells: &Cells,
+        others: &[(i16, &Model, Vec<Pose>)],
+        (space, known): (Option<&Space>, Known),
+    ) -> Self {
+        let mut all: Vec<Obstacle> = cells.obstacles().collect();
+        for (number, model, poses) in others {
+            all.extend(surface(*number, model, poses));
+        }
+        if let Some(space) = space {
+            all.extend(unseen(space, &known.world_from_base.inverse()));
+        }
+        let bin = |o: &Obstacle| o.at.map(|v| (f64::from(v) / BIN).floor() as i32);
+        all.sort_by_key(bin);
+        let mut bins = Vec::new();
+        let mut from = 0;
+        for own in all.chunk_by(|a, b| bin(a) == bin(b)) {
+            bins.push(Bin::of(own, from));
+            from += own.len();
+        }
+        Self { all, bins, known }
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+}
+
+impl Bin {
+    fn of(own: &[Obstacle], from: usize) -> Self {
+        let bounds = Aabb::of(own.iter().map(|o| o.at.map(f64::from)));
+        let middle: [f32; 3] = bounds.center().coords.map(|v| v as f32).into();
+        let far = |o: &Obstacle| distance(o.at, middle) + o.radius;
+        let radius = own.iter().map(far).fold(0.0, f32::max);
+        Self { middle, radius, range: from..from + own.len() }
+    }
+}
+
+/// The surface of another robot: what no scan saw of it is there all the same.
+fn surface<'a>(
+    number: i16,
+    model: &'a Model,
+    poses: &'a [Pose],
+) -> impl Iterator<Item = Obstacle> + 'a {
+    let links = model.links.iter().zip(poses);
+    links.flat_map(move |(link, pose)| {
+        // Each sample stands for a square of the surface.
+        let radius = std::f32::consts::FRAC_1_SQRT_2 * link.cad.spacing;
+        link.cad.points.iter().map(move |p| {
+            let at = pose * Point::from(p.map(f64::from));
+            let at = at.coords.map(|v| v as f32).into();
+            Obstacle { at, radius, what: What::Robot(number) }
+        })
+    })
+}
+
+/// Voxels that no beam went through: balls inside of them, for what they are is not known to the millimetre.
+fn unseen(space: &Space, base_from_world: &Pose) -> impl Iterator<Item = Obstacle> {
+    let grid = *space.grid();
+    let voxels = space.voxels().iter().enumerate();
+    voxels.filter(|(_, kind)| **kind == SpaceKind::Unknown).map(move |(at, _)| {
+        let cell = grid.cell(at);
+        let middle = |i: usize| ((grid.first[i] + cell[i] as i64) as f64 + 0.5) * grid.edge;
+        let p = base_from_world * Point::new(middle(0), middle(1), middle(2));
+        let at = p.coords.map(|v| v as f32).into();
+        Obstacle { at, radius: 0.5 * grid.edge as f32, what: What::Unseen }
+    })
+}
+
+impl Known {
+    /// Whether a box of a link reaches into space of which nothing is known.
+    pub(crate) fn leaves(&self, bounds: &Aabb, base_from_link: &Pose) -> bool {
+        let pose = self.world_from_base * base_from_link;
+        let is_known = |c: [f64; 3]| self.bounds.contains((pose * Point::from(c)).coords.into());
+        !bounds.corners().into_iter().all(is_known)
+    }
+}
+
+#[inline]
+pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f32>().sqrt()
+}

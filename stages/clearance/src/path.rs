@@ -1,0 +1,352 @@
+//! Postures of a path in; postures so close to each other that nothing is missed between them, and where on the way which part is
+//! near to what, out.
+
+use crate::Level;
+use crate::body::{Body, Near, Touch};
+use crate::obstacles::{Obstacles, What};
+use contract::Fan;
+use geometry::Point;
+use std::collections::BTreeMap;
+
+/// No point of the robot moves farther from one posture that is looked at to the next, metres.
+pub const STEP: f64 = 0.01;
+/// A first guess of steps: so far do joints go in one, radians or metres. Arcs differ from their chords by less than 0.2 % then.
+const TURN: f64 = 0.1;
+/// Most postures between two waypoints: a metre of reach turned about once takes 630.
+const MAX_STEPS: usize = 1 << 14;
+/// Postures that are looked at together.
+const PIECE: usize = 8;
+
+/// The way from one waypoint to the next, joints going straight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Leg {
+    /// Postures that are looked at, the first one included, the last one not.
+    pub n_steps: usize,
+    /// Some part jumps: a closed loop falls over to its other solution.
+    pub jumps: bool,
+}
+
+/// Where on the way a part is near to something: waypoints are numbered from 0, and 1.5 lies midway between the second and the
+/// third.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contact {
+    /// Index of the link.
+    pub link: usize,
+    /// It is what hangs on the link, not the link itself.
+    pub hangs: bool,
+    /// To what.
+    pub what: What,
+    /// How near at worst.
+    pub level: Level,
+    /// It is not nearer than where it was found; to obstacles that it was as near to.
+    pub as_found: bool,
+    /// Where that begins first and ends last.
+    pub from: f64,
+    /// See `from`.
+    pub to: f64,
+    /// At how many of the postures that are looked at.
+    pub n_postures: usize,
+    /// Where it is worst.
+    pub worst: f64,
+    /// It is at least so far there, metres.
+    pub gap: f64,
+    /// One of the obstacles there, frame of the base, metres; nothing for space beyond all that is known.
+    pub at: Option<Point>,
+    /// Cells of obstacles there.
+    pub n: usize,
+}
+
+/// Which part, to what, and whether only as it was found.
+type Key = (usize, What, bool);
+
+/// A path that is looked at piece by piece.
+pub struct Walk<'a> {
+    body: &'a Body<'a>,
+    around: &'a Obstacles,
+    path: &'a [Vec<f64>],
+    legs: Vec<Leg>,
+    /// Leg and step of each posture.
+    places: Vec<(usize, usize)>,
+    found: AsFound,
+}
+
+/// What is near at the postures of a piece.
+pub struct Looked(Vec<(f64, Told)>);
+
+impl<'a> Walk<'a> {
+    /// Lays postures between the waypoints; `found` is the posture that the robot was scanned in.
+    #[must_use]
+    pub fn new(
+        (body, around): (&'a Body<'a>, &'a Obstacles),
+        path: &'a [Vec<f64>],
+        found: &[f64],
+        fan: &impl Fan,
+    ) -> Self {
+        let pairs: Vec<&[Vec<f64>]> = path.windows(2).collect();
+        let legs: Vec<Leg> = fan.fan(pairs, |pair| leg(body, &pair[0], &pair[1]));
+        let mut places: Vec<(usize, usize)> = Vec::new();
+        for (at, leg) in legs.iter().enumerate() {
+            places.extend((0..leg.n_steps).map(|step| (at, step)));
+        }
+        places.extend(path.len().checked_sub(1).map(|last| (last, 0)));
+        let found = AsFound::of(body.near(found, around));
+        Self { body, around, path, legs, places, found }
+    }
+
+    /// The ways between waypoints.
+    #[must_use]
+    pub fn legs(&self) -> &[Leg] {
+        &self.legs
+    }
+
+    /// Number of postures.
+    #[must_use]
+    pub fn n_postures(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Number of pieces.
+    #[must_use]
+    pub fn n_pieces(&self) -> usize {
+        self.places.len().div_ceil(PIECE)
+    }
+
+    /// Looks at a piece; none of them asks for another.
+    #[must_use]
+    pub fn look(&self, piece: usize) -> Looked {
+        let own = self.places.iter().skip(piece * PIECE).take(PIECE);
+        let look = |&(leg, step): &(usize, usize)| {
+            let share = self.legs.get(leg).map_or(0.0, |l| step as f64 / l.n_steps as f64);
+            let from = &self.path[leg];
+            let to = self.path.get(leg + 1).unwrap_or(from);
+            let near = self.body.near(&between(from, to, share), self.around);
+            (leg as f64 + share, told(&near, (&self.found, self.around)))
+        };
+        Looked(own.map(look).collect())
+    }
+
+    /// Where on the path which part is near to what, the worst first, from all pieces in their order.
+    #[must_use]
+    pub fn contacts(&self, looked: Vec<Looked>) -> Vec<Contact> {
+        all(self.body, self.around, looked.into_iter().flat_map(|l| l.0))
+    }
+}
+
+fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
+    let turn = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+    let mut n_steps = ((turn / TURN).ceil() as usize).clamp(1, MAX_STEPS);
+    loop {
+        let longest = longest(body, from, to, n_steps);
+        if longest <= STEP {
+            return Leg { n_steps, jumps: false };
+        }
+        if n_steps == MAX_STEPS {
+            return Leg { n_steps, jumps: true };
+        }
+        let wanted = (n_steps as f64 * (longest / STEP).min(2.0) * 1.02).ceil() as usize;
+        n_steps = wanted.clamp(n_steps + 1, MAX_STEPS);
+    }
+}
+
+/// The longest way of any point of the robot from one of the postures to the next, metres: that of a corner of its bounds.
+fn longest(body: &Body<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
+    let corners = |step: usize| -> Vec<Point> {
+        let poses = body.model.poses(&between(from, to, step as f64 / n_steps as f64));
+        let own =
+            body.bounds().flat_map(|(link, b)| b.corners().map(|c| poses[link] * Point::from(c)));
+        own.collect()
+    };
+    let mut before = corners(0);
+    let mut longest = 0.0_f64;
+    for step in 1..=n_steps {
+        let now = corners(step);
+        let ways = before.iter().zip(&now).map(|(a, b)| (b - a).norm());
+        longest = ways.fold(longest, f64::max);
+        // Twice as many steps are wanted anyway.
+        if longest > 2.0 * STEP {
+            break;
+        }
+        before = now;
+    }
+    longest
+}
+
+/// The posture at a share of the way.
+fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
+    from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect()
+}
+
+/// How near parts were to obstacles where the robot was found.
+struct AsFound {
+    levels: BTreeMap<(usize, usize), Level>,
+    outside: Vec<usize>,
+}
+
+impl AsFound {
+    fn of(near: Near) -> Self {
+        let levels = near.touches.iter().map(|t| ((t.part, t.obstacle), t.level)).collect();
+        Self { levels, outside: near.outside }
+    }
+
+    fn is(&self, touch: &Touch) -> bool {
+        self.levels.get(&(touch.part, touch.obstacle)).is_some_and(|level| *level >= touch.level)
+    }
+}
+
+/// What is near at one posture, the worst of each kind: how near, at least so far, which obstacle, how many.
+type Told = BTreeMap<Key, (Level, f32, Option<usize>, usize)>;
+
+fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
+    let mut out = Told::new();
+    for touch in &near.touches {
+        let key = (touch.part, around.all[touch.obstacle].what, found.is(touch));
+        let worst = out.entry(key).or_insert((touch.level, touch.gap, Some(touch.obstacle), 0));
+        if (touch.level, -touch.gap) > (worst.0, -worst.1) {
+            (worst.0, worst.1, worst.2) = (touch.level, touch.gap, Some(touch.obstacle));
+        }
+        worst.3 += 1;
+    }
+    for &part in &near.outside {
+        let key = (part, What::Unseen, found.outside.contains(&part));
+        out.entry(key).or_insert((Level::Unseen, 0.0, None, 0));
+    }
+    out
+}
+
+/// All postures at which the same part is near to the same thing are one contact.
+fn all(
+    body: &Body<'_>,
+    around: &Obstacles,
+    looked: impl Iterator<Item = (f64, Told)>,
+) -> Vec<Contact> {
+    let mut all: BTreeMap<Key, Contact> = BTreeMap::new();
+    for (place, told) in looked {
+        for (key, (level, gap, obstacle, n)) in told {
+            let part = &body.parts[key.0];
+            let now = Contact {
+                link: part.link,
+                hangs: part.hangs,
+                what: key.1,
+                level,
+                as_found: key.2,
+                from: place,
+                to: place,
+                n_postures: 1,
+                worst: place,
+                gap: f64::from(gap),
+                at: obstacle.map(|o| Point::from(around.all[o].at.map(f64::from))),
+                n,
+            };
+            let Some(before) = all.get_mut(&key) else {
+                all.insert(key, now);
+                continue;
+            };
+            (before.to, before.n_postures) = (place, before.n_postures + 1);
+            if (level, -now.gap) > (before.level, -before.gap) {
+                let (from, n_postures) = (before.from, before.n_postures);
+                *before = Contact { from, n_postures, ..now };
+            }
+        }
+    }
+    let mut all: Vec<Contact> = all.into_values().collect();
+    let order = |c: &Contact| (c.as_found, std::cmp::Reverse(c.level));
+    all.sort_by(|a, b| order(a).cmp(&order(b)).then(a.from.total_cmp(&b.from)));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Cells, Known};
+    use contract::OneByOne;
+    use geometry::{Aabb, Pose};
+    use robot::{Model, Settings};
+
+    /// An arm of one link, 1 m long and 0.1 m thick, that turns about z at its end.
+    fn arm(dir: &std::path::Path) -> Model {
+        let urdf = "<robot name='arm'><link name='foot'/><link name='beam'><visual><origin xyz='0.5 0 0'/>\
+            <geometry><box size='1 0.1 0.1'/></geometry></visual></link><joint name='turn' type='revolute'>\
+            <parent link='foot'/><child link='beam'/><axis xyz='0 0 1'/>\
+            <limit lower='-3.2' upper='3.2' effort='1' velocity='1'/></joint></robot>";
+        let path = dir.join("arm.urdf");
+        std::fs::write(&path, urdf).expect("is written");
+        Model::load_urdf(&path, "arm", &Settings::default()).expect("loads").0
+    }
+
+    fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
+        let dir = tempfile::tempdir().expect("a folder");
+        let model = arm(dir.path());
+        let body = Body::new(&model, BTreeMap::new(), margin, &OneByOne);
+        let mut cells = Cells::within(&crate::reach(&model, margin));
+        points.iter().for_each(|(p, what)| cells.add(*p, *what));
+        cells.settle();
+        let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
+        let known = Known { world_from_base: Pose::identity(), bounds };
+        let mut around = Obstacles::new(&cells, &[], (None, known));
+        body.set_beside(&[found], &mut around);
+        let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
+        let walk = Walk::new((&body, &around), &path, &[found], &OneByOne);
+        let looked = (0..walk.n_pieces()).map(|piece| walk.look(piece)).collect();
+        walk.contacts(looked)
+    }
+
+    #[test]
+    fn a_post_in_the_way_is_hit_where_it_stands() {
+        // Half a turn; the post stands 90° on, 0.9 m away.
+        let post: Vec<_> =
+            (0..100).map(|k| ([0.0, 0.9, 0.002 * f64::from(k) - 0.1], What::Fixed)).collect();
+        let found = walk(&post, &[0.0, std::f64::consts::PI], 0.0, 0.02);
+        let [hit] = &found[..] else { panic!("one contact: {found:?}") };
+        assert!(!hit.as_found && hit.level >= Level::Hit && hit.gap == 0.0, "{hit:?}");
+        // The beam's side is 5 cm off its middle: 3.2° before, and as much behind; the margin and half a step more.
+        let share = (0.05_f64 / 0.9).asin() / std::f64::consts::PI;
+        assert!(hit.from < 0.5 - share && hit.from > 0.5 - 1.8 * share, "{hit:?}");
+        assert!(hit.to > 0.5 + share && hit.to < 0.5 + 1.8 * share, "{hit:?}");
+        assert!((hit.at.expect("a point") - Point::new(0.0, 0.9, 0.0)).norm() < 0.12);
+        // Beyond its end nothing is hit; within the margin it is near.
+        let beyond = |off: f64| vec![([0.0, 1.0 + off, 0.0], What::Fixed)];
+        assert!(walk(&beyond(0.04), &[0.0, 3.0], 0.0, 0.02).is_empty());
+        let near = walk(&beyond(0.015), &[0.0, 3.0], 0.0, 0.02);
+        assert!(near.len() == 1 && near[0].level == Level::Near, "{near:?}");
+        assert!(near[0].gap <= 0.015 && near[0].gap > 0.002, "{near:?}");
+    }
+
+    #[test]
+    fn what_it_touched_where_it_was_found_is_told_apart_until_it_comes_nearer() {
+        // At its end, 1 cm away, as found; and a post that it turns into.
+        let points = [([1.01, 0.0, 0.0], What::Uncertain), ([0.0, 0.8, 0.0], What::Fixed)];
+        let found = walk(&points, &[0.0, 1.6], 0.0, 0.02);
+        let levels: Vec<_> =
+            found.iter().map(|c| (c.what, c.level >= Level::Hit, c.as_found)).collect();
+        assert_eq!(levels, [(What::Fixed, true, false), (What::Beside, false, true)]);
+        // The same point is none of its own where it was found elsewhere.
+        assert!(walk(&points[..1], &[0.0, 1.6], 1.6, 0.02).iter().all(|c| !c.as_found));
+        // It was near where it was found, and is inside on the way.
+        let points = [([0.9, 0.06, 0.0], What::Fixed)];
+        let found = walk(&points, &[0.0, 0.1], 0.0, 0.02);
+        assert!(found.iter().any(|c| c.level >= Level::Hit && !c.as_found), "{found:?}");
+    }
+
+    #[test]
+    fn what_lies_inside_of_a_link_from_the_beginning_is_hit() {
+        let found = walk(&[([0.5, 0.0, 0.0], What::Uncertain)], &[0.0], 1.0, 0.005);
+        assert!(found.len() == 1 && found[0].level == Level::Inside, "{found:?}");
+    }
+
+    #[test]
+    fn space_of_which_nothing_is_known_is_not_free() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let model = arm(dir.path());
+        let body = Body::new(&model, BTreeMap::new(), 0.02, &OneByOne);
+        let bounds = Aabb { min: [-9.0, -0.2, -9.0], max: [9.0, 9.0, 9.0] };
+        let known = Known { world_from_base: Pose::identity(), bounds };
+        let around =
+            Obstacles::new(&Cells::within(&crate::reach(&model, 0.02)), &[], (None, known));
+        let path = [vec![0.0], vec![-1.0]];
+        let walk = Walk::new((&body, &around), &path, &[0.0], &OneByOne);
+        let looked = (0..walk.n_pieces()).map(|piece| walk.look(piece)).collect();
+        let found = walk.contacts(looked);
+        assert!(found.len() == 1 && found[0].what == What::Unseen && found[0].at.is_none());
+        assert!(found[0].from > 0.0 && found[0].to == 1.0, "{found:?}");
+    }
+}

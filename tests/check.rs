@@ -1,0 +1,105 @@
+//! A path of a robot against what was scanned, from outside: into the floor, through what nobody has seen, and what is no path.
+
+mod common;
+
+use common::palletiser;
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Beams of each scanner.
+const N_BEAMS: u64 = 250_000;
+
+fn program(dir: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
+    command.current_dir(dir).args(args).args(["--progress", "none"]);
+    command.output().expect("the program starts")
+}
+
+/// Checks a path; the exit code and the answer.
+fn check(dir: &Path, path: &str, more: &[&str]) -> (i32, Value) {
+    std::fs::write(dir.join("path.csv"), path).expect("writes");
+    let args = ["check", "out", "--trajectory", "path.csv", "--json"];
+    let output = program(dir, &[&args, more].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    let answer = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {said}"));
+    (output.status.code().expect("it ends"), answer)
+}
+
+/// Contacts of a level, with what.
+fn contacts<'a>(answer: &'a Value, what: &str) -> Vec<&'a Value> {
+    let all = answer["contacts"].as_array().expect("contacts");
+    all.iter().filter(|c| c["what"] == what && c["level"] != "unseen").collect()
+}
+
+#[test]
+fn a_path_is_free_only_where_all_is_known_and_nothing_near() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let dir = dir.path();
+    palletiser(dir, 12, N_BEAMS);
+    let args = ["run", "scans/scans.e57", "--robots", "robots", "--out", "out"];
+    let run = program(dir, &args);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let text = std::fs::read_to_string(dir.join("out/result.json")).expect("a result");
+    let result: Value = serde_json::from_str(&text).expect("JSON");
+    let joints = result["robots"][0]["joints"].as_object().expect("joints");
+    let names: Vec<&str> = joints.keys().map(String::as_str).collect();
+    let found: Vec<f64> = joints.values().map(|v| v.as_f64().expect("a value")).collect();
+    let line =
+        |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
+    let moved = |joint: usize, by: f64| {
+        let mut out = found.clone();
+        out[joint] += by;
+        out
+    };
+    let head = names.join(",") + "\n";
+
+    // Where it stands nothing is in its way, in whatever units.
+    let (code, stands) = check(dir, &(head.clone() + &line(&found)), &[]);
+    assert!([0, 3].contains(&code) && stands["outcome"] != "blocked", "{stands}");
+    assert_eq!(stands["n_postures"], 1);
+    let degrees: Vec<f64> = found.iter().map(|v| v.to_degrees()).collect();
+    let (_, same) = check(dir, &(head.clone() + &line(&degrees)), &["--degrees"]);
+    assert_eq!(same["contacts"], stands["contacts"]);
+
+    // Its arm bent to its stops goes through the floor, once it is low enough.
+    let mut stops = found.clone();
+    (stops[1], stops[2]) = (1.2, 1.2);
+    let down = head.clone() + &line(&found) + &line(&stops);
+    let (code, down) = check(dir, &down, &["--allow", "unseen,beside,as-found"]);
+    assert_eq!((code, &down["outcome"]), (1, &Value::from("blocked")), "{down}");
+    let floor = contacts(&down, "floor");
+    assert!(!floor.is_empty(), "{down}");
+    let hit = floor.iter().find(|c| c["level"] == "hit" || c["level"] == "inside");
+    let hit = hit.expect("it goes in");
+    assert!(hit["from"].as_f64().expect("a place") > 0.1, "{hit}");
+    assert!(hit["at"][2].as_f64().expect("a height").abs() < 0.02, "{hit}");
+    assert_eq!(hit["as_found"], false);
+
+    // A turn keeps clear of the floor: what is left is not known, and may be allowed.
+    let turn = head.clone() + &line(&found) + &line(&moved(0, 0.5));
+    let (code, turned) = check(dir, &turn, &[]);
+    assert_eq!((code, &turned["outcome"]), (3, &Value::from("open")), "{turned}");
+    assert!(turned["doubts"].as_array().expect("doubts").contains(&"unseen".into()), "{turned}");
+    let (code, _) = check(dir, &turn, &["--allow", "unseen,beside,as-found"]);
+    assert_eq!(code, 0);
+    // The same on any number of threads.
+    let (_, one) = check(dir, &turn, &["--threads", "1"]);
+    assert_eq!(one, turned);
+
+    // Beyond its stops it cannot get.
+    let (code, beyond) = check(dir, &(head.clone() + &line(&moved(0, 9.0))), &[]);
+    assert_eq!(code, 1);
+    assert!(beyond["impossible"][0]["what"].to_string().contains("beyond its limits"), "{beyond}");
+
+    for (path, code, said) in [
+        ("elbow\n0.1\n".to_owned(), 2, "no robot of the result has the joints elbow"),
+        (head + "0.1\n", 4, "line 2 has 1 values"),
+    ] {
+        std::fs::write(dir.join("path.csv"), path).expect("writes");
+        let output = program(dir, &["check", "out", "--trajectory", "path.csv"]);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{text}");
+        assert!(text.contains(said), "{text}");
+    }
+}
