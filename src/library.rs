@@ -18,10 +18,10 @@ pub(crate) fn load(
     kept: Option<&Cache>,
     engine: &Engine,
 ) -> Result<Library> {
-    load_those(dir, |_| true, (settings, kept), engine)
+    load_those(dir, |_| true, (settings, kept), engine)?.checked(dir)
 }
 
-/// The same of those whose names are wanted.
+/// The same of those whose names are wanted; maybe none.
 pub(crate) fn load_those(
     dir: &Path,
     is_wanted: impl Fn(&str) -> bool,
@@ -46,5 +46,5 @@ pub(crate) fn load_those(
     for model in loaded {
         library.add(model);
     }
-    library.checked(dir)
+    Ok(library)
 }

@@ -8,12 +8,17 @@
 
 use contract::{Error, Kind, Result};
 use serde_json::Value;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-/// Larger files are no path of one robot, bytes.
-const MAX_BYTES: u64 = 256 << 20;
+/// Larger files are no path of one robot, bytes; nor are ones with more waypoints.
+const MAX_BYTES: u64 = 64 << 20;
+const MAX_WAYPOINTS: usize = 1_000_000;
+/// No joint gets so far, radians, degrees or metres.
+const MAX_VALUE: f64 = 1e5;
 /// Names of columns that are times, not joints.
-const TIMES: [&str; 3] = ["time", "t", "time_from_start"];
+const TIMES: [&str; 2] = ["time", "time_from_start"];
 
 /// A path of one robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,16 +37,24 @@ impl Trajectory {
     /// # Errors
     /// A file that cannot be read, or is no path: with the line or the waypoint.
     pub fn read(path: &Path) -> Result<Self> {
-        let io = |e: std::io::Error| Error::of_file("path cannot be read", path, e);
-        let n_bytes = std::fs::metadata(path).map_err(io)?.len();
         let bad = |what: String| {
-            let hint = "a path is CSV with joints' names in its head, or JSON as trajectory_msgs/JointTrajectory";
+            let hint = "a path is CSV with joints' names in its head, or JSON as trajectory_msgs/JointTrajectory, both in UTF-8";
             Error::new(Kind::BadInput, what).at(path.display()).hint(hint)
         };
-        if n_bytes > MAX_BYTES {
-            return Err(bad(format!("{n_bytes} bytes are too many for a path")));
+        let io = |e: std::io::Error| match e.kind() {
+            ErrorKind::NotFound => {
+                Error::new(Kind::Usage, "there is no such file").at(path.display())
+            }
+            ErrorKind::InvalidData => bad("it is no text".into()),
+            _ => Error::of_file("path cannot be read", path, e),
+        };
+        // Not as long as its folder says, but as it is: some files have no end.
+        let mut text = String::new();
+        let file = File::open(path).map_err(io)?;
+        file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+        if text.len() as u64 > MAX_BYTES {
+            return Err(bad(format!("it is longer than {MAX_BYTES} bytes")));
         }
-        let text = std::fs::read_to_string(path).map_err(io)?;
         let text = text.trim_start_matches('\u{feff}');
         let is_json = text.trim_start().starts_with(['{', '[']);
         let read = if is_json { json(text) } else { csv(text) };
@@ -57,15 +70,18 @@ impl Trajectory {
         if self.joints.is_empty() || self.points.is_empty() {
             return Err("it has no joints or no waypoints".into());
         }
+        if self.points.len() > MAX_WAYPOINTS {
+            return Err(format!("it has more than {MAX_WAYPOINTS} waypoints: cut it into parts"));
+        }
         let n = self.joints.len();
         for (at, point) in self.points.iter().enumerate() {
             if point.len() != n {
                 return Err(format!("waypoint {at} has {} values for {n} joints", point.len()));
             }
-            if let Some(odd) = point.iter().position(|v| !v.is_finite()) {
+            if let Some(odd) = point.iter().position(|v| !(v.abs() <= MAX_VALUE)) {
                 return Err(format!(
-                    "waypoint {at}: the value of {} is no number",
-                    self.joints[odd]
+                    "waypoint {at}: {} of {} is no value of a joint",
+                    point[odd], self.joints[odd]
                 ));
             }
         }
@@ -119,6 +135,10 @@ fn csv(text: &str) -> std::result::Result<Trajectory, String> {
 fn json(text: &str) -> std::result::Result<Trajectory, String> {
     let all: Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
     let path = all.get("joint_trajectory").unwrap_or(&all);
+    let base = all.get("multi_dof_joint_trajectory").and_then(|t| t["points"].as_array());
+    if base.is_some_and(|points| !points.is_empty()) {
+        return Err("it moves a base, too (multi_dof_joint_trajectory): robots stand".into());
+    }
     let list =
         |name: &str| path.get(name).and_then(Value::as_array).ok_or(format!("it has no {name}"));
     let name =
@@ -166,7 +186,7 @@ mod tests {
         let forms = [
             "time,a,b\n0,0.5,-1\n1.5,0.25,2\n",
             "# a comment\n\"Time\";\"a\";\"b\"\n\n0;0,5;-1\n1,5;0,25;2,0\n",
-            "a b t\n0.5 -1 0\n0.25 2 1.5\n",
+            "a b time\n0.5 -1 0\n0.25 2 1.5\n",
             r#"{"joint_names": ["a", "b"], "points": [{"positions": [0.5, -1], "time_from_start": {"sec": 0, "nanosec": 0}},
                 {"positions": [0.25, 2.0], "time_from_start": {"secs": 1, "nsecs": 500000000}}]}"#,
             r#"{"joint_trajectory": {"joint_names": ["a", "b"], "points": [{"positions": [0.5, -1], "time_from_start": 0},
@@ -194,7 +214,12 @@ mod tests {
             ),
             (
                 "{\"joint_names\": [\"a\"], \"points\": [{\"positions\": [\"x\"]}]}",
-                "value of a is no number",
+                "NaN of a is no value",
+            ),
+            ("a\n1e9\n", "1000000000 of a is no value"),
+            (
+                "{\"joint_trajectory\": {}, \"multi_dof_joint_trajectory\": {\"points\": [{}]}}",
+                "moves a base",
             ),
             ("{\"joint_names\"", "EOF"),
         ] {

@@ -28,8 +28,8 @@ pub(super) struct Surroundings<'a> {
 struct Sorting<'a> {
     number: i16,
     base_from_world: Pose,
-    /// Frame of the base.
-    bounds: Aabb,
+    /// Farthest from the base on each of its axes, metres.
+    far: f64,
     /// Links from the base, as the robot was found.
     link_from_base: Vec<Pose>,
     /// By link: whether joints move it.
@@ -45,16 +45,17 @@ struct Sorted {
 }
 
 impl Surroundings<'_> {
-    /// What hangs on a robot, and what stands around it: points, `others`, and space that no beam went through.
+    /// What hangs on a robot, and what stands around it no farther than so on each axis of its base, metres: points, `others`, and
+    /// space that no beam went through.
     pub(super) fn gather(
         &self,
         robot: &Robot<'_>,
         (others, models): (&[(usize, &Fit)], &[Model]),
-        margin: f64,
+        far: f64,
         engine: &Engine,
     ) -> Result<(Hung, Obstacles)> {
         let moves = moving(robot.model);
-        let sorting = self.sorting(robot, margin, &moves);
+        let sorting = sorting(robot, far, &moves);
         let (cells, hung) = self.points(&sorting, engine)?;
         let base_from_world = &sorting.base_from_world;
         let standing = |(number, fit): &(usize, &Fit)| {
@@ -75,18 +76,6 @@ impl Surroundings<'_> {
         Ok((hung, Obstacles::new(&cells, &others, (space.as_ref(), known))))
     }
 
-    fn sorting<'s>(&self, robot: &Robot<'_>, margin: f64, moves: &'s [bool]) -> Sorting<'s> {
-        let (fit, model) = (robot.fit, robot.model);
-        let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
-        Sorting {
-            number: robot.number as i16,
-            base_from_world: fit.world_from_base.inverse(),
-            bounds: clearance::reach(model, margin),
-            link_from_base: model.poses(&posture).iter().map(Pose::inverse).collect(),
-            moves,
-        }
-    }
-
     /// Cells of all points that may stand in the way, and points that hang on the robot.
     fn points(&self, sorting: &Sorting<'_>, engine: &Engine) -> Result<(Cells, Hung)> {
         let Some(edge) = self.state.records.tile_edge() else {
@@ -95,12 +84,12 @@ impl Surroundings<'_> {
                 .hint("run with --set export.tiles=true"));
         };
         let corners =
-            sorting.bounds.corners().map(|c| sorting.base_from_world.inverse() * Point::from(c));
+            sorting.bounds().corners().map(|c| sorting.base_from_world.inverse() * Point::from(c));
         let world = Aabb::of(corners.iter().map(|c| c.coords.into()));
         let names = tiles_of(&self.manifest.files, edge, &[&world]);
         let las = self.state.records.las();
         let tiles = engine.fan_out(Task::new("points"), names, |name| {
-            let mut own = Sorted::new(&sorting.bounds);
+            let mut own = Sorted::new(sorting.far);
             read_tile(&self.out.join(&name), &las, |points| {
                 points.iter().try_for_each(|p| self.sort(sorting, p, &mut own))?;
                 own.settle(SETTLED);
@@ -109,13 +98,14 @@ impl Surroundings<'_> {
             own.settle(0);
             Ok(own)
         })?;
-        let mut all = Sorted::new(&sorting.bounds);
+        let mut all = Sorted::new(sorting.far);
         for own in tiles {
             all.cells.join(own.cells);
             for (link, cells) in own.hung {
                 all.hung.entry(link).or_default().extend(cells);
             }
         }
+        all.cells.settle();
         let middle = |cell: &[i32; 3]| cell.map(|v| ((f64::from(v) + 0.5) * CELL) as f32);
         let hung =
             all.hung.into_iter().map(|(link, cells)| (link, cells.iter().map(middle).collect()));
@@ -124,11 +114,14 @@ impl Surroundings<'_> {
 
     fn sort(&self, sorting: &Sorting<'_>, point: &OldPoint, into: &mut Sorted) -> Result<()> {
         let p = sorting.base_from_world * Point::from(point.world);
-        if !sorting.bounds.contains(p.coords.into()) {
-            return Ok(());
-        }
         let label = point.label;
         let is_own = label.robot == sorting.number;
+        // What hangs on the robot counts wherever it is.
+        let is_hung = is_own && label.kind == PointKind::Attachment;
+        let is_inside = sorting.bounds().contains(p.coords.into());
+        if !is_inside && !is_hung {
+            return Ok(());
+        }
         let what = match label.kind {
             PointKind::Link if is_own => return Ok(()),
             PointKind::Attachment if is_own => {
@@ -141,7 +134,8 @@ impl Surroundings<'_> {
                         return Ok(());
                     }
                     // What hangs on its foot stays where it is.
-                    None => What::Uncertain,
+                    None if is_inside => What::Uncertain,
+                    None => return Ok(()),
                 }
             }
             PointKind::Link | PointKind::Attachment if label.robot >= 0 => {
@@ -170,9 +164,28 @@ impl Surroundings<'_> {
     }
 }
 
+fn sorting<'m>(robot: &Robot<'_>, far: f64, moves: &'m [bool]) -> Sorting<'m> {
+    let (fit, model) = (robot.fit, robot.model);
+    let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    Sorting {
+        number: robot.number as i16,
+        base_from_world: fit.world_from_base.inverse(),
+        far,
+        link_from_base: model.poses(&posture).iter().map(Pose::inverse).collect(),
+        moves,
+    }
+}
+
+impl Sorting<'_> {
+    /// Frame of the base.
+    fn bounds(&self) -> Aabb {
+        Aabb { min: [-self.far; 3], max: [self.far; 3] }
+    }
+}
+
 impl Sorted {
-    fn new(bounds: &Aabb) -> Self {
-        Self { cells: Cells::within(bounds), n_waiting: 0, hung: BTreeMap::new() }
+    fn new(far: f64) -> Self {
+        Self { cells: Cells::within(far), n_waiting: 0, hung: BTreeMap::new() }
     }
 
     fn settle(&mut self, most: usize) {

@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 /// Name and version of what is told to programs.
 const SCHEMA: &str = "stillpoint.check/1";
 /// What is never looked at.
-const NOT_CHECKED: &str =
-    "the robot against itself, other robots in motion, the way to the first waypoint";
+const NOT_CHECKED: &str = "the robot against itself, other robots in motion, the way to the first waypoint, joints that do not go \
+     straight from one waypoint to the next, limits of joints that follow others, sides that nobody saw of what hangs on it";
 
 impl Outcome {
     /// As it is written.
@@ -38,7 +38,7 @@ impl Doubt {
         match self {
             Self::Unseen => "it leads through space that no beam went through",
             Self::Beside => {
-                "it leads through uncertain points beside where the robot was found, most of them its own"
+                "uncertain points lie beside where the robot was found: most are its own, some may stand in its way"
             }
             Self::AsFound => "parts are as near to something as where the robot was found",
             Self::Posture => "the robot's posture is not certain",

@@ -61,38 +61,41 @@ struct Said {
 /// A model that the library no longer has.
 pub(crate) fn models_of(fits: &mut [Fit], library: &Library) -> Result<Vec<Model>> {
     let mut models = library.models.clone();
-    for fit in fits {
-        let missing = |name: &str| {
-            let what =
-                format!("the library has no model \"{name}\", which the earlier result found");
+    fits.iter_mut().try_for_each(|fit| own_model(fit, library, &mut models))?;
+    Ok(models)
+}
+
+/// Sets the model of a fit, and of the same robot as it stood in other scans; one that is no model of the library is added.
+fn own_model(fit: &mut Fit, library: &Library, models: &mut Vec<Model>) -> Result<()> {
+    let missing = |name: &str| {
+        let what = format!("the library has no model \"{name}\", which the earlier result found");
+        Error::bad_input(what).hint("give the library of the earlier run with --robots")
+    };
+    let known = |name: &str| library.model(name).ok_or_else(|| missing(name));
+    fit.model = known(&fit.model_name)?;
+    let mut own = (!fit.other_branches.is_empty())
+        .then(|| models[fit.model].with_other_branches(&fit.other_branches));
+    if let Some(tool) = &fit.tool {
+        let arm = own.as_ref().unwrap_or(&models[fit.model]);
+        let flange = arm.links.iter().position(|l| l.name == tool.link).ok_or_else(|| {
+            let what = format!("model \"{}\" has no link \"{}\"", arm.name, tool.link);
             Error::bad_input(what).hint("give the library of the earlier run with --robots")
-        };
-        let known = |name: &str| library.model(name).ok_or_else(|| missing(name));
-        fit.model = known(&fit.model_name)?;
-        let mut own = (!fit.other_branches.is_empty())
-            .then(|| models[fit.model].with_other_branches(&fit.other_branches));
-        if let Some(tool) = &fit.tool {
-            let arm = own.as_ref().unwrap_or(&models[fit.model]);
-            let flange = arm.links.iter().position(|l| l.name == tool.link).ok_or_else(|| {
-                let what = format!("model \"{}\" has no link \"{}\"", arm.name, tool.link);
-                Error::bad_input(what).hint("give the library of the earlier run with --robots")
-            })?;
-            own = Some(arm.with_tool(&models[known(&tool.model)?], flange, tool.mount));
-        }
-        if let Some(found) = &fit.calibration {
-            let own = own.get_or_insert_with(|| models[fit.model].clone());
-            for joint in &mut own.joints {
-                if let Some(frame) = found.frames.iter().find(|f| f.name == joint.name) {
-                    joint.parent_from_joint *= frame.moved();
-                }
+        })?;
+        own = Some(arm.with_tool(&models[known(&tool.model)?], flange, tool.mount));
+    }
+    if let Some(found) = &fit.calibration {
+        let own = own.get_or_insert_with(|| models[fit.model].clone());
+        for joint in &mut own.joints {
+            if let Some(frame) = found.frames.iter().find(|f| f.name == joint.name) {
+                joint.parent_from_joint *= frame.moved();
             }
         }
-        if let Some(own) = own {
-            fit.model = models.len();
-            models.push(own);
-        }
     }
-    Ok(models)
+    if let Some(own) = own {
+        fit.model = models.len();
+        models.push(own);
+    }
+    fit.stays.iter_mut().try_for_each(|stay| own_model(stay, library, models))
 }
 
 /// World bounds of a robot as it stands.

@@ -1,7 +1,7 @@
 //! A robot and what hangs on it in; at one posture, which of its parts are near to which obstacles, out.
 
 use crate::Level;
-use crate::obstacles::{Bin, Obstacle, Obstacles, What};
+use crate::obstacles::{Bin, HALF_CELL, Obstacle, Obstacles, What};
 use crate::path::STEP;
 use crate::shape::{Gap, Shape};
 use contract::Fan;
@@ -54,14 +54,21 @@ pub(crate) struct Near {
 }
 
 impl<'a> Body<'a> {
-    /// The parts of a model that its joints move, and what hangs on them; `margin` is what is near, metres.
+    /// The parts of a model that its joints move, and what hangs on them; `margin` is what is near, `largest` the radius of the largest
+    /// obstacle, metres.
     #[must_use]
-    pub fn new(model: &'a Model, hung: Hung, margin: f64, fan: &impl Fan) -> Self {
+    pub fn new(
+        model: &'a Model,
+        hung: Hung,
+        (margin, largest): (f64, f64),
+        fan: &impl Fan,
+    ) -> Self {
         let margin = margin as f32;
+        let least = margin + BETWEEN + HALF_CELL;
         let moving: Vec<usize> = (0..model.links.len()).filter(|&l| moves(model, l)).collect();
         let surfaces = fan.fan(moving.clone(), |link| {
             let (mesh, bounds) = (&model.links[link].mesh, model.links[link].bounds);
-            let shape = Shape::surface(mesh, &bounds)?;
+            let shape = Shape::surface(mesh, &bounds, least)?;
             Some(Part { link, hangs: false, bounds, shape })
         });
         let mut parts: Vec<Part> = surfaces.into_iter().flatten().collect();
@@ -69,10 +76,17 @@ impl<'a> Body<'a> {
             hung.into_iter().filter(|(link, points)| moving.contains(link) && !points.is_empty())
         {
             let bounds = Aabb::of(points.iter().map(|p| p.map(f64::from)));
-            let within = margin + BETWEEN + crate::obstacles::CELL as f32;
+            let within = margin.max(BESIDE) + BETWEEN + largest as f32;
             parts.push(Part { link, hangs: true, bounds, shape: Shape::hung(points, within) });
         }
         Self { model, parts, margin }
+    }
+
+    /// No part of it, nor of what hangs on it, gets farther from the base's origin, metres.
+    #[must_use]
+    pub fn farthest(&self) -> f64 {
+        let far = |p: &Part| farthest(&p.bounds) + way(self.model, p.link);
+        self.parts.iter().map(far).fold(0.0, f64::max)
     }
 
     /// Bounds of its parts in the frames of their links.
@@ -80,8 +94,8 @@ impl<'a> Body<'a> {
         self.parts.iter().map(|part| (part.link, &part.bounds))
     }
 
-    /// Tells those uncertain points apart that lie beside the robot as it was scanned.
-    pub fn set_beside(&self, found: &[f64], around: &mut Obstacles) {
+    /// Tells those uncertain points apart that lie beside the robot as it was scanned, and whether there are any.
+    pub fn set_beside(&self, found: &[f64], around: &mut Obstacles) -> bool {
         let near = self.within(BESIDE, found, around);
         for touch in near.touches {
             let obstacle = &mut around.all[touch.obstacle];
@@ -89,6 +103,7 @@ impl<'a> Body<'a> {
                 obstacle.what = What::Beside;
             }
         }
+        around.all.iter().any(|o| o.what == What::Beside)
     }
 
     /// All that is nearer than the margin at a posture.
@@ -101,7 +116,8 @@ impl<'a> Body<'a> {
         let mut out = Near::default();
         for (at, part) in self.parts.iter().enumerate() {
             let base_from_link = &poses[part.link];
-            if around.known.leaves(&part.bounds, base_from_link) {
+            let grown = part.bounds.grown(f64::from(margin + BETWEEN));
+            if around.leaves(&grown, base_from_link) {
                 out.outside.push(at);
             }
             let link_from_base = Flat::of(&base_from_link.inverse());
@@ -157,14 +173,15 @@ fn touch(
     (o, margin): (&Obstacle, f32),
     gap: f32,
 ) -> Option<Touch> {
-    let to_ball = gap - o.radius;
+    // Between two postures it may be half a step nearer.
+    let gap = gap - o.radius - BETWEEN;
     let level = match o.what {
-        What::Unseen if to_ball <= margin => Level::Unseen,
-        What::Unseen => return None,
-        _ if to_ball <= 0.0 => Level::Hit,
+        _ if gap > margin => return None,
+        What::Unseen => Level::Unseen,
+        _ if gap <= 0.0 => Level::Hit,
         _ => Level::Near,
     };
-    Some(Touch { part, obstacle, level, gap: (to_ball - BETWEEN).max(0.0) })
+    Some(Touch { part, obstacle, level, gap: gap.max(0.0) })
 }
 
 fn inside(part: usize, obstacle: usize, o: &Obstacle) -> Touch {
@@ -172,21 +189,20 @@ fn inside(part: usize, obstacle: usize, o: &Obstacle) -> Touch {
     Touch { part, obstacle, level, gap: 0.0 }
 }
 
-/// Bounds of all that can ever be near to a robot, with what hangs on it, frame of its base, metres.
+/// No link of a robot gets farther from its base's origin, metres.
 #[must_use]
-pub fn reach(model: &Model, margin: f64) -> Aabb {
-    let far = |(at, link): (usize, &Link)| {
-        let corners =
-            if link.bounds.is_empty() { Vec::new() } else { link.bounds.corners().to_vec() };
-        let own = corners.into_iter().map(|c| Point::from(c).coords.norm()).fold(0.0, f64::max);
-        own + way(model, at)
-    };
-    let all = model.links.iter().enumerate().map(far).fold(0.0, f64::max) + HUNG + margin;
-    Aabb { min: [-all; 3], max: [all; 3] }
+pub fn reach(model: &Model) -> f64 {
+    let far = |(at, link): (usize, &Link)| farthest(&link.bounds) + way(model, at);
+    model.links.iter().enumerate().map(far).fold(0.0, f64::max)
 }
 
-/// What hangs on a robot reaches no farther beyond it, metres: the largest part that a gripper holds.
-const HUNG: f64 = 1.5;
+/// Of all places of a box in a link's frame, from its origin, metres.
+fn farthest(bounds: &Aabb) -> f64 {
+    if bounds.is_empty() {
+        return 0.0;
+    }
+    bounds.corners().into_iter().map(|c| Point::from(c).coords.norm()).fold(0.0, f64::max)
+}
 
 /// Whether a joint that moves lies between the root and a link.
 #[must_use]

@@ -10,8 +10,8 @@ mod path;
 mod shape;
 
 pub use body::{Body, Hung, moves, reach};
-pub use obstacles::{CELL, Cells, Known, Obstacles, What};
-pub use path::{Contact, Leg, Looked, STEP, Walk};
+pub use obstacles::{CELL, Cells, FARTHEST, Known, Obstacles, What};
+pub use path::{Contact, Contacts, Leg, Looked, STEP, Walk, leg};
 
 /// How a part of a robot stands to an obstacle; what is worse is greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

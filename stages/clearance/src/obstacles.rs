@@ -10,10 +10,14 @@ use std::ops::Range;
 pub const CELL: f64 = 0.004;
 /// Half the diagonal of a cube of edge 1.
 const HALF_DIAGONAL: f64 = 0.8661;
+/// Radius of a ball that holds a cell, metres.
+pub(crate) const HALF_CELL: f32 = (HALF_DIAGONAL * CELL) as f32;
 /// Edge of a bin, metres: about as many cells of a surface as bins about a robot.
 const BIN: f64 = 0.16;
 /// Bits of a cell's place on each axis.
 const BITS: u32 = 20;
+/// Farthest from a base that points are told apart, metres: 2 km.
+pub const FARTHEST: f64 = 0.5 * CELL * (1_u32 << BITS) as f64;
 
 /// What an obstacle is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -52,8 +56,8 @@ pub(crate) struct Bin {
 /// Cells that hold points, each once for each kind of them.
 #[derive(Debug, Clone, Default)]
 pub struct Cells {
-    /// Corner that places are counted from, metres.
-    corner: [f64; 3],
+    /// Farthest from the base on each axis, metres.
+    far: f64,
     cells: Vec<(u64, What)>,
 }
 
@@ -72,19 +76,21 @@ pub struct Obstacles {
     pub(crate) all: Vec<Obstacle>,
     pub(crate) bins: Vec<Bin>,
     pub(crate) known: Known,
+    /// Farthest from the base on each axis that points were gathered, metres.
+    far: f64,
 }
 
 impl Cells {
-    /// None, of points in `bounds` (frame of the base).
+    /// None, of points no farther from the base than so on each axis, metres.
     #[must_use]
-    pub fn within(bounds: &Aabb) -> Self {
-        Self { corner: bounds.min, cells: Vec::new() }
+    pub fn within(far: f64) -> Self {
+        Self { far, cells: Vec::new() }
     }
 
-    /// Adds a point of the bounds, frame of the base.
+    /// Adds a point that is no farther, frame of the base.
     pub fn add(&mut self, p: [f64; 3], what: What) {
         let most = f64::from((1_u32 << BITS) - 1);
-        let place = |i: usize| ((p[i] - self.corner[i]) / CELL).clamp(0.0, most) as u64;
+        let place = |i: usize| ((p[i] + self.far) / CELL).clamp(0.0, most) as u64;
         self.cells.push((place(0) << (2 * BITS) | place(1) << BITS | place(2), what));
     }
 
@@ -94,18 +100,17 @@ impl Cells {
         self.cells.dedup();
     }
 
-    /// Adds those of another part of the same bounds.
+    /// Adds those of another part of the same room; to be settled behind the last.
     pub fn join(&mut self, other: Self) {
         self.cells.extend(other.cells);
-        self.settle();
     }
 
     fn obstacles(&self) -> impl Iterator<Item = Obstacle> {
         let mask = (1_u64 << BITS) - 1;
         self.cells.iter().map(move |&(key, what)| {
             let cell = [key >> (2 * BITS), key >> BITS & mask, key & mask];
-            let at = |i: usize| (self.corner[i] + (cell[i] as f64 + 0.5) * CELL) as f32;
-            Obstacle { at: [at(0), at(1), at(2)], radius: (HALF_DIAGONAL * CELL) as f32, what }
+            let at = |i: usize| ((cell[i] as f64 + 0.5) * CELL - self.far) as f32;
+            Obstacle { at: [at(0), at(1), at(2)], radius: HALF_CELL, what }
         })
     }
 }
@@ -134,19 +139,23 @@ impl Obstacles {
             bins.push(Bin::of(own, from));
             from += own.len();
         }
-        Self { all, bins, known }
+        Self { all, bins, known, far: cells.far }
     }
 
-    /// How many there are.
+    /// Radius of the largest, metres.
     #[must_use]
-    pub fn len(&self) -> usize {
-        self.all.len()
+    pub fn largest(&self) -> f64 {
+        self.all.iter().map(|o| f64::from(o.radius)).fold(0.0, f64::max)
     }
 
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.all.is_empty()
+    /// Whether a box of a link reaches to where nobody looked for points, or into space of which nothing is known.
+    pub(crate) fn leaves(&self, bounds: &Aabb, base_from_link: &Pose) -> bool {
+        let pose = self.known.world_from_base * base_from_link;
+        let is_known = |c: [f64; 3]| {
+            let (here, world) = (base_from_link * Point::from(c), pose * Point::from(c));
+            here.coords.amax() <= self.far && self.known.bounds.contains(world.coords.into())
+        };
+        !bounds.corners().into_iter().all(is_known)
     }
 }
 
@@ -168,8 +177,8 @@ fn surface<'a>(
 ) -> impl Iterator<Item = Obstacle> + 'a {
     let links = model.links.iter().zip(poses);
     links.flat_map(move |(link, pose)| {
-        // Each sample stands for a square of the surface.
-        let radius = std::f32::consts::FRAC_1_SQRT_2 * link.cad.spacing;
+        // Samples are spread unevenly: gaps between them are wider than they are on average.
+        let radius = 2.0 * link.cad.spacing;
         link.cad.points.iter().map(move |p| {
             let at = pose * Point::from(p.map(f64::from));
             let at = at.coords.map(|v| v as f32).into();
@@ -178,7 +187,7 @@ fn surface<'a>(
     })
 }
 
-/// Voxels that no beam went through: balls inside of them, for what they are is not known to the millimetre.
+/// Voxels that no beam went through: balls that hold them.
 fn unseen(space: &Space, base_from_world: &Pose) -> impl Iterator<Item = Obstacle> {
     let grid = *space.grid();
     let voxels = space.voxels().iter().enumerate();
@@ -187,17 +196,8 @@ fn unseen(space: &Space, base_from_world: &Pose) -> impl Iterator<Item = Obstacl
         let middle = |i: usize| ((grid.first[i] + cell[i] as i64) as f64 + 0.5) * grid.edge;
         let p = base_from_world * Point::new(middle(0), middle(1), middle(2));
         let at = p.coords.map(|v| v as f32).into();
-        Obstacle { at, radius: 0.5 * grid.edge as f32, what: What::Unseen }
+        Obstacle { at, radius: (HALF_DIAGONAL * grid.edge) as f32, what: What::Unseen }
     })
-}
-
-impl Known {
-    /// Whether a box of a link reaches into space of which nothing is known.
-    pub(crate) fn leaves(&self, bounds: &Aabb, base_from_link: &Pose) -> bool {
-        let pose = self.world_from_base * base_from_link;
-        let is_known = |c: [f64; 3]| self.bounds.contains((pose * Point::from(c)).coords.into());
-        !bounds.corners().into_iter().all(is_known)
-    }
 }
 
 #[inline]

@@ -4,7 +4,6 @@
 use crate::Level;
 use crate::body::{Body, Near, Touch};
 use crate::obstacles::{Obstacles, What};
-use contract::Fan;
 use geometry::Point;
 use std::collections::BTreeMap;
 
@@ -64,80 +63,81 @@ pub struct Walk<'a> {
     body: &'a Body<'a>,
     around: &'a Obstacles,
     path: &'a [Vec<f64>],
-    legs: Vec<Leg>,
-    /// Leg and step of each posture.
-    places: Vec<(usize, usize)>,
+    legs: &'a [Leg],
+    /// Number of the first posture of each leg, and of the last waypoint.
+    first: Vec<usize>,
     found: AsFound,
 }
 
-/// What is near at the postures of a piece.
-pub struct Looked(Vec<(f64, Told)>);
+/// What is near at the postures of a piece, and how far closed loops stay open there, metres.
+pub struct Looked(Vec<(f64, Told, f64)>);
 
 impl<'a> Walk<'a> {
-    /// Lays postures between the waypoints; `found` is the posture that the robot was scanned in.
+    /// Along the waypoints (at least one), with a leg from each to the next; `found` is the posture that the robot was scanned in.
     #[must_use]
     pub fn new(
         (body, around): (&'a Body<'a>, &'a Obstacles),
-        path: &'a [Vec<f64>],
+        (path, legs): (&'a [Vec<f64>], &'a [Leg]),
         found: &[f64],
-        fan: &impl Fan,
     ) -> Self {
-        let pairs: Vec<&[Vec<f64>]> = path.windows(2).collect();
-        let legs: Vec<Leg> = fan.fan(pairs, |pair| leg(body, &pair[0], &pair[1]));
-        let mut places: Vec<(usize, usize)> = Vec::new();
-        for (at, leg) in legs.iter().enumerate() {
-            places.extend((0..leg.n_steps).map(|step| (at, step)));
+        let mut first = vec![0];
+        for leg in legs {
+            first.push(first[first.len() - 1] + leg.n_steps);
         }
-        places.extend(path.len().checked_sub(1).map(|last| (last, 0)));
-        let found = AsFound::of(body.near(found, around));
-        Self { body, around, path, legs, places, found }
-    }
-
-    /// The ways between waypoints.
-    #[must_use]
-    pub fn legs(&self) -> &[Leg] {
-        &self.legs
+        Self { body, around, path, legs, first, found: AsFound::of(body.near(found, around)) }
     }
 
     /// Number of postures.
     #[must_use]
     pub fn n_postures(&self) -> usize {
-        self.places.len()
+        self.first[self.first.len() - 1] + 1
     }
 
     /// Number of pieces.
     #[must_use]
     pub fn n_pieces(&self) -> usize {
-        self.places.len().div_ceil(PIECE)
+        self.n_postures().div_ceil(PIECE)
     }
 
     /// Looks at a piece; none of them asks for another.
     #[must_use]
     pub fn look(&self, piece: usize) -> Looked {
-        let own = self.places.iter().skip(piece * PIECE).take(PIECE);
-        let look = |&(leg, step): &(usize, usize)| {
-            let share = self.legs.get(leg).map_or(0.0, |l| step as f64 / l.n_steps as f64);
+        let own = piece * PIECE..((piece + 1) * PIECE).min(self.n_postures());
+        let look = |at: usize| {
+            let leg = self.first.partition_point(|first| *first <= at) - 1;
+            let share = self
+                .legs
+                .get(leg)
+                .map_or(0.0, |l| (at - self.first[leg]) as f64 / l.n_steps as f64);
             let from = &self.path[leg];
-            let to = self.path.get(leg + 1).unwrap_or(from);
-            let near = self.body.near(&between(from, to, share), self.around);
-            (leg as f64 + share, told(&near, (&self.found, self.around)))
+            let posture = between(from, self.path.get(leg + 1).unwrap_or(from), share);
+            let near = self.body.near(&posture, self.around);
+            let open = self.body.model.loop_gap(&posture);
+            (leg as f64 + share, told(&near, (&self.found, self.around)), open)
         };
         Looked(own.map(look).collect())
     }
 
-    /// Where on the path which part is near to what, the worst first, from all pieces in their order.
-    #[must_use]
-    pub fn contacts(&self, looked: Vec<Looked>) -> Vec<Contact> {
-        all(self.body, self.around, looked.into_iter().flat_map(|l| l.0))
+    /// Adds what was near in the next piece.
+    pub fn add(&self, looked: Looked, to: &mut Contacts) {
+        for (place, told, open) in looked.0 {
+            to.add((self.body, self.around), place, told);
+            if open > to.open.1 {
+                to.open = (place, open);
+            }
+        }
     }
 }
 
-fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
+/// How many postures lie between a waypoint and the next.
+#[must_use]
+pub fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
     let turn = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
     let mut n_steps = ((turn / TURN).ceil() as usize).clamp(1, MAX_STEPS);
     loop {
         let longest = longest(body, from, to, n_steps);
-        if longest <= STEP {
+        // Whole turns in a step would look like none.
+        if longest <= STEP && turn <= TURN * n_steps as f64 {
             return Leg { n_steps, jumps: false };
         }
         if n_steps == MAX_STEPS {
@@ -176,20 +176,24 @@ fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
     from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect()
 }
 
+/// What comes nearer by less is as near as before, metres: scans are no finer.
+const ROUNDING: f32 = 2e-3;
+
 /// How near parts were to obstacles where the robot was found.
 struct AsFound {
-    levels: BTreeMap<(usize, usize), Level>,
+    touches: BTreeMap<(usize, usize), (Level, f32)>,
     outside: Vec<usize>,
 }
 
 impl AsFound {
     fn of(near: Near) -> Self {
-        let levels = near.touches.iter().map(|t| ((t.part, t.obstacle), t.level)).collect();
-        Self { levels, outside: near.outside }
+        let touch = |t: &Touch| ((t.part, t.obstacle), (t.level, t.gap));
+        Self { touches: near.touches.iter().map(touch).collect(), outside: near.outside }
     }
 
     fn is(&self, touch: &Touch) -> bool {
-        self.levels.get(&(touch.part, touch.obstacle)).is_some_and(|level| *level >= touch.level)
+        let before = self.touches.get(&(touch.part, touch.obstacle));
+        before.is_some_and(|(level, gap)| *level >= touch.level && touch.gap >= gap - ROUNDING)
     }
 }
 
@@ -214,13 +218,15 @@ fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
 }
 
 /// All postures at which the same part is near to the same thing are one contact.
-fn all(
-    body: &Body<'_>,
-    around: &Obstacles,
-    looked: impl Iterator<Item = (f64, Told)>,
-) -> Vec<Contact> {
-    let mut all: BTreeMap<Key, Contact> = BTreeMap::new();
-    for (place, told) in looked {
+#[derive(Debug, Clone, Default)]
+pub struct Contacts {
+    all: BTreeMap<Key, Contact>,
+    /// Where closed loops stay open most, and how far, metres.
+    open: (f64, f64),
+}
+
+impl Contacts {
+    fn add(&mut self, (body, around): (&Body<'_>, &Obstacles), place: f64, told: Told) {
         for (key, (level, gap, obstacle, n)) in told {
             let part = &body.parts[key.0];
             let now = Contact {
@@ -237,8 +243,8 @@ fn all(
                 at: obstacle.map(|o| Point::from(around.all[o].at.map(f64::from))),
                 n,
             };
-            let Some(before) = all.get_mut(&key) else {
-                all.insert(key, now);
+            let Some(before) = self.all.get_mut(&key) else {
+                self.all.insert(key, now);
                 continue;
             };
             (before.to, before.n_postures) = (place, before.n_postures + 1);
@@ -248,10 +254,21 @@ fn all(
             }
         }
     }
-    let mut all: Vec<Contact> = all.into_values().collect();
-    let order = |c: &Contact| (c.as_found, std::cmp::Reverse(c.level));
-    all.sort_by(|a, b| order(a).cmp(&order(b)).then(a.from.total_cmp(&b.from)));
-    all
+
+    /// Where closed loops stay open most, and how far, metres.
+    #[must_use]
+    pub fn open(&self) -> (f64, f64) {
+        self.open
+    }
+
+    /// The worst first.
+    #[must_use]
+    pub fn all(self) -> Vec<Contact> {
+        let mut all: Vec<Contact> = self.all.into_values().collect();
+        let order = |c: &Contact| (c.as_found, std::cmp::Reverse(c.level));
+        all.sort_by(|a, b| order(a).cmp(&order(b)).then(a.from.total_cmp(&b.from)));
+        all
+    }
 }
 
 #[cfg(test)]
@@ -273,11 +290,21 @@ mod tests {
         Model::load_urdf(&path, "arm", &Settings::default()).expect("loads").0
     }
 
+    fn legs(body: &Body<'_>, path: &[Vec<f64>]) -> Vec<Leg> {
+        path.windows(2).map(|pair| leg(body, &pair[0], &pair[1])).collect()
+    }
+
+    fn contacts(walk: &Walk<'_>) -> Vec<Contact> {
+        let mut all = Contacts::default();
+        (0..walk.n_pieces()).for_each(|piece| walk.add(walk.look(piece), &mut all));
+        all.all()
+    }
+
     fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let body = Body::new(&model, BTreeMap::new(), margin, &OneByOne);
-        let mut cells = Cells::within(&crate::reach(&model, margin));
+        let body = Body::new(&model, BTreeMap::new(), (margin, 0.0), &OneByOne);
+        let mut cells = Cells::within(crate::reach(&model) + margin + 0.1);
         points.iter().for_each(|(p, what)| cells.add(*p, *what));
         cells.settle();
         let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
@@ -285,9 +312,9 @@ mod tests {
         let mut around = Obstacles::new(&cells, &[], (None, known));
         body.set_beside(&[found], &mut around);
         let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
-        let walk = Walk::new((&body, &around), &path, &[found], &OneByOne);
-        let looked = (0..walk.n_pieces()).map(|piece| walk.look(piece)).collect();
-        walk.contacts(looked)
+        let legs = legs(&body, &path);
+        let walk = Walk::new((&body, &around), (&path, &legs), &[found]);
+        contacts(&walk)
     }
 
     #[test]
@@ -328,6 +355,23 @@ mod tests {
     }
 
     #[test]
+    fn what_was_near_outside_is_not_as_found_inside() {
+        // Beside the beam, 15 mm off its side; it is pushed into by 10 mm and no more.
+        let points = [([0.5, 0.065, 0.0], What::Fixed)];
+        let found = walk(&points, &[0.0, 0.05], 0.0, 0.02);
+        assert!(found.iter().any(|c| c.level == Level::Inside && !c.as_found), "{found:?}");
+    }
+
+    #[test]
+    fn whole_turns_are_no_rest() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let model = arm(dir.path());
+        let body = Body::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
+        let turns = MAX_STEPS as f64 * std::f64::consts::TAU;
+        assert!(leg(&body, &[0.0], &[turns]).jumps && leg(&body, &[0.0], &[1e308]).jumps);
+    }
+
+    #[test]
     fn what_lies_inside_of_a_link_from_the_beginning_is_hit() {
         let found = walk(&[([0.5, 0.0, 0.0], What::Uncertain)], &[0.0], 1.0, 0.005);
         assert!(found.len() == 1 && found[0].level == Level::Inside, "{found:?}");
@@ -337,15 +381,14 @@ mod tests {
     fn space_of_which_nothing_is_known_is_not_free() {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let body = Body::new(&model, BTreeMap::new(), 0.02, &OneByOne);
+        let body = Body::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
         let bounds = Aabb { min: [-9.0, -0.2, -9.0], max: [9.0, 9.0, 9.0] };
         let known = Known { world_from_base: Pose::identity(), bounds };
-        let around =
-            Obstacles::new(&Cells::within(&crate::reach(&model, 0.02)), &[], (None, known));
+        let around = Obstacles::new(&Cells::within(crate::reach(&model) + 0.2), &[], (None, known));
         let path = [vec![0.0], vec![-1.0]];
-        let walk = Walk::new((&body, &around), &path, &[0.0], &OneByOne);
-        let looked = (0..walk.n_pieces()).map(|piece| walk.look(piece)).collect();
-        let found = walk.contacts(looked);
+        let legs = legs(&body, &path);
+        let walk = Walk::new((&body, &around), (&path, &legs), &[0.0]);
+        let found = contacts(&walk);
         assert!(found.len() == 1 && found[0].what == What::Unseen && found[0].at.is_none());
         assert!(found[0].from > 0.0 && found[0].to == 1.0, "{found:?}");
     }

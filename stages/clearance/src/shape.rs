@@ -1,18 +1,21 @@
 //! The surface of a link, or points that hang on it, in; how far a place is from it, out. All in the frame of the link, metres.
 
-use crate::obstacles::distance;
+use crate::obstacles::{HALF_CELL, distance};
 use contract::{Space, SpaceGrid, SpaceKind};
 use geometry::{Aabb, NearestField};
 use glamx::Vec3;
 use parry3d::shape::{CompositeShapeRef, TriMesh};
 use robot::Mesh;
 
-/// Edge of the voxels that tell what a link encloses, metres: cracks between badly joined triangles are narrower.
-const INSIDE_EDGE: f64 = 0.02;
+/// Smallest edge of the voxels that tell what a link encloses, metres, and how many of them a link may have before they are wider.
+const INSIDE_EDGE: f64 = 0.004;
+const N_INSIDE: f64 = 4e6;
+/// Diagonal of a cube of edge 1.
+const DIAGONAL: f64 = 1.7321;
 /// Edge of the voxels that tell which hanging point is nearest, metres.
 const HUNG_EDGE: f32 = 0.01;
-/// What that may be off, metres: twice the half diagonal of such a voxel.
-const HUNG_BIAS: f32 = 0.0174;
+/// So much farther than is asked they tell it, metres: their own diagonal, also where they had to be widened.
+const HUNG_REACH: f32 = 0.1;
 
 /// A place seen from a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,34 +37,37 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
-    /// Nothing for a mesh without triangles.
-    pub(crate) fn surface(mesh: &Mesh, bounds: &Aabb) -> Option<Self> {
+    /// Of which nobody asks for less than `least` metres. Nothing for a mesh without triangles.
+    pub(crate) fn surface(mesh: &Mesh, bounds: &Aabb, least: f32) -> Option<Self> {
         let corners = mesh.vertices.iter().map(|v| Vec3::from_array(*v)).collect();
         let triangles = TriMesh::new(corners, mesh.triangles.clone()).ok()?;
-        Some(Self::Surface(triangles, enclosed(mesh, bounds)))
+        // A place that is farther than is asked is in no voxel of the surface, so it is told on which side it is.
+        let widest = (f64::from(least) / DIAGONAL).max(INSIDE_EDGE);
+        let volume: f64 = bounds.size().iter().map(|s| s.max(INSIDE_EDGE)).product();
+        let edge = (volume / N_INSIDE).cbrt().clamp(INSIDE_EDGE, widest);
+        Some(Self::Surface(triangles, enclosed(mesh, bounds, edge)))
     }
 
-    /// Points that are told from up to `reach` away.
-    pub(crate) fn hung(points: Vec<[f32; 3]>, reach: f32) -> Self {
-        let field = NearestField::new(&points, HUNG_EDGE, reach + HUNG_BIAS);
+    /// Points that are told from up to `most` away.
+    pub(crate) fn hung(points: Vec<[f32; 3]>, most: f32) -> Self {
+        let field = NearestField::new(&points, HUNG_EDGE, most + HUNG_REACH);
         Self::Hung(points, field)
     }
 
-    /// How far a place is, if it is `within` metres.
+    /// How far a place is, if it is `within` metres. What is enclosed is inside, however near to the surface.
     pub(crate) fn gap(&self, p: [f32; 3], within: f32) -> Gap {
         match self {
-            Self::Surface(mesh, inside) => {
+            Self::Surface(_, inside) if encloses(inside, p) => Gap::Inside,
+            Self::Surface(mesh, _) => {
                 let at = Vec3::from_array(p);
                 let found = CompositeShapeRef(mesh).project_local_point(at, within, false);
-                match found {
-                    Some((_, projection)) => Gap::At((projection.point - at).length()),
-                    None if encloses(inside, p) => Gap::Inside,
-                    None => Gap::Far,
-                }
+                found.map_or(Gap::Far, |(_, there)| Gap::At((there.point - at).length()))
             }
             Self::Hung(points, field) => match field.nearest(p) {
                 Some(i) => {
-                    let gap = (distance(points[i], p) - HUNG_BIAS).max(0.0);
+                    // The one nearest to the middle of the voxel may be farther by that, and each stands for a cell.
+                    let off = DIAGONAL as f32 / field.grid().1 + HALF_CELL;
+                    let gap = (distance(points[i], p) - off).max(0.0);
                     if gap <= within { Gap::At(gap) } else { Gap::Far }
                 }
                 None => Gap::Far,
@@ -81,30 +87,40 @@ fn encloses(inside: &Space, p: [f32; 3]) -> bool {
 }
 
 /// What cannot be reached from outside without crossing the mesh; its surface is not in it.
-fn enclosed(mesh: &Mesh, bounds: &Aabb) -> Space {
-    let grid = SpaceGrid::over(&bounds.grown(2.0 * INSIDE_EDGE), INSIDE_EDGE);
+fn enclosed(mesh: &Mesh, bounds: &Aabb, edge: f64) -> Space {
+    let grid = SpaceGrid::over(&bounds.grown(2.0 * edge), edge);
     let mut space = Space::unknown(grid);
-    let mut surface = Vec::new();
     for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|i| Vec3::from_array(mesh.vertices[i as usize]));
-        let longest = (b - a).length().max((c - a).length()).max((c - b).length());
-        // Two samples a voxel on each side leave none out that a triangle goes through by more than a corner.
-        let n = (f64::from(longest) / (0.5 * grid.edge)).ceil().max(1.0);
-        let step = 1.0 / n;
-        let n = n as usize;
-        for (i, j) in (0..=n).flat_map(|i| (0..=n - i).map(move |j| (i, j))) {
-            let [u, v] = [i, j].map(|k| (k as f64 * step) as f32);
-            let p = a + (b - a) * u + (c - a) * v;
-            surface.extend(grid.index(p.to_array().map(f64::from)));
-        }
+        let corners = triangle.map(|i| Vec3::from_array(mesh.vertices[i as usize]));
+        samples(corners, 0.5 * grid.edge as f32, |p| {
+            if let Some(at) = grid.index(p.to_array().map(f64::from)) {
+                space.voxels_mut()[at] = SpaceKind::Free;
+            }
+        });
     }
-    surface.sort_unstable();
-    surface.dedup();
+    let is_surface = |(_, kind): &(usize, &SpaceKind)| **kind == SpaceKind::Free;
+    let all = space.voxels().iter().enumerate();
+    let surface: Vec<usize> = all.filter(is_surface).map(|(at, _)| at).collect();
     for at in grid.enclosed(&grid.bounds(), &surface) {
         space.voxels_mut()[at] = SpaceKind::Robot;
     }
-    surface.iter().for_each(|at| space.voxels_mut()[*at] = SpaceKind::Free);
     space
+}
+
+/// Places on a triangle no farther apart than that along two of its sides.
+fn samples([a, b, c]: [Vec3; 3], apart: f32, mut take: impl FnMut(Vec3)) {
+    // From the corner between the two shorter sides: needles have few places.
+    let lengths = [(c - b).length(), (c - a).length(), (b - a).length()];
+    let longest = (0..3).max_by(|&i, &j| lengths[i].total_cmp(&lengths[j])).unwrap_or(0);
+    let [from, u, v] = [[a, b, c], [b, c, a], [c, a, b]][longest];
+    let (u, v) = (u - from, v - from);
+    let steps = |length: f32| (length / apart).ceil().max(1.0);
+    let n = steps(u.length());
+    for i in 0..=n as usize {
+        let at = i as f32 / n;
+        let m = steps((1.0 - at) * v.length());
+        (0..=m as usize).for_each(|j| take(from + u * at + v * ((1.0 - at) * j as f32 / m)));
+    }
 }
 
 #[cfg(test)]
@@ -125,14 +141,21 @@ mod tests {
     #[test]
     fn a_place_is_far_at_the_surface_or_inside() {
         let (mesh, bounds) = cube();
-        let shape = Shape::surface(&mesh, &bounds).expect("triangles");
+        let shape = Shape::surface(&mesh, &bounds, 0.03).expect("triangles");
         assert_eq!(shape.gap([0.5, 0.0, 0.0], 0.1), Gap::Far);
         let Gap::At(gap) = shape.gap([0.25, 0.1, -0.1], 0.1) else { panic!("near") };
         assert!((gap - 0.05).abs() < 1e-6, "{gap}");
         assert_eq!(shape.gap([0.0; 3], 0.1), Gap::Inside);
+        // However little is asked, each place is told on which side it is.
+        for (margin, k) in [0.0085, 0.02].into_iter().flat_map(|m| (1..20).map(move |k| (m, k))) {
+            let shape = Shape::surface(&mesh, &bounds, margin).expect("triangles");
+            let off = 0.01 * k as f32 - 0.0005;
+            let gap = shape.gap([0.2 - off, 0.0137, -0.0049], margin);
+            assert!(off < 0.007 || gap == Gap::Inside, "{margin} {off}: {gap:?}");
+        }
         // Where one of its sides is missing, nothing is enclosed.
         let open = Mesh { triangles: mesh.triangles[2..].to_vec(), ..mesh };
-        let shape = Shape::surface(&open, &bounds).expect("triangles");
+        let shape = Shape::surface(&open, &bounds, 0.03).expect("triangles");
         assert_eq!(shape.gap([0.0; 3], 0.1), Gap::Far);
     }
 
@@ -143,7 +166,7 @@ mod tests {
         for k in 0..100 {
             let off = 0.0005 * k as f32;
             match shape.gap([0.2, off, 0.0], 0.05) {
-                Gap::At(gap) => assert!(gap <= off + 2e-3 && gap >= off - 0.02, "{gap} {off}"),
+                Gap::At(gap) => assert!(gap <= off + 2e-3 && gap >= off - 0.023, "{gap} {off}"),
                 Gap::Far => assert!(off > 0.05, "{off}"),
                 Gap::Inside => panic!("points enclose nothing"),
             }

@@ -56,7 +56,7 @@ pub use result::{
     BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
     SCHEMA, ScanLabels, StageEntry, TipPose,
 };
-pub use robot_model::write_robot;
+pub use robot_model::{mesh_files, write_robot};
 pub use robot_picture::RobotPicture;
 pub use session::{RegistrationEntry, RescanEntry};
 pub use settings::Settings;

@@ -142,7 +142,8 @@ impl<'a> Tile<'a> {
         if !is_ours {
             return Err(foreign());
         }
-        let left = header.large_file.map_or(0, |large| large.number_of_point_records);
+        let left =
+            header.large_file.map(|large| large.number_of_point_records).ok_or_else(foreign)?;
         let records = if las.compress {
             file.seek(SeekFrom::Start(expected as u64)).map_err(failed)?;
             let laz = crate::las::laz_vlr(las);

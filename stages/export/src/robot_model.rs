@@ -58,6 +58,21 @@ pub fn write_robot(
     Ok(folder)
 }
 
+/// Files of the links' own meshes, relative to the output folder, of the robot with this id, and their lengths in bytes; none for
+/// links without a body.
+#[must_use]
+pub fn mesh_files(id: &str, model: &Model) -> Vec<Option<(String, u64)>> {
+    let of_link = |(link, name): (&robot::Link, String)| {
+        let n = link.mesh.triangles.len() as u64;
+        (n > 0).then(|| (format!("robots/{id}/meshes/{name}.stl"), STL_HEAD + STL_TRIANGLE * n))
+    };
+    model.links.iter().zip(file_names(model)).map(of_link).collect()
+}
+
+/// Bytes of an STL file before its triangles, and of each of them.
+const STL_HEAD: u64 = 84;
+const STL_TRIANGLE: u64 = 50;
+
 /// A name for the files of each link: letters that every file system knows, each once.
 fn file_names(model: &Model) -> Vec<String> {
     let plain = |name: &str| -> String {

@@ -28,7 +28,8 @@ pub(crate) fn settle(
     (near, all): (&[u32], &[u32]),
     fan: &impl Fan,
 ) -> Settled {
-    let mut points = adjusted_points(refine, h, (all, refine.settings.max_points / SETTLED), fan);
+    let part = if refine.scene.has_camera() { OF_CAMERAS } else { SETTLED };
+    let mut points = adjusted_points(refine, h, (all, refine.settings.max_points / part), fan);
     let leaves: Vec<usize> = (0..h.posture.len()).filter(|&j| refine.prepared.leaf[j]).collect();
     let adjust = Adjust::new(refine);
     let mut best = Adjust { loose: &leaves, ..adjust }.run(h, &mut points, fan);
@@ -52,7 +53,9 @@ pub(crate) fn settle(
 
 /// A part of the points of the last adjustment is enough to choose what it is made of: one of so many, where that is more than links
 /// have at least.
-const SETTLED: usize = 15;
+const SETTLED: usize = 30;
+/// The same of depth cameras, whose points err alike over a hand's width: a wrist in eight views was lost with fewer.
+const OF_CAMERAS: usize = 15;
 
 /// A posture with the best values of its last joints, where one of them is another mode, not the same one found again.
 pub(crate) fn better(posture: &[f64], spins: &[Spin]) -> Option<Vec<f64>> {
