@@ -78,7 +78,7 @@ impl Trajectory {
             if point.len() != n {
                 return Err(format!("waypoint {at} has {} values for {n} joints", point.len()));
             }
-            if let Some(odd) = point.iter().position(|v| !(v.abs() <= MAX_VALUE)) {
+            if let Some(odd) = point.iter().position(|v| v.is_nan() || v.abs() > MAX_VALUE) {
                 return Err(format!(
                     "waypoint {at}: {} of {} is no value of a joint",
                     point[odd], self.joints[odd]

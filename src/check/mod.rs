@@ -239,13 +239,16 @@ fn chosen(
     }
 }
 
+/// A fit and its number in the result.
+type Numbered = (usize, Fit);
+
 /// All robots that stand, by number, and their models.
 fn stood(
     request: &Request,
     state: &State,
     means: &Means,
     engine: &Engine,
-) -> Result<(Vec<(usize, Fit)>, Vec<Model>)> {
+) -> Result<(Vec<Numbered>, Vec<Model>)> {
     let dir = request.robots.as_deref().unwrap_or(&state.robots);
     let stands = |fit: &Fit| fit.verdict != Verdict::Refused;
     let (numbers, mut fits): (Vec<usize>, Vec<Fit>) =

@@ -126,7 +126,7 @@ impl Robot<'_> {
         let lever = clearance::reach(self.model);
         let sigma = (shift + turn * lever.powi(2) + fit.tip_sigma.powi(2)).sqrt();
         // Also where it is no number.
-        if !(3.0 * sigma <= margin) {
+        if sigma.is_nan() || 3.0 * sigma > margin {
             out.push(format!(
                 "what {id} reaches is known to ± {:.1} mm: a margin of {:.1} mm is less than three times that",
                 sigma * 1e3,

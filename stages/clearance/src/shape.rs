@@ -31,7 +31,7 @@ pub(crate) enum Gap {
 /// What is not to touch anything.
 pub(crate) enum Shape {
     /// Triangles, and what they enclose.
-    Surface(TriMesh, Space),
+    Surface(Box<TriMesh>, Space),
     /// Points.
     Hung(Vec<[f32; 3]>, NearestField),
 }
@@ -45,7 +45,7 @@ impl Shape {
         let widest = (f64::from(least) / DIAGONAL).max(INSIDE_EDGE);
         let volume: f64 = bounds.size().iter().map(|s| s.max(INSIDE_EDGE)).product();
         let edge = (volume / N_INSIDE).cbrt().clamp(INSIDE_EDGE, widest);
-        Some(Self::Surface(triangles, enclosed(mesh, bounds, edge)))
+        Some(Self::Surface(Box::new(triangles), enclosed(mesh, bounds, edge)))
     }
 
     /// Points that are told from up to `most` away.
@@ -60,7 +60,7 @@ impl Shape {
             Self::Surface(_, inside) if encloses(inside, p) => Gap::Inside,
             Self::Surface(mesh, _) => {
                 let at = Vec3::from_array(p);
-                let found = CompositeShapeRef(mesh).project_local_point(at, within, false);
+                let found = CompositeShapeRef(&**mesh).project_local_point(at, within, false);
                 found.map_or(Gap::Far, |(_, there)| Gap::At((there.point - at).length()))
             }
             Self::Hung(points, field) => match field.nearest(p) {
