@@ -54,7 +54,7 @@ impl Surroundings<'_> {
         far: f64,
         engine: &Engine,
     ) -> Result<(Hung, Obstacles)> {
-        let moves = moving(robot.model);
+        let moves = robot.model.moving();
         let sorting = sorting(robot, far, &moves);
         let (cells, hung) = self.points(&sorting, engine)?;
         let base_from_world = &sorting.base_from_world;
@@ -194,9 +194,4 @@ impl Sorted {
             self.n_waiting = 0;
         }
     }
-}
-
-/// By link: whether joints move it.
-fn moving(model: &Model) -> Vec<bool> {
-    (0..model.links.len()).map(|link| clearance::moves(model, link)).collect()
 }

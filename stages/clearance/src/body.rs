@@ -6,7 +6,7 @@ use crate::path::STEP;
 use crate::shape::{Gap, Shape};
 use contract::Fan;
 use geometry::{Aabb, Point, Pose};
-use robot::{JointKind, Link, Model};
+use robot::{Link, Model};
 use std::collections::BTreeMap;
 
 /// Points that hang on the links of a robot, by link, in its frame, metres.
@@ -65,7 +65,8 @@ impl<'a> Body<'a> {
     ) -> Self {
         let margin = margin as f32;
         let least = margin + BETWEEN + HALF_CELL;
-        let moving: Vec<usize> = (0..model.links.len()).filter(|&l| moves(model, l)).collect();
+        let moves = model.moving();
+        let moving: Vec<usize> = (0..model.links.len()).filter(|&l| moves[l]).collect();
         let surfaces = fan.fan(moving.clone(), |link| {
             let (mesh, bounds) = (&model.links[link].mesh, model.links[link].bounds);
             let shape = Shape::surface(mesh, &bounds, least)?;
@@ -85,7 +86,8 @@ impl<'a> Body<'a> {
     /// No part of it, nor of what hangs on it, gets farther from the base's origin, metres.
     #[must_use]
     pub fn farthest(&self) -> f64 {
-        let far = |p: &Part| farthest(&p.bounds) + way(self.model, p.link);
+        let ways = self.model.ways();
+        let far = |p: &Part| farthest(&p.bounds) + ways[p.link];
         self.parts.iter().map(far).fold(0.0, f64::max)
     }
 
@@ -192,8 +194,8 @@ fn inside(part: usize, obstacle: usize, o: &Obstacle) -> Touch {
 /// No link of a robot gets farther from its base's origin, metres.
 #[must_use]
 pub fn reach(model: &Model) -> f64 {
-    let far = |(at, link): (usize, &Link)| farthest(&link.bounds) + way(model, at);
-    model.links.iter().enumerate().map(far).fold(0.0, f64::max)
+    let far = |(link, way): (&Link, f64)| farthest(&link.bounds) + way;
+    model.links.iter().zip(model.ways()).map(far).fold(0.0, f64::max)
 }
 
 /// Of all places of a box in a link's frame, from its origin, metres.
@@ -202,29 +204,6 @@ fn farthest(bounds: &Aabb) -> f64 {
         return 0.0;
     }
     bounds.corners().into_iter().map(|c| Point::from(c).coords.norm()).fold(0.0, f64::max)
-}
-
-/// Whether a joint that moves lies between the root and a link.
-#[must_use]
-pub fn moves(model: &Model, link: usize) -> bool {
-    let moves = |j: &usize| model.joints[*j].kind != JointKind::Fixed;
-    (0..model.joints.len()).filter(moves).any(|j| model.hangs_on(link, j))
-}
-
-/// The way from the base to a link's frame is never longer, metres.
-fn way(model: &Model, link: usize) -> f64 {
-    let mut length = 0.0;
-    let mut at = link;
-    while let Some(j) = model.links[at].parent_joint {
-        let joint = &model.joints[j];
-        let stroke = match (joint.kind, joint.limits) {
-            (JointKind::Prismatic, Some(limits)) => limits[0].abs().max(limits[1].abs()),
-            _ => 0.0,
-        };
-        length += joint.parent_from_joint.translation.vector.norm() + stroke;
-        at = joint.parent;
-    }
-    length
 }
 
 fn is_near(bounds: &Aabb, p: [f32; 3], within: f32) -> bool {

@@ -9,7 +9,7 @@ mod obstacles;
 mod path;
 mod shape;
 
-pub use body::{Body, Hung, moves, reach};
+pub use body::{Body, Hung, reach};
 pub use obstacles::{CELL, Cells, FARTHEST, Known, Obstacles, What};
 pub use path::{Contact, Contacts, Leg, Looked, STEP, Walk, leg};
 

@@ -5,7 +5,7 @@ use crate::graph::Graph;
 use contract::{
     Fit, Fold, Label, LinkAt, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Verdict, Voxel,
 };
-use robot::{JointKind, Model, Motion};
+use robot::Model;
 
 /// Decides what hangs on which link.
 pub struct Attach {
@@ -64,7 +64,7 @@ impl Attach {
     #[must_use]
     pub fn new(fits: &[Fit], models: &[Model], settings: Settings) -> Self {
         let moving = fits.iter().map(|fit| match models.get(fit.model) {
-            Some(model) if fit.verdict != Verdict::Refused => moving(model),
+            Some(model) if fit.verdict != Verdict::Refused => model.moving(),
             _ => Vec::new(),
         });
         Self { moving: moving.collect(), settings }
@@ -208,16 +208,6 @@ impl Sum {
         });
         self.joined = self.voxels.len();
     }
-}
-
-/// For each link: whether a free joint lies between it and the base.
-fn moving(model: &Model) -> Vec<bool> {
-    let mut moving = vec![false; model.links.len()];
-    for joint in &model.joints {
-        let turns = joint.kind != JointKind::Fixed && joint.motion != Motion::Fixed;
-        moving[joint.child] = moving[joint.parent] || turns;
-    }
-    moving
 }
 
 /// The mark that occurs most, the smaller of equals; `None` for none.

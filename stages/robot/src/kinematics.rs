@@ -170,8 +170,19 @@ impl Model {
     /// the longest way, and the size of what hangs at its end.
     #[must_use]
     pub fn reach(&self) -> f64 {
-        let mut so_far = vec![0.0_f64; self.links.len()];
         let mut longest = 0.0_f64;
+        for (link, way) in self.links.iter().zip(self.ways()) {
+            let size =
+                link.cad.points.iter().take(500).map(|p| f64::from(p[0].hypot(p[1]).hypot(p[2])));
+            longest = longest.max(way + size.fold(0.0, f64::max));
+        }
+        longest
+    }
+
+    /// How far each link's origin gets from that of the base at most, metres: the distances from joint to joint, and strokes.
+    #[must_use]
+    pub fn ways(&self) -> Vec<f64> {
+        let mut ways = vec![0.0_f64; self.links.len()];
         for (l, link) in self.links.iter().enumerate() {
             if let Some(j) = link.parent_joint {
                 let joint = &self.joints[j];
@@ -179,15 +190,22 @@ impl Model {
                     (JointKind::Prismatic, Some(limits)) => limits[0].abs().max(limits[1].abs()),
                     _ => 0.0,
                 };
-                so_far[l] = so_far[joint.parent]
-                    + joint.parent_from_joint.translation.vector.norm()
-                    + stroke;
+                ways[l] =
+                    ways[joint.parent] + joint.parent_from_joint.translation.vector.norm() + stroke;
             }
-            let size =
-                link.cad.points.iter().take(500).map(|p| f64::from(p[0].hypot(p[1]).hypot(p[2])));
-            longest = longest.max(so_far[l] + size.fold(0.0, f64::max));
         }
-        longest
+        ways
+    }
+
+    /// For each link: whether a joint that moves lies between it and the base.
+    #[must_use]
+    pub fn moving(&self) -> Vec<bool> {
+        let mut moving = vec![false; self.links.len()];
+        for joint in &self.joints {
+            let turns = joint.kind != JointKind::Fixed && joint.motion != Motion::Fixed;
+            moving[joint.child] = moving[joint.parent] || turns;
+        }
+        moving
     }
 
     /// Number of free joints: the length of a posture.
