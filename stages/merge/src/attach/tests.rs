@@ -3,7 +3,7 @@
 use super::*;
 use contract::JointFit;
 use geometry::{Aabb, Pose, Vector};
-use robot::{Joint, Link, Role};
+use robot::{Joint, JointKind, Link, Motion, Role};
 use std::sync::Arc;
 
 fn model() -> Model {
