@@ -9,11 +9,11 @@ use crate::spaces::poses;
 use crate::store::Store;
 use contract::{Fit, Format, Input, InputId, Result, Scan, Verdict};
 use export::{
-    InputEntry, Labels, ResultFile, RobotEntry, SCHEMA, ScanLabels, SpaceEntry, StageEntry,
+    InputEntry, Labels, Places, ResultFile, RobotEntry, SCHEMA, ScanLabels, SpaceEntry, StageEntry,
     write_table,
 };
 use ingest::Sources;
-use robot::{Library, Model, Role};
+use robot::{JointKind, Library, Model, Motion, Role};
 use std::fmt::Write as _;
 
 /// Everything that the result tells.
@@ -43,7 +43,7 @@ impl Report<'_> {
             .enumerate()
             .map(|(i, fit)| {
                 let space = self.written.spaces[i].clone();
-                robot_entry(i, fit, &self.models[fit.model], space)
+                robot_entry(i, fit, self.models, space)
             })
             .collect();
         write_table(output.next(), &robots)?;
@@ -188,20 +188,36 @@ impl Report<'_> {
     }
 }
 
-/// The entry of a robot in the result.
+/// The entry of a robot in the result; `models` are those that fits are of.
 pub(crate) fn robot_entry(
     index: usize,
     fit: &Fit,
-    model: &Model,
+    models: &[Model],
     space: Option<SpaceEntry>,
 ) -> RobotEntry {
+    let model = &models[fit.model];
     let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
-    let poses = poses(fit, model);
-    let tip = tip(model).map(|l| (names[l].clone(), poses[l]));
-    let slides = model.free.iter().map(|&j| &model.joints[j]);
-    let slides = slides.filter(|j| j.kind == robot::JointKind::Prismatic);
-    let slides = slides.map(|j| j.name.clone()).collect();
-    RobotEntry { space, slides, ..RobotEntry::new(&id(index), fit, &names, tip) }
+    let tip = tip(model).map(|l| (names[l].clone(), poses(fit, model)[l]));
+    let mut entry = RobotEntry { space, ..RobotEntry::new(&id(index), fit, &names, tip) };
+    stand(&mut entry, fit, models);
+    entry
+}
+
+/// Says where the links of a robot stand, and of the same robot in other scans.
+fn stand(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
+    let model = &models[fit.model];
+    let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    let joints = model.joints.iter().zip(model.joint_values(&posture));
+    let passive =
+        joints.filter(|(j, _)| matches!(j.motion, Motion::Mimic { .. } | Motion::Loop(_)));
+    entry.passive = Places(passive.map(|(j, value)| (j.name.clone(), value)).collect());
+    let slides = model.joints.iter().filter(|j| j.kind == JointKind::Prismatic);
+    entry.slides = slides.map(|j| j.name.clone()).collect();
+    let links = model.links.iter().zip(poses(fit, model));
+    entry.link_poses = Places(links.map(|(l, pose)| (l.name.clone(), (&pose).into())).collect());
+    for (entry, stay) in entry.stays.iter_mut().zip(&fit.stays) {
+        stand(entry, stay, models);
+    }
 }
 
 /// The entry of an input in the result; `counts` of the masks of the inputs that are open.

@@ -81,6 +81,7 @@ fn the_robot_is_found_and_any_number_of_threads_gives_the_same_bytes() {
     assert!(agreement.worst_joint_deg() < JOINT_DEG, "{}", agreement.table());
     assert!(agreement.points.f1() > 0.97, "{}", agreement.table());
     space_is_told(&dir.path().join("out2"));
+    links_stand_as_told(&dir.path().join("out2"));
     let (one, two) = (files(&dir.path().join("out1")), files(&dir.path().join("out2")));
     assert!(one.keys().eq(two.keys()), "the same files");
     assert!(one.len() > 10, "{:?}", one.keys());
@@ -110,6 +111,42 @@ fn space_is_told(out: &Path) {
     for tree in [&space.octomap, &space.unknown] {
         let bytes = std::fs::read(out.join(tree)).expect("a tree");
         assert!(bytes.starts_with(b"# Octomap OcTree binary file"), "{tree}");
+    }
+}
+
+/// The robot as a planner loads it, in the posture of its table, has each link where the result says that it is; bars of its
+/// loops, too.
+fn links_stand_as_told(out: &Path) {
+    let robot = &export::ResultFile::read(out).expect("a result").robots[0];
+    let folder = out.join("robots").join(&robot.id);
+    let settings = robot::Settings::without_clouds();
+    let (model, _) =
+        robot::Model::load_urdf(&folder.join("robot.urdf"), "again", &settings).expect("loads");
+    let table = std::fs::read_to_string(folder.join("joints.csv")).expect("a table");
+    let row = |line: &str| {
+        let (name, rest) = line.split_once(',')?;
+        Some((name.trim_matches('"').to_owned(), rest.split(',').next()?.parse().ok()?))
+    };
+    let rows: BTreeMap<String, f64> = table.lines().skip(1).filter_map(row).collect();
+    assert_eq!(rows.len(), robot.joints.0.len() + robot.passive.0.len(), "{table}");
+    for (name, value) in robot.joints.0.iter().chain(&robot.passive.0) {
+        assert!((rows[name] - value).abs() < 1e-8, "{name}: {value} against {}", rows[name]);
+    }
+    let posture: Vec<f64> = model.free.iter().map(|&j| rows[&model.joints[j].name]).collect();
+    let poses = model.poses(&posture);
+    assert_eq!(robot.link_poses.0.len(), robot.links.len());
+    let told = |name: &str| {
+        let pose = robot.link_poses.0.iter().find(|(link, _)| link == name).expect("each link").1;
+        let [w, i, j, k] = pose.quat_wxyz;
+        let turn = nalgebra::Unit::new_normalize(nalgebra::Quaternion::new(w, i, j, k));
+        geometry::Pose::from_parts(pose.xyz.into(), turn)
+    };
+    let world_from_base = told(&robot.base_link);
+    assert_eq!(told(&robot.base_link).translation.vector.as_slice(), robot.base_pose.xyz);
+    for (link, pose) in model.links.iter().zip(poses) {
+        let off = (world_from_base * pose).inv_mul(&told(&link.name));
+        let [far, turned] = [off.translation.vector.norm(), off.rotation.angle()];
+        assert!(far < 1e-6 && turned < 1e-6, "{} is {far} m, {turned} rad off", link.name);
     }
 }
 

@@ -67,12 +67,7 @@ impl Said<'_, '_> {
         let mut result = self.found.base.result.clone();
         for &i in self.found.robots.changed.iter().chain(&self.found.robots.gone) {
             let space = self.done.spaces[i].clone();
-            let entry = robot_entry(
-                i,
-                &self.found.fits[i],
-                &self.found.models[self.found.fits[i].model],
-                space,
-            );
+            let entry = robot_entry(i, &self.found.fits[i], self.found.models, space);
             if i < result.robots.len() {
                 result.robots[i] = entry
             } else {

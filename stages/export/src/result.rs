@@ -57,11 +57,17 @@ pub struct RobotEntry {
     pub slides: Vec<String>,
     /// Standard deviation of each joint, same unit; that of any angle, π/√3, where the points say nothing of it.
     pub sigma: Places<f64>,
+    /// Values of the joints that follow those, by a rule of the model or as a closed loop needs it, same units.
+    #[serde(default)]
+    pub passive: Places<f64>,
     /// Whether the points determine each joint.
     #[serde(default)]
     pub determined: Places<bool>,
     /// Names of the links; their places here are the numbers in the masks.
     pub links: Vec<String>,
+    /// World from each link.
+    #[serde(default)]
+    pub link_poses: Places<BasePose>,
     /// `trusted`, `doubtful` or `refused`.
     pub verdict: String,
     /// Share explained less share contradicted.
@@ -296,7 +302,9 @@ impl RobotEntry {
             joints: Places(named(|j| j.value).collect()),
             sigma: Places(named(|j| j.sigma).collect()),
             determined: Places(fit.joints.iter().map(|j| (j.name.clone(), j.determined)).collect()),
+            passive: Places::default(),
             links: links.to_vec(),
+            link_poses: Places::default(),
             verdict: fit.verdict.word().into(),
             score: finite(fit.score),
             rms: finite(fit.rms),
