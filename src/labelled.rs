@@ -2,8 +2,8 @@
 //! pass, so that those that write have only to copy.
 
 use crate::bodies::Bodies;
-use crate::spaces::{Spot, spots};
-use contract::{Label, Map, MaskId, PlaceRun, PointKind, Result, Scan, SpaceGrid, Strip, Weigh};
+use crate::spaces::{Grids, Spot};
+use contract::{Label, Map, MaskId, PlaceRun, PointKind, Result, Scan, Strip, Weigh};
 use export::{LabelColumns, Pack, Packed, PlanPicture, PointColumns};
 use geometry::{Aabb, Point, Pose};
 use segment::Ground;
@@ -20,8 +20,8 @@ pub(crate) struct LabelStrip<'a> {
     pub(crate) near: &'a [Vec<PlaceRun<Label>>],
     pub(crate) ground: &'a Ground,
     pub(crate) scans: &'a [Scan],
-    /// Grids of the robots' spaces and their bounds.
-    pub(crate) grids: &'a [Option<(SpaceGrid, Aabb)>],
+    /// Voxels of the robots' spaces.
+    pub(crate) grids: &'a Grids,
     /// What the picture of each robot shows.
     pub(crate) shown: &'a [Aabb],
     pub(crate) plan: &'a PlanPicture,
@@ -83,7 +83,9 @@ impl Map for LabelStrip<'_> {
             first_place: strip.first_place,
             packed: self.packed(&points)?,
             n_moving: labels.iter().filter(|label| label.moves()).count() as u64,
-            spots: spots(self.grids, &world, &labels, &blocks),
+            spots: self.grids.spots(&world, &labels, &blocks, |i| {
+                self.cell.is_none_or(|cell| cell.contains(world[i]))
+            }),
             shown: self.shown(&strip, &world, &labels, &blocks),
             labels: LabelColumns::of(&labels),
             place: strip.place,
@@ -162,7 +164,7 @@ impl LabelStrip<'_> {
 }
 
 /// Bounds of each [`BLOCK`] of points.
-fn blocks(world: &[[f64; 3]]) -> Vec<(Range<usize>, Aabb)> {
+pub(crate) fn blocks(world: &[[f64; 3]]) -> Vec<(Range<usize>, Aabb)> {
     let block = |(i, points): (usize, &[[f64; 3]])| {
         (i * BLOCK..i * BLOCK + points.len(), Aabb::of(points.iter().copied()))
     };

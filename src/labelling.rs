@@ -25,7 +25,7 @@ use crate::masks::Masks;
 use crate::near::Near;
 use crate::reading::Reading;
 use crate::report::id;
-use crate::spaces::poses;
+use crate::spaces::{Grids, mark, poses};
 
 /// Records that wait for their tiles may take so many times what a channel does, where memory is short.
 const SPOOLED: usize = 8;
@@ -102,6 +102,12 @@ impl Streamed<'_> {
     /// The tiles that were left open.
     pub(crate) fn take_open(&mut self) -> Vec<Spool> {
         std::mem::take(&mut self.open)
+    }
+
+    /// The spaces, by fit, where something else is still to be marked in them; they are not written then.
+    pub(crate) fn take_spaces(&mut self) -> Vec<Option<Space>> {
+        let none = vec![None; self.spaces.len()];
+        std::mem::replace(&mut self.spaces, none)
     }
 
     /// Writes the files of robots.
@@ -208,8 +214,7 @@ impl<'a> Labelling<'a> {
         (out, engine): (&Path, &Engine),
         hand: Hand<'_, Labelled>,
     ) -> Result<Vec<String>> {
-        let grid = |s: &Option<Space>| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()));
-        let grids: Vec<_> = spaces.iter().map(grid).collect();
+        let grids = Grids::of(spaces);
         let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
         let (disks, mut pictures) = (engine.disks()?, Vec::new());
         for input in self.sources.opened() {
@@ -227,9 +232,7 @@ impl<'a> Labelling<'a> {
                 bodies: self.bodies.as_ref(),
             };
             self.each_strip(input, &label, engine, |mut strip| {
-                for (space, voxel, kind) in strip.spots.drain(..) {
-                    spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));
-                }
+                mark(spaces, strip.spots.drain(..));
                 for (robot, point, label) in strip.shown.drain(..) {
                     robots[robot].add(point, label);
                 }

@@ -15,7 +15,7 @@ use crate::rescan::{Records, State};
 use crate::reuse::{self, Cache, Digests, Key, OutputFile};
 use crate::review::Review;
 use crate::search::{Search, Shelf};
-use crate::spaces;
+use crate::spaces::Around;
 use crate::store::Store;
 use crate::surfaces::{Gather, Ground, Surfaces};
 use crate::tools;
@@ -97,7 +97,7 @@ impl Run<'_> {
         })?;
         let found = self.robots(found.concat(), (&search, &regions), (&given, &ground))?;
         let (fits, models) = (&found.fits, &found.models);
-        let spaces = spaces::around(fits, models, (&search, settings), engine)?;
+        let spaces = Around { robots: (fits, models), search: &search, settings }.all(engine)?;
         drop(shelf);
 
         // Tiles near robots once more; then all points.

@@ -1,10 +1,10 @@
-//! Fits and what the scans saw about them in; around each robot, which space was seen free, which it fills itself and
+//! Fits and what the scans saw about them in; around each robot, which space was seen free, which it and other robots fill and
 //! which nobody has seen, out. Points are marked into it while they are labelled.
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use crate::search::Search;
-use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind};
+use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind, Verdict};
 use geometry::{Aabb, Point, Pose, Vector};
 use lattice::ViewSettings;
 use robot::Model;
@@ -17,33 +17,73 @@ const BEHIND: f64 = 0.5;
 /// Vertical part of a base's axis from which on its robot stands, or hangs: 60°.
 const UPRIGHT: f64 = 0.5;
 
-/// The spaces of all robots, in the order of the fits; none where no scan says where its beams went.
-pub(crate) fn around(
-    fits: &[Fit],
-    models: &[Model],
-    (search, settings): (&Search<'_, '_>, &Settings),
-    engine: &Engine,
-) -> Result<Vec<Option<Space>>> {
-    if !settings.merge.space {
-        return Ok(vec![None; fits.len()]);
+/// What spaces are made of.
+pub(crate) struct Around<'a, 's> {
+    /// Robots of the plant, and the models that they are of.
+    pub(crate) robots: (&'a [Fit], &'a [Model]),
+    /// Who has what the scans saw.
+    pub(crate) search: &'a Search<'a, 's>,
+    pub(crate) settings: &'a Settings,
+}
+
+impl Around<'_, '_> {
+    /// The spaces of all robots, in the order of the fits; none where no scan says where its beams went.
+    pub(crate) fn all(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
+        let (fits, models) = self.robots;
+        if !self.settings.merge.space {
+            return Ok(vec![None; fits.len()]);
+        }
+        let edge = self.settings.merge.space_edge;
+        let known = self.search.bounds().grown(edge);
+        engine.fan_out(Task::new("space").large(), (0..fits.len()).collect(), |i| {
+            let model = &models[fits[i].model];
+            let grid = SpaceGrid::over(&bounds(&fits[i], model.reach()).shared(&known), edge);
+            self.one(i, grid)
+        })
     }
-    engine.fan_out(Task::new("space").large(), fits.iter().collect(), |fit| {
-        let model = &models[fit.model];
-        let base: Point = fit.world_from_base.translation.vector.into();
-        let edge = settings.merge.space_edge;
-        let bounds = bounds(fit, model.reach()).shared(&search.bounds().grown(edge));
-        let grid = SpaceGrid::over(&bounds, edge);
+
+    /// The space of one robot, in these voxels; none where no scan says where its beams went.
+    pub(crate) fn one(&self, robot: usize, grid: SpaceGrid) -> Result<Option<Space>> {
+        let base: Point = self.robots.0[robot].world_from_base.translation.vector.into();
         let region = region(&base, &grid.bounds());
-        let min_cell = grid.edge / CELLS_PER_EDGE;
-        let views = search.images(&region, &ViewSettings { min_cell, ..settings.view.clone() })?;
+        let view =
+            ViewSettings { min_cell: grid.edge / CELLS_PER_EDGE, ..self.settings.view.clone() };
+        let views = self.search.images(&region, &view)?;
         if views.iter().all(|v| v.images.is_empty()) {
             return Ok(None);
         }
         let mut space = Space::unknown(grid);
         merge::see(&mut space, &region, &views, &AllThreads);
-        merge::stand(&mut space, model, &poses(fit, model));
+        self.stand(&mut space, robot);
         Ok(Some(space))
-    })
+    }
+
+    /// Fills what robots fill, last the one whose space it is.
+    pub(crate) fn stand(&self, space: &mut Space, robot: usize) {
+        let (fits, models) = self.robots;
+        let bounds = space.grid().bounds();
+        let is_other = |i: usize, fit: &Fit| {
+            let stands = i != robot && fit.verdict != Verdict::Refused;
+            stands && standing(fit, &models[fit.model]).touches(&bounds)
+        };
+        for (_, fit) in fits.iter().enumerate().filter(|(i, fit)| is_other(*i, fit)) {
+            let model = &models[fit.model];
+            merge::stand(space, SpaceKind::Other, model, &poses(fit, model));
+        }
+        let own = &models[fits[robot].model];
+        merge::stand(space, SpaceKind::Robot, own, &poses(&fits[robot], own));
+    }
+}
+
+/// World bounds of a robot as it stands.
+pub(crate) fn standing(fit: &Fit, model: &Model) -> Aabb {
+    let mut out = Aabb::EMPTY;
+    for (link, pose) in model.links.iter().zip(poses(fit, model)) {
+        if !link.bounds.is_empty() {
+            link.bounds.corners().into_iter().for_each(|c| out.add((pose * Point::from(c)).into()));
+        }
+    }
+    out
 }
 
 /// The region of all that a robot can get to.
@@ -60,7 +100,7 @@ pub(crate) fn region(middle: &Point, world: &Aabb) -> Region {
 }
 
 /// All that a robot can get to, and no more behind its foot than pedestals are high: below one that stands, above one that hangs.
-fn bounds(fit: &Fit, reach: f64) -> Aabb {
+pub(crate) fn bounds(fit: &Fit, reach: f64) -> Aabb {
     let base = fit.world_from_base.translation.vector;
     let mut out = Aabb::EMPTY;
     out.add(base.add_scalar(-reach).into());
@@ -83,28 +123,47 @@ pub(crate) fn poses(fit: &Fit, model: &Model) -> Vec<Pose> {
 /// A point in a voxel of a space: number of the space, of the voxel, and what the point makes of it.
 pub(crate) type Spot = (usize, usize, SpaceKind);
 
-/// Which voxels labelled points fall into; the same voxel once in a row. `blocks` are bounds of runs of points.
-pub(crate) fn spots(
-    grids: &[Option<(SpaceGrid, Aabb)>],
-    world: &[[f64; 3]],
-    labels: &[Label],
-    blocks: &[(Range<usize>, Aabb)],
-) -> Vec<Spot> {
-    let mut out: Vec<Spot> = Vec::new();
-    for (s, grid) in grids.iter().enumerate() {
-        let Some((grid, bounds)) = grid else { continue };
-        for (range, _) in blocks.iter().filter(|(_, own)| own.touches(bounds)) {
-            for i in range.clone() {
-                let at = bounds.contains(world[i]).then(|| grid.index(world[i])).flatten();
-                let Some(at) = at else { continue };
-                let spot = (s, at, Space::kind_of(labels[i]));
-                if out.last() != Some(&spot) {
-                    out.push(spot);
+/// Grids of spaces, with their bounds in the world.
+pub(crate) struct Grids(Vec<Option<(SpaceGrid, Aabb)>>);
+
+impl Grids {
+    pub(crate) fn of(spaces: &[Option<Space>]) -> Self {
+        let grid = |s: &Option<Space>| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()));
+        Self(spaces.iter().map(grid).collect())
+    }
+
+    /// Which voxels labelled points fall into, where `counts` says that a point counts; the same voxel once in a row. `blocks`
+    /// are bounds of runs of points.
+    pub(crate) fn spots(
+        &self,
+        world: &[[f64; 3]],
+        labels: &[Label],
+        blocks: &[(Range<usize>, Aabb)],
+        counts: impl Fn(usize) -> bool,
+    ) -> Vec<Spot> {
+        let mut out: Vec<Spot> = Vec::new();
+        for (s, grid) in self.0.iter().enumerate() {
+            let Some((grid, bounds)) = grid else { continue };
+            for (range, _) in blocks.iter().filter(|(_, own)| own.touches(bounds)) {
+                for i in range.clone().filter(|i| counts(*i)) {
+                    let at = bounds.contains(world[i]).then(|| grid.index(world[i])).flatten();
+                    let Some(at) = at else { continue };
+                    let spot = (s, at, Space::kind_of(labels[i], s));
+                    if out.last() != Some(&spot) {
+                        out.push(spot);
+                    }
                 }
             }
         }
+        out
     }
-    out
+}
+
+/// Puts points into their spaces.
+pub(crate) fn mark(spaces: &mut [Option<Space>], spots: impl IntoIterator<Item = Spot>) {
+    for (space, voxel, kind) in spots {
+        spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));
+    }
 }
 
 #[cfg(test)]

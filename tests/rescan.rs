@@ -1,6 +1,8 @@
 //! A cell that is scanned again, from outside: what was changed is found and nothing else, what was not touched stays as it
 //! was, byte for byte, and a rescan can be gone on from in its turn.
 
+use contract::SpaceKind;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use stillpoint::compare::Agreement;
@@ -147,7 +149,59 @@ fn a_rescanned_cell_is_brought_up_to_date() {
         in_tiles
     };
     assert_ne!(held(&plant.path("base")), held(&out));
+    for name in ["base", "again"] {
+        spaces_hold_what_tiles_hold(&plant.path(name));
+    }
     goes_on(&plant, &out);
+}
+
+/// Each point of the tiles lies in a voxel that says so, in the space of each robot that has one there; and what is said to be
+/// fixed has points. Tiles have coordinates rounded to 0.1 mm: a point may lie in the voxel beside.
+fn spaces_hold_what_tiles_hold(out: &Path) {
+    let robots = export::ResultFile::read(out).expect("a result").robots;
+    let space = |r: &export::RobotEntry| r.space.as_ref().expect("one").read(out).expect("voxels");
+    let spaces: Vec<_> = robots.iter().map(space).collect();
+    let quantum = export::Quantum { scale: [1e-4; 3], offset: [0.0; 3] };
+    let las = export::LasSettings::new(quantum);
+    let mut fixed: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); spaces.len()];
+    let (mut n_others, mut lost) = (0, Vec::new());
+    for tile in std::fs::read_dir(out.join("tiles")).expect("a folder").flatten() {
+        let read = export::read_tile(&tile.path(), &las, |points| {
+            for (i, space) in spaces.iter().enumerate() {
+                for point in points {
+                    let near = |k: usize| {
+                        let off = [0, 1, 2].map(|a| if k >> a & 1 == 1 { 6e-5 } else { -6e-5 });
+                        space.grid().index([0, 1, 2].map(|a| point.world[a] + off[a]))
+                    };
+                    let Some(places) = (0..8).map(near).collect::<Option<Vec<_>>>() else {
+                        continue;
+                    };
+                    let kind = contract::Space::kind_of(point.label, i);
+                    let holds = |at: &usize| match (kind, space.voxels()[*at]) {
+                        (SpaceKind::Fixed, there) => there == SpaceKind::Fixed,
+                        (SpaceKind::Other, there) => there.is_obstacle(),
+                        (_, there) => there == SpaceKind::Robot || there.is_obstacle(),
+                    };
+                    n_others += usize::from(kind == SpaceKind::Other);
+                    lost.extend((!places.iter().any(holds)).then_some((i, point.world, kind)));
+                    if kind == SpaceKind::Fixed {
+                        fixed[i].extend(places);
+                    }
+                }
+            }
+            Ok(())
+        });
+        read.expect("a tile");
+    }
+    assert!(lost.is_empty(), "{} lost: {:?}", lost.len(), &lost[..lost.len().min(9)]);
+    assert!(n_others > 1000, "robots stand within reach of one another: {n_others}");
+    for (space, fixed) in spaces.iter().zip(fixed) {
+        let voxels = space.voxels().iter().enumerate();
+        let said: Vec<usize> =
+            voxels.filter(|(_, k)| **k == SpaceKind::Fixed).map(|(at, _)| at).collect();
+        let n_empty = said.iter().filter(|at| !fixed.contains(at)).count();
+        assert_eq!(n_empty, 0, "of {} voxels that are said to be fixed", said.len());
+    }
 }
 
 #[test]

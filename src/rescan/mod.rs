@@ -11,6 +11,7 @@ mod present;
 mod robots;
 mod say;
 mod session;
+mod spaces;
 mod state;
 mod write;
 

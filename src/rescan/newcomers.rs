@@ -1,13 +1,13 @@
 //! Things that appeared in a cell in; the robots among them, and how they stood then where the earlier scans show them though
 //! their result missed them, out.
 
-use super::robots::{Now, bounds, look};
+use super::robots::{Now, look};
 use super::session::{Labels, Robots, Session, ground};
 use crate::engine::{Engine, Task};
 use crate::labelling::Labelling;
 use crate::near::Near;
 use crate::search::Search;
-use crate::spaces::region;
+use crate::spaces::{region, standing};
 use contract::{Fit, Region, Result, Verdict};
 use geometry::Aabb;
 use merge::{Thing, Watch};
@@ -93,7 +93,7 @@ impl Session<'_> {
                     stood.model = models.len();
                     models.push(own);
                 }
-                robots.left.push(bounds(&stood, &models[stood.model]));
+                robots.left.push(standing(&stood, &models[stood.model]));
                 robots.missed.push((fits.len(), stood));
             }
             fits.push(fit);

@@ -98,17 +98,6 @@ fn own_model(fit: &mut Fit, library: &Library, models: &mut Vec<Model>) -> Resul
     fit.stays.iter_mut().try_for_each(|stay| own_model(stay, library, models))
 }
 
-/// World bounds of a robot as it stands.
-pub(crate) fn bounds(fit: &Fit, model: &Model) -> Aabb {
-    let mut out = Aabb::EMPTY;
-    for (link, pose) in model.links.iter().zip(poses(fit, model)) {
-        if !link.bounds.is_empty() {
-            link.bounds.corners().into_iter().for_each(|c| out.add((pose * Point::from(c)).into()));
-        }
-    }
-    out
-}
-
 /// Whether robots about a cell hang on walls or ceilings.
 pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
     let about = cell.grown(SAME_PLACE);

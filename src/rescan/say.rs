@@ -74,6 +74,9 @@ impl Said<'_, '_> {
                 result.robots.push(entry)
             }
         }
+        for (robot, space) in result.robots.iter_mut().zip(&self.done.spaces) {
+            robot.space = space.clone().or(robot.space.take());
+        }
         for (scan, list) in result.labels.scans.iter_mut().zip(self.lists) {
             scan.superseded.clone_from(list);
         }

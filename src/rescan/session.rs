@@ -4,13 +4,13 @@ use super::Cell;
 use super::base::Base;
 use super::past::{Compared, Past};
 use super::present::{self, Present};
-use super::robots::{Now, bounds as robot_bounds, look};
+use super::robots::{Now, look};
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use crate::labelling::Labelling;
 use crate::near::Near;
 use crate::search::{Search, Shelf};
-use crate::spaces::{reach, region};
+use crate::spaces::{reach, region, standing};
 use crate::store::Store;
 use crate::surfaces::{Gather, Ground, Surfaces};
 use contract::{
@@ -136,7 +136,7 @@ pub(crate) fn bounds(
 
 /// Robots of the plant that reach into the cell, by place among the fits, and what they filled.
 fn here((fits, models): (&[Fit], &[Model]), cell: &Aabb) -> Vec<(usize, Aabb)> {
-    let bounds = |(i, fit): (usize, &Fit)| (i, robot_bounds(fit, &models[fit.model]));
+    let bounds = |(i, fit): (usize, &Fit)| (i, standing(fit, &models[fit.model]));
     let all = fits.iter().enumerate().filter(|(_, fit)| fit.verdict != Verdict::Refused);
     all.map(bounds).filter(|(_, bounds)| bounds.touches(cell)).collect()
 }

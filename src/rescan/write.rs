@@ -8,14 +8,17 @@ use super::session::{Labels, Robots, Session};
 use crate::copc;
 use crate::engine::Engine;
 use crate::job::{Outcome, OutputDir};
+use crate::labelled::blocks;
 use crate::labelling::{Labelling, Scope, Streamed};
 use crate::report::id;
 use crate::reuse::{Digests, OutputFile};
-use contract::{Fit, MaskId, Result, Space};
+use crate::spaces::{Grids, Spot};
+use contract::{Fit, MaskId, Result};
 use export::{COPC, FileSum, MaskFiles, NpyWriter, OldPoint, Spool};
 use geometry::Aabb;
 use merge::{Registration, Sight, Tally, ThingChange, Watch};
 use robot::Model;
+use std::cell::RefCell;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -54,11 +57,15 @@ impl Written<'_, '_> {
         let own = self.session.own_fits(self.fits, self.robots);
         let labelling = self.session.labelling(&own, self.models);
         let rest = || {
-            let mut streamed =
-                self.label((&own, &labelling), registered, (next, &scratch), engine)?;
-            let open = streamed.take_open();
-            let tiles = || self.tiles(open, &gone, (next, &scratch), engine);
-            engine.beside("files of robots", || streamed.finish(engine), tiles)
+            let mut streamed = self.label(&labelling, registered, (next, &scratch), engine)?;
+            let (open, spaces) = (streamed.take_open(), streamed.take_spaces());
+            let grids = Grids::of(&spaces);
+            let tiles = || self.tiles((open, &grids), &gone, (next, &scratch), engine);
+            let (mut done, mut touched) =
+                engine.beside("files of robots", || streamed.finish(engine), tiles)?;
+            let left = std::mem::take(&mut touched.spots);
+            done.spaces = self.write_spaces(spaces, left, next, engine)?;
+            Ok((done, touched))
         };
         let (lists, (mut done, touched)) = engine.beside("lists", lists, rest)?;
         let mut written: BTreeSet<String> = touched.names;
@@ -74,6 +81,8 @@ impl Written<'_, '_> {
         };
         let outcome = said.finish(digests, next)?;
         written.extend(say::NAMES.map(String::from));
+        let spaces = done.spaces.iter().flatten();
+        written.extend(spaces.flat_map(|s| [&s.grid, &s.octomap, &s.unknown]).cloned());
         let rewritten = self.robots.changed.iter().chain(&self.robots.gone);
         let folders: Vec<String> = rewritten.map(|&i| id(i)).collect();
         let has_copc = self.base.has(COPC);
@@ -94,21 +103,15 @@ impl Written<'_, '_> {
     /// written.
     fn label<'l>(
         &'l self,
-        (own, labelling): (&[Fit], &'l Labelling<'l>),
+        labelling: &'l Labelling<'l>,
         registered: &[Option<Registration>],
         (next, scratch): (&'l Path, &Path),
         engine: &Engine,
     ) -> Result<Streamed<'l>> {
         let session = self.session;
-        let changed = &self.robots.changed;
-        let mut spaces: Vec<Option<Space>> = vec![None; own.len()];
-        let seen: Vec<Fit> = changed.iter().map(|&i| own[i].clone()).collect();
-        let search = session.search();
-        let around =
-            crate::spaces::around(&seen, self.models, (&search, session.settings), engine)?;
-        changed.iter().zip(around).for_each(|(&i, space)| spaces[i] = space);
+        let spaces = self.spaces(engine)?;
         let scope = Scope {
-            robots: Some(changed.clone()),
+            robots: Some(self.robots.changed.clone()),
             cell: Some(session.past.cell),
             moved: session.moved(registered),
             las: Some(self.base.state.records.las()),
@@ -174,7 +177,7 @@ impl Written<'_, '_> {
     /// already) comes what is left of the old ones.
     fn tiles(
         &self,
-        open: Vec<Spool>,
+        (open, grids): (Vec<Spool>, &Grids),
         gone: &BTreeSet<[i32; 3]>,
         (next, scratch): (&Path, &Path),
         engine: &Engine,
@@ -199,22 +202,28 @@ impl Written<'_, '_> {
         let n_bytes = |name: &str| self.base.out.join(name).metadata().map_or(0, |m| m.len());
         all.sort_by_cached_key(|(name, _)| (Reverse(n_bytes(name)), name.clone()));
         let watch = self.session.watch();
-        let digests = engine.for_disks().fan_out("tiles", all, |(name, mut tile)| {
+        let written = engine.for_disks().fan_out("tiles", all, |(name, mut tile)| {
+            let spots = RefCell::new(Vec::new());
             let new = scratch.join(&name);
             if new.is_file() {
                 tile.take_from(&new, |points| vec![true; points.len()])?;
             }
             if self.base.has(&name) {
-                let stays = |points: &[OldPoint]| self.stay(points, &watch, gone);
+                let stays = |points: &[OldPoint]| {
+                    let stays = self.stay(points, &watch, gone);
+                    spots.borrow_mut().extend(spots_of(points, &stays, grids));
+                    stays
+                };
                 tile.take_from(&self.base.out.join(&name), stays)?;
             }
             let is_left = tile.n_points() > 0;
-            is_left.then(|| tile.finish()).transpose()
+            Ok((is_left.then(|| tile.finish()).transpose()?, spots.into_inner()))
         })?;
+        let (digests, spots): (Vec<_>, Vec<_>) = written.into_iter().unzip();
         let fixed = ["las", "laz"].map(|end| format!("clouds/fixed.{end}"));
         let names = names.into_iter().chain(fixed).collect();
         let digests = digests.into_iter().flatten().filter_map(|summary| summary.sum).collect();
-        Ok(Touched { names, digests })
+        Ok(Touched { names, digests, spots: spots.concat() })
     }
 
     /// Writes lists of the places of old points that are superseded, of masks whose list grew.
@@ -256,6 +265,14 @@ struct Lists {
 struct Touched {
     names: BTreeSet<String>,
     digests: Vec<FileSum>,
+    /// Voxels of what is left of the old points.
+    spots: Vec<Spot>,
+}
+
+/// Voxels of those points that stay.
+fn spots_of(points: &[OldPoint], stays: &[bool], grids: &Grids) -> Vec<Spot> {
+    let (worlds, labels): (Vec<_>, Vec<_>) = points.iter().map(|p| (p.world, p.label)).unzip();
+    grids.spots(&worlds, &labels, &blocks(&worlds), |i| stays[i])
 }
 
 /// Whether a file belongs to one of these robots.

@@ -1,4 +1,4 @@
-//! Space around a robot as voxels: seen free, something fixed, the robot itself, or unknown.
+//! Space around a robot as voxels: seen free, something fixed, the robot itself, another robot, or unknown.
 
 use crate::{Label, PointKind};
 use geometry::Aabb;
@@ -15,6 +15,19 @@ pub enum SpaceKind {
     Fixed = 2,
     /// The robot's own body, or points that move with it.
     Robot = 3,
+    /// The body of another robot, or points that move with that.
+    Other = 4,
+}
+
+impl SpaceKind {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Unknown, Self::Free, Self::Fixed, Self::Robot, Self::Other];
+
+    /// Whether a robot would hit it: what stands still, and other robots as they were found.
+    #[must_use]
+    pub fn is_obstacle(self) -> bool {
+        matches!(self, Self::Fixed | Self::Other)
+    }
 }
 
 /// Where voxels lie: aligned to whole multiples of their edge from the origin of the world.
@@ -80,6 +93,14 @@ impl SpaceGrid {
     pub fn cell(&self, at: usize) -> [usize; 3] {
         let [_, y, z] = self.size;
         [at / (y * z), at / z % y, at % z]
+    }
+
+    /// The box of a voxel in the world, metres.
+    #[must_use]
+    pub fn voxel(&self, at: usize) -> Aabb {
+        let cell = self.cell(at);
+        let side = |i: usize, more: i64| (self.first[i] + cell[i] as i64 + more) as f64 * self.edge;
+        Aabb { min: std::array::from_fn(|i| side(i, 0)), max: std::array::from_fn(|i| side(i, 1)) }
     }
 
     /// Voxels that cannot be reached from outside of `bounds` without crossing those of a surface: what it encloses. Ascending.
@@ -159,19 +180,30 @@ impl Space {
         n as f64 * self.grid.edge.powi(3)
     }
 
-    /// Puts a labelled point into a voxel. What stands still beats all: an obstacle is never lost.
+    /// Puts a labelled point into a voxel. What stands still beats all, another robot the own one: an obstacle is never lost.
     pub fn mark(&mut self, index: usize, voxel: SpaceKind) {
+        let rank = |kind| match kind {
+            SpaceKind::Unknown | SpaceKind::Free => 0,
+            SpaceKind::Robot => 1,
+            SpaceKind::Other => 2,
+            SpaceKind::Fixed => 3,
+        };
         let old = &mut self.voxels[index];
-        if *old != SpaceKind::Fixed {
+        if rank(voxel) > rank(*old) {
             *old = voxel;
         }
     }
 
-    /// What a point with this label makes of its voxel.
+    /// What a point with this label makes of its voxel in the space of the robot of this number.
     #[must_use]
-    pub fn kind_of(label: Label) -> SpaceKind {
+    pub fn kind_of(label: Label, robot: usize) -> SpaceKind {
         match label.kind {
-            PointKind::Link | PointKind::Attachment => SpaceKind::Robot,
+            PointKind::Link | PointKind::Attachment
+                if usize::try_from(label.robot).is_ok_and(|own| own == robot) =>
+            {
+                SpaceKind::Robot
+            }
+            PointKind::Link | PointKind::Attachment => SpaceKind::Other,
             PointKind::Fixed | PointKind::Floor | PointKind::Uncertain => SpaceKind::Fixed,
         }
     }

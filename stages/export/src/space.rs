@@ -1,8 +1,8 @@
 //! The space around a robot in; its voxels as a NumPy array and as octrees out.
 //!
 //! ```text
-//! robots/R1/space.npy      kinds by [x][y][z]: 0 unknown, 1 free, 2 fixed, 3 the robot
-//! robots/R1/space.bt       OctoMap: fixed is occupied, free and the robot are free, unknown is not in the tree
+//! robots/R1/space.npy      kinds by [x][y][z]: 0 unknown, 1 free, 2 fixed, 3 the robot, 4 another robot
+//! robots/R1/space.bt       OctoMap: fixed and other robots are occupied, free and the robot are free, unknown is not in it
 //! robots/R1/unknown.bt     OctoMap: unknown is occupied, all else is free: what a planner must not take for free
 //! ```
 
@@ -15,9 +15,10 @@ use std::path::Path;
 /// What is known of the space around a robot, and where it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpaceEntry {
-    /// Kinds of voxels, by `[x][y][z]`, relative to the output folder: 0 unknown, 1 free, 2 fixed, 3 the robot.
+    /// Kinds of voxels, by `[x][y][z]`, relative to the output folder: 0 unknown, 1 free, 2 fixed, 3 the robot, 4
+    /// another robot.
     pub grid: String,
-    /// Octree of what is fixed and what is free.
+    /// Octree of what is fixed or another robot, and what is free.
     pub octomap: String,
     /// Octree in which what is unknown is occupied.
     pub unknown: String,
@@ -36,6 +37,13 @@ pub struct SpaceEntry {
 }
 
 impl SpaceEntry {
+    /// Its voxels, as it states them.
+    #[must_use]
+    pub fn voxels(&self) -> SpaceGrid {
+        let first = self.origin.map(|v| (v / self.edge).round() as i64);
+        SpaceGrid { edge: self.edge, first, size: self.size }
+    }
+
     /// Reads its voxels back.
     ///
     /// # Errors
@@ -46,8 +54,7 @@ impl SpaceEntry {
             let hint = "`stillpoint verify` says whether the result is whole";
             Error::bad_input(what.to_owned()).at(path.display()).hint(hint)
         };
-        let first = self.origin.map(|v| (v / self.edge).round() as i64);
-        let grid = SpaceGrid { edge: self.edge, first, size: self.size };
+        let grid = self.voxels();
         let n = self.size.iter().try_fold(1_usize, |n, s| n.checked_mul(*s));
         // What the list says of its size is believed only where the file is as long.
         let n = n.filter(|n| npy::n_bytes(&path).is_ok_and(|there| there == *n as u64));
@@ -56,8 +63,7 @@ impl SpaceEntry {
         })?;
         let mut space = Space::unknown(grid);
         for (voxel, byte) in space.voxels_mut().iter_mut().zip(npy::read_bytes(&path, 0, n, 1)?) {
-            let kinds = [SpaceKind::Unknown, SpaceKind::Free, SpaceKind::Fixed, SpaceKind::Robot];
-            let kind = kinds.into_iter().find(|kind| *kind as u8 == byte);
+            let kind = SpaceKind::ALL.into_iter().find(|kind| *kind as u8 == byte);
             *voxel = kind.ok_or_else(|| bad("a voxel of a robot's space is of no kind"))?;
         }
         Ok(space)
@@ -86,7 +92,7 @@ pub fn write_space(out: &Path, id: &str, space: &Space) -> Result<SpaceEntry> {
     };
     let known = |at: usize| match voxels[at] {
         SpaceKind::Unknown => None,
-        kind => Some(kind == SpaceKind::Fixed),
+        kind => Some(kind.is_obstacle()),
     };
     tree(&known, "space.bt")?;
     tree(&|at| Some(voxels[at] == SpaceKind::Unknown), "unknown.bt")?;

@@ -43,8 +43,9 @@ pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &impl Fan) {
     });
 }
 
-/// Fills the body of a robot that stands with its links at `world_from_links`: what its surface encloses.
-pub fn stand(space: &mut Space, model: &Model, world_from_links: &[Pose]) {
+/// Fills the body of a robot that stands with its links at `world_from_links`, what its surface encloses, with a kind: its own or
+/// another's.
+pub fn stand(space: &mut Space, kind: SpaceKind, model: &Model, world_from_links: &[Pose]) {
     let grid = *space.grid();
     let mut body = Aabb::EMPTY;
     let mut surface = Vec::new();
@@ -58,9 +59,9 @@ pub fn stand(space: &mut Space, model: &Model, world_from_links: &[Pose]) {
     if surface.is_empty() {
         return;
     }
-    surface.iter().for_each(|at| space.voxels_mut()[*at] = SpaceKind::Robot);
+    surface.iter().for_each(|at| space.voxels_mut()[*at] = kind);
     for at in grid.enclosed(&body, &surface) {
-        space.voxels_mut()[at] = SpaceKind::Robot;
+        space.voxels_mut()[at] = kind;
     }
 }
 
@@ -113,8 +114,12 @@ mod tests {
             assert_eq!(at(&space, p), SpaceKind::Unknown, "{p:?}");
         }
         let wall = space.grid().index([4.0, -0.5, 0.0]).expect("inside");
+        for kind in [SpaceKind::Robot, SpaceKind::Other, SpaceKind::Robot] {
+            space.mark(wall, kind);
+        }
+        assert_eq!(space.voxels()[wall], SpaceKind::Other);
         space.mark(wall, SpaceKind::Fixed);
-        space.mark(wall, SpaceKind::Robot);
+        space.mark(wall, SpaceKind::Other);
         assert_eq!(space.voxels()[wall], SpaceKind::Fixed);
     }
 }
