@@ -38,12 +38,14 @@ impl Around<'_, '_> {
         engine.fan_out(Task::new("space").large(), (0..fits.len()).collect(), |i| {
             let model = &models[fits[i].model];
             let grid = SpaceGrid::over(&bounds(&fits[i], model.reach()).shared(&known), edge);
-            self.one(i, grid)
+            let mut space = self.seen(i, grid)?;
+            space.iter_mut().for_each(|space| self.stand(space, i));
+            Ok(space)
         })
     }
 
-    /// The space of one robot, in these voxels; none where no scan says where its beams went.
-    pub(crate) fn one(&self, robot: usize, grid: SpaceGrid) -> Result<Option<Space>> {
+    /// What beams went through about a robot, in these voxels; none where no scan says where its beams went.
+    pub(crate) fn seen(&self, robot: usize, grid: SpaceGrid) -> Result<Option<Space>> {
         let base: Point = self.robots.0[robot].world_from_base.translation.vector.into();
         let region = region(&base, &grid.bounds());
         let view =
@@ -54,7 +56,6 @@ impl Around<'_, '_> {
         }
         let mut space = Space::unknown(grid);
         merge::see(&mut space, &region, &views, &AllThreads);
-        self.stand(&mut space, robot);
         Ok(Some(space))
     }
 

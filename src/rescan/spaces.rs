@@ -8,6 +8,7 @@ use crate::spaces::{Around, Spot, bounds, mark};
 use contract::{Result, Space, SpaceGrid, SpaceKind};
 use export::{SpaceEntry, write_space};
 use geometry::Aabb;
+use merge::Passed;
 use std::path::Path;
 
 impl Written<'_, '_> {
@@ -29,24 +30,31 @@ impl Written<'_, '_> {
         let is_renewed = |i: &usize| self.robots.changed.contains(i) || (!is_gone(*i) && meets(*i));
         let renewed: Vec<usize> = (0..self.fits.len()).filter(is_renewed).collect();
         let spaces = engine.fan_out(Task::new("space").large(), renewed.clone(), |i| {
-            let old = self.entry(i).map(|entry| entry.read(&self.base.out)).transpose()?;
-            let edge = old.as_ref().map_or(settings.merge.space_edge, |old| old.grid().edge);
-            let known = old.as_ref().map_or(Aabb::EMPTY, |old| old.grid().bounds());
-            let known = known.union(&search.bounds().grown(edge));
-            let fit = &self.fits[i];
-            let reach = bounds(fit, self.models[fit.model].reach());
-            let grid = SpaceGrid::over(&reach.shared(&known), edge);
-            let seen = around.one(i, grid)?;
-            let Some(old) = old else { return Ok(seen) };
-            let unseen = || {
-                let mut space = Space::unknown(grid);
-                around.stand(&mut space, i);
-                space
-            };
-            Ok(Some(renewed_in(&places, &old, seen.unwrap_or_else(unseen))))
+            self.space(i, &around, &places)
         })?;
         renewed.into_iter().zip(spaces).for_each(|(i, space)| out[i] = space);
         Ok(out)
+    }
+
+    /// The space of one robot; points of the places are still to be marked.
+    fn space(&self, i: usize, around: &Around<'_, '_>, places: &[Aabb]) -> Result<Option<Space>> {
+        let old = self.entry(i).map(|entry| entry.read(&self.base.out)).transpose()?;
+        let edge = old.as_ref().map_or(around.settings.merge.space_edge, |old| old.grid().edge);
+        let known = old.as_ref().map_or(Aabb::EMPTY, |old| old.grid().bounds());
+        let known = known.union(&around.search.bounds().grown(edge));
+        let fit = &self.fits[i];
+        let reach = bounds(fit, self.models[fit.model].reach()).shared(&known);
+        let grid = SpaceGrid::over(&reach, edge);
+        let Some(old) = old.filter(|_| !places.is_empty()) else {
+            let mut seen = around.seen(i, grid)?;
+            seen.iter_mut().for_each(|space| around.stand(space, i));
+            return Ok(seen);
+        };
+        let mut space = Space::unknown(grid);
+        around.stand(&mut space, i);
+        let passed = Passed::new(&self.session.cell, &self.session.new_views, grid.edge);
+        renew(&mut space, &old, places, |middle| passed.is_free(middle));
+        Ok(Some(space))
     }
 
     /// Marks what is left of the old points and writes them; by fit, what is said of them.
@@ -77,52 +85,58 @@ impl Written<'_, '_> {
     }
 }
 
-/// A space as beams of the new scans and models have it within some places, else as it was. What points they hold is not known
-/// yet within the places; what was seen free and is not seen now stays free.
-fn renewed_in(places: &[Aabb], old: &Space, mut seen: Space) -> Space {
-    let grid = *seen.grid();
-    for (at, voxel) in seen.voxels_mut().iter_mut().enumerate() {
-        let own = grid.voxel(at);
-        let was = old.grid().index(own.center().into());
-        let was = was.map_or(SpaceKind::Unknown, |at| old.voxels()[at]);
+/// Adds to a space that robots fill what is seen within some places, and what was known elsewhere. Which points the places hold
+/// is not known yet; what was seen free and is not seen now stays free.
+fn renew(space: &mut Space, old: &Space, places: &[Aabb], is_free: impl Fn([f64; 3]) -> bool) {
+    use SpaceKind::{Fixed, Free, Other, Robot, Unknown};
+    let grid = *space.grid();
+    for (at, voxel) in space.voxels_mut().iter_mut().enumerate() {
+        let middle = grid.middle(at);
+        let was = old.grid().index(middle).map_or(Unknown, |at| old.voxels()[at]);
+        if (*voxel, was) == (Unknown, Free) {
+            *voxel = Free;
+            continue;
+        }
+        let own = Aabb { min: middle, max: middle }.grown(0.5 * grid.edge);
         let is_within = places.iter().any(|p| p.contains(own.min) && p.contains(own.max));
         *voxel = match (*voxel, was) {
-            (SpaceKind::Unknown, SpaceKind::Free) => SpaceKind::Free,
-            (now, _) if is_within => now,
-            (now @ (SpaceKind::Robot | SpaceKind::Other), was) if was != SpaceKind::Fixed => now,
+            (Unknown, _) if is_within && is_free(middle) => Free,
+            (body, _) if is_within => body,
+            (body @ (Robot | Other), was) if was != Fixed => body,
             (_, was) => was,
         };
     }
-    seen
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn space(kinds: [SpaceKind; 4]) -> Space {
+        let bounds = Aabb { min: [0.0; 3], max: [0.4, 0.1, 0.1] };
+        let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));
+        space.voxels_mut().copy_from_slice(&kinds);
+        space
+    }
+
     #[test]
     fn voxels_are_renewed_where_points_are_looked_at_again_and_nowhere_else() {
         use SpaceKind::{Fixed, Free, Other, Robot, Unknown};
-        let bounds = Aabb { min: [0.0; 3], max: [0.4, 0.1, 0.1] };
-        let space = |kinds: [SpaceKind; 4]| {
-            let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));
-            space.voxels_mut().copy_from_slice(&kinds);
-            space
-        };
         // The place ends within the third voxel: that is not all looked at.
         let place = Aabb { min: [-0.01; 3], max: [0.25, 0.11, 0.11] };
-        let renewed = |was, now| renewed_in(&[place], &space(was), space(now)).voxels().to_vec();
-        assert_eq!(
-            renewed([Fixed; 4], [Free, Unknown, Free, Unknown]),
-            [Free, Unknown, Fixed, Fixed]
-        );
-        assert_eq!(
-            renewed([Free; 4], [Unknown, Other, Unknown, Robot]),
-            [Free, Other, Free, Robot]
-        );
-        assert_eq!(
-            renewed([Robot, Other, Robot, Fixed], [Unknown, Free, Unknown, Robot]),
-            [Unknown, Free, Robot, Fixed]
-        );
+        let after = |was, free: [bool; 4], bodies| {
+            let (mut space, old) = (space(bodies), space(was));
+            renew(&mut space, &old, &[place], |p| free[(p[0] / 0.1) as usize]);
+            space.voxels().to_vec()
+        };
+        let (unseen, nobody) = ([false; 4], [Unknown; 4]);
+        let seen = [true, false, true, true];
+        assert_eq!(after([Fixed; 4], seen, nobody), [Free, Unknown, Fixed, Fixed]);
+        let bodies = [Unknown, Other, Unknown, Robot];
+        assert_eq!(after([Free; 4], unseen, bodies), [Free, Other, Free, Robot]);
+        let was = [Robot, Other, Robot, Fixed];
+        assert_eq!(after(was, unseen, bodies), [Unknown, Other, Robot, Fixed]);
+        // A robot is where it stands, whatever beams are said to have gone through it.
+        assert_eq!(after([Unknown; 4], [true; 4], bodies), [Free, Other, Unknown, Robot]);
     }
 }

@@ -95,12 +95,11 @@ impl SpaceGrid {
         [at / (y * z), at / z % y, at % z]
     }
 
-    /// The box of a voxel in the world, metres.
+    /// The middle of a voxel in the world, metres.
     #[must_use]
-    pub fn voxel(&self, at: usize) -> Aabb {
+    pub fn middle(&self, at: usize) -> [f64; 3] {
         let cell = self.cell(at);
-        let side = |i: usize, more: i64| (self.first[i] + cell[i] as i64 + more) as f64 * self.edge;
-        Aabb { min: std::array::from_fn(|i| side(i, 0)), max: std::array::from_fn(|i| side(i, 1)) }
+        std::array::from_fn(|i| ((self.first[i] + cell[i] as i64) as f64 + 0.5) * self.edge)
     }
 
     /// Voxels that cannot be reached from outside of `bounds` without crossing those of a surface: what it encloses. Ascending.

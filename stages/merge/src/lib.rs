@@ -22,7 +22,7 @@ pub use attach::{Attach, Attached, Group};
 pub use hang::{Hanging, hang};
 pub use register::{Planes, Registration, Surfaces};
 pub use sight::{Sight, Watch};
-pub use space::{see, stand};
+pub use space::{Passed, see, stand};
 pub use tally::{Seen, Tally, Tallying};
 pub use things::{Thing, ThingChange, ThingSettings, things};
 pub use unseen::{Unseen, unseen};

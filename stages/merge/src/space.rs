@@ -15,28 +15,42 @@ const BEYOND: f64 = 0.01;
 /// Voxels that are looked at by one thread.
 const PIECE: usize = 1 << 14;
 
+/// What beams went through.
+pub struct Passed<'a> {
+    region: &'a Region,
+    eyes: Vec<Eye<'a>>,
+    /// Edge of the voxels that are asked about, metres.
+    edge: f64,
+}
+
+impl<'a> Passed<'a> {
+    /// Of views of a region, for voxels of this edge.
+    #[must_use]
+    pub fn new(region: &'a Region, views: &'a [View], edge: f64) -> Self {
+        Self { region, eyes: views.iter().map(|view| Eye::new(&view.images)).collect(), edge }
+    }
+
+    /// Whether a beam went on beyond the voxel with this middle (world, metres).
+    #[must_use]
+    pub fn is_free(&self, middle: [f64; 3]) -> bool {
+        let beyond = (HALF_DIAGONAL * self.edge + BEYOND) as f32;
+        let p: [f32; 3] = std::array::from_fn(|i| (middle[i] - self.region.origin[i]) as f32);
+        let is_passed = |eye: &Eye<'_>| {
+            let look = eye.look(p, 0.5 * self.edge as f32);
+            look.is_some_and(|l| l.far.is_finite() && l.far > l.range + beyond)
+        };
+        self.eyes.iter().any(is_passed)
+    }
+}
+
 /// Frees every voxel that a beam of the views (of `region`) went through.
 pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &impl Fan) {
     let grid = *space.grid();
-    let (edge, first) = (grid.edge, grid.first);
-    let beyond = (HALF_DIAGONAL * edge + BEYOND) as f32;
-    let eyes: Vec<Eye<'_>> = views.iter().map(|view| Eye::new(&view.images)).collect();
-    let is_free = |at: usize| {
-        let cell = grid.cell(at);
-        let p: [f32; 3] = std::array::from_fn(|i| {
-            let middle = ((first[i] + cell[i] as i64) as f64 + 0.5) * edge;
-            (middle - region.origin[i]) as f32
-        });
-        let is_passed = |eye: &Eye<'_>| {
-            let look = eye.look(p, 0.5 * edge as f32);
-            look.is_some_and(|l| l.far.is_finite() && l.far > l.range + beyond)
-        };
-        eyes.iter().any(is_passed)
-    };
+    let passed = Passed::new(region, views, grid.edge);
     let pieces = space.voxels_mut().chunks_mut(PIECE).enumerate().collect();
     fan.fan(pieces, |(n, voxels): (usize, &mut [SpaceKind])| {
         for (i, voxel) in voxels.iter_mut().enumerate() {
-            if is_free(n * PIECE + i) {
+            if passed.is_free(grid.middle(n * PIECE + i)) {
                 *voxel = SpaceKind::Free;
             }
         }
