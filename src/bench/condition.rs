@@ -75,6 +75,8 @@ pub(super) struct Condition {
     pub(super) mount: Place,
     /// How far the plate of such a place stands out from under the foot, metres; 0: a large one.
     pub(super) rim: f64,
+    /// Whether a wall, a ceiling or a large leaning plate is behind that plate.
+    pub(super) backed: bool,
     /// How its posture is found.
     pub(super) way: Way,
     /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0: the whole search.
@@ -105,6 +107,7 @@ pub(super) const PLAIN: Condition = Condition {
     stand: 0.0,
     mount: Place::Floor,
     rim: 0.0,
+    backed: false,
     way: Way::Whole,
     perturbed_deg: 0.0,
 };
@@ -121,6 +124,8 @@ const FRAMES: [f64; 2] = [0.002, 0.1];
 
 /// A plate no larger than it must be to be bolted on, metres.
 const RIM: f64 = 0.06;
+/// One whose rim is too narrow to be a plane of its own, metres.
+const NARROW: f64 = 0.02;
 
 /// One cell to be drawn.
 #[derive(Debug, Clone)]
@@ -193,6 +198,13 @@ const SUITES: &[Suite] = &[
     ("mounts", 6, |k| Condition {
         mount: [Place::Ceiling, Place::Wall, Place::Tilted][k % 3],
         rim: [0.0, RIM][k % 2],
+        mixed: true,
+        ..PLAIN
+    }),
+    ("plates", 6, |k| Condition {
+        mount: [Place::Ceiling, Place::Wall, Place::Tilted][k % 3],
+        rim: NARROW,
+        backed: true,
         mixed: true,
         ..PLAIN
     }),

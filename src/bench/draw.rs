@@ -39,6 +39,9 @@ const HEIGHT: f64 = 1.6;
 const DOME: [f64; 2] = [-60.0, 90.0];
 /// Side and thickness of a plate, metres: a carrier that is bolted to steelwork.
 const PLATE: [f64; 2] = [1.6, 0.08];
+/// Thickness of a plate on something larger, metres, and side and thickness of that.
+const ON_PANEL: [f64; 2] = [0.02, 0.12];
+const PANEL: [f64; 2] = [2.4, 0.1];
 /// Side of a stand, metres: room for the largest foot.
 const STAND_SIDE: f64 = 1.4;
 /// Heights of stands that a foot hides the top of, metres, and their side in widths of the foot.
@@ -210,14 +213,24 @@ fn plate(
         }
         None => (surface, [PLATE[0]; 2]),
     };
-    let middle = middle * Pose::translation(0.0, 0.0, -0.5 * PLATE[1]);
-    scene.boxes.push(Cuboid {
-        name: "plate".into(),
-        xyz: middle.translation.vector.into(),
-        size: [a, b, PLATE[1]],
-        rpy_deg: rpy_deg(&middle),
-        reflectance: 0.5,
-    });
+    let mut push = |name: &str, top: &Pose, size: [f64; 3]| {
+        let middle = top * Pose::translation(0.0, 0.0, -0.5 * size[2]);
+        scene.boxes.push(Cuboid {
+            name: name.into(),
+            xyz: middle.translation.vector.into(),
+            size,
+            rpy_deg: rpy_deg(&middle),
+            reflectance: 0.5,
+        });
+    };
+    if c.backed {
+        let thick = random.between(ON_PANEL[0], ON_PANEL[1]);
+        push("plate", &middle, [a, b, thick]);
+        let behind = surface * Pose::translation(0.0, 0.0, -thick);
+        push("panel", &behind, [PANEL[0], PANEL[0], PANEL[1]]);
+    } else {
+        push("plate", &middle, [a, b, PLATE[1]]);
+    }
     Some(turned)
 }
 

@@ -65,7 +65,8 @@ impl Search<'_, '_> {
         self.hung(scene, sight, ("mounts beside", &|c: &Candidate| is_apart(c, &feet)), tried)
     }
 
-    /// Fits on the region's ceilings, walls and tilted plates, of what is wanted of these candidates; kept under a name.
+    /// Fits on the region's ceilings, walls and tilted plates, of what is wanted of these candidates; kept under a name. Where none
+    /// of them is trusted, before these planes, too: what stands there may be bolted to a plate.
     fn hung(
         &self,
         scene: &Scene<'_>,
@@ -73,10 +74,21 @@ impl Search<'_, '_> {
         (name, is_wanted): (&str, &impl Fn(&Candidate) -> bool),
         tried: &mut Tried,
     ) -> Result<Vec<Fit>> {
-        let find = || self.candidates(sight, &self.mounts(scene.region), (MIN_MOUNT_SCORE, 1));
-        let mut hung = self.piece((scene.region, name), find)?;
-        hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
-        self.fits(scene, &few(hung, MAX_MOUNTS), tried)
+        let mounts = self.mounts(scene.region);
+        let mut fits = Vec::new();
+        for (name, planes) in [
+            (name.to_owned(), mounts.clone()),
+            (format!("{name} raised"), identify::raised_planes(&mounts)),
+        ] {
+            let find = || self.candidates(sight, &planes, (MIN_MOUNT_SCORE, 1));
+            let mut hung = self.piece((scene.region, &name), find)?;
+            hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
+            fits.extend(self.fits(scene, &few(hung, MAX_MOUNTS), tried)?);
+            if fits.iter().any(|fit: &Fit| fit.verdict == Verdict::Trusted) {
+                break;
+            }
+        }
+        Ok(fits)
     }
 
     /// Ceilings, walls and tilted plates about the region.

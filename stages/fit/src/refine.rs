@@ -239,6 +239,7 @@ impl Refine<'_> {
     ) {
         const STAY: f64 = 1.0 / (0.7 * 0.7); // 40° or 0.7 m, one sigma per step
         const LIMIT_SIGMA: f64 = 0.0087; // 0.5°: hard stops have play
+        const OFF_PLANE: f64 = 3.0; // deviations off the plane from which on it is likely another's
         for a in 0..hessian.nrows() {
             hessian[(a, a)] += STAY;
         }
@@ -259,6 +260,9 @@ impl Refine<'_> {
             let up = plane_from_base.rotation.inverse() * Vector::z();
             let [ws, wt] = prior.sigma.map(|s| 1.0 / (s * s));
             let height = plane_from_base.translation.z;
+            // What points say stands on a plate before the plane is not pulled back to it (METHOD.md §5).
+            let far = height / (OFF_PLANE * prior.sigma[0]);
+            let ws = ws / (1.0 + far * far).powi(2);
             for a in 0..3 {
                 gradient[a] += ws * height * up[a];
                 for b in 0..3 {

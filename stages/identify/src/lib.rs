@@ -13,5 +13,5 @@ mod trial;
 mod volume;
 
 pub use base::{BaseSearch, Settings};
-pub use sites::{RegionSettings, guessed_planes, regions, stand_planes};
+pub use sites::{RegionSettings, guessed_planes, raised_planes, regions, stand_planes};
 pub use volume::Sight;

@@ -100,6 +100,24 @@ pub fn stand_planes(world: &Aabb, floor: f64) -> Vec<InstallationPlane> {
     level_planes(world, (floor + STANDS.0, (floor + STANDS.1).min(world.max[2] - 0.3)))
 }
 
+/// Thickest plate between a wall, a ceiling or a leaning plate and what is bolted to it, metres.
+const THICKEST: f64 = 0.15;
+
+/// Planes before walls, ceilings and leaning plates, as plates and brackets lie on them whose rims are too narrow to be planes of
+/// their own. Their area is zero, too.
+#[must_use]
+pub fn raised_planes(mounts: &[InstallationPlane]) -> Vec<InstallationPlane> {
+    let n = (THICKEST / GUESS_STEP).round() as usize;
+    let raised = |mount: &InstallationPlane, k: usize| {
+        let (by, normal) = (k as f64 * GUESS_STEP, mount.plane.normal);
+        let shift = |p: [f64; 3]| [0, 1, 2].map(|i| p[i] + by * normal[i]);
+        let bounds = Aabb { min: shift(mount.bounds.min), max: shift(mount.bounds.max) };
+        let plane = Plane { normal, offset: mount.plane.offset + by };
+        InstallationPlane { plane, bounds, area: 0.0, is_floor: false }
+    };
+    mounts.iter().flat_map(|mount| (1..=n).map(move |k| raised(mount, k))).collect()
+}
+
 fn level_planes(world: &Aabb, (low, high): (f64, f64)) -> Vec<InstallationPlane> {
     let n = ((high - low) / GUESS_STEP).ceil().clamp(0.0, MAX_GUESSES) as usize;
     let level = |k: usize| {
@@ -142,4 +160,25 @@ fn local(bounds: &Aabb, margin: f64) -> Region {
     let origin = Point::from([0, 1, 2].map(|i| (c[i] * 100.0).round() / 100.0));
     let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
     Region { origin, bounds: Aabb { min: shift(grown.min), max: shift(grown.max) } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plates_before_a_wall_are_guessed_up_to_a_hand() {
+        let normal = Vector::new(0.6, -0.8, 0.0);
+        let bounds = Aabb { min: [-1.0, -1.0, 0.0], max: [1.0, 1.0, 3.0] };
+        let plane = Plane { normal, offset: 0.25 };
+        let wall = InstallationPlane { plane, bounds, area: 5.0, is_floor: false };
+        let raised = raised_planes(&[wall]);
+        assert_eq!(raised.len(), 5);
+        for (k, plane) in (1..).zip(&raised) {
+            let by = 0.03 * f64::from(k);
+            assert!((plane.plane.offset - 0.25 - by).abs() < 1e-12 && plane.is_guess());
+            let moved = Vector::from(plane.bounds.min) - Vector::from(bounds.min);
+            assert!((moved - by * normal).norm() < 1e-12);
+        }
+    }
 }
