@@ -73,7 +73,7 @@ impl Written<'_, '_> {
 
     /// Where points of the earlier result are looked at again, one by one: the cell, and where robots stood. Nowhere, where
     /// it has no tiles of them.
-    pub(super) fn places(&self) -> Vec<Aabb> {
+    fn places(&self) -> Vec<Aabb> {
         let has_tiles = self.base.state.records.tile_edge().is_some();
         let places = self.robots.left.iter().chain([&self.session.past.cell]);
         places.filter(|_| has_tiles).copied().collect()
