@@ -2,7 +2,7 @@
 //! other things, on stands that nobody sees, moved between scans.
 
 use super::tried::Tried;
-use super::{MAX_SUNK, SAME_BASE, Search, base};
+use super::{GUESS_BREADTH, MAX_SUNK, SAME_BASE, Search, base, breadth};
 use crate::engine::AllThreads;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Verdict};
 use fit::{Scene, Sights};
@@ -27,6 +27,8 @@ const MAX_MOUNTS: usize = 2;
 /// model.
 const BREADTH: usize = 3;
 const MAX_LEFT_OVER: usize = 4;
+/// The same before walls and the like, where a place is there at five heights at most.
+const RAISED_BREADTH: usize = 2;
 /// What hangs on a wall keeps its base so far above the floor, metres.
 const FLOOR_SLACK: f64 = 0.05;
 /// Score of a base from which on it is asked whether its robot moved between scans, and so many of a region are.
@@ -76,11 +78,11 @@ impl Search<'_, '_> {
     ) -> Result<Vec<Fit>> {
         let mounts = self.mounts(scene.region);
         let mut fits = Vec::new();
-        for (name, planes) in [
-            (name.to_owned(), mounts.clone()),
-            (format!("{name} raised"), identify::raised_planes(&mounts)),
+        for (name, planes, breadth) in [
+            (name.to_owned(), mounts.clone(), 1),
+            (format!("{name} raised"), identify::raised_planes(&mounts), RAISED_BREADTH),
         ] {
-            let find = || self.candidates(sight, &planes, (MIN_MOUNT_SCORE, 1));
+            let find = || self.candidates(sight, &planes, (MIN_MOUNT_SCORE, breadth));
             let mut hung = self.piece((scene.region, &name), find)?;
             hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
             fits.extend(self.fits(scene, &few(hung, MAX_MOUNTS), tried)?);
@@ -115,7 +117,7 @@ impl Search<'_, '_> {
         tried: &mut Tried,
     ) -> Result<Vec<Fit>> {
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
-        let find = || self.candidates(sight, planes, (0.0, BREADTH));
+        let find = || self.candidates(sight, planes, (0.0, BREADTH.max(breadth(planes))));
         let mut found = self.piece((scene.region, "left over"), find)?;
         found.retain(|c| is_apart(c, &feet));
         self.fits(scene, &few(found, MAX_LEFT_OVER), tried)
@@ -137,7 +139,7 @@ impl Search<'_, '_> {
         let Some(floor) = height.map(|h| at.z - h) else { return Ok(Vec::new()) };
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
         let planes = identify::stand_planes(&region.world_bounds(), floor);
-        let find = || self.candidates(sight, &planes, (MIN_STAND_SCORE, 1));
+        let find = || self.candidates(sight, &planes, (MIN_STAND_SCORE, GUESS_BREADTH));
         let mut found = self.piece((region, "stands"), find)?;
         found.retain(|c| is_apart(c, &feet) && is_wanted(c));
         self.fits(scene, &few(found, MAX_MOUNTS), tried)
@@ -169,7 +171,7 @@ impl Search<'_, '_> {
         if gone.len() < MIN_GONE {
             return Vec::new();
         }
-        let feet = self.candidates(&sight.apart(), sights.floors, (0.0, 1));
+        let feet = self.candidates(&sight.apart(), sights.floors, (0.0, breadth(sights.floors)));
         let mut out: Vec<Fit> = Vec::new();
         let in_reach = |candidate: &&Candidate| {
             let here = base(&candidate.bases[0].0) - sights.region.origin.coords;

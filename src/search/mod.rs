@@ -155,8 +155,8 @@ impl<'a, 'm> Search<'a, 'm> {
         }
         let feet = about.map_or(*region, |(place, radius)| feet(region, &place, radius));
         let mut sight = Sight::new(&feet, &views, (&scene.evidence, &scene.scouts), &AllThreads);
-        let mut candidates =
-            self.piece((region, "candidates"), || self.candidates(&sight, &planes, (0.0, 1)))?;
+        let find = || self.candidates(&sight, &planes, (0.0, breadth(&planes)));
+        let mut candidates = self.piece((region, "candidates"), find)?;
         candidates.retain(is_wanted);
         let mut tried = Tried::default();
         let mut fits = self.fits(&scene, &candidates, &mut tried)?;
@@ -176,7 +176,8 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(fits)
     }
 
-    /// Where robots of all models may stand on some planes, best base first, those that score so much.
+    /// Where robots of all models may stand on some planes, best base first, those that score so much; so many times the usual
+    /// base poses are looked at.
     fn candidates(
         &self,
         sight: &Sight<'_>,
@@ -188,7 +189,6 @@ impl<'a, 'm> Search<'a, 'm> {
             let model = (index, &self.shelf.models[index]);
             let search = BaseSearch::new(model, sight, &self.settings.identify);
             let search = search.map(|s| if guessed { s.on_guesses() } else { s });
-            let breadth = if guessed { breadth.max(GUESS_BREADTH) } else { breadth };
             let search = search.map(|s| s.at_least(min_score).broad(breadth));
             search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default()
         };
@@ -336,6 +336,11 @@ fn feet(region: &Region, place: &Point, radius: f64) -> Region {
         bounds.max[i] = bounds.max[i].min(at[i] + reach);
     }
     Region { bounds, ..*region }
+}
+
+/// So many times the base poses are looked at on planes of a region.
+fn breadth(planes: &[InstallationPlane]) -> usize {
+    if planes.iter().all(InstallationPlane::is_guess) { GUESS_BREADTH } else { 1 }
 }
 
 fn base(world_from_base: &Pose) -> Point {

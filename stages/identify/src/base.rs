@@ -12,7 +12,7 @@ use robot::Model;
 use crate::climb::Grid;
 use crate::first::First;
 use crate::graded::Stencil;
-use crate::sites::GUESS_STEP;
+use crate::sites::{GUESS_STEP, are_stacked};
 use crate::trial::{QUOTA, Said, Trial, base_link, best, coarse_yaw, prefix};
 use crate::volume::Sight;
 
@@ -165,8 +165,8 @@ impl<'a> BaseSearch<'a> {
     pub fn run(&self, planes: &[InstallationPlane], fan: &impl Fan) -> Vec<Candidate> {
         let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
         let mut trials = Vec::new();
-        for (at, plane) in planes.iter().enumerate().step_by(self.stride()) {
-            trials.extend(self.coarse(at, plane, &local[at], fan));
+        for at in self.looked_at_coarsely(&local) {
+            trials.extend(self.coarse(at, &planes[at], &local[at], fan));
         }
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
@@ -216,10 +216,19 @@ impl<'a> BaseSearch<'a> {
         self.sight.of_grid((COARSE_REACH * self.coarse_step()) as f32)
     }
 
-    /// Of so many planes one is looked at coarsely.
-    fn stride(&self) -> usize {
+    /// Of guessed heights, one above the other, the first and every so manieth; of other planes all.
+    fn looked_at_coarsely(&self, planes: &[Plane]) -> Vec<usize> {
         let reach = COARSE_REACH * self.coarse_step();
-        if self.is_guess { ((1.5 * reach / GUESS_STEP) as usize).clamp(1, MAX_STRIDE) } else { 1 }
+        let stride = ((1.5 * reach / GUESS_STEP) as usize).clamp(1, MAX_STRIDE);
+        let mut first = 0;
+        let is_looked_at = |at: &usize| {
+            let is_above = *at > first && are_stacked(&planes[*at - 1], &planes[*at], 1);
+            if !is_above {
+                first = *at;
+            }
+            !self.is_guess || (*at - first).is_multiple_of(stride)
+        };
+        (0..planes.len()).filter(is_looked_at).collect()
     }
 
     /// Every place on the plane that has points about it, every yaw.

@@ -3,14 +3,19 @@
 
 use contract::Fan;
 use geometry::{Plane, Pose};
+use std::collections::HashMap;
 
 use crate::base::BaseSearch;
+use crate::sites::are_stacked;
 use crate::trial::{Said, Trial, best, prefix};
 
 /// Steps that a pose may go beyond its neighbours while it gets better.
 const CLIMB: usize = 3;
 /// Mean score on a quarter of the samples by which a pose may lag behind the best and still be looked at closely.
 pub(crate) const LAG: f64 = 0.15;
+
+/// Steps from a pose that is refined: planes up, along x and y, yaw.
+type Steps = [isize; 4];
 
 /// Spacing of a level of the search: metres, radians, and planes where heights are guessed.
 pub(crate) struct Grid {
@@ -61,51 +66,60 @@ impl BaseSearch<'_> {
         (trial, firsts): (&Trial, &[Pose]),
         grid: &Grid,
     ) -> Vec<Trial> {
-        let top = |near: &[Trial]| {
-            let better = |a: &Trial, b: &Trial| a.said.score.total_cmp(&b.said.score);
-            near.iter().copied().max_by(better).unwrap_or(*trial)
+        // Those about one pose are mostly about the next, too.
+        let mut known: HashMap<Steps, Option<Trial>> = HashMap::new();
+        let mut about = |middle: Steps| -> Vec<(Steps, Trial)> {
+            let levels = if self.is_guess { -1..2 } else { 0..1 };
+            let all = levels.flat_map(|level| (0..27).map(move |n| (level, n)));
+            let near = all.filter_map(|(level, n)| {
+                let by = [level, n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
+                let steps = [0, 1, 2, 3].map(|i| middle[i] + by[i]);
+                let find = || self.moved_by(planes, (trial, firsts), (grid, steps));
+                known.entry(steps).or_insert_with(find).map(|trial| (steps, trial))
+            });
+            near.collect()
         };
-        let mut near = self.neighbours(planes, (trial, firsts), grid);
-        let mut best = top(&near);
+        let mut near = about([0; 4]);
+        let mut best = highest(&near);
         for _ in 0..CLIMB {
-            let farther = self.neighbours(planes, (&best, firsts), grid);
-            let next = top(&farther);
-            if next.said.score <= best.said.score {
+            let Some((middle, so_far)) = best else { break };
+            let farther = about(middle);
+            let next = highest(&farther);
+            if next.is_none_or(|(_, trial)| trial.said.score <= so_far.said.score) {
                 break;
             }
             (near, best) = (farther, next);
         }
         // A few samples tell most neighbours to be worse.
-        near.retain(|t| t.said.score >= best.said.score - LAG);
-        near
+        let least = best.map_or(f64::INFINITY, |(_, trial)| trial.said.score - LAG);
+        near.into_iter().map(|(_, trial)| trial).filter(|t| t.said.score >= least).collect()
     }
 
-    /// A pose and those beside it, with what a few samples of base and first link say; of guessed heights those `rise` planes up
-    /// and down.
-    fn neighbours(
+    /// A pose moved by some steps, with what a few samples of base and first link say; `None` where there is no such plane.
+    fn moved_by(
         &self,
         planes: &[Plane],
         (trial, firsts): (&Trial, &[Pose]),
-        grid: &Grid,
-    ) -> Vec<Trial> {
-        let levels = if self.is_guess { -1..2 } else { 0..1 };
-        let all = levels.flat_map(|level| (0..27_i32).map(move |n| (level * grid.rise, n)));
-        let near = all.filter_map(|(level, n)| {
-            let plane = trial.plane.checked_add_signed(level).filter(|p| *p < planes.len())?;
-            let (i, j, k) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-            let mut next = Trial { plane, ..*trial };
-            next.x += f64::from(i) * grid.step;
-            next.y += f64::from(j) * grid.step;
-            next.yaw += f64::from(k) * grid.yaw;
-            let own = self.look(planes, &next, self.settings.n_fine / 4, grid.tolerance());
-            if firsts.is_empty() {
-                return Some(Trial { said: own, ..next });
-            }
-            next.first = self.glance_at(&planes[plane], &next, firsts, grid.tolerance());
-            next.said = self.joined(own, next.first);
-            Some(next)
-        });
-        near.collect()
+        (grid, [level, i, j, k]): (&Grid, Steps),
+    ) -> Option<Trial> {
+        let rise = level * grid.rise;
+        let plane = trial.plane.checked_add_signed(rise).filter(|p| *p < planes.len())?;
+        if !are_stacked(&planes[trial.plane], &planes[plane], rise) {
+            return None;
+        }
+        let next = Trial {
+            plane,
+            x: trial.x + i as f64 * grid.step,
+            y: trial.y + j as f64 * grid.step,
+            yaw: trial.yaw + k as f64 * grid.yaw,
+            ..*trial
+        };
+        let own = self.look(planes, &next, self.settings.n_fine / 4, grid.tolerance());
+        if firsts.is_empty() {
+            return Some(Trial { said: own, ..next });
+        }
+        let first = self.glance_at(&planes[plane], &next, firsts, grid.tolerance());
+        Some(Trial { said: self.joined(own, first), first, ..next })
     }
 
     /// What some samples of the base say at a glance.
@@ -113,4 +127,9 @@ impl BaseSearch<'_> {
         let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
         self.sight.glance(prefix(self.model, self.base, n_samples), &pose, tolerance)
     }
+}
+
+/// The trial that scores most, with where it is; of equals the last.
+fn highest(near: &[(Steps, Trial)]) -> Option<(Steps, Trial)> {
+    near.iter().copied().max_by(|a, b| a.1.said.score.total_cmp(&b.1.said.score))
 }

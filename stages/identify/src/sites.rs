@@ -118,6 +118,12 @@ pub fn raised_planes(mounts: &[InstallationPlane]) -> Vec<InstallationPlane> {
     mounts.iter().flat_map(|mount| (1..=n).map(move |k| raised(mount, k))).collect()
 }
 
+/// Whether one guessed plane is so many guesses above another: those before several walls follow one another, too.
+pub(crate) fn are_stacked(low: &Plane, high: &Plane, n: isize) -> bool {
+    let off = high.offset - low.offset - n as f64 * GUESS_STEP;
+    low.normal == high.normal && off.abs() < 0.1 * GUESS_STEP
+}
+
 fn level_planes(world: &Aabb, (low, high): (f64, f64)) -> Vec<InstallationPlane> {
     let n = ((high - low) / GUESS_STEP).ceil().clamp(0.0, MAX_GUESSES) as usize;
     let level = |k: usize| {
@@ -179,6 +185,24 @@ mod tests {
             assert!((plane.plane.offset - 0.25 - by).abs() < 1e-12 && plane.is_guess());
             let moved = Vector::from(plane.bounds.min) - Vector::from(bounds.min);
             assert!((moved - by * normal).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn planes_before_another_wall_are_not_above_those_before_the_first() {
+        let bounds = Aabb { min: [-1.0, -1.0, 0.0], max: [1.0, 1.0, 3.0] };
+        let wall = |normal: Vector, offset: f64| InstallationPlane {
+            plane: Plane { normal, offset },
+            bounds,
+            area: 5.0,
+            is_floor: false,
+        };
+        let walls = [wall(Vector::x(), 0.2), wall(Vector::x(), 1.7), wall(Vector::y(), 0.2)];
+        let planes: Vec<Plane> = raised_planes(&walls).iter().map(|p| p.plane).collect();
+        for (a, low) in (0_isize..).zip(&planes) {
+            for (b, high) in (0_isize..).zip(&planes) {
+                assert_eq!(are_stacked(low, high, b - a), a / 5 == b / 5, "{a} {b}");
+            }
         }
     }
 }
