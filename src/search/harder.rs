@@ -27,7 +27,7 @@ const MAX_MOUNTS: usize = 2;
 /// model.
 const BREADTH: usize = 3;
 const MAX_LEFT_OVER: usize = 4;
-/// The same before walls and the like, where a place is there at five heights at most.
+/// So many times the base poses are looked at before walls and the like, where a place is there at five heights at most.
 const RAISED_BREADTH: usize = 2;
 /// What hangs on a wall keeps its base so far above the floor, metres.
 const FLOOR_SLACK: f64 = 0.05;

@@ -216,7 +216,7 @@ impl<'a> BaseSearch<'a> {
         self.sight.of_grid((COARSE_REACH * self.coarse_step()) as f32)
     }
 
-    /// Of guessed heights, one above the other, the first and every so manieth; of other planes all.
+    /// Which planes are looked at coarsely: the lowest of a stack of guessed heights and every few above it; else all.
     fn looked_at_coarsely(&self, planes: &[Plane]) -> Vec<usize> {
         let reach = COARSE_REACH * self.coarse_step();
         let stride = ((1.5 * reach / GUESS_STEP) as usize).clamp(1, MAX_STRIDE);
