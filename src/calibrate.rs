@@ -145,7 +145,7 @@ impl Together {
         let moves: Vec<(String, Pose)> =
             self.calibration.frames.iter().map(|f| (f.name.clone(), f.moved())).collect();
         let at = |e: Error| e.at(urdf.display());
-        let text = std::fs::read_to_string(&urdf).map_err(|e| at(e.into()))?;
+        let text = robot::urdf_text(&urdf)?;
         let corrected = robot::correct(&text, &moves).map_err(at)?;
         let Ok(inside) = urdf.strip_prefix(&from) else {
             let what = format!("the model's URDF is not in its folder {}", from.display());

@@ -85,18 +85,18 @@ impl Ply {
         let mut record = [0; RECORD];
         let numbers = [point.x, point.y, point.z].map(f64::to_le_bytes);
         record[..24].copy_from_slice(numbers.as_flattened());
-        record[24..26].copy_from_slice(&point.intensity.to_le_bytes());
-        record[26] = kind as u8;
+        record[24..28].copy_from_slice(&i32::from(point.intensity).to_le_bytes());
+        record[28] = kind as u8;
         // Fields `RobotId` and `LinkId`: numbers from 1 on, 0 for none.
         let index = |at: usize| {
             let bytes = point.extra_bytes.get(at..at + 2).unwrap_or(&[0, 0]);
-            u16::from_le_bytes([bytes[0], bytes[1]]).wrapping_sub(1).to_le_bytes()
+            (i32::from(u16::from_le_bytes([bytes[0], bytes[1]])) - 1).to_le_bytes()
         };
-        record[27..31].copy_from_slice([index(0), index(2)].as_flattened());
+        record[29..BARE].copy_from_slice([index(0), index(2)].as_flattened());
         let color = point.color.map_or([0; 3], |c| [c.red, c.green, c.blue]);
-        record[31..].copy_from_slice(&color.map(|v| (v >> 8) as u8));
+        record[BARE..].copy_from_slice(&color.map(|v| (v >> 8) as u8));
         self.n += 1;
-        self.write(&record[..if self.has_color { RECORD } else { 31 }])
+        self.write(&record[..if self.has_color { RECORD } else { BARE }])
     }
 
     fn finish(mut self) -> Result<u64> {
@@ -109,9 +109,13 @@ impl Ply {
     }
 }
 
+/// Length of a point without its colour, bytes.
+const BARE: usize = 37;
 /// Length of a point with its colour, bytes.
-const RECORD: usize = 34;
+const RECORD: usize = BARE + 3;
 
+/// Numbers are `int`, since the tensor reader of Open3D passes over `short`, `ushort` and `uint`; names begin with `scalar_`,
+/// since CloudCompare takes no others where nobody answers its questions. See `scripts/cross`.
 fn header(n: u64, has_color: bool) -> Result<Vec<u8>> {
     let color = if has_color {
         "property uchar red\nproperty uchar green\nproperty uchar blue\n"
@@ -120,8 +124,9 @@ fn header(n: u64, has_color: bool) -> Result<Vec<u8>> {
     };
     let before = "ply\nformat binary_little_endian 1.0\ncomment ";
     let after = format!(
-        "\nelement vertex {n}\nproperty double x\nproperty double y\nproperty double z\nproperty ushort intensity\n\
-         property uchar kind\nproperty short robot\nproperty short link\n{color}end_header\n"
+        "\nelement vertex {n}\nproperty double x\nproperty double y\nproperty double z\nproperty int intensity\n\
+         property uchar scalar_kind\n\
+         property int scalar_robot\nproperty int scalar_link\n{color}end_header\n"
     );
     let room = HEADER.checked_sub(before.len() + after.len());
     let room = room.ok_or_else(|| Error::new(Kind::Bug, "a PLY header is too long"))?;

@@ -88,11 +88,11 @@ fn tiles_make_one_copc_file_the_same_for_any_number_of_threads() {
 }
 
 /// The header of a PLY file, and its points' bytes.
-fn ply(path: &Path) -> (String, Vec<[u8; 34]>) {
+fn ply(path: &Path) -> (String, Vec<[u8; 40]>) {
     let bytes = std::fs::read(path).expect("reads");
     let end = b"end_header\n";
     let at = bytes.windows(end.len()).position(|w| w == end).expect("a header") + end.len();
-    let (points, rest) = bytes[at..].as_chunks::<34>();
+    let (points, rest) = bytes[at..].as_chunks::<40>();
     assert!(rest.is_empty());
     (String::from_utf8(bytes[..at].to_vec()).expect("text"), points.to_vec())
 }
@@ -109,19 +109,39 @@ fn ply_files_hold_each_point_once_moving_and_fixed_apart() {
     for (name, n) in export::PLY.iter().zip(n) {
         let (header, points) = ply(&out.join("export").join(name));
         assert!(header.contains(&format!("element vertex {n}\n")), "{header}");
+        // Open3D's tensor reader passes over properties of these types; CloudCompare's command line over other names.
+        for kept in ["scalar_kind", "scalar_robot", "scalar_link"] {
+            assert!(header.contains(&format!(" {kept}\n")), "{header}");
+        }
+        for lost in ["char ", "short ", "ushort ", "uint "] {
+            assert!(!header.contains(&format!("property {lost}")), "{header}");
+        }
         assert_eq!(points.len() as u64, n);
-        let moves = |p: &[u8; 34]| p[26] == 1 || p[26] == 2;
+        let moves = |p: &[u8; 40]| p[28] == 1 || p[28] == 2;
         assert!(points.iter().all(|p| moves(p) == (*name == export::PLY[0])));
         whole.extend(points);
     }
     let of_tiles = written.tiles.iter().flat_map(|tile| read(&tile.path).1);
-    let mut tiles: Vec<[u64; 3]> = of_tiles.map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect();
-    let number = |p: &[u8; 34], i: usize| {
+    let extra = |p: &las::Point, at: usize| {
+        i64::from(u16::from_le_bytes([p.extra_bytes[at], p.extra_bytes[at + 1]])) - 1
+    };
+    let mut tiles: Vec<([u64; 3], [i64; 3])> = of_tiles
+        .map(|p| {
+            let numbers = [i64::from(p.intensity), extra(&p, 0), extra(&p, 2)];
+            ([p.x, p.y, p.z].map(f64::to_bits), numbers)
+        })
+        .collect();
+    let number = |p: &[u8; 40], i: usize| {
         u64::from_le_bytes(p[8 * i..8 * i + 8].try_into().expect("eight bytes"))
     };
+    let int = |p: &[u8; 40], at: usize| {
+        i64::from(i32::from_le_bytes(p[at..at + 4].try_into().expect("four bytes")))
+    };
     // Colours, as the tiles have them.
-    assert!(whole.iter().any(|p| p[31..] != [0; 3]));
-    let mut found: Vec<[u64; 3]> = whole.iter().map(|p| [0, 1, 2].map(|i| number(p, i))).collect();
+    assert!(whole.iter().any(|p| p[37..] != [0; 3]));
+    let mut found: Vec<([u64; 3], [i64; 3])> = (whole.iter())
+        .map(|p| ([0, 1, 2].map(|i| number(p, i)), [24, 29, 33].map(|at| int(p, at))))
+        .collect();
     tiles.sort_unstable();
     found.sort_unstable();
     assert!(tiles == found);

@@ -134,7 +134,7 @@ impl Bodies<'_> {
         match soup {
             Ok(soup) => {
                 for note in &soup.notes {
-                    findings.note(&place, *note, "");
+                    findings.note(&place, note.as_str(), "");
                 }
                 Some(soup)
             }

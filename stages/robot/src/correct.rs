@@ -1,6 +1,8 @@
 //! The text of a URDF and where joints are against it in; the text with those joints' origins moved out, all else as it
-//! was written.
+//! was written, but for the declared encoding: what comes out is UTF-8.
 
+use crate::encoding;
+use crate::urdf::{self, has_quaternions};
 use contract::{Error, Result};
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -11,9 +13,10 @@ use roxmltree::{Document, Node};
 /// # Errors
 /// Not a URDF, or a joint that it has not.
 pub fn correct(text: &str, moves: &[(String, Pose)]) -> Result<String> {
-    let text = text.trim_start_matches('\u{feff}');
-    let document = Document::parse(text)
+    let text = encoding::declare_utf8(text);
+    let document = Document::parse(&text)
         .map_err(|e| Error::bad_input(format!("not well-formed XML ({e})")))?;
+    let turns = has_quaternions(document.root_element());
     let mut edits: Vec<(std::ops::Range<usize>, String)> = Vec::new();
     for (name, moved) in moves {
         let is_it = |n: &Node<'_, '_>| n.has_tag_name("joint") && n.attribute("name") == Some(name);
@@ -23,7 +26,7 @@ pub fn correct(text: &str, moves: &[(String, Pose)]) -> Result<String> {
             .find(is_it)
             .ok_or_else(|| Error::bad_input(format!("there is no joint '{name}'")))?;
         let origin = joint.children().find(|n| n.has_tag_name("origin"));
-        let corrected = origin.map_or_else(Pose::identity, |n| pose(&n)) * moved;
+        let corrected = origin.map_or_else(Pose::identity, |n| pose(&n, turns)) * moved;
         let (p, (roll, pitch, yaw)) =
             (corrected.translation.vector, corrected.rotation.euler_angles());
         let written = format!(
@@ -52,8 +55,9 @@ pub fn correct(text: &str, moves: &[(String, Pose)]) -> Result<String> {
     Ok(out)
 }
 
-/// An `<origin>` as it is written; what is no number counts as zero, as for the reader of models.
-fn pose(origin: &Node<'_, '_>) -> Pose {
+/// An `<origin>` as it is written; what is no number counts as zero, as for the reader of models. `turns` says whether a
+/// quaternion counts.
+fn pose(origin: &Node<'_, '_>, turns: bool) -> Pose {
     let vector = |name: &str| {
         let mut numbers = origin
             .attribute(name)
@@ -63,7 +67,8 @@ fn pose(origin: &Node<'_, '_>) -> Pose {
         Vector::from_fn(|_, _| numbers.next().unwrap_or(0.0))
     };
     let (xyz, rpy) = (vector("xyz"), vector("rpy"));
-    let turn = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z);
+    let quaternion = origin.attribute("quat_xyzw").filter(|_| turns).and_then(urdf::turn);
+    let turn = quaternion.unwrap_or_else(|| UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z));
     Pose::from_parts(Translation3::from(xyz), turn)
 }
 
@@ -82,5 +87,27 @@ mod tests {
         assert!(out.contains("<origin xyz=\"0.100000000 0.000000000 0.000000000\""), "{out}");
         assert!(out.contains("<!-- kept -->") && out.contains("<axis xyz=\"0 0 1\"/>"));
         assert!(correct(text, &[("c".into(), moved)]).is_err());
+    }
+
+    #[test]
+    fn a_quaternion_is_moved_as_the_reader_reads_it() {
+        // A quarter turn about z, so that a move along x goes along y; version 1.0 passes the quaternion over.
+        let text = |version: &str| {
+            format!(
+                "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?><robot{version}><joint name=\"a\">\
+                 <origin xyz=\"1 2 3\" quat_xyzw=\"0 0 2 2\"/></joint></robot>"
+            )
+        };
+        let moves = [("a".to_owned(), Pose::translation(0.1, 0.0, 0.0))];
+        let out = correct(&text(" version=\"1.1\""), &moves).expect("is a URDF");
+        assert!(out.contains("xyz=\"1.000000000 2.100000000 3.000000000\""), "{out}");
+        assert!(
+            out.contains("rpy=\"0.000000000 -0.000000000 1.570796327\"")
+                || out.contains("0.000000000 1.570796327"),
+            "{out}"
+        );
+        assert!(out.starts_with("<?xml version=\"1.0\" encoding=\"UTF-8\"?>"), "{out}");
+        let out = correct(&text(""), &moves).expect("is a URDF");
+        assert!(out.contains("xyz=\"1.100000000 2.000000000 3.000000000\""), "{out}");
     }
 }

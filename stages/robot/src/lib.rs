@@ -7,6 +7,7 @@ mod close;
 mod cloud;
 mod correct;
 mod dress;
+mod encoding;
 mod finding;
 mod hull;
 mod kinematics;
@@ -31,3 +32,4 @@ pub use loops::{ClosedLoop, Closure, Form};
 pub use model::{
     CadCloud, Joint, JointKind, Kinematics, Link, Mesh, Model, Motion, Role, Symmetry,
 };
+pub use reading::urdf_text;

@@ -4,7 +4,7 @@ use crate::bodies::Bodies;
 use crate::finding::{Finding, Findings};
 use crate::model::{Link, Model};
 use crate::notes::{named_passive, note_links};
-use crate::reading::{file_name, read_text};
+use crate::reading::{file_name, read_text, read_xml};
 use crate::resolve::Roots;
 use crate::sheet::{MAX_SHEET_BYTES, Sheet, SubChain};
 use crate::tree::Tree;
@@ -208,7 +208,7 @@ struct Loader<'a> {
 impl Loader<'_> {
     fn load(&self, path: &Path, sheet: &Sheet, findings: &mut Findings) -> Option<Model> {
         let file = file_name(path);
-        let text = read_text(path, MAX_URDF_BYTES, &file, findings)?;
+        let text = read_xml(path, MAX_URDF_BYTES, &file, findings)?;
         let mut description = urdf::read(&text, &file, findings)?;
         let mut passive = BTreeMap::new();
         let mut moving = Vec::new();
@@ -274,7 +274,7 @@ impl Loader<'_> {
         let found = self.roots.find(written).map_err(|what| {
             findings.fail(&place, format!("{what} \"{written}\""), "mend the name");
         });
-        let text = read_text(&found.ok()?.path, MAX_URDF_BYTES, written, findings)?;
+        let text = read_xml(&found.ok()?.path, MAX_URDF_BYTES, written, findings)?;
         let mut sub = urdf::read(&text, written, findings)?;
         let children: BTreeSet<String> = sub.joints.iter().map(|j| j.child.clone()).collect();
         let roots: Vec<String> = sub

@@ -1,6 +1,9 @@
 //! A path in, the bytes of a regular file out, never more than its limit.
 
+use crate::encoding;
 use crate::finding::Findings;
+use contract::{Error, Result};
+use std::borrow::Cow;
 use std::io::Read as _;
 use std::path::Path;
 
@@ -35,4 +38,27 @@ pub(crate) fn read_text(
     let text = read_bytes(path, limit)
         .and_then(|bytes| String::from_utf8(bytes).map_err(|e| format!("is not UTF-8 ({e})")));
     text.map_err(|what| findings.fail(place, what, "mend or replace the file")).ok()
+}
+
+/// Reads an XML file of at most `limit` bytes in the encoding that it declares.
+pub(crate) fn read_xml(
+    path: &Path,
+    limit: u64,
+    place: &str,
+    findings: &mut Findings,
+) -> Option<String> {
+    read_bytes(path, limit)
+        .and_then(|bytes| encoding::decode(&bytes).map(Cow::into_owned))
+        .map_err(|what| findings.fail(place, what, "mend or replace the file"))
+        .ok()
+}
+
+/// The text of a URDF file in the encoding that it declares, without its byte order mark.
+///
+/// # Errors
+/// A file that cannot be read, is larger than any URDF, or is in an encoding that is not read.
+pub fn urdf_text(path: &Path) -> Result<String> {
+    read_bytes(path, crate::urdf::MAX_URDF_BYTES)
+        .and_then(|bytes| encoding::decode(&bytes).map(Cow::into_owned))
+        .map_err(|what| Error::bad_input(what).at(path.display()))
 }

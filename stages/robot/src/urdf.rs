@@ -3,7 +3,7 @@
 
 use crate::finding::Findings;
 use geometry::{Pose, Vector};
-use nalgebra::{Translation3, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::fmt::Write as _;
 
@@ -11,6 +11,8 @@ use std::fmt::Write as _;
 pub(crate) const MAX_URDF_BYTES: u64 = 16 << 20;
 /// Elements, attributes' owners and texts of one file: a hundred times the largest met.
 const MAX_NODES: u32 = 400_000;
+/// Below this length the numbers of a quaternion are rounding, and no direction.
+const SHORTEST_QUATERNION: f64 = 1e-6;
 
 /// Links and joints as one file has them, unchecked against one another.
 #[derive(Debug, Default, Clone)]
@@ -57,7 +59,6 @@ pub(crate) struct RawJoint {
 
 /// Reads a description; what is wrong goes to `findings`.
 pub(crate) fn read(text: &str, file: &str, findings: &mut Findings) -> Option<Description> {
-    let text = text.trim_start_matches('\u{feff}');
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document = match Document::parse_with_options(text, options) {
         Ok(document) => document,
@@ -81,7 +82,8 @@ pub(crate) fn read(text: &str, file: &str, findings: &mut Findings) -> Option<De
         );
         return None;
     }
-    let clean = Cleaner { file, findings }.robot(root)?;
+    let turns = has_quaternions(root);
+    let clean = Cleaner { file, findings, turns }.robot(root)?;
     match urdf_rs::read_from_string(&clean) {
         Ok(robot) => Some(describe(&robot, &document)),
         Err(error) => {
@@ -100,17 +102,35 @@ fn is_xacro(root: Node) -> bool {
     })
 }
 
+/// Whether `quat_xyzw` counts: from URDF 1.1 on; a file without a version is 1.0.
+pub(crate) fn has_quaternions(root: Node) -> bool {
+    let mut parts = root.attribute("version").unwrap_or("1.0").trim().split('.');
+    let mut next = || parts.next().and_then(|p| p.parse::<u32>().ok()).unwrap_or(0);
+    (next(), next()) >= (1, 1)
+}
+
+/// The unit quaternion of `quat_xyzw`; `None` where its four numbers name no direction.
+pub(crate) fn turn(quat_xyzw: &str) -> Option<UnitQuaternion<f64>> {
+    let numbers: Vec<f64> =
+        quat_xyzw.split_whitespace().map(str::parse).collect::<Result<_, _>>().ok()?;
+    let [x, y, z, w] = numbers[..] else {
+        return None;
+    };
+    UnitQuaternion::try_new(Quaternion::new(w, x, y, z), SHORTEST_QUATERNION)
+}
+
 /// Writes the part of a URDF that we use, and only that.
 struct Cleaner<'a> {
     file: &'a str,
     findings: &'a mut Findings,
+    /// Whether `quat_xyzw` counts in this file.
+    turns: bool,
 }
 
 /// How many numbers an attribute holds.
 fn numbers_of(attribute: &str) -> Option<usize> {
     match attribute {
         "xyz" | "rpy" | "scale" | "size" => Some(3),
-        "quat_xyzw" => Some(4),
         "radius" | "length" | "lower" | "upper" | "multiplier" | "offset" => Some(1),
         _ => None,
     }
@@ -187,7 +207,7 @@ impl Cleaner<'_> {
         let _ = write!(out, "<{tag}>");
         let mut right = true;
         if let Some(origin) = self.only(node, "origin") {
-            right &= self.open(origin, &[], &["xyz", "rpy", "quat_xyzw"], out, false);
+            right &= self.origin(origin, out);
         }
         out.push_str("<geometry>");
         right &= self.open(shape, needs, may, out, false);
@@ -210,8 +230,10 @@ impl Cleaner<'_> {
             );
             right = false;
         }
-        let parts: [(&str, &[&str], &[&str]); 6] = [
-            ("origin", &[], &["xyz", "rpy", "quat_xyzw"]),
+        if let Some(origin) = self.only(node, "origin") {
+            right &= self.origin(origin, out);
+        }
+        let parts: [(&str, &[&str], &[&str]); 5] = [
             ("parent", &["link"], &[]),
             ("child", &["link"], &[]),
             ("axis", &["xyz"], &[]),
@@ -235,6 +257,41 @@ impl Cleaner<'_> {
             }
         }
         out.push_str("</joint>");
+        right
+    }
+
+    /// Writes an origin, its quaternion only where it counts, and then of unit length.
+    fn origin(&mut self, node: Node, out: &mut String) -> bool {
+        let Some(written) = node.attribute("quat_xyzw") else {
+            return self.open(node, &[], &["xyz", "rpy"], out, false);
+        };
+        let place = self.place(node);
+        if !self.turns {
+            let what = "quat_xyzw counts from URDF version 1.1 on, and is passed over here";
+            let way_out = "write rpy instead, or add version=\"1.1\" to <robot>";
+            self.findings.warn(place, what, way_out);
+            return self.open(node, &[], &["xyz", "rpy"], out, false);
+        }
+        if node.has_attribute("rpy") {
+            let what = "has both rpy and quat_xyzw, which may name two directions";
+            self.findings.fail(place, what, "keep rpy");
+            return false;
+        }
+        let Some(turn) = turn(written) else {
+            let what = format!("quat_xyzw is no direction \"{}\"", shortened(written));
+            self.findings.fail(place, what, "write four finite numbers, not all zero: x y z w");
+            return false;
+        };
+        let what = "quat_xyzw is obeyed here, but passed over by most other readers of URDF";
+        self.findings.note(place, what, "write rpy, which all of them read");
+        let right = node.attribute("xyz").is_none_or(|xyz| self.numbers(node, "xyz", xyz, 3));
+        out.push_str("<origin");
+        if let Some(xyz) = node.attribute("xyz") {
+            attribute(out, "xyz", xyz);
+        }
+        let q = turn.coords;
+        attribute(out, "quat_xyzw", &format!("{} {} {} {}", q.x, q.y, q.z, q.w));
+        out.push_str("/>");
         right
     }
 

@@ -12,9 +12,10 @@ const MAX_DEPTH: usize = 64;
 const MAX_VISITS: usize = 100_000;
 /// Elements and texts of one file.
 const MAX_NODES: u32 = 4_000_000;
+/// A unit that differs from the metre by less is a rounded metre: a millionth of a robot is below any scanner.
+const SAME_UNIT: f64 = 1e-6;
 
 pub(super) fn read(text: &str) -> Result<Soup, String> {
-    let text = text.trim_start_matches('\u{feff}');
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options)
         .map_err(|e| format!("not well-formed XML ({e})"))?;
@@ -36,10 +37,23 @@ pub(super) fn read(text: &str) -> Result<Soup, String> {
     }
     let unit = scene.unit;
     let mut soup = scene.soup;
+    if (unit - 1.0).abs() > SAME_UNIT {
+        soup.note(&format!(
+            "its unit of {unit} m is applied here; most other readers of URDF pass it over and see \
+             the mesh {} times as large",
+            rounded(unit.recip())
+        ));
+    }
     for p in &mut soup.vertices {
         *p = p.map(|v| v * unit);
     }
     Ok(soup)
+}
+
+/// Six digits of a ratio, so that 1/0.0254 is 39.3701.
+fn rounded(ratio: f64) -> f64 {
+    let digit = 10_f64.powf(5.0 - ratio.log10().floor());
+    (ratio * digit).round() / digit
 }
 
 struct Scene<'a, 'i> {

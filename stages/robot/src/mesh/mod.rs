@@ -5,6 +5,7 @@ mod obj;
 pub(crate) mod primitive;
 mod stl;
 
+use crate::encoding;
 use crate::model::Mesh;
 use geometry::{Pose, Vector, narrow::local_f32};
 use std::collections::HashMap;
@@ -18,7 +19,7 @@ pub(crate) struct Soup {
     pub(crate) vertices: Vec<[f64; 3]>,
     pub(crate) triangles: Vec<[u32; 3]>,
     /// What a person may want to know about the file.
-    pub(crate) notes: Vec<&'static str>,
+    pub(crate) notes: Vec<String>,
 }
 
 impl Soup {
@@ -37,9 +38,9 @@ impl Soup {
         Ok(())
     }
 
-    fn note(&mut self, note: &'static str) {
-        if !self.notes.contains(&note) {
-            self.notes.push(note);
+    fn note(&mut self, note: &str) {
+        if !self.notes.iter().any(|known| known == note) {
+            self.notes.push(note.to_owned());
         }
     }
 }
@@ -49,7 +50,7 @@ pub(crate) fn read(bytes: &[u8], extension: &str) -> Result<Soup, String> {
     let soup = match extension.to_lowercase().as_str() {
         "stl" => stl::read(bytes),
         "obj" => obj::read(text(bytes)?),
-        "dae" => dae::read(text(bytes)?),
+        "dae" => dae::read(&encoding::decode(bytes)?),
         other => Err(format!(
             "a mesh format that is not read; convert it to STL, OBJ or DAE \"{other}\""
         )),
