@@ -4,7 +4,7 @@
 //! five of their standard deviations together, and by more than models and registration make. Joints that the points of
 //! either session leave open are not compared, and named.
 
-use contract::{Fit, Verdict};
+use contract::{Fit, Verdict, quote};
 use export::{ResultFile, RobotEntry};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -257,18 +257,18 @@ fn length(v: [f64; 3]) -> f64 {
 pub fn words(changes: &[RobotChange]) -> String {
     let mut text = String::new();
     for robot in changes {
-        let id = |id: &Option<String>| id.clone().unwrap_or_else(|| "-".into());
+        let id = |id: &Option<String>| quote::shown(id.as_deref().unwrap_or("-")).into_owned();
         let what = match &robot.change {
             Change::Same => "stands as it stood".into(),
             Change::Moved => "moved".into(),
-            Change::Exchanged { was } => format!("stands where {was} stood"),
+            Change::Exchanged { was } => format!("stands where {} stood", quote::shown(was)),
             Change::Appeared => "appeared".into(),
             Change::Gone => "is gone".into(),
         };
         let (then, now) = (id(&robot.then), id(&robot.now));
         let what =
             if robot.was_missed { format!("{what} (the earlier result missed it)") } else { what };
-        let _ = writeln!(text, "{then} -> {now} {}: {what}", robot.model);
+        let _ = writeln!(text, "{then} -> {now} {}: {what}", quote::shown(&robot.model));
         if robot.change == Change::Moved {
             let [x, y, z] = robot.base_shift.unwrap_or_default().map(|v| v * 1e3);
             let turn = robot.base_turn.unwrap_or_default().to_degrees();
@@ -280,12 +280,20 @@ pub fn words(changes: &[RobotChange]) -> String {
                 let _ = writeln!(
                     text,
                     "     {:<24} {:.5} ± {:.5} -> {:.5} ± {:.5} rad or m",
-                    j.joint, j.then[0], j.then[1], j.now[0], j.now[1]
+                    quote::shown(&j.joint),
+                    j.then[0],
+                    j.then[1],
+                    j.now[0],
+                    j.now[1]
                 );
             }
         }
         if !robot.not_compared.is_empty() {
-            let _ = writeln!(text, "     not compared: {}", robot.not_compared.join(", "));
+            let _ = writeln!(
+                text,
+                "     not compared: {}",
+                quote::shown(&robot.not_compared.join(", "))
+            );
         }
     }
     text

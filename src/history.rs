@@ -3,7 +3,7 @@
 
 use crate::job::{Job, memory_words};
 use crate::reuse::Manifest;
-use contract::{Error, Kind, Result};
+use contract::{Error, Kind, Result, quote};
 use export::ResultFile;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -140,11 +140,11 @@ pub fn words(sessions: &[Session]) -> String {
         "session              goes on from         inputs  robots       size  by itself\n",
     );
     for s in sessions {
-        let base = s.base.clone().unwrap_or_else(|| "-".into());
+        let base = quote::shown(s.base.as_deref().unwrap_or("-"));
         let _ = writeln!(
             text,
             "{:<20} {base:<20} {:>6} {:>7} {:>10} {:>10}",
-            s.name,
+            quote::shown(&s.name),
             s.n_inputs,
             s.n_robots,
             memory_words(s.n_bytes),

@@ -25,6 +25,8 @@ mod library;
 mod masks;
 mod near;
 pub mod plan;
+#[cfg(fuzzing)]
+pub mod probes;
 pub mod progress;
 mod reading;
 mod report;

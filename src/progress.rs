@@ -3,6 +3,7 @@
 
 mod words;
 
+use contract::quote;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -93,6 +94,8 @@ pub struct Progress(Arc<Inner>);
 
 struct Inner {
     mode: Mode,
+    /// Lines are objects, for programs.
+    is_json: bool,
     out: Mutex<Box<dyn Write + Send>>,
     reports: Mutex<Vec<StageReport>>,
     bars: indicatif::MultiProgress,
@@ -121,6 +124,12 @@ impl Progress {
         Self::to(mode, Box::new(std::io::stderr()))
     }
 
+    /// Shows nothing, and says the few lines that must be said as JSON.
+    #[must_use]
+    pub fn json_without_progress() -> Self {
+        Self::with(Mode::None, true, Box::new(std::io::stderr()))
+    }
+
     /// Shows nothing; reports are kept all the same.
     #[must_use]
     pub fn silent() -> Self {
@@ -130,12 +139,17 @@ impl Progress {
     /// Writes lines to `out`; bars always go to standard error.
     #[must_use]
     pub fn to(mode: Mode, out: Box<dyn Write + Send>) -> Self {
+        Self::with(mode, mode == Mode::Json, out)
+    }
+
+    fn with(mode: Mode, is_json: bool, out: Box<dyn Write + Send>) -> Self {
         let target = match mode {
             Mode::Bar => ProgressDrawTarget::stderr(),
             _ => ProgressDrawTarget::hidden(),
         };
         Self(Arc::new(Inner {
             mode,
+            is_json,
             out: Mutex::new(out),
             reports: Mutex::new(Vec::new()),
             bars: indicatif::MultiProgress::with_draw_target(target),
@@ -166,7 +180,13 @@ impl Progress {
 
     /// Says a line on standard error without spoiling a bar.
     pub fn say(&self, line: &str) {
-        self.0.bars.suspend(|| self.line(line));
+        let said = if self.0.is_json {
+            let said = serde_json::json!({"level": "info", "message": line}).to_string();
+            quote::json(&said).into_owned()
+        } else {
+            quote::printed(line).into_owned()
+        };
+        self.0.bars.suspend(|| self.line(&said));
     }
 
     fn every(&self) -> Duration {

@@ -7,7 +7,7 @@ use crate::progress::Amount;
 use crate::reuse::Digests;
 use crate::spaces::poses;
 use crate::store::Store;
-use contract::{Fit, Format, Input, InputId, Result, Scan, Verdict};
+use contract::{Fit, Format, Input, InputId, Result, Scan, Verdict, quote};
 use export::{
     InputEntry, Labels, Places, ResultFile, RobotEntry, SCHEMA, ScanLabels, SpaceEntry, StageEntry,
     write_table,
@@ -101,13 +101,14 @@ impl Report<'_> {
         let mut out = self.sources.warnings.clone();
         out.extend(self.left_out.iter().chain(&self.unmet).cloned());
         out.extend(self.models_left_out().map(|finding| {
-            let (model, place, what) = (&finding.model, &finding.place, &finding.what);
+            let [model, place, what] =
+                [&finding.model, &finding.place, &finding.what].map(|part| quote::shown(part));
             format!("robot model '{model}' is left out: {place}: {what}")
         }));
         for scan in self.scans().filter(|s| !s.has_beams()) {
             out.push(format!(
                 "scan '{}': its scanner's position is not known: no proof of free space from it",
-                scan.name
+                quote::shown(&scan.name)
             ));
         }
         out
@@ -125,7 +126,8 @@ impl Report<'_> {
                 "not determined".into()
             };
             let value = joint.value * factor;
-            let _ = writeln!(text, "     {:<24} {value:>9.3}{unit} {sigma}", joint.name);
+            let _ =
+                writeln!(text, "     {:<24} {value:>9.3}{unit} {sigma}", quote::shown(&joint.name));
         }
     }
 
@@ -146,7 +148,7 @@ impl Report<'_> {
                 text,
                 "  R{} {} at ({:.3}, {:.3}, {:.3}) m: {}, score {:.2}, rms {:.1} mm",
                 i + 1,
-                fit.model_name,
+                quote::shown(&fit.model_name),
                 p.x,
                 p.y,
                 p.z,

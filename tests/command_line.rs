@@ -121,3 +121,81 @@ fn a_scene_becomes_scans_with_truth() {
     // An E57 file states its beams; how many came back is known once it is read.
     assert_eq!(all["inputs"][1]["n_points"].as_u64(), Some(n), "{all}");
 }
+
+/// Each line of standard error is one JSON object.
+fn json_lines(output: &Output) -> Vec<serde_json::Value> {
+    let parse = |line: &str| {
+        serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}\n{}", err(output)))
+    };
+    err(output).lines().map(parse).collect()
+}
+
+#[test]
+fn a_log_of_json_holds_nothing_else() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("noise.e57");
+    std::fs::write(&path, "noise").expect("writes");
+    let path = path.to_string_lossy().into_owned();
+    for (args, kind) in [
+        (&["frobnicate", "--log-format", "json"][..], "usage"),
+        (&["run", "--log-format=json"], "usage"),
+        (&["inspect", "no/such.e57", "--log-format=json"], "usage"),
+        (&["inspect", &path, "--log-format", "json"], "bad_input"),
+        (&["run", &path, "--robots", "no/such", "--out", "no", "--log-format=json"], "usage"),
+    ] {
+        let output = stillpoint(args);
+        let lines = json_lines(&output);
+        assert_eq!(lines.last().map(|l| &l["kind"]), Some(&kind.into()), "{args:?}: {lines:?}");
+    }
+    // Progress, too, even where lines are asked for, or none.
+    for progress in ["plain", "none", "json"] {
+        let out = dir.path().join(progress);
+        let scene = dir.path().join("scene.toml");
+        std::fs::write(&scene, SCENE).expect("writes");
+        let [scene, out] = [scene, out].map(|p| p.to_string_lossy().into_owned());
+        let robots = dir.path().to_string_lossy().into_owned();
+        let output = stillpoint(&[
+            "simulate",
+            &scene,
+            "--robots",
+            &robots,
+            "--out",
+            &out,
+            "--log-format=json",
+            "--progress",
+            progress,
+        ]);
+        json_lines(&output);
+    }
+}
+
+/// A scene that names a robot that no library has: refused after the library was read.
+const SCENE: &str = "seed = 1\n[[robots]]\nmodel = 'none'\nxyz = [0, 0, 0]\n";
+
+#[test]
+fn names_of_files_do_not_steer_the_terminal() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let name = "a\u{1b}[2Jb\u{202e}c\rd\nerror: all is well";
+    let path = dir.path().join(name).with_extension("e57");
+    std::fs::write(&path, "noise").expect("writes");
+    let path = path.to_string_lossy().into_owned();
+    let is_odd = |c: char| contract::quote::is_odd(c) && c != '\n';
+    for args in [
+        &["inspect", &path][..],
+        &["inspect", &path, "--log-format=json"],
+        &["verify", &path],
+        &["robots", "lint", &path],
+        &["robots", "lint", &path, "--json"],
+        &["history", &path],
+    ] {
+        let output = stillpoint(args);
+        for text in [err(&output), String::from_utf8_lossy(&output.stdout).into_owned()] {
+            assert!(!text.contains(is_odd), "{args:?}: {text:?}");
+            assert!(!text.lines().any(|l| l.starts_with("error: all is well")), "{text:?}");
+        }
+    }
+    // JSON says the same name.
+    let output = stillpoint(&["inspect", &path, "--log-format=json"]);
+    let said = json_lines(&output);
+    assert!(said[0]["message"].as_str().is_some_and(|m| m.contains("a\\u{1b}[2J")), "{said:?}");
+}

@@ -2,6 +2,7 @@
 
 use super::labels::{Told, share_of};
 use super::score::Row;
+use contract::quote;
 use std::fmt::Write as _;
 
 /// One line a suite: what was found, how exact it is, whether standard deviations and verdicts hold.
@@ -115,19 +116,19 @@ pub(super) fn csv(rows: &[Row]) -> String {
         "suite,model,seed,scanners,robot_points,found,verdict,right,joint,truth,error,sigma,determined\n",
     );
     for row in rows {
-        let found = row.found.as_deref().unwrap_or("");
+        let found = quote::csv(row.found.as_deref().unwrap_or(""));
         for j in &row.joints {
             let _ = writeln!(
                 out,
                 "{},{},{},{},{},{found},{},{},{},{},{},{},{}",
                 row.suite,
-                row.model,
+                quote::csv(&row.model),
                 row.seed,
                 row.n_scanners,
                 row.n_robot_points,
                 row.verdict,
                 row.right,
-                j.name,
+                quote::csv(&j.name),
                 j.truth,
                 j.error,
                 j.sigma,

@@ -318,7 +318,12 @@ impl Common {
         let mut engine = Engine::new(means.n_threads);
         engine.channel_bytes = means.channel_bytes();
         engine.is_narrow = means.is_narrow();
-        engine.progress = Progress::new(self.progress.unwrap_or_else(Mode::fitting));
+        engine.progress = match (self.progress, self.log_format) {
+            // Nothing but JSON is asked for: bars and lines are for people.
+            (Some(Mode::None), LogFormat::Json) => Progress::json_without_progress(),
+            (_, LogFormat::Json) => Progress::new(Mode::Json),
+            (mode, LogFormat::Text) => Progress::new(mode.unwrap_or_else(Mode::fitting)),
+        };
         engine.cancel.on_ctrl_c()?;
         // Libraries that use rayon by themselves keep to the same number; a pool made earlier (tests) is kept.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();

@@ -4,7 +4,7 @@ use super::flags::{Common, InspectFlags, present};
 use super::say::Say;
 use crate::engine::AllThreads;
 use crate::exit;
-use contract::{Error, Kind, Result};
+use contract::Result;
 use ingest::Scanners;
 
 pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Result<u8> {
@@ -24,10 +24,7 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
             "inputs": descriptions,
             "warnings": sources.warnings,
         });
-        let text = serde_json::to_string_pretty(&all).map_err(|e| {
-            Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e)
-        })?;
-        say.result(&text);
+        say.result(&super::say::json(&all)?);
     } else {
         let texts: Vec<String> = descriptions.iter().map(ToString::to_string).collect();
         say.result(&texts.join("\n"));

@@ -15,50 +15,74 @@ mod simulate;
 use crate::exit;
 use bench_flags::BenchCommand;
 use clap::Parser;
+use contract::{Error, Kind, Result, fence};
 use flags::{Command, Line, RobotsCommand};
-use say::Say;
+use say::{LogFormat, Say};
 use std::ffi::OsString;
 
 /// Runs the program with these arguments, program name first; gives the exit code.
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
-    let line = match Line::try_parse_from(args) {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let line = match Line::try_parse_from(&args) {
         Ok(line) => line,
-        Err(error) => {
-            // Help and version are errors to clap, but no failures. A closed pipe is none either.
-            let _ = error.print();
-            return if error.use_stderr() { exit::code(contract::Kind::Usage) } else { exit::OK };
-        }
+        Err(error) => return refuse(&error, &args),
     };
     let say = Say::new(line.common.log_format);
-    let done = match &line.command {
-        Command::Demo(flags) => demo::demo(flags, &line.common, &say),
-        Command::Inspect(flags) => inspect::inspect(flags, &line.common, &say),
-        Command::Run(flags) => run::run(flags, &line.common, &say),
-        Command::Plan(flags) => run::plan(flags, &line.common, &say),
-        Command::Rescan(flags) => run::rescan(flags, &line.common, &say),
-        Command::Verify(flags) => results::verify(flags, &line.common, &say),
-        Command::Report(flags) => results::report(flags, &say),
-        Command::Export(flags) => results::export(flags, &line.common, &say),
-        Command::Check(flags) => results::check_path(flags, &line.common, &say),
-        Command::Diff(flags) => results::diff(flags, &say),
-        Command::History(flags) => results::history(flags, &say),
-        Command::Bench(BenchCommand::Accuracy(flags)) => {
-            bench::bench_accuracy(flags, &line.common, &say)
-        }
-        Command::Bench(BenchCommand::Plant(flags)) => bench::bench_plant(flags, &line.common, &say),
-        Command::Bench(BenchCommand::Rescan(flags)) => {
-            bench::bench_rescan(flags, &line.common, &say)
-        }
-        Command::Bench(BenchCommand::Throughput(flags)) => {
-            bench::bench_throughput(flags, &line.common, &say)
-        }
-        Command::Simulate(flags) => simulate::simulate(flags, &line.common, &say),
-        Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, &say),
-        Command::Robots(RobotsCommand::Calibrate(flags)) => robots::calibrate(flags, &say),
-    };
+    say.for_panics();
+    let done = fence::fenced(|| run(&line, &say)).unwrap_or_else(|what| {
+        Err(Error::new(Kind::Bug, format!("the program broke off: {what}"))
+            .hint("this is a fault of stillpoint: please report it with its input"))
+    });
     done.unwrap_or_else(|error| {
         say.error(&error);
         exit::code(error.kind())
     })
+}
+
+/// Says what is wrong with a command line, in the format that it asks for as far as it can be read.
+fn refuse(error: &clap::Error, args: &[OsString]) -> u8 {
+    if !error.use_stderr() {
+        // Help and version are errors to clap, but no failures. A closed pipe is none either.
+        let _ = error.print();
+        return exit::OK;
+    }
+    let is_json = |pair: &[OsString]| pair[0] == "--log-format" && pair[1] == "json";
+    if args.windows(2).any(is_json) || args.iter().any(|arg| arg == "--log-format=json") {
+        let text = error.to_string();
+        let text = text.strip_prefix("error: ").unwrap_or(&text).trim();
+        Say::new(LogFormat::Json).error(&Error::new(Kind::Usage, text));
+    } else {
+        let _ = error.print();
+    }
+    exit::code(Kind::Usage)
+}
+
+fn run(line: &Line, say: &Say) -> Result<u8> {
+    match &line.command {
+        Command::Demo(flags) => demo::demo(flags, &line.common, say),
+        Command::Inspect(flags) => inspect::inspect(flags, &line.common, say),
+        Command::Run(flags) => run::run(flags, &line.common, say),
+        Command::Plan(flags) => run::plan(flags, &line.common, say),
+        Command::Rescan(flags) => run::rescan(flags, &line.common, say),
+        Command::Verify(flags) => results::verify(flags, &line.common, say),
+        Command::Report(flags) => results::report(flags, say),
+        Command::Export(flags) => results::export(flags, &line.common, say),
+        Command::Check(flags) => results::check_path(flags, &line.common, say),
+        Command::Diff(flags) => results::diff(flags, say),
+        Command::History(flags) => results::history(flags, say),
+        Command::Bench(BenchCommand::Accuracy(flags)) => {
+            bench::bench_accuracy(flags, &line.common, say)
+        }
+        Command::Bench(BenchCommand::Plant(flags)) => bench::bench_plant(flags, &line.common, say),
+        Command::Bench(BenchCommand::Rescan(flags)) => {
+            bench::bench_rescan(flags, &line.common, say)
+        }
+        Command::Bench(BenchCommand::Throughput(flags)) => {
+            bench::bench_throughput(flags, &line.common, say)
+        }
+        Command::Simulate(flags) => simulate::simulate(flags, &line.common, say),
+        Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, say),
+        Command::Robots(RobotsCommand::Calibrate(flags)) => robots::calibrate(flags, say),
+    }
 }

@@ -124,6 +124,5 @@ fn things(out: &Path) -> Result<Vec<serde_json::Value>> {
 }
 
 fn json(value: &impl serde::Serialize) -> Result<String> {
-    serde_json::to_string_pretty(value)
-        .map_err(|e| Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e))
+    super::say::json(value)
 }

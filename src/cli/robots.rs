@@ -5,7 +5,7 @@ use super::flags::{CalibrateFlags, LintFlags};
 use super::say::Say;
 use crate::calibrate::{Wanted, together};
 use crate::exit;
-use contract::{Error, Kind, Result};
+use contract::{Kind, Result, quote};
 use robot::{Finding, Library, Severity};
 
 /// Exit code 4 where a model cannot be used, else 0.
@@ -21,9 +21,7 @@ pub(super) fn lint(flags: &LintFlags, say: &Say) -> Result<u8> {
             "errors": errors, "warnings": warnings, "notes": notes,
             "findings": list,
         });
-        let text = serde_json::to_string_pretty(&all)
-            .map_err(|e| Error::new(Kind::Bug, "findings cannot be written as JSON").because(e))?;
-        say.result(&text);
+        say.result(&super::say::json(&all)?);
     } else {
         let mut text: String = findings.iter().map(|f| words(f) + "\n").collect();
         text += &format!("{errors} errors, {warnings} warnings, {notes} notes\n");
@@ -54,7 +52,7 @@ fn words(finding: &Finding) -> String {
     let mut text = word(finding.severity).to_owned();
     for part in [&finding.model, &finding.place, &finding.what] {
         if !part.is_empty() {
-            text += &format!(": {part}");
+            text += &format!(": {}", quote::shown(part));
         }
     }
     if !finding.way_out.is_empty() {

@@ -22,10 +22,7 @@ pub(super) fn plan(flags: &PlanFlags, common: &Common, say: &Say) -> Result<u8> 
     let (job, engine) = job(&flags.run, common)?;
     let estimate = estimate(&job, &engine)?;
     if flags.json {
-        let text = serde_json::to_string_pretty(&estimate).map_err(|e| {
-            Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e)
-        })?;
-        say.result(&text);
+        say.result(&super::say::json(&estimate)?);
     } else {
         say.result(&estimate.to_string());
     }

@@ -1,7 +1,8 @@
-//! What the program says: results to standard output; warnings and errors to standard error, as text or JSON.
+//! What the program says: results to standard output; warnings and errors to standard error, as text or JSON. Whatever names
+//! hold, no terminal obeys them: all that is said is quoted here (`contract::quote`).
 
 use crate::job::Outcome;
-use contract::{Error, Kind};
+use contract::{Error, Kind, Result, fence, quote};
 use std::io::Write;
 
 /// How warnings and errors are written.
@@ -18,15 +19,36 @@ pub(super) struct Say {
     format: LogFormat,
 }
 
+/// A result as JSON, for [`Say::result`].
+pub(super) fn json(value: &impl serde::Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|e| Error::new(Kind::Bug, "the answer cannot be written as JSON").because(e))?;
+    Ok(quote::json(&text).into_owned())
+}
+
 impl Say {
     pub(super) fn new(format: LogFormat) -> Self {
         Self { format }
     }
 
+    /// From now on panics say nothing by themselves: what catches them says it, in this format. Developers who ask for the
+    /// calls that lead to them (`RUST_BACKTRACE`) get these beside text.
+    pub(super) fn for_panics(&self) {
+        let wants_calls = std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0");
+        let usual = std::panic::take_hook();
+        let says_calls = wants_calls && self.format == LogFormat::Text;
+        std::panic::set_hook(Box::new(move |panic| {
+            fence::note(panic);
+            if says_calls {
+                usual(panic);
+            }
+        }));
+    }
+
     /// A result, on standard output. Nobody listening is no failure of ours.
     pub(super) fn result(&self, text: &str) {
         let mut out = std::io::stdout().lock();
-        let _ = writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush());
+        let _ = writeln!(out, "{}", quote::printed(text.trim_end())).and_then(|()| out.flush());
     }
 
     /// What a run came to: warnings and what was used again on standard error, its summary on standard output.
@@ -67,6 +89,10 @@ impl Say {
     }
 
     fn line(&self, line: &str) {
+        let line = match self.format {
+            LogFormat::Text => quote::printed(line),
+            LogFormat::Json => quote::json(line),
+        };
         let _ = writeln!(std::io::stderr(), "{line}");
     }
 }
@@ -80,5 +106,53 @@ fn word(kind: Kind) -> &'static str {
         Kind::Usage => "usage",
         Kind::Cancelled => "cancelled",
         _ => "bug",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::process::Command;
+
+    /// Set in the process that panics, to the format that it is to speak in.
+    const CHILD: &str = "STILLPOINT_TEST_PANICS";
+
+    /// A stand-in for a decoder that panics on a damaged file, on another thread as decoders' own threads do.
+    fn decode() -> u8 {
+        let of = |bytes: &[u8]| bytes[usize::from(bytes[0])];
+        std::thread::scope(|scope| {
+            let part = scope.spawn(|| of(&[9, 1, 2]));
+            part.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
+
+    #[test]
+    fn panics_that_are_caught_say_one_line_in_the_format_asked_for() {
+        if let Ok(format) = std::env::var(CHILD) {
+            let is_json = format == "json";
+            let say = Say::new(if is_json { LogFormat::Json } else { LogFormat::Text });
+            say.for_panics();
+            let what = fence::fenced(decode).expect_err("it panics");
+            say.error(&Error::bad_input("decompressing broke off").because(what).at("chunk 3"));
+            return;
+        }
+        let name = "cli::say::tests::panics_that_are_caught_say_one_line_in_the_format_asked_for";
+        let said = |format: &str| {
+            let mut child = Command::new(std::env::current_exe().expect("a test"));
+            child
+                .args([name, "--exact", "--nocapture"])
+                .env(CHILD, format)
+                .env("RUST_BACKTRACE", "0");
+            String::from_utf8(child.output().expect("runs").stderr).expect("text")
+        };
+        let words =
+            "decompressing broke off (index out of bounds: the len is 3 but the index is 9 (";
+        let text = said("text");
+        assert_eq!(text.lines().count(), 1, "{text}");
+        assert!(text.starts_with(&format!("error: chunk 3: {words}")), "{text}");
+        assert!(text.contains("say.rs:"), "{text}");
+        let json = said("json");
+        let object: serde_json::Value = serde_json::from_str(&json).expect("one object");
+        assert!(object["message"].as_str().is_some_and(|m| m.contains(words)), "{object}");
     }
 }

@@ -15,6 +15,8 @@ mod edge;
 mod flow;
 mod guard;
 #[cfg(test)]
+mod laws;
+#[cfg(test)]
 mod tests;
 
 use crate::progress::{Amount, Progress};

@@ -8,20 +8,27 @@ use std::thread::sleep;
 use std::time::Duration;
 
 /// An item that knows how many bytes are alive.
-struct Heavy {
-    value: u64,
+pub(super) struct Heavy {
+    pub(super) value: u64,
     bytes: usize,
     live: Arc<Live>,
 }
 
 #[derive(Default)]
-struct Live {
+pub(super) struct Live {
     now: AtomicI64,
     peak: AtomicI64,
 }
 
+impl Live {
+    /// Bytes alive now, and the most there ever were.
+    pub(super) fn both(&self) -> (i64, i64) {
+        (self.now.load(Ordering::SeqCst), self.peak.load(Ordering::SeqCst))
+    }
+}
+
 impl Heavy {
-    fn new(value: u64, bytes: usize, live: &Arc<Live>) -> Self {
+    pub(super) fn new(value: u64, bytes: usize, live: &Arc<Live>) -> Self {
         let now = live.now.fetch_add(bytes as i64, Ordering::SeqCst) + bytes as i64;
         live.peak.fetch_max(now, Ordering::SeqCst);
         Self { value, bytes, live: Arc::clone(live) }
@@ -42,7 +49,7 @@ impl Weigh for Heavy {
 
 /// A light item.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Number(u64);
+pub(super) struct Number(pub(super) u64);
 
 impl Weigh for Number {
     fn weight_bytes(&self) -> usize {
@@ -57,9 +64,9 @@ fn mix(x: u64) -> u64 {
 
 /// Takes a time that varies from item to item, fails or panics where told.
 #[derive(Default)]
-struct Work {
-    fails: Vec<u64>,
-    panics: Vec<u64>,
+pub(super) struct Work {
+    pub(super) fails: Vec<u64>,
+    pub(super) panics: Vec<u64>,
 }
 
 impl Map for Work {
@@ -78,7 +85,7 @@ impl Map for Work {
 }
 
 /// A digest that depends on order.
-struct Digest;
+pub(super) struct Digest;
 
 impl Fold for Digest {
     type In = Number;
@@ -99,7 +106,7 @@ impl Fold for Digest {
     }
 }
 
-fn engine(n_workers: usize, channel_bytes: usize) -> Engine {
+pub(super) fn engine(n_workers: usize, channel_bytes: usize) -> Engine {
     let mut engine = Engine::new(n_workers);
     engine.channel_bytes = channel_bytes;
     engine

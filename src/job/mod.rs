@@ -306,6 +306,24 @@ mod tests {
     }
 
     #[test]
+    fn what_is_recorded_of_a_run_can_be_set_again() {
+        let settings = Settings::default();
+        for (key, value) in settings.all() {
+            let mut again = settings.clone();
+            again.set(key, &value).unwrap_or_else(|e| panic!("{key} = {value}: {e}"));
+            let written = again.all().into_iter().find(|(k, _)| *k == key).map(|(_, v)| v);
+            assert_eq!(written, Some(value), "{key}");
+        }
+        // Single precision does not hold it.
+        let single = settings.all().into_iter().any(|(key, _)| {
+            let huge = toml::Value::Float(1e300);
+            let mut again = settings.clone();
+            again.set(key, &huge).is_ok() && format!("{:?}", again.all()).contains("inf")
+        });
+        assert!(!single, "a setting is infinite");
+    }
+
+    #[test]
     fn what_is_not_known_is_refused_by_name() {
         for (set, says) in [
             ("fit.bean=3", "\"fit.bean\""),

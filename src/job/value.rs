@@ -48,7 +48,8 @@ impl Value for f32 {
         f64::kind()
     }
     fn read(value: &Toml) -> Option<Self> {
-        f64::read(value).map(|v| v as f32)
+        // A number that single precision cannot hold would become infinite.
+        f64::read(value).map(|v| v as f32).filter(|v| v.is_finite())
     }
     /// As short as it was written: 0.025, not 0.02500000037.
     fn write(&self) -> Toml {
@@ -115,7 +116,8 @@ impl<T: Value> Value for Option<T> {
         T::kind()
     }
     fn read(value: &Toml) -> Option<Self> {
-        T::read(value).map(Some)
+        // What is written of one that is not set reads back as that.
+        if value.as_str() == Some("none") { Some(None) } else { T::read(value).map(Some) }
     }
     fn write(&self) -> Toml {
         self.as_ref().map_or_else(|| Toml::String("none".into()), T::write)

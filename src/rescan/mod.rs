@@ -8,6 +8,8 @@ mod newcomers;
 mod past;
 mod places;
 mod present;
+#[cfg(fuzzing)]
+pub(crate) mod probe;
 mod robots;
 mod say;
 mod session;

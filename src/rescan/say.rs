@@ -7,7 +7,7 @@ use crate::job::Outcome;
 use crate::labelling::Done;
 use crate::report::{id, input_entry, robot_entry};
 use crate::reuse::Digests;
-use contract::{Error, Kind, Result};
+use contract::{Error, Kind, Result, quote};
 use export::{
     ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
     draw_changes, write_table,
@@ -179,10 +179,10 @@ impl Said<'_, '_> {
             let _ = writeln!(text, "robot,{id},{word},{at},{dx:.4},{dy:.4},{dz:.4},,,,");
             for joint in robot.joints.iter().filter(|j| j.is_change) {
                 let sigma = joint.then[1].hypot(joint.now[1]);
-                let (name, then, now) = (&joint.joint, joint.then[0], joint.now[0]);
+                let (name, then, now) = (quote::csv(&joint.joint), joint.then[0], joint.now[0]);
                 let _ = writeln!(
                     text,
-                    "joint,{id},{word},{at},,,,\"{name}\",{then:.6},{now:.6},{sigma:.6}"
+                    "joint,{id},{word},{at},,,,{name},{then:.6},{now:.6},{sigma:.6}"
                 );
             }
         }

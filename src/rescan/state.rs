@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file.
 const NAME: &str = "plant.bin";
 /// What the file begins with: its format.
-const FORMAT: &[u8] = b"stillpoint.plant/4\n";
+pub(super) const FORMAT: &[u8] = b"stillpoint.plant/4\n";
 
 /// Scans, floor and robots of a plant as a run found them.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -99,7 +99,31 @@ impl State {
             .map_err(|e| bad("what a rescan starts from cannot be read").because(e))?;
         let body = bytes.strip_prefix(FORMAT);
         let body = body.ok_or_else(|| bad("this was written by another version"))?;
-        read(body).ok_or_else(|| bad("the file is damaged"))
+        let state: Self = read(body).ok_or_else(|| bad("the file is damaged"))?;
+        if state.is_consistent() {
+            Ok(state)
+        } else {
+            Err(bad("its numbers contradict one another"))
+        }
+    }
+
+    /// Whether inputs, masks and scans are numbered in their order and name one another, and clouds have a scale: the digest
+    /// guards against damage, not against another program that writes such a file.
+    fn is_consistent(&self) -> bool {
+        let (inputs, masks, scans) = (&self.inputs, &self.masks, &self.scans);
+        let is_number = |id: u32, at: usize| id as usize == at;
+        let is_scale = |v: &f64| v.is_finite() && *v > 0.0;
+        let Records { scale, offset, tile_edge, .. } = &self.records;
+        self.tiles.len() == inputs.len()
+            && inputs.iter().enumerate().all(|(at, input)| is_number(input.id.0, at))
+            && masks.iter().enumerate().all(|(at, mask)| is_number(mask.id.0, at))
+            && masks.iter().all(|mask| (mask.input.0 as usize) < inputs.len())
+            && scans.iter().enumerate().all(|(at, scan)| is_number(scan.id.0, at))
+            && scans.iter().all(|scan| {
+                masks.get(scan.mask.0 as usize).is_some_and(|mask| mask.input == scan.input)
+            })
+            && scale.iter().chain(tile_edge).all(is_scale)
+            && offset.iter().all(|v| v.is_finite())
     }
 
     /// Its inputs, for new ones to be numbered after them.
@@ -118,6 +142,49 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_plant_whose_numbers_name_nothing_is_refused() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let las = LasSettings::new(Quantum { scale: [1e-4; 3], offset: [0.0; 3] });
+        let (input, id) = (contract::InputId(0), contract::MaskId(0));
+        let whole = State {
+            inputs: vec![Input {
+                id: input,
+                path: "a.las".into(),
+                format: contract::Format::Las,
+                n_bytes: 1,
+            }],
+            masks: vec![Mask { id, input, name: "a".into(), n_points: None }],
+            scans: Vec::new(),
+            tiles: vec![Key::of("test", &["a"])],
+            floor: Floor::default(),
+            fits: Vec::new(),
+            robots: "robots".into(),
+            records: Records::of(&las, &export::Settings::default()),
+        };
+        whole.write(dir.path()).expect("writes");
+        assert!(State::read(dir.path()).is_ok());
+        let wrong: [fn(&mut State); 5] = [
+            |s| s.masks[0].input.0 = 1,
+            |s| s.masks[0].id.0 = 7,
+            |s| s.tiles.clear(),
+            |s| s.records.scale[1] = 0.0,
+            |s| s.records.tile_edge = Some(f64::NAN),
+        ];
+        for (i, wrong) in wrong.into_iter().enumerate() {
+            let mut state = whole.clone();
+            wrong(&mut state);
+            state.write(dir.path()).expect("writes");
+            let error = State::read(dir.path()).expect_err("refused").to_string();
+            assert!(error.contains("contradict"), "{i}: {error}");
+        }
+        // A key is the name of a folder in the store, and nothing else.
+        let foreign = written(&vec!["../../elsewhere".to_owned()]).expect("is written");
+        assert!(read::<Vec<Key>>(&foreign).is_none());
+        let own = written(&whole.tiles).expect("is written");
+        assert_eq!(read::<Vec<Key>>(&own), Some(whole.tiles));
+    }
 
     #[test]
     fn it_comes_back_and_damage_is_told() {

@@ -112,6 +112,26 @@ impl Weigh for Part {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn any_cut_comes_to_the_digest_of_the_whole(
+            bytes in prop::collection::vec(any::<u8>(), 0..40_000),
+            cuts in prop::collection::vec(0_usize..40_000, 0..12),
+        ) {
+            let n = bytes.len();
+            let mut cuts: Vec<usize> = cuts.into_iter().map(|at| at.min(n)).chain([0, n]).collect();
+            cuts.sort_unstable();
+            let mut tree = Tree::new(n as u64);
+            for pair in cuts.windows(2) {
+                let own = Tree::own(&(pair[0] as u64..pair[1] as u64), n as u64);
+                let of = &bytes[own.start as usize..own.end as usize];
+                tree.add(Tree::parts(own.start, of, n as u64));
+            }
+            prop_assert_eq!(tree.finish(), Some(blake3::hash(&bytes)));
+        }
+    }
 
     #[test]
     fn pieces_of_any_length_come_to_the_digest_of_the_whole() {

@@ -4,6 +4,8 @@
 mod catalogue;
 mod encode;
 mod file;
+#[cfg(test)]
+mod laws;
 mod map;
 mod parts;
 mod record;

@@ -28,7 +28,7 @@ fn scan(id: u32, lattice: Option<Lattice>) -> Scan {
     }
 }
 
-fn scans() -> Vec<Scan> {
+pub(super) fn scans() -> Vec<Scan> {
     let mut turned = Lattice::new(0.003, 0.002, 0.1, 0.2);
     turned.lattice_from_scan = nalgebra::UnitQuaternion::from_euler_angles(1.2, 0.1, 0.0);
     vec![scan(0, Some(Lattice::new(0.004, 0.003, 0.0, 0.0))), scan(1, Some(turned)), scan(2, None)]
@@ -64,7 +64,12 @@ fn strips(n: usize) -> Vec<Strip> {
     (0..3).flat_map(cuts).map(cut).collect()
 }
 
-fn build(dir: &Path, strips: Vec<Strip>, budget_bytes: usize, n_workers: usize) -> (Store, u64) {
+pub(super) fn build(
+    dir: &Path,
+    strips: Vec<Strip>,
+    budget_bytes: usize,
+    n_workers: usize,
+) -> (Store, u64) {
     let scans = scans();
     let engine = Engine::new(n_workers);
     let mut sink = Store::create(dir, &scans, 0, budget_bytes).expect("begins");
@@ -77,7 +82,7 @@ fn build(dir: &Path, strips: Vec<Strip>, budget_bytes: usize, n_workers: usize) 
 }
 
 /// All tiles; where they lie in the file is nobody's business.
-fn tiles(store: &Store) -> Vec<Tile> {
+pub(super) fn tiles(store: &Store) -> Vec<Tile> {
     store.picks(|_| 0).map(|pick| pick.and_then(|p| store.read(&p)).expect("whole")).collect()
 }
 

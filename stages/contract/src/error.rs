@@ -1,5 +1,6 @@
 //! Errors by what a caller can do about them; one type for all rooms, since a stage's errors only travel up.
 
+use crate::quote;
 use std::fmt;
 use std::path::Path;
 
@@ -116,7 +117,8 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(place) = &self.0.place {
-            write!(f, "{place}: ")?;
+            // A path may hold anything, a line break among it; `what` and its source are sentences.
+            write!(f, "{}: ", quote::shown(place))?;
         }
         f.write_str(&self.0.what)?;
         if let Some(source) = &self.0.source {

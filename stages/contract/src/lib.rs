@@ -1,12 +1,15 @@
 //! The types that stages share: scan, lattice, strip, tile, planes, cluster, candidate, fit, label, errors, and
-//! the two shapes of a step. Types only: how to compute them is in `geometry` or in the stage that makes them.
+//! the two shapes of a step; and how names are quoted and panics caught. How anything is computed is in `geometry` or in the stage
+//! that does it.
 #![forbid(unsafe_code)]
 
 mod candidate;
 mod error;
+pub mod fence;
 mod fit;
 mod label;
 mod lattice;
+pub mod quote;
 mod residual;
 mod scan;
 mod space;

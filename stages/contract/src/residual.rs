@@ -134,6 +134,58 @@ impl Weigh for TileLabels {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn runs_say_the_same_of_each_place_in_any_order(
+            labels in prop::collection::vec(prop::option::of(0_u8..3), 0..300),
+            first in prop::sample::select(vec![0_u64, 7, u64::from(u32::MAX) - 3]),
+            keys in prop::collection::vec(any::<u32>(), 300),
+        ) {
+            let place = |at: usize| first + at as u64;
+            let known = labels.iter().enumerate().filter_map(|(at, l)| Some((place(at), (*l)?)));
+            let known: Vec<(u64, u8)> = known.collect();
+            let mut shuffled: Vec<(u32, PlaceRun<u8>)> =
+                keys.into_iter().zip(known.iter().map(|(p, l)| PlaceRun::one(*p, *l))).collect();
+            shuffled.sort_by_key(|(key, _)| *key);
+            let mut runs: Vec<PlaceRun<u8>> = shuffled.into_iter().map(|(_, run)| run).collect();
+            PlaceRun::join(&mut runs);
+            let places = |run: &PlaceRun<u8>| (run.first..run.end()).map(|p| (p, run.what)).collect::<Vec<_>>();
+            prop_assert_eq!(runs.iter().flat_map(places).collect::<Vec<_>>(), known);
+            // As few as can be: neighbours differ.
+            let differ = |w: &[PlaceRun<u8>]| w[0].end() < w[1].first || w[0].what != w[1].what;
+            prop_assert!(runs.windows(2).all(differ));
+            let mut again = runs.clone();
+            PlaceRun::join(&mut again);
+            prop_assert_eq!(again, runs);
+        }
+
+        #[test]
+        fn joining_voxels_does_not_depend_on_order(
+            parts in prop::collection::vec((0_u32..9, 0_u32..9, 0_u16..3, 0_u16..3, 0.0_f32..1.0, any::<bool>(), any::<bool>()), 1..6),
+            turn in 0_usize..6,
+        ) {
+            let voxel = |(n_residual, n_link, robot, link, distance, at_border, grounded)| ResidualVoxel {
+                voxel: [0; 3],
+                n_residual,
+                n_link,
+                nearest: LinkAt { robot, link },
+                distance,
+                at_border,
+                grounded,
+            };
+            let voxels: Vec<ResidualVoxel> = parts.into_iter().map(voxel).collect();
+            let join = |all: &[ResidualVoxel]| {
+                let mut sum = all[0];
+                all[1..].iter().for_each(|v| sum.join(v));
+                sum
+            };
+            let mut turned = voxels.clone();
+            turned.rotate_left(turn % voxels.len());
+            prop_assert_eq!(join(&turned), join(&voxels));
+        }
+    }
 
     #[test]
     fn runs_join_where_they_follow_and_share() {

@@ -2,8 +2,7 @@
 
 use crate::atomic;
 use crate::result::{ResultFile, RobotEntry};
-use crate::robot_model::escaped;
-use contract::Result;
+use contract::{Result, quote};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -26,17 +25,22 @@ fn passes(robot: &RobotEntry) -> bool {
 }
 
 fn case(text: &mut String, robot: &RobotEntry) {
-    let (id, model) = (escaped(&robot.id), escaped(&robot.model));
+    let (id, model) = (for_people(&robot.id), for_people(&robot.model));
     let _ = writeln!(text, "  <testcase classname=\"{model}\" name=\"{id} {model}\">");
     if !passes(robot) {
-        let why = escaped(&robot.reasons.join("; "));
-        let verdict = escaped(&robot.verdict);
+        let why = for_people(&robot.reasons.join("; "));
+        let verdict = for_people(&robot.verdict);
         let _ = writeln!(text, "    <failure type=\"{verdict}\" message=\"{why}\"/>");
     }
     let [x, y, z] = robot.base_pose.xyz;
     let _ = writeln!(text, "    <system-out>base at ({x:.4}, {y:.4}, {z:.4}) m");
     for (name, value) in &robot.joints.0 {
-        let _ = writeln!(text, "{} = {value:.6}", escaped(name));
+        let _ = writeln!(text, "{} = {value:.6}", for_people(name));
     }
     text.push_str("    </system-out>\n  </testcase>\n");
+}
+
+/// A build server shows the values to people.
+fn for_people(text: &str) -> String {
+    quote::xml(&quote::shown(text)).into_owned()
 }

@@ -9,7 +9,7 @@
 //! ```
 
 use crate::atomic;
-use contract::{Fit, JointFit, Result};
+use contract::{Fit, JointFit, Result, quote};
 use geometry::Pose;
 use robot::{Joint, JointKind, Mesh, Model, Motion};
 use std::collections::BTreeMap;
@@ -35,7 +35,7 @@ pub fn write_robot(
         }
         let pieces = hanging.get(&l).into_iter().flatten().enumerate();
         bodies.extend(pieces.map(|(k, mesh)| (format!("{}_hanging_{k}", names[l]), mesh)));
-        let _ = writeln!(links, "  <link name=\"{}\">", escaped(&link.name));
+        let _ = writeln!(links, "  <link name=\"{}\">", quote::xml(&link.name));
         for (name, mesh) in bodies {
             atomic::write(&dir.join(format!("meshes/{name}.stl")), &stl(mesh))?;
             for kind in ["visual", "collision"] {
@@ -50,7 +50,7 @@ pub fn write_robot(
     let joints: String = model.joints.iter().map(|j| joint(model, j)).collect();
     let urdf = format!(
         "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n{links}{joints}</robot>\n",
-        escaped(&format!("{id} {}", fit.model_name))
+        quote::xml(&format!("{id} {}", fit.model_name))
     );
     atomic::write(&dir.join("robot.urdf"), urdf.as_bytes())?;
     atomic::write(&dir.join("joints.yaml"), yaml(fit, model).as_bytes())?;
@@ -75,11 +75,8 @@ const STL_TRIANGLE: u64 = 50;
 
 /// A name for the files of each link: letters that every file system knows, each once.
 fn file_names(model: &Model) -> Vec<String> {
-    let plain = |name: &str| -> String {
-        name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
-    };
     let all = model.links.iter().enumerate();
-    all.map(|(l, link)| format!("{l:02}_{}", plain(&link.name))).collect()
+    all.map(|(l, link)| format!("{l:02}_{}", quote::file_name(&link.name))).collect()
 }
 
 fn joint(model: &Model, joint: &Joint) -> String {
@@ -89,10 +86,10 @@ fn joint(model: &Model, joint: &Joint) -> String {
         JointKind::Prismatic => "prismatic",
         JointKind::Fixed => "fixed",
     };
-    let [parent, child] = [joint.parent, joint.child].map(|l| escaped(&model.links[l].name));
+    let [parent, child] = [joint.parent, joint.child].map(|l| quote::xml(&model.links[l].name));
     let mut text = format!(
         "  <joint name=\"{}\" type=\"{kind}\">\n    {}\n    <parent link=\"{parent}\"/>\n    <child link=\"{child}\"/>\n",
-        escaped(&joint.name),
+        quote::xml(&joint.name),
         origin(&joint.parent_from_joint)
     );
     if joint.kind != JointKind::Fixed {
@@ -106,7 +103,7 @@ fn joint(model: &Model, joint: &Joint) -> String {
         );
     }
     if let Motion::Mimic { free, multiplier, offset } = joint.motion {
-        let driver = escaped(&model.joints[model.free[free]].name);
+        let driver = quote::xml(&model.joints[model.free[free]].name);
         let _ = writeln!(
             text,
             "    <mimic joint=\"{driver}\" multiplier=\"{multiplier:.9}\" offset=\"{offset:.9}\"/>"
@@ -121,10 +118,6 @@ fn origin(pose: &Pose) -> String {
         "<origin xyz=\"{:.9} {:.9} {:.9}\" rpy=\"{roll:.9} {pitch:.9} {yaw:.9}\"/>",
         p.x, p.y, p.z
     )
-}
-
-pub(crate) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
 /// Value of every joint that moves, passive ones of loops included, by name.
@@ -143,7 +136,7 @@ fn yaml(fit: &Fit, model: &Model) -> String {
     let mut text = format!(
         "# {}: metres and radians\nbase:\n  link: {}\n  xyz: [{:.6}, {:.6}, {:.6}]\n  quat_wxyz: [{:.9}, {:.9}, {:.9}, {:.9}]\njoints:\n",
         fit.verdict.word(),
-        quoted(&model.links[0].name),
+        quote::yaml(&model.links[0].name),
         p.x,
         p.y,
         p.z,
@@ -156,7 +149,7 @@ fn yaml(fit: &Fit, model: &Model) -> String {
         let open = joint_fit(fit, model, j).filter(|f| !f.determined);
         let open =
             open.map_or_else(String::new, |f| format!("  # not determined, ± {:.4}", f.sigma));
-        let _ = writeln!(text, "  {}: {value:.9}{open}", quoted(&model.joints[j].name));
+        let _ = writeln!(text, "  {}: {value:.9}{open}", quote::yaml(&model.joints[j].name));
     }
     text
 }
@@ -164,11 +157,6 @@ fn yaml(fit: &Fit, model: &Model) -> String {
 /// What is known of a joint of the model; nothing of one that follows others.
 fn joint_fit<'a>(fit: &'a Fit, model: &Model, joint: usize) -> Option<&'a JointFit> {
     model.free.iter().position(|&f| f == joint).and_then(|free| fit.joints.get(free))
-}
-
-/// A name as YAML has it between double quotes: what JSON has.
-fn quoted(name: &str) -> String {
-    serde_json::Value::from(name).to_string()
 }
 
 fn csv(fit: &Fit, model: &Model) -> String {
@@ -179,8 +167,8 @@ fn csv(fit: &Fit, model: &Model) -> String {
         let own = joint_fit(fit, model, j);
         let told = own.map_or_else(|| ",".into(), |f| format!("{:.9},{}", f.sigma, f.determined));
         let limits = joint.limits.map_or_else(|| ",".into(), |[a, b]| format!("{a:.9},{b:.9}"));
-        let name = joint.name.replace('"', "\"\"");
-        let _ = writeln!(text, "\"{name}\",{value:.9},{unit},{told},{limits}");
+        let name = quote::csv(&joint.name);
+        let _ = writeln!(text, "{name},{value:.9},{unit},{told},{limits}");
     }
     text
 }

@@ -2,7 +2,7 @@
 
 use crate::raster::Steps;
 use crate::sources::Sources;
-use contract::{Format, Input, Scan};
+use contract::{Format, Input, Scan, quote};
 use geometry::{Aabb, Pose};
 use serde::Serialize;
 use std::fmt;
@@ -182,7 +182,7 @@ fn metres(v: &[f64; 3]) -> String {
 
 impl fmt::Display for Description {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.path)?;
+        writeln!(f, "{}", quote::shown(&self.path))?;
         writeln!(f, "  format: {}", self.format)?;
         writeln!(f, "  bytes: {}", self.n_bytes)?;
         match self.n_points {
@@ -190,7 +190,7 @@ impl fmt::Display for Description {
             None => writeln!(f, "  points: known once read")?,
         }
         for fact in &self.facts {
-            writeln!(f, "  {}: {}", fact.name, fact.value)?;
+            writeln!(f, "  {}: {}", quote::shown(&fact.name), quote::shown(&fact.value))?;
         }
         self.scans.iter().try_for_each(|scan| scan.fmt(f))
     }
@@ -198,7 +198,7 @@ impl fmt::Display for Description {
 
 impl fmt::Display for ScanDescription {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "  scan: {}", self.name)?;
+        writeln!(f, "  scan: {}", quote::shown(&self.name))?;
         if let Some(id) = self.source_id {
             writeln!(f, "    point source id: {id}")?;
         }

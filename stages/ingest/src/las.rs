@@ -12,6 +12,15 @@ use contract::{Error, Format, Result};
 use std::borrow::Cow;
 use std::path::Path;
 
+/// Largest run of records that is decompressed from a stream at once, bytes: of usual records, more than a strip.
+const RUN_BYTES: usize = 16 << 20;
+
+/// Records of this length that are decompressed from a stream at once. A stream does not say how many there really are, and a
+/// header may state records of 64 KiB, so that a strip of them would take gigabytes before the first was read.
+fn at_once(record_len: usize) -> usize {
+    (RUN_BYTES / record_len.max(1)).max(1)
+}
+
 /// The records of a file, whichever way they are stored.
 pub(crate) struct Records {
     map: Mapped,
@@ -38,6 +47,7 @@ impl Records {
             return Ok((first, Cow::Borrowed(self.mapped(first, n))));
         };
         if laz.pieces.is_empty() {
+            let n = n.min(at_once(self.header.record_len));
             return Ok((0, Cow::Owned(laz.stream(&self.map)?.next(n)?)));
         }
         let mut at = laz.piece_of(first);
@@ -268,7 +278,8 @@ impl Streamed<'_> {
     fn run(&mut self) -> Result<Option<Vec<RawStrip>>> {
         let (las, first) = (self.las, self.place);
         let left = las.records.header.n_points - first;
-        let n = usize::try_from(left).unwrap_or(usize::MAX).min(las.strip_points);
+        let most = las.strip_points.min(at_once(las.records.header.record_len));
+        let n = usize::try_from(left).unwrap_or(usize::MAX).min(most);
         let (Some(laz), true) = (&las.records.laz, n > 0) else { return Ok(None) };
         let stream = match &mut self.stream {
             Some(stream) => stream,

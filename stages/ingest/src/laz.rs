@@ -4,12 +4,11 @@
 use crate::las_header::LasHeader;
 use crate::reader::{Extent, Want};
 use crate::settings::Settings;
-use contract::{Error, Kind, Result};
+use contract::{Error, Kind, Result, fence};
 use laz::laszip::{ChunkTable, ChunkTableEntry, CompressorType};
 use laz::{DecompressionSelection, LasZipDecompressor, LazItemRecordBuilder, LazItemType, LazVlr};
 use std::io::Cursor;
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// No real piece is compressed more than this many times; a larger claim would only cost memory.
 const MAX_RATIO: u64 = 250;
@@ -246,10 +245,10 @@ fn guarded<T, E>(doing: &str, run: impl FnOnce() -> std::result::Result<T, E>) -
 where
     E: std::error::Error + Send + Sync + 'static,
 {
-    match catch_unwind(AssertUnwindSafe(run)) {
+    match fence::fenced(run) {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(cause)) => Err(damaged(format!("{doing} failed")).because(cause)),
-        Err(_) => Err(damaged(format!("{doing} broke off"))),
+        Err(words) => Err(damaged(format!("{doing} broke off")).because(words)),
     }
 }
 

@@ -5,8 +5,12 @@ use contract::{Error, Kind, Result};
 use geometry::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::Path;
+
+/// Most entries of a file: LAS tells no more sources apart.
+const MAX_SCANNERS: usize = 1 << 16;
 
 /// A scanner whose pose the user knows.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,12 +82,18 @@ impl Scanners {
             toml::from_str(text)
                 .map_err(|e| Error::bad_input("wrong TOML").because(e).hint(HINT))?
         };
+        if file.scanner.len() > MAX_SCANNERS {
+            return Err(Error::bad_input(format!(
+                "a plant has at most {MAX_SCANNERS} scanners, not \"{}\"",
+                file.scanner.len()
+            )));
+        }
         let mut entries: Vec<Scanner> = Vec::new();
+        let mut known = BTreeMap::new();
         for (i, entry) in file.scanner.into_iter().enumerate() {
             let entry = entry.check().map_err(|e| e.at(format!("scanner {}", i + 1)))?;
-            let twin =
-                |e: &Scanner| e.point_source_id == entry.point_source_id && e.name == entry.name;
-            if let Some(twin) = entries.iter().position(twin) {
+            let twin = known.insert((entry.point_source_id, entry.name.clone()), i);
+            if let Some(twin) = twin {
                 return Err(Error::new(
                     Kind::BadInput,
                     format!("has the same name and point_source_id as scanner \"{}\"", twin + 1),
@@ -138,6 +148,15 @@ mod tests {
         assert_eq!(a, b);
         assert_eq!(a.entries.len(), 2);
         assert!((a.entries[0].world_from_scan.rotation.norm() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn as_many_scanners_as_there_can_be_are_soon_read() {
+        let entry = |i: usize| format!("[[scanner]]\nname = 's{i}'\nposition = [0, 0, 0]\n");
+        let text = |n: usize| (0..n).map(entry).collect::<String>();
+        assert_eq!(Scanners::parse(&text(MAX_SCANNERS)).unwrap().entries.len(), MAX_SCANNERS);
+        let error = Scanners::parse(&text(MAX_SCANNERS + 1)).unwrap_err().to_string();
+        assert!(error.contains("not \"65537\""), "{error}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Text files of points in, lines and numbers out. Knows no format.
 
-use contract::{Error, Result};
+use contract::{Error, Result, quote};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -120,7 +120,7 @@ pub(crate) fn numbers(line: &[u8], out: &mut [f64]) -> std::result::Result<usize
 
 /// A word as it may stand in a message: short, and printable.
 fn shown(word: &[u8]) -> String {
-    String::from_utf8_lossy(&word[..word.len().min(40)]).escape_debug().to_string()
+    quote::shown(&String::from_utf8_lossy(&word[..word.len().min(40)])).into_owned()
 }
 
 /// The number that a line begins with, and its length; only the common case, exact: at most 15 digits with an optional
@@ -154,6 +154,43 @@ fn plain(line: &[u8]) -> Option<(f64, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    /// A word of a line: numbers as programs write them, and things that are nearly numbers.
+    fn word() -> impl Strategy<Value = String> {
+        prop_oneof![
+            any::<f64>().prop_map(|v| v.to_string()),
+            (-1e7_f64..1e7, 0_usize..12).prop_map(|(v, n)| format!("{v:.n$}")),
+            any::<f32>().prop_map(|v| format!("{v:e}")),
+            "[-+]?[0-9]{0,20}[.]?[0-9]{0,20}",
+            "[-+0-9.eE]{1,9}",
+            "nan|inf|-inf|x|1,5",
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn numbers_of_a_line_are_those_of_the_standard_library(
+            words in prop::collection::vec(word().prop_filter("a word", |w| !w.is_empty()), 0..9),
+            gap in prop::sample::select(vec![" ", "\t", "  ", " \r"]),
+        ) {
+            let line = words.join(gap);
+            let mut out = [0.0; 7];
+            let parsed: std::result::Result<Vec<f64>, &String> =
+                words.iter().take(out.len()).map(|w| w.parse::<f64>().map_err(|_| w)).collect();
+            match (numbers(line.as_bytes(), &mut out), parsed) {
+                (Ok(n), Ok(wanted)) => {
+                    prop_assert_eq!(n, words.len());
+                    for (got, want) in out.iter().zip(&wanted) {
+                        let same = got.to_bits() == want.to_bits() || got.is_nan() && want.is_nan();
+                        prop_assert!(same, "{} for {} in {}", got, want, line);
+                    }
+                }
+                (Err(word), Err(wrong)) => prop_assert_eq!(&word, wrong),
+                (got, wanted) => prop_assert!(false, "{:?} where {:?}: {}", got, wanted, line),
+            }
+        }
+    }
 
     fn number(word: &str) -> Option<f64> {
         let mut out = [0.0];

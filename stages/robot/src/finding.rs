@@ -30,6 +30,10 @@ pub struct Finding {
     pub way_out: String,
 }
 
+/// Most findings of a model of each severity: whoever mends a library reads no more, and a file of a few megabytes can be wrong
+/// in a hundred thousand places.
+const MAX_FINDINGS: usize = 100;
+
 /// Findings of one model while it is read.
 #[derive(Debug, Default)]
 pub(crate) struct Findings {
@@ -44,7 +48,18 @@ impl Findings {
 
     fn add(&mut self, severity: Severity, place: &dyn Display, what: String, way_out: &str) {
         let (place, way_out) = (place.to_string(), way_out.to_owned());
-        let finding = Finding { model: self.model.clone(), severity, what, place, way_out };
+        let n = self.list.iter().filter(|f| f.severity == severity).count();
+        let finding = if n < MAX_FINDINGS {
+            Finding { model: self.model.clone(), severity, what, place, way_out }
+        } else {
+            Finding {
+                model: self.model.clone(),
+                severity,
+                what: format!("there are more than these {MAX_FINDINGS}, which are not listed"),
+                place: String::new(),
+                way_out: "mend those that are listed first".to_owned(),
+            }
+        };
         if !self.list.contains(&finding) {
             self.list.push(finding);
         }

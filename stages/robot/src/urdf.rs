@@ -83,7 +83,7 @@ pub(crate) fn read(text: &str, file: &str, findings: &mut Findings) -> Option<De
         return None;
     }
     let turns = has_quaternions(root);
-    let clean = Cleaner { file, findings, turns }.robot(root)?;
+    let clean = Cleaner { file, findings, turns, ends: line_ends(text) }.robot(root)?;
     match urdf_rs::read_from_string(&clean) {
         Ok(robot) => Some(describe(&robot, &document)),
         Err(error) => {
@@ -125,6 +125,12 @@ struct Cleaner<'a> {
     findings: &'a mut Findings,
     /// Whether `quat_xyzw` counts in this file.
     turns: bool,
+    /// Where lines of the file end: a file may be wrong in thousands of places, and each is to be named.
+    ends: Vec<usize>,
+}
+
+fn line_ends(text: &str) -> Vec<usize> {
+    text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at).collect()
 }
 
 /// How many numbers an attribute holds.
@@ -156,7 +162,7 @@ impl Cleaner<'_> {
     }
 
     fn place(&self, node: Node) -> String {
-        let line = node.document().text_pos_at(node.range().start).row;
+        let line = self.ends.partition_point(|end| *end < node.range().start) + 1;
         format!("{}:{line}: {}", self.file, node.tag_name().name())
     }
 

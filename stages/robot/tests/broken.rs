@@ -86,6 +86,17 @@ fn deep_nesting_does_not_overflow() {
 }
 
 #[test]
+fn a_file_that_is_wrong_in_a_hundred_thousand_places_is_soon_explained() {
+    let odd = "<visual/>\n".repeat(100_000);
+    let folder = Folder::new()
+        .with("robot.urdf", robot(&(arm(3) + &format!("<link name='x'>{odd}</link>"))));
+    let found = ::robot::Library::lint(&folder.library());
+    assert!((100..400).contains(&found.len()), "{}", found.len());
+    assert!(found.iter().any(|f| f.what.contains("there are more than these 100")), "{found:?}");
+    assert!(found.iter().any(|f| f.place.contains("robot.urdf:7: visual")), "{found:?}");
+}
+
+#[test]
 fn broken_sheets_are_named() {
     let sheet =
         |text: &str| Folder::new().with("robot.urdf", robot(&arm(3))).with("robot.toml", text);

@@ -145,14 +145,15 @@ fn rigid(rows: [[f64; 4]; 4]) -> Result<Pose> {
         return Err(Error::bad_input("matrix of the pose holds what is no number").hint(way_out));
     }
     let last = [rows[0][3], rows[1][3], rows[2][3], rows[3][3] - 1.0];
-    if last.iter().any(|v| v.abs() > RIGID) {
+    // What is no number is not near anything.
+    if !last.iter().all(|v| v.abs() <= RIGID) {
         return Err(
             Error::bad_input("last column of the pose's matrix is not \"0 0 0 1\"").hint(way_out)
         );
     }
     let scale = axes.determinant().cbrt();
     let residual = (axes.transpose() * axes - Matrix3::identity()).amax();
-    if residual > 2.0 * RIGID || scale < 0.0 {
+    if !(residual <= 2.0 * RIGID && scale >= 0.0) {
         let sheared =
             (axes.transpose() * axes - Matrix3::identity() * scale * scale).amax() > 2.0 * RIGID;
         let what = match (scale > 0.0, sheared) {

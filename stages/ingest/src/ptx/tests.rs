@@ -129,6 +129,7 @@ fn broken_files_are_refused_with_their_line() {
         (good.replace("1 2 3 0.5", "1 2 3 0.5 7"), "line 11: line of a point must hold"),
         (good.replace("1 2 3 0.5", "1,5 2 3 0.5"), "decimal point"),
         (good.replace("10 20 30 1", "10 20 30 0"), "last column"),
+        (good.replace("10 20 30 1", "10 20 30 nan"), "last column"),
         (good.replace("0 1 0 0", "0 2 0 0"), "no rotation"),
         (
             good.replace("0 1 0 0\n-1 0 0 0\n0 0 1 0", "0 .001 0 0\n-.001 0 0 0\n0 0 .001 0"),

@@ -1,0 +1,47 @@
+//! Doors for the fuzz targets in `tests/fuzz`, compiled for them only: bytes of files that this program alone writes, in;
+//! whether they were believed, out.
+
+use crate::rescan::probe;
+use crate::reuse;
+use contract::{Fit, Result};
+use robot::{Finding, Model};
+use std::path::Path;
+
+/// A plant's file (`plant.bin`) with this body, its digest made right.
+#[must_use]
+pub fn plant_file(body: &[u8]) -> Vec<u8> {
+    probe::file(body)
+}
+
+/// The body of a plant's file of one scan and one robot.
+#[must_use]
+pub fn plant_body() -> Vec<u8> {
+    probe::body()
+}
+
+/// Reads the plant's file of a folder, and uses its numbers as a rescan does.
+///
+/// # Errors
+/// As a rescan refuses it.
+pub fn plant(out: &Path) -> Result<()> {
+    probe::read(out)
+}
+
+/// Reads a kept piece of either kind, its digest made right.
+#[must_use]
+pub fn piece(body: &[u8]) -> [bool; 2] {
+    let bytes = [blake3::hash(body).as_bytes(), body].concat();
+    let fits = reuse::read::<Vec<Fit>>(&bytes);
+    let model = reuse::read::<(Option<Model>, Vec<Finding>)>(&bytes);
+    [fits.is_some(), model.is_some()]
+}
+
+/// Bodies of kept pieces: fits, and a model.
+#[must_use]
+pub fn pieces(model: &Model) -> Vec<Vec<u8>> {
+    let bodies = [
+        reuse::written(&vec![Fit::default()]),
+        reuse::written(&(Some(model), Vec::<Finding>::new())),
+    ];
+    bodies.into_iter().flatten().map(|bytes| bytes[32..].to_vec()).collect()
+}

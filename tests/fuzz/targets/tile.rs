@@ -1,0 +1,6 @@
+//! Fuzz target `tile`; what it does and checks stands in `src/own.rs`.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(init: stillpoint_fuzz::begin(), |data: &[u8]| {
+    stillpoint_fuzz::case(|| stillpoint_fuzz::own::tile(data));
+});
