@@ -308,3 +308,17 @@ impl Iterator for Streamed<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_is_decompressed_in_runs_of_bounded_bytes() {
+        for record_len in [20, 30, 67, 1000, usize::from(u16::MAX)] {
+            let n = at_once(record_len);
+            assert!(n >= 1 && n * record_len <= RUN_BYTES, "{n} records of {record_len} bytes");
+        }
+        assert!(at_once(67) > Settings::default().strip_points, "usual records: whole strips");
+    }
+}
