@@ -76,11 +76,17 @@ fn a_path_is_free_only_where_all_is_known_and_nothing_near() {
     assert!(hit["at"][2].as_f64().expect("a height").abs() < 0.02, "{hit}");
     assert_eq!(hit["as_found"], false);
 
+    // Why it is so, in one sentence.
+    let why = down["why"].as_str().expect("a sentence");
+    assert!(why.contains(" hits something (") && why.ends_with('.'), "{why}");
+
     // A turn keeps clear of the floor: what is left is not known, and may be allowed.
     let turn = head.clone() + &line(&found) + &line(&moved(0, 0.5));
     let (code, turned) = check(dir, &turn, &[]);
-    assert_eq!((code, &turned["outcome"]), (3, &Value::from("open")), "{turned}");
+    assert_eq!((code, &turned["outcome"]), (3, &Value::from("unknown")), "{turned}");
     assert!(turned["doubts"].as_array().expect("doubts").contains(&"unseen".into()), "{turned}");
+    let why = turned["why"].as_str().expect("a sentence");
+    assert!(why.starts_with("It is not known whether the path is free: "), "{why}");
     let (code, _) = check(dir, &turn, &["--allow", "unseen,beside,as-found"]);
     assert_eq!(code, 0);
     // The same on any number of threads.

@@ -7,6 +7,7 @@
 mod borne;
 mod cases;
 mod cell;
+pub mod check;
 mod condition;
 mod draw;
 mod growth;

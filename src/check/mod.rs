@@ -46,7 +46,7 @@ pub enum Outcome {
     /// Nothing is near, and all is known.
     Free,
     /// Nothing is near that was not as near where the robot was found; but not all is known.
-    Open,
+    Unknown,
     /// Something is nearer than the margin.
     Near,
     /// Something is hit, or a joint cannot get there.
@@ -58,7 +58,7 @@ pub enum Outcome {
 pub enum Doubt {
     /// It leads through space that no beam went through
     Unseen,
-    /// Uncertain points within 10 cm of where the robot was found: most are its own and move with it, some may stand in its way
+    /// It comes nearer to uncertain points within 10 cm of where the robot was found: most are its own and move with it, some may stand in its way
     Beside,
     /// Parts are as near to something as they were where the robot was found
     AsFound,
@@ -101,6 +101,33 @@ pub struct Report {
 /// # Errors
 /// No result, or one without what this needs; a path that is none of the robot's; files that cannot be read.
 pub fn check(request: &Request, means: &Means, engine: &Engine) -> Result<Report> {
+    let path = Trajectory::read(&request.trajectory)?;
+    let choose = |result: &ResultFile, state: &State| chosen(request, (result, state), &path);
+    at_robot(request, choose, (means, engine), |place| place.look(&path, engine))
+}
+
+/// A robot of a result, and all that stands around it: its paths can be looked at one after the other.
+pub(crate) struct Place<'a> {
+    request: &'a Request,
+    robot: &'a Robot<'a>,
+    body: Body<'a>,
+    obstacles: Obstacles,
+    /// Ids of all robots, by their numbers.
+    ids: Vec<String>,
+    /// Whether parts of the run were left out.
+    is_partial: bool,
+}
+
+/// Opens the result, and does something at the robot that is chosen.
+///
+/// # Errors
+/// No result, or one without what this needs; what `choose` and `then` end with; files that cannot be read.
+pub(crate) fn at_robot<T>(
+    request: &Request,
+    choose: impl FnOnce(&ResultFile, &State) -> Result<usize>,
+    (means, engine): (&Means, &Engine),
+    then: impl FnOnce(&Place<'_>) -> Result<T>,
+) -> Result<T> {
     let out = &request.out;
     // A result that was copied without its store has nobody at work in it.
     let _lock = out.join("store").is_dir().then(|| Job::hold_shared(out)).transpose()?;
@@ -111,8 +138,7 @@ pub fn check(request: &Request, means: &Means, engine: &Engine) -> Result<Report
             .at(out.display())
             .hint("run the same job again"));
     }
-    let path = Trajectory::read(&request.trajectory)?;
-    let number = chosen(request, (&result, &state), &path)?;
+    let number = choose(&result, &state)?;
     let (fits, models) = stood(request, &state, means, engine)?;
     let robots: Vec<Robot<'_>> = (fits.iter())
         .map(|(number, fit)| {
@@ -124,32 +150,50 @@ pub fn check(request: &Request, means: &Means, engine: &Engine) -> Result<Report
     let robot = robots.iter().find(|robot| robot.number == number);
     let robot =
         robot.ok_or_else(|| Error::new(Kind::Bug, "the robot that is meant does not stand"))?;
-    let postures = robot.postures(&path, request.degrees)?;
     let around = Surroundings { out, manifest: &manifest, state: &state, result: &result };
     let others: Vec<(usize, &Fit)> =
         fits.iter().filter(|(at, _)| *at != number).map(|(at, fit)| (*at, fit)).collect();
-    let found: Vec<f64> = robot.fit.joints.iter().map(|j| j.value).collect();
-    let (body, mut obstacles) = surrounded(robot, (&around, &others, &models), request, engine)?;
-    let has_beside = body.set_beside(&found, &mut obstacles);
-    let pairs: Vec<&[Vec<f64>]> = postures.windows(2).collect();
-    let lay = |pair: &[Vec<f64>]| Ok(clearance::leg(&body, &pair[0], &pair[1]));
-    let legs = engine.fan_out(Task::new("path"), pairs, lay)?;
-    let walk = Walk::new((&body, &obstacles), (&postures, &legs), &found);
-    let contacts = contacts(&walk, engine)?;
-    let impossible = robot.impossible(&postures, (&legs, contacts.open()), request.degrees);
-    let contacts = contacts.all();
-    let mut report = robot.report(request, &path, (&contacts, has_beside), impossible);
-    report.n_postures = walk.n_postures();
-    report.ids = result.robots.iter().map(|r| r.id.clone()).collect();
-    if manifest.partial {
-        let what = "parts of the run were left out: `stillpoint report` says which";
-        report.warnings.push(what.into());
+    let (mut body, mut obstacles) =
+        surrounded(robot, (&around, &others, &models), request, engine)?;
+    body.stand(&robot.found(), &mut obstacles);
+    then(&Place {
+        request,
+        robot,
+        body,
+        obstacles,
+        ids: result.robots.iter().map(|r| r.id.clone()).collect(),
+        is_partial: manifest.partial,
+    })
+}
+
+impl Place<'_> {
+    /// Looks along a path.
+    ///
+    /// # Errors
+    /// A path that is none of the robot's; cancelled.
+    pub(crate) fn look(&self, path: &Trajectory, engine: &Engine) -> Result<Report> {
+        let &Self { request, robot, ref body, ref obstacles, .. } = self;
+        let postures = robot.postures(path, request.degrees)?;
+        let pairs: Vec<&[Vec<f64>]> = postures.windows(2).collect();
+        let lay = |pair: &[Vec<f64>]| Ok(clearance::leg(body, &pair[0], &pair[1]));
+        let legs = engine.fan_out(Task::new("path"), pairs, lay)?;
+        let walk = Walk::new((body, obstacles), (&postures, &legs), &robot.found());
+        let contacts = contacts(&walk, engine)?;
+        let impossible = robot.impossible(&postures, (&legs, contacts.open()), request.degrees);
+        let contacts = contacts.all();
+        let mut report = robot.report(request, path, &contacts, impossible);
+        report.n_postures = walk.n_postures();
+        report.ids.clone_from(&self.ids);
+        if self.is_partial {
+            let what = "parts of the run were left out: `stillpoint report` says which";
+            report.warnings.push(what.into());
+        }
+        if robot.entry.space.is_none() {
+            let what = "the result knows no space about the robot, so nothing is known to be free: it takes scanner positions and --set merge.space=true";
+            report.warnings.push(what.into());
+        }
+        Ok(report)
     }
-    if robot.entry.space.is_none() {
-        let what = "the result knows no space about the robot, so nothing is known to be free: it takes scanner positions and --set merge.space=true";
-        report.warnings.push(what.into());
-    }
-    Ok(report)
 }
 
 /// The robot with what hangs on it, and all that they can get near to.
@@ -276,6 +320,6 @@ impl Report {
     /// Whether the path may be gone where these doubts are allowed.
     #[must_use]
     pub fn passes(&self, allowed: &[Doubt]) -> bool {
-        self.outcome <= Outcome::Open && self.doubts.iter().all(|doubt| allowed.contains(doubt))
+        self.outcome <= Outcome::Unknown && self.doubts.iter().all(|doubt| allowed.contains(doubt))
     }
 }

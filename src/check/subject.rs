@@ -52,6 +52,11 @@ impl Robot<'_> {
         Ok(())
     }
 
+    /// The posture that it was scanned in.
+    pub(super) fn found(&self) -> Vec<f64> {
+        self.fit.joints.iter().map(|j| j.value).collect()
+    }
+
     /// The waypoints as whole postures: joints that the path does not name stay where they were found.
     pub(super) fn postures(&self, path: &Trajectory, degrees: bool) -> Result<Vec<Vec<f64>>> {
         let columns: Vec<Option<usize>> = (self.fit.joints.iter())
@@ -141,21 +146,23 @@ impl Robot<'_> {
         &self,
         request: &Request,
         path: &Trajectory,
-        (contacts, has_beside): (&[Contact], bool),
+        contacts: &[Contact],
         impossible: Vec<(f64, String)>,
     ) -> Report {
         let warnings = self.uncertain(path, request.margin);
         let mut doubts = if warnings.is_empty() { Vec::new() } else { vec![Doubt::Posture] };
-        let stands = |c: &&Contact| !c.as_found && c.what != What::Beside;
+        let is_beside = |c: &Contact| c.what == What::Beside || c.is_doubtful;
+        let stands = |c: &&Contact| !c.as_found && !is_beside(c);
         let is = |level: Level| contacts.iter().filter(stands).any(|c| c.level >= level);
-        if contacts.iter().any(|c| c.level == Level::Unseen) {
+        let has = |is: &dyn Fn(&Contact) -> bool| contacts.iter().any(is);
+        // What was as near where it stood is no news: it stood there.
+        if has(&|c| c.level == Level::Unseen && !c.as_found) {
             doubts.push(Doubt::Unseen);
         }
-        // They may be its own and move with it, wherever the path leads.
-        if has_beside {
+        if has(&|c| is_beside(c) && c.level > Level::Unseen && !c.as_found) {
             doubts.push(Doubt::Beside);
         }
-        if contacts.iter().any(|c| c.as_found && c.level > Level::Unseen) {
+        if has(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c)) {
             doubts.push(Doubt::AsFound);
         }
         let outcome = if is(Level::Hit) || !impossible.is_empty() {
@@ -165,7 +172,7 @@ impl Robot<'_> {
         } else if doubts.is_empty() {
             Outcome::Free
         } else {
-            Outcome::Open
+            Outcome::Unknown
         };
         Report {
             robot: self.entry.id.clone(),

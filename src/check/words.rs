@@ -17,7 +17,7 @@ impl Outcome {
     pub fn word(self) -> &'static str {
         match self {
             Self::Free => "free",
-            Self::Open => "open",
+            Self::Unknown => "unknown",
             Self::Near => "near",
             Self::Blocked => "blocked",
         }
@@ -25,7 +25,7 @@ impl Outcome {
 }
 
 impl Doubt {
-    fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Unseen => "unseen",
             Self::Beside => "beside",
@@ -38,7 +38,7 @@ impl Doubt {
         match self {
             Self::Unseen => "it leads through space that no beam went through",
             Self::Beside => {
-                "uncertain points lie beside where the robot was found: most are its own, some may stand in its way"
+                "it comes nearer to uncertain points beside where the robot was found: most are its own, some may stand in its way"
             }
             Self::AsFound => "parts are as near to something as where the robot was found",
             Self::Posture => "the robot's posture is not certain",
@@ -72,7 +72,11 @@ impl Report {
 
     fn part(&self, contact: &Contact) -> String {
         let link = self.links.get(contact.link).map_or("", |l| l);
-        if contact.hangs { format!("what hangs on {link}") } else { link.to_owned() }
+        match (contact.is_doubtful, contact.hangs) {
+            (true, _) => format!("what may hang on {link}"),
+            (false, true) => format!("what hangs on {link}"),
+            (false, false) => link.to_owned(),
+        }
     }
 
     /// When a place of the path is reached, seconds.
@@ -80,6 +84,58 @@ impl Report {
         let from = self.times.get(place.floor() as usize)?;
         let to = self.times.get(place.ceil() as usize)?;
         Some(from + place.fract() * (to - from))
+    }
+
+    /// Why the outcome is what it is, in one sentence.
+    #[must_use]
+    pub fn why(&self) -> String {
+        let margin = self.margin * 1e3;
+        if let Some((place, what)) = self.impossible.first() {
+            return format!("The robot cannot go there: at waypoint {place:.0} {what}.");
+        }
+        let worst = |is: &dyn Fn(&Contact) -> bool| self.contacts.iter().find(|c| is(c));
+        let told = |c: &Contact| {
+            let place = c.at.map_or(String::new(), |at| {
+                let [x, y, z] = self.world(&at);
+                format!(" near ({x:.3}, {y:.3}, {z:.3})")
+            });
+            (self.part(c), self.what(c.what), format!("{place} at waypoint {:.2}", c.worst))
+        };
+        let is_beside = |c: &Contact| c.what == What::Beside || c.is_doubtful;
+        let anew = |c: &Contact| !c.as_found && !is_beside(c);
+        if let Some(c) = worst(&|c| anew(c) && c.level >= Level::Hit) {
+            let (part, what, place) = told(c);
+            return format!("{part} hits something ({what}){place}.");
+        }
+        if let Some(c) = worst(&|c| anew(c) && c.level == Level::Near) {
+            let ((part, what, place), gap) = (told(c), c.gap * 1e3);
+            return format!(
+                "{part} may come as near as {gap:.0} mm to something ({what}){place}, and the margin is {margin:.0} mm."
+            );
+        }
+        let Some(doubt) = self.doubts.first() else {
+            return format!(
+                "Nothing comes nearer than {margin:.0} mm, and beams went through all space on the way."
+            );
+        };
+        let contact = match doubt {
+            Doubt::Unseen => worst(&|c| c.level == Level::Unseen && !c.as_found),
+            Doubt::Beside => worst(&|c| is_beside(c) && !c.as_found),
+            Doubt::AsFound => worst(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c)),
+            Doubt::Posture => None,
+        };
+        match contact.map(told) {
+            Some((part, _, place)) => {
+                format!(
+                    "It is not known whether the path is free: {} ({part}{place}).",
+                    doubt.why()
+                )
+            }
+            None => {
+                let more = self.warnings.first().map_or(String::new(), |w| format!(" ({w})"));
+                format!("It is not known whether the path is free: {}{more}.", doubt.why())
+            }
+        }
     }
 
     /// For people.
@@ -123,10 +179,9 @@ impl Report {
             parts.dedup();
             let _ = writeln!(text, "  no nearer than as found: {}", parts.join(", "));
         }
-        let _ = write!(text, "{}", self.outcome.word());
-        let why: Vec<&str> = self.doubts.iter().map(|d| d.why()).collect();
-        if !why.is_empty() {
-            let _ = write!(text, "; {}", why.join("; "));
+        let _ = write!(text, "{}: {}", self.outcome.word(), self.why());
+        for doubt in self.doubts.iter().skip(1) {
+            let _ = write!(text, "\nand {}", doubt.why());
         }
         let _ = writeln!(text, "\nnot looked at: {NOT_CHECKED}");
         text
@@ -140,6 +195,7 @@ impl Report {
                 "level": level(c),
                 "link": self.links.get(c.link),
                 "hangs": c.hangs,
+                "doubtful": c.is_doubtful,
                 "what": self.what(c.what),
                 "as_found": c.as_found,
                 "from": c.from,
@@ -157,6 +213,7 @@ impl Report {
             "schema": SCHEMA,
             "robot": self.robot,
             "outcome": self.outcome.word(),
+            "why": self.why(),
             "doubts": self.doubts.iter().map(|d| d.word()).collect::<Vec<_>>(),
             "margin": self.margin,
             "n_waypoints": self.n_waypoints,

@@ -1,8 +1,11 @@
 //! `bench`: suites and numbers in; tables of what the program is worth out.
 
-use super::bench_flags::{AccuracyFlags, Against, PlantFlags, RescanBenchFlags, ThroughputFlags};
+use super::bench_flags::{
+    AccuracyFlags, Against, CheckBenchFlags, PlantFlags, RescanBenchFlags, ThroughputFlags,
+};
 use super::flags::Common;
 use super::say::Say;
+use crate::bench::check::{CheckBench, checks};
 use crate::bench::plant::{PlantBench, plants};
 use crate::bench::rescan::{RescanBench, rescans};
 use crate::bench::throughput::{ThroughputBench, throughput};
@@ -59,6 +62,25 @@ pub(super) fn bench_rescan(flags: &RescanBenchFlags, common: &Common, say: &Say)
         alone: flags.alone,
     };
     say.result(&rescans(&bench, &means, &engine)?);
+    Ok(exit::OK)
+}
+
+pub(super) fn bench_check(flags: &CheckBenchFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let bench = CheckBench {
+        n_cases: flags.cases,
+        first: flags.first,
+        seed: flags.seed,
+        n_robots: flags.n_robots,
+        n_scanners: flags.scans,
+        step_deg: flags.step,
+        margin: flags.margin,
+        robots: flags.robots.clone(),
+        out: flags.out.clone(),
+        keep: flags.keep,
+    };
+    say.result(&checks(&bench, &means, &engine)?);
     Ok(exit::OK)
 }
 

@@ -12,6 +12,8 @@ pub(super) enum BenchCommand {
     Plant(PlantFlags),
     /// Draw plants of which one cell is scanned again: what a rescan finds, what it invents, its time beside a whole run
     Rescan(RescanBenchFlags),
+    /// Draw cells and paths of their robots, do the main job and check the paths: false alarms and misses
+    Check(CheckBenchFlags),
     /// Draw plants of given sizes as files, do the main job on them: points a second, memory, share of the machine's limits
     Throughput(ThroughputFlags),
 }
@@ -95,6 +97,40 @@ pub(super) struct RescanBenchFlags {
     /// Do the main job on the new scans alone, too, to compare with
     #[arg(long)]
     pub(super) alone: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CheckBenchFlags {
+    /// Cells
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub(super) cases: usize,
+    /// Number of the first of them
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub(super) first: usize,
+    /// Seed of all that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Robots of each cell
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) n_robots: usize,
+    /// Scanners of each cell
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub(super) scans: usize,
+    /// Angle between beams, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.17)]
+    pub(super) step: f64,
+    /// What comes nearer to a robot is in its way, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.02)]
+    pub(super) margin: f64,
+    /// Robot library (else the demo's robots)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// Where rows and tables go; scenes, scans and results are kept there, too, with --keep
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// Keep scenes, scans and results
+    #[arg(long, requires = "out")]
+    pub(super) keep: bool,
 }
 
 #[derive(Debug, Args)]

@@ -75,6 +75,7 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
             bench::bench_accuracy(flags, &line.common, say)
         }
         Command::Bench(BenchCommand::Plant(flags)) => bench::bench_plant(flags, &line.common, say),
+        Command::Bench(BenchCommand::Check(flags)) => bench::bench_check(flags, &line.common, say),
         Command::Bench(BenchCommand::Rescan(flags)) => {
             bench::bench_rescan(flags, &line.common, say)
         }

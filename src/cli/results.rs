@@ -74,7 +74,7 @@ pub(super) fn check_path(flags: &CheckFlags, common: &Common, say: &Say) -> Resu
     say.result(&if flags.json { json(&report.json())? } else { report.words() });
     Ok(match report.outcome {
         _ if report.passes(&flags.allow) => exit::OK,
-        Clear::Free | Clear::Open => exit::PARTIAL,
+        Clear::Free | Clear::Unknown => exit::PARTIAL,
         Clear::Near | Clear::Blocked => exit::NO,
     })
 }

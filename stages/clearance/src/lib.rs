@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod evidence;
 mod obstacles;
 mod path;
 mod shape;

@@ -1,7 +1,8 @@
 //! Points around a robot in, tile by tile; balls that hold them, gathered in bins, out. All in the frame of its base, metres.
 
+use crate::evidence::evident;
 use contract::{Space, SpaceKind};
-use geometry::{Aabb, Point, Pose};
+use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
 use std::ops::Range;
 
@@ -70,6 +71,14 @@ pub struct Known {
     pub bounds: Aabb,
 }
 
+/// What becomes of an obstacle.
+pub(crate) enum Replaced {
+    /// It stays.
+    Kept,
+    /// Others, or none.
+    By(Vec<Obstacle>),
+}
+
 /// All that stands around a robot.
 #[derive(Debug, Clone)]
 pub struct Obstacles {
@@ -78,6 +87,16 @@ pub struct Obstacles {
     pub(crate) known: Known,
     /// Farthest from the base on each axis that points were gathered, metres.
     far: f64,
+    pub(crate) split: Split,
+}
+
+/// How a voxel of unseen space is told by parts.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Split {
+    /// Their middles from that of the voxel, frame of the base, metres.
+    offsets: Vec<[f32; 3]>,
+    /// Of balls that hold them, metres.
+    radius: f32,
 }
 
 impl Cells {
@@ -125,21 +144,46 @@ impl Obstacles {
         (space, known): (Option<&Space>, Known),
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles().collect();
+        let is_evident = evident(&all, space, &known.world_from_base);
+        let mut told = is_evident.into_iter();
+        all.retain(|_| told.next().unwrap_or(true));
         for (number, model, poses) in others {
             all.extend(surface(*number, model, poses));
         }
+        let base_from_world = known.world_from_base.inverse();
+        let mut split = Split::default();
         if let Some(space) = space {
-            all.extend(unseen(space, &known.world_from_base.inverse()));
+            all.extend(unseen(space, &base_from_world));
+            split = Split::of(space.grid().edge, &base_from_world);
         }
+        let mut out = Self { all, bins: Vec::new(), known, far: cells.far, split };
+        out.sort();
+        out
+    }
+
+    /// Gathers obstacles in bins.
+    fn sort(&mut self) {
         let bin = |o: &Obstacle| o.at.map(|v| (f64::from(v) / BIN).floor() as i32);
-        all.sort_by_key(bin);
-        let mut bins = Vec::new();
+        self.all.sort_by_key(bin);
+        self.bins.clear();
         let mut from = 0;
-        for own in all.chunk_by(|a, b| bin(a) == bin(b)) {
-            bins.push(Bin::of(own, from));
+        for own in self.all.chunk_by(|a, b| bin(a) == bin(b)) {
+            self.bins.push(Bin::of(own, from));
             from += own.len();
         }
-        Self { all, bins, known, far: cells.far }
+    }
+
+    /// Takes each obstacle as what `of` makes of it: one, several or none.
+    pub(crate) fn replace(&mut self, mut of: impl FnMut(usize, &Obstacle) -> Replaced) {
+        let mut all = Vec::with_capacity(self.all.len());
+        for (at, o) in self.all.iter().enumerate() {
+            match of(at, o) {
+                Replaced::Kept => all.push(*o),
+                Replaced::By(others) => all.extend(others),
+            }
+        }
+        self.all = all;
+        self.sort();
     }
 
     /// Radius of the largest, metres.
@@ -185,6 +229,36 @@ fn surface<'a>(
             Obstacle { at, radius, what: What::Robot(number) }
         })
     })
+}
+
+/// Parts on each axis that a voxel of unseen space is told by: balls of them bulge by less than a margin.
+const PARTS: usize = 4;
+
+impl Split {
+    /// Of voxels of this edge, metres.
+    fn of(edge: f64, base_from_world: &Pose) -> Self {
+        let step = edge / PARTS as f64;
+        let at = |k: usize| (k as f64 - 0.5 * (PARTS - 1) as f64) * step;
+        let middle = |k: usize| {
+            let by = Vector::new(at(k % PARTS), at(k / PARTS % PARTS), at(k / (PARTS * PARTS)));
+            (base_from_world * by).map(|v| v as f32).into()
+        };
+        let offsets = (0..PARTS.pow(3)).map(middle).collect();
+        Self { offsets, radius: (HALF_DIAGONAL * step) as f32 }
+    }
+
+    /// The parts of a voxel of unseen space; nothing for all else, and for parts themselves.
+    pub(crate) fn parts(&self, o: &Obstacle) -> Option<impl Iterator<Item = Obstacle> + '_> {
+        let is_whole = o.what == What::Unseen && o.radius > 1.5 * self.radius;
+        let (middle, what, radius) = (o.at, o.what, self.radius);
+        is_whole.then(|| {
+            self.offsets.iter().map(move |by| Obstacle {
+                at: std::array::from_fn(|i| middle[i] + by[i]),
+                radius,
+                what,
+            })
+        })
+    }
 }
 
 /// Voxels that no beam went through: balls that hold them.

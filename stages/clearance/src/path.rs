@@ -33,6 +33,8 @@ pub struct Contact {
     pub link: usize,
     /// It is what hangs on the link, not the link itself.
     pub hangs: bool,
+    /// Nobody knows whether it hangs there: uncertain points beside the link as it was scanned.
+    pub is_doubtful: bool,
     /// To what.
     pub what: What,
     /// How near at worst.
@@ -232,6 +234,7 @@ impl Contacts {
             let now = Contact {
                 link: part.link,
                 hangs: part.hangs,
+                is_doubtful: part.is_doubtful,
                 what: key.1,
                 level,
                 as_found: key.2,
@@ -303,14 +306,14 @@ mod tests {
     fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let body = Body::new(&model, BTreeMap::new(), (margin, 0.0), &OneByOne);
+        let mut body = Body::new(&model, BTreeMap::new(), (margin, 0.0), &OneByOne);
         let mut cells = Cells::within(crate::reach(&model) + margin + 0.1);
         points.iter().for_each(|(p, what)| cells.add(*p, *what));
         cells.settle();
         let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
         let known = Known { world_from_base: Pose::identity(), bounds };
         let mut around = Obstacles::new(&cells, &[], (None, known));
-        body.set_beside(&[found], &mut around);
+        body.stand(&[found], &mut around);
         let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
         let legs = legs(&body, &path);
         let walk = Walk::new((&body, &around), (&path, &legs), &[found]);
@@ -360,6 +363,35 @@ mod tests {
         let points = [([0.5, 0.065, 0.0], What::Fixed)];
         let found = walk(&points, &[0.0, 0.05], 0.0, 0.02);
         assert!(found.iter().any(|c| c.level == Level::Inside && !c.as_found), "{found:?}");
+    }
+
+    #[test]
+    fn points_on_its_own_surface_are_no_obstacle() {
+        // A patch that a mask left to the fixed world, so far off the beam's side.
+        let patch = |off: f64| -> Vec<_> {
+            let at =
+                |k: u32| [0.4 + 0.01 * f64::from(k % 10), 0.05 + off, 0.01 * f64::from(k / 10)];
+            (0..40).map(|k| (at(k), What::Fixed)).collect()
+        };
+        assert_eq!(walk(&patch(0.003), &[0.0, 0.3], 0.0, 0.02), []);
+        let hit = |c: &Contact| c.level >= Level::Hit && !c.as_found;
+        assert!(walk(&patch(0.03), &[0.0, 0.3], 0.0, 0.02).iter().any(hit));
+    }
+
+    #[test]
+    fn uncertain_points_beside_it_may_move_with_it() {
+        // Above the beam's end; and a post that the beam passes below, but not they.
+        let beside = (0..8).map(|k| ([0.9, 0.0, 0.07 + 0.01 * f64::from(k)], What::Uncertain));
+        let post = std::iter::once(([0.0, 0.9, 0.12], What::Fixed));
+        let points: Vec<_> = beside.chain(post).collect();
+        let found = walk(&points, &[0.0, 3.0], 0.0, 0.02);
+        let fixed: Vec<_> = found.iter().filter(|c| c.what == What::Fixed).collect();
+        assert!(
+            fixed.len() == 1 && fixed[0].is_doubtful && fixed[0].level == Level::Hit,
+            "{found:?}"
+        );
+        let away = found.iter().filter(|c| c.what == What::Beside && !c.as_found);
+        assert!(away.count() == 0, "it does not come nearer to them: {found:?}");
     }
 
     #[test]

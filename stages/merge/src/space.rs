@@ -30,13 +30,24 @@ impl<'a> Passed<'a> {
         Self { region, eyes: views.iter().map(|view| Eye::new(&view.images)).collect(), edge }
     }
 
-    /// Whether a beam went on beyond the voxel with this middle (world, metres).
+    /// Whether a beam went on beyond the voxel with this middle (world, metres), or beams got to the middle of each of its eighths: in a
+    /// voxel beside a surface none goes on, and where one ends in it there is a point, which makes of it what that is.
     #[must_use]
     pub fn is_free(&self, middle: [f64; 3]) -> bool {
         let beyond = (HALF_DIAGONAL * self.edge + BEYOND) as f32;
         let p: [f32; 3] = std::array::from_fn(|i| (middle[i] - self.region.origin[i]) as f32);
+        let quarter = 0.25 * self.edge as f32;
+        let eighth = |k: usize| {
+            std::array::from_fn(|i| if k >> i & 1 == 0 { p[i] - quarter } else { p[i] + quarter })
+        };
+        self.is_passed(p, 2.0 * quarter, beyond)
+            || (0..8).all(|k| self.is_passed(eighth(k), quarter, 0.0))
+    }
+
+    /// Whether a beam in a cell about a place of the region went on so far beyond it, metres.
+    fn is_passed(&self, p: [f32; 3], footprint: f32, beyond: f32) -> bool {
         let is_passed = |eye: &Eye<'_>| {
-            let look = eye.look(p, 0.5 * self.edge as f32);
+            let look = eye.look(p, footprint);
             look.is_some_and(|l| l.far.is_finite() && l.far > l.range + beyond)
         };
         self.eyes.iter().any(is_passed)
@@ -127,6 +138,9 @@ mod tests {
         for p in [[3.0, 0.5, 0.0], [4.6, -0.5, 0.0], [0.7, 0.9, 0.0]] {
             assert_eq!(at(&space, p), SpaceKind::Unknown, "{p:?}");
         }
+        // Up to the wall space is seen, and no farther.
+        assert_eq!(at(&space, [3.95, -0.5, 0.0]), SpaceKind::Free);
+        assert_eq!(at(&space, [4.05, -0.5, 0.0]), SpaceKind::Unknown);
         let wall = space.grid().index([4.0, -0.5, 0.0]).expect("inside");
         for kind in [SpaceKind::Robot, SpaceKind::Other, SpaceKind::Robot] {
             space.mark(wall, kind);

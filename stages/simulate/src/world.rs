@@ -19,6 +19,8 @@ pub(crate) struct Surface {
     pub(crate) reflectance: f32,
     /// Thinner than the distance of beams: a beam may touch it where its neighbours do not.
     pub(crate) is_thin: bool,
+    /// Index of the link that holds an attachment rigidly; −1 for all else, hoses too.
+    pub(crate) holder: i16,
 }
 
 /// A robot of the scene with everything placed.
@@ -90,7 +92,8 @@ impl World {
 
     fn add_hall(&mut self, scene: &Scene) {
         let object = self.object("floor", "");
-        let fixed = Surface { label: Label::FIXED, object, reflectance: GREY, is_thin: false };
+        let fixed =
+            Surface { label: Label::FIXED, object, reflectance: GREY, is_thin: false, holder: -1 };
         let (ground, faces) = hall::ground(scene);
         let lowest = ground.vertices.iter().map(|p| p.z).fold(0.0, f64::min);
         self.add(Surface { label: Label::FLOOR, ..fixed }, &ground);
@@ -144,7 +147,7 @@ impl World {
                 if part.role == Role::Effector { PointKind::Attachment } else { PointKind::Link };
             let label = Label { kind, robot: index_i16(index)?, link: index_i16(link)? };
             let vertices = place_mesh(&part.mesh, &poses[link]);
-            let surface = Surface { label, object, reflectance: PAINT, is_thin: false };
+            let surface = Surface { label, object, reflectance: PAINT, is_thin: false, holder: -1 };
             self.add_mesh(surface, &vertices, &part.mesh.triangles);
         }
         self.robots.push(PlacedRobot { model: at, posture, world_from_link: poses });
@@ -157,7 +160,8 @@ impl World {
                 let link = self.link_pose(scene, models, &place.name, Some(&tool.link))?;
                 let body = attach::tool(tool).posed(&(link * pose(tool.xyz, tool.rpy_deg)));
                 let object = self.object("tool of", &place.name);
-                self.add(attachment(index, object, GREY)?, &body);
+                let holder = self.holder(models, index, &tool.link)?;
+                self.add(Surface { holder, ..attachment(index, object, GREY)? }, &body);
             }
         }
         for part in &scene.carried {
@@ -165,7 +169,8 @@ impl World {
             let index = robot_index(scene, &part.robot)?;
             let body = cuboid(part.size, 0.002).posed(&(link * pose(part.xyz, part.rpy_deg)));
             let object = self.object("carried", &part.name);
-            self.add(attachment(index, object, GREY)?, &body);
+            let holder = self.holder(models, index, &part.link)?;
+            self.add(Surface { holder, ..attachment(index, object, GREY)? }, &body);
         }
         for hose in &scene.hoses {
             let held = hose
@@ -182,11 +187,23 @@ impl World {
             let object = self.object("hose", &hose.name);
             let surface = match owner {
                 Some(name) => attachment(robot_index(scene, name)?, object, BLACK)?,
-                None => Surface { label: Label::FIXED, object, reflectance: BLACK, is_thin: false },
+                None => Surface {
+                    label: Label::FIXED,
+                    object,
+                    reflectance: BLACK,
+                    is_thin: false,
+                    holder: -1,
+                },
             };
             self.add(surface, &attach::hose(hose, &held));
         }
         Ok(())
+    }
+
+    /// Index of a link of a robot of the scene, by its name.
+    fn holder(&self, models: &[Model], robot: usize, link: &str) -> Result<i16> {
+        let links = &models[self.robots[robot].model].links;
+        index_i16(links.iter().position(|l| l.name == link).unwrap_or(0))
     }
 
     fn anchor(&self, scene: &Scene, models: &[Model], anchor: &Anchor) -> Result<Point> {
@@ -226,7 +243,7 @@ impl World {
 
 fn attachment(robot: usize, object: u16, reflectance: f32) -> Result<Surface> {
     let label = Label { kind: PointKind::Attachment, robot: index_i16(robot)?, link: -1 };
-    Ok(Surface { label, object, reflectance, is_thin: false })
+    Ok(Surface { label, object, reflectance, is_thin: false, holder: -1 })
 }
 
 fn index_i16(index: usize) -> Result<i16> {

@@ -1,0 +1,215 @@
+//! A seed in; a cell with wires and pipes in its robots' ways, and paths of these robots, out.
+
+use super::truth::{TOUCH, Truth, between};
+use contract::Result;
+use geometry::{Point, Pose, Vector};
+use robot::Model;
+use simulate::random::Random;
+use simulate::scene::{Anchor, Hose};
+use simulate::{Plant, Postures, Scene};
+
+/// Smallest and largest turn of a joint in a small move, radians; slides go a fifth of that in metres.
+const SMALL: [f64; 2] = [0.03, 0.35];
+/// Paths of each kind for each robot; to thin things goes one for each of them.
+const N_SMALL: usize = 8;
+const N_FAR: usize = 4;
+const N_HIT: usize = 3;
+/// Thin things in the way of each robot.
+const N_THIN: usize = 2;
+/// Tries to draw a path that hits something, or a thin thing that does not touch a robot as it stands.
+const N_TRIES: usize = 12;
+/// Radii of wires and of pipes, metres.
+const WIRE: [f64; 2] = [0.002, 0.005];
+const PIPE: f64 = 0.010;
+/// Thin things keep so far from robots as they stand, metres: more than the margin of a check.
+const ASIDE: f64 = 0.08;
+/// Length of a wire that hangs level, metres.
+const LENGTH: [f64; 2] = [1.0, 2.5];
+
+/// What a path was drawn as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Drawn {
+    /// A few joints turned by little.
+    Small,
+    /// To a posture of its own.
+    Far,
+    /// One of several that hits something.
+    Hit,
+    /// Into a wire or a pipe.
+    Thin,
+}
+
+/// From how a robot stands, joints going straight.
+#[derive(Debug, Clone)]
+pub(super) struct DrawnPath {
+    pub(super) drawn: Drawn,
+    pub(super) to: Vec<f64>,
+}
+
+/// A cell, and for each robot the paths that lead into thin things.
+pub(super) fn cell(wanted: &Plant, models: &[Model]) -> Result<(Scene, Vec<Vec<DrawnPath>>)> {
+    let mut scene = simulate::plant(wanted, models)?;
+    // Beams that do not come back prove nothing: of a hall that is open above, little is known.
+    if let Some(hall) = &mut scene.hall {
+        hall.ceiling = true;
+    }
+    let mut random = Random::keyed(&[wanted.seed, 0xC4EC]);
+    // Low and high, as they are put up in real cells: what no scanner sees from below no path is free in.
+    for (k, scanner) in scene.scanners.iter_mut().enumerate() {
+        if k % 2 == 1 {
+            scanner.position[2] -= random.between(0.6, 1.1);
+        }
+    }
+    let standing = standing(&scene, models);
+    let mut paths = Vec::new();
+    for robot in 0..scene.robots.len() {
+        let mut own = Vec::new();
+        for k in 0..N_THIN {
+            let name = format!("thin {k} of {}", scene.robots[robot].name);
+            if let Some((thing, to)) = thin(&scene, models, robot, (&standing, &name), &mut random)?
+            {
+                scene.hoses.push(thing);
+                own.push(DrawnPath { drawn: Drawn::Thin, to });
+            }
+        }
+        paths.push(own);
+    }
+    Ok((scene, paths))
+}
+
+/// The model of a robot of a scene, and its posture.
+pub(super) fn robot_of<'m>(
+    scene: &Scene,
+    models: &'m [Model],
+    robot: usize,
+) -> Option<(&'m Model, Vec<f64>)> {
+    let place = &scene.robots[robot];
+    let model = models.iter().find(|m| m.name == place.model)?;
+    let home = model.home().into_iter().zip(&model.free);
+    let value = |(home, joint): (f64, &usize)| {
+        place.posture.get(&model.joints[*joint].name).copied().unwrap_or(home)
+    };
+    Some((model, home.map(value).collect()))
+}
+
+/// Places on the robots as they stand, world, metres.
+fn standing(scene: &Scene, models: &[Model]) -> Vec<Point> {
+    let mut out = Vec::new();
+    for robot in 0..scene.robots.len() {
+        let Some((model, posture)) = robot_of(scene, models, robot) else { continue };
+        let base = scene.robots[robot].world_from_base();
+        for (link, pose) in model.links.iter().zip(model.poses(&posture)) {
+            out.extend(places(&link.cad.points, &(base * pose)));
+        }
+    }
+    out
+}
+
+fn places<'p>(points: &'p [[f32; 3]], pose: &'p Pose) -> impl Iterator<Item = Point> + 'p {
+    /// Enough of a link's samples to keep a few centimetres off it.
+    const EACH: usize = 7;
+    points.iter().step_by(EACH).map(move |p| pose * Point::from(p.map(f64::from)))
+}
+
+/// A wire or a pipe through a place that a link goes through, away from all robots as they stand; and where that path ends.
+fn thin(
+    scene: &Scene,
+    models: &[Model],
+    robot: usize,
+    (standing, name): (&[Point], &str),
+    random: &mut Random,
+) -> Result<Option<(Hose, Vec<f64>)>> {
+    let Some((model, from)) = robot_of(scene, models, robot) else { return Ok(None) };
+    let base = scene.robots[robot].world_from_base();
+    let moves = model.moving();
+    for _ in 0..N_TRIES {
+        let to = target(scene, (model, &base), &from, random)?;
+        let there = model.poses(&between(&from, &to, random.between(0.3, 1.0)));
+        let links: Vec<usize> = (0..model.links.len())
+            .filter(|&l| moves[l] && !model.links[l].cad.points.is_empty())
+            .collect();
+        let link = links[random.below(links.len())];
+        let points = &model.links[link].cad.points;
+        let p = base * there[link] * Point::from(points[random.below(points.len())].map(f64::from));
+        let ground = scene.ground(p.x, p.y);
+        let radius = if random.unit() < 0.35 { PIPE } else { random.between(WIRE[0], WIRE[1]) };
+        let ends = if random.unit() < 0.5 {
+            let top = (p.z + random.between(0.3, 1.0)).max(ground + 1.0);
+            [Point::new(p.x, p.y, ground), Point::new(p.x, p.y, top)]
+        } else {
+            let yaw = random.between(0.0, std::f64::consts::PI);
+            let half = Vector::new(yaw.cos(), yaw.sin(), 0.0)
+                * (0.5 * random.between(LENGTH[0], LENGTH[1]));
+            [p - half, p + half]
+        };
+        let is_clear = standing.iter().all(|q| off(q, &ends) > ASIDE + radius);
+        if p.z < ground + 0.2 || !is_clear {
+            continue;
+        }
+        let anchors = ends.map(|p| Anchor { robot: None, link: None, xyz: p.coords.into() });
+        let thing = Hose { name: name.into(), anchors: anchors.to_vec(), radius, sag: 0.0 };
+        return Ok(Some((thing, to)));
+    }
+    Ok(None)
+}
+
+/// How far a place is from a line between two others, metres.
+fn off(p: &Point, [a, b]: &[Point; 2]) -> f64 {
+    let along = b - a;
+    let at = ((p - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+    (p - (a + along * at)).norm()
+}
+
+/// A posture some way to another one that the robot can stand in.
+fn target(
+    scene: &Scene,
+    (model, base): (&Model, &Pose),
+    from: &[f64],
+    random: &mut Random,
+) -> Result<Vec<f64>> {
+    let above = |p: &Point| p.z > scene.ground(p.x, p.y);
+    let to = Postures::new(model).draw(random, base, above)?;
+    Ok(between(from, &to, random.between(0.3, 1.0)))
+}
+
+/// Paths of a robot, beside those into thin things.
+pub(super) fn paths(
+    scene: &Scene,
+    (model, base, from): (&Model, &Pose, &[f64]),
+    truth: &Truth<'_>,
+    random: &mut Random,
+) -> Result<Vec<DrawnPath>> {
+    let mut out = Vec::new();
+    for _ in 0..N_SMALL {
+        out.push(DrawnPath { drawn: Drawn::Small, to: small(model, from, random) });
+    }
+    for _ in 0..N_FAR {
+        let to = target(scene, (model, base), from, random)?;
+        out.push(DrawnPath { drawn: Drawn::Far, to });
+    }
+    for _ in 0..N_HIT {
+        for _ in 0..N_TRIES {
+            let to = target(scene, (model, base), from, random)?;
+            if truth.along(from, &to).gap <= TOUCH {
+                out.push(DrawnPath { drawn: Drawn::Hit, to });
+                break;
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// One to three joints turned by little, within their limits.
+fn small(model: &Model, from: &[f64], random: &mut Random) -> Vec<f64> {
+    let mut to = from.to_vec();
+    for _ in 0..=random.below(3) {
+        let joint = random.below(to.len());
+        let slides = model.joints[model.free[joint]].kind == robot::JointKind::Prismatic;
+        let far = random.between(SMALL[0], SMALL[1]) * if slides { 0.2 } else { 1.0 };
+        let way = if random.unit() < 0.5 { far } else { -far };
+        let [low, high] = model.limits(joint);
+        to[joint] = (from[joint] + way).clamp(low, high);
+    }
+    to
+}

@@ -1,0 +1,102 @@
+//! Paths that were checked, with what is true of them, in; tables for people and a line a path for programs out.
+
+use super::{PathRow, Row, True};
+use crate::check::Outcome;
+use std::fmt::Write as _;
+
+/// All outcomes, as columns.
+const OUTCOMES: [Outcome; 4] = [Outcome::Free, Outcome::Unknown, Outcome::Near, Outcome::Blocked];
+
+/// What is true of a path, in words.
+fn words(of: True) -> &'static str {
+    match of {
+        True::Free => "keeps the margin, in seen space",
+        True::Unseen => "keeps the margin, not all of its space was seen",
+        True::Grazes => "nearer than the margin, touches nothing",
+        True::Collides => "collides",
+    }
+}
+
+/// Counts, shares and reasons.
+pub(super) fn table(rows: &[Row]) -> String {
+    let all: Vec<&PathRow> = rows.iter().flat_map(|r| &r.paths).collect();
+    let mut out = String::from(
+        "| what is true of a path | paths | free | unknown | near | blocked |\n| --- | --- | --- | --- | --- | --- |\n",
+    );
+    for of in [True::Free, True::Unseen, True::Grazes, True::Collides] {
+        let own: Vec<&&PathRow> = all.iter().filter(|p| p.truth == of).collect();
+        let n = |outcome| own.iter().filter(|p| p.outcome == outcome).count();
+        let counts: Vec<String> = OUTCOMES.iter().map(|o| n(o.word()).to_string()).collect();
+        let _ = writeln!(out, "| {} | {} | {} |", words(of), own.len(), counts.join(" | "));
+    }
+    let count = |is: &dyn Fn(&PathRow) -> bool| all.iter().filter(|p| is(p)).count();
+    let free = |p: &PathRow| p.outcome == Outcome::Free.word();
+    let seen = count(&|p| p.truth == True::Free);
+    let right = count(&|p| p.truth == True::Free && free(p));
+    let _ = writeln!(
+        out,
+        "\n{} cells, {} paths; misses (colliding, called free): {}; free in seen space and called free: {right} of {seen} ({:.1} %); \
+         free, called near or blocked: {}; {} robots of {} looked at",
+        rows.len(),
+        all.len(),
+        count(&|p| p.truth == True::Collides && free(p)),
+        100.0 * right as f64 / seen.max(1) as f64,
+        count(&|p| p.is_wolf()),
+        rows.iter().map(|r| r.n_checked).sum::<usize>(),
+        rows.iter().map(|r| r.n_robots).sum::<usize>(),
+    );
+    out += &reasons("\nFree in seen space, and not called free:", &all, &|p: &PathRow| {
+        p.truth == True::Free && !free(p)
+    });
+    out += &reasons("\nNot all seen, and called near or blocked:", &all, &|p: &PathRow| {
+        p.truth == True::Unseen && p.is_wolf()
+    });
+    let missed = all.iter().filter(|p| p.truth == True::Collides && free(p));
+    for path in missed {
+        let _ = writeln!(out, "MISSED: {}", path.line());
+    }
+    for row in rows.iter().filter(|r| r.failed.is_some()) {
+        let _ = writeln!(out, "- {}: {}", row.seed, row.failed.as_deref().unwrap_or_default());
+    }
+    out
+}
+
+/// Paths of a kind by what was said of them.
+fn reasons(head: &str, all: &[&PathRow], is: &dyn Fn(&PathRow) -> bool) -> String {
+    let mut counts = std::collections::BTreeMap::new();
+    for path in all.iter().filter(|p| is(p)) {
+        *counts.entry(format!("{}: {}", path.outcome, path.why())).or_insert(0_usize) += 1;
+    }
+    if counts.is_empty() {
+        return String::new();
+    }
+    let mut sorted: Vec<_> = counts.into_iter().collect();
+    sorted.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    let lines: String = sorted.iter().map(|(why, n)| format!("- {n} × {why}\n")).collect();
+    format!("{head}\n\n{lines}")
+}
+
+/// One line a path.
+pub(super) fn csv(rows: &[Row]) -> String {
+    let mut out =
+        String::from("seed,path,robot,model,drawn,truth,gap_m,nearest,outcome,doubts,contacts\n");
+    for row in rows {
+        for (at, p) in row.paths.iter().enumerate() {
+            let _ = writeln!(
+                out,
+                "{},{at},{},{},{:?},{:?},{:.4},\"{}\",{},{},\"{}\"",
+                row.seed,
+                p.robot,
+                p.model,
+                p.drawn,
+                p.truth,
+                p.gap,
+                p.nearest,
+                p.outcome,
+                p.doubts.join(" "),
+                p.contacts.join("; "),
+            );
+        }
+    }
+    out
+}

@@ -1,0 +1,291 @@
+//! The bodies of a scene and one of its robots in; how far that robot keeps from all else along a path, and whether its scanners saw
+//! the space that it goes through, out: from meshes alone, without scans.
+
+use contract::{Result, SpaceGrid};
+use geometry::{Aabb, Point, Pose};
+use glamx::Vec3;
+use nalgebra::Point3;
+use parry3d::partitioning::BvhNode;
+use parry3d::query;
+use parry3d::shape::{TriMesh, Triangle};
+use robot::Model;
+use simulate::{Scene, Shape, Shapes};
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+/// Distances are told up to this, metres: farther is far.
+pub(super) const FAR: f64 = 0.1;
+/// Nearer than this bodies touch, metres: rounding of single precision in a hall.
+pub(super) const TOUCH: f64 = 5e-4;
+/// No point moves farther from one posture that is looked at to the next, metres, wherever something is near.
+const STEP: f64 = 2e-3;
+/// Distance of the places that are asked whether they were seen, metres; finer than the voxels that the product tells space by.
+const SAMPLE: f64 = 0.04;
+/// Postures that are asked so are so far apart, metres.
+const SEEN_STEP: f64 = 0.02;
+/// Edge of the voxels that tell what the robot filled as it was scanned, metres, and the distance of the places that mark them.
+const OWN_EDGE: f64 = 0.02;
+const OWN_SAMPLE: f64 = 0.008;
+/// Farthest that the virtual scanners measure, metres.
+const RANGE: f64 = 80.0;
+
+/// A body that moves with a link, in its frame.
+struct Part {
+    link: usize,
+    mesh: TriMesh,
+    bounds: Aabb,
+    /// Places on its surface, and outward normals.
+    samples: Vec<(Point, geometry::Vector)>,
+}
+
+/// A robot of a scene among all else.
+pub(super) struct Truth<'a> {
+    model: &'a Model,
+    world_from_base: Pose,
+    parts: Vec<Part>,
+    standing: TriMesh,
+    /// Index of the shape of each triangle of what stands.
+    of: Vec<u32>,
+    shapes: &'a Shapes,
+    /// Where scanners stand, with their elevations, radians.
+    scanners: Vec<(Point, [f64; 2])>,
+    own: (SpaceGrid, Vec<bool>),
+}
+
+/// How near a path comes to something.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Nearest {
+    /// Metres; no more than [`FAR`].
+    pub(super) gap: f64,
+    /// To what; nothing where it is far.
+    pub(super) name: String,
+    /// Which part.
+    pub(super) link: usize,
+    /// Where on the way, 0 to 1.
+    pub(super) at: f64,
+}
+
+impl<'a> Truth<'a> {
+    /// Of the robot of this index, as it stands in the scene.
+    pub(super) fn new(
+        scene: &Scene,
+        shapes: &'a Shapes,
+        (robot, model, posture): (usize, &'a Model, &[f64]),
+    ) -> Result<Self> {
+        let world_from_base = scene.robots[robot].world_from_base();
+        let poses = placed(model, &world_from_base, posture);
+        let moves = model.moving();
+        let is_own = |s: &&Shape| s.robot == Some(robot);
+        let own = shapes.all.iter().filter(is_own).filter_map(|s| Some((s.link?, s)));
+        let parts = own.clone().filter(|(link, _)| moves[*link]);
+        let parts: Vec<Part> =
+            parts.filter_map(|(link, shape)| Part::of(link, shape, &poses[link])).collect();
+        let (mut corners, mut triangles, mut of) = (Vec::new(), Vec::new(), Vec::new());
+        for (at, shape) in shapes.all.iter().enumerate().filter(|(_, s)| !is_own(s)) {
+            for t in &shape.triangles {
+                let first = corners.len() as u32;
+                corners.extend(t.map(Vec3::from_array));
+                triangles.push([first, first + 1, first + 2]);
+                of.push(at as u32);
+            }
+        }
+        let bad = |_| contract::Error::bad_input("nothing stands around the robot");
+        let standing = TriMesh::new(corners, triangles).map_err(bad)?;
+        let scanners = scene.scanners.iter().map(|s| {
+            let dome = s.raster.elevation_deg.map(f64::to_radians);
+            (Point::from(s.position), dome)
+        });
+        let own = filled(own.map(|(_, shape)| shape));
+        let scanners = scanners.collect();
+        Ok(Self { model, world_from_base, parts, standing, of, shapes, scanners, own })
+    }
+
+    /// How near a posture is to something, no farther than so, metres.
+    pub(super) fn gap(&self, posture: &[f64], within: f64) -> Nearest {
+        let poses = placed(self.model, &self.world_from_base, posture);
+        let mut best = Nearest { gap: within, ..Nearest::default() };
+        for part in &self.parts {
+            if let Some((gap, triangle)) = self.nearest(part, &poses[part.link], best.gap) {
+                let name = self.shapes.all[self.of[triangle as usize] as usize].name.clone();
+                best = Nearest { gap, name, link: part.link, at: 0.0 };
+            }
+        }
+        best
+    }
+
+    /// The nearest triangle to a part, where one is nearer than that.
+    fn nearest(&self, part: &Part, world_from_link: &Pose, within: f64) -> Option<(f64, u32)> {
+        let (best, link_from_world) = (Cell::new(within as f32), world_from_link.inverse());
+        let turn = link_from_world.rotation.to_rotation_matrix().into_inner().map(f64::abs);
+        let is_near = |node: &BvhNode| {
+            let (low, high) = (node.mins().to_array(), node.maxs().to_array());
+            let half: [f64; 3] = std::array::from_fn(|i| 0.5 * f64::from(high[i] - low[i]));
+            let middle: [f64; 3] = std::array::from_fn(|i| 0.5 * f64::from(high[i] + low[i]));
+            let middle = link_from_world * Point::from(middle);
+            let half = turn * geometry::Vector::from(half);
+            let reach = f64::from(best.get());
+            (0..3).all(|i| {
+                middle[i] + half[i] + reach >= part.bounds.min[i]
+                    && middle[i] - half[i] - reach <= part.bounds.max[i]
+            })
+        };
+        let mut found = None;
+        for at in self.standing.bvh().leaves(is_near) {
+            let corner = |p: Vec3| {
+                let p = link_from_world * Point::from(p.to_array().map(f64::from));
+                Vec3::new(p.x as f32, p.y as f32, p.z as f32)
+            };
+            let t = self.standing.triangle(at);
+            let t = Triangle::new(corner(t.a), corner(t.b), corner(t.c));
+            if let Some(gap) = apart(&part.mesh, &t, best.get()) {
+                best.set(gap);
+                found = Some((f64::from(gap), at));
+            }
+        }
+        found
+    }
+
+    /// The nearest that a path comes to something: joints go straight from one posture to another.
+    pub(super) fn along(&self, from: &[f64], to: &[f64]) -> Nearest {
+        let n = self.n_steps(from, to, STEP);
+        let mut best = Nearest { gap: FAR, ..Nearest::default() };
+        let mut step = 0;
+        while step <= n {
+            let at = step as f64 / n as f64;
+            let now = self.gap(&between(from, to, at), FAR);
+            if now.gap < best.gap {
+                best = Nearest { at, ..now.clone() };
+            }
+            if now.gap <= TOUCH {
+                break;
+            }
+            // No part gets nearer than what it moves.
+            let skip = ((now.gap - best.gap.min(0.5 * FAR)) / STEP).floor().max(1.0);
+            step += skip as usize;
+        }
+        best
+    }
+
+    /// Whether scanners saw all space that the robot goes through, and so far around it, metres, but for what it filled itself as it was
+    /// scanned: a beam can go there, and ends on something.
+    pub(super) fn is_seen(&self, from: &[f64], to: &[f64], around: f64) -> bool {
+        let n = self.n_steps(from, to, SEEN_STEP);
+        (0..=n).all(|step| {
+            let posture = between(from, to, step as f64 / n as f64);
+            let poses = placed(self.model, &self.world_from_base, &posture);
+            self.parts.iter().all(|part| {
+                let pose = &poses[part.link];
+                part.samples.iter().all(|(p, out)| {
+                    let p = pose * p;
+                    let beyond = p + (pose * out) * around;
+                    self.is_known(&p) && self.is_known(&beyond)
+                })
+            })
+        })
+    }
+
+    fn is_known(&self, p: &Point) -> bool {
+        let (grid, filled) = &self.own;
+        if grid.index(p.coords.into()).is_some_and(|at| filled[at]) {
+            return true;
+        }
+        self.scanners.iter().any(|(eye, dome)| {
+            let way = p - eye;
+            let rise = way.z.atan2(way.xy().norm());
+            rise > dome[0]
+                && rise < dome[1]
+                && self.shapes.sees(eye, p)
+                && self.shapes.ends(eye, p, RANGE)
+        })
+    }
+
+    /// Steps between two postures in which no point moves farther than so, metres.
+    fn n_steps(&self, from: &[f64], to: &[f64], most: f64) -> usize {
+        /// Arcs in a step are short: chords tell their lengths.
+        const COARSE: usize = 64;
+        let corners = |k: usize| -> Vec<Point> {
+            let posture = between(from, to, k as f64 / COARSE as f64);
+            let poses = placed(self.model, &self.world_from_base, &posture);
+            let own = self.parts.iter();
+            own.flat_map(|p| p.bounds.corners().map(|c| poses[p.link] * Point::from(c))).collect()
+        };
+        let all: Vec<Vec<Point>> = (0..=COARSE).map(corners).collect();
+        let ways = all.windows(2).flat_map(|w| w[0].iter().zip(&w[1]).map(|(a, b)| (b - a).norm()));
+        let longest = ways.fold(0.0, f64::max);
+        ((longest * COARSE as f64 / most).ceil() as usize).max(1)
+    }
+}
+
+impl Part {
+    fn of(link: usize, shape: &Shape, world_from_link: &Pose) -> Option<Self> {
+        let link_from_world = world_from_link.inverse();
+        let inner = |p: &[f32; 3]| {
+            (link_from_world * Point::from(p.map(f64::from))).coords.map(|v| v as f32)
+        };
+        let corners: Vec<Vec3> =
+            shape.triangles.iter().flatten().map(|p| Vec3::from_array(inner(p).into())).collect();
+        let bounds = Aabb::of(corners.iter().map(|p| p.to_array().map(f64::from)));
+        let triangles: Vec<[u32; 3]> =
+            (0..shape.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let thin = |p: &Point| [p.x, p.y, p.z].map(|v| (v / SAMPLE).floor() as i32);
+        let mut samples = BTreeMap::new();
+        for t in corners.chunks_exact(3) {
+            let normal = (t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero().to_array();
+            let normal = geometry::Vector::from(normal.map(f64::from));
+            places(&[t[0], t[1], t[2]], 0.5 * SAMPLE, |p| {
+                samples.entry(thin(&p)).or_insert((p, normal));
+            });
+        }
+        let samples = samples.into_values().collect();
+        Some(Self { link, mesh: TriMesh::new(corners, triangles).ok()?, bounds, samples })
+    }
+}
+
+/// What bodies fill: their surfaces, and what these enclose.
+fn filled<'s>(shapes: impl Iterator<Item = &'s Shape>) -> (SpaceGrid, Vec<bool>) {
+    let mut all = Vec::new();
+    for t in shapes.flat_map(|s| &s.triangles) {
+        places(&t.map(Vec3::from_array), OWN_SAMPLE, |p| all.push(p));
+    }
+    let bounds = Aabb::of(all.iter().map(|p| p.coords.into()));
+    let grid = SpaceGrid::over(&bounds.grown(2.0 * OWN_EDGE), OWN_EDGE);
+    let mut filled = vec![false; grid.size.iter().product()];
+    let surface: Vec<usize> = all.iter().filter_map(|p| grid.index(p.coords.into())).collect();
+    surface.iter().for_each(|at| filled[*at] = true);
+    grid.enclosed(&bounds, &surface).into_iter().for_each(|at| filled[at] = true);
+    (grid, filled)
+}
+
+/// Places on a triangle, about so far apart, metres.
+fn places([a, b, c]: &[Vec3; 3], apart: f64, mut take: impl FnMut(Point)) {
+    let longest = (*b - *a).length().max((*c - *a).length()).max((*c - *b).length());
+    let n = (f64::from(longest) / apart).ceil().max(1.0) as usize;
+    for i in 0..=n {
+        for j in 0..=n - i {
+            let (u, v) = (i as f32 / n as f32, j as f32 / n as f32);
+            let p = *a + (*b - *a) * u + (*c - *a) * v;
+            take(Point3::from(p.to_array().map(f64::from)));
+        }
+    }
+}
+
+/// How far a triangle is from a mesh, where it is nearer than that; both in one frame, metres.
+fn apart(mesh: &TriMesh, t: &Triangle, within: f32) -> Option<f32> {
+    let (low, high) = (t.a.min(t.b).min(t.c), t.a.max(t.b).max(t.c));
+    let gap = |node: &BvhNode, _: f32| {
+        let off = (low - node.maxs()).max(node.mins() - high).max(Vec3::ZERO);
+        off.length()
+    };
+    let here = parry3d::math::Pose::IDENTITY;
+    let leaf = |at: u32, _: f32| query::distance(&here, &mesh.triangle(at), &here, t).ok();
+    mesh.bvh().find_best(within, gap, leaf).map(|(_, found)| found.distance)
+}
+
+fn placed(model: &Model, world_from_base: &Pose, posture: &[f64]) -> Vec<Pose> {
+    model.poses(posture).iter().map(|p| world_from_base * p).collect()
+}
+
+/// The posture at a share of the way.
+pub(super) fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
+    from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect()
+}

@@ -1,0 +1,167 @@
+//! Points around a robot in; those of them that are evidence of something, out.
+//!
+//! A scan has strays: a beam that ends half on an edge and half behind it gives a point between the two, where nothing is, and a mask
+//! leaves some points of a robot to the fixed world. A point counts where others tell of the same surface, or of the same line, as
+//! those of a wire do. One that has neither, in space that beams went through, is evidence of nothing.
+
+use crate::obstacles::{Obstacle, What, distance};
+use contract::{Space, SpaceKind};
+use geometry::{Point, Pose};
+use rustc_hash::FxHashMap;
+
+/// Neighbours on a surface are this near, metres: the edge of the voxels that space is told by.
+const NEAR: f32 = 0.05;
+/// With so many neighbours a point is of a surface …
+const ENOUGH: usize = 8;
+/// … or with this share of what half of all points have, where scans are sparse.
+const SHARE: f64 = 0.125;
+/// Neighbours on a line are this near, metres: beams as far apart as 15 mm meet a wire of 4 mm four times on twice that way.
+const ALONG: f32 = 0.15;
+/// A line is this thick, metres: wires, a scanner's noise, and the edge of a cell.
+const ACROSS: f32 = 0.010;
+/// So many others make a line.
+const ON_LINE: usize = 3;
+/// Of the six voxels beside that of a point so many may be unknown where its surroundings count as seen.
+const UNKNOWN: usize = 2;
+
+/// Obstacles by the cubes of edge [`NEAR`] that they lie in.
+struct Cubes<'a> {
+    all: &'a [Obstacle],
+    cubes: FxHashMap<[i32; 3], Vec<u32>>,
+}
+
+/// For each obstacle: whether it is evidence of something. Without space nothing is known to be seen, and all of them are.
+pub(crate) fn evident(
+    all: &[Obstacle],
+    space: Option<&Space>,
+    world_from_base: &Pose,
+) -> Vec<bool> {
+    let mut out = vec![true; all.len()];
+    let Some(space) = space else { return out };
+    let cubes = Cubes::of(all);
+    let enough = cubes.enough();
+    for (at, o) in all.iter().enumerate() {
+        // Of floors and other robots more is known than single points.
+        if !matches!(o.what, What::Fixed | What::Uncertain) {
+            continue;
+        }
+        out[at] = cubes.n_near(o, enough) >= enough
+            || cubes.is_on_line(at)
+            || !is_seen(space, &(world_from_base * Point::from(o.at.map(f64::from))));
+    }
+    out
+}
+
+impl<'a> Cubes<'a> {
+    fn of(all: &'a [Obstacle]) -> Self {
+        let mut cubes: FxHashMap<[i32; 3], Vec<u32>> = FxHashMap::default();
+        for (at, o) in all.iter().enumerate() {
+            cubes.entry(cube(o.at)).or_default().push(at as u32);
+        }
+        Self { all, cubes }
+    }
+
+    /// Obstacles of the cubes about a place, so many cubes away on each axis.
+    fn around(&self, at: [f32; 3], n: i32) -> impl Iterator<Item = u32> + '_ {
+        let [x, y, z] = cube(at);
+        let side = 2 * n + 1;
+        (0..side * side * side).flat_map(move |i| {
+            let by = [i % side - n, i / side % side - n, i / (side * side) - n];
+            self.cubes.get(&[x + by[0], y + by[1], z + by[2]]).into_iter().flatten().copied()
+        })
+    }
+
+    /// Neighbours of an obstacle, itself not counted, as far as `most`.
+    fn n_near(&self, o: &Obstacle, most: usize) -> usize {
+        let near = self.around(o.at, 1).filter(|i| distance(self.all[*i as usize].at, o.at) < NEAR);
+        near.take(most + 1).count().saturating_sub(1)
+    }
+
+    /// Neighbours that make a surface, here.
+    fn enough(&self) -> usize {
+        /// Points that are asked: enough for a median.
+        const ASKED: usize = 2000;
+        let step = self.all.len() / ASKED + 1;
+        let most = (ENOUGH as f64 / SHARE) as usize;
+        let mut n: Vec<usize> =
+            self.all.iter().step_by(step).map(|o| self.n_near(o, most)).collect();
+        n.sort_unstable();
+        let median = n.get(n.len() / 2).copied().unwrap_or(0);
+        ((median as f64 * SHARE) as usize).clamp(1, ENOUGH)
+    }
+
+    /// Whether enough others lie on a line through an obstacle.
+    fn is_on_line(&self, at: usize) -> bool {
+        let here = self.all[at].at;
+        let reach = (ALONG / NEAR).ceil() as i32;
+        let off =
+            |i: u32| -> [f32; 3] { std::array::from_fn(|k| self.all[i as usize].at[k] - here[k]) };
+        let length = |v: [f32; 3]| v.iter().map(|v| v * v).sum::<f32>().sqrt();
+        let near: Vec<[f32; 3]> = (self.around(here, reach))
+            .filter(|i| *i as usize != at)
+            .map(off)
+            .filter(|v| length(*v) < ALONG)
+            .collect();
+        // Those that are too near tell no direction.
+        near.iter().filter(|v| length(**v) > 2.0 * ACROSS).any(|v| {
+            let unit = v.map(|c| c / length(*v));
+            let across = |w: &&[f32; 3]| {
+                let along = (0..3).map(|k| w[k] * unit[k]).sum::<f32>();
+                length(std::array::from_fn(|k| w[k] - along * unit[k])) < ACROSS
+            };
+            near.iter().filter(across).count() >= ON_LINE
+        })
+    }
+}
+
+fn cube(at: [f32; 3]) -> [i32; 3] {
+    at.map(|v| (v / NEAR).floor() as i32)
+}
+
+/// Whether beams went through the space beside a place of the world.
+fn is_seen(space: &Space, p: &Point) -> bool {
+    let grid = space.grid();
+    let is_unknown = |k: &usize| {
+        let mut beside: [f64; 3] = p.coords.into();
+        beside[k / 2] += if k % 2 == 0 { grid.edge } else { -grid.edge };
+        grid.index(beside).is_none_or(|at| space.voxels()[at] == SpaceKind::Unknown)
+    };
+    (0..6).filter(is_unknown).count() <= UNKNOWN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::SpaceGrid;
+    use geometry::Aabb;
+
+    fn told(points: &[[f32; 3]], kind: SpaceKind) -> Vec<bool> {
+        // A wall 1 cm between points, far from all else, says how dense scans are.
+        let wall = (0..2500).map(|i| [1.0, 0.01 * (i % 50) as f32, 0.01 * (i / 50) as f32]);
+        let obstacle = |at| Obstacle { at, radius: 0.0035, what: What::Fixed };
+        let all: Vec<Obstacle> = points.iter().copied().chain(wall).map(obstacle).collect();
+        let bounds = Aabb { min: [-1.5; 3], max: [1.5; 3] };
+        let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
+        space.voxels_mut().fill(kind);
+        let out = evident(&all, Some(&space), &Pose::identity());
+        assert!(out[points.len()..].iter().all(|is| *is), "the wall stands");
+        out[..points.len()].to_vec()
+    }
+
+    #[test]
+    fn strays_in_seen_space_are_evidence_of_nothing() {
+        let strays = [[0.0, 0.0, 0.0], [0.03, 0.02, -0.02], [-0.02, 0.05, 0.05], [0.3, 0.3, 0.1]];
+        assert_eq!(told(&strays, SpaceKind::Free), [false; 4]);
+        // Where no beam went through, each of them may be something.
+        assert_eq!(told(&strays, SpaceKind::Unknown), [true; 4]);
+    }
+
+    #[test]
+    fn a_wire_that_few_beams_met_stays() {
+        // 4 cm between points, and a noise of 3 mm.
+        let noise = |i: usize| [0.003, -0.002, 0.001, -0.003][i % 4];
+        let wire: Vec<[f32; 3]> =
+            (0..9).map(|i| [noise(i), noise(i + 1), 0.04 * i as f32 - 0.16]).collect();
+        assert_eq!(told(&wire, SpaceKind::Free), [true; 9]);
+    }
+}
