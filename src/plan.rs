@@ -213,6 +213,7 @@ impl Run<'_> {
             inputs: sources.inputs.clone(),
             masks: sources.masks.clone(),
             scans: sources.scans.clone(),
+            frames: Vec::new(),
             tiles: tiles.to_vec(),
             floor: floor.clone(),
             fits,

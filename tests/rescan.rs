@@ -10,7 +10,7 @@ use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
 use stillpoint::job::{Given, Job, Means};
 use stillpoint::plan;
-use stillpoint::rescan::{Cell, Request, rescan};
+use stillpoint::rescan::{Cell, Frame, Request, rescan};
 use stillpoint::reuse::{Manifest, check};
 use stillpoint::scanning::{Formats, scan_scene};
 
@@ -65,7 +65,8 @@ impl Plant {
     }
 
     fn request(&self, base: &str, out: &str) -> Request {
-        Request { base: self.path(base), cell: Cell::Seen, job: self.job("now", out) }
+        let (base, job) = (self.path(base), self.job("now", out));
+        Request { base, cell: Cell::Seen, frame: Frame::Find, job }
     }
 
     fn run(&self, args: &[&str]) -> Output {

@@ -10,6 +10,7 @@ mod cell;
 pub mod check;
 mod condition;
 mod draw;
+pub mod frames;
 mod growth;
 mod labels;
 mod limits;

@@ -2,6 +2,7 @@
 //! invented, and its time beside a run of the whole, out.
 
 use super::cases::{Case, CaseRow, Cases};
+use super::frames::{Suite, frames};
 use super::robots_of;
 use super::watch::{command, watch};
 use crate::compare::{Agreement, Found, RobotAgreement};
@@ -41,6 +42,8 @@ pub struct RescanBench {
     pub out: Option<PathBuf>,
     /// Keep scenes, scans and results.
     pub keep: bool,
+    /// What is drawn.
+    pub suite: Suite,
     /// Do the main job on the new scans alone, too, to compare with.
     pub alone: bool,
 }
@@ -78,6 +81,9 @@ struct Row {
 
 /// Runs the cases; returns the table.
 pub fn rescans(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {
+    if bench.suite != Suite::Same {
+        return frames(bench, means, engine);
+    }
     let temporary = tempfile::tempdir()?;
     let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
     let quiet = engine.quiet();

@@ -60,6 +60,7 @@ pub(super) fn bench_rescan(flags: &RescanBenchFlags, common: &Common, say: &Say)
         out: flags.out.clone(),
         keep: flags.keep,
         alone: flags.alone,
+        suite: flags.suite,
     };
     say.result(&rescans(&bench, &means, &engine)?);
     Ok(exit::OK)

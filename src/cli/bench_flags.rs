@@ -1,5 +1,6 @@
 //! Commands and flags of `bench`, as `clap` knows them.
 
+use crate::bench::frames::Suite;
 use crate::bench::throughput::Scanned;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -94,6 +95,9 @@ pub(super) struct RescanBenchFlags {
     /// Keep scans and results
     #[arg(long, requires = "out")]
     pub(super) keep: bool,
+    /// Plants in one frame, new scans in frames that are drawn, or lines of equal cells in such frames
+    #[arg(long, value_enum, value_name = "WHICH", default_value = "same")]
+    pub(super) suite: Suite,
     /// Do the main job on the new scans alone, too, to compare with
     #[arg(long)]
     pub(super) alone: bool,

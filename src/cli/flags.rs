@@ -136,6 +136,10 @@ pub(super) struct RescanFlags {
         conflicts_with = "robot"
     )]
     pub(super) cell: Vec<f64>,
+    /// Where the new scans are: "same", their frame is the plant's; or about where the first new scanner stands in the plant,
+    /// metres, and how far the new frame is turned, degrees (else found by surfaces, and refused where that is not clear)
+    #[arg(long, value_name = "X,Y,Z,YAW", allow_hyphen_values = true)]
+    pub(super) frame: Option<String>,
     /// The cell is what these robots of the earlier run reach
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     pub(super) robot: Vec<String>,

@@ -4,7 +4,7 @@ use super::flags::{Common, PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;
 use crate::engine::Engine;
 use crate::estimate::{estimate, with_missing};
-use crate::rescan::{self, Cell, Request};
+use crate::rescan::{self, Cell, Frame, Request};
 use crate::{exit, job::Job, lenient};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
@@ -37,6 +37,7 @@ pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<
     let request = Request {
         base: flags.base.clone(),
         cell: cell(flags)?,
+        frame: frame(flags.frame.as_deref())?,
         job: Job {
             scanners: common.scanners(&means),
             ..Job::new(
@@ -66,6 +67,22 @@ fn cell(flags: &RescanFlags) -> Result<Cell> {
             let what = "--cell takes six numbers, the least corner first";
             Err(Error::new(Kind::Usage, what).hint("for example --cell 2,1,0,8,6,4"))
         }
+    }
+}
+
+fn frame(wish: Option<&str>) -> Result<Frame> {
+    let numbers = |text: &str| {
+        let all: Vec<f64> = text.split(',').map_while(|v| v.trim().parse().ok()).collect();
+        let is_place = all.iter().all(|v: &f64| v.is_finite()) && text.split(',').count() == 4;
+        <[f64; 4]>::try_from(all).ok().filter(|_| is_place)
+    };
+    match wish {
+        None => Ok(Frame::Find),
+        Some("same") => Ok(Frame::Stated),
+        Some(text) => numbers(text).map(Frame::Rough).ok_or_else(|| {
+            let what = "--frame takes \"same\", or four numbers: x, y, z in metres, yaw in degrees";
+            Error::new(Kind::Usage, what).hint("for example --frame 12.5,-3.0,1.6,90")
+        }),
     }
 }
 

@@ -63,7 +63,10 @@ impl Base {
     pub(crate) fn store(&self, output: &OutputDir, resident_bytes: usize) -> Result<Store> {
         let open = |(input, key): (usize, &crate::reuse::Key)| {
             let place = output.tiles().join(key.name());
-            Store::open(&place, self.state.first_scan(input), resident_bytes)
+            let mut store = Store::open(&place, self.state.first_scan(input), resident_bytes)?;
+            let frame = self.state.frames.get(input).and_then(Option::as_ref);
+            frame.into_iter().for_each(|motion| store.carry(motion));
+            Ok(store)
         };
         let stores: Result<Vec<Store>> = self.state.tiles.iter().enumerate().map(open).collect();
         Ok(Store::join(stores?))

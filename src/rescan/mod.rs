@@ -2,6 +2,7 @@
 //! and what changed, out. What the new scans do not touch is shared with the earlier result, byte for byte.
 
 mod base;
+mod carry;
 mod exchanged;
 mod fate;
 mod newcomers;
@@ -17,6 +18,8 @@ mod spaces;
 mod state;
 mod write;
 
+pub use carry::Frame;
+
 pub(crate) use base::tiles_of;
 pub(crate) use robots::models_of;
 pub(crate) use state::{Records, State};
@@ -30,7 +33,7 @@ use crate::search::Shelf;
 use crate::store::Store;
 use base::Base;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
-use geometry::Aabb;
+use geometry::{Aabb, Pose};
 use ingest::{Scanners, Sources};
 use past::Past;
 use robot::Library;
@@ -45,6 +48,8 @@ pub struct Request {
     pub base: PathBuf,
     /// Which part of the plant.
     pub cell: Cell,
+    /// Which frame the new scans are in.
+    pub frame: Frame,
     /// The new scans, where the result goes, and the means; the library is that of the base where its path is empty.
     pub job: Job,
 }
@@ -68,13 +73,12 @@ pub fn rescan(request: &Request, engine: &Engine) -> Result<Outcome> {
     let base = Base::open(&request.base)?;
     let job = job(request, &base)?;
     let output = job.output()?;
-    let digests = Digests::of(&job, &output, engine)?
-        .after(base.state.inputs.len(), format!("{} {:?}", base.digest, request.cell));
+    let digests =
+        Digests::of(&job, &output, engine)?.after(base.state.inputs.len(), asked(request, &base));
     if let Some(manifest) = digests.unchanged(&job, &output)? {
         return Ok(manifest.outcome());
     }
-    Rescan { base: &base, job: &job, output: &output, digests: &digests, engine }
-        .whole(&request.cell)
+    Rescan { base: &base, job: &job, output: &output, digests: &digests, engine }.whole(request)
 }
 
 /// A rescan that has something to do.
@@ -88,7 +92,7 @@ struct Rescan<'a> {
 }
 
 impl Rescan<'_> {
-    fn whole(&self, cell: &Cell) -> Result<Outcome> {
+    fn whole(&self, request: &Request) -> Result<Outcome> {
         let &Rescan { base, job, output, digests, engine } = self;
         let settings = &job.means.settings;
         base.share_store(output)?;
@@ -96,19 +100,21 @@ impl Rescan<'_> {
         let (library, mut sources) = self.given(&shelved)?;
 
         // The new scans into tiles; those of the plant are there.
-        let filling = Filling::new(&sources, &job.means, output.tiles(), engine);
-        let filled = sources.opened().iter().map(|i| filling.tiles_of(i, digests));
-        let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
-        let n_kept = filling.n_kept();
-        sources.opened().iter().try_for_each(|input| fresh(input, base, digests))?;
-        let (old, new) = (base.store(output, job.means.store_bytes())?, Store::join(stores));
+        let (tiles, mut new, n_kept) = self.tiles(&sources)?;
+        let old = base.store(output, job.means.store_bytes())?;
 
-        // Where the cell is, and how far the new scans are off what stood there: they are taken back by that.
+        // Which frame the new scans are in: they are carried into that of the plant.
         let mut fits = base.state.fits.clone();
         let mut models = robots::models_of(&mut fits, &library)?;
-        let cell = session::bounds(cell, base, (&fits, &models), (&sources, &new))?;
         let scans = base.state.scans.clone();
-        let past = Past::new(base, &scans, &old, cell)?;
+        let past = Past::new(base, &scans, &old, Aabb::EMPTY)?;
+        let stood = session::stood((&fits, &models));
+        let carried =
+            carry::carry(&request.frame, (&past, stood), (&mut sources, &mut new), engine)?;
+
+        // Where the cell is, and how far the new scans are off what stood there: they are taken back by that.
+        let cell = session::bounds(&request.cell, base, (&fits, &models), (&sources, &new))?;
+        let past = past.of_cell(cell);
         let shelf = Shelf::new(&library.models);
         let names = session::known((&fits, &models), &cell);
         let floor = (&base.state.floor, robots::hang(&fits, &past.cell));
@@ -130,19 +136,30 @@ impl Rescan<'_> {
 
         // New masks and records of the new scans, tiles of the cell anew, all the rest as it was.
         let (session, robots) = (&session, &robots);
-        let found =
-            Written { base, session, robots, labels: &labels, models: &models, fits: &fits };
+        let (labels, models) = (&labels, &models);
+        let carried = &carried;
+        let found = Written { base, session, robots, labels, models, fits: &fits, carried };
         let written = found.write(&registered, (output, digests), engine)?;
         let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
         let mut outcome = written.outcome;
-        self.conclude((fits, robots), (&sources, &all), (&outcome, written.known))?;
+        let frame = carried.plant_from_new;
+        self.conclude((fits, robots), (&sources, &all, frame), (&outcome, written.known))?;
         output.prune_tiles(&all, &shelved);
-        outcome.reused = reuse::said(&[
-            ("models", shelved.n_kept()),
-            ("tiles of new scans", n_kept),
-            ("files of the earlier result", written.n_shared),
-        ]);
+        let (models, shared) = (shelved.n_kept(), written.n_shared);
+        let tiles = ("tiles of new scans", n_kept);
+        outcome.reused =
+            reuse::said(&[("models", models), tiles, ("files of the earlier result", shared)]);
         Ok(outcome)
+    }
+
+    /// The tiles of the new scans: keys of their folders, one store of all, and how many were there already.
+    fn tiles(&self, sources: &Sources) -> Result<(Vec<Key>, Store, [usize; 2])> {
+        let &Rescan { base, job, output, digests, engine } = self;
+        let filling = Filling::new(sources, &job.means, output.tiles(), engine);
+        let filled = sources.opened().iter().map(|i| filling.tiles_of(i, digests));
+        let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
+        sources.opened().iter().try_for_each(|input| fresh(input, base, digests))?;
+        Ok((tiles, Store::join(stores), filling.n_kept()))
     }
 
     /// Reads the library, and opens the new scans behind those of the base.
@@ -164,7 +181,7 @@ impl Rescan<'_> {
     fn conclude(
         &self,
         (mut fits, robots): (Vec<Fit>, &Robots),
-        (sources, tiles): (&Sources, &[Key]),
+        (sources, tiles, frame): (&Sources, &[Key], Option<Pose>),
         (outcome, known): (&Outcome, Vec<OutputFile>),
     ) -> Result<()> {
         let &Rescan { base, job, output, digests, engine } = self;
@@ -173,7 +190,11 @@ impl Rescan<'_> {
         for i in (0..base.state.fits.len()).filter(stays) {
             fits[i].clone_from(&base.state.fits[i]);
         }
+        let mut frames = base.state.frames.clone();
+        frames.resize(base.state.inputs.len(), None);
+        frames.resize(sources.inputs.len(), frame);
         let state = State {
+            frames,
             inputs: sources.inputs.clone(),
             masks: sources.masks.clone(),
             scans: sources.scans.clone(),
@@ -185,6 +206,15 @@ impl Rescan<'_> {
         state.write(output.next())?;
         reuse::publish(job, (output, digests), (outcome, known), engine)
     }
+}
+
+/// What a rescan is asked for beside its inputs and settings, for its digest.
+fn asked(request: &Request, base: &Base) -> String {
+    let frame = match request.frame {
+        Frame::Find => String::new(),
+        other => format!(" {other:?}"),
+    };
+    format!("{} {:?}{frame}", base.digest, request.cell)
 }
 
 /// The job with the base's library and ways of writing.

@@ -72,6 +72,11 @@ impl<'a> Past<'a> {
         Ok(Self { scans, store, cell, masks, before, n_points, tiles: store.touching(&cell) })
     }
 
+    /// The same with another cell.
+    pub(crate) fn of_cell(self, cell: Aabb) -> Self {
+        Self { cell, tiles: self.store.touching(&cell), ..self }
+    }
+
     /// The surfaces of what stood there.
     pub(crate) fn surfaces(&self, engine: &Engine) -> Result<Surfaces> {
         let (skip, step) = sampled((self.n_points() / N_SAMPLED).max(SAMPLE));
@@ -136,6 +141,11 @@ impl<'a> Past<'a> {
     /// Voxels of robots that the earlier result missed: what the new scans see through of them is gone.
     pub(crate) fn missed(compared: &Compared) -> impl Iterator<Item = &[i32; 3]> {
         compared.tiles.iter().flat_map(|tile| &tile.missed)
+    }
+
+    /// Whether a place of a mask was superseded before.
+    pub(crate) fn was_superseded(&self, mask: MaskId, place: u64) -> bool {
+        self.before[mask.0 as usize].binary_search(&place).is_ok()
     }
 
     /// How many of one mask were superseded before.

@@ -34,6 +34,7 @@ pub(crate) fn body() -> Vec<u8> {
         masks: vec![Mask { id: mask, input, name: "a.las".into(), n_points: Some(7) }],
         scans: vec![scan],
         tiles: vec![crate::reuse::Key::of("tiles", &["a"])],
+        frames: vec![Some(Pose::identity())],
         floor: Floor::default(),
         fits: vec![Fit { score: 0.7, ..Fit::default() }],
         robots: "robots".into(),

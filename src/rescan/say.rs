@@ -9,8 +9,8 @@ use crate::report::{id, input_entry, robot_entry};
 use crate::reuse::Digests;
 use contract::{Error, Kind, Result, quote};
 use export::{
-    ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
-    draw_changes, write_table,
+    CarriedEntry, ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile,
+    ScanLabels, draw_changes, write_table,
 };
 use merge::{Registration, Thing, ThingChange, Unseen};
 use serde_json::json;
@@ -46,6 +46,7 @@ impl Said<'_, '_> {
             "schema": "stillpoint.changes/1",
             "base": self.found.base.out.display().to_string(),
             "cell": result.rescan.as_ref().map(|r| r.cell),
+            "frame": result.rescan.as_ref().and_then(|r| r.frame.as_ref()),
             "scans": result.rescan.as_ref().map(|r| &r.scans),
             "robots": robots,
             "things": self.found.labels.things.iter().map(thing).collect::<Vec<_>>(),
@@ -97,6 +98,7 @@ impl Said<'_, '_> {
             cell: [cell.min, cell.max],
             inputs: sources.opened().iter().map(|i| i.id.0).collect(),
             robots: self.found.robots.compared().into_iter().map(id).collect(),
+            frame: self.found.carried.entry.clone(),
             scans: self.registrations(),
             n_superseded: self.n_superseded,
             changes: "changes.json".into(),
@@ -105,7 +107,7 @@ impl Said<'_, '_> {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let mut out = Vec::new();
+        let mut out = self.found.carried.warnings.clone();
         let first = self.found.session.past.scans.len();
         for (scan, found) in self.found.session.sources.scans[first..].iter().zip(self.registered) {
             if found.is_none() {
@@ -250,6 +252,9 @@ impl Said<'_, '_> {
             size[2],
             self.found.robots.compared().len()
         );
+        if let Some(frame) = &self.found.carried.entry {
+            let _ = writeln!(text, "  {}", frame_in_words(frame));
+        }
         for scan in self.registrations() {
             let [x, y, z] = scan.shift.map(|v| v * 1e3);
             let turn = scan.turn.iter().map(|v| v * v).sum::<f64>().sqrt().to_degrees();
@@ -281,6 +286,22 @@ impl Said<'_, '_> {
         let _ = writeln!(text, "{} points of earlier scans superseded", self.n_superseded);
         text
     }
+}
+
+/// Which frame the new scans are in.
+fn frame_in_words(frame: &CarriedEntry) -> String {
+    let [x, y, z] = frame.xyz;
+    let [qx, qy, qz, qw] = frame.quat_xyzw;
+    let yaw = (2.0 * (qw * qz + qx * qy)).atan2(1.0 - 2.0 * (qy * qy + qz * qz)).to_degrees();
+    let (n, against) = (
+        frame.n_on_old + frame.n_on_new,
+        frame.n_where_old_saw_through + frame.n_where_new_saw_through,
+    );
+    format!(
+        "the new scans are in another frame, {}: the plant's is theirs turned by {yaw:.3}° and shifted by ({x:.3}, {y:.3}, {z:.3}) m; {:.1} % of the upright surfaces that both sessions can see agree",
+        frame.by,
+        100.0 * n as f64 / (n + against).max(1) as f64
+    )
 }
 
 /// What is said of a thing, which is the `k`th.

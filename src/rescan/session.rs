@@ -134,6 +134,12 @@ pub(crate) fn bounds(
     Ok(cell)
 }
 
+/// What robots of the plant filled, world, metres.
+pub(crate) fn stood((fits, models): (&[Fit], &[Model])) -> Vec<Aabb> {
+    let all = fits.iter().filter(|fit| fit.verdict != Verdict::Refused);
+    all.map(|fit| standing(fit, &models[fit.model])).collect()
+}
+
 /// Robots of the plant that reach into the cell, by place among the fits, and what they filled.
 fn here((fits, models): (&[Fit], &[Model]), cell: &Aabb) -> Vec<(usize, Aabb)> {
     let bounds = |(i, fit): (usize, &Fit)| (i, standing(fit, &models[fit.model]));
@@ -344,10 +350,19 @@ impl<'a> Session<'a> {
         Labelling::new(fits, models, self.sources, ground, self.settings)
     }
 
-    /// By scan: what takes back how far it was off, where its file states coordinates of the world.
-    pub(crate) fn moved(&self, registered: &[Option<Registration>]) -> Vec<Option<Pose>> {
+    /// By scan: what carries it from its frame into the plant's and takes back how far it was off, where its file states
+    /// coordinates of the world.
+    pub(crate) fn moved(
+        &self,
+        registered: &[Option<Registration>],
+        plant_from_new: Option<Pose>,
+    ) -> Vec<Option<Pose>> {
         let first = self.past.scans.len();
-        let moved = registered.iter().map(|r| r.map(|r| r.plant_from_stated));
+        let moved = registered.iter().map(|r| match (r, plant_from_new) {
+            (Some(r), Some(carried)) => Some(r.plant_from_stated * carried),
+            (Some(r), None) => Some(r.plant_from_stated),
+            (None, carried) => carried,
+        });
         std::iter::repeat_n(None, first).chain(moved).collect()
     }
 }

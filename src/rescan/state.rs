@@ -3,6 +3,7 @@
 use crate::reuse::{Key, read, written};
 use contract::{Error, Fit, Floor, Input, Kind, Mask, Result, Scan};
 use export::{LasSettings, Quantum};
+use geometry::Pose;
 use ingest::Before;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file.
 const NAME: &str = "plant.bin";
 /// What the file begins with: its format.
-pub(super) const FORMAT: &[u8] = b"stillpoint.plant/4\n";
+pub(super) const FORMAT: &[u8] = b"stillpoint.plant/5\n";
 
 /// Scans, floor and robots of a plant as a run found them.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -20,6 +21,8 @@ pub(crate) struct State {
     pub(crate) scans: Vec<Scan>,
     /// Tiles of each input, by the name of their folder in the store.
     pub(crate) tiles: Vec<Key>,
+    /// By input: what carried its scans into the plant's frame, where their files state another one.
+    pub(crate) frames: Vec<Option<Pose>>,
     pub(crate) floor: Floor,
     /// In the order of the result; robots that are gone are refused.
     pub(crate) fits: Vec<Fit>,
@@ -114,7 +117,10 @@ impl State {
         let is_number = |id: u32, at: usize| id as usize == at;
         let is_scale = |v: &f64| v.is_finite() && *v > 0.0;
         let Records { scale, offset, tile_edge, .. } = &self.records;
+        let is_pose = |pose: &Pose| pose.to_homogeneous().iter().all(|v| v.is_finite());
         self.tiles.len() == inputs.len()
+            && self.frames.len() <= inputs.len()
+            && self.frames.iter().flatten().all(is_pose)
             && inputs.iter().enumerate().all(|(at, input)| is_number(input.id.0, at))
             && masks.iter().enumerate().all(|(at, mask)| is_number(mask.id.0, at))
             && masks.iter().all(|mask| (mask.input.0 as usize) < inputs.len())
@@ -158,6 +164,7 @@ mod tests {
             masks: vec![Mask { id, input, name: "a".into(), n_points: None }],
             scans: Vec::new(),
             tiles: vec![Key::of("test", &["a"])],
+            frames: vec![None],
             floor: Floor::default(),
             fits: Vec::new(),
             robots: "robots".into(),
@@ -165,7 +172,9 @@ mod tests {
         };
         whole.write(dir.path()).expect("writes");
         assert!(State::read(dir.path()).is_ok());
-        let wrong: [fn(&mut State); 5] = [
+        let wrong: [fn(&mut State); 7] = [
+            |s| s.frames.push(None),
+            |s| s.frames[0] = Some(Pose::translation(f64::NAN, 0.0, 0.0)),
             |s| s.masks[0].input.0 = 1,
             |s| s.masks[0].id.0 = 7,
             |s| s.tiles.clear(),
@@ -195,6 +204,7 @@ mod tests {
             masks: Vec::new(),
             scans: Vec::new(),
             tiles: Vec::new(),
+            frames: Vec::new(),
             floor: Floor::default(),
             fits: vec![Fit { score: 0.7, ..Fit::default() }],
             robots: "robots".into(),

@@ -2,6 +2,7 @@
 //! result that joins them, out.
 
 use super::base::Base;
+use super::carry::Carried;
 use super::past::Past;
 use super::say::{self, Said};
 use super::session::{Labels, Robots, Session};
@@ -31,6 +32,7 @@ pub(crate) struct Written<'a, 's> {
     pub(crate) labels: &'a Labels,
     pub(crate) models: &'a [Model],
     pub(crate) fits: &'a [Fit],
+    pub(crate) carried: &'a Carried,
 }
 
 /// What came of it.
@@ -113,7 +115,7 @@ impl Written<'_, '_> {
         let scope = Scope {
             robots: Some(self.robots.changed.clone()),
             cell: Some(session.past.cell),
-            moved: session.moved(registered),
+            moved: session.moved(registered, self.carried.plant_from_new),
             las: Some(self.base.state.records.las()),
             leaves_open: true,
         };

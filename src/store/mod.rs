@@ -19,7 +19,7 @@ mod writer;
 use crate::straight::Straight;
 use catalogue::broken;
 use contract::{Error, MAX_SKIP, Map, Result, Scan, Tile, TileAt, TilePoints, Weigh};
-use geometry::Aabb;
+use geometry::{Aabb, Point, Pose};
 use map::FileMap;
 use record::N_LEVELS;
 use std::fs::File;
@@ -98,6 +98,15 @@ impl Store {
             all.is_whole.extend(store.is_whole);
         }
         all
+    }
+
+    /// Scans were carried by a motion of the world: tiles get bounds that hold their points there.
+    pub fn carry(&mut self, motion: &Pose) {
+        for entry in &mut self.entries {
+            let corners = entry.bounds.corners();
+            entry.bounds = Aabb::EMPTY;
+            corners.iter().for_each(|c| entry.bounds.add((motion * Point::from(*c)).coords.into()));
+        }
     }
 
     /// What is known of each tile without reading it, sorted by [`TileAt`], then by place. Entries at the same

@@ -58,7 +58,7 @@ pub use result::{
 };
 pub use robot_model::{mesh_files, write_robot};
 pub use robot_picture::RobotPicture;
-pub use session::{RegistrationEntry, RescanEntry};
+pub use session::{CarriedEntry, RegistrationEntry, RescanEntry};
 pub use settings::Settings;
 pub use space::{SpaceEntry, write_space};
 pub use spool::Spool;

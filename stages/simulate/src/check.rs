@@ -6,6 +6,8 @@ use std::collections::BTreeSet;
 
 /// Largest coordinate inside a scene, metres: beyond it single precision triangles are coarser than 0.1 mm.
 const MAX_COORDINATE: f64 = 1000.0;
+/// Largest difference between true and stated poses, metres: stated ones may be those of a map.
+const MAX_STATED: f64 = 1e8;
 /// Most beams of one scanner: 65 536 rows and columns.
 const MAX_SIDE: u32 = 1 << 16;
 /// Longest fence, metres: each metre has 60 wires.
@@ -170,8 +172,8 @@ fn scanner(s: &Scanner, place: &str) -> Result<()> {
     finite("noise", place, &[s.noise, s.noise_per_metre, s.jitter], 0.0, 1.0)?;
     finite("share", place, &[s.dropouts, s.dark_dropouts], 0.0, 1.0)?;
     finite("bias", place, &[s.range_bias], -10.0, 10.0)?;
-    finite("registration", place, &s.registration.xyz, -10.0, 10.0)?;
-    finite("registration", place, &s.registration.rpy_deg, -90.0, 90.0)?;
+    finite("registration", place, &s.registration.xyz, -MAX_STATED, MAX_STATED)?;
+    finite("registration", place, &s.registration.rpy_deg, -360.0, 360.0)?;
     if let Some(m) = &s.mixed {
         finite("sub-beams", place, &[f64::from(m.sub_beams)], 1.0, 64.0)?;
         finite("beam", place, &[m.radius, m.divergence, m.depth], 0.0, 10.0)?;

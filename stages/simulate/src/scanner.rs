@@ -160,6 +160,17 @@ pub struct Registration {
 }
 
 impl Registration {
+    /// That of a scan with this true pose, and this stated one: another frame of the world, for example.
+    #[must_use]
+    pub fn between(world_from_scan: &Pose, stated: &Pose) -> Self {
+        let error = world_from_scan.inverse() * stated;
+        let (roll, pitch, yaw) = error.rotation.euler_angles();
+        Self {
+            xyz: error.translation.vector.into(),
+            rpy_deg: [roll, pitch, yaw].map(f64::to_degrees),
+        }
+    }
+
     /// One that is drawn: standard deviations of the shift on each axis, metres, and of the turn about each, degrees.
     #[must_use]
     pub fn drawn([shift, turn]: [f64; 2], random: &mut Random) -> Self {

@@ -1,0 +1,169 @@
+//! A rough pose of the new session in the earlier one in; the pose that lays its planes on those of the earlier one, by
+//! shift and yaw, and how well that is determined, out.
+
+use crate::surfels::{Surfel, Surfels, voxel};
+use geometry::{Pose, Vector};
+use nalgebra::{Matrix2, Matrix4, SymmetricEigen, Translation3, UnitQuaternion, Vector4};
+
+/// How far from a plane a surfel may lie to be laid on it, metres, round by round, from a pose of the search …
+pub(crate) const WIDE: [f64; 12] =
+    [0.35, 0.35, 0.3, 0.25, 0.2, 0.15, 0.12, 0.1, 0.08, 0.06, 0.05, 0.05];
+/// … and from the stated one.
+pub(crate) const NEAR: [f64; 8] = [0.12, 0.12, 0.1, 0.1, 0.08, 0.06, 0.05, 0.05];
+/// Cosine between normals of one surface in both sessions: 25°.
+const ALIKE: f64 = 0.9;
+/// Steps along the normal in which a plane is looked for, metres.
+const STEP: f64 = 0.1;
+/// Fewest pairs that lay a session.
+const MIN_PAIRS: usize = 30;
+/// Surfels of each kind, level and not, that are laid at most: evenly chosen, more say the same.
+const MAX_LAID: usize = 2500;
+/// A step this small ends the rounds of the last gate, metres and radians.
+const SETTLED: f64 = 1e-5;
+/// Weight of where a step begins, in surfels.
+const DAMPING: f64 = 0.5;
+/// Least standard deviation of a surfel's distance, metres: noise is averaged, registration of the session is not.
+const MIN_SCALE: f64 = 1e-3;
+
+/// Surfels of a square metre err alike: waves of a surface, and what scans of one session are off each other.
+const ALIKE_SURFELS: f64 = 25.0;
+
+/// A pose that was refined.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Laid {
+    /// The earlier session's world from that of the new one, each about its own origin.
+    pub old_from_new: Pose,
+    /// Standard deviations of x, y, z, metres, and yaw, radians, at the place `about`.
+    pub sigma: [f64; 4],
+    /// Middle of what was laid, the earlier session's world about its origin, metres.
+    pub about: Vector,
+    /// Upright surfaces that hold it in the direction in the plan in which it is held least, in surfels.
+    pub hold: f64,
+    /// Surfels that were laid.
+    pub n_pairs: usize,
+    /// RMS distance of the surfels from the planes, metres.
+    pub rms: f64,
+}
+
+/// Surfels of a new session that are laid on an earlier one.
+pub(crate) struct Chosen {
+    surfels: Vec<Surfel>,
+    middle: Vector,
+}
+
+impl Chosen {
+    /// Evenly from all flat ones.
+    pub(crate) fn of(new: &Surfels) -> Self {
+        let flat =
+            |level: bool| new.all.iter().filter(move |s| s.is_flat() && s.is_level() == level);
+        let some = |level: bool| {
+            let step = flat(level).count().div_ceil(MAX_LAID).max(1);
+            flat(level).step_by(step).copied()
+        };
+        let surfels: Vec<Surfel> = some(false).chain(some(true)).collect();
+        let n = surfels.len().max(1) as f64;
+        let middle = surfels.iter().map(|s| s.at).sum::<Vector>() / n;
+        Self { surfels, middle }
+    }
+
+    /// Lays them on the planes of an earlier session, from a pose on; `None` where too few of them lie near any.
+    pub(crate) fn lay(&self, old: &Surfels, from: &Pose, gates: &[f64]) -> Option<Laid> {
+        let mut pose = *from;
+        let mut last = None;
+        for gate in gates {
+            let sums = self.sums(old, &pose, *gate)?;
+            // What no plane tells stays as it was.
+            let step = (sums.normal + Matrix4::identity() * DAMPING).try_inverse()? * sums.right;
+            let about = (pose * nalgebra::Point3::from(self.middle)).coords;
+            pose = moved(&step, &about) * pose;
+            last = Some(sums);
+            if *gate == gates[gates.len() - 1] && step.amax() < SETTLED {
+                break;
+            }
+        }
+        let sums = last?;
+        let rms = (sums.squares / sums.weight).sqrt();
+        let covariance = (sums.normal + Matrix4::identity() * DAMPING).try_inverse()?
+            * rms.max(MIN_SCALE).powi(2) * ALIKE_SURFELS;
+        let sigma = std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt());
+        let hold = SymmetricEigen::new(sums.in_plan).eigenvalues.min();
+        let about = (pose * nalgebra::Point3::from(self.middle)).coords;
+        Some(Laid { old_from_new: pose, sigma, about, hold, n_pairs: sums.n, rms })
+    }
+
+    fn sums(&self, old: &Surfels, pose: &Pose, gate: f64) -> Option<Sums> {
+        let mut out = Sums::default();
+        let about = (pose * nalgebra::Point3::from(self.middle)).coords;
+        for surfel in &self.surfels {
+            let at = (pose * nalgebra::Point3::from(surfel.at)).coords;
+            let normal = pose.rotation * surfel.normal;
+            let Some(on) = nearest(old, &at, (&normal, surfel.is_signed), gate) else { continue };
+            let plane = &old.all[on];
+            let distance = plane.normal.dot(&(at - plane.at));
+            let u = distance / gate;
+            let weight = (1.0 - u * u).powi(2);
+            let n = plane.normal;
+            let arm = at - about;
+            let row = Vector4::new(n.x, n.y, n.z, arm.x * n.y - arm.y * n.x);
+            out.normal += weight * row * row.transpose();
+            out.right -= weight * distance * row;
+            out.squares += weight * distance * distance;
+            out.weight += weight;
+            out.n += 1;
+            out.in_plan += weight * Matrix2::new(n.x * n.x, n.x * n.y, n.x * n.y, n.y * n.y);
+        }
+        (out.n >= MIN_PAIRS && out.weight > 0.0).then_some(out)
+    }
+}
+
+#[derive(Default)]
+struct Sums {
+    normal: Matrix4<f64>,
+    right: Vector4<f64>,
+    in_plan: Matrix2<f64>,
+    squares: f64,
+    weight: f64,
+    n: usize,
+}
+
+/// The plane of an earlier session nearest to a place along a normal.
+fn nearest(
+    old: &Surfels,
+    at: &Vector,
+    (normal, is_signed): (&Vector, bool),
+    gate: f64,
+) -> Option<usize> {
+    let n_steps = (gate / STEP).ceil() as i32;
+    let mut best: Option<(f64, usize)> = None;
+    let mut last = [i32::MAX; 3];
+    for k in -n_steps..=n_steps {
+        let here = voxel(&(at + normal * (f64::from(k) * STEP)));
+        if here == last {
+            continue;
+        }
+        last = here;
+        let Some(i) = old.of(&here) else { continue };
+        let plane = &old.all[i];
+        if !plane.is_flat() || plane.cosine(normal, is_signed) < ALIKE {
+            continue;
+        }
+        let distance = plane.normal.dot(&(at - plane.at)).abs();
+        if distance < gate && best.is_none_or(|(least, _)| distance < least) {
+            best = Some((distance, i));
+        }
+    }
+    best.map(|(_, i)| i)
+}
+
+/// A motion by shift and yaw about a place.
+fn moved(step: &Vector4<f64>, about: &Vector) -> Pose {
+    let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), step[3]);
+    let shift = Vector::new(step[0], step[1], step[2]);
+    Pose::from_parts(Translation3::from(about + shift - turn * about), turn)
+}
+
+/// How far two poses lay a place apart in the plan and height, metres, and how much they differ in yaw, radians.
+pub(crate) fn apart(a: &Pose, b: &Pose, at: &Vector) -> (f64, f64) {
+    let at = nalgebra::Point3::from(*at);
+    ((a * at - b * at).norm(), a.rotation.angle_to(&b.rotation))
+}
