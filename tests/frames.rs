@@ -4,9 +4,12 @@
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
+use stillpoint::job::{Given, Job, Means, Outcome};
+use stillpoint::plan;
+use stillpoint::rescan::{Cell, Frame, Request, rescan};
+use stillpoint::reuse::check;
 use stillpoint::scanning::{Formats, scan_scene};
 
 /// A plant, what was scanned again of it, and another plant.
@@ -62,15 +65,18 @@ impl Plant {
         self.dir.path().join(name)
     }
 
-    fn run(&self, args: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
-        command.current_dir(self.dir.path()).args(["--progress", "none"]).args(args);
-        command.output().expect("the program starts")
+    fn job(&self, input: &str, out: &str) -> Job {
+        let means = Means::of(&Given::default()).expect("it can be set");
+        Job::new(vec![self.path(input)], self.path("robots"), self.path(out), means)
     }
-}
 
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    /// Rescans into a folder, from a base, with this input, by what is said of its frame.
+    fn rescan(&self, [base, input, out]: [&str; 3], frame: Frame) -> contract::Result<Outcome> {
+        let scanners = input.ends_with("las").then(|| self.path("mapped/scanners.toml"));
+        let job = Job { scanners, ..self.job(input, out) };
+        let request = Request { base: self.path(base), cell: Cell::Seen, frame, job };
+        rescan(&request, &Engine::new(2))
+    }
 }
 
 fn changes(out: &Path) -> serde_json::Value {
@@ -89,31 +95,25 @@ fn kinds(changes: &serde_json::Value) -> (Vec<String>, Vec<String>) {
 #[test]
 fn new_scans_in_another_frame_are_laid_on_the_plant_or_refused() {
     let plant = Plant::new();
-    let run = plant.run(&["run", "then/scans.e57", "--robots", "robots", "--out", "base"]);
-    assert!(run.status.success(), "{}", said(&run));
+    plan::run(&plant.job("then/scans.e57", "base"), &Engine::new(2)).expect("the run ends well");
 
-    let again = plant.run(&["rescan", "--base", "base", "mapped/scans.e57", "--out", "again"]);
-    assert!(again.status.success(), "{}", said(&again));
-    let text = String::from_utf8_lossy(&again.stdout);
+    let again = plant.rescan(["base", "mapped/scans.e57", "again"], Frame::Find);
+    let text = again.expect("it is laid").summary;
     assert!(text.contains("another frame, found"), "{text}");
     is_laid(&plant, "again", "found");
-    let own = plant.run(&["verify", "again"]);
-    assert!(own.status.success(), "{}", said(&own));
+    let whole = check(&plant.path("again"), &Engine::new(2)).expect("a result");
+    assert_eq!(whole.wrong, [""; 0]);
 
-    // A LAS file states coordinates of the map for each point; given by a person, about.
+    // A LAS file states coordinates of the map for each point; a person says about where it is.
     let [x, y, z] = plant.scanner;
     let yaw = -plant.frame.rotation.euler_angles().2.to_degrees() + 0.7;
-    let rough = format!("{:.2},{:.2},{:.2},{yaw:.2}", x + 0.15, y - 0.1, z);
-    let args = ["rescan", "--base", "base", "mapped/scans.las", "--scanners"];
-    let more = ["mapped/scanners.toml", "--out", "given", "--frame", &rough];
-    let given = plant.run(&[&args[..], &more].concat());
-    assert!(given.status.success(), "{}", said(&given));
+    let rough = Frame::Rough([x + 0.15, y - 0.1, z, yaw]);
+    plant.rescan(["base", "mapped/scans.las", "given"], rough).expect("it is laid");
     is_laid(&plant, "given", "given");
     points_lie_in_the_plant(&plant.path("given"));
 
     // What is gone on from it stands where the plant does.
-    let third = plant.run(&["rescan", "--base", "again", "third/scans.e57", "--out", "last"]);
-    assert!(third.status.success(), "{}", said(&third));
+    plant.rescan(["again", "third/scans.e57", "last"], Frame::Find).expect("it is in its frame");
     let last = changes(&plant.path("last"));
     assert!(last["frame"].is_null(), "{}", last["frame"]);
     let (robots, things) = kinds(&last);
@@ -155,17 +155,19 @@ fn points_lie_in_the_plant(out: &Path) {
     }
 }
 
-/// Scans of elsewhere and frames that are contradicted end with 4, name the input and the way out, and leave no result.
+/// Scans of elsewhere and frames that are contradicted are refused, by the name of the input and with the way out, and leave
+/// no result.
 fn refuses(plant: &Plant) {
-    let args = |input: &'static str| ["rescan", "--base", "base", input, "--out", "none"];
-    let elsewhere = plant.run(&args("other/scans.e57"));
-    assert_eq!(elsewhere.status.code(), Some(4), "{}", said(&elsewhere));
-    let text = said(&elsewhere);
-    assert!(text.contains("other/scans.e57") && text.contains("--frame"), "{text}");
-    for (frame, code) in [("same", 4), ("0.0,0.0,1.6,10.0", 4), ("1,2,3", 2), ("there", 2)] {
-        let all = [&args("mapped/scans.e57")[..], &["--frame", frame]].concat();
-        let output = plant.run(&all);
-        assert_eq!(output.status.code(), Some(code), "{frame}: {}", said(&output));
+    let tries = [
+        ("other/scans.e57", Frame::Find),
+        ("mapped/scans.e57", Frame::Stated),
+        ("mapped/scans.e57", Frame::Rough([0.0, 0.0, 1.6, 10.0])),
+    ];
+    for (input, frame) in tries {
+        let error = plant.rescan(["base", input, "none"], frame).expect_err("refused");
+        assert_eq!(error.kind(), contract::Kind::BadInput, "{error}");
+        let text = error.to_string();
+        assert!(text.contains(input) && text.contains("--frame"), "{text}");
     }
     assert!(!plant.path("none/result.json").exists());
 }

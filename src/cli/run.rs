@@ -99,3 +99,18 @@ fn job(flags: &RunFlags, common: &Common) -> Result<(Job, Engine)> {
     };
     Ok((job, engine))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_stated_by_a_word_or_by_four_numbers() {
+        let told = |text: &str| frame(Some(text)).map_err(|e| e.kind());
+        assert_eq!(told("same"), Ok(Frame::Stated));
+        assert_eq!(told("12.5, -3,1.6,90"), Ok(Frame::Rough([12.5, -3.0, 1.6, 90.0])));
+        for wrong in ["1,2,3", "1,2,3,4,5", "1,2,,4", "1,2,3,inf", "there", ""] {
+            assert_eq!(told(wrong), Err(Kind::Usage), "{wrong}");
+        }
+    }
+}

@@ -84,7 +84,8 @@ impl Chosen {
         let sums = last?;
         let rms = (sums.squares / sums.weight).sqrt();
         let covariance = (sums.normal + Matrix4::identity() * DAMPING).try_inverse()?
-            * rms.max(MIN_SCALE).powi(2) * ALIKE_SURFELS;
+            * rms.max(MIN_SCALE).powi(2)
+            * ALIKE_SURFELS;
         let sigma = std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt());
         let hold = SymmetricEigen::new(sums.in_plan).eigenvalues.min();
         let about = (pose * nalgebra::Point3::from(self.middle)).coords;
