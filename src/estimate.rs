@@ -5,6 +5,8 @@ use crate::engine::Engine;
 use crate::job::{Job, OutputDir, Settings, memory_words};
 use crate::library;
 use crate::reuse::Digests;
+use crate::tile_bound;
+use crate::units;
 use contract::{Error, Format, Input, Kind, Result};
 use ingest::{Scanners, Sources};
 use serde::Serialize;
@@ -25,6 +27,8 @@ const COPC: f64 = 0.9e6;
 const TEXT_BYTES: u64 = 45;
 /// Pictures, models, voxels and lists, bytes for each model of the library: more robots stand in large plants.
 const EXTRA_BYTES: u64 = 32 << 20;
+/// Bytes of a spatial tile beside its points: header, and what of a disk's block is left empty.
+const TILE_BYTES: u64 = 4096;
 /// Points that one thread gets through in a second: ingest of E57, LAS, LAZ, PTX; tiles, planes, labels and writing.
 const INGEST: [(Format, f64); 4] =
     [(Format::E57, 20e6), (Format::Las, 18e6), (Format::Laz, 2.8e6), (Format::Ptx, 6e6)];
@@ -46,6 +50,8 @@ const SCANS: u64 = 24;
 pub struct Estimate {
     /// Points of all inputs, as far as they say; else by their length.
     pub n_points: u64,
+    /// Units of the inputs' own coordinates, in words.
+    pub units: Vec<String>,
     /// Models that are tried.
     pub n_models: usize,
     /// Resident memory at most, bytes: not above `--memory`, but where even one region of all scans takes more.
@@ -54,6 +60,8 @@ pub struct Estimate {
     pub store_bytes: u64,
     /// Disk for what is written, bytes. Old results stay until the new ones are whole.
     pub output_bytes: u64,
+    /// Spatial tiles, about, as far as samples of the scans tell, and at most: more end the run before it writes any.
+    pub tiles: [u64; 2],
     /// Free where both go, bytes; 0 where the system does not tell.
     pub free_bytes: u64,
     /// Time, seconds: for empty halls, and for crowded ones.
@@ -90,6 +98,7 @@ fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<Est
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let sources =
         ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest, &AllThreads)?;
+    sources.check_sizes()?;
     Ok(Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)))
 }
 
@@ -155,6 +164,7 @@ impl Estimate {
         }
         seconds += REST[1..].iter().map(|rate| n as f64 / rate).sum::<f64>();
         let models = n_models as u64;
+        let tiles = tile_bound::expected(&sources.spread(), n, &job.means.settings.export);
         let cloud = CLOUD_BYTES[usize::from(sources.has_color())];
         let export = &job.means.settings.export;
         let body = if export.bodies { 4 } else { 0 };
@@ -169,10 +179,14 @@ impl Estimate {
         let least = base + SCAN_BYTES * SCANS.min(sources.scans.len() as u64);
         Self {
             n_points: n,
+            units: units::said(sources),
             n_models,
             memory_bytes: memory.min(job.means.memory_bytes.max(least)),
             store_bytes: n_new.saturating_mul(STORE_BYTES),
-            output_bytes: labelled.saturating_add(models * EXTRA_BYTES),
+            output_bytes: labelled
+                .saturating_add(models * EXTRA_BYTES)
+                .saturating_add(tiles[0].saturating_mul(TILE_BYTES)),
+            tiles,
             free_bytes: free(&job.out),
             seconds: SEARCH.map(|search| {
                 (seconds + n_models as f64 * (LOAD + search * n as f64 / 1e6)) / threads
@@ -187,11 +201,12 @@ impl Estimate {
         self.store_bytes.saturating_add(self.output_bytes)
     }
 
-    /// Refuses what the disk cannot hold.
+    /// Refuses what the disk cannot hold, and more spatial tiles than there may be.
     ///
     /// # Errors
-    /// More is needed than is free.
+    /// More is needed than is free or allowed.
     pub fn checked(&self, out: &Path) -> Result<()> {
+        tile_bound::within(self.tiles)?;
         let need = self.need();
         if self.free_bytes == 0 || need <= self.free_bytes {
             return Ok(());
@@ -211,6 +226,9 @@ impl std::fmt::Display for Estimate {
             return write!(f, "nothing has changed: the result that is there is used again");
         }
         writeln!(f, "points    {:.1} M in {all} input(s)", self.n_points as f64 / 1e6)?;
+        for line in &self.units {
+            writeln!(f, "unit      {line}")?;
+        }
         writeln!(f, "models    {}", self.n_models)?;
         writeln!(f, "memory    {} at most", memory_words(self.memory_bytes))?;
         writeln!(
@@ -220,6 +238,7 @@ impl std::fmt::Display for Estimate {
             memory_words(self.output_bytes),
             memory_words(self.free_bytes)
         )?;
+        writeln!(f, "tiles     about {} spatial tiles, at most {}", self.tiles[0], self.tiles[1])?;
         writeln!(f, "time      {:.0} to {:.0} s", self.seconds[0], self.seconds[1])?;
         write!(f, "kept      tiles of {kept} of {all} input(s)")
     }

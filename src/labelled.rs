@@ -81,7 +81,7 @@ impl Map for LabelStrip<'_> {
         Ok(Labelled {
             mask: strip.mask,
             first_place: strip.first_place,
-            packed: self.packed(&points)?,
+            packed: self.packed(&points).map_err(|e| e.at(format!("scan '{}'", scan.name)))?,
             n_moving: labels.iter().filter(|label| label.moves()).count() as u64,
             spots: self.grids.spots(&world, &labels, &blocks, |i| {
                 self.cell.is_none_or(|cell| cell.contains(world[i]))

@@ -281,11 +281,11 @@ impl<'a> Labelling<'a> {
         LasSettings { with_color, ..LasSettings::new(self.quantum()) }
     }
 
-    /// Scale and offset of the clouds: those of the first LAS input, so that its coordinates stay what they are.
+    /// Scale and offset of the clouds: those of a LAS input where they hold, so that its coordinates stay what they are.
     fn quantum(&self) -> Quantum {
         let all = self.bounds.iter().fold(Aabb::EMPTY, |all, bounds| all.union(bounds));
         let of_input = self.sources.las_quantum();
-        of_input.map_or_else(|| Quantum::around(&all), |(scale, offset)| Quantum { scale, offset })
+        Quantum::holding(&all, of_input.map(|(scale, offset)| Quantum { scale, offset }))
     }
 
     fn robot_pictures(&self, chosen: &[usize], engine: &Engine) -> Result<Vec<RobotPicture>> {

@@ -40,5 +40,7 @@ pub mod store;
 mod straight;
 mod surfaces;
 pub mod tally;
+mod tile_bound;
 mod tools;
 pub mod trajectory;
+mod units;

@@ -18,7 +18,9 @@ use crate::search::{Search, Shelf};
 use crate::spaces::Around;
 use crate::store::Store;
 use crate::surfaces::{Gather, Ground, Surfaces};
+use crate::tile_bound;
 use crate::tools;
+use crate::units;
 use contract::{Cluster, Fit, Floor, Input, Region, Result, Scan, Space};
 use export::COPC;
 use ingest::{Scanners, Sources};
@@ -75,7 +77,7 @@ impl Run<'_> {
         let filling = Filling::new(sources, &job.means, output.tiles(), engine);
         let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, digests));
         let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
-        let store = Store::join(stores);
+        let store = tile_bound::checked(Store::join(stores), scans, &settings.export, engine)?;
 
         // On the tiles: local planes and occupied space, joined over tiles and scans; from here on nothing is as large as
         // the cloud.
@@ -134,6 +136,7 @@ impl Run<'_> {
         let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
         let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
         let sources = engine.pool()?.install(open)?;
+        units::check_sizes(&library, &sources)?;
         let has_tiles = |i: &Input| {
             let key = digests.tiles(i, &sources.scans, settings);
             key.is_some_and(|key| output.has_tiles(&key))

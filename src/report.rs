@@ -7,7 +7,8 @@ use crate::progress::Amount;
 use crate::reuse::Digests;
 use crate::spaces::poses;
 use crate::store::Store;
-use contract::{Fit, Format, Input, InputId, Result, Scan, Verdict, quote};
+use crate::units;
+use contract::{Fit, Format, Input, InputId, Mask, Result, Scan, Verdict, quote};
 use export::{
     InputEntry, Labels, Places, ResultFile, RobotEntry, SCHEMA, ScanLabels, SpaceEntry, StageEntry,
     write_table,
@@ -105,6 +106,7 @@ impl Report<'_> {
                 [&finding.model, &finding.place, &finding.what].map(|part| quote::shown(part));
             format!("robot model '{model}' is left out: {place}: {what}")
         }));
+        out.extend(dropped(self.sources, &self.written.masks));
         for scan in self.scans().filter(|s| !s.has_beams()) {
             out.push(format!(
                 "scan '{}': its scanner's position is not known: no proof of free space from it",
@@ -134,6 +136,9 @@ impl Report<'_> {
     fn summary(&self) -> String {
         let mut text = String::new();
         let _ = writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.scans().count());
+        for line in units::said(self.sources) {
+            let _ = writeln!(text, "  unit {line}");
+        }
         if self.fits.is_empty() {
             let n_arms = self.library.models.iter().filter(|model| !model.is_tool()).count();
             let _ = writeln!(
@@ -222,6 +227,19 @@ fn stand(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
     }
 }
 
+/// What is said of masks of the open inputs whose points were dropped in part.
+pub(crate) fn dropped(sources: &Sources, counts: &[MaskCount]) -> Vec<String> {
+    let masks = sources.opened_masks().iter().zip(counts).filter(|(_, count)| count.n_dropped > 0);
+    let say = |(mask, count): (&Mask, &MaskCount)| {
+        let (n, all) = (count.n_dropped, count.n_points);
+        format!(
+            "'{}': {n} of {all} points were dropped: withheld by the file, no numbers, or far from all others",
+            quote::shown(&mask.name)
+        )
+    };
+    masks.map(say).collect()
+}
+
 /// The entry of an input in the result; `counts` of the masks of the inputs that are open.
 pub(crate) fn input_entry(
     sources: &Sources,
@@ -241,6 +259,7 @@ pub(crate) fn input_entry(
         n_scans: scans.len() as u32,
         n_points,
         n_dropped,
+        units: units::entry(sources, input),
         notes: scans.iter().flat_map(|s| &s.notes).cloned().collect(),
     }
 }

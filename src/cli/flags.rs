@@ -283,6 +283,10 @@ pub(super) struct Common {
     /// Scanner poses, for formats that carry none (TOML or JSON)
     #[arg(long, global = true, value_name = "FILE")]
     scanners: Option<PathBuf>,
+    /// Unit of the inputs' coordinates: m, cm, mm, km, in, ft, us-ft; one file's own as NAME=UNIT, heights apart as
+    /// us-ft/m, several with commas (else what each file declares, else metres)
+    #[arg(long, global = true, value_name = "UNIT")]
+    units: Option<String>,
     /// Settings (TOML)
     #[arg(long, global = true, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -304,11 +308,12 @@ impl Common {
     /// Defaults, configuration and flags, put together and checked.
     pub(super) fn means(&self) -> Result<Means> {
         let method = self.method.iter().map(|name| format!("fit.method={name}"));
+        let units = self.units.iter().map(|unit| format!("ingest.units=\"{unit}\""));
         Means::of(&Given {
             memory: self.memory.clone(),
             threads: self.threads,
             config: self.config.clone(),
-            set: self.set.iter().cloned().chain(method).collect(),
+            set: self.set.iter().cloned().chain(method).chain(units).collect(),
         })
     }
 

@@ -32,5 +32,6 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
             say.warning(warning);
         }
     }
+    sources.check_sizes()?;
     Ok(exit::OK)
 }

@@ -191,6 +191,7 @@ impl Means {
             )
             .hint("raise --memory"));
         }
+        self.settings.ingest.check()?;
         let export = &self.settings.export;
         if export.copc && !export.tiles {
             let what = "export.copc needs export.tiles: the COPC file is made of the tiles";

@@ -45,7 +45,7 @@ macro_rules! settings {
 settings! {
     ingest: ingest::Settings {
         strip_points, max_xml_bytes, max_scanners_bytes, sample_points, max_laz_chunk_bytes,
-        max_range, max_native_rms, min_step, max_step,
+        max_range, max_native_rms, min_step, max_step, units,
     }
     robot: robot::Settings {
         clouds, spacing, max_samples, max_mesh_bytes,
@@ -96,7 +96,7 @@ settings! {
         min_size, min_voxels, min_points, robot_margin,
     }
     export: export::Settings {
-        tiles, tile_edge, fixed_cloud, bodies, copc, compress, waiting_bytes,
+        tiles, tile_edge, max_tiles, fixed_cloud, bodies, copc, compress, waiting_bytes,
     }
 }
 

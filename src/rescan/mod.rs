@@ -31,6 +31,7 @@ use crate::library;
 use crate::reuse::{self, Cache, Digests, Key, OutputFile};
 use crate::search::Shelf;
 use crate::store::Store;
+use crate::units;
 use base::Base;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
 use geometry::{Aabb, Pose};
@@ -173,7 +174,9 @@ impl Rescan<'_> {
             let settings = &settings.ingest;
             ingest::open_after(before, &job.inputs, scanners.as_ref(), settings, &AllThreads)
         };
-        Ok((library, engine.pool()?.install(open)?))
+        let sources = engine.pool()?.install(open)?;
+        units::check_sizes(&library, &sources)?;
+        Ok((library, sources))
     }
 
     /// All is whole, and of the inputs that the rescan began with: it takes its place. Robots that stand as they stood are

@@ -5,7 +5,7 @@ use super::write::Written;
 use crate::changes::{Change, RobotChange, changes, of_missed, words};
 use crate::job::Outcome;
 use crate::labelling::Done;
-use crate::report::{id, input_entry, robot_entry};
+use crate::report::{dropped, id, input_entry, robot_entry};
 use crate::reuse::Digests;
 use contract::{Error, Kind, Result, quote};
 use export::{
@@ -91,6 +91,7 @@ impl Said<'_, '_> {
             .map(|input| input_entry(sources, input, digests, &self.done.masks));
         result.inputs.extend(inputs);
         result.warnings.extend(sources.warnings.iter().cloned());
+        result.warnings.extend(dropped(sources, &self.done.masks));
         result.warnings.extend(self.warnings());
         let cell = &self.found.session.past.cell;
         result.rescan = Some(RescanEntry {

@@ -54,7 +54,7 @@ pub use record::{LasSettings, Quantum, RawVlr, class_of};
 pub use refill::{OldPoint, read_tile};
 pub use result::{
     BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
-    SCHEMA, ScanLabels, StageEntry, TipPose,
+    SCHEMA, ScanLabels, StageEntry, TipPose, UnitsEntry,
 };
 pub use robot_model::{mesh_files, write_robot};
 pub use robot_picture::RobotPicture;

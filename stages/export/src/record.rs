@@ -37,9 +37,47 @@ impl Quantum {
             let at: f64 = middle[i];
             if at.is_finite() { (at / 1000.0).trunc() * 1000.0 } else { 0.0 }
         });
-        Self { scale: [1e-4; 3], offset }
+        Self { scale: [FINE; 3], offset }
+    }
+
+    /// `wanted`, as an input has it, where its steps hold these bounds and some room around them; else the finest steps of a
+    /// power of ten that do, no finer than those that are wanted, or than 0.1 mm where none are.
+    #[must_use]
+    pub fn holding(bounds: &Aabb, wanted: Option<Self>) -> Self {
+        if let Some(wanted) = wanted
+            && (bounds.is_empty() || wanted.holds(&bounds.grown(ROOM)))
+            && wanted.scale.iter().all(|step| *step > 0.0)
+        {
+            return wanted;
+        }
+        let mut own = Self::around(bounds);
+        for axis in 0..3 {
+            let far = |at: f64| (at - own.offset[axis]).abs() + ROOM;
+            let most = far(bounds.min[axis]).max(far(bounds.max[axis]));
+            let asked = wanted.map_or(FINE, |wanted| wanted.scale[axis].abs());
+            let holds = |step: &&f64| **step >= asked && most / **step < MOST_STEPS;
+            own.scale[axis] = STEPS.iter().find(holds).copied().unwrap_or(own.scale[axis]);
+        }
+        own
+    }
+
+    /// Whether its whole steps reach all of these bounds.
+    fn holds(&self, bounds: &Aabb) -> bool {
+        (0..3).all(|axis| {
+            let steps = |at: f64| ((at - self.offset[axis]) / self.scale[axis]).abs();
+            steps(bounds.min[axis]) < MOST_STEPS && steps(bounds.max[axis]) < MOST_STEPS
+        })
     }
 }
+
+/// Steps of coordinates where no input says any, metres: a tenth of what scanners resolve.
+const FINE: f64 = 1e-4;
+/// Room around what is written, metres: a later session adds points beside them, in the same steps.
+const ROOM: f64 = 1_000.0;
+/// Steps that a coordinate of LAS can count from its offset on.
+const MOST_STEPS: f64 = i32::MAX as f64;
+/// Steps that are tried, metres.
+const STEPS: [f64; 12] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2];
 
 /// A variable length record to pass on, such as the reference system of an input.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -163,5 +201,47 @@ impl Extent {
 #[cold]
 pub(crate) fn too_far(xyz: [f64; 3]) -> Error {
     Error::new(Kind::BadInput, format!("point does not fit into LAS coordinates: \"{xyz:?}\""))
-        .hint("choose a larger scale or an offset near the points")
+        .hint("it lies too far from the plant for the steps of its clouds: bring the scans into the plant's frame")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quantum(scale: f64, offset: [f64; 3]) -> Quantum {
+        Quantum { scale: [scale; 3], offset }
+    }
+
+    #[test]
+    fn steps_of_an_input_stay_where_they_hold() {
+        let bounds = Aabb { min: [-5.0, -4.0, 0.0], max: [5.0, 4.0, 3.0] };
+        let of_input = quantum(1e-3, [0.5, 0.0, 0.0]);
+        assert_eq!(Quantum::holding(&bounds, Some(of_input)), of_input);
+        assert_eq!(Quantum::holding(&Aabb::EMPTY, Some(of_input)), of_input);
+        assert_eq!(Quantum::holding(&bounds, None), Quantum::around(&bounds));
+    }
+
+    #[test]
+    fn steps_of_the_whole_range_leave_room_and_stay_fine() {
+        // Scale = extent / (2³¹ - 1), offset = the least coordinate: the last point is on the edge.
+        let bounds = Aabb { min: [100.0, 200.0, 0.0], max: [160.0, 230.0, 8.0] };
+        let scale = bounds.size().map(|side| side / f64::from(i32::MAX));
+        let own = Quantum::holding(&bounds, Some(Quantum { scale, offset: bounds.min }));
+        assert_eq!(own.scale, [1e-6; 3], "as fine as there is room for");
+        assert!(own.holds(&bounds.grown(ROOM)));
+        // A step below zero is legal; bounds of a header would be turned round.
+        let own = Quantum::holding(&bounds, Some(quantum(-1e-3, [0.0; 3])));
+        assert_eq!(own.scale, [1e-3; 3]);
+    }
+
+    #[test]
+    fn what_spreads_over_a_country_has_coarser_steps() {
+        let bounds = Aabb { min: [0.0; 3], max: [500_000.0, 10.0, 10.0] };
+        let own = Quantum::holding(&bounds, None);
+        assert_eq!(own.scale, [1e-3, 1e-4, 1e-4]);
+        assert!(own.holds(&bounds));
+        // Nothing holds that; it is finite all the same.
+        let own = Quantum::holding(&Aabb { min: [-1e300; 3], max: [1e300; 3] }, None);
+        assert!(own.scale.iter().chain(&own.offset).all(|v| v.is_finite()));
+    }
 }

@@ -254,7 +254,7 @@ pub struct ScanLabels {
 }
 
 /// An input as it was read.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InputEntry {
     /// As given.
     pub path: String,
@@ -270,8 +270,22 @@ pub struct InputEntry {
     pub n_points: u64,
     /// Of those, points that were dropped (not finite).
     pub n_dropped: u64,
+    /// Units that its coordinates were read in; all that is written is in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<UnitsEntry>,
     /// What is missing in it and what is worse for that.
     pub notes: Vec<String>,
+}
+
+/// Units of an input's own coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UnitsEntry {
+    /// In words, with where they come from.
+    pub text: String,
+    /// `given`, `declared`, `format` (the format prescribes them) or `assumed`.
+    pub origin: String,
+    /// Metres of one unit of x, y and z.
+    pub metres: [f64; 3],
 }
 
 /// A stage as it ran. Holds nothing that differs from run to run, such as times.

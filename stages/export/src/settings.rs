@@ -9,6 +9,9 @@ pub struct Settings {
     pub tiles: bool,
     /// Edge of a tile, metres: half a robot cell, so that a rescan of one rewrites little beside it.
     pub tile_edge: f64,
+    /// Spatial tiles at most: a square kilometre in tiles of 5 m. Points that are spread wider, by a wrong unit or by strays,
+    /// would fill a disk with files of a few points each.
+    pub max_tiles: usize,
     /// Whether all that does not move is written as one cloud too (`clouds/fixed`). It is what most planners read, and
     /// twice the disk; a plant is read by tiles, whose classes tell the same.
     pub fixed_cloud: bool,
@@ -28,6 +31,7 @@ impl Default for Settings {
         Self {
             tiles: true,
             tile_edge: 5.0,
+            max_tiles: 40_000,
             fixed_cloud: true,
             bodies: false,
             copc: false,

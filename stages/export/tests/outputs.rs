@@ -143,6 +143,7 @@ fn sample(out: &Path) {
             n_scans: 1,
             n_points,
             n_dropped: 5,
+            units: None,
             notes: Vec::new(),
         }],
         stages: vec![StageEntry {

@@ -10,6 +10,7 @@ mod strips;
 
 use crate::Settings;
 use crate::reader::{MaskSeed, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::units::{self, Choice, Units};
 use ::e57::E57Reader;
 use contract::{Error, Format, Kind, Result};
 use pages::{PAGE, Pages};
@@ -29,6 +30,7 @@ struct E57File {
     scans: Vec<ScanSeed>,
     files: Vec<E57Scan>,
     facts: Vec<(String, String)>,
+    units: Units,
 }
 
 /// Opens an E57 file: header, description and the first points of each scan are read and checked.
@@ -42,13 +44,15 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
         scans: Vec::new(),
         files: Vec::new(),
         facts: facts(&reader),
+        units: units(&reader, path, settings)?,
     };
+    let metres = file.units.horizontal.metres;
     for (n, cloud) in reader.pointclouds().iter().enumerate() {
         let name = match cloud.name.as_deref().map(str::trim) {
             Some(name) if !name.is_empty() => name.to_string(),
             _ => format!("scan {}", n + 1),
         };
-        let (scan, mut seed) = E57Scan::new(path, cloud, &name, settings)
+        let (scan, mut seed) = E57Scan::new(path, cloud, (&name, metres), settings)
             .map_err(|e| e.at(format!("scan \"{name}\"")))?;
         seed.mask = n;
         file.facts.push((format!("scan {} fields", n + 1), fields(cloud)));
@@ -79,6 +83,10 @@ impl Reader for E57File {
 
     fn read(&self, want: Want) -> Result<Reading<'_>> {
         Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
+    }
+
+    fn units(&self) -> &Units {
+        &self.units
     }
 
     fn has_color(&self) -> bool {
@@ -150,6 +158,21 @@ fn describe(e: ::e57::Error) -> Error {
         _ => (Kind::BadInput, "description of the file is broken"),
     };
     Error::new(kind, what).because(e).hint("export the file anew")
+}
+
+/// Units of the file's coordinates: metres, by the standard. That the reference system has another unit is mentioned.
+fn units(reader: &E57Reader<BufReader<File>>, path: &Path, settings: &Settings) -> Result<Units> {
+    let mut out = Units::of_format(Choice::read(&settings.units)?.of(path))?;
+    let system = reader.coordinate_metadata().and_then(|text| units::of_wkt(text.as_bytes()));
+    if let Some(Ok(declared)) = system.map(|system| Units::of(&[system], None))
+        && !declared.is_metres()
+    {
+        out.remarks.push(format!(
+            "its reference system is in {}, but coordinates of E57 are in metres by the standard",
+            declared.horizontal
+        ));
+    }
+    Ok(out)
 }
 
 /// What the file says of itself.

@@ -2,6 +2,7 @@
 
 use crate::raster::Steps;
 use crate::sources::Sources;
+use crate::units::Units;
 use contract::{Format, Input, Scan, quote};
 use geometry::{Aabb, Pose};
 use serde::Serialize;
@@ -16,6 +17,8 @@ pub struct Description {
     pub format: &'static str,
     /// Length of the file, bytes.
     pub n_bytes: u64,
+    /// Units of its coordinates as they stand in the file; all lengths here are metres.
+    pub units: Units,
     /// What the file says of itself, in the order of the reader.
     pub facts: Vec<Fact>,
     /// Points that the file does not flag as invalid, where known without reading them.
@@ -110,6 +113,7 @@ fn description(sources: &Sources, at: usize, input: &Input) -> Description {
         path: input.path.display().to_string(),
         format: word(input.format),
         n_bytes: input.n_bytes,
+        units: file.reader.units().clone(),
         facts: file.reader.facts().into_iter().map(|(name, value)| Fact { name, value }).collect(),
         n_points: masks.map(|m| m.n_points).sum(),
         scans: scans.map(|(scan, (steps, known))| scan_description(scan, *steps, *known)).collect(),
@@ -189,6 +193,7 @@ impl fmt::Display for Description {
             Some(n) => writeln!(f, "  points: {n}")?,
             None => writeln!(f, "  points: known once read")?,
         }
+        writeln!(f, "  units: {}", self.units)?;
         for fact in &self.facts {
             writeln!(f, "  {}: {}", quote::shown(&fact.name), quote::shown(&fact.value))?;
         }

@@ -8,6 +8,7 @@ use crate::laz::{Laz, Stream};
 use crate::map::{Mapped, map};
 use crate::reader::{Extent, MaskSeed, RawStrip, Reader, Reading, Sampled, ScanSeed, Want};
 use crate::settings::Settings;
+use crate::units::{Choice, Units};
 use contract::{Error, Format, Result};
 use std::borrow::Cow;
 use std::path::Path;
@@ -24,8 +25,10 @@ fn at_once(record_len: usize) -> usize {
 /// The records of a file, whichever way they are stored.
 pub(crate) struct Records {
     map: Mapped,
-    /// Header, checked.
+    /// Header, checked, in metres.
     pub(crate) header: LasHeader,
+    /// Units of the file's own coordinates.
+    units: Units,
     /// How to decompress, where they are compressed.
     pub(crate) laz: Option<Laz>,
 }
@@ -35,8 +38,11 @@ impl Records {
     pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Self> {
         let map = map(path)?;
         let header = LasHeader::read(&map)?;
+        let choice = Choice::read(&settings.units)?;
+        let units = Units::of(&header.declared, choice.of(path))?;
+        let header = header.in_metres(units.factors())?;
         let laz = if header.compressed { Some(Laz::read(&map, &header, settings)?) } else { None };
-        Ok(Self { map, header, laz })
+        Ok(Self { map, header, units, laz })
     }
 
     /// At most `n` records from `first` on; `(place of the first one, records)`. Where records are compressed, the
@@ -129,6 +135,10 @@ impl Las {
 impl Reader for Las {
     fn format(&self) -> Format {
         if self.records.header.compressed { Format::Laz } else { Format::Las }
+    }
+
+    fn units(&self) -> &Units {
+        &self.records.units
     }
 
     fn has_color(&self) -> bool {

@@ -1,6 +1,7 @@
 //! The bytes of a LAS or LAZ file in; its header out, checked against the length of the file.
 
 use crate::las_record::Layout;
+use crate::units::{self, Declaration};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use std::io::Cursor;
@@ -18,7 +19,7 @@ pub(crate) struct LasHeader {
     pub(crate) record_len: usize,
     /// Number of records.
     pub(crate) n_points: u64,
-    /// Metres (or whatever the file's unit is) of one count.
+    /// Of one count: in the unit of the file until it is brought to metres.
     pub(crate) scale: [f64; 3],
     /// Added after scaling.
     pub(crate) offset: [f64; 3],
@@ -32,6 +33,8 @@ pub(crate) struct LasHeader {
     pub(crate) copc: bool,
     /// Program that wrote it.
     pub(crate) software: String,
+    /// What its records declare of its units, what counts first.
+    pub(crate) declared: Vec<Declaration>,
     /// What is odd, in words.
     pub(crate) notes: Vec<String>,
 }
@@ -83,6 +86,7 @@ impl LasHeader {
             laszip: None,
             copc: false,
             software: text(&raw.generating_software),
+            declared: units::of_las(&raw, data),
             notes: Vec::new(),
         };
         header.check_numbers()?;
@@ -93,6 +97,23 @@ impl LasHeader {
             header.notes.push("the stated bounds make no sense and are not used".into());
         }
         Ok(header)
+    }
+
+    /// The same in metres, where one unit of x, y and z has so many of them.
+    ///
+    /// # Errors
+    /// Numbers that are none any more.
+    pub(crate) fn in_metres(mut self, factors: [f64; 3]) -> Result<Self> {
+        for (axis, factor) in factors.into_iter().enumerate() {
+            self.scale[axis] *= factor;
+            self.offset[axis] *= factor;
+            if let Some(bounds) = &mut self.bounds {
+                bounds.min[axis] *= factor;
+                bounds.max[axis] *= factor;
+            }
+        }
+        self.check_numbers()?;
+        Ok(self)
     }
 
     fn check_numbers(&self) -> Result<()> {

@@ -22,8 +22,10 @@ mod raster_native;
 mod reader;
 mod scanners;
 mod settings;
+mod size;
 mod sources;
 mod text;
+mod units;
 
 pub use inspect::{
     BoundsText, Description, Fact, LatticeText, PoseText, ScanDescription, describe,
@@ -32,3 +34,4 @@ pub use reader::{Extent, Want};
 pub use scanners::{Scanner, Scanners};
 pub use settings::Settings;
 pub use sources::{Before, Piece, Pieces, Sources, Strips, open, open_after};
+pub use units::{Origin, Unit, Units};

@@ -9,6 +9,7 @@ mod tests;
 use crate::Settings;
 use crate::frame::Frame;
 use crate::reader::{MaskSeed, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::units::{Choice, Units};
 use contract::{Format, Result};
 use std::path::{Path, PathBuf};
 
@@ -25,7 +26,9 @@ struct Block {
     n_valid: u64,
     /// Byte where the points begin, and the number of the line before.
     points_at: (u64, u64),
-    /// From the file's coordinates to the scan frame.
+    /// Metres of one unit of the file.
+    metres: f64,
+    /// From the file's coordinates, in metres, to the scan frame.
     frame: Frame,
 }
 
@@ -36,6 +39,7 @@ struct PtxFile {
     masks: Vec<MaskSeed>,
     scans: Vec<ScanSeed>,
     blocks: Vec<Block>,
+    units: Units,
 }
 
 /// Opens a PTX file. All lines are counted: only so can the scans after the first be found.
@@ -46,8 +50,9 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
         masks: Vec::new(),
         scans: Vec::new(),
         blocks: Vec::new(),
+        units: Units::of_nothing(Choice::read(&settings.units)?.of(path))?,
     };
-    for (block, notes) in blocks::find(path)? {
+    for (block, notes) in blocks::find(path, file.units.horizontal.metres)? {
         let name = format!("scan {}", file.blocks.len() + 1);
         let n_points = Some(block.n_valid);
         file.masks.push(MaskSeed { name: name.clone(), n_points, n_stated: n_points });
@@ -86,6 +91,10 @@ impl Reader for PtxFile {
 
     fn read(&self, want: Want) -> Result<Reading<'_>> {
         Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
+    }
+
+    fn units(&self) -> &Units {
+        &self.units
     }
 
     fn has_color(&self) -> bool {

@@ -1,6 +1,7 @@
 //! What every format gives: its masks and scans, a sample of each scan, and its points as strips in file order.
 
 use crate::map::Mapped;
+use crate::units::Units;
 use contract::{Attributes, Error, Format, Kind, Result};
 use geometry::{Aabb, Pose};
 use std::ops::Range;
@@ -143,6 +144,8 @@ pub(crate) trait Reader: Send + Sync {
     fn mapped(&self) -> Option<&Mapped> {
         None
     }
+    /// Units of its coordinates as they stand in the file; what it gives is in metres.
+    fn units(&self) -> &Units;
     /// Whether points have colour.
     fn has_color(&self) -> bool;
     /// Scale and offset of its coordinates, metres, where they are whole multiples of a step (LAS).

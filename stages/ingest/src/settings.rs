@@ -16,8 +16,9 @@ pub struct Settings {
     /// Largest memory for one LAZ chunk once decompressed, bytes. Chunks have 50,000 points (2 MB) in practice; a
     /// file in one piece is decompressed point by point and does not count.
     pub max_laz_chunk_bytes: u64,
-    /// Coordinates farther than this from the scanner are not measured but broken, metres. No terrestrial scanner
-    /// reaches 10 km; files without scanner may span a region, hence a thousand kilometres.
+    /// Coordinates farther than this from the scanner, or from the middle of points without one, are not measured but
+    /// broken, metres: such points are dropped and counted. No terrestrial scanner reaches 10 km; files without
+    /// scanner may span a region, hence a hundred: as far as coordinates in steps of 0.1 mm reach (214 km).
     pub max_range: f64,
     /// Residual of native rows and columns from a regular lattice that is accepted, pixels RMS. Above it, native
     /// pixels cannot map one to one anyway.
@@ -27,6 +28,19 @@ pub struct Settings {
     pub min_step: f64,
     /// Coarsest lattice step, radians (2°).
     pub max_step: f64,
+    /// Units of coordinates: `declared` for what each file declares, else one such as `mm`, `us-ft/m` (heights apart), or
+    /// `hall.las=ft,mm` (one file's own).
+    pub units: String,
+}
+
+impl Settings {
+    /// Sees that what is set can be.
+    ///
+    /// # Errors
+    /// Units that are none.
+    pub fn check(&self) -> contract::Result<()> {
+        crate::units::Choice::read(&self.units).map(drop)
+    }
 }
 
 impl Default for Settings {
@@ -37,10 +51,11 @@ impl Default for Settings {
             max_scanners_bytes: 16 << 20,
             sample_points: 60_000,
             max_laz_chunk_bytes: 512 << 20,
-            max_range: 1.0e6,
+            max_range: 1.0e5,
             max_native_rms: 0.3,
             min_step: 0.005_f64.to_radians(),
             max_step: 2.0_f64.to_radians(),
+            units: crate::units::DECLARED.into(),
         }
     }
 }

@@ -8,10 +8,12 @@ use crate::raster::{self, Raster, Steps};
 use crate::reader::{self, Extent, RawStrip, Reader, Reading, Sampled, ScanSeed, Want};
 use crate::scanners::Scanners;
 use crate::settings::Settings;
+use crate::size::{self, N_LOOKED};
+use crate::units::{Choice, Units};
 use contract::{
     Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
 };
-use geometry::Pose;
+use geometry::{Aabb, Pose};
 use std::path::{Path, PathBuf};
 
 /// Strips of one input, in its order.
@@ -62,7 +64,7 @@ const NO_RASTER: &str = "too few points to tell the raster: no free-space eviden
 /// One open file.
 pub(crate) struct File {
     pub(crate) reader: Box<dyn Reader>,
-    first_scan: u32,
+    pub(crate) first_scan: u32,
     first_mask: u32,
     /// For each scan whose pose the user replaced: its new scan frame from that of the file.
     moved: Vec<Option<Pose>>,
@@ -70,6 +72,8 @@ pub(crate) struct File {
     pub(crate) known: Vec<bool>,
     /// For each scan: where the steps of its lattice come from.
     pub(crate) steps: Vec<Steps>,
+    /// For each scan: where most of its points lie in the world, metres, where that could be told.
+    pub(crate) spreads: Vec<Option<Aabb>>,
 }
 
 /// Opens inputs: finds out what each is, reads and checks its header, and makes the lattices of scans whose scanner
@@ -113,6 +117,10 @@ pub fn open_after(
     }
     sources.find_lattices(settings, fan)?;
     sources.warnings.extend(poses.unused());
+    let choice = Choice::read(&settings.units)?;
+    let unknown = choice.unknown(paths);
+    sources.warnings.extend(unknown.map(|name| format!("--units names no input: '{name}'")));
+    sources.warn_of_sizes();
     Ok(sources)
 }
 
@@ -177,6 +185,12 @@ impl Sources {
         known.ok_or_else(|| Error::new(Kind::Bug, format!("there is no input \"{at}\"")))
     }
 
+    /// Units of an opened input's own coordinates; all that is read of it is in metres.
+    #[must_use]
+    pub fn units(&self, input: InputId) -> Option<&Units> {
+        self.open(input).ok().map(|(file, _)| file.reader.units())
+    }
+
     /// The inputs that are open.
     #[must_use]
     pub fn opened(&self) -> &[Input] {
@@ -189,10 +203,16 @@ impl Sources {
         &self.masks[self.n_before[1]..]
     }
 
-    /// Scale and offset of the first LAS input's coordinates, metres.
+    /// Scale and offset, metres, of the LAS input with the finest steps; nothing where an input of another format is finer.
     #[must_use]
     pub fn las_quantum(&self) -> Option<([f64; 3], [f64; 3])> {
-        self.files.iter().find_map(|file| file.reader.quantum())
+        /// Steps of formats that have none of their own, metres.
+        const OTHERS: f64 = 1e-4;
+        let coarsest = |(scale, _): &([f64; 3], _)| scale.iter().fold(0.0, |a, s| s.abs().max(a));
+        let all = self.files.iter().map(|file| file.reader.quantum());
+        let is_mixed = all.clone().any(|quantum| quantum.is_none());
+        let finest = all.flatten().min_by(|a, b| coarsest(a).total_cmp(&coarsest(b)));
+        finest.filter(|quantum| !is_mixed || coarsest(quantum) <= OTHERS)
     }
 
     /// Whether any input has colour.
@@ -234,7 +254,8 @@ impl Sources {
             });
         }
         let (moved, known, steps) = (Vec::new(), Vec::new(), Vec::new());
-        let mut file = File { reader, first_scan, first_mask, moved, known, steps };
+        let spreads = Vec::new();
+        let mut file = File { reader, first_scan, first_mask, moved, known, steps, spreads };
         for i in 0..file.reader.scans().len() {
             let scan = self.scan(id, &mut file, i, poses);
             self.scans.push(scan);
@@ -252,7 +273,7 @@ impl Sources {
         let scan_of = |file: &File, i: usize| file.first_scan as usize + i;
         let found = fan.fan(all, |(f, i): (usize, usize)| {
             let file = &self.files[f];
-            let found = file.raster(i, self.scans[scan_of(file, i)].stated_points, settings);
+            let found = file.look(i, &self.scans[scan_of(file, i)], settings);
             let whole = file.reader.check().and(found);
             whole.map_err(|e| e.at(self.inputs[self.n_before[0] + f].path.display()))
         });
@@ -260,10 +281,11 @@ impl Sources {
         for file in &mut self.files {
             for i in 0..n_scans(file) {
                 let at = scan_of(file, i);
-                let (raster, note) = found.next().transpose()?.unwrap_or_default();
-                self.scans[at].notes.extend(note.map(str::to_owned));
-                self.scans[at].lattice = raster.map(|r| r.lattice);
-                file.steps.push(raster.map_or(Steps::None, |r| r.steps));
+                let looked = found.next().transpose()?.unwrap_or_default();
+                self.scans[at].notes.extend(looked.note.map(str::to_owned));
+                self.scans[at].lattice = looked.raster.as_ref().map(|r| r.lattice);
+                file.steps.push(looked.raster.map_or(Steps::None, |r| r.steps));
+                file.spreads.push(looked.spread);
             }
         }
         Ok(())
@@ -336,29 +358,40 @@ impl File {
         }
     }
 
-    /// The raster of a scan, where scanner and points are known and tell it, and what is odd about that.
-    fn raster(
-        &self,
-        i: usize,
-        stated_points: Option<u64>,
-        settings: &Settings,
-    ) -> Result<(Option<Raster>, Option<&'static str>)> {
-        if !self.known[i] || stated_points == Some(0) {
-            return Ok((None, None));
+    /// What a sample of a scan tells.
+    fn look(&self, i: usize, scan: &Scan, settings: &Settings) -> Result<Looked> {
+        if scan.stated_points == Some(0) {
+            return Ok(Looked::default());
         }
-        let mut sample: Vec<Sampled> = self.reader.sample(i, settings.sample_points)?;
+        let n = if self.known[i] { settings.sample_points } else { N_LOOKED };
+        let mut sample: Vec<Sampled> = self.reader.sample(i, n)?;
         if let Some(new_from_file) = &self.moved[i] {
             sample.iter_mut().for_each(|s| s.xyz = moved(new_from_file, s.xyz));
         }
-        let n_points = stated_points.or(self.reader.scans()[i].likely_points);
+        let spread = size::spread(sample.iter().map(|s| s.xyz), &scan.world_from_scan);
+        if !self.known[i] {
+            return Ok(Looked { spread, ..Looked::default() });
+        }
+        let n_points = scan.stated_points.or(self.reader.scans()[i].likely_points);
         let raster = raster::estimate(&sample, n_points, settings);
         let note = match &raster {
             None if !sample.is_empty() => Some(NO_RASTER),
             Some(raster) if raster.lattice.is_camera => Some(CAMERA),
             _ => None,
         };
-        Ok((raster, note))
+        Ok(Looked { raster, note, spread })
     }
+}
+
+/// What a look at a scan tells.
+#[derive(Default)]
+struct Looked {
+    /// The raster, where the scanner is known and its points tell it.
+    raster: Option<Raster>,
+    /// What is odd about the raster, or worse for the lack of one.
+    note: Option<&'static str>,
+    /// Where most of its points lie in the world, metres.
+    spread: Option<Aabb>,
 }
 
 fn moved(pose: &Pose, p: [f32; 3]) -> [f32; 3] {

@@ -24,6 +24,8 @@ pub(super) struct Points {
     native: Option<[usize; 2]>,
     intensity: Option<Channel>,
     color: Option<[Channel; 3]>,
+    /// Metres of one unit of the file.
+    metres: f64,
     /// One a field: whether it is decoded.
     read: Vec<bool>,
     /// Columns of the block.
@@ -64,6 +66,7 @@ impl Points {
             native,
             intensity,
             color,
+            metres: scan.metres,
             read,
             axes: Default::default(),
             states: Vec::new(),
@@ -87,7 +90,10 @@ impl Points {
             }
         }
         if let Some(Coordinates::Spherical(_)) = self.coordinates {
+            self.to_metres(1);
             self.convert_spherical();
+        } else {
+            self.to_metres(3);
         }
         if let Some(field) = self.state {
             self.packets.integers(field, n, &mut self.states);
@@ -108,6 +114,14 @@ impl Points {
         }
         self.packets.advance(n, &self.read);
         Ok(n)
+    }
+
+    /// Brings the first `n` columns of the block to metres: angles stay what they are.
+    fn to_metres(&mut self, n: usize) {
+        if self.metres != 1.0 {
+            let values = self.axes[..n].iter_mut().flatten();
+            values.for_each(|v| *v *= self.metres);
+        }
     }
 
     /// Range, azimuth, elevation of the block to x, y, z.

@@ -55,7 +55,9 @@ pub(super) struct E57Scan {
     pub(super) intensity: Option<Channel>,
     /// Fields of the colour.
     pub(super) color: Option<[Channel; 3]>,
-    /// From the file's coordinates to the scan frame.
+    /// Metres of one unit of the file.
+    pub(super) metres: f64,
+    /// From the file's coordinates, in metres, to the scan frame.
     pub(super) frame: Frame,
 }
 
@@ -64,12 +66,12 @@ impl E57Scan {
     pub(super) fn new(
         path: &Path,
         cloud: &PointCloud,
-        name: &str,
+        (name, metres): (&str, f64),
         settings: &Settings,
     ) -> Result<(Self, ScanSeed)> {
         let mut notes = Vec::new();
-        let pose = pose(cloud)?;
-        let mut scan = Self::fields(cloud)?;
+        let pose = pose(cloud, metres)?;
+        let mut scan = Self { metres, ..Self::fields(cloud)? };
         if scan.coordinates.is_none() && scan.n_records > 0 {
             return Err(Error::new(
                 Kind::Unsupported,
@@ -77,7 +79,7 @@ impl E57Scan {
             ));
         }
         scan.channels(cloud, &mut notes);
-        let bounds = bounds(cloud);
+        let bounds = bounds(cloud, metres);
         let first = scan.first_points(path, settings)?;
         scan.frame = scan.judge(cloud, pose, bounds.as_ref(), &first, &mut notes);
         if scan.n_records == 0 {
@@ -161,6 +163,7 @@ impl E57Scan {
                 .map(|(row, col)| [row, col]),
             intensity: None,
             color: None,
+            metres: 1.0,
             frame: Frame::of_scanner(Pose::identity()),
         })
     }
@@ -256,10 +259,10 @@ impl E57Scan {
     }
 }
 
-/// World from the file's frame of a scan; identity where the file states none.
-fn pose(cloud: &PointCloud) -> Result<Pose> {
+/// World from the file's frame of a scan, metres; identity where the file states none.
+fn pose(cloud: &PointCloud, metres: f64) -> Result<Pose> {
     let Some(t) = &cloud.transform else { return Ok(Pose::identity()) };
-    let translation = Vector3::new(t.translation.x, t.translation.y, t.translation.z);
+    let translation = Vector3::new(t.translation.x, t.translation.y, t.translation.z) * metres;
     if !translation.iter().all(|v| v.is_finite()) {
         return Err(Error::bad_input(format!(
             "translation of the pose is no number, \"{translation:?}\""
@@ -270,10 +273,11 @@ fn pose(cloud: &PointCloud) -> Result<Pose> {
     Ok(Pose::from_parts(Translation3::from(translation), rotation))
 }
 
-/// Stated bounds in the file's frame, where they are sane.
-fn bounds(cloud: &PointCloud) -> Option<Aabb> {
+/// Stated bounds in the file's frame, metres, where they are sane.
+fn bounds(cloud: &PointCloud, metres: f64) -> Option<Aabb> {
     let b = cloud.get_cartesian_bounds()?;
-    let bounds = Aabb { min: [b.x_min?, b.y_min?, b.z_min?], max: [b.x_max?, b.y_max?, b.z_max?] };
+    let [min, max] = [[b.x_min?, b.y_min?, b.z_min?], [b.x_max?, b.y_max?, b.z_max?]];
+    let bounds = Aabb { min: min.map(|v| v * metres), max: max.map(|v| v * metres) };
     // Writers that do not know them write the largest number there is.
     let sane = bounds.min.iter().chain(&bounds.max).all(|v| v.abs() < 1e9);
     (sane && !bounds.is_empty()).then_some(bounds)

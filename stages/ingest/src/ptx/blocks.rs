@@ -17,13 +17,13 @@ const RIGID: f64 = 1e-3;
 /// How far the stated scanner position may be from the matrix, metres, before it is mentioned.
 const SAME_POSITION: f64 = 1e-3;
 
-/// All blocks of the file, in its order, with what is missing in each.
-pub(super) fn find(path: &Path) -> Result<Vec<(Block, Vec<String>)>> {
+/// All blocks of the file, in its order, with what is missing in each; one unit of it has so many metres.
+pub(super) fn find(path: &Path, metres: f64) -> Result<Vec<(Block, Vec<String>)>> {
     let n_bytes = std::fs::metadata(path)?.len();
     let mut lines = Lines::open(path, 0, 0)?;
     let mut out = Vec::new();
     while lines.advance()? {
-        out.push(block(&mut lines, n_bytes)?);
+        out.push(block(&mut lines, n_bytes, metres)?);
     }
     if out.is_empty() {
         return Err(Error::bad_input(format!("file holds no scan, bytes \"{n_bytes}\"")));
@@ -32,7 +32,7 @@ pub(super) fn find(path: &Path) -> Result<Vec<(Block, Vec<String>)>> {
 }
 
 /// One block, from the line with its columns to its last point.
-fn block(lines: &mut Lines, n_bytes: u64) -> Result<(Block, Vec<String>)> {
+fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<String>)> {
     let mut notes = Vec::new();
     let n_cols = count(lines).map_err(|e| {
         if lines.number() == 1 {
@@ -52,7 +52,7 @@ fn block(lines: &mut Lines, n_bytes: u64) -> Result<(Block, Vec<String>)> {
             ))
             .hint("the file is truncated or its header lies: export it anew"));
     };
-    let pose = pose(lines, &mut notes)?;
+    let pose = pose(lines, metres, &mut notes)?;
     let points_at = (lines.end(), lines.number());
     let (mut n_valid, mut n_columns) = (0, 0);
     let mut first = Vec::new();
@@ -73,7 +73,7 @@ fn block(lines: &mut Lines, n_bytes: u64) -> Result<(Block, Vec<String>)> {
             let mut p = [f64::NAN; 3];
             // What is no number is refused when points are read; here it is only left out.
             if numbers(lines.line(), &mut p).is_ok() && p.iter().all(|v| v.is_finite()) {
-                first.push(p);
+                first.push(p.map(|v| v * metres));
             }
         }
     }
@@ -90,7 +90,7 @@ fn block(lines: &mut Lines, n_bytes: u64) -> Result<(Block, Vec<String>)> {
     if n_valid == 0 {
         notes.push("scan has no points".into());
     }
-    Ok((Block { n_rows, n_lines, n_columns, n_valid, points_at, frame }, notes))
+    Ok((Block { n_rows, n_lines, n_columns, n_valid, points_at, metres, frame }, notes))
 }
 
 /// Goes to the next line of a header.
@@ -112,10 +112,10 @@ fn count(lines: &Lines) -> Result<u64> {
     Ok(value as u64)
 }
 
-/// Scanner position, axes and matrix. Only the matrix counts; that the position differs is mentioned.
-fn pose(lines: &mut Lines, notes: &mut Vec<String>) -> Result<Pose> {
+/// Scanner position, axes and matrix, brought to metres. Only the matrix counts; that the position differs is mentioned.
+fn pose(lines: &mut Lines, metres: f64, notes: &mut Vec<String>) -> Result<Pose> {
     next(lines)?;
-    let position = Vector3::from(lines.exactly::<3>()?);
+    let position = Vector3::from(lines.exactly::<3>()?) * metres;
     for _axis in 0..3 {
         next(lines)?;
         lines.exactly::<3>()?;
@@ -124,6 +124,9 @@ fn pose(lines: &mut Lines, notes: &mut Vec<String>) -> Result<Pose> {
     for row in &mut rows {
         next(lines)?;
         *row = lines.exactly()?;
+    }
+    for value in &mut rows[3][..3] {
+        *value *= metres;
     }
     let pose = rigid(rows).map_err(|e| e.at(format!("line {}", lines.number())))?;
     if (pose.translation.vector - position).norm() > SAME_POSITION {

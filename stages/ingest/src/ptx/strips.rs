@@ -59,7 +59,8 @@ impl<'a> Points<'a> {
 
     /// The current point in the scan frame, metres; `None` where it is broken.
     fn xyz(&self, max_range: f64) -> Option<[f64; 3]> {
-        let p = self.block.frame.scan_from_file([self.values[0], self.values[1], self.values[2]]);
+        let metres = |i: usize| self.values[i] * self.block.metres;
+        let p = self.block.frame.scan_from_file([metres(0), metres(1), metres(2)]);
         p.iter().all(|v| v.abs() <= max_range).then_some(p)
     }
 

@@ -1,0 +1,41 @@
+//! Opened inputs in; the units that they are read in, in words and for the result, out; and whether robots of a library can
+//! stand in them.
+
+use contract::{Input, Result};
+use export::UnitsEntry;
+use ingest::{Origin, Sources};
+use robot::Library;
+
+/// The units of inputs, in words: one line for all inputs of the same.
+pub(crate) fn said(sources: &Sources) -> Vec<String> {
+    let all = sources.opened().iter().filter_map(|input| sources.units(input.id));
+    let all: Vec<String> = all.map(ToString::to_string).collect();
+    let mut out: Vec<(&String, usize)> = Vec::new();
+    for text in &all {
+        match out.iter_mut().find(|(known, _)| *known == text) {
+            Some((_, n)) => *n += 1,
+            None => out.push((text, 1)),
+        }
+    }
+    out.into_iter().map(|(text, n)| format!("{text}: {n} input(s)")).collect()
+}
+
+/// The units of an opened input, for the result.
+pub(crate) fn entry(sources: &Sources, input: &Input) -> Option<UnitsEntry> {
+    let units = sources.units(input.id)?;
+    let origin = match units.origin {
+        Origin::Given => "given",
+        Origin::Declared => "declared",
+        Origin::Format => "format",
+        Origin::Assumed => "assumed",
+    };
+    Some(UnitsEntry { text: units.to_string(), origin: origin.into(), metres: units.factors() })
+}
+
+/// Refuses inputs that cannot be of a plant with robots of this library, in the units that they are read in.
+pub(crate) fn check_sizes(library: &Library, sources: &Sources) -> Result<()> {
+    sources.check_sizes()?;
+    let arms = library.models.iter().filter(|model| !model.is_tool());
+    let smallest = arms.min_by(|a, b| a.reach().total_cmp(&b.reach()));
+    smallest.map_or(Ok(()), |arm| sources.check_reach(&arm.name, arm.reach()))
+}

@@ -1,0 +1,240 @@
+//! A sample of each scan in; how far its points spread, and whether that can be a plant in the units that they are read
+//! in, out.
+
+use crate::sources::{File, Sources};
+use crate::units::{Origin, Unit, Units};
+use contract::{Error, Input, Result, quote};
+use geometry::{Aabb, Point, Pose};
+
+/// Points of a scan that are looked at where nothing else needs a sample.
+pub(crate) const N_LOOKED: usize = 4096;
+/// Fewer points spread over nothing in particular.
+const LEAST_POINTS: usize = 100;
+/// Share of the points on either side that count for nothing: strays, and what is seen through gates.
+const TAIL: f64 = 0.05;
+/// No scan of a plant spreads farther, metres: halls measure hundreds of metres, scanners reach as far.
+const LARGEST: [f64; 3] = [2_000.0, 2_000.0, 200.0];
+/// No scan spreads over less, metres: the smallest arms are ten times as large.
+const SMALLEST: f64 = 0.02;
+/// Scans of one plant lie no farther from one another, metres.
+const FARTHEST: f64 = 1.0e5;
+/// A cloud that is smaller than this share of the smallest robot's reach cannot hold it.
+const SHARE_OF_REACH: f64 = 0.2;
+/// A robot cell in its right unit: least and most of its larger side, and of its height, metres.
+const CELL: [[f64; 2]; 2] = [[1.5, 500.0], [0.8, 100.0]];
+/// Units that are tried on a cloud of the wrong size, the most common ones first.
+const TRIED: [(&str, f64); 5] =
+    [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254), ("m", 1.0), ("km", 1e3)];
+
+/// Where most points of a scan lie in the world, metres; nothing of too few points.
+pub(crate) fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose) -> Option<Aabb> {
+    let world = xyz.map(|p| world_from_scan * Point::from(p.map(f64::from)));
+    let world: Vec<Point> = world.collect();
+    if world.len() < LEAST_POINTS {
+        return None;
+    }
+    let last = (world.len() - 1) as f64;
+    let (low, high) = ((last * TAIL) as usize, (last * (1.0 - TAIL)) as usize);
+    let mut out = Aabb::EMPTY;
+    for axis in 0..3 {
+        let mut along: Vec<f64> = world.iter().map(|p| p[axis]).collect();
+        along.sort_unstable_by(f64::total_cmp);
+        (out.min[axis], out.max[axis]) = (along[low], along[high]);
+    }
+    Some(out)
+}
+
+impl Sources {
+    /// Refuses inputs that cannot be of a plant in the units that they are read in: where nobody gave a unit or declared one,
+    /// clouds of kilometres; where somebody did, clouds of millimetres, too.
+    ///
+    /// # Errors
+    /// The first such input, with what its points would measure and how to give the right unit.
+    pub fn check_sizes(&self) -> Result<()> {
+        self.check_frames()?;
+        self.opened().iter().zip(&self.files).try_for_each(|(input, file)| {
+            let units = file.reader.units();
+            let is_bare = matches!(units.origin, Origin::Format | Origin::Assumed);
+            let of = |is_wrong: fn(&[f64; 3]) -> bool| file.sizes().find(is_wrong);
+            match (of(is_vast), file.largest()) {
+                (Some(size), _) if is_bare => {
+                    Err(wrong(input, units, &size, "no plant is that large"))
+                }
+                (_, Some(size)) if diagonal(&size) < SMALLEST => {
+                    Err(wrong(input, units, &size, "no robot cell is that small"))
+                }
+                _ => Ok(()),
+            }
+        })
+    }
+
+    /// Where most points of the opened inputs lie in the world, metres, as far as samples tell; empty where they do not.
+    #[must_use]
+    pub fn spread(&self) -> Aabb {
+        let all = self.files.iter().flat_map(|file| file.spreads.iter().flatten());
+        all.fold(Aabb::EMPTY, |all, own| all.union(own))
+    }
+
+    /// Refuses scans that lie as far from one another as frames do, and plants do not.
+    fn check_frames(&self) -> Result<()> {
+        let place = |file: &File, i: usize| {
+            let scan = &self.scans[file.first_scan as usize + i];
+            (scan.world_from_scan.translation.vector, &self.inputs[scan.input.0 as usize].path)
+        };
+        let has_points = |file: &File, i: &usize| file.spreads[*i].is_some();
+        let all = self.files.iter().flat_map(|file| {
+            let scans = (0..file.spreads.len()).filter(move |i| has_points(file, i));
+            scans.map(move |i| place(file, i))
+        });
+        let Some((first, of)) = all.clone().next() else { return Ok(()) };
+        let far = all.map(|(at, path)| ((at - first).norm(), path));
+        let Some((distance, path)) = far.clone().find(|(distance, _)| *distance > FARTHEST) else {
+            return Ok(());
+        };
+        let what = format!(
+            "a scan lies {:.0} km from the first one of \"{}\": they are not in one frame",
+            distance / 1000.0,
+            of.display()
+        );
+        Err(Error::bad_input(what)
+            .at(path.display())
+            .hint("bring the scans into one frame, or run them one by one"))
+    }
+
+    /// Refuses inputs that are all too small to hold the smallest robot of a library.
+    ///
+    /// # Errors
+    /// The largest of them, with what its points measure.
+    pub fn check_reach(&self, smallest: &str, reach: f64) -> Result<()> {
+        let all = self.opened().iter().zip(&self.files);
+        let sizes = all.filter_map(|(input, file)| Some((input, file, file.largest()?)));
+        let largest = sizes.max_by(|a, b| diagonal(&a.2).total_cmp(&diagonal(&b.2)));
+        match largest {
+            Some((input, file, size)) if diagonal(&size) < SHARE_OF_REACH * reach => {
+                let what =
+                    format!("the smallest robot of the library, {smallest}, reaches {reach:.2} m");
+                Err(wrong(input, file.reader.units(), &size, &what))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What is worth a word where files declare their units.
+    pub(crate) fn warn_of_sizes(&mut self) {
+        let inputs = self.opened().iter().zip(&self.files);
+        let said = inputs.flat_map(|(input, file)| {
+            let units = file.reader.units();
+            let path = input.path.display().to_string();
+            let path = quote::shown(&path);
+            let vast = file.sizes().find(is_vast);
+            let vast = vast.filter(|_| units.origin == Origin::Declared).map(|size| {
+                format!(
+                    "{path}: points spread over {}, in {units}: no plant is that large",
+                    words(&size)
+                )
+            });
+            let remarks = units.remarks.iter().map(|remark| format!("{path}: {remark}"));
+            remarks.chain(vast).collect::<Vec<_>>()
+        });
+        let said: Vec<String> = said.collect();
+        self.warnings.extend(said);
+    }
+}
+
+impl File {
+    /// How far the points of each scan spread, metres.
+    fn sizes(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.spreads.iter().flatten().map(Aabb::size)
+    }
+
+    /// The largest of its scans.
+    fn largest(&self) -> Option<[f64; 3]> {
+        self.sizes().max_by(|a, b| diagonal(a).total_cmp(&diagonal(b)))
+    }
+}
+
+fn is_vast(size: &[f64; 3]) -> bool {
+    size.iter().zip(LARGEST).any(|(side, most)| *side > most)
+}
+
+fn diagonal(size: &[f64; 3]) -> f64 {
+    size.iter().map(|side| side * side).sum::<f64>().sqrt()
+}
+
+fn wrong(input: &Input, units: &Units, size: &[f64; 3], why: &str) -> Error {
+    let hint = match likely(units, size) {
+        Some((unit, size)) if unit == "m" => {
+            format!("in metres they spread over {}: give --units m", words(&size))
+        }
+        Some((unit, size)) => format!(
+            "in {unit} they spread over {}: give --units {unit}, or --units m where they are metres all the same",
+            words(&size)
+        ),
+        None => "give the unit with --units, for example --units mm, or --units m where they are \
+                 metres all the same"
+            .into(),
+    };
+    let what = format!("the points spread over {}, and {why}; unit: \"{units}\"", words(size));
+    Error::bad_input(what).at(input.path.display()).hint(hint)
+}
+
+/// The unit in which a cloud is as large as robot cells are, and how large it is then, metres.
+fn likely(units: &Units, size: &[f64; 3]) -> Option<(&'static str, [f64; 3])> {
+    let factors = units.factors();
+    let of_file: [f64; 3] = std::array::from_fn(|axis| size[axis] / factors[axis]);
+    let is_other = |metres: f64| !Unit::new("", metres).is_about(units.horizontal.metres);
+    TRIED.into_iter().filter(|(_, metres)| is_other(*metres)).find_map(|(unit, metres)| {
+        let size = of_file.map(|side| side * metres);
+        let within = |v: f64, [least, most]: [f64; 2]| v >= least && v <= most;
+        let is_cell = within(size[0].max(size[1]), CELL[0]) && within(size[2], CELL[1]);
+        is_cell.then_some((unit, size))
+    })
+}
+
+/// Three lengths for people.
+fn words(size: &[f64; 3]) -> String {
+    let most = size.iter().fold(0.0_f64, |a, b| a.max(*b));
+    let (factor, unit) = match most {
+        v if v >= 2_000.0 => (1e-3, "km"),
+        v if v >= 0.1 => (1.0, "m"),
+        _ => (1e3, "mm"),
+    };
+    let [x, y, z] = size.map(|v| v * factor);
+    format!("{x:.1} × {y:.1} × {z:.1} {unit}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_is_of_most_points_and_along_the_worlds_axes() {
+        let points = || (0..1000).map(|i| [i as f32 * 0.01, 0.0, 0.5]);
+        let stray = points().chain([[9e5, 9e5, -9e5]]);
+        let box_of = |points: &mut dyn Iterator<Item = [f32; 3]>, pose: &Pose| spread(points, pose);
+        let found = box_of(&mut stray.into_iter(), &Pose::identity()).expect("points");
+        assert!((found.size()[0] - 9.0).abs() < 0.05, "{found:?}");
+        assert_eq!((found.size()[1], found.min[2]), (0.0, 0.5));
+        let upright = Pose::rotation(geometry::Vector::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
+        let found = box_of(&mut points(), &upright).expect("points");
+        assert!((found.size()[2] - 9.0).abs() < 0.05 && found.size()[0] < 1e-6, "{found:?}");
+        assert_eq!(box_of(&mut points().take(99), &Pose::identity()), None);
+    }
+
+    #[test]
+    fn the_unit_that_makes_a_cell_is_named() {
+        let in_metres = Units::of_nothing(None).expect("metres");
+        for (size, unit) in [
+            ([7_200.0, 6_300.0, 3_100.0], Some("mm")),
+            ([800.0, 700.0, 400.0], Some("cm")),
+            ([40_000.0, 20_000.0, 8_000.0], Some("mm")),
+            ([0.008, 0.007, 0.003], Some("km")),
+            ([1e9, 1e9, 1e9], None),
+        ] {
+            assert_eq!(likely(&in_metres, &size).map(|(unit, _)| unit), unit, "{size:?}");
+        }
+        let mm = Unit::new("millimetre", 1e-3);
+        let given = Units::of_nothing(Some(&[mm.clone(), mm])).expect("given");
+        assert_eq!(likely(&given, &[0.008, 0.007, 0.003]).map(|(unit, _)| unit), Some("m"));
+    }
+}

@@ -1,0 +1,83 @@
+//! The variable length records of a LAS file in; what they declare of its coordinates' units out.
+
+use super::declared::{Declaration, System};
+use super::{geokeys, projjson, wkt};
+use las::raw;
+
+/// Bit of the global encoding that says that the WKT record counts, not the GeoTIFF keys.
+const WKT_COUNTS: u16 = 1 << 4;
+/// Lengths of the headers of a variable length record and of an extended one, bytes.
+const HEADER: usize = 54;
+const EXTENDED: usize = 60;
+/// Longest record that is looked at, bytes: texts of reference systems have a few thousand.
+const MAX_BYTES: usize = 1 << 20;
+/// Records that are looked at: writers put a handful of them.
+const MAX_RECORDS: usize = 4096;
+
+/// What a file declares in its several ways, what counts first.
+pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
+    let records = records(raw, data);
+    let find = |users: &[&str], id: u16| {
+        let is_it = |r: &&Record<'_>| r.id == id && users.contains(&r.user.as_str());
+        records.iter().find(is_it).map(|r| r.payload)
+    };
+    const PROJECTION: &[&str] = &["LASF_Projection", "liblas"];
+    let of_wkt = |id| find(PROJECTION, id).and_then(wkt::read);
+    let keys = find(PROJECTION, 34_735);
+    let doubles = find(PROJECTION, 34_736).unwrap_or_default();
+    let keys = keys.and_then(|keys| geokeys::read(keys, doubles));
+    let json = find(&["PDAL", "LASF_Projection"], 4225).and_then(projjson::read);
+    let text = of_wkt(2112);
+    let last = if raw.global_encoding & WKT_COUNTS != 0 { [text, keys] } else { [keys, text] };
+    let mut all: Vec<Declaration> =
+        [of_wkt(4224), json].into_iter().chain(last).flatten().collect();
+    // Stable: those that say what coordinates are, before those that speak of heights alone.
+    all.sort_by_key(|declaration| declaration.system == System::Unknown);
+    all
+}
+
+struct Record<'a> {
+    user: String,
+    id: u16,
+    payload: &'a [u8],
+}
+
+/// Records before the points, then those behind them, as far as they lie within the file.
+fn records<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<Record<'a>> {
+    let mut out = Vec::new();
+    let first = (usize::from(raw.header_size), raw.number_of_variable_length_records as usize);
+    walk(data, first, HEADER, &mut out);
+    if let Some(extended) = &raw.evlr {
+        let start = usize::try_from(extended.start_of_first_evlr).unwrap_or(usize::MAX);
+        walk(data, (start, extended.number_of_evlrs as usize), EXTENDED, &mut out);
+    }
+    out
+}
+
+fn walk<'a>(
+    data: &'a [u8],
+    (mut at, n): (usize, usize),
+    n_header: usize,
+    out: &mut Vec<Record<'a>>,
+) {
+    for _ in 0..n.min(MAX_RECORDS) {
+        let Some(header) = at.checked_add(n_header).and_then(|end| data.get(at..end)) else {
+            return;
+        };
+        let user = header[2..18].iter().take_while(|b| **b != 0).map(|b| char::from(*b));
+        let id = u16::from_le_bytes([header[18], header[19]]);
+        let n_payload = if n_header == HEADER {
+            usize::from(u16::from_le_bytes([header[20], header[21]]))
+        } else {
+            let length = header[20..28].first_chunk().map_or(0, |b| u64::from_le_bytes(*b));
+            usize::try_from(length).unwrap_or(usize::MAX)
+        };
+        let start = at + n_header;
+        let Some(end) = start.checked_add(n_payload).filter(|end| *end <= data.len()) else {
+            return;
+        };
+        let user = user.collect::<String>().trim_end().to_owned();
+        out.push(Record { user, id, payload: &data[start..end.min(start + MAX_BYTES)] });
+        at = end;
+    }
+}

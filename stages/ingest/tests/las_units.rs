@@ -1,0 +1,89 @@
+//! What units the LAS and LAZ files of public test suites declare, in all their ways: read from WKT 1 and 2, GeoTIFF keys
+//! and numbers of systems. The files are not part of the repository; without them this test says that it was skipped.
+#![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
+
+use contract::{Kind, OneByOne};
+use ingest::{Origin, Settings, Want, open};
+use std::path::Path;
+
+const FOOT: f64 = 0.3048;
+const US_FOOT: f64 = 1200.0 / 3937.0;
+
+/// File; metres of one unit of x and y, and of z, where it declares them.
+#[rustfmt::skip]
+const DECLARED: &[(&str, [f64; 2])] = &[
+    // The number of the system alone says it: California zone 5.
+    ("ll__certainty3d-color-utm-feet-navd88.las", [US_FOOT, US_FOOT]),
+    // Heights are called feet and said to be metres of one: as x and y.
+    ("lpy__1_4_w_evlr.las", [US_FOOT, US_FOOT]),
+    ("lpy__1_4_w_evlr.laz", [US_FOOT, US_FOOT]),
+    ("lpy__test1_4.las", [US_FOOT, US_FOOT]),
+    ("lpy__append-bug.laz", [1.0, 1.0]),
+    ("lpy__file_with_both_wkt_and_geotiff_vlrs.las", [US_FOOT, US_FOOT]),
+    ("lpy__fullwave.laz", [1.0, 1.0]),
+    ("lpy__plane.laz", [1.0, 1.0]),
+    // Metres across, feet up.
+    ("lpy__simple.copc.laz", [1.0, US_FOOT]),
+    ("lrs__32-1-472-150-76.laz", [1.0, 1.0]),
+    ("lrs__autzen.laz", [FOOT, FOOT]),
+    ("pdal__1.0_0.las", [1.0, 1.0]),
+    ("pdal__1.2-empty-geotiff-vlrs.las", [1.0, 1.0]),
+    ("pdal__lots_of_vlr.las", [US_FOOT, US_FOOT]),
+];
+
+/// Files that declare nothing, or nothing that is a unit.
+const ASSUMED: [&str; 4] = [
+    "lpy__simple1_3.las",
+    "lz__5points_14.las",
+    "pdal__1.2-with-color.las",
+    "pdal__extrabytes.las",
+];
+
+/// Files that declare longitude and latitude.
+const DEGREES: [&str; 3] = ["lpy__simple1_4.las", "pdal__no-points.las", "pdal__spurious.las"];
+
+#[test]
+fn real_files_are_read_in_the_units_that_they_declare() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scans/las-compat");
+    if !folder.is_dir() {
+        eprintln!("skipped: no folder of compatibility files");
+        return;
+    }
+    let open = |name: &str, units: &str| {
+        let settings = Settings { units: units.into(), ..Settings::default() };
+        open(&[folder.join(name)], None, &settings, &OneByOne)
+    };
+    let largest = |name: &str, units: &str| -> [f64; 3] {
+        let sources = open(name, units).unwrap();
+        let mut most = [f64::NEG_INFINITY; 3];
+        for strip in sources.strips(sources.inputs[0].id, Want::Everything).unwrap() {
+            for p in strip.unwrap().attributes.unwrap().world {
+                (0..3).for_each(|axis| most[axis] = most[axis].max(p[axis]));
+            }
+        }
+        most
+    };
+    for (name, [across, up]) in DECLARED {
+        let sources = open(name, "declared").unwrap_or_else(|e| panic!("{e}"));
+        let units = sources.units(sources.inputs[0].id).unwrap();
+        assert_eq!(units.origin, Origin::Declared, "{name}: {units}");
+        for (own, right) in units.factors().into_iter().zip([across, across, up]) {
+            assert!((own / right - 1.0).abs() < 1e-12, "{name}: {units}");
+        }
+        let (raw, own) = (largest(name, "m"), largest(name, "declared"));
+        for (axis, factor) in units.factors().into_iter().enumerate() {
+            assert!((own[axis] - raw[axis] * factor).abs() < 1e-6, "{name}: {raw:?} {own:?}");
+        }
+    }
+    for name in ASSUMED {
+        let sources = open(name, "declared").unwrap_or_else(|e| panic!("{e}"));
+        let units = sources.units(sources.inputs[0].id).unwrap();
+        assert!(units.origin == Origin::Assumed && units.is_metres(), "{name}: {units}");
+    }
+    for name in DEGREES {
+        let error = open(name, "declared").err().expect(name);
+        assert_eq!(error.kind(), Kind::Unsupported, "{error}");
+        assert!(error.to_string().contains("--units m"), "{error}");
+        assert!(open(name, "m").is_ok(), "{name}");
+    }
+}
