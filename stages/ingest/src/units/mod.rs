@@ -95,7 +95,8 @@ impl Units {
                 return Err(place(contradiction(&name, &number)));
             }
             Some(Sense::Nothing(name)) => {
-                remarks.push(format!("its {} names a unit that nobody knows: {name:?}", first.by));
+                let name = quote::shown(&name);
+                remarks.push(format!("its {} names a unit that nobody knows: '{name}'", first.by));
                 None
             }
             None => None,
@@ -196,14 +197,17 @@ fn heights(
     Ok(match stated {
         None => {
             if let Some(unit) = horizontal.filter(|unit| !is_same(unit.metres, 1.0)) {
-                remarks
-                    .push(format!("the unit of heights is not declared: {} as x and y", unit.name));
+                remarks.push(format!(
+                    "the unit of heights is not declared: {} as x and y",
+                    quote::shown(&unit.name)
+                ));
             }
             None
         }
         Some((Sense::Unit(unit), _)) => Some(unit),
         Some((Sense::Nothing(name), by)) => {
-            remarks.push(format!("its {by} names a unit of heights that nobody knows: {name:?}"));
+            let name = quote::shown(&name);
+            remarks.push(format!("its {by} names a unit of heights that nobody knows: '{name}'"));
             None
         }
         Some((Sense::Either(name, number), by)) => {

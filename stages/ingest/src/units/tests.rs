@@ -75,3 +75,13 @@ fn what_counts_goes_first_and_another_mind_is_told() {
     assert_eq!(units.factors(), [0.3048; 3]);
     assert!(units.remarks.iter().any(|r| r.contains("another unit")), "{:?}", units.remarks);
 }
+
+#[test]
+fn names_of_units_reach_people_quoted_and_cut() {
+    let name = format!("\u{1b}[2J\u{202e}{}", "x".repeat(1000));
+    let units = of(&[&format!("PROJCS[\"a\",UNIT[\"{name}\",0.5]]")]).unwrap();
+    assert_eq!(units.factors(), [0.5; 3]);
+    for text in units.remarks.iter().chain([&units.to_string()]) {
+        assert!(!text.contains(['\u{1b}', '\u{202e}']) && text.len() < 300, "{text:?}");
+    }
+}
