@@ -120,9 +120,12 @@ pub fn remove(folder: &Path, name: &str) -> Result<()> {
     let path: PathBuf = folder.join(name);
     let is_inside = Path::new(name).components().count() == 1 && path.parent() == Some(folder);
     if !is_inside || Manifest::read(&path).is_err() {
-        return Err(Error::new(Kind::Usage, format!("there is no session \"{name}\""))
-            .at(folder.display())
-            .hint("`stillpoint history` lists them"));
+        return Err(Error::new(
+            Kind::Usage,
+            format!("there is no session \"{}\"", quote::shown(name)),
+        )
+        .at(folder.display())
+        .hint("`stillpoint history` lists them"));
     }
     let lock = Job::hold(&path)?;
     // Without its list it is no result any more, however far the rest of this comes.

@@ -141,7 +141,6 @@ fn a_log_of_json_holds_nothing_else() {
         (&["run", "--log-format=json"], "usage"),
         (&["inspect", "no/such.e57", "--log-format=json"], "usage"),
         (&["inspect", &path, "--log-format", "json"], "bad_input"),
-        (&["run", &path, "--robots", "no/such", "--out", "no", "--log-format=json"], "usage"),
     ] {
         let output = stillpoint(args);
         let lines = json_lines(&output);

@@ -33,7 +33,10 @@ pub fn masks(data: &[u8]) {
     let n = data.len().saturating_sub(128) / 2;
     for n in [n, n + 1] {
         match reader.range(0, n) {
-            Ok(range) => (0..n).for_each(|i| drop(range.label(i).map_err(|e| refused(&e)))),
+            Ok(range) => (0..n).for_each(|i| match range.label(i) {
+                Ok(_) => {}
+                Err(error) => refused(&error),
+            }),
             Err(error) => refused(&error),
         }
     }
