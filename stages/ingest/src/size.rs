@@ -23,8 +23,7 @@ const SHARE_OF_REACH: f64 = 0.2;
 /// A robot cell in its right unit: least and most of its larger side, and of its height, metres.
 const CELL: [[f64; 2]; 2] = [[1.5, 500.0], [0.8, 100.0]];
 /// Units that are tried on a cloud of the wrong size, the most common ones first.
-const TRIED: [(&str, f64); 5] =
-    [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254), ("m", 1.0), ("km", 1e3)];
+const TRIED: [(&str, f64); 4] = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("km", 1e3)];
 
 /// Where most points of a scan lie in the world, metres; nothing of too few points.
 pub(crate) fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose) -> Option<Aabb> {
@@ -170,8 +169,8 @@ fn wrong(input: &Input, units: &Units, size: &[f64; 3], why: &str) -> Error {
             "in {unit} they spread over {}: give --units {unit}, or --units m where they are metres all the same",
             words(&size)
         ),
-        None => "give the unit with --units, for example --units mm, or --units m where they are \
-                 metres all the same"
+        None => "give the unit with --units (mm, cm, in, ft, us-ft), or --units m where they are metres \
+                 all the same"
             .into(),
     };
     let what = format!("the points spread over {}, and {why}; unit: \"{units}\"", words(size));
@@ -230,6 +229,8 @@ mod tests {
             ([40_000.0, 20_000.0, 8_000.0], Some("mm")),
             ([0.008, 0.007, 0.003], Some("km")),
             ([1e9, 1e9, 1e9], None),
+            // A landscape from the air, in feet as it happens: no cell in any unit.
+            ([3_000.0, 4_000.0, 70.0], None),
         ] {
             assert_eq!(likely(&in_metres, &size).map(|(unit, _)| unit), unit, "{size:?}");
         }
