@@ -156,7 +156,7 @@ impl Robot<'_> {
         let is = |level: Level| contacts.iter().filter(stands).any(|c| c.level >= level);
         let has = |is: &dyn Fn(&Contact) -> bool| contacts.iter().any(is);
         // What was as near where it stood is no news: it stood there.
-        if has(&|c| c.level == Level::Unseen && !c.as_found) {
+        if has(&Contact::is_unseen) {
             doubts.push(Doubt::Unseen);
         }
         if has(&|c| is_beside(c) && c.level > Level::Unseen && !c.as_found) {

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 
 /// Name and version of what is told to programs.
-const SCHEMA: &str = "stillpoint.check/1";
+const SCHEMA: &str = "stillpoint.check/2";
 /// What is never looked at.
 const NOT_CHECKED: &str = "the robot against itself, other robots in motion, the way to the first waypoint, joints that do not go \
      straight from one waypoint to the next, limits of joints that follow others, sides that nobody saw of what hangs on it";
@@ -119,7 +119,7 @@ impl Report {
             );
         };
         let contact = match doubt {
-            Doubt::Unseen => worst(&|c| c.level == Level::Unseen && !c.as_found),
+            Doubt::Unseen => worst(&Contact::is_unseen),
             Doubt::Beside => worst(&|c| is_beside(c) && !c.as_found),
             Doubt::AsFound => worst(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c)),
             Doubt::Posture => None,

@@ -15,6 +15,9 @@ const NEAR: f32 = 0.05;
 const ENOUGH: usize = 8;
 /// … or with this share of what half of all points have, where scans are sparse.
 const SHARE: f64 = 0.125;
+/// So many neighbours that are this near, metres, are a small thing: strays lie farther apart, over the depth of what an edge hides.
+const CLOSE: f32 = 0.025;
+const TOGETHER: usize = 3;
 /// Neighbours on a line are this near, metres: beams as far apart as 15 mm meet a wire of 4 mm four times on twice that way.
 const ALONG: f32 = 0.15;
 /// A line is this thick, metres: wires, a scanner's noise, and the edge of a cell.
@@ -45,7 +48,8 @@ pub(crate) fn evident(
         if !matches!(o.what, What::Fixed | What::Uncertain) {
             continue;
         }
-        out[at] = cubes.n_near(o, enough) >= enough
+        out[at] = cubes.n_near(o, NEAR, enough) >= enough
+            || cubes.n_near(o, CLOSE, TOGETHER) >= TOGETHER
             || cubes.is_on_line(at)
             || !is_seen(space, &(world_from_base * Point::from(o.at.map(f64::from))));
     }
@@ -71,10 +75,10 @@ impl<'a> Cubes<'a> {
         })
     }
 
-    /// Neighbours of an obstacle, itself not counted, as far as `most`.
-    fn n_near(&self, o: &Obstacle, most: usize) -> usize {
-        let near = self.around(o.at, 1).filter(|i| distance(self.all[*i as usize].at, o.at) < NEAR);
-        near.take(most + 1).count().saturating_sub(1)
+    /// Neighbours of an obstacle nearer than so, no more than [`NEAR`], metres; itself not counted, as far as `most`.
+    fn n_near(&self, o: &Obstacle, within: f32, most: usize) -> usize {
+        let is_near = |i: &u32| distance(self.all[*i as usize].at, o.at) < within;
+        self.around(o.at, 1).filter(is_near).take(most + 1).count().saturating_sub(1)
     }
 
     /// Neighbours that make a surface, here.
@@ -84,7 +88,7 @@ impl<'a> Cubes<'a> {
         let step = self.all.len() / ASKED + 1;
         let most = (ENOUGH as f64 / SHARE) as usize;
         let mut n: Vec<usize> =
-            self.all.iter().step_by(step).map(|o| self.n_near(o, most)).collect();
+            self.all.iter().step_by(step).map(|o| self.n_near(o, NEAR, most)).collect();
         n.sort_unstable();
         let median = n.get(n.len() / 2).copied().unwrap_or(0);
         ((median as f64 * SHARE) as usize).clamp(1, ENOUGH)
@@ -154,6 +158,12 @@ mod tests {
         assert_eq!(told(&strays, SpaceKind::Free), [false; 4]);
         // Where no beam went through, each of them may be something.
         assert_eq!(told(&strays, SpaceKind::Unknown), [true; 4]);
+    }
+
+    #[test]
+    fn a_small_thing_of_four_points_stays() {
+        let hook = [[0.0, 0.0, 0.0], [0.012, 0.0, 0.0], [0.0, 0.0, 0.012], [0.012, 0.0, 0.012]];
+        assert_eq!(told(&hook, SpaceKind::Free), [true; 4]);
     }
 
     #[test]

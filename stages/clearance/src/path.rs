@@ -57,6 +57,14 @@ pub struct Contact {
     pub n: usize,
 }
 
+impl Contact {
+    /// It leads into space of which nothing is known, and did not so where the robot was found; beyond all that is known nobody can tell.
+    #[must_use]
+    pub fn is_unseen(&self) -> bool {
+        self.level == Level::Unseen && (!self.as_found || self.at.is_none())
+    }
+}
+
 /// Which part, to what, and whether only as it was found.
 type Key = (usize, What, bool);
 
