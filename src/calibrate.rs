@@ -5,6 +5,7 @@ use crate::engine::{AllThreads, Engine, Task};
 use crate::folders;
 use crate::search::Search;
 use crate::tools::adopt;
+use contract::words::count;
 use contract::{Calibration, Error, Fit, Kind, Region, Result, Verdict};
 use export::atomic;
 use export::{ResultFile, RobotEntry};
@@ -134,7 +135,8 @@ fn zeros(file: &Path, robots: &[(PathBuf, RobotEntry)]) -> Result<BTreeMap<Strin
 }
 
 impl Together {
-    /// Writes the corrected model: the folder of the library's, with the joints of its URDF moved.
+    /// Writes the corrected model into a library: the folder of the given library's model, with the joints of its URDF moved,
+    /// under its own name in `out`.
     ///
     /// # Errors
     /// No such model in the library, a folder that is there already or cannot be written, or a URDF outside its folder.
@@ -151,7 +153,7 @@ impl Together {
             let what = format!("the model's URDF is not in its folder {}", from.display());
             return Err(at(Error::bad_input(what).hint("copy it there and name it in robot.toml")));
         };
-        folders::copy_as_new(&from, out, |made| {
+        folders::copy_as_new(&from, &out.join(&self.model), |made| {
             atomic::write(&made.join(inside), corrected.as_bytes())
         })
     }
@@ -159,7 +161,8 @@ impl Together {
     /// For people.
     #[must_use]
     pub fn words(&self, out: &Path) -> String {
-        let mut text = format!("{} from {} posture(s)\n", self.model, self.n_postures);
+        let mut text =
+            format!("{} from {}\n", self.model, count(self.n_postures as u64, "posture"));
         for f in &self.calibration.frames {
             let ([offset, offset_sigma], [swing, swing_sigma]) = (f.offset(), f.swing());
             let _ = writeln!(
@@ -182,7 +185,8 @@ impl Together {
                 sigma * factor
             );
         }
-        let _ = writeln!(text, "corrected model in {}", out.display());
+        let (folder, library) = (out.join(&self.model), out.display());
+        let _ = writeln!(text, "corrected model in {}: give --robots {library}", folder.display());
         text
     }
 }

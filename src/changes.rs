@@ -4,6 +4,7 @@
 //! five of their standard deviations together, and by more than models and registration make. Joints that the points of
 //! either session leave open are not compared, and named.
 
+use contract::words::{Unit, triple};
 use contract::{Fit, Verdict, quote};
 use export::{ResultFile, RobotEntry};
 use serde::Serialize;
@@ -56,6 +57,8 @@ pub struct JointChange {
     pub change: f64,
     /// Whether it is one, beyond what both know.
     pub is_change: bool,
+    /// Whether the joint slides: its values are metres.
+    pub slides: bool,
 }
 
 /// One robot of either result.
@@ -234,7 +237,7 @@ fn joint(name: &str, then: [f64; 2], now: [f64; 2], slides: bool) -> JointChange
         change -= (change / TAU).round() * TAU;
     }
     let is_change = change.abs() > (SURE * then[1].hypot(now[1])).max(LEAST_JOINT);
-    JointChange { joint: name.into(), then, now, change, is_change }
+    JointChange { joint: name.into(), then, now, change, is_change, slides }
 }
 
 fn shift(a: &RobotEntry, b: &RobotEntry) -> [f64; 3] {
@@ -270,22 +273,13 @@ pub fn words(changes: &[RobotChange]) -> String {
             if robot.was_missed { format!("{what} (the earlier result missed it)") } else { what };
         let _ = writeln!(text, "{then} -> {now} {}: {what}", quote::shown(&robot.model));
         if robot.change == Change::Moved {
-            let [x, y, z] = robot.base_shift.unwrap_or_default().map(|v| v * 1e3);
-            let turn = robot.base_turn.unwrap_or_default().to_degrees();
-            let _ = writeln!(
-                text,
-                "     base shifted by ({x:.1}, {y:.1}, {z:.1}) mm, turned {turn:.2}°"
-            );
+            let shift = triple(robot.base_shift.unwrap_or_default().map(|v| v * 1e3), 1);
+            let turn = Unit::DEGREES.say(robot.base_turn.unwrap_or_default(), 2);
+            let _ = writeln!(text, "     base shifted by {shift} mm, turned {turn}");
             for j in robot.joints.iter().filter(|j| j.is_change) {
-                let _ = writeln!(
-                    text,
-                    "     {:<24} {:.5} ± {:.5} -> {:.5} ± {:.5} rad or m",
-                    quote::shown(&j.joint),
-                    j.then[0],
-                    j.then[1],
-                    j.now[0],
-                    j.now[1]
-                );
+                let unit = Unit::of(j.slides);
+                let [then, now] = [j.then, j.now].map(|[v, sigma]| unit.say_both(v, sigma));
+                let _ = writeln!(text, "     {:<24} {then} -> {now}", quote::shown(&j.joint));
             }
         }
         if !robot.not_compared.is_empty() {
@@ -333,7 +327,7 @@ mod tests {
         ]);
         let now = result(vec![
             robot("R1", "m", 0.002, 0.504 + TAU),
-            robot("R2", "m", 3.0, 0.6),
+            robot("R2", "m", 3.0 - 1e-5, 0.6),
             robot("R3", "other", 6.0, 0.5),
             robot("R4", "m", 12.0, 0.5),
         ]);
@@ -344,7 +338,10 @@ mod tests {
         assert_eq!(found[0].not_compared, ["flange"]);
         assert!((found[1].joints[0].change - 0.1).abs() < 1e-12);
         assert_eq!((found[3].then.as_deref(), found[4].now.as_deref()), (Some("R4"), Some("R4")));
-        assert!(words(&found).contains("R2 -> R2 m: moved"), "{}", words(&found));
+        let said = words(&found);
+        let moved = "R2 -> R2 m: moved\n     base shifted by (0.0, 0.0, 0.0) mm, turned 0.00°\n     \
+                     a                        28.648° ± 0.057° -> 34.377° ± 0.057°\n";
+        assert!(said.contains(moved), "{said}");
         assert!(changes(&then, &then).iter().all(|r| r.change == Change::Same));
     }
 

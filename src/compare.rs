@@ -1,7 +1,8 @@
 //! A result and the truth of its scene in; how far they agree, robot by robot and point by point, out.
 
 use crate::tally::Tally;
-use contract::{Error, Kind, Label, PointKind, Result};
+use contract::words::{Unit, count};
+use contract::{Certainty, Error, Kind, Label, PointKind, Result};
 use export::{ResultFile, RobotEntry};
 use fit::turns;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -70,10 +71,17 @@ pub struct JointError {
     pub error: f64,
     /// Stated standard deviation, same unit.
     pub sigma: f64,
-    /// Whether it is said to be determined by the points.
-    pub determined: bool,
+    /// How well the points are said to tell it.
+    pub certainty: Certainty,
     /// Whether it slides: its values are metres.
     pub slides: bool,
+}
+
+impl JointError {
+    /// Whether it is said to be determined.
+    fn is_determined(&self) -> bool {
+        self.certainty == Certainty::Determined
+    }
 }
 
 impl Found {
@@ -193,21 +201,20 @@ impl Agreement {
                 found.base[0] * 1e3,
                 found.base[1].to_degrees()
             );
-            for JointError { name, error, sigma, determined, slides } in &found.joints {
-                let note = if *determined { "" } else { "  (not determined by the points)" };
-                let (factor, unit) =
-                    if *slides { (1e3, " mm") } else { (1_f64.to_degrees(), "°") };
+            for JointError { name, error, sigma, certainty, slides } in &found.joints {
+                let (unit, note) = (Unit::of(*slides), certainty.note());
                 let _ = writeln!(
                     text,
-                    "             {name:<26} error {:>8.4}{unit}  stated ± {:.4}{unit}{note}",
-                    error * factor,
-                    sigma * factor
+                    "             {name:<26} error {:>9}  stated ± {}{note}",
+                    unit.say(*error, 4),
+                    unit.deviation(*sigma)
                 );
             }
         }
         text.push_str(&self.points.words());
         if self.n_invented > 0 {
-            let _ = writeln!(text, "{} robot(s) INVENTED", self.n_invented);
+            let n = count(self.n_invented as u64, "robot");
+            let _ = writeln!(text, "{n} INVENTED");
         }
         text
     }
@@ -260,13 +267,12 @@ fn match_robot(
 
 /// The joints against a true posture.
 fn off(robot: &RobotEntry, truth: &BTreeMap<String, f64>) -> Vec<JointError> {
-    let joints = robot.joints.0.iter().filter_map(|(name, value)| {
-        let truth = truth.get(name)?;
-        let sigma = robot.sigma.0.iter().find(|s| s.0 == *name)?.1;
-        let determined = robot.determined.0.iter().any(|d| d.0 == *name && d.1);
-        let slides = robot.slides.contains(name);
-        let error = if slides { value - truth } else { turns::from_to(*truth, *value) };
-        Some(JointError { name: name.clone(), error, sigma, determined, slides })
+    let joints = robot.posture().filter_map(|joint| {
+        let (name, value, truth) = (joint.name, joint.value, truth.get(joint.name)?);
+        let slides = joint.unit == Unit::MILLIMETRES;
+        let error = if slides { value - truth } else { turns::from_to(*truth, value) };
+        let (sigma, certainty) = (joint.sigma, joint.certainty);
+        Some(JointError { name: name.into(), error, sigma, certainty, slides })
     });
     joints.collect()
 }
@@ -278,8 +284,8 @@ fn worst(joints: &[JointError]) -> f64 {
 
 /// The joints that are said to be determined; where none is, all of them.
 fn judged(joints: &[JointError]) -> impl Iterator<Item = &JointError> {
-    let is_none = joints.iter().all(|j| !j.determined);
-    joints.iter().filter(move |j| is_none || j.determined)
+    let is_none = joints.iter().all(|j| !j.is_determined());
+    joints.iter().filter(move |j| is_none || j.is_determined())
 }
 
 fn rotation(wxyz: [f64; 4]) -> UnitQuaternion<f64> {

@@ -1,4 +1,9 @@
-//! A job in; what it will take of memory, disk and time, and what of it is there already, out. No point is read.
+//! A job in; what it will take of memory, disk and time, and what of it is there already, out. Some points are looked at to
+//! tell how much there is to search.
+
+mod rates;
+mod search;
+mod stand;
 
 use crate::engine::AllThreads;
 use crate::engine::Engine;
@@ -7,10 +12,14 @@ use crate::library;
 use crate::reuse::Digests;
 use crate::tile_bound;
 use crate::units;
-use contract::{Error, Format, Input, Kind, Result};
+use contract::words::count;
+use contract::{Error, Input, Kind, Result};
 use ingest::{Scanners, Sources};
+use rates::{COPC, INGEST, LOAD, REST, SPREAD};
 use serde::Serialize;
 use std::path::Path;
+
+pub use stand::{Searched, Stand};
 
 /// Bytes of a point in the store, with its share of catalogue and checksums.
 const STORE_BYTES: u64 = 18;
@@ -20,22 +29,14 @@ const LABEL_BYTES: u64 = 5;
 const COMPRESSED: f64 = 0.35;
 /// Bytes of a point in a cloud, without and with colour.
 const CLOUD_BYTES: [u64; 2] = [34, 40];
-/// Bytes of a point that wait on disk while a COPC file is made, and points that one thread makes of it in a second.
+/// Bytes of a point that wait on disk while a COPC file is made.
 const COPC_BYTES: u64 = 40;
-const COPC: f64 = 0.9e6;
 /// Bytes of a point in a text file, about.
 const TEXT_BYTES: u64 = 45;
 /// Pictures, models, voxels and lists, bytes for each model of the library: more robots stand in large plants.
 const EXTRA_BYTES: u64 = 32 << 20;
 /// Bytes of a spatial tile beside its points: header, and what of a disk's block is left empty.
 const TILE_BYTES: u64 = 4096;
-/// Points that one thread gets through in a second: ingest of E57, LAS, LAZ, PTX; tiles, planes, labels and writing.
-const INGEST: [(Format, f64); 4] =
-    [(Format::E57, 20e6), (Format::Las, 18e6), (Format::Laz, 2.8e6), (Format::Ptx, 6e6)];
-const REST: [f64; 4] = [30e6, 8e6, 60e6, 9e6];
-/// Seconds of one thread to load a model, and to search a million points for it: between empty and crowded halls.
-const LOAD: f64 = 1.0;
-const SEARCH: [f64; 2] = [0.2, 0.9];
 /// Memory of the program with an open library, and of each model and each point until the budget is full, bytes.
 const PROGRAM_BYTES: u64 = 160 << 20;
 const MODEL_BYTES: u64 = 24 << 20;
@@ -64,8 +65,10 @@ pub struct Estimate {
     pub tiles: [u64; 2],
     /// Free where both go, bytes; 0 where the system does not tell.
     pub free_bytes: u64,
-    /// Time, seconds: for empty halls, and for crowded ones.
+    /// Time, seconds, least and most, where no other program takes the processors' time.
     pub seconds: [f64; 2],
+    /// What seems to stand in the plant, where it was looked at.
+    pub stand: Option<Stand>,
     /// Inputs whose tiles are there, of all.
     pub kept_inputs: [usize; 2],
     /// Whether nothing has changed, and nothing will be done.
@@ -85,21 +88,23 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
     let has_tiles = |i: &Input, sources: &Sources| {
         earlier.as_ref().is_some_and(|e| e.has_tiles(i, sources, settings))
     };
-    let mut estimate = opened(job, has_tiles)?;
+    let (mut estimate, sources) = opened(job, has_tiles)?;
     if unchanged {
         (estimate.store_bytes, estimate.output_bytes, estimate.seconds) = (0, 0, [0.5; 2]);
+    } else {
+        estimate.look(job, &sources, engine)?;
     }
     Ok(Estimate { unchanged, ..estimate })
 }
 
-/// Opens what a job reads, and estimates it.
-fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<Estimate> {
+/// Opens what a job reads, and estimates it but for the search.
+fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<(Estimate, Sources)> {
     let n_models = library::count(&job.robots)?;
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let sources =
         ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest, &AllThreads)?;
     sources.check_sizes()?;
-    Ok(Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)))
+    Ok((Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)), sources))
 }
 
 /// An error of the job; where a disk was full, with what is missing there.
@@ -108,7 +113,8 @@ pub(crate) fn with_missing(error: Error, job: &Job, engine: &Engine) -> Error {
         return error;
     }
     // Where there is no room even to look at what is kept, none of it is counted.
-    let estimate = estimate(job, engine).or_else(|_| opened(job, |_, _| false));
+    let estimate =
+        estimate(job, engine).or_else(|_| opened(job, |_, _| false).map(|opened| opened.0));
     match estimate.map(|e| e.need().saturating_sub(e.free_bytes)) {
         Ok(missing) if missing > 0 => error.hint(format!(
             "about {} are missing: make room, or choose another --out; what was done is kept, and the next run goes on from it",
@@ -188,12 +194,20 @@ impl Estimate {
                 .saturating_add(tiles[0].saturating_mul(TILE_BYTES)),
             tiles,
             free_bytes: free(&job.out),
-            seconds: SEARCH.map(|search| {
-                (seconds + n_models as f64 * (LOAD + search * n as f64 / 1e6)) / threads
-            }),
+            seconds: [(seconds + library::bytes(&job.robots) as f64 / 1e6 * LOAD) / threads; 2],
+            stand: None,
             kept_inputs: [n_kept, sources.inputs.len()],
             unchanged: false,
         }
+    }
+
+    /// Adds the time of the search, for what seems to stand in the plant.
+    fn look(&mut self, job: &Job, sources: &Sources, engine: &Engine) -> Result<()> {
+        let stand = stand::look(sources, &job.means.settings, engine)?;
+        let search = search::seconds(&stand, self.n_models) / job.means.n_threads as f64;
+        self.seconds = [self.seconds[0] + search / SPREAD, self.seconds[1] + search * SPREAD];
+        self.stand = Some(stand);
+        Ok(())
     }
 
     /// Disk that it takes, bytes.
@@ -225,7 +239,8 @@ impl std::fmt::Display for Estimate {
         if self.unchanged {
             return write!(f, "nothing has changed: the result that is there is used again");
         }
-        writeln!(f, "points    {:.1} M in {all} input(s)", self.n_points as f64 / 1e6)?;
+        let inputs = count(all as u64, "input");
+        writeln!(f, "points    {:.1} M in {inputs}", self.n_points as f64 / 1e6)?;
         for line in &self.units {
             writeln!(f, "unit      {line}")?;
         }
@@ -240,7 +255,12 @@ impl std::fmt::Display for Estimate {
         )?;
         writeln!(f, "tiles     about {} spatial tiles, at most {}", self.tiles[0], self.tiles[1])?;
         writeln!(f, "time      {:.0} to {:.0} s", self.seconds[0], self.seconds[1])?;
-        write!(f, "kept      tiles of {kept} of {all} input(s)")
+        if let Some(stand) = &self.stand {
+            let regions = count(stand.regions.len() as u64, "region");
+            let area: f64 = stand.regions.iter().map(|r| r.size[0] * r.size[1]).sum();
+            writeln!(f, "search    {regions} of {area:.0} m² in all, as far as a glance tells")?;
+        }
+        write!(f, "kept      tiles of {kept} of {inputs}")
     }
 }
 

@@ -40,6 +40,7 @@ pub mod store;
 mod straight;
 mod surfaces;
 pub mod tally;
+mod things;
 mod tile_bound;
 mod tools;
 pub mod trajectory;

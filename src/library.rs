@@ -11,6 +11,21 @@ pub(crate) fn count(dir: &Path) -> Result<usize> {
     Ok(Library::open(dir)?.0.len())
 }
 
+/// Bytes of the files of all models; what cannot be read counts nothing. Links are not followed.
+pub(crate) fn bytes(dir: &Path) -> u64 {
+    let (mut sum, mut folders) = (0, Library::open(dir).map(|opened| opened.0).unwrap_or_default());
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
+            match entry.metadata() {
+                Ok(meta) if meta.is_dir() => folders.push(entry.path()),
+                Ok(meta) if meta.is_file() => sum += meta.len(),
+                _ => {}
+            }
+        }
+    }
+    sum
+}
+
 /// Loads all models, those that are `kept` from there; those that cannot be loaded are explained in the library's findings.
 pub(crate) fn load(
     dir: &Path,

@@ -22,7 +22,7 @@ use crate::tile_bound;
 use crate::tools;
 use crate::units;
 use contract::{Cluster, Fit, Floor, Input, Region, Result, Scan, Space};
-use export::COPC;
+use export::{COPC, ReviewEntry};
 use ingest::{Scanners, Sources};
 use robot::{Library, Model};
 use std::path::PathBuf;
@@ -61,8 +61,8 @@ struct Robots {
     fits: Vec<Fit>,
     /// The library's models, and after them those with a tool, other loops or calibrated joints.
     models: Vec<Model>,
-    /// What of the review could not be, in words.
-    unmet: Vec<String>,
+    /// What each entry of the review did.
+    review: Vec<ReviewEntry>,
 }
 
 impl Run<'_> {
@@ -72,8 +72,7 @@ impl Run<'_> {
         let given = self.given(&models_kept)?;
         let (sources, scans) = (&given.sources, &given.sources.scans);
 
-        // First pass: every point once, from the files into the lattice tiles of the store; inputs whose tiles are there are
-        // not read.
+        // First pass: every point once, from files into lattice tiles of the store; inputs whose tiles are there are not read.
         let filling = Filling::new(sources, &job.means, output.tiles(), engine);
         let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, digests));
         let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
@@ -93,7 +92,8 @@ impl Run<'_> {
         let shelf = Shelf::new(&given.library.models);
         let search = Search::new(&shelf, scans, &store, &ground, settings).keeping(&pieces_kept);
         let failures = Failures::of(job);
-        let found = engine.fan_out(Task::new("fit").large(), regions.clone(), |region| {
+        let task = Task::new("fit").large().showing(search.pieces());
+        let found = engine.fan_out(task, regions.clone(), |region| {
             let find = || search.region(&region);
             failures.spare(&region, || fits_kept.get_or_compute(&format!("{region:?}"), find))
         })?;
@@ -113,7 +113,7 @@ impl Run<'_> {
             fits,
             n_searched: [clusters.len(), regions.len()],
             written: &written,
-            unmet: found.unmet,
+            review: found.review,
             left_out: failures.said(job),
         }
         .finish(output)?;
@@ -165,9 +165,9 @@ impl Run<'_> {
     ) -> Result<Robots> {
         let (review, settings, mut models) =
             (&given.review, self.settings, given.library.models.clone());
+        let without = review.without(&found, &models);
         let (fits, wrong) = review.correct(found, place, &models, self.engine)?;
         let fits = fit::choose(review.apply(fits), &models, |fit| review.accepts(fit));
-        let absent = review.missing(&fits);
         let mut fits = tools::dress(fits, &mut models, place, self.engine)?;
         if settings.fit.calibrate {
             fits = calibrate(fits, &mut models, place, self.engine)?;
@@ -177,7 +177,8 @@ impl Run<'_> {
             let (scans, still) = (&given.sources.scans[..], &ground.surfaces.overlaps);
             fit::together(&mut fits, &models, (scans, still), &settings.fit);
         }
-        Ok(Robots { fits, models, unmet: [wrong, absent].concat() })
+        let review = review.did(&without, &fits, &wrong);
+        Ok(Robots { fits, models, review })
     }
 
     /// Which points near robots are links, and which hang on them; then the second pass: every point once more, in the order of

@@ -7,7 +7,7 @@ use contract::quote;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 use std::time::{Duration, Instant};
 use words::{json, words};
 
@@ -105,16 +105,58 @@ struct Inner {
 #[derive(Clone)]
 pub struct Stage(Arc<Running>);
 
+/// Pieces of work within the items of a stage, which become known while an item is worked on: each may take minutes. Clones
+/// share them.
+#[derive(Clone, Default)]
+pub struct Pieces(Arc<Inside>);
+
+#[derive(Default)]
+struct Inside {
+    /// Pieces done, and pieces known so far.
+    done: AtomicU64,
+    known: AtomicU64,
+    /// The stage that they are shown with.
+    stage: OnceLock<Weak<Running>>,
+}
+
 struct Running {
     progress: Progress,
     name: String,
     total: Amount,
     start: Instant,
+    /// Time of processors at its start, seconds.
+    start_cpu: f64,
     done: [AtomicU64; 3],
     /// Milliseconds since `start` at which the next line is due.
     next_line: AtomicU64,
     bar: Option<ProgressBar>,
     finished: Mutex<bool>,
+    pieces: Pieces,
+}
+
+impl Pieces {
+    /// Says that so many more will have to be done.
+    pub fn expect(&self, n: usize) {
+        self.0.known.fetch_add(n as u64, Ordering::Relaxed);
+        self.show();
+    }
+
+    /// Says that one of them is done.
+    pub fn done(&self) {
+        self.0.done.fetch_add(1, Ordering::Relaxed);
+        self.show();
+    }
+
+    /// Done and known so far.
+    fn counts(&self) -> [u64; 2] {
+        [&self.0.done, &self.0.known].map(|n| n.load(Ordering::Relaxed))
+    }
+
+    fn show(&self) {
+        if let Some(stage) = self.0.stage.get().and_then(Weak::upgrade) {
+            Stage(stage).add(0, 0, 0);
+        }
+    }
 }
 
 impl Progress {
@@ -159,17 +201,28 @@ impl Progress {
     /// Begins a stage; zero in `total` means not known. It ends with [`Stage::finish`], or when its last clone goes.
     #[must_use]
     pub fn stage(&self, name: &str, total: Amount) -> Stage {
+        self.stage_of(name, total, Pieces::default())
+    }
+
+    /// The same, which shows pieces of its items, too.
+    #[must_use]
+    pub fn stage_of(&self, name: &str, total: Amount, pieces: Pieces) -> Stage {
         let bar = (self.0.mode == Mode::Bar).then(|| self.bar(name, &total));
-        Stage(Arc::new(Running {
+        let stage = Stage(Arc::new(Running {
             progress: self.clone(),
             name: name.to_owned(),
             total,
             start: Instant::now(),
+            start_cpu: cpu_seconds(),
             done: Default::default(),
             next_line: AtomicU64::new(self.every().as_millis() as u64),
             bar,
             finished: Mutex::new(false),
-        }))
+            pieces,
+        }));
+        // Pieces belong to the first stage that they are shown with.
+        stage.0.pieces.0.stage.set(Arc::downgrade(&stage.0)).ok();
+        stage
     }
 
     /// What each finished stage did, in the order of their ends.
@@ -273,22 +326,37 @@ impl Running {
         let done = self.done();
         match (self.progress.0.mode, &self.bar) {
             (Mode::None, _) => {}
-            (Mode::Json, _) => {
-                self.progress.line(&json(&self.name, &done, &self.total, seconds, last))
-            }
+            (Mode::Json, _) => self.progress.line(&json(
+                &self.name,
+                (&done, &self.total),
+                self.pieces.counts(),
+                ([seconds, cpu_seconds() - self.start_cpu], last),
+            )),
             (_, Some(bar)) => {
                 let share = done.share(&self.total).unwrap_or(0.0);
                 bar.set_position((share * 1000.0) as u64);
                 bar.tick();
-                let message = words(&done, &self.total, seconds, last);
+                let message = words((&done, &self.total), self.pieces.counts(), (seconds, last));
                 if last { bar.finish_with_message(message) } else { bar.set_message(message) }
             }
             (_, None) => {
-                let words = words(&done, &self.total, seconds, last);
+                let words = words((&done, &self.total), self.pieces.counts(), (seconds, last));
                 self.progress.line(&format!("{}: {words}", self.name));
             }
         }
     }
+}
+
+/// Time of processors that this process has used so far, seconds; 0 where the system does not tell.
+fn cpu_seconds() -> f64 {
+    /// Fields of `/proc/self/stat` after the name: time of the program and of the system for it, in ticks, of which Linux has a
+    /// hundred a second for programs.
+    const TIMES: [usize; 2] = [11, 12];
+    const TICKS: f64 = 100.0;
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields: Vec<&str> = text.rsplit(')').next().unwrap_or("").split_whitespace().collect();
+    let ticks = |at: usize| fields.get(at).and_then(|f| f.parse::<f64>().ok()).unwrap_or(0.0);
+    TIMES.iter().map(|at| ticks(*at)).sum::<f64>() / TICKS
 }
 
 impl Drop for Running {
@@ -338,6 +406,28 @@ mod tests {
         );
         assert_eq!(told(Mode::None).0, "");
         assert_eq!(told(Mode::None).1.len(), 1);
+    }
+
+    #[test]
+    fn pieces_of_an_item_are_told_while_none_of_the_items_is_done() {
+        let page = Page::default();
+        let progress = Progress::to(Mode::Json, Box::new(page.clone()));
+        let pieces = Pieces::default();
+        let stage = progress.stage_of("fit", Amount::items(3), pieces.clone());
+        // As if a second had gone by.
+        stage.0.next_line.store(0, Ordering::Relaxed);
+        pieces.expect(8);
+        stage.0.next_line.store(0, Ordering::Relaxed);
+        pieces.done();
+        let bytes = page.0.lock().expect("not poisoned").clone();
+        let text = String::from_utf8(bytes).expect("text");
+        let last: serde_json::Value =
+            serde_json::from_str(text.lines().last().expect("a line")).expect("JSON");
+        assert_eq!((&last["items"], &last["event"]), (&0.into(), &"progress".into()));
+        assert_eq!((&last["pieces"], &last["pieces_known"]), (&1.into(), &8.into()));
+        drop(stage);
+        // Its stage is gone: nobody is told.
+        pieces.done();
     }
 
     #[test]

@@ -8,10 +8,11 @@ use crate::reuse::Digests;
 use crate::spaces::poses;
 use crate::store::Store;
 use crate::units;
-use contract::{Fit, Format, Input, InputId, Mask, Result, Scan, Verdict, quote};
+use contract::words::{Unit, count, fixed, triple};
+use contract::{Fit, Format, Input, InputId, JointFit, Mask, Result, Scan, Verdict, quote};
 use export::{
-    InputEntry, Labels, Places, ResultFile, RobotEntry, SCHEMA, ScanLabels, SpaceEntry, StageEntry,
-    write_table,
+    InputEntry, Labels, Places, ResultFile, ReviewEntry, RobotEntry, SCHEMA, ScanLabels,
+    SpaceEntry, StageEntry, write_table,
 };
 use ingest::Sources;
 use robot::{JointKind, Library, Model, Motion, Role};
@@ -29,8 +30,8 @@ pub(crate) struct Report<'a> {
     /// Bodies above the floor, and the places about them that were searched for robots.
     pub(crate) n_searched: [usize; 2],
     pub(crate) written: &'a Done,
-    /// What the review expects and nobody found.
-    pub(crate) unmet: Vec<String>,
+    /// What each entry of the review did.
+    pub(crate) review: Vec<ReviewEntry>,
     /// Inputs and regions that failed and were left out.
     pub(crate) left_out: Vec<String>,
 }
@@ -67,6 +68,7 @@ impl Report<'_> {
                 .collect(),
             stages: self.stages(),
             warnings: warnings.clone(),
+            review: self.review.clone(),
             rescan: None,
         };
         result.write(output.next())?;
@@ -100,7 +102,9 @@ impl Report<'_> {
 
     fn warnings(&self) -> Vec<String> {
         let mut out = self.sources.warnings.clone();
-        out.extend(self.left_out.iter().chain(&self.unmet).cloned());
+        out.extend(self.left_out.iter().cloned());
+        let odd = self.review.iter().filter(|entry| entry.needs_look);
+        out.extend(odd.map(ReviewEntry::words));
         out.extend(self.models_left_out().map(|finding| {
             let [model, place, what] =
                 [&finding.model, &finding.place, &finding.what].map(|part| quote::shown(part));
@@ -120,51 +124,41 @@ impl Report<'_> {
     fn say_posture(&self, text: &mut String, fit: &Fit) {
         let model = &self.models[fit.model];
         for (joint, &index) in fit.joints.iter().zip(&model.free) {
-            let slides = model.joints[index].kind == robot::JointKind::Prismatic;
-            let (factor, unit) = if slides { (1e3, " mm") } else { (1_f64.to_degrees(), "°") };
-            let sigma = if joint.determined {
-                format!("± {:.3}{unit}", joint.sigma * factor)
-            } else {
-                "not determined".into()
-            };
-            let value = joint.value * factor;
-            let _ =
-                writeln!(text, "     {:<24} {value:>9.3}{unit} {sigma}", quote::shown(&joint.name));
+            let slides = model.joints[index].kind == JointKind::Prismatic;
+            let _ = writeln!(text, "     {}", joint_line(joint, slides));
         }
     }
 
     fn summary(&self) -> String {
         let mut text = String::new();
-        let _ = writeln!(text, "{} robot(s) in {} scan(s)", self.fits.len(), self.scans().count());
+        let n_scans = count(self.scans().count() as u64, "scan");
+        let _ = writeln!(text, "{} in {n_scans}", count(self.fits.len() as u64, "robot"));
         for line in units::said(self.sources) {
             let _ = writeln!(text, "  unit {line}");
         }
         if self.fits.is_empty() {
             let n_arms = self.library.models.iter().filter(|model| !model.is_tool()).count();
+            let places = count(self.n_searched[1] as u64, "place");
+            let models = count(n_arms as u64, "model");
             let _ = writeln!(
                 text,
-                "  {} place(s) as large as a robot were searched for {n_arms} model(s), and none of them stands there",
-                self.n_searched[1]
+                "  {places} as large as a robot searched for {models}: none of them stands there"
             );
         }
         for (i, fit) in self.fits.iter().enumerate() {
-            let p = fit.world_from_base.translation.vector;
             let _ = writeln!(
                 text,
-                "  R{} {} at ({:.3}, {:.3}, {:.3}) m: {}, score {:.2}, rms {:.1} mm",
-                i + 1,
+                "  {} {} at {} m: {}, score {}, rms {:.1} mm",
+                id(i),
                 quote::shown(&fit.model_name),
-                p.x,
-                p.y,
-                p.z,
+                triple(fit.world_from_base.translation.vector.into(), 3),
                 fit.verdict.word(),
-                fit.score,
+                fixed(fit.score, 2),
                 fit.rms * 1e3
             );
             if let Some(tool) = &fit.tool {
-                let deg = tool.mount.to_degrees();
-                let _ =
-                    writeln!(text, "     carries {} on '{}' at {deg:.0}°", tool.model, tool.link);
+                let turn = Unit::DEGREES.say(tool.mount, 0);
+                let _ = writeln!(text, "     carries {} on '{}' at {turn}", tool.model, tool.link);
             }
             self.say_posture(&mut text, fit);
             let word = if fit.verdict == Verdict::Trusted { "note" } else { "why" };
@@ -174,25 +168,32 @@ impl Report<'_> {
             for stay in &fit.stays {
                 let _ = writeln!(
                     text,
-                    "     in {} other scan(s): {}, score {:.2}",
-                    stay.stands_in.len(),
+                    "     in {}: {}, score {}",
+                    count(stay.stands_in.len() as u64, "other scan"),
                     stay.verdict.word(),
-                    stay.score
+                    fixed(stay.score, 2)
                 );
                 self.say_posture(&mut text, stay);
             }
         }
+        for entry in &self.review {
+            let _ = writeln!(text, "  {}", entry.words());
+        }
         let n: u64 = self.written.masks.iter().map(|m| m.n_points).sum();
         let moving: u64 = self.written.masks.iter().map(|m| m.n_moving).sum();
-        let _ = writeln!(text, "{n} points labelled, {moving} of them moving");
-        let _ = writeln!(
-            text,
-            "{} spatial tiles, {} pictures",
-            self.written.clouds.tiles.len(),
-            self.written.pictures.len(),
-        );
+        let _ = writeln!(text, "{} labelled, {moving} of them moving", count(n, "point"));
+        let tiles = count(self.written.clouds.tiles.len() as u64, "spatial tile");
+        let pictures = count(self.written.pictures.len() as u64, "picture");
+        let _ = writeln!(text, "{tiles}, {pictures}");
         text
     }
+}
+
+/// A joint as the summary has it: name, value, standard deviation, and a word where it is not determined.
+fn joint_line(joint: &JointFit, slides: bool) -> String {
+    let unit = Unit::of(slides);
+    let (value, sigma) = (unit.say(joint.value, 3), unit.deviation(joint.sigma));
+    format!("{:<24} {value:>11} ± {sigma}{}", quote::shown(&joint.name), joint.certainty.note())
 }
 
 /// The entry of a robot in the result; `models` are those that fits are of.
@@ -295,5 +296,40 @@ fn format_word(format: Format) -> &'static str {
         Format::Ptx => "ptx",
         Format::Las => "las",
         Format::Laz => "laz",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::Certainty;
+
+    #[test]
+    fn a_joint_has_its_deviation_always_and_the_word_that_fits_it() {
+        let joint = |value: f64, sigma: f64, certainty| JointFit {
+            name: "joint_a4".into(),
+            value: value.to_radians(),
+            sigma: sigma.to_radians(),
+            certainty,
+            ..JointFit::default()
+        };
+        let lines = [
+            joint_line(&joint(-0.000_1, 0.012, Certainty::Determined), false),
+            joint_line(&joint(57.483, 0.06, Certainty::Coarse), false),
+            joint_line(&joint(178.0, 103.9, Certainty::Undetermined), false),
+            joint_line(
+                &joint(0.25_f64.to_degrees(), 0.000_3_f64.to_degrees(), Certainty::Determined),
+                true,
+            ),
+        ];
+        assert_eq!(
+            lines,
+            [
+                "joint_a4                      0.000° ± 0.012°",
+                "joint_a4                     57.483° ± 0.060° coarse",
+                "joint_a4                    178.000° ± 103.9° undetermined",
+                "joint_a4                  250.000 mm ± 0.300 mm",
+            ]
+        );
     }
 }

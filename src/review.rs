@@ -1,4 +1,4 @@
-//! What a person knows of the robots, as a file in; the fits with that applied, and what could not be, out.
+//! What a person knows of the robots, as a file in; the fits with that applied, and what each entry of the file did, out.
 //!
 //! ```toml
 //! [[robot]]                     # one for each place that something is known of
@@ -12,9 +12,13 @@
 //!
 //! The file is the user's and is given again with every run, so what it says survives reruns.
 
+mod heard;
+
 use crate::engine::{AllThreads, Engine, Task};
 use crate::search::Search;
+use contract::words::triple;
 use contract::{Error, Fit, JointFit, Region, Result, Verdict};
+use export::ReviewEntry;
 use geometry::{Point, Pose};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
@@ -89,25 +93,28 @@ impl Review {
             return Err(bad("too large for a review".into()));
         }
         let text = std::fs::read_to_string(path).map_err(io)?;
-        let review: Self = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
-        for place in &review.places {
-            place.check(models).map_err(bad)?;
+        let review: Self = toml::from_str(&text).map_err(|e| {
+            let line = e.span().map_or(1, |span| text[..span.start].lines().count().max(1));
+            bad(format!("line {line}: {}", e.message().trim().replace('\n', " ")))
+        })?;
+        for (k, place) in review.places.iter().enumerate() {
+            place.check(k + 1, models).map_err(bad)?;
         }
         Ok(review)
     }
 
-    /// The fits of all candidates, those from postures that are given in the place of others; and a warning for each posture
-    /// that the scans do not bear out.
+    /// The fits of all candidates, those from postures that are given in the place of others; and the numbers of the entries
+    /// whose posture the scans do not bear out.
     pub(crate) fn correct(
         &self,
         mut fits: Vec<Fit>,
         (search, regions): (&Search<'_, '_>, &[Region]),
         models: &[Model],
         engine: &Engine,
-    ) -> Result<(Vec<Fit>, Vec<String>)> {
-        let given = self.places.iter().filter(|place| !place.joints.is_empty());
-        let starts: Vec<(&Place, Fit)> =
-            given.filter_map(|place| Some((place, place.start(&fits, models)?))).collect();
+    ) -> Result<(Vec<Fit>, Vec<usize>)> {
+        let given = self.places.iter().enumerate().filter(|(_, place)| !place.joints.is_empty());
+        let starts: Vec<(usize, Fit)> =
+            given.filter_map(|(k, place)| Some((k, place.start(&fits, models)?))).collect();
         let found = engine.fan_out(
             Task::new("review").large(),
             starts.iter().collect(),
@@ -118,21 +125,17 @@ impl Review {
                 })
             },
         )?;
-        let mut warnings = Vec::new();
-        for ((place, start), fit) in starts.iter().zip(found) {
+        let mut wrong = Vec::new();
+        for ((k, _), fit) in starts.iter().zip(found) {
             match fit.flatten() {
                 Some(fit) => {
-                    fits.retain(|f| !place.has(f));
+                    fits.retain(|f| !self.places[*k].has(f));
                     fits.push(fit);
                 }
-                None => warnings.push(format!(
-                    "the posture that the review gives for the {} near {} is not what the scans show",
-                    start.model_name,
-                    place.words()
-                )),
+                None => wrong.push(*k),
             }
         }
-        Ok((fits, warnings))
+        Ok((fits, wrong))
     }
 
     /// The fits of all candidates with what is known applied: where a robot is accepted, it alone is left.
@@ -160,18 +163,21 @@ impl Review {
         fits
     }
 
-    /// A warning for each place where none of the robots that were chosen stands, though one should.
+    /// The robots that would be reported without the review, for [`Review::did`]; none where it has no entry.
     #[must_use]
-    pub fn missing(&self, chosen: &[Fit]) -> Vec<String> {
-        let expected = self.places.iter().filter(|p| p.verdict != Some(Decision::Reject));
-        let missing = expected.filter(|place| !chosen.iter().any(|f| place.has(f)));
-        let warning = |place: &Place| {
-            let (what, at) = (place.model.as_deref().unwrap_or("robot"), place.words());
-            format!(
-                "the review expects a {what} near {at}, and none of the robots that were found stands there"
-            )
-        };
-        missing.map(warning).collect()
+    pub(crate) fn without(&self, found: &[Fit], models: &[Model]) -> Vec<Fit> {
+        if self.places.is_empty() {
+            Vec::new()
+        } else {
+            fit::choose(found.to_vec(), models, |_| false)
+        }
+    }
+
+    /// What each entry did, in their order: robots that would be reported without the review, those that are, and entries
+    /// whose posture the scans do not bear out.
+    #[must_use]
+    pub(crate) fn did(&self, without: &[Fit], with: &[Fit], wrong: &[usize]) -> Vec<ReviewEntry> {
+        self.told(&heard::Heard { without, with, wrong })
     }
 
     /// Whether somebody accepts a fit.
@@ -192,11 +198,12 @@ impl Review {
 }
 
 impl Place {
-    /// Whether all of it can be; else what cannot.
-    fn check(&self, models: &[Model]) -> std::result::Result<(), String> {
+    /// Whether all of the entry with this number can be; else what cannot.
+    fn check(&self, number: usize, models: &[Model]) -> std::result::Result<(), String> {
         let numbers = self.at.iter().chain([&self.radius]).chain(self.joints.values());
         if !numbers.chain(self.rpy.iter().flatten()).all(|v| v.is_finite()) || self.radius <= 0.0 {
-            return Err(format!("a place, radius, joint or turn is no number: {self:?}"));
+            let what = "at, joints and rpy must be numbers, and radius one above 0";
+            return Err(format!("entry {number}, near {}: {what}", self.words()));
         }
         if self.rpy.is_some() && self.joints.is_empty() {
             return Err(format!("rpy near {} belongs to no joints: give them, too", self.words()));
@@ -265,8 +272,7 @@ impl Place {
 
     /// The place for people.
     fn words(&self) -> String {
-        let [x, y, z] = self.at;
-        format!("({x:.2}, {y:.2}, {z:.2})")
+        triple(self.at, 2)
     }
 }
 
@@ -280,12 +286,12 @@ fn by_rank(a: &Fit, b: &Fit) -> std::cmp::Ordering {
 mod tests {
     use super::*;
 
-    fn fit(model: &str, x: f64, explained: f64) -> Fit {
+    pub(super) fn fit(model: &str, x: f64, explained: f64) -> Fit {
         let world_from_base = Pose::translation(x, 0.0, 0.0);
         Fit { model_name: model.into(), world_from_base, explained, ..Fit::default() }
     }
 
-    fn place(x: f64, model: Option<&str>, verdict: Option<Decision>) -> Place {
+    pub(super) fn place(x: f64, model: Option<&str>, verdict: Option<Decision>) -> Place {
         let (model, joints) = (model.map(Into::into), BTreeMap::new());
         Place { at: [x, 0.0, 0.0], radius: RADIUS, model, verdict, joints, rpy: None }
     }
@@ -328,6 +334,29 @@ mod tests {
     }
 
     #[test]
+    fn what_cannot_be_is_named_by_entry_and_line_in_plain_words() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("review.toml");
+        let said = |text: &str| {
+            std::fs::write(&path, text).expect("is written");
+            Review::read(&path, &[]).expect_err("cannot be").to_string()
+        };
+        let good = "[[robot]]\nat = [1.0, 2.0, 0.0]\n";
+        let radius = said(&format!("{good}[[robot]]\nat = [1.0, -0.001, 0.0]\nradius = 0.0\n"));
+        assert!(
+            radius.contains(
+                "entry 2, near (1.00, 0.00, 0.00): at, joints and rpy must be numbers, and radius one above 0"
+            ),
+            "{radius}"
+        );
+        let verdict = said(&format!("{good}verdict = \"acept\"\n"));
+        assert!(verdict.contains("review.toml: line 3: unknown variant `acept`"), "{verdict}");
+        for text in [radius, verdict] {
+            assert!(!text.contains('\n') && !text.contains("Place {"), "{text}");
+        }
+    }
+
+    #[test]
     fn a_person_knows_better() {
         let review = Review {
             places: vec![
@@ -342,8 +371,6 @@ mod tests {
         let left: Vec<(&str, Verdict)> = fits.iter().map(|f| (&*f.model_name, f.verdict)).collect();
         assert_eq!(left, [("b", Verdict::Trusted), ("a", Verdict::Doubtful)]);
         assert_eq!(fits[0].reasons, ["accepted in review"]);
-        let warnings = review.missing(&fits);
-        assert!(warnings.len() == 1 && warnings[0].contains("(9.00, "), "{warnings:?}");
         // Without a model the best is meant, and its rivals stand back.
         let review = Review { places: vec![place(0.0, None, Some(Decision::Accept))] };
         let mut fits = review.apply(vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.9)]);

@@ -3,7 +3,7 @@
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::search::{Search, Shelf};
-use contract::{Fit, JointFit, Mounted, Region, Result, Verdict};
+use contract::{Certainty, Fit, JointFit, Mounted, Region, Result, Verdict};
 use fit::{Prepared, Scene, Settings, Tooled};
 use robot::Model;
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
@@ -181,7 +181,9 @@ fn best_tool(
 fn widen(last: &mut JointFit, alike: &[[f64; 2]]) {
     let apart = alike.iter().map(|[_, value]| fit::turns::apart(*value, last.value));
     let spread = apart.fold(0.0, f64::max);
-    last.determined &= alike.is_empty();
+    if !alike.is_empty() {
+        last.certainty = Certainty::Undetermined;
+    }
     last.sigma = last.sigma.max(spread);
 }
 

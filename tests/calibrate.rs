@@ -80,7 +80,7 @@ fn a_joint_that_is_elsewhere_is_found_and_the_model_corrected() {
     let robots = dir.path().join("robots");
     write_robots(&robots).expect("the library is written");
     let (outs, readings) = runs(dir.path(), &robots);
-    let (file, corrected) = (dir.path().join("readings.toml"), dir.path().join("corrected/arm"));
+    let (file, corrected) = (dir.path().join("readings.toml"), dir.path().join("corrected"));
     std::fs::write(&file, readings).expect("is written");
     let words = stillpoint(&[
         &"robots",
@@ -94,14 +94,18 @@ fn a_joint_that_is_elsewhere_is_found_and_the_model_corrected() {
         &"--readings",
         &file,
     ]);
-    assert!(words.contains("from 2 posture(s)"), "{words}");
+    assert!(words.contains("from 2 postures"), "{words}");
     let load = |dir: &Path| {
         robot::Library::load(dir, &robot::Settings::without_clouds()).expect("loads").models
     };
     let nominal = load(&robots);
     let nominal =
         nominal.iter().find(|m| m.name == simulate::demo_robots::PALLETISER).expect("is there");
-    let own = &load(&dir.path().join("corrected"))[0];
+    let own = &load(&corrected)[0];
+    assert_eq!(own.name, nominal.name);
+    // What is written is a library, as all commands take one.
+    let linted = stillpoint(&[&"robots", &"lint", &corrected]);
+    assert!(linted.contains("0 errors"), "{linted}");
     for &joint in &nominal.free {
         let moved =
             nominal.joints[joint].parent_from_joint.inverse() * own.joints[joint].parent_from_joint;
@@ -122,7 +126,7 @@ fn a_joint_that_is_elsewhere_is_found_and_the_model_corrected() {
 fn refuses_to_overwrite(out: &Path, robots: &Path) {
     let own = robots.join(simulate::demo_robots::PALLETISER);
     let urdf = std::fs::read(own.join("robot.urdf")).expect("a URDF");
-    for taken in [own.clone(), own.join("corrected")] {
+    for taken in [robots.to_path_buf(), own.clone(), own.join("corrected")] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
         command.args(["robots", "calibrate"]).arg(out).arg("--robots").arg(robots);
         let done = command.arg("--out").arg(&taken).output().expect("the program starts");

@@ -69,6 +69,31 @@ fn an_empty_library_is_explained() {
     assert!(all["errors"].as_u64() > Some(0), "{all}");
 }
 
+#[test]
+fn what_is_counted_and_what_the_system_says_read_as_sentences() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let model = dir.path().join("arm");
+    std::fs::create_dir(&model).expect("is made");
+    std::fs::write(model.join("robot.urdf"), "<robot name='arm'>").expect("is written");
+    let output = stillpoint(&["robots", "lint", &dir.path().to_string_lossy()]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.ends_with("1 error, 0 warnings, 0 notes\n"), "{text}");
+    let nowhere = dir.path().join("nowhere").to_string_lossy().into_owned();
+    for args in [
+        &["verify", &nowhere][..],
+        &["report", &nowhere],
+        &["history", &nowhere],
+        &["diff", &nowhere, &nowhere],
+        &["robots", "lint", &nowhere],
+        &["simulate", &nowhere, "--out", &nowhere],
+    ] {
+        let output = stillpoint(args);
+        let said = err(&output) + &String::from_utf8_lossy(&output.stdout);
+        assert_ne!(code(&output), 0, "{args:?}");
+        assert!(!said.is_empty() && !said.contains("os error"), "{args:?}: {said}");
+    }
+}
+
 /// A bare room with one scanner: scans, poses and truth come out whole, the same for any number of threads.
 #[test]
 fn a_scene_becomes_scans_with_truth() {

@@ -66,6 +66,13 @@ fn a_posture_that_is_given_is_where_the_fit_begins_and_no_more() {
     assert_eq!(joints(&far["robots"][0]), joints(found));
     let none = result(dir, &format!("[[robot]]\nat = {at}\nverdict = \"reject\"\n"));
     assert_eq!(none["robots"].as_array().expect("robots").len(), 0);
+    // It was a true robot: that is said, not passed over.
+    let did = none["review"][0]["did"].as_str().expect("a sentence");
+    assert!(
+        did.contains("(trusted, score ") && did.contains("look whether this is meant"),
+        "{did}"
+    );
+    assert!(none["warnings"].to_string().contains("review, entry 1: reject near "), "{none:#}");
     let odd = run(
         dir,
         &format!("[[robot]]\nat = {at}\nmodel = {}\njoints = {{ elbow = 1.0 }}", found["model"]),

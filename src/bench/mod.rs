@@ -15,6 +15,7 @@ mod growth;
 mod labels;
 mod limits;
 mod obstacles;
+pub mod plan;
 pub mod plant;
 mod plot;
 pub mod rescan;

@@ -259,7 +259,7 @@ fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) 
             error: whole(error),
             sigma: joint.sigma,
             // The source's method does not say; its table has all joints.
-            determined: joint.determined || !fit.rough.is_empty(),
+            determined: joint.is_determined() || !fit.rough.is_empty(),
             slides,
         }
     });

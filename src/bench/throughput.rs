@@ -144,7 +144,7 @@ fn run(
 }
 
 /// Draws the plant and scans it; returns its number of points.
-fn scan(
+pub(super) fn scan(
     bench: &ThroughputBench,
     (size, n_scans): (u64, usize),
     scans: &Path,
@@ -199,7 +199,7 @@ fn trusted(out: &Path) -> usize {
 }
 
 /// The command line of the measured run, with the means of this one.
-fn arguments(
+pub(super) fn arguments(
     input: &Path,
     scans: &Path,
     robots: &Path,

@@ -18,6 +18,9 @@ pub(super) struct StageTime {
     pub(super) stage: String,
     pub(super) seconds: f64,
     pub(super) points: u64,
+    /// Time of processors, seconds; 0 where the system does not tell.
+    #[serde(default)]
+    pub(super) cpu_seconds: f64,
 }
 
 /// What was seen.

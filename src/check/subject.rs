@@ -121,9 +121,10 @@ impl Robot<'_> {
                 "moved between scans: what hangs on it is not known to hang there in all of them";
             out.push(format!("{id} {what}"));
         }
-        let is_open = |j: &&JointFit| !j.determined && !path.joints.contains(&j.name);
+        let is_open = |j: &&JointFit| !j.is_determined() && !path.joints.contains(&j.name);
         out.extend(fit.joints.iter().filter(is_open).map(|joint| {
-            format!("{} is not determined, and the path does not give it", joint.name)
+            let (name, word) = (&joint.name, joint.certainty.word());
+            format!("joint '{name}' is {word}, and the path does not give it")
         }));
         // How far the base's turn takes what it reaches.
         let [shift, turn] =

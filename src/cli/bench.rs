@@ -1,11 +1,13 @@
 //! `bench`: suites and numbers in; tables of what the program is worth out.
 
 use super::bench_flags::{
-    AccuracyFlags, Against, CheckBenchFlags, PlantFlags, RescanBenchFlags, ThroughputFlags,
+    AccuracyFlags, Against, CheckBenchFlags, PlanBenchFlags, PlantFlags, RescanBenchFlags,
+    ThroughputFlags,
 };
 use super::flags::Common;
 use super::say::Say;
 use crate::bench::check::{CheckBench, checks};
+use crate::bench::plan::{PlanBench, plans};
 use crate::bench::plant::{PlantBench, plants};
 use crate::bench::rescan::{RescanBench, rescans};
 use crate::bench::throughput::{ThroughputBench, throughput};
@@ -43,6 +45,21 @@ pub(super) fn bench_plant(flags: &PlantFlags, common: &Common, say: &Say) -> Res
         keep: flags.keep,
     };
     say.result(&plants(&bench, &means, &engine)?);
+    Ok(exit::OK)
+}
+
+pub(super) fn bench_plan(flags: &PlanBenchFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let bench = PlanBench {
+        n_halls: flags.halls,
+        first: flags.first,
+        seed: flags.seed,
+        robots: flags.robots.clone(),
+        out: flags.out.clone(),
+        keep: flags.keep,
+    };
+    say.result(&plans(&bench, &means, &engine)?);
     Ok(exit::OK)
 }
 

@@ -11,6 +11,8 @@ pub(super) enum BenchCommand {
     Accuracy(AccuracyFlags),
     /// Draw cells and lines as files, do the main job on them, compare robots and labels with the truth
     Plant(PlantFlags),
+    /// Draw halls with libraries of their own, ask what they will take, do the main job: predicted beside measured
+    Plan(PlanBenchFlags),
     /// Draw plants of which one cell is scanned again: what a rescan finds, what it invents, its time beside a whole run
     Rescan(RescanBenchFlags),
     /// Draw cells and paths of their robots, do the main job and check the paths: false alarms and misses
@@ -63,6 +65,28 @@ pub(super) struct PlantFlags {
     pub(super) out: Option<PathBuf>,
     /// Keep scenes, scans and results
     #[arg(long, requires = "out")]
+    pub(super) keep: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct PlanBenchFlags {
+    /// Halls
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub(super) halls: usize,
+    /// Number of the first of them
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub(super) first: usize,
+    /// Seed of all that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Robot library that the halls' libraries are chosen from
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: PathBuf,
+    /// Where rows and table go; scans are kept there, too, with --keep
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Keep scans: the next bench of the same halls finds them
+    #[arg(long)]
     pub(super) keep: bool,
 }
 

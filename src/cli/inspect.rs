@@ -17,7 +17,7 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
         &means.settings.ingest,
         &AllThreads,
     )?;
-    let descriptions = ingest::describe(&sources);
+    let descriptions = ingest::describe(&sources, &AllThreads);
     if flags.json {
         let all = serde_json::json!({
             "schema": "stillpoint.inspect/1",

@@ -76,6 +76,7 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
         }
         Command::Bench(BenchCommand::Plant(flags)) => bench::bench_plant(flags, &line.common, say),
         Command::Bench(BenchCommand::Check(flags)) => bench::bench_check(flags, &line.common, say),
+        Command::Bench(BenchCommand::Plan(flags)) => bench::bench_plan(flags, &line.common, say),
         Command::Bench(BenchCommand::Rescan(flags)) => {
             bench::bench_rescan(flags, &line.common, say)
         }

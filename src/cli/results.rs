@@ -12,6 +12,8 @@ use crate::exit;
 use crate::history;
 use crate::job::Outcome;
 use crate::reuse::{self, Manifest};
+use crate::things::ThingEntry;
+use contract::words::count;
 use contract::{Error, Kind, Result};
 use export::ResultFile;
 use std::path::Path;
@@ -23,13 +25,17 @@ pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8>
     let n_bytes: u64 = checked.manifest.files.iter().map(|f| f.n_bytes).sum();
     match checked.wrong.split_first() {
         None => {
-            say.result(&format!("{n_files} files, {n_bytes} bytes: as they were written"));
+            let files = count(n_files as u64, "file");
+            say.result(&format!("{files}, {}: as they were written", count(n_bytes, "byte")));
             Ok(exit::OK)
         }
         Some((first, others)) => {
             others.iter().for_each(|wrong| say.warning(wrong));
+            let wrong = others.len() + 1;
+            let verb = if wrong == 1 { "is" } else { "are" };
+            let files = count(n_files as u64, "file");
             Err(Error::bad_input(first.clone())
-                .because(format!("{} of {n_files} files are wrong", others.len() + 1))
+                .because(format!("{wrong} of {files} {verb} wrong"))
                 .hint("run the same job again: what is whole is used again, the rest made anew"))
         }
     }
@@ -38,7 +44,7 @@ pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8>
 pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
     let manifest = Manifest::read(&flags.out)?;
     if let Some(path) = &flags.junit {
-        export::write_junit(path, &ResultFile::read(&flags.out)?)?;
+        export::write_junit(path, &ResultFile::read(&flags.out)?, manifest.partial)?;
     }
     let Manifest { summary, warnings, partial, .. } = manifest;
     say.outcome(&Outcome { summary, warnings, partial, reused: Vec::new() });
@@ -104,23 +110,26 @@ pub(super) fn diff(flags: &DiffFlags, say: &Say) -> Result<u8> {
         });
         say.result(&json(&all)?);
     } else {
-        let lines = things
-            .iter()
-            .map(|t| format!("thing {}: {} -> {}\n", t["change"], t["then"], t["now"]));
+        let lines = things.iter().enumerate().map(|(k, thing)| thing.words(k) + "\n");
         say.result(&(words(&changes) + &lines.collect::<String>()));
     }
     Ok(exit::OK)
 }
 
 /// Things that are not where they were, as a rescan listed them.
-fn things(out: &Path) -> Result<Vec<serde_json::Value>> {
+fn things(out: &Path) -> Result<Vec<ThingEntry>> {
+    #[derive(serde::Deserialize)]
+    struct Changes {
+        things: Vec<ThingEntry>,
+    }
+
     let path = out.join("changes.json");
     let bad = |e: String| Error::bad_input("the list of changes cannot be read").because(e);
     let text = std::fs::read_to_string(&path);
     let text = text.map_err(|e| bad(e.to_string()).at(path.display()))?;
-    let all: serde_json::Value =
+    let all: Changes =
         serde_json::from_str(&text).map_err(|e| bad(e.to_string()).at(path.display()))?;
-    Ok(all["things"].as_array().cloned().unwrap_or_default())
+    Ok(all.things)
 }
 
 fn json(value: &impl serde::Serialize) -> Result<String> {

@@ -5,14 +5,15 @@ use super::flags::{CalibrateFlags, LintFlags};
 use super::say::Say;
 use crate::calibrate::{Wanted, together};
 use crate::exit;
+use contract::words::count;
 use contract::{Kind, Result, quote};
 use robot::{Finding, Library, Severity};
 
 /// Exit code 4 where a model cannot be used, else 0.
 pub(super) fn lint(flags: &LintFlags, say: &Say) -> Result<u8> {
     let findings = Library::lint(&flags.dir);
-    let count = |s: Severity| findings.iter().filter(|f| f.severity == s).count();
-    let [errors, warnings, notes] = [Severity::Error, Severity::Warning, Severity::Note].map(count);
+    let of = |s: Severity| findings.iter().filter(|f| f.severity == s).count();
+    let [errors, warnings, notes] = [Severity::Error, Severity::Warning, Severity::Note].map(of);
     if flags.json {
         let list: Vec<_> = findings.iter().map(json).collect();
         let all = serde_json::json!({
@@ -24,7 +25,8 @@ pub(super) fn lint(flags: &LintFlags, say: &Say) -> Result<u8> {
         say.result(&super::say::json(&all)?);
     } else {
         let mut text: String = findings.iter().map(|f| words(f) + "\n").collect();
-        text += &format!("{errors} errors, {warnings} warnings, {notes} notes\n");
+        let counts = [(errors, "error"), (warnings, "warning"), (notes, "note")];
+        text += &counts.map(|(n, noun)| count(n as u64, noun)).join(", ");
         say.result(&text);
     }
     Ok(if errors > 0 { exit::code(Kind::BadInput) } else { exit::OK })

@@ -4,6 +4,7 @@ use super::flags::{Common, SimulateFlags};
 use super::say::Say;
 use crate::exit;
 use crate::scanning::{Formats, read_scene, scan_scene};
+use contract::words::count;
 use contract::{Error, Kind, Result};
 use robot::Library;
 
@@ -26,9 +27,10 @@ pub(super) fn simulate(flags: &SimulateFlags, common: &Common, say: &Say) -> Res
     let truth = scan_scene(&scene, &models, &flags.out, Formats::ALL, &engine)?;
     let n_points: u64 = truth.scans.iter().map(|s| s.n_points).sum();
     say.result(&format!(
-        "{} scans, {n_points} points, {} robots, written to {}",
-        truth.scans.len(),
-        truth.robots.len(),
+        "{}, {}, {}, written to {}",
+        count(truth.scans.len() as u64, "scan"),
+        count(n_points, "point"),
+        count(truth.robots.len() as u64, "robot"),
         flags.out.display()
     ));
     Ok(exit::OK)

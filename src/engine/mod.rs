@@ -19,7 +19,7 @@ mod laws;
 #[cfg(test)]
 mod tests;
 
-use crate::progress::{Amount, Progress};
+use crate::progress::{Amount, Pieces, Progress};
 use contract::{Error, Fan, Kind, Result, Weigh};
 use flow::Pass;
 pub(crate) use guard::guarded;
@@ -50,10 +50,11 @@ pub struct Engine {
 }
 
 /// Name and size of a pass or fan-out, for progress.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Task {
     name: String,
     total: Amount,
+    pieces: Pieces,
     is_large: bool,
 }
 
@@ -61,7 +62,7 @@ impl Task {
     /// A task of unknown size.
     #[must_use]
     pub fn new(name: impl Into<String>) -> Self {
-        Self { name: name.into(), total: Amount::default(), is_large: false }
+        Self { name: name.into(), ..Self::default() }
     }
 
     /// Its items take much memory each, as all that scans see of a region does: where there is little, they are done one after
@@ -69,6 +70,13 @@ impl Task {
     #[must_use]
     pub fn large(mut self) -> Self {
         self.is_large = true;
+        self
+    }
+
+    /// Says that its items have pieces of their own, to be shown beside them.
+    #[must_use]
+    pub fn showing(mut self, pieces: &Pieces) -> Self {
+        self.pieces = pieces.clone();
         self
     }
 
@@ -169,7 +177,7 @@ impl Engine {
     {
         let mut task = task.into();
         task.total.items = items.len() as u64;
-        let stage = self.progress.stage(&task.name, task.total);
+        let stage = self.progress.stage_of(&task.name, task.total, task.pieces.clone());
         // Items after a failed one are skipped, since an earlier error decides.
         let failed = AtomicUsize::new(usize::MAX);
         let one = |(at, item): (usize, T)| {

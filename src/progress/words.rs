@@ -1,6 +1,7 @@
 //! How far a stage is, in; words for people, or JSON for programs, out.
 
 use super::Amount;
+use contract::words::count;
 
 /// Seconds to go at the rate so far.
 fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
@@ -8,7 +9,11 @@ fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
     Some(seconds * (1.0 - share) / share)
 }
 
-pub(super) fn words(done: &Amount, total: &Amount, seconds: f64, last: bool) -> String {
+pub(super) fn words(
+    (done, total): (&Amount, &Amount),
+    [n_done, n_known]: [u64; 2],
+    (seconds, last): (f64, bool),
+) -> String {
     let mut words = Vec::new();
     if let Some(share) = done.share(total) {
         words.push(format!("{:.0} %", 100.0 * share));
@@ -18,7 +23,10 @@ pub(super) fn words(done: &Amount, total: &Amount, seconds: f64, last: bool) -> 
         words.push(format!("{} points", short(done.points as f64)));
         words.push(format!("{} points/s", short(rate(done.points))));
     } else {
-        words.push(format!("{} items", done.items));
+        words.push(count(done.items, "item"));
+    }
+    if n_known > 0 && !last {
+        words.push(format!("{n_done} of {} known so far", count(n_known, "piece")));
     }
     // Where no total is known, bytes are those of items in memory, which say nothing to people.
     if total.bytes > 0 {
@@ -32,16 +40,23 @@ pub(super) fn words(done: &Amount, total: &Amount, seconds: f64, last: bool) -> 
     words.join(", ")
 }
 
-pub(super) fn json(name: &str, done: &Amount, total: &Amount, seconds: f64, last: bool) -> String {
+pub(super) fn json(
+    name: &str,
+    (done, total): (&Amount, &Amount),
+    [n_done, n_known]: [u64; 2],
+    ([seconds, cpu_seconds], last): ([f64; 2], bool),
+) -> String {
     let known = |n: u64| (n > 0).then_some(n);
     let rate = done.points as f64 / seconds.max(1e-3);
     serde_json::json!({
         "event": if last { "stage_end" } else { "progress" },
         "stage": name,
         "seconds": seconds,
+        "cpu_seconds": cpu_seconds,
         "items": done.items, "items_total": known(total.items),
         "points": done.points, "points_total": known(total.points),
         "bytes": done.bytes, "bytes_total": known(total.bytes),
+        "pieces": known(n_known).map(|_| n_done), "pieces_known": known(n_known),
         "points_per_second": rate,
         "share": done.share(total),
         "eta_seconds": if last { Some(0.0) } else { eta(done, total, seconds) },
@@ -70,5 +85,9 @@ mod tests {
         assert_eq!(eta(&done, &total, 10.0), Some(30.0));
         assert_eq!(eta(&Amount::default(), &total, 10.0), None);
         assert_eq!(short(35_200_000.0), "35.2 M");
+        let fit = (&Amount::items(1), &Amount::items(4));
+        let said = words(fit, [17, 60], (9.0, false));
+        assert_eq!(said, "25 %, 1 item, 17 of 60 pieces known so far, 27 s to go");
+        assert_eq!(words(fit, [60, 60], (9.0, true)), "25 %, 1 item, done in 9.0 s");
     }
 }

@@ -50,9 +50,11 @@ impl Session<'_> {
         let walls = ground(self.floor, true, (self.sources, self.store), self.settings, engine)?;
         let (scans, settings) = (&self.sources.scans, self.settings);
         let search = Search::new(self.shelf, scans, self.store, &walls, settings);
-        let found = engine.fan_out(Task::new("search").large(), regions.clone(), |region| {
-            search.region(&region)
-        })?;
+        let found = engine.fan_out(
+            Task::new("search").large().showing(search.pieces()),
+            regions.clone(),
+            |region| search.region(&region),
+        )?;
         let found = found.into_iter().flatten().collect();
         let is_new = |fit: &Fit| {
             let at = fit.world_from_base.translation.vector;

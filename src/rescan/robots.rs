@@ -178,7 +178,7 @@ fn is_foot_alone([then, now]: [&(Pose, Vec<Pose>); 2], bounds: &[Aabb]) -> bool 
 /// Whether the points of one fit determine all joints that those of another do.
 fn knows(fit: &Fit, other: &Fit) -> bool {
     let mut joints = fit.joints.iter().zip(&other.joints);
-    joints.all(|(own, other)| own.determined || !other.determined)
+    joints.all(|(own, other)| own.is_determined() || !other.is_determined())
 }
 
 /// A robot that does not stand as it stood, searched anew at its place; with the model of its own, where it has one.

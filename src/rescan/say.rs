@@ -7,12 +7,14 @@ use crate::job::Outcome;
 use crate::labelling::Done;
 use crate::report::{dropped, id, input_entry, robot_entry};
 use crate::reuse::Digests;
+use crate::things::{ThingEntry, word};
+use contract::words::{count, triple};
 use contract::{Error, Kind, Result, quote};
 use export::{
     CarriedEntry, ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile,
     ScanLabels, draw_changes, write_table,
 };
-use merge::{Registration, Thing, ThingChange, Unseen};
+use merge::{Registration, Unseen};
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -49,7 +51,7 @@ impl Said<'_, '_> {
             "frame": result.rescan.as_ref().and_then(|r| r.frame.as_ref()),
             "scans": result.rescan.as_ref().map(|r| &r.scans),
             "robots": robots,
-            "things": self.found.labels.things.iter().map(thing).collect::<Vec<_>>(),
+            "things": self.found.labels.things.iter().map(ThingEntry::of).collect::<Vec<_>>(),
             "fixed_not_compared": self.found.labels.unseen.iter().map(region).collect::<Vec<_>>(),
             "not_compared": self.found.robots.unseen.iter().map(|&i| id(i)).collect::<Vec<_>>(),
         });
@@ -247,29 +249,25 @@ impl Said<'_, '_> {
         let size = self.found.session.past.cell.size();
         let _ = writeln!(
             text,
-            "a cell of {:.1} x {:.1} x {:.1} m, {} robot(s) looked at again",
+            "a cell of {:.1} x {:.1} x {:.1} m, {} looked at again",
             size[0],
             size[1],
             size[2],
-            self.found.robots.compared().len()
+            count(self.found.robots.compared().len() as u64, "robot")
         );
         if let Some(frame) = &self.found.carried.entry {
             let _ = writeln!(text, "  {}", frame_in_words(frame));
         }
         for scan in self.registrations() {
-            let [x, y, z] = scan.shift.map(|v| v * 1e3);
+            let by = triple(scan.shift.map(|v| -1e3 * v), 1);
             let turn = scan.turn.iter().map(|v| v * v).sum::<f64>().sqrt().to_degrees();
-            let _ = writeln!(
-                text,
-                "  scan '{}' was off by ({:.1}, {:.1}, {:.1}) mm, {turn:.3}°",
-                scan.scan, -x, -y, -z
-            );
+            let _ = writeln!(text, "  scan '{}' was off by {by} mm, {turn:.3}°", scan.scan);
         }
         for line in words(robots).lines() {
             let _ = writeln!(text, "  {line}");
         }
         for (k, thing) in self.found.labels.things.iter().enumerate() {
-            let _ = writeln!(text, "  {}", in_words(k, thing));
+            let _ = writeln!(text, "  {}", ThingEntry::of(thing).words(k));
         }
         for &i in &self.found.robots.unseen {
             let _ = writeln!(text, "  {} not compared: the new scans hardly see it", id(i));
@@ -280,11 +278,13 @@ impl Said<'_, '_> {
             let at = largest.bounds.center();
             let _ = writeln!(
                 text,
-                "  {n} place(s) of what stands still not compared: no new beam got there; the largest {x:.1} x {y:.1} x {z:.1} m at ({:.1}, {:.1}, {:.1}) m",
-                at.x, at.y, at.z
+                "  {} of what stands still not compared: no new beam got there; the largest {x:.1} x {y:.1} x {z:.1} m at {} m",
+                count(n as u64, "place"),
+                triple(at.into(), 1)
             );
         }
-        let _ = writeln!(text, "{} points of earlier scans superseded", self.n_superseded);
+        let points = count(self.n_superseded, "point");
+        let _ = writeln!(text, "{points} of earlier scans superseded");
         text
     }
 }
@@ -303,47 +303,6 @@ fn frame_in_words(frame: &CarriedEntry) -> String {
         frame.by,
         100.0 * n as f64 / (n + against).max(1) as f64
     )
-}
-
-/// What is said of a thing, which is the `k`th.
-fn in_words(k: usize, thing: &Thing) -> String {
-    let at = thing.now.or(thing.then).map(|b| b.center()).unwrap_or_default();
-    let size = thing.now.or(thing.then).map(|b| b.size()).unwrap_or_default();
-    let mut text = format!(
-        "T{} {}: {:.2} x {:.2} x {:.2} m at ({:.2}, {:.2}, {:.2}) m",
-        k + 1,
-        word(thing.change),
-        size[0],
-        size[1],
-        size[2],
-        at.x,
-        at.y,
-        at.z
-    );
-    if let Some([x, y, z]) = thing.shift {
-        let _ = write!(text, ", by ({x:.2}, {y:.2}, {z:.2}) m");
-    }
-    text
-}
-
-fn word(change: ThingChange) -> &'static str {
-    match change {
-        ThingChange::Appeared => "appeared",
-        ThingChange::Gone => "gone",
-        ThingChange::Moved => "moved",
-    }
-}
-
-fn thing(thing: &Thing) -> serde_json::Value {
-    let bounds = |b: Option<geometry::Aabb>| b.map(|b| [b.min, b.max]);
-    json!({
-        "change": word(thing.change),
-        "then": bounds(thing.then),
-        "now": bounds(thing.now),
-        "shift": thing.shift,
-        "volume_m3": thing.volume,
-        "n_points": thing.n_points,
-    })
 }
 
 fn region(region: &Unseen) -> serde_json::Value {

@@ -7,6 +7,7 @@ mod views;
 
 use crate::engine::AllThreads;
 use crate::job::Settings;
+use crate::progress::Pieces;
 use crate::reuse::Cache;
 use crate::store::Store;
 use crate::surfaces::Ground;
@@ -65,6 +66,8 @@ pub(crate) struct Search<'a, 'm> {
     settings: &'a Settings,
     /// Where what was found of a region piece by piece is kept, for a run that is cut short.
     kept: Option<&'a Cache>,
+    /// Told of models that are searched for and candidates that are fitted.
+    pieces: Pieces,
 }
 
 /// A base farther below a floor belongs to a lower level, metres.
@@ -90,13 +93,18 @@ impl<'a, 'm> Search<'a, 'm> {
         ground: &'a Ground,
         settings: &'a Settings,
     ) -> Self {
-        Self { shelf, scans, store, ground, settings, kept: None }
+        Self { shelf, scans, store, ground, settings, kept: None, pieces: Pieces::default() }
     }
 
     /// The same, which keeps what it finds of a region piece by piece.
     #[must_use]
     pub(crate) fn keeping(self, kept: &'a Cache) -> Self {
         Self { kept: Some(kept), ..self }
+    }
+
+    /// What is told of models that are searched for and candidates that are fitted.
+    pub(crate) fn pieces(&self) -> &Pieces {
+        &self.pieces
     }
 
     /// A piece of what is found in a region: the one that is kept, else a new one.
@@ -190,8 +198,11 @@ impl<'a, 'm> Search<'a, 'm> {
             let search = BaseSearch::new(model, sight, &self.settings.identify);
             let search = search.map(|s| if guessed { s.on_guesses() } else { s });
             let search = search.map(|s| s.at_least(min_score).broad(breadth));
-            search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default()
+            let found = search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default();
+            self.pieces.done();
+            found
         };
+        self.pieces.expect(self.shelf.models.len());
         let models = (0..self.shelf.models.len()).into_par_iter();
         let found: Vec<Vec<Candidate>> = models.map(search).collect();
         let mut out: Vec<Candidate> =
@@ -224,8 +235,11 @@ impl<'a, 'm> Search<'a, 'm> {
                     let prepared = self.shelf.prepared(c.model);
                     fit::fit(c, prepared, scene, &self.settings.fit, &AllThreads)
                 };
-                self.piece((scene.region, &format!("{} {:?}", c.model, c.bases)), find)
+                let fit = self.piece((scene.region, &format!("{} {:?}", c.model, c.bases)), find);
+                self.pieces.done();
+                fit
             };
+            self.pieces.expect(open.len());
             let found: Result<Vec<Option<Fit>>> = open.par_iter().map(fit).collect();
             let found = found?;
             for (fit, candidate) in found.into_iter().zip(open) {

@@ -1,6 +1,7 @@
 //! Errors by what a caller can do about them; one type for all rooms, since a stage's errors only travel up.
 
 use crate::quote;
+use crate::words::without_numbers;
 use std::fmt;
 use std::path::Path;
 
@@ -120,9 +121,9 @@ impl fmt::Display for Error {
             // A path may hold anything, a line break among it; `what` and its source are sentences.
             write!(f, "{}: ", quote::shown(place))?;
         }
-        f.write_str(&self.0.what)?;
+        f.write_str(&without_numbers(&self.0.what))?;
         if let Some(source) = &self.0.source {
-            write!(f, " ({source})")?;
+            write!(f, " ({})", without_numbers(&source.to_string()))?;
         }
         if let Some(hint) = &self.0.hint {
             write!(f, "; {hint}")?;
@@ -146,4 +147,19 @@ impl From<std::io::Error> for Error {
 
 fn is_full(cause: &std::io::Error) -> bool {
     matches!(cause.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_system_says_has_no_numbers() {
+        let cause = || std::io::Error::from_raw_os_error(2);
+        let whole = Error::of_file("cannot be read", Path::new("a.las"), cause()).to_string();
+        let other = Error::bad_input(cause().to_string()).to_string();
+        for text in [whole, other, Error::from(cause()).to_string()] {
+            assert!(!text.contains("os error") && text.contains("file"), "{text}");
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! A fit: which robot, where, in which posture, and how far to trust it.
 
+use crate::Certainty;
 use geometry::Pose;
 use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -39,10 +40,18 @@ pub struct JointFit {
     pub value: f64,
     /// Standard deviation, same unit; that of any angle, π/√3, where the points say nothing of it.
     pub sigma: f64,
-    /// Whether the points determine it.
-    pub determined: bool,
+    /// How well the points tell it.
+    pub certainty: Certainty,
     /// Other values within the limits, whole turns away, at which the robot stands the same.
     pub equivalents: Vec<f64>,
+}
+
+impl JointFit {
+    /// Whether the points determine it.
+    #[must_use]
+    pub fn is_determined(&self) -> bool {
+        self.certainty == Certainty::Determined
+    }
 }
 
 /// What the scans say of one link at the fitted posture.

@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod candidate;
+mod certainty;
 mod error;
 pub mod fence;
 mod fit;
@@ -18,8 +19,10 @@ mod strip;
 mod surface;
 mod tile;
 mod view;
+pub mod words;
 
 pub use candidate::{Candidate, Cluster, Voxel};
+pub use certainty::{Certainty, DETERMINED_SIGMA, UNDETERMINED_SIGMA};
 pub use error::{Error, Kind, Result};
 pub use fit::{
     Calibration, Equal, Fit, JointFit, JointFrame, LinkEvidence, Mounted, RunnerUp, ScanShare,

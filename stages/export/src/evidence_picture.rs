@@ -3,7 +3,8 @@
 
 use crate::canvas::{Canvas, INK, Rgb};
 use crate::robot_picture::{FULL, RobotPicture, residual_color};
-use contract::{Fit, Verdict};
+use contract::words::Unit;
+use contract::{Certainty, Fit, Verdict};
 use robot::{Joint, JointKind, Model};
 
 /// Width of the page and of one picture on it, pixels.
@@ -22,6 +23,7 @@ const LINE_CHARS: usize = 136;
 const GREY: Rgb = [150, 154, 162];
 const PALE: Rgb = [226, 229, 234];
 const RED: Rgb = [196, 30, 40];
+const AMBER: Rgb = [176, 106, 0];
 const BLUE: Rgb = [0, 90, 170];
 
 /// Draws the page; `title` names robot, model and verdict.
@@ -68,8 +70,16 @@ pub fn draw_evidence(title: &str, picture: &RobotPicture, fit: &Fit, model: &Mod
 fn verdict_color(verdict: Verdict) -> Rgb {
     match verdict {
         Verdict::Trusted => [20, 110, 60],
-        Verdict::Doubtful => [176, 106, 0],
+        Verdict::Doubtful => AMBER,
         Verdict::Refused => RED,
+    }
+}
+
+fn certainty_color(certainty: Certainty) -> Rgb {
+    match certainty {
+        Certainty::Determined => BLUE,
+        Certainty::Coarse => AMBER,
+        Certainty::Undetermined => RED,
     }
 }
 
@@ -88,13 +98,11 @@ fn row(canvas: &mut Canvas, y: i64, (fit, at): (&Fit, usize), own: &Joint) {
         canvas.fill(place(equal.posture[at]), y, 2, 9, GREY);
     }
     let (from, to) = (place(joint.value - joint.sigma), place(joint.value + joint.sigma));
-    let color = if joint.determined { BLUE } else { RED };
+    let color = certainty_color(joint.certainty);
     canvas.fill(from, y + 2, (to - from).max(1), 5, color);
     canvas.fill(place(joint.value) - 1, y - 1, 3, 11, color);
-    let (unit, scale) =
-        if own.kind == JointKind::Prismatic { ("mm", 1e3) } else { ("°", 1f64.to_degrees()) };
-    let open = if joint.determined { "" } else { " open" };
-    let words = format!("{:.3} ± {:.3} {unit}{open}", joint.value * scale, joint.sigma * scale);
+    let unit = Unit::of(own.kind == JointKind::Prismatic);
+    let words = unit.say_both(joint.value, joint.sigma) + joint.certainty.note();
     canvas.text(BAR.0 + BAR.1 + 12, y, 1, color, &words);
 }
 

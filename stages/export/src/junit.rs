@@ -1,46 +1,251 @@
-//! A result in, a JUnit file out: each robot is a test case, so that a build server shows those to look at.
+//! A result in, a JUnit file out: each robot is a test case and each of its joints one, so that a build server shows what
+//! nobody knows beside what is wrong.
+//!
+//! | what | case |
+//! | --- | --- |
+//! | a trusted robot | passes |
+//! | a doubtful or refused robot | fails, its reasons in the message |
+//! | a joint that is determined or coarse, of a trusted robot | passes |
+//! | a joint that is undetermined, or of a robot that is not trusted | is skipped, its value and standard deviation in the message |
+//! | a run that left something out | a case of its own that fails |
 
 use crate::atomic;
+use crate::posture::JointWords;
 use crate::result::{ResultFile, RobotEntry};
-use contract::{Result, quote};
+use contract::words::triple;
+use contract::{Certainty, Result, Verdict, quote};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Writes the file. Trusted robots pass; others fail with their reasons. Values stand in the cases' output.
-pub fn write_junit(path: &Path, result: &ResultFile) -> Result<()> {
-    let n_failed = result.robots.iter().filter(|r| !passes(r)).count();
-    let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    let _ = writeln!(
-        text,
-        "<testsuites>\n<testsuite name=\"stillpoint\" tests=\"{}\" failures=\"{n_failed}\">",
-        result.robots.len()
+/// What a case came to.
+enum Outcome {
+    Passes,
+    /// Type and message.
+    Fails(String, String),
+    /// Message.
+    Skipped(String),
+}
+
+/// One test case.
+struct Case {
+    class: String,
+    name: String,
+    outcome: Outcome,
+    /// Lines for whoever looks at the case.
+    output: Vec<String>,
+}
+
+/// Writes the file; `is_partial` where the run left out inputs, models or regions that failed.
+pub fn write_junit(path: &Path, result: &ResultFile, is_partial: bool) -> Result<()> {
+    atomic::write(path, junit(result, is_partial).as_bytes())
+}
+
+fn junit(result: &ResultFile, is_partial: bool) -> String {
+    let mut cases = Vec::new();
+    if is_partial {
+        cases.push(left_out(result));
+    }
+    for robot in &result.robots {
+        of_robot(&mut cases, robot);
+    }
+    let count = |is: fn(&Outcome) -> bool| cases.iter().filter(|c| is(&c.outcome)).count();
+    let counts = format!(
+        "tests=\"{}\" failures=\"{}\" skipped=\"{}\"",
+        cases.len(),
+        count(|o| matches!(o, Outcome::Fails(..))),
+        count(|o| matches!(o, Outcome::Skipped(_)))
     );
-    result.robots.iter().for_each(|robot| case(&mut text, robot));
-    text.push_str("</testsuite>\n</testsuites>\n");
-    atomic::write(path, text.as_bytes())
-}
-
-fn passes(robot: &RobotEntry) -> bool {
-    robot.verdict == "trusted"
-}
-
-fn case(text: &mut String, robot: &RobotEntry) {
-    let (id, model) = (for_people(&robot.id), for_people(&robot.model));
-    let _ = writeln!(text, "  <testcase classname=\"{model}\" name=\"{id} {model}\">");
-    if !passes(robot) {
-        let why = for_people(&robot.reasons.join("; "));
-        let verdict = for_people(&robot.verdict);
-        let _ = writeln!(text, "    <failure type=\"{verdict}\" message=\"{why}\"/>");
+    let mut text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {counts}>\n<testsuite name=\"stillpoint\" {counts}>\n"
+    );
+    cases.iter().for_each(|case| case.write(&mut text));
+    if !result.warnings.is_empty() {
+        let _ = writeln!(text, "  <system-err>{}</system-err>", lines(&result.warnings));
     }
-    let [x, y, z] = robot.base_pose.xyz;
-    let _ = writeln!(text, "    <system-out>base at ({x:.4}, {y:.4}, {z:.4}) m");
-    for (name, value) in &robot.joints.0 {
-        let _ = writeln!(text, "{} = {value:.6}", for_people(name));
-    }
-    text.push_str("    </system-out>\n  </testcase>\n");
+    text + "</testsuite>\n</testsuites>\n"
 }
 
-/// A build server shows the values to people.
+/// The case of a run that left something out.
+fn left_out(result: &ResultFile) -> Case {
+    let why = format!("inputs, models or regions were left out: {}", result.warnings.join("; "));
+    Case {
+        class: "stillpoint".into(),
+        name: "everything was looked at".into(),
+        outcome: Outcome::Fails("partial".into(), why),
+        output: Vec::new(),
+    }
+}
+
+/// The cases of a robot: itself, its joints, and the same of how it stands in other scans.
+fn of_robot(cases: &mut Vec<Case>, robot: &RobotEntry) {
+    let scans: Vec<String> = robot.stands_in.iter().map(u32::to_string).collect();
+    let stands =
+        if scans.is_empty() { String::new() } else { format!(" in scans {}", scans.join(", ")) };
+    let mut output = vec![format!("base at {} m", triple(robot.base_pose.xyz, 4))];
+    output.extend(robot.posture().map(|joint| format!("{} = {}", joint.name, joint.say())));
+    output.extend(robot.reasons.iter().cloned());
+    let is_trusted = robot.verdict == Verdict::Trusted.word();
+    let why = || match robot.reasons.join("; ") {
+        why if why.is_empty() => format!("the robot is {}, and nothing says why", robot.verdict),
+        why => why,
+    };
+    cases.push(Case {
+        class: robot.model.clone(),
+        name: format!("{} {}{stands}", robot.id, robot.model),
+        outcome: if is_trusted {
+            Outcome::Passes
+        } else {
+            Outcome::Fails(robot.verdict.clone(), why())
+        },
+        output,
+    });
+    cases.extend(robot.posture().map(|joint| Case {
+        class: robot.model.clone(),
+        name: format!("{} {}{stands}", robot.id, joint.name),
+        outcome: of_joint(robot, &joint, is_trusted),
+        output: vec![joint.say()],
+    }));
+    robot.stays.iter().for_each(|stay| of_robot(cases, stay));
+}
+
+/// What is not known is skipped, not passed: a value that may be any other is no value.
+fn of_joint(robot: &RobotEntry, joint: &JointWords<'_>, is_trusted: bool) -> Outcome {
+    let said = joint.say();
+    if !is_trusted {
+        return Outcome::Skipped(format!("{said}, and the robot is {}", robot.verdict));
+    }
+    if joint.certainty == Certainty::Undetermined {
+        let quoted = format!("joint '{}' ", joint.name);
+        let mut reasons = robot.reasons.iter().filter_map(|why| why.strip_prefix(&quoted));
+        let why = reasons.find_map(|why| why.split_once(": ")).map(|(_, why)| format!(": {why}"));
+        return Outcome::Skipped(said + &why.unwrap_or_default());
+    }
+    Outcome::Passes
+}
+
+impl Case {
+    fn write(&self, text: &mut String) {
+        let (class, name) = (for_people(&self.class), for_people(&self.name));
+        let _ = writeln!(text, "  <testcase classname=\"{class}\" name=\"{name}\">");
+        match &self.outcome {
+            Outcome::Passes => {}
+            Outcome::Fails(kind, why) => {
+                let (kind, why) = (for_people(kind), for_people(why));
+                let _ = writeln!(text, "    <failure type=\"{kind}\" message=\"{why}\"/>");
+            }
+            Outcome::Skipped(why) => {
+                let _ = writeln!(text, "    <skipped message=\"{}\"/>", for_people(why));
+            }
+        }
+        if !self.output.is_empty() {
+            let output = lines(&self.output);
+            let _ = writeln!(text, "    <system-out>{output}</system-out>");
+        }
+        text.push_str("  </testcase>\n");
+    }
+}
+
+/// Text for people in XML.
 fn for_people(text: &str) -> String {
     quote::xml(&quote::shown(text)).into_owned()
+}
+
+/// Lines of it.
+fn lines(all: &[String]) -> String {
+    all.iter().map(|line| for_people(line)).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn robot(id: &str, verdict: &str, reasons: &[&str]) -> RobotEntry {
+        serde_json::from_value(serde_json::json!({
+            "id": id, "model": "kr10", "base_link": "base",
+            "base_pose": {"xyz": [1.0, -0.000_01, 0.0], "quat_wxyz": [1.0, 0.0, 0.0, 0.0]},
+            "base_sigma": {"xyz": [1e-4, 1e-4, 1e-4], "rotation": [1e-4, 1e-4, 1e-4]},
+            "joints": {"a": 1.003_267_6, "slide": 0.25, "wrist": 3.1},
+            "sigma": {"a": 0.001_047_2, "slide": 0.000_2, "wrist": 1.813_8},
+            "slides": ["slide"],
+            "determined": {"a": false, "slide": true, "wrist": false},
+            "certainty": {"a": "coarse", "slide": "determined", "wrist": "undetermined"},
+            "links": ["base"], "verdict": verdict, "score": 0.9, "reasons": reasons
+        }))
+        .expect("an entry")
+    }
+
+    fn result(robots: Vec<RobotEntry>, warnings: &[&str]) -> ResultFile {
+        serde_json::from_value(serde_json::json!({
+            "schema": crate::SCHEMA, "version": "0", "robots": robots,
+            "labels": {"table": "t", "scans": []}, "inputs": [], "stages": [], "warnings": warnings
+        }))
+        .expect("a result")
+    }
+
+    #[test]
+    fn what_nobody_knows_is_skipped_with_its_deviation_and_only_trusted_robots_pass() {
+        let wrist =
+            "joint 'wrist' is undetermined (± 103.9°): it may as well stand at 2.0° or elsewhere";
+        let trusted = junit(&result(vec![robot("R1", "trusted", &[wrist])], &[]), false);
+        let expected = "\
+<?xml version=\"1.0\" encoding=\"UTF-8\"?>
+<testsuites tests=\"4\" failures=\"0\" skipped=\"1\">
+<testsuite name=\"stillpoint\" tests=\"4\" failures=\"0\" skipped=\"1\">
+  <testcase classname=\"kr10\" name=\"R1 kr10\">
+    <system-out>base at (1.0000, 0.0000, 0.0000) m
+a = 57.483° ± 0.060° coarse
+slide = 250.000 mm ± 0.200 mm
+wrist = 177.617° ± 103.9° undetermined
+joint &apos;wrist&apos; is undetermined (± 103.9°): it may as well stand at 2.0° or elsewhere</system-out>
+  </testcase>
+  <testcase classname=\"kr10\" name=\"R1 a\">
+    <system-out>57.483° ± 0.060° coarse</system-out>
+  </testcase>
+  <testcase classname=\"kr10\" name=\"R1 slide\">
+    <system-out>250.000 mm ± 0.200 mm</system-out>
+  </testcase>
+  <testcase classname=\"kr10\" name=\"R1 wrist\">
+    <skipped message=\"177.617° ± 103.9° undetermined: it may as well stand at 2.0° or elsewhere\"/>
+    <system-out>177.617° ± 103.9° undetermined</system-out>
+  </testcase>
+</testsuite>
+</testsuites>
+";
+        assert_eq!(trusted, expected);
+        let robots = vec![robot("R1", "doubtful", &["score 0.5"]), robot("R2", "refused", &[])];
+        let text = junit(&result(robots, &["scan 2 could not be read"]), true);
+        for part in [
+            "tests=\"9\" failures=\"3\" skipped=\"6\"",
+            "<failure type=\"partial\" message=\"inputs, models or regions were left out: scan 2",
+            "<failure type=\"doubtful\" message=\"score 0.5\"/>",
+            "<failure type=\"refused\" message=\"the robot is refused, and nothing says why\"/>",
+            "<skipped message=\"250.000 mm ± 0.200 mm, and the robot is doubtful\"/>",
+            "<system-err>scan 2 could not be read</system-err>",
+        ] {
+            assert!(text.contains(part), "{part} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn results_without_the_words_are_read_by_their_deviations() {
+        let mut old = robot("R1", "trusted", &[]);
+        old.certainty.0.clear();
+        let words = old.posture().map(|joint| joint.certainty.word()).collect::<Vec<_>>();
+        assert_eq!(words, ["coarse", "determined", "undetermined"]);
+        // Narrow, but one of several answers.
+        old.sigma.0[0].1 = 1e-4;
+        assert_eq!(old.posture().next().map(|a| a.certainty), Some(Certainty::Undetermined));
+    }
+
+    #[test]
+    fn a_robot_that_moved_has_a_case_for_each_of_its_postures() {
+        let mut moved = robot("R1", "trusted", &[]);
+        moved.stands_in = vec![0, 1];
+        moved.stays =
+            vec![RobotEntry { stands_in: vec![2], ..robot("R1", "doubtful", &["few points"]) }];
+        let text = junit(&result(vec![moved], &[]), false);
+        assert!(text.contains("name=\"R1 kr10 in scans 0, 1\""), "{text}");
+        assert!(text.contains("name=\"R1 wrist in scans 2\""), "{text}");
+        assert!(text.contains("tests=\"8\" failures=\"1\" skipped=\"4\""), "{text}");
+    }
 }

@@ -21,9 +21,11 @@ mod pack;
 mod places;
 mod plan_picture;
 mod ply;
+mod posture;
 mod record;
 mod refill;
 mod result;
+mod review;
 mod robot_model;
 mod robot_picture;
 mod session;
@@ -50,12 +52,14 @@ pub use pack::{Pack, Packed, PointColumns};
 pub use places::Places;
 pub use plan_picture::PlanPicture;
 pub use ply::{PLY, write_ply};
+pub use posture::JointWords;
 pub use record::{LasSettings, Quantum, RawVlr, class_of};
 pub use refill::{OldPoint, read_tile};
 pub use result::{
     BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
     SCHEMA, ScanLabels, StageEntry, TipPose, UnitsEntry,
 };
+pub use review::ReviewEntry;
 pub use robot_model::{mesh_files, write_robot};
 pub use robot_picture::RobotPicture;
 pub use session::{CarriedEntry, RegistrationEntry, RescanEntry};

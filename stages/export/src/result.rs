@@ -5,9 +5,10 @@ use crate::atomic;
 use crate::calibration::CalibrationEntry;
 use crate::mask::MaskFiles;
 use crate::places::Places;
+use crate::review::ReviewEntry;
 use crate::session::RescanEntry;
 use crate::space::SpaceEntry;
-use contract::{Error, Fit, Kind, Mask, Result};
+use contract::{Certainty, Error, Fit, JointFit, Kind, Mask, Result};
 use geometry::Pose;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -32,6 +33,9 @@ pub struct ResultFile {
     pub stages: Vec<StageEntry>,
     /// What a person should know, in words.
     pub warnings: Vec<String>,
+    /// What each entry of the review did, where there was one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub review: Vec<ReviewEntry>,
     /// Which result it goes on from, where one cell was scanned again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rescan: Option<RescanEntry>,
@@ -63,6 +67,9 @@ pub struct RobotEntry {
     /// Whether the points determine each joint.
     #[serde(default)]
     pub determined: Places<bool>,
+    /// The same in three words: `determined`, `coarse` or `undetermined`.
+    #[serde(default)]
+    pub certainty: Places<Certainty>,
     /// Names of the links; their places here are the numbers in the masks.
     pub links: Vec<String>,
     /// World from each link.
@@ -304,18 +311,16 @@ impl RobotEntry {
     #[must_use]
     pub fn new(id: &str, fit: &Fit, links: &[String], tip: Option<(String, Pose)>) -> Self {
         let sigma = |range: usize| finite(fit.base_sigma[range]);
-        let named = |value: fn(&contract::JointFit) -> f64| {
-            fit.joints.iter().map(move |j| (j.name.clone(), value(j)))
-        };
         Self {
             id: id.into(),
             model: fit.model_name.clone(),
             base_link: links.first().cloned().unwrap_or_default(),
             base_pose: (&fit.world_from_base).into(),
             base_sigma: BaseSigma { xyz: [0, 1, 2].map(sigma), rotation: [3, 4, 5].map(sigma) },
-            joints: Places(named(|j| j.value).collect()),
-            sigma: Places(named(|j| j.sigma).collect()),
-            determined: Places(fit.joints.iter().map(|j| (j.name.clone(), j.determined)).collect()),
+            joints: Places(each(fit, |j| j.value)),
+            sigma: Places(each(fit, |j| j.sigma)),
+            determined: Places(each(fit, |j| j.is_determined())),
+            certainty: Places(each(fit, |j| j.certainty)),
             passive: Places::default(),
             links: links.to_vec(),
             link_poses: Places::default(),
@@ -430,6 +435,11 @@ impl ResultFile {
             .map_err(|e| Error::new(Kind::Bug, "result does not serialize").because(e))?;
         atomic::write(&out.join("result.json"), (text + "\n").as_bytes())
     }
+}
+
+/// Something of each joint of a fit, by name.
+fn each<T>(fit: &Fit, of: impl Fn(&JointFit) -> T) -> Vec<(String, T)> {
+    fit.joints.iter().map(|joint| (joint.name.clone(), of(joint))).collect()
 }
 
 /// The number, if it is one.

@@ -5,7 +5,7 @@
 //! robots/R1/robot.urdf        links, joints, limits; closed loops are open, their joints stand as found in joints.csv
 //! robots/R1/meshes/*.stl      metres, frames of the links
 //! robots/R1/joints.yaml       name: value, as ROS loads it
-//! robots/R1/joints.csv        name, value, unit, standard deviation, whether it is determined, limits
+//! robots/R1/joints.csv        name, value, unit, standard deviation, whether it is determined, limits, how well it is known
 //! ```
 
 use crate::atomic;
@@ -146,9 +146,9 @@ fn yaml(fit: &Fit, model: &Model) -> String {
         q.k
     );
     for (j, value) in values(fit, model) {
-        let open = joint_fit(fit, model, j).filter(|f| !f.determined);
-        let open =
-            open.map_or_else(String::new, |f| format!("  # not determined, ± {:.4}", f.sigma));
+        let open = joint_fit(fit, model, j).filter(|f| !f.is_determined());
+        let open = open
+            .map_or_else(String::new, |f| format!("  # {}, ± {:.4}", f.certainty.word(), f.sigma));
         let _ = writeln!(text, "  {}: {value:.9}{open}", quote::yaml(&model.joints[j].name));
     }
     text
@@ -160,15 +160,17 @@ fn joint_fit<'a>(fit: &'a Fit, model: &Model, joint: usize) -> Option<&'a JointF
 }
 
 fn csv(fit: &Fit, model: &Model) -> String {
-    let mut text = String::from("joint,value,unit,sigma,determined,lower,upper\n");
+    let mut text = String::from("joint,value,unit,sigma,determined,lower,upper,certainty\n");
     for (j, value) in values(fit, model) {
         let joint = &model.joints[j];
         let unit = if joint.kind == JointKind::Prismatic { "m" } else { "rad" };
         let own = joint_fit(fit, model, j);
-        let told = own.map_or_else(|| ",".into(), |f| format!("{:.9},{}", f.sigma, f.determined));
+        let told =
+            own.map_or_else(|| ",".into(), |f| format!("{:.9},{}", f.sigma, f.is_determined()));
         let limits = joint.limits.map_or_else(|| ",".into(), |[a, b]| format!("{a:.9},{b:.9}"));
         let name = quote::csv(&joint.name);
-        let _ = writeln!(text, "{name},{value:.9},{unit},{told},{limits}");
+        let word = own.map_or("", |f| f.certainty.word());
+        let _ = writeln!(text, "{name},{value:.9},{unit},{told},{limits},{word}");
     }
     text
 }

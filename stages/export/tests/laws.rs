@@ -91,7 +91,7 @@ proptest! {
                 name: model.joints[*free].name.clone(),
                 value: *value,
                 sigma: 0.01,
-                determined: true,
+                certainty: contract::Certainty::Determined,
                 ..JointFit::default()
             }).collect(),
             ..Fit::default()

@@ -84,10 +84,11 @@ fn junit_of_a_result_with_odd_names_is_xml_that_says_them() {
         inputs: Vec::new(),
         stages: Vec::new(),
         warnings: Vec::new(),
+        review: Vec::new(),
         rescan: None,
     };
     let path = dir.path().join("junit.xml");
-    write_junit(&path, &result).expect("is written");
+    write_junit(&path, &result, false).expect("is written");
     let text = std::fs::read_to_string(&path).expect("is there");
     assert!(is_clean(&text), "{text:?}");
     let document = roxmltree::Document::parse(&text).expect("well-formed XML");

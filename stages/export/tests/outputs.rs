@@ -5,7 +5,10 @@
 mod common;
 
 use common::{N, clouds, copc, folder, label};
-use contract::{Fit, InputId, JointFit, Label, LinkEvidence, Mask, MaskId, RunnerUp, Verdict};
+use contract::{
+    Certainty, DETERMINED_SIGMA, Fit, InputId, JointFit, Label, LinkEvidence, Mask, MaskId,
+    RunnerUp, Verdict,
+};
 use export::*;
 use geometry::{Pose, Vector};
 use std::path::Path;
@@ -61,7 +64,7 @@ fn fit() -> Fit {
         name: name.into(),
         value,
         sigma,
-        determined: sigma.is_finite(),
+        certainty: Certainty::of(sigma, false, DETERMINED_SIGMA),
         ..JointFit::default()
     };
     Fit {
@@ -152,6 +155,7 @@ fn sample(out: &Path) {
             n_out: written.tiles.len() as u64,
         }],
         warnings: Vec::new(),
+        review: Vec::new(),
         rescan: None,
     };
     result.write(out).expect("result");

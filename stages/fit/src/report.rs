@@ -1,7 +1,7 @@
 //! The adjusted posture, the others that were looked at, and what the beams say in; out comes the fit as it is reported:
 //! values with their standard deviations, which joints are open, rivals, equals, verdict.
 
-use contract::{Equal, Fan, Fit, JointFit, RunnerUp, ScanShare, ScanShift, Verdict};
+use contract::{Certainty, Equal, Fan, Fit, JointFit, RunnerUp, ScanShare, ScanShift, Verdict};
 use geometry::{Pose, Vector};
 use nalgebra::{DMatrix, DVector};
 use robot::{Model, Motion};
@@ -169,7 +169,11 @@ fn joints(
             name: model.joints[model.free[j]].name.clone(),
             value,
             sigma,
-            determined: !open[j] && !is_elsewhere(j) && sigma < refine.settings.determined_sigma,
+            certainty: Certainty::of(
+                sigma,
+                open[j] || is_elsewhere(j),
+                refine.settings.determined_sigma,
+            ),
             equivalents,
         }
     });
@@ -212,7 +216,7 @@ pub(crate) fn refused(refine: &Refine<'_>, best: &Adjusted, judgement: &Judgemen
         name: model.joints[*free].name.clone(),
         value: *value,
         sigma: ANY_ANGLE,
-        determined: false,
+        certainty: Certainty::Undetermined,
         equivalents: Vec::new(),
     };
     Fit {

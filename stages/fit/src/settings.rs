@@ -60,8 +60,7 @@ pub struct Settings {
     /// How far a joint may be from where its model has it, one sigma: shift on each axis, metres, turn about each axis,
     /// radians (0.15°).
     pub frame_sigma: [f64; 2],
-    /// A joint is determined by the points if its standard deviation is below this, radians or metres: 0.043°, so that
-    /// 0.1° is more than two of them.
+    /// A joint is determined by the points if its standard deviation is below this, radians or metres.
     pub determined_sigma: f64,
     /// Lowest score that is reported at all.
     pub min_score: f64,
@@ -100,7 +99,7 @@ impl Default for Settings {
             together: true,
             calibrate: false,
             frame_sigma: [0.003, 0.0026],
-            determined_sigma: 0.000_75,
+            determined_sigma: contract::DETERMINED_SIGMA,
             min_score: 0.30,
             max_violation: 0.20,
         }

@@ -1,6 +1,7 @@
 //! A candidate and scans that contradict each other in; out come the groups of scans in which the robot stood still, as a
 //! fit with the others beside it: somebody moved the robot between two stations.
 
+use contract::words::count;
 use contract::{Candidate, Fan, Fit, InstallationPlane, Region, Verdict, View};
 use geometry::{Point, Pose};
 
@@ -115,7 +116,10 @@ fn together(
     let mut first = fits.next()?;
     first.stays = fits.collect();
     if n_silent > 0 {
-        first.reasons.push(format!("{n_silent} scan(s) show it in no posture that was found"));
+        first.reasons.push(format!(
+            "in {} it stands in no posture that was found",
+            count(n_silent as u64, "scan")
+        ));
     }
     first.reasons.push(match first.stays.len() {
         0 => "scans contradict one another about it: some of them bear this posture out".into(),

@@ -241,7 +241,7 @@ impl New {
     fn bring(&self, fit: &mut Fit, own: &Own, model: &Model, scans: &[Scan]) {
         let mut step = &own.gain * &self.step;
         let joints = fit.joints.iter().enumerate();
-        joints.filter(|(_, joint)| !joint.determined).for_each(|(j, _)| step[6 + j] = 0.0);
+        joints.filter(|(_, joint)| !joint.is_determined()).for_each(|(j, _)| step[6 + j] = 0.0);
         if step.amax() > MAX_STEP {
             return;
         }
@@ -263,7 +263,9 @@ impl New {
         let [before, after] = [&old, &new].map(|cov| tip_sigma(model, &posture, cov).powi(2));
         let least = LEAST_LEFT * fit.tip_sigma.powi(2);
         fit.tip_sigma = (fit.tip_sigma.powi(2) - before + after).max(least).sqrt();
-        for (j, joint) in fit.joints.iter_mut().enumerate() {
+        // What does not follow the others is known no better by them.
+        let joints = fit.joints.iter_mut().enumerate();
+        for (j, joint) in joints.filter(|(_, joint)| joint.is_determined()) {
             joint.value += step[6 + j];
             joint.sigma = shrunk(joint.sigma, 6 + j);
         }

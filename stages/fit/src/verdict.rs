@@ -1,6 +1,7 @@
 //! Evidence of a fit in; verdict and reasons in words out (METHOD.md §15).
 
-use contract::{Fit, JointFit, Verdict};
+use contract::words::{Unit, count};
+use contract::{Certainty, Fit, JointFit, Verdict};
 use robot::{JointKind, Model, Motion, Role};
 
 use crate::adjust::Adjusted;
@@ -29,8 +30,8 @@ const OPEN_RMS: (f64, f64) = (1.25, 0.002);
 /// Noise of a scanner from which on more of it is no excuse there, metres: in a corridor scanned with 9 mm, walls and cabinets
 /// had room for four small arms, 9.5 to 11.6 mm off.
 const OPEN_NOISE: f64 = 0.005;
-/// Standard deviation up to which a joint counts as known for that, radians: 1°.
-const KNOWN_SIGMA: f64 = 0.0175;
+/// Standard deviation up to which a joint counts as known for that, radians or metres.
+const KNOWN_SIGMA: f64 = contract::UNDETERMINED_SIGMA;
 /// Smallest share of the surface that must have been judged.
 const SEEN: f64 = 0.12;
 /// Share of the joints that are known at most where so little of a surface was seen that it may be anything: of the suites' right
@@ -120,7 +121,9 @@ fn of_surface(
         });
     }
     let n_points: usize = fit.links.iter().map(|l| l.n_points).sum();
-    reasons.grade(n_points < ROBOT_POINTS, false, || format!("only {n_points} points lie on it"));
+    reasons.grade(n_points < ROBOT_POINTS, false, || {
+        format!("only {} on it", count(n_points as u64, "point"))
+    });
     let n_known = (0..fit.joints.len()).filter(|&j| own_sigma(fit, j) < KNOWN_SIGMA).count();
     let is_little = judgement.seen < SEEN;
     let is_anything = is_little && n_known as f64 <= LITTLE_KNOWN * fit.joints.len() as f64;
@@ -171,17 +174,19 @@ fn of_joints(reasons: &mut Reasons, fit: &Fit, prepared: &Prepared<'_>, scene: &
     for (j, joint) in fit.joints.iter().enumerate() {
         let n: usize = prepared.carried(j).into_iter().map(|l| fit.links[l].n_points).sum();
         if n < JOINT_POINTS && j + 1 < fit.joints.len() {
-            doubts.push(format!("only {n} points on what joint '{}' moves", joint.name));
+            let points = count(n as u64, "point");
+            doubts.push(format!("only {points} on what joint '{}' moves", joint.name));
         } else if j + 1 < fit.joints.len() && own_sigma(fit, j) > KNOWN_SIGMA {
-            doubts.push(format!("the points do not determine joint '{}'", joint.name));
-        } else if !joint.determined {
-            notes.push(undetermined(fit, j, prepared.slides(j)));
+            let sigma = Unit::of(prepared.slides(j)).deviation(own_sigma(fit, j));
+            doubts.push(format!("joint '{}' is undetermined (± {sigma})", joint.name));
+        } else if !joint.is_determined() {
+            notes.push(not_determined(fit, j, prepared.slides(j)));
         }
     }
     for (j, joint) in fit.joints.iter().enumerate() {
         // A joint that hardly anything but its stop holds may stand far beyond it.
         let is_open = prepared.slides(j) || j + 1 == fit.joints.len();
-        let least = match (joint.determined, is_open) {
+        let least = match (joint.is_determined(), is_open) {
             (true, _) => 3.0 * joint.sigma,
             (false, false) => 0.0,
             (false, true) => continue,
@@ -191,14 +196,14 @@ fn of_joints(reasons: &mut Reasons, fit: &Fit, prepared: &Prepared<'_>, scene: &
         }
     }
     // A robot that is a hundredth smaller than its model leaves all of them open, each by half a degree.
-    if !fit.joints.iter().any(|joint| joint.determined) {
+    if !fit.joints.iter().any(JointFit::is_determined) {
         doubts.push("the points determine none of its joints closely".into());
     }
     let [n_known, n_but_last] = n_known(fit);
     reasons.grade(
         is_scanned(scene) && leaves_most_open([n_but_last, fit.joints.len()]),
         2 * n_known <= fit.joints.len(),
-        || format!("{n_known} of {} joints are known", fit.joints.len()),
+        || format!("{n_known} of {} known", count(fit.joints.len() as u64, "joint")),
     );
     let turning: Vec<usize> = (0..fit.joints.len()).filter(|&j| !prepared.slides(j)).collect();
     reasons.notes.extend(weak(fit, &turning));
@@ -297,9 +302,9 @@ fn beyond(prepared: &Prepared<'_>, j: usize, value: f64) -> f64 {
     (low - value).max(value - high) - play
 }
 
-/// What is said of a joint that the points do not determine.
-fn undetermined(fit: &Fit, j: usize, slides: bool) -> String {
-    let joint = &fit.joints[j];
+/// What is said of a joint that is not determined: its standard deviation always, and other values that it may have.
+fn not_determined(fit: &Fit, j: usize, slides: bool) -> String {
+    let (joint, unit) = (&fit.joints[j], Unit::of(slides));
     let apart = |a: f64, b: f64| turns::apart(a, b) > KNOWN_SIGMA;
     let mut values: Vec<f64> = Vec::new();
     for value in fit.equals.iter().map(|e| e.posture[j]).filter(|v| apart(*v, joint.value)) {
@@ -307,25 +312,21 @@ fn undetermined(fit: &Fit, j: usize, slides: bool) -> String {
             values.push(value);
         }
     }
-    let say = |v: &f64| match slides {
-        true => format!("{:.1} mm", v * 1e3),
-        false => format!("{:.1}°", v.to_degrees()),
+    let others: Vec<String> = values.iter().map(|v| unit.say(*v, 1)).collect();
+    let others = others.join(", ");
+    let why = match joint.certainty {
+        _ if !values.is_empty() && !slides && joint.sigma > ANYWHERE => {
+            format!(": it may as well stand at {others} or elsewhere")
+        }
+        _ if !values.is_empty() => format!(": it may as well stand at {others}"),
+        // Its standard deviation is that of one of several answers.
+        Certainty::Undetermined if joint.sigma < KNOWN_SIGMA => {
+            ": another posture explains the points nearly as well".into()
+        }
+        _ => String::new(),
     };
-    let values: Vec<String> = values.iter().map(say).collect();
-    if !values.is_empty() && !slides && joint.sigma > ANYWHERE {
-        let (values, sigma) = (values.join(", "), joint.sigma.to_degrees());
-        format!("joint '{}' may as well stand at {values} or elsewhere (± {sigma:.0}°)", joint.name)
-    } else if !values.is_empty() {
-        format!("joint '{}' may as well stand at {}", joint.name, values.join(", "))
-    } else if joint.sigma < KNOWN_SIGMA {
-        let sigma = match slides {
-            true => format!("{:.1} mm", joint.sigma * 1e3),
-            false => format!("{:.2}°", joint.sigma.to_degrees()),
-        };
-        format!("the points determine joint '{}' only to ± {sigma}", joint.name)
-    } else {
-        format!("the points do not determine joint '{}'", joint.name)
-    }
+    let (name, word, sigma) = (&joint.name, joint.certainty.word(), unit.deviation(joint.sigma));
+    format!("joint '{name}' is {word} (± {sigma}){why}")
 }
 
 #[cfg(test)]
@@ -383,5 +384,32 @@ mod tests {
         assert!(off(0.0055, 3).is_anything && !off(0.0055, 4).is_anything);
         assert!(!off(0.003, 0).is_anything && !off(0.003, 6).is_poor);
         assert!(off(0.006, 6).is_poor && off(0.008, 6).is_anything);
+    }
+
+    #[test]
+    fn what_is_said_of_a_joint_has_its_deviation_and_the_word_that_fits_it() {
+        let joint = |value: f64, sigma: f64, certainty| JointFit {
+            name: "a".into(),
+            value: value.to_radians(),
+            sigma: sigma.to_radians(),
+            certainty,
+            ..JointFit::default()
+        };
+        let said = |joint: JointFit, others: &[f64]| {
+            let equal = |v: &f64| contract::Equal { posture: vec![v.to_radians()], margin: 0.0 };
+            let equals = others.iter().map(equal).collect();
+            not_determined(&Fit { joints: vec![joint], equals, ..Fit::default() }, 0, false)
+        };
+        let (coarse, open) = (Certainty::Coarse, Certainty::Undetermined);
+        assert_eq!(said(joint(57.483, 0.06, coarse), &[]), "joint 'a' is coarse (± 0.060°)");
+        assert_eq!(said(joint(5.0, 12.0, open), &[]), "joint 'a' is undetermined (± 12.0°)");
+        assert_eq!(
+            said(joint(5.0, 104.0, open), &[65.0, 125.0]),
+            "joint 'a' is undetermined (± 104.0°): it may as well stand at 65.0°, 125.0° or elsewhere"
+        );
+        assert_eq!(
+            said(joint(5.0, 0.02, open), &[]),
+            "joint 'a' is undetermined (± 0.020°): another posture explains the points nearly as well"
+        );
     }
 }

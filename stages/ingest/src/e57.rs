@@ -9,7 +9,7 @@ mod stream;
 mod strips;
 
 use crate::Settings;
-use crate::reader::{MaskSeed, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::reader::{MaskSeed, RawStrips, Reader, Reading, Sampled, ScanSeed, Want};
 use crate::units::{self, Choice, Units};
 use ::e57::E57Reader;
 use contract::{Error, Format, Kind, Result};
@@ -87,6 +87,10 @@ impl Reader for E57File {
 
     fn units(&self) -> &Units {
         &self.units
+    }
+
+    fn read_scan(&self, scan: usize) -> Option<RawStrips<'_>> {
+        Some(Box::new(strips::Strips::of_scan(self, scan)))
     }
 
     fn has_color(&self) -> bool {

@@ -1,11 +1,14 @@
 //! Open inputs in; what is in them, and what will be worse for what they lack, out: for people and as JSON.
 
+use crate::bounds;
 use crate::raster::Steps;
 use crate::sources::Sources;
 use crate::units::Units;
-use contract::{Format, Input, Scan, quote};
+use contract::words::fixed;
+use contract::{Fan, Format, Input, Scan, quote};
 use geometry::{Aabb, Pose};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// What one input holds.
@@ -54,7 +57,10 @@ pub struct ScanDescription {
     pub structured: bool,
     /// The lattice, where there is one.
     pub lattice: Option<LatticeText>,
-    /// Bounds in the world, metres, where the file states them.
+    /// Bounds of its points in the world, metres, where they are known: stated in the world, or the points were read for it.
+    pub bounds: Option<BoundsText>,
+    /// Bounds in the world, metres, where the file states them; those that an E57 file states in the frame of the scan hold all
+    /// points, but may be wider.
     pub stated_bounds: Option<BoundsText>,
     /// What is missing, and what will be worse for it.
     pub notes: Vec<String>,
@@ -95,13 +101,19 @@ pub struct BoundsText {
     pub max: [f64; 3],
 }
 
-/// Describes each input, in their order.
+/// Describes each input, in their order. E57 files that are not large are read for the bounds of their points.
 #[must_use]
-pub fn describe(sources: &Sources) -> Vec<Description> {
-    sources.inputs.iter().enumerate().map(|(i, input)| description(sources, i, input)).collect()
+pub fn describe(sources: &Sources, fan: &impl Fan) -> Vec<Description> {
+    let read = bounds::read(sources, fan);
+    let inputs = sources.inputs.iter().enumerate();
+    inputs.map(|(i, input)| description(sources, (i, input), &read)).collect()
 }
 
-fn description(sources: &Sources, at: usize, input: &Input) -> Description {
+fn description(
+    sources: &Sources,
+    (at, input): (usize, &Input),
+    read: &BTreeMap<u32, Aabb>,
+) -> Description {
     let file = &sources.files[at];
     let scans = sources
         .scans
@@ -116,11 +128,23 @@ fn description(sources: &Sources, at: usize, input: &Input) -> Description {
         units: file.reader.units().clone(),
         facts: file.reader.facts().into_iter().map(|(name, value)| Fact { name, value }).collect(),
         n_points: masks.map(|m| m.n_points).sum(),
-        scans: scans.map(|(scan, (steps, known))| scan_description(scan, *steps, *known)).collect(),
+        scans: scans
+            .map(|(scan, (steps, known))| {
+                let is_exact = !matches!(input.format, Format::E57);
+                let stated = scan.stated_bounds.filter(|_| is_exact);
+                let bounds = read.get(&scan.id.0).copied().or(stated);
+                scan_description(scan, *steps, *known, bounds)
+            })
+            .collect(),
     }
 }
 
-fn scan_description(scan: &Scan, steps: Steps, scanner_known: bool) -> ScanDescription {
+fn scan_description(
+    scan: &Scan,
+    steps: Steps,
+    scanner_known: bool,
+    bounds: Option<Aabb>,
+) -> ScanDescription {
     let mut notes = scan.notes.clone();
     match steps {
         Steps::Irregular => notes.push(
@@ -152,6 +176,7 @@ fn scan_description(scan: &Scan, steps: Steps, scanner_known: bool) -> ScanDescr
                 Steps::Directions | Steps::None => "directions",
             },
         }),
+        bounds: bounds.as_ref().map(bounds_text),
         stated_bounds: scan.stated_bounds.as_ref().map(bounds_text),
         notes,
     }
@@ -181,7 +206,7 @@ fn bounds_text(bounds: &Aabb) -> BoundsText {
 }
 
 fn metres(v: &[f64; 3]) -> String {
-    format!("{:.3} {:.3} {:.3}", v[0], v[1], v[2])
+    v.map(|v| fixed(v, 3)).join(" ")
 }
 
 impl fmt::Display for Description {
@@ -227,8 +252,16 @@ impl fmt::Display for ScanDescription {
                 lattice.row_step_deg, lattice.col_step_deg, lattice.axis, lattice.from
             )?;
         }
-        if let Some(bounds) = &self.stated_bounds {
-            writeln!(f, "    bounds: {} to {}", metres(&bounds.min), metres(&bounds.max))?;
+        match (&self.bounds, &self.stated_bounds) {
+            (Some(b), _) => writeln!(f, "    bounds: {} to {}", metres(&b.min), metres(&b.max))?,
+            // Too many points to read them for that.
+            (None, Some(b)) => writeln!(
+                f,
+                "    bounds: within {} to {}, as stated in the frame of the scan",
+                metres(&b.min),
+                metres(&b.max)
+            )?,
+            (None, None) => {}
         }
         self.notes.iter().try_for_each(|note| writeln!(f, "    note: {note}"))
     }

@@ -1,11 +1,13 @@
 //! Files in, strips out: the only reader of point formats. Knows how files are read, and nothing of what is in them.
 #![deny(unsafe_code)]
 
+mod bounds;
 #[cfg(test)]
 mod check;
 mod e57;
 mod format;
 mod frame;
+mod glance;
 mod inspect;
 mod las;
 mod las_header;
@@ -27,6 +29,7 @@ mod sources;
 mod text;
 mod units;
 
+pub use glance::{Glance, Sample};
 pub use inspect::{
     BoundsText, Description, Fact, LatticeText, PoseText, ScanDescription, describe,
 };

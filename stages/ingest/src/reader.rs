@@ -146,6 +146,10 @@ pub(crate) trait Reader: Send + Sync {
     }
     /// Units of its coordinates as they stand in the file; what it gives is in metres.
     fn units(&self) -> &Units;
+    /// The coordinates of one scan from its first point on, where a scan can be read by itself.
+    fn read_scan(&self, _scan: usize) -> Option<RawStrips<'_>> {
+        None
+    }
     /// Whether points have colour.
     fn has_color(&self) -> bool;
     /// Scale and offset of its coordinates, metres, where they are whole multiples of a step (LAS).

@@ -178,7 +178,7 @@ impl Sources {
     }
 
     /// An open input and its path.
-    fn open(&self, input: InputId) -> Result<(&File, &Path)> {
+    pub(crate) fn open(&self, input: InputId) -> Result<(&File, &Path)> {
         let at = input.0 as usize;
         let open = at.checked_sub(self.n_before[0]).and_then(|at| self.files.get(at));
         let known = open.zip(self.inputs.get(at)).map(|(file, known)| (file, &*known.path));
@@ -343,7 +343,7 @@ impl File {
         self.reader.check().and(read)
     }
 
-    fn number(&self, mut raw: RawStrip) -> Strip {
+    pub(crate) fn number(&self, mut raw: RawStrip) -> Strip {
         let seed: &ScanSeed = &self.reader.scans()[raw.scan];
         if let Some(new_from_file) = &self.moved[raw.scan] {
             raw.xyz.iter_mut().for_each(|p| *p = moved(new_from_file, *p));

@@ -89,7 +89,7 @@ fn a_tilting_laser_without_rows_is_rebuilt() {
     let sources =
         open(&[folder.join("lgl__indoor.laz")], None, &Settings::default(), &OneByOne).unwrap();
     assert!(!sources.scans[0].has_beams());
-    let text = describe(&sources)[0].to_string();
+    let text = describe(&sources, &OneByOne)[0].to_string();
     assert!(text.contains("scanner: not known") && text.contains("free-space"), "{text}");
 }
 
@@ -114,7 +114,7 @@ fn gridded_files_keep_their_grid() {
             assert!((axis - nalgebra::Vector3::z()).norm() < 1e-9, "{name}: the axis is y");
             assert!(alone > 0.98, "{name}: {alone}");
         }
-        let text = serde_json::to_string(&describe(&sources)).unwrap();
+        let text = serde_json::to_string(&describe(&sources, &OneByOne)).unwrap();
         assert!(text.contains("\"structured\":true"), "{text}");
     }
     let Some(pump) = folder("e57-real-pump") else {
@@ -127,5 +127,5 @@ fn gridded_files_keep_their_grid() {
     let (alone, filled) = filling(&sources, 0);
     eprintln!("pump: {row:.4} {col:.4} alone {alone:.4} filled {filled:.3}");
     assert!((0.05..0.09).contains(&row) && (0.18..0.32).contains(&col), "{row} {col}");
-    assert!(describe(&sources)[0].to_string().contains("irregular"));
+    assert!(describe(&sources, &OneByOne)[0].to_string().contains("irregular"));
 }

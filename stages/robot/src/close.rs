@@ -5,6 +5,7 @@ use crate::kinematics::Placing;
 use crate::loops::{ClosedLoop, Closure, Form};
 use crate::model::{JointKind, Model, Motion};
 use crate::sheet::{LoopWord, SubChain};
+use contract::words::count;
 use geometry::Vector;
 
 /// Values of each free joint at which a loop is tried.
@@ -152,8 +153,11 @@ fn shape(
     let place = format!("robot.toml: sub_chain {}", closed_loop.name);
     let (n_passive, n_pins) = (closed_loop.passive.len(), closed_loop.closures.len());
     if n_passive > 2 * n_pins {
-        let what =
-            format!("{n_pins} pin(s) determine {} joints, but {n_passive} are passive", 2 * n_pins);
+        let what = format!(
+            "{} determine {} joints, but {n_passive} are passive",
+            count(n_pins as u64, "pin"),
+            2 * n_pins
+        );
         findings.fail(&place, what, "leave out of passive what moves by itself or mimics");
         return None;
     }

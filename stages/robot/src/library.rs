@@ -3,6 +3,7 @@
 use crate::finding::{Finding, Findings, Severity};
 use crate::load::{Settings, load, urdfs};
 use crate::model::Model;
+use contract::words::count;
 use contract::{Error, Kind, Result};
 use std::path::{Path, PathBuf};
 
@@ -124,8 +125,11 @@ impl Library {
         };
         let n = self.findings.iter().filter(|f| f.severity == Severity::Error).count();
         let what = format!(
-            "no model of the library could be loaded, {n} error(s), the first: {}: {}: {}",
-            first.model, first.place, first.what
+            "no model of the library could be loaded: {}, the first: {}: {}: {}",
+            count(n as u64, "error"),
+            first.model,
+            first.place,
+            first.what
         );
         Err(Error::bad_input(what)
             .at(dir.display())

@@ -2,6 +2,7 @@
 //! the parser skips words that are no numbers, stops at a second material, and recurses as deep as the file says.
 
 use crate::finding::Findings;
+use contract::words::count;
 use geometry::{Pose, Vector};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use roxmltree::{Document, Node, ParsingOptions};
@@ -353,7 +354,11 @@ impl Cleaner<'_> {
         let right = words.clone().count() == n
             && words.clone().all(|w| w.parse().is_ok_and(f64::is_finite));
         if !right {
-            let what = format!("{name} must be {n} finite number(s) \"{}\"", shortened(value));
+            let what = format!(
+                "{name} must be {} \"{}\"",
+                count(n as u64, "finite number"),
+                shortened(value)
+            );
             self.findings.fail(self.place(node), what, "write numbers with spaces between them");
         }
         right

@@ -198,7 +198,7 @@ fn spread(
 fn covariance(fit: &Fit) -> DMatrix<f64> {
     let n = 6 + fit.joints.len();
     let is_whole = fit.covariance.len() == n * n && fit.covariance.iter().all(|v| v.is_finite());
-    if is_whole && fit.joints.iter().all(|joint| joint.determined) {
+    if is_whole && fit.joints.iter().all(contract::JointFit::is_determined) {
         return DMatrix::from_row_slice(n, n, &fit.covariance);
     }
     let sigmas = fit.base_sigma.iter().copied().chain(fit.joints.iter().map(|joint| joint.sigma));

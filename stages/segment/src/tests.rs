@@ -119,7 +119,7 @@ fn fit(world_from_base: Pose, q: f64) -> Fit {
             name: "j1".into(),
             value: q,
             sigma: 1e-4,
-            determined: true,
+            certainty: contract::Certainty::Determined,
             ..JointFit::default()
         }],
         verdict: Verdict::Trusted,
@@ -347,7 +347,7 @@ fn points_of_a_real_robot_go_to_their_links() {
             name: format!("j{i}"),
             value: *q,
             sigma: 1e-4,
-            determined: true,
+            certainty: contract::Certainty::Determined,
             ..JointFit::default()
         })
         .collect();

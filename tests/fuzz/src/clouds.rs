@@ -89,7 +89,7 @@ fn read(path: &Path) {
 fn read_with(path: &Path, settings: &Settings) -> Option<Vec<Points>> {
     let opened = ingest::open(&[path.to_path_buf()], None, settings, &OneByOne);
     let sources = opened.map_err(|e| refused(&e)).ok()?;
-    let said = ingest::describe(&sources);
+    let said = ingest::describe(&sources, &OneByOne);
     assert_eq!(said.len(), 1, "one file, one description");
     let plain = points(&sources, Want::Coordinates)?;
     let all = points(&sources, Want::Everything)?;

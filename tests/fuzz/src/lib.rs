@@ -115,7 +115,8 @@ pub(crate) fn refused(error: &Error) {
 pub(crate) fn folder() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
-        let above = std::env::var_os("STILLPOINT_FUZZ_DIR").map_or_else(std::env::temp_dir, PathBuf::from);
+        let above =
+            std::env::var_os("STILLPOINT_FUZZ_DIR").map_or_else(std::env::temp_dir, PathBuf::from);
         let folder = above.join(std::process::id().to_string());
         std::fs::create_dir_all(&folder).expect("the folder of a fuzzer can be made");
         folder

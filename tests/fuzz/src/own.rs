@@ -11,7 +11,7 @@ pub fn result(data: &[u8]) {
             let path = folder().join("result/again.json");
             #[cfg(feature = "program")]
             let _ = stillpoint::changes::words(&stillpoint::changes::changes(&result, &result));
-            export::write_junit(&folder().join("result/junit.xml"), &result).expect("writes");
+            export::write_junit(&folder().join("result/junit.xml"), &result, true).expect("writes");
             for robot in &result.robots {
                 if let Some(space) = &robot.space {
                     let _ = space.read(&folder().join("result")).map_err(|e| refused(&e));

@@ -88,7 +88,10 @@ fn check(model: &Model) {
     assert_eq!(n_links, n_joints + 1, "a tree");
     for joint in &model.joints {
         assert!(joint.parent < n_links && joint.child < n_links && joint.child > 0, "links");
-        assert!(joint.limits.is_none_or(|[a, b]| a.is_finite() && a <= b && b.is_finite()), "limits");
+        assert!(
+            joint.limits.is_none_or(|[a, b]| a.is_finite() && a <= b && b.is_finite()),
+            "limits"
+        );
     }
     for link in &model.links {
         let (n, mesh) = (link.mesh.vertices.len(), &link.mesh);
@@ -99,7 +102,11 @@ fn check(model: &Model) {
     let middle = |j: &usize| model.joints[*j].limits.map_or(0.0, |[a, b]| 0.5 * (a + b));
     let posture: Vec<f64> = model.free.iter().map(middle).collect();
     let at = model.kinematics(&posture);
-    assert_eq!((at.base_from_link.len(), at.twists.len()), (n_links, n_links), "poses of all links");
+    assert_eq!(
+        (at.base_from_link.len(), at.twists.len()),
+        (n_links, n_links),
+        "poses of all links"
+    );
 }
 
 /// A robot of two links, the second with this mesh.
@@ -117,7 +124,9 @@ pub fn with_mesh(name: &str) -> String {
 #[must_use]
 pub fn six_joints() -> String {
     let link = |i: usize| {
-        format!("<link name='l{i}'><visual><geometry><box size='.1 .2 .3'/></geometry></visual></link>")
+        format!(
+            "<link name='l{i}'><visual><geometry><box size='.1 .2 .3'/></geometry></visual></link>"
+        )
     };
     let joint = |i: usize| {
         let axis = ["0 0 1", "0 1 0"][i % 2];

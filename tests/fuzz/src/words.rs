@@ -20,7 +20,9 @@ pub fn scanners(data: &[u8]) {
 
 /// A scene of the virtual scanner.
 pub fn scene(data: &[u8]) {
-    match std::str::from_utf8(data).map_or_else(|_| Err(contract::Error::bad_input("no text")), Scene::from_toml) {
+    match std::str::from_utf8(data)
+        .map_or_else(|_| Err(contract::Error::bad_input("no text")), Scene::from_toml)
+    {
         Ok(scene) => {
             let text = scene.to_toml().expect("a scene that was read can be written");
             let again = Scene::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));

@@ -170,7 +170,7 @@ impl Paper<'_> {
             value: *value,
             sigma: SIGMA,
             // It does not ask.
-            determined: false,
+            certainty: contract::Certainty::Undetermined,
             ..JointFit::default()
         });
         let none = vec![0; model.links.len()];

@@ -24,8 +24,9 @@ const MAX_SPAN: u64 = 1 << 31;
 pub(super) struct Strips<'a> {
     file: &'a E57File,
     want: Want,
-    /// Scan being read, and its points once open.
+    /// Scan being read, the one to end before, and the points of the first once open.
     scan: usize,
+    until: usize,
     points: Option<Points>,
     /// Place in the mask of the next valid point.
     place: u64,
@@ -37,12 +38,18 @@ pub(super) struct Strips<'a> {
 impl<'a> Strips<'a> {
     /// At the first point of the file.
     pub(super) fn new(file: &'a E57File, want: Want) -> Self {
-        Self { file, want, scan: 0, points: None, place: 0, named: 0, done: false }
+        let until = file.files.len();
+        Self { file, want, scan: 0, until, points: None, place: 0, named: 0, done: false }
+    }
+
+    /// At the first point of a scan, of which coordinates are read and no other scan's.
+    pub(super) fn of_scan(file: &'a E57File, scan: usize) -> Self {
+        Self { scan, until: scan + 1, ..Self::new(file, Want::Coordinates) }
     }
 
     /// The next strip; `None` after the last scan.
     fn read(&mut self) -> Result<Option<RawStrip>> {
-        while let Some(scan) = self.file.files.get(self.scan) {
+        while let Some(scan) = self.file.files[..self.until].get(self.scan) {
             let at = self.scan;
             let strip = self
                 .read_scan(scan)

@@ -47,7 +47,7 @@ fn fit() -> Fit {
             name: "j1".into(),
             value: 0.0,
             sigma: 0.0,
-            determined: true,
+            certainty: contract::Certainty::Determined,
             ..JointFit::default()
         }],
         verdict: Verdict::Trusted,

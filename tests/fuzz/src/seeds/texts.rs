@@ -18,7 +18,11 @@ fn put_settings(seeds: &Seeds, scratch: &Path) {
         "[[scanner]]\nposition = [0, 0, 0.0]\n[[scanner]]\nname = 'b'\nposition = [0, 0, 0.0]\n",
         r#"{"scanner": [{"point_source_id": 1, "name": "a", "position": [4.9, 1, 1.5], "quaternion_wxyz": [1, 0, 0, 0]}]}"#,
     ]);
-    seeds.put("settings", "means", "memory = \"8GiB\"\nthreads = 3\nscanners = \"s.toml\"\n[fit]\nbeam = 77\n");
+    seeds.put(
+        "settings",
+        "means",
+        "memory = \"8GiB\"\nthreads = 3\nscanners = \"s.toml\"\n[fit]\nbeam = 77\n",
+    );
     seeds.put_all("review", [
         "[[robot]]\nat = [2.7, 0.0, 0.3]\nmodel = \"known\"\nverdict = \"accept\"\njoints = { j1 = -1.2 }\nrpy = [0.0, 0.0, 1.5]\n",
         "[[robot]]\nat = [2.7, 0.0, 0.3]\nradius = 0.5\nverdict = \"reject\"\n",
@@ -33,7 +37,8 @@ fn put_settings(seeds: &Seeds, scratch: &Path) {
     let models = crate::robots::models();
     let scene = simulate::paper_scene(1, &models[0], &[0.0; 6], 20_000);
     seeds.put("scene", "paper", scene.to_toml().expect("a scene can be written"));
-    let hall = simulate::demo_scene(1, &demo_models(scratch)).expect("a scene of the demo's robots");
+    let hall =
+        simulate::demo_scene(1, &demo_models(scratch)).expect("a scene of the demo's robots");
     seeds.put("scene", "hall", hall.to_toml().expect("a scene can be written"));
 }
 
@@ -60,8 +65,19 @@ fn put_robots(seeds: &Seeds) {
     seeds.put("urdf", "six", &six);
     seeds.put("urdf", "sheet", format!("{six}\0{SHEET}"));
     seeds.put("urdf", "mesh", with_mesh("m.obj"));
-    seeds.put("urdf", "package", with_mesh("package://urdf/m.obj").replace("1 1 1", ".001 .001 .001"));
-    seeds.put("urdf", "mimic", six.replace("</joint><joint name='j6'", "<mimic joint='j1' multiplier='2' offset='.1'/></joint><joint name='j6'"));
+    seeds.put(
+        "urdf",
+        "package",
+        with_mesh("package://urdf/m.obj").replace("1 1 1", ".001 .001 .001"),
+    );
+    seeds.put(
+        "urdf",
+        "mimic",
+        six.replace(
+            "</joint><joint name='j6'",
+            "<mimic joint='j1' multiplier='2' offset='.1'/></joint><joint name='j6'",
+        ),
+    );
     let shapes = "<sphere radius='.1'/></geometry></visual><collision><geometry><cylinder radius='.1' length='.2'/></geometry></collision><visual><geometry><box size='1 1 1'/>";
     seeds.put("urdf", "shapes", with_mesh("m.obj").replace("<mesh filename='m.obj'/>", shapes));
     seeds.put("sheet", "all", SHEET);
