@@ -44,8 +44,6 @@ const N_LOOSE: u64 = 1_000_000;
 const MAX_ASKED: usize = 8;
 /// Room about the new scans in which the earlier session is looked at for that, metres.
 const ROOM: f64 = 1.0;
-/// A stated frame is contradicted where fewer surfaces than this share agree.
-const LEAST_SHARE: f64 = 0.5;
 
 /// Finds the frame of the new scans, and carries them and their tiles into that of the plant; `stood` are the bounds of
 /// robots as they stood, world, metres.
@@ -115,6 +113,11 @@ impl Sessions<'_> {
             Answer::Holds(_) => Ok(Carried::default()),
             Answer::Near(place) => Ok(carried(&place, "given", both)),
             Answer::Not(Some(place)) if is_contradicted(&place) => Err(self.contradicted(&place)),
+            Answer::Not(_) if both.0.surfels.all.is_empty() => {
+                let what = "--frame says that the new scans are in the plant's frame, but no point of the plant lies where they do";
+                let hint = "leave --frame out, or give --frame X,Y,Z,YAW";
+                Err(Error::bad_input(what).at(self.input()).hint(hint))
+            }
             Answer::Not(_) => Ok(Carried { warnings: vec![warning.into()], ..Carried::default() }),
         }
     }
@@ -226,8 +229,9 @@ impl Sessions<'_> {
     }
 }
 
+/// Whether beams went through more than what agrees.
 fn is_contradicted(place: &Place) -> bool {
-    place.evidence.n_against() > place.evidence.n_same() && place.evidence.share() < LEAST_SHARE
+    place.evidence.n_against() > place.evidence.n_same()
 }
 
 /// What speaks for and against a place.

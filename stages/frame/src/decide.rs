@@ -73,9 +73,7 @@ pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
     let place = plain(&judge(old, new, laid));
     let off = apart(&laid.old_from_new, stated, &middle(new));
     let is_within = |most: (f64, f64)| off.0 <= most.0 && off.1 <= most.1;
-    let evidence = &place.evidence;
-    let is_borne_out = evidence.n_same() >= MIN_SAME_STATED && evidence.share() >= MIN_SHARE_STATED;
-    if !is_borne_out || !is_within(STATED_ABOUT) {
+    if !is_borne_out(&place) || !is_within(STATED_ABOUT) {
         return Answer::Not(Some(place));
     }
     // A few centimetres are believed only where surfaces hold the pose in all directions.
@@ -93,7 +91,7 @@ pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
 pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, Option<Place>> {
     let laid = Chosen::of(&new.surfels).lay(&old.surfels, rough, &WIDE).ok_or(None)?;
     let place = plain(&judge(old, new, laid));
-    if is_good(&place, MIN_SHARE_STATED) { Ok(place) } else { Err(Some(place)) }
+    if is_borne_out(&place) { Ok(place) } else { Err(Some(place)) }
 }
 
 /// Where the new session lies in the earlier one, searched over all shifts and yaws; `stated` is one of the poses that are
@@ -181,6 +179,11 @@ fn is_good(place: &Place, min_share: f64) -> bool {
     place.evidence.n_same() >= MIN_SAME
         && place.laid.hold >= MIN_HOLD
         && place.evidence.share() >= min_share
+}
+
+/// Whether enough speaks for a pose that somebody states.
+fn is_borne_out(place: &Place) -> bool {
+    place.evidence.n_same() >= MIN_SAME_STATED && place.evidence.share() >= MIN_SHARE_STATED
 }
 
 /// Where poses of a new session are compared.
