@@ -103,7 +103,7 @@ fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<(Es
     let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
     let sources =
         ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest, &AllThreads)?;
-    sources.check_sizes()?;
+    units::check_plan(&job.robots, &sources)?;
     Ok((Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)), sources))
 }
 

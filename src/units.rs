@@ -5,6 +5,7 @@ use contract::{Input, Result};
 use export::UnitsEntry;
 use ingest::{Origin, Sources};
 use robot::Library;
+use std::path::Path;
 
 /// The units of inputs, in words: one line for all inputs of the same.
 pub(crate) fn said(sources: &Sources) -> Vec<String> {
@@ -30,6 +31,20 @@ pub(crate) fn entry(sources: &Sources, input: &Input) -> Option<UnitsEntry> {
         Origin::Assumed => "assumed",
     };
     Some(UnitsEntry { text: units.to_string(), origin: origin.into(), metres: units.factors() })
+}
+
+/// Clouds that are larger hold a robot of any library, metres: a fifth of the largest one's reach.
+const LARGE_ENOUGH: f64 = 1.0;
+
+/// As [`check_sizes`], of a library that is not loaded yet: it is only where clouds are so small that its robots decide.
+pub(crate) fn check_plan(robots: &Path, sources: &Sources) -> Result<()> {
+    sources.check_sizes()?;
+    let spread = sources.spread();
+    let is_small = spread.size().iter().all(|side| *side < LARGE_ENOUGH);
+    if spread.is_empty() || !is_small {
+        return Ok(());
+    }
+    check_sizes(&Library::load(robots, &robot::Settings::without_clouds())?, sources)
 }
 
 /// Refuses inputs that cannot be of a plant with robots of this library, in the units that they are read in.

@@ -163,6 +163,15 @@ fn check_place(scan: &mut ScanSeed, look: &Look, settings: &Settings) -> Result<
         return check_distance(scan, look.middle, settings);
     }
     let far = look.far_from(scan.world_from_scan.translation.vector, settings.max_range);
+    if far > 0 && far == look.points.len() {
+        let what = format!(
+            "none of {far} points looked at lies within {} km of their middle, \"{:?}\"",
+            settings.max_range / 1000.0,
+            look.origin
+        );
+        return Err(Error::bad_input(what)
+            .hint("the file is damaged, or its unit is another: give it with --units"));
+    }
     if far > 0 {
         scan.notes.push(format!(
             "{far} of {} points looked at lie more than {} km from the middle: such points are dropped",
