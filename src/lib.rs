@@ -1,6 +1,7 @@
 //! How a run goes: plan, engine, store, command line, configuration, progress. Scans and a robot library in, postures
 //! and masks out. Knows no geometry: what is done stands in `stages/`.
 
+mod advice;
 pub mod bench;
 mod bodies;
 pub mod calibrate;

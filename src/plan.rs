@@ -137,6 +137,7 @@ impl Run<'_> {
         let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
         let sources = engine.pool()?.install(open)?;
         units::check_sizes(&library, &sources)?;
+        sources.check_steps()?;
         let has_tiles = |i: &Input| {
             let key = digests.tiles(i, &sources.scans, settings);
             key.is_some_and(|key| output.has_tiles(&key))

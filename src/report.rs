@@ -1,5 +1,6 @@
 //! What a run came to in; `result.json`, the legend of the masks and a summary for people out.
 
+use crate::advice::Lack;
 use crate::engine::Task;
 use crate::job::{Outcome, OutputDir};
 use crate::labelling::{Done, MaskCount};
@@ -14,7 +15,7 @@ use export::{
     InputEntry, Labels, Places, ResultFile, ReviewEntry, RobotEntry, SCHEMA, ScanLabels,
     SpaceEntry, StageEntry, write_table,
 };
-use ingest::Sources;
+use ingest::{MISPLACED, Sources};
 use robot::{JointKind, Library, Model, Motion, Role};
 use std::fmt::Write as _;
 
@@ -102,6 +103,7 @@ impl Report<'_> {
 
     fn warnings(&self) -> Vec<String> {
         let mut out = self.sources.warnings.clone();
+        out.extend(self.sources.oddities());
         out.extend(self.left_out.iter().cloned());
         let odd = self.review.iter().filter(|entry| entry.needs_look);
         out.extend(odd.map(ReviewEntry::words));
@@ -112,10 +114,18 @@ impl Report<'_> {
         }));
         out.extend(dropped(self.sources, &self.written.masks));
         for scan in self.scans().filter(|s| !s.has_beams()) {
-            out.push(format!(
-                "scan '{}': its scanner's position is not known: no proof of free space from it",
-                quote::shown(&scan.name)
-            ));
+            // A position that was given and is not used says why.
+            let why = scan.notes.iter().find(|note| note.contains(MISPLACED));
+            let why = why.map_or("its scanner's position is not known", String::as_str);
+            let name = quote::shown(&scan.name);
+            out.push(format!("scan '{name}': {why}: no proof of free space from it"));
+        }
+        if self.fits.is_empty() {
+            let scans: Vec<&Scan> = self.scans().collect();
+            let (tiles, models) = (self.store.entries(), &self.library.models[..]);
+            out.extend(
+                Lack { scans: &scans, tiles, models, n_places: self.n_searched[1] }.advice(),
+            );
         }
         out
     }

@@ -176,6 +176,7 @@ impl Rescan<'_> {
         };
         let sources = engine.pool()?.install(open)?;
         units::check_sizes(&library, &sources)?;
+        sources.check_steps()?;
         Ok((library, sources))
     }
 

@@ -92,7 +92,7 @@ impl Said<'_, '_> {
             .iter()
             .map(|input| input_entry(sources, input, digests, &self.done.masks));
         result.inputs.extend(inputs);
-        result.warnings.extend(sources.warnings.iter().cloned());
+        result.warnings.extend(sources.warnings.iter().cloned().chain(sources.oddities()));
         result.warnings.extend(dropped(sources, &self.done.masks));
         result.warnings.extend(self.warnings());
         let cell = &self.found.session.past.cell;

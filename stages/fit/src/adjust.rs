@@ -337,7 +337,7 @@ impl<'a> Adjust<'a> {
 }
 
 /// From where on the kernel gives no weight to residuals of a variance, m²; metres.
-fn kernel_scale(variance: f64, gate: f64) -> f64 {
+pub(crate) fn kernel_scale(variance: f64, gate: f64) -> f64 {
     (TUKEY * variance.sqrt()).min(gate)
 }
 

@@ -120,7 +120,7 @@ fn estimate(
 fn as_known(nominal: &Refine<'_>, fit: &Fit, h: &Hypothesis, calibrated: &Fit) -> Verdict {
     let judgement = judged(nominal, h);
     let passed = |mut fit: Fit| {
-        verdict::pass(&mut fit, nominal.prepared, nominal.scene, &judgement);
+        verdict::pass(&mut fit, nominal.prepared, nominal.scene, (&judgement, None));
         fit.verdict
     };
     // Others than the points may have made it doubtful.

@@ -3,8 +3,8 @@
 //! the covariance so (METHOD.md §14).
 
 use contract::Fan;
-use geometry::Vector;
-use nalgebra::{DMatrix, DVector, UnitQuaternion};
+use geometry::{Pose, Vector};
+use nalgebra::{DMatrix, DVector, Unit, UnitQuaternion};
 use robot::JointKind;
 
 use crate::beam::Hypothesis;
@@ -27,45 +27,75 @@ impl Refine<'_> {
         near: &[u32],
         fan: &impl Fan,
     ) -> DMatrix<f64> {
-        let model = self.prepared.model;
-        let Some(&first) = model.free.first() else { return covariance };
-        let (first, fixed) = (&model.joints[first], &self.prepared.fixed);
-        if first.kind == JointKind::Prismatic || fixed.is_empty() {
-            return covariance;
-        }
-        let points = self.swept(h, near, fixed);
-        let base_from_first = model.poses(&h.posture)[first.parent] * first.parent_from_joint;
-        let turned = |angle: f64| {
-            let turn = UnitQuaternion::from_axis_angle(&first.axis, angle);
-            let mut other = h.clone();
-            other.local_from_base *= base_from_first * turn * base_from_first.inverse();
-            other.posture[0] -= angle;
-            other
-        };
-        let extent = if points.len() < MIN_POINTS {
-            SPAN
-        } else {
-            let still = self.distances(h, &points, |l| !fixed.contains(&l));
-            let n = (SPAN / STEP) as i32;
-            let angles = (-n..=n).map(|k| f64::from(k) * STEP).collect();
-            let squares = |angle: f64| -> (f64, Vec<f64>) {
-                let own = self.distances(&turned(angle), &points, |l| fixed.contains(&l));
-                let least = own.iter().zip(&still).map(|(a, b)| f64::from(a.min(*b)));
-                (angle, least.map(|d| d * d).collect())
-            };
-            run(&fan.fan(angles, squares), self.scene.noise * self.scene.noise)
-        };
+        let Some(foot) = Foot::new(self, h, near) else { return covariance };
+        let n = (SPAN / STEP) as i32;
+        let extent = foot.reach((-n..=n).map(|k| f64::from(k) * STEP).collect(), 1.0, fan);
         if extent > VALLEY {
             let spread = extent / 3.0_f64.sqrt();
-            let axis: Vector = base_from_first.rotation * first.axis.into_inner();
-            let at = base_from_first.translation.vector;
-            let mut way = DVector::zeros(covariance.nrows());
-            way.rows_mut(0, 3).copy_from(&at.cross(&axis));
-            way.rows_mut(3, 3).copy_from(&axis);
-            way[6] = -1.0;
+            let way = foot.way(covariance.nrows());
             covariance.ger(spread * spread, &way, &way, 1.0);
         }
         covariance
+    }
+}
+
+/// The foot of a robot as it stands, and the points about it.
+pub(crate) struct Foot<'a> {
+    refine: &'a Refine<'a>,
+    h: &'a Hypothesis,
+    points: Vec<u32>,
+    base_from_first: Pose,
+    axis: Unit<Vector>,
+}
+
+impl<'a> Foot<'a> {
+    /// `None` where nothing turns on a foot.
+    pub(crate) fn new(refine: &'a Refine<'a>, h: &'a Hypothesis, near: &[u32]) -> Option<Self> {
+        let (model, fixed) = (refine.prepared.model, &refine.prepared.fixed);
+        let first = &model.joints[*model.free.first()?];
+        if first.kind == JointKind::Prismatic || fixed.is_empty() {
+            return None;
+        }
+        let points = refine.swept(h, near, fixed);
+        let base_from_first = model.poses(&h.posture)[first.parent] * first.parent_from_joint;
+        Some(Self { refine, h, points, base_from_first, axis: first.axis })
+    }
+
+    /// The base turned by an angle, the first joint turned back.
+    fn turned(&self, angle: f64) -> Hypothesis {
+        let turn = UnitQuaternion::from_axis_angle(&self.axis, angle);
+        let mut other = self.h.clone();
+        other.local_from_base *= self.base_from_first * turn * self.base_from_first.inverse();
+        other.posture[0] -= angle;
+        other
+    }
+
+    /// How far turns reach at which the points fit as well, of which so many err alike: the farthest of those tried where there are
+    /// too few points to tell, radians.
+    pub(crate) fn reach(&self, angles: Vec<f64>, n_alike: f64, fan: &impl Fan) -> f64 {
+        let Self { refine, points, .. } = self;
+        if points.len() < MIN_POINTS {
+            return angles.into_iter().fold(0.0, f64::max);
+        }
+        let fixed = &refine.prepared.fixed;
+        let still = refine.distances(self.h, points, |l| !fixed.contains(&l));
+        let squares = |angle: f64| -> (f64, Vec<f64>) {
+            let own = refine.distances(&self.turned(angle), points, |l| fixed.contains(&l));
+            let least = own.iter().zip(&still).map(|(a, b)| f64::from(a.min(*b)));
+            (angle, least.map(|d| d * d).collect())
+        };
+        run(&fan.fan(angles, squares), n_alike * refine.scene.noise * refine.scene.noise)
+    }
+
+    /// How base twist (base axes) and joints of so many unknowns change with such a turn.
+    pub(crate) fn way(&self, n: usize) -> DVector<f64> {
+        let axis = self.base_from_first.rotation * self.axis.into_inner();
+        let at = self.base_from_first.translation.vector;
+        let mut way = DVector::zeros(n);
+        way.rows_mut(0, 3).copy_from(&at.cross(&axis));
+        way.rows_mut(3, 3).copy_from(&axis);
+        way[6] = -1.0;
+        way
     }
 }
 

@@ -12,6 +12,7 @@ mod beam;
 mod bend;
 mod branch;
 mod calibrate;
+mod camera;
 mod choose;
 #[cfg(test)]
 mod cubes;

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 
 use crate::adjust::Adjusted;
 use crate::beam::Hypothesis;
+use crate::camera;
 use crate::judge::{Judgement, evidence};
 use crate::profile;
 use crate::refine::Refine;
@@ -64,15 +65,15 @@ pub(crate) fn report(
     let mut in_base = refine.with_foot(h, best.covariance.clone(), near, fan);
     let (mut open, mut spread) = open_joints(refine, &in_base, h, &rivals);
     let several: Vec<&Spin> = spins.iter().filter(|s| s.values.len() > 1).collect();
-    let mut of_joints = in_base.view_mut((6, 6), (n - 6, n - 6));
-    of_joints += sway(refine, best, &several, (near, points), fan);
-    let beyond = profile::beyond(refine, best, points, fan);
-    beyond.into_iter().enumerate().for_each(|(j, variance)| of_joints[(j, j)] += variance);
-    if let Some(wrist) = wrist {
-        let at = (wrist.joint, wrist.joint);
-        of_joints[at] = of_joints[at].max(wrist.variance());
-    }
+    widen(refine, (best, wrist), &several, (near, points), (&mut in_base, fan));
     spread_spins(h, (spins, &several), &mut open, &mut spread);
+    let held: Vec<f64> = (0..n - 6).map(|j| sigma_of(&in_base, 6 + j)).collect();
+    if refine.scene.has_camera() {
+        let near_equal = rivals.iter().filter(|(margin, _)| *margin < RIVAL);
+        let near_equal = near_equal.map(|(_, (other, _))| other);
+        in_base += camera::beyond(refine, best, (near, points), fan);
+        camera::spread(h, near_equal, &mut spread);
+    }
     let covariance = in_world_axes(&in_base, &h.local_from_base);
     // Where a joint may stand elsewhere, so may the tip.
     for (j, spread) in spread.iter().enumerate() {
@@ -101,8 +102,27 @@ pub(crate) fn report(
         equals: equals(refine, h, &rivals, (&passed, &several)),
         ..Fit::default()
     };
-    verdict::pass(&mut fit, prepared, refine.scene, judgement);
+    verdict::pass(&mut fit, prepared, refine.scene, (judgement, Some(&held)));
     fit
+}
+
+/// Adds to the covariance of the joints what their valleys, others that may stand elsewhere and the wrist leave open.
+fn widen(
+    refine: &Refine<'_>,
+    (best, wrist): (&Adjusted, Option<&Wrist>),
+    several: &[&Spin],
+    (near, points): (&[u32], &Sampled),
+    (in_base, fan): (&mut DMatrix<f64>, &impl Fan),
+) {
+    let n = best.hypothesis.posture.len();
+    let mut of_joints = in_base.view_mut((6, 6), (n, n));
+    of_joints += sway(refine, best, several, (near, points), fan);
+    let beyond = profile::beyond(refine, best, points, fan);
+    beyond.into_iter().enumerate().for_each(|(j, variance)| of_joints[(j, j)] += variance);
+    if let Some(wrist) = wrist {
+        let at = (wrist.joint, wrist.joint);
+        of_joints[at] = of_joints[at].max(wrist.variance());
+    }
 }
 
 /// The others, the one that the best is least better than first.

@@ -72,15 +72,17 @@ impl Reasons {
     }
 }
 
-/// Sets verdict and reasons from what stands in the fit and the judgement.
+/// Sets verdict and reasons from what stands in the fit and the judgement; `held` are standard deviations of the joints as the scatter
+/// of the points has them, radians or metres, where those of the fit hold more.
 pub(crate) fn pass(
     fit: &mut Fit,
     prepared: &Prepared<'_>,
     scene: &Scene<'_>,
-    judgement: &Judgement,
+    (judgement, held): (&Judgement, Option<&[f64]>),
 ) {
     let mut reasons = Reasons::default();
-    of_surface(&mut reasons, fit, prepared, scene, judgement);
+    let own: Vec<f64> = (0..fit.joints.len()).map(|j| own_sigma(fit, j)).collect();
+    of_surface(&mut reasons, (fit, held.unwrap_or(&own)), prepared, scene, judgement);
     of_joints(&mut reasons, fit, prepared, scene);
     let rival = fit.runner_up.as_ref().is_some_and(|rival| rival.margin < RIVAL);
     if rival {
@@ -100,7 +102,7 @@ pub(crate) fn pass(
 /// What score, beams and residual say of the surface.
 fn of_surface(
     reasons: &mut Reasons,
-    fit: &Fit,
+    (fit, held): (&Fit, &[f64]),
     prepared: &Prepared<'_>,
     scene: &Scene<'_>,
     judgement: &Judgement,
@@ -114,7 +116,7 @@ fn of_surface(
     });
     for (l, link) in fit.links.iter().enumerate().filter(|(_, link)| link.seen > MIN_SEEN) {
         let (v, is_aside) = (link.violated, is_aside(prepared.model, l));
-        let refuses = v > LINK_VIOLATION.1 && is_held(fit, prepared, l) && !is_aside;
+        let refuses = v > LINK_VIOLATION.1 && is_held(held, prepared, l) && !is_aside;
         reasons.grade(refuses, v > LINK_VIOLATION.0, || {
             let loops = if is_aside { ": a loop that the model lacks may move it" } else { "" };
             format!("beams went through {:.0} % of link '{}'{loops}", v * 100.0, link.name)
@@ -124,7 +126,7 @@ fn of_surface(
     reasons.grade(n_points < ROBOT_POINTS, false, || {
         format!("only {} on it", count(n_points as u64, "point"))
     });
-    let n_known = (0..fit.joints.len()).filter(|&j| own_sigma(fit, j) < KNOWN_SIGMA).count();
+    let n_known = held.iter().filter(|sigma| **sigma < KNOWN_SIGMA).count();
     let is_little = judgement.seen < SEEN;
     let is_anything = is_little && n_known as f64 <= LITTLE_KNOWN * fit.joints.len() as f64;
     reasons.grade(is_anything, is_little, || {
@@ -148,12 +150,12 @@ fn of_surface(
 
 /// Whether the joint that places a link and the one before it are known; else the link may well stand elsewhere, and the rest of
 /// the arm where it was found. A last joint does not count: at each of its values a flange is about where it is.
-fn is_held(fit: &Fit, prepared: &Prepared<'_>, link: usize) -> bool {
-    let n = fit.joints.len();
+fn is_held(sigmas: &[f64], prepared: &Prepared<'_>, link: usize) -> bool {
+    let n = sigmas.len();
     let placed = (0..n).find(|&j| prepared.placed_by[j].contains(&link));
     placed.is_none_or(|own| {
         let mut near = (own.saturating_sub(1)..=own).filter(|j| j + 1 < n);
-        near.all(|j| own_sigma(fit, j) < KNOWN_SIGMA)
+        near.all(|j| sigmas[j] < KNOWN_SIGMA)
     })
 }
 

@@ -86,7 +86,7 @@ pub(crate) fn shared(folder: &str) -> Option<PathBuf> {
 }
 
 #[allow(clippy::print_stdout)] // the test says that it did not run
-fn skipped(folder: &str) {
+pub(crate) fn skipped(folder: &str) {
     println!("skipped: no shared scans '{folder}'");
 }
 

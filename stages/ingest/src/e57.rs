@@ -1,6 +1,7 @@
 //! E57 (ASTM E2807) files in; scans and their points out. The description is parsed by the crate `e57`, points are
 //! decoded here.
 
+mod look;
 mod packets;
 mod pages;
 mod points;
@@ -9,6 +10,7 @@ mod stream;
 mod strips;
 
 use crate::Settings;
+use crate::oddities::Oddities;
 use crate::reader::{MaskSeed, RawStrips, Reader, Reading, Sampled, ScanSeed, Want};
 use crate::units::{self, Choice, Units};
 use ::e57::E57Reader;
@@ -29,6 +31,8 @@ struct E57File {
     masks: Vec<MaskSeed>,
     scans: Vec<ScanSeed>,
     files: Vec<E57Scan>,
+    /// One a scan.
+    oddities: Vec<Oddities>,
     facts: Vec<(String, String)>,
     units: Units,
 }
@@ -43,6 +47,7 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
         masks: Vec::new(),
         scans: Vec::new(),
         files: Vec::new(),
+        oddities: Vec::new(),
         facts: facts(&reader),
         units: units(&reader, path, settings)?,
     };
@@ -59,6 +64,7 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
         file.masks.push(scan.mask(&name));
         file.scans.push(seed);
         file.files.push(scan);
+        file.oddities.push(Oddities::default());
     }
     Ok(Box::new(file))
 }
@@ -81,6 +87,11 @@ impl Reader for E57File {
             .map_err(|e| e.at(format!("scan \"{}\"", self.scans[scan].name)))
     }
 
+    fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
+        strips::spread(self, &self.files[scan], n, most)
+            .map_err(|e| e.at(format!("scan \"{}\"", self.scans[scan].name)))
+    }
+
     fn read(&self, want: Want) -> Result<Reading<'_>> {
         Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
     }
@@ -91,6 +102,10 @@ impl Reader for E57File {
 
     fn read_scan(&self, scan: usize) -> Option<RawStrips<'_>> {
         Some(Box::new(strips::Strips::of_scan(self, scan)))
+    }
+
+    fn oddities(&self, scan: usize) -> Option<&Oddities> {
+        self.oddities.get(scan)
     }
 
     fn has_color(&self) -> bool {
@@ -230,6 +245,8 @@ fn fields(cloud: &::e57::PointCloud) -> String {
     words.join(", ")
 }
 
+#[cfg(test)]
+mod odd_tests;
 #[cfg(test)]
 mod own_tests;
 #[cfg(test)]

@@ -8,6 +8,11 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 /// Farthest that a terrestrial scanner stands from what it measured, metres. Long-range scanners of quarries reach
 /// 2 to 6 km, those of plants 0.4 km; map coordinates (easting, northing) are tens of kilometres at the least.
 const FARTHEST_SCANNER: f64 = 8.0e3;
+/// Points nearer to their scanner than this are beams without return that the file has written as its origin, metres:
+/// no scanner and no camera measures within its own housing.
+pub(crate) const NO_RETURN: f64 = 0.01;
+/// The same about the origin of a file whose scanner is not known: rounding of map coordinates, metres.
+const NO_POINT: f64 = 1e-6;
 
 /// How a file's coordinates become those of the scan frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,12 +25,15 @@ pub(crate) struct Frame {
     pub(crate) world_from_scan: Pose,
     /// Whether the origin of the scan frame is the scanner.
     pub(crate) scanner_known: bool,
+    /// Where beams without return are written, scan frame, and how near to it points are such, metres; 0 where none are.
+    no_return: ([f64; 3], f64),
 }
 
 impl Frame {
     /// The file's own frame, with the scanner at its origin.
     pub(crate) fn of_scanner(world_from_scan: Pose) -> Self {
-        Self { rotation: None, shift: [0.0; 3], world_from_scan, scanner_known: true }
+        let no_return = ([0.0; 3], NO_RETURN);
+        Self { rotation: None, shift: [0.0; 3], world_from_scan, scanner_known: true, no_return }
     }
 
     /// World axes about a whole metre near `near` (a point in the file's frame), for points whose scanner is not known.
@@ -40,7 +48,26 @@ impl Frame {
                 UnitQuaternion::identity(),
             ),
             scanner_known: false,
+            no_return: ([0.0; 3], 0.0),
         }
+    }
+
+    /// The same where the file writes beams without return as its origin.
+    pub(crate) fn without_origin(self) -> Self {
+        let no_return = (self.scan_from_file([0.0; 3]), NO_POINT);
+        Self { no_return, ..self }
+    }
+
+    /// The same where the origin is a point as any other.
+    pub(crate) fn with_origin(self) -> Self {
+        Self { no_return: ([0.0; 3], 0.0), ..self }
+    }
+
+    /// Whether a place in the scan frame is no return but the mark of a beam without.
+    #[inline]
+    pub(crate) fn is_no_return(&self, p: [f64; 3]) -> bool {
+        let (at, reach) = self.no_return;
+        (0..3).map(|i| (p[i] - at[i]).powi(2)).sum::<f64>() < reach * reach
     }
 
     /// A point of the file in the scan frame, metres.
@@ -114,6 +141,19 @@ mod tests {
         let about = Frame::about(pose, [300.0, -40.0, 5.0]);
         assert!(Vector3::from(about.scan_from_file(p)).norm() < 20.0);
         assert_eq!(about.world_from_scan.rotation, UnitQuaternion::identity());
+    }
+
+    #[test]
+    fn the_origin_is_no_return_where_it_is_the_scanner_or_marks_one() {
+        let scanner = Frame::of_scanner(Pose::translation(1.0, 2.0, 3.0));
+        assert!(
+            scanner.is_no_return([0.0, 0.0, -0.009]) && !scanner.is_no_return([0.0, 0.02, 0.0])
+        );
+        let map = Frame::about(Pose::identity(), [400_000.0, 5_600_000.0, 80.0]);
+        let origin = map.scan_from_file([0.0; 3]);
+        assert!(!map.is_no_return(origin) && !map.is_no_return([0.0; 3]));
+        let marked = map.without_origin();
+        assert!(marked.is_no_return(origin) && !marked.is_no_return([0.0; 3]));
     }
 
     #[test]

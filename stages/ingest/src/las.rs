@@ -6,6 +6,7 @@ use crate::las_record::Decoder;
 use crate::las_scans::{self, LasScanner};
 use crate::laz::{Laz, Stream};
 use crate::map::{Mapped, map};
+use crate::oddities::Oddities;
 use crate::reader::{Extent, MaskSeed, RawStrip, Reader, Reading, Sampled, ScanSeed, Want};
 use crate::settings::Settings;
 use crate::units::{Choice, Units};
@@ -115,7 +116,8 @@ impl Las {
     pub(crate) fn open(path: &Path, scanners: &[LasScanner], settings: &Settings) -> Result<Self> {
         let records = Records::open(path, settings)?;
         let found = las_scans::find(path, &records, scanners, settings)?;
-        let poses: Vec<_> = found.scans.iter().map(|s| s.world_from_scan).collect();
+        let pose = |s: &ScanSeed| (s.world_from_scan, s.scanner_known);
+        let poses: Vec<_> = found.scans.iter().map(pose).collect();
         let decoder =
             Decoder::new(&records.header, &poses, found.scan_of_source, settings.max_range);
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
@@ -189,7 +191,34 @@ impl Reader for Las {
         Ok(sample)
     }
 
+    fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
+        /// Records that are read at once: a piece of most compressed files.
+        const RUN: u64 = 50_000;
+        let (first, last) = self.extents[scan];
+        let span = (last + 1).saturating_sub(first);
+        let n_runs = span.min(most).div_ceil(RUN);
+        let every = span.min(most).div_ceil(n.max(1) as u64).max(1);
+        let mut out = Vec::new();
+        for run in 0..n_runs {
+            let from = first + (span as f64 * run as f64 / n_runs as f64) as u64;
+            let (place, records) = self.records.run(from, RUN.min(last + 1 - from) as usize)?;
+            for strip in self.decoder.decode(&records, place, Want::Coordinates) {
+                let places = strip.place.iter().map(|p| strip.first_place + u64::from(*p));
+                let own = places.zip(strip.xyz).filter(|_| strip.scan == scan);
+                out.extend(own.filter(|(at, _)| at.is_multiple_of(every)).map(|(_, xyz)| xyz));
+            }
+        }
+        Ok(out)
+    }
+
+    fn oddities(&self, scan: usize) -> Option<&Oddities> {
+        self.decoder.oddities(scan)
+    }
+
     fn read(&self, want: Want) -> Result<Reading<'_>> {
+        if want == Want::Everything {
+            (0..self.scans.len()).filter_map(|i| self.oddities(i)).for_each(Oddities::clear);
+        }
         let streamed = || {
             let records = Streamed { las: self, want, place: 0, stream: None, has_failed: false };
             Reading::Straight(Box::new(records.flatten()))

@@ -1,7 +1,9 @@
 //! Bytes of LAS point records in; strips out. The table of the eleven point formats, and the one loop that every
 //! LAS and LAZ point goes through.
 
+use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
+use crate::oddities::Oddities;
 use crate::reader::{RawStrip, Want};
 use contract::Attributes;
 use geometry::Pose;
@@ -97,15 +99,33 @@ fn trimmed(mut strip: RawStrip) -> Option<RawStrip> {
     Some(strip)
 }
 
+/// A record in the scan frame, metres.
+#[inline]
+fn in_scan(record: &[u8], frame: &Frame) -> [f64; 3] {
+    let (c, m, t) = (counts(record), &frame.m, &frame.t);
+    // One order of sums for all records: see `add_block`.
+    [0, 1, 2].map(|i| c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i])
+}
+
 /// From counts to the scan frame: `m · counts + t`.
 #[derive(Debug, Clone)]
 struct Frame {
     m: [[f64; 3]; 3],
     t: [f64; 3],
+    /// Points nearer to the scanner than this are beams without return, metres; 0 where no scanner is known.
+    no_return: f64,
+}
+
+impl Frame {
+    /// Whether a place in the scan frame is at the scanner itself.
+    #[inline]
+    fn is_no_return(&self, p: [f64; 3]) -> bool {
+        p.iter().all(|v| v.abs() < self.no_return)
+    }
 }
 
 /// Turns records into strips.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct Decoder {
     layout: Layout,
     record_len: usize,
@@ -115,6 +135,8 @@ pub(crate) struct Decoder {
     /// Scan of each source id; empty where all points are of scan 0.
     scan_of_source: Vec<u16>,
     max_range: f64,
+    /// One a scan.
+    oddities: Vec<Oddities>,
 }
 
 impl Decoder {
@@ -123,23 +145,26 @@ impl Decoder {
         self.layout.color.is_some()
     }
 
-    /// For the scans of a file with these poses; `scan_of_source` tells the scan of each source id (65,536 entries),
+    /// For the scans of a file with these poses, and whether the scanner is there; `scan_of_source` tells the scan of each source id (65,536 entries),
     /// or is empty where there is only one scan.
     pub(crate) fn new(
         header: &LasHeader,
-        poses: &[Pose],
+        poses: &[(Pose, bool)],
         scan_of_source: Vec<u16>,
         max_range: f64,
     ) -> Self {
-        let frames = poses
+        let frames: Vec<Frame> = poses
             .iter()
-            .map(|world_from_scan| {
+            .map(|(world_from_scan, is_scanner)| {
                 let turn = world_from_scan.rotation.inverse().to_rotation_matrix();
                 let from =
                     nalgebra::Vector3::from(header.offset) - world_from_scan.translation.vector;
                 let t = turn * from;
                 let m = [0, 1, 2].map(|i| [0, 1, 2].map(|j| turn[(i, j)] * header.scale[j]));
-                Frame { m, t: [t.x, t.y, t.z] }
+                // Coordinates are whole steps of the scale: one step off is where it was meant to be.
+                let step = header.scale.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+                let no_return = if *is_scanner { NO_RETURN.max(step) } else { 0.0 };
+                Frame { m, t: [t.x, t.y, t.z], no_return }
             })
             .collect();
         Self {
@@ -147,6 +172,7 @@ impl Decoder {
             record_len: header.record_len,
             scale: header.scale,
             offset: header.offset,
+            oddities: frames.iter().map(|_| Oddities::default()).collect(),
             frames,
             scan_of_source,
             max_range,
@@ -208,6 +234,9 @@ impl Decoder {
                 continue;
             }
             for record in block.chunks_exact(self.record_len) {
+                if strip.attributes.is_some() && self.is_no_return(record, frame) {
+                    self.oddities[strip.scan].add_no_returns(1);
+                }
                 if let Some(xyz) = self.local(record, frame) {
                     strip.place.push(place);
                     strip.xyz.push(xyz);
@@ -231,16 +260,18 @@ impl Decoder {
         }
         let (m, t) = (&frame.m, &frame.t);
         let mut xyz = [[0.0_f32; 3]; BLOCK];
-        let mut near = true;
+        let (mut near, mut at_scanner) = (true, false);
         for (c, p) in counts.iter().zip(&mut xyz) {
             for i in 0..3 {
-                // One order of sums for all scans: see `local`.
+                // One order of sums for all scans: see `in_scan`.
                 let v = c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i];
                 near &= v.abs() <= self.max_range;
                 p[i] = v as f32;
             }
+            let reach = p.iter().fold(0.0_f32, |most, v| most.max(v.abs()));
+            at_scanner |= f64::from(reach) < frame.no_return;
         }
-        if withheld || !near {
+        if withheld || !near || at_scanner {
             return false;
         }
         strip.xyz.extend_from_slice(&xyz);
@@ -287,16 +318,23 @@ impl Decoder {
     /// Scan frame, or nothing where the point is withheld or not to be believed.
     #[inline]
     fn local(&self, record: &[u8], frame: &Frame) -> Option<[f32; 3]> {
-        let (c, m, t) = (counts(record), &frame.m, &frame.t);
-        let mut p = [0.0; 3];
-        for i in 0..3 {
-            p[i] = c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i];
-        }
+        let p = in_scan(record, frame);
         // Written so that a NaN (from a scale near the end of f64) fails too.
         let near = p[0].abs() <= self.max_range
             && p[1].abs() <= self.max_range
             && p[2].abs() <= self.max_range;
-        (near && !self.layout.withheld(record)).then(|| p.map(|v| v as f32))
+        let is_good = near && !frame.is_no_return(p) && !self.layout.withheld(record);
+        is_good.then(|| p.map(|v| v as f32))
+    }
+
+    /// Whether a point that is not withheld lies at the scanner itself.
+    fn is_no_return(&self, record: &[u8], frame: &Frame) -> bool {
+        frame.is_no_return(in_scan(record, frame)) && !self.layout.withheld(record)
+    }
+
+    /// What was odd in a scan when all was last read.
+    pub(crate) fn oddities(&self, scan: usize) -> Option<&Oddities> {
+        self.oddities.get(scan)
     }
 
     fn add_attributes(&self, record: &[u8], to: &mut Attributes) {

@@ -1,9 +1,11 @@
 //! The records of a LAS or LAZ file and the scanners known for it in; its scans out: which source id belongs to
 //! which scanner, and where the origin lies when no scanner is known.
 
+use crate::frame::NO_RETURN;
 use crate::las::Records;
 use crate::las_header::LasHeader;
 use crate::las_record::Layout;
+use crate::oddities::no_returns_note;
 use crate::reader::ScanSeed;
 use crate::settings::Settings;
 use contract::{Error, Kind, Result};
@@ -78,6 +80,8 @@ pub(crate) fn find(
     let whole = (0, header.n_points.saturating_sub(1));
     let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     let mut notes = header.notes.clone();
+    let step = crate::steps::coarse(&look.points);
+    notes.extend(step.map(crate::steps::note));
     if look.bounds_wrong() && header.bounds.is_some() {
         let (outside, n) = (look.outside, look.points.len());
         notes.push(format!(
@@ -95,6 +99,7 @@ pub(crate) fn find(
         stated_points: None,
         likely_points: None,
         notes: notes.clone(),
+        step,
     };
     let mut found = Found {
         scans: Vec::new(),
@@ -160,6 +165,10 @@ fn by_source_id(
 /// Checks where a scan stands: its scanner where that is known, else how far its points lie apart; notes what is worth it.
 fn check_place(scan: &mut ScanSeed, look: &Look, settings: &Settings) -> Result<()> {
     if scan.scanner_known {
+        let n = look.n_at(scan.world_from_scan.translation.vector);
+        if n > 0 {
+            scan.notes.push(no_returns_note(n, look.points.len()));
+        }
         return check_distance(scan, look.middle, settings);
     }
     let far = look.far_from(scan.world_from_scan.translation.vector, settings.max_range);
@@ -228,6 +237,12 @@ struct Look {
 impl Look {
     fn bounds_wrong(&self) -> bool {
         self.outside * 2 > self.points.len()
+    }
+
+    /// How many points lie at a scanner itself.
+    fn n_at(&self, scanner: nalgebra::Vector3<f64>) -> usize {
+        let is_at = |p: &&[f64; 3]| (0..3).all(|a| (p[a] - scanner[a]).abs() < NO_RETURN);
+        self.points.iter().filter(is_at).count()
     }
 
     fn far_from(&self, origin: nalgebra::Vector3<f64>, max_range: f64) -> usize {

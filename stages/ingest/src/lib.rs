@@ -14,9 +14,13 @@ mod las_header;
 mod las_record;
 mod las_scans;
 mod laz;
+mod levels;
+mod looked;
 mod map;
+mod oddities;
 mod picture;
 mod poses;
+mod position;
 mod ptx;
 mod raster;
 mod raster_free;
@@ -26,6 +30,7 @@ mod scanners;
 mod settings;
 mod size;
 mod sources;
+mod steps;
 mod text;
 mod units;
 
@@ -33,6 +38,7 @@ pub use glance::{Glance, Sample};
 pub use inspect::{
     BoundsText, Description, Fact, LatticeText, PoseText, ScanDescription, describe,
 };
+pub use position::MISPLACED;
 pub use reader::{Extent, Want};
 pub use scanners::{Scanner, Scanners};
 pub use settings::Settings;

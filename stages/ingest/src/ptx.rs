@@ -2,12 +2,15 @@
 //! scanner's pose, the same as a 4 × 4 matrix, then a line a pixel, column by column.
 
 mod blocks;
+mod look;
 mod strips;
 #[cfg(test)]
 mod tests;
 
 use crate::Settings;
 use crate::frame::Frame;
+use crate::levels::Span;
+use crate::oddities::Oddities;
 use crate::reader::{MaskSeed, Reader, Reading, Sampled, ScanSeed, Want};
 use crate::units::{Choice, Units};
 use contract::{Format, Result};
@@ -30,6 +33,10 @@ struct Block {
     metres: f64,
     /// From the file's coordinates, in metres, to the scan frame.
     frame: Frame,
+    /// Which intensities become 0 and 65535.
+    intensity: Span,
+    /// The step of the coordinates, metres, where it is coarse.
+    step: Option<f64>,
 }
 
 /// An open PTX file.
@@ -40,6 +47,8 @@ struct PtxFile {
     scans: Vec<ScanSeed>,
     blocks: Vec<Block>,
     units: Units,
+    /// One a scan.
+    oddities: Vec<Oddities>,
 }
 
 /// Opens a PTX file. All lines are counted: only so can the scans after the first be found.
@@ -51,6 +60,7 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
         scans: Vec::new(),
         blocks: Vec::new(),
         units: Units::of_nothing(Choice::read(&settings.units)?.of(path))?,
+        oddities: Vec::new(),
     };
     for (block, notes) in blocks::find(path, file.units.horizontal.metres)? {
         let name = format!("scan {}", file.blocks.len() + 1);
@@ -66,8 +76,10 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
             stated_points: Some(block.n_valid),
             likely_points: None,
             notes,
+            step: block.step,
         });
         file.blocks.push(block);
+        file.oddities.push(Oddities::default());
     }
     Ok(Box::new(file))
 }
@@ -89,12 +101,20 @@ impl Reader for PtxFile {
         strips::sample(self, scan, n)
     }
 
+    fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
+        strips::spread(self, scan, n, most)
+    }
+
     fn read(&self, want: Want) -> Result<Reading<'_>> {
         Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
     }
 
     fn units(&self) -> &Units {
         &self.units
+    }
+
+    fn oddities(&self, scan: usize) -> Option<&Oddities> {
+        self.oddities.get(scan)
     }
 
     fn has_color(&self) -> bool {

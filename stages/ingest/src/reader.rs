@@ -1,6 +1,7 @@
 //! What every format gives: its masks and scans, a sample of each scan, and its points as strips in file order.
 
 use crate::map::Mapped;
+use crate::oddities::Oddities;
 use crate::units::Units;
 use contract::{Attributes, Error, Format, Kind, Result};
 use geometry::{Aabb, Pose};
@@ -47,6 +48,8 @@ pub(crate) struct ScanSeed {
     pub(crate) likely_points: Option<u64>,
     /// What is missing and what is worse for it.
     pub(crate) notes: Vec<String>,
+    /// The step that its coordinates come in, metres, where it is coarse.
+    pub(crate) step: Option<f64>,
 }
 
 /// A valid point of a sample, with its native row and column where the file has them.
@@ -133,6 +136,8 @@ pub(crate) trait Reader: Send + Sync {
     fn scans(&self) -> &[ScanSeed];
     /// Up to `n` valid points of a scan, as runs of neighbours in file order spread over the scan.
     fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>>;
+    /// Up to `n` valid points of a scan, scan frame, metres, evenly spread over it; of a scan of more than `most` points over so many.
+    fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>>;
     /// All valid points in file order. Ends with an error, never with a silent end, where the file is broken.
     fn read(&self, want: Want) -> Result<Reading<'_>>;
     /// The points of an extent, from its bytes.
@@ -154,6 +159,10 @@ pub(crate) trait Reader: Send + Sync {
     fn has_color(&self) -> bool;
     /// Scale and offset of its coordinates, metres, where they are whole multiples of a step (LAS).
     fn quantum(&self) -> Option<([f64; 3], [f64; 3])> {
+        None
+    }
+    /// What was odd about the points of a scan when all was last read, where that is counted.
+    fn oddities(&self, _scan: usize) -> Option<&Oddities> {
         None
     }
     /// Whether all that was read so far was really there: a mapped file may have been cut short.

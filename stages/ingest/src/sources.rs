@@ -3,12 +3,12 @@
 
 use crate::format::detect;
 use crate::las::Las;
+use crate::looked::moved;
 use crate::poses::Poses;
-use crate::raster::{self, Raster, Steps};
-use crate::reader::{self, Extent, RawStrip, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::raster::Steps;
+use crate::reader::{self, Extent, RawStrip, Reader, Reading, ScanSeed, Want};
 use crate::scanners::Scanners;
 use crate::settings::Settings;
-use crate::size::{self, N_LOOKED};
 use crate::units::{Choice, Units};
 use contract::{
     Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
@@ -56,18 +56,13 @@ pub struct Before {
     pub scans: Vec<Scan>,
 }
 
-/// Said of a scan that a camera took.
-const CAMERA: &str = "taken by a depth camera: its points err by half a percent of their range, alike over a hand's width";
-/// Said of a scan whose scanner is known and whose raster is not.
-const NO_RASTER: &str = "too few points to tell the raster: no free-space evidence from this scan";
-
 /// One open file.
 pub(crate) struct File {
     pub(crate) reader: Box<dyn Reader>,
     pub(crate) first_scan: u32,
     first_mask: u32,
     /// For each scan whose pose the user replaced: its new scan frame from that of the file.
-    moved: Vec<Option<Pose>>,
+    pub(crate) moved: Vec<Option<Pose>>,
     /// For each scan: whether its scanner's position is known.
     pub(crate) known: Vec<bool>,
     /// For each scan: where the steps of its lattice come from.
@@ -229,6 +224,35 @@ impl Sources {
         file.reader.masks().iter().map(|mask| mask.n_stated).sum()
     }
 
+    /// What was odd about the points of the open inputs when all was last read of them, in words.
+    #[must_use]
+    pub fn oddities(&self) -> Vec<String> {
+        let of = |file: &File| -> Vec<String> {
+            let scans = file.reader.scans().iter().enumerate();
+            let said = scans.flat_map(|(i, scan)| {
+                file.reader.oddities(i).map(|odd| odd.said(&scan.name)).unwrap_or_default()
+            });
+            said.collect()
+        };
+        self.files.iter().flat_map(of).collect()
+    }
+
+    /// Refuses inputs whose coordinates are too coarse for any robot to be told.
+    ///
+    /// # Errors
+    /// The first such input, by path and scan.
+    pub fn check_steps(&self) -> Result<()> {
+        for (file, input) in self.files.iter().zip(self.opened()) {
+            for scan in file.reader.scans() {
+                let checked = scan.step.map_or(Ok(()), crate::steps::refuse);
+                checked.map_err(|e| {
+                    e.at(format!("scan \"{}\"", scan.name)).at(input.path.display())
+                })?;
+            }
+        }
+        Ok(())
+    }
+
     fn add(&mut self, path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<()> {
         let meta = std::fs::metadata(path)?;
         if meta.is_dir() {
@@ -264,7 +288,8 @@ impl Sources {
         Ok(())
     }
 
-    /// Looks at a sample of each scan for the raster that it was taken in.
+    /// Looks at a sample of each scan for the raster that it was taken in, and whether its scanner can have stood where it is
+    /// said to.
     fn find_lattices(&mut self, settings: &Settings, fan: &impl Fan) -> Result<()> {
         let n_scans = |file: &File| file.reader.scans().len();
         let all = (self.files.iter().enumerate())
@@ -282,10 +307,11 @@ impl Sources {
             for i in 0..n_scans(file) {
                 let at = scan_of(file, i);
                 let looked = found.next().transpose()?.unwrap_or_default();
-                self.scans[at].notes.extend(looked.note.map(str::to_owned));
+                self.scans[at].notes.extend(looked.note);
                 self.scans[at].lattice = looked.raster.as_ref().map(|r| r.lattice);
                 file.steps.push(looked.raster.map_or(Steps::None, |r| r.steps));
                 file.spreads.push(looked.spread);
+                file.known[i] &= !looked.is_misplaced;
             }
         }
         Ok(())
@@ -357,46 +383,6 @@ impl File {
             attributes: raw.attributes,
         }
     }
-
-    /// What a sample of a scan tells.
-    fn look(&self, i: usize, scan: &Scan, settings: &Settings) -> Result<Looked> {
-        if scan.stated_points == Some(0) {
-            return Ok(Looked::default());
-        }
-        let n = if self.known[i] { settings.sample_points } else { N_LOOKED };
-        let mut sample: Vec<Sampled> = self.reader.sample(i, n)?;
-        if let Some(new_from_file) = &self.moved[i] {
-            sample.iter_mut().for_each(|s| s.xyz = moved(new_from_file, s.xyz));
-        }
-        let spread = size::spread(sample.iter().map(|s| s.xyz), &scan.world_from_scan);
-        if !self.known[i] {
-            return Ok(Looked { spread, ..Looked::default() });
-        }
-        let n_points = scan.stated_points.or(self.reader.scans()[i].likely_points);
-        let raster = raster::estimate(&sample, n_points, settings);
-        let note = match &raster {
-            None if !sample.is_empty() => Some(NO_RASTER),
-            Some(raster) if raster.lattice.is_camera => Some(CAMERA),
-            _ => None,
-        };
-        Ok(Looked { raster, note, spread })
-    }
-}
-
-/// What a look at a scan tells.
-#[derive(Default)]
-struct Looked {
-    /// The raster, where the scanner is known and its points tell it.
-    raster: Option<Raster>,
-    /// What is odd about the raster, or worse for the lack of one.
-    note: Option<&'static str>,
-    /// Where most of its points lie in the world, metres.
-    spread: Option<Aabb>,
-}
-
-fn moved(pose: &Pose, p: [f32; 3]) -> [f32; 3] {
-    let q = pose * nalgebra::Point3::from(p.map(f64::from));
-    [q.x as f32, q.y as f32, q.z as f32]
 }
 
 fn open_file(path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<Box<dyn Reader>> {

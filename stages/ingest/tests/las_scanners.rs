@@ -109,6 +109,48 @@ fn source_ids_go_to_their_scanners_and_the_rest_to_none() {
 }
 
 #[test]
+fn points_at_the_scanner_are_dropped_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut points = mixed();
+    // The scanner stands at 1004, 5, 6: every third point of its id is a beam without return.
+    let mut n_none = 0;
+    for (i, point) in points.iter_mut().enumerate().filter(|(_, p)| p.1 == 2) {
+        if i % 9 == 2 {
+            (point.0, n_none) =
+                ([4000, 5000, 6000 + (i % 2) as i32], n_none + usize::from(!point.2));
+        }
+    }
+    let path = write(folder.path(), "origin.las", &las(&points, 0));
+    let scanners = scanners("[[scanner]]\npoint_source_id = 2\nposition = [1004, 5, 6]\n");
+    let sources = open(&[path], Some(&scanners), &Settings::default(), &OneByOne).unwrap();
+    let notes = &sources.scans[0].notes;
+    assert!(
+        notes.iter().any(|n| n.contains("points looked at lie at the scanner itself")),
+        "{notes:?}"
+    );
+    let kept = |id: u16| points.iter().filter(|p| p.1 == id && !p.2).count();
+    let all = counts(&sources);
+    assert_eq!(all, [kept(2) - n_none, kept(0) + kept(1)]);
+    let said = sources.oddities();
+    assert_eq!(said.len(), 1);
+    assert!(said[0].starts_with(&format!("scan 'origin 2': {n_none} points lie at")), "{said:?}");
+}
+
+#[test]
+fn steps_too_coarse_for_any_robot_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let half = |p: &mut ([i32; 3], u16, bool)| p.0 = p.0.map(|v| v / 500 * 500);
+    let mut points = mixed();
+    points.iter_mut().for_each(half);
+    let path = write(folder.path(), "coarse.las", &las(&points, 0));
+    let sources = open(&[path], None, &Settings::default(), &OneByOne).unwrap();
+    let notes = &sources.scans[0].notes;
+    assert!(notes.iter().any(|n| n.contains("steps of 0.50 m")), "{notes:?}");
+    let refusal = sources.check_steps().expect_err("it is refused").to_string();
+    assert!(refusal.contains("coarse.las") && refusal.contains("steps of 0.50 m"), "{refusal}");
+}
+
+#[test]
 fn entries_find_their_file_or_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = las(&mixed(), 0);

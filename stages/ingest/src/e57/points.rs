@@ -33,7 +33,8 @@ pub(super) struct Points {
     states: Vec<i64>,
     rows_cols: [Vec<i64>; 2],
     levels: [Vec<u16>; 4],
-    scratch: Vec<f64>,
+    /// Intensities of the block as the file has them, then, in turn, colours.
+    raw: [Vec<f64>; 2],
 }
 
 impl Points {
@@ -72,7 +73,7 @@ impl Points {
             states: Vec::new(),
             rows_cols: Default::default(),
             levels: Default::default(),
-            scratch: Vec::new(),
+            raw: Default::default(),
         })
     }
 
@@ -103,14 +104,14 @@ impl Points {
         }
         let color = self.color.map_or([None; 3], |c| c.map(Some));
         let channels = [self.intensity, color[0], color[1], color[2]];
-        for (channel, levels) in channels.into_iter().zip(&mut self.levels) {
+        for (at, channel) in channels.into_iter().enumerate() {
             let Some(channel) = channel else { continue };
-            self.packets.numbers(channel.field, n, &mut self.scratch);
+            let (raw, levels) = (&mut self.raw[at.min(1)], &mut self.levels[at]);
+            self.packets.numbers(channel.field, n, raw);
+            let (min, scale) = (channel.span.min, channel.span.scale());
             levels.clear();
             // `as` cuts at both ends, and no number becomes 0.
-            levels.extend(
-                self.scratch.iter().map(|v| ((v - channel.min) * channel.scale).round() as u16),
-            );
+            levels.extend(raw.iter().map(|v| ((v - min) * scale).round() as u16));
         }
         self.packets.advance(n, &self.read);
         Ok(n)
@@ -165,6 +166,17 @@ impl Points {
     /// Intensities of the block; empty where the file has none.
     pub(super) fn intensity(&self) -> &[u16] {
         &self.levels[0]
+    }
+
+    /// Intensity of point `i` of the block as the file has it.
+    pub(super) fn raw_intensity(&self, i: usize) -> Option<f64> {
+        self.raw[0].get(i).copied()
+    }
+
+    /// Whether the intensity of point `i` of the block lies outside its limits.
+    pub(super) fn is_cut(&self, i: usize) -> bool {
+        let own = self.intensity.zip(self.raw_intensity(i));
+        own.is_some_and(|(channel, value)| channel.span.cuts(value))
     }
 
     /// Colours of point `i` of the block, where the file has them.

@@ -1,9 +1,10 @@
 //! The description of one scan in an E57 file in; which fields hold what, and the scan's seed, out.
 
-use super::pages::Pages;
-use super::points::{Points, Wanted};
+use super::look::Look;
 use crate::Settings;
 use crate::frame::{self, Frame};
+use crate::levels::Span;
+use crate::oddities::no_returns_note;
 use crate::reader::{MaskSeed, ScanSeed};
 use contract::{Error, Kind, Result};
 use e57::{PointCloud, Record, RecordDataType, RecordName, RecordValue};
@@ -11,10 +12,11 @@ use geometry::{Aabb, Point, Pose};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
-/// Points that the scanner's reach is judged by.
-const N_JUDGED: usize = 64;
-/// Records among which those points are looked for.
-const N_JUDGED_RECORDS: u64 = 65_536;
+/// Share of the points looked at that lie at the origin of a file whose scanner is not known, from which on they are beams
+/// without return: a single one may have been measured.
+const NO_RETURNS: f64 = 0.005;
+/// Scans of fewer points are a writer's examples, and the origin may be one of their points.
+const FEW: usize = 64;
 
 /// Which fields hold the coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,10 +32,8 @@ pub(super) enum Coordinates {
 pub(super) struct Channel {
     /// Index of the field.
     pub(super) field: usize,
-    /// Value that becomes 0.
-    pub(super) min: f64,
-    /// 65535 over the span of values.
-    pub(super) scale: f64,
+    /// Which values become 0 and 65535.
+    pub(super) span: Span,
 }
 
 /// One scan of the file.
@@ -78,10 +78,15 @@ impl E57Scan {
                 "scan has neither Cartesian nor spherical coordinates",
             ));
         }
-        scan.channels(cloud, &mut notes);
+        let is_stated = scan.channels(cloud);
         let bounds = bounds(cloud, metres);
-        let first = scan.first_points(path, settings)?;
-        scan.frame = scan.judge(cloud, pose, bounds.as_ref(), &first, &mut notes);
+        let look = Look::at(&scan, path, settings)?;
+        scan.suit_intensity(&look, is_stated, &mut notes);
+        scan.frame = scan.judge(cloud, pose, bounds.as_ref(), &look, &mut notes);
+        let (step, n_valid) = (look.step(), scan.n_valid());
+        let share = 1.0 - look.n_at_origin as f64 / look.n_looked.max(1) as f64;
+        let likely = n_valid.filter(|_| share < 1.0).map(|n| (n as f64 * share) as u64);
+        notes.extend(step.map(crate::steps::note));
         if scan.n_records == 0 {
             notes.push("scan has no points".into());
         } else if scan.native.is_none() && scan.frame.scanner_known {
@@ -100,9 +105,10 @@ impl E57Scan {
             world_from_scan: scan.frame.world_from_scan,
             scanner_known: scan.frame.scanner_known,
             stated_bounds,
-            stated_points: scan.n_valid(),
-            likely_points: None,
+            stated_points: n_valid,
+            likely_points: likely,
             notes,
+            step,
         };
         Ok((scan, seed))
     }
@@ -168,8 +174,8 @@ impl E57Scan {
         })
     }
 
-    /// Finds intensity and colour and what their values span.
-    fn channels(&mut self, cloud: &PointCloud, notes: &mut Vec<String>) {
+    /// Finds intensity and colour and what their values span; whether the file states that of the intensity.
+    fn channels(&mut self, cloud: &PointCloud) -> bool {
         let channel = |name: RecordName, limits: Option<[&Option<RecordValue>; 2]>| {
             let field = cloud.prototype.iter().position(|r| r.name == name)?;
             let data_type = &cloud.prototype[field].data_type;
@@ -181,15 +187,10 @@ impl E57Scan {
                 .filter(is_span)
                 .or_else(|| type_span(data_type).filter(is_span));
             let [min, max] = span.unwrap_or([0.0, 1.0]);
-            Some((Channel { field, min, scale: 65_535.0 / (max - min) }, span.is_some()))
+            Some((Channel { field, span: Span { min, max } }, span.is_some()))
         };
         let limits = cloud.intensity_limits.as_ref().map(|l| [&l.intensity_min, &l.intensity_max]);
         let intensity = channel(RecordName::Intensity, limits);
-        if intensity.is_some_and(|(_, spanned)| !spanned) {
-            notes.push(
-                "intensity has no stated limits: taken as 0 to 1, values outside are cut".into(),
-            );
-        }
         self.intensity = intensity.map(|(channel, _)| channel);
         let limits = cloud.color_limits.as_ref();
         let red = channel(RecordName::ColorRed, limits.map(|l| [&l.red_min, &l.red_max]));
@@ -199,27 +200,21 @@ impl E57Scan {
             (Some((red, _)), Some((green, _)), Some((blue, _))) => Some([red, green, blue]),
             _ => None,
         };
+        intensity.is_some_and(|(_, is_stated)| is_stated)
     }
 
-    /// The first valid points, file's frame.
-    fn first_points(&self, path: &Path, settings: &Settings) -> Result<Vec<[f64; 3]>> {
-        let mut out = Vec::new();
-        if self.n_records == 0 {
-            return Ok(out);
+    /// Takes the span that the intensities have where most of them do not keep to their limits.
+    fn suit_intensity(&mut self, look: &Look, is_stated: bool, notes: &mut Vec<String>) {
+        let Some(channel) = &mut self.intensity else { return };
+        let (span, note) = channel.span.suited(&look.intensities, is_stated);
+        channel.span = span;
+        match note {
+            Some(note) => notes.push(note),
+            None if !is_stated => notes.push(
+                "intensity has no stated limits: taken as 0 to 1, values outside are cut".into(),
+            ),
+            None => {}
         }
-        let mut points = Points::open(self, Pages::open(path)?, Wanted::Coordinates)?;
-        let mut n_seen = 0;
-        while out.len() < N_JUDGED && n_seen < N_JUDGED_RECORDS {
-            let n = points.next_block(settings.strip_points.min(4096))?;
-            if n == 0 {
-                break;
-            }
-            n_seen += n as u64;
-            let valid = (0..n).filter(|i| points.is_valid(*i)).map(|i| points.xyz(i));
-            let finite = valid.filter(|p| p.iter().all(|v| v.is_finite()));
-            out.extend(finite.take(N_JUDGED - out.len()));
-        }
-        Ok(out)
     }
 
     /// The scan frame: the file's own where its origin can be the scanner, else one about the points.
@@ -228,9 +223,10 @@ impl E57Scan {
         cloud: &PointCloud,
         pose: Pose,
         bounds: Option<&Aabb>,
-        first: &[[f64; 3]],
+        look: &Look,
         notes: &mut Vec<String>,
     ) -> Frame {
+        let first = look.first();
         let spherical = matches!(self.coordinates, Some(Coordinates::Spherical(_)));
         let claimed =
             spherical || self.native.is_some() || cloud.transform.is_some() || self.n_records == 0;
@@ -243,7 +239,14 @@ impl E57Scan {
                         .into(),
                 );
             }
-            return Frame::of_scanner(pose);
+            let frame = Frame::of_scanner(pose);
+            if look.n_looked < FEW {
+                return frame.with_origin();
+            }
+            if look.n_at_origin > 0 {
+                notes.push(no_returns_note(look.n_at_origin, look.n_looked));
+            }
+            return frame;
         }
         notes.push(
             if claimed {
@@ -255,7 +258,12 @@ impl E57Scan {
             }
             .into(),
         );
-        Frame::about(pose, frame::near(bounds, first))
+        let frame = Frame::about(pose, frame::near(bounds, first));
+        if (look.n_at_origin as f64) < NO_RETURNS * look.n_looked as f64 || look.n_at_origin < 2 {
+            return frame;
+        }
+        notes.push(no_returns_note(look.n_at_origin, look.n_looked));
+        frame.without_origin()
     }
 }
 

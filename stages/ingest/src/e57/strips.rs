@@ -5,6 +5,7 @@ use super::pages::Pages;
 use super::points::{Points, Wanted};
 use super::scan::E57Scan;
 use crate::Settings;
+use crate::oddities::Oddities;
 use crate::reader::{RawStrip, Sampled, Want};
 use contract::{Attributes, Result};
 use geometry::Point;
@@ -38,6 +39,9 @@ pub(super) struct Strips<'a> {
 impl<'a> Strips<'a> {
     /// At the first point of the file.
     pub(super) fn new(file: &'a E57File, want: Want) -> Self {
+        if want == Want::Everything {
+            file.oddities.iter().for_each(Oddities::clear);
+        }
         let until = file.files.len();
         Self { file, want, scan: 0, until, points: None, place: 0, named: 0, done: false }
     }
@@ -86,6 +90,8 @@ impl<'a> Strips<'a> {
                 attributes: (self.want == Want::Everything).then(Attributes::default),
             },
             place: self.place,
+            n_no_returns: 0,
+            n_cut: 0,
         };
         while strip.strip.xyz.len() < settings.strip_points && strip.span() < MAX_SPAN {
             let most = BLOCK.min(settings.strip_points - strip.strip.xyz.len());
@@ -95,8 +101,13 @@ impl<'a> Strips<'a> {
             }
             strip.add(points, n);
         }
-        let Filling { strip, place, .. } = strip;
+        let Filling { strip, place, n_no_returns, n_cut, .. } = strip;
         self.place = place;
+        if self.want == Want::Everything {
+            let oddities = &self.file.oddities[self.scan];
+            oddities.add_no_returns(n_no_returns);
+            oddities.add_cut(n_cut);
+        }
         if let Some(last) = strip.place.last() {
             self.named = strip.first_place + u64::from(*last) + 1;
             return Ok(Some(strip));
@@ -129,6 +140,9 @@ struct Filling<'a> {
     strip: RawStrip,
     /// Place in the mask of the next valid point.
     place: u64,
+    /// Points at the scanner itself, and intensities outside their limits.
+    n_no_returns: u64,
+    n_cut: u64,
 }
 
 impl Filling<'_> {
@@ -141,7 +155,10 @@ impl Filling<'_> {
         {
             let [x, y, z] = points.axes();
             let near = |axis: &[f64], shift: f64| axis.iter().all(|v| (v - shift).abs() <= far);
-            if near(x, shift[0]) && near(y, shift[1]) && near(z, shift[2]) {
+            let is_near = near(x, shift[0]) && near(y, shift[1]) && near(z, shift[2]);
+            let mut all = x.iter().zip(y).zip(z).map(|((x, y), z)| [*x, *y, *z]);
+            let frame = &self.scan.frame;
+            if is_near && !all.any(|p| frame.is_no_return(frame.scan_from_file(p))) {
                 return self.add_plain(points, shift);
             }
         }
@@ -152,7 +169,9 @@ impl Filling<'_> {
                 continue;
             }
             let p = self.scan.frame.scan_from_file(points.xyz(i));
-            if p.iter().all(|v| v.abs() <= far) {
+            if self.scan.frame.is_no_return(p) {
+                self.n_no_returns += 1;
+            } else if p.iter().all(|v| v.abs() <= far) {
                 self.push_place();
                 self.strip.xyz.push(p.map(|v| v as f32));
                 self.push_attributes(points, i, p);
@@ -194,6 +213,7 @@ impl Filling<'_> {
         let Some(attributes) = &mut self.strip.attributes else { return };
         attributes.world.push((self.scan.frame.world_from_scan * Point::from(p)).coords.into());
         attributes.intensity.extend(points.intensity().get(i));
+        self.n_cut += u64::from(points.is_cut(i));
         attributes.color.extend(points.color(i));
     }
 }
@@ -219,9 +239,36 @@ pub(super) fn sample(file: &E57File, scan: &E57Scan, n: usize) -> Result<Vec<Sam
             let p = scan.frame.scan_from_file(points.xyz(i));
             if out.len() < most
                 && points.is_valid(i)
+                && !scan.frame.is_no_return(p)
                 && p.iter().all(|v| v.abs() <= file.settings.max_range)
             {
                 out.push(Sampled { xyz: p.map(|v| v as f32), native: points.native(i) });
+            }
+        }
+        seen += n_block as u64;
+    }
+    Ok(out)
+}
+
+/// Up to `n` valid points of a scan, evenly spread over its first `most` records.
+pub(super) fn spread(file: &E57File, scan: &E57Scan, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
+    let mut out = Vec::new();
+    if scan.n_records == 0 || n == 0 {
+        return Ok(out);
+    }
+    let mut points = Points::open(scan, Pages::open(&file.path)?, Wanted::Coordinates)?;
+    let every = scan.n_records.min(most).div_ceil(n as u64);
+    let mut seen = 0;
+    while seen < most {
+        let n_block = points.next_block(BLOCK)?;
+        if n_block == 0 {
+            break;
+        }
+        for i in (0..n_block).filter(|i| (seen + *i as u64).is_multiple_of(every)) {
+            let p = scan.frame.scan_from_file(points.xyz(i));
+            let is_near = p.iter().all(|v| v.abs() <= file.settings.max_range);
+            if points.is_valid(i) && !scan.frame.is_no_return(p) && is_near {
+                out.push(p.map(|v| v as f32));
             }
         }
         seen += n_block as u64;

@@ -1,15 +1,15 @@
 //! A PTX file in; its blocks out: where each begins, its pose, how many lines hold a point. No point is kept.
 
 use super::Block;
+use super::look::Look;
 use crate::frame::{self, Frame};
+use crate::oddities::no_returns_note;
 use crate::text::{Lines, numbers};
 use contract::{Error, Result};
 use geometry::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
-/// Points that the scanner's reach is judged by.
-const N_JUDGED: usize = 64;
 /// Fewest bytes of a line of points: three digits, two spaces, an end (the last may lack it).
 const MIN_LINE: u64 = 6;
 /// How far a matrix may be from a rotation: files carry 4 to 6 digits.
@@ -55,7 +55,7 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
     let pose = pose(lines, metres, &mut notes)?;
     let points_at = (lines.end(), lines.number());
     let (mut n_valid, mut n_columns) = (0, 0);
-    let mut first = Vec::new();
+    let mut look = Look::new(n_lines, metres);
     for n in 0..n_lines {
         if !lines.advance()? {
             return Err(lines
@@ -68,29 +68,36 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
         if is_no_return(lines.line()) {
             continue;
         }
+        look.add(n_valid, lines.line(), n_columns);
         n_valid += 1;
-        if first.len() < N_JUDGED {
-            let mut p = [f64::NAN; 3];
-            // What is no number is refused when points are read; here it is only left out.
-            if numbers(lines.line(), &mut p).is_ok() && p.iter().all(|v| v.is_finite()) {
-                first.push(p.map(|v| v * metres));
-            }
-        }
     }
-    let frame = if frame::within_reach(&first) {
-        Frame::of_scanner(pose)
-    } else {
-        notes.push(
-            "points lie farther from the scan's origin than any scanner reaches: the scanner is not known, so there \
-             is no free-space evidence"
-                .into(),
-        );
-        Frame::about(pose, frame::near(None, &first))
-    };
+    let frame = judge(pose, &look, &mut notes);
     if n_valid == 0 {
         notes.push("scan has no points".into());
     }
-    Ok((Block { n_rows, n_lines, n_columns, n_valid, points_at, metres, frame }, notes))
+    let (intensity, note) = look.intensity();
+    let step = look.step();
+    notes.extend(note.into_iter().chain(step.map(crate::steps::note)));
+    Ok((
+        Block { n_rows, n_lines, n_columns, n_valid, points_at, metres, frame, intensity, step },
+        notes,
+    ))
+}
+
+/// The scan frame: the file's own where its origin can be the scanner, else one about the points.
+fn judge(pose: Pose, look: &Look, notes: &mut Vec<String>) -> Frame {
+    if frame::within_reach(look.first()) {
+        if look.n_at_origin > 0 {
+            notes.push(no_returns_note(look.n_at_origin, look.n_looked));
+        }
+        return Frame::of_scanner(pose);
+    }
+    notes.push(
+        "points lie farther from the scan's origin than any scanner reaches: the scanner is not known, so there \
+         is no free-space evidence"
+            .into(),
+    );
+    Frame::about(pose, frame::near(None, look.first()))
 }
 
 /// Goes to the next line of a header.

@@ -1,6 +1,7 @@
 //! Lines of all blocks of a PTX file in, strips in its order out.
 
 use super::{Block, PtxFile, blocks};
+use crate::oddities::Oddities;
 use crate::reader::{RawStrip, Sampled, Want};
 use crate::text::{Lines, numbers};
 use contract::{Attributes, Result};
@@ -57,11 +58,22 @@ impl<'a> Points<'a> {
         Ok(false)
     }
 
-    /// The current point in the scan frame, metres; `None` where it is broken.
+    /// The current point in the scan frame, metres; `None` where it is broken, or lies at the scanner itself.
     fn xyz(&self, max_range: f64) -> Option<[f64; 3]> {
+        let p = self.in_scan();
+        let is_good = p.iter().all(|v| v.abs() <= max_range) && !self.block.frame.is_no_return(p);
+        is_good.then_some(p)
+    }
+
+    /// The current point in the scan frame, whatever it is.
+    fn in_scan(&self) -> [f64; 3] {
         let metres = |i: usize| self.values[i] * self.block.metres;
-        let p = self.block.frame.scan_from_file([metres(0), metres(1), metres(2)]);
-        p.iter().all(|v| v.abs() <= max_range).then_some(p)
+        self.block.frame.scan_from_file([metres(0), metres(1), metres(2)])
+    }
+
+    /// Whether the intensity of the current point lies outside its limits.
+    fn is_cut(&self) -> bool {
+        matches!(self.block.n_columns, 4 | 7) && self.block.intensity.cuts(self.values[3])
     }
 
     /// Column-major: row and column of the current point.
@@ -87,6 +99,9 @@ pub(super) struct Strips<'a> {
 impl<'a> Strips<'a> {
     /// At the first point of the file.
     pub(super) fn new(file: &'a PtxFile, want: Want) -> Self {
+        if want == Want::Everything {
+            file.oddities.iter().for_each(Oddities::clear);
+        }
         Self { file, want, scan: 0, points: None, place: 0, done: false }
     }
 
@@ -116,6 +131,7 @@ impl<'a> Strips<'a> {
             xyz: Vec::new(),
             attributes: (self.want == Want::Everything).then(Attributes::default),
         };
+        let (mut n_no_returns, mut n_cut) = (0, 0);
         let n_wanted = if self.want == Want::Everything { 7 } else { 3 };
         while strip.xyz.len() < settings.strip_points
             && (strip.xyz.is_empty() || self.place - strip.first_place < MAX_SPAN)
@@ -129,9 +145,16 @@ impl<'a> Strips<'a> {
                 strip.xyz.push(p.map(|v| v as f32));
                 if let Some(attributes) = &mut strip.attributes {
                     push(attributes, points, p);
+                    n_cut += u64::from(points.is_cut());
                 }
+            } else {
+                n_no_returns += u64::from(block.frame.is_no_return(points.in_scan()));
             }
             self.place += 1;
+        }
+        if self.want == Want::Everything {
+            self.file.oddities[self.scan].add_no_returns(n_no_returns);
+            self.file.oddities[self.scan].add_cut(n_cut);
         }
         Ok((!strip.xyz.is_empty()).then_some(strip))
     }
@@ -153,9 +176,10 @@ impl Iterator for Strips<'_> {
 /// Adds what the current line says of its point beside the coordinates.
 fn push(attributes: &mut Attributes, points: &Points<'_>, p: [f64; 3]) {
     attributes.world.push((points.block.frame.world_from_scan * Point::from(p)).coords.into());
-    // `as` cuts at both ends, and no number becomes 0. Intensity is 0..1, colour 0..255.
+    // `as` cuts at both ends, and no number becomes 0. Colour is 0..255.
     if let 4 | 7 = points.block.n_columns {
-        attributes.intensity.push((points.values[3] * 65_535.0).round() as u16);
+        let span = points.block.intensity;
+        attributes.intensity.push(((points.values[3] - span.min) * span.scale()).round() as u16);
     }
     if let n @ (6 | 7) = points.block.n_columns {
         attributes
@@ -178,6 +202,24 @@ pub(super) fn sample(file: &PtxFile, scan: usize, n: usize) -> Result<Vec<Sample
         {
             out.push(Sampled { xyz: p.map(|v| v as f32), native: points.native() });
         }
+    }
+    Ok(out)
+}
+
+/// Up to `n` valid points of a scan, evenly spread over its first `most` lines.
+pub(super) fn spread(file: &PtxFile, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
+    let mut out = Vec::new();
+    let block = &file.blocks[scan];
+    let every = block.n_valid.min(most).div_ceil(n.max(1) as u64).max(1);
+    let mut points = Points::open(file, block)?;
+    let mut at = 0_u64;
+    while points.n_read < most && points.advance(3)? {
+        if at.is_multiple_of(every)
+            && let Some(p) = points.xyz(file.settings.max_range)
+        {
+            out.push(p.map(|v| v as f32));
+        }
+        at += 1;
     }
     Ok(out)
 }

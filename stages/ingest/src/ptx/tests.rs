@@ -116,6 +116,34 @@ fn own_file_comes_back() {
 }
 
 #[test]
+fn points_at_the_scanner_and_intensities_of_another_scale_are_said() {
+    // Zeros that the format does not know as such, and intensities as older exports have them.
+    let line = |k: i32| match k % 4 {
+        0 => "1e-7 0 -1e-7 0\n".to_owned(),
+        _ => format!(
+            "{:.3} {:.3} 1.5 {}\n",
+            3.0 + f64::from(k).sin(),
+            f64::from(k) * 0.01,
+            k * 7 % 256
+        ),
+    };
+    let text = block(20, 50, &(0..1000).map(line).collect::<String>());
+    let file = Scratch::new("odd.ptx", text.as_bytes());
+    let reader = open(&file.0, &settings()).expect("valid");
+    let notes = &reader.scans()[0].notes;
+    assert!(
+        notes.iter().any(|n| n.starts_with("250 of 1000 points looked at lie at")),
+        "{notes:?}"
+    );
+    assert!(notes.iter().any(|n| n.contains("0 to 255 are taken instead")), "{notes:?}");
+    let scans = read(&file.0, Want::Everything).expect("valid");
+    assert_eq!((scans[0].xyz.len(), scans[0].n_places), (750, 1000));
+    let levels = &scans[0].attributes.intensity;
+    assert_eq!(levels[0], 7 * 257);
+    assert_eq!(levels.iter().collect::<std::collections::BTreeSet<_>>().len(), 192);
+}
+
+#[test]
 fn broken_files_are_refused_with_their_line() {
     let points = "1 2 3 0.5\n4 5 6 0.5\n";
     let good = block(1, 2, points);

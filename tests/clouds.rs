@@ -1,0 +1,150 @@
+//! Clouds that lack something or say what is not so: a stated scanner position that cannot be right is not used, one that is right
+//! is; what is dropped is counted; coordinates too coarse are refused; a run that finds nothing says what was missing.
+#![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
+
+use contract::{Kind, OneByOne};
+use ingest::{Scanners, Sources};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use stillpoint::demo::write_robots;
+use stillpoint::engine::Engine;
+use stillpoint::job::{Given, Job, Means, Outcome};
+use stillpoint::plan;
+use stillpoint::scanning::{Formats, scan_scene};
+
+/// Beams of each scanner: 0.8° apart, which is sparser than any crew scans.
+const N_BEAMS: u64 = 60_000;
+
+fn shared(name: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared").join(name);
+    if !path.exists() {
+        eprintln!("skipped: no shared {name}");
+        return None;
+    }
+    Some(path)
+}
+
+/// A palletiser and its surroundings, scanned into `dir/scans`; the library.
+fn scene(dir: &Path, seed: u64) -> PathBuf {
+    let robots = dir.join("robots");
+    write_robots(&robots).expect("the library is written");
+    let library = robot::Library::load(&robots, &robot::Settings::without_clouds()).expect("loads");
+    let model =
+        &library.models[library.model(simulate::demo_robots::PALLETISER).expect("is there")];
+    let middle = |j: usize| (model.limits(j)[0] + model.limits(j)[1]) / 2.0;
+    let posture: Vec<f64> = (0..model.n_free()).map(middle).collect();
+    let scene = simulate::paper_scene(seed, model, &posture, N_BEAMS);
+    scan_scene(&scene, &library.models, &dir.join("scans"), Formats::ALL, &Engine::new(2))
+        .expect("scans");
+    robots
+}
+
+/// Scans of a LAS file whose scanners are all said to stand `off` from where they stood, metres.
+fn opened(scans: &Path, off: [f64; 3]) -> Sources {
+    let text = std::fs::read_to_string(scans.join("scanners.toml")).expect("scanners");
+    let mut table: toml::Table = text.parse().expect("TOML");
+    let entries = table["scanner"].as_array_mut().expect("a list");
+    for entry in entries {
+        let position = entry["position"].as_array_mut().expect("a position");
+        for (value, off) in position.iter_mut().zip(off) {
+            *value = toml::Value::Float(value.as_float().expect("a number") + off);
+        }
+    }
+    let scanners = Scanners::parse(&table.to_string()).expect("scanners");
+    let settings = ingest::Settings::default();
+    ingest::open(&[scans.join("scans.las")], Some(&scanners), &settings, &OneByOne).expect("opens")
+}
+
+fn run(
+    input: PathBuf,
+    scanners: Option<PathBuf>,
+    robots: PathBuf,
+    out: PathBuf,
+) -> contract::Result<Outcome> {
+    let means = Means::of(&Given { threads: Some(2), ..Given::default() }).expect("defaults hold");
+    let job = Job { scanners, ..Job::new(vec![input], robots, out, means) };
+    plan::run(&job, &Engine::new(2))
+}
+
+fn warnings(out: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(out.join("result.json")).expect("a result");
+    let result: Value = serde_json::from_str(&text).expect("JSON");
+    let all = result["warnings"].as_array().expect("a list").iter();
+    all.map(|w| w.as_str().expect("words").to_owned()).collect()
+}
+
+#[test]
+fn right_positions_are_used_and_wrong_ones_are_not() {
+    let dir = tempfile::tempdir().expect("a folder");
+    scene(dir.path(), 31);
+    let scans = dir.path().join("scans");
+    let right = opened(&scans, [0.0; 3]);
+    assert!(right.scans.len() > 3 && right.scans.iter().all(contract::Scan::has_beams));
+    // E57 files state their positions themselves.
+    let file = [scans.join("scans.e57")];
+    let own = ingest::open(&file, None, &ingest::Settings::default(), &OneByOne).expect("opens");
+    assert!(own.scans.iter().all(contract::Scan::has_beams));
+    for off in [[1.5, 0.0, 0.0], [0.0, -1.0, 0.8], [0.3, 0.2, -2.5]] {
+        let wrong = opened(&scans, off);
+        let n_used = wrong.scans.iter().filter(|s| s.has_beams()).count();
+        assert!(n_used <= 1, "{off:?}: {n_used} of {} are used", wrong.scans.len());
+        for scan in wrong.scans.iter().filter(|s| !s.has_beams()) {
+            assert!(scan.notes.iter().any(|n| n.contains(ingest::MISPLACED)), "{:?}", scan.notes);
+        }
+    }
+}
+
+#[test]
+fn a_position_that_cannot_be_right_does_not_cost_the_floor() {
+    let Some(cloud) = shared("scans/robot-cell-covered/scenario1.laz") else { return };
+    let dir = tempfile::tempdir().expect("a folder");
+    let robots = dir.path().join("robots");
+    write_robots(&robots).expect("the library is written");
+    let scanners = dir.path().join("scanners.toml");
+    std::fs::write(&scanners, "[[scanner]]\nposition = [0.0, 0.0, 0.0]\n").expect("written");
+    let out = dir.path().join("out");
+    run(cloud, Some(scanners), robots, out.clone()).expect("the run ends well");
+    let said = warnings(&out);
+    assert!(said.iter().any(|w| w.contains(ingest::MISPLACED)), "{said:?}");
+    assert!(said.iter().any(|w| w.contains("no scan has a usable scanner position")), "{said:?}");
+    assert!(said.iter().any(|w| w.contains("the points are sparse")), "{said:?}");
+    let kinds = std::fs::read(out.join("labels/0.kind.npy")).expect("a mask");
+    let n_floor = kinds[kinds.len() - 42_764..].iter().filter(|kind| **kind == 3).count();
+    assert!(n_floor > 7_000, "{n_floor} points are floor");
+}
+
+#[test]
+fn returns_at_the_scanner_are_dropped_counted_and_uncertain() {
+    let Some(cloud) = shared("cases/e57-returns-at-origin/phantom.e57") else { return };
+    let dir = tempfile::tempdir().expect("a folder");
+    let robots = dir.path().join("robots");
+    write_robots(&robots).expect("the library is written");
+    let out = dir.path().join("out");
+    run(cloud, None, robots, out.clone()).expect("the run ends well");
+    let said = warnings(&out);
+    assert!(said.iter().any(|w| w.contains("7200 points lie at the scanner itself")), "{said:?}");
+    let kinds = std::fs::read(out.join("labels/0.kind.npy")).expect("a mask");
+    let n_none = kinds[kinds.len() - 9_600..].iter().filter(|kind| **kind == 255).count();
+    assert!(n_none >= 7_200, "{n_none} points are uncertain");
+}
+
+#[test]
+fn coordinates_in_steps_of_half_a_metre_are_refused_by_name() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let robots = dir.path().join("robots");
+    write_robots(&robots).expect("the library is written");
+    let mut text =
+        "40\n25\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n".to_owned();
+    for k in 0..1000_u32 {
+        let at = |about: f32, by: f32| about + 10.0 * (f64::from(k) * f64::from(by)).sin() as f32;
+        let _ =
+            writeln!(text, "{} {} {}", at(412_300.0, 0.7), at(5_653_120.0, 1.3), at(87.0, 0.37));
+    }
+    let cloud = dir.path().join("coarse.ptx");
+    std::fs::write(&cloud, text).expect("written");
+    let refusal = run(cloud, None, robots, dir.path().join("out")).expect_err("it is refused");
+    assert_eq!(refusal.kind(), Kind::BadInput);
+    let words = refusal.to_string();
+    assert!(words.contains("coarse.ptx") && words.contains("steps of 0.50 m"), "{words}");
+}
