@@ -1,6 +1,7 @@
 //! Opened inputs in; the units that they are read in, in words and for the result, out; and whether robots of a library can
 //! stand in them.
 
+use contract::words::count;
 use contract::{Input, Result};
 use export::UnitsEntry;
 use ingest::{Origin, Sources};
@@ -18,7 +19,7 @@ pub(crate) fn said(sources: &Sources) -> Vec<String> {
             None => out.push((text, 1)),
         }
     }
-    out.into_iter().map(|(text, n)| format!("{text}: {n} input(s)")).collect()
+    out.into_iter().map(|(text, n)| format!("{text}: {}", count(n as u64, "input"))).collect()
 }
 
 /// The units of an opened input, for the result.
