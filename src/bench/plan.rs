@@ -1,5 +1,6 @@
-//! `bench plan`: a seed in; halls drawn from it, each with a library of its own, scanned to files, asked what they will take and
-//! then done; what was predicted beside what was measured, out. The rows hold what `scripts/plan_rates.py` measures rates from.
+//! `bench plan`: a seed in; halls drawn from it, each with a library of its own, scanned to files,
+//! asked what they will take and then done; what was predicted beside what was measured, out. The
+//! rows hold what `scripts/plan_rates.py` measures rates from.
 
 use super::Journal;
 use super::throughput::{Scanned, ThroughputBench, arguments, scan};
@@ -73,7 +74,8 @@ struct Row {
     /// Bytes of the store and of what was written.
     store_bytes: u64,
     output_bytes: u64,
-    /// Processes that waited for a processor, about: the mean over the minute before the end, where the system tells.
+    /// Processes that waited for a processor, about: the mean over the minute before the end, where
+    /// the system tells.
     load: f64,
 }
 
@@ -189,14 +191,16 @@ fn size(folder: &Path) -> Result<u64> {
     Ok(sum)
 }
 
-/// Processes that ran or waited over the last minute, on average; not a number where the system does not tell.
+/// Processes that ran or waited over the last minute, on average; not a number where the system
+/// does not tell.
 fn load() -> f64 {
     let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     text.split(' ').next().and_then(|first| first.parse().ok()).unwrap_or(f64::NAN)
 }
 
 impl Row {
-    /// Processor time of the run, shared among its threads, seconds: its time on a machine that does nothing else.
+    /// Processor time of the run, shared among its threads, seconds: its time on a machine that
+    /// does nothing else.
     fn alone(&self) -> f64 {
         self.measured.cpu_seconds / self.n_threads as f64
     }

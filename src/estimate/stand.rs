@@ -1,5 +1,6 @@
-//! Open inputs in; what seems to stand in the plant, by a glance at some of its points, out: the regions that a run would search.
-//! Floor and voxels are found more simply than a run does; clusters and regions are made by the same stages.
+//! Open inputs in; what seems to stand in the plant, by a glance at some of its points, out: the
+//! regions that a run would search. Floor and voxels are found more simply than a run does;
+//! clusters and regions are made by the same stages.
 
 use crate::engine::{AllThreads, Engine};
 use crate::job::Settings;
@@ -17,15 +18,18 @@ const DECODED: [(Format, u64); 4] = [
     (Format::Laz, 3_000_000),
     (Format::Ptx, 6_000_000),
 ];
-/// Points that are kept of all inputs: a hall of 20 m x 20 m has some twenty in each voxel of its surfaces then.
+/// Points that are kept of all inputs: a hall of 20 m x 20 m has some twenty in each voxel of its
+/// surfaces then.
 const KEPT: u64 = 3_000_000;
 /// Edge of the columns that a floor's extent is counted in, metres.
 const COLUMN: f64 = 0.25;
 /// Thickness of a layer in which a floor is looked for, metres.
 const LAYER: f64 = 0.05;
-/// Share of the columns of the widest layer that a floor has at least: robots and machines hide much of it, and ceilings are as wide.
+/// Share of the columns of the widest layer that a floor has at least: robots and machines hide
+/// much of it, and ceilings are as wide.
 const FLOOR_SHARE: f64 = 0.35;
-/// Edge of a cell of the floor's heights, and how far these may lie off the layer, metres: floors lean.
+/// Edge of a cell of the floor's heights, and how far these may lie off the layer, metres: floors
+/// lean.
 const CELL: f64 = 1.0;
 const OFF: f64 = 0.15;
 /// Step of heights within a cell, metres.
@@ -51,8 +55,8 @@ pub struct Searched {
     pub n_voxels: usize,
 }
 
-/// Looks at some points of all inputs.
-/// An input that is broken where it is looked at gives no points: the run says what is wrong with it.
+/// Looks at some points of all inputs. An input that is broken where it is looked at gives no
+/// points: the run says what is wrong with it.
 pub(super) fn look(sources: &Sources, settings: &Settings, engine: &Engine) -> Result<Stand> {
     let inputs = sources.opened();
     let all: u64 = inputs.iter().filter_map(|input| sources.n_stated(input.id)).sum();

@@ -1,5 +1,6 @@
-//! A review, the robots that would be reported without it and those that are reported with it in; what each of its entries
-//! did, in a sentence, out: a person's word is never passed over in silence.
+//! A review, the robots that would be reported without it and those that are reported with it in;
+//! what each of its entries did, in a sentence, out: a person's word is never passed over in
+//! silence.
 
 use super::{Decision, Place, Review};
 use crate::report::id;
@@ -110,7 +111,8 @@ impl Review {
         })
     }
 
-    /// Number of an entry of the other mind about a place: one that holds the same robot, or whose middle it holds.
+    /// Number of an entry of the other mind about a place: one that holds the same robot, or whose
+    /// middle it holds.
     fn other(&self, place: &Place, verdict: Decision, heard: &Heard<'_>) -> Option<usize> {
         let both = |p: &Place| {
             heard.without.iter().any(|f| p.has(f) && place.has(f))

@@ -1,12 +1,14 @@
-//! The standard deviation of a joint in; how well the points tell where it stands, in one of three words, out. The thresholds
-//! and the words stand here only: terminal, reports, pages and JUnit files use them.
+//! The standard deviation of a joint in; how well the points tell where it stands, in one of three
+//! words, out. The thresholds and the words stand here only: terminal, reports, pages and JUnit
+//! files use them.
 
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation below which a joint is determined, radians or metres: 0.043°, so that 0.1° is more than two of them.
+/// Standard deviation below which a joint is determined, radians or metres: 0.043°, so that 0.1° is
+/// more than two of them.
 pub const DETERMINED_SIGMA: f64 = 0.000_75;
-/// Standard deviation from which on a joint is undetermined, radians (1°) or metres (17.5 mm): at the end of a reach of
-/// two metres 1° is 35 mm, which no planner's margin covers.
+/// Standard deviation from which on a joint is undetermined, radians (1°) or metres (17.5 mm): at
+/// the end of a reach of two metres 1° is 35 mm, which no planner's margin covers.
 pub const UNDETERMINED_SIGMA: f64 = 0.0175;
 
 /// How well the points tell where a joint stands.
@@ -15,19 +17,21 @@ pub const UNDETERMINED_SIGMA: f64 = 0.0175;
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Certainty {
-    /// It may stand elsewhere: its standard deviation is large, or other values explain the points as well.
+    /// It may stand elsewhere: its standard deviation is large, or other values explain the points
+    /// as well.
     #[default]
     Undetermined,
-    /// It stands about there: its standard deviation is larger than that of most joints, but small, and there is no other
-    /// value.
+    /// It stands about there: its standard deviation is larger than that of most joints, but small,
+    /// and there is no other value.
     Coarse,
     /// It stands there.
     Determined,
 }
 
 impl Certainty {
-    /// That of a standard deviation, radians or metres, where a joint is determined below `determined_sigma` (by default
-    /// [`DETERMINED_SIGMA`]); a joint that may have other values is undetermined whatever the width of one of them.
+    /// That of a standard deviation, radians or metres, where a joint is determined below
+    /// `determined_sigma` (by default [`DETERMINED_SIGMA`]); a joint that may have other values is
+    /// undetermined whatever the width of one of them.
     #[must_use]
     pub fn of(sigma: f64, has_other_values: bool, determined_sigma: f64) -> Self {
         // A standard deviation that is no number is that of nothing.
@@ -50,7 +54,8 @@ impl Certainty {
         }
     }
 
-    /// What stands behind a value and its standard deviation: nothing where it is determined, else a space and the word.
+    /// What stands behind a value and its standard deviation: nothing where it is determined, else
+    /// a space and the word.
     #[must_use]
     pub fn note(self) -> &'static str {
         match self {

@@ -1,5 +1,6 @@
-//! Numbers and what the system says in; how people read them out: counts with their nouns, values without a sign before
-//! nothing, joints' values in degrees or millimetres, errors of the system without their numbers.
+//! Numbers and what the system says in; how people read them out: counts with their nouns, values
+//! without a sign before nothing, joints' values in degrees or millimetres, errors of the system
+//! without their numbers.
 
 /// A number with its noun, which stands in the singular: `1 robot`, `2 robots`, `0 entries`.
 #[must_use]
@@ -65,8 +66,8 @@ impl Unit {
         fixed(value * self.factor, decimals) + self.symbol
     }
 
-    /// A value and its standard deviation (radians or metres), three decimals each; of a deviation of a whole degree or
-    /// millimetre one is enough.
+    /// A value and its standard deviation (radians or metres), three decimals each; of a deviation
+    /// of a whole degree or millimetre one is enough.
     #[must_use]
     pub fn say_both(self, value: f64, sigma: f64) -> String {
         format!("{} ± {}", self.say(value, 3), self.deviation(sigma))
@@ -79,7 +80,8 @@ impl Unit {
     }
 }
 
-/// What the system says, without the numbers that it has for it: ` (os error 2)` tells people nothing.
+/// What the system says, without the numbers that it has for it: ` (os error 2)` tells people
+/// nothing.
 #[must_use]
 pub fn without_numbers(text: &str) -> String {
     const MARK: &str = " (os error ";

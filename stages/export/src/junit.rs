@@ -1,5 +1,5 @@
-//! A result in, a JUnit file out: each robot is a test case and each of its joints one, so that a build server shows what
-//! nobody knows beside what is wrong.
+//! A result in, a JUnit file out: each robot is a test case and each of its joints one, so that a
+//! build server shows what nobody knows beside what is wrong.
 //!
 //! | what | case |
 //! | --- | --- |

@@ -1,4 +1,5 @@
-//! The entry of a robot in; its joints as people read them, each with its standard deviation and how well it is known, out.
+//! The entry of a robot in; its joints as people read them, each with its standard deviation and
+//! how well it is known, out.
 
 use crate::result::RobotEntry;
 use contract::words::Unit;

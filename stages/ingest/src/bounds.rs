@@ -1,5 +1,6 @@
-//! Open inputs in; the bounds of the points of each scan out, where that takes a second or two. An E57 file states bounds in the
-//! frame of the scan: turned into the world they hold all points, but may be much wider.
+//! Open inputs in; the bounds of the points of each scan out, where that takes a second or two. An
+//! E57 file states bounds in the frame of the scan: turned into the world they hold all points, but
+//! may be much wider.
 
 use crate::reader::Want;
 use crate::sources::Sources;
@@ -10,8 +11,8 @@ use std::collections::BTreeMap;
 /// Most points of an input that are read for its bounds: one thread decodes 20 million a second.
 const MOST_READ: u64 = 20_000_000;
 
-/// Bounds of scans in the world, metres, by their number: those of inputs that were read. An input that cannot be read has
-/// none; a run says why.
+/// Bounds of scans in the world, metres, by their number: those of inputs that were read. An input
+/// that cannot be read has none; a run says why.
 pub(crate) fn read(sources: &Sources, fan: &impl Fan) -> BTreeMap<u32, Aabb> {
     let is_small = |input: &&Input| sources.n_stated(input.id).is_some_and(|n| n <= MOST_READ);
     let inputs: Vec<&Input> =

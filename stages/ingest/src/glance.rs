@@ -1,5 +1,5 @@
-//! An open input in; some of its points, spread over it as well as its format lets, out: enough to guess what stands in a plant
-//! without reading all of it.
+//! An open input in; some of its points, spread over it as well as its format lets, out: enough to
+//! guess what stands in a plant without reading all of it.
 
 use crate::reader::{Extent, RawStrip, RawStrips, Reading, Want};
 use crate::sources::{File, Sources};
@@ -25,8 +25,8 @@ pub struct Glance {
 }
 
 impl Sources {
-    /// Looks at points of an input: of formats that are read in pieces at every few pieces, of E57 files at the beginning of each
-    /// scan, of others at the beginning of the file.
+    /// Looks at points of an input: of formats that are read in pieces at every few pieces, of E57
+    /// files at the beginning of each scan, of others at the beginning of the file.
     ///
     /// # Errors
     /// An input that is broken where it was looked at, with its path.
