@@ -69,7 +69,8 @@ def pdal(path, call="pdal", driver=""):
         data = np.loadtxt(out.name, delimiter=",", skiprows=1, ndmin=2)
     ours = {"X": "x", "Y": "y", "Z": "z", "Intensity": "intensity", "Classification": "classification", "Red": "red",
             "PointSourceId": "point_source_id", "GpsTime": "gps_time", "Green": "green", "Blue": "blue"}
-    ours |= {name: name for name in ("RobotId", "LinkId", "BodyId", "kind", "robot", "link")}
+    ours |= {name: name for name in ("RobotId", "LinkId", "BodyId")}
+    ours |= {f"scalar_{name}": name for name in ("kind", "robot", "link")}
     lower = {"intensity": "intensity", "red": "red", "green": "green", "blue": "blue"}
     return {(ours | lower)[name]: data[:, i] for i, name in enumerate(header) if name in ours | lower}
 

@@ -60,7 +60,7 @@ class Setting:
             self.probe("writers.py", "coloured", cell / "scans.las", cell / "coloured.las")
         job = ["run", cell / "coloured.las", "--scanners", cell / "scanners.toml", "--robots", library, "--set", "export.bodies=true"]
         plain, packed = self.work / "plain", self.work / "packed"
-        if self.given.only and (packed / "junit.xml").is_file():
+        if (self.given.only or self.given.keep) and (packed / "junit.xml").is_file():
             return library, cell, plain, packed
         self.run(*job, "--out", plain)
         if not packed.is_dir():
@@ -93,11 +93,11 @@ class Setting:
 class Table:
     """Rows by heading: file, reader, what it says."""
 
-    def __init__(self):
-        self.parts = {}
+    def __init__(self, work):
+        self.parts, self.work = {}, f"{work}/"
 
     def add(self, part, file, reader, said):
-        said = " ".join(str(said).replace("|", "\\|").split())
+        said = " ".join(str(said).replace(self.work, "").replace("|", "\\|").split())
         self.parts.setdefault(part, []).append((file, reader, said))
         print(f"{part}: {file}: {reader}: {said}", flush=True)
 
@@ -118,6 +118,7 @@ def main():
     for name, what in (("pdal", "PDAL"), ("cloudcompare", "CloudCompare"), ("octomap-tools", "OctoMap's tools")):
         parser.add_argument(f"--{name}", help=f"how {what} is called, such as 'chroot /somewhere {name}'")
         parser.add_argument(f"--{name}-version", help="its version, for the table")
+    parser.add_argument("--keep", action="store_true", help="use Stillpoint's files that are under --work already")
     parser.add_argument("--only", help="parts whose name has one of these words, on what was made already; the table is not written", nargs="+")
     given = parser.parse_args()
     setting = Setting(given)
@@ -125,7 +126,7 @@ def main():
     # Needs numpy, which the environment has.
     import parts
 
-    table = Table()
+    table = Table(given.work)
     material = setting.material()
     for part in parts.ALL:
         if not given.only or any(word in part.__name__ for word in given.only):

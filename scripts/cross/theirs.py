@@ -1,6 +1,7 @@
 """What other programs write, opened by Stillpoint: points come back from the tiles of a run, robots from a scan of them."""
 
 import json
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -59,13 +60,16 @@ def converted(setting, table, part, given):
             line = [*call.split(), "translate", str(source), str(out)]
             if not made.endswith("e57"):
                 line += ["--writers.las.minor_version=4", "--writers.las.forward=all", "--writers.las.dataformat_id=7"]
-                line += ["--writers.las.extra_dims=none"][:0]
         else:
             kind = made.split(".")[1].upper()
             line = [*call.split(), "-SILENT", "-AUTO_SAVE", "OFF", "-NO_TIMESTAMP", "-C_EXPORT_FMT", kind, "-O", "-GLOBAL_SHIFT",
                     "0", "0", "0", str(source), "-SAVE_CLOUDS", "FILE", str(out)]
-        done = subprocess.run(line, capture_output=True, text=True, timeout=240, check=False)
-        wrong = None if out.is_file() else (done.stderr or done.stdout).strip().splitlines()[-1:]
+        environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}
+        done = subprocess.run(line, capture_output=True, text=True, timeout=240, env=environment, check=False)
+        if "unhandled file extension" in done.stdout:
+            table.add(part, f"`{made}`", who, "absent: this build has no plugin for the format")
+            continue
+        wrong = None if out.is_file() else " ".join((done.stderr or done.stdout).strip().splitlines()[-1:])
         said = f"not written: {wrong}" if wrong is not None else ran(setting, library, out, points, kept, step)
         table.add(part, f"`{made}`", who, said)
 
@@ -95,9 +99,11 @@ def ran(setting, library, path, points, kept, step):
 
 SCENE = """
 [[robot]]
+name = "R1"
 model = "{model}"
-xy = [0.0, 0.0]
+xyz = [0.0, 0.0, 0.0]
 [[scanner]]
+name = "s"
 position = [4.0, 2.0, 2.0]
 noise = 0.0
 dropouts = 0.0
@@ -135,17 +141,12 @@ def robots(setting, material, table):
 
 
 def remeshed(setting, made, writer, kind):
-    """All meshes of a model in another format, and its URDF with their new names."""
+    """All meshes of a model in another format, and its URDF with their new names; what went wrong, or none."""
     text = (made / "robot.urdf").read_text()
     for path in sorted((made / "meshes").iterdir()):
-        out = path.with_name(f"{path.stem}_new.{kind}")
-        _, wrong = setting.probe("writers.py", writer, path, out)
-        if wrong:
-            return wrong
-        text = text.replace(path.name, out.name)
-        path.unlink()
+        text = text.replace(path.name, f"{path.stem}_new.{kind}")
     (made / "robot.urdf").write_text(text)
-    return None
+    return setting.probe("writers.py", "meshes", made / "meshes", kind, writer)[1]
 
 
 def linted(setting, folder, model, original):

@@ -63,7 +63,7 @@ def pye57(points, out):
         data = {f"cartesian{c.upper()}": points[c] for c in "xyz"}
         data["intensity"] = points["intensity"] / 65535
         data |= {f"color{c.capitalize()}": (points[c] >> 8).astype(np.uint8) for c in ("red", "green", "blue")}
-        file.write_scan_raw(data, name="scan_1", rotation=[1, 0, 0, 0], translation=[0, 0, 0])
+        file.write_scan_raw(data, name="scan_1", rotation=np.array([1.0, 0, 0, 0]), translation=np.zeros(3))
 
 
 def open3d(points, out):
@@ -77,7 +77,9 @@ def open3d(points, out):
 def yourdfpy(path, out):
     from yourdfpy import URDF
 
-    URDF.load(path, load_meshes=True).write_xml_file(out)
+    # Its own handler of names would write absolute paths.
+    robot = URDF.load(path, load_meshes=False, build_scene_graph=False, filename_handler=lambda name: name)
+    robot.write_xml_file(out)
 
 
 def urchin(path, out):
@@ -107,12 +109,18 @@ def meshio_mesh(path, out):
     meshio.write(out, meshio.read(path), **({"binary": True} if out.endswith(".stl") else {}))
 
 
-WRITERS = {f.__name__: f for f in (coloured, las, copc, pye57, open3d, yourdfpy, urchin, mesh, open3d_mesh, meshio_mesh)}
+def meshes(folder, kind, by):
+    """All meshes of a model in another format, each beside the old one, which goes."""
+    for path in sorted(Path(folder).iterdir()):
+        WRITERS[by](str(path), str(path.with_name(f"{path.stem}_new.{kind}")))
+        path.unlink()
+
+
+WRITERS = {f.__name__: f for f in (coloured, las, copc, pye57, open3d, yourdfpy, urchin, mesh, open3d_mesh, meshio_mesh, meshes)}
 
 if __name__ == "__main__":
     writer, source, out, *more = sys.argv[1:]
     if source.endswith(".npz"):
         with np.load(source) as read:
             source = dict(read)
-    Path(out).parent.mkdir(parents=True, exist_ok=True)
     WRITERS[writer](source, out, *more)

@@ -114,18 +114,19 @@ const BARE: usize = 37;
 /// Length of a point with its colour, bytes.
 const RECORD: usize = BARE + 3;
 
-/// Numbers are `int`, since the tensor reader of Open3D passes over `short`, `ushort` and `uint`; names begin with `scalar_`,
-/// since CloudCompare takes no others where nobody answers its questions. See `scripts/cross`.
+/// Numbers are `int`, since the tensor reader of Open3D passes over `short`, `ushort` and `uint`; bytes are `uint8`, since meshio
+/// takes `uchar` for signed; names begin with `scalar_`, since CloudCompare takes no others where nobody answers its questions.
+/// See `scripts/cross`.
 fn header(n: u64, has_color: bool) -> Result<Vec<u8>> {
     let color = if has_color {
-        "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+        "property uint8 red\nproperty uint8 green\nproperty uint8 blue\n"
     } else {
         ""
     };
     let before = "ply\nformat binary_little_endian 1.0\ncomment ";
     let after = format!(
         "\nelement vertex {n}\nproperty double x\nproperty double y\nproperty double z\nproperty int intensity\n\
-         property uchar scalar_kind\n\
+         property uint8 scalar_kind\n\
          property int scalar_robot\nproperty int scalar_link\n{color}end_header\n"
     );
     let room = HEADER.checked_sub(before.len() + after.len());
