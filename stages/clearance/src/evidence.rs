@@ -127,7 +127,7 @@ fn is_seen(space: &Space, p: &Point) -> bool {
     let grid = space.grid();
     let is_unknown = |k: &usize| {
         let mut beside: [f64; 3] = p.coords.into();
-        beside[k / 2] += if k % 2 == 0 { grid.edge } else { -grid.edge };
+        beside[k / 2] += if k.is_multiple_of(2) { grid.edge } else { -grid.edge };
         grid.index(beside).is_none_or(|at| space.voxels()[at] == SpaceKind::Unknown)
     };
     (0..6).filter(is_unknown).count() <= UNKNOWN

@@ -92,9 +92,16 @@ fn of_links(refine: &Refine<'_>, best: &Adjusted, points: &Sampled) -> DMatrix<f
     out
 }
 
-/// Where the points of each link lie in the image: their middle, two directions across its beam, and how far they spread along
-/// each, metres.
-struct Places(Vec<Option<(Vector, [(Vector, f64); 2])>>);
+/// Where the points of one link lie in the image.
+struct Seen {
+    /// The mean of the points, metres.
+    middle: Vector,
+    /// Two unit vectors across the beam, each with the standard deviation of the points along it, metres.
+    axes: [(Vector, f64); 2],
+}
+
+/// Where the points of each link lie in the image; `None` for a link without points.
+struct Places(Vec<Option<Seen>>);
 
 impl Places {
     fn of(pairs: &[Pair], n_links: usize) -> Self {
@@ -108,14 +115,14 @@ impl Places {
                 let square = |pair: &&Pair| axis.dot(&(pair.p - middle)).powi(2);
                 (axis, (own.iter().map(square).sum::<f64>() / n).sqrt().max(1e-3))
             };
-            Some((middle, [spread(first), spread(beam.cross(&first))]))
+            Some(Seen { middle, axes: [spread(first), spread(beam.cross(&first))] })
         };
         Self((0..n_links).map(of).collect())
     }
 
     /// How much a point is off with each way in which its link may be.
     fn ways(&self, pair: &Pair) -> [f64; N_WAYS] {
-        let Some((middle, axes)) = &self.0[pair.link] else { return [0.0; N_WAYS] };
+        let Some(Seen { middle, axes }) = &self.0[pair.link] else { return [0.0; N_WAYS] };
         let [first, second] = axes.map(|(axis, spread)| axis.dot(&(pair.p - middle)) / spread);
         [1.0, first, second]
     }

@@ -60,7 +60,7 @@ pub enum Answer {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Refusal {
     /// Nothing of the new session lies well on the earlier one; the best of what was tried.
-    Nothing(Option<Place>),
+    Nothing(Option<Box<Place>>),
     /// Several places fit, the best first: what tells them apart is less than what may have been moved.
     Several(Vec<Place>),
 }
@@ -88,10 +88,10 @@ pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
 ///
 /// # Errors
 /// The pose as far as it could be refined, where they do not.
-pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, Option<Place>> {
+pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, Option<Box<Place>>> {
     let laid = Chosen::of(&new.surfels).lay(&old.surfels, rough, &WIDE).ok_or(None)?;
     let place = plain(&judge(old, new, laid));
-    if is_borne_out(&place) { Ok(place) } else { Err(Some(place)) }
+    if is_borne_out(&place) { Ok(place) } else { Err(Some(Box::new(place))) }
 }
 
 /// Where the new session lies in the earlier one, searched over all shifts and yaws; `stated` is one of the poses that are
@@ -154,7 +154,7 @@ fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal
     let off = apart(&place.laid.old_from_new, stated, at);
     let is_stated = off.0 <= STATED_ABOUT.0 && off.1 <= STATED_ABOUT.1;
     if !is_good(&place, if is_stated { MIN_SHARE_CHANGED } else { MIN_SHARE }) {
-        return Err(Refusal::Nothing(Some(place)));
+        return Err(Refusal::Nothing(Some(Box::new(place))));
     }
     let n_same = best.evidence.n_same() as f64;
     let serious: Vec<&Judged> =

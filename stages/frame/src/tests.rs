@@ -163,8 +163,9 @@ fn cells(beyond: f64) -> World {
 fn a_line_of_equal_cells_is_refused_unless_its_ends_decide() {
     for (beyond, is_clear) in [(60.0, false), (1.5, true)] {
         let world = cells(beyond);
-        let scanners =
-            |k: usize| [beyond + 4.0 * k as f64 + 1.8, if k % 2 == 0 { 1.0 } else { 6.0 }, 1.7];
+        let scanners = |k: usize| {
+            [beyond + 4.0 * k as f64 + 1.8, if k.is_multiple_of(2) { 1.0 } else { 6.0 }, 1.7]
+        };
         let old = world.session(&[0, 1, 2, 3, 4].map(scanners), &Pose::identity());
         let stated = frame([4.0, 0.0, 0.0], 0.0);
         let new = world.session(&[[beyond + 9.0, 1.0, 1.8], [beyond + 10.0, 6.0, 1.6]], &stated);

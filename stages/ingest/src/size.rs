@@ -162,7 +162,7 @@ fn diagonal(size: &[f64; 3]) -> f64 {
 
 fn wrong(input: &Input, units: &Units, size: &[f64; 3], why: &str) -> Error {
     let hint = match likely(units, size) {
-        Some((unit, size)) if unit == "m" => {
+        Some(("m", size)) => {
             format!("in metres they spread over {}: give --units m", words(&size))
         }
         Some((unit, size)) => format!(

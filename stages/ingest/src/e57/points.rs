@@ -91,10 +91,10 @@ impl Points {
             }
         }
         if let Some(Coordinates::Spherical(_)) = self.coordinates {
-            self.to_metres(1);
+            self.scale_to_metres(1);
             self.convert_spherical();
         } else {
-            self.to_metres(3);
+            self.scale_to_metres(3);
         }
         if let Some(field) = self.state {
             self.packets.integers(field, n, &mut self.states);
@@ -118,7 +118,7 @@ impl Points {
     }
 
     /// Brings the first `n` columns of the block to metres: angles stay what they are.
-    fn to_metres(&mut self, n: usize) {
+    fn scale_to_metres(&mut self, n: usize) {
         if self.metres != 1.0 {
             let values = self.axes[..n].iter_mut().flatten();
             values.for_each(|v| *v *= self.metres);
