@@ -6,8 +6,8 @@ use contract::{Error, Result};
 
 /// Steps from here on are worth a word, metres: the noise of a common scanner, beside which finer ones vanish.
 const COARSE: f64 = 0.003;
-/// Steps from here on are refused, metres. Measured with the demo cell: at 0.05 m its robots are found,
-/// at 0.1 m none is.
+/// Steps from here on are refused, metres: points are then off by as much as the links of a small arm are thick, so that no posture is
+/// told from another.
 const USELESS: f64 = 0.1;
 /// Fewer points tell nothing: what few points have in common may be chance.
 const MIN_POINTS: usize = 200;
@@ -39,9 +39,9 @@ fn step(mut values: Vec<f64>) -> Option<f64> {
         }
         (a >= COARSE).then_some(a)
     };
-    let first = gaps.iter().copied().reduce(f64::min)?;
-    let found = gaps.iter().try_fold(first, divides);
-    found.filter(|step| gaps.len() >= MIN_GAPS && *step >= COARSE)
+    let least = gaps.iter().copied().reduce(f64::min)?;
+    let is_told = gaps.len() >= MIN_GAPS && least >= COARSE;
+    is_told.then(|| gaps.iter().try_fold(least, divides)).flatten()
 }
 
 /// What is worse for a step, in words.
