@@ -132,7 +132,8 @@ fn bounds_of_a_turned_scan_are_those_of_its_points() {
         pose.rotation = Quaternion { w: z, x: 0.0, y: 0.0, z: w };
     }
     let file = write("turned.e57", vec![turned], |xml| xml);
-    let sources = crate::open(&[file.0.clone()], None, &settings(), &contract::OneByOne);
+    let sources =
+        crate::open(std::slice::from_ref(&file.0), None, &settings(), &contract::OneByOne);
     let described = crate::describe(&sources.expect("valid"), &contract::OneByOne).remove(0);
     let scan = &described.scans[0];
     let [bounds, stated] = [&scan.bounds, &scan.stated_bounds].map(|b| b.as_ref().expect("known"));

@@ -207,8 +207,11 @@ impl<'a> Reader<'a> {
 mod tests {
     use super::*;
 
+    /// The name of a unit and its length, metres.
+    type Named = (String, f64);
+
     /// System, horizontal and vertical unit as stated.
-    fn read_text(text: &str) -> (System, Option<(String, f64)>, Option<(String, f64)>) {
+    fn read_text(text: &str) -> (System, Option<Named>, Option<Named>) {
         let found = super::read(text.as_bytes()).expect("WKT");
         let pair = |s: Stated| (s.name.unwrap_or_default(), s.metres.expect("a number of metres"));
         (found.system, found.horizontal.map(pair), found.vertical.map(pair))
