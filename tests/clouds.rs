@@ -13,8 +13,49 @@ use stillpoint::job::{Given, Job, Means, Outcome};
 use stillpoint::plan;
 use stillpoint::scanning::{Formats, scan_scene};
 
-/// Beams of each scanner: 0.8° apart, which is sparser than any crew scans.
-const N_BEAMS: u64 = 60_000;
+/// A hall with things that stand before its walls, and three scanners whose beams are 0.6° apart: sparser than any crew scans.
+const HALL: &str = r#"
+seed = 31
+[hall]
+size = [12.0, 10.0, 4.0]
+[floor]
+[[box]]
+name = "a"
+xyz = [1.0, 1.0, 0.75]
+size = [1.0, 0.8, 1.5]
+[[box]]
+name = "b"
+xyz = [-2.0, -1.5, 0.9]
+size = [0.8, 1.2, 1.8]
+[[box]]
+name = "c"
+xyz = [3.0, -2.5, 0.6]
+size = [1.5, 0.7, 1.2]
+[[column]]
+xy = [-1.0, 2.0]
+radius = 0.3
+height = 4.0
+[[fence]]
+from = [-4.0, 3.5]
+to = [2.0, 3.5]
+height = 2.0
+filling = "wires"
+[[scanner]]
+name = "s1"
+position = [4.5, 3.0, 1.6]
+raster = { n_beams = 120_000 }
+noise = 0.002
+[[scanner]]
+name = "s2"
+position = [-4.5, 0.5, 1.5]
+raster = { n_beams = 120_000 }
+noise = 0.002
+[[scanner]]
+name = "s3"
+position = [0.5, -3.5, 1.7]
+raster = { n_beams = 120_000 }
+noise = 0.002
+"#;
 
 fn shared(name: &str) -> Option<PathBuf> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared").join(name);
@@ -23,21 +64,6 @@ fn shared(name: &str) -> Option<PathBuf> {
         return None;
     }
     Some(path)
-}
-
-/// A palletiser and its surroundings, scanned into `dir/scans`; the library.
-fn scene(dir: &Path, seed: u64) -> PathBuf {
-    let robots = dir.join("robots");
-    write_robots(&robots).expect("the library is written");
-    let library = robot::Library::load(&robots, &robot::Settings::without_clouds()).expect("loads");
-    let model =
-        &library.models[library.model(simulate::demo_robots::PALLETISER).expect("is there")];
-    let middle = |j: usize| (model.limits(j)[0] + model.limits(j)[1]) / 2.0;
-    let posture: Vec<f64> = (0..model.n_free()).map(middle).collect();
-    let scene = simulate::paper_scene(seed, model, &posture, N_BEAMS);
-    scan_scene(&scene, &library.models, &dir.join("scans"), Formats::ALL, &Engine::new(2))
-        .expect("scans");
-    robots
 }
 
 /// Scans of a LAS file whose scanners are all said to stand `off` from where they stood, metres.
@@ -77,10 +103,11 @@ fn warnings(out: &Path) -> Vec<String> {
 #[test]
 fn right_positions_are_used_and_wrong_ones_are_not() {
     let dir = tempfile::tempdir().expect("a folder");
-    scene(dir.path(), 31);
     let scans = dir.path().join("scans");
+    let hall = simulate::Scene::from_toml(HALL).expect("a scene");
+    scan_scene(&hall, &[], &scans, Formats::ALL, &Engine::new(2)).expect("scans");
     let right = opened(&scans, [0.0; 3]);
-    assert!(right.scans.len() > 3 && right.scans.iter().all(contract::Scan::has_beams));
+    assert!(right.scans.len() == 3 && right.scans.iter().all(contract::Scan::has_beams));
     // E57 files state their positions themselves.
     let file = [scans.join("scans.e57")];
     let own = ingest::open(&file, None, &ingest::Settings::default(), &OneByOne).expect("opens");
