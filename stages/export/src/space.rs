@@ -57,7 +57,8 @@ impl SpaceEntry {
         let grid = self.voxels();
         let n = self.size.iter().try_fold(1_usize, |n, s| n.checked_mul(*s));
         // What the list says of its size is believed only where the file is as long.
-        let n = n.filter(|n| npy::n_bytes(&path).is_ok_and(|there| there == *n as u64));
+        // A file of no voxels need not even be an array.
+        let n = n.filter(|n| *n > 0 && npy::n_bytes(&path).is_ok_and(|there| there == *n as u64));
         let n = n.ok_or_else(|| {
             bad("the voxels of a robot's space are not as many as they are said to be")
         })?;

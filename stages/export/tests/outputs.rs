@@ -232,3 +232,20 @@ fn a_list_of_places_that_a_mask_does_not_have_is_refused() {
     write(&[5, 1]);
     assert!(read_places(&path, 10).is_err());
 }
+
+#[test]
+fn a_space_of_no_voxels_is_refused_whatever_its_file_is() {
+    let out = folder("no_voxels");
+    let entry = |size: [usize; 3]| -> SpaceEntry {
+        serde_json::from_value(serde_json::json!({
+            "grid": "space.npy", "octomap": "", "unknown": "", "edge": 0.05, "origin": [0.0, 0.0, 0.0],
+            "size": size, "octomap_shift": [0.0, 0.0, 0.0], "unknown_m3": 0.0, "free_m3": 0.0,
+        }))
+        .expect("an entry")
+    };
+    std::fs::write(out.join("space.npy"), "nothing").expect("writes");
+    assert!(entry([0, 2, 2]).read(&out).is_err());
+    std::fs::write(out.join("space.npy"), vec![0; 128 + 4]).expect("writes");
+    assert_eq!(entry([1, 2, 2]).read(&out).expect("reads").voxels().len(), 4);
+    assert!(entry([1, 2, 3]).read(&out).is_err());
+}
