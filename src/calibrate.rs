@@ -3,12 +3,14 @@
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::folders;
+use crate::job::MAX_TEXT;
+use crate::reuse::result_of;
 use crate::search::Search;
 use crate::tools::adopt;
 use contract::words::count;
 use contract::{Calibration, Error, Fit, Kind, Region, Result, Verdict};
+use export::RobotEntry;
 use export::atomic;
-use export::{ResultFile, RobotEntry};
 use fit::Prepared;
 use geometry::Pose;
 use robot::Model;
@@ -75,18 +77,19 @@ struct Readings {
     posture: Vec<Reading>,
 }
 
-/// Puts together what the results say of the wanted robots.
+/// Puts together what the results say of the wanted robots; readings are a file and how many bytes
+/// it may have.
 ///
 /// # Errors
 /// A result that cannot be read, robots of several models, or none that was calibrated.
 pub fn together(
     results: &[PathBuf],
     wanted: &Wanted<'_>,
-    readings: Option<&Path>,
+    readings: Option<(&Path, u64)>,
 ) -> Result<Together> {
     let mut robots: Vec<(PathBuf, RobotEntry)> = Vec::new();
     for path in results {
-        let result = ResultFile::read(path)?;
+        let result = result_of(path)?;
         let is_wanted = |r: &RobotEntry| {
             r.calibration.is_some()
                 && wanted.model.is_none_or(|m| m == r.model)
@@ -112,9 +115,12 @@ pub fn together(
 }
 
 /// Offsets of joints' zeros: weighted means of what was found less what was read.
-fn zeros(file: &Path, robots: &[(PathBuf, RobotEntry)]) -> Result<BTreeMap<String, [f64; 2]>> {
+fn zeros(
+    (file, most): (&Path, u64),
+    robots: &[(PathBuf, RobotEntry)],
+) -> Result<BTreeMap<String, [f64; 2]>> {
     let bad = |e: String| Error::bad_input(e).at(file.display());
-    let text = std::fs::read_to_string(file).map_err(|e| bad(e.to_string()))?;
+    let text = ingest::read_text(file, most, MAX_TEXT)?;
     let readings: Readings = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
     let mut sums: BTreeMap<String, [f64; 2]> = BTreeMap::new();
     for reading in &readings.posture {

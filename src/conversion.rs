@@ -1,12 +1,13 @@
-//! A result that is whole in; its points in another format out, in `OUT/export`, which the next run into OUT takes away.
+//! A result that is whole in; its points in another format out, in `OUT/export`. The next run into
+//! OUT takes away what is true of its points no longer, and says so.
 
 use crate::copc;
 use crate::engine::Engine;
 use crate::job::Job;
 use crate::progress::Amount;
-use crate::reuse::EXPORT;
+use crate::reuse::{EXPORT, Vouched, straight};
 use contract::{Error, Kind, Result};
-use export::{COPC, PLY, ResultFile, write_ply};
+use export::{COPC, PLY, write_ply};
 use std::path::{Path, PathBuf};
 
 /// What points can be written as.
@@ -33,14 +34,19 @@ fn copc_name() -> &'static str {
 /// # Errors
 /// No result, or one without tiles; another run at work in it; files that cannot be read or written.
 pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBuf>> {
-    ResultFile::read(out)?;
+    let files = Vouched::open(out)?;
     // A result that was copied without its store has nobody at work in it.
     let _lock = out.join("store").is_dir().then(|| Job::hold(out)).transpose()?;
-    let into = out.join(EXPORT);
+    let into = straight(out, EXPORT)?;
+    // Tiles as the list has them, each compared with it: what else lies in their folder is none of
+    // the result.
+    let listed = files.manifest().files.iter().map(|file| &*file.path);
+    let listed = listed.filter(|path| path.starts_with("tiles/")).collect();
+    let tiles = engine.fan_out("compare", listed, |name: &str| files.compared(name))?;
     let written = match format {
         Format::Copc => {
             let to = into.join(copc_name());
-            let written = copc::write(out, &to, &into.join("scratch"), engine);
+            let written = copc::write(&tiles, &to, &into.join("scratch"), engine);
             let damaged = |e: Error| match e.kind() {
                 Kind::Bug => {
                     e.hint("`stillpoint verify` says whether the result's tiles are whole")
@@ -51,7 +57,7 @@ pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBu
         }
         Format::Ply => {
             let stage = engine.progress.stage("ply", Amount::items(0));
-            let points = write_ply(out, &into, || engine.cancel.check())?;
+            let points = write_ply(&tiles, &into, || engine.cancel.check())?;
             points.iter().for_each(|n| stage.add(0, n.iter().sum(), 0));
             stage.finish();
             points.map(|_| PLY.map(|name| into.join(name)).to_vec())

@@ -4,16 +4,16 @@ use crate::engine::{Cancel, Engine, guarded};
 use crate::progress::{Amount, Progress, Stage};
 use contract::Result;
 use export::CopcSteps;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Writes the file `to` of the tiles of `out`, if there are any, and says whether; `scratch` is a folder that is taken away at
-/// the end, however that comes.
+/// Writes the file `to` of some tiles, if there are any, and says whether; `scratch` is a folder
+/// that is taken away at the end, however that comes.
 ///
 /// # Errors
 /// Files that cannot be read or written; a run that is cancelled.
-pub(crate) fn write(out: &Path, to: &Path, scratch: &Path, engine: &Engine) -> Result<bool> {
+pub(crate) fn write(tiles: &[PathBuf], to: &Path, scratch: &Path, engine: &Engine) -> Result<bool> {
     let steps = Arc::new(Steps {
         progress: engine.progress.clone(),
         cancel: engine.cancel.clone(),
@@ -21,7 +21,7 @@ pub(crate) fn write(out: &Path, to: &Path, scratch: &Path, engine: &Engine) -> R
         done: AtomicU64::new(0),
     });
     engine.cancel.check()?;
-    let write = || guarded("copc", 0, || export::write_copc(out, to, scratch, &steps));
+    let write = || guarded("copc", 0, || export::write_copc(tiles, to, scratch, &steps));
     let written = engine.pool()?.install(write);
     // Of the disk only, and what is left is taken away by the next run.
     let _ = std::fs::remove_dir_all(scratch);

@@ -101,7 +101,8 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
 /// Opens what a job reads, and estimates it but for the search.
 fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<(Estimate, Sources)> {
     let n_models = library::count(&job.robots)?;
-    let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+    let read = |path| Scanners::read(path, &job.means.settings.ingest);
+    let scanners = job.scanners.as_deref().map(read).transpose()?;
     let sources =
         ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest, &AllThreads)?;
     units::check_plan(&job.robots, &sources)?;

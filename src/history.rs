@@ -2,7 +2,7 @@
 //! itself, out. Results share files that are the same, so that any of them can be taken away without harm to the others.
 
 use crate::job::{Job, memory_words};
-use crate::reuse::Manifest;
+use crate::reuse::{Manifest, Vouched, refuse_link};
 use contract::{Error, Kind, Result, quote};
 use export::ResultFile;
 use serde::Serialize;
@@ -28,15 +28,22 @@ pub struct Session {
     pub n_own_bytes: u64,
 }
 
-/// The sessions below a folder: each after the one that it goes on from, then by name.
+/// What lies in a folder.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Sessions {
+    /// Each after the one that it goes on from, then by name.
+    pub sessions: Vec<Session>,
+    /// Results that are not what was written, in words.
+    pub damaged: Vec<String>,
+}
+
+/// The sessions below a folder. Links in it are not followed: what they lead to lies elsewhere.
 ///
 /// # Errors
-/// A folder that cannot be read, or holds no result.
-pub fn sessions(folder: &Path) -> Result<Vec<Session>> {
+/// A folder that cannot be read.
+pub fn sessions(folder: &Path) -> Result<Sessions> {
     let failed = |e: std::io::Error| Error::from(e).at(folder.display());
-    if !folder.is_dir() {
-        return Err(no_results(folder, "there is no such folder"));
-    }
+    let mut damaged = Vec::new();
     let mut found = Vec::new();
     let mut digests = HashMap::new();
     let mut paths = Vec::new();
@@ -44,16 +51,20 @@ pub fn sessions(folder: &Path) -> Result<Vec<Session>> {
         paths.push(entry.map_err(failed)?.path());
     }
     paths.sort();
+    paths.retain(|path| refuse_link(path).is_ok() && Manifest::is_beside(path));
     for path in paths {
-        let (Ok(digest), Ok(result)) = (Manifest::digest(&path), ResultFile::read(&path)) else {
-            continue;
+        let read =
+            Vouched::open(&path).and_then(|files| Ok((files.digest().to_owned(), files.result()?)));
+        let (digest, result) = match read {
+            Ok(read) => read,
+            Err(error) => {
+                damaged.push(error.to_string());
+                continue;
+            }
         };
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         digests.insert(digest, name.clone());
         found.push((session(&path, name, &result)?, result.rescan.map(|r| r.base)));
-    }
-    if found.is_empty() {
-        return Err(no_results(folder, "there is no result in this folder"));
     }
     let mut left: Vec<Session> = found
         .into_iter()
@@ -70,12 +81,13 @@ pub fn sessions(folder: &Path) -> Result<Vec<Session>> {
         let at = left.iter().position(is_next).unwrap_or(0);
         out.push(left.remove(at));
     }
-    Ok(out)
+    Ok(Sessions { sessions: out, damaged })
 }
 
 /// The error for a folder that holds no results.
-fn no_results(folder: &Path, what: &str) -> Error {
-    Error::new(Kind::Usage, what)
+#[must_use]
+pub fn no_results(folder: &Path) -> Error {
+    Error::bad_input("there is no result in this folder")
         .at(folder.display())
         .hint("give the folder that output folders of runs lie in")
 }
@@ -112,27 +124,36 @@ fn n_names(_: &Metadata) -> u64 {
     1
 }
 
-/// Takes a session away. What others share with it stays theirs.
+/// Takes a session away. What others share with it stays theirs. A name is the name of a folder and
+/// nothing else, and a link is not followed.
 ///
 /// # Errors
-/// No result of that name, one at which a run is at work, or what the system refuses.
+/// No result of that name, a link, a result at which a run is at work, or what the system refuses.
 pub fn remove(folder: &Path, name: &str) -> Result<()> {
     let path: PathBuf = folder.join(name);
-    let is_inside = Path::new(name).components().count() == 1 && path.parent() == Some(folder);
-    if !is_inside || Manifest::read(&path).is_err() {
-        return Err(Error::new(
-            Kind::Usage,
-            format!("there is no session \"{}\"", quote::shown(name)),
-        )
-        .at(folder.display())
-        .hint("`stillpoint history` lists them"));
+    let is_name = Path::new(name).file_name().is_some_and(|own| own == name);
+    if is_name {
+        refuse_link(&path)?;
+        refuse_link(&path.join("store"))?;
     }
-    let lock = Job::hold(&path)?;
+    if !is_name || !Manifest::is_beside(&path) {
+        let what = format!("there is no session \"{}\"", quote::shown(name));
+        return Err(Error::new(Kind::Usage, what)
+            .at(folder.display())
+            .hint("`stillpoint history` lists them; --remove takes a name from that list"));
+    }
+    // A result that was copied without its store has nobody at work in it.
+    let lock = path.join("store").is_dir().then(|| Job::hold(&path)).transpose()?;
     // Without its list it is no result any more, however far the rest of this comes.
     let failed = |e: std::io::Error| Error::from(e).at(path.display());
-    std::fs::remove_file(path.join("result.json")).map_err(failed)?;
-    std::fs::remove_file(path.join("manifest.json")).map_err(failed)?;
+    let without = |name: &str| match std::fs::remove_file(path.join(name)) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(failed(e)),
+        _ => Ok(()),
+    };
+    without("result.json")?;
+    without("manifest.json")?;
     drop(lock);
+    // Of links in it the links go, not what they lead to.
     std::fs::remove_dir_all(&path).map_err(failed)
 }
 

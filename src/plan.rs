@@ -117,7 +117,7 @@ impl Run<'_> {
             left_out: failures.said(job),
         }
         .finish(output)?;
-        self.conclude((found.fits, floor), (sources, &tiles), &written, &outcome)?;
+        self.conclude((found.fits, floor), (sources, &tiles, &store), &written, &mut outcome)?;
         output.prune(&tiles, &[&ground_kept, &fits_kept], &models_kept);
         outcome.reused = reuse::said(&[
             ("models", models_kept.n_kept()),
@@ -131,9 +131,11 @@ impl Run<'_> {
     fn given(&self, models_kept: &Cache) -> Result<Given> {
         let &Run { job, settings, output, digests, engine } = self;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
-        let read = |path: &PathBuf| Review::read(path, &library.models);
+        let most = settings.ingest.max_text_bytes;
+        let read = |path: &PathBuf| Review::read(path, &library.models, most);
         let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
-        let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+        let read = |path| Scanners::read(path, &job.means.settings.ingest);
+        let scanners = job.scanners.as_deref().map(read).transpose()?;
         let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
         let sources = engine.pool()?.install(open)?;
         units::check_sizes(&library, &sources)?;
@@ -199,7 +201,7 @@ impl Run<'_> {
             .write((&near, spaces), &Scope::default(), (next, next), engine)?
             .finish(engine)?;
         if settings.export.copc {
-            copc::write(next, &next.join(COPC), &self.output.scratch(), engine)?;
+            copc::write(&export::tiles(next)?, &next.join(COPC), &self.output.scratch(), engine)?;
         }
         Ok(written)
     }
@@ -208,9 +210,9 @@ impl Run<'_> {
     fn conclude(
         &self,
         (fits, floor): (Vec<Fit>, &Floor),
-        (sources, tiles): (&Sources, &[Key]),
+        (sources, tiles, store): (&Sources, &[Key], &Store),
         written: &Done,
-        outcome: &Outcome,
+        outcome: &mut Outcome,
     ) -> Result<()> {
         let next = self.output.next();
         sources.inputs.iter().try_for_each(|input| self.digests.check(input))?;
@@ -220,6 +222,7 @@ impl Run<'_> {
             scans: sources.scans.clone(),
             frames: Vec::new(),
             tiles: tiles.to_vec(),
+            contents: store.contents(),
             floor: floor.clone(),
             fits,
             robots: self.job.robots.clone(),
@@ -227,6 +230,8 @@ impl Run<'_> {
         }
         .write(next)?;
         let files = written.digests.iter().map(|sum| OutputFile::of(next, sum)).collect();
-        reuse::publish(self.job, (self.output, self.digests), (outcome, files), self.engine)
+        let (to, made) = ((self.output, self.digests), (&*outcome, files));
+        outcome.told = reuse::publish(self.job, to, made, self.engine)?;
+        Ok(())
     }
 }

@@ -45,3 +45,10 @@ pub fn pieces(model: &Model) -> Vec<Vec<u8>> {
     ];
     bodies.into_iter().flatten().map(|bytes| bytes[32..].to_vec()).collect()
 }
+
+/// The file of a list of outputs, its digest made right.
+#[must_use]
+pub fn list_file(body: &[u8]) -> Vec<u8> {
+    std::str::from_utf8(body)
+        .map_or_else(|_| body.to_vec(), |text| reuse::sealed(text).into_bytes())
+}

@@ -15,6 +15,7 @@
 mod heard;
 
 use crate::engine::{AllThreads, Engine, Task};
+use crate::job::MAX_TEXT;
 use crate::search::Search;
 use contract::words::triple;
 use contract::{Error, Fit, JointFit, Region, Result, Verdict};
@@ -28,8 +29,6 @@ use std::path::Path;
 
 /// How near a base must be to the place given, metres.
 const RADIUS: f64 = 0.5;
-/// A review is a page: larger files are something else, bytes.
-const MAX_BYTES: u64 = 1 << 20;
 
 /// The whole file.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -81,18 +80,15 @@ impl Review {
     /// Reads a review.
     ///
     /// # Errors
-    /// A file that cannot be read, is no review, or names a model that the library has not.
-    pub fn read(path: &Path, models: &[Model]) -> Result<Self> {
+    /// A file that cannot be read or has more than `most` bytes, is no review, or names a model
+    /// that the library has not.
+    pub fn read(path: &Path, models: &[Model], most: u64) -> Result<Self> {
         let bad = |what: String| {
             Error::bad_input(what)
                 .at(path.display())
                 .hint("a review has [[robot]] with at, and radius, model, verdict, joints or rpy")
         };
-        let io = |e: std::io::Error| Error::from(e).at(path.display());
-        if std::fs::metadata(path).map_err(io)?.len() > MAX_BYTES {
-            return Err(bad("too large for a review".into()));
-        }
-        let text = std::fs::read_to_string(path).map_err(io)?;
+        let text = ingest::read_text(path, most, MAX_TEXT)?;
         let review: Self = toml::from_str(&text).map_err(|e| {
             let line = e.span().map_or(1, |span| text[..span.start].lines().count().max(1));
             bad(format!("line {line}: {}", e.message().trim().replace('\n', " ")))
@@ -339,7 +335,7 @@ mod tests {
         let path = dir.path().join("review.toml");
         let said = |text: &str| {
             std::fs::write(&path, text).expect("is written");
-            Review::read(&path, &[]).expect_err("cannot be").to_string()
+            Review::read(&path, &[], 1 << 20).expect_err("cannot be").to_string()
         };
         let good = "[[robot]]\nat = [1.0, 2.0, 0.0]\n";
         let radius = said(&format!("{good}[[robot]]\nat = [1.0, -0.001, 0.0]\nradius = 0.0\n"));

@@ -10,8 +10,9 @@
 //! ```
 
 use crate::engine::{Engine, Task};
+use crate::job::MAX_TEXT;
 use crate::progress::Amount;
-use contract::{Error, Kind, Label, Map, MaskId, Result, Weigh};
+use contract::{Error, Label, Map, MaskId, Result, Weigh};
 use export::atomic;
 use export::{
     E57Scans, GridPoint, GridScan, LabelColumns, LasSettings, LasWriter, MaskWriter, NpyWriter,
@@ -302,18 +303,11 @@ fn scanners(simulator: &Simulator) -> String {
     (0..simulator.n_scans()).map(entry).collect()
 }
 
-/// Reads a scene file.
-pub fn read_scene(path: &Path) -> Result<Scene> {
-    /// A scene is written by hand or by a small program.
-    const MAX_BYTES: u64 = 64 << 20;
-    let at = |e: Error| e.at(path.display());
-    let len = std::fs::metadata(path).map_err(|e| at(e.into()))?.len();
-    if len > MAX_BYTES {
-        return Err(at(Error::new(
-            Kind::BadInput,
-            format!("a scene is not that long: \"{len}\" bytes"),
-        )));
-    }
-    let text = std::fs::read_to_string(path).map_err(|e| at(e.into()))?;
-    Scene::from_toml(&text).map_err(at)
+/// Reads a scene file of at most `most` bytes.
+///
+/// # Errors
+/// A file that cannot be read, is longer, or is no scene; with its path.
+pub fn read_scene(path: &Path, most: u64) -> Result<Scene> {
+    let text = ingest::read_text(path, most, MAX_TEXT)?;
+    Scene::from_toml(&text).map_err(|e| e.at(path.display()))
 }

@@ -6,14 +6,12 @@
 //!         one as joint_trajectory, as MoveIt's RobotTrajectory
 //! ```
 
+use crate::job::MAX_TEXT;
 use contract::{Error, Kind, Result};
 use serde_json::Value;
-use std::fs::File;
-use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-/// Larger files are no path of one robot, bytes; nor are ones with more waypoints.
-const MAX_BYTES: u64 = 64 << 20;
+/// Files with more waypoints are no path of one robot.
 const MAX_WAYPOINTS: usize = 1_000_000;
 /// No joint gets so far, radians, degrees or metres.
 const MAX_VALUE: f64 = 1e5;
@@ -35,26 +33,14 @@ impl Trajectory {
     /// Reads a path.
     ///
     /// # Errors
-    /// A file that cannot be read, or is no path: with the line or the waypoint.
-    pub fn read(path: &Path) -> Result<Self> {
+    /// A file that cannot be read or has more than `most` bytes, or is no path: with the line or
+    /// the waypoint.
+    pub fn read(path: &Path, most: u64) -> Result<Self> {
         let bad = |what: String| {
             let hint = "a path is CSV with joints' names in its head, or JSON as trajectory_msgs/JointTrajectory, both in UTF-8";
             Error::new(Kind::BadInput, what).at(path.display()).hint(hint)
         };
-        let io = |e: std::io::Error| match e.kind() {
-            ErrorKind::NotFound => {
-                Error::new(Kind::Usage, "there is no such file").at(path.display())
-            }
-            ErrorKind::InvalidData => bad("it is no text".into()),
-            _ => Error::of_file("path cannot be read", path, e),
-        };
-        // Not as long as its folder says, but as it is: some files have no end.
-        let mut text = String::new();
-        let file = File::open(path).map_err(io)?;
-        file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(io)?;
-        if text.len() as u64 > MAX_BYTES {
-            return Err(bad(format!("it is longer than {MAX_BYTES} bytes")));
-        }
+        let text = ingest::read_text(path, most, MAX_TEXT)?;
         let text = text.trim_start_matches('\u{feff}');
         let is_json = text.trim_start().starts_with(['{', '[']);
         let read = if is_json { json(text) } else { csv(text) };
@@ -173,7 +159,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("path");
         std::fs::write(&path, text).expect("is written");
-        Trajectory::read(&path)
+        Trajectory::read(&path, 1 << 20)
     }
 
     #[test]

@@ -32,16 +32,114 @@ fn usage_is_two() {
         &["frobnicate"][..],
         &["run", "a.e57"],
         &["inspect", "a.e57", "--set", "fit.bean=3"],
-        &["inspect", "a.e57", "--config", "no/such.toml"],
         &["inspect", "a.e57", "--threads", "0"],
         &["inspect", "a.e57", "--memory", "much"],
-        &["inspect", "no/such/scan.e57"],
+        &["check", "a", "--trajectory", "b", "--margin", "7"],
+        &["rescan", "a.e57", "--base", "b", "--out", "o", "--cell", "1,2", "--robot", "R1"],
     ] {
         let output = stillpoint(args);
         assert_eq!(code(&output), 2, "{args:?}: {}", err(&output));
         assert!(output.stdout.is_empty(), "{args:?}");
     }
     assert_eq!(code(&stillpoint(&["inspect", "a.e57", "--memory", "1MiB"])), 5);
+}
+
+/// One rule for all commands: a path that a person names and that is not there, or is not what it
+/// should be, is bad input.
+#[test]
+fn a_path_that_leads_nowhere_is_four_for_every_command() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name).to_string_lossy().into_owned();
+    let (nosuch, out, file) = (at("nosuch"), at("out"), at("file"));
+    std::fs::write(&file, "plain text").expect("writes");
+    std::fs::create_dir(at("empty")).expect("is made");
+    let (empty, path) = (at("empty"), at("path.csv"));
+    std::fs::write(&path, "joint\n0.5\n").expect("writes");
+    // What is wrong stands behind the arguments.
+    let cases: &[(&[&str], &str)] = &[
+        (&["inspect", &nosuch], &nosuch),
+        (&["inspect", &empty], &empty),
+        (&["run", &nosuch, "--robots", &empty, "--out", &out], &nosuch),
+        (&["run", &file, "--robots", &nosuch, "--out", &out], &nosuch),
+        (&["run", &file, "--robots", &empty, "--out", &out, "--review", &nosuch], &nosuch),
+        (&["run", &file, "--robots", &empty, "--out", &out, "--scanners", &nosuch], &nosuch),
+        (&["plan", &nosuch, "--robots", &empty, "--out", &out], &nosuch),
+        (&["plan", &file, "--robots", &nosuch, "--out", &out], &nosuch),
+        (&["rescan", &nosuch, "--base", &empty, "--out", &out], &nosuch),
+        (&["rescan", &file, "--base", &nosuch, "--out", &out], &nosuch),
+        (&["rescan", &file, "--base", &empty, "--out", &out], &empty),
+        (&["verify", &nosuch], &nosuch),
+        (&["verify", &empty], &empty),
+        (&["report", &nosuch], &nosuch),
+        (&["report", &empty], &empty),
+        (&["export", &nosuch, "--to", "ply"], &nosuch),
+        (&["export", &empty, "--to", "copc"], &empty),
+        (&["check", &nosuch, "--trajectory", &path], &nosuch),
+        (&["check", &empty, "--trajectory", &path], &empty),
+        (&["check", &empty, "--trajectory", &nosuch], &nosuch),
+        (&["diff", &nosuch, &nosuch], &nosuch),
+        (&["diff", &empty, &file], &empty),
+        (&["history", &nosuch], &nosuch),
+        (&["history", &empty], &empty),
+        (&["history", &file], &file),
+        (&["simulate", &nosuch, "--out", &out], &nosuch),
+        (&["simulate", &file, "--out", &out], &file),
+        (&["robots", "lint", &nosuch], ""),
+        (&["robots", "calibrate", &nosuch, "--robots", &empty, "--out", &out], &nosuch),
+        (&["robots", "calibrate", &empty, "--robots", &empty, "--out", &out], &empty),
+        (&["bench", "accuracy", "--robots", &nosuch], &nosuch),
+        (&["bench", "plant", "--robots", &nosuch], &nosuch),
+        (&["bench", "rescan", "--robots", &nosuch], &nosuch),
+        (&["bench", "throughput", "--robots", &nosuch, "--out", &out], &nosuch),
+        (&["inspect", &file, "--config", &nosuch], &nosuch),
+        (&["inspect", &file, "--config", &file], &file),
+        (&["inspect", &file, "--scanners", &nosuch], &nosuch),
+        (&["inspect", &file], &file),
+    ];
+    for (args, wrong) in cases {
+        let output = stillpoint(&[*args, &["--progress", "none"][..]].concat());
+        let text = err(&output);
+        assert_eq!(code(&output), 4, "{args:?}: {text}");
+        assert!(text.contains(wrong), "{args:?}: {text}");
+    }
+    assert!(!dir.path().join("out/result.json").exists());
+}
+
+/// Pipes wait for ever, and devices have no end: neither is read, whatever it is named for.
+#[cfg(target_os = "linux")]
+#[test]
+fn pipes_and_devices_are_refused_at_once() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name).to_string_lossy().into_owned();
+    let (pipe, file, out, empty) = (at("pipe"), at("file"), at("out"), at("empty"));
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("makes pipes").success());
+    std::fs::write(&file, "plain text").expect("writes");
+    std::fs::create_dir(&empty).expect("is made");
+    for odd in [pipe.as_str(), "/dev/zero"] {
+        let cases: &[&[&str]] = &[
+            &["inspect", odd],
+            &["inspect", &file, "--config", odd],
+            &["inspect", &file, "--scanners", odd],
+            &["run", odd, "--robots", &empty, "--out", &out],
+            &["run", &file, "--robots", &empty, "--out", &out, "--review", odd],
+            &["simulate", odd, "--out", &out],
+        ];
+        for args in cases {
+            let output = stillpoint(args);
+            assert_eq!(code(&output), 4, "{args:?}: {}", err(&output));
+            let text = err(&output);
+            assert!(text.contains(odd) && text.contains("only regular files"), "{args:?}: {text}");
+        }
+    }
+    // A limit names the file, itself and what lifts it; and it is lifted by that.
+    let config = at("config.toml");
+    std::fs::write(&config, "threads = 2\n").expect("writes");
+    let bounded = |most: &str| stillpoint(&["inspect", &file, "--config", &config, "--set", most]);
+    let long = bounded("ingest.max_text_bytes=5");
+    let text = err(&long);
+    assert!(code(&long) == 5 && text.contains("config.toml") && text.contains("5 bytes"), "{text}");
+    assert!(text.contains("--set ingest.max_text_bytes"), "{text}");
+    assert_eq!(code(&bounded("ingest.max_text_bytes=500")), 4, "the input is no scan");
 }
 
 #[test]

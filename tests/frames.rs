@@ -147,7 +147,7 @@ fn is_laid(plant: &Plant, out: &str, by: &str) {
 fn points_lie_in_the_plant(out: &Path) {
     let las = export::LasSettings::new(export::Quantum { scale: [1e-4; 3], offset: [0.0; 3] });
     for tile in std::fs::read_dir(out.join("tiles")).expect("a folder").flatten() {
-        let read = export::read_tile(&tile.path(), &las, |points| {
+        let read = export::read_tile(&tile.path(), &las, None, |points| {
             assert!(points.iter().all(|p| p.world.iter().all(|v| v.abs() < 50.0)));
             Ok(())
         });

@@ -167,7 +167,7 @@ fn spaces_hold_what_tiles_hold(out: &Path) {
     let mut fixed: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); spaces.len()];
     let (mut n_others, mut lost) = (0, Vec::new());
     for tile in std::fs::read_dir(out.join("tiles")).expect("a folder").flatten() {
-        let read = export::read_tile(&tile.path(), &las, |points| {
+        let read = export::read_tile(&tile.path(), &las, None, |points| {
             for (i, space) in spaces.iter().enumerate() {
                 for point in points {
                     let near = |k: usize| {

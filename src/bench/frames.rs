@@ -7,6 +7,7 @@ use super::robots_of;
 use crate::engine::Engine;
 use crate::job::{Job, Means};
 use crate::rescan::{Cell, Frame, Request, State, rescan};
+use crate::reuse::Vouched;
 use crate::scanning::{Formats, scan_scene};
 use crate::{library, plan};
 use contract::{Error, Kind, Result};
@@ -162,7 +163,7 @@ fn drawn(row: &mut Row) -> Pose {
 
 /// Compares poses of the new scans, as they were laid, with the true ones.
 fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()> {
-    let laid = &State::read(out)?.scans[then.scanners.len()..];
+    let laid = &State::read(&Vouched::open(out)?)?.scans[then.scanners.len()..];
     for (scan, scanner) in laid.iter().zip(&now.scanners) {
         let real = scanner.world_from_scan()?;
         let off = real.inverse() * scan.world_from_scan;

@@ -12,7 +12,7 @@ use crate::engine::{AllThreads, Engine, Task};
 use crate::job::{Job, Means};
 use crate::library;
 use crate::rescan::{State, models_of};
-use crate::reuse::Manifest;
+use crate::reuse::Vouched;
 use crate::trajectory::Trajectory;
 use clearance::{Body, Contact, Contacts, FARTHEST, Obstacles, Walk};
 use contract::{Error, Fit, Kind, Result, Verdict};
@@ -101,7 +101,7 @@ pub struct Report {
 /// # Errors
 /// No result, or one without what this needs; a path that is none of the robot's; files that cannot be read.
 pub fn check(request: &Request, means: &Means, engine: &Engine) -> Result<Report> {
-    let path = Trajectory::read(&request.trajectory)?;
+    let path = Trajectory::read(&request.trajectory, means.settings.ingest.max_text_bytes)?;
     let choose = |result: &ResultFile, state: &State| chosen(request, (result, state), &path);
     at_robot(request, choose, (means, engine), |place| place.look(&path, engine))
 }
@@ -131,8 +131,8 @@ pub(crate) fn at_robot<T>(
     let out = &request.out;
     // A result that was copied without its store has nobody at work in it.
     let _lock = out.join("store").is_dir().then(|| Job::hold_shared(out)).transpose()?;
-    let manifest = Manifest::read(out)?;
-    let (result, state) = (ResultFile::read(out)?, State::read(out)?);
+    let files = Vouched::open(out)?;
+    let (result, state) = (files.result()?, State::read(&files)?);
     if result.robots.len() != state.fits.len() {
         return Err(Error::bad_input("the result and what is kept beside it are not of one run")
             .at(out.display())
@@ -146,11 +146,11 @@ pub(crate) fn at_robot<T>(
             Robot { entry, number: *number, fit, model }
         })
         .collect();
-    robots.iter().try_for_each(|robot| robot.is_of_the_library(&manifest))?;
+    robots.iter().try_for_each(|robot| robot.is_of_the_library(files.manifest()))?;
     let robot = robots.iter().find(|robot| robot.number == number);
     let robot =
         robot.ok_or_else(|| Error::new(Kind::Bug, "the robot that is meant does not stand"))?;
-    let around = Surroundings { out, manifest: &manifest, state: &state, result: &result };
+    let around = Surroundings { out, files: &files, state: &state, result: &result };
     let others: Vec<(usize, &Fit)> =
         fits.iter().filter(|(at, _)| *at != number).map(|(at, fit)| (*at, fit)).collect();
     let (mut body, mut obstacles) =
@@ -162,7 +162,7 @@ pub(crate) fn at_robot<T>(
         body,
         obstacles,
         ids: result.robots.iter().map(|r| r.id.clone()).collect(),
-        is_partial: manifest.partial,
+        is_partial: files.manifest().partial,
     })
 }
 

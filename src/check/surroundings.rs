@@ -3,11 +3,11 @@
 use super::Robot;
 use crate::engine::{Engine, Task};
 use crate::rescan::{State, tiles_of};
-use crate::reuse::Manifest;
+use crate::reuse::Vouched;
 use crate::spaces::poses;
 use clearance::{CELL, Cells, Hung, Known, Obstacles, What};
 use contract::{Error, Fit, PointKind, Result, Space};
-use export::{OldPoint, ResultFile, read_tile};
+use export::{OldPoint, ResultFile, SpaceEntry, read_tile};
 use geometry::{Aabb, Point, Pose};
 use robot::Model;
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,7 +19,7 @@ const SETTLED: usize = 1 << 22;
 /// A result.
 pub(super) struct Surroundings<'a> {
     pub(super) out: &'a Path,
-    pub(super) manifest: &'a Manifest,
+    pub(super) files: &'a Vouched,
     pub(super) state: &'a State,
     pub(super) result: &'a ResultFile,
 }
@@ -69,8 +69,11 @@ impl Surroundings<'_> {
             all.map(placed).collect::<Vec<(i16, &Model, Vec<Pose>)>>()
         };
         let others: Vec<_> = others.iter().flat_map(standing).collect();
-        let space: Option<Space> =
-            robot.entry.space.as_ref().map(|entry| entry.read(self.out)).transpose()?;
+        let read = |entry: &SpaceEntry| {
+            self.files.compared(&entry.grid)?;
+            entry.read(self.out)
+        };
+        let space: Option<Space> = robot.entry.space.as_ref().map(read).transpose()?;
         let bounds = space.as_ref().map_or(Aabb::EMPTY, |space| space.grid().bounds());
         let known = Known { world_from_base: robot.fit.world_from_base, bounds };
         Ok((hung, Obstacles::new(&cells, &others, (space.as_ref(), known))))
@@ -86,11 +89,12 @@ impl Surroundings<'_> {
         let corners =
             sorting.bounds().corners().map(|c| sorting.base_from_world.inverse() * Point::from(c));
         let world = Aabb::of(corners.iter().map(|c| c.coords.into()));
-        let names = tiles_of(&self.manifest.files, edge, &[&world]);
+        let names = tiles_of(&self.files.manifest().files, edge, &[&world]);
         let las = self.state.records.las();
         let tiles = engine.fan_out(Task::new("points"), names, |name| {
             let mut own = Sorted::new(sorting.far);
-            read_tile(&self.out.join(&name), &las, |points| {
+            let (path, stated) = self.files.stated(&name)?;
+            read_tile(&path, &las, stated, |points| {
                 points.iter().try_for_each(|p| self.sort(sorting, p, &mut own))?;
                 own.settle(SETTLED);
                 engine.cancel.check()

@@ -65,6 +65,10 @@ pub(super) fn bench_plan(flags: &PlanBenchFlags, common: &Common, say: &Say) -> 
 
 pub(super) fn bench_rescan(flags: &RescanBenchFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
+    // Of a case that fails the bench says so and goes on; a library that is not there fails all.
+    if let Some(robots) = &flags.robots {
+        robot::Library::open(robots)?;
+    }
     let engine = common.engine(&means)?;
     let bench = RescanBench {
         n_cases: flags.cases,

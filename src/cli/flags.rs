@@ -8,7 +8,7 @@ use crate::engine::Engine;
 use crate::job::{Given, Means};
 use crate::progress::{Mode, Progress};
 use clap::{Args, Parser, Subcommand};
-use contract::{Error, Kind, Result};
+use contract::Result;
 use std::path::PathBuf;
 
 /// Finds the robots in laser scans of a plant, in which posture they stand, and splits the cloud into what moves and
@@ -150,7 +150,8 @@ pub(super) struct ExportFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
-    /// Which format; files go to OUT/export, which the next run into OUT takes away
+    /// Which format; files go to OUT/export; a later run into OUT takes them away where the points
+    /// are others, and says so
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub(super) to: Format,
 }
@@ -340,12 +341,9 @@ impl Common {
     }
 }
 
-/// Refuses names of inputs that do not exist, before anything else is done.
+/// Refuses names of inputs that are no files, before anything else is done.
 pub(super) fn present(inputs: &[PathBuf]) -> Result<()> {
-    match inputs.iter().find(|path| !path.exists()) {
-        None => Ok(()),
-        Some(path) => Err(Error::new(Kind::Usage, "there is no such file").at(path.display())),
-    }
+    inputs.iter().try_for_each(|path| ingest::regular(path))
 }
 
 #[cfg(test)]

@@ -10,7 +10,8 @@ use ingest::Scanners;
 pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
     present(&flags.inputs)?;
-    let scanners = common.scanners(&means).map(|path| Scanners::read(&path));
+    let scanners =
+        common.scanners(&means).map(|path| Scanners::read(&path, &means.settings.ingest));
     let sources = ingest::open(
         &flags.inputs,
         scanners.transpose()?.as_ref(),

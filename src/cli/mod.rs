@@ -84,7 +84,9 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
             bench::bench_throughput(flags, &line.common, say)
         }
         Command::Simulate(flags) => simulate::simulate(flags, &line.common, say),
-        Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, say),
-        Command::Robots(RobotsCommand::Calibrate(flags)) => robots::calibrate(flags, say),
+        Command::Robots(RobotsCommand::Lint(flags)) => robots::lint(flags, &line.common, say),
+        Command::Robots(RobotsCommand::Calibrate(flags)) => {
+            robots::calibrate(flags, &line.common, say)
+        }
     }
 }

@@ -11,11 +11,10 @@ use crate::conversion::convert;
 use crate::exit;
 use crate::history;
 use crate::job::Outcome;
-use crate::reuse::{self, Manifest};
+use crate::reuse::{self, Manifest, Vouched, result_of};
 use crate::things::ThingEntry;
 use contract::words::count;
 use contract::{Error, Kind, Result};
-use export::ResultFile;
 use std::path::Path;
 
 pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8> {
@@ -25,8 +24,9 @@ pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8>
     let n_bytes: u64 = checked.manifest.files.iter().map(|f| f.n_bytes).sum();
     match checked.wrong.split_first() {
         None => {
-            let files = count(n_files as u64, "file");
-            say.result(&format!("{files}, {}: as they were written", count(n_bytes, "byte")));
+            let (files, list) = (count(n_files as u64, "file"), &checked.digest);
+            let bytes = count(n_bytes, "byte");
+            say.result(&format!("{files}, {bytes}: as they were written\nlist of them: {list}"));
             Ok(exit::OK)
         }
         Some((first, others)) => {
@@ -42,12 +42,12 @@ pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8>
 }
 
 pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
-    let manifest = Manifest::read(&flags.out)?;
+    let files = Vouched::open(&flags.out)?;
     if let Some(path) = &flags.junit {
-        export::write_junit(path, &ResultFile::read(&flags.out)?, manifest.partial)?;
+        export::write_junit(path, &files.result()?, files.manifest().partial)?;
     }
-    let Manifest { summary, warnings, partial, .. } = manifest;
-    say.outcome(&Outcome { summary, warnings, partial, reused: Vec::new() });
+    let Manifest { summary, warnings, partial, .. } = files.manifest().clone();
+    say.outcome(&Outcome { summary, warnings, partial, ..Outcome::default() });
     Ok(if partial { exit::PARTIAL } else { exit::OK })
 }
 
@@ -92,17 +92,23 @@ pub(super) fn history(flags: &HistoryFlags, say: &Say) -> Result<u8> {
     for name in &flags.remove {
         history::remove(&flags.folder, name)?;
     }
-    let sessions = history::sessions(&flags.folder)?;
-    say.result(&if flags.json { json(&sessions)? } else { history::words(&sessions) });
-    Ok(exit::OK)
+    let found = history::sessions(&flags.folder)?;
+    // A folder whose last session was just taken away holds none, as was asked for.
+    if found.sessions.is_empty() && found.damaged.is_empty() && flags.remove.is_empty() {
+        return Err(history::no_results(&flags.folder));
+    }
+    found.damaged.iter().for_each(|damaged| say.warning(damaged));
+    let sessions = &found.sessions;
+    say.result(&if flags.json { json(sessions)? } else { history::words(sessions) });
+    Ok(if found.damaged.is_empty() { exit::OK } else { exit::PARTIAL })
 }
 
 pub(super) fn diff(flags: &DiffFlags, say: &Say) -> Result<u8> {
-    let (then, now) = (ResultFile::read(&flags.then)?, ResultFile::read(&flags.now)?);
+    let (then, now) = (result_of(&flags.then)?, result_of(&flags.now)?);
     let changes = changes(&then, &now);
     // Where the one goes on from the other, that one knows what else changed.
-    let goes_on =
-        now.rescan.as_ref().map(|r| &r.base) == Manifest::digest(&flags.then).ok().as_ref();
+    let digest = Vouched::open(&flags.then).ok().map(|files| files.digest().to_owned());
+    let goes_on = digest.is_some() && now.rescan.as_ref().map(|r| &r.base) == digest.as_ref();
     let things = if goes_on { things(&flags.now)? } else { Vec::new() };
     if flags.json {
         let all = serde_json::json!({
@@ -122,13 +128,13 @@ fn things(out: &Path) -> Result<Vec<ThingEntry>> {
     struct Changes {
         things: Vec<ThingEntry>,
     }
+    const NAME: &str = "changes.json";
 
-    let path = out.join("changes.json");
-    let bad = |e: String| Error::bad_input("the list of changes cannot be read").because(e);
-    let text = std::fs::read_to_string(&path);
-    let text = text.map_err(|e| bad(e.to_string()).at(path.display()))?;
-    let all: Changes =
-        serde_json::from_str(&text).map_err(|e| bad(e.to_string()).at(path.display()))?;
+    let text = Vouched::open(out)?.bytes(NAME)?;
+    let all: Changes = serde_json::from_slice(&text).map_err(|e| {
+        let bad = Error::bad_input("the list of changes cannot be read").because(e);
+        bad.at(out.join(NAME).display())
+    })?;
     Ok(all.things)
 }
 

@@ -1,7 +1,7 @@
 //! `robots lint`: a library in; what is wrong with it, in words or JSON, out. `robots calibrate`: results in; a corrected
 //! model out.
 
-use super::flags::{CalibrateFlags, LintFlags};
+use super::flags::{CalibrateFlags, Common, LintFlags};
 use super::say::Say;
 use crate::calibrate::{Wanted, together};
 use crate::exit;
@@ -10,8 +10,8 @@ use contract::{Kind, Result, quote};
 use robot::{Finding, Library, Severity};
 
 /// Exit code 4 where a model cannot be used, else 0.
-pub(super) fn lint(flags: &LintFlags, say: &Say) -> Result<u8> {
-    let findings = Library::lint(&flags.dir);
+pub(super) fn lint(flags: &LintFlags, common: &Common, say: &Say) -> Result<u8> {
+    let findings = Library::lint(&flags.dir, &common.means()?.settings.robot);
     let of = |s: Severity| findings.iter().filter(|f| f.severity == s).count();
     let [errors, warnings, notes] = [Severity::Error, Severity::Warning, Severity::Note].map(of);
     if flags.json {
@@ -33,9 +33,10 @@ pub(super) fn lint(flags: &LintFlags, say: &Say) -> Result<u8> {
 }
 
 /// Puts the calibrations of some results together.
-pub(super) fn calibrate(flags: &CalibrateFlags, say: &Say) -> Result<u8> {
+pub(super) fn calibrate(flags: &CalibrateFlags, common: &Common, say: &Say) -> Result<u8> {
     let wanted = Wanted { model: flags.model.as_deref(), robots: &flags.robot };
-    let readings = flags.readings.as_deref();
+    let most = common.means()?.settings.ingest.max_text_bytes;
+    let readings = flags.readings.as_deref().map(|file| (file, most));
     let found = together(&flags.results, &wanted, readings)?;
     found.write(&flags.robots, &flags.out)?;
     say.result(&found.words(&flags.out));

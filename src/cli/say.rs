@@ -53,7 +53,7 @@ impl Say {
 
     /// What a run came to: warnings and what was used again on standard error, its summary on standard output.
     pub(super) fn outcome(&self, outcome: &Outcome) {
-        outcome.warnings.iter().for_each(|warning| self.warning(warning));
+        outcome.warnings.iter().chain(&outcome.told).for_each(|warning| self.warning(warning));
         for piece in &outcome.reused {
             self.line(&match self.format {
                 LogFormat::Text => format!("used again: {piece}"),

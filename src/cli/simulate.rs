@@ -11,7 +11,7 @@ use robot::Library;
 pub(super) fn simulate(flags: &SimulateFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
     let engine = common.engine(&means)?;
-    let scene = read_scene(&flags.scene)?;
+    let scene = read_scene(&flags.scene, means.settings.ingest.max_text_bytes)?;
     let models = match &flags.robots {
         Some(dir) => {
             let mut settings = means.settings.robot;

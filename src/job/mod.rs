@@ -22,8 +22,8 @@ const NARROW_BYTES: u64 = 3 << 29;
 pub const LEAST_MEMORY_BYTES: u64 = 256 << 20;
 /// What program and robot library take, bytes, before any point is read.
 const PROGRAM_BYTES: u64 = 160 << 20;
-/// Longest configuration that is read, bytes: a thousand times what all settings take.
-const MAX_CONFIG_BYTES: u64 = 4 << 20;
+/// The setting that bounds configurations, reviews, scenes, paths and lists of readings.
+pub const MAX_TEXT: &str = "ingest.max_text_bytes";
 
 /// What is to be done, with which means.
 #[derive(Debug, Clone)]
@@ -70,6 +70,14 @@ impl Job {
         output::hold_shared(out)
     }
 
+    /// Refuses an output folder that is, holds or lies in the result that a rescan goes on from.
+    ///
+    /// # Errors
+    /// It does.
+    pub(crate) fn apart(&self, base: &Path) -> Result<()> {
+        places::apart(base, &self.out)
+    }
+
     /// Prepares the output folder.
     ///
     /// # Errors
@@ -104,6 +112,8 @@ pub struct Outcome {
     pub partial: bool,
     /// What was there from earlier runs and not made again; said on standard error.
     pub reused: Vec<String>,
+    /// What became of files beside the result; said on standard error, and no part of the result.
+    pub told: Vec<String>,
 }
 
 /// Means as flags give them; `None` where a flag is missing.
@@ -131,15 +141,12 @@ impl Means {
             scanners: None,
             settings: Settings::default(),
         };
+        // Before the file, since they bound it, too; and after it, since they go before what it
+        // says.
+        means.set_all(&given.set)?;
         if let Some(path) = &given.config {
-            means.read(path).map_err(|e| e.at(path.display()))?;
-        }
-        for pair in &given.set {
-            let (key, value) = pair.split_once('=').ok_or_else(|| {
-                usage(format!("--set takes key=value, got \"{pair}\""))
-                    .hint("for example fit.beam=150")
-            })?;
-            means.set(key.trim(), &parsed(value.trim())).map_err(|e| e.at("--set"))?;
+            means.read(path)?;
+            means.set_all(&given.set)?;
         }
         if let Some(memory) = &given.memory {
             means.memory_bytes = memory_bytes(memory).map_err(|e| e.at("--memory"))?;
@@ -200,16 +207,30 @@ impl Means {
         Ok(self)
     }
 
-    fn read(&mut self, path: &Path) -> Result<()> {
-        let len = std::fs::metadata(path).map_err(|e| unreadable(e, path))?.len();
-        if len > MAX_CONFIG_BYTES {
-            return Err(usage(format!("a configuration is not that long: \"{len}\" bytes")));
+    fn set_all(&mut self, pairs: &[String]) -> Result<()> {
+        for pair in pairs {
+            let (key, value) = pair.split_once('=').ok_or_else(|| {
+                usage(format!("--set takes key=value, got \"{pair}\""))
+                    .hint("for example fit.beam=150")
+            })?;
+            self.set(key.trim(), &parsed(value.trim())).map_err(|e| e.at("--set"))?;
         }
-        let text = std::fs::read_to_string(path).map_err(|e| unreadable(e, path))?;
-        let table: toml::Table = text.parse().map_err(|e: toml::de::Error| {
+        Ok(())
+    }
+
+    /// Takes the settings of a file. What is wrong in it is bad input: the command line that names
+    /// it is right.
+    fn read(&mut self, path: &Path) -> Result<()> {
+        let text = ingest::read_text(path, self.settings.ingest.max_text_bytes, MAX_TEXT)?;
+        let table = text.parse().map_err(|e: toml::de::Error| {
             usage("this is not TOML").because(e.message().to_owned()).at(line(&text, &e))
-        })?;
-        for (key, value) in &table {
+        });
+        let taken = table.and_then(|table| self.take(&table, path));
+        taken.map_err(|e| e.at(path.display()).of_kind(Kind::BadInput))
+    }
+
+    fn take(&mut self, table: &toml::Table, path: &Path) -> Result<()> {
+        for (key, value) in table {
             match value {
                 toml::Value::Table(room) => {
                     for (field, value) in room {
@@ -270,11 +291,6 @@ fn line(text: &str, error: &toml::de::Error) -> String {
 
 fn usage(what: impl Into<String>) -> Error {
     Error::new(Kind::Usage, what)
-}
-
-fn unreadable(cause: std::io::Error, path: &Path) -> Error {
-    let kind = if path.exists() { Kind::Io } else { Kind::Usage };
-    Error::new(kind, "the configuration cannot be read").because(cause)
 }
 
 #[cfg(test)]

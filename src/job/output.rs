@@ -1,5 +1,6 @@
 //! The output folder of a run: where results go, where they lie until all are whole, and where the store is kept.
 
+use super::places;
 use crate::reuse::{Cache, Key, Manifest};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
@@ -31,8 +32,9 @@ impl OutputDir {
         let at = |e: std::io::Error| Error::from(e).at(out.display());
         if out.exists() && !out.is_dir() {
             let what = "the output path is a file, not a folder";
-            return Err(Error::new(Kind::Usage, what).at(out.display()).hint("give another --out"));
+            return Err(Error::bad_input(what).at(out.display()).hint("give another --out"));
         }
+        places::refuse_links(out)?;
         let store = out.join("store");
         std::fs::create_dir_all(&store).map_err(at)?;
         let lock = locked(&store.join("lock"))?;

@@ -1,15 +1,15 @@
 //! The paths of a job in; an error where they cannot be, or where what the job writes would meet what it reads.
 
 use super::Job;
+use crate::reuse::{FILES, FOLDERS, refuse_link};
 use contract::{Error, Kind, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a run writes into its output folder, besides single files: what a user keeps there else is left alone.
-const FOLDERS: [&str; 6] = ["store", "tiles", "clouds", "labels", "robots", "pictures"];
-/// Those files.
-const FILES: [&str; 5] =
-    ["result.json", "manifest.json", "plant.bin", "changes.json", "changes.csv"];
+/// What a run writes into its output folder besides what its result names: what a user keeps there
+/// else is left alone.
+const STORE: &str = "store";
+const LIST: &str = "manifest.json";
 
 impl Job {
     /// Checks that everything the job reads is there, is named once, and is nothing that it writes.
@@ -19,19 +19,15 @@ impl Job {
     pub(crate) fn check_places(&self) -> Result<()> {
         let others = self.scanners.iter().chain(&self.review);
         if !self.robots.is_dir() {
-            return Err(usage("there is no such folder", &self.robots)
+            return Err(Error::bad_input("there is no such folder")
+                .at(self.robots.display())
                 .hint("--robots takes a folder with a folder for each model"));
         }
         for file in self.inputs.iter().chain(others.clone()) {
-            if file.is_dir() {
-                return Err(usage("this is a folder", file).hint("name the files in it"));
-            }
-            if !file.is_file() {
-                return Err(usage("there is no such file", file).hint("check the path"));
-            }
+            ingest::regular(file)?;
             if file.to_str().is_none() {
-                return Err(usage("its name is not UTF-8, and results name their inputs", file)
-                    .hint("rename it"));
+                let what = "its name is not UTF-8, and results name their inputs";
+                return Err(Error::bad_input(what).at(file.display()).hint("rename it"));
             }
         }
         let mut seen: BTreeMap<PathBuf, &Path> = BTreeMap::new();
@@ -59,9 +55,8 @@ impl Job {
         let first = inside.components().next();
         let first = first.map(|c| c.as_os_str().to_string_lossy().into_owned());
         let is_ours = |first: &String| {
-            FOLDERS.contains(&first.as_str())
-                || FILES.contains(&first.as_str())
-                || inside.as_os_str().is_empty()
+            let names = FOLDERS.iter().chain(&FILES).chain(&[STORE, LIST]);
+            names.into_iter().any(|name| first == name) || inside.as_os_str().is_empty()
         };
         if first.as_ref().is_none_or(is_ours) {
             let what = format!("is read and would be written over in {}", self.out.display());
@@ -73,6 +68,49 @@ impl Job {
 
 fn usage(what: &str, path: &Path) -> Error {
     Error::new(Kind::Usage, what).at(path.display())
+}
+
+/// Refuses an output folder in which what a run writes, moves or takes away would lie elsewhere,
+/// since a link leads there. The folder itself may be a link.
+///
+/// # Errors
+/// The first link.
+pub(super) fn refuse_links(out: &Path) -> Result<()> {
+    for name in FILES.iter().chain(&[LIST, STORE]) {
+        refuse_link(&out.join(name))?;
+    }
+    refuse_link(&out.join(STORE).join("next"))?;
+    let mut folders: Vec<PathBuf> = FOLDERS.iter().map(|name| out.join(name)).collect();
+    while let Some(folder) = folders.pop() {
+        refuse_link(&folder)?;
+        // What is not there is made, and what cannot be read is told when it is written to.
+        for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
+            match entry.file_type() {
+                Ok(kind) if kind.is_symlink() => refuse_link(&entry.path())?,
+                Ok(kind) if kind.is_dir() => folders.push(entry.path()),
+                _ => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses two folders of which one is, or lies in, the other.
+///
+/// # Errors
+/// They are so.
+pub(crate) fn apart(base: &Path, out: &Path) -> Result<()> {
+    let (within, outside) = (real(out), real(base));
+    let what = if within == outside {
+        "a rescan does not write over the result it goes on from"
+    } else if within.starts_with(&outside) {
+        "the output folder lies in the result that the rescan goes on from"
+    } else if outside.starts_with(&within) {
+        "the result that the rescan goes on from lies in the output folder"
+    } else {
+        return Ok(());
+    };
+    Err(usage(what, out).hint("give another --out, beside the earlier result"))
 }
 
 /// The path without links and dots; of what is not there, as far as it is there.
@@ -111,19 +149,53 @@ mod tests {
         {
             checked(&[good[0]], good[1], good[2]).expect("can be");
         }
-        let bad: [(&[&str], &str, &str); 8] = [
-            (&["out/clouds/fixed.las"], "lib", "out"),
-            (&["out/scans/../clouds/fixed.las"], "lib", "out"),
-            (&["a.las"], "out/robots", "out"),
-            (&["a.las"], "lib", "lib"),
-            (&["a.las"], "lib", "lib/results/new"),
-            (&["a.las", "out/../a.las"], "lib", "out"),
-            (&["none.las"], "lib", "out"),
-            (&["a.las"], "none", "out"),
+        let bad: [(&[&str], &str, &str, Kind); 9] = [
+            (&["out/clouds/fixed.las"], "lib", "out", Kind::Usage),
+            (&["out/scans/../clouds/fixed.las"], "lib", "out", Kind::Usage),
+            (&["a.las"], "out/robots", "out", Kind::Usage),
+            (&["a.las"], "lib", "lib", Kind::Usage),
+            (&["a.las"], "lib", "lib/results/new", Kind::Usage),
+            (&["a.las", "out/../a.las"], "lib", "out", Kind::Usage),
+            (&["none.las"], "lib", "out", Kind::BadInput),
+            (&["out"], "lib", "new", Kind::BadInput),
+            (&["a.las"], "none", "out", Kind::BadInput),
         ];
-        for (inputs, robots, out) in bad {
+        for (inputs, robots, out, kind) in bad {
             let error = checked(inputs, robots, out).expect_err("cannot be");
-            assert_eq!(error.kind(), Kind::Usage, "{error}");
+            assert_eq!(error.kind(), kind, "{error}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_in_an_output_folder_and_folders_in_one_another_are_refused() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let at = |path: &str| dir.path().join(path);
+        for folder in ["base/labels", "out/robots/R1", "plain"] {
+            std::fs::create_dir_all(at(folder)).expect("is made");
+        }
+        for link in ["out/labels", "out/store", "out/robots/R1/meshes", "out/result.json"] {
+            std::os::unix::fs::symlink(at("base/labels"), at(link)).expect("is made");
+            let error = refuse_links(&at("out")).expect_err(link);
+            assert_eq!(error.kind(), Kind::BadInput);
+            assert!(error.to_string().contains(link), "{error}");
+            std::fs::remove_file(at(link)).expect("goes");
+        }
+        refuse_links(&at("out")).expect("has no links");
+        // The folder itself may lie on another disk.
+        std::os::unix::fs::symlink(at("out"), at("link")).expect("is made");
+        refuse_links(&at("link")).expect("has no links");
+        for (base, out) in [
+            ("base", "base"),
+            ("base", "base/sub"),
+            ("base", "base/labels/x"),
+            ("link/robots", "out"),
+            ("base", "."),
+        ] {
+            let error = apart(&at(base), &at(out)).expect_err(out);
+            assert_eq!(error.kind(), Kind::Usage);
+        }
+        apart(&at("base"), &at("plain")).expect("lie apart");
+        apart(&at("base"), &at("base2")).expect("lie apart");
     }
 }

@@ -44,11 +44,12 @@ macro_rules! settings {
 
 settings! {
     ingest: ingest::Settings {
-        strip_points, max_xml_bytes, max_scanners_bytes, sample_points, max_laz_chunk_bytes,
-        max_range, max_native_rms, min_step, max_step, units,
+        strip_points, max_xml_bytes, max_xml_nodes, max_xml_attributes, max_scanners_bytes, max_text_bytes,
+        sample_points, max_laz_chunk_bytes, max_range, max_native_rms, min_step, max_step, units,
     }
     robot: robot::Settings {
-        clouds, spacing, max_samples, max_mesh_bytes,
+        clouds, spacing, max_samples, max_mesh_bytes, max_mesh_growth, max_urdf_bytes, max_xml_nodes,
+        max_xml_attributes,
     }
     lattice: lattice::Settings {
         noise, noise_growth, angular_noise, noise_limit, max_incidence, max_grazing, window,

@@ -2,7 +2,7 @@
 
 use super::state::State;
 use crate::job::{Job, OutputDir};
-use crate::reuse::{Manifest, OutputFile};
+use crate::reuse::{OutputFile, Vouched};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
 use export::{MaskReader, ResultFile, ScanLabels, read_places};
@@ -14,9 +14,8 @@ pub(crate) struct Base {
     pub(crate) out: PathBuf,
     pub(crate) result: ResultFile,
     pub(crate) state: State,
-    /// Digest of its list of files, which names all of it.
-    pub(crate) digest: String,
-    files: Vec<OutputFile>,
+    /// Its files: what is read of them is compared with its list.
+    pub(crate) files: Vouched,
     /// Nobody rewrites it meanwhile.
     _lock: std::fs::File,
 }
@@ -27,11 +26,14 @@ impl Base {
     /// # Errors
     /// No result, or one without its store.
     pub(crate) fn open(out: &Path) -> Result<Self> {
-        let Manifest { files, .. } = Manifest::read(out)?;
+        // A folder without a list is no result; one without its store is a result that cannot be
+        // gone on from.
+        drop(Vouched::open(out)?);
         let lock = Job::hold_shared(out)?;
-        let digest = Manifest::digest(out)?;
-        let (result, state) = (ResultFile::read(out)?, State::read(out)?);
-        let base = Self { out: out.to_path_buf(), result, state, digest, files, _lock: lock };
+        // Once more, since another run may have ended there meanwhile.
+        let files = Vouched::open(out)?;
+        let (result, state) = (files.result()?, State::read(&files)?);
+        let base = Self { out: out.to_path_buf(), result, state, files, _lock: lock };
         for key in &base.state.tiles {
             let folder = base.tiles_folder().join(key.name());
             if !folder.is_dir() {
@@ -52,9 +54,8 @@ impl Base {
         for key in &self.state.tiles {
             let (from, to) =
                 (self.tiles_folder().join(key.name()), output.tiles().join(key.name()));
-            if !to.is_dir() {
-                share_folder(&from, &to)?;
-            }
+            // Also where they are there already: they may be what an earlier attempt met damaged.
+            share_folder(&from, &to)?;
         }
         share_folder(&self.out.join("store").join("models"), &output.models())
     }
@@ -64,6 +65,14 @@ impl Base {
         let open = |(input, key): (usize, &crate::reuse::Key)| {
             let place = output.tiles().join(key.name());
             let mut store = Store::open(&place, self.state.first_scan(input), resident_bytes)?;
+            // Its tiles are compared with its catalogue while they are read, and the catalogue here
+            // with what the run kept.
+            if store.contents().first() != self.state.contents.get(input) {
+                let what = "the tiles in the store are not those of the earlier result";
+                let folder = self.tiles_folder().join(key.name());
+                let error = Error::bad_input(what).at(folder.display());
+                return Err(error.hint("run the whole plant again"));
+            }
             let frame = self.state.frames.get(input).and_then(Option::as_ref);
             frame.into_iter().for_each(|motion| store.carry(motion));
             Ok(store)
@@ -80,25 +89,40 @@ impl Base {
         is_new: impl Fn(&str) -> bool,
     ) -> Result<Vec<OutputFile>> {
         let stay: Vec<OutputFile> =
-            self.files.iter().filter(|file| !is_new(&file.path)).cloned().collect();
+            self.listed().iter().filter(|file| !is_new(&file.path)).cloned().collect();
         for file in &stay {
-            share(&self.out.join(&file.path), &next.join(&file.path))?;
+            // What is not read is not compared: its digest is handed on, and `verify` finds what
+            // was changed of it.
+            share(&self.files.path(&file.path)?, &next.join(&file.path))?;
         }
         Ok(stay)
     }
 
     /// Whether the result has a file of this name.
     pub(crate) fn has(&self, path: &str) -> bool {
-        self.files.iter().any(|file| file.path == path)
+        self.files.has(path)
+    }
+
+    /// All of its files.
+    pub(crate) fn listed(&self) -> &[OutputFile] {
+        &self.files.manifest().files
     }
 
     /// Names of its spatial tiles that some boxes touch, relative to its folder.
     pub(crate) fn tiles(&self, touched: &[&Aabb]) -> Vec<String> {
         let edge = self.state.records.tile_edge();
-        edge.map_or_else(Vec::new, |edge| tiles_of(&self.files, edge, touched))
+        edge.map_or_else(Vec::new, |edge| tiles_of(self.listed(), edge, touched))
     }
 
-    /// Reads labels of each of its masks.
+    /// Compares the files of one of its masks with its list, each once.
+    pub(crate) fn compare_mask(&self, mask: usize) -> Result<()> {
+        let files = &self.result.labels.scans[mask];
+        [&files.kind, &files.robot, &files.link]
+            .iter()
+            .try_for_each(|name| self.files.compared(name).map(drop))
+    }
+
+    /// Reads labels of each of its masks, once that was compared.
     pub(crate) fn masks(&self) -> Vec<MaskReader> {
         let reader = |s: &ScanLabels| MaskReader::new(&self.out, [&s.kind, &s.robot, &s.link]);
         self.result.labels.scans.iter().map(reader).collect()
@@ -108,7 +132,7 @@ impl Base {
     pub(crate) fn superseded(&self) -> Result<Vec<Vec<u64>>> {
         let read = |s: &ScanLabels| {
             let file = s.superseded.as_ref();
-            file.map_or(Ok(Vec::new()), |name| read_places(&self.out.join(name), s.n_points))
+            file.map_or(Ok(Vec::new()), |name| read_places(&self.files.compared(name)?, s.n_points))
         };
         self.result.labels.scans.iter().map(read).collect()
     }

@@ -39,7 +39,7 @@ use ingest::{Scanners, Sources};
 use past::Past;
 use robot::Library;
 use session::{Robots, Session};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use write::Written;
 
 /// What is to be done.
@@ -102,6 +102,7 @@ impl Rescan<'_> {
 
         // The new scans into tiles; those of the plant are there.
         let (tiles, mut new, n_kept) = self.tiles(&sources)?;
+        let contents = [base.state.contents.clone(), new.contents()].concat();
         let old = base.store(output, job.means.store_bytes())?;
 
         // Which frame the new scans are in: they are carried into that of the plant.
@@ -143,8 +144,8 @@ impl Rescan<'_> {
         let written = found.write(&registered, (output, digests), engine)?;
         let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
         let mut outcome = written.outcome;
-        let frame = carried.plant_from_new;
-        self.conclude((fits, robots), (&sources, &all, frame), (&outcome, written.known))?;
+        let kept = (&sources, (&*all, contents, carried.plant_from_new));
+        outcome.told = self.conclude((fits, robots), kept, (&outcome, written.known))?;
         output.prune_tiles(&all, &shelved);
         let (models, shared) = (shelved.n_kept(), written.n_shared);
         let tiles = ("tiles of new scans", n_kept);
@@ -168,7 +169,8 @@ impl Rescan<'_> {
         let &Rescan { base, job, engine, .. } = self;
         let settings = &job.means.settings;
         let library = library::load(&job.robots, &settings.robot, Some(shelved), engine)?;
-        let scanners = job.scanners.as_deref().map(Scanners::read).transpose()?;
+        let read = |path| Scanners::read(path, &job.means.settings.ingest);
+        let scanners = job.scanners.as_deref().map(read).transpose()?;
         let before = base.state.before();
         let open = || {
             let settings = &settings.ingest;
@@ -185,9 +187,9 @@ impl Rescan<'_> {
     fn conclude(
         &self,
         (mut fits, robots): (Vec<Fit>, &Robots),
-        (sources, tiles, frame): (&Sources, &[Key], Option<Pose>),
+        (sources, (tiles, contents, frame)): (&Sources, Kept<'_>),
         (outcome, known): (&Outcome, Vec<OutputFile>),
-    ) -> Result<()> {
+    ) -> Result<Vec<String>> {
         let &Rescan { base, job, output, digests, engine } = self;
         sources.opened().iter().try_for_each(|input| digests.check(input))?;
         let stays = |i: &usize| !robots.changed.contains(i) && !robots.gone.contains(i);
@@ -203,6 +205,7 @@ impl Rescan<'_> {
             masks: sources.masks.clone(),
             scans: sources.scans.clone(),
             tiles: tiles.to_vec(),
+            contents,
             fits,
             robots: job.robots.clone(),
             ..base.state.clone()
@@ -212,13 +215,16 @@ impl Rescan<'_> {
     }
 }
 
+/// Tiles of all inputs, what their stores hold, and what carried the new scans into the plant's frame.
+type Kept<'a> = (&'a [Key], Vec<String>, Option<Pose>);
+
 /// What a rescan is asked for beside its inputs and settings, for its digest.
 fn asked(request: &Request, base: &Base) -> String {
     let frame = match request.frame {
         Frame::Find => String::new(),
         other => format!(" {other:?}"),
     };
-    format!("{} {:?}{frame}", base.digest, request.cell)
+    format!("{} {:?}{frame}", base.files.digest(), request.cell)
 }
 
 /// The job with the base's library and ways of writing.
@@ -228,19 +234,11 @@ fn job(request: &Request, base: &Base) -> Result<Job> {
         job.robots.clone_from(&base.state.robots);
     }
     if !job.robots.is_dir() {
-        return Err(Error::new(Kind::Usage, "the robot library is not there")
+        return Err(Error::bad_input("the robot library is not there")
             .at(job.robots.display())
             .hint("name it with --robots"));
     }
-    let same = |a: &Path, b: &Path| std::fs::canonicalize(a).ok() == std::fs::canonicalize(b).ok();
-    if job.out.exists() && same(&job.out, &request.base) {
-        return Err(Error::new(
-            Kind::Usage,
-            "a rescan does not write over the result it goes on from",
-        )
-        .at(job.out.display())
-        .hint("give another --out"));
-    }
+    job.apart(&request.base)?;
     job.means.settings.export = base.state.records.export(&job.means.settings.export);
     Ok(job)
 }

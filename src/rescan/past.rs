@@ -29,6 +29,7 @@ pub(crate) struct Past<'a> {
     pub(crate) scans: &'a [Scan],
     pub(crate) store: &'a Store,
     pub(crate) cell: Aabb,
+    base: &'a Base,
     masks: Vec<MaskReader>,
     /// By mask: places that were superseded before, and how many points it has.
     before: Vec<Vec<u64>>,
@@ -62,14 +63,14 @@ struct Looked {
 
 impl<'a> Past<'a> {
     pub(crate) fn new(
-        base: &Base,
+        base: &'a Base,
         scans: &'a [Scan],
         store: &'a Store,
         cell: Aabb,
     ) -> Result<Self> {
         let (masks, before) = (base.masks(), base.superseded()?);
         let n_points = base.result.labels.scans.iter().map(|s| s.n_points).collect();
-        Ok(Self { scans, store, cell, masks, before, n_points, tiles: store.touching(&cell) })
+        Ok(Self { scans, store, cell, base, masks, before, n_points, tiles: store.touching(&cell) })
     }
 
     /// The same with another cell.
@@ -176,6 +177,9 @@ impl<'a> Past<'a> {
 
     /// Labels of a tile's points.
     fn labels(&self, mask: MaskId, places: &[u64], labels: &mut Vec<Label>) -> Result<()> {
+        if !places.is_empty() {
+            self.base.compare_mask(mask.0 as usize)?;
+        }
         let mask = &self.masks[mask.0 as usize];
         let of = |first: u64, last: u64| mask.range(first, (last - first + 1) as usize);
         labels.clear();

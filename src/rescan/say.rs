@@ -97,7 +97,7 @@ impl Said<'_, '_> {
         result.warnings.extend(self.warnings());
         let cell = &self.found.session.past.cell;
         result.rescan = Some(RescanEntry {
-            base: self.found.base.digest.clone(),
+            base: self.found.base.files.digest().to_owned(),
             cell: [cell.min, cell.max],
             inputs: sources.opened().iter().map(|i| i.id.0).collect(),
             robots: self.found.robots.compared().into_iter().map(id).collect(),

@@ -38,7 +38,11 @@ impl Written<'_, '_> {
 
     /// The space of one robot; points of the places are still to be marked.
     fn space(&self, i: usize, around: &Around<'_, '_>, places: &[Aabb]) -> Result<Option<Space>> {
-        let old = self.entry(i).map(|entry| entry.read(&self.base.out)).transpose()?;
+        let read = |entry: &SpaceEntry| {
+            self.base.files.compared(&entry.grid)?;
+            entry.read(&self.base.out)
+        };
+        let old = self.entry(i).map(read).transpose()?;
         let edge = old.as_ref().map_or(around.settings.merge.space_edge, |old| old.grid().edge);
         let known = old.as_ref().map_or(Aabb::EMPTY, |old| old.grid().bounds());
         let known = known.union(&around.search.bounds().grown(edge));

@@ -1,6 +1,6 @@
 //! What a run leaves for a later session of its plant, and that again: `plant.bin` beside the result.
 
-use crate::reuse::{Key, read, written};
+use crate::reuse::{Key, Vouched, read, written};
 use contract::{Error, Fit, Floor, Input, Kind, Mask, Result, Scan};
 use export::{LasSettings, Quantum};
 use geometry::Pose;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file.
 const NAME: &str = "plant.bin";
 /// What the file begins with: its format.
-pub(super) const FORMAT: &[u8] = b"stillpoint.plant/5\n";
+pub(super) const FORMAT: &[u8] = b"stillpoint.plant/6\n";
 
 /// Scans, floor and robots of a plant as a run found them.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -23,6 +23,8 @@ pub(crate) struct State {
     pub(crate) tiles: Vec<Key>,
     /// By input: what carried its scans into the plant's frame, where their files state another one.
     pub(crate) frames: Vec<Option<Pose>>,
+    /// Digest of what each of these stores holds (see `Store::contents`).
+    pub(crate) contents: Vec<String>,
     pub(crate) floor: Floor,
     /// In the order of the result; robots that are gone are refused.
     pub(crate) fits: Vec<Fit>,
@@ -94,12 +96,13 @@ impl State {
     ///
     /// # Errors
     /// There is none, or it is not what was written.
-    pub(crate) fn read(out: &Path) -> Result<Self> {
-        let path = out.join(NAME);
+    pub(crate) fn read(files: &Vouched) -> Result<Self> {
+        Self::parse(&files.bytes(NAME)?).map_err(|e| e.at(NAME))
+    }
+
+    pub(super) fn parse(bytes: &[u8]) -> Result<Self> {
         let hint = "run the whole plant again with this version";
-        let bad = |what: &str| Error::bad_input(what.to_owned()).at(path.display()).hint(hint);
-        let bytes = std::fs::read(&path)
-            .map_err(|e| bad("what a rescan starts from cannot be read").because(e))?;
+        let bad = |what: &str| Error::bad_input(what.to_owned()).hint(hint);
         let body = bytes.strip_prefix(FORMAT);
         let body = body.ok_or_else(|| bad("this was written by another version"))?;
         let state: Self = read(body).ok_or_else(|| bad("the file is damaged"))?;
@@ -121,6 +124,7 @@ impl State {
         self.tiles.len() == inputs.len()
             && self.frames.len() <= inputs.len()
             && self.frames.iter().flatten().all(is_pose)
+            && self.contents.len() == inputs.len()
             && inputs.iter().enumerate().all(|(at, input)| is_number(input.id.0, at))
             && masks.iter().enumerate().all(|(at, mask)| is_number(mask.id.0, at))
             && masks.iter().all(|mask| (mask.input.0 as usize) < inputs.len())
@@ -165,27 +169,31 @@ mod tests {
             scans: Vec::new(),
             tiles: vec![Key::of("test", &["a"])],
             frames: vec![None],
+            contents: vec!["blake3:0".into()],
             floor: Floor::default(),
             fits: Vec::new(),
             robots: "robots".into(),
             records: Records::of(&las, &export::Settings::default()),
         };
-        whole.write(dir.path()).expect("writes");
-        assert!(State::read(dir.path()).is_ok());
-        let wrong: [fn(&mut State); 7] = [
+        let read_back = |state: &State| {
+            state.write(dir.path()).expect("writes");
+            State::parse(&std::fs::read(dir.path().join(NAME)).expect("reads"))
+        };
+        assert!(read_back(&whole).is_ok());
+        let wrong: [fn(&mut State); 8] = [
             |s| s.frames.push(None),
             |s| s.frames[0] = Some(Pose::translation(f64::NAN, 0.0, 0.0)),
             |s| s.masks[0].input.0 = 1,
             |s| s.masks[0].id.0 = 7,
             |s| s.tiles.clear(),
+            |s| s.contents.clear(),
             |s| s.records.scale[1] = 0.0,
             |s| s.records.tile_edge = Some(f64::NAN),
         ];
         for (i, wrong) in wrong.into_iter().enumerate() {
             let mut state = whole.clone();
             wrong(&mut state);
-            state.write(dir.path()).expect("writes");
-            let error = State::read(dir.path()).expect_err("refused").to_string();
+            let error = read_back(&state).expect_err("refused").to_string();
             assert!(error.contains("contradict"), "{i}: {error}");
         }
         // A key is the name of a folder in the store, and nothing else.
@@ -205,20 +213,20 @@ mod tests {
             scans: Vec::new(),
             tiles: Vec::new(),
             frames: Vec::new(),
+            contents: Vec::new(),
             floor: Floor::default(),
             fits: vec![Fit { score: 0.7, ..Fit::default() }],
             robots: "robots".into(),
             records: Records::of(&las, &export::Settings::default()),
         };
         state.write(dir.path()).expect("writes");
-        let again = State::read(dir.path()).expect("reads");
-        assert_eq!((again.fits, again.records.las()), (state.fits, las));
         let path = dir.path().join(NAME);
+        let again = State::parse(&std::fs::read(&path).expect("reads")).expect("reads");
+        assert_eq!((again.fits, again.records.las()), (state.fits, las));
         let mut bytes = std::fs::read(&path).expect("reads");
         *bytes.last_mut().expect("a byte") ^= 1;
-        std::fs::write(&path, &bytes).expect("writes");
-        assert!(State::read(dir.path()).expect_err("damaged").to_string().contains("plant.bin"));
-        std::fs::write(&path, b"stillpoint.plant/0\n").expect("writes");
-        assert!(State::read(dir.path()).expect_err("old").to_string().contains("version"));
+        assert!(State::parse(&bytes).expect_err("damaged").to_string().contains("damaged"));
+        let old = State::parse(b"stillpoint.plant/0\n");
+        assert!(old.expect_err("old").to_string().contains("version"));
     }
 }

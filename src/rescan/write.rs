@@ -92,7 +92,12 @@ impl Written<'_, '_> {
         let is_new = |path: &str| written.contains(path) || is_of(path, &folders);
         let shared = self.base.share_files(next, is_new)?;
         if has_copc {
-            copc::write(next, &next.join(COPC), &scratch, engine)?;
+            // It is made of all tiles, those that did not change, too.
+            let tiles = shared.iter().filter(|file| file.path.starts_with("tiles/")).collect();
+            engine.fan_out("compare", tiles, |file: &OutputFile| {
+                self.base.files.compared(&file.path).map(drop)
+            })?;
+            copc::write(&export::tiles(next)?, &next.join(COPC), &scratch, engine)?;
         }
         let fresh = done.digests.iter().filter(|sum| sum.path.starts_with(next));
         let mut known: Vec<OutputFile> = fresh.map(|sum| OutputFile::of(next, sum)).collect();
@@ -208,7 +213,7 @@ impl Written<'_, '_> {
             let spots = RefCell::new(Vec::new());
             let new = scratch.join(&name);
             if new.is_file() {
-                tile.take_from(&new, |points| vec![true; points.len()])?;
+                tile.take_from(&new, None, |points| vec![true; points.len()])?;
             }
             if self.base.has(&name) {
                 let stays = |points: &[OldPoint]| {
@@ -216,7 +221,8 @@ impl Written<'_, '_> {
                     spots.borrow_mut().extend(spots_of(points, &stays, grids));
                     stays
                 };
-                tile.take_from(&self.base.out.join(&name), stays)?;
+                let (path, stated) = self.base.files.stated(&name)?;
+                tile.take_from(&path, stated, stays)?;
             }
             let is_left = tile.n_points() > 0;
             Ok((is_left.then(|| tile.finish()).transpose()?, spots.into_inner()))

@@ -106,7 +106,9 @@ impl Contents {
         Ok(())
     }
 
-    /// Digest of names and bytes of all files below a folder, in the order of their names.
+    /// Digest of names and bytes of all files below a folder, in the order of their names. Of links
+    /// it holds where they lead: what lies in the folder is in it by itself, and what lies
+    /// elsewhere is not read.
     pub(super) fn folder(&self, folder: &Path) -> Result<String> {
         let mut files = Vec::new();
         walk(folder, &mut files)?;
@@ -116,7 +118,10 @@ impl Contents {
             let name = path.strip_prefix(folder).unwrap_or(path).display().to_string();
             hasher.update(name.as_bytes());
             hasher.update(&[0]);
-            hasher.update(self.digest(path, Algorithm::Blake3)?.as_bytes());
+            match std::fs::read_link(path) {
+                Ok(to) => hasher.update(format!("link {}\n", to.display()).as_bytes()),
+                Err(_) => hasher.update(self.digest(path, Algorithm::Blake3)?.as_bytes()),
+            };
         }
         Ok(format!("blake3:{}", hasher.finalize().to_hex()))
     }
@@ -170,7 +175,7 @@ impl Algorithm {
             .find(|algorithm| digest.starts_with(algorithm.name()))
     }
 
-    fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Blake3 => "blake3:",
             Self::Crc32c => "crc32c:",
@@ -180,6 +185,14 @@ impl Algorithm {
     /// A digest with its kind.
     pub(super) fn word(self, digits: &str) -> String {
         format!("{}{digits}", self.name())
+    }
+
+    /// Of bytes in memory.
+    pub(super) fn of_bytes(self, bytes: &[u8]) -> String {
+        match self {
+            Self::Blake3 => self.word(&blake3::hash(bytes).to_hex()),
+            Self::Crc32c => self.word(&format!("{:08x}", crc32c::crc32c(bytes))),
+        }
     }
 
     /// Reads a file.
@@ -291,15 +304,16 @@ fn number(_: &Metadata) -> u64 {
     0
 }
 
-/// All files below a folder. Links to folders are followed by name only once: a loop of links ends at the system's limit.
+/// All files and links below a folder; links are not followed.
 pub(super) fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     let failed = |e: std::io::Error| Error::from(e).at(folder.display());
     for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        if path.is_dir() {
-            walk(&path, files)?;
-        } else if path.is_file() {
-            files.push(path);
+        let entry = entry.map_err(failed)?;
+        let kind = entry.file_type().map_err(failed)?;
+        if kind.is_dir() {
+            walk(&entry.path(), files)?;
+        } else if kind.is_file() || kind.is_symlink() {
+            files.push(entry.path());
         }
     }
     Ok(())

@@ -4,23 +4,27 @@
 //! the last to move, so that a run that is cut short while they move is finished by the next one.
 
 use super::contents::{Algorithm, Contents, walk};
+use super::inside::{is_own, straight};
 use crate::engine::Engine;
 use crate::job::Outcome;
 use contract::{Error, Kind, Result};
 use export::FileSum;
 use export::atomic;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Name of the list.
-const LIST: &str = "manifest.json";
+pub(super) const LIST: &str = "manifest.json";
 /// The file that vouches for all others: it goes first and comes last.
-const RESULT: &str = "result.json";
+pub(super) const RESULT: &str = "result.json";
 /// Where files lie that are made of a result afterwards; the list does not name them.
 pub(crate) const EXPORT: &str = "export";
 /// What the list's format is called.
-const SCHEMA: &str = "stillpoint.manifest/1";
+const SCHEMA: &str = "stillpoint.manifest/2";
+/// What stands before the digest of all that comes before it, and behind it: the end of the list.
+const BEFORE_DIGEST: &str = ",\n  \"digest\": \"";
+const BEHIND_DIGEST: &str = "\"\n}";
 
 /// All that a run has written, and what it was made from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,6 +59,8 @@ pub struct OutputFile {
 pub struct Checked {
     /// The list.
     pub manifest: Manifest,
+    /// Digest of the list: kept elsewhere, it tells a list that was made anew, too.
+    pub digest: String,
     /// Files that are missing or not what they were, in words.
     pub wrong: Vec<String>,
 }
@@ -71,9 +77,14 @@ impl Manifest {
     /// The list of an output folder.
     ///
     /// # Errors
-    /// There is none, or it cannot be read.
+    /// There is none, it is not what was written, or it names what is no file of a result.
     pub fn read(out: &Path) -> Result<Self> {
-        let path = out.join(LIST);
+        Self::read_with_digest(out).map(|(manifest, _)| manifest)
+    }
+
+    /// The same, with the digest of the list: it names every byte of the result.
+    pub(super) fn read_with_digest(out: &Path) -> Result<(Self, String)> {
+        let path = straight(out, LIST)?;
         let text = std::fs::read_to_string(&path).map_err(|e| {
             let hint = "give the --out folder of a run that has ended";
             Error::bad_input("this is no result: it has no list of its files")
@@ -82,24 +93,40 @@ impl Manifest {
                 .at(path.display())
         })?;
         let broken = |what: &str| Error::bad_input(what.to_owned()).at(path.display());
+        let anew = "run the same job again; `stillpoint verify` works by this list";
         let manifest: Self = serde_json::from_str(&text)
-            .map_err(|e| broken("the list of files cannot be read").because(e))?;
-        let is_inside = |file: &OutputFile| {
-            let parts = Path::new(&file.path).components();
-            parts.into_iter().all(|part| matches!(part, std::path::Component::Normal(_)))
-        };
-        match manifest.files.iter().find(|file| !is_inside(file)) {
-            None => Ok(manifest),
+            .map_err(|e| broken("the list of files cannot be read").because(e).hint(anew))?;
+        if manifest.schema != SCHEMA {
+            return Err(broken("the list of files was written by another version").hint(anew));
+        }
+        let is_whole = text.rsplit_once(BEFORE_DIGEST).is_some_and(|(body, end)| {
+            end.strip_suffix(BEHIND_DIGEST) == Some(&*Algorithm::Blake3.of_bytes(body.as_bytes()))
+        });
+        if !is_whole {
+            let what = "the list of files is not what was written: its digest is another";
+            return Err(broken(what).hint(anew));
+        }
+        match manifest.files.iter().find(|file| !is_own(&file.path)) {
+            None => Ok((manifest, Algorithm::Blake3.of_bytes(text.as_bytes()))),
             Some(file) => {
-                Err(broken("the list names a file outside of its folder")
-                    .because(file.path.clone()))
+                Err(broken("the list names what is no file of a result").because(&*file.path))
             }
         }
     }
 
-    /// Digest of the list of an output folder: it names every byte of the result.
-    pub(crate) fn digest(out: &Path) -> Result<String> {
-        Algorithm::Blake3.read(&out.join(LIST))
+    /// Whether a list lies in a folder, whole or not.
+    pub(crate) fn is_beside(out: &Path) -> bool {
+        out.join(LIST).symlink_metadata().is_ok_and(|meta| meta.is_file())
+    }
+
+    /// Files that the list of an output folder names, if there is a list, whatever version wrote
+    /// it: those that a result has.
+    fn named(out: &Path) -> Vec<OutputFile> {
+        let text = straight(out, LIST).ok().and_then(|path| std::fs::read(path).ok());
+        let manifest = text.and_then(|text| serde_json::from_slice::<Self>(&text).ok());
+        let mut files = manifest.map_or_else(Vec::new, |manifest| manifest.files);
+        files.retain(|file| is_own(&file.path));
+        files
     }
 
     /// Lists what lies in `next`, files that are known as they are `known`, and writes the list there.
@@ -129,15 +156,20 @@ impl Manifest {
         };
         let text = serde_json::to_string_pretty(&manifest)
             .map_err(|e| Error::new(Kind::Bug, "the list of files cannot be written").because(e))?;
-        atomic::write(&next.join(LIST), text.as_bytes())?;
+        atomic::write(&next.join(LIST), sealed(&text).as_bytes())?;
         Ok(manifest)
     }
 
     /// Moves what lies in `next`, as its list says, to `out`, and takes away what only the old list of `out` names. May be
-    /// cut short anywhere and done again.
-    pub(crate) fn publish(next: &Path, out: &Path) -> Result<Self> {
+    /// cut short anywhere and done again. Beside the list: what was made of the old result and is
+    /// true no longer, in words.
+    pub(crate) fn publish(next: &Path, out: &Path) -> Result<(Self, Vec<String>)> {
         let manifest = Self::read(next)?;
-        let old = Self::read(out).map(|old| old.files).unwrap_or_default();
+        let old = Self::named(out);
+        // Nothing is moved or taken away through a link.
+        for file in manifest.files.iter().chain(&old) {
+            straight(out, &file.path)?;
+        }
         // Where it has moved already, all but the list has: a run was cut short between the two.
         if next.join(RESULT).exists() {
             remove(&out.join(RESULT))?;
@@ -151,17 +183,18 @@ impl Manifest {
         for file in old.iter().filter(|file| !stays(&file.path)) {
             remove(&out.join(&file.path))?;
         }
-        forget_exports(out);
+        let told =
+            if same_points(&old, &manifest.files) { Vec::new() } else { forget_exports(out) };
         shift(&next.join(RESULT), &out.join(RESULT))?;
         shift(&next.join(LIST), &out.join(LIST))?;
         // Empty folders; where they stay the next run takes them away.
         let _ = std::fs::remove_dir_all(next);
-        Ok(manifest)
+        Ok((manifest, told))
     }
 
-    /// Whether a list lies in `next`: all of it is written, and some of it may have moved.
+    /// Whether a whole list lies in `next`: all of it is written, and some of it may have moved.
     pub(crate) fn waits(next: &Path) -> bool {
-        next.join(LIST).is_file()
+        Self::read(next).is_ok()
     }
 
     /// The outcome of the run that wrote it.
@@ -173,18 +206,47 @@ impl Manifest {
             reused: vec![
                 "everything: neither inputs, library, settings nor program have changed".into(),
             ],
+            told: Vec::new(),
         }
     }
 }
 
-/// Takes away what was made of the result that was there; nothing else that lies beside it. What cannot be taken away must not keep a
-/// result that is whole from its place.
-fn forget_exports(out: &Path) {
-    let folder = out.join(EXPORT);
+/// A list in JSON with its own digest behind all else.
+pub(crate) fn sealed(text: &str) -> String {
+    let text = text.trim_end();
+    let body = text.strip_suffix('}').unwrap_or(text).trim_end();
+    let digest = Algorithm::Blake3.of_bytes(body.as_bytes());
+    format!("{body}{BEFORE_DIGEST}{digest}{BEHIND_DIGEST}")
+}
+
+/// Whether two results have the same tiles: what was made of their points is true of both.
+fn same_points(old: &[OutputFile], new: &[OutputFile]) -> bool {
+    let tiles = |files: &[OutputFile]| -> BTreeSet<(String, String)> {
+        let tiles = files.iter().filter(|file| file.path.starts_with("tiles/"));
+        tiles.map(|file| (file.path.clone(), file.digest.clone())).collect()
+    };
+    tiles(old) == tiles(new)
+}
+
+/// Takes away what was made of the result that was there, and says so; nothing else that lies
+/// beside it. What cannot be taken away must not keep a result that is whole from its place, and is
+/// named, too.
+fn forget_exports(out: &Path) -> Vec<String> {
+    let mut told = Vec::new();
     for name in crate::conversion::names() {
-        let _ = std::fs::remove_file(folder.join(name));
+        let Ok(path) = straight(out, &format!("{EXPORT}/{name}")) else { continue };
+        let went = match std::fs::remove_file(&path) {
+            Ok(()) => "was taken away",
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => continue,
+            Err(_) => "is to be taken away",
+        };
+        told.push(format!(
+            "{} {went}: it was made of the points of the earlier result, and these are others; `stillpoint export` makes it anew",
+            path.display()
+        ));
     }
-    let _ = std::fs::remove_dir(folder);
+    let _ = std::fs::remove_dir(out.join(EXPORT));
+    told
 }
 
 /// Whether the files of a result are what they were when they were written; all of them are read.
@@ -192,9 +254,12 @@ fn forget_exports(out: &Path) {
 /// # Errors
 /// There is no list.
 pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
-    let manifest = Manifest::read(out)?;
+    let (manifest, digest) = Manifest::read_with_digest(out)?;
     let look = |file: &OutputFile| -> Result<Option<String>> {
-        let path = out.join(&file.path);
+        let path = match straight(out, &file.path) {
+            Ok(path) => path,
+            Err(link) => return Ok(Some(link.to_string())),
+        };
         let Some(algorithm) = Algorithm::of(&file.digest) else {
             return Ok(Some(format!(
                 "{}: its checksum is of no kind that is known",
@@ -214,7 +279,7 @@ pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
         })
     };
     let wrong = engine.fan_out("verify", manifest.files.iter().collect(), look)?;
-    Ok(Checked { manifest, wrong: wrong.into_iter().flatten().collect() })
+    Ok(Checked { manifest, digest, wrong: wrong.into_iter().flatten().collect() })
 }
 
 /// The list of `out`, if it is of `key` and every file is what it was, as far as lengths, times and known digests tell.

@@ -6,8 +6,10 @@
 
 mod cache;
 mod contents;
+mod inside;
 mod manifest;
 mod tree;
+mod vouched;
 
 pub use manifest::{Checked, Manifest, OutputFile, check};
 
@@ -22,8 +24,12 @@ use std::sync::OnceLock;
 
 pub(crate) use cache::{Cache, read, written};
 pub(crate) use contents::Pace;
+pub(crate) use inside::{FILES, FOLDERS, refuse_link, straight};
 pub(crate) use manifest::EXPORT;
+#[cfg(fuzzing)]
+pub(crate) use manifest::sealed;
 pub(crate) use tree::{Part, Tree};
+pub(crate) use vouched::{Vouched, result_of};
 
 /// A digest of what a piece is made from, as 32 hexadecimal digits: the name of its file.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -79,15 +85,18 @@ pub(crate) struct Digests {
     base: String,
 }
 
-/// Gives a whole result, whose files lie beside the output folder, its place there, and remembers what was read for it.
+/// Gives a whole result, whose files lie beside the output folder, its place there, and remembers
+/// what was read for it; what was taken away beside it, in words.
 pub(crate) fn publish(
     job: &Job,
     (output, digests): (&OutputDir, &Digests),
     (outcome, files): (&Outcome, Vec<OutputFile>),
     engine: &Engine,
-) -> Result<()> {
+) -> Result<Vec<String>> {
     Manifest::write(output.next(), digests.whole(job), (outcome, files), engine)?;
-    digests.remember(&Manifest::publish(output.next(), output.out())?, output.out())
+    let (manifest, told) = Manifest::publish(output.next(), output.out())?;
+    digests.remember(&manifest, output.out())?;
+    Ok(told)
 }
 
 impl Digests {

@@ -110,10 +110,29 @@ pub(super) fn write(
     atomic::write(path, &bytes)
 }
 
+/// Digest of what some tiles of one store hold, wherever that lies; scans are numbered from their
+/// first.
+pub(super) fn digest(entries: &[TileEntry]) -> String {
+    let first = entries.first().map_or(0, |e| e.at.scan.0);
+    let mut hasher = blake3::Hasher::new();
+    for e in entries {
+        for n in [e.at.scan.0 - first, e.at.row, e.at.col].iter().chain(&e.n_of).chain(&e.checksums)
+        {
+            hasher.update(&n.to_le_bytes());
+        }
+        hasher.update(&e.first_place.to_le_bytes());
+        hasher.update(&e.range.to_le_bytes());
+        for bound in e.bounds.min.iter().chain(&e.bounds.max) {
+            hasher.update(&bound.to_le_bytes());
+        }
+    }
+    format!("blake3:{}", hasher.finalize().to_hex())
+}
+
 /// Reads and checks a catalogue whose scans are numbered from `first`; gives the entries and the length of the tile file.
 pub(super) fn read(path: &Path, first: u32) -> Result<(Vec<TileEntry>, u64)> {
     let bytes =
-        std::fs::read(path).map_err(|e| Error::of_file("the catalogue cannot be read", path, e))?;
+        std::fs::read(path).map_err(|e| Error::of_read("the catalogue cannot be read", path, e))?;
     let (mut entries, n) = parse(&bytes).map_err(|e| e.at(path.display()))?;
     for entry in &mut entries {
         let Some(scan) = entry.at.scan.0.checked_add(first) else {

@@ -77,7 +77,7 @@ impl Store {
             return Err(broken("the tiles are not those of the catalogue").at(path.display()));
         }
         let file = File::open(&path);
-        let file = file.map_err(|e| Error::of_file("the tiles cannot be opened", &path, e))?;
+        let file = file.map_err(|e| Error::of_read("the tiles cannot be opened", &path, e))?;
         let straight = Straight::past_cache(file);
         let is_whole = entries.iter().map(|_| AtomicU8::new(0)).collect();
         Ok(Self { entries, is_whole, parts: vec![Part { first: 0, path, map, straight }] })
@@ -116,6 +116,15 @@ impl Store {
         &self.entries
     }
 
+    /// Of each of its folders a digest of what it holds: points and checksums of all tiles,
+    /// wherever they lie in their file. The same for whatever memory it was filled with.
+    #[must_use]
+    pub fn contents(&self) -> Vec<String> {
+        let ends = self.parts.iter().skip(1).map(|part| part.first).chain([self.entries.len()]);
+        let parts = self.parts.iter().zip(ends);
+        parts.map(|(part, end)| catalogue::digest(&self.entries[part.first..end])).collect()
+    }
+
     /// Number of points of all tiles.
     #[must_use]
     pub fn n_points(&self) -> u64 {
@@ -131,14 +140,21 @@ impl Store {
         let n_levels = n_levels(skip);
         let (part, Range { start, end }) = self.place(i, n_levels);
         let bytes = &part.map.bytes()[start..end];
-        self.check(i, n_levels, bytes)?;
-        let tile = encode::decode(&self.entries[i], n_levels, bytes);
+        let checked = self.check(i, n_levels, bytes);
+        let tile = checked.map(|()| encode::decode(&self.entries[i], n_levels, bytes));
+        // A file that was cut short meanwhile says more than the checksum of what was put in its
+        // place.
+        part.map.check()?;
         part.map.has_read(end - start);
-        Ok(tile)
+        tile
     }
 
     /// Does something with the points of each of these tiles, with those of a tile level by level, the coarsest first; in the given
     /// order and without a copy. Levels of less than `skip` are not read.
+    ///
+    /// # Errors
+    /// A damaged tile; a store that was cut short meanwhile, of which `work` may have seen zeros:
+    /// what it made is of no use.
     pub fn look_at(
         &self,
         indices: &[usize],
@@ -151,12 +167,17 @@ impl Store {
             indices.get(k + AHEAD).into_iter().for_each(|&i| self.will_need(i, n_levels));
             let (part, Range { start, end }) = self.place(i, n_levels);
             let bytes = &part.map.bytes()[start..end];
-            self.check(i, n_levels, bytes)?;
+            let checked = self.check(i, n_levels, bytes);
+            part.map.check()?;
+            checked?;
             let entry = &self.entries[i];
             for (level, block) in encode::blocks(&entry.n_of).into_iter().take(n_levels).enumerate()
             {
                 work(&encode::points(entry, level, &bytes[block]));
             }
+            // Tiles whose checksums are known are not summed up again: what was cut off since shows
+            // only here.
+            part.map.check()?;
             part.map.has_read(end - start);
         }
         Ok(())
@@ -168,9 +189,9 @@ impl Store {
         let known = is_whole.load(Ordering::Relaxed);
         for (level, block) in encode::blocks(&entry.n_of).into_iter().take(n_levels).enumerate() {
             if known & 1 << level == 0 && crc32c::crc32c(&bytes[block]) != entry.checksums[level] {
-                let at = entry.at;
+                let (at, path) = (entry.at, self.place(i, 0).0.path.display());
                 return Err(broken("the tile is damaged: its checksum is not what it should be")
-                    .at(format!("store, scan {}, tile {} {}", at.scan.0, at.row, at.col)));
+                    .at(format!("{path}: scan {}, tile {} {}", at.scan.0, at.row, at.col)));
             }
             is_whole.fetch_or(1 << level, Ordering::Relaxed);
         }
@@ -259,7 +280,7 @@ impl Store {
         let (i, n_levels) = (pick.i, n_levels(pick.skip));
         let (part, Range { start, end }) = self.place(i, n_levels);
         let bytes = part.straight.read(start as u64, end - start);
-        let bytes = bytes.map_err(|e| Error::of_file("the tiles cannot be read", &part.path, e))?;
+        let bytes = bytes.map_err(|e| Error::of_read("the tiles cannot be read", &part.path, e))?;
         if bytes.len() < end - start {
             return Err(broken("the tiles are cut short").at(part.path.display()));
         }

@@ -233,7 +233,8 @@ fn damage_is_named() {
     let store = Store::open(dir.path(), 0, 1 << 20).expect("opens");
     let error = store.tile(0, 0).expect_err("damaged");
     assert_eq!(error.kind(), Kind::BadInput);
-    assert!(error.to_string().starts_with("store, scan 0, tile"), "{error}");
+    let place = format!("{}: scan 0, tile", tiles.display());
+    assert!(error.to_string().starts_with(&place), "{error}");
     // Who reads no more than the part that is whole does not mind.
     let coarse = (N_LEVELS - finest) as u32;
     assert!(finest > 0 && store.tile(0, coarse).is_ok() && store.tile(1, 0).is_ok());
@@ -242,6 +243,44 @@ fn damage_is_named() {
     assert!(Store::open(dir.path(), 0, 1 << 20).is_err());
     std::fs::remove_file(&tiles).expect("removes");
     assert!(Store::open(dir.path(), 0, 1 << 20).is_err());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_store_that_is_cut_short_under_a_run_is_named_and_the_program_lives() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (store, _) = build(dir.path(), strips(9000), usize::MAX, 1);
+    let path = dir.path().join(TILES);
+    let n = store.entries().len();
+    let cut = |len| std::fs::OpenOptions::new().write(true).open(&path)?.set_len(len);
+    // A tile whose checksums are known already, and one that was never read.
+    store.tile(0, 0).expect("is whole");
+    cut(64).expect("cuts");
+    let named = |error: contract::Error| {
+        assert_eq!(error.kind(), Kind::BadInput);
+        let text = error.to_string();
+        assert!(
+            text.starts_with(&path.display().to_string()) && text.contains("cut short"),
+            "{text}"
+        );
+    };
+    // Pages that the system still has are whole; those behind the new end are not.
+    let errors: Vec<_> = (0..n).filter_map(|i| store.tile(i, 0).err()).collect();
+    assert_eq!(errors.len(), n, "every tile lies in pages that are gone");
+    errors.into_iter().for_each(named);
+    named(store.look_at(&[0, n - 1], 0, |_| ()).expect_err("cut short"));
+}
+
+#[test]
+fn what_a_store_holds_has_one_digest_whatever_its_file_looks_like() {
+    let digest = |n, budget| {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (store, _) = build(dir.path(), strips(n), budget, 2);
+        store.contents()
+    };
+    assert_eq!(digest(9000, usize::MAX), digest(9000, 1 << 20));
+    assert_eq!(digest(9000, usize::MAX).len(), 1);
+    assert_ne!(digest(9000, usize::MAX), digest(6000, usize::MAX));
 }
 
 #[test]

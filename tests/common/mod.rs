@@ -1,5 +1,8 @@
 //! What several tests run on: a small scene, its scans and its library of one model.
 
+#![allow(dead_code, reason = "each test takes what it needs")]
+
+use simulate::scene::Cuboid;
 use std::path::Path;
 use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
@@ -7,16 +10,44 @@ use stillpoint::scanning::{Formats, scan_scene};
 
 /// A palletiser on a bare floor: `robots` and `scans` below a folder, with about so many beams of each scanner.
 pub(crate) fn palletiser(dir: &Path, seed: u64, n_beams: u64) {
+    simulated(dir, "scans", (seed, n_beams), |scene| scene);
+}
+
+/// The same robot beside two boxes, by which rescans are registered: `robots`, and the folder of the
+/// scans.
+pub(crate) fn boxed_cell(dir: &Path, scans: &str, seed: u64, n_beams: u64) {
+    let cuboid = |xyz: [f64; 3], size: [f64; 3]| Cuboid {
+        name: "box".into(),
+        xyz,
+        size,
+        rpy_deg: [0.0; 3],
+        reflectance: 0.5,
+    };
+    simulated(dir, scans, (seed, n_beams), |scene| simulate::Scene {
+        boxes: vec![
+            cuboid([2.4, 2.9, 0.5], [1.2, 0.8, 1.0]),
+            cuboid([-3.1, 1.2, 0.7], [0.6, 1.6, 1.4]),
+        ],
+        ..scene
+    });
+}
+
+fn simulated(
+    dir: &Path,
+    scans: &str,
+    (seed, n_beams): (u64, u64),
+    more: impl Fn(simulate::Scene) -> simulate::Scene,
+) {
     let robots = dir.join("robots");
     write_robots(&robots).expect("the library is written");
     for other in ["demo_welder_2600", "demo_arm_1100"] {
-        std::fs::remove_dir_all(robots.join(other)).expect("one model is enough");
+        let _ = std::fs::remove_dir_all(robots.join(other));
     }
     let library = robot::Library::load(&robots, &robot::Settings::without_clouds()).expect("loads");
     let model = &library.models[0];
     let posture: Vec<f64> =
         (0..model.n_free()).map(|j| model.limits(j).into_iter().sum::<f64>() / 2.0).collect();
-    let scene = simulate::paper_scene(seed, model, &posture, n_beams);
+    let scene = more(simulate::paper_scene(seed, model, &posture, n_beams));
     let engine = Engine::new(2);
-    scan_scene(&scene, &library.models, &dir.join("scans"), Formats::ALL, &engine).expect("scans");
+    scan_scene(&scene, &library.models, &dir.join(scans), Formats::ALL, &engine).expect("scans");
 }

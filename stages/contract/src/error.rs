@@ -65,6 +65,18 @@ impl Error {
         })
     }
 
+    /// What the system refuses about a file that is to be read: one that is not there, no longer or
+    /// not as a file, or that ends early, is bad input.
+    pub fn of_read(what: impl Into<String>, path: &Path, cause: std::io::Error) -> Self {
+        let is_bad = is_missing(&cause);
+        let kind = if is_bad { Kind::BadInput } else { Kind::Io };
+        Self::new(kind, what).because(cause).at(path.display()).hint(if is_bad {
+            "put it back as it was, or make it anew"
+        } else {
+            "check that you may read it, and that its disk or share is there"
+        })
+    }
+
     /// Whether it is for want of room on a disk.
     #[must_use]
     pub fn is_full_disk(&self) -> bool {
@@ -86,6 +98,20 @@ impl Error {
             None => place.to_string(),
             Some(inner) => format!("{place}: {inner}"),
         });
+        self
+    }
+
+    /// Forgets where, for who says it himself.
+    #[must_use]
+    pub fn without_place(mut self) -> Self {
+        self.0.place = None;
+        self
+    }
+
+    /// The same of another kind.
+    #[must_use]
+    pub fn of_kind(mut self, kind: Kind) -> Self {
+        self.0.kind = kind;
         self
     }
 
@@ -140,9 +166,26 @@ impl std::error::Error for Error {
 
 impl From<std::io::Error> for Error {
     fn from(source: std::io::Error) -> Self {
+        if is_missing(&source) {
+            let what = match source.kind() {
+                std::io::ErrorKind::NotFound => "it is not there",
+                std::io::ErrorKind::UnexpectedEof => "it ends early",
+                _ => "it is not of the kind, file or folder, that is read there",
+            };
+            return Self::new(Kind::BadInput, what).because(source).hint(
+                "check the path; what is read must stay as it is until the program has ended",
+            );
+        }
         let kind = if is_full(&source) { Kind::OverBudget } else { Kind::Io };
         Self::new(kind, "the system refused").because(source)
     }
+}
+
+/// Whether a file that is to be read is not there, is none, or ends early: the input is to be
+/// mended, not the machine.
+fn is_missing(cause: &std::io::Error) -> bool {
+    use std::io::ErrorKind::{IsADirectory, NotADirectory, NotFound, UnexpectedEof};
+    matches!(cause.kind(), NotFound | IsADirectory | NotADirectory | UnexpectedEof)
 }
 
 fn is_full(cause: &std::io::Error) -> bool {

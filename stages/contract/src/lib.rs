@@ -20,6 +20,7 @@ mod surface;
 mod tile;
 mod view;
 pub mod words;
+mod xml;
 
 pub use candidate::{Candidate, Cluster, Voxel};
 pub use certainty::{Certainty, DETERMINED_SIGMA, UNDETERMINED_SIGMA};
@@ -40,3 +41,4 @@ pub use surface::{
 };
 pub use tile::{MAX_SKIP, TILE_SIDE, Tile, TileAt, TilePoints};
 pub use view::{Region, View};
+pub use xml::{XmlLimits, check_xml};

@@ -33,18 +33,18 @@ pub trait CopcSteps: Send + Sync {
     fn ends(&self) -> Result<()>;
 }
 
-/// Writes a file of all tiles under `out`; false where there are none. It keeps files as large as the cloud under `scratch`
-/// meanwhile, and works on the threads of the pool that it is called in.
+/// Writes a file of some tiles (see [`tiles`]); false where there are none. It keeps files as large
+/// as the cloud under `scratch` meanwhile, and works on the threads of the pool that it is called
+/// in.
 ///
 /// # Errors
 /// Files that cannot be read or written; a step that is to be the last.
 pub fn write_copc(
-    out: &Path,
+    tiles: &[PathBuf],
     to: &Path,
     scratch: &Path,
     steps: &Arc<impl CopcSteps + 'static>,
 ) -> Result<bool> {
-    let tiles = tiles(out)?;
     if tiles.is_empty() {
         return Ok(false);
     }
@@ -62,7 +62,7 @@ pub fn write_copc(
         node_storage: NodeStorage::Packed,
     };
     let failed = |e: copc_converter::Error| failed(e, &path);
-    let all = Pipeline::scan(&tiles, config).and_then(Pipeline::validate).map_err(failed)?;
+    let all = Pipeline::scan(tiles, config).and_then(Pipeline::validate).map_err(failed)?;
     steps.ends()?;
     let all = all.distribute().map_err(failed)?;
     steps.ends()?;
@@ -78,8 +78,11 @@ pub fn write_copc(
     Ok(true)
 }
 
-/// The tiles of an output folder, in the order of their names.
-pub(crate) fn tiles(out: &Path) -> Result<Vec<PathBuf>> {
+/// The tiles that lie in an output folder, in the order of their names.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn tiles(out: &Path) -> Result<Vec<PathBuf>> {
     let folder = out.join("tiles");
     let failed = |e| Error::of_file("tiles cannot be listed", &folder, e);
     let listed = match std::fs::read_dir(&folder) {

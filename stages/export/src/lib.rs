@@ -25,6 +25,7 @@ mod posture;
 mod record;
 mod refill;
 mod result;
+mod result_file;
 mod review;
 mod robot_model;
 mod robot_picture;
@@ -41,7 +42,7 @@ pub use calibration::{CalibrationEntry, FrameEntry};
 pub use canvas::{Canvas, Rgb, link_color, robot_color};
 pub use change_picture::{ChangedThing, draw_changes};
 pub use clouds::{Clouds, Written};
-pub use copc::{COPC, CopcSteps, write_copc};
+pub use copc::{COPC, CopcSteps, tiles, write_copc};
 pub use e57::{E57Scans, GridPoint, GridScan};
 pub use evidence_picture::draw_evidence;
 pub use junit::write_junit;
@@ -54,7 +55,7 @@ pub use plan_picture::PlanPicture;
 pub use ply::{PLY, write_ply};
 pub use posture::JointWords;
 pub use record::{LasSettings, Quantum, RawVlr, class_of};
-pub use refill::{OldPoint, read_tile};
+pub use refill::{OldPoint, Stated, read_tile};
 pub use result::{
     BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
     SCHEMA, ScanLabels, StageEntry, TipPose, UnitsEntry,

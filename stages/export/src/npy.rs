@@ -62,7 +62,7 @@ pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Resul
         file.seek(SeekFrom::Start(HEADER as u64 + first * len as u64))?;
         file.read_exact(&mut bytes)
     });
-    read.map_err(|e| Error::of_file("array cannot be read back", path, e))?;
+    read.map_err(|e| Error::of_read("array cannot be read back", path, e))?;
     Ok(bytes)
 }
 
@@ -77,7 +77,7 @@ pub(crate) fn n_bytes(path: &Path) -> std::io::Result<u64> {
 /// A file that cannot be read, or whose places do not ascend or are none of the mask's.
 pub fn read_places(path: &Path, n_points: u64) -> Result<Vec<u64>> {
     let n_bytes =
-        std::fs::metadata(path).map_err(|e| Error::of_file("list cannot be read", path, e))?.len();
+        std::fs::metadata(path).map_err(|e| Error::of_read("list cannot be read", path, e))?.len();
     let n = n_bytes.saturating_sub(HEADER as u64) / 8;
     let bytes = read_bytes(path, 0, n as usize, 8)?;
     let (whole, _) = bytes.as_chunks::<8>();

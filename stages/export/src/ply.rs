@@ -2,11 +2,10 @@
 //! libraries that read no LAS (Open3D, MeshLab).
 
 use crate::atomic::AtomicFile;
-use crate::copc::tiles;
 use crate::refill::KINDS;
 use contract::{Error, Kind, PointKind, Result};
 use std::io::{Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Their names: what moves, what stands still.
 pub const PLY: [&str; 2] = ["robots.ply", "fixed.ply"];
@@ -16,17 +15,16 @@ const PIECE: u64 = 1 << 16;
 /// Length of a header, bytes: a comment makes it so long, so that the number of points can be written last.
 const HEADER: usize = 512;
 
-/// Writes [`PLY`] into a folder, of all tiles under `out`; `told` is asked before each whether to go on. Numbers of points; none
-/// where there are no tiles.
+/// Writes [`PLY`] into a folder, of some tiles (see [`tiles`](crate::tiles)); `told` is asked
+/// before each whether to go on. Numbers of points; none where there are no tiles.
 ///
 /// # Errors
 /// Files that cannot be read or written; what `told` says, which ends the work.
 pub fn write_ply(
-    out: &Path,
+    tiles: &[PathBuf],
     into: &Path,
     told: impl Fn() -> Result<()>,
 ) -> Result<Option<[u64; 2]>> {
-    let tiles = tiles(out)?;
     if tiles.is_empty() {
         return Ok(None);
     }
@@ -41,7 +39,7 @@ pub fn write_ply(
     let has_color = open(&tiles[0])?.header().point_format().has_color;
     let [moving, fixed] = PLY.map(|name| Ply::create(&into.join(name), has_color));
     let (mut moving, mut fixed) = (moving?, fixed?);
-    for tile in &tiles {
+    for tile in tiles {
         told()?;
         let bad = |e| bad(e, tile);
         let mut reader = open(tile)?;

@@ -26,6 +26,8 @@ pub(crate) const KINDS: [PointKind; 256] = {
 /// Records that are read at a time: what is made of them stays in a processor's own cache.
 const PIECE: u64 = 1 << 12;
 
+/// Bytes that are summed up at a time.
+const SUMMED: usize = 1 << 18;
 /// Bytes that wait for a tile.
 const WAITING: usize = 1 << 20;
 
@@ -38,17 +40,32 @@ pub struct OldPoint {
     pub label: Label,
 }
 
+/// What a list of files says of a tile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stated {
+    /// Its length, bytes.
+    pub n_bytes: u64,
+    /// CRC-32C (Castagnoli) of all of them.
+    pub crc32c: u32,
+}
+
 impl Spool {
     /// Adds the points of a tile of ours, with records as its own, that `keep` wants: it is asked piece by piece, and answers for
-    /// each point.
+    /// each point. Where a sum is `stated`, the tile is compared with it while it is read.
     ///
     /// # Errors
-    /// A tile that is not one of ours or cannot be read; a file that cannot be written.
-    pub fn take_from(&mut self, old: &Path, keep: impl Fn(&[OldPoint]) -> Vec<bool>) -> Result<()> {
+    /// A tile that is not one of ours, is not as stated or cannot be read; a file that cannot be
+    /// written.
+    pub fn take_from(
+        &mut self,
+        old: &Path,
+        stated: Option<Stated>,
+        keep: impl Fn(&[OldPoint]) -> Vec<bool>,
+    ) -> Result<()> {
         let las = self.las().clone();
         let (record_len, mut blocks) = (las.record_len(), Blocks::new(WAITING));
         let (mut bytes, mut points) = (Vec::new(), Vec::new());
-        let mut tile = Tile::open(old, &las)?;
+        let mut tile = Tile::open(old, &las, stated)?;
         while let Some(records) = tile.piece(&mut bytes)? {
             points.clear();
             points.extend(records.chunks_exact(record_len).map(|record| point(record, &las)));
@@ -63,17 +80,21 @@ impl Spool {
     }
 }
 
-/// Hands over the points of a tile of ours, with records as `las` has them, piece by piece.
+/// Hands over the points of a tile of ours, with records as `las` has them, piece by piece. Where a
+/// sum is `stated`, the tile is compared with it while it is read: what was taken is of no use
+/// where that fails at its end.
 ///
 /// # Errors
-/// A tile that is not one of ours or cannot be read; what `take` says, which ends the work.
+/// A tile that is not one of ours, is not as stated or cannot be read; what `take` says, which ends
+/// the work.
 pub fn read_tile(
     path: &Path,
     las: &LasSettings,
+    stated: Option<Stated>,
     mut take: impl FnMut(&[OldPoint]) -> Result<()>,
 ) -> Result<()> {
     let (record_len, mut bytes, mut points) = (las.record_len(), Vec::new(), Vec::new());
-    let mut tile = Tile::open(path, las)?;
+    let mut tile = Tile::open(path, las, stated)?;
     while let Some(records) = tile.piece(&mut bytes)? {
         points.clear();
         points.extend(records.chunks_exact(record_len).map(|record| point(record, las)));
@@ -118,6 +139,9 @@ struct Tile<'a> {
     records: Records,
     record_len: usize,
     left: u64,
+    /// What it should come to, and what was read so far does; where that is known and it is read
+    /// from its beginning to its end.
+    sum: Option<(Stated, Stated)>,
 }
 
 enum Records {
@@ -126,8 +150,8 @@ enum Records {
 }
 
 impl<'a> Tile<'a> {
-    fn open(path: &'a Path, las: &LasSettings) -> Result<Self> {
-        let failed = |e| Error::of_file("tile cannot be read", path, e);
+    fn open(path: &'a Path, las: &LasSettings, stated: Option<Stated>) -> Result<Self> {
+        let failed = |e| Error::of_read("tile cannot be read", path, e);
         let foreign = || {
             let what = "this is no tile of the earlier result: its records are others";
             Error::bad_input(what).at(path.display()).hint("run the whole plant again")
@@ -144,30 +168,76 @@ impl<'a> Tile<'a> {
         }
         let left =
             header.large_file.map(|large| large.number_of_point_records).ok_or_else(foreign)?;
+        let mut sum = None;
         let records = if las.compress {
+            // Chunks are read as their table says, not one behind the other: it is summed up
+            // before.
+            if let Some(stated) = stated {
+                let read = sum_of(file.get_mut()).map_err(failed)?;
+                compare(path, stated, read)?;
+            }
             file.seek(SeekFrom::Start(expected as u64)).map_err(failed)?;
             let laz = crate::las::laz_vlr(las);
             let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;
             Records::Compressed(Box::new(reader))
         } else {
+            if let Some(stated) = stated {
+                let mut head = vec![0; expected];
+                file.seek(SeekFrom::Start(0))
+                    .and_then(|_| file.read_exact(&mut head))
+                    .map_err(failed)?;
+                let read = Stated { n_bytes: expected as u64, crc32c: crc32c::crc32c(&head) };
+                sum = Some((stated, read));
+            }
             Records::Plain(Straight::new(file.into_inner(), expected as u64).map_err(failed)?)
         };
-        Ok(Self { path, records, record_len: las.record_len(), left })
+        Ok(Self { path, records, record_len: las.record_len(), left, sum })
     }
 
     /// The next records, read into `bytes`; `None` behind the last.
     fn piece<'b>(&mut self, bytes: &'b mut Vec<u8>) -> Result<Option<&'b [u8]>> {
         let n = self.left.min(PIECE);
         if n == 0 {
-            return Ok(None);
+            return match self.sum {
+                Some((stated, read)) => compare(self.path, stated, read).map(|()| None),
+                None => Ok(None),
+            };
         }
         bytes.resize(n as usize * self.record_len, 0);
         let read = match &mut self.records {
             Records::Plain(file) => file.read_exact(bytes),
             Records::Compressed(reader) => reader.decompress_many(bytes),
         };
-        read.map_err(|e| Error::of_file("tile cannot be read", self.path, e))?;
+        read.map_err(|e| Error::of_read("tile cannot be read", self.path, e))?;
+        if let Some((_, read)) = &mut self.sum {
+            read.n_bytes += bytes.len() as u64;
+            read.crc32c = crc32c::crc32c_append(read.crc32c, bytes);
+        }
         self.left -= n;
         Ok(Some(bytes))
     }
+}
+
+/// Length and sum of a whole file, from its beginning.
+fn sum_of(file: &mut File) -> std::io::Result<Stated> {
+    let (mut bytes, mut sum) = (vec![0; SUMMED], Stated { n_bytes: 0, crc32c: 0 });
+    file.seek(SeekFrom::Start(0))?;
+    loop {
+        let n = file.read(&mut bytes)?;
+        if n == 0 {
+            return Ok(sum);
+        }
+        sum.n_bytes += n as u64;
+        sum.crc32c = crc32c::crc32c_append(sum.crc32c, &bytes[..n]);
+    }
+}
+
+/// Refuses a tile that is not what was written.
+fn compare(path: &Path, stated: Stated, read: Stated) -> Result<()> {
+    if stated == read {
+        return Ok(());
+    }
+    Err(Error::bad_input("its bytes are not those that were written")
+        .at(path.display())
+        .hint("`stillpoint verify` names all files that are wrong; run the same job again"))
 }

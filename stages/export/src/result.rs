@@ -1,17 +1,15 @@
 //! `result.json`: what was found, how sure that is, and from what; schema `stillpoint.result/1`, which grows by
 //! adding fields. Numbers that are not finite are written as null.
 
-use crate::atomic;
 use crate::calibration::CalibrationEntry;
 use crate::mask::MaskFiles;
 use crate::places::Places;
 use crate::review::ReviewEntry;
 use crate::session::RescanEntry;
 use crate::space::SpaceEntry;
-use contract::{Certainty, Error, Fit, JointFit, Kind, Mask, Result};
+use contract::{Certainty, Fit, JointFit, Mask};
 use geometry::Pose;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "stillpoint.result/1";
@@ -407,33 +405,6 @@ impl ScanLabels {
         let MaskFiles { kind, robot, link } = MaskFiles::of(mask.id);
         let (scan, input) = (mask.name.clone(), mask.input.0);
         Self { scan, input, n_points, kind, robot, link, superseded: None }
-    }
-}
-
-impl ResultFile {
-    /// Reads the `result.json` of an output folder, or of a file of that kind.
-    pub fn read(path: &Path) -> Result<Self> {
-        let file = if path.is_dir() { path.join("result.json") } else { path.to_path_buf() };
-        let bad = |e: String| {
-            Error::bad_input(e)
-                .at(file.display())
-                .hint("give the output folder of a run that ended")
-        };
-        let text = std::fs::read_to_string(&file).map_err(|e| bad(e.to_string()))?;
-        let result: Self = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
-        if result.schema == SCHEMA {
-            Ok(result)
-        } else {
-            Err(bad(format!("the schema is \"{}\", not \"{SCHEMA}\"", result.schema)))
-        }
-    }
-
-    /// Writes `result.json` under the output folder: the last file of a run, so that its presence says that all the
-    /// others are whole.
-    pub fn write(&self, out: &Path) -> Result<()> {
-        let text = serde_json::to_string_pretty(self)
-            .map_err(|e| Error::new(Kind::Bug, "result does not serialize").because(e))?;
-        atomic::write(&out.join("result.json"), (text + "\n").as_bytes())
     }
 }
 

@@ -14,13 +14,15 @@ use crate::oddities::Oddities;
 use crate::reader::{MaskSeed, RawStrips, Reader, Reading, Sampled, ScanSeed, Want};
 use crate::units::{self, Choice, Units};
 use ::e57::E57Reader;
-use contract::{Error, Format, Kind, Result};
+use contract::{Error, Format, Kind, Result, XmlLimits, check_xml};
 use pages::{PAGE, Pages};
 use scan::E57Scan;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+/// Bytes of the description that are read at a time: as many as [`Pages::read`] gives.
+const AT_ONCE: usize = 64 << 10;
 /// Bytes of the file's header.
 const HEADER: usize = 48;
 
@@ -152,17 +154,31 @@ fn check_header(pages: &mut Pages, settings: &Settings) -> Result<()> {
     }
     let (offset, len) = (number(24), number(32));
     let start = pages.logical(offset).map_err(|e| e.at(place))?;
-    if len > settings.max_xml_bytes || start.checked_add(len).is_none_or(|end| end > pages.len()) {
+    if len > settings.max_xml_bytes {
+        let (limit, way) = (settings.max_xml_bytes, "raise --set ingest.max_xml_bytes");
+        let what = format!("description of the file is longer than {limit} bytes, \"{len}\"");
+        return Err(Error::bad_input(what).at(place).hint(format!("if the file is right, {way}")));
+    }
+    if start.checked_add(len).is_none_or(|end| end > pages.len()) {
         return Err(Error::bad_input(format!(
             "description of the file reaches outside it, bytes \"{len}\""
         ))
         .at(place));
     }
-    // Every page of the description is checked here, so that an error names it.
-    for page in Pages::page(start)..=Pages::page(start + len.max(1) - 1) {
-        pages.read(page * (PAGE - 4), 1).map_err(|e| e.at("description"))?;
+    // Every page of the description is checked here, so that an error names it; and what is in it
+    // counted, before its reader keeps all of it.
+    let mut text = Vec::new();
+    while (text.len() as u64) < len {
+        let n = (len as usize - text.len()).min(AT_ONCE);
+        let piece = pages.read(start + text.len() as u64, n).map_err(|e| e.at("description"))?;
+        text.extend_from_slice(piece);
     }
-    Ok(())
+    let limits = XmlLimits {
+        max_nodes: settings.max_xml_nodes,
+        max_attributes: settings.max_xml_attributes,
+        room: "ingest",
+    };
+    check_xml(&text, &limits).map_err(|what| Error::bad_input(what).at("description"))
 }
 
 /// An error of the crate that parses descriptions, in our words.

@@ -26,6 +26,7 @@ mod raster;
 mod raster_free;
 mod raster_native;
 mod reader;
+mod regular;
 mod scanners;
 mod settings;
 mod size;
@@ -38,8 +39,10 @@ pub use glance::{Glance, Sample};
 pub use inspect::{
     BoundsText, Description, Fact, LatticeText, PoseText, ScanDescription, describe,
 };
+pub use map::{Mapped, map};
 pub use position::MISPLACED;
 pub use reader::{Extent, Want};
+pub use regular::{read_text, regular};
 pub use scanners::{Scanner, Scanners};
 pub use settings::Settings;
 pub use sources::{Before, Piece, Pieces, Sources, Strips, open, open_after};

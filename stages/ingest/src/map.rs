@@ -1,4 +1,5 @@
-//! Path in, bytes out: the one place of this room that maps files into memory.
+//! Path in, bytes out: the one place of the program that maps files into memory, inputs and the
+//! store alike.
 //!
 //! A file that is cut short, or a share that goes away, while it is mapped would end the program with a signal (SIGBUS). The
 //! signal is caught: the page that is missing is replaced by zeros, so that the reader comes to an end, and the map says
@@ -11,22 +12,28 @@ use std::fs::File;
 use std::ops::Deref;
 use std::path::Path;
 
-/// A read-only map of a whole file.
-pub(crate) struct Mapped {
+/// A read-only map of a whole file. After its bytes were used, [`Mapped::check`] says whether they
+/// were there.
+pub struct Mapped {
     map: Mmap,
     /// The same file, to be read otherwise.
     file: File,
     watch: guard::Watch,
 }
 
-/// Maps a whole file, read only. An empty file is refused, since it cannot be mapped and holds nothing.
-pub(crate) fn map(path: &Path) -> Result<Mapped> {
+/// Maps a whole file, read only.
+///
+/// # Errors
+/// A file that cannot be opened or mapped; an empty one, since it cannot be mapped and holds
+/// nothing.
+pub fn map(path: &Path) -> Result<Mapped> {
     let file = File::open(path)?;
     if file.metadata()?.len() == 0 {
         return Err(Error::bad_input("the file is empty"));
     }
-    // SAFETY: the map is private to this room and only read, and inputs are never written by us. What remains is
-    // another process that shortens the file while it is read: `guard` takes care of that.
+    // SAFETY: the map is only read. Inputs are never written by us; files of the store are renamed
+    // to their place whole and never written again. What remains is another process that shortens
+    // the file while it is read: `guard` takes care of that.
     let map = unsafe { Mmap::map(&file)? };
     let watch = guard::Watch::over(&map);
     Ok(Mapped { map, file, watch })
@@ -34,7 +41,8 @@ pub(crate) fn map(path: &Path) -> Result<Mapped> {
 
 impl Mapped {
     /// The file that is mapped, whatever has its name by now.
-    pub(crate) fn file(&self) -> &File {
+    #[must_use]
+    pub fn file(&self) -> &File {
         &self.file
     }
 
@@ -42,12 +50,34 @@ impl Mapped {
     ///
     /// # Errors
     /// The file was cut short, or could not be reached any more: what was read of it is of no use.
-    pub(crate) fn check(&self) -> Result<()> {
-        if self.watch.is_whole() {
+    pub fn check(&self) -> Result<()> {
+        // Of the page in which a file ends now the rest reads as zeros without a signal: only its
+        // length tells.
+        let is_as_long = self.file.metadata().is_ok_and(|meta| meta.len() >= self.map.len() as u64);
+        if self.watch.is_whole() && is_as_long {
             return Ok(());
         }
         Err(Error::bad_input("the file was cut short or went away while it was read")
             .hint("start again once it is whole"))
+    }
+
+    /// Has the system read `n` bytes from `start` on, which will be asked for soon. Advice only:
+    /// errors are no harm.
+    pub fn will_need(&self, start: usize, n: usize) {
+        #[cfg(unix)]
+        let _ = self.map.advise_range(memmap2::Advice::WillNeed, start, n);
+        #[cfg(not(unix))]
+        let _ = (start, n);
+    }
+
+    /// Gives its pages back to the system, which reads them again where they are asked for again.
+    /// Advice only.
+    pub fn give_back(&self) {
+        // SAFETY: the map is shared and read-only, so that a dropped page is read again from the
+        // file with the same bytes; a page of zeros in the place of a missing one is private and
+        // becomes zeros again.
+        #[cfg(unix)]
+        let _ = unsafe { self.map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
     }
 }
 
@@ -180,14 +210,26 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("scan.las");
         let bytes: Vec<u8> = (0..1 << 20).map(|i| i as u8 | 1).collect();
-        std::fs::write(&path, &bytes).expect("writes");
-        let [cut, whole] = [map(&path).expect("maps"), map(&path).expect("maps")];
+        let other = dir.path().join("other.las");
+        let mapped = [&path, &other].map(|path| {
+            std::fs::write(path, &bytes).expect("writes");
+            map(path).expect("maps")
+        });
+        let [cut, whole] = mapped;
         assert_eq!(whole[..1000], bytes[..1000]);
-        File::options().write(true).open(&path).and_then(|f| f.set_len(8192)).expect("cuts");
-        assert!(cut[..8192].iter().all(|b| b & 1 == 1) && cut.check().is_ok());
+        assert!(cut.check().is_ok());
+        let shorten = |n| File::options().write(true).open(&path).and_then(|f| f.set_len(n));
+        // Within its last page there is no signal.
+        shorten((1 << 20) - 10).expect("cuts");
+        assert!(cut[(1 << 20) - 1] == 0 && cut.check().is_err());
+        shorten(8192).expect("cuts");
+        assert!(cut[..8192].iter().all(|b| b & 1 == 1));
         let sum: u64 = cut.iter().map(|b| u64::from(*b)).sum();
         assert_eq!(sum, bytes[..8192].iter().map(|b| u64::from(*b)).sum::<u64>());
         assert!(cut.check().expect_err("torn").to_string().contains("cut short"));
         assert!(whole.check().is_ok());
+        // Pages that were given back are read again; missing ones stay missing.
+        cut.give_back();
+        assert!(cut[..8192].iter().all(|b| b & 1 == 1) && cut[8192] == 0 && cut.check().is_err());
     }
 }

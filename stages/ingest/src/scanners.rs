@@ -1,12 +1,12 @@
 //! The file of `--scanners` in (TOML or JSON); scanner poses out, world from scan, each checked.
 
+use crate::regular::read_text;
 use crate::settings::Settings;
 use contract::{Error, Kind, Result};
 use geometry::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::io::Read as _;
 use std::path::Path;
 
 /// Most entries of a file: LAS tells no more sources apart.
@@ -50,21 +50,8 @@ impl Scanners {
     ///
     /// # Errors
     /// What cannot be read, is unknown, not finite, or stated twice is refused, with its place.
-    pub fn read(path: &Path) -> Result<Self> {
-        let most = Settings::default().max_scanners_bytes;
-        let mut text = String::new();
-        let read =
-            std::fs::File::open(path).and_then(|f| f.take(most + 1).read_to_string(&mut text));
-        match read {
-            Err(cause) if cause.kind() == std::io::ErrorKind::InvalidData => {
-                return Err(Error::bad_input("the file is not text").at(path.display()));
-            }
-            Err(cause) => return Err(Error::from(cause).at(path.display())),
-            Ok(n) if n as u64 > most => {
-                return Err(Error::bad_input(format!("more than {most} bytes")).at(path.display()));
-            }
-            Ok(_) => {}
-        }
+    pub fn read(path: &Path, settings: &Settings) -> Result<Self> {
+        let text = read_text(path, settings.max_scanners_bytes, "ingest.max_scanners_bytes")?;
         Self::parse(&text).map_err(|e| e.at(path.display()))
     }
 

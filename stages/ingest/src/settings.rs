@@ -7,10 +7,19 @@ pub struct Settings {
     /// the second-level cache.
     pub strip_points: usize,
     /// Largest XML section of an E57 file that is read, bytes. Real ones stay below 1 MB even with thousands of
-    /// images; a larger one is a lie of the header.
+    /// images.
     pub max_xml_bytes: u64,
+    /// Most elements, attributes and texts of that section: its reader keeps about 80 bytes of
+    /// each.
+    pub max_xml_nodes: u64,
+    /// Most attributes of one element of it: real ones have below ten, and its reader compares each
+    /// with all others.
+    pub max_xml_attributes: u64,
     /// Largest `--scanners` file, bytes: 100,000 scanners fit.
     pub max_scanners_bytes: u64,
+    /// Largest configuration, review, scene, path or list of readings, bytes: texts that people or
+    /// small programs write.
+    pub max_text_bytes: u64,
     /// Points of a scan that the lattice is estimated from: angles to a hundredth of a pixel need no more.
     pub sample_points: usize,
     /// Largest memory for one LAZ chunk once decompressed, bytes. Chunks have 50,000 points (2 MB) in practice; a
@@ -47,8 +56,11 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             strip_points: 65_536,
-            max_xml_bytes: 64 << 20,
+            max_xml_bytes: 16 << 20,
+            max_xml_nodes: 2_000_000,
+            max_xml_attributes: 256,
             max_scanners_bytes: 16 << 20,
+            max_text_bytes: 64 << 20,
             sample_points: 60_000,
             max_laz_chunk_bytes: 512 << 20,
             max_range: 1.0e5,

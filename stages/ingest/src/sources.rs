@@ -7,6 +7,7 @@ use crate::looked::moved;
 use crate::poses::Poses;
 use crate::raster::Steps;
 use crate::reader::{self, Extent, RawStrip, Reader, Reading, ScanSeed, Want};
+use crate::regular::regular;
 use crate::scanners::Scanners;
 use crate::settings::Settings;
 use crate::units::{Choice, Units};
@@ -254,12 +255,11 @@ impl Sources {
     }
 
     fn add(&mut self, path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<()> {
-        let meta = std::fs::metadata(path)?;
-        if meta.is_dir() {
-            return Err(
-                Error::new(Kind::Usage, "this is a folder").hint("name the scan files in it")
-            );
+        // Its own place is put before it by who adds it.
+        if let Err(e) = regular(path) {
+            return Err(e.without_place());
         }
+        let meta = std::fs::metadata(path)?;
         let reader = open_file(path, poses, settings)?;
         let id = InputId(self.inputs.len() as u32);
         let (first_scan, first_mask) = (self.scans.len() as u32, self.masks.len() as u32);

@@ -129,8 +129,8 @@ impl Bodies<'_> {
         }
         let extension =
             found.path.extension().map_or_else(String::new, |e| e.to_string_lossy().into_owned());
-        let soup = read_bytes(&found.path, self.settings.max_mesh_bytes)
-            .and_then(|bytes| mesh::read(&bytes, &extension));
+        let soup = read_bytes(&found.path, self.settings.max_mesh_bytes, "max_mesh_bytes")
+            .and_then(|bytes| mesh::read(&bytes, &extension, self.settings));
         match soup {
             Ok(soup) => {
                 for note in &soup.notes {

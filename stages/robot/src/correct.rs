@@ -2,6 +2,7 @@
 //! was written, but for the declared encoding: what comes out is UTF-8.
 
 use crate::encoding;
+use crate::load::Settings;
 use crate::urdf::{self, has_quaternions};
 use contract::{Error, Result};
 use geometry::{Pose, Vector};
@@ -14,6 +15,7 @@ use roxmltree::{Document, Node};
 /// Not a URDF, or a joint that it has not.
 pub fn correct(text: &str, moves: &[(String, Pose)]) -> Result<String> {
     let text = encoding::declare_utf8(text);
+    contract::check_xml(text.as_bytes(), &Settings::default().xml()).map_err(Error::bad_input)?;
     let document = Document::parse(&text)
         .map_err(|e| Error::bad_input(format!("not well-formed XML ({e})")))?;
     let turns = has_quaternions(document.root_element());

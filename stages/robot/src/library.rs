@@ -4,7 +4,7 @@ use crate::finding::{Finding, Findings, Severity};
 use crate::load::{Settings, load, urdfs};
 use crate::model::Model;
 use contract::words::count;
-use contract::{Error, Kind, Result};
+use contract::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// All models that a run may find.
@@ -31,8 +31,8 @@ impl Library {
 
     /// Everything wrong with a library, and what is worth knowing; a library that cannot be opened is one finding.
     #[must_use]
-    pub fn lint(dir: &Path) -> Vec<Finding> {
-        let settings = Settings::without_clouds();
+    pub fn lint(dir: &Path, settings: &Settings) -> Vec<Finding> {
+        let settings = &Settings { clouds: false, ..*settings };
         let fail = |error: &Error| {
             let mut findings = Findings::new("");
             findings.fail(dir.display(), error.to_string(), "");
@@ -43,7 +43,7 @@ impl Library {
             Err(error) => return fail(&error),
         };
         for folder in &folders {
-            library.add(Self::load_folder(dir, folder, &settings));
+            library.add(Self::load_folder(dir, folder, settings));
         }
         if folders.is_empty() {
             library.findings.extend(fail(&empty(dir)));
@@ -60,7 +60,7 @@ impl Library {
         let at = |e: std::io::Error| {
             let is_missing = e.kind() == std::io::ErrorKind::NotFound;
             let error = if is_missing {
-                Error::new(Kind::Usage, "there is no such folder")
+                Error::bad_input("there is no such folder")
             } else {
                 Error::from(e)
             };

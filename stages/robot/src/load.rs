@@ -6,11 +6,11 @@ use crate::model::{Link, Model};
 use crate::notes::{named_passive, note_links};
 use crate::reading::{file_name, read_text, read_xml};
 use crate::resolve::Roots;
-use crate::sheet::{MAX_SHEET_BYTES, Sheet, SubChain};
+use crate::sheet::{Sheet, SubChain};
 use crate::tree::Tree;
-use crate::urdf::{Description, MAX_URDF_BYTES};
+use crate::urdf::Description;
 use crate::{chain, close, cloud, tree, urdf};
-use contract::{Error, Fan, OneByOne, Result};
+use contract::{Error, Fan, OneByOne, Result, XmlLimits};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -25,11 +25,33 @@ pub struct Settings {
     pub max_samples: usize,
     /// Largest mesh file that is read, bytes. 256 MiB: ten times the largest robot met, all links together.
     pub max_mesh_bytes: u64,
+    /// What a COLLADA file may come to in memory and work, times its size and a megabyte more: a
+    /// file names the same geometry again and again, and nodes that do. Real ones come to four
+    /// times their size.
+    pub max_mesh_growth: u64,
+    /// Largest URDF and `robot.toml` that is read, bytes: text about a few dozen links. Real ones
+    /// stay below 1 MiB.
+    pub max_urdf_bytes: u64,
+    /// Most elements, attributes and texts of a URDF or COLLADA file: their reader keeps about 80
+    /// bytes of each.
+    pub max_xml_nodes: u64,
+    /// Most attributes of one element of them: real ones have below ten, and their reader compares
+    /// each with all others.
+    pub max_xml_attributes: u64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { clouds: true, spacing: 0.005, max_samples: 60_000, max_mesh_bytes: 256 << 20 }
+        Self {
+            clouds: true,
+            spacing: 0.005,
+            max_samples: 60_000,
+            max_mesh_bytes: 256 << 20,
+            max_mesh_growth: 32,
+            max_urdf_bytes: 4 << 20,
+            max_xml_nodes: 4_000_000,
+            max_xml_attributes: 256,
+        }
     }
 }
 
@@ -38,6 +60,14 @@ impl Settings {
     #[must_use]
     pub fn without_clouds() -> Self {
         Self { clouds: false, ..Self::default() }
+    }
+
+    pub(crate) fn xml(&self) -> XmlLimits {
+        XmlLimits {
+            max_nodes: self.max_xml_nodes,
+            max_attributes: self.max_xml_attributes,
+            room: "robot",
+        }
     }
 }
 
@@ -104,7 +134,11 @@ pub(crate) fn load(
             return None;
         }
     };
-    let sheet = read_sheet(folder, findings)?;
+    if let Err(what) = roots.check() {
+        findings.fail(folder.display(), what, "put the model's folder itself into the library");
+        return None;
+    }
+    let sheet = read_sheet(folder, (&roots, settings), findings)?;
     let path = urdf_in(folder, &sheet, &roots, findings)?;
     Loader { name, roots, settings }.load(&path, &sheet, findings)
 }
@@ -116,7 +150,11 @@ pub(crate) fn load(
 pub fn urdf_of(folder: &Path) -> Result<PathBuf> {
     let mut findings = Findings::new(&file_name(folder));
     let roots = Roots::new(folder, None).map_err(|e| Error::from(e).at(folder.display()))?;
-    let mut find = || urdf_in(folder, &read_sheet(folder, &mut findings)?, &roots, &mut findings);
+    let settings = Settings::default();
+    let mut find = || {
+        let sheet = read_sheet(folder, (&roots, &settings), &mut findings)?;
+        urdf_in(folder, &sheet, &roots, &mut findings)
+    };
     find().ok_or_else(|| findings.first_error())
 }
 
@@ -128,7 +166,8 @@ fn urdf_in(
     findings: &mut Findings,
 ) -> Option<PathBuf> {
     let Some(written) = &sheet.urdf else {
-        return find_urdf(folder, findings);
+        let path = find_urdf(folder, findings)?;
+        return inside(&path, roots, findings);
     };
     match roots.find(written) {
         Ok(found) => Some(found.path),
@@ -139,12 +178,17 @@ fn urdf_in(
     }
 }
 
-fn read_sheet(folder: &Path, findings: &mut Findings) -> Option<Sheet> {
+fn read_sheet(
+    folder: &Path,
+    (roots, settings): (&Roots, &Settings),
+    findings: &mut Findings,
+) -> Option<Sheet> {
     let path = folder.join("robot.toml");
-    if !path.exists() {
+    if path.symlink_metadata().is_err() {
         return Some(Sheet::default());
     }
-    let text = read_text(&path, MAX_SHEET_BYTES, "robot.toml", findings)?;
+    let path = inside(&path, roots, findings)?;
+    let text = read_text(&path, settings.max_urdf_bytes, "robot.toml", findings)?;
     match toml::from_str(&text) {
         Ok(sheet) => Some(sheet),
         Err(error) => {
@@ -153,6 +197,12 @@ fn read_sheet(folder: &Path, findings: &mut Findings) -> Option<Sheet> {
             None
         }
     }
+}
+
+/// A file of the model, unless it is a link that leads out of its folder and the library's.
+fn inside(path: &Path, roots: &Roots, findings: &mut Findings) -> Option<PathBuf> {
+    let found = roots.inside(path);
+    found.map_err(|what| findings.fail(file_name(path), what, "put the file itself there")).ok()
 }
 
 /// `robot.urdf`, or the only URDF there is.
@@ -208,8 +258,8 @@ struct Loader<'a> {
 impl Loader<'_> {
     fn load(&self, path: &Path, sheet: &Sheet, findings: &mut Findings) -> Option<Model> {
         let file = file_name(path);
-        let text = read_xml(path, MAX_URDF_BYTES, &file, findings)?;
-        let mut description = urdf::read(&text, &file, findings)?;
+        let text = read_xml(path, self.settings.max_urdf_bytes, &file, findings)?;
+        let mut description = urdf::read(&text, &file, &self.settings.xml(), findings)?;
         let mut passive = BTreeMap::new();
         let mut moving = Vec::new();
         for sub_chain in &sheet.sub_chain {
@@ -274,8 +324,9 @@ impl Loader<'_> {
         let found = self.roots.find(written).map_err(|what| {
             findings.fail(&place, format!("{what} \"{written}\""), "mend the name");
         });
-        let text = read_xml(&found.ok()?.path, MAX_URDF_BYTES, written, findings)?;
-        let mut sub = urdf::read(&text, written, findings)?;
+        let most = self.settings.max_urdf_bytes;
+        let text = read_xml(&found.ok()?.path, most, written, findings)?;
+        let mut sub = urdf::read(&text, written, &self.settings.xml(), findings)?;
         let children: BTreeSet<String> = sub.joints.iter().map(|j| j.child.clone()).collect();
         let roots: Vec<String> = sub
             .links

@@ -2,6 +2,7 @@
 
 use crate::encoding;
 use crate::finding::Findings;
+use crate::load::Settings;
 use contract::{Error, Result};
 use std::borrow::Cow;
 use std::io::Read as _;
@@ -11,8 +12,17 @@ pub(crate) fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
-/// Reads a regular file of at most `limit` bytes.
-pub(crate) fn read_bytes(path: &Path, limit: u64) -> std::result::Result<Vec<u8>, String> {
+/// Reads a regular file of at most `limit` bytes, which the setting of this room with this name
+/// sets.
+pub(crate) fn read_bytes(
+    path: &Path,
+    limit: u64,
+    setting: &str,
+) -> std::result::Result<Vec<u8>, String> {
+    // A pipe waits for ever for somebody to write, and devices may have no end.
+    if path.metadata().is_ok_and(|meta| !meta.is_file()) {
+        return Err("is no regular file, and nothing else is read".to_owned());
+    }
     let open = || {
         let file = std::fs::File::open(path)?;
         let len = file.metadata()?.len();
@@ -24,7 +34,9 @@ pub(crate) fn read_bytes(path: &Path, limit: u64) -> std::result::Result<Vec<u8>
     };
     match open() {
         Ok((len, bytes)) if len <= limit => Ok(bytes),
-        Ok((len, _)) => Err(format!("is larger than the limit of {limit} bytes \"{len}\"")),
+        Ok((len, _)) => Err(format!(
+            "is larger than the limit of {limit} bytes \"{len}\"; if the file is right, raise --set robot.{setting}"
+        )),
         Err(error) => Err(format!("cannot be read ({error})")),
     }
 }
@@ -35,7 +47,7 @@ pub(crate) fn read_text(
     place: &str,
     findings: &mut Findings,
 ) -> Option<String> {
-    let text = read_bytes(path, limit)
+    let text = read_bytes(path, limit, "max_urdf_bytes")
         .and_then(|bytes| String::from_utf8(bytes).map_err(|e| format!("is not UTF-8 ({e})")));
     text.map_err(|what| findings.fail(place, what, "mend or replace the file")).ok()
 }
@@ -47,7 +59,7 @@ pub(crate) fn read_xml(
     place: &str,
     findings: &mut Findings,
 ) -> Option<String> {
-    read_bytes(path, limit)
+    read_bytes(path, limit, "max_urdf_bytes")
         .and_then(|bytes| encoding::decode(&bytes).map(Cow::into_owned))
         .map_err(|what| findings.fail(place, what, "mend or replace the file"))
         .ok()
@@ -58,7 +70,7 @@ pub(crate) fn read_xml(
 /// # Errors
 /// A file that cannot be read, is larger than any URDF, or is in an encoding that is not read.
 pub fn urdf_text(path: &Path) -> Result<String> {
-    read_bytes(path, crate::urdf::MAX_URDF_BYTES)
+    read_bytes(path, Settings::default().max_urdf_bytes, "max_urdf_bytes")
         .and_then(|bytes| encoding::decode(&bytes).map(Cow::into_owned))
         .map_err(|what| Error::bad_input(what).at(path.display()))
 }

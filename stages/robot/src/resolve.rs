@@ -27,6 +27,29 @@ impl Roots {
         })
     }
 
+    /// Whether the model's folder lies in the library's, and is no link that leads out of it; else
+    /// what is wrong, in words.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        match &self.library {
+            Some(library) if !self.model.starts_with(library) => {
+                Err("is a link that leads out of the library's folder".to_owned())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The path, if what it leads to lies in the model's or the library's folder; else what is
+    /// wrong, in words.
+    pub(crate) fn inside(&self, path: &Path) -> Result<PathBuf, String> {
+        match path.canonicalize() {
+            Ok(found) if self.holds(&found) => Ok(path.to_path_buf()),
+            Ok(_) => {
+                Err("is a link that leads out of the model's and the library's folder".to_owned())
+            }
+            Err(error) => Err(format!("cannot be opened ({error})")),
+        }
+    }
+
     /// The file that `written` means, or what is wrong with it in words.
     pub(crate) fn find(&self, written: &str) -> Result<Found, String> {
         let candidates = self.candidates(written)?;

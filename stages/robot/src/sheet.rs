@@ -2,9 +2,6 @@
 
 use serde::Deserialize;
 
-/// A sheet holds a few loops; real ones stay below 10 KiB.
-pub(crate) const MAX_SHEET_BYTES: u64 = 1 << 20;
-
 #[derive(Debug, Default, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Sheet {

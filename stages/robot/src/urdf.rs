@@ -3,15 +3,12 @@
 
 use crate::finding::Findings;
 use contract::words::count;
+use contract::{XmlLimits, check_xml};
 use geometry::{Pose, Vector};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::{Document, Node};
 use std::fmt::Write as _;
 
-/// A URDF is text about a few dozen links; real ones stay below 1 MiB.
-pub(crate) const MAX_URDF_BYTES: u64 = 16 << 20;
-/// Elements, attributes' owners and texts of one file: a hundred times the largest met.
-const MAX_NODES: u32 = 400_000;
 /// Below this length the numbers of a quaternion are rounding, and no direction.
 const SHORTEST_QUATERNION: f64 = 1e-6;
 
@@ -59,9 +56,17 @@ pub(crate) struct RawJoint {
 }
 
 /// Reads a description; what is wrong goes to `findings`.
-pub(crate) fn read(text: &str, file: &str, findings: &mut Findings) -> Option<Description> {
-    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    let document = match Document::parse_with_options(text, options) {
+pub(crate) fn read(
+    text: &str,
+    file: &str,
+    limits: &XmlLimits,
+    findings: &mut Findings,
+) -> Option<Description> {
+    if let Err(what) = check_xml(text.as_bytes(), limits) {
+        findings.fail(file, what, "mend the file");
+        return None;
+    }
+    let document = match Document::parse(text) {
         Ok(document) => document,
         Err(error) => {
             findings.fail(file, format!("not well-formed XML ({error})"), "mend the file");

@@ -44,7 +44,7 @@ fn broken_urdfs_are_named() {
             + &joint("k", "revolute", "a", "b", "0 0 1", LIMIT))), "more than one joint"),
         (robot("<link name='a'/>"), "no link has a surface"),
         ("<robot xmlns:xacro='http://www.ros.org/wiki/xacro'><xacro:include filename='x'/></robot>".to_owned(), "xacro"),
-        ("<a>".repeat(200_000), "not well-formed XML"),
+        ("<a>".repeat(200_000), "256 elements in one another"),
     ];
     for (text, words) in cases {
         says(&Folder::new().with("robot.urdf", text), words);
@@ -90,7 +90,7 @@ fn a_file_that_is_wrong_in_a_hundred_thousand_places_is_soon_explained() {
     let odd = "<visual/>\n".repeat(100_000);
     let folder = Folder::new()
         .with("robot.urdf", robot(&(arm(3) + &format!("<link name='x'>{odd}</link>"))));
-    let found = ::robot::Library::lint(&folder.library());
+    let found = ::robot::Library::lint(&folder.library(), &Settings::default());
     assert!((100..400).contains(&found.len()), "{}", found.len());
     assert!(found.iter().any(|f| f.what.contains("there are more than these 100")), "{found:?}");
     assert!(found.iter().any(|f| f.place.contains("robot.urdf:7: visual")), "{found:?}");
@@ -147,7 +147,7 @@ fn empty_and_wrong_libraries_are_explained() {
     assert!(error.contains("no robot") && error.contains("robot.urdf"), "{error}");
     let error = Library::load(&dir.path().join("nowhere"), &settings).unwrap_err().to_string();
     assert!(error.contains("nowhere"), "{error}");
-    assert!(!Library::lint(&dir.path().join("nowhere")).is_empty());
+    assert!(!Library::lint(&dir.path().join("nowhere"), &settings).is_empty());
     let folder = Folder::new().with("robot.urdf", "<robot/>");
     let error = Library::load(&folder.library(), &settings).unwrap_err().to_string();
     assert!(error.contains("model") && error.contains("no links"), "{error}");
@@ -272,6 +272,90 @@ fn paths_stay_inside() {
         .unwrap();
         says(&folder, "leads out");
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn links_that_lead_out_are_refused_by_name_and_others_are_followed() {
+    use std::os::unix::fs::symlink;
+    let urdf = robot(&arm(3));
+    for name in ["robot.urdf", "robot.toml"] {
+        let text = if name == "robot.toml" { "" } else { urdf.as_str() };
+        let other = if name == "robot.toml" { "robot.urdf" } else { "unused.txt" };
+        let folder = Folder::new()
+            .with(other, &urdf)
+            .with("../../outside", text)
+            .with("../shared/inside", text);
+        let link = folder.path().join(name);
+        symlink("../../outside", &link).unwrap();
+        let found = folder.lint();
+        assert!(found.iter().any(|f| f.contains(name) && f.contains("leads out")), "{found:#?}");
+        assert!(Model::load(&folder.path(), &Settings::without_clouds()).is_err(), "{name}");
+        std::fs::remove_file(&link).unwrap();
+        symlink("../shared/inside", &link).unwrap();
+        assert!(Model::load(&folder.path(), &Settings::without_clouds()).is_ok(), "{name}");
+        // One that leads nowhere is no file that is missing.
+        std::fs::remove_file(&link).unwrap();
+        symlink("../nowhere", &link).unwrap();
+        assert!(Model::load(&folder.path(), &Settings::without_clouds()).is_err(), "{name}");
+    }
+    // The folder of a model is no other.
+    let folder = Folder::new().with("robot.urdf", &urdf).with("../../far/robot.urdf", &urdf);
+    symlink("../far", folder.library().join("far")).unwrap();
+    says(&folder, "far: is a link that leads out");
+    symlink("model", folder.library().join("near")).unwrap();
+    let library = Library::load(&folder.library(), &Settings::without_clouds()).unwrap();
+    assert_eq!(library.models.len(), 2);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn pipes_and_devices_in_a_library_are_refused_at_once() {
+    let folder = Folder::new().with("robot.urdf", robot(&arm(3)));
+    let pipe = folder.path().join("robot.toml");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    says(&folder, "no regular file");
+}
+
+#[test]
+fn what_grows_is_bounded_and_the_setting_is_named() {
+    let with = |folder: &Folder, settings: &Settings| -> Vec<String> {
+        let found = Library::lint(&folder.library(), settings);
+        found.iter().map(|f| f.what.clone()).collect()
+    };
+    let named = |folder: &Folder, settings: &Settings, setting: &str| {
+        let found = with(folder, settings);
+        assert!(found.iter().any(|f| f.contains(setting)), "{setting}: {found:#?}");
+        let found = with(folder, &Settings::default());
+        assert!(!found.iter().any(|f| f.contains("--set")), "{setting}: {found:#?}");
+    };
+    let all = Settings::default();
+    // Four nodes, each with ten instances of the next: ten thousand times one triangle of a source
+    // with 99 corners.
+    let levels: String = (0..4)
+        .map(|k| {
+            let instances = format!("<instance_node url='#n{}'/>", k + 1).repeat(10);
+            format!("<node id='n{k}'>{instances}</node>")
+        })
+        .collect();
+    let text = format!(
+        "<COLLADA><library_geometries><geometry id='g'><mesh><source id='p'><float_array id='f' count='297'>{}\
+         </float_array></source><triangles><input semantic='POSITION' source='#p' offset='0'/><p>0 1 2</p></triangles>\
+         </mesh></geometry></library_geometries><library_nodes>{levels}<node id='n4'><instance_geometry url='#g'/></node>\
+         </library_nodes><library_visual_scenes><visual_scene id='s'><node><instance_node url='#n0'/></node>\
+         </visual_scene></library_visual_scenes></COLLADA>",
+        "0 0 0 1 0 0 0 1 0 ".repeat(33)
+    );
+    let folder = meshed("m.dae", text.as_bytes());
+    named(&folder, &Settings { max_mesh_growth: 1, ..all }, "robot.max_mesh_growth");
+    named(&folder, &Settings { max_mesh_bytes: 100, ..all }, "robot.max_mesh_bytes");
+    named(&folder, &Settings { max_xml_nodes: 60, ..all }, "robot.max_xml_nodes");
+    let wide = text.replace("<mesh>", "<mesh a='' b='' c='' d=''>");
+    let folder = meshed("m.dae", wide.as_bytes());
+    named(&folder, &Settings { max_xml_attributes: 3, ..all }, "robot.max_xml_attributes");
+    let folder = Folder::new().with("robot.urdf", robot(&arm(3)));
+    named(&folder, &Settings { max_urdf_bytes: 100, ..all }, "robot.max_urdf_bytes");
+    named(&folder, &Settings { max_xml_nodes: 10, ..all }, "robot.max_xml_nodes");
 }
 
 #[test]

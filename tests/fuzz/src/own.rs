@@ -73,7 +73,7 @@ pub fn tile(data: &[u8]) {
     let Some((first, bytes)) = data.split_first() else { return };
     let las = LasSettings { compress: first % 2 == 1, ..tile_settings() };
     let mut n = 0;
-    let read = read_tile(&file("tile.las", bytes), &las, |points| {
+    let read = read_tile(&file("tile.las", bytes), &las, None, |points| {
         n += points.len();
         assert!(points.iter().flat_map(|p| p.world).all(|v| v.is_finite()), "a finite place");
         Ok(())

@@ -15,6 +15,8 @@ use stillpoint::store::{Scatter, Store};
 use stillpoint::trajectory::Trajectory;
 use stillpoint::{history, probes};
 
+/// Longest text that is read, bytes: inputs of a target are shorter.
+const MOST: u64 = 1 << 26;
 /// Lengths of the headers of a store's two files, bytes.
 const HEADER: usize = 64;
 
@@ -107,7 +109,7 @@ pub fn pieces(data: &[u8]) {
 pub fn manifest(data: &[u8]) {
     static ONCE: OnceLock<()> = OnceLock::new();
     ONCE.get_or_init(|| drop(file("manifest/result.json", b"{}")));
-    file("manifest/manifest.json", data);
+    file("manifest/manifest.json", &probes::list_file(data));
     let out = folder().join("manifest");
     match Manifest::read(&out) {
         Ok(manifest) => {
@@ -123,7 +125,7 @@ pub fn manifest(data: &[u8]) {
         }
         Err(error) => refused(&error),
     }
-    let _ = history::sessions(folder()).map(|sessions| history::words(&sessions));
+    let _ = history::sessions(folder()).map(|found| history::words(&found.sessions));
 }
 
 /// `--config`.
@@ -145,7 +147,7 @@ pub fn settings(data: &[u8]) {
 /// `--review`.
 pub fn review(data: &[u8]) {
     let models = crate::robots::models();
-    match Review::read(&file("review.toml", data), models) {
+    match Review::read(&file("review.toml", data), models, MOST) {
         Ok(review) => {
             for place in &review.places {
                 assert!(place.at.iter().all(|v| v.is_finite()), "a finite place");
@@ -161,7 +163,7 @@ pub fn review(data: &[u8]) {
 
 /// `--trajectory`, CSV or JSON.
 pub fn trajectory(data: &[u8]) {
-    match Trajectory::read(&file("path.csv", data)) {
+    match Trajectory::read(&file("path.csv", data), MOST) {
         Ok(path) => {
             let n = path.joints.len();
             assert!(n > 0 && !path.points.is_empty(), "a path has joints and waypoints");

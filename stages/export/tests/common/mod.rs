@@ -100,7 +100,8 @@ impl CopcSteps for Quiet {
 /// Writes one COPC file of the tiles; whether there were any.
 pub fn copc(out: &Path, n_threads: usize) -> bool {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
-    let write =
-        || write_copc(out, &out.join(COPC), &out.join("scratch"), &std::sync::Arc::new(Quiet));
+    let write = || {
+        write_copc(&tiles(out)?, &out.join(COPC), &out.join("scratch"), &std::sync::Arc::new(Quiet))
+    };
     pool.install(write).expect("writes")
 }

@@ -294,8 +294,25 @@ fn a_description_of_a_million_levels_is_never_fatal() {
         let deep = format!("{}{}", "<a>".repeat(1_000_000), "</a>".repeat(1_000_000));
         xml.replace("</e57Root>", &format!("{deep}</e57Root>"))
     });
-    let _either = open(&file.0, &settings());
-    let small = Settings { max_xml_bytes: 100, ..settings() };
-    let error = open(&file.0, &small).err().expect("refused");
-    assert!(error.to_string().contains("description"), "{error}");
+    let error = open(&file.0, &settings()).err().expect("refused").to_string();
+    assert!(error.contains("description") && error.contains("in one another"), "{error}");
+}
+
+#[test]
+fn a_description_that_grows_is_bounded_by_settings_that_are_named() {
+    let file = write("wide.e57", vec![own(10)], |xml| {
+        let wide: String = (0..300).map(|i| format!(" a{i}=''")).collect();
+        xml.replace("</e57Root>", &format!("<x{wide}/></e57Root>"))
+    });
+    let most = Settings { max_xml_attributes: 300, ..settings() };
+    let wide = open(&file.0, &most).err().map(|e| e.to_string());
+    assert_eq!(wide, None, "it is within the limit");
+    for (few, setting) in [
+        (settings(), "ingest.max_xml_attributes"),
+        (Settings { max_xml_nodes: 200, ..most.clone() }, "ingest.max_xml_nodes"),
+        (Settings { max_xml_bytes: 100, ..most.clone() }, "ingest.max_xml_bytes"),
+    ] {
+        let error = open(&file.0, &few).err().expect(setting).to_string();
+        assert!(error.contains("description") && error.contains(setting), "{error}");
+    }
 }

@@ -2,28 +2,31 @@
 //! as the viewers do for which robot makers draw their meshes.
 
 use super::Soup;
+use crate::load::Settings;
+use contract::check_xml;
 use nalgebra::{Matrix4, Rotation3, Unit, Vector3};
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::{Document, Node};
 use std::collections::HashMap;
 
 /// Nodes in one another; real files have below ten.
 const MAX_DEPTH: usize = 64;
 /// Nodes walked in all, since an instance may hold instances.
 const MAX_VISITS: usize = 100_000;
-/// Elements and texts of one file.
-const MAX_NODES: u32 = 4_000_000;
 /// A unit that differs from the metre by less is a rounded metre: a millionth of a robot is below any scanner.
 const SAME_UNIT: f64 = 1e-6;
+/// What a file of any size may come to, times the growth that is allowed, bytes: small ones draw
+/// one bolt a hundred times.
+const SMALL: u64 = 1 << 20;
 
-pub(super) fn read(text: &str) -> Result<Soup, String> {
-    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options)
-        .map_err(|e| format!("not well-formed XML ({e})"))?;
+pub(super) fn read(text: &str, settings: &Settings) -> Result<Soup, String> {
+    check_xml(text.as_bytes(), &settings.xml())?;
+    let document = Document::parse(text).map_err(|e| format!("not well-formed XML ({e})"))?;
     let root = document.root_element();
     if root.tag_name().name() != "COLLADA" {
         return Err(format!("not a COLLADA file, opens with \"{}\"", root.tag_name().name()));
     }
-    let mut scene = Scene::new(root)?;
+    let mut scene =
+        Scene::new(root, (text.len() as u64 + SMALL).saturating_mul(settings.max_mesh_growth))?;
     let roots = scene.roots(root);
     for node in &roots {
         scene.node(*node, Matrix4::identity(), 0)?;
@@ -61,6 +64,9 @@ struct Scene<'a, 'i> {
     unit: f64,
     soup: Soup,
     n_visits: usize,
+    /// What instances may still come to, bytes that are read or kept: geometries that are named
+    /// again and again make much of little.
+    left: u64,
 }
 
 fn element<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
@@ -90,7 +96,7 @@ fn index_list(text: &str) -> Result<Vec<usize>, String> {
 }
 
 impl<'a, 'i> Scene<'a, 'i> {
-    fn new(root: Node<'a, 'i>) -> Result<Self, String> {
+    fn new(root: Node<'a, 'i>, left: u64) -> Result<Self, String> {
         let mut by_id = HashMap::new();
         for node in root.descendants() {
             if let Some(id) = node.attribute("id") {
@@ -109,7 +115,16 @@ impl<'a, 'i> Scene<'a, 'i> {
                 .ok_or_else(|| format!("the unit is no length \"{text}\""))?,
             None => 1.0,
         };
-        Ok(Self { by_id, unit, soup: Soup::default(), n_visits: 0 })
+        Ok(Self { by_id, unit, soup: Soup::default(), n_visits: 0, left })
+    }
+
+    /// Counts bytes that are read once more, or kept.
+    fn spend(&mut self, n: usize) -> Result<(), String> {
+        self.left = self.left.checked_sub(n as u64).ok_or(
+            "it comes to far more than its size by what is named again and again; if it is right, raise --set \
+             robot.max_mesh_growth",
+        )?;
+        Ok(())
     }
 
     /// The element of that id in a mesh, else anywhere: real files give the same ids to each geometry.
@@ -186,6 +201,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         let mirrored = scene_from_node.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
         let mut placed: Vec<(&str, usize, usize)> = Vec::new();
         for part in mesh.children().filter(Node::is_element) {
+            self.spend(1)?;
             let tag = part.tag_name().name();
             match tag {
                 "triangles" | "polylist" | "polygons" | "tristrips" | "trifans" => {}
@@ -195,6 +211,8 @@ impl<'a, 'i> Scene<'a, 'i> {
                 }
                 _ => continue,
             }
+            // Each of its sources is looked for among all children.
+            self.spend(mesh.children().count() + part.children().count() + placed.len())?;
             let Some(layout) = self.layout(mesh, part)? else {
                 continue;
             };
@@ -208,6 +226,7 @@ impl<'a, 'i> Scene<'a, 'i> {
             };
             let from = self.soup.triangles.len();
             self.faces(part, &layout, first, n)?;
+            self.spend((self.soup.triangles.len() - from) * size_of::<[u32; 3]>())?;
             if mirrored {
                 for t in &mut self.soup.triangles[from..] {
                     t.swap(1, 2);
@@ -277,7 +296,9 @@ impl<'a, 'i> Scene<'a, 'i> {
         if stride < 3 {
             return Err(format!("positions need three numbers each \"{stride}\""));
         }
-        let values = numbers(&all_text(array))?;
+        let text = all_text(array);
+        self.spend(text.len())?;
+        let values = numbers(&text)?;
         if let Some(claimed) = array.attribute("count").and_then(|c| c.parse::<usize>().ok())
             && claimed > values.len()
         {
@@ -288,7 +309,15 @@ impl<'a, 'i> Scene<'a, 'i> {
             let p = scene_from_node.transform_point(&geometry::Point::new(p[0], p[1], p[2]));
             self.soup.add_vertex([p.x, p.y, p.z])?;
         }
+        self.spend((self.soup.vertices.len() - first) * size_of::<[f64; 3]>())?;
         Ok((first, self.soup.vertices.len() - first))
+    }
+
+    /// The indices that an element lists.
+    fn indices(&mut self, list: Node<'a, 'i>) -> Result<Vec<usize>, String> {
+        let text = all_text(list);
+        self.spend(text.len())?;
+        index_list(&text)
     }
 
     fn faces(
@@ -299,10 +328,8 @@ impl<'a, 'i> Scene<'a, 'i> {
         n: usize,
     ) -> Result<(), String> {
         let tag = part.tag_name().name();
-        let mut sizes = match element(part, "vcount").filter(|_| tag == "polylist") {
-            Some(vcount) => Some(index_list(&all_text(vcount))?.into_iter()),
-            None => None,
-        };
+        let vcount = element(part, "vcount").filter(|_| tag == "polylist");
+        let mut sizes = vcount.map(|list| self.indices(list)).transpose()?.map(Vec::into_iter);
         // A polygon with holes keeps its outline in <ph><p>.
         let lists = part.children().flat_map(|c| match c.tag_name().name() {
             "p" => Some(c),
@@ -310,7 +337,7 @@ impl<'a, 'i> Scene<'a, 'i> {
             _ => None,
         });
         for list in lists {
-            let indices = index_list(&all_text(list))?;
+            let indices = self.indices(list)?;
             let mut corners = Vec::with_capacity(indices.len() / layout.stride);
             for corner in indices.chunks_exact(layout.stride) {
                 let at = corner[layout.offset];

@@ -6,6 +6,7 @@ pub(crate) mod primitive;
 mod stl;
 
 use crate::encoding;
+use crate::load::Settings;
 use crate::model::Mesh;
 use geometry::{Pose, Vector, narrow::local_f32};
 use std::collections::HashMap;
@@ -46,11 +47,11 @@ impl Soup {
 }
 
 /// Reads a mesh file by its name's ending and its bytes.
-pub(crate) fn read(bytes: &[u8], extension: &str) -> Result<Soup, String> {
+pub(crate) fn read(bytes: &[u8], extension: &str, settings: &Settings) -> Result<Soup, String> {
     let soup = match extension.to_lowercase().as_str() {
         "stl" => stl::read(bytes),
         "obj" => obj::read(text(bytes)?),
-        "dae" => dae::read(&encoding::decode(bytes)?),
+        "dae" => dae::read(&encoding::decode(bytes)?, settings),
         other => Err(format!(
             "a mesh format that is not read; convert it to STL, OBJ or DAE \"{other}\""
         )),

@@ -55,7 +55,7 @@ impl Folder {
 
     /// Error and warning findings, as text.
     pub fn lint(&self) -> Vec<String> {
-        (robot::Library::lint(&self.library()).iter())
+        (robot::Library::lint(&self.library(), &robot::Settings::default()).iter())
             .filter(|f| f.severity >= Severity::Warning)
             .map(|f| format!("{:?} {}: {} ({})", f.severity, f.place, f.what, f.way_out))
             .collect()

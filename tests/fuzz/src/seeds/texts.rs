@@ -130,7 +130,7 @@ fn put_results(seeds: &Seeds) {
     let digest = format!("blake3:{}", "0".repeat(64));
     let manifest = |files: serde_json::Value| {
         serde_json::json!({
-            "schema": "stillpoint.manifest/1", "key": "0".repeat(32), "summary": "2 robots", "warnings": ["a"],
+            "schema": "stillpoint.manifest/2", "key": "0".repeat(32), "summary": "2 robots", "warnings": ["a"],
             "partial": false, "files": files,
         })
     };
