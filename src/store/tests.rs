@@ -273,14 +273,17 @@ fn a_store_that_is_cut_short_under_a_run_is_named_and_the_program_lives() {
 
 #[test]
 fn what_a_store_holds_has_one_digest_whatever_its_file_looks_like() {
-    let digest = |n, budget| {
+    let digest = |strips, budget| {
         let dir = tempfile::tempdir().expect("a folder");
-        let (store, _) = build(dir.path(), strips(n), budget, 2);
+        let (store, _) = build(dir.path(), strips, budget, 2);
         store.contents()
     };
-    assert_eq!(digest(9000, usize::MAX), digest(9000, 1 << 20));
-    assert_eq!(digest(9000, usize::MAX).len(), 1);
-    assert_ne!(digest(9000, usize::MAX), digest(6000, usize::MAX));
+    let whole = digest(strips(9000), usize::MAX);
+    assert_eq!(whole.len(), 1);
+    assert_eq!(whole, digest(strips(9000), 1 << 20));
+    assert_eq!(whole, digest(strips(6000), usize::MAX), "the same points in other strips");
+    let fewer = strips(9000).split_off(1);
+    assert_ne!(whole, digest(fewer, usize::MAX));
 }
 
 #[test]

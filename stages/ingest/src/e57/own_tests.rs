@@ -119,9 +119,10 @@ fn own_file_comes_back_with_gaps_and_attributes() {
 #[test]
 fn bounds_of_a_turned_scan_are_those_of_its_points() {
     let mut turned = own(4000);
-    // A diagonal line, turned by 45°: the corners of its box lie far off it.
+    // A diagonal line, turned by 45°: the corners of its box lie far off it. It begins 35 mm from the
+    // scanner, where points are no beams without return.
     for (n, point) in turned.points.iter_mut().enumerate() {
-        let along = n as f64 * 1e-3;
+        let along = n.max(20) as f64 * 1e-3;
         point[0] = RecordValue::ScaledInteger((along * 1e4) as i64 - 5000);
         point[1] = RecordValue::Double(along);
         point[2] = RecordValue::Single(along as f32);
@@ -137,16 +138,16 @@ fn bounds_of_a_turned_scan_are_those_of_its_points() {
     let described = crate::describe(&sources.expect("valid"), &contract::OneByOne).remove(0);
     let scan = &described.scans[0];
     let [bounds, stated] = [&scan.bounds, &scan.stated_bounds].map(|b| b.as_ref().expect("known"));
-    // Turned by 45° the diagonal is the y axis, 3.999 · √2 long.
-    let long = 3.999 * 2.0_f64.sqrt();
-    let wanted = [[100.0, 200.0, 300.0], [100.0, 200.0 + long, 303.999]];
+    // Turned by 45° the diagonal is the y axis, from 0.020 · √2 to 3.999 · √2.
+    let [from, to] = [0.020, 3.999].map(|along| 200.0 + along * 2.0_f64.sqrt());
+    let wanted = [[100.0, from, 300.020], [100.0, to, 303.999]];
     for (got, wanted) in [bounds.min, bounds.max].iter().zip(wanted) {
         assert!((0..3).all(|i| (got[i] - wanted[i]).abs() < 1e-3), "{got:?} {wanted:?}");
     }
     assert!(stated.min[0] < 98.0 && stated.max[0] > 102.0, "{stated:?}");
     let text = described.to_string();
     assert!(
-        text.contains("    bounds: 100.000 200.000 300.000 to 100.000 205.655 303.999"),
+        text.contains("    bounds: 100.000 200.028 300.020 to 100.000 205.655 303.999"),
         "{text}"
     );
 }
