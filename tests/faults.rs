@@ -74,7 +74,7 @@ fn whatever_fails_to_be_written_the_state_is_old_or_new() {
         run.env("FAULT_COUNT", dir.join("count")).output().expect("the program starts")
     };
     assert!(command(dir, "old", &old).status().expect("starts").success());
-    copy(&dir.join("old"), &dir.join("new"));
+    common::copy_folder(&dir.join("old"), &dir.join("new"));
     assert!(with("new", &[], 0).status.success());
     let n: usize =
         std::fs::read_to_string(dir.join("count")).expect("a count").parse().expect("it");
@@ -85,7 +85,7 @@ fn whatever_fails_to_be_written_the_state_is_old_or_new() {
     faults.extend(n + 1 - LAST_FAULTS..=n);
     for at in faults {
         let _ = std::fs::remove_dir_all(dir.join("out"));
-        copy(&dir.join("old"), &dir.join("out"));
+        common::copy_folder(&dir.join("old"), &dir.join("out"));
         let failed = with("out", &[], at);
         // A sync of a folder or a hint to the system may be passed over; a signal or a panic may not.
         let code = failed.status.code().unwrap_or_else(|| panic!("call {at}: {}", failed.status));
@@ -98,19 +98,6 @@ fn whatever_fails_to_be_written_the_state_is_old_or_new() {
         assert!(next.status.success(), "after call {at}: {}", said(&next));
         assert!(list(dir, "out") == list(dir, "new"), "after call {at}: other bytes");
         assert!(whole(dir, "out"), "after call {at}");
-    }
-}
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).expect("a folder");
-    for entry in std::fs::read_dir(from).expect("a folder") {
-        let path = entry.expect("an entry").path();
-        let place = to.join(path.file_name().expect("a name"));
-        if path.is_dir() {
-            copy(&path, &place);
-        } else {
-            std::fs::copy(&path, &place).expect("copies");
-        }
     }
 }
 

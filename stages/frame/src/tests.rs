@@ -147,8 +147,8 @@ fn a_stated_frame_holds_although_much_has_changed() {
     assert!(shift < 0.004 && turn < 0.03, "{shift} m, {turn}°");
 }
 
-/// Five equal cells with a post between each two, in a hall that is long or ends close to them.
-fn cells(beyond: f64) -> World {
+/// A line of `n` equal cells with a post between each two, in a hall that ends `beyond` metres from it.
+fn cells(n: usize, beyond: f64) -> World {
     let cell = |k: usize| {
         let x = beyond + 4.0 * k as f64;
         let post = [[x, 2.0, 0.0], [x + 0.2, 4.0, 2.0]];
@@ -156,19 +156,23 @@ fn cells(beyond: f64) -> World {
         let cabinet = [[x + 3.0, 3.2, 0.0], [x + 3.5, 3.8, 1.6]];
         [post, bench, cabinet]
     };
-    World { size: [20.0 + 2.0 * beyond, 7.0, 4.0], blocks: (0..5).flat_map(cell).collect() }
+    let length = 4.0 * n as f64 + 2.0 * beyond;
+    World { size: [length, 7.0, 4.0], blocks: (0..n).flat_map(cell).collect() }
 }
 
 #[test]
 fn a_line_of_equal_cells_is_refused_unless_its_ends_decide() {
-    for (beyond, is_clear) in [(60.0, false), (1.5, true)] {
-        let world = cells(beyond);
+    for (n, beyond, is_clear) in [(9, 60.0, false), (5, 1.5, true)] {
+        let world = cells(n, beyond);
         let scanners = |k: usize| {
             [beyond + 4.0 * k as f64 + 1.8, if k.is_multiple_of(2) { 1.0 } else { 6.0 }, 1.7]
         };
-        let old = world.session(&[0, 1, 2, 3, 4].map(scanners), &Pose::identity());
+        // Only the middle of the line was scanned: its ends are far, and speak little.
+        let middle = [0, 1, 2, 3, 4].map(|k| n / 2 - 2 + k);
+        let old = world.session(&middle.map(scanners), &Pose::identity());
         let stated = frame([4.0, 0.0, 0.0], 0.0);
-        let new = world.session(&[[beyond + 9.0, 1.0, 1.8], [beyond + 10.0, 6.0, 1.6]], &stated);
+        let at = beyond + 4.0 * (n / 2) as f64;
+        let new = world.session(&[[at + 1.0, 1.0, 1.8], [at + 2.0, 6.0, 1.6]], &stated);
         let as_stated = truth(&old, &new, &Pose::identity());
         match find(&old, &new, &as_stated, &OneByOne) {
             Ok(place) => {
