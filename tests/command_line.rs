@@ -262,7 +262,7 @@ fn a_log_of_json_holds_nothing_else() {
     for (args, kind) in [
         (&["frobnicate", "--log-format", "json"][..], "usage"),
         (&["run", "--log-format=json"], "usage"),
-        (&["inspect", "no/such.e57", "--log-format=json"], "usage"),
+        (&["inspect", "no/such.e57", "--log-format=json"], "bad_input"),
         (&["inspect", &path, "--log-format", "json"], "bad_input"),
     ] {
         let output = stillpoint(args);

@@ -13,12 +13,19 @@ const FEET: &str = r#"PROJCS["Texas South Central (ftUS)",GEOGCS["NAD83",DATUM["
     SPHEROID["GRS 1980",6378137,298.257]],UNIT["degree",0.0174532925199433]],
     UNIT["US survey foot",0.3048006096012192],AXIS["X",EAST],AXIS["Y",NORTH]]"#;
 
-/// A room of 6 × 5 × 3 m: floor and two walls, a point every 0.1 m.
+/// A room of 6 × 5 × 3 m: floor and two walls, a point about every 0.1 m, in no coarse step.
 fn room() -> Vec<[f64; 3]> {
-    let grid = |n: usize, m: usize| (0..n * m).map(move |i| [(i / m) as f64, (i % m) as f64]);
-    let floor = grid(60, 50).map(|[x, y]| [0.1 * x, 0.1 * y, 0.0]);
-    let back = grid(60, 30).map(|[x, z]| [0.1 * x, 5.0, 0.1 * z]);
-    let side = grid(50, 30).map(|[y, z]| [0.0, 0.1 * y, 0.1 * z]);
+    // Points at the ends of a surface stay where they are, so that bounds are known.
+    let along = |k: usize, n: usize, i: usize| {
+        let off = if k == 0 || k + 1 == n { 0 } else { i * 7919 % 1009 };
+        0.1 * k as f64 + 0.03 * off as f64 / 1009.0
+    };
+    let grid = |n: usize, m: usize| {
+        (0..n * m).map(move |i| [along(i / m, n, i), along(i % m, m, 3 * i + 1)])
+    };
+    let floor = grid(60, 50).map(|[x, y]| [x, y, 0.0]);
+    let back = grid(60, 30).map(|[x, z]| [x, 5.0, z]);
+    let side = grid(50, 30).map(|[y, z]| [0.0, y, z]);
     floor.chain(back).chain(side).collect()
 }
 
@@ -168,7 +175,7 @@ fn inputs_of_several_units_become_one_cloud_in_metres() {
     let (place, room) = (Place::new(), room());
     place.write("bare.las", las(&room, 1.0, STEPS, ""));
     place.write("feet.las", las(&room, US_FOOT, STEPS, FEET));
-    place.write("thou.las", las(&room, 1e-3, ([0.1; 3], [0.0; 3]), ""));
+    place.write("thou.las", las(&room, 1e-3, ([0.01; 3], [0.0; 3]), ""));
     let args = ["bare.las", "feet.las", "thou.las", "--units", "thou=mm"];
     let seen = place.inspect(&args);
     for (i, (origin, metres)) in
@@ -208,7 +215,7 @@ fn inputs_of_several_units_become_one_cloud_in_metres() {
 #[test]
 fn clouds_of_the_wrong_size_end_with_the_likely_unit() {
     let (place, room) = (Place::new(), room());
-    place.write("thou.las", las(&room, 1e-3, ([0.1; 3], [0.0; 3]), ""));
+    place.write("thou.las", las(&room, 1e-3, ([0.01; 3], [0.0; 3]), ""));
     place.write("bare.las", las(&room, 1.0, STEPS, ""));
     let hall: Vec<_> = room.iter().map(|p| [7.0 * p[0], 5.0 * p[1], 3.0 * p[2]]).collect();
     place.write("hall.las", las(&hall, 1.0, STEPS, ""));
@@ -260,7 +267,7 @@ fn degrees_are_refused_with_a_way_out() {
 #[test]
 fn a_run_writes_no_more_tiles_than_its_plan_allows() {
     let (place, room) = (Place::new(), room());
-    place.write("thou.las", las(&room, 1e-3, ([0.1; 3], [0.0; 3]), ""));
+    place.write("thou.las", las(&room, 1e-3, ([0.01; 3], [0.0; 3]), ""));
     place.write("bare.las", las(&room, 1.0, STEPS, ""));
     // The plan knows it from a sample; a run, too.
     let wide = ["thou.las", "--units", "m", "--set", "export.max_tiles=1000"];
