@@ -15,7 +15,7 @@ const PIECE: u64 = 1 << 16;
 /// Length of a header, bytes: a comment makes it so long, so that the number of points can be written last.
 const HEADER: usize = 512;
 
-/// Writes [`PLY`] into a folder, of some tiles (see [`tiles`](crate::tiles)); `told` is asked
+/// Writes [`PLY`] into a folder, of some tiles (see [`tiles`](fn@crate::tiles)); `told` is asked
 /// before each whether to go on. Numbers of points; none where there are no tiles.
 ///
 /// # Errors
