@@ -196,20 +196,13 @@ impl Engine {
             }
             Some(out)
         };
-        let items = items.into_iter().enumerate();
-        // Begun in their order, each by the next free thread: where the largest are first, no thread ends long after the others.
-        let mut all: Vec<(usize, Option<Result<U>>)> = self.pool()?.install(|| {
-            let work = |(at, item)| (at, one((at, item)));
-            if task.is_large && self.is_narrow {
-                return items.map(work).collect();
-            }
-            items.par_bridge().map(work).collect()
-        });
-        all.sort_unstable_by_key(|(at, _)| *at);
+        let items: Vec<(usize, T)> = items.into_iter().enumerate().collect();
+        let threads = Inside { pool: self.pool()?, in_turn: task.is_large && self.is_narrow };
+        let all: Vec<Option<Result<U>>> = (&threads as &dyn Fan).fan(items, one);
         stage.finish();
         // A skipped item stands after an error, and `collect` stops at that.
         all.into_iter()
-            .map(|(_, out)| {
+            .map(|out| {
                 out.unwrap_or_else(|| Err(Error::new(Kind::Bug, "an item was skipped")))
             })
             .collect()
@@ -226,7 +219,8 @@ impl Engine {
     ) -> Result<Vec<U>> {
         let f = |(at, item): (usize, T)| guarded("small work", at as u64, || f(item));
         let items = items.into_iter().enumerate().collect();
-        self.pool()?.install(|| AllThreads.fan(items, f)).into_iter().collect()
+        let threads = Inside { pool: self.pool()?, in_turn: false };
+        (&threads as &dyn Fan).fan(items, f).into_iter().collect()
     }
 
     /// Threads for pieces of a step that wait for the disk most of their time.
@@ -257,12 +251,27 @@ impl Engine {
 pub(crate) struct Threads(OnceLock<rayon::ThreadPool>);
 
 impl Fan for Threads {
-    fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
-        let work = || AllThreads.fan(items, work);
+    fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync)) {
         match self.0.get() {
-            Some(pool) => pool.install(work),
-            None => work(),
+            Some(pool) => Inside { pool, in_turn: false }.each(n, work),
+            None => AllThreads.each(n, work),
         }
+    }
+}
+
+/// The pieces of a pass on the threads of a pool; where so asked one after the other, each of them
+/// on all threads.
+struct Inside<'p> {
+    pool: &'p rayon::ThreadPool,
+    in_turn: bool,
+}
+
+impl Fan for Inside<'_> {
+    fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync)) {
+        self.pool.install(|| match self.in_turn {
+            true => (0..n).for_each(work),
+            false => AllThreads.each(n, work),
+        });
     }
 }
 
@@ -271,8 +280,13 @@ impl Fan for Threads {
 pub(crate) struct AllThreads;
 
 impl Fan for AllThreads {
-    fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
+    /// Begun in their order, each by the next free thread: where the largest are first, no thread
+    /// ends long after the others. The only such use of rayon here, since each is compiled anew for
+    /// each closure that it is given.
+    fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync)) {
+        let next = AtomicUsize::new(0);
         // Items are few and large: each may go to whichever thread is free.
-        items.into_par_iter().with_max_len(1).map(work).collect()
+        let pieces = (0..n).into_par_iter().with_max_len(1);
+        pieces.for_each(|_| work(next.fetch_add(1, Ordering::Relaxed)));
     }
 }

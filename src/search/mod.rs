@@ -40,7 +40,7 @@ impl<'a> Shelf<'a> {
     }
 
     /// Makes what these models need now.
-    pub(crate) fn prepare(&self, names: &BTreeSet<&str>, fan: &impl Fan) {
+    pub(crate) fn prepare(&self, names: &BTreeSet<&str>, fan: &dyn Fan) {
         for (i, own) in self.prepared.iter().enumerate() {
             if own.get().is_none() && names.contains(self.models[i].name.as_str()) {
                 let prepared = Prepared::new(i, &self.models[i], fan);

@@ -191,7 +191,7 @@ pub(super) fn paths(
     for _ in 0..N_HIT {
         for _ in 0..N_TRIES {
             let to = target(scene, (model, base), from, random)?;
-            if truth.along(from, &to).gap <= TOUCH {
+            if truth.along(from, &to, TOUCH).gap <= TOUCH {
                 out.push(DrawnPath { drawn: Drawn::Hit, to });
                 break;
             }

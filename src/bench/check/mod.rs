@@ -235,7 +235,7 @@ impl Bench<'_> {
             times: Vec::new(),
         };
         let report = place.look(&asked, self.engine)?;
-        let nearest = truth.along(from, &path.to);
+        let nearest = truth.along(from, &path.to, margin);
         let is = match nearest.gap {
             ..=TOUCH => True::Collides,
             gap if gap < margin => True::Grazes,

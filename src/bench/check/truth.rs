@@ -36,6 +36,9 @@ struct Part {
     bounds: Aabb,
     /// Places on its surface, and outward normals.
     samples: Vec<(Point, geometry::Vector)>,
+    /// The triangle of what stands that was nearest last: near it in the next posture, too, which
+    /// saves most of the others.
+    last: Cell<Option<u32>>,
 }
 
 /// A robot of a scene among all else.
@@ -129,8 +132,8 @@ impl<'a> Truth<'a> {
                     && middle[i] - half[i] - reach <= part.bounds.max[i]
             })
         };
-        let mut found = None;
-        for at in self.standing.bvh().leaves(is_near) {
+        let found = Cell::new(None);
+        let look = |at: u32| {
             let corner = |p: Vec3| {
                 let p = link_from_world * Point::from(p.to_array().map(f64::from));
                 Vec3::new(p.x as f32, p.y as f32, p.z as f32)
@@ -139,14 +142,18 @@ impl<'a> Truth<'a> {
             let t = Triangle::new(corner(t.a), corner(t.b), corner(t.c));
             if let Some(gap) = apart(&part.mesh, &t, best.get()) {
                 best.set(gap);
-                found = Some((f64::from(gap), at));
+                found.set(Some((f64::from(gap), at)));
             }
-        }
-        found
+        };
+        part.last.get().into_iter().for_each(&look);
+        self.standing.bvh().leaves(is_near).for_each(&look);
+        part.last.set(found.get().map(|(_, at)| at).or(part.last.get()));
+        found.get()
     }
 
     /// The nearest that a path comes to something: joints go straight from one posture to another.
-    pub(super) fn along(&self, from: &[f64], to: &[f64]) -> Nearest {
+    /// Exact below the margin only: what keeps it is looked at no closer than that takes.
+    pub(super) fn along(&self, from: &[f64], to: &[f64], margin: f64) -> Nearest {
         let n = self.n_steps(from, to, STEP);
         let mut best = Nearest { gap: FAR, ..Nearest::default() };
         let mut step = 0;
@@ -160,7 +167,7 @@ impl<'a> Truth<'a> {
                 break;
             }
             // No part gets nearer than what it moves.
-            let skip = ((now.gap - best.gap.min(0.5 * FAR)) / STEP).floor().max(1.0);
+            let skip = ((now.gap - best.gap.min(margin)) / STEP).floor().max(1.0);
             step += skip as usize;
         }
         best
@@ -237,7 +244,8 @@ impl Part {
             });
         }
         let samples = samples.into_values().collect();
-        Some(Self { link, mesh: TriMesh::new(corners, triangles).ok()?, bounds, samples })
+        let mesh = TriMesh::new(corners, triangles).ok()?;
+        Some(Self { link, mesh, bounds, samples, last: Cell::new(None) })
     }
 }
 

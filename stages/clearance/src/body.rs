@@ -76,7 +76,7 @@ impl<'a> Body<'a> {
         model: &'a Model,
         hung: Hung,
         (margin, largest): (f64, f64),
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Self {
         let margin = margin as f32;
         let least = margin + BETWEEN + HALF_CELL;

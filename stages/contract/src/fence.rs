@@ -21,6 +21,14 @@ const MAX_NOTED: usize = 64;
 /// # Errors
 /// The words of the panic and, where [`note`] was told, its line of source; in one line.
 pub fn fenced<T>(run: impl FnOnce() -> T) -> std::result::Result<T, String> {
+    let mut run = Some(run);
+    let mut out = None;
+    caught(&mut || out = run.take().map(|run| run()))?;
+    out.ok_or_else(|| "the step did not run".to_owned())
+}
+
+/// The fence itself, compiled once.
+fn caught(run: &mut dyn FnMut()) -> std::result::Result<(), String> {
     STANDING.fetch_add(1, Ordering::Relaxed);
     let done = catch_unwind(AssertUnwindSafe(run));
     STANDING.fetch_sub(1, Ordering::Relaxed);

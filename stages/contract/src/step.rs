@@ -1,6 +1,7 @@
 //! The shapes of a step. The engine owns threads, order, budget and errors, so that a step stays one screen.
 
 use crate::Result;
+use std::sync::{Mutex, PoisonError};
 
 /// How many bytes an item keeps in memory: channels are bounded by it.
 pub trait Weigh {
@@ -73,11 +74,26 @@ pub trait Fold {
 
 /// Independent pieces of work inside one step: who calls the step says on which threads they are done.
 ///
-/// # Law
-/// Results come in the order of the items, whatever the order of the work.
+/// Steps take it as `&dyn Fan`: were they generic over it, all of their code would be compiled anew
+/// in the crate that calls them.
 pub trait Fan: Sync {
-    /// Does `work` on each item.
-    fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U>;
+    /// Does `work` on each number below `n`, once; in any order.
+    fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync));
+}
+
+impl dyn Fan + '_ {
+    /// Does `work` on each item; results in the order of the items, whatever the order of the work.
+    pub fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync) -> Vec<U> {
+        let items: Vec<Mutex<Option<T>>> = items.into_iter().map(|i| Mutex::new(Some(i))).collect();
+        let done: Vec<Mutex<Option<U>>> = items.iter().map(|_| Mutex::new(None)).collect();
+        self.each(items.len(), &|at| {
+            let item = items[at].lock().unwrap_or_else(PoisonError::into_inner).take();
+            let out = item.map(&work);
+            *done[at].lock().unwrap_or_else(PoisonError::into_inner) = out;
+        });
+        let out = |slot: Mutex<Option<U>>| slot.into_inner().unwrap_or_else(PoisonError::into_inner);
+        done.into_iter().map(|slot| out(slot).expect("each item is done once")).collect()
+    }
 }
 
 /// All pieces on the calling thread.
@@ -85,7 +101,7 @@ pub trait Fan: Sync {
 pub struct OneByOne;
 
 impl Fan for OneByOne {
-    fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
-        items.into_iter().map(work).collect()
+    fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync)) {
+        (0..n).for_each(work);
     }
 }

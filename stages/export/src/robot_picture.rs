@@ -50,7 +50,7 @@ const NOTHING: Shown = Shown { depth: f32::INFINITY, link: u16::MAX, normal: [0.
 impl RobotPicture {
     /// The views of the robot with this index in the labels, its links standing at `world_from_link`.
     #[must_use]
-    pub fn new(robot: i16, model: &Model, world_from_link: &[Pose], fan: &impl Fan) -> Self {
+    pub fn new(robot: i16, model: &Model, world_from_link: &[Pose], fan: &dyn Fan) -> Self {
         let mut bounds = Aabb::EMPTY;
         for (link, pose) in model.links.iter().zip(world_from_link) {
             for corner in link.bounds.corners() {

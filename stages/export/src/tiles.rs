@@ -41,12 +41,12 @@ impl Tiles {
     ///
     /// # Errors
     /// A tile that cannot be written.
-    pub fn add(&mut self, packed: &Packed, fan: &impl Fan) -> Result<()> {
+    pub fn add(&mut self, packed: &Packed, fan: &dyn Fan) -> Result<()> {
         let mut runs = packed.runs(self.las.record_len());
         runs.try_for_each(|(run, records)| self.spool(run, records, fan))
     }
 
-    fn spool(&mut self, run: &Run, mut records: &[u8], fan: &impl Fan) -> Result<()> {
+    fn spool(&mut self, run: &Run, mut records: &[u8], fan: &dyn Fan) -> Result<()> {
         let (at, las) = (run.tile, &self.las);
         let path = || self.out.join(format!("tiles/{}_{}.{}", at[1], at[0], las.ending()));
         let spool = match self.tiles.entry(at) {
@@ -71,7 +71,7 @@ impl Tiles {
     ///
     /// # Errors
     /// A tile that cannot be written, the first of them.
-    pub fn finish(self, fan: &impl Fan) -> Result<Vec<LasSummary>> {
+    pub fn finish(self, fan: &dyn Fan) -> Result<Vec<LasSummary>> {
         fan.fan(self.open(), Spool::finish).into_iter().collect()
     }
 
@@ -87,7 +87,7 @@ impl Tiles {
 fn relieve(
     tiles: &mut BTreeMap<[i32; 2], Spool>,
     blocks: &mut Blocks,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Result<()> {
     let mut fullest: Vec<([i32; 2], usize)> =
         tiles.iter().map(|(at, spool)| (*at, spool.blocks.len())).filter(|(_, n)| *n > 0).collect();

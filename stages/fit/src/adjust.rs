@@ -142,12 +142,12 @@ impl<'a> Adjust<'a> {
     }
 
     /// Adjusts on some points, from where nothing is known of the scans' errors.
-    pub(crate) fn run(&self, start: &Hypothesis, points: &mut Sampled, fan: &impl Fan) -> Adjusted {
+    pub(crate) fn run(&self, start: &Hypothesis, points: &mut Sampled, fan: &dyn Fan) -> Adjusted {
         self.run_from(State::at(start, self.refine.scene), points, fan)
     }
 
     /// The same from any state.
-    pub(crate) fn run_from(&self, start: State, points: &mut Sampled, fan: &impl Fan) -> Adjusted {
+    pub(crate) fn run_from(&self, start: State, points: &mut Sampled, fan: &dyn Fan) -> Adjusted {
         let mut state = start;
         let (mut round, mut before) = (0, 0.0);
         self.refine.prepared.make_triangles(fan);
@@ -184,7 +184,7 @@ impl<'a> Adjust<'a> {
     }
 
     /// Normal equations at a state, the places of the joints among the unknowns.
-    pub(crate) fn at(&self, state: &State, points: &mut Sampled, fan: &impl Fan) -> Normal {
+    pub(crate) fn at(&self, state: &State, points: &mut Sampled, fan: &dyn Fan) -> Normal {
         self.closed(state, self.sums(state, points, fan).0, fan)
     }
 
@@ -194,7 +194,7 @@ impl<'a> Adjust<'a> {
         &self,
         state: &State,
         points: &mut Sampled,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> (Normal, Tallies) {
         let pairing = Pairing::new(self.refine, state, points.gate);
         let mut sums = fan.fan(points.chunks(), |chunk| self.sums_of(&pairing, chunk));
@@ -226,7 +226,7 @@ impl<'a> Adjust<'a> {
     }
 
     /// Normal equations of what was summed up at a state, patches taken out, with all priors.
-    fn closed(&self, state: &State, mut sums: Normal, fan: &impl Fan) -> Normal {
+    fn closed(&self, state: &State, mut sums: Normal, fan: &dyn Fan) -> Normal {
         self.add_priors(state, &mut sums);
         sums.close(&self.refine.prepared.patches, state.smoothness, fan);
         sums

@@ -37,7 +37,7 @@ const N_TURNED: usize = 2;
 
 impl Beam<'_> {
     /// Other values of single joints that score nearly as well as these or better, best first.
-    pub(crate) fn alternatives(&self, h: &Hypothesis, fan: &impl Fan) -> Vec<Hypothesis> {
+    pub(crate) fn alternatives(&self, h: &Hypothesis, fan: &dyn Fan) -> Vec<Hypothesis> {
         let joints = (0..h.posture.len()).collect();
         let found = fan.fan(joints, |free| self.other_values(h, free));
         let mut out: Vec<Hypothesis> = found.into_iter().flatten().collect();
@@ -183,7 +183,7 @@ impl Beam<'_> {
         &self,
         h: &Hypothesis,
         judgement: &Judgement,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Vec<Hypothesis> {
         let bad = |l: usize| {
             let probe = &judgement.probes[l];

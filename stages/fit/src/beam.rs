@@ -61,7 +61,7 @@ impl<'a> Beam<'a> {
 
 impl Beam<'_> {
     /// The best hypotheses over all joints, best first.
-    pub(crate) fn run(&self, bases: &[Pose], fan: &impl Fan) -> Vec<Hypothesis> {
+    pub(crate) fn run(&self, bases: &[Pose], fan: &dyn Fan) -> Vec<Hypothesis> {
         let home = self.prepared.model.home();
         let tolerance = self.tolerance as f32;
         let beam: Vec<Hypothesis> = bases
@@ -81,7 +81,7 @@ impl Beam<'_> {
         &self,
         mut beam: Vec<Hypothesis>,
         first: usize,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Vec<Hypothesis> {
         let (tolerance, n) = (self.tolerance as f32, self.prepared.placed_by.len());
         for free in first..n {
@@ -161,7 +161,7 @@ impl Beam<'_> {
     }
 
     /// All values of a sweep of one joint, each with the score of what it places added.
-    pub(crate) fn every(&self, h: &Hypothesis, free: usize, fan: &impl Fan) -> Vec<Hypothesis> {
+    pub(crate) fn every(&self, h: &Hypothesis, free: usize, fan: &dyn Fan) -> Vec<Hypothesis> {
         let (low, span, n) = self.sweep(free);
         let links = &self.prepared.placed_by[free];
         fan.fan((0..n).collect(), |k| {

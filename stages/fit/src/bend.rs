@@ -23,7 +23,7 @@ const MAX_SLIDES: f64 = 100.0;
 
 impl Refine<'_> {
     /// Postures with other values of the joint before the last, best first.
-    pub(crate) fn bends(&self, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<Hypothesis> {
+    pub(crate) fn bends(&self, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> Vec<Hypothesis> {
         let joint = h.posture.len().checked_sub(2);
         let sweep = joint.and_then(|joint| Some((joint, Sweep::new(self, h, near, joint)?)));
         let Some((joint, sweep)) = sweep else { return Vec::new() };
@@ -51,7 +51,7 @@ impl Refine<'_> {
     }
 
     /// Postures with other values of each slide that moves nothing but a tool's part.
-    pub(crate) fn slides(&self, h: &Hypothesis, fan: &impl Fan) -> Vec<Polished> {
+    pub(crate) fn slides(&self, h: &Hypothesis, fan: &dyn Fan) -> Vec<Polished> {
         let slides =
             (0..h.posture.len()).filter(|&j| self.prepared.leaf[j] && self.is_prismatic(j));
         let others = slides.flat_map(|joint| {

@@ -39,7 +39,7 @@ pub fn calibrate(
     prepared: &Prepared<'_>,
     scene: &Scene<'_>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> (Model, Fit) {
     let h = Hypothesis {
         local_from_base: scene.world_from_local().inverse() * fit.world_from_base,
@@ -83,7 +83,7 @@ fn estimate(
     start: &Hypothesis,
     all: &[u32],
     every: usize,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> (Model, Adjusted, Vec<JointFrame>) {
     let nominal = refine.prepared.model;
     let mut model = nominal.clone();
@@ -187,7 +187,7 @@ pub(crate) fn doubt(
     refine: &Refine<'_>,
     (best, spins): (&mut Adjusted, &mut [Spin]),
     all: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Vec<String> {
     if best.patch_sigma < SMOOTH.0.max(SMOOTH.1 * refine.scene.noise) {
         return Vec::new();

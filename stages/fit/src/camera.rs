@@ -34,7 +34,7 @@ pub(crate) fn beyond(
     refine: &Refine<'_>,
     best: &Adjusted,
     (near, points): (&[u32], &Sampled),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> DMatrix<f64> {
     of_links(refine, best, points) + of_foot(refine, &best.hypothesis, near, fan)
 }
@@ -130,7 +130,7 @@ impl Places {
 
 /// What turns of the base add, the first joint turned back, where the points of the foot leave them open all around: no more than
 /// a quarter turn is looked at where a scanner shows the foot (see `foot.rs`), and a camera bends it besides.
-fn of_foot(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> DMatrix<f64> {
+fn of_foot(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> DMatrix<f64> {
     let n = 6 + h.posture.len();
     let mut out = DMatrix::zeros(n, n);
     let Some(foot) = Foot::new(refine, h, near) else { return out };

@@ -25,7 +25,7 @@ impl Refine<'_> {
         h: &Hypothesis,
         mut covariance: DMatrix<f64>,
         near: &[u32],
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> DMatrix<f64> {
         let Some(foot) = Foot::new(self, h, near) else { return covariance };
         let n = (SPAN / STEP) as i32;
@@ -72,7 +72,7 @@ impl<'a> Foot<'a> {
 
     /// How far turns reach at which the points fit as well, of which so many err alike: the farthest of those tried where there are
     /// too few points to tell, radians.
-    pub(crate) fn reach(&self, angles: Vec<f64>, n_alike: f64, fan: &impl Fan) -> f64 {
+    pub(crate) fn reach(&self, angles: Vec<f64>, n_alike: f64, fan: &dyn Fan) -> f64 {
         let Self { refine, points, .. } = self;
         if points.len() < MIN_POINTS {
             return angles.into_iter().fold(0.0, f64::max);

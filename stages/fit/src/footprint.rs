@@ -26,7 +26,7 @@ pub(crate) fn whole(
     refine: &Refine<'_>,
     (state, joints): (&State, &[usize]),
     mut points: Sampled,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Sampled {
     let links: Vec<usize> = joints.iter().flat_map(|&j| refine.prepared.carried(j)).collect();
     if links.is_empty() {
@@ -42,7 +42,7 @@ fn on_one_plane(
     refine: &Refine<'_>,
     (state, links): (&State, &[usize]),
     points: &mut Sampled,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Sampled {
     refine.prepared.make_triangles(fan);
     let pairing = Pairing::new(refine, state, points.gate);
@@ -62,7 +62,7 @@ fn is_held(
     refine: &Refine<'_>,
     (state, joints): (&State, &[usize]),
     points: &Sampled,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> bool {
     // A part of them tells.
     let mut part = points.about(refine.settings.part());

@@ -47,7 +47,7 @@ impl<'a> Turning<'a> {
     }
 
     /// Distances of the points to some of the links at equal steps of a whole turn from where the joint stands, metres.
-    fn around(&self, n: usize, links: &[usize], fan: &impl Fan) -> Vec<Vec<f32>> {
+    fn around(&self, n: usize, links: &[usize], fan: &dyn Fan) -> Vec<Vec<f32>> {
         fan.fan((0..n).collect(), |k| self.sweep.distances(self.at(k, n), links))
     }
 
@@ -66,7 +66,7 @@ impl Refine<'_> {
         near: &[u32],
         flange: usize,
         holes: &[f64],
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Vec<Bolt> {
         let Some(turning) = Turning::new(self, h, near, flange) else { return Vec::new() };
         let limits = self.prepared.model.limits(flange);

@@ -21,13 +21,13 @@ const FLAT: f64 = 0.05;
 
 /// Standard deviation of the points, metres: from one point to the next, or over a hand's width where that is more, as
 /// it is for depth cameras, whose neighbours err alike.
-pub(crate) fn of(views: &[&View], points: &[Measured], thin: &[u32], fan: &impl Fan) -> f64 {
+pub(crate) fn of(views: &[&View], points: &[Measured], thin: &[u32], fan: &dyn Fan) -> f64 {
     let beams = between_neighbours(views, fan).unwrap_or(UNKNOWN);
     beams.max(over_patches(points, thin, fan).unwrap_or(0.0))
 }
 
 /// Noise along the beams: how far the middle one of three consecutive points lies off the line through the others.
-fn between_neighbours(views: &[&View], fan: &impl Fan) -> Option<f64> {
+fn between_neighbours(views: &[&View], fan: &dyn Fan) -> Option<f64> {
     let mut off = fan.fan(views.to_vec(), bends).concat();
     let enough = off.len() >= MIN_TRIPLES;
     median(&mut off).filter(|_| enough).map(|m| 1.4826 * m)
@@ -52,7 +52,7 @@ fn bends(view: &View) -> Vec<f64> {
 }
 
 /// How far the points of the flattest patches, one view's each, lie off their planes.
-fn over_patches(points: &[Measured], thin: &[u32], fan: &impl Fan) -> Option<f64> {
+fn over_patches(points: &[Measured], thin: &[u32], fan: &dyn Fan) -> Option<f64> {
     let view = |i: &u32| points[*i as usize].view;
     let of_views = thin.chunk_by(|a, b| view(a) == view(b)).collect();
     let mut off = fan.fan(of_views, |own| patches_of(points, own)).concat();

@@ -61,7 +61,7 @@ impl PreparedLink {
 impl<'a> Prepared<'a> {
     /// Prepares model `index` of the library.
     #[must_use]
-    pub fn new(index: usize, model: &'a Model, fan: &impl Fan) -> Self {
+    pub fn new(index: usize, model: &'a Model, fan: &dyn Fan) -> Self {
         let fields = fan.fan(model.links.iter().collect(), |link| Arc::new(Fields::new(link)));
         Self::of((index, model), fields.into_iter())
     }
@@ -123,7 +123,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Makes what tells where beams meet the links' meshes, where it is not there yet.
-    pub fn make_triangles(&self, fan: &impl Fan) {
+    pub fn make_triangles(&self, fan: &dyn Fan) {
         fan.fan((0..self.links.len()).collect(), |l| {
             self.links[l].fields.triangles(&self.model.links[l]);
         });

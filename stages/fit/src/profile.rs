@@ -23,7 +23,7 @@ pub(crate) fn beyond(
     refine: &Refine<'_>,
     best: &Adjusted,
     points: &Sampled,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Vec<f64> {
     let n = best.hypothesis.posture.len();
     let sigma = |j: usize| best.covariance[(6 + j, 6 + j)].max(0.0).sqrt();
@@ -41,7 +41,7 @@ fn costs(
     best: &Adjusted,
     points: &Sampled,
     (joint, sigma): (usize, f64),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Option<Vec<f64>> {
     let [_, turning] = points.parted(&refine.prepared.carried(joint));
     if turning.points().len() > MAX_POINTS {

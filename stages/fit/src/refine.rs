@@ -129,7 +129,7 @@ impl Refine<'_> {
         start: &Hypothesis,
         points: &[u32],
         rounds: &[Round],
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Hypothesis {
         let mut h = start.clone();
         let mut rounds = rounds.iter().peekable();
@@ -170,7 +170,7 @@ impl Refine<'_> {
     }
 
     /// Normal equations by link.
-    fn sums(&self, h: &Hypothesis, points: &[u32], gate: f64, fan: &impl Fan) -> Vec<Sums> {
+    fn sums(&self, h: &Hypothesis, points: &[u32], gate: f64, fan: &dyn Fan) -> Vec<Sums> {
         let matching = Matching::new(self, h, gate);
         let kinematics = self.prepared.model.kinematics(&h.posture);
         let n = 6 + h.posture.len();

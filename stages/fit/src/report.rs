@@ -54,7 +54,7 @@ pub(crate) fn report(
     others: &[Polished],
     (near, points): (&[u32], &Sampled),
     wrist: Option<&Wrist>,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Fit {
     let prepared = refine.prepared;
     let model = prepared.model;
@@ -112,7 +112,7 @@ fn widen(
     (best, wrist): (&Adjusted, Option<&Wrist>),
     several: &[&Spin],
     (near, points): (&[u32], &Sampled),
-    (in_base, fan): (&mut DMatrix<f64>, &impl Fan),
+    (in_base, fan): (&mut DMatrix<f64>, &dyn Fan),
 ) {
     let n = best.hypothesis.posture.len();
     let mut of_joints = in_base.view_mut((6, 6), (n, n));
@@ -131,7 +131,7 @@ fn ranked<'o>(
     best: (&Hypothesis, &Judgement),
     others: &'o [Polished],
     near: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Vec<Rival<'o>> {
     let mut rivals: Vec<Rival<'o>> = fan.fan(others.iter().collect(), |other| {
         let [by_beams, by_points] = lead(refine, best, other, near);

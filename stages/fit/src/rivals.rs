@@ -58,7 +58,7 @@ pub(crate) fn best_of(
     best: Settled,
     others: &mut Vec<Polished>,
     (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Settled {
     let mut best = best;
     let mut rivals = near_rivals((beam, refine), others, &best, near, fan);
@@ -94,7 +94,7 @@ pub(crate) fn at_rest(
     (best, ..): &Settled,
     others: &[Polished],
     (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Vec<Polished> {
     let (h, prepared) = (&best.hypothesis, refine.prepared);
     let is_on_its_way = |other: &Hypothesis| {
@@ -114,7 +114,7 @@ fn near_rivals(
     others: &[Polished],
     (best, judgement, _): &Settled,
     near: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Vec<Polished> {
     let least = judgement.explained - SHORT * judgement.explained.abs();
     let last = best.hypothesis.posture.len().saturating_sub(1);
@@ -147,7 +147,7 @@ fn compare(
     mut best: Settled,
     others: Vec<Polished>,
     (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> (Settled, Vec<Polished>) {
     let mut rest = Vec::new();
     for polished in others {

@@ -55,7 +55,7 @@ impl<'a> Scene<'a> {
         views: &'a [View],
         floors: &[InstallationPlane],
         settings: &Settings,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Self {
         Self::of(region, &views.iter().collect::<Vec<_>>(), floors, settings, fan)
     }
@@ -66,7 +66,7 @@ impl<'a> Scene<'a> {
         views: &[&'a View],
         floors: &[InstallationPlane],
         settings: &Settings,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Self {
         let planes: Vec<Plane> = floors
             .iter()

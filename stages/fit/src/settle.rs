@@ -26,7 +26,7 @@ pub(crate) fn settle(
     refine: &Refine<'_>,
     h: &Hypothesis,
     (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Settled {
     let part = if refine.scene.has_camera() { OF_CAMERAS } else { SETTLED };
     let mut points = adjusted_points(refine, h, (all, refine.settings.max_points / part), fan);
@@ -74,7 +74,7 @@ pub(crate) fn finish(
     mut best: Settled,
     others: &[Polished],
     (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Fit {
     let mut points = sharpen(refine, &mut best, all, fan);
     let wrist = bent(refine, (&mut best, &mut points), (near, all), fan);
@@ -90,7 +90,7 @@ fn bent(
     refine: &Refine<'_>,
     (best, points): (&mut Settled, &mut Sampled),
     (near, all): (&[u32], &[u32]),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Option<Wrist> {
     for _ in 0..N_BENT {
         let state = best.0.state();
@@ -119,7 +119,7 @@ fn sharpen(
     refine: &Refine<'_>,
     (best, judgement, spins): &mut Settled,
     all: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Sampled {
     let n = refine.settings.max_points;
     let state = best.state();

@@ -41,7 +41,7 @@ pub fn fit(
     prepared: &Prepared<'_>,
     scene: &Scene<'_>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Option<Fit> {
     let local_from_world = scene.world_from_local().inverse();
     let bases: Vec<Pose> =
@@ -89,7 +89,7 @@ pub fn again(
     prepared: &Prepared<'_>,
     scene: &Scene<'_>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Option<Fit> {
     let refine = Refine { prepared, scene, settings, prior: None };
     let start = Hypothesis {
@@ -117,7 +117,7 @@ const QUICK: [usize; 3] = [25, 8, 3];
 
 /// Whether anything like the robot's arm stands on one of the bases. A right one may end with a wrong wrist in a quick
 /// look, but not without shoulder and elbow.
-fn is_promising(refine: &Refine<'_>, bases: &[Pose], near: &[u32], fan: &impl Fan) -> bool {
+fn is_promising(refine: &Refine<'_>, bases: &[Pose], near: &[u32], fan: &dyn Fan) -> bool {
     let found = quick(refine, bases, near, fan);
     found.is_some_and(|found| found.1.score >= hopeless(refine.scene))
 }
@@ -127,7 +127,7 @@ pub(crate) fn quick(
     refine: &Refine<'_>,
     bases: &[Pose],
     near: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Option<Polished> {
     let [beam, settle, n_refine] = QUICK;
     let quick = Settings { beam, settle, n_refine, n_polish: 1, ..refine.settings.clone() };
@@ -183,7 +183,7 @@ fn look_beside(
     refine: &Refine<'_>,
     polished: &mut Vec<Polished>,
     near: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Option<()> {
     for look in [Look::Again, Look::Others] {
         let Some((best, judgement)) = polished.first() else { break };
@@ -218,7 +218,7 @@ fn rough(
     refine: &Refine<'_>,
     found: Vec<Hypothesis>,
     near: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Vec<Hypothesis> {
     let settings = refine.settings;
     let mut out: Vec<(Hypothesis, f64)> = Vec::new();
@@ -242,7 +242,7 @@ pub(crate) fn roughly(
     h: &Hypothesis,
     near: &[u32],
     rounds: &[Round],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Hypothesis {
     let few = refine.stratified(h, &some(near, COARSE_NEAR), (rounds[0].gate, COARSE_CAP), fan);
     refine.run(h, &few, rounds, fan)
@@ -262,7 +262,7 @@ pub(crate) fn polish(
     refine: &Refine<'_>,
     h: &Hypothesis,
     near: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Polished {
     let h = fine(refine, h, near, fan);
     let judgement = judged(refine, &h);
@@ -274,18 +274,18 @@ pub(crate) fn fine(
     refine: &Refine<'_>,
     h: &Hypothesis,
     near: &[u32],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Hypothesis {
     fine_on(refine, h, &few(refine, h, near, fan), fan)
 }
 
 /// Points for that.
-fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<u32> {
+fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> Vec<u32> {
     refine.stratified(h, &some(near, POLISH_NEAR), (FINE_GATE, POLISH_CAP), fan)
 }
 
 /// The same on points that are chosen.
-fn fine_on(refine: &Refine<'_>, h: &Hypothesis, few: &[u32], fan: &impl Fan) -> Hypothesis {
+fn fine_on(refine: &Refine<'_>, h: &Hypothesis, few: &[u32], fan: &dyn Fan) -> Hypothesis {
     let h = refine.run(h, few, &FINE_ROUNDS, fan);
     refine.run(&h, few, &last_rounds(refine, &h, few), fan)
 }

@@ -45,12 +45,12 @@ pub(crate) fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
 
 impl Refine<'_> {
     /// Sweeps each joint that moves nothing but the links that it places and the tool.
-    pub(crate) fn spins(&self, h: &Hypothesis, near: &[u32], fan: &impl Fan) -> Vec<Spin> {
+    pub(crate) fn spins(&self, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> Vec<Spin> {
         let leaves = (0..h.posture.len()).filter(|&j| self.prepared.leaf[j]);
         leaves.filter_map(|joint| self.spin(h, near, joint, fan)).collect()
     }
 
-    fn spin(&self, h: &Hypothesis, near: &[u32], joint: usize, fan: &impl Fan) -> Option<Spin> {
+    fn spin(&self, h: &Hypothesis, near: &[u32], joint: usize, fan: &dyn Fan) -> Option<Spin> {
         let sweep = Sweep::new(self, h, near, joint)?;
         let [low, high] = self.prepared.model.limits(joint);
         let span = (high - low).min(TAU);

@@ -40,7 +40,7 @@ pub fn stays(
     prepared: &Prepared<'_>,
     sights: &Sights<'_>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Option<Fit> {
     let seeing = (0..sights.views.len()).filter(|&v| !sights.views[v].images.is_empty()).collect();
     let single =
@@ -147,7 +147,7 @@ impl<'a> Single<'a> {
         prepared: &Prepared<'_>,
         sights: &Sights<'a>,
         settings: &Settings,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Self {
         let scene = Scene::of(sights.region, &[view], sights.floors, settings, fan);
         let local_from_world = scene.world_from_local().inverse();

@@ -23,7 +23,7 @@ impl Refine<'_> {
         h: &Hypothesis,
         points: &[u32],
         (gate, cap): (f64, usize),
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Vec<u32> {
         let strata = Strata::new(self, h, gate);
         let some: Vec<u32> = points.iter().copied().step_by(SOME).collect();
@@ -61,7 +61,7 @@ pub(crate) fn adjusted_points(
     refine: &Refine<'_>,
     h: &Hypothesis,
     (all, n): (&[u32], usize),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Sampled {
     let n_links = refine.prepared.model.links.len().max(1);
     let cap = (n / n_links).max(MIN_CAP);
@@ -126,7 +126,7 @@ impl<'a> Strata<'a> {
     }
 
     /// The points by stratum; only those near the wanted links, where some are told.
-    fn sort(&self, points: &[u32], wanted: Option<&Placed<'_>>, fan: &impl Fan) -> Vec<Vec<u32>> {
+    fn sort(&self, points: &[u32], wanted: Option<&Placed<'_>>, fan: &dyn Fan) -> Vec<Vec<u32>> {
         let n_strata = self.beside() + 1;
         let sorted = fan.fan(points.chunks(chunk(points.len())).collect(), |chunk: &[u32]| {
             let mut strata: Vec<Vec<u32>> = vec![Vec::new(); n_strata];

@@ -26,7 +26,7 @@ pub(crate) fn sway(
     best: &Adjusted,
     several: &[&Spin],
     (near, points): (&[u32], &Sampled),
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> DMatrix<f64> {
     let h = &best.hypothesis;
     let n = h.posture.len();
@@ -74,7 +74,7 @@ impl<'a> Steps<'a> {
         best: &'a Adjusted,
         several: &[&Spin],
         points: &Sampled,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Self {
         let adjust = Adjust::new(refine);
         let moved: Vec<usize> =

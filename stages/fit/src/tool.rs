@@ -50,7 +50,7 @@ pub fn try_tool(
     (tooled, [n_joints, n_links]): (&Prepared<'_>, [usize; 2]),
     scene: &Scene<'_>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Option<Tooled> {
     let beam = Beam::new(tooled, scene, settings).fitted();
     let start = start(fit, tooled, scene);
@@ -84,7 +84,7 @@ pub fn bolt(
     holes: &[f64],
     scene: &Scene<'_>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Vec<Bolt> {
     let refine = Refine { prepared: tooled, scene, settings, prior: None };
     let [near, _] = near(start, tooled, scene);
@@ -99,7 +99,7 @@ pub fn fit_tool(
     (tooled, flange): (&Prepared<'_>, usize),
     scene: &Scene<'_>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Fit {
     let refine = Refine { prepared: tooled, scene, settings, prior: None };
     let [near, all] = near(start, tooled, scene);

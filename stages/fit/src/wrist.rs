@@ -57,7 +57,7 @@ impl Wrist {
         refine: &Refine<'_>,
         (best, spins): (&Adjusted, &[Spin]),
         points: &Sampled,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Option<Self> {
         let at = 6 + best.hypothesis.posture.len().checked_sub(2)?;
         let is_known = best.covariance[(at, at)] < KNOWN * KNOWN;
@@ -68,7 +68,7 @@ impl Wrist {
         refine: &Refine<'_>,
         (state, spins): (&State, &[Spin]),
         points: &Sampled,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Option<Self> {
         let (prepared, h) = (refine.prepared, &state.hypothesis);
         let flange = spins.iter().find(|s| s.values.len() > 1)?.joint;

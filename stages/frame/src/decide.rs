@@ -99,7 +99,7 @@ pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, O
 ///
 /// # Errors
 /// No pose is clear.
-pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &impl Fan) -> Result<Place, Refusal> {
+pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Result<Place, Refusal> {
     let chosen = Chosen::of(&new.surfels);
     let mut poses = search::poses(&old.surfels, &new.surfels, fan);
     poses.push(*stated);

@@ -27,7 +27,7 @@ const HEIGHT_APART: i32 = 8;
 const MAX_POSES: usize = 96;
 
 /// Poses of the new session in the earlier one, each about its own origin, the most promising first.
-pub(crate) fn poses(old: &Surfels, new: &Surfels, fan: &impl Fan) -> Vec<Pose> {
+pub(crate) fn poses(old: &Surfels, new: &Surfels, fan: &dyn Fan) -> Vec<Pose> {
     let (yaws, main) = yaws(old, new);
     let Some(plans) = Plans::of(old, new, main) else { return Vec::new() };
     let found = fan.fan(yaws, |yaw| (yaw, plans.peaks(new, yaw)));

@@ -162,7 +162,7 @@ impl<'a> BaseSearch<'a> {
 
     /// The candidates: one for each place, best first.
     #[must_use]
-    pub fn run(&self, planes: &[InstallationPlane], fan: &impl Fan) -> Vec<Candidate> {
+    pub fn run(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> Vec<Candidate> {
         let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
         let mut trials = Vec::new();
         for at in self.looked_at_coarsely(&local) {
@@ -237,7 +237,7 @@ impl<'a> BaseSearch<'a> {
         at: usize,
         plane: &InstallationPlane,
         local: &Plane,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Vec<Trial> {
         let (step, tolerance) = (self.coarse_step(), self.coarse_tolerance());
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;

@@ -38,7 +38,7 @@ impl BaseSearch<'_> {
         planes: &[Plane],
         trials: &[Trial],
         (grid, (keep, quota)): (Grid, (usize, usize)),
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Vec<Trial> {
         let (tolerance, apart) = (grid.tolerance(), (grid.step * 0.6, grid.yaw * 0.6));
         let around = |trial: Trial| -> Vec<Trial> {

@@ -87,7 +87,7 @@ impl<'a> Sight<'a> {
         region: &'a Region,
         views: &'a [View],
         (all, scouts): (&Evidence<'_>, &'a Evidence<'a>),
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Self {
         let volume = Volume::new(region, all, fan);
         let all_spots = spots(views, fan);
@@ -182,7 +182,7 @@ impl<'a> Sight<'a> {
 type Sum = (u64, [f64; 3], u32);
 
 /// The points of all views, cube by cube.
-fn spots(views: &[View], fan: &impl Fan) -> Vec<Spot> {
+fn spots(views: &[View], fan: &dyn Fan) -> Vec<Spot> {
     // Beams beside each other mostly end in one cube: there are far fewer runs of points than points.
     let of_view = |view: &View| {
         let mut runs: Vec<Sum> = Vec::new();
@@ -242,7 +242,7 @@ struct Volume {
 
 impl Volume {
     /// The region's grid; `None` where there are no beams.
-    fn new(region: &Region, evidence: &Evidence<'_>, fan: &impl Fan) -> Option<Self> {
+    fn new(region: &Region, evidence: &Evidence<'_>, fan: &dyn Fan) -> Option<Self> {
         if !evidence.has_beams() {
             return None;
         }

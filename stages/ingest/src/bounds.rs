@@ -13,7 +13,7 @@ const MOST_READ: u64 = 20_000_000;
 
 /// Bounds of scans in the world, metres, by their number: those of inputs that were read. An input
 /// that cannot be read has none; a run says why.
-pub(crate) fn read(sources: &Sources, fan: &impl Fan) -> BTreeMap<u32, Aabb> {
+pub(crate) fn read(sources: &Sources, fan: &dyn Fan) -> BTreeMap<u32, Aabb> {
     let is_small = |input: &&Input| sources.n_stated(input.id).is_some_and(|n| n <= MOST_READ);
     let inputs: Vec<&Input> =
         sources.opened().iter().filter(|i| i.format == Format::E57).filter(is_small).collect();

@@ -30,12 +30,12 @@ impl Sources {
     ///
     /// # Errors
     /// An input that is broken where it was looked at, with its path.
-    pub fn glance(&self, input: InputId, sample: Sample, fan: &impl Fan) -> Result<Glance> {
+    pub fn glance(&self, input: InputId, sample: Sample, fan: &dyn Fan) -> Result<Glance> {
         let (file, path) = self.open(input)?;
         self.glanced(file, sample, fan).map_err(|e| e.at(path.display()))
     }
 
-    fn glanced(&self, file: &File, sample: Sample, fan: &impl Fan) -> Result<Glance> {
+    fn glanced(&self, file: &File, sample: Sample, fan: &dyn Fan) -> Result<Glance> {
         let n_stated: u64 = file.reader.masks().iter().filter_map(|m| m.n_stated).sum();
         let every = sample.n_decoded.min(n_stated).div_ceil(sample.n_kept.max(1)).max(1);
         let found = match file.reader.read(Want::Coordinates)? {

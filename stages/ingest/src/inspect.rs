@@ -103,7 +103,7 @@ pub struct BoundsText {
 
 /// Describes each input, in their order. E57 files that are not large are read for the bounds of their points.
 #[must_use]
-pub fn describe(sources: &Sources, fan: &impl Fan) -> Vec<Description> {
+pub fn describe(sources: &Sources, fan: &dyn Fan) -> Vec<Description> {
     let read = bounds::read(sources, fan);
     let inputs = sources.inputs.iter().enumerate();
     inputs.map(|(i, input)| description(sources, (i, input), &read)).collect()

@@ -81,7 +81,7 @@ pub fn open(
     paths: &[PathBuf],
     scanners: Option<&Scanners>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Result<Sources> {
     open_after(Before::default(), paths, scanners, settings, fan)
 }
@@ -95,7 +95,7 @@ pub fn open_after(
     paths: &[PathBuf],
     scanners: Option<&Scanners>,
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Result<Sources> {
     let n_before = [before.inputs.len(), before.masks.len()];
     let Before { inputs, masks, scans } = before;
@@ -290,7 +290,7 @@ impl Sources {
 
     /// Looks at a sample of each scan for the raster that it was taken in, and whether its scanner can have stood where it is
     /// said to.
-    fn find_lattices(&mut self, settings: &Settings, fan: &impl Fan) -> Result<()> {
+    fn find_lattices(&mut self, settings: &Settings, fan: &dyn Fan) -> Result<()> {
         let n_scans = |file: &File| file.reader.scans().len();
         let all = (self.files.iter().enumerate())
             .flat_map(|(f, file)| (0..n_scans(file)).map(move |i| (f, i)))

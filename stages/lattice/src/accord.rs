@@ -21,7 +21,7 @@ fn step(view: &View, n_views: usize) -> usize {
 
 /// Lets the views of a region check each other's missing returns: where one scan measured matter, the silence of another
 /// is no free space (a scanner behind a near post, black or shiny surfaces).
-pub fn agree(views: &mut [View], fan: &impl Fan) {
+pub fn agree(views: &mut [View], fan: &dyn Fan) {
     let n = views.len();
     let asked = |view: &View| view.points.iter().step_by(step(view, n)).copied().collect();
     let matter: Vec<Vec<[f32; 3]>> = views.iter().map(asked).collect();
@@ -47,7 +47,7 @@ const MIN_IN_CELL: usize = 3;
 /// What was here for one scan and gone for another: middles of cells of 5 cm, local frame. Edges and wires make a few, what
 /// moved makes many.
 #[must_use]
-pub fn disagreement(views: &[View], fan: &impl Fan) -> Vec<[f32; 3]> {
+pub fn disagreement(views: &[View], fan: &dyn Fan) -> Vec<[f32; 3]> {
     let eyes: Vec<Eye<'_>> = views.iter().map(|v| Eye::new(&v.images)).collect();
     let parts = views.iter().enumerate().flat_map(|(own, view)| {
         let points = view.points.chunks(N_AT_A_TIME * step(view, views.len()));

@@ -55,7 +55,7 @@ impl<'a> Passed<'a> {
 }
 
 /// Frees every voxel that a beam of the views (of `region`) went through.
-pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &impl Fan) {
+pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &dyn Fan) {
     let grid = *space.grid();
     let passed = Passed::new(region, views, grid.edge);
     let pieces = space.voxels_mut().chunks_mut(PIECE).enumerate().collect();

@@ -219,7 +219,7 @@ impl Tally {
 
 /// What differs between two sessions: things that moved, then those that went, then those that appeared, each by size.
 #[must_use]
-pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings, fan: &impl Fan) -> Vec<Thing> {
+pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings, fan: &dyn Fan) -> Vec<Thing> {
     let by_size = |mut pieces: Vec<Piece>| {
         pieces.sort_by_key(|p| std::cmp::Reverse(p.cells.len()));
         pieces

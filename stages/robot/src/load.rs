@@ -103,7 +103,7 @@ impl Model {
     }
 
     /// Makes the CAD clouds of all links, of a model that was loaded without them.
-    pub fn sample(&mut self, settings: &Settings, fan: &impl Fan) {
+    pub fn sample(&mut self, settings: &Settings, fan: &dyn Fan) {
         let links = self.links.iter().collect();
         let sample =
             |link: &Link| cloud::sample(&link.mesh, settings.spacing, settings.max_samples);

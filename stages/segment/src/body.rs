@@ -60,7 +60,7 @@ pub(crate) fn bodies(
     fits: &[Fit],
     models: &[Model],
     settings: &Settings,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Vec<Body> {
     let all = fits.iter().enumerate().flat_map(|(robot, fit)| {
         std::iter::once(fit).chain(&fit.stays).map(move |fit| (robot, fit))
@@ -85,7 +85,7 @@ pub(crate) fn bodies(
 /// For each model in use: the fields of its links that have a surface.
 fn fields(
     used: &[(u16, &Fit, &Model)],
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> BTreeMap<usize, Vec<Option<Arc<Field>>>> {
     let models: BTreeMap<usize, &Model> = used.iter().map(|(_, fit, m)| (fit.model, *m)).collect();
     let links = models.iter().flat_map(|(at, model)| model.links.iter().map(move |l| (*at, l)));

@@ -102,7 +102,7 @@ impl Segment {
         floor: &Floor,
         scans: &[Scan],
         settings: Settings,
-        fan: &impl Fan,
+        fan: &dyn Fan,
     ) -> Self {
         Self {
             bodies: bodies(fits, models, &settings, fan),

@@ -232,7 +232,7 @@ impl Normal {
 
     /// Takes the patches' offsets out, as smooth as told, or as is likeliest. Call once, after the last residual and all
     /// priors.
-    pub(crate) fn close(&mut self, of: &Patches, told: Option<Smoothness>, fan: &impl Fan) {
+    pub(crate) fn close(&mut self, of: &Patches, told: Option<Smoothness>, fan: &dyn Fan) {
         self.flush();
         self.hessian.fill_upper_triangle_with_lower_triangle();
         self.sigma2 = patch_variance(self.patches.iter().flatten());

@@ -125,7 +125,7 @@ pub(super) fn take_out(
     (patches, of): (&mut [Option<Patch>], &Patches),
     sigma2: f64,
     told: Option<Smoothness>,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Smoothness {
     patches.iter().flatten().for_each(|patch| *gradient += &patch.g);
     if sigma2 <= 0.0 {
@@ -155,7 +155,7 @@ fn likeliest(
     equations: (&DMatrix<f64>, &DVector<f64>),
     links: &[Link],
     sigma2: f64,
-    fan: &impl Fan,
+    fan: &dyn Fan,
 ) -> Smoothness {
     let judged = |among: Vec<Smoothness>| {
         fan.fan(among, |of| (evidence(equations, links, (of, sigma2)), of)).into_iter()
