@@ -1,12 +1,14 @@
-//! A run that found no robot in; what its clouds and library lack for one, and what supplying it would change, out.
+//! A run that found no robot in; what its clouds and library lack for one, and what supplying it
+//! would change, out.
 
 use crate::store::TileEntry;
 use contract::{Scan, quote};
 use geometry::Aabb;
 use robot::Model;
 
-/// Points of a square metre of surface below which robots are often missed: of twelve arms that a camera showed in 1,400 to
-/// 2,800 points, about as many a square metre, four were found (benches/README.md, Depth cameras).
+/// Points of a square metre of surface below which robots are often missed: of twelve arms that a
+/// camera showed in 1,400 to 2,800 points, about as many a square metre, four were found
+/// (benches/README.md, Depth cameras).
 const SPARSE: f64 = 2_800.0;
 /// Names of scans that a sentence lists.
 const N_NAMES: usize = 3;

@@ -1,5 +1,5 @@
-//! The program's own sources in; a number that changes with any of them out (`STILLPOINT_CODE`): what another program
-//! computed is not taken for what this one would.
+//! The program's own sources in; a number that changes with any of them out (`STILLPOINT_CODE`):
+//! what another program computed is not taken for what this one would.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};

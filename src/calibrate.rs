@@ -1,5 +1,6 @@
-//! Fits in; the same with the places of their joints estimated, and the models so corrected, out: for robots that their
-//! models fit poorly, where it is asked for. And results of several such runs in; one corrected model out.
+//! Fits in; the same with the places of their joints estimated, and the models so corrected, out:
+//! for robots that their models fit poorly, where it is asked for. And results of several such runs
+//! in; one corrected model out.
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::folders;
@@ -54,7 +55,8 @@ pub struct Together {
     model: String,
     n_postures: usize,
     calibration: Calibration,
-    /// Of each joint's zero against the controller's, and standard deviation, where readings were given.
+    /// Of each joint's zero against the controller's, and standard deviation, where readings were
+    /// given.
     zeros: BTreeMap<String, [f64; 2]>,
 }
 
@@ -141,11 +143,12 @@ fn zeros(
 }
 
 impl Together {
-    /// Writes the corrected model into a library: the folder of the given library's model, with the joints of its URDF moved,
-    /// under its own name in `out`.
+    /// Writes the corrected model into a library: the folder of the given library's model, with the
+    /// joints of its URDF moved, under its own name in `out`.
     ///
     /// # Errors
-    /// No such model in the library, a folder that is there already or cannot be written, or a URDF outside its folder.
+    /// No such model in the library, a folder that is there already or cannot be written, or a URDF
+    /// outside its folder.
     pub fn write(&self, library: &Path, out: &Path) -> Result<()> {
         let from = library.join(&self.model);
         let from = from.canonicalize().map_err(|e| Error::from(e).at(from.display()))?;

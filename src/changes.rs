@@ -1,8 +1,9 @@
 //! Two results of one plant in; which robots stand otherwise, came, went or were exchanged, out.
 //!
-//! A change within what both results know of a value is none: a joint has moved where its values differ by more than
-//! five of their standard deviations together, and by more than models and registration make. Joints that the points of
-//! either session leave open are not compared, and named.
+//! A change within what both results know of a value is none: a joint has moved where its values
+//! differ by more than five of their standard deviations together, and by more than models and
+//! registration make. Joints that the points of either session leave open are not compared, and
+//! named.
 
 use contract::words::{Unit, triple};
 use contract::{Fit, Verdict, quote};
@@ -13,12 +14,14 @@ use std::fmt::Write as _;
 
 /// Robots nearer than this are one place, metres: no two feet stand so near.
 const SAME_PLACE: f64 = 0.5;
-/// Standard deviations of a difference from which on it is one: of a plant's hundreds of joints none by chance.
+/// Standard deviations of a difference from which on it is one: of a plant's hundreds of joints
+/// none by chance.
 const SURE: f64 = 5.0;
 /// Least difference of a joint that counts, radians (0.1°) or metres.
 const LEAST_JOINT: f64 = 0.001_75;
-/// Joints of two trusted postures that are known less well than joints ought to be, and have no other values, radians: up to this
-/// standard deviation (2°) they tell a change of at least so much (2°).
+/// Joints of two trusted postures that are known less well than joints ought to be, and have no
+/// other values, radians: up to this standard deviation (2°) they tell a change of at least so much
+/// (2°).
 const ROUGH: f64 = 0.035;
 /// Least shift of a base that counts, metres: two sessions are registered to within millimetres.
 const LEAST_SHIFT: f64 = 0.010;
@@ -78,7 +81,8 @@ pub struct RobotChange {
     pub base_shift: Option<[f64; 3]>,
     /// Turn of its base, radians.
     pub base_turn: Option<f64>,
-    /// Joints that both results determine, and those known roughly that differ by far more than that.
+    /// Joints that both results determine, and those known roughly that differ by far more than
+    /// that.
     pub joints: Vec<JointChange>,
     /// Joints that one of them leaves open.
     pub not_compared: Vec<String>,
@@ -86,7 +90,8 @@ pub struct RobotChange {
     pub verdicts: [Option<String>; 2],
 }
 
-/// Compares two results: robots of the first in its order, then those that appeared. Refused ones stand in neither.
+/// Compares two results: robots of the first in its order, then those that appeared. Refused ones
+/// stand in neither.
 #[must_use]
 pub fn changes(then: &ResultFile, now: &ResultFile) -> Vec<RobotChange> {
     let standing = |result| -> Vec<&RobotEntry> {

@@ -1,4 +1,5 @@
-//! A result and the truth of its scene in; how far they agree, robot by robot and point by point, out.
+//! A result and the truth of its scene in; how far they agree, robot by robot and point by point,
+//! out.
 
 use crate::tally::Tally;
 use contract::words::{Unit, count};
@@ -13,7 +14,8 @@ use std::path::Path;
 
 /// A found robot farther than this from a true one is not it, metres.
 const SAME_PLACE: f64 = 0.5;
-/// A posture is found if no joint that is said to be determined is farther off, radians (1°) or metres.
+/// A posture is found if no joint that is said to be determined is farther off, radians (1°) or
+/// metres.
 const SAME_POSTURE: f64 = 0.0175;
 
 /// How far a result agrees with the truth.
@@ -25,8 +27,8 @@ pub struct Agreement {
     pub n_invented: usize,
     /// Its points, by what they are and what they are said to be.
     pub points: Tally,
-    /// For each thing of the scene: its points, and those of them that are said to move. Empty where the truth does not
-    /// name things.
+    /// For each thing of the scene: its points, and those of them that are said to move. Empty
+    /// where the truth does not name things.
     pub by_object: Vec<[u64; 2]>,
     /// Names of the things.
     pub objects: Vec<String>,
@@ -85,7 +87,8 @@ impl JointError {
 }
 
 impl Found {
-    /// Largest error of a joint that turns and is said to be determined, degrees; of all that turn where none is.
+    /// Largest error of a joint that turns and is said to be determined, degrees; of all that turn
+    /// where none is.
     #[must_use]
     pub fn worst_joint_deg(&self) -> f64 {
         let joints = judged(&self.joints).filter(|j| !j.slides);
@@ -94,13 +97,15 @@ impl Found {
 }
 
 impl Agreement {
-    /// Compares `OUT/result.json` and its masks with the truth beside the scans; the result must be of `scans.e57`.
+    /// Compares `OUT/result.json` and its masks with the truth beside the scans; the result must be
+    /// of `scans.e57`.
     pub fn of(out: &Path, truth_dir: &Path) -> Result<Self> {
         Self::of_session(out, truth_dir, 0)
     }
 
-    /// The same for a result that goes on from another, by the masks of its own scans, from the mask `first` on. Uncertain
-    /// points of theirs lie outside of the cell, and are passed over.
+    /// The same for a result that goes on from another, by the masks of its own scans, from the
+    /// mask `first` on. Uncertain points of theirs lie outside of the cell, and are passed
+    /// over.
     pub fn of_session(out: &Path, truth_dir: &Path, first: usize) -> Result<Self> {
         let truth = Truth::from_json(&read_text(&truth_dir.join("truth.json"))?)?;
         let result: ResultFile = serde_json::from_str(&read_text(&out.join("result.json"))?)

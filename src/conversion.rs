@@ -32,7 +32,8 @@ fn copc_name() -> &'static str {
 /// Writes the points of the result in `out`; the files' paths.
 ///
 /// # Errors
-/// No result, or one without tiles; another run at work in it; files that cannot be read or written.
+/// No result, or one without tiles; another run at work in it; files that cannot be read or
+/// written.
 pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBuf>> {
     let files = Vouched::open(out)?;
     // A result that was copied without its store has nobody at work in it.

@@ -1,4 +1,5 @@
-//! The tiles of a result in; one COPC file of all their points out, its steps told as those of the run.
+//! The tiles of a result in; one COPC file of all their points out, its steps told as those of the
+//! run.
 
 use crate::engine::{Cancel, Engine, guarded};
 use crate::progress::{Amount, Progress, Stage};

@@ -1,5 +1,5 @@
-//! A virtual cell: robots of our own built, the cell scanned, the main job run on the scans, the result compared with
-//! the truth.
+//! A virtual cell: robots of our own built, the cell scanned, the main job run on the scans, the
+//! result compared with the truth.
 
 use crate::compare::Agreement;
 use crate::engine::Engine;

@@ -1,5 +1,5 @@
-//! A job in; what it will take of memory, disk and time, and what of it is there already, out. Some points are looked at to
-//! tell how much there is to search.
+//! A job in; what it will take of memory, disk and time, and what of it is there already, out. Some
+//! points are looked at to tell how much there is to search.
 
 mod rates;
 mod search;
@@ -33,17 +33,19 @@ const CLOUD_BYTES: [u64; 2] = [34, 40];
 const COPC_BYTES: u64 = 40;
 /// Bytes of a point in a text file, about.
 const TEXT_BYTES: u64 = 45;
-/// Pictures, kept models, voxels and lists, bytes for each model of the library: 7 to 11 MB were measured in halls of none to two
-/// robots, and more robots stand in large plants.
+/// Pictures, kept models, voxels and lists, bytes for each model of the library: 7 to 11 MB were
+/// measured in halls of none to two robots, and more robots stand in large plants.
 const EXTRA_BYTES: u64 = 16 << 20;
 /// Bytes of a spatial tile beside its points: header, and what of a disk's block is left empty.
 const TILE_BYTES: u64 = 4096;
-/// Memory of the program with an open library, and of each model and each point until the budget is full, bytes.
+/// Memory of the program with an open library, and of each model and each point until the budget is
+/// full, bytes.
 const PROGRAM_BYTES: u64 = 160 << 20;
 const MODEL_BYTES: u64 = 24 << 20;
 const POINT_BYTES: u64 = 40;
-/// What is kept of each scan while a robot is searched, however little memory there is, bytes: a billion points of 20 scans took
-/// 0.8 GiB under 512 MiB. No more of them than about so many see a place.
+/// What is kept of each scan while a robot is searched, however little memory there is, bytes: a
+/// billion points of 20 scans took 0.8 GiB under 512 MiB. No more of them than about so many see a
+/// place.
 const SCAN_BYTES: u64 = 28 << 20;
 const SCANS: u64 = 24;
 
@@ -56,13 +58,15 @@ pub struct Estimate {
     pub units: Vec<String>,
     /// Models that are tried.
     pub n_models: usize,
-    /// Resident memory at most, bytes: not above `--memory`, but where even one region of all scans takes more.
+    /// Resident memory at most, bytes: not above `--memory`, but where even one region of all
+    /// scans takes more.
     pub memory_bytes: u64,
     /// Disk for the store, bytes, where it is not there already.
     pub store_bytes: u64,
     /// Disk for what is written, bytes. Old results stay until the new ones are whole.
     pub output_bytes: u64,
-    /// Spatial tiles, about, as far as samples of the scans tell, and at most: more end the run before it writes any.
+    /// Spatial tiles, about, as far as samples of the scans tell, and at most: more end the run
+    /// before it writes any.
     pub tiles: [u64; 2],
     /// Free where both go, bytes; 0 where the system does not tell.
     pub free_bytes: u64,

@@ -1,4 +1,5 @@
-//! An input in, the store of its tiles out: the one that is there from an earlier run, or a new one.
+//! An input in, the store of its tiles out: the one that is there from an earlier run, or a new
+//! one.
 
 use crate::engine::{Engine, Task};
 use crate::job::Means;
@@ -39,8 +40,8 @@ impl<'a> Filling<'a> {
         self.n_kept.get()
     }
 
-    /// The tiles of one input and their key. A store that is there and whole is believed; one that is damaged is made
-    /// again.
+    /// The tiles of one input and their key. A store that is there and whole is believed; one that
+    /// is damaged is made again.
     pub(crate) fn tiles_of(&self, input: &Input, digests: &Digests) -> Result<(Key, Store)> {
         let scans = &self.sources.scans;
         let first = scans.iter().find(|s| s.input == input.id).map_or(0, |s| s.id.0);

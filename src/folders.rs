@@ -28,10 +28,12 @@ pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Copies a folder to a place where nothing is, outside of it, and changes the copy before it takes its name.
+/// Copies a folder to a place where nothing is, outside of it, and changes the copy before it takes
+/// its name.
 ///
 /// # Errors
-/// Something is there already, the place lies in the folder itself, or what [`copy`] and the change say.
+/// Something is there already, the place lies in the folder itself, or what [`copy`] and the change
+/// say.
 pub(crate) fn copy_as_new(
     from: &Path,
     to: &Path,

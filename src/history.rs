@@ -1,5 +1,6 @@
-//! A folder of results in; which sessions of a plant lie in it, which goes on from which, and how much room each takes by
-//! itself, out. Results share files that are the same, so that any of them can be taken away without harm to the others.
+//! A folder of results in; which sessions of a plant lie in it, which goes on from which, and how
+//! much room each takes by itself, out. Results share files that are the same, so that any of them
+//! can be taken away without harm to the others.
 
 use crate::job::{Job, memory_words};
 use crate::reuse::{Manifest, Vouched, refuse_link};

@@ -1,5 +1,5 @@
-//! A strip in; its labels, its records for the clouds, and what pictures and spaces take of it, out: the map of the second
-//! pass, so that those that write have only to copy.
+//! A strip in; its labels, its records for the clouds, and what pictures and spaces take of it,
+//! out: the map of the second pass, so that those that write have only to copy.
 
 use crate::bodies::Bodies;
 use crate::spaces::{Grids, Spot};
@@ -11,7 +11,8 @@ use std::ops::Range;
 
 /// Points whose bounds are looked at together: neighbours of a scan are near each other.
 const BLOCK: usize = 128;
-/// Of so many points that stand still near a robot, one is drawn: its picture has fewer pixels than they are.
+/// Of so many points that stand still near a robot, one is drawn: its picture has fewer pixels than
+/// they are.
 const DRAWN: u64 = 4;
 
 /// The map of the second pass.
@@ -26,7 +27,8 @@ pub(crate) struct LabelStrip<'a> {
     pub(crate) shown: &'a [Aabb],
     pub(crate) plan: &'a PlanPicture,
     pub(crate) pack: Pack,
-    /// Bounds that records of the clouds are written in; labels outside stay uncertain. All where left out.
+    /// Bounds that records of the clouds are written in; labels outside stay uncertain. All where
+    /// left out.
     pub(crate) cell: Option<Aabb>,
     /// World as it is from the world as the file states it, by scan, where that differs.
     pub(crate) moved: &'a [Option<Pose>],
@@ -94,7 +96,8 @@ impl Map for LabelStrip<'_> {
 }
 
 impl LabelStrip<'_> {
-    /// The labels of a strip's points: those that are known near robots, else those of their places alone.
+    /// The labels of a strip's points: those that are known near robots, else those of their places
+    /// alone.
     fn labels(&self, strip: &Strip, world: &[[f64; 3]]) -> Vec<Label> {
         let mut labels: Vec<Label> = world.iter().map(|p| self.ground.label(*p)).collect();
         let near = &self.near[strip.mask.0 as usize];
@@ -171,7 +174,8 @@ pub(crate) fn blocks(world: &[[f64; 3]]) -> Vec<(Range<usize>, Aabb)> {
     world.chunks(BLOCK).enumerate().map(block).collect()
 }
 
-/// World coordinates of a strip's points: those of the file where it states them, moved where that has to be.
+/// World coordinates of a strip's points: those of the file where it states them, moved where that
+/// has to be.
 fn world(strip: &mut Strip, scan: &Scan, moved: Option<&Pose>) -> Vec<[f64; 3]> {
     match &mut strip.attributes {
         Some(a) if a.world.len() == strip.xyz.len() => {

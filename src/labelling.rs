@@ -1,8 +1,9 @@
-//! Fits in; the label of every point out, in the order of its file, written as masks, clouds and pictures.
+//! Fits in; the label of every point out, in the order of its file, written as masks, clouds and
+//! pictures.
 //!
-//! Tiles near robots are segmented and what hangs on the robots is decided over all scans; that leaves a sorted list of
-//! labels by place. Then each input is streamed once more: a point's label is that of the list, or else that of its
-//! place alone (floor or fixed).
+//! Tiles near robots are segmented and what hangs on the robots is decided over all scans; that
+//! leaves a sorted list of labels by place. Then each input is streamed once more: a point's label
+//! is that of the list, or else that of its place alone (floor or fixed).
 
 use crate::engine::{AllThreads, Engine, Hand, Handed, Task};
 use crate::job::Settings;
@@ -27,7 +28,8 @@ use crate::reading::Reading;
 use crate::report::id;
 use crate::spaces::{Grids, mark, poses};
 
-/// Records that wait for their tiles may take so many times what a channel does, where memory is short.
+/// Records that wait for their tiles may take so many times what a channel does, where memory is
+/// short.
 const SPOOLED: usize = 8;
 
 /// What labelling reads.
@@ -104,7 +106,8 @@ impl Streamed<'_> {
         std::mem::take(&mut self.open)
     }
 
-    /// The spaces, by fit, where something else is still to be marked in them; they are not written then.
+    /// The spaces, by fit, where something else is still to be marked in them; they are not written
+    /// then.
     pub(crate) fn take_spaces(&mut self) -> Vec<Option<Space>> {
         let none = vec![None; self.spaces.len()];
         std::mem::replace(&mut self.spaces, none)
@@ -157,7 +160,8 @@ impl<'a> Labelling<'a> {
         Near::find((self.fits, self.models), place, (self.settings, self.merge), engine)
     }
 
-    /// Streams every input once more and writes its labels and tiles, clouds to another folder; then what is said of robots.
+    /// Streams every input once more and writes its labels and tiles, clouds to another folder;
+    /// then what is said of robots.
     pub(crate) fn write<'l>(
         &'l self,
         (near, mut spaces): (&'l Near, Vec<Option<Space>>),
@@ -176,7 +180,8 @@ impl<'a> Labelling<'a> {
         let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
         let mut robots = self.robot_pictures(&chosen, engine)?;
         let pack = Pack::of_clouds(&records, &export);
-        // Tiles are as many bytes as masks and clouds: each has a thread that copies them to their files.
+        // Tiles are as many bytes as masks and clouds: each has a thread that copies them to their
+        // files.
         let apart = |strips: Handed<'_, Labelled>| {
             for strip in strips {
                 let strip = strip?;
@@ -205,7 +210,8 @@ impl<'a> Labelling<'a> {
         Ok(Streamed { labelling: self, near, spaces, robots, open, out, done })
     }
 
-    /// Streams every input once more: into spaces, pictures of robots and tiles, and on to `hand`; names of the plans drawn.
+    /// Streams every input once more: into spaces, pictures of robots and tiles, and on to `hand`;
+    /// names of the plans drawn.
     fn stream(
         &self,
         (near, scope): (&Near, &Scope),
@@ -257,7 +263,8 @@ impl<'a> Labelling<'a> {
         reading.each(task, label, None, engine, sink)
     }
 
-    /// The files of one robot: model, space, pictures; what is said of its space, and the pictures' names.
+    /// The files of one robot: model, space, pictures; what is said of its space, and the pictures'
+    /// names.
     fn write_robot(
         &self,
         i: usize,
@@ -281,7 +288,8 @@ impl<'a> Labelling<'a> {
         LasSettings { with_color, ..LasSettings::new(self.quantum()) }
     }
 
-    /// Scale and offset of the clouds: those of a LAS input where they hold, so that its coordinates stay what they are.
+    /// Scale and offset of the clouds: those of a LAS input where they hold, so that its
+    /// coordinates stay what they are.
     fn quantum(&self) -> Quantum {
         let all = self.bounds.iter().fold(Aabb::EMPTY, |all, bounds| all.union(bounds));
         let of_input = self.sources.las_quantum();

@@ -1,5 +1,5 @@
-//! A job of which parts may fail in; its outcome without those, which are named, out: a plant that runs overnight is not lost
-//! for one broken file.
+//! A job of which parts may fail in; its outcome without those, which are named, out: a plant that
+//! runs overnight is not lost for one broken file.
 
 use crate::engine::{Engine, guarded};
 use crate::job::{Job, Outcome};
@@ -8,8 +8,8 @@ use contract::{Error, Kind, Region, Result};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-/// Does the main job; where it is asked for, without the inputs that cannot be read. Tiles of the others stay in the store, so
-/// that each is read once.
+/// Does the main job; where it is asked for, without the inputs that cannot be read. Tiles of the
+/// others stay in the store, so that each is read once.
 ///
 /// # Errors
 /// As [`plan::run`]; where failures are forgiven, those of the last input that is left.
@@ -46,7 +46,8 @@ impl Failures {
         Self { is_forgiving: job.keep_going, list: Mutex::default() }
     }
 
-    /// What `work` makes of a region; nothing where it fails by a fault of ours, and that is forgiven.
+    /// What `work` makes of a region; nothing where it fails by a fault of ours, and that is
+    /// forgiven.
     pub(crate) fn spare<T: Default>(
         &self,
         region: &Region,

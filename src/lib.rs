@@ -1,5 +1,5 @@
-//! How a run goes: plan, engine, store, command line, configuration, progress. Scans and a robot library in, postures
-//! and masks out. Knows no geometry: what is done stands in `stages/`.
+//! How a run goes: plan, engine, store, command line, configuration, progress. Scans and a robot
+//! library in, postures and masks out. Knows no geometry: what is done stands in `stages/`.
 
 mod advice;
 pub mod bench;

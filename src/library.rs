@@ -26,7 +26,8 @@ pub(crate) fn bytes(dir: &Path) -> u64 {
     sum
 }
 
-/// Loads all models, those that are `kept` from there; those that cannot be loaded are explained in the library's findings.
+/// Loads all models, those that are `kept` from there; those that cannot be loaded are explained in
+/// the library's findings.
 pub(crate) fn load(
     dir: &Path,
     settings: &Settings,
@@ -49,7 +50,8 @@ pub(crate) fn load_those(
         let load = || {
             let bare = Settings { clouds: false, ..*settings };
             let (mut model, findings) = Library::load_folder(dir, &folder, &bare);
-            // A library has few models, and one of them is the largest: its links are sampled side by side.
+            // A library has few models, and one of them is the largest: its links are sampled side
+            // by side.
             if let (Some(model), true) = (&mut model, settings.clouds) {
                 model.sample(settings, &AllThreads);
             }

@@ -11,8 +11,8 @@ fn main() -> ExitCode {
     stillpoint::exit::exit(stillpoint::cli::main(std::env::args_os()))
 }
 
-/// Memory is handed from stage to stage in pieces of all sizes; in pages of 2 MiB the system clears more of it than is used, which
-/// takes up to a fifth of a short run (benches/README.md).
+/// Memory is handed from stage to stage in pieces of all sizes; in pages of 2 MiB the system clears
+/// more of it than is used, which takes up to a fifth of a short run (benches/README.md).
 fn use_small_pages() {
     #[cfg(target_os = "linux")]
     {

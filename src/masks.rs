@@ -1,5 +1,5 @@
-//! Strips with labels in, in the order of each file; one triple of label arrays a mask out, an entry for every point
-//! that the file does not itself flag as invalid.
+//! Strips with labels in, in the order of each file; one triple of label arrays a mask out, an
+//! entry for every point that the file does not itself flag as invalid.
 
 use crate::labelled::Labelled;
 use crate::labelling::MaskCount;
@@ -16,8 +16,9 @@ pub(crate) struct Masks {
     counts: Vec<MaskCount>,
 }
 
-/// A mask that is being written. Strips of several scans of one LAS file share a mask, and their places interleave
-/// within one piece of the file: labels wait in a window until a strip begins behind all of them.
+/// A mask that is being written. Strips of several scans of one LAS file share a mask, and their
+/// places interleave within one piece of the file: labels wait in a window until a strip begins
+/// behind all of them.
 struct Open {
     writer: MaskWriter,
     /// Labels of the places from `writer.len()` on; what no strip named stays uncertain.
@@ -85,7 +86,8 @@ impl Open {
             return Err(Error::new(Kind::Bug, "a strip came after its places were written"));
         };
         self.n_named += n as u64;
-        // Most strips have every place from their first to their last, and no other strip lies among them.
+        // Most strips have every place from their first to their last, and no other strip lies
+        // among them.
         let is_dense = strip.place.last().is_none_or(|last| *last as usize + 1 == n);
         if is_dense && start == 0 && self.window.is_empty() {
             return self.writer.push(&strip.labels);

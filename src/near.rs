@@ -1,4 +1,5 @@
-//! Fits and the tiles near them in; the labels of the points there, by place, and what hangs on each robot out.
+//! Fits and the tiles near them in; the labels of the points there, by place, and what hangs on
+//! each robot out.
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::store::Store;

@@ -1,5 +1,5 @@
-//! The whole way of the data on one page: a job in, everything found and written, its outcome out. Nothing else
-//! decides order.
+//! The whole way of the data on one page: a job in, everything found and written, its outcome out.
+//! Nothing else decides order.
 
 use crate::calibrate::calibrate;
 use crate::copc;
@@ -72,21 +72,23 @@ impl Run<'_> {
         let given = self.given(&models_kept)?;
         let (sources, scans) = (&given.sources, &given.sources.scans);
 
-        // First pass: every point once, from files into lattice tiles of the store; inputs whose tiles are there are not read.
+        // First pass: every point once, from files into lattice tiles of the store; inputs whose
+        // tiles are there are not read.
         let filling = Filling::new(sources, &job.means, output.tiles(), engine);
         let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, digests));
         let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
         let store = tile_bound::checked(Store::join(stores), scans, &settings.export, engine)?;
 
-        // On the tiles: local planes and occupied space, joined over tiles and scans; from here on nothing is as large as
-        // the cloud.
+        // On the tiles: local planes and occupied space, joined over tiles and scans; from here on
+        // nothing is as large as the cloud.
         let ground_kept = Cache::new(output.fits(), digests.ground(&tiles, settings));
         let ground = ground_kept.get_or_compute("ground", || self.ground(scans, &store))?;
         let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
         let clusters = cluster::split(space, floor, &settings.cluster);
         let regions = identify::regions(&clusters, &settings.region);
 
-        // One task a region, and in it one a model: base poses, then postures; then those that can stand together.
+        // One task a region, and in it one a model: base poses, then postures; then those that can
+        // stand together.
         let of_plant = || Cache::new(output.fits(), digests.fits(&tiles, settings));
         let (fits_kept, pieces_kept) = (of_plant(), of_plant());
         let shelf = Shelf::new(&given.library.models);
@@ -158,8 +160,9 @@ impl Run<'_> {
         })
     }
 
-    /// Of all fits those that can stand together, with tools on their flanges, their joints calibrated where that is asked for,
-    /// and agreed on how far the scans are off; all as far as the review lets them.
+    /// Of all fits those that can stand together, with tools on their flanges, their joints
+    /// calibrated where that is asked for, and agreed on how far the scans are off; all as far
+    /// as the review lets them.
     fn robots(
         &self,
         found: Vec<Fit>,
@@ -184,8 +187,9 @@ impl Run<'_> {
         Ok(Robots { fits, models, review })
     }
 
-    /// Which points near robots are links, and which hang on them; then the second pass: every point once more, in the order of
-    /// its file, to label and to write, with what nobody saw around the robots.
+    /// Which points near robots are links, and which hang on them; then the second pass: every
+    /// point once more, in the order of its file, to label and to write, with what nobody saw
+    /// around the robots.
     fn label(
         &self,
         robots: &Robots,
@@ -206,7 +210,8 @@ impl Run<'_> {
         Ok(written)
     }
 
-    /// All is whole, and of the inputs that the run began with: it takes the place of what was there.
+    /// All is whole, and of the inputs that the run began with: it takes the place of what was
+    /// there.
     fn conclude(
         &self,
         (fits, floor): (Vec<Fit>, &Floor),

@@ -1,5 +1,5 @@
-//! Doors for the fuzz targets in `tests/fuzz`, compiled for them only: bytes of files that this program alone writes, in;
-//! whether they were believed, out.
+//! Doors for the fuzz targets in `tests/fuzz`, compiled for them only: bytes of files that this
+//! program alone writes, in; whether they were believed, out.
 
 use crate::rescan::probe;
 use crate::reuse;

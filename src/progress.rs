@@ -1,5 +1,5 @@
-//! Progress: what stages have done in, bars, lines or JSON on standard error out; and one report a stage for the
-//! result. The only place that owns a clock.
+//! Progress: what stages have done in, bars, lines or JSON on standard error out; and one report a
+//! stage for the result. The only place that owns a clock.
 
 mod words;
 
@@ -63,7 +63,8 @@ impl Amount {
         Self { points, ..Self::default() }
     }
 
-    /// Share of `total` that is done, 0..1, by the first of points, bytes, items whose total is known.
+    /// Share of `total` that is done, 0..1, by the first of points, bytes, items whose total is
+    /// known.
     #[must_use]
     pub fn share(&self, total: &Self) -> Option<f64> {
         [(self.points, total.points), (self.bytes, total.bytes), (self.items, total.items)]
@@ -105,8 +106,8 @@ struct Inner {
 #[derive(Clone)]
 pub struct Stage(Arc<Running>);
 
-/// Pieces of work within the items of a stage, which become known while an item is worked on: each may take minutes. Clones
-/// share them.
+/// Pieces of work within the items of a stage, which become known while an item is worked on: each
+/// may take minutes. Clones share them.
 #[derive(Clone, Default)]
 pub struct Pieces(Arc<Inside>);
 
@@ -198,7 +199,8 @@ impl Progress {
         }))
     }
 
-    /// Begins a stage; zero in `total` means not known. It ends with [`Stage::finish`], or when its last clone goes.
+    /// Begins a stage; zero in `total` means not known. It ends with [`Stage::finish`], or when its
+    /// last clone goes.
     #[must_use]
     pub fn stage(&self, name: &str, total: Amount) -> Stage {
         self.stage_of(name, total, Pieces::default())
@@ -349,8 +351,8 @@ impl Running {
 
 /// Time of processors that this process has used so far, seconds; 0 where the system does not tell.
 fn cpu_seconds() -> f64 {
-    /// Fields of `/proc/self/stat` after the name: time of the program and of the system for it, in ticks, of which Linux has a
-    /// hundred a second for programs.
+    /// Fields of `/proc/self/stat` after the name: time of the program and of the system for it, in
+    /// ticks, of which Linux has a hundred a second for programs.
     const TIMES: [usize; 2] = [11, 12];
     const TICKS: f64 = 100.0;
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();

@@ -1,5 +1,5 @@
-//! An input in, what a step makes of its strips out, in the order of the file: some threads read pieces of it, and sum them up
-//! where nobody knows its digest; others make points of them.
+//! An input in, what a step makes of its strips out, in the order of the file: some threads read
+//! pieces of it, and sum them up where nobody knows its digest; others make points of them.
 
 use crate::engine::{Engine, Task};
 use crate::reuse::{Part, Tree};
@@ -7,8 +7,8 @@ use crate::straight::{Lent, Straight};
 use contract::{Error, Input, Kind, Map, Result, Strip, Weigh};
 use ingest::{Extent, Piece, Sources, Want};
 
-/// Inputs that are larger than this in all are read past the system's cache, bytes: smaller ones it may still hold when they are
-/// read once more, and a disk or share may be slow.
+/// Inputs that are larger than this in all are read past the system's cache, bytes: smaller ones it
+/// may still hold when they are read once more, and a disk or share may be slow.
 const CACHED: u64 = 1 << 30;
 
 /// How an input is read.
@@ -20,8 +20,8 @@ pub(crate) struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    /// Does `step` to each strip; hands what it makes of them to `sink`, in order. Digests the file up on the way where `tree` wants it and
-    /// it is read in pieces.
+    /// Does `step` to each strip; hands what it makes of them to `sink`, in order. Digests the file
+    /// up on the way where `tree` wants it and it is read in pieces.
     pub(crate) fn each<M: Map<In = Strip>>(
         &self,
         task: Task,

@@ -90,7 +90,8 @@ impl Report<'_> {
         ]
     }
 
-    /// The scans with points: of a large LAZ file it is not known beforehand whether any are of no scanner that is given.
+    /// The scans with points: of a large LAZ file it is not known beforehand whether any are of no
+    /// scanner that is given.
     fn scans(&self) -> impl Iterator<Item = &Scan> {
         let has_points = |scan: &&Scan| self.store.entries().iter().any(|e| e.at.scan == scan.id);
         self.sources.scans.iter().filter(has_points)
@@ -199,7 +200,8 @@ impl Report<'_> {
     }
 }
 
-/// A joint as the summary has it: name, value, standard deviation, and a word where it is not determined.
+/// A joint as the summary has it: name, value, standard deviation, and a word where it is not
+/// determined.
 fn joint_line(joint: &JointFit, slides: bool) -> String {
     let unit = Unit::of(slides);
     let (value, sigma) = (unit.say(joint.value, 3), unit.deviation(joint.sigma));

@@ -1,4 +1,5 @@
-//! What a person knows of the robots, as a file in; the fits with that applied, and what each entry of the file did, out.
+//! What a person knows of the robots, as a file in; the fits with that applied, and what each entry
+//! of the file did, out.
 //!
 //! ```toml
 //! [[robot]]                     # one for each place that something is known of
@@ -54,10 +55,12 @@ pub struct Place {
     /// What a person decided.
     #[serde(default)]
     pub verdict: Option<Decision>,
-    /// Values of joints near which it stands, by name, radians or metres; empty where that is not known.
+    /// Values of joints near which it stands, by name, radians or metres; empty where that is not
+    /// known.
     #[serde(default)]
     pub joints: BTreeMap<String, f64>,
-    /// How its base is turned, roll, pitch and yaw as in URDF, radians; [`Place::at`] is the base itself then.
+    /// How its base is turned, roll, pitch and yaw as in URDF, radians; [`Place::at`] is the base
+    /// itself then.
     #[serde(default)]
     pub rpy: Option<[f64; 3]>,
 }
@@ -99,8 +102,8 @@ impl Review {
         Ok(review)
     }
 
-    /// The fits of all candidates, those from postures that are given in the place of others; and the numbers of the entries
-    /// whose posture the scans do not bear out.
+    /// The fits of all candidates, those from postures that are given in the place of others; and
+    /// the numbers of the entries whose posture the scans do not bear out.
     pub(crate) fn correct(
         &self,
         mut fits: Vec<Fit>,
@@ -134,7 +137,8 @@ impl Review {
         Ok((fits, wrong))
     }
 
-    /// The fits of all candidates with what is known applied: where a robot is accepted, it alone is left.
+    /// The fits of all candidates with what is known applied: where a robot is accepted, it alone
+    /// is left.
     #[must_use]
     pub fn apply(&self, mut fits: Vec<Fit>) -> Vec<Fit> {
         for place in &self.places {
@@ -159,7 +163,8 @@ impl Review {
         fits
     }
 
-    /// The robots that would be reported without the review, for [`Review::did`]; none where it has no entry.
+    /// The robots that would be reported without the review, for [`Review::did`]; none where it has
+    /// no entry.
     #[must_use]
     pub(crate) fn without(&self, found: &[Fit], models: &[Model]) -> Vec<Fit> {
         if self.places.is_empty() {
@@ -169,8 +174,8 @@ impl Review {
         }
     }
 
-    /// What each entry did, in their order: robots that would be reported without the review, those that are, and entries
-    /// whose posture the scans do not bear out.
+    /// What each entry did, in their order: robots that would be reported without the review, those
+    /// that are, and entries whose posture the scans do not bear out.
     #[must_use]
     pub(crate) fn did(&self, without: &[Fit], with: &[Fit], wrong: &[usize]) -> Vec<ReviewEntry> {
         self.told(&heard::Heard { without, with, wrong })
@@ -235,7 +240,8 @@ impl Place {
         (base - Point::from(self.at)).norm() <= self.radius
     }
 
-    /// What the fit of the posture that is given begins with: on the base that is given, else that of the best fit here.
+    /// What the fit of the posture that is given begins with: on the base that is given, else that
+    /// of the best fit here.
     fn start(&self, fits: &[Fit], models: &[Model]) -> Option<Fit> {
         let index = models.iter().position(|m| Some(&m.name) == self.model.as_ref())?;
         let own = fits.iter().filter(|f| f.model == index && self.has(f));
@@ -272,7 +278,8 @@ impl Place {
     }
 }
 
-/// What is refused stands behind all else, as people are not shown it; then what explains more goes first.
+/// What is refused stands behind all else, as people are not shown it; then what explains more goes
+/// first.
 fn by_rank(a: &Fit, b: &Fit) -> std::cmp::Ordering {
     let stands = |f: &Fit| f.verdict != Verdict::Refused;
     stands(a).cmp(&stands(b)).then_with(|| a.explained.total_cmp(&b.explained))

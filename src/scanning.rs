@@ -1,4 +1,5 @@
-//! The virtual scanner at work: a scene and robot models in; scans, scanner poses and their truth as files out.
+//! The virtual scanner at work: a scene and robot models in; scans, scanner poses and their truth
+//! as files out.
 //!
 //! ```text
 //! OUT/scans.e57            all scans with poses, rows and columns; beams without return are flagged as invalid

@@ -1,5 +1,6 @@
-//! Fits and what the scans saw about them in; around each robot, which space was seen free, which it and other robots fill and
-//! which nobody has seen, out. Points are marked into it while they are labelled.
+//! Fits and what the scans saw about them in; around each robot, which space was seen free, which
+//! it and other robots fill and which nobody has seen, out. Points are marked into it while they
+//! are labelled.
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
@@ -10,9 +11,11 @@ use lattice::ViewSettings;
 use robot::Model;
 use std::ops::Range;
 
-/// Depth images need cells this much smaller than the voxels, so that each voxel is looked at through its middle.
+/// Depth images need cells this much smaller than the voxels, so that each voxel is looked at
+/// through its middle.
 const CELLS_PER_EDGE: f64 = 3.0;
-/// Room behind a base that belongs to its robot's space, as a share of its reach: what stands on a pedestal reaches below.
+/// Room behind a base that belongs to its robot's space, as a share of its reach: what stands on a
+/// pedestal reaches below.
 const BEHIND: f64 = 0.5;
 /// Vertical part of a base's axis from which on its robot stands, or hangs: 60°.
 const UPRIGHT: f64 = 0.5;
@@ -27,7 +30,8 @@ pub(crate) struct Around<'a, 's> {
 }
 
 impl Around<'_, '_> {
-    /// The spaces of all robots, in the order of the fits; none where no scan says where its beams went.
+    /// The spaces of all robots, in the order of the fits; none where no scan says where its beams
+    /// went.
     pub(crate) fn all(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
         let (fits, models) = self.robots;
         if !self.settings.merge.space {
@@ -44,7 +48,8 @@ impl Around<'_, '_> {
         })
     }
 
-    /// What beams went through about a robot, in these voxels; none where no scan says where its beams went.
+    /// What beams went through about a robot, in these voxels; none where no scan says where its
+    /// beams went.
     pub(crate) fn seen(&self, robot: usize, grid: SpaceGrid) -> Result<Option<Space>> {
         let base: Point = self.robots.0[robot].world_from_base.translation.vector.into();
         let region = region(&base, &grid.bounds());
@@ -100,7 +105,8 @@ pub(crate) fn region(middle: &Point, world: &Aabb) -> Region {
     Region { origin, bounds: Aabb { min: shift(world.min), max: shift(world.max) } }
 }
 
-/// All that a robot can get to, and no more behind its foot than pedestals are high: below one that stands, above one that hangs.
+/// All that a robot can get to, and no more behind its foot than pedestals are high: below one that
+/// stands, above one that hangs.
 pub(crate) fn bounds(fit: &Fit, reach: f64) -> Aabb {
     let base = fit.world_from_base.translation.vector;
     let mut out = Aabb::EMPTY;
@@ -121,7 +127,8 @@ pub(crate) fn poses(fit: &Fit, model: &Model) -> Vec<Pose> {
     model.poses(&posture).into_iter().map(|p| fit.world_from_base * p).collect()
 }
 
-/// A point in a voxel of a space: number of the space, of the voxel, and what the point makes of it.
+/// A point in a voxel of a space: number of the space, of the voxel, and what the point makes of
+/// it.
 pub(crate) type Spot = (usize, usize, SpaceKind);
 
 /// Grids of spaces, with their bounds in the world.
@@ -133,8 +140,8 @@ impl Grids {
         Self(spaces.iter().map(grid).collect())
     }
 
-    /// Which voxels labelled points fall into, where `counts` says that a point counts; the same voxel once in a row. `blocks`
-    /// are bounds of runs of points.
+    /// Which voxels labelled points fall into, where `counts` says that a point counts; the same
+    /// voxel once in a row. `blocks` are bounds of runs of points.
     pub(crate) fn spots(
         &self,
         world: &[[f64; 3]],

@@ -1,5 +1,5 @@
-//! A file in, pieces of it out, past the system's cache where that is asked for and can be: what is read once, and is larger
-//! than any cache, would only push out of it what is read again.
+//! A file in, pieces of it out, past the system's cache where that is asked for and can be: what is
+//! read once, and is larger than any cache, would only push out of it what is read again.
 
 use export::block::{Block, PAGE, read_all, set_direct};
 use std::fs::File;

@@ -1,5 +1,5 @@
-//! Tiles in; what the scans cover, floor and occupied space out: the lattice stage's map and the floor stage's fold,
-//! joined so that one pass over the tiles serves both.
+//! Tiles in; what the scans cover, floor and occupied space out: the lattice stage's map and the
+//! floor stage's fold, joined so that one pass over the tiles serves both.
 
 use crate::store::TileEntry;
 use contract::{Fold, Map, Result, Scan, ScanId, TILE_SIDE, Tile, TileSummary, Weigh};

@@ -1,4 +1,5 @@
-//! Points in, each with what it is and what it is said to be; how many of each kind are told rightly out.
+//! Points in, each with what it is and what it is said to be; how many of each kind are told
+//! rightly out.
 
 use contract::{Label, PointKind};
 use std::fmt::Write as _;
@@ -8,11 +9,13 @@ use std::fmt::Write as _;
 pub struct Tally {
     /// Moving and said to be, moving and not said to be, not moving but said to be, the rest.
     pub moving: [u64; 4],
-    /// Of links: with the right robot and link, all that are true links, all that are said to be links.
+    /// Of links: with the right robot and link, all that are true links, all that are said to be
+    /// links.
     pub links: [u64; 3],
     /// That truly stand still, and those of them that are lost to moving.
     pub fixed: [u64; 2],
-    /// For each true robot, for each of its links: points with the right robot and link, true ones, and said ones.
+    /// For each true robot, for each of its links: points with the right robot and link, true
+    /// ones, and said ones.
     pub by_link: Vec<Vec<[u64; 3]>>,
     /// Of attachments: said to be moving (attachment or link), and all.
     pub attached: [u64; 2],
@@ -24,7 +27,8 @@ impl Tally {
         Self { by_link: n_links.map(|n| vec![[0; 3]; n]).collect(), ..Self::default() }
     }
 
-    /// Counts a point that is said to be `said` and is `real`; `whose` tells which true robot a found one is.
+    /// Counts a point that is said to be `said` and is `real`; `whose` tells which true robot a
+    /// found one is.
     pub fn add(&mut self, said: Label, real: Label, whose: impl Fn(usize) -> Option<usize>) {
         self.moving[match (real.moves(), said.moves()) {
             (true, true) => 0,

@@ -1,4 +1,5 @@
-//! Where points lie in, how many spatial tiles they fill out; more than a run may write are refused before any is written.
+//! Where points lie in, how many spatial tiles they fill out; more than a run may write are refused
+//! before any is written.
 
 use crate::engine::{Engine, Task};
 use crate::store::{Store, TileEntry};
@@ -6,14 +7,15 @@ use contract::{Error, Kind, Result, Scan};
 use geometry::{Aabb, Point};
 use std::collections::BTreeSet;
 
-/// Spatial tiles that the bounds of a tile of the store may touch and still be taken for filled, all of them: a long
-/// shot of a scanner.
+/// Spatial tiles that the bounds of a tile of the store may touch and still be taken for filled,
+/// all of them: a long shot of a scanner.
 const FEW: u64 = 64;
 
 /// A spatial tile: its row and column.
 type At = [i32; 2];
 
-/// About how many spatial tiles points fill that mostly lie within these bounds, and how many there may be.
+/// About how many spatial tiles points fill that mostly lie within these bounds, and how many there
+/// may be.
 pub(crate) fn expected(spread: &Aabb, n_points: u64, settings: &export::Settings) -> [u64; 2] {
     let most = (settings.max_tiles as u64).min(n_points);
     if !settings.tiles {

@@ -1,5 +1,5 @@
-//! Fits of arms and a library with tools in; fits of arms with what hangs on their flanges out, and the models that
-//! these fits are of.
+//! Fits of arms and a library with tools in; fits of arms with what hangs on their flanges out, and
+//! the models that these fits are of.
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::search::{Search, Shelf};
@@ -8,7 +8,8 @@ use fit::{Prepared, Scene, Settings, Tooled};
 use robot::Model;
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
 
-/// A tool stands at a multiple of 30° or 45° about the flange: bolt circles have 4, 6, 8 or 12 holes.
+/// A tool stands at a multiple of 30° or 45° about the flange: bolt circles have 4, 6, 8 or 12
+/// holes.
 const MOUNTS: [f64; 2] = [FRAC_PI_6, FRAC_PI_4];
 /// Most other holes that are named.
 const MAX_NAMED: usize = 3;
@@ -72,7 +73,8 @@ pub(crate) fn dress_in(
     (fit, tooled.or(branched))
 }
 
-/// Whether tools are looked for: of a robot that moved, the scans of one posture may show too little of one.
+/// Whether tools are looked for: of a robot that moved, the scans of one posture may show too
+/// little of one.
 fn tells_tools(fit: &Fit) -> bool {
     fit.verdict != Verdict::Refused && fit.stands_in.is_empty()
 }
@@ -83,7 +85,8 @@ fn own(fit: Fit, arm: &Model, dressed: Option<Dressed>, models: &[Model]) -> (Fi
     (together, Some(arm.with_tool(&models[tool], flange, mount)))
 }
 
-/// A fit of arm and tool, the tool's number in the library and the link that it hangs on, and its turn about it, radians.
+/// A fit of arm and tool, the tool's number in the library and the link that it hangs on, and its
+/// turn about it, radians.
 type Dressed = (Fit, [usize; 2], f64);
 
 /// The fits, those with a model of their own pointing at it among `models`.
@@ -151,8 +154,8 @@ fn dress_one(
     Some((together, [tool, flange], mount))
 }
 
-/// The tool that explains most of what hangs on one of the arm's flanges, if one is there: its number and the flange's
-/// link, and where it stands. `bare` is the arm.
+/// The tool that explains most of what hangs on one of the arm's flanges, if one is there: its
+/// number and the flange's link, and where it stands. `bare` is the arm.
 fn best_tool(
     fit: &Fit,
     arm: &Model,
@@ -176,8 +179,8 @@ fn best_tool(
     best
 }
 
-/// The arm's last joint may be as far off as at the other holes, each with the joint's value there, radians: the tool's place
-/// is known, not what of it is the hole's and what the joint's.
+/// The arm's last joint may be as far off as at the other holes, each with the joint's value there,
+/// radians: the tool's place is known, not what of it is the hole's and what the joint's.
 fn widen(last: &mut JointFit, alike: &[[f64; 2]]) {
     let apart = alike.iter().map(|[_, value]| fit::turns::apart(*value, last.value));
     let spread = apart.fold(0.0, f64::max);

@@ -1,5 +1,5 @@
-//! Opened inputs in; the units that they are read in, in words and for the result, out; and whether robots of a library can
-//! stand in them.
+//! Opened inputs in; the units that they are read in, in words and for the result, out; and whether
+//! robots of a library can stand in them.
 
 use contract::words::count;
 use contract::{Input, Result};
@@ -37,7 +37,8 @@ pub(crate) fn entry(sources: &Sources, input: &Input) -> Option<UnitsEntry> {
 /// Clouds that are larger hold a robot of any library, metres: a fifth of the largest one's reach.
 const LARGE_ENOUGH: f64 = 1.0;
 
-/// As [`check_sizes`], of a library that is not loaded yet: it is only where clouds are so small that its robots decide.
+/// As [`check_sizes`], of a library that is not loaded yet: it is only where clouds are so small
+/// that its robots decide.
 pub(crate) fn check_plan(robots: &Path, sources: &Sources) -> Result<()> {
     sources.check_sizes()?;
     let spread = sources.spread();
@@ -48,7 +49,8 @@ pub(crate) fn check_plan(robots: &Path, sources: &Sources) -> Result<()> {
     check_sizes(&Library::load(robots, &robot::Settings::without_clouds())?, sources)
 }
 
-/// Refuses inputs that cannot be of a plant with robots of this library, in the units that they are read in.
+/// Refuses inputs that cannot be of a plant with robots of this library, in the units that they are
+/// read in.
 pub(crate) fn check_sizes(library: &Library, sources: &Sources) -> Result<()> {
     sources.check_sizes()?;
     let arms = library.models.iter().filter(|model| !model.is_tool());

@@ -1,4 +1,5 @@
-//! Runs that come again, from outside: what is there is used, what is damaged is made anew, and runs that are killed go on.
+//! Runs that come again, from outside: what is there is used, what is damaged is made anew, and
+//! runs that are killed go on.
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! Cells drawn from seeds, scanned and searched by `bench accuracy`: mounts, closed loops, scans without noise and the
-//! source's method are right in them, and what is written can be read.
+//! Cells drawn from seeds, scanned and searched by `bench accuracy`: mounts, closed loops, scans
+//! without noise and the source's method are right in them, and what is written can be read.
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 mod common;

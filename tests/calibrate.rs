@@ -1,5 +1,6 @@
-//! A robot that its model fits poorly, from outside: runs with --calibrate find where a joint really is, readings of the
-//! controller find where its zeros are, and the corrected model is a model.
+//! A robot that its model fits poorly, from outside: runs with --calibrate find where a joint
+//! really is, readings of the controller find where its zeros are, and the corrected model is a
+//! model.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -24,7 +25,8 @@ fn stillpoint(args: &[&dyn AsRef<std::ffi::OsStr>]) -> String {
     String::from_utf8_lossy(&done.stdout).into_owned()
 }
 
-/// A robot whose third joint is elsewhere than its model has it, and the library that it is not quite of.
+/// A robot whose third joint is elsewhere than its model has it, and the library that it is not
+/// quite of.
 fn true_robot(robots: &Path) -> (robot::Model, robot::Library) {
     let mut library =
         robot::Library::load(robots, &robot::Settings::without_clouds()).expect("loads");

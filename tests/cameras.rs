@@ -1,5 +1,6 @@
-//! Real depth-camera clouds of arms with known joints in; arms found where they stand, and none trusted that the clouds do not
-//! bear out; each joint is stated so that its truth lies within. Says so where `../shared` is missing.
+//! Real depth-camera clouds of arms with known joints in; arms found where they stand, and none
+//! trusted that the clouds do not bear out; each joint is stated so that its truth lies within.
+//! Says so where `../shared` is missing.
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 use serde_json::Value;

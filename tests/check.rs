@@ -1,4 +1,5 @@
-//! A path of a robot against what was scanned, from outside: into the floor, through what nobody has seen, and what is no path.
+//! A path of a robot against what was scanned, from outside: into the floor, through what nobody
+//! has seen, and what is no path.
 
 mod common;
 

@@ -1,5 +1,6 @@
-//! Clouds that lack something or say what is not so: a stated scanner position that cannot be right is not used, one that is right
-//! is; what is dropped is counted; coordinates too coarse are refused; a run that finds nothing says what was missing.
+//! Clouds that lack something or say what is not so: a stated scanner position that cannot be right
+//! is not used, one that is right is; what is dropped is counted; coordinates too coarse are
+//! refused; a run that finds nothing says what was missing.
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 use contract::{Kind, OneByOne};
@@ -13,7 +14,8 @@ use stillpoint::job::{Given, Job, Means, Outcome};
 use stillpoint::plan;
 use stillpoint::scanning::{Formats, scan_scene};
 
-/// A hall with things that stand before its walls, and three scanners whose beams are 0.6° apart: sparser than any crew scans.
+/// A hall with things that stand before its walls, and three scanners whose beams are 0.6° apart:
+/// sparser than any crew scans.
 const HALL: &str = r#"
 seed = 31
 [hall]

@@ -192,7 +192,8 @@ fn what_is_counted_and_what_the_system_says_read_as_sentences() {
     }
 }
 
-/// A bare room with one scanner: scans, poses and truth come out whole, the same for any number of threads.
+/// A bare room with one scanner: scans, poses and truth come out whole, the same for any number of
+/// threads.
 #[test]
 fn a_scene_becomes_scans_with_truth() {
     const SCENE: &str = r#"

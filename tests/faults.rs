@@ -1,5 +1,6 @@
-//! Writes, syncs and renames that fail, one after the other, and inputs that change under a run, from outside: the state is
-//! the old one or the new one, and the next run ends right. Linux only: faults are put between the program and its system.
+//! Writes, syncs and renames that fail, one after the other, and inputs that change under a run,
+//! from outside: the state is the old one or the new one, and the next run ends right. Linux only:
+//! faults are put between the program and its system.
 #![cfg(target_os = "linux")]
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
@@ -11,8 +12,8 @@ use std::process::{Command, Output};
 
 /// Beams of each scanner: few, since only what is written matters here.
 const N_BEAMS: u64 = 60_000;
-/// Faults that are tried, spread over the run, and the last ones, when results take their places; all of them, from the
-/// number that it gives on, where the environment asks for it.
+/// Faults that are tried, spread over the run, and the last ones, when results take their places;
+/// all of them, from the number that it gives on, where the environment asks for it.
 const N_FAULTS: usize = 14;
 const LAST_FAULTS: usize = 3;
 const ALL: &str = "STILLPOINT_ALL_FAULTS";
@@ -87,7 +88,8 @@ fn whatever_fails_to_be_written_the_state_is_old_or_new() {
         let _ = std::fs::remove_dir_all(dir.join("out"));
         common::copy_folder(&dir.join("old"), &dir.join("out"));
         let failed = with("out", &[], at);
-        // A sync of a folder or a hint to the system may be passed over; a signal or a panic may not.
+        // A sync of a folder or a hint to the system may be passed over; a signal or a panic may
+        // not.
         let code = failed.status.code().unwrap_or_else(|| panic!("call {at}: {}", failed.status));
         assert!([0, 1, 5].contains(&code), "call {at}: {code} {}", said(&failed));
         assert!(code == 0 || said(&failed).contains("error: "), "call {at}: {}", said(&failed));

@@ -1,5 +1,5 @@
-//! A cell that is scanned again in another frame, from outside: it is laid on the plant where that is clear, as the result
-//! says, and refused elsewhere.
+//! A cell that is scanned again in another frame, from outside: it is laid on the plant where that
+//! is clear, as the result says, and refused elsewhere.
 
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -155,8 +155,8 @@ fn points_lie_in_the_plant(out: &Path) {
     }
 }
 
-/// Scans of elsewhere and frames that are contradicted are refused, by the name of the input and with the way out, and leave
-/// no result.
+/// Scans of elsewhere and frames that are contradicted are refused, by the name of the input and
+/// with the way out, and leave no result.
 fn refuses(plant: &Plant) {
     let tries = [
         ("other/scans.e57", Frame::Find),

@@ -1,4 +1,5 @@
-//! The rules of the house that no compiler holds: who may import whom, what stages keep away from, how files begin.
+//! The rules of the house that no compiler holds: who may import whom, what stages keep away from,
+//! how files begin.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 /// Rooms that others may import.
 const SHARED: [&str; 3] = ["geometry", "contract", "robot"];
-/// Rooms that may touch the disk: the reader of points, the reader of robots, the writer of results.
+/// Rooms that may touch the disk: the reader of points, the reader of robots, the writer of
+/// results.
 const MAY_READ: [&str; 3] = ["ingest", "robot", "export"];
 /// Files that may hold unsafe code: memory maps.
 const MAY_BE_UNSAFE: [&str; 1] = ["stages/ingest/src/map.rs"];

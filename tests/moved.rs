@@ -1,5 +1,5 @@
-//! Robots that somebody moved between two stations, from outside: both postures come out, each with its scans, and points
-//! are labelled by the posture of their scan.
+//! Robots that somebody moved between two stations, from outside: both postures come out, each with
+//! its scans, and points are labelled by the posture of their scan.
 
 use std::path::Path;
 use stillpoint::compare::Agreement;
@@ -10,7 +10,8 @@ use stillpoint::plan;
 use stillpoint::scanning::{Formats, scan_scene};
 
 const SEED: u64 = 5;
-/// Share of points of links and of what hangs on them that come out as such, and the other way round.
+/// Share of points of links and of what hangs on them that come out as such, and the other way
+/// round.
 const F1: f64 = 0.97;
 
 #[test]

@@ -1,5 +1,5 @@
-//! A cell that is scanned again, from outside: what was changed is found and nothing else, what was not touched stays as it
-//! was, byte for byte, and a rescan can be gone on from in its turn.
+//! A cell that is scanned again, from outside: what was changed is found and nothing else, what was
+//! not touched stays as it was, byte for byte, and a rescan can be gone on from in its turn.
 
 use contract::SpaceKind;
 use std::collections::BTreeSet;
@@ -15,7 +15,8 @@ use stillpoint::reuse::{Manifest, check};
 use stillpoint::scanning::{Formats, scan_scene};
 
 const SEED: u64 = 11;
-/// Share of points of links and of what hangs on them that come out as such, and the other way round, in the cell.
+/// Share of points of links and of what hangs on them that come out as such, and the other way
+/// round, in the cell.
 const F1: f64 = 0.98;
 
 /// Two sessions of a small plant with three robots, and the result of the first.
@@ -106,7 +107,8 @@ fn a_rescanned_cell_is_brought_up_to_date() {
     let things = changes["things"].as_array().expect("things");
     let kinds: Vec<_> = things.iter().filter_map(|t| t["change"].as_str()).collect();
     assert_eq!(kinds, ["moved", "gone"], "{things:#?}");
-    // Two scanners do not see the backs of things, and it is said where; what they do say something of is not among that.
+    // Two scanners do not see the backs of things, and it is said where; what they do say something
+    // of is not among that.
     let unseen = changes["fixed_not_compared"].as_array().expect("regions");
     assert!(!unseen.is_empty());
     let side = |bounds: &serde_json::Value, k: usize, i: usize| bounds[k][i].as_f64().expect("m");
@@ -156,8 +158,9 @@ fn a_rescanned_cell_is_brought_up_to_date() {
     goes_on(&plant, &out);
 }
 
-/// Each point of the tiles lies in a voxel that says so, in the space of each robot that has one there; and what is said to be
-/// fixed has points. Tiles have coordinates rounded to 0.1 mm: a point may lie in the voxel beside.
+/// Each point of the tiles lies in a voxel that says so, in the space of each robot that has one
+/// there; and what is said to be fixed has points. Tiles have coordinates rounded to 0.1 mm: a
+/// point may lie in the voxel beside.
 fn spaces_hold_what_tiles_hold(out: &Path) {
     let robots = export::ResultFile::read(out).expect("a result").robots;
     let space = |r: &export::RobotEntry| r.space.as_ref().expect("one").read(out).expect("voxels");

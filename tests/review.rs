@@ -1,5 +1,5 @@
-//! What a person says of a robot, from outside: a posture near which it stands, one at which it does not, that nothing stands
-//! there, and what cannot be.
+//! What a person says of a robot, from outside: a posture near which it stands, one at which it
+//! does not, that nothing stands there, and what cannot be.
 
 mod common;
 
@@ -10,7 +10,8 @@ use std::process::{Command, Output};
 
 /// Beams of each scanner.
 const N_BEAMS: u64 = 250_000;
-/// How far the posture in the review is from the true one, and how far from it the fit may end, radians.
+/// How far the posture in the review is from the true one, and how far from it the fit may end,
+/// radians.
 const OFF: f64 = 0.05;
 const NEAR: f64 = 2e-4;
 

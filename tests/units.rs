@@ -1,6 +1,6 @@
-//! Units of inputs from outside: what files declare or a person gives is used and told, what cannot be is refused with the
-//! likely unit, and no run writes more files than its plan says. Small clouds are made here; the cases of public reports
-//! are read where they lie beside the repository.
+//! Units of inputs from outside: what files declare or a person gives is used and told, what cannot
+//! be is refused with the likely unit, and no run writes more files than its plan says. Small
+//! clouds are made here; the cases of public reports are read where they lie beside the repository.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,8 @@ fn room() -> Vec<[f64; 3]> {
     floor.chain(back).chain(side).collect()
 }
 
-/// A LAS 1.2 file of these points, metres, in units of so many metres, with such steps and offset of the file's own unit.
+/// A LAS 1.2 file of these points, metres, in units of so many metres, with such steps and offset
+/// of the file's own unit.
 fn las(
     points: &[[f64; 3]],
     metres: f64,
@@ -155,7 +156,8 @@ fn files(dir: &Path, ending: &str) -> Vec<PathBuf> {
     out
 }
 
-/// Number of points of LAS files, and their bounds as the headers state them: least x, y, z, greatest x, y, z.
+/// Number of points of LAS files, and their bounds as the headers state them: least x, y, z,
+/// greatest x, y, z.
 fn content(files: &[PathBuf]) -> (u64, [f64; 6]) {
     let (mut n, mut bounds) = (0, [f64::MAX, f64::MAX, f64::MAX, f64::MIN, f64::MIN, f64::MIN]);
     for file in files {

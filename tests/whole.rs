@@ -1,5 +1,5 @@
-//! The whole way from outside: a virtual scan of a robot of our own in, the robot found and its points labelled out; and
-//! the same bytes for any number of threads.
+//! The whole way from outside: a virtual scan of a robot of our own in, the robot found and its
+//! points labelled out; and the same bytes for any number of threads.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,8 @@ use stillpoint::job::{Given, Job, Means};
 use stillpoint::plan;
 use stillpoint::scanning::{Formats, scan_scene};
 
-/// Beams of each of the six scanners: about 30 mm apart at 5 m, an eighth of what a crew would take.
+/// Beams of each of the six scanners: about 30 mm apart at 5 m, an eighth of what a crew would
+/// take.
 const N_BEAMS: u64 = 600_000;
 /// Error of the base that so few points allow, metres.
 const BASE: f64 = 0.003;
@@ -114,8 +115,8 @@ fn space_is_told(out: &Path) {
     }
 }
 
-/// The robot as a planner loads it, in the posture of its table, has each link where the result says that it is; bars of its
-/// loops, too.
+/// The robot as a planner loads it, in the posture of its table, has each link where the result
+/// says that it is; bars of its loops, too.
 fn links_stand_as_told(out: &Path) {
     let robot = &export::ResultFile::read(out).expect("a result").robots[0];
     let folder = out.join("robots").join(&robot.id);

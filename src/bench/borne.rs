@@ -1,4 +1,5 @@
-//! A robot of a scene in; what hangs on its arm out: hoses from body to body, a gripper with a part, a dress pack, a rag.
+//! A robot of a scene in; what hangs on its arm out: hoses from body to body, a gripper with a
+//! part, a dress pack, a rag.
 
 use geometry::Vector;
 use nalgebra::{Rotation3, UnitQuaternion};
@@ -17,7 +18,8 @@ const CLAMP: f64 = 0.03;
 const SHELL: f64 = 0.02;
 const LAID: f64 = 0.005;
 
-/// Hoses along the arm, from the second body on, each from the top of one to the top of the next; with this chance.
+/// Hoses along the arm, from the second body on, each from the top of one to the top of the next;
+/// with this chance.
 pub(super) fn hoses(scene: &mut Scene, model: &Model, chance: f64, random: &mut Random) {
     let links = bodies(model);
     if random.unit() >= chance || links.len() <= 3 {
@@ -41,8 +43,8 @@ pub(super) fn hoses(scene: &mut Scene, model: &Model, chance: f64, random: &mut 
     }
 }
 
-/// A gripper with a part, a dress pack along the forearm and a rag on the upper arm, each with this chance; all as large as
-/// befits a robot of this reach, metres.
+/// A gripper with a part, a dress pack along the forearm and a rag on the upper arm, each with this
+/// chance; all as large as befits a robot of this reach, metres.
 pub(super) fn load(
     scene: &mut Scene,
     model: &Model,
@@ -91,7 +93,8 @@ fn laid(model: &Model, link: usize, name: &str, (gap, size): (f64, [f64; 3])) ->
     }
 }
 
-/// The point of a link's surface nearest to the middle of its upper side, and the way off it, link's frame, metres.
+/// The point of a link's surface nearest to the middle of its upper side, and the way off it,
+/// link's frame, metres.
 fn top(model: &Model, link: usize) -> (Vector, Vector) {
     let own = &model.links[link];
     let wide = |p: &[f32; 3]| Vector::from(p.map(f64::from));

@@ -1,4 +1,5 @@
-//! Cases in, each done in a folder of its own; their rows, kept as they come, and one table of them out.
+//! Cases in, each done in a folder of its own; their rows, kept as they come, and one table of them
+//! out.
 
 use super::Journal;
 use crate::engine::Engine;

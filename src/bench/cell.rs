@@ -123,7 +123,8 @@ impl Cell {
         *place += hits.len() as u64;
     }
 
-    /// Sends the scans through the stages of the main job, from the store on; the models of the shelf are tried.
+    /// Sends the scans through the stages of the main job, from the store on; the models of the
+    /// shelf are tried.
     pub(super) fn search(
         self,
         (shelf, then): (&Shelf<'_>, Then<'_>),
@@ -180,7 +181,8 @@ fn nearest<'r>(regions: &'r [Region], world_from_base: &Pose) -> Option<&'r Regi
     regions.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
 }
 
-/// Fits adjusted once more from where they ended, or from a start of the first one's robot; those that hold.
+/// Fits adjusted once more from where they ended, or from a start of the first one's robot; those
+/// that hold.
 fn adjusted(
     fits: &[Fit],
     from: Option<&Start>,

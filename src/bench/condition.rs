@@ -19,7 +19,8 @@ pub(super) enum Place {
     Tilted,
 }
 
-/// How the robot of a case is found: as the product does, or as a baseline that it is measured against.
+/// How the robot of a case is found: as the product does, or as a baseline that it is measured
+/// against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
     /// As the product does.
@@ -42,7 +43,8 @@ pub(super) struct Condition {
     pub(super) n_beams: f64,
     /// Range noise, metres, one sigma.
     pub(super) noise: f64,
-    /// Registration error of each scan: metres on each axis, degrees about each; range bias, metres. One sigma.
+    /// Registration error of each scan: metres on each axis, degrees about each; range bias,
+    /// metres. One sigma.
     pub(super) registration: [f64; 3],
     /// Whether beams have a width.
     pub(super) mixed: bool,
@@ -54,8 +56,8 @@ pub(super) struct Condition {
     pub(super) uncovered: bool,
     /// By how much of its size the surface of one link is larger.
     pub(super) scaled: f64,
-    /// How far joints are from where the model has them, one sigma: shift on each axis, metres, turn about each but
-    /// their own, degrees.
+    /// How far joints are from where the model has them, one sigma: shift on each axis, metres,
+    /// turn about each but their own, degrees.
     pub(super) frames: [f64; 2],
     /// Whether a tool of the library hangs on the flange.
     pub(super) tool: bool,
@@ -63,11 +65,14 @@ pub(super) struct Condition {
     pub(super) other_branch: bool,
     /// Whether the places of joints are estimated, too.
     pub(super) calibrate: bool,
-    /// Share of 0..1 of each kind of clutter being there: fence, conveyor, cabinet and post, hoses along the arm.
+    /// Share of 0..1 of each kind of clutter being there: fence, conveyor, cabinet and post, hoses
+    /// along the arm.
     pub(super) clutter: f64,
-    /// Share of 0..1 of each thing that a robot may bear besides: a gripper with a part, a dress pack, a rag.
+    /// Share of 0..1 of each thing that a robot may bear besides: a gripper with a part, a dress
+    /// pack, a rag.
     pub(super) laden: f64,
-    /// Share of the foot's height that plates about it hide, in a cell fenced in on three sides; 0: none of that.
+    /// Share of the foot's height that plates about it hide, in a cell fenced in on three sides;
+    /// 0: none of that.
     pub(super) hidden: f64,
     /// Whether the arm of another robot crosses it.
     pub(super) crossed: bool,
@@ -79,7 +84,8 @@ pub(super) struct Condition {
     pub(super) backed: bool,
     /// How its posture is found.
     pub(super) way: Way,
-    /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0: the whole search.
+    /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0:
+    /// the whole search.
     pub(super) perturbed_deg: f64,
     /// Height of a stand is drawn up to this, metres; 0: on the floor.
     pub(super) stand: f64,

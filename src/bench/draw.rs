@@ -28,10 +28,12 @@ pub(super) struct Drawn {
     pub(super) beside: Option<Vector>,
 }
 
-/// Starts of a case of the basin's curve, and how far their bases are off: metres, radians (METHOD.md §20).
+/// Starts of a case of the basin's curve, and how far their bases are off: metres, radians
+/// (METHOD.md §20).
 const N_STARTS: usize = 24;
 const START_BASE: (f64, f64) = (0.02, 0.0175);
-/// Radius of the circle of scanners, metres, at least (METHOD.md §19); larger robots are scanned from farther away.
+/// Radius of the circle of scanners, metres, at least (METHOD.md §19); larger robots are scanned
+/// from farther away.
 const CIRCLE: f64 = 5.0;
 /// Height of a scanner, metres.
 const HEIGHT: f64 = 1.6;
@@ -185,7 +187,8 @@ fn rpy_deg(pose: &Pose) -> [f64; 3] {
     [roll, pitch, yaw].map(f64::to_degrees)
 }
 
-/// A plate that the robot is bolted to, where it does not stand: the pose of its surface, z away from it.
+/// A plate that the robot is bolted to, where it does not stand: the pose of its surface, z away
+/// from it.
 fn plate(
     scene: &mut Scene,
     model: &Model,
@@ -234,7 +237,8 @@ fn plate(
     Some(turned)
 }
 
-/// Starts of the refinement alone, where the case asks for it: the truth, then every joint and the base off by something.
+/// Starts of the refinement alone, where the case asks for it: the truth, then every joint and the
+/// base off by something.
 pub(super) fn starts(case: &Case, drawn: &Drawn) -> Vec<Start> {
     let off = case.condition.perturbed_deg.to_radians();
     if off == 0.0 {
@@ -277,7 +281,8 @@ fn narrower(model: &Model) -> f64 {
     })
 }
 
-/// Bounds of the robot in the world: farthest from the upright through its base, and highest, metres.
+/// Bounds of the robot in the world: farthest from the upright through its base, and highest,
+/// metres.
 fn reach(model: &Model, world_from_base: &Pose, posture: &[f64]) -> [f64; 2] {
     let base = world_from_base.translation.vector;
     let mut out = [0.5_f64, 1.0];

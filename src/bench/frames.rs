@@ -1,5 +1,6 @@
-//! Seeds and sizes in; plants whose new scans are in frames that are drawn, and lines of equal cells, out: which of them a
-//! rescan laid on the plant, how exactly, which it refused, and which it laid on a wrong place.
+//! Seeds and sizes in; plants whose new scans are in frames that are drawn, and lines of equal
+//! cells, out: which of them a rescan laid on the plant, how exactly, which it refused, and which
+//! it laid on a wrong place.
 
 use super::cases::{Case, CaseRow, Cases};
 use super::rescan::RescanBench;
@@ -54,7 +55,8 @@ struct Row {
     came: String,
     /// Largest error of a scan's place, metres, and turn, degrees.
     off: [f64; 2],
-    /// Share of what can be compared that agrees, and by how much more other places are contradicted.
+    /// Share of what can be compared that agrees, and by how much more other places are
+    /// contradicted.
     share: f64,
     margin: Option<i64>,
     /// Why it was refused.

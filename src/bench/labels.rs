@@ -1,4 +1,5 @@
-//! What the points of a cell are said to be, and what they are, in; how well links, hoses and fixed points are told out.
+//! What the points of a cell are said to be, and what they are, in; how well links, hoses and fixed
+//! points are told out.
 
 use super::cell::Found;
 use super::plant::MIN_LINK_POINTS;
@@ -20,8 +21,8 @@ pub(super) struct Told {
 }
 
 impl Told {
-    /// Compares the labels with the truth, where robot 0 is what the fit `here` found, if any did, with so many links. Of points
-    /// of other robots nothing is asked.
+    /// Compares the labels with the truth, where robot 0 is what the fit `here` found, if any did,
+    /// with so many links. Of points of other robots nothing is asked.
     pub(super) fn of(found: &Found, here: Option<usize>, n_links: usize) -> Option<Self> {
         let (near, truth) = found.labels.as_ref()?;
         let mut tally = Tally::new(std::iter::once(n_links));

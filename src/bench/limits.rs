@@ -1,5 +1,5 @@
-//! A file and a folder in; what this machine can do at best out: copying the file, copying memory. A run is measured
-//! against both, in the same minute.
+//! A file and a folder in; what this machine can do at best out: copying the file, copying memory.
+//! A run is measured against both, in the same minute.
 
 use contract::{Error, Result};
 use serde::Serialize;
@@ -30,7 +30,8 @@ impl Copied {
     }
 }
 
-/// Copies a file beside itself, at most `most` bytes of it, waits for the disk, and removes the copy.
+/// Copies a file beside itself, at most `most` bytes of it, waits for the disk, and removes the
+/// copy.
 pub(super) fn copy(path: &Path, most: u64) -> Result<Copied> {
     let copy = path.with_extension("copy");
     let failed = |e: std::io::Error| Error::from(e).at(path.display());

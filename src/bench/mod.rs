@@ -1,8 +1,9 @@
-//! `bench accuracy`: suites of drawn cells in; how well postures, standard deviations and verdicts hold, as tables, out.
+//! `bench accuracy`: suites of drawn cells in; how well postures, standard deviations and verdicts
+//! hold, as tables, out.
 //!
-//! Each case is drawn from a seed, scanned in memory by the virtual scanner and sent through the same stages as the
-//! main job, from strips of points on: nothing but the scans' points and stated poses goes in. Suites and their goals
-//! follow METHOD.md §19.
+//! Each case is drawn from a seed, scanned in memory by the virtual scanner and sent through the
+//! same stages as the main job, from strips of points on: nothing but the scans' points and stated
+//! poses goes in. Suites and their goals follow METHOD.md §19.
 
 mod borne;
 mod cases;
@@ -115,7 +116,8 @@ fn json(rows: &[Row]) -> Result<String> {
         .map_err(|e| Error::new(Kind::Bug, "rows cannot be written").because(e))
 }
 
-/// Standard deviations of shift and turn of scans that are taken to be where they are said to be: a nanometre, a nanoradian.
+/// Standard deviations of shift and turn of scans that are taken to be where they are said to be: a
+/// nanometre, a nanoradian.
 const HELD: f64 = 1e-9;
 
 /// One case; what goes wrong in it is a row, too.

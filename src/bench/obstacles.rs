@@ -1,5 +1,6 @@
-//! A drawn robot in; what stands in the way of its scanners as METHOD.md §19 (T6) has it out: plates about its foot, a conveyor that
-//! touches it, a fence on three sides, another robot whose arm crosses it.
+//! A drawn robot in; what stands in the way of its scanners as METHOD.md §19 (T6) has it out:
+//! plates about its foot, a conveyor that touches it, a fence on three sides, another robot whose
+//! arm crosses it.
 
 use super::condition::{Case, Condition};
 use contract::Result;
@@ -83,7 +84,8 @@ fn plates(
     }
 }
 
-/// A conveyor that ends at the plates of a foot of a radius, metres, where the arm is least in its way.
+/// A conveyor that ends at the plates of a foot of a radius, metres, where the arm is least in its
+/// way.
 fn conveyor(
     scene: &mut Scene,
     robot: &Standing<'_>,

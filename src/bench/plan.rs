@@ -74,8 +74,8 @@ struct Row {
     /// Bytes of the store and of what was written.
     store_bytes: u64,
     output_bytes: u64,
-    /// Processes that waited for a processor, about: the mean over the minute before the end, where
-    /// the system tells.
+    /// Processes that waited for a processor, about: the mean over the minute before the end,
+    /// where the system tells.
     load: f64,
 }
 

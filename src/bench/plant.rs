@@ -1,5 +1,5 @@
-//! `bench plant`: suites of drawn cells and lines in; scanned to files, sent through the main job, and compared with the
-//! truth robot by robot and point by point, as a table, out.
+//! `bench plant`: suites of drawn cells and lines in; scanned to files, sent through the main job,
+//! and compared with the truth robot by robot and point by point, as a table, out.
 
 use super::cases::{Case, CaseRow, Cases};
 use super::condition::{self, Condition, PLAIN, Place};
@@ -145,7 +145,8 @@ struct Row {
     ious: Vec<f64>,
     /// Share of points of hoses, tools and parts that are said to move.
     attached: Option<f64>,
-    /// Share of points that stand still said to move; and that of the thing that lost most, with its name.
+    /// Share of points that stand still said to move; and that of the thing that lost most, with
+    /// its name.
     lost: f64,
     worst_lost: f64,
     worst_object: String,

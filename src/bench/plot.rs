@@ -1,4 +1,5 @@
-//! Rows in; two pictures as SVG out: how the errors of each suite are spread, and how they compare with what was stated.
+//! Rows in; two pictures as SVG out: how the errors of each suite are spread, and how they compare
+//! with what was stated.
 
 use super::score::Row;
 use std::fmt::Write as _;

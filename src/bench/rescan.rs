@@ -1,5 +1,5 @@
-//! Seeds and sizes in; plants of which one cell is scanned again, what the rescan found of what was changed, what it
-//! invented, and its time beside a run of the whole, out.
+//! Seeds and sizes in; plants of which one cell is scanned again, what the rescan found of what was
+//! changed, what it invented, and its time beside a run of the whole, out.
 
 use super::cases::{Case, CaseRow, Cases};
 use super::frames::{Suite, frames};
@@ -68,7 +68,8 @@ struct Row {
     invented: Vec<String>,
     /// Robots that were found, and all of the plant.
     n_robots: [usize; 2],
-    /// Largest error of a determined joint of the robot that moved, degrees: rescan, and a run of the new scans alone.
+    /// Largest error of a determined joint of the robot that moved, degrees: rescan, and a run of
+    /// the new scans alone.
     joint: [f64; 2],
     /// F1 of moving points in the cell, likewise.
     f1: [f64; 2],
@@ -168,7 +169,8 @@ fn on_disk(path: &Path) -> Result<()> {
     synced.map_err(|e| Error::from(e).at(path.display()))
 }
 
-/// Largest error of a determined joint of the robot that moved, degrees; no number where it was not found.
+/// Largest error of a determined joint of the robot that moved, degrees; no number where it was not
+/// found.
 fn joint(agreement: &Agreement) -> f64 {
     let found = agreement.robots.first().and_then(|robot| robot.found.as_ref());
     found.map_or(f64::NAN, Found::worst_joint_deg)
@@ -211,7 +213,8 @@ fn judge_robots(row: &mut Row, robots: &[Value], now: &Scene, result: &ResultFil
     }
 }
 
-/// Things that are said to differ: the pallet is elsewhere now, and the barrel, which stood at this place, is gone.
+/// Things that are said to differ: the pallet is elsewhere now, and the barrel, which stood at this
+/// place, is gone.
 fn judge_things(row: &mut Row, things: &[Value], (then, now): (&Scene, &Scene), barrel: [f64; 2]) {
     let middle = |thing: &Value, when: &str| {
         let corner = |k: usize, i: usize| thing[when][k][i].as_f64();

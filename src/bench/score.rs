@@ -14,9 +14,11 @@ use serde::Serialize;
 const SAME_PLACE: f64 = 0.5;
 /// A joint is right within this, radians (0.3°) or metres …
 const RIGHT: f64 = 0.005_236;
-/// … or within so many of its stated standard deviations, where the fit says that the points do not determine it.
+/// … or within so many of its stated standard deviations, where the fit says that the points do not
+/// determine it.
 const RIGHT_SIGMAS: f64 = 4.0;
-/// Other holes of a flange are told by sweeps in steps of a degree: right within this, radians (2°).
+/// Other holes of a flange are told by sweeps in steps of a degree: right within this, radians
+/// (2°).
 const NEARLY_RIGHT: f64 = 0.035;
 /// From this standard deviation on a joint is said to be open: nothing is claimed of it, radians.
 const OPEN: f64 = 0.02;
@@ -68,11 +70,13 @@ pub(super) struct Row {
     pub(super) tip: [f64; 3],
     /// Displacement of the surface in the base's frame: mean and 95th percentile, metres.
     pub(super) surface: [f64; 2],
-    /// Largest turn and shift of a sub link in the base's frame, radians and metres; zero without such links.
+    /// Largest turn and shift of a sub link in the base's frame, radians and metres; zero without
+    /// such links.
     pub(super) sub: [f64; 2],
     /// How far its loops are open, metres.
     pub(super) loop_gap: f64,
-    /// Of the refinement alone: how far its starts were off, degrees, how many there were, and how many came home.
+    /// Of the refinement alone: how far its starts were off, degrees, how many there were, and how
+    /// many came home.
     pub(super) perturbed_deg: f64,
     pub(super) n_starts: usize,
     pub(super) n_home: usize,
@@ -119,8 +123,9 @@ impl Row {
         self.determined().filter(|j| !j.slides)
     }
 
-    /// The refinement alone: which starts came home, to the truth or to where the start at the truth itself ended: a few
-    /// points on a small wrist pull it off. What a wrist of round parts leaves open does not count.
+    /// The refinement alone: which starts came home, to the truth or to where the start at the
+    /// truth itself ended: a few points on a small wrist pull it off. What a wrist of round
+    /// parts leaves open does not count.
     fn with_ends(mut self, case: &Case, model: &Model, drawn: &Drawn, found: &Found) -> Self {
         let n = model.free.len();
         let Some(((_, from_truth), ends)) = found.ends.split_first() else { return self };
@@ -223,7 +228,8 @@ pub(super) fn score(
     row
 }
 
-/// Where a fit found the joints to be and where they are, each as it is from the model, where that was asked for.
+/// Where a fit found the joints to be and where they are, each as it is from the model, where that
+/// was asked for.
 fn calibration(
     case: &Case,
     models: &[Model],
@@ -243,7 +249,8 @@ fn is_beside(fit: &Fit, model: &Model, drawn: &Drawn) -> bool {
     fit.model_name == model.name && drawn.beside.is_some_and(|base| apart(base) < SAME_PLACE)
 }
 
-/// The hole that a tool is bolted to and the arm's last joint are one turn: only their sum is compared.
+/// The hole that a tool is bolted to and the arm's last joint are one turn: only their sum is
+/// compared.
 fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) -> Vec<JointRow> {
     let bolted = fit.tool.as_ref().map_or(0.0, |t| t.mount);
     let turned =

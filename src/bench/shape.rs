@@ -1,5 +1,5 @@
-//! A model in; the same as a real robot differs from it out: its surface off by a smooth field along its normals, as
-//! castings are, or its joints elsewhere.
+//! A model in; the same as a real robot differs from it out: its surface off by a smooth field
+//! along its normals, as castings are, or its joints elsewhere.
 
 use geometry::{Pose, Vector};
 use robot::{JointKind, Model};
@@ -17,8 +17,8 @@ const COVER: f64 = 0.125;
 /// Vertices of one corner that triangles do not share are one if they agree to this, metres.
 const WELD: f32 = 1e-4;
 
-/// Moves the surface of each link along its normals by about `amplitude` metres at most: all around it alike, so that it is too
-/// thick here and too thin there, or each of its six sides by itself.
+/// Moves the surface of each link along its normals by about `amplitude` metres at most: all around
+/// it alike, so that it is too thick here and too thin there, or each of its six sides by itself.
 pub(super) fn warp(model: &mut Model, amplitude: f64, each_side: bool, seed: u64) {
     for (l, link) in model.links.iter_mut().enumerate() {
         let mut random = Random::keyed(&[seed, l as u64, 0x5A]);
@@ -75,7 +75,8 @@ impl Waves {
     }
 }
 
-/// Takes a cover off one link that moves: what lies within an eighth of its size of one of its sides is not there.
+/// Takes a cover off one link that moves: what lies within an eighth of its size of one of its
+/// sides is not there.
 pub(super) fn uncover(model: &mut Model, seed: u64) {
     let mut random = Random::keyed(&[seed, 0xC0F]);
     let Some(l) = any_moving(model, &mut random) else { return };
@@ -116,7 +117,8 @@ fn any_moving(model: &Model, random: &mut Random) -> Option<usize> {
     bodies.get((random.unit() * bodies.len() as f64) as usize).copied()
 }
 
-/// Moves the place of each free joint: shift on each axis, metres, turn about each but its own, degrees, one sigma.
+/// Moves the place of each free joint: shift on each axis, metres, turn about each but its own,
+/// degrees, one sigma.
 pub(super) fn displace(model: &mut Model, [shift, turn]: [f64; 2], seed: u64) {
     let mut random = Random::keyed(&[seed, 0xF4A]);
     let free = model.free.clone();

@@ -1,11 +1,13 @@
-//! Rows in; tables of what is measured otherwise than by suites out: the source's Table 1, closed loops, the basin.
+//! Rows in; tables of what is measured otherwise than by suites out: the source's Table 1, closed
+//! loops, the basin.
 
 use super::score::{JointRow, Row};
 use contract::{Calibration, JointFrame};
 use geometry::Pose;
 use std::fmt::Write as _;
 
-/// The source's Table 1: three postures of a robot with seven joints, after the sweep and after the registration, degrees.
+/// The source's Table 1: three postures of a robot with seven joints, after the sweep and after the
+/// registration, degrees.
 const PRINTED: [[[f64; 2]; 3]; 7] = [
     [[0.5, 0.002], [-0.3, -0.068], [-0.2, -0.022]],
     [[-0.2, 0.014], [0.4, -0.032], [0.3, 0.014]],
@@ -73,8 +75,8 @@ fn table_1(rows: &[Row]) -> String {
 const WAYS: [&str; 5] =
     ["registration", "sequential", "sequential-adjusted", "scans-held", "from-truth"];
 
-/// What others reach in the cells of `registration` that all of them were given, and what none can better, over the joints that
-/// the product says there to be determined.
+/// What others reach in the cells of `registration` that all of them were given, and what none can
+/// better, over the joints that the product says there to be determined.
 fn baselines(rows: &[Row]) -> String {
     let given = |way: &str| rows.iter().any(|r| r.suite == way);
     let ways: Vec<&str> = WAYS.into_iter().filter(|way| given(way)).collect();
@@ -136,7 +138,8 @@ fn loops(rows: &[Row]) -> String {
     out
 }
 
-/// Where joints are against their models, found from single postures and from all of a robot's together.
+/// Where joints are against their models, found from single postures and from all of a robot's
+/// together.
 fn calibration(rows: &[Row]) -> String {
     let mut out = String::new();
     for model in models(rows, "calibration") {
@@ -187,8 +190,8 @@ fn calibration(rows: &[Row]) -> String {
     out
 }
 
-/// Root mean squares over joints: error of the axis across itself, metres; of its direction, radians; errors over
-/// standard deviations.
+/// Root mean squares over joints: error of the axis across itself, metres; of its direction,
+/// radians; errors over standard deviations.
 fn off(found: &[&Calibration], real: &[Pose]) -> [f64; 3] {
     let mut errors: [Vec<f64>; 3] = Default::default();
     for (frame, real) in found.iter().flat_map(|c| c.frames.iter().zip(real)) {

@@ -5,7 +5,8 @@ use super::score::Row;
 use contract::quote;
 use std::fmt::Write as _;
 
-/// One line a suite: what was found, how exact it is, whether standard deviations and verdicts hold.
+/// One line a suite: what was found, how exact it is, whether standard deviations and verdicts
+/// hold.
 pub(super) fn table(rows: &[Row]) -> String {
     let mut out = String::from(
         "| suite | cases | found | model | right | trusted | wrong, trusted | invented | rms ° | max ° | median worst ° \

@@ -1,5 +1,6 @@
-//! `bench throughput`: sizes of plants in; each drawn, scanned to files and sent through the main job in a process of its
-//! own; points a second of every stage beside what the machine can do, and resident memory, out.
+//! `bench throughput`: sizes of plants in; each drawn, scanned to files and sent through the main
+//! job in a process of its own; points a second of every stage beside what the machine can do, and
+//! resident memory, out.
 
 use super::limits::{Copied, copy, forget, memory};
 use super::watch::{Watched, command, watch};
@@ -51,9 +52,11 @@ pub enum Scanned {
     E57,
 }
 
-/// Beams of one scan where it is not said how many scans there are: a full scan of a common scanner.
+/// Beams of one scan where it is not said how many scans there are: a full scan of a common
+/// scanner.
 const SCAN_BEAMS: u64 = 50_000_000;
-/// Most bytes that are copied to measure the disk: where the disk is short, the rest is taken in proportion.
+/// Most bytes that are copied to measure the disk: where the disk is short, the rest is taken in
+/// proportion.
 const MOST_COPIED: u64 = 8 << 30;
 /// Elevations and azimuths of the drawn scanners, square degrees.
 const DOME: f64 = 130.0 * 360.0;

@@ -1,4 +1,5 @@
-//! A command of this program in; how long it took, stage by stage, and how much memory it had resident, out.
+//! A command of this program in; how long it took, stage by stage, and how much memory it had
+//! resident, out.
 
 use crate::job::Means;
 use contract::{Error, Kind, Result};
@@ -118,7 +119,8 @@ struct Event {
     stage: StageTime,
 }
 
-/// Largest resident memory so far, and that which is of no file now, bytes; 0 where the system does not tell.
+/// Largest resident memory so far, and that which is of no file now, bytes; 0 where the system does
+/// not tell.
 fn memory_of(pid: u32) -> [u64; 2] {
     let text = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
     ["VmHWM:", "RssAnon:"].map(|name| {
@@ -128,9 +130,11 @@ fn memory_of(pid: u32) -> [u64; 2] {
     })
 }
 
-/// Time of processors that ended processes of this one have used so far, seconds; 0 where the system does not tell.
+/// Time of processors that ended processes of this one have used so far, seconds; 0 where the
+/// system does not tell.
 fn children_seconds() -> f64 {
-    /// Fields of `/proc/self/stat` after the name, and ticks of a second, which Linux fixes for programs.
+    /// Fields of `/proc/self/stat` after the name, and ticks of a second, which Linux fixes for
+    /// programs.
     const TIMES: [usize; 2] = [13, 14];
     const TICKS: f64 = 100.0;
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();

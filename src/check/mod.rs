@@ -1,8 +1,9 @@
-//! A result and a path of one of its robots in; where on the way the robot comes near to what the scans saw, to other robots, or
-//! to what nobody has seen, out.
+//! A result and a path of one of its robots in; where on the way the robot comes near to what the
+//! scans saw, to other robots, or to what nobody has seen, out.
 //!
-//! In doubt a path is not free: points of which nobody knows stand in the way as fixed ones do, space that no beam went through is
-//! not free, and what a part touched already where it was found is told apart, not forgotten.
+//! In doubt a path is not free: points of which nobody knows stand in the way as fixed ones do,
+//! space that no beam went through is not free, and what a part touched already where it was found
+//! is told apart, not forgotten.
 
 mod subject;
 mod surroundings;
@@ -58,11 +59,13 @@ pub enum Outcome {
 pub enum Doubt {
     /// It leads through space that no beam went through
     Unseen,
-    /// It comes nearer to uncertain points within 10 cm of where the robot was found: most are its own and move with it, some may stand in its way
+    /// It comes nearer to uncertain points within 10 cm of where the robot was found: most are its
+    /// own and move with it, some may stand in its way
     Beside,
     /// Parts are as near to something as they were where the robot was found
     AsFound,
-    /// The robot's posture is doubtful, not known well enough for the margin, or a joint is not determined that the path leaves as found
+    /// The robot's posture is doubtful, not known well enough for the margin, or a joint is not
+    /// determined that the path leaves as found
     Posture,
 }
 
@@ -99,14 +102,16 @@ pub struct Report {
 /// Checks a path.
 ///
 /// # Errors
-/// No result, or one without what this needs; a path that is none of the robot's; files that cannot be read.
+/// No result, or one without what this needs; a path that is none of the robot's; files that cannot
+/// be read.
 pub fn check(request: &Request, means: &Means, engine: &Engine) -> Result<Report> {
     let path = Trajectory::read(&request.trajectory, means.settings.ingest.max_text_bytes)?;
     let choose = |result: &ResultFile, state: &State| chosen(request, (result, state), &path);
     at_robot(request, choose, (means, engine), |place| place.look(&path, engine))
 }
 
-/// A robot of a result, and all that stands around it: its paths can be looked at one after the other.
+/// A robot of a result, and all that stands around it: its paths can be looked at one after the
+/// other.
 pub(crate) struct Place<'a> {
     request: &'a Request,
     robot: &'a Robot<'a>,
@@ -121,7 +126,8 @@ pub(crate) struct Place<'a> {
 /// Opens the result, and does something at the robot that is chosen.
 ///
 /// # Errors
-/// No result, or one without what this needs; what `choose` and `then` end with; files that cannot be read.
+/// No result, or one without what this needs; what `choose` and `then` end with; files that cannot
+/// be read.
 pub(crate) fn at_robot<T>(
     request: &Request,
     choose: impl FnOnce(&ResultFile, &State) -> Result<usize>,
@@ -224,7 +230,8 @@ fn surrounded<'a>(
 /// What parts may move between two postures, metres, and rounding.
 const BETWEEN: f64 = 0.02;
 
-/// What hangs on a robot mostly reaches no farther beyond it, metres; where it does, all is looked at once more.
+/// What hangs on a robot mostly reaches no farther beyond it, metres; where it does, all is looked
+/// at once more.
 const HUNG: f64 = 0.5;
 
 /// Pieces of a path that wait to be summed up.

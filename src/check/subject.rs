@@ -1,4 +1,5 @@
-//! A robot of a result and a path in; the path as whole postures, what the joints cannot do, and what the path came to, out.
+//! A robot of a result and a path in; the path as whole postures, what the joints cannot do, and
+//! what the path came to, out.
 
 use super::{Doubt, Outcome, Report, Request};
 use crate::reuse::Manifest;
@@ -57,7 +58,8 @@ impl Robot<'_> {
         self.fit.joints.iter().map(|j| j.value).collect()
     }
 
-    /// The waypoints as whole postures: joints that the path does not name stay where they were found.
+    /// The waypoints as whole postures: joints that the path does not name stay where they were
+    /// found.
     pub(super) fn postures(&self, path: &Trajectory, degrees: bool) -> Result<Vec<Vec<f64>>> {
         let columns: Vec<Option<usize>> = (self.fit.joints.iter())
             .map(|joint| path.joints.iter().position(|name| *name == joint.name))
@@ -79,7 +81,8 @@ impl Robot<'_> {
         Ok(path.points.iter().map(posture).collect())
     }
 
-    /// What its joints cannot do, and where on the path; closed loops stay `open` there, by so much, metres.
+    /// What its joints cannot do, and where on the path; closed loops stay `open` there, by so
+    /// much, metres.
     pub(super) fn impossible(
         &self,
         path: &[Vec<f64>],

@@ -45,8 +45,8 @@ struct Sorted {
 }
 
 impl Surroundings<'_> {
-    /// What hangs on a robot, and what stands around it no farther than so on each axis of its base, metres: points, `others`, and
-    /// space that no beam went through.
+    /// What hangs on a robot, and what stands around it no farther than so on each axis of its
+    /// base, metres: points, `others`, and space that no beam went through.
     pub(super) fn gather(
         &self,
         robot: &Robot<'_>,

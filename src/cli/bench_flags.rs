@@ -9,15 +9,20 @@ use std::path::PathBuf;
 pub(super) enum BenchCommand {
     /// Draw cells from seeds, scan them, find the robots, compare with the truth
     Accuracy(AccuracyFlags),
-    /// Draw cells and lines as files, do the main job on them, compare robots and labels with the truth
+    /// Draw cells and lines as files, do the main job on them, compare robots and labels with the
+    /// truth
     Plant(PlantFlags),
-    /// Draw halls with libraries of their own, ask what they will take, do the main job: predicted beside measured
+    /// Draw halls with libraries of their own, ask what they will take, do the main job: predicted
+    /// beside measured
     Plan(PlanBenchFlags),
-    /// Draw plants of which one cell is scanned again: what a rescan finds, what it invents, its time beside a whole run
+    /// Draw plants of which one cell is scanned again: what a rescan finds, what it invents, its
+    /// time beside a whole run
     Rescan(RescanBenchFlags),
-    /// Draw cells and paths of their robots, do the main job and check the paths: false alarms and misses
+    /// Draw cells and paths of their robots, do the main job and check the paths: false alarms and
+    /// misses
     Check(CheckBenchFlags),
-    /// Draw plants of given sizes as files, do the main job on them: points a second, memory, share of the machine's limits
+    /// Draw plants of given sizes as files, do the main job on them: points a second, memory, share
+    /// of the machine's limits
     Throughput(ThroughputFlags),
 }
 
@@ -27,7 +32,8 @@ pub(super) struct Drawn {
     /// Suites, by name (else all)
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub(super) suite: Vec<String>,
-    /// Cases of each suite, and of each model where there is one a case (else the suite's own number)
+    /// Cases of each suite, and of each model where there is one a case (else the suite's own
+    /// number)
     #[arg(long, value_name = "N")]
     pub(super) cases: Option<usize>,
     /// Number of the first of them, to look at single ones again
@@ -119,7 +125,8 @@ pub(super) struct RescanBenchFlags {
     /// Keep scans and results
     #[arg(long, requires = "out")]
     pub(super) keep: bool,
-    /// Plants in one frame, new scans in frames that are drawn, or lines of equal cells in such frames
+    /// Plants in one frame, new scans in frames that are drawn, or lines of equal cells in such
+    /// frames
     #[arg(long, value_enum, value_name = "WHICH", default_value = "same")]
     pub(super) suite: Suite,
     /// Do the main job on the new scans alone, too, to compare with

@@ -1,4 +1,5 @@
-//! `demo`: nothing in; a virtual cell, what was found in it, and how that compares with the truth, out.
+//! `demo`: nothing in; a virtual cell, what was found in it, and how that compares with the truth,
+//! out.
 
 use super::flags::{Common, DemoFlags};
 use super::say::Say;

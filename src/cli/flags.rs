@@ -1,4 +1,5 @@
-//! Commands and flags, as `clap` knows them. Their names are fixed: people and scripts rely on them.
+//! Commands and flags, as `clap` knows them. Their names are fixed: people and scripts rely on
+//! them.
 
 use super::bench_flags::BenchCommand;
 use super::say::LogFormat;
@@ -11,8 +12,8 @@ use clap::{Args, Parser, Subcommand};
 use contract::Result;
 use std::path::PathBuf;
 
-/// Finds the robots in laser scans of a plant, in which posture they stand, and splits the cloud into what moves and
-/// what stands still.
+/// Finds the robots in laser scans of a plant, in which posture they stand, and splits the cloud
+/// into what moves and what stands still.
 #[derive(Debug, Parser)]
 #[command(name = "stillpoint", version, subcommand_required = true, arg_required_else_help = true)]
 pub(super) struct Line {
@@ -32,7 +33,8 @@ pub(super) enum Command {
     Run(RunFlags),
     /// As run, but only says what it would take: memory, disk, time
     Plan(PlanFlags),
-    /// One cell again: an earlier result and new scans in, the whole result with that cell brought up to date out
+    /// One cell again: an earlier result and new scans in, the whole result with that cell brought
+    /// up to date out
     Rescan(RescanFlags),
     /// Whether the files of a result are what they were when they were written
     Verify(OutFlags),
@@ -44,7 +46,8 @@ pub(super) enum Command {
     Check(CheckFlags),
     /// Which robots differ between two results of one plant: moved, exchanged, appeared, gone
     Diff(DiffFlags),
-    /// Which results lie in a folder, which goes on from which, and what each takes; --remove takes one away
+    /// Which results lie in a folder, which goes on from which, and what each takes; --remove takes
+    /// one away
     History(HistoryFlags),
     /// Virtual scanner: a scene file in, scans and their truth out
     Simulate(SimulateFlags),
@@ -98,7 +101,8 @@ pub(super) struct RunFlags {
     /// Finish without the files and robots that fail, and exit with 3
     #[arg(long)]
     pub(super) keep_going: bool,
-    /// Estimate where the joints of each robot really are, too: for robots that their models fit poorly
+    /// Estimate where the joints of each robot really are, too: for robots that their models fit
+    /// poorly
     #[arg(long)]
     pub(super) calibrate: bool,
 }
@@ -126,7 +130,8 @@ pub(super) struct RescanFlags {
     /// Robot library (else that of the earlier run)
     #[arg(long, value_name = "DIR")]
     pub(super) robots: Option<PathBuf>,
-    /// Bounds of the cell, metres: least x, y, z, greatest x, y, z (else what the new scans see well)
+    /// Bounds of the cell, metres: least x, y, z, greatest x, y, z (else what the new scans see
+    /// well)
     #[arg(
         long,
         value_name = "X,Y,Z,X,Y,Z",
@@ -136,8 +141,9 @@ pub(super) struct RescanFlags {
         conflicts_with = "robot"
     )]
     pub(super) cell: Vec<f64>,
-    /// Where the new scans are: "same", their frame is the plant's; or about where the first new scanner stands in the plant,
-    /// metres, and how far the new frame is turned, degrees (else found by surfaces, and refused where that is not clear)
+    /// Where the new scans are: "same", their frame is the plant's; or about where the first new
+    /// scanner stands in the plant, metres, and how far the new frame is turned, degrees (else
+    /// found by surfaces, and refused where that is not clear)
     #[arg(long, value_name = "X,Y,Z,YAW", allow_hyphen_values = true)]
     pub(super) frame: Option<String>,
     /// The cell is what these robots of the earlier run reach
@@ -161,7 +167,8 @@ pub(super) struct CheckFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
-    /// The path: CSV with joints' names in its head, or JSON as trajectory_msgs/JointTrajectory; radians and metres
+    /// The path: CSV with joints' names in its head, or JSON as trajectory_msgs/JointTrajectory;
+    /// radians and metres
     #[arg(long, value_name = "FILE")]
     pub(super) trajectory: PathBuf,
     /// Whose path it is (else the only robot that has all of its joints)
@@ -261,7 +268,8 @@ pub(super) struct CalibrateFlags {
     /// Robots by their ids in the results (else all of the model: they count as one and the same)
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     pub(super) robot: Vec<String>,
-    /// Joint values that the controller showed while it was scanned: offsets of its zeros are estimated (TOML)
+    /// Joint values that the controller showed while it was scanned: offsets of its zeros are
+    /// estimated (TOML)
     #[arg(long, value_name = "FILE")]
     pub(super) readings: Option<PathBuf>,
     /// Robot library that the model is taken from
@@ -284,8 +292,9 @@ pub(super) struct Common {
     /// Scanner poses, for formats that carry none (TOML or JSON)
     #[arg(long, global = true, value_name = "FILE")]
     scanners: Option<PathBuf>,
-    /// Unit of the inputs' coordinates: m, cm, mm, km, in, ft, us-ft; one file's own as NAME=UNIT, heights apart as
-    /// us-ft/m, several with commas (else what each file declares, else metres)
+    /// Unit of the inputs' coordinates: m, cm, mm, km, in, ft, us-ft; one file's own as NAME=UNIT,
+    /// heights apart as us-ft/m, several with commas (else what each file declares, else
+    /// metres)
     #[arg(long, global = true, value_name = "UNIT")]
     units: Option<String>,
     /// Settings (TOML)
@@ -294,7 +303,8 @@ pub(super) struct Common {
     /// One setting, for example fit.beam=150; goes before the file
     #[arg(long, global = true, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// How postures are found: "beam" (else), or "paper", the method of the source, link after link
+    /// How postures are found: "beam" (else), or "paper", the method of the source, link after
+    /// link
     #[arg(long, global = true, value_name = "NAME")]
     method: Option<String>,
     /// How progress is shown (else a bar on a terminal, lines elsewhere)
@@ -335,7 +345,8 @@ impl Common {
             (mode, LogFormat::Text) => Progress::new(mode.unwrap_or_else(Mode::fitting)),
         };
         engine.cancel.on_ctrl_c()?;
-        // Libraries that use rayon by themselves keep to the same number; a pool made earlier (tests) is kept.
+        // Libraries that use rayon by themselves keep to the same number; a pool made earlier
+        // (tests) is kept.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();
         Ok(engine)
     }

@@ -1,5 +1,5 @@
-//! The command line: words of a person in, an exit code out. Results go to standard output, everything else to
-//! standard error.
+//! The command line: words of a person in, an exit code out. Results go to standard output,
+//! everything else to standard error.
 
 mod bench;
 mod bench_flags;

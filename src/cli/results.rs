@@ -1,5 +1,6 @@
-//! `verify`, `report`, `export`, `check`, `diff` and `history`: output folders of runs in; whether they are whole, what is in them,
-//! their points in other formats, whether a path keeps clear of them, how they differ and which goes on from which, out.
+//! `verify`, `report`, `export`, `check`, `diff` and `history`: output folders of runs in; whether
+//! they are whole, what is in them, their points in other formats, whether a path keeps clear of
+//! them, how they differ and which goes on from which, out.
 
 use super::flags::{
     CheckFlags, Common, DiffFlags, ExportFlags, HistoryFlags, OutFlags, ReportFlags,
@@ -59,7 +60,8 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
     Ok(exit::OK)
 }
 
-/// Exit code 0 where the path is free but for what is allowed, 1 where something is in its way, 3 where that is not known.
+/// Exit code 0 where the path is free but for what is allowed, 1 where something is in its way, 3
+/// where that is not known.
 pub(super) fn check_path(flags: &CheckFlags, common: &Common, say: &Say) -> Result<u8> {
     if !(flags.margin.is_finite() && (0.0..=MAX_MARGIN).contains(&flags.margin)) {
         return Err(Error::new(Kind::Usage, format!("a margin of {} m is none", flags.margin))

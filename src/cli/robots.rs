@@ -1,5 +1,5 @@
-//! `robots lint`: a library in; what is wrong with it, in words or JSON, out. `robots calibrate`: results in; a corrected
-//! model out.
+//! `robots lint`: a library in; what is wrong with it, in words or JSON, out. `robots calibrate`:
+//! results in; a corrected model out.
 
 use super::flags::{CalibrateFlags, Common, LintFlags};
 use super::say::Say;

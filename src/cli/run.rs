@@ -1,4 +1,5 @@
-//! `run`, `plan` and `rescan`: flags in, the main job done, or what it would take, or done again for one cell.
+//! `run`, `plan` and `rescan`: flags in, the main job done, or what it would take, or done again
+//! for one cell.
 
 use super::flags::{Common, PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;

@@ -1,5 +1,6 @@
-//! What the program says: results to standard output; warnings and errors to standard error, as text or JSON. Whatever names
-//! hold, no terminal obeys them: all that is said is quoted here (`contract::quote`).
+//! What the program says: results to standard output; warnings and errors to standard error, as
+//! text or JSON. Whatever names hold, no terminal obeys them: all that is said is quoted here
+//! (`contract::quote`).
 
 use crate::job::Outcome;
 use contract::{Error, Kind, Result, fence, quote};
@@ -31,8 +32,9 @@ impl Say {
         Self { format }
     }
 
-    /// From now on panics say nothing by themselves: what catches them says it, in this format. Developers who ask for the
-    /// calls that lead to them (`RUST_BACKTRACE`) get these beside text.
+    /// From now on panics say nothing by themselves: what catches them says it, in this format.
+    /// Developers who ask for the calls that lead to them (`RUST_BACKTRACE`) get these beside
+    /// text.
     pub(super) fn for_panics(&self) {
         let wants_calls = std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0");
         let usual = std::panic::take_hook();
@@ -51,7 +53,8 @@ impl Say {
         let _ = writeln!(out, "{}", quote::printed(text.trim_end())).and_then(|()| out.flush());
     }
 
-    /// What a run came to: warnings and what was used again on standard error, its summary on standard output.
+    /// What a run came to: warnings and what was used again on standard error, its summary on
+    /// standard output.
     pub(super) fn outcome(&self, outcome: &Outcome) {
         outcome.warnings.iter().chain(&outcome.told).for_each(|warning| self.warning(warning));
         for piece in &outcome.reused {
@@ -117,7 +120,8 @@ mod tests {
     /// Set in the process that panics, to the format that it is to speak in.
     const CHILD: &str = "STILLPOINT_TEST_PANICS";
 
-    /// A stand-in for a decoder that panics on a damaged file, on another thread as decoders' own threads do.
+    /// A stand-in for a decoder that panics on a damaged file, on another thread as decoders' own
+    /// threads do.
     fn decode() -> u8 {
         let of = |bytes: &[u8]| bytes[usize::from(bytes[0])];
         std::thread::scope(|scope| {

@@ -1,4 +1,5 @@
-//! Work beside other work: two closures in, what both came to out. One may hand items to the other, in order, bounded by bytes.
+//! Work beside other work: two closures in, what both came to out. One may hand items to the other,
+//! in order, bounded by bytes.
 
 use super::Engine;
 use super::cancel::Cancel;
@@ -12,7 +13,8 @@ pub type Handed<'i, T> = &'i mut dyn Iterator<Item = Result<T>>;
 pub type Hand<'h, T> = &'h mut dyn FnMut(T) -> Result<()>;
 
 impl Engine {
-    /// Does `aside` on a thread of its own while `work` is done on this one; the error of the work goes first.
+    /// Does `aside` on a thread of its own while `work` is done on this one; the error of the work
+    /// goes first.
     ///
     /// # Errors
     /// Those of both; a panic of either is a bug.
@@ -31,8 +33,9 @@ impl Engine {
         })
     }
 
-    /// The same, and `aside` is handed items by `work`: as many wait as a channel holds. Where the work fails, so does what comes
-    /// to `aside`; where `aside` stops taking, its error is the one.
+    /// The same, and `aside` is handed items by `work`: as many wait as a channel holds. Where the
+    /// work fails, so does what comes to `aside`; where `aside` stops taking, its error is the
+    /// one.
     ///
     /// # Errors
     /// As of [`Engine::beside`].

@@ -34,8 +34,8 @@ impl Cancel {
         if self.is_set() { Err(Self::error()) } else { Ok(()) }
     }
 
-    /// Ctrl-C sets the flag; a second Ctrl-C ends the program at once. Outputs are written under temporary names, so
-    /// that nothing half-written has a final name even then.
+    /// Ctrl-C sets the flag; a second Ctrl-C ends the program at once. Outputs are written under
+    /// temporary names, so that nothing half-written has a final name even then.
     pub fn on_ctrl_c(&self) -> Result<()> {
         let flag = self.clone();
         ctrlc::set_handler(move || {

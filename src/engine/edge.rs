@@ -1,15 +1,18 @@
-//! An edge joins two steps: numbered items in, in any order; the same items out, in order. Bounded by bytes.
+//! An edge joins two steps: numbered items in, in any order; the same items out, in order. Bounded
+//! by bytes.
 //!
-//! One window serves as channel and as reordering buffer. Whoever holds the item that is next out never waits, so
-//! that the window cannot lock up; everybody else waits while the window is full. It therefore keeps at most
-//! `cap_bytes` and one more item. An item heavier than the window travels alone.
+//! One window serves as channel and as reordering buffer. Whoever holds the item that is next out
+//! never waits, so that the window cannot lock up; everybody else waits while the window is full.
+//! It therefore keeps at most `cap_bytes` and one more item. An item heavier than the window
+//! travels alone.
 
 use crate::progress::Stage;
 use contract::{Error, Kind, Result};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Least weight of an item, bytes: its place in the window is not free, so that weightless items are bounded too.
+/// Least weight of an item, bytes: its place in the window is not free, so that weightless items
+/// are bounded too.
 const LEAST_WEIGHT_BYTES: usize = 64;
 
 struct Edge<T> {
@@ -37,7 +40,8 @@ struct State<T> {
 }
 
 impl<T> Edge<T> {
-    /// Nothing panics while it holds this lock (items are dropped outside), so poison means nothing.
+    /// Nothing panics while it holds this lock (items are dropped outside), so poison means
+    /// nothing.
     fn lock(&self) -> MutexGuard<'_, State<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

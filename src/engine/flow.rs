@@ -1,5 +1,5 @@
-//! A flow: numbered items on their way through the steps of one pass. Maps run on groups of threads; folds and sinks
-//! run on the caller's thread, in order.
+//! A flow: numbered items on their way through the steps of one pass. Maps run on groups of
+//! threads; folds and sinks run on the caller's thread, in order.
 
 use super::cancel::Cancel;
 use super::edge::{Onward, Put, Take, edge};

@@ -2,8 +2,8 @@
 
 use contract::{Error, Kind, Result, fence};
 
-/// Runs `step` on item `at` of pass `name`. What the step leaves half-done after a panic is never used again, since
-/// the pass ends.
+/// Runs `step` on item `at` of pass `name`. What the step leaves half-done after a panic is never
+/// used again, since the pass ends.
 pub(crate) fn guarded<T>(name: &str, at: u64, step: impl FnOnce() -> Result<T>) -> Result<T> {
     fence::fenced(step).unwrap_or_else(|what| Err(panicked(&what, name, at)))
 }

@@ -1,4 +1,5 @@
-//! The engine: steps in, threads, order, memory bounds, errors and cancellation around them. Knows no geometry.
+//! The engine: steps in, threads, order, memory bounds, errors and cancellation around them. Knows
+//! no geometry.
 //!
 //! | promise | how |
 //! | --- | --- |
@@ -31,7 +32,8 @@ pub use aside::{Hand, Handed};
 pub use cancel::Cancel;
 pub use flow::Flow;
 
-/// Default of [`Engine::channel_bytes`]: a few dozen strips or tiles, far more than it takes to keep workers busy.
+/// Default of [`Engine::channel_bytes`]: a few dozen strips or tiles, far more than it takes to
+/// keep workers busy.
 pub const CHANNEL_BYTES: usize = 32 << 20;
 
 /// Runs steps. Threads are started for a pass and joined before it returns.
@@ -65,8 +67,8 @@ impl Task {
         Self { name: name.into(), ..Self::default() }
     }
 
-    /// Its items take much memory each, as all that scans see of a region does: where there is little, they are done one after
-    /// the other, each on all threads.
+    /// Its items take much memory each, as all that scans see of a region does: where there is
+    /// little, they are done one after the other, each on all threads.
     #[must_use]
     pub fn large(mut self) -> Self {
         self.is_large = true;
@@ -119,8 +121,8 @@ impl Engine {
         }
     }
 
-    /// One like it, for work that waits for the disk most of its time: with four times the threads, since a disk reads and writes
-    /// several files at once faster than one after the other.
+    /// One like it, for work that waits for the disk most of its time: with four times the threads,
+    /// since a disk reads and writes several files at once faster than one after the other.
     #[must_use]
     pub(crate) fn for_disks(&self) -> Self {
         Self {
@@ -163,8 +165,9 @@ impl Engine {
         out
     }
 
-    /// Does `f` to each item on a pool of `n_workers` threads; results in the order of the items, the first error by
-    /// position. `f` may use rayon in its turn, but must not wait for a channel.
+    /// Does `f` to each item on a pool of `n_workers` threads; results in the order of the items,
+    /// the first error by position. `f` may use rayon in its turn, but must not wait for a
+    /// channel.
     pub fn fan_out<T, U>(
         &self,
         task: impl Into<Task>,
@@ -202,9 +205,7 @@ impl Engine {
         stage.finish();
         // A skipped item stands after an error, and `collect` stops at that.
         all.into_iter()
-            .map(|out| {
-                out.unwrap_or_else(|| Err(Error::new(Kind::Bug, "an item was skipped")))
-            })
+            .map(|out| out.unwrap_or_else(|| Err(Error::new(Kind::Bug, "an item was skipped"))))
             .collect()
     }
 

@@ -62,7 +62,8 @@ impl Job {
         output::hold(out)
     }
 
-    /// Keeps those who would write to an output folder out of it for as long as what is returned lives.
+    /// Keeps those who would write to an output folder out of it for as long as what is returned
+    /// lives.
     ///
     /// # Errors
     /// A run is at work in it.
@@ -81,7 +82,8 @@ impl Job {
     /// Prepares the output folder.
     ///
     /// # Errors
-    /// Something to read that is not there or lies where the job writes; a path that is a file, or that the system refuses.
+    /// Something to read that is not there or lies where the job writes; a path that is a file, or
+    /// that the system refuses.
     pub fn output(&self) -> Result<OutputDir> {
         self.check_places()?;
         OutputDir::prepare(&self.out)
@@ -133,7 +135,8 @@ impl Means {
     /// Defaults, then the configuration file, then `--set`, then the other flags.
     ///
     /// # Errors
-    /// A key that does not exist, a value of another kind: usage; a configuration that cannot be read: as it is.
+    /// A key that does not exist, a value of another kind: usage; a configuration that cannot be
+    /// read: as it is.
     pub fn of(given: &Given) -> Result<Self> {
         let mut means = Self {
             memory_bytes: MEMORY_BYTES,
@@ -157,8 +160,9 @@ impl Means {
         means.checked()
     }
 
-    /// What the points that wait for their tiles may keep, bytes: a quarter of what the program itself leaves. As much goes
-    /// into vectors that grow by copying and tiles on their way to disk; more would not make scans any faster.
+    /// What the points that wait for their tiles may keep, bytes: a quarter of what the program
+    /// itself leaves. As much goes into vectors that grow by copying and tiles on their way to
+    /// disk; more would not make scans any faster.
     #[must_use]
     pub fn ingest_bytes(&self) -> usize {
         let free = self.memory_bytes.saturating_sub(PROGRAM_BYTES) / 4;
@@ -171,13 +175,15 @@ impl Means {
         usize::try_from(self.memory_bytes / 16).unwrap_or(usize::MAX)
     }
 
-    /// What each channel of a pass may keep, bytes: small beside the whole, and never more than is of use.
+    /// What each channel of a pass may keep, bytes: small beside the whole, and never more than is
+    /// of use.
     #[must_use]
     pub fn channel_bytes(&self) -> usize {
         usize::try_from(self.memory_bytes / 128).unwrap_or(usize::MAX).clamp(1 << 20, CHANNEL_BYTES)
     }
 
-    /// Whether there is too little memory for two regions at once: twenty scans of one take half a gigabyte.
+    /// Whether there is too little memory for two regions at once: twenty scans of one take half a
+    /// gigabyte.
     #[must_use]
     pub fn is_narrow(&self) -> bool {
         self.memory_bytes < NARROW_BYTES

@@ -1,4 +1,5 @@
-//! The output folder of a run: where results go, where they lie until all are whole, and where the store is kept.
+//! The output folder of a run: where results go, where they lie until all are whole, and where the
+//! store is kept.
 
 use super::places;
 use crate::reuse::{Cache, Key, Manifest};
@@ -23,8 +24,8 @@ pub struct OutputDir {
 }
 
 impl OutputDir {
-    /// Makes the folder, keeps others out of it, and finishes what an earlier run was cut short in: results that were
-    /// whole take their places, others are taken away.
+    /// Makes the folder, keeps others out of it, and finishes what an earlier run was cut short in:
+    /// results that were whole take their places, others are taken away.
     ///
     /// # Errors
     /// A path that is a file, a folder in which another run is at work, or what the system refuses.
@@ -103,7 +104,8 @@ impl OutputDir {
         crate::reuse::prune(&self.models(), &[models.name()]);
     }
 
-    /// Where a rescan makes the clouds of its new points; taken away by the next run where one is cut short.
+    /// Where a rescan makes the clouds of its new points; taken away by the next run where one is
+    /// cut short.
     #[must_use]
     pub fn scratch(&self) -> PathBuf {
         self.store.join(SCRATCH)

@@ -1,4 +1,5 @@
-//! The paths of a job in; an error where they cannot be, or where what the job writes would meet what it reads.
+//! The paths of a job in; an error where they cannot be, or where what the job writes would meet
+//! what it reads.
 
 use super::Job;
 use crate::reuse::{FILES, FOLDERS, refuse_link};

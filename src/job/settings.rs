@@ -1,5 +1,6 @@
-//! Settings of all stages, nested; a key such as `fit.beam` and a value in, the changed setting out. A key that no
-//! stage has is refused. `tests/house.rs` holds this list against the stages' own.
+//! Settings of all stages, nested; a key such as `fit.beam` and a value in, the changed setting
+//! out. A key that no stage has is refused. `tests/house.rs` holds this list against the stages'
+//! own.
 
 use super::value::{Value, assign};
 use contract::{Error, Kind, Result};

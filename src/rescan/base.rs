@@ -1,4 +1,5 @@
-//! The result that a rescan goes on from: its folder in; what it found, and its files shared with the new result, out.
+//! The result that a rescan goes on from: its folder in; what it found, and its files shared with
+//! the new result, out.
 
 use super::state::State;
 use crate::job::{Job, OutputDir};
@@ -81,8 +82,8 @@ impl Base {
         Ok(Store::join(stores?))
     }
 
-    /// Gives the new result the files of this one but those that `is_new` says are made anew; returns them as they are
-    /// listed.
+    /// Gives the new result the files of this one but those that `is_new` says are made anew;
+    /// returns them as they are listed.
     pub(crate) fn share_files(
         &self,
         next: &Path,
@@ -165,8 +166,8 @@ fn share_folder(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A file under a second name: nobody writes to it under either, so it takes no room twice. A copy where the two lie on
-/// different disks.
+/// A file under a second name: nobody writes to it under either, so it takes no room twice. A copy
+/// where the two lie on different disks.
 fn share(from: &Path, to: &Path) -> Result<()> {
     let made = to.parent().map_or(Ok(()), std::fs::create_dir_all);
     let _ = std::fs::remove_file(to);

@@ -1,5 +1,6 @@
-//! The earlier session and new scans in; which frame the new scans are in, found by surfaces and beams of both where it
-//! is not that of the plant, out: the scans and their tiles are carried into the plant.
+//! The earlier session and new scans in; which frame the new scans are in, found by surfaces and
+//! beams of both where it is not that of the plant, out: the scans and their tiles are carried into
+//! the plant.
 
 use super::past::{Past, World};
 use crate::engine::{AllThreads, Engine, Task};
@@ -19,8 +20,8 @@ pub enum Frame {
     Find,
     /// It is the plant's.
     Stated,
-    /// About where the first new scanner stands in the plant, metres, and by how much the new frame is turned to be
-    /// the plant's, degrees.
+    /// About where the first new scanner stands in the plant, metres, and by how much the new frame
+    /// is turned to be the plant's, degrees.
     Rough([f64; 4]),
 }
 
@@ -35,7 +36,8 @@ pub(crate) struct Carried {
     pub(crate) warnings: Vec<String>,
 }
 
-/// Angle between beams that are looked at, radians, at most: 0.25°; of a plant with many scans more.
+/// Angle between beams that are looked at, radians, at most: 0.25°; of a plant with many scans
+/// more.
 const STEP: f64 = 0.004_36;
 const MANY_SCANS: f64 = 16.0;
 /// Points of a scan without a raster that are looked at, about.
@@ -45,8 +47,8 @@ const MAX_ASKED: usize = 8;
 /// Room about the new scans in which the earlier session is looked at for that, metres.
 const ROOM: f64 = 1.0;
 
-/// Finds the frame of the new scans, and carries them and their tiles into that of the plant; `stood` are the bounds of
-/// robots as they stood, world, metres.
+/// Finds the frame of the new scans, and carries them and their tiles into that of the plant;
+/// `stood` are the bounds of robots as they stood, world, metres.
 ///
 /// # Errors
 /// `BadInput` where no frame is clear, or the given one is contradicted.
@@ -106,7 +108,8 @@ impl Sessions<'_> {
         }
     }
 
-    /// The word of a person that the frame is the plant's: believed unless surfaces and beams contradict it.
+    /// The word of a person that the frame is the plant's: believed unless surfaces and beams
+    /// contradict it.
     fn as_stated(&self, answer: Answer, both: (&Session, &Session)) -> Result<Carried> {
         let warning = "too few surfaces of the new scans lie on the plant's to confirm the frame that --frame states";
         match answer {
@@ -136,14 +139,16 @@ impl Sessions<'_> {
         }
     }
 
-    /// The plant's frame from the new one, by the place of the first new scanner and a turn in degrees.
+    /// The plant's frame from the new one, by the place of the first new scanner and a turn in
+    /// degrees.
     fn posed(&self, [x, y, z, yaw]: [f64; 4]) -> Pose {
         let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), yaw.to_radians());
         let shift = Vector::new(x, y, z) - turn * self.first();
         Pose::from_parts(Translation3::from(shift), turn)
     }
 
-    /// Where the first new scanner stands in the new frame; the middle of its points where that is not known.
+    /// Where the first new scanner stands in the new frame; the middle of its points where that is
+    /// not known.
     fn first(&self) -> Vector {
         let scans = self.scans();
         scans.first().map_or_else(Vector::zeros, |scan| scan.world_from_scan.translation.vector)

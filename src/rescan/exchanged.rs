@@ -1,5 +1,5 @@
-//! A robot's fit on the base that it had, and what both sessions saw about it, in; whether another model may stand there
-//! instead, out: a search of all models is only worth it then.
+//! A robot's fit on the base that it had, and what both sessions saw about it, in; whether another
+//! model may stand there instead, out: a search of all models is only worth it then.
 
 use crate::spaces::poses;
 use contract::{Fit, Verdict};
@@ -12,14 +12,15 @@ use robot::Model;
 const ABOUT_FOOT: f64 = 0.3;
 /// How far beyond the boxes of its links points are a robot's own: hoses, covers, metres.
 const OWN: f64 = 0.08;
-/// Share of what is new within its reach that need not be its own: a tool, a box that was put there. Of robots that only
-/// moved, in halls with other things moved about them, it was up to a half.
+/// Share of what is new within its reach that need not be its own: a tool, a box that was put
+/// there. Of robots that only moved, in halls with other things moved about them, it was up to a
+/// half.
 const MAX_STRANGE: f64 = 0.5;
 /// Points that are looked at.
 const ASKED: usize = 4000;
 
-/// Whether nothing speaks against a fit on an old base: neither the beams nor what is new there. If it is doubtful, then
-/// because too little of it was seen, and of another model as little would be.
+/// Whether nothing speaks against a fit on an old base: neither the beams nor what is new there. If
+/// it is doubtful, then because too little of it was seen, and of another model as little would be.
 pub(crate) fn is_the_same(
     fit: &Fit,
     model: &Model,
@@ -31,7 +32,8 @@ pub(crate) fn is_the_same(
             && strange(fit, model, scene, other_session) <= MAX_STRANGE
 }
 
-/// Share of what stands within a robot's reach, where the other session saw that nothing did, that is not its own.
+/// Share of what stands within a robot's reach, where the other session saw that nothing did, that
+/// is not its own.
 fn strange(fit: &Fit, model: &Model, scene: &Scene<'_>, other_session: &Watch<'_>) -> f64 {
     let base = Point::from(fit.world_from_base.translation.vector);
     let links: Vec<(Pose, Aabb)> = model

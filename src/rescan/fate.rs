@@ -1,13 +1,16 @@
-//! What the new scans say of each old point in a cell in; by voxel, whether all of its points stay or all of them go, out: where
-//! one or the other is so, the records of those points need not be asked for one by one again.
+//! What the new scans say of each old point in a cell in; by voxel, whether all of its points stay
+//! or all of them go, out: where one or the other is so, the records of those points need not be
+//! asked for one by one again.
 
 use geometry::Aabb;
 use merge::{Sight, Tally};
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Most voxels that are kept, one byte each: 30 x 30 x 9 m. Of larger cells each point is asked for again.
+/// Most voxels that are kept, one byte each: 30 x 30 x 9 m. Of larger cells each point is asked for
+/// again.
 const MAX_VOXELS: usize = 1 << 26;
-/// A point in the voxel stays; the new scans measured what one is of; they saw through the place of one.
+/// A point in the voxel stays; the new scans measured what one is of; they saw through the place of
+/// one.
 const STAYS: u8 = 1;
 const ONTO: u8 = 2;
 const THROUGH: u8 = 4;
@@ -46,8 +49,8 @@ impl Fates {
         }
     }
 
-    /// Whether all points of a voxel stay, or none; `is_gone`: what stood in it is no longer there. `None` where that
-    /// depends on the point.
+    /// Whether all points of a voxel stay, or none; `is_gone`: what stood in it is no longer there.
+    /// `None` where that depends on the point.
     pub(crate) fn stays(&self, voxel: [i32; 3], is_gone: impl Fn() -> bool) -> Option<bool> {
         let fate = self.at(voxel)?.load(Ordering::Relaxed);
         let through = match fate & THROUGH {

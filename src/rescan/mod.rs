@@ -1,5 +1,6 @@
-//! One cell of a plant scanned again: an earlier result and new scans in; the same result with that cell brought up to date,
-//! and what changed, out. What the new scans do not touch is shared with the earlier result, byte for byte.
+//! One cell of a plant scanned again: an earlier result and new scans in; the same result with that
+//! cell brought up to date, and what changed, out. What the new scans do not touch is shared with
+//! the earlier result, byte for byte.
 
 mod base;
 mod carry;
@@ -51,7 +52,8 @@ pub struct Request {
     pub cell: Cell,
     /// Which frame the new scans are in.
     pub frame: Frame,
-    /// The new scans, where the result goes, and the means; the library is that of the base where its path is empty.
+    /// The new scans, where the result goes, and the means; the library is that of the base where
+    /// its path is empty.
     pub job: Job,
 }
 
@@ -114,7 +116,8 @@ impl Rescan<'_> {
         let carried =
             carry::carry(&request.frame, (&past, stood), (&mut sources, &mut new), engine)?;
 
-        // Where the cell is, and how far the new scans are off what stood there: they are taken back by that.
+        // Where the cell is, and how far the new scans are off what stood there: they are taken
+        // back by that.
         let cell = session::bounds(&request.cell, base, (&fits, &models), (&sources, &new))?;
         let past = past.of_cell(cell);
         let shelf = Shelf::new(&library.models);
@@ -126,7 +129,8 @@ impl Rescan<'_> {
         };
         let (laid, between) = (&mut sources, (&past, &new));
         let on_shelf = &shelf;
-        // Reading waits for disks and for itself: what fits of the cell's robots need is made meanwhile.
+        // Reading waits for disks and for itself: what fits of the cell's robots need is made
+        // meanwhile.
         let ((), (registered, session)) = engine.beside("models", known, move || {
             let registered = session::register(between, laid, engine)?;
             let session = Session::new(floor, laid, between, on_shelf, settings, engine)?;
@@ -154,7 +158,8 @@ impl Rescan<'_> {
         Ok(outcome)
     }
 
-    /// The tiles of the new scans: keys of their folders, one store of all, and how many were there already.
+    /// The tiles of the new scans: keys of their folders, one store of all, and how many were there
+    /// already.
     fn tiles(&self, sources: &Sources) -> Result<(Vec<Key>, Store, [usize; 2])> {
         let &Rescan { base, job, output, digests, engine } = self;
         let filling = Filling::new(sources, &job.means, output.tiles(), engine);
@@ -182,8 +187,8 @@ impl Rescan<'_> {
         Ok((library, sources))
     }
 
-    /// All is whole, and of the inputs that the rescan began with: it takes its place. Robots that stand as they stood are
-    /// handed on as the base has them.
+    /// All is whole, and of the inputs that the rescan began with: it takes its place. Robots that
+    /// stand as they stood are handed on as the base has them.
     fn conclude(
         &self,
         (mut fits, robots): (Vec<Fit>, &Robots),
@@ -215,7 +220,8 @@ impl Rescan<'_> {
     }
 }
 
-/// Tiles of all inputs, what their stores hold, and what carried the new scans into the plant's frame.
+/// Tiles of all inputs, what their stores hold, and what carried the new scans into the plant's
+/// frame.
 type Kept<'a> = (&'a [Key], Vec<String>, Option<Pose>);
 
 /// What a rescan is asked for beside its inputs and settings, for its digest.

@@ -1,5 +1,5 @@
-//! Things that appeared in a cell in; the robots among them, and how they stood then where the earlier scans show them though
-//! their result missed them, out.
+//! Things that appeared in a cell in; the robots among them, and how they stood then where the
+//! earlier scans show them though their result missed them, out.
 
 use super::robots::{Now, look};
 use super::session::{Labels, Robots, Session, ground};
@@ -15,10 +15,11 @@ use robot::Model;
 
 /// Smallest height and largest edge of a new thing that may be a robot, metres.
 const ROBOT_LIKE: [f64; 2] = [0.4, 0.5];
-/// Room about such a thing, metres; and about one that does not stand on the floor, since the arm of a robot whose foot stood still
-/// is a thing by itself.
+/// Room about such a thing, metres; and about one that does not stand on the floor, since the arm
+/// of a robot whose foot stood still is a thing by itself.
 const ABOUT: [f64; 2] = [0.3, 1.0];
-/// What moved up or down by more than this may be no thing that somebody pushed, but an arm in place of one, metres.
+/// What moved up or down by more than this may be no thing that somebody pushed, but an arm in
+/// place of one, metres.
 const LIFTED: f64 = 0.2;
 /// What begins less high above the floor stands on it, metres.
 const STANDS: f64 = 0.2;
@@ -103,7 +104,8 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// How a robot that the earlier result does not have stood then, if its scans show it, too: it did not appear.
+    /// How a robot that the earlier result does not have stood then, if its scans show it, too: it
+    /// did not appear.
     fn stood(&self, now: &Fit, models: &[Model]) -> Result<Option<(Fit, Option<Model>)>> {
         let search = Search::new(
             self.shelf,
@@ -120,7 +122,8 @@ impl Session<'_> {
         })
     }
 
-    /// Labels of points of the earlier scans on robots that their result missed; nothing where it missed none.
+    /// Labels of points of the earlier scans on robots that their result missed; nothing where it
+    /// missed none.
     pub(crate) fn missed(
         &self,
         (fits, models): (&[Fit], &[Model]),

@@ -1,5 +1,5 @@
-//! Points of earlier scans in a cell in; the surfaces that they lie on, what the new scans say of each of them, and which of
-//! them are superseded, out.
+//! Points of earlier scans in a cell in; the surfaces that they lie on, what the new scans say of
+//! each of them, and which of them are superseded, out.
 
 use super::base::Base;
 use super::fate::Fates;
@@ -14,8 +14,8 @@ use geometry::{Aabb, Point};
 use merge::{Seen, Sight, Surfaces, Tally, Tallying, Watch};
 use std::collections::BTreeSet;
 
-/// One of so many points tells the surfaces, and of many points more are passed over, so that about so many do: a tenth of a
-/// voxel's points is enough for its plane.
+/// One of so many points tells the surfaces, and of many points more are passed over, so that about
+/// so many do: a tenth of a voxel's points is enough for its plane.
 const SAMPLE: u64 = 5;
 const N_SAMPLED: u64 = 2_000_000;
 /// Places so far apart are read from the mask one after the other.
@@ -116,8 +116,8 @@ impl<'a> Past<'a> {
         Ok(Compared { then, tiles, fates, anew })
     }
 
-    /// All places that are superseded now, by mask: those that were before, those that were measured anew, those of things
-    /// that are gone, and those of robots that stand otherwise.
+    /// All places that are superseded now, by mask: those that were before, those that were
+    /// measured anew, those of things that are gone, and those of robots that stand otherwise.
     pub(crate) fn superseded<'c>(
         &self,
         compared: &'c Compared,
@@ -139,7 +139,8 @@ impl<'a> Past<'a> {
         all
     }
 
-    /// Voxels of robots that the earlier result missed: what the new scans see through of them is gone.
+    /// Voxels of robots that the earlier result missed: what the new scans see through of them is
+    /// gone.
     pub(crate) fn missed(compared: &Compared) -> impl Iterator<Item = &[i32; 3]> {
         compared.tiles.iter().flat_map(|tile| &tile.missed)
     }
@@ -207,7 +208,8 @@ impl<'a> Past<'a> {
     }
 }
 
-/// How one of so many points is read: what is left out of each tile (see [`Tile::skip`]), and one of how many of the others.
+/// How one of so many points is read: what is left out of each tile (see [`Tile::skip`]), and one
+/// of how many of the others.
 pub(crate) fn sampled(of: u64) -> (u32, usize) {
     let skip = (of.max(1).ilog2() / 2).min(MAX_SKIP);
     (skip, (of >> (2 * skip)) as usize)
@@ -242,7 +244,8 @@ impl Map for Sample<'_> {
     }
 }
 
-/// The points of a tile that are asked for; kept from tile to tile, since fresh memory costs more than what is done with it.
+/// The points of a tile that are asked for; kept from tile to tile, since fresh memory costs more
+/// than what is done with it.
 #[derive(Default)]
 struct Asked {
     places: Vec<u64>,
@@ -320,7 +323,8 @@ impl Map for Look<'_> {
     }
 }
 
-/// What a session has at the place of another one's point, of which that one's own beams say whether it is of a mesh.
+/// What a session has at the place of another one's point, of which that one's own beams say
+/// whether it is of a mesh.
 pub(crate) fn seen(sight: Sight, own: &Watch<'_>, world: [f64; 3]) -> Seen {
     match sight {
         Sight::Through => Seen::Nothing { is_pierced: own.is_pierced(world) },
@@ -329,7 +333,8 @@ pub(crate) fn seen(sight: Sight, own: &Watch<'_>, world: [f64; 3]) -> Seen {
     }
 }
 
-/// Area across its beam that a point stands for, m²: that of its pixel, or of a voxel's share where no scanner is known.
+/// Area across its beam that a point stands for, m²: that of its pixel, or of a voxel's share where
+/// no scanner is known.
 pub(crate) fn area(scan: &Scan, world: [f64; 3]) -> f64 {
     let Some(lattice) = &scan.lattice else { return Tally::FACE };
     let beam = Point::from(world) - Point::from(scan.world_from_scan.translation.vector);

@@ -1,4 +1,5 @@
-//! Places of a mask in, from any thread and in any order; how many they are, and all of them in order, out.
+//! Places of a mask in, from any thread and in any order; how many they are, and all of them in
+//! order, out.
 
 use contract::Result;
 use std::sync::OnceLock;
@@ -7,7 +8,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Places that are handed on together.
 const PART: usize = 1 << 16;
 
-/// Places of one mask, one bit each: millions of them are in order without being sorted, and take an eighth of a byte a point.
+/// Places of one mask, one bit each: millions of them are in order without being sorted, and take
+/// an eighth of a byte a point.
 pub(crate) struct Places {
     /// Of the mask.
     n_points: u64,

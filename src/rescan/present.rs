@@ -1,4 +1,5 @@
-//! Points of the new scans in; how far each scan is off the plant, and what stands still in the cell now, out.
+//! Points of the new scans in; how far each scan is off the plant, and what stands still in the
+//! cell now, out.
 
 use super::past::{World, area, sampled, seen};
 use crate::engine::Engine;
@@ -13,7 +14,8 @@ use segment::Ground;
 /// Points of a scan that are laid on the plant's surfaces, about.
 const N_LAID: u64 = 100_000;
 
-/// How each new scan, from the number `first` on, is off the plant; none where too little of what stood is seen.
+/// How each new scan, from the number `first` on, is off the plant; none where too little of what
+/// stood is seen.
 pub(crate) fn register(
     planes: &Planes,
     (scans, first): (&[Scan], usize),

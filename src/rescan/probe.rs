@@ -1,4 +1,5 @@
-//! A door for the fuzz targets: the body of a plant's file in, whether a rescan would go on from it, out.
+//! A door for the fuzz targets: the body of a plant's file in, whether a rescan would go on from
+//! it, out.
 
 use super::state::{FORMAT, Records, State};
 use crate::reuse::written;

@@ -1,4 +1,5 @@
-//! A robot of the earlier result, and what the new scans saw, in; how it stands now, or that it is gone, out.
+//! A robot of the earlier result, and what the new scans saw, in; how it stands now, or that it is
+//! gone, out.
 
 use super::exchanged::is_the_same;
 use crate::search::Search;
@@ -14,8 +15,9 @@ use robot::{Library, Model};
 const ASKED: usize = 400;
 /// Share of those that they must have judged for the robot to be compared at all.
 const MIN_JUDGED: f64 = 0.06;
-/// Share of the judged that they went through up to which it may still stand so, though too little of it is seen for a fit;
-/// and from which on it does not stand so any more. Fences and edges make up to a tenth.
+/// Share of the judged that they went through up to which it may still stand so, though too little
+/// of it is seen for a fit; and from which on it does not stand so any more. Fences and edges make
+/// up to a tenth.
 const STANDS: f64 = 0.1;
 const CONTRADICTED: f64 = 0.25;
 /// The same of the link that it stands on: it has gone.
@@ -23,8 +25,9 @@ const GONE: f64 = 0.6;
 /// A base farther from the old one is another robot's, metres.
 const SAME_PLACE: f64 = 0.5;
 
-/// A link that turns by more against its base than this, radians, is none of its foot; one that turns by no more in the world, and
-/// whose corners are no farther from where they were than this, metres, stays: two sessions are registered to within millimetres.
+/// A link that turns by more against its base than this, radians, is none of its foot; one that
+/// turns by no more in the world, and whose corners are no farther from where they were than this,
+/// metres, stays: two sessions are registered to within millimetres.
 const FOOT_TURNS: f64 = 0.001_75;
 const STAYS: f64 = 0.005;
 
@@ -39,7 +42,8 @@ pub(crate) enum Now {
     Anew(Box<Fit>, bool),
     /// It stands no longer there.
     Gone,
-    /// The new scans saw too little of it; what they saw does not contradict that it stands as it stood.
+    /// The new scans saw too little of it; what they saw does not contradict that it stands as it
+    /// stood.
     Unseen,
     /// They saw too little of it, and that speaks against how it stood.
     Open,
@@ -47,15 +51,16 @@ pub(crate) enum Now {
     Lost,
 }
 
-/// What the new scans say of a posture: points of the surface that were judged, of all, and gone through, of the judged;
-/// and the same share of the link it stands on.
+/// What the new scans say of a posture: points of the surface that were judged, of all, and gone
+/// through, of the judged; and the same share of the link it stands on.
 struct Said {
     judged: f64,
     through: f64,
     foot: f64,
 }
 
-/// The models that earlier fits are of, rebuilt from a library: those with tools, with other loops or calibrated after its own.
+/// The models that earlier fits are of, rebuilt from a library: those with tools, with other loops
+/// or calibrated after its own.
 ///
 /// # Errors
 /// A model that the library no longer has.
@@ -65,7 +70,8 @@ pub(crate) fn models_of(fits: &mut [Fit], library: &Library) -> Result<Vec<Model
     Ok(models)
 }
 
-/// Sets the model of a fit, and of the same robot as it stood in other scans; one that is no model of the library is added.
+/// Sets the model of a fit, and of the same robot as it stood in other scans; one that is no model
+/// of the library is added.
 fn own_model(fit: &mut Fit, library: &Library, models: &mut Vec<Model>) -> Result<()> {
     let missing = |name: &str| {
         let what = format!("the library has no model \"{name}\", which the earlier result found");
@@ -109,8 +115,8 @@ pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
 /// No robot of a library reaches farther than this from its base, but for those on rails, metres.
 const FAR_REACH: f64 = 4.0;
 
-/// Looks at one robot again, through the scans of this session and of the other; `regions` are those of this one. The model is its
-/// own, where it is none of the library.
+/// Looks at one robot again, through the scans of this session and of the other; `regions` are
+/// those of this one. The model is its own, where it is none of the library.
 pub(crate) fn look(
     before: &Fit,
     models: &[Model],
@@ -122,11 +128,13 @@ pub(crate) fn look(
         return Ok((if said.through < STANDS { Now::Unseen } else { Now::Open }, None));
     }
     let near = home(before, model, regions);
-    // Where the new scans see through much of how it stood, it stands otherwise: that is told from its base alone.
+    // Where the new scans see through much of how it stood, it stands otherwise: that is told from
+    // its base alone.
     if said.through <= CONTRADICTED
         && let Some(fit) = search.again(&near, before, model)?
     {
-        // What is known of how it stood counts for how it stands, but only where all of that is seen again.
+        // What is known of how it stood counts for how it stands, but only where all of that is
+        // seen again.
         let sure = Fit { verdict: fit.verdict.max(before.verdict), ..fit.clone() };
         let is_same = !crate::changes::stands_otherwise(before, &sure) && knows(&fit, before);
         match fit.verdict {
@@ -151,8 +159,9 @@ pub(crate) fn look(
     })
 }
 
-/// Whether two postures differ in nothing but how the foot stands under links that stay where they are. Of a round foot that few
-/// points show, the turn trades with the first joint: that the one was undone by the other is no change that anybody makes.
+/// Whether two postures differ in nothing but how the foot stands under links that stay where they
+/// are. Of a round foot that few points show, the turn trades with the first joint: that the one
+/// was undone by the other is no change that anybody makes.
 fn only_foot_turns(then: &Fit, now: &Fit, model: &Model) -> bool {
     let bounds: Vec<Aabb> = model.links.iter().map(|link| link.bounds).collect();
     let stood = |fit: &Fit| (fit.world_from_base, poses(fit, model));
@@ -181,7 +190,8 @@ fn knows(fit: &Fit, other: &Fit) -> bool {
     joints.all(|(own, other)| own.is_determined() || !other.is_determined())
 }
 
-/// A robot that does not stand as it stood, searched anew at its place; with the model of its own, where it has one.
+/// A robot that does not stand as it stood, searched anew at its place; with the model of its own,
+/// where it has one.
 fn anew(
     before: &Fit,
     models: &[Model],
@@ -232,7 +242,8 @@ fn beside(region: &Region, base: Point) -> Region {
     crate::spaces::region(&bounds.center(), &bounds)
 }
 
-/// The region of the new scans that a robot stands in; all that it can get to, where it stands in none.
+/// The region of the new scans that a robot stands in; all that it can get to, where it stands in
+/// none.
 fn home(fit: &Fit, model: &Model, regions: &[Region]) -> Region {
     let base = fit.world_from_base.translation.vector;
     let own = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(base.into()));

@@ -1,5 +1,5 @@
-//! What a rescan found in; the result of the whole plant, the list of changes as JSON, CSV and picture, and a summary for
-//! people, out.
+//! What a rescan found in; the result of the whole plant, the list of changes as JSON, CSV and
+//! picture, and a summary for people, out.
 
 use super::write::Written;
 use crate::changes::{Change, RobotChange, changes, of_missed, words};
@@ -156,7 +156,8 @@ impl Said<'_, '_> {
                 .filter(|c| c.now.as_ref() == Some(&id))
                 .for_each(|c| *c = of_missed(&id, stood, own));
         }
-        // Where joints are left open, others alone do not say that a robot stands as it stood when beams went through it.
+        // Where joints are left open, others alone do not say that a robot stands as it stood when
+        // beams went through it.
         let contradicted: Vec<String> =
             self.found.robots.contradicted.iter().copied().map(id).collect();
         let open =

@@ -1,4 +1,5 @@
-//! Earlier and new scans of a cell in; how its robots stand now, and what else is not where it was, out.
+//! Earlier and new scans of a cell in; how its robots stand now, and what else is not where it was,
+//! out.
 
 use super::Cell;
 use super::base::Base;
@@ -23,12 +24,13 @@ use merge::{Registration, Tally, Thing, Unseen, Watch, things};
 use robot::Model;
 use std::collections::BTreeSet;
 
-/// How far from its scanner a new scan may see the cell, metres, where nobody says where it is: a robot cell.
+/// How far from its scanner a new scan may see the cell, metres, where nobody says where it is: a
+/// robot cell.
 const CELL_RADIUS: f64 = 8.0;
 /// Beams farther apart say less than the scans that were there, metres.
 const CELL_SPACING: f64 = 0.025;
-/// Cells of depth images in a unit of their plane, at most, and nearest distance for which they are as fine, metres: 2.5 mm
-/// at 1 m, as fine as a common scan.
+/// Cells of depth images in a unit of their plane, at most, and nearest distance for which they are
+/// as fine, metres: 2.5 mm at 1 m, as fine as a common scan.
 const LOOK_CELL: f64 = 0.3 / 400.0;
 /// Earlier scans that are asked what was there: those with most points in the cell.
 const MAX_ASKED: usize = 6;
@@ -63,7 +65,8 @@ pub(crate) struct Robots {
     pub(crate) lost: Vec<usize>,
     /// Are gone.
     pub(crate) gone: Vec<usize>,
-    /// The new scans saw too little of them; and those of them that label points by how they stood.
+    /// The new scans saw too little of them; and those of them that label points by how they
+    /// stood.
     pub(crate) unseen: Vec<usize>,
     pub(crate) as_it_stood: Vec<usize>,
     /// Bounds of robots as they stood that do no longer stand so.
@@ -175,8 +178,8 @@ pub(crate) fn register(
 }
 
 impl<'a> Session<'a> {
-    /// Looks at the cell through earlier and new scans; `floor` is that of the plant, and `hang` says whether robots of the
-    /// cell hang on walls or ceilings.
+    /// Looks at the cell through earlier and new scans; `floor` is that of the plant, and `hang`
+    /// says whether robots of the cell hang on walls or ceilings.
     pub(crate) fn new(
         (floor, hang): (&'a Floor, bool),
         sources: &'a Sources,
@@ -283,7 +286,8 @@ impl<'a> Session<'a> {
                     fits[i].verdict = Verdict::Refused;
                     fits[i].reasons = vec!["it is gone: the new scans see through it".into()];
                 }
-                // Labels by a posture that is none could take a fixed thing for a link: it gives none.
+                // Labels by a posture that is none could take a fixed thing for a link: it gives
+                // none.
                 Now::Lost => {
                     out.changed.push(i);
                     out.lost.push(i);
@@ -350,8 +354,8 @@ impl<'a> Session<'a> {
         Labelling::new(fits, models, self.sources, ground, self.settings)
     }
 
-    /// By scan: what carries it from its frame into the plant's and takes back how far it was off, where its file states
-    /// coordinates of the world.
+    /// By scan: what carries it from its frame into the plant's and takes back how far it was off,
+    /// where its file states coordinates of the world.
     pub(crate) fn moved(
         &self,
         registered: &[Option<Registration>],
@@ -367,8 +371,8 @@ impl<'a> Session<'a> {
     }
 }
 
-/// What the new scans cover and what they found occupied; with their walls where those are asked for, and all of their
-/// planes where the plant has no floor.
+/// What the new scans cover and what they found occupied; with their walls where those are asked
+/// for, and all of their planes where the plant has no floor.
 pub(crate) fn ground(
     floor: &Floor,
     with_walls: bool,

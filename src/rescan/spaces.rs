@@ -1,5 +1,6 @@
-//! Spaces of robots as the earlier result has them, and what the new scans saw, in; spaces in and beside the cell, brought up to
-//! date, out. Points are marked into them while they are labelled and while tiles are written.
+//! Spaces of robots as the earlier result has them, and what the new scans saw, in; spaces in and
+//! beside the cell, brought up to date, out. Points are marked into them while they are labelled
+//! and while tiles are written.
 
 use super::write::Written;
 use crate::engine::{Engine, Task};
@@ -12,7 +13,8 @@ use merge::Passed;
 use std::path::Path;
 
 impl Written<'_, '_> {
-    /// By fit: spaces of robots that stand otherwise, and of others that reach to where points are looked at again.
+    /// By fit: spaces of robots that stand otherwise, and of others that reach to where points are
+    /// looked at again.
     pub(super) fn spaces(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
         let mut out: Vec<Option<Space>> = vec![None; self.fits.len()];
         let settings = self.session.settings;
@@ -75,8 +77,8 @@ impl Written<'_, '_> {
         })
     }
 
-    /// Where points of the earlier result are looked at again, one by one: the cell, and where robots stood. Nowhere, where
-    /// it has no tiles of them.
+    /// Where points of the earlier result are looked at again, one by one: the cell, and where
+    /// robots stood. Nowhere, where it has no tiles of them.
     fn places(&self) -> Vec<Aabb> {
         let has_tiles = self.base.state.records.tile_edge().is_some();
         let places = self.robots.left.iter().chain([&self.session.past.cell]);
@@ -89,8 +91,9 @@ impl Written<'_, '_> {
     }
 }
 
-/// Adds to a space that robots fill what is seen within some places, and what was known elsewhere. Which points the places hold
-/// is not known yet; what was seen free and is not seen now stays free.
+/// Adds to a space that robots fill what is seen within some places, and what was known elsewhere.
+/// Which points the places hold is not known yet; what was seen free and is not seen now stays
+/// free.
 fn renew(space: &mut Space, old: &Space, places: &[Aabb], is_free: impl Fn([f64; 3]) -> bool) {
     use SpaceKind::{Fixed, Free, Other, Robot, Unknown};
     let grid = *space.grid();

@@ -1,4 +1,5 @@
-//! What a run leaves for a later session of its plant, and that again: `plant.bin` beside the result.
+//! What a run leaves for a later session of its plant, and that again: `plant.bin` beside the
+//! result.
 
 use crate::reuse::{Key, Vouched, read, written};
 use contract::{Error, Fit, Floor, Input, Kind, Mask, Result, Scan};
@@ -21,7 +22,8 @@ pub(crate) struct State {
     pub(crate) scans: Vec<Scan>,
     /// Tiles of each input, by the name of their folder in the store.
     pub(crate) tiles: Vec<Key>,
-    /// By input: what carried its scans into the plant's frame, where their files state another one.
+    /// By input: what carried its scans into the plant's frame, where their files state another
+    /// one.
     pub(crate) frames: Vec<Option<Pose>>,
     /// Digest of what each of these stores holds (see `Store::contents`).
     pub(crate) contents: Vec<String>,
@@ -113,8 +115,9 @@ impl State {
         }
     }
 
-    /// Whether inputs, masks and scans are numbered in their order and name one another, and clouds have a scale: the digest
-    /// guards against damage, not against another program that writes such a file.
+    /// Whether inputs, masks and scans are numbered in their order and name one another, and clouds
+    /// have a scale: the digest guards against damage, not against another program that writes
+    /// such a file.
     fn is_consistent(&self) -> bool {
         let (inputs, masks, scans) = (&self.inputs, &self.masks, &self.scans);
         let is_number = |id: u32, at: usize| id as usize == at;

@@ -1,5 +1,5 @@
-//! What a rescan found in; masks of the new scans, tiles of the cell anew, the rest of the earlier result shared, and the
-//! result that joins them, out.
+//! What a rescan found in; masks of the new scans, tiles of the cell anew, the rest of the earlier
+//! result shared, and the result that joins them, out.
 
 use super::base::Base;
 use super::carry::Carried;
@@ -106,8 +106,8 @@ impl Written<'_, '_> {
         Ok(Out { outcome, known, n_shared })
     }
 
-    /// Masks of the new scans, clouds of their points in the cell; and files of robots that stand otherwise, still to be
-    /// written.
+    /// Masks of the new scans, clouds of their points in the cell; and files of robots that stand
+    /// otherwise, still to be written.
     fn label<'l>(
         &'l self,
         labelling: &'l Labelling<'l>,
@@ -127,7 +127,8 @@ impl Written<'_, '_> {
         labelling.write((&self.labels.near, spaces), &scope, (next, scratch), engine)
     }
 
-    /// Voxels of things that are gone and of robots that the earlier result missed, and those next to them.
+    /// Voxels of things that are gone and of robots that the earlier result missed, and those next
+    /// to them.
     fn gone(&self) -> BTreeSet<[i32; 3]> {
         let things = self.labels.things.iter().filter(|t| t.change != ThingChange::Appeared);
         let near = |c: &[i32; 3]| {
@@ -180,8 +181,8 @@ impl Written<'_, '_> {
         stays
     }
 
-    /// Tiles that the cell touches, and the cloud of all that moves: behind the new points of each (those of `open` are in it
-    /// already) comes what is left of the old ones.
+    /// Tiles that the cell touches, and the cloud of all that moves: behind the new points of each
+    /// (those of `open` are in it already) comes what is left of the old ones.
     fn tiles(
         &self,
         (open, grids): (Vec<Spool>, &Grids),
@@ -261,7 +262,8 @@ impl Written<'_, '_> {
     }
 }
 
-/// Lists of superseded places: of each mask the name, those that grew, and how many places all of them have.
+/// Lists of superseded places: of each mask the name, those that grew, and how many places all of
+/// them have.
 #[derive(Default)]
 struct Lists {
     names: Vec<Option<String>>,

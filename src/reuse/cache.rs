@@ -1,5 +1,5 @@
-//! Pieces that took long to find in (fits of a region, models of a library), a file of each out, and back: what an earlier
-//! run had found already.
+//! Pieces that took long to find in (fits of a region, models of a library), a file of each out,
+//! and back: what an earlier run had found already.
 
 use super::Key;
 use contract::Result;

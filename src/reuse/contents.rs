@@ -1,5 +1,5 @@
-//! Files in, digests of their bytes out. A file that was read before and has since kept its length, time and place on disk
-//! is not read again.
+//! Files in, digests of their bytes out. A file that was read before and has since kept its length,
+//! time and place on disk is not read again.
 
 use contract::{Error, Kind, Result};
 use export::atomic;
@@ -16,7 +16,8 @@ use std::time::{Duration, SystemTime};
 const LIST: &str = "contents.json";
 /// Bytes that are read at a time.
 const PIECE: usize = 1 << 20;
-/// How far a file may be read ahead of the one that decodes it, bytes: the system still has it in memory then.
+/// How far a file may be read ahead of the one that decodes it, bytes: the system still has it in
+/// memory then.
 const AHEAD: u64 = 256 << 20;
 /// A file that changed so recently may change again without its time telling.
 const SETTLED: Duration = Duration::from_secs(2);
@@ -83,7 +84,8 @@ impl Contents {
         Ok(self.lock().get(&name(path)?).filter(is_known).map(|s| s.digest.clone()))
     }
 
-    /// Whether a file may be one that was read before, under another name or time: it has the length of one.
+    /// Whether a file may be one that was read before, under another name or time: it has the
+    /// length of one.
     pub(super) fn may_know(&self, path: &Path) -> Result<bool> {
         let n_bytes = Stamp::of(path)?.n_bytes;
         Ok(self.lock().values().any(|s| s.stamp.n_bytes == n_bytes))
@@ -97,7 +99,8 @@ impl Contents {
         Ok(digest)
     }
 
-    /// Takes the digest of a file that was read since it had this stamp; refuses one that was changed meanwhile.
+    /// Takes the digest of a file that was read since it had this stamp; refuses one that was
+    /// changed meanwhile.
     pub(super) fn take(&self, path: &Path, stamp: Stamp, digest: &str) -> Result<()> {
         stamp.check(path)?;
         if stamp.is_settled() {
@@ -232,8 +235,8 @@ fn name(path: &Path) -> Result<String> {
     Ok(absolute.display().to_string())
 }
 
-/// How far the one who decodes a file has come, for another who sums it up: both read it from disk only once if they stay
-/// near each other.
+/// How far the one who decodes a file has come, for another who sums it up: both read it from disk
+/// only once if they stay near each other.
 #[derive(Debug, Default)]
 pub(crate) struct Pace {
     /// Points that are decoded, and how many there are; no pace where that is 0.

@@ -1,7 +1,9 @@
-//! What a run has written in, the list of it out (`manifest.json`); and that list again in, what is missing or changed out.
+//! What a run has written in, the list of it out (`manifest.json`); and that list again in, what is
+//! missing or changed out.
 //!
-//! Outputs are written beside the old ones and take their places together: the list is the last to be written there and
-//! the last to move, so that a run that is cut short while they move is finished by the next one.
+//! Outputs are written beside the old ones and take their places together: the list is the last to
+//! be written there and the last to move, so that a run that is cut short while they move is
+//! finished by the next one.
 
 use super::contents::{Algorithm, Contents, walk};
 use super::inside::{is_own, straight};
@@ -129,7 +131,8 @@ impl Manifest {
         files
     }
 
-    /// Lists what lies in `next`, files that are known as they are `known`, and writes the list there.
+    /// Lists what lies in `next`, files that are known as they are `known`, and writes the list
+    /// there.
     pub(crate) fn write(
         next: &Path,
         key: Option<super::Key>,
@@ -160,9 +163,9 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Moves what lies in `next`, as its list says, to `out`, and takes away what only the old list of `out` names. May be
-    /// cut short anywhere and done again. Beside the list: what was made of the old result and is
-    /// true no longer, in words.
+    /// Moves what lies in `next`, as its list says, to `out`, and takes away what only the old list
+    /// of `out` names. May be cut short anywhere and done again. Beside the list: what was made
+    /// of the old result and is true no longer, in words.
     pub(crate) fn publish(next: &Path, out: &Path) -> Result<(Self, Vec<String>)> {
         let manifest = Self::read(next)?;
         let old = Self::named(out);
@@ -282,7 +285,8 @@ pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
     Ok(Checked { manifest, digest, wrong: wrong.into_iter().flatten().collect() })
 }
 
-/// The list of `out`, if it is of `key` and every file is what it was, as far as lengths, times and known digests tell.
+/// The list of `out`, if it is of `key` and every file is what it was, as far as lengths, times and
+/// known digests tell.
 pub(super) fn unchanged(
     contents: &Contents,
     out: &Path,

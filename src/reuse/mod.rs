@@ -1,8 +1,10 @@
-//! What a run is made from in, names for its pieces out: a piece whose name is there already need not be made again.
+//! What a run is made from in, names for its pieces out: a piece whose name is there already need
+//! not be made again.
 //!
-//! A key is a digest of all that a piece depends on: contents of files, settings, the program itself. Places, times and the
-//! number of threads are no part of it. A piece is looked at before it is believed: a store has its catalogue, kept fits
-//! their checksum, outputs their length and time.
+//! A key is a digest of all that a piece depends on: contents of files, settings, the program
+//! itself. Places, times and the number of threads are no part of it. A piece is looked at before
+//! it is believed: a store has its catalogue, kept fits their checksum, outputs their length and
+//! time.
 
 mod cache;
 mod contents;
@@ -100,7 +102,8 @@ pub(crate) fn publish(
 }
 
 impl Digests {
-    /// Reads every file of the job once, except those that are known and unchanged since, and inputs that are new.
+    /// Reads every file of the job once, except those that are known and unchanged since, and
+    /// inputs that are new.
     pub(crate) fn of(job: &Job, output: &OutputDir, engine: &Engine) -> Result<Self> {
         let contents = Contents::open(output.store());
         let stamped = |path: &PathBuf| Ok((path.clone(), Stamp::of(path)?));
@@ -139,7 +142,8 @@ impl Digests {
         self.inputs[self.at(input)].get().map(String::as_str)
     }
 
-    /// Reads an input whose digest is not known, beside the one who decodes it and tells how far he is.
+    /// Reads an input whose digest is not known, beside the one who decodes it and tells how far he
+    /// is.
     pub(crate) fn read(&self, input: &Input, pace: &Pace) -> Result<()> {
         let at = self.at(input);
         let digest = self.contents.read(&self.files[at].0, Algorithm::Blake3, pace)?;
@@ -164,7 +168,8 @@ impl Digests {
         self.contents.keep()
     }
 
-    /// Refuses an input that is not the one any more that the run began with: what was read of it may be of either.
+    /// Refuses an input that is not the one any more that the run began with: what was read of it
+    /// may be of either.
     pub(crate) fn check(&self, input: &Input) -> Result<()> {
         let (path, stamp) = &self.files[self.at(input)];
         stamp.check(path)
@@ -176,7 +181,8 @@ impl Digests {
         key.map_or(Ok(None), |key| manifest::unchanged(&self.contents, output.out(), &key))
     }
 
-    /// Remembers outputs as they were written, so that the next run need not read them to see that nothing has changed.
+    /// Remembers outputs as they were written, so that the next run need not read them to see that
+    /// nothing has changed.
     pub(crate) fn remember(&self, manifest: &Manifest, out: &Path) -> Result<()> {
         for file in &manifest.files {
             self.contents.believe(&out.join(&file.path), &file.digest)?;
@@ -210,8 +216,8 @@ impl Digests {
         Key::of("models", &[&self.library, &words(&settings.robot)])
     }
 
-    /// All that a job writes, where the digests of all inputs are known yet. Names of files are part of it: results name
-    /// their inputs.
+    /// All that a job writes, where the digests of all inputs are known yet. Names of files are
+    /// part of it: results name their inputs.
     pub(crate) fn whole(&self, job: &Job) -> Option<Key> {
         let names: Vec<_> = job.inputs.iter().map(|p| p.display().to_string()).collect();
         let digests: Option<Vec<&String>> = self.inputs.iter().map(OnceLock::get).collect();

@@ -1,5 +1,6 @@
-//! Pieces of a file in, by whatever thread has them; the BLAKE3 digest of the whole out, as if it had been read from its
-//! beginning to its end. (BLAKE3 paper, 2.1: chunks of 1 KiB are the leaves of a binary tree, each left half as large as can be.)
+//! Pieces of a file in, by whatever thread has them; the BLAKE3 digest of the whole out, as if it
+//! had been read from its beginning to its end. (BLAKE3 paper, 2.1: chunks of 1 KiB are the leaves
+//! of a binary tree, each left half as large as can be.)
 
 use blake3::hazmat::{
     ChainingValue, HasherExt, Mode, left_subtree_len, merge_subtrees_non_root, merge_subtrees_root,
@@ -37,7 +38,8 @@ impl Tree {
         self.n_bytes
     }
 
-    /// The leaves that begin in a piece of the file, which are its to sum up: the last of them goes on into the next piece.
+    /// The leaves that begin in a piece of the file, which are its to sum up: the last of them goes
+    /// on into the next piece.
     pub(crate) fn own(piece: &Range<u64>, n_bytes: u64) -> Range<u64> {
         let leaf = |at: u64| at.next_multiple_of(LEAF).min(n_bytes);
         leaf(piece.start)..leaf(piece.end)
@@ -53,7 +55,8 @@ impl Tree {
         let (mut at, mut left) = (start, bytes);
         while !left.is_empty() {
             let whole = if at == 0 { left_subtree_len(n_bytes) } else { 1 << at.trailing_zeros() };
-            // The largest subtree that begins here and ends in these bytes; the last leaf of a file may be short.
+            // The largest subtree that begins here and ends in these bytes; the last leaf of a file
+            // may be short.
             let fits = (left.len() as u64 / LEAF).checked_ilog2().map_or(LEAF, |log| LEAF << log);
             let (own, next) = left.split_at(whole.min(fits).min(left.len() as u64) as usize);
             let value = Hasher::new().set_input_offset(at).update(own).finalize_non_root();

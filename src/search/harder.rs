@@ -1,5 +1,5 @@
-//! A region and the fits of what stands plainly in it in; the fits of what is harder to find out: on walls and ceilings, behind
-//! other things, on stands that nobody sees, moved between scans.
+//! A region and the fits of what stands plainly in it in; the fits of what is harder to find out:
+//! on walls and ceilings, behind other things, on stands that nobody sees, moved between scans.
 
 use super::tried::Tried;
 use super::{GUESS_BREADTH, MAX_SUNK, SAME_BASE, Search, base, breadth};
@@ -11,32 +11,37 @@ use identify::Sight;
 use robot::Model;
 use std::collections::BTreeMap;
 
-/// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls, and few carry robots.
+/// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls,
+/// and few carry robots.
 const MIN_MOUNT_SCORE: f64 = 0.15;
 /// The same of a base on a stand of which nothing is seen.
 const MIN_STAND_SCORE: f64 = 0.10;
-/// Such stands are looked for where at least so many points are left over, so far above the region's lowest, metres: a
-/// stand with an arm that may reach down from it; benches and most conveyors are no higher.
+/// Such stands are looked for where at least so many points are left over, so far above the
+/// region's lowest, metres: a stand with an arm that may reach down from it; benches and most
+/// conveyors are no higher.
 const MIN_LEFT: usize = 500;
 const MIN_STANDING: f64 = 0.9;
 /// How far beyond the box of a link points may be its own, metres.
 const BOX_MARGIN: f64 = 0.08;
 /// Places on walls, ceilings and such stands that are looked at for each model.
 const MAX_MOUNTS: usize = 2;
-/// So many times the base poses are looked at where a region is searched for what is left over; and so many places for each
-/// model.
+/// So many times the base poses are looked at where a region is searched for what is left over; and
+/// so many places for each model.
 const BREADTH: usize = 3;
 const MAX_LEFT_OVER: usize = 4;
-/// So many times the base poses are looked at before walls and the like, where a place is there at five heights at most.
+/// So many times the base poses are looked at before walls and the like, where a place is there at
+/// five heights at most.
 const RAISED_BREADTH: usize = 2;
 /// What hangs on a wall keeps its base so far above the floor, metres.
 const FLOOR_SLACK: f64 = 0.05;
-/// Score of a base from which on it is asked whether its robot moved between scans, and so many of a region are.
+/// Score of a base from which on it is asked whether its robot moved between scans, and so many of
+/// a region are.
 const MIN_FOOT: f64 = 0.12;
 const MAX_FEET: usize = 8;
 /// Share of what was here and gone that must be within its reach: two robots may have moved.
 const GONE_IN_REACH: f64 = 0.3;
-/// Cells of what was here for one scan and gone for another from which on a robot may have moved: a small arm has 100.
+/// Cells of what was here for one scan and gone for another from which on a robot may have moved: a
+/// small arm has 100.
 const MIN_GONE: usize = 80;
 
 impl Search<'_, '_> {
@@ -67,8 +72,9 @@ impl Search<'_, '_> {
         self.hung(scene, sight, ("mounts beside", &|c: &Candidate| is_apart(c, &feet)), tried)
     }
 
-    /// Fits on the region's ceilings, walls and tilted plates, of what is wanted of these candidates; kept under a name. Where none
-    /// of them is trusted, before these planes, too: what stands there may be bolted to a plate.
+    /// Fits on the region's ceilings, walls and tilted plates, of what is wanted of these
+    /// candidates; kept under a name. Where none of them is trusted, before these planes, too:
+    /// what stands there may be bolted to a plate.
     fn hung(
         &self,
         scene: &Scene<'_>,
@@ -107,8 +113,8 @@ impl Search<'_, '_> {
         height.is_none_or(|h| h > FLOOR_SLACK)
     }
 
-    /// Fits of robots that less is seen of than of what stands about those that were found: without that, more bases of each
-    /// model are looked at.
+    /// Fits of robots that less is seen of than of what stands about those that were found: without
+    /// that, more bases of each model are looked at.
     pub(super) fn left_over(
         &self,
         scene: &Scene<'_>,
@@ -123,8 +129,8 @@ impl Search<'_, '_> {
         self.fits(scene, &few(found, MAX_LEFT_OVER), tried)
     }
 
-    /// Fits of robots that hide all of the stand under their feet: where much is left that no trusted robot explains, all
-    /// heights are tried.
+    /// Fits of robots that hide all of the stand under their feet: where much is left that no
+    /// trusted robot explains, all heights are tried.
     pub(super) fn on_stands(
         &self,
         scene: &Scene<'_>,
@@ -145,8 +151,8 @@ impl Search<'_, '_> {
         self.fits(scene, &few(found, MAX_MOUNTS), tried)
     }
 
-    /// Lets only points count that are on no trusted robot; returns the bases of those robots where much is left, `None`
-    /// where little is.
+    /// Lets only points count that are on no trusted robot; returns the bases of those robots where
+    /// much is left, `None` where little is.
     fn pass_over(
         &self,
         scene: &Scene<'_>,
@@ -164,8 +170,8 @@ impl Search<'_, '_> {
         is_much.then(|| trusted().map(|f| base(&f.world_from_base)).collect())
     }
 
-    /// Robots that moved between scans: where no robot is trusted, but something stands like a robot's foot within whose
-    /// reach things were here and gone (region's frame).
+    /// Robots that moved between scans: where no robot is trusted, but something stands like a
+    /// robot's foot within whose reach things were here and gone (region's frame).
     pub(super) fn moved(&self, fits: &[Fit], sight: Sight<'_>, sights: &Sights<'_>) -> Vec<Fit> {
         let gone = lattice::disagreement(sights.views, &AllThreads);
         if gone.len() < MIN_GONE {

@@ -1,5 +1,5 @@
-//! A region in, the fits of all models in it out: reads the tiles that the region's views need, and sends every model
-//! of the library through base search and fit.
+//! A region in, the fits of all models in it out: reads the tiles that the region's views need, and
+//! sends every model of the library through base search and fit.
 
 mod harder;
 mod tried;
@@ -74,7 +74,8 @@ pub(crate) struct Search<'a, 'm> {
 const MAX_SUNK: f64 = 2.0;
 /// Candidates that are fitted at the same time; then it is asked which others they make needless.
 const BATCH: usize = 6;
-/// What is looked at of a robot to find its base reaches no farther from it, metres: foot and shoulder.
+/// What is looked at of a robot to find its base reaches no farther from it, metres: foot and
+/// shoulder.
 const FOOT: f64 = 1.5;
 /// Bases nearer than this are at one place, metres.
 const SAME_BASE: f64 = 0.35;
@@ -82,7 +83,8 @@ const SAME_BASE: f64 = 0.35;
 const FOOT_BESIDE: f64 = 0.3;
 /// Share of the score of a trusted robot's base below which another base at its place is needless.
 const FAR_WORSE: f64 = 0.7;
-/// So many times the base poses are looked at where heights are guessed: each place is there at many.
+/// So many times the base poses are looked at where heights are guessed: each place is there at
+/// many.
 const GUESS_BREADTH: usize = 8;
 
 impl<'a, 'm> Search<'a, 'm> {
@@ -168,7 +170,8 @@ impl<'a, 'm> Search<'a, 'm> {
         candidates.retain(is_wanted);
         let mut tried = Tried::default();
         let mut fits = self.fits(&scene, &candidates, &mut tried)?;
-        // What stands on the floor explains most regions; ceilings and walls are asked where nothing does.
+        // What stands on the floor explains most regions; ceilings and walls are asked where
+        // nothing does.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
             fits.extend(self.on_mounts(&scene, &sight, &is_wanted, &mut tried)?);
         }
@@ -184,8 +187,8 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(fits)
     }
 
-    /// Where robots of all models may stand on some planes, best base first, those that score so much; so many times the usual
-    /// base poses are looked at.
+    /// Where robots of all models may stand on some planes, best base first, those that score so
+    /// much; so many times the usual base poses are looked at.
     fn candidates(
         &self,
         sight: &Sight<'_>,
@@ -211,8 +214,8 @@ impl<'a, 'm> Search<'a, 'm> {
         out
     }
 
-    /// Fits of candidates, which come best base first: where a robot is trusted, bases that fit the place far worse are
-    /// not tried any more, nor are those that were tried before.
+    /// Fits of candidates, which come best base first: where a robot is trusted, bases that fit the
+    /// place far worse are not tried any more, nor are those that were tried before.
     fn fits(
         &self,
         scene: &Scene<'_>,
@@ -253,7 +256,8 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(out)
     }
 
-    /// The fit of a robot that stands in a region as an earlier one had it; `None` where it does not.
+    /// The fit of a robot that stands in a region as an earlier one had it; `None` where it does
+    /// not.
     pub(crate) fn again(
         &self,
         region: &Region,
@@ -294,7 +298,8 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(work(&scene, &self.settings.fit))
     }
 
-    /// Does something with the scene that a fit stands in; `None` where it stands in none of the regions.
+    /// Does something with the scene that a fit stands in; `None` where it stands in none of the
+    /// regions.
     pub(crate) fn with_scene<T>(
         &self,
         fit: &Fit,
@@ -327,12 +332,13 @@ impl<'a, 'm> Search<'a, 'm> {
         })
     }
 
-    /// Planes that a robot of this region may stand on; heights guessed all over the region where the plant has no
-    /// floor to go by (a camera's view, a cut-out).
+    /// Planes that a robot of this region may stand on; heights guessed all over the region where
+    /// the plant has no floor to go by (a camera's view, a cut-out).
     fn planes(&self, region: &Region) -> Vec<InstallationPlane> {
         let world = region.world_bounds();
         let floor = &self.ground.surfaces.floor;
-        // Without beams nothing contradicts a wrong height, and every one of them would have to be tried out.
+        // Without beams nothing contradicts a wrong height, and every one of them would have to be
+        // tried out.
         let has_beams = self.scans.iter().any(Scan::has_beams);
         if floor.levels.is_empty() && has_beams {
             return identify::guessed_planes(&world);

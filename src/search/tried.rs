@@ -1,10 +1,12 @@
-//! Candidates of a region that were fitted in, whether another one is nothing new out: what is left over is searched for bases again,
-//! and where it finds those of before, their fits would be the same.
+//! Candidates of a region that were fitted in, whether another one is nothing new out: what is left
+//! over is searched for bases again, and where it finds those of before, their fits would be the
+//! same.
 
 use contract::Candidate;
 use geometry::Pose;
 
-/// Bases nearer than this to each other are one for a fit, metres and radians: it moves them farther itself.
+/// Bases nearer than this to each other are one for a fit, metres and radians: it moves them
+/// farther itself.
 const SAME: (f64, f64) = (0.01, 0.01);
 
 /// Models and the bases that they were fitted on.

@@ -1,5 +1,5 @@
-//! A region in, what each scan saw of it out: reads the tiles that the region's views need, no more points of them than a fit
-//! can use.
+//! A region in, what each scan saw of it out: reads the tiles that the region's views need, no more
+//! points of them than a fit can use.
 
 use super::Search;
 use crate::engine::AllThreads;
@@ -7,8 +7,8 @@ use contract::{Region, Result, Scan, View};
 use lattice::{ViewBuilder, ViewSettings};
 use rayon::prelude::*;
 
-/// Points of a region beyond which more of them tell a fit nothing new: a robot has a hundredth of that in its adjustment.
-/// Up to four times as many are kept.
+/// Points of a region beyond which more of them tell a fit nothing new: a robot has a hundredth of
+/// that in its adjustment. Up to four times as many are kept.
 const ENOUGH_POINTS: u64 = 3_000_000;
 /// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
 const MAX_SPACING: f64 = 0.05;

@@ -1,7 +1,8 @@
 //! The catalogue: entries of all tiles in, a checked file out, and back.
 //!
-//! A header of 64 bytes (magic 8, version u32, zero u32, length of the archive u64, its BLAKE3 32, zeros), then an
-//! `rkyv` archive of exactly that length, and nothing more: `rkyv` may read trailing bytes as another answer.
+//! A header of 64 bytes (magic 8, version u32, zero u32, length of the archive u64, its BLAKE3 32,
+//! zeros), then an `rkyv` archive of exactly that length, and nothing more: `rkyv` may read
+//! trailing bytes as another answer.
 
 use super::encode::layout;
 use super::record::N_LEVELS;
@@ -13,7 +14,8 @@ use std::path::Path;
 
 /// Length of the header of both files, bytes.
 pub(super) const HEADER_BYTES: u64 = 64;
-/// Tiles and their arrays begin at multiples of this, bytes: a cache line, and more than any cast needs.
+/// Tiles and their arrays begin at multiples of this, bytes: a cache line, and more than any cast
+/// needs.
 pub(super) const ALIGN: u64 = 64;
 /// Grows with any change of either file.
 const VERSION: u32 = 2;
@@ -31,7 +33,8 @@ pub struct TileEntry {
     pub first_place: u64,
     /// Bounds of its points in the world, metres.
     pub bounds: Aabb,
-    /// About four of five of its points are no farther than this from the origin of their scan, metres; 0 where it has but few.
+    /// About four of five of its points are no farther than this from the origin of their scan,
+    /// metres; 0 where it has but few.
     pub range: f32,
     /// Where its bytes begin in the tile file.
     pub(super) offset: u64,
@@ -77,8 +80,8 @@ pub(super) fn tiles_header() -> [u8; HEADER_BYTES as usize] {
     header
 }
 
-/// Writes the catalogue of a tile file that is `n_tile_bytes` long. Scans are numbered from the `first` of the store: in
-/// another run the same store may hold others.
+/// Writes the catalogue of a tile file that is `n_tile_bytes` long. Scans are numbered from the
+/// `first` of the store: in another run the same store may hold others.
 pub(super) fn write(
     path: &Path,
     entries: &[TileEntry],
@@ -129,7 +132,8 @@ pub(super) fn digest(entries: &[TileEntry]) -> String {
     format!("blake3:{}", hasher.finalize().to_hex())
 }
 
-/// Reads and checks a catalogue whose scans are numbered from `first`; gives the entries and the length of the tile file.
+/// Reads and checks a catalogue whose scans are numbered from `first`; gives the entries and the
+/// length of the tile file.
 pub(super) fn read(path: &Path, first: u32) -> Result<(Vec<TileEntry>, u64)> {
     let bytes =
         std::fs::read(path).map_err(|e| Error::of_read("the catalogue cannot be read", path, e))?;
@@ -184,7 +188,8 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
             checksums: row.checksums,
         });
     }
-    // In the order of the file no tile begins before the one before it ends; gaps are tiles that were written twice.
+    // In the order of the file no tile begins before the one before it ends; gaps are tiles that
+    // were written twice.
     let mut spans: Vec<(u64, u64)> =
         entries.iter().map(|e| (e.offset, e.n_bytes(N_LEVELS))).collect();
     spans.sort_unstable();

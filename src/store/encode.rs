@@ -1,7 +1,8 @@
 //! Points of one tile in, its bytes on disk and its catalogue entry out; and back.
 //!
-//! By level, coarsest first, three little-endian arrays, each padded with zeros to 64 bytes: xyz (f32 × 3), place (u32, less
-//! the tile's first place), pixel (u16). Who can do with a part of a dense tile reads its beginning.
+//! By level, coarsest first, three little-endian arrays, each padded with zeros to 64 bytes: xyz
+//! (f32 × 3), place (u32, less the tile's first place), pixel (u16). Who can do with a part of a
+//! dense tile reads its beginning.
 
 use super::catalogue::{ALIGN, TileEntry};
 use super::parts::Part;
@@ -113,7 +114,8 @@ const PROBES: usize = 64;
 /// Share of them that are no farther.
 const NEARER: f64 = 0.8;
 
-/// How far most records are from the origin of their scan, metres; 0 where they are too few to tell.
+/// How far most records are from the origin of their scan, metres; 0 where they are too few to
+/// tell.
 fn range(records: &[Record]) -> f32 {
     let step = (records.len() / PROBES).max(1);
     let range = |r: &Record| r.xyz.iter().map(|v| v * v).sum::<f32>().sqrt();
@@ -142,7 +144,8 @@ pub(super) fn blocks(n_of: &[u32; N_LEVELS]) -> [Range<usize>; N_LEVELS] {
     })
 }
 
-/// The points of a level of a tile in its (aligned) bytes, which have the length that [`layout`] says.
+/// The points of a level of a tile in its (aligned) bytes, which have the length that [`layout`]
+/// says.
 pub(super) fn points<'a>(entry: &TileEntry, level: usize, bytes: &'a [u8]) -> TilePoints<'a> {
     let n = entry.n_of[level] as usize;
     let [_, place, pixel, _] = layout(n as u64).map(|v| v as usize);
@@ -156,7 +159,8 @@ pub(super) fn points<'a>(entry: &TileEntry, level: usize, bytes: &'a [u8]) -> Ti
     }
 }
 
-/// The coarsest levels of a tile, so many as lie in its (aligned) bytes, copied out and sorted by pixel.
+/// The coarsest levels of a tile, so many as lie in its (aligned) bytes, copied out and sorted by
+/// pixel.
 pub(super) fn decode(entry: &TileEntry, n_levels: usize, bytes: &[u8]) -> Tile {
     let blocks = blocks(&entry.n_of);
     let levels: Vec<TilePoints<'_>> =

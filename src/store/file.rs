@@ -1,4 +1,5 @@
-//! Encoded tiles in, one after the other in a file, out; and tiles of it back while it is still being written.
+//! Encoded tiles in, one after the other in a file, out; and tiles of it back while it is still
+//! being written.
 
 use super::catalogue::{self, TileEntry};
 use super::encode::Encoded;

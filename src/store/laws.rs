@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 /// Stores that are drawn: each is written to disk twice.
 const N_CASES: u32 = 48;
 
-/// Points of one scan by place: places ascend with gaps, coordinates are of a room, of a far one, or of one spot.
+/// Points of one scan by place: places ascend with gaps, coordinates are of a room, of a far one,
+/// or of one spot.
 fn points() -> impl Strategy<Value = Vec<(u64, [f32; 3])>> {
     let gap = prop_oneof![8 => Just(1_u64), 2 => 2_u64..50, 1 => Just(1_u64 << 20)];
     let axis = || prop_oneof![4 => -9.0_f32..9.0, 1 => -900.0_f32..900.0, 1 => Just(1.5_f32)];

@@ -6,8 +6,8 @@ use ingest::Mapped;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A read-only map of a whole file. Pages that were read count as resident, so they are given back each time
-/// `resident_bytes` have been read.
+/// A read-only map of a whole file. Pages that were read count as resident, so they are given back
+/// each time `resident_bytes` have been read.
 pub(super) struct FileMap {
     map: Mapped,
     path: PathBuf,
@@ -36,7 +36,8 @@ impl FileMap {
         })
     }
 
-    /// Has the system read a range that will be asked for soon: page by page it would be read at the disk's leisure.
+    /// Has the system read a range that will be asked for soon: page by page it would be read at
+    /// the disk's leisure.
     pub(super) fn will_need(&self, start: usize, n: usize) {
         self.map.will_need(start, n);
     }

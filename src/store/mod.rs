@@ -1,5 +1,5 @@
-//! The store: strips in, tiles on disk, tiles out again in any order. A folder with two files: the catalogue, and the
-//! tiles, memory-mapped. Knows no geometry beyond bounds.
+//! The store: strips in, tiles on disk, tiles out again in any order. A folder with two files: the
+//! catalogue, and the tiles, memory-mapped. Knows no geometry beyond bounds.
 
 mod catalogue;
 mod encode;
@@ -41,7 +41,8 @@ const TILES: &str = "tiles.bin";
 /// A store that is whole: tiles by place, in the order of [`TileAt`], whatever way they came in.
 pub struct Store {
     entries: Vec<TileEntry>,
-    /// Which of their levels were read and found whole, a bit each: a tile is read for each region that sees it.
+    /// Which of their levels were read and found whole, a bit each: a tile is read for each region
+    /// that sees it.
     is_whole: Vec<AtomicU8>,
     /// Its folders.
     parts: Vec<Part>,
@@ -60,14 +61,14 @@ struct Part {
 }
 
 impl Store {
-    /// Begins a store in `dir` for strips of `scans` (all of a run, in their order) from the scan `first` on; it keeps
-    /// about `budget_bytes` in memory while it is filled.
+    /// Begins a store in `dir` for strips of `scans` (all of a run, in their order) from the scan
+    /// `first` on; it keeps about `budget_bytes` in memory while it is filled.
     pub fn create(dir: &Path, scans: &[Scan], first: u32, budget_bytes: usize) -> Result<TileSink> {
         TileSink::new(dir, scans, first, budget_bytes)
     }
 
-    /// Opens a whole store, its scans numbered from `first`. Mapped pages are given back to the system each time
-    /// `resident_bytes` have been read.
+    /// Opens a whole store, its scans numbered from `first`. Mapped pages are given back to the
+    /// system each time `resident_bytes` have been read.
     pub fn open(dir: &Path, first: u32, resident_bytes: usize) -> Result<Self> {
         let (entries, n_tile_bytes) = catalogue::read(&dir.join(CATALOGUE), first)?;
         let path = dir.join(TILES);
@@ -109,8 +110,8 @@ impl Store {
         }
     }
 
-    /// What is known of each tile without reading it, sorted by [`TileAt`], then by place. Entries at the same
-    /// [`TileAt`] are parts of one tile that would be too large.
+    /// What is known of each tile without reading it, sorted by [`TileAt`], then by place. Entries
+    /// at the same [`TileAt`] are parts of one tile that would be too large.
     #[must_use]
     pub fn entries(&self) -> &[TileEntry] {
         &self.entries
@@ -131,8 +132,8 @@ impl Store {
         self.entries.iter().map(|e| e.n_points).sum()
     }
 
-    /// Tile `i` of [`Store::entries`], copied out, with all of its points or less (see [`Tile::skip`]); checked where it is
-    /// read for the first time.
+    /// Tile `i` of [`Store::entries`], copied out, with all of its points or less (see
+    /// [`Tile::skip`]); checked where it is read for the first time.
     ///
     /// # Panics
     /// Where there is no such entry.
@@ -149,8 +150,9 @@ impl Store {
         tile
     }
 
-    /// Does something with the points of each of these tiles, with those of a tile level by level, the coarsest first; in the given
-    /// order and without a copy. Levels of less than `skip` are not read.
+    /// Does something with the points of each of these tiles, with those of a tile level by level,
+    /// the coarsest first; in the given order and without a copy. Levels of less than `skip`
+    /// are not read.
     ///
     /// # Errors
     /// A damaged tile; a store that was cut short meanwhile, of which `work` may have seen zeros:
@@ -211,7 +213,8 @@ impl Store {
         part.map.will_need(start, end - start);
     }
 
-    /// Indices of the tile at `at`: none where it holds no point, mostly one, several where it has parts.
+    /// Indices of the tile at `at`: none where it holds no point, mostly one, several where it has
+    /// parts.
     #[must_use]
     pub fn find(&self, at: TileAt) -> Range<usize> {
         let start = self.entries.partition_point(|e| e.at < at);
@@ -224,8 +227,9 @@ impl Store {
         (0..self.entries.len()).filter(|&i| self.entries[i].bounds.touches(bounds)).collect()
     }
 
-    /// All tiles in order, each to be read once, past the system's cache: a source for a pass, whose first map is
-    /// [`Store::reads`]. `skip` says how much of each is left out (see [`Tile::skip`]).
+    /// All tiles in order, each to be read once, past the system's cache: a source for a pass,
+    /// whose first map is [`Store::reads`]. `skip` says how much of each is left out (see
+    /// [`Tile::skip`]).
     pub fn picks<'s>(
         &'s self,
         skip: impl Fn(&TileEntry) -> u32 + Send + 's,
@@ -243,7 +247,8 @@ impl Store {
         indices.into_iter().map(move |i| self.pick(i, skip, true))
     }
 
-    /// The same of these tiles, for those that are asked for again and again: the system reads them ahead.
+    /// The same of these tiles, for those that are asked for again and again: the system reads them
+    /// ahead.
     pub fn picks_again(
         &self,
         indices: Vec<usize>,

@@ -1,5 +1,5 @@
-//! Tiles as they were gathered in, in memory, in the spill file, or written too early; parts of at most [`TILE_POINTS`] out,
-//! whole and in the order of tiles.
+//! Tiles as they were gathered in, in memory, in the spill file, or written too early; parts of at
+//! most [`TILE_POINTS`] out, whole and in the order of tiles.
 
 use super::encode::decode;
 use super::file::Early;
@@ -8,7 +8,8 @@ use super::sink::{Buffer, TILE_POINTS};
 use super::spill::{Segment, Spill};
 use contract::{Result, TileAt, Weigh};
 
-/// Longest way from the first to the last place of one tile: places are kept as 32 bits from the first.
+/// Longest way from the first to the last place of one tile: places are kept as 32 bits from the
+/// first.
 pub(super) const LONGEST_SPAN: u64 = u32::MAX as u64;
 
 /// From the smallest to the largest place.

@@ -32,14 +32,14 @@ impl Record {
     }
 }
 
-/// Levels of a tile, coarsest first: the points of a level and of all before it are those of the first pixel with points of
-/// each square of 2^(number of levels after it) by as many pixels.
+/// Levels of a tile, coarsest first: the points of a level and of all before it are those of the
+/// first pixel with points of each square of 2^(number of levels after it) by as many pixels.
 pub(super) const N_LEVELS: usize = MAX_SKIP as usize + 1;
 /// Pixels of a tile.
 pub(super) const N_PIXELS: usize = (TILE_SIDE * TILE_SIDE) as usize;
 
-/// Where each record of a tile goes: into the block of its level, sorted by pixel in a counting sort, which keeps the order
-/// that they have already (that of places).
+/// Where each record of a tile goes: into the block of its level, sorted by pixel in a counting
+/// sort, which keeps the order that they have already (that of places).
 pub(super) struct PixelOrder {
     /// By pixel: its level, and the place there of its next record.
     level: Vec<u8>,
@@ -78,7 +78,8 @@ impl PixelOrder {
         n_of
     }
 
-    /// Of how many squares of growing size, from 2 x 2 pixels on, a pixel is the first that has points.
+    /// Of how many squares of growing size, from 2 x 2 pixels on, a pixel is the first that has
+    /// points.
     fn n_first(&mut self, pixel: usize) -> usize {
         let side = TILE_SIDE as usize;
         let (row, col) = (pixel / side, pixel % side);

@@ -4,7 +4,8 @@ use super::record::Record;
 use contract::{Lattice, Map, Pixel, Result, Scan, ScanId, Strip, TILE_SIDE, Tile, Weigh};
 use geometry::direction::spherical;
 
-/// Finds tile and pixel of each point. Remembers nothing; run it as a map before a [`super::TileSink`].
+/// Finds tile and pixel of each point. Remembers nothing; run it as a map before a
+/// [`super::TileSink`].
 pub struct Scatter {
     lattices: Vec<Option<Lattice>>,
 }
@@ -25,8 +26,8 @@ pub(super) struct Run {
     pub(super) n: usize,
 }
 
-/// A strip with shorter runs than this, on average, is worth sorting: one look-up a run costs as much as about
-/// sixteen copies.
+/// A strip with shorter runs than this, on average, is worth sorting: one look-up a run costs as
+/// much as about sixteen copies.
 const SHORT_RUN: usize = 16;
 
 impl Scatter {
@@ -68,7 +69,8 @@ impl Weigh for Scattered {
     }
 }
 
-/// Points whose pixels are found together: small enough for the first-level cache, long enough for vector loops.
+/// Points whose pixels are found together: small enough for the first-level cache, long enough for
+/// vector loops.
 const BLOCK: usize = 64;
 
 /// Pixels of a block of points: the same as [`Lattice::pixel`] gives one by one.

@@ -1,6 +1,7 @@
-//! Grouped strips in, a store out. Tiles gather in memory; what does not fit is written: tiles that no point has come to for
-//! the longest time first, since a scanner that has passed a place does not come back. Where points do come back, the rest
-//! of their tile goes through a spill file, and the tile is written once more in the end.
+//! Grouped strips in, a store out. Tiles gather in memory; what does not fit is written: tiles that
+//! no point has come to for the longest time first, since a scanner that has passed a place does
+//! not come back. Where points do come back, the rest of their tile goes through a spill file, and
+//! the tile is written once more in the end.
 
 use super::catalogue;
 use super::encode::{Encode, Encoded};
@@ -18,12 +19,15 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Most points of one tile: bounds what a worker holds. A square of ground of a dense cloud, or a lattice far coarser
-/// than its scan, may have more; then several tiles stand at the same [`TileAt`], cut in the order of places.
+/// Most points of one tile: bounds what a worker holds. A square of ground of a dense cloud, or a
+/// lattice far coarser than its scan, may have more; then several tiles stand at the same
+/// [`TileAt`], cut in the order of places.
 pub const TILE_POINTS: usize = 1 << 21;
-/// Most room that a tile gets before it needs it, points: that of a scan with a point a pixel and a few more.
+/// Most room that a tile gets before it needs it, points: that of a scan with a point a pixel and a
+/// few more.
 const USUAL_POINTS: usize = (1 << 16) + (1 << 13);
-/// Tiles of which the memory may be free and wait for the next ones, at most, however large the budget.
+/// Tiles of which the memory may be free and wait for the next ones, at most, however large the
+/// budget.
 const MAX_FREE: usize = 128;
 /// Records that go to disk at once, bytes: some tens of tiles, and little beside what gathers.
 const BATCH_BYTES: usize = 48 << 20;
@@ -37,7 +41,8 @@ pub struct TileSink {
     buffers: Vec<Buffer>,
     /// Room of all buffers, bytes.
     bytes: usize,
-    /// Most points that a tile had when it was written: room for the next ones, so that they need not grow.
+    /// Most points that a tile had when it was written: room for the next ones, so that they need
+    /// not grow.
     usual: usize,
     budget_bytes: usize,
     writer: Writer,
@@ -67,8 +72,8 @@ pub(super) struct Buffer {
 }
 
 impl TileSink {
-    /// A sink for the scans from `first` on that keeps about `budget_bytes` in memory. An older store in `dir` is
-    /// removed.
+    /// A sink for the scans from `first` on that keeps about `budget_bytes` in memory. An older
+    /// store in `dir` is removed.
     pub(super) fn new(dir: &Path, scans: &[Scan], first: u32, budget_bytes: usize) -> Result<Self> {
         std::fs::create_dir_all(dir)
             .map_err(|e| Error::of_file("the store cannot be made", dir, e))?;
@@ -137,7 +142,8 @@ impl TileSink {
         })
     }
 
-    /// Brings tiles to disk until they fit into the budget again, those first that were touched the longest time ago.
+    /// Brings tiles to disk until they fit into the budget again, those first that were touched the
+    /// longest time ago.
     fn relieve(&mut self) -> Result<()> {
         let mut order: Vec<usize> =
             (0..self.buffers.len()).filter(|&i| !self.buffers[i].records.is_empty()).collect();
@@ -170,7 +176,8 @@ impl TileSink {
         self.writer.write(batch)
     }
 
-    /// Writes what is left of the tiles, and the catalogue, and opens the store. `open_bytes` as in [`Store::open`].
+    /// Writes what is left of the tiles, and the catalogue, and opens the store. `open_bytes` as in
+    /// [`Store::open`].
     pub fn finish(self, engine: &Engine, open_bytes: usize) -> Result<Store> {
         let Self { dir, encode, mut buffers, writer, spill, first, .. } = self;
         let (mut file, written) = writer.finish()?;
@@ -226,8 +233,8 @@ impl Buffer {
         self.records.extend_from_slice(records);
     }
 
-    /// Makes room for `n` more points, at first for `usual`; bytes that this takes. It grows by a quarter: what waits is
-    /// most of the memory of a run.
+    /// Makes room for `n` more points, at first for `usual`; bytes that this takes. It grows by a
+    /// quarter: what waits is most of the memory of a run.
     fn make_room(&mut self, n: usize, usual: usize) -> usize {
         let (len, before) = (self.records.len(), self.records.capacity());
         if len + n > before {

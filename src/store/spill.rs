@@ -1,5 +1,6 @@
-//! Records in, segments of a spill file out, and back. The file has no name in the folder once it is open (where the
-//! system can do that), so that nothing is left behind when the program is killed.
+//! Records in, segments of a spill file out, and back. The file has no name in the folder once it
+//! is open (where the system can do that), so that nothing is left behind when the program is
+//! killed.
 
 use super::record::Record;
 use bytemuck::Zeroable;

@@ -1,5 +1,6 @@
-//! Batches of tiles in, written behind the back of the sink that gathers the next ones; their entries out in the end. Threads
-//! in turn encode tiles while another one waits for the disk to take those before.
+//! Batches of tiles in, written behind the back of the sink that gathers the next ones; their
+//! entries out in the end. Threads in turn encode tiles while another one waits for the disk to
+//! take those before.
 
 use super::catalogue::TileEntry;
 use super::encode::{Encode, Encoded};
@@ -18,13 +19,15 @@ type Written = (TileFile, Vec<(usize, TileEntry)>);
 
 /// Threads that encode: two do it faster than a disk takes what they make.
 const ENCODERS: usize = 2;
-/// Tiles that wait for each of them, and encoded ones of each that wait for the disk, at most: a megabyte or two each.
+/// Tiles that wait for each of them, and encoded ones of each that wait for the disk, at most: a
+/// megabyte or two each.
 const WAITING: usize = 2;
 
 /// Threads that encode tiles and append them to a file.
 pub(super) struct Writer {
     batches: Option<Sender<Batch>>,
-    /// Memory of records that are written, no more than is of use: fresh memory costs as much as what is done with it.
+    /// Memory of records that are written, no more than is of use: fresh memory costs as much as
+    /// what is done with it.
     free: Receiver<Vec<Record>>,
     thread: Option<JoinHandle<Result<Written>>>,
 }
@@ -91,7 +94,8 @@ fn work(
         }
         let append = move || append(file, &takes, &give_back);
         let append = start("store disk").spawn_scoped(scope, append).map_err(failed)?;
-        // In turn, so that they come out in turn as well. Who appends has failed where nobody takes any more, and says why.
+        // In turn, so that they come out in turn as well. Who appends has failed where nobody takes
+        // any more, and says why.
         for (turn, part) in batches.iter().flatten().enumerate() {
             if gives[turn % ENCODERS].send(part).is_err() {
                 break;

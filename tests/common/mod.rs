@@ -8,13 +8,14 @@ use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
 use stillpoint::scanning::{Formats, scan_scene};
 
-/// A palletiser on a bare floor: `robots` and `scans` below a folder, with about so many beams of each scanner.
+/// A palletiser on a bare floor: `robots` and `scans` below a folder, with about so many beams of
+/// each scanner.
 pub(crate) fn palletiser(dir: &Path, seed: u64, n_beams: u64) {
     simulated(dir, "scans", (seed, n_beams), |scene| scene);
 }
 
-/// The same robot beside two boxes, by which rescans are registered: `robots`, and the folder of the
-/// scans.
+/// The same robot beside two boxes, by which rescans are registered: `robots`, and the folder of
+/// the scans.
 pub(crate) fn boxed_cell(dir: &Path, scans: &str, seed: u64, n_beams: u64) {
     let cuboid = |xyz: [f64; 3], size: [f64; 3]| Cuboid {
         name: "box".into(),

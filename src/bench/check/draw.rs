@@ -8,7 +8,8 @@ use simulate::random::Random;
 use simulate::scene::{Anchor, Hose};
 use simulate::{Plant, Postures, Scene};
 
-/// Smallest and largest turn of a joint in a small move, radians; slides go a fifth of that in metres.
+/// Smallest and largest turn of a joint in a small move, radians; slides go a fifth of that in
+/// metres.
 const SMALL: [f64; 2] = [0.03, 0.35];
 /// Paths of each kind for each robot; to thin things goes one for each of them.
 const N_SMALL: usize = 8;
@@ -16,7 +17,8 @@ const N_FAR: usize = 4;
 const N_HIT: usize = 3;
 /// Thin things in the way of each robot.
 const N_THIN: usize = 2;
-/// Tries to draw a path that hits something, or a thin thing that does not touch a robot as it stands.
+/// Tries to draw a path that hits something, or a thin thing that does not touch a robot as it
+/// stands.
 const N_TRIES: usize = 12;
 /// Radii of wires and of pipes, metres.
 const WIRE: [f64; 2] = [0.002, 0.005];
@@ -55,7 +57,8 @@ pub(super) fn cell(wanted: &Plant, models: &[Model]) -> Result<(Scene, Vec<Vec<D
         hall.ceiling = true;
     }
     let mut random = Random::keyed(&[wanted.seed, 0xC4EC]);
-    // Low and high, as they are put up in real cells: what no scanner sees from below no path is free in.
+    // Low and high, as they are put up in real cells: what no scanner sees from below no path is
+    // free in.
     for (k, scanner) in scene.scanners.iter_mut().enumerate() {
         if k % 2 == 1 {
             scanner.position[2] -= random.between(0.6, 1.1);
@@ -112,7 +115,8 @@ fn places<'p>(points: &'p [[f32; 3]], pose: &'p Pose) -> impl Iterator<Item = Po
     points.iter().step_by(EACH).map(move |p| pose * Point::from(p.map(f64::from)))
 }
 
-/// A wire or a pipe through a place that a link goes through, away from all robots as they stand; and where that path ends.
+/// A wire or a pipe through a place that a link goes through, away from all robots as they stand;
+/// and where that path ends.
 fn thin(
     scene: &Scene,
     models: &[Model],

@@ -1,5 +1,5 @@
-//! `bench check`: seeds in; cells scanned, run and then asked about paths of their robots, of which the meshes tell whether they
-//! collide; false alarms and misses, by reason, out.
+//! `bench check`: seeds in; cells scanned, run and then asked about paths of their robots, of which
+//! the meshes tell whether they collide; false alarms and misses, by reason, out.
 
 mod draw;
 mod table;

@@ -1,4 +1,5 @@
-//! Paths that were checked, with what is true of them, in; tables for people and a line a path for programs out.
+//! Paths that were checked, with what is true of them, in; tables for people and a line a path for
+//! programs out.
 
 use super::{PathRow, Row, True};
 use crate::check::Outcome;

@@ -1,5 +1,6 @@
-//! The bodies of a scene and one of its robots in; how far that robot keeps from all else along a path, and whether its scanners saw
-//! the space that it goes through, out: from meshes alone, without scans.
+//! The bodies of a scene and one of its robots in; how far that robot keeps from all else along a
+//! path, and whether its scanners saw the space that it goes through, out: from meshes alone,
+//! without scans.
 
 use contract::{Result, SpaceGrid};
 use geometry::{Aabb, Point, Pose};
@@ -17,13 +18,16 @@ use std::collections::BTreeMap;
 pub(super) const FAR: f64 = 0.1;
 /// Nearer than this bodies touch, metres: rounding of single precision in a hall.
 pub(super) const TOUCH: f64 = 5e-4;
-/// No point moves farther from one posture that is looked at to the next, metres, wherever something is near.
+/// No point moves farther from one posture that is looked at to the next, metres, wherever
+/// something is near.
 const STEP: f64 = 2e-3;
-/// Distance of the places that are asked whether they were seen, metres; finer than the voxels that the product tells space by.
+/// Distance of the places that are asked whether they were seen, metres; finer than the voxels that
+/// the product tells space by.
 const SAMPLE: f64 = 0.04;
 /// Postures that are asked so are so far apart, metres.
 const SEEN_STEP: f64 = 0.02;
-/// Edge of the voxels that tell what the robot filled as it was scanned, metres, and the distance of the places that mark them.
+/// Edge of the voxels that tell what the robot filled as it was scanned, metres, and the distance
+/// of the places that mark them.
 const OWN_EDGE: f64 = 0.02;
 const OWN_SAMPLE: f64 = 0.008;
 /// Farthest that the virtual scanners measure, metres.
@@ -173,8 +177,9 @@ impl<'a> Truth<'a> {
         best
     }
 
-    /// Whether scanners saw all space that the robot goes through, and so far around it, metres, but for what it filled itself as it was
-    /// scanned: a beam can go there, and ends on something.
+    /// Whether scanners saw all space that the robot goes through, and so far around it, metres,
+    /// but for what it filled itself as it was scanned: a beam can go there, and ends on
+    /// something.
     pub(super) fn is_seen(&self, from: &[f64], to: &[f64], around: f64) -> bool {
         let n = self.n_steps(from, to, SEEN_STEP);
         (0..=n).all(|step| {

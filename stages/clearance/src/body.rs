@@ -1,4 +1,5 @@
-//! A robot and what hangs on it in; at one posture, which of its parts are near to which obstacles, out.
+//! A robot and what hangs on it in; at one posture, which of its parts are near to which obstacles,
+//! out.
 
 use crate::Level;
 use crate::obstacles::{Bin, HALF_CELL, Obstacle, Obstacles, Replaced, What};
@@ -15,12 +16,12 @@ pub type Hung = BTreeMap<usize, Vec<[f32; 3]>>;
 /// Between two postures of a path each part may be so much farther, metres.
 const BETWEEN: f32 = 0.5 * STEP as f32;
 
-/// So near to where it was scanned uncertain points are the robot's own most likely, metres: edges, cables and covers that its model
-/// lacks.
+/// So near to where it was scanned uncertain points are the robot's own most likely, metres: edges,
+/// cables and covers that its model lacks.
 const BESIDE: f32 = 0.1;
 
-/// So near to the surface of a link, as it was scanned, a point is of that link, metres: links of labels end 6 to 12 mm off it. Of a
-/// thing that the robot touches all stays that is farther off.
+/// So near to the surface of a link, as it was scanned, a point is of that link, metres: links of
+/// labels end 6 to 12 mm off it. Of a thing that the robot touches all stays that is farther off.
 const OWN: f32 = 0.008;
 
 /// A link's surface, or what hangs on it.
@@ -69,15 +70,10 @@ pub(crate) struct Near {
 }
 
 impl<'a> Body<'a> {
-    /// The parts of a model that its joints move, and what hangs on them; `margin` is what is near, `largest` the radius of the largest
-    /// obstacle, metres.
+    /// The parts of a model that its joints move, and what hangs on them; `margin` is what is near,
+    /// `largest` the radius of the largest obstacle, metres.
     #[must_use]
-    pub fn new(
-        model: &'a Model,
-        hung: Hung,
-        (margin, largest): (f64, f64),
-        fan: &dyn Fan,
-    ) -> Self {
+    pub fn new(model: &'a Model, hung: Hung, (margin, largest): (f64, f64), fan: &dyn Fan) -> Self {
         let margin = margin as f32;
         let least = margin + BETWEEN + HALF_CELL;
         let moves = model.moving();
@@ -110,8 +106,9 @@ impl<'a> Body<'a> {
         self.parts.iter().map(|part| (part.link, &part.bounds))
     }
 
-    /// Looks at the obstacles from where the robot was scanned: points on its own surface, or inside, are its own, whatever a mask says of
-    /// them, and what it filled itself is no unseen space. Uncertain points beside it are told apart: they may stand there, and they may
+    /// Looks at the obstacles from where the robot was scanned: points on its own surface, or
+    /// inside, are its own, whatever a mask says of them, and what it filled itself is no
+    /// unseen space. Uncertain points beside it are told apart: they may stand there, and they may
     /// hang on the part that is nearest and move with it.
     pub fn stand(&mut self, found: &[f64], around: &mut Obstacles) {
         let mut near: Vec<Option<(f32, usize)>> = vec![None; around.all.len()];

@@ -1,8 +1,9 @@
 //! Points around a robot in; those of them that are evidence of something, out.
 //!
-//! A scan has strays: a beam that ends half on an edge and half behind it gives a point between the two, where nothing is, and a mask
-//! leaves some points of a robot to the fixed world. A point counts where others tell of the same surface, or of the same line, as
-//! those of a wire do. One that has neither, in space that beams went through, is evidence of nothing.
+//! A scan has strays: a beam that ends half on an edge and half behind it gives a point between the
+//! two, where nothing is, and a mask leaves some points of a robot to the fixed world. A point
+//! counts where others tell of the same surface, or of the same line, as those of a wire do. One
+//! that has neither, in space that beams went through, is evidence of nothing.
 
 use crate::obstacles::{Obstacle, What, distance};
 use contract::{Space, SpaceKind};
@@ -15,16 +16,19 @@ const NEAR: f32 = 0.05;
 const ENOUGH: usize = 8;
 /// … or with this share of what half of all points have, where scans are sparse.
 const SHARE: f64 = 0.125;
-/// So many neighbours that are this near, metres, are a small thing: strays lie farther apart, over the depth of what an edge hides.
+/// So many neighbours that are this near, metres, are a small thing: strays lie farther apart, over
+/// the depth of what an edge hides.
 const CLOSE: f32 = 0.025;
 const TOGETHER: usize = 3;
-/// Neighbours on a line are this near, metres: beams as far apart as 15 mm meet a wire of 4 mm four times on twice that way.
+/// Neighbours on a line are this near, metres: beams as far apart as 15 mm meet a wire of 4 mm four
+/// times on twice that way.
 const ALONG: f32 = 0.15;
 /// A line is this thick, metres: wires, a scanner's noise, and the edge of a cell.
 const ACROSS: f32 = 0.010;
 /// So many others make a line.
 const ON_LINE: usize = 3;
-/// Of the six voxels beside that of a point so many may be unknown where its surroundings count as seen.
+/// Of the six voxels beside that of a point so many may be unknown where its surroundings count as
+/// seen.
 const UNKNOWN: usize = 2;
 
 /// Obstacles by the cubes of edge [`NEAR`] that they lie in.
@@ -33,7 +37,8 @@ struct Cubes<'a> {
     cubes: FxHashMap<[i32; 3], Vec<u32>>,
 }
 
-/// For each obstacle: whether it is evidence of something. Without space nothing is known to be seen, and all of them are.
+/// For each obstacle: whether it is evidence of something. Without space nothing is known to be
+/// seen, and all of them are.
 pub(crate) fn evident(
     all: &[Obstacle],
     space: Option<&Space>,
@@ -75,7 +80,8 @@ impl<'a> Cubes<'a> {
         })
     }
 
-    /// Neighbours of an obstacle nearer than so, no more than [`NEAR`], metres; itself not counted, as far as `most`.
+    /// Neighbours of an obstacle nearer than so, no more than [`NEAR`], metres; itself not counted,
+    /// as far as `most`.
     fn n_near(&self, o: &Obstacle, within: f32, most: usize) -> usize {
         let is_near = |i: &u32| distance(self.all[*i as usize].at, o.at) < within;
         self.around(o.at, 1).filter(is_near).take(most + 1).count().saturating_sub(1)

@@ -1,7 +1,8 @@
-//! A robot, what stands around it and a path of postures in; where on the way it comes near to what, out.
+//! A robot, what stands around it and a path of postures in; where on the way it comes near to
+//! what, out.
 //!
-//! In doubt it is near: points count as balls that hold all of their cell, and between two postures of the path each part
-//! may be half a step farther.
+//! In doubt it is near: points count as balls that hold all of their cell, and between two postures
+//! of the path each part may be half a step farther.
 #![forbid(unsafe_code)]
 
 mod body;

@@ -1,4 +1,5 @@
-//! Points around a robot in, tile by tile; balls that hold them, gathered in bins, out. All in the frame of its base, metres.
+//! Points around a robot in, tile by tile; balls that hold them, gathered in bins, out. All in the
+//! frame of its base, metres.
 
 use crate::evidence::evident;
 use contract::{Space, SpaceKind};
@@ -6,8 +7,8 @@ use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
 use std::ops::Range;
 
-/// Edge of the cells in which all points are one obstacle, metres: finer than planners' margins, and the floor of a cell in such
-/// cells fits into memory.
+/// Edge of the cells in which all points are one obstacle, metres: finer than planners' margins,
+/// and the floor of a cell in such cells fits into memory.
 pub const CELL: f64 = 0.004;
 /// Half the diagonal of a cube of edge 1.
 const HALF_DIAGONAL: f64 = 0.8661;
@@ -135,8 +136,8 @@ impl Cells {
 }
 
 impl Obstacles {
-    /// Those of the cells, of other robots (number, model, base of this one from their links) and of the space that no beam went
-    /// through, as far as it is known.
+    /// Those of the cells, of other robots (number, model, base of this one from their links) and
+    /// of the space that no beam went through, as far as it is known.
     #[must_use]
     pub fn new(
         cells: &Cells,
@@ -192,7 +193,8 @@ impl Obstacles {
         self.all.iter().map(|o| f64::from(o.radius)).fold(0.0, f64::max)
     }
 
-    /// Whether a box of a link reaches to where nobody looked for points, or into space of which nothing is known.
+    /// Whether a box of a link reaches to where nobody looked for points, or into space of which
+    /// nothing is known.
     pub(crate) fn leaves(&self, bounds: &Aabb, base_from_link: &Pose) -> bool {
         let pose = self.known.world_from_base * base_from_link;
         let is_known = |c: [f64; 3]| {
@@ -231,7 +233,8 @@ fn surface<'a>(
     })
 }
 
-/// Parts on each axis that a voxel of unseen space is told by: balls of them bulge by less than a margin.
+/// Parts on each axis that a voxel of unseen space is told by: balls of them bulge by less than a
+/// margin.
 const PARTS: usize = 4;
 
 impl Split {

@@ -1,5 +1,5 @@
-//! Postures of a path in; postures so close to each other that nothing is missed between them, and where on the way which part is
-//! near to what, out.
+//! Postures of a path in; postures so close to each other that nothing is missed between them, and
+//! where on the way which part is near to what, out.
 
 use crate::Level;
 use crate::body::{Body, Near, Touch};
@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 
 /// No point of the robot moves farther from one posture that is looked at to the next, metres.
 pub const STEP: f64 = 0.01;
-/// A first guess of steps: so far do joints go in one, radians or metres. Arcs differ from their chords by less than 0.2 % then.
+/// A first guess of steps: so far do joints go in one, radians or metres. Arcs differ from their
+/// chords by less than 0.2 % then.
 const TURN: f64 = 0.1;
 /// Most postures between two waypoints: a metre of reach turned about once takes 630.
 const MAX_STEPS: usize = 1 << 14;
@@ -25,8 +26,8 @@ pub struct Leg {
     pub jumps: bool,
 }
 
-/// Where on the way a part is near to something: waypoints are numbered from 0, and 1.5 lies midway between the second and the
-/// third.
+/// Where on the way a part is near to something: waypoints are numbered from 0, and 1.5 lies midway
+/// between the second and the third.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
     /// Index of the link.
@@ -51,14 +52,16 @@ pub struct Contact {
     pub worst: f64,
     /// It is at least so far there, metres.
     pub gap: f64,
-    /// One of the obstacles there, frame of the base, metres; nothing for space beyond all that is known.
+    /// One of the obstacles there, frame of the base, metres; nothing for space beyond all that is
+    /// known.
     pub at: Option<Point>,
     /// Cells of obstacles there.
     pub n: usize,
 }
 
 impl Contact {
-    /// It leads into space of which nothing is known, and did not so where the robot was found; beyond all that is known nobody can tell.
+    /// It leads into space of which nothing is known, and did not so where the robot was found;
+    /// beyond all that is known nobody can tell.
     #[must_use]
     pub fn is_unseen(&self) -> bool {
         self.level == Level::Unseen && (!self.as_found || self.at.is_none())
@@ -83,7 +86,8 @@ pub struct Walk<'a> {
 pub struct Looked(Vec<(f64, Told, f64)>);
 
 impl<'a> Walk<'a> {
-    /// Along the waypoints (at least one), with a leg from each to the next; `found` is the posture that the robot was scanned in.
+    /// Along the waypoints (at least one), with a leg from each to the next; `found` is the posture
+    /// that the robot was scanned in.
     #[must_use]
     pub fn new(
         (body, around): (&'a Body<'a>, &'a Obstacles),
@@ -158,7 +162,8 @@ pub fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
     }
 }
 
-/// The longest way of any point of the robot from one of the postures to the next, metres: that of a corner of its bounds.
+/// The longest way of any point of the robot from one of the postures to the next, metres: that of
+/// a corner of its bounds.
 fn longest(body: &Body<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
     let corners = |step: usize| -> Vec<Point> {
         let poses = body.model.poses(&between(from, to, step as f64 / n_steps as f64));
@@ -207,7 +212,8 @@ impl AsFound {
     }
 }
 
-/// What is near at one posture, the worst of each kind: how near, at least so far, which obstacle, how many.
+/// What is near at one posture, the worst of each kind: how near, at least so far, which obstacle,
+/// how many.
 type Told = BTreeMap<Key, (Level, f32, Option<usize>, usize)>;
 
 fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
@@ -336,7 +342,8 @@ mod tests {
         let found = walk(&post, &[0.0, std::f64::consts::PI], 0.0, 0.02);
         let [hit] = &found[..] else { panic!("one contact: {found:?}") };
         assert!(!hit.as_found && hit.level >= Level::Hit && hit.gap == 0.0, "{hit:?}");
-        // The beam's side is 5 cm off its middle: 3.2° before, and as much behind; the margin and half a step more.
+        // The beam's side is 5 cm off its middle: 3.2° before, and as much behind; the margin and
+        // half a step more.
         let share = (0.05_f64 / 0.9).asin() / std::f64::consts::PI;
         assert!(hit.from < 0.5 - share && hit.from > 0.5 - 1.8 * share, "{hit:?}");
         assert!(hit.to > 0.5 + share && hit.to < 0.5 + 1.8 * share, "{hit:?}");

@@ -1,4 +1,5 @@
-//! The surface of a link, or points that hang on it, in; how far a place is from it, out. All in the frame of the link, metres.
+//! The surface of a link, or points that hang on it, in; how far a place is from it, out. All in
+//! the frame of the link, metres.
 
 use crate::obstacles::{HALF_CELL, distance};
 use contract::{Space, SpaceGrid, SpaceKind};
@@ -7,14 +8,16 @@ use glamx::Vec3;
 use parry3d::shape::{CompositeShapeRef, TriMesh};
 use robot::Mesh;
 
-/// Smallest edge of the voxels that tell what a link encloses, metres, and how many of them a link may have before they are wider.
+/// Smallest edge of the voxels that tell what a link encloses, metres, and how many of them a link
+/// may have before they are wider.
 const INSIDE_EDGE: f64 = 0.004;
 const N_INSIDE: f64 = 4e6;
 /// Diagonal of a cube of edge 1.
 const DIAGONAL: f64 = 1.7321;
 /// Edge of the voxels that tell which hanging point is nearest, metres.
 const HUNG_EDGE: f32 = 0.01;
-/// So much farther than is asked they tell it, metres: their own diagonal, also where they had to be widened.
+/// So much farther than is asked they tell it, metres: their own diagonal, also where they had to
+/// be widened.
 const HUNG_REACH: f32 = 0.1;
 
 /// A place seen from a shape.
@@ -41,7 +44,8 @@ impl Shape {
     pub(crate) fn surface(mesh: &Mesh, bounds: &Aabb, least: f32) -> Option<Self> {
         let corners = mesh.vertices.iter().map(|v| Vec3::from_array(*v)).collect();
         let triangles = TriMesh::new(corners, mesh.triangles.clone()).ok()?;
-        // A place that is farther than is asked is in no voxel of the surface, so it is told on which side it is.
+        // A place that is farther than is asked is in no voxel of the surface, so it is told on
+        // which side it is.
         let widest = (f64::from(least) / DIAGONAL).max(INSIDE_EDGE);
         let volume: f64 = bounds.size().iter().map(|s| s.max(INSIDE_EDGE)).product();
         let edge = (volume / N_INSIDE).cbrt().clamp(INSIDE_EDGE, widest);
@@ -54,7 +58,8 @@ impl Shape {
         Self::Hung(points, field)
     }
 
-    /// How far a place is, if it is `within` metres. What is enclosed is inside, however near to the surface.
+    /// How far a place is, if it is `within` metres. What is enclosed is inside, however near to
+    /// the surface.
     pub(crate) fn gap(&self, p: [f32; 3], within: f32) -> Gap {
         match self {
             Self::Surface(_, inside) if encloses(inside, p) => Gap::Inside,
@@ -65,7 +70,8 @@ impl Shape {
             }
             Self::Hung(points, field) => match field.nearest(p) {
                 Some(i) => {
-                    // The one nearest to the middle of the voxel may be farther by that, and each stands for a cell.
+                    // The one nearest to the middle of the voxel may be farther by that, and each
+                    // stands for a cell.
                     let off = DIAGONAL as f32 / field.grid().1 + HALF_CELL;
                     let gap = (distance(points[i], p) - off).max(0.0);
                     if gap <= within { Gap::At(gap) } else { Gap::Far }

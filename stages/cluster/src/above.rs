@@ -44,8 +44,8 @@ struct Patch {
     heights: Vec<f64>,
 }
 
-/// Most columns that are remembered: 32 MB of heights a level, a hall of 100 m × 100 m at 5 cm. Larger ones are
-/// looked up each time.
+/// Most columns that are remembered: 32 MB of heights a level, a hall of 100 m × 100 m at 5 cm.
+/// Larger ones are looked up each time.
 const MOST: usize = 1 << 22;
 
 impl Patch {

@@ -1,5 +1,5 @@
-//! Sorted voxels in, the number of the connected set of each out. Rows are cut into runs and runs of near rows
-//! joined, so that the work grows with the number of voxels only.
+//! Sorted voxels in, the number of the connected set of each out. Rows are cut into runs and runs
+//! of near rows joined, so that the work grows with the number of voxels only.
 
 use crate::Counted;
 
@@ -16,8 +16,9 @@ struct Row {
     runs: std::ops::Range<usize>,
 }
 
-/// Number of the set of each voxel: 0, 1, … in the order of the sets' first voxels. Two voxels belong together if
-/// they differ by at most `gap + 1` along each axis. `voxels` must be sorted by (z, y, x).
+/// Number of the set of each voxel: 0, 1, … in the order of the sets' first voxels. Two voxels
+/// belong together if they differ by at most `gap + 1` along each axis. `voxels` must be sorted by
+/// (z, y, x).
 pub(crate) fn connect(voxels: &[Counted], gap: i32) -> Vec<u32> {
     let reach = gap.saturating_add(1);
     let (rows, runs, run_of) = cut(voxels, reach);

@@ -1,4 +1,5 @@
-//! Occupied space and floor in, clusters out: connected sets of what stands above the floor, over all scans.
+//! Occupied space and floor in, clusters out: connected sets of what stands above the floor, over
+//! all scans.
 #![forbid(unsafe_code)]
 
 mod above;
@@ -10,11 +11,14 @@ use geometry::Aabb;
 /// Settings of the cluster stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Empty voxels that a cluster may bridge: 1, since thin and distant parts leave holes at 5 cm.
+    /// Empty voxels that a cluster may bridge: 1, since thin and distant parts leave holes at 5
+    /// cm.
     pub gap: i32,
-    /// Least height of a voxel's bottom above the floor, metres: three times the noise of a common scanner.
+    /// Least height of a voxel's bottom above the floor, metres: three times the noise of a common
+    /// scanner.
     pub clearance: f64,
-    /// Depth below a level down to which a voxel still counts as that level's noise or dirt, metres.
+    /// Depth below a level down to which a voxel still counts as that level's noise or dirt,
+    /// metres.
     pub slack: f64,
     /// Fewest points of a cluster: fewer are dust.
     pub min_points: u64,
@@ -26,7 +30,8 @@ impl Default for Settings {
     }
 }
 
-/// Clusters of what stands above the floor, most points first. Where no floor is known, of everything.
+/// Clusters of what stands above the floor, most points first. Where no floor is known, of
+/// everything.
 ///
 /// What lies below every known level at its place is dropped: mirror images and noise.
 #[must_use]

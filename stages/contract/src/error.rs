@@ -1,11 +1,13 @@
-//! Errors by what a caller can do about them; one type for all rooms, since a stage's errors only travel up.
+//! Errors by what a caller can do about them; one type for all rooms, since a stage's errors only
+//! travel up.
 
 use crate::quote;
 use crate::words::without_numbers;
 use std::fmt;
 use std::path::Path;
 
-/// What a caller can do about an error. As many kinds as there are reactions; each has an exit code.
+/// What a caller can do about an error. As many kinds as there are reactions; each has an exit
+/// code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Kind {
@@ -54,7 +56,8 @@ impl Error {
         Self::new(Kind::BadInput, what)
     }
 
-    /// What the system refuses about a file; a disk that is full is a limit, which the user can lift.
+    /// What the system refuses about a file; a disk that is full is a limit, which the user can
+    /// lift.
     pub fn of_file(what: impl Into<String>, path: &Path, cause: std::io::Error) -> Self {
         let is_full = is_full(&cause);
         let kind = if is_full { Kind::OverBudget } else { Kind::Io };

@@ -1,8 +1,8 @@
 //! Code that may panic in; its value, or the words of its panic, out.
 //!
-//! Decoders of other projects panic on some damaged files, and a step of ours may hold a fault. Neither may end the program
-//! without a word, and neither may write to standard error by itself: whoever put up the fence says what happened, in the format
-//! that the user asked for.
+//! Decoders of other projects panic on some damaged files, and a step of ours may hold a fault.
+//! Neither may end the program without a word, and neither may write to standard error by itself:
+//! whoever put up the fence says what happened, in the format that the user asked for.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
@@ -16,7 +16,8 @@ static NOTED: Mutex<Vec<(String, String)>> = Mutex::new(Vec::new());
 /// Most panics that are noted at the same time: one a thread, and some to spare.
 const MAX_NOTED: usize = 64;
 
-/// Runs code that may panic. What it leaves half-done after a panic must not be used again; hence no `UnwindSafe` is asked for.
+/// Runs code that may panic. What it leaves half-done after a panic must not be used again; hence
+/// no `UnwindSafe` is asked for.
 ///
 /// # Errors
 /// The words of the panic and, where [`note`] was told, its line of source; in one line.
@@ -49,10 +50,12 @@ pub fn is_fenced() -> bool {
     STANDING.load(Ordering::Relaxed) > 0
 }
 
-/// Notes where a panic came from, for the fence that catches it: for a panic hook, which is then to say nothing itself.
+/// Notes where a panic came from, for the fence that catches it: for a panic hook, which is then to
+/// say nothing itself.
 pub fn note(panic: &PanicHookInfo<'_>) {
     let line = panic.location().map_or_else(String::new, |at| {
-        // The last three parts of a path name package and file; what comes before differs from machine to machine.
+        // The last three parts of a path name package and file; what comes before differs from
+        // machine to machine.
         let parts: Vec<&str> = at.file().split(['/', '\\']).collect();
         format!("{}:{}", parts[parts.len().saturating_sub(4)..].join("/"), at.line())
     });

@@ -80,7 +80,8 @@ pub struct RunnerUp {
     pub score: f64,
     /// Whether it is the same model in another posture.
     pub same_model: bool,
-    /// How clearly the beams prefer the best, on the surface of the links that stand differently: about 0 for equals.
+    /// How clearly the beams prefer the best, on the surface of the links that stand differently:
+    /// about 0 for equals.
     pub margin: f64,
 }
 
@@ -97,8 +98,9 @@ pub struct ScanShift {
     pub range_bias: f64,
 }
 
-/// What a robot's points say of the errors of the scans that see it, for others that the same scans see: of each scan its shift,
-/// metres, its turn about its scanner, radians, both world axes, and its range bias, metres: seven values, scan after scan.
+/// What a robot's points say of the errors of the scans that see it, for others that the same scans
+/// see: of each scan its shift, metres, its turn about its scanner, radians, both world axes, and
+/// its range bias, metres: seven values, scan after scan.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ScanShare {
     /// Whose.
@@ -107,7 +109,8 @@ pub struct ScanShare {
     pub errors: Vec<f64>,
     /// Information of its points alone, prior left out, row-major.
     pub information: Vec<f64>,
-    /// By how much base twist (world axes at the base: translation, rotation) and joints give way to each of them, row-major.
+    /// By how much base twist (world axes at the base: translation, rotation) and joints give way
+    /// to each of them, row-major.
     pub gain: Vec<f64>,
 }
 
@@ -127,9 +130,11 @@ pub struct Mounted {
     pub model: String,
     /// The robot's link that it is bolted to.
     pub link: String,
-    /// Turn of its root about the axis of the robot's last joint, along that link's own axis, radians.
+    /// Turn of its root about the axis of the robot's last joint, along that link's own axis,
+    /// radians.
     pub mount: f64,
-    /// Other such turns, and the last joint's value with each, radians, that explain the points as well.
+    /// Other such turns, and the last joint's value with each, radians, that explain the points as
+    /// well.
     pub alike: Vec<[f64; 2]>,
 }
 
@@ -144,14 +149,16 @@ pub struct JointFrame {
     pub slides: bool,
     /// Shift of its origin, joint's frame of the model, metres.
     pub shift: [f64; 3],
-    /// Turn of its frame, joint's frame of the model, radians; about the axis zero, since the joint itself turns there.
+    /// Turn of its frame, joint's frame of the model, radians; about the axis zero, since the
+    /// joint itself turns there.
     pub turn: [f64; 3],
     /// Standard deviations of both, axis by axis.
     pub sigma: [f64; 6],
 }
 
 impl JointFrame {
-    /// The joint's own frame from the model's: what the joint's origin is moved by, joint's frame, metres.
+    /// The joint's own frame from the model's: what the joint's origin is moved by, joint's frame,
+    /// metres.
     #[must_use]
     pub fn moved(&self) -> Pose {
         let turn = UnitQuaternion::from_scaled_axis(self.turn.into());
@@ -201,12 +208,13 @@ pub struct Fit {
     pub model_name: String,
     /// World from base link (the root of the URDF's tree), metres.
     pub world_from_base: Pose,
-    /// Standard deviations of the base: x, y, z (metres), rotations about x, y, z (radians), world axes at the base.
+    /// Standard deviations of the base: x, y, z (metres), rotations about x, y, z (radians), world
+    /// axes at the base.
     pub base_sigma: [f64; 6],
     /// Free joints, in the order of the model.
     pub joints: Vec<JointFit>,
-    /// Covariance of (base twist: translation, rotation about the base's origin, world axes; free joints), row-major,
-    /// (6+n)².
+    /// Covariance of (base twist: translation, rotation about the base's origin, world axes; free
+    /// joints), row-major, (6+n)².
     pub covariance: Vec<f64>,
     /// Share explained less share contradicted, −1.5..1.
     pub score: f64,
@@ -214,7 +222,8 @@ pub struct Fit {
     pub explained: f64,
     /// RMS distance of the points of the robot from its surface, metres.
     pub rms: f64,
-    /// How far the robot's surface is off the model's, standard deviation over patches of a hand's width, metres.
+    /// How far the robot's surface is off the model's, standard deviation over patches of a hand's
+    /// width, metres.
     pub surface_sigma: f64,
     /// Standard deviation of the place of the main chain's tip in the base's frame, metres.
     pub tip_sigma: f64,
@@ -230,15 +239,20 @@ pub struct Fit {
     pub stays: Vec<Fit>,
     /// The best other explanation, if any came near.
     pub runner_up: Option<RunnerUp>,
-    /// Other postures that explain the points as well (a symmetric link, a wrist that nobody saw), best first.
+    /// Other postures that explain the points as well (a symmetric link, a wrist that nobody saw),
+    /// best first.
     pub equals: Vec<Equal>,
-    /// Posture after the sweeps and before the registration, where the method goes link after link; else empty.
+    /// Posture after the sweeps and before the registration, where the method goes link after
+    /// link; else empty.
     pub rough: Vec<f64>,
-    /// Closed loops, by their place in the model, that stand on the other of their two solutions than at the model's zero.
+    /// Closed loops, by their place in the model, that stand on the other of their two solutions
+    /// than at the model's zero.
     pub other_branches: Vec<usize>,
-    /// The tool of the library that it carries, if one was found; its joints follow the robot's own.
+    /// The tool of the library that it carries, if one was found; its joints follow the robot's
+    /// own.
     pub tool: Option<Mounted>,
-    /// Where its joints really are, where that was asked for; base and joints are those of the robot so corrected.
+    /// Where its joints really are, where that was asked for; base and joints are those of the
+    /// robot so corrected.
     pub calibration: Option<Calibration>,
     /// Other models that fit as well where the points can tell.
     pub alike: Vec<String>,

@@ -4,12 +4,13 @@ use geometry::direction::{spherical, unit};
 use nalgebra::UnitQuaternion;
 use serde::{Deserialize, Serialize};
 
-/// A regular raster of elevation (rows, upwards) and azimuth (columns, counter-clockwise) about the axis of the
-/// lattice frame, covering the whole sphere; only the pixels that a scan fills exist in tiles.
+/// A regular raster of elevation (rows, upwards) and azimuth (columns, counter-clockwise) about the
+/// axis of the lattice frame, covering the whole sphere; only the pixels that a scan fills exist in
+/// tiles.
 ///
-/// A file's native rows and columns choose its steps and phase where they are regular to 0.3 pixels; otherwise the
-/// steps come from the directions of the points. A pixel may then hold two returns or none: consumers must not rely
-/// on one each.
+/// A file's native rows and columns choose its steps and phase where they are regular to 0.3
+/// pixels; otherwise the steps come from the directions of the points. A pixel may then hold two
+/// returns or none: consumers must not rely on one each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Lattice {
     /// Turns the scan frame so that the scanner's spin axis is z (identity for most scanners).
@@ -26,8 +27,8 @@ pub struct Lattice {
     pub n_rows: u32,
     /// Number of columns of a full turn.
     pub n_cols: u32,
-    /// Whether a camera took the points, whose pixels are only nearly regular in angles, and whose depths err alike over a
-    /// hand's width.
+    /// Whether a camera took the points, whose pixels are only nearly regular in angles, and whose
+    /// depths err alike over a hand's width.
     pub is_camera: bool,
 }
 
@@ -41,8 +42,8 @@ pub struct Pixel {
 }
 
 impl Lattice {
-    /// A lattice with these steps; columns are rounded so that a whole number makes a turn, and the phase is such
-    /// that a pixel's middle lies at (`elevation`, `azimuth`).
+    /// A lattice with these steps; columns are rounded so that a whole number makes a turn, and the
+    /// phase is such that a pixel's middle lies at (`elevation`, `azimuth`).
     #[must_use]
     pub fn new(row_step: f64, col_step: f64, elevation: f64, azimuth: f64) -> Self {
         use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -78,7 +79,8 @@ impl Lattice {
         let row = nearest(row).clamp(0, i64::from(self.n_rows) - 1);
         let n_cols = i64::from(self.n_cols);
         let mut col = nearest(col);
-        // Nearly always inside already: a division for each point would cost more than all the rest.
+        // Nearly always inside already: a division for each point would cost more than all the
+        // rest.
         if col < 0 || col >= n_cols {
             col = col.rem_euclid(n_cols);
         }
@@ -169,7 +171,8 @@ impl Window {
     }
 }
 
-/// `floor(value + ½)`, without the call into the mathematics library that `f64::floor` is on a plain x86-64.
+/// `floor(value + ½)`, without the call into the mathematics library that `f64::floor` is on a
+/// plain x86-64.
 #[inline]
 fn nearest(value: f64) -> i64 {
     let value = value + 0.5;

@@ -1,8 +1,10 @@
-//! Text that people or files chose (names of scans, models, links, joints; paths) in; the same as each medium may hold it, out.
+//! Text that people or files chose (names of scans, models, links, joints; paths) in; the same as
+//! each medium may hold it, out.
 //!
-//! Such a name may hold anything: an escape sequence that clears a terminal, a character that turns the direction of writing
-//! round, a line break, a zero. Inside the program it stays as it is, since it identifies something; it is quoted where it leaves,
-//! by one of these functions and by no other means.
+//! Such a name may hold anything: an escape sequence that clears a terminal, a character that turns
+//! the direction of writing round, a line break, a zero. Inside the program it stays as it is,
+//! since it identifies something; it is quoted where it leaves, by one of these functions and by no
+//! other means.
 //!
 //! | medium | function | what it does |
 //! | --- | --- | --- |
@@ -17,8 +19,9 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// Characters that nobody sees, or that change how others are shown: control characters, marks of direction, separators of lines,
-/// spaces without width, tags, and what Unicode says is no character.
+/// Characters that nobody sees, or that change how others are shown: control characters, marks of
+/// direction, separators of lines, spaces without width, tags, and what Unicode says is no
+/// character.
 #[must_use]
 pub fn is_odd(c: char) -> bool {
     c.is_control()
@@ -61,8 +64,8 @@ pub fn printed(text: &str) -> Cow<'_, str> {
     replaced(text, |c| is_odd(c) && !matches!(c, '\n' | '\t'), escape)
 }
 
-/// Text that is JSON: the same value, in which no odd character stands as itself. Outside of strings JSON has none but line
-/// breaks and tabs, which stay.
+/// Text that is JSON: the same value, in which no odd character stands as itself. Outside of
+/// strings JSON has none but line breaks and tabs, which stay.
 #[must_use]
 pub fn json(text: &str) -> Cow<'_, str> {
     replaced(
@@ -90,8 +93,9 @@ pub fn yaml(text: &str) -> String {
     format!("\"{inner}\"")
 }
 
-/// Text of XML, or the value of an attribute. It is read back as it was, but for characters that no XML 1.0 document may hold,
-/// not even by reference: these become `\u{…}`. Where people are to read the value, quote [`shown`] text.
+/// Text of XML, or the value of an attribute. It is read back as it was, but for characters that no
+/// XML 1.0 document may hold, not even by reference: these become `\u{…}`. Where people are to read
+/// the value, quote [`shown`] text.
 #[must_use]
 pub fn xml(text: &str) -> Cow<'_, str> {
     let is_meant = |c: char| is_odd(c) || matches!(c, '&' | '<' | '>' | '"' | '\'');
@@ -110,8 +114,8 @@ pub fn xml(text: &str) -> Cow<'_, str> {
     })
 }
 
-/// A cell of CSV, in double quotes. One that a spreadsheet would take for a formula begins with an apostrophe, which spreadsheets
-/// take for "this is text"; a number stays a number.
+/// A cell of CSV, in double quotes. One that a spreadsheet would take for a formula begins with an
+/// apostrophe, which spreadsheets take for "this is text"; a number stays a number.
 #[must_use]
 pub fn csv(text: &str) -> String {
     let shown = shown(text);

@@ -1,5 +1,5 @@
-//! What segmenting one tile leaves behind: labels that are certain, and the rest of the points near robots with
-//! their voxels, from which merge tells attachments from fixed things.
+//! What segmenting one tile leaves behind: labels that are certain, and the rest of the points near
+//! robots with their voxels, from which merge tells attachments from fixed things.
 
 use crate::{Label, MaskId, TileAt, Voxel, Weigh};
 
@@ -27,7 +27,8 @@ pub struct ResidualVoxel {
     pub n_link: u32,
     /// The link nearest to any of its points.
     pub nearest: LinkAt,
-    /// Distance of the nearest point to that link's surface, metres; infinite beyond the field's reach.
+    /// Distance of the nearest point to that link's surface, metres; infinite beyond the field's
+    /// reach.
     pub distance: f32,
     /// Lies at the border of the region: what is in it may go on outside.
     pub at_border: bool,
@@ -67,7 +68,8 @@ pub struct TileLabels {
 }
 
 impl TileLabels {
-    /// Labels of all points that differ from fixed, by place, once the label of each residual voxel is known.
+    /// Labels of all points that differ from fixed, by place, once the label of each residual voxel
+    /// is known.
     #[must_use]
     pub fn settle(&self, label_of: impl Fn(Voxel) -> Label) -> Vec<PlaceRun<Label>> {
         let mut out = self.labels.clone();
@@ -78,7 +80,8 @@ impl TileLabels {
     }
 }
 
-/// Consecutive places of a mask that share something: points of a scan in the order of measurement mostly do.
+/// Consecutive places of a mask that share something: points of a scan in the order of measurement
+/// mostly do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlaceRun<T> {
     /// First of them.
@@ -107,7 +110,8 @@ impl<T: Copy + PartialEq> PlaceRun<T> {
         self.first + u64::from(self.n)
     }
 
-    /// Sorts runs, which have no place in common, and joins those that follow each other and share the same.
+    /// Sorts runs, which have no place in common, and joins those that follow each other and share
+    /// the same.
     pub fn join(runs: &mut Vec<Self>) {
         runs.sort_unstable_by_key(|run| run.first);
         runs.dedup_by(|later, kept| {

@@ -41,7 +41,8 @@ pub struct Input {
     pub n_bytes: u64,
 }
 
-/// The points of one output triple (`labels/N.*.npy`): one scan of an E57 or PTX file, one LAS or LAZ file whole.
+/// The points of one output triple (`labels/N.*.npy`): one scan of an E57 or PTX file, one LAS or
+/// LAZ file whole.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Mask {
     /// Its number.
@@ -50,8 +51,8 @@ pub struct Mask {
     pub input: InputId,
     /// Name for people: scan name, or file name.
     pub name: String,
-    /// Points that the file does not itself flag as invalid: the length of the mask. For text formats it is known
-    /// only once read, and then `None` here.
+    /// Points that the file does not itself flag as invalid: the length of the mask. For text
+    /// formats it is known only once read, and then `None` here.
     pub n_points: Option<u64>,
 }
 
@@ -68,10 +69,11 @@ pub struct Scan {
     pub name: String,
     /// LAS `point_source_id` of its points, where scans of one file are told apart by it.
     pub source_id: Option<u16>,
-    /// Pose of the scanner. Where the scanner's position is not known: a translation near the points, so that
-    /// coordinates about it stay small.
+    /// Pose of the scanner. Where the scanner's position is not known: a translation near the
+    /// points, so that coordinates about it stay small.
     pub world_from_scan: Pose,
-    /// The angular raster; `None` where the scanner's position is not known: then there is no free-space evidence.
+    /// The angular raster; `None` where the scanner's position is not known: then there is no
+    /// free-space evidence.
     pub lattice: Option<Lattice>,
     /// Bounds in the world, metres, where the file states them; may be wrong, so only a hint.
     pub stated_bounds: Option<Aabb>,

@@ -1,4 +1,5 @@
-//! Space around a robot as voxels: seen free, something fixed, the robot itself, another robot, or unknown.
+//! Space around a robot as voxels: seen free, something fixed, the robot itself, another robot, or
+//! unknown.
 
 use crate::{Label, PointKind};
 use geometry::Aabb;
@@ -102,7 +103,8 @@ impl SpaceGrid {
         std::array::from_fn(|i| ((self.first[i] + cell[i] as i64) as f64 + 0.5) * self.edge)
     }
 
-    /// Voxels that cannot be reached from outside of `bounds` without crossing those of a surface: what it encloses. Ascending.
+    /// Voxels that cannot be reached from outside of `bounds` without crossing those of a surface:
+    /// what it encloses. Ascending.
     #[must_use]
     pub fn enclosed(&self, bounds: &Aabb, surface: &[usize]) -> Vec<usize> {
         let cell = |p: [f64; 3], up: bool| -> [usize; 3] {
@@ -179,7 +181,8 @@ impl Space {
         n as f64 * self.grid.edge.powi(3)
     }
 
-    /// Puts a labelled point into a voxel. What stands still beats all, another robot the own one: an obstacle is never lost.
+    /// Puts a labelled point into a voxel. What stands still beats all, another robot the own one:
+    /// an obstacle is never lost.
     pub fn mark(&mut self, index: usize, voxel: SpaceKind) {
         let rank = |kind| match kind {
             SpaceKind::Unknown | SpaceKind::Free => 0,

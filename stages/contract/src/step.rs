@@ -1,4 +1,5 @@
-//! The shapes of a step. The engine owns threads, order, budget and errors, so that a step stays one screen.
+//! The shapes of a step. The engine owns threads, order, budget and errors, so that a step stays
+//! one screen.
 
 use crate::Result;
 use std::sync::{Mutex, PoisonError};
@@ -72,7 +73,8 @@ pub trait Fold {
     fn finish(&self, sum: Self::Sum) -> Result<Self::Out>;
 }
 
-/// Independent pieces of work inside one step: who calls the step says on which threads they are done.
+/// Independent pieces of work inside one step: who calls the step says on which threads they are
+/// done.
 ///
 /// Steps take it as `&dyn Fan`: were they generic over it, all of their code would be compiled anew
 /// in the crate that calls them.
@@ -91,7 +93,8 @@ impl dyn Fan + '_ {
             let out = item.map(&work);
             *done[at].lock().unwrap_or_else(PoisonError::into_inner) = out;
         });
-        let out = |slot: Mutex<Option<U>>| slot.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let out =
+            |slot: Mutex<Option<U>>| slot.into_inner().unwrap_or_else(PoisonError::into_inner);
         done.into_iter().map(|slot| out(slot).expect("each item is done once")).collect()
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::{MaskId, ScanId, Weigh};
 
-/// Consecutive points of one scan, in the order of the file; points that the file flags as invalid are not in it.
+/// Consecutive points of one scan, in the order of the file; points that the file flags as invalid
+/// are not in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Strip {
     /// Whose points these are.
@@ -11,8 +12,8 @@ pub struct Strip {
     pub mask: MaskId,
     /// Place in the mask of the smallest place here.
     pub first_place: u64,
-    /// Place in the mask of each point, less `first_place`; ascending. Points that were dropped (not a number, not
-    /// finite) leave a gap.
+    /// Place in the mask of each point, less `first_place`; ascending. Points that were dropped
+    /// (not a number, not finite) leave a gap.
     pub place: Vec<u32>,
     /// Scan frame, metres.
     pub xyz: Vec<[f32; 3]>,
@@ -20,7 +21,8 @@ pub struct Strip {
     pub attributes: Option<Attributes>,
 }
 
-/// Columns beside the coordinates, one entry a point of the strip; a column that the file lacks is empty.
+/// Columns beside the coordinates, one entry a point of the strip; a column that the file lacks is
+/// empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Attributes {
     /// World coordinates as the file states them (with its pose applied), metres.

@@ -17,10 +17,12 @@ pub struct PlanePatch {
     pub rms: f64,
     /// Bounds of its points, metres.
     pub bounds: Aabb,
-    /// Area covered by its points, m² (from solid angle, range and incidence; not from its outline).
+    /// Area covered by its points, m² (from solid angle, range and incidence; not from its
+    /// outline).
     pub area: f64,
-    /// Ground cells (0.25 m, index = floor(x/0.25), floor(y/0.25)) that its points touch, sorted, with the number of
-    /// points and the sum of their z (metres) in each; only for nearly horizontal patches.
+    /// Ground cells (0.25 m, index = floor(x/0.25), floor(y/0.25)) that its points touch, sorted,
+    /// with the number of points and the sum of their z (metres) in each; only for nearly
+    /// horizontal patches.
     pub ground: Vec<([i32; 2], u32, f64)>,
 }
 
@@ -36,14 +38,16 @@ pub struct Overlap {
 /// Occupied voxels with the number of points in each: sorted by (z, y, x), each voxel once.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Occupancy {
-    /// Edge of a voxel, metres. Voxel `[i, j, k]` spans `[i·edge, (i+1)·edge)` along x, and so on, in the world.
+    /// Edge of a voxel, metres. Voxel `[i, j, k]` spans `[i·edge, (i+1)·edge)` along x, and so on,
+    /// in the world.
     pub edge: f64,
     /// Voxel and points in it.
     pub voxels: Vec<([i32; 3], u32)>,
 }
 
 impl Occupancy {
-    /// Adds the points of `other`, voxel by voxel; both must have the same edge unless one is empty.
+    /// Adds the points of `other`, voxel by voxel; both must have the same edge unless one is
+    /// empty.
     pub fn merge(&mut self, other: Self) {
         if self.voxels.is_empty() {
             *self = other;
@@ -101,19 +105,21 @@ pub struct FloorLevel {
     pub plane: Plane,
     /// RMS of its cells' heights about the mean plane, metres (waviness).
     pub waviness: f64,
-    /// How far its points lie off its heights, metres, one sigma: noise, registration, and waves smaller than a cell.
+    /// How far its points lie off its heights, metres, one sigma: noise, registration, and waves
+    /// smaller than a cell.
     pub scatter: f64,
     /// Area, m².
     pub area: f64,
     /// Edge of a cell of the height map, metres.
     pub cell: f64,
-    /// Cells of the ground (index = floor(x/cell), floor(y/cell)) and the floor's height in each, metres; sorted.
+    /// Cells of the ground (index = floor(x/cell), floor(y/cell)) and the floor's height in each,
+    /// metres; sorted.
     pub heights: Vec<([i32; 2], f64)>,
 }
 
 impl FloorLevel {
-    /// Height of the floor at a place, metres: bilinear between the heights at cell middles, the mean plane where
-    /// they are missing. `None` farther than two cells from any known cell.
+    /// Height of the floor at a place, metres: bilinear between the heights at cell middles, the
+    /// mean plane where they are missing. `None` farther than two cells from any known cell.
     #[must_use]
     pub fn height(&self, x: f64, y: f64) -> Option<f64> {
         let (u, v) = (x / self.cell - 0.5, y / self.cell - 0.5);
@@ -173,7 +179,8 @@ impl InstallationPlane {
     }
 }
 
-/// The floor of the plant: its levels, largest first, and the smaller planes that something may stand on.
+/// The floor of the plant: its levels, largest first, and the smaller planes that something may
+/// stand on.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Floor {
     /// Largest first; none where nothing like a floor was found.
@@ -183,8 +190,8 @@ pub struct Floor {
 }
 
 impl Floor {
-    /// Height above the floor level that lies nearest below or at `p` (by at most `slack` metres above `p`); `None`
-    /// where no level is known.
+    /// Height above the floor level that lies nearest below or at `p` (by at most `slack` metres
+    /// above `p`); `None` where no level is known.
     #[must_use]
     pub fn height_above(&self, p: [f64; 3], slack: f64) -> Option<f64> {
         self.levels

@@ -1,4 +1,5 @@
-//! A tile: the points of a rectangle of one lattice; the unit of disk layout, of parallel work, of reuse.
+//! A tile: the points of a rectangle of one lattice; the unit of disk layout, of parallel work, of
+//! reuse.
 
 use crate::{Pixel, ScanId, Weigh};
 use geometry::Aabb;
@@ -9,8 +10,9 @@ pub const TILE_SIDE: u32 = 256;
 /// Most that can be left out of a tile: of each 8 × 8 pixels one stays.
 pub const MAX_SKIP: u32 = 3;
 
-/// Which rectangle of which scan. For a scan without lattice: which square of the ground, 256 × 256 cells of 0.05 m
-/// about the scan's origin, row from y, column from x, both offset by 2²⁰ tiles so that they stay positive.
+/// Which rectangle of which scan. For a scan without lattice: which square of the ground, 256 × 256
+/// cells of 0.05 m about the scan's origin, row from y, column from x, both offset by 2²⁰ tiles so
+/// that they stay positive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TileAt {
     /// Whose lattice.
@@ -21,7 +23,8 @@ pub struct TileAt {
     pub col: u32,
 }
 
-/// Points of one tile, sorted by pixel, then by place in the mask: all of them, or of each square of pixels those of one.
+/// Points of one tile, sorted by pixel, then by place in the mask: all of them, or of each square
+/// of pixels those of one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tile {
     /// Where it lies.
@@ -36,14 +39,16 @@ pub struct Tile {
     pub xyz: Vec<[f32; 3]>,
     /// Bounds of all of its points in the world, metres.
     pub bounds: Aabb,
-    /// Of each square of 2^`skip` by 2^`skip` pixels only the points of the first pixel that has some are here …
+    /// Of each square of 2^`skip` by 2^`skip` pixels only the points of the first pixel that has
+    /// some are here …
     pub skip: u32,
     /// … of so many that the tile has.
     pub n_all: u64,
 }
 
-/// Points of a tile where they lie, not copied: those of pixels that are the first ones with points in their squares of
-/// 2^`skip` by 2^`skip` pixels, and not in larger ones (of 2^[`MAX_SKIP`] at most).
+/// Points of a tile where they lie, not copied: those of pixels that are the first ones with points
+/// in their squares of 2^`skip` by 2^`skip` pixels, and not in larger ones (of 2^[`MAX_SKIP`] at
+/// most).
 #[derive(Debug, Clone, Copy)]
 pub struct TilePoints<'a> {
     /// As in [`Tile`].

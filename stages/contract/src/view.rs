@@ -3,7 +3,8 @@
 use crate::{MaskId, ScanId};
 use geometry::{Aabb, DepthImage, Point};
 
-/// A piece of the world with a local frame: world axes, shifted to `origin`, so that f32 is exact enough.
+/// A piece of the world with a local frame: world axes, shifted to `origin`, so that f32 is exact
+/// enough.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {
     /// Origin of the local frame in the world, metres.
@@ -28,7 +29,8 @@ pub struct View {
     pub scan: ScanId,
     /// The mask of its points.
     pub mask: MaskId,
-    /// Where the scanner stands in the local frame; `None` where unknown, and then `images` is empty.
+    /// Where the scanner stands in the local frame; `None` where unknown, and then `images` is
+    /// empty.
     pub scanner: Option<Point>,
     /// Angle between neighbouring beams, radians; 0 where unknown.
     pub beam_step: f64,
@@ -36,18 +38,20 @@ pub struct View {
     pub is_camera: bool,
     /// Depth images that together cover the region.
     pub images: Vec<DepthImage>,
-    /// The scan's points inside the region's bounds, local frame, metres: neighbours follow one another.
+    /// The scan's points inside the region's bounds, local frame, metres: neighbours follow one
+    /// another.
     pub points: Vec<[f32; 3]>,
 }
 
 /// Views that a search looks through: more tell it little, and cost it as much as the first.
 const MAX_SCOUTS: usize = 8;
-/// Scanners nearer to each other than this, seen from the region's middle, see the same side of it; cosine of 25°.
+/// Scanners nearer to each other than this, seen from the region's middle, see the same side of it;
+/// cosine of 25°.
 const SAME_SIDE: f64 = 0.906;
 
 impl View {
-    /// The views that a search goes by, where there are many: those with most points, of scanners on different sides first.
-    /// In their order.
+    /// The views that a search goes by, where there are many: those with most points, of scanners
+    /// on different sides first. In their order.
     #[must_use]
     pub fn scouts<'a>(views: &[&'a Self], region: &Region) -> Vec<&'a Self> {
         if views.len() <= MAX_SCOUTS {

@@ -1,4 +1,5 @@
-//! Files that exist whole or not at all: bytes in; a temporary name until the end, then a sync and a rename.
+//! Files that exist whole or not at all: bytes in; a temporary name until the end, then a sync and
+//! a rename.
 
 use crate::block::{self, Block};
 use contract::{Error, Result};
@@ -9,17 +10,19 @@ use std::path::{Path, PathBuf};
 /// Ending of a file that is not yet whole.
 pub const PART: &str = "part";
 
-/// Bytes that are gathered before they go to a file: disks write pieces of this size at nearly their full rate.
+/// Bytes that are gathered before they go to a file: disks write pieces of this size at nearly
+/// their full rate.
 const GATHER: usize = 1 << 19;
 
-/// A file that takes its own name only when it is committed; dropped before, it is removed. What is written is gathered, and
-/// goes to disk past the system's cache as long as it is one long stream.
+/// A file that takes its own name only when it is committed; dropped before, it is removed. What is
+/// written is gathered, and goes to disk past the system's cache as long as it is one long stream.
 pub struct AtomicFile {
     file: Option<File>,
     part: PathBuf,
     path: PathBuf,
     waiting: Block,
-    /// Whether the file is written past the cache; `None` before the first piece, that of a small file is its last.
+    /// Whether the file is written past the cache; `None` before the first piece, that of a small
+    /// file is its last.
     direct: Option<bool>,
 }
 
@@ -67,7 +70,8 @@ impl AtomicFile {
         let done = settled.and_then(|()| file.sync_all());
         let done = done.and_then(|()| std::fs::rename(&self.part, &self.path));
         done.map_err(|e| Error::of_file("file cannot be finished", &self.path, e))?;
-        // The new name itself must survive a power cut; where folders cannot be opened (Windows) it does anyway.
+        // The new name itself must survive a power cut; where folders cannot be opened (Windows) it
+        // does anyway.
         if let Some(folder) = self.path.parent().and_then(|f| File::open(f).ok()) {
             let _ = folder.sync_all();
         }
@@ -115,7 +119,8 @@ pub(crate) fn part_of(path: &Path) -> PathBuf {
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if self.file.take().is_some() {
-            // Nothing more can be done about a leftover that refuses to go; it never had a final name.
+            // Nothing more can be done about a leftover that refuses to go; it never had a final
+            // name.
             let _ = std::fs::remove_file(&self.part);
         }
     }

@@ -1,14 +1,16 @@
-//! Bytes in, one after the other; whole pages of memory out, aligned as disks want them, so that what is large goes to its
-//! file, and comes from it, past the system's cache.
+//! Bytes in, one after the other; whole pages of memory out, aligned as disks want them, so that
+//! what is large goes to its file, and comes from it, past the system's cache.
 //!
-//! A plant's outputs are larger than any cache, and nobody reads them at once: copied into fresh pages of the cache they
-//! take a processor and most of the disk's rate. Where a file system knows no such writes, they go through its cache.
+//! A plant's outputs are larger than any cache, and nobody reads them at once: copied into fresh
+//! pages of the cache they take a processor and most of the disk's rate. Where a file system knows
+//! no such writes, they go through its cache.
 
 use bytemuck::{Pod, Zeroable};
 use std::fs::File;
 use std::io::{Error, ErrorKind, IoSlice, Read, Result, Seek, SeekFrom, Write};
 
-/// Bytes that memory and places of a file are aligned to: a multiple of the sectors of all common disks.
+/// Bytes that memory and places of a file are aligned to: a multiple of the sectors of all common
+/// disks.
 pub const PAGE: usize = 4096;
 
 /// Memory that is aligned to its length.
@@ -30,7 +32,8 @@ impl Block {
         &bytemuck::cast_slice(&self.pages)[..self.n_bytes]
     }
 
-    /// Takes as many bytes as it has room for, where it may hold `capacity` (whole pages); returns the others.
+    /// Takes as many bytes as it has room for, where it may hold `capacity` (whole pages); returns
+    /// the others.
     pub(crate) fn fill<'a>(&mut self, bytes: &'a [u8], capacity: usize) -> &'a [u8] {
         let (now, later) = bytes.split_at(bytes.len().min(capacity - self.n_bytes));
         let end = self.n_bytes + now.len();
@@ -60,8 +63,8 @@ impl Block {
     }
 }
 
-/// Has an open file written and read past the system's cache from now on, or through it again; whether it is past it now. It never is
-/// but on Linux, and there not on all file systems.
+/// Has an open file written and read past the system's cache from now on, or through it again;
+/// whether it is past it now. It never is but on Linux, and there not on all file systems.
 #[must_use]
 pub fn set_direct(file: &File, is_direct: bool) -> bool {
     #[cfg(target_os = "linux")]
@@ -80,7 +83,8 @@ pub fn set_direct(file: &File, is_direct: bool) -> bool {
     }
 }
 
-/// Writes all of some slices. Where the file is `direct` (see [`set_direct`]), and its system takes that back, through the cache.
+/// Writes all of some slices. Where the file is `direct` (see [`set_direct`]), and its system takes
+/// that back, through the cache.
 pub(crate) fn write_all(
     file: &mut File,
     slices: &mut [IoSlice<'_>],
@@ -101,8 +105,8 @@ pub(crate) fn write_all(
     Ok(())
 }
 
-/// Reads as much as there is room for, or as there is; returns how much that was. Where the file is direct, and its system takes
-/// that back, through the cache.
+/// Reads as much as there is room for, or as there is; returns how much that was. Where the file is
+/// direct, and its system takes that back, through the cache.
 ///
 /// # Errors
 /// What the reads say.

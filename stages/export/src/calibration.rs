@@ -12,7 +12,8 @@ pub struct CalibrationEntry {
     pub joints: Vec<FrameEntry>,
     /// Standard deviations that were assumed beforehand: shift, metres, turn, radians.
     pub prior: [f64; 2],
-    /// RMS distance of each link's points from its surface, metres: as in the model, and corrected.
+    /// RMS distance of each link's points from its surface, metres: as in the model, and
+    /// corrected.
     pub link_rms: Places<[Option<f64>; 2]>,
 }
 

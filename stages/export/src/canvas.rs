@@ -12,7 +12,8 @@ pub type Rgb = [u8; 3];
 pub(crate) const WHITE: Rgb = [255, 255, 255];
 /// Ink.
 pub(crate) const INK: Rgb = [30, 34, 40];
-/// Eight colours that people with any colour vision can tell apart (after Okabe and Ito), without black.
+/// Eight colours that people with any colour vision can tell apart (after Okabe and Ito), without
+/// black.
 const COLORS: [Rgb; 8] = [
     [0, 114, 178],
     [213, 94, 0],
@@ -90,7 +91,8 @@ impl Canvas {
         }
     }
 
-    /// Writes words, `size` times 8 pixels high, on a white ground; what the font lacks becomes a question mark.
+    /// Writes words, `size` times 8 pixels high, on a white ground; what the font lacks becomes a
+    /// question mark.
     pub fn text(&mut self, x: i64, y: i64, size: i64, color: Rgb, words: &str) {
         let n = words.chars().count() as i64;
         self.fill(x - size, y - size, n * 8 * size + 2 * size, 10 * size, WHITE);

@@ -1,5 +1,5 @@
-//! A cell that was scanned again: what stands in it, what went and what came, in; a picture from above and one from the
-//! side out.
+//! A cell that was scanned again: what stands in it, what went and what came, in; a picture from
+//! above and one from the side out.
 
 use crate::canvas::{Canvas, INK, Rgb, blend};
 use geometry::Aabb;
@@ -29,7 +29,8 @@ pub struct ChangedThing {
     pub at: [f64; 3],
 }
 
-/// Draws the cell: places where something stands, those where something stood that was not looked at again, things that changed, robots with the places of their bases, world, metres.
+/// Draws the cell: places where something stands, those where something stood that was not looked
+/// at again, things that changed, robots with the places of their bases, world, metres.
 #[must_use]
 pub fn draw_changes(
     cell: &Aabb,

@@ -1,4 +1,5 @@
-//! The tiles of a plant in; one COPC file of all their points, coarse to fine, out. `copc_converter` makes the octree out of core.
+//! The tiles of a plant in; one COPC file of all their points, coarse to fine, out.
+//! `copc_converter` makes the octree out of core.
 //!
 //! COPC 1.0 (<https://copc.io>) is LAZ whose chunks are the nodes of an octree: viewers (Potree, QGIS) load no more of it than
 //! they show, and everything else reads it as LAZ.
@@ -13,11 +14,12 @@ use std::sync::Arc;
 /// Its name, relative to an output folder.
 pub const COPC: &str = "clouds/plant.copc.laz";
 
-/// What the octree is built within, bytes; and points that are built together, for which that is enough. Not what a run may use:
-/// how points are grouped decides the bytes of the file.
+/// What the octree is built within, bytes; and points that are built together, for which that is
+/// enough. Not what a run may use: how points are grouped decides the bytes of the file.
 const BUDGET: u64 = 256 << 20;
 const TOGETHER: u64 = 200_000;
-/// Day and year of creation in a LAS header: zero in all files of ours, so that the same points are the same bytes.
+/// Day and year of creation in a LAS header: zero in all files of ours, so that the same points are
+/// the same bytes.
 const CREATED: (u64, [u8; 4]) = (90, [0; 4]);
 
 /// What is to be told of the conversion's steps, from any thread.

@@ -46,7 +46,8 @@ pub struct E57Scans {
 }
 
 impl E57Scans {
-    /// Opens the file. Its identifiers come from its name, so that the same scene gives the same bytes.
+    /// Opens the file. Its identifiers come from its name, so that the same scene gives the same
+    /// bytes.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
         let file = Arc::new(Mutex::new(Straight::new(AtomicFile::create(&path)?)));
@@ -147,7 +148,8 @@ fn failed(e: e57::Error, path: &Path) -> Error {
     Error::new(Kind::Io, "e57 file cannot be written").because(e).at(path.display())
 }
 
-/// An identifier made of a name and a number (128 bits of FNV-1a): unique in the file, the same every time.
+/// An identifier made of a name and a number (128 bits of FNV-1a): unique in the file, the same
+/// every time.
 fn guid(name: &str, number: u64) -> String {
     let mut hash = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d_u128;
     for byte in name.bytes().chain(number.to_le_bytes()) {
@@ -157,7 +159,8 @@ fn guid(name: &str, number: u64) -> String {
     format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
 }
 
-/// Bytes gathered before they go to the file: the crate writes pages of 1 KiB, with a look at the position of each.
+/// Bytes gathered before they go to the file: the crate writes pages of 1 KiB, with a look at the
+/// position of each.
 const GATHER: usize = 1 << 20;
 
 /// A file that is written almost straight on: seeking costs nothing, and writes are gathered.

@@ -1,5 +1,6 @@
-//! One robot's fit in; a page that a person checks in ten seconds out: how far its points are from the posture's surface,
-//! where each joint stands within its limits, what the scans say of each link, verdict and runner-up.
+//! One robot's fit in; a page that a person checks in ten seconds out: how far its points are from
+//! the posture's surface, where each joint stands within its limits, what the scans say of each
+//! link, verdict and runner-up.
 
 use crate::canvas::{Canvas, INK, Rgb};
 use crate::robot_picture::{FULL, RobotPicture, residual_color};
@@ -83,7 +84,8 @@ fn certainty_color(certainty: Certainty) -> Rgb {
     }
 }
 
-/// One joint: its limits as a bar, on it the value with its standard deviation, and values that fit as well.
+/// One joint: its limits as a bar, on it the value with its standard deviation, and values that fit
+/// as well.
 fn row(canvas: &mut Canvas, y: i64, (fit, at): (&Fit, usize), own: &Joint) {
     let joint = &fit.joints[at];
     let [low, high] = own.limits.unwrap_or(NO_LIMITS);

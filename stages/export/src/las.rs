@@ -1,4 +1,5 @@
-//! LAS 1.4 and LAZ: points in, one file out; counts and bounds are written into the header at the end.
+//! LAS 1.4 and LAZ: points in, one file out; counts and bounds are written into the header at the
+//! end.
 
 use crate::atomic::AtomicFile;
 use crate::pack::{Pack, PointColumns};
@@ -132,7 +133,8 @@ pub(crate) fn bounds(settings: &LasSettings, extent: &Extent) -> Aabb {
     Aabb { min: metres(extent.min), max: metres(extent.max) }
 }
 
-/// Everything before the first point: header and variable length records. Its length does not depend on `extent`.
+/// Everything before the first point: header and variable length records. Its length does not
+/// depend on `extent`.
 pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     let records = records(settings)?;
     let mut tail = Vec::new();
@@ -185,7 +187,8 @@ pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     Ok(out)
 }
 
-/// The variable length records: those of the settings, that of the extra bytes, that of the compression.
+/// The variable length records: those of the settings, that of the extra bytes, that of the
+/// compression.
 fn records(settings: &LasSettings) -> Result<Vec<raw::Vlr>> {
     let mut records = Vec::new();
     for vlr in &settings.vlrs {

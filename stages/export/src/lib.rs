@@ -1,6 +1,8 @@
-//! The plant in, files out: masks, result, clouds, scans, pictures. The only writer of formats; decides nothing.
+//! The plant in, files out: masks, result, clouds, scans, pictures. The only writer of formats;
+//! decides nothing.
 //!
-//! Every file is written under a temporary name, synced, and gets its own name only when it is whole.
+//! Every file is written under a temporary name, synced, and gets its own name only when it is
+//! whole.
 #![forbid(unsafe_code)]
 
 pub mod atomic;

@@ -55,7 +55,8 @@ impl Element for i16 {
 /// Length of magic and header, bytes: room for any length, a multiple of 64 as NumPy asks for.
 const HEADER: usize = 128;
 
-/// The bytes of `n` elements, `len` bytes each, from the `first` on, of a file that [`NpyWriter`] wrote.
+/// The bytes of `n` elements, `len` bytes each, from the `first` on, of a file that [`NpyWriter`]
+/// wrote.
 pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Result<Vec<u8>> {
     let mut bytes = vec![0; n * len];
     let read = File::open(path).and_then(|mut file| {
@@ -71,7 +72,8 @@ pub(crate) fn n_bytes(path: &Path) -> std::io::Result<u64> {
     Ok(std::fs::metadata(path)?.len().saturating_sub(HEADER as u64))
 }
 
-/// All of a list of places (u64, ascending) in a mask of `n_points` entries that [`NpyWriter`] wrote.
+/// All of a list of places (u64, ascending) in a mask of `n_points` entries that [`NpyWriter`]
+/// wrote.
 ///
 /// # Errors
 /// A file that cannot be read, or whose places do not ascend or are none of the mask's.
@@ -82,7 +84,8 @@ pub fn read_places(path: &Path, n_points: u64) -> Result<Vec<u64>> {
     let bytes = read_bytes(path, 0, n as usize, 8)?;
     let (whole, _) = bytes.as_chunks::<8>();
     let places: Vec<u64> = whole.iter().map(|b| u64::from_le_bytes(*b)).collect();
-    let is_whole = places.is_sorted() && places.last().is_none_or(|last| *last < n_points);
+    let in_order = places.is_sorted_by(|a, b| a < b);
+    let is_whole = in_order && places.last().is_none_or(|last| *last < n_points);
     is_whole.then_some(places).ok_or_else(|| {
         let what = format!("the list is none of places among {n_points} points");
         Error::bad_input(what).at(path.display()).hint("run the whole plant again")

@@ -1,8 +1,9 @@
 //! A voxel grid in, an OctoMap binary tree (`.bt`) out, as ROS and MoveIt load it.
 //!
-//! Format: Hornung et al., *OctoMap*, Autonomous Robots 34 (2013), and its reference implementation: a text header, then
-//! for each inner node two bytes, two bits a child (`01` free, `10` occupied, `11` inner, `00` unknown; lowest bits first),
-//! depth first. The tree is 16 levels deep about the origin.
+//! Format: Hornung et al., *OctoMap*, Autonomous Robots 34 (2013), and its reference
+//! implementation: a text header, then for each inner node two bytes, two bits a child (`01` free,
+//! `10` occupied, `11` inner, `00` unknown; lowest bits first), depth first. The tree is 16 levels
+//! deep about the origin.
 
 use crate::atomic;
 use contract::{Error, Kind, Result};
@@ -16,7 +17,8 @@ pub(crate) const HALF: i64 = 1 << (DEPTH - 1);
 /// Occupied, free, or not known.
 pub(crate) type Known = Option<bool>;
 
-/// A grid of voxels: place of the first in edges from the tree's origin, number on each axis, and what they are.
+/// A grid of voxels: place of the first in edges from the tree's origin, number on each axis, and
+/// what they are.
 pub(crate) struct Grid<'a> {
     pub(crate) first: [i64; 3],
     pub(crate) size: [usize; 3],

@@ -1,12 +1,14 @@
-//! Columns of labelled points in; their LAS records, in runs of one spatial tile, out. No object is made for a point, and
-//! nothing is shared, so that workers pack strips while one thread writes them.
+//! Columns of labelled points in; their LAS records, in runs of one spatial tile, out. No object is
+//! made for a point, and nothing is shared, so that workers pack strips while one thread writes
+//! them.
 
 use crate::record::{Extent, LasSettings, Quantum, class_of, too_far};
 use crate::settings::Settings;
 use contract::{Label, PointKind, Result};
 use geometry::narrow::floor_i32;
 
-/// Runs shorter than this on average are worth joining: a look-up of a tile costs as much as copying that many records.
+/// Runs shorter than this on average are worth joining: a look-up of a tile costs as much as
+/// copying that many records.
 const SHORT_RUN: usize = 8;
 /// Added to a number below 2³¹, it leaves the nearest whole number in the low 32 bits: 1.5 · 2⁵².
 const NEAREST: f64 = 6_755_399_441_055_744.0;
@@ -104,7 +106,8 @@ impl Pack {
         self.with_fixed || label.moves()
     }
 
-    /// The records of some points, in their order where they are in the order of a scan: then neighbours share a tile.
+    /// The records of some points, in their order where they are in the order of a scan: then
+    /// neighbours share a tile.
     ///
     /// # Errors
     /// A point that the integers of LAS cannot hold.
@@ -218,7 +221,8 @@ impl Packed {
     }
 }
 
-/// Whole steps of coordinates, in one loop without calls that the compiler turns into vector instructions.
+/// Whole steps of coordinates, in one loop without calls that the compiler turns into vector
+/// instructions.
 fn steps(world: &[[f64; 3]], quantum: &Quantum) -> Result<Vec<[i32; 3]>> {
     let (inverse, offset) = (quantum.scale.map(|s| 1.0 / s), quantum.offset);
     let scaled =

@@ -88,7 +88,8 @@ impl PlanPicture {
         count.fetch_add(n, Relaxed);
     }
 
-    /// Draws the plan: robots with their names and places of their bases, scanners with theirs, world, metres.
+    /// Draws the plan: robots with their names and places of their bases, scanners with theirs,
+    /// world, metres.
     #[must_use]
     pub fn draw(
         &self,

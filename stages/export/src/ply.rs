@@ -1,5 +1,5 @@
-//! The tiles of a result in; two PLY files of their points out, one of what moves and one of what stands still, for viewers and
-//! libraries that read no LAS (Open3D, MeshLab).
+//! The tiles of a result in; two PLY files of their points out, one of what moves and one of what
+//! stands still, for viewers and libraries that read no LAS (Open3D, MeshLab).
 
 use crate::atomic::AtomicFile;
 use crate::refill::KINDS;
@@ -12,7 +12,8 @@ pub const PLY: [&str; 2] = ["robots.ply", "fixed.ply"];
 
 /// Points that are read at a time.
 const PIECE: u64 = 1 << 16;
-/// Length of a header, bytes: a comment makes it so long, so that the number of points can be written last.
+/// Length of a header, bytes: a comment makes it so long, so that the number of points can be
+/// written last.
 const HEADER: usize = 512;
 
 /// Writes [`PLY`] into a folder, of some tiles (see [`tiles`](fn@crate::tiles)); `told` is asked
@@ -112,9 +113,9 @@ const BARE: usize = 37;
 /// Length of a point with its colour, bytes.
 const RECORD: usize = BARE + 3;
 
-/// Numbers are `int`, since the tensor reader of Open3D passes over `short`, `ushort` and `uint`; bytes are `uint8`, since meshio
-/// takes `uchar` for signed; names begin with `scalar_`, since CloudCompare takes no others where nobody answers its questions.
-/// See `scripts/cross`.
+/// Numbers are `int`, since the tensor reader of Open3D passes over `short`, `ushort` and `uint`;
+/// bytes are `uint8`, since meshio takes `uchar` for signed; names begin with `scalar_`, since
+/// CloudCompare takes no others where nobody answers its questions. See `scripts/cross`.
 fn header(n: u64, has_color: bool) -> Result<Vec<u8>> {
     let color = if has_color {
         "property uint8 red\nproperty uint8 green\nproperty uint8 blue\n"

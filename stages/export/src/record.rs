@@ -1,4 +1,5 @@
-//! What LAS records hold: kinds in, classes out; coordinates in, whole steps out; the settings of a file.
+//! What LAS records hold: kinds in, classes out; coordinates in, whole steps out; the settings of a
+//! file.
 
 use contract::{Error, Kind, PointKind};
 use geometry::Aabb;
@@ -28,8 +29,8 @@ pub struct Quantum {
 }
 
 impl Quantum {
-    /// Steps of 0.1 mm about the middle of `bounds`, rounded to whole kilometres where the middle is farther than one
-    /// from zero, so that tiles of one plant share it.
+    /// Steps of 0.1 mm about the middle of `bounds`, rounded to whole kilometres where the middle
+    /// is farther than one from zero, so that tiles of one plant share it.
     #[must_use]
     pub fn around(bounds: &Aabb) -> Self {
         let middle = bounds.center();
@@ -40,8 +41,9 @@ impl Quantum {
         Self { scale: [FINE; 3], offset }
     }
 
-    /// `wanted`, as an input has it, where its steps hold these bounds and some room around them; else the finest steps of a
-    /// power of ten that do, no finer than those that are wanted, or than 0.1 mm where none are.
+    /// `wanted`, as an input has it, where its steps hold these bounds and some room around them;
+    /// else the finest steps of a power of ten that do, no finer than those that are wanted, or
+    /// than 0.1 mm where none are.
     #[must_use]
     pub fn holding(bounds: &Aabb, wanted: Option<Self>) -> Self {
         if let Some(wanted) = wanted
@@ -103,7 +105,8 @@ pub struct LasSettings {
     pub with_labels: bool,
     /// With the extra field `BodyId`.
     pub with_bodies: bool,
-    /// Format 0 instead: 20 bytes a point with place, intensity and source, and nothing else of all this.
+    /// Format 0 instead: 20 bytes a point with place, intensity and source, and nothing else of
+    /// all this.
     pub short: bool,
     /// Compressed (LAZ).
     pub compress: bool,

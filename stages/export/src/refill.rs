@@ -1,5 +1,5 @@
-//! A spatial tile of an earlier result in; its points that are not superseded out, behind the new ones of a tile that is being
-//! written. Records stay as they are, byte for byte.
+//! A spatial tile of an earlier result in; its points that are not superseded out, behind the new
+//! ones of a tile that is being written. Records stay as they are, byte for byte.
 
 use crate::block::Straight;
 use crate::las::head;
@@ -50,8 +50,9 @@ pub struct Stated {
 }
 
 impl Spool {
-    /// Adds the points of a tile of ours, with records as its own, that `keep` wants: it is asked piece by piece, and answers for
-    /// each point. Where a sum is `stated`, the tile is compared with it while it is read.
+    /// Adds the points of a tile of ours, with records as its own, that `keep` wants: it is asked
+    /// piece by piece, and answers for each point. Where a sum is `stated`, the tile is
+    /// compared with it while it is read.
     ///
     /// # Errors
     /// A tile that is not one of ours, is not as stated or cannot be read; a file that cannot be

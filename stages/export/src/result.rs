@@ -1,5 +1,5 @@
-//! `result.json`: what was found, how sure that is, and from what; schema `stillpoint.result/1`, which grows by
-//! adding fields. Numbers that are not finite are written as null.
+//! `result.json`: what was found, how sure that is, and from what; schema `stillpoint.result/1`,
+//! which grows by adding fields. Numbers that are not finite are written as null.
 
 use crate::calibration::CalibrationEntry;
 use crate::mask::MaskFiles;
@@ -57,9 +57,11 @@ pub struct RobotEntry {
     /// Joints whose values are metres; those of the others are radians.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub slides: Vec<String>,
-    /// Standard deviation of each joint, same unit; that of any angle, π/√3, where the points say nothing of it.
+    /// Standard deviation of each joint, same unit; that of any angle, π/√3, where the points say
+    /// nothing of it.
     pub sigma: Places<f64>,
-    /// Values of the joints that follow those, by a rule of the model or as a closed loop needs it, same units.
+    /// Values of the joints that follow those, by a rule of the model or as a closed loop needs
+    /// it, same units.
     #[serde(default)]
     pub passive: Places<f64>,
     /// Whether the points determine each joint.
@@ -86,23 +88,26 @@ pub struct RobotEntry {
     /// The best other explanation.
     #[serde(default)]
     pub runner_up: Option<RunnerUpEntry>,
-    /// Other postures that explain the points as well: a flange with six bolts, a wrist that nobody saw.
+    /// Other postures that explain the points as well: a flange with six bolts, a wrist that
+    /// nobody saw.
     #[serde(default)]
     pub equals: Vec<EqualEntry>,
-    /// Other values within the limits, whole turns away, at which the robot stands the same, by joint.
+    /// Other values within the limits, whole turns away, at which the robot stands the same, by
+    /// joint.
     #[serde(default)]
     pub equivalents: Places<Vec<f64>>,
     /// The tool of the library that it carries; its joints and links follow the robot's own.
     #[serde(default)]
     pub tool: Option<ToolEntry>,
-    /// Where its joints are against the model, where that was asked for: base and joints are then those of the robot so
-    /// corrected.
+    /// Where its joints are against the model, where that was asked for: base and joints are then
+    /// those of the robot so corrected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationEntry>,
     /// Models that fit as well where the points can tell.
     #[serde(default)]
     pub alike: Vec<String>,
-    /// How far the robot's surface is off the model's, standard deviation over patches of a hand's width, metres.
+    /// How far the robot's surface is off the model's, standard deviation over patches of a hand's
+    /// width, metres.
     #[serde(default)]
     pub surface_sigma: Option<f64>,
     /// Standard deviation of the tip's place in the frame of the base, metres.
@@ -190,7 +195,8 @@ pub struct RunnerUpEntry {
     pub score: Option<f64>,
     /// Whether it is the same model in another posture.
     pub same_model: bool,
-    /// How clearly the beams prefer the best, on the links that stand differently: about 0 for equals, 1 for clear.
+    /// How clearly the beams prefer the best, on the links that stand differently: about 0 for
+    /// equals, 1 for clear.
     #[serde(default)]
     pub margin: Option<f64>,
 }
@@ -202,7 +208,8 @@ pub struct ToolEntry {
     pub model: String,
     /// The robot's link that it is bolted to.
     pub link: String,
-    /// Turn of its root about the axis of the robot's last joint, along that link's own axis, radians.
+    /// Turn of its root about the axis of the robot's last joint, along that link's own axis,
+    /// radians.
     pub mount: f64,
 }
 
@@ -252,8 +259,8 @@ pub struct ScanLabels {
     pub robot: String,
     /// Links, i16.
     pub link: String,
-    /// Points that a later scan has replaced or proved gone: their places in the mask, u64, ascending. They are no part of
-    /// the plant any more, whatever their labels say.
+    /// Points that a later scan has replaced or proved gone: their places in the mask, u64,
+    /// ascending. They are no part of the plant any more, whatever their labels say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub superseded: Option<String>,
 }

@@ -11,8 +11,8 @@ pub struct ReviewEntry {
     pub at: [f64; 3],
     /// What it asked for and what that did, in a sentence.
     pub did: String,
-    /// Whether a person should look at it again: it did nothing, contradicts another, or takes away
-    /// what the scans show.
+    /// Whether a person should look at it again: it did nothing, contradicts another, or takes
+    /// away what the scans show.
     pub needs_look: bool,
 }
 

@@ -1,5 +1,5 @@
-//! A fitted robot and what hangs on it in; its model as a planner loads it out: a URDF with its meshes and the hanging
-//! things as convex pieces of their links, and the posture as YAML and CSV.
+//! A fitted robot and what hangs on it in; its model as a planner loads it out: a URDF with its
+//! meshes and the hanging things as convex pieces of their links, and the posture as YAML and CSV.
 //!
 //! ```text
 //! robots/R1/robot.urdf        links, joints, limits; closed loops are open, their joints stand as found in joints.csv
@@ -58,8 +58,8 @@ pub fn write_robot(
     Ok(folder)
 }
 
-/// Files of the links' own meshes, relative to the output folder, of the robot with this id, and their lengths in bytes; none for
-/// links without a body.
+/// Files of the links' own meshes, relative to the output folder, of the robot with this id, and
+/// their lengths in bytes; none for links without a body.
 #[must_use]
 pub fn mesh_files(id: &str, model: &Model) -> Vec<Option<(String, u64)>> {
     let of_link = |(link, name): (&robot::Link, String)| {

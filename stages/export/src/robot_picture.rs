@@ -1,5 +1,6 @@
-//! One robot from four sides: its fitted posture and the labelled points about it in; a picture of points by link
-//! with the posture's outline over them out. An outline beside its points is a wrong posture, at a glance.
+//! One robot from four sides: its fitted posture and the labelled points about it in; a picture of
+//! points by link with the posture's outline over them out. An outline beside its points is a wrong
+//! posture, at a glance.
 
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, link_color};
 use contract::{Fan, Label, PointKind};
@@ -32,7 +33,8 @@ struct View {
     origin: Point,
     points: Vec<(f32, Rgb)>,
     outline: Vec<bool>,
-    /// Depth of the posture's surface and cosine to the eye; of its points nearest to the eye, the distance from it.
+    /// Depth of the posture's surface and cosine to the eye; of its points nearest to the eye, the
+    /// distance from it.
     surface: Vec<(f32, f32)>,
     residuals: Vec<(f32, f32)>,
 }
@@ -48,7 +50,8 @@ struct Shown {
 const NOTHING: Shown = Shown { depth: f32::INFINITY, link: u16::MAX, normal: [0.0; 3] };
 
 impl RobotPicture {
-    /// The views of the robot with this index in the labels, its links standing at `world_from_link`.
+    /// The views of the robot with this index in the labels, its links standing at
+    /// `world_from_link`.
     #[must_use]
     pub fn new(robot: i16, model: &Model, world_from_link: &[Pose], fan: &dyn Fan) -> Self {
         let mut bounds = Aabb::EMPTY;
@@ -116,7 +119,8 @@ impl RobotPicture {
         canvas
     }
 
-    /// The views from front and side with how far the points of its links are from the posture's surface.
+    /// The views from front and side with how far the points of its links are from the posture's
+    /// surface.
     pub(crate) fn residuals(&self) -> [Canvas; 2] {
         [self.views[0].draw_residuals(), self.views[1].draw_residuals()]
     }
@@ -137,7 +141,8 @@ impl RobotPicture {
 }
 
 impl View {
-    /// A view from the front (+x), turned by `turn` degrees about z and tilted by `tilt` degrees from above.
+    /// A view from the front (+x), turned by `turn` degrees about z and tilted by `tilt` degrees
+    /// from above.
     fn new(name: &'static str, turn: f64, tilt: f64, bounds: &Aabb) -> Self {
         let (st, ct) = turn.to_radians().sin_cos();
         let (sp, cp) = tilt.to_radians().sin_cos();
@@ -174,8 +179,8 @@ impl View {
         inside.then_some((u as usize, v as usize, depth))
     }
 
-    /// Notes how far a point of the robot is from the surface that shows in its pixel, if it is the nearest to the eye: by
-    /// depth, as the surface leans.
+    /// Notes how far a point of the robot is from the surface that shows in its pixel, if it is the
+    /// nearest to the eye: by depth, as the surface leans.
     fn measure(&mut self, world: [f64; 3]) {
         let Some((u, v, depth)) = self.pixel(world) else { return };
         let (surface, facing) = self.surface[v * SIDE + u];
@@ -305,7 +310,8 @@ fn normal(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3] {
     [n.x as f32, n.y as f32, n.z as f32]
 }
 
-/// Fills the pixels whose middle lies inside a triangle (pixels right and down, depth), the nearest surface winning.
+/// Fills the pixels whose middle lies inside a triangle (pixels right and down, depth), the nearest
+/// surface winning.
 fn fill_triangle(shown: &mut [Shown], corners: [[f32; 3]; 3], normal: [f32; 3], link: u16) {
     let [a, b, c] = corners;
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);

@@ -24,7 +24,8 @@ pub struct RescanEntry {
     pub changes: String,
 }
 
-/// How far a new scan was off the plant; its points are written as they are when that is taken back.
+/// How far a new scan was off the plant; its points are written as they are when that is taken
+/// back.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RegistrationEntry {
     /// Name of the scan.
@@ -39,8 +40,8 @@ pub struct RegistrationEntry {
     pub rms: [f64; 2],
 }
 
-/// The frame of new scans, found by the surfaces and beams of both sessions, and what speaks for it. Evidence is counted in
-/// pieces of 0.04 m² of surfaces that are not level.
+/// The frame of new scans, found by the surfaces and beams of both sessions, and what speaks for
+/// it. Evidence is counted in pieces of 0.04 m² of surfaces that are not level.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CarriedEntry {
     /// `found`, or `given` with `--frame` and refined.
@@ -63,6 +64,7 @@ pub struct CarriedEntry {
     pub n_on_new: usize,
     /// Surfaces of the plant where new beams went through.
     pub n_where_new_saw_through: usize,
-    /// By how much more the next best place is contradicted; none where no other place fits half as well.
+    /// By how much more the next best place is contradicted; none where no other place fits half
+    /// as well.
     pub margin: Option<i64>,
 }

@@ -7,18 +7,20 @@ use crate::record::LasSettings;
 pub struct Settings {
     /// Whether all points are written with their labels, in spatial tiles (`tiles/`).
     pub tiles: bool,
-    /// Edge of a tile, metres: half a robot cell, so that a rescan of one rewrites little beside it.
+    /// Edge of a tile, metres: half a robot cell, so that a rescan of one rewrites little beside
+    /// it.
     pub tile_edge: f64,
-    /// Spatial tiles at most: a square kilometre in tiles of 5 m. Points that are spread wider, by a wrong unit or by strays,
-    /// would fill a disk with files of a few points each.
+    /// Spatial tiles at most: a square kilometre in tiles of 5 m. Points that are spread wider, by
+    /// a wrong unit or by strays, would fill a disk with files of a few points each.
     pub max_tiles: usize,
-    /// Whether all that does not move is written as one cloud too (`clouds/fixed`). It is what most planners read, and
-    /// twice the disk; a plant is read by tiles, whose classes tell the same.
+    /// Whether all that does not move is written as one cloud too (`clouds/fixed`). It is what
+    /// most planners read, and twice the disk; a plant is read by tiles, whose classes tell
+    /// the same.
     pub fixed_cloud: bool,
     /// Whether records hold the number of the connected body that a point belongs to (`BodyId`).
     pub bodies: bool,
-    /// Whether all points are written as one COPC file too (`clouds/plant.copc.laz`), made of the tiles: an octree that viewers
-    /// load piece by piece.
+    /// Whether all points are written as one COPC file too (`clouds/plant.copc.laz`), made of the
+    /// tiles: an octree that viewers load piece by piece.
     pub copc: bool,
     /// Whether clouds are compressed (LAZ): a quarter of the disk, at a tenth of the speed.
     pub compress: bool,

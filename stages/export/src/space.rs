@@ -15,8 +15,8 @@ use std::path::Path;
 /// What is known of the space around a robot, and where it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpaceEntry {
-    /// Kinds of voxels, by `[x][y][z]`, relative to the output folder: 0 unknown, 1 free, 2 fixed, 3 the robot, 4
-    /// another robot.
+    /// Kinds of voxels, by `[x][y][z]`, relative to the output folder: 0 unknown, 1 free, 2 fixed,
+    /// 3 the robot, 4 another robot.
     pub grid: String,
     /// Octree of what is fixed or another robot, and what is free.
     pub octomap: String,
@@ -28,7 +28,8 @@ pub struct SpaceEntry {
     pub origin: [f64; 3],
     /// Number of voxels on each axis.
     pub size: [usize; 3],
-    /// World from the octrees' frame: a shift, metres; zero unless the plant is far from its origin.
+    /// World from the octrees' frame: a shift, metres; zero unless the plant is far from its
+    /// origin.
     pub octomap_shift: [f64; 3],
     /// Volume that no beam has seen, m³.
     pub unknown_m3: f64,

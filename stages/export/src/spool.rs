@@ -1,4 +1,5 @@
-//! Records in, piece by piece; one spatial tile out. It keeps no file open: records wait in blocks of memory and are appended.
+//! Records in, piece by piece; one spatial tile out. It keeps no file open: records wait in blocks
+//! of memory and are appended.
 
 use crate::atomic::part_of;
 use crate::block::{self, Block};
@@ -10,7 +11,8 @@ use std::fs::{File, OpenOptions};
 use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Blocks in which records wait, bytes. They are used again and again: fresh memory costs as much as copying into it.
+/// Blocks in which records wait, bytes. They are used again and again: fresh memory costs as much
+/// as copying into it.
 const BLOCK_BYTES: usize = 128 << 10;
 /// Fewest blocks, however little memory there is.
 const MIN_BLOCKS: usize = 4;
@@ -108,7 +110,8 @@ impl Spool {
         }
     }
 
-    /// Takes as many records as the last block has room for; returns the others. A record may lie in two blocks.
+    /// Takes as many records as the last block has room for; returns the others. A record may lie
+    /// in two blocks.
     pub(crate) fn fill<'a>(&mut self, records: &'a [u8]) -> &'a [u8] {
         let Some(last) = self.blocks.last_mut() else { return records };
         if !self.head.is_empty() {
@@ -146,7 +149,8 @@ impl Spool {
         Ok(written)
     }
 
-    /// The file, to be written from its end on; the first time, what an earlier run left behind goes.
+    /// The file, to be written from its end on; the first time, what an earlier run left behind
+    /// goes.
     fn open(&self) -> std::io::Result<File> {
         let mut options = OpenOptions::new();
         if self.is_begun {
@@ -208,7 +212,8 @@ impl Spool {
 impl Drop for Spool {
     fn drop(&mut self) {
         if self.is_begun {
-            // After a rename there is nothing left; a leftover that refuses to go never had a final name.
+            // After a rename there is nothing left; a leftover that refuses to go never had a final
+            // name.
             let _ = std::fs::remove_file(&self.part);
         }
     }

@@ -1,5 +1,5 @@
-//! Bytes in, one after the other, and what shall stand before them in the end; a file and its checksum out. Its bytes need
-//! not be read again to be listed.
+//! Bytes in, one after the other, and what shall stand before them in the end; a file and its
+//! checksum out. Its bytes need not be read again to be listed.
 
 use crate::atomic::AtomicFile;
 use contract::{Error, Result};

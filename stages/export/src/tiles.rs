@@ -1,7 +1,8 @@
 //! Packed strips in, in any order; spatial tiles of all points out.
 //!
-//! Tiles are as many as the plant is large, so none of them keeps a file open: records wait in blocks of memory, bounded in
-//! number, and where none is left those of the fullest tiles are appended to their files, side by side.
+//! Tiles are as many as the plant is large, so none of them keeps a file open: records wait in
+//! blocks of memory, bounded in number, and where none is left those of the fullest tiles are
+//! appended to their files, side by side.
 
 use crate::las::LasSummary;
 use crate::pack::{Packed, Run};
@@ -22,7 +23,8 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Tiles under the output folder, of records as `las` has them; `None` where they are not asked for.
+    /// Tiles under the output folder, of records as `las` has them; `None` where they are not asked
+    /// for.
     ///
     /// # Errors
     /// A folder that cannot be made.
@@ -37,7 +39,8 @@ impl Tiles {
         Ok(Some(Self { out: out.to_path_buf(), las: las.clone(), tiles: BTreeMap::new(), blocks }))
     }
 
-    /// Adds a packed strip; where no more records may wait, those of some tiles are written by `fan`.
+    /// Adds a packed strip; where no more records may wait, those of some tiles are written by
+    /// `fan`.
     ///
     /// # Errors
     /// A tile that cannot be written.
@@ -82,8 +85,8 @@ impl Tiles {
     }
 }
 
-/// Appends the fullest tiles to their files, side by side, until half of the blocks are free: full blocks, as long as there are
-/// some.
+/// Appends the fullest tiles to their files, side by side, until half of the blocks are free: full
+/// blocks, as long as there are some.
 fn relieve(
     tiles: &mut BTreeMap<[i32; 2], Spool>,
     blocks: &mut Blocks,

@@ -109,8 +109,8 @@ fn ply_files_hold_each_point_once_moving_and_fixed_apart() {
     for (name, n) in export::PLY.iter().zip(n) {
         let (header, points) = ply(&out.join("export").join(name));
         assert!(header.contains(&format!("element vertex {n}\n")), "{header}");
-        // Open3D's tensor reader passes over most of these types, and meshio takes `uchar` for signed; CloudCompare's
-        // command line passes over other names.
+        // Open3D's tensor reader passes over most of these types, and meshio takes `uchar` for
+        // signed; CloudCompare's command line passes over other names.
         for kept in ["scalar_kind", "scalar_robot", "scalar_link"] {
             assert!(header.contains(&format!(" {kept}\n")), "{header}");
         }

@@ -1,4 +1,5 @@
-//! Robots drawn at random in; the law of what is written of them, out: whoever loads it has the same robot.
+//! Robots drawn at random in; the law of what is written of them, out: whoever loads it has the
+//! same robot.
 
 use contract::{Fit, JointFit};
 use export::write_robot;
@@ -10,7 +11,8 @@ use std::path::Path;
 
 /// Robots that are drawn: each is written to disk and loaded twice.
 const N_CASES: u32 = 64;
-/// Nine digits behind the point are written; a chain of eight joints adds them up. Metres and radians.
+/// Nine digits behind the point are written; a chain of eight joints adds them up. Metres and
+/// radians.
 const NEAR: f64 = 1e-7;
 
 /// A joint: kind, parent (among the links before it), origin, turn, axis, limits.

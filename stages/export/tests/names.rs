@@ -1,5 +1,5 @@
-//! Names that hold anything (escape sequences, line breaks, marks of direction, formulas) in; files that their readers take for
-//! what they are, out.
+//! Names that hold anything (escape sequences, line breaks, marks of direction, formulas) in; files
+//! that their readers take for what they are, out.
 
 use contract::{Fit, JointFit, Verdict, quote};
 use export::{Labels, ResultFile, RobotEntry, SCHEMA, write_junit, write_robot};
@@ -7,7 +7,8 @@ use robot::{Model, Settings};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// ESC and a sequence that clears the screen, a zero, a bell, a line break, a mark of direction, what XML marks with, a quote.
+/// ESC and a sequence that clears the screen, a zero, a bell, a line break, a mark of direction,
+/// what XML marks with, a quote.
 const ODD: &str = "a\u{1b}[2J\u{0}\u{7}\r\nb\u{202e}c<&>\"'d\u{ffff}e";
 
 /// What a URDF can say: XML has no ESC and no zero.

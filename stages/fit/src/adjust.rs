@@ -1,11 +1,12 @@
-//! A refined posture and its points in; out come base, joints and the scans' own errors in one robust least-squares
-//! adjustment, with a covariance that stays honest when errors of points are alike (METHOD.md §11, §14).
+//! A refined posture and its points in; out come base, joints and the scans' own errors in one
+//! robust least-squares adjustment, with a covariance that stays honest when errors of points are
+//! alike (METHOD.md §11, §14).
 //!
-//! Beside base and joints each scan has a shift, a turn about its scanner and a range bias with priors: scans are
-//! registered to millimetres only, and a fit that does not know that bends the robot. And each patch of the model's
-//! surface has an offset along its normals, `u ~ N(0, σ_u²)`, taken out in closed form, σ_u estimated from the patches
-//! themselves: a model is drawn to millimetres only. Both or neither: without the patches scans would be bent to fit a
-//! wrong shape.
+//! Beside base and joints each scan has a shift, a turn about its scanner and a range bias with
+//! priors: scans are registered to millimetres only, and a fit that does not know that bends the
+//! robot. And each patch of the model's surface has an offset along its normals, `u ~ N(0, σ_u²)`,
+//! taken out in closed form, σ_u estimated from the patches themselves: a model is drawn to
+//! millimetres only. Both or neither: without the patches scans would be bent to fit a wrong shape.
 
 use contract::{Fan, OneByOne};
 use geometry::{Point, Pose, Vector, robust};
@@ -56,7 +57,8 @@ pub(crate) struct Adjusted {
     pub(crate) covariance: DMatrix<f64>,
     /// One for each view.
     pub(crate) scans: Vec<ScanError>,
-    /// Noise of the ranges as the residuals show it, metres, one sigma; at most what it started with.
+    /// Noise of the ranges as the residuals show it, metres, one sigma; at most what it started
+    /// with.
     pub(crate) noise: f64,
     /// How the robot gives way to those, and what its points say of them (see [`Normal::shared`]).
     pub(crate) shared: Option<[DMatrix<f64>; 2]>,
@@ -91,14 +93,16 @@ pub(crate) struct Adjust<'a> {
     pub(crate) refine: &'a Refine<'a>,
     /// Joints whose places on their links are unknowns, too, in [`Self::at`].
     pub(crate) frames: &'a [usize],
-    /// Joints that need not have come to rest at the end: their values are looked for by themselves.
+    /// Joints that need not have come to rest at the end: their values are looked for by
+    /// themselves.
     pub(crate) loose: &'a [usize],
 }
 
 /// Most rounds of the adjustment: a flange that the points leave open would wander on for ever.
 const N_ROUNDS: usize = 7;
-/// The last step is one by less than a third of a standard deviation, in all directions together, or one after which steps that
-/// go on to shrink as they did, mostly sixfold a round, come to less than that.
+/// The last step is one by less than a third of a standard deviation, in all directions together,
+/// or one after which steps that go on to shrink as they did, mostly sixfold a round, come to less
+/// than that.
 const SMALL_STEP: f64 = 0.3;
 /// Tukey's constant: 95 % efficient for normal errors.
 const TUKEY: f64 = 4.685;
@@ -116,8 +120,8 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// A posture, before anything is known of the scans' errors. Patches of the surface are off apart: that is soon reckoned, and
-    /// enough to choose by.
+    /// A posture, before anything is known of the scans' errors. Patches of the surface are off
+    /// apart: that is soon reckoned, and enough to choose by.
     pub(crate) fn at(hypothesis: &Hypothesis, scene: &Scene<'_>) -> Self {
         let scans = vec![ScanError::NONE; scene.views.len()];
         let hypothesis = hypothesis.clone();
@@ -188,8 +192,8 @@ impl<'a> Adjust<'a> {
         self.closed(state, self.sums(state, points, fan).0, fan)
     }
 
-    /// Sums of the points at a state, and what is said of each link. What triangles the points lie on is known from a state
-    /// like this one, and kept.
+    /// Sums of the points at a state, and what is said of each link. What triangles the points lie
+    /// on is known from a state like this one, and kept.
     pub(crate) fn sums(
         &self,
         state: &State,
@@ -210,8 +214,8 @@ impl<'a> Adjust<'a> {
         sums.pop().unwrap_or_else(|| self.sums_of(&pairing, (&[], &mut [])))
     }
 
-    /// Half the robust squares of all points over their variance; one that lies on nothing counts as much as one at the end
-    /// of the kernel.
+    /// Half the robust squares of all points over their variance; one that lies on nothing counts
+    /// as much as one at the end of the kernel.
     pub(crate) fn cost(&self, state: &State, points: &Sampled) -> f64 {
         let pairing = Pairing::new(self.refine, state, points.gate);
         let slack = state.patch_sigma * state.patch_sigma;

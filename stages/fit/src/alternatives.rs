@@ -1,5 +1,6 @@
-//! A fitted posture in; out come other postures worth a look: other values of one joint, the flipped wrist, and a new
-//! search from the joint on from which the beams contradict the links (METHOD.md §9).
+//! A fitted posture in; out come other postures worth a look: other values of one joint, the
+//! flipped wrist, and a new search from the joint on from which the beams contradict the links
+//! (METHOD.md §9).
 
 use contract::Fan;
 use nalgebra::UnitQuaternion;
@@ -21,16 +22,19 @@ const MIN_SEEN: f32 = 0.05;
 /// Hypotheses of a new search that are refined.
 const N_AGAIN: usize = 10;
 
-/// Of those, so many that differ in their last joint only: in the others by fewer sweep steps than so many.
+/// Of those, so many that differ in their last joint only: in the others by fewer sweep steps than
+/// so many.
 const N_FLANGES: usize = 3;
 const WRIST_STEPS: f64 = 6.0;
 /// So far beyond its limit a mirrored joint is put to its limit, radians: 3°.
 const BEYOND: f64 = 0.052;
-/// Yaws that a base is tried at: every 2°, the arc that its corners move by half of the tolerance in.
+/// Yaws that a base is tried at: every 2°, the arc that its corners move by half of the tolerance
+/// in.
 const N_YAWS: usize = 180;
 /// Share of the tolerance for that: where the base stands is known.
 const TURNED_TOLERANCE: f64 = 0.5;
-/// Share of its surface by which a yaw may explain less than the one found: the best may lie between two.
+/// Share of its surface by which a yaw may explain less than the one found: the best may lie
+/// between two.
 const TURNED_SHORT: f64 = 0.05;
 /// So many of the best are refined.
 const N_TURNED: usize = 2;
@@ -47,8 +51,8 @@ impl Beam<'_> {
         out
     }
 
-    /// The base turned under the robot, its first joint turned back: what stands on it stays. A round base shows its
-    /// yaw by a connector box only.
+    /// The base turned under the robot, its first joint turned back: what stands on it stays. A
+    /// round base shows its yaw by a connector box only.
     fn turned_bases(&self, h: &Hypothesis) -> Vec<Hypothesis> {
         let model = self.prepared.model;
         let joint = &model.joints[model.free[0]];
@@ -85,8 +89,8 @@ impl Beam<'_> {
         out
     }
 
-    /// Other maxima of one joint alone: a joint whose link nearly hides in its parent may have been caught at the wrong
-    /// one.
+    /// Other maxima of one joint alone: a joint whose link nearly hides in its parent may have been
+    /// caught at the wrong one.
     fn other_values(&self, h: &Hypothesis, free: usize) -> Vec<Hypothesis> {
         if self.prepared.placed_by[free].is_empty() {
             return Vec::new();
@@ -114,8 +118,9 @@ impl Beam<'_> {
             .collect()
     }
 
-    /// The other way to hold the same hand: for each three turning joints in a row the outer ones half a turn on, the
-    /// middle one mirrored about the value at which the outer axes are parallel. Within limits, where it scores well.
+    /// The other way to hold the same hand: for each three turning joints in a row the outer ones
+    /// half a turn on, the middle one mirrored about the value at which the outer axes are
+    /// parallel. Within limits, where it scores well.
     pub(crate) fn flips(&self, h: &Hypothesis) -> Vec<Hypothesis> {
         let tolerance = self.tolerance as f32;
         let mut out = Vec::new();
@@ -144,8 +149,8 @@ impl Beam<'_> {
         out
     }
 
-    /// Value of joint `first + 1` at which the axes of its neighbours are parallel; `None` where one of the three does
-    /// not turn or nothing is mirrored by it.
+    /// Value of joint `first + 1` at which the axes of its neighbours are parallel; `None` where
+    /// one of the three does not turn or nothing is mirrored by it.
     fn mirror(&self, h: &Hypothesis, first: usize) -> Option<f64> {
         let model = self.prepared.model;
         let turns = |j: usize| model.joints[model.free[j]].kind != JointKind::Prismatic;
@@ -170,15 +175,16 @@ impl Beam<'_> {
         (b.hypot(c) > 0.5).then(|| c.atan2(b))
     }
 
-    /// A value of a joint, whole turns added, within its limits; at a limit that it is only a little beyond, since what it was
-    /// made of may be off.
+    /// A value of a joint, whole turns added, within its limits; at a limit that it is only a
+    /// little beyond, since what it was made of may be off.
     fn within_limits(&self, free: usize, value: f64) -> Option<f64> {
         let [low, high] = self.prepared.model.limits(free);
         let value = turns::within(value, [low - BEYOND, high + BEYOND])?;
         Some(value.clamp(low, high))
     }
 
-    /// A new search from the joint before the first link that the beams contradict; nothing where they contradict none.
+    /// A new search from the joint before the first link that the beams contradict; nothing where
+    /// they contradict none.
     pub(crate) fn again(
         &self,
         h: &Hypothesis,
@@ -200,8 +206,8 @@ impl Beam<'_> {
         self.varied(self.resume(vec![start], first, fan), N_AGAIN)
     }
 
-    /// The first `n` of some hypotheses, few of those that differ in their last joint only: a flange that may stand
-    /// anywhere must not crowd out another wrist.
+    /// The first `n` of some hypotheses, few of those that differ in their last joint only: a
+    /// flange that may stand anywhere must not crowd out another wrist.
     pub(crate) fn varied(&self, found: Vec<Hypothesis>, n: usize) -> Vec<Hypothesis> {
         let mut kept: Vec<Hypothesis> = Vec::new();
         for next in found {

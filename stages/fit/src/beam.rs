@@ -1,5 +1,6 @@
-//! Base poses in; out come postures that the beams allow, best first: a beam search along the joints, in which every
-//! local maximum of every sweep, to within its steps, competes with all others (METHOD.md §8, §9).
+//! Base poses in; out come postures that the beams allow, best first: a beam search along the
+//! joints, in which every local maximum of every sweep, to within its steps, competes with all
+//! others (METHOD.md §8, §9).
 
 use contract::Fan;
 use geometry::probe::HIDDEN_PRICE;
@@ -17,11 +18,12 @@ pub(crate) struct Hypothesis {
     pub(crate) score: f64,
 }
 
-/// Mean score by which a value may lag behind the best on a quarter of the samples and still be looked at: three of
-/// that mean's standard deviations.
+/// Mean score by which a value may lag behind the best on a quarter of the samples and still be
+/// looked at: three of that mean's standard deviations.
 const HOPELESS: f64 = 0.4;
 
-/// Share of the tolerance by which two steps of a sweep may move samples, so that every second value is enough to find its maxima.
+/// Share of the tolerance by which two steps of a sweep may move samples, so that every second
+/// value is enough to find its maxima.
 const FINE_ARC: f64 = 0.67;
 
 /// The search for one model's posture.
@@ -33,10 +35,11 @@ pub(crate) struct Beam<'a> {
     pub(crate) tolerance: f64,
 }
 
-/// Mean score of the links placed so far down to which a search goes on: half of what it is where no beam reached any of them, as
-/// a bench or the arm itself may hide a foot.
+/// Mean score of the links placed so far down to which a search goes on: half of what it is where
+/// no beam reached any of them, as a bench or the arm itself may hide a foot.
 const MOST_HIDDEN: f64 = 0.5 * HIDDEN_PRICE as f64;
-/// A base is turned by half and a quarter of this to settle it, radians: what its foot shows of its yaw.
+/// A base is turned by half and a quarter of this to settle it, radians: what its foot shows of its
+/// yaw.
 const SHAKEN_YAW: f64 = 0.03;
 /// Turning joints with which the base is settled: the small links after those say little of it.
 const N_SHAKEN: usize = 3;
@@ -53,7 +56,8 @@ impl<'a> Beam<'a> {
         Self { prepared, scene, settings, tolerance: settings.search_tolerance }
     }
 
-    /// For links whose carriers are fitted already: a small wrist fits many places to within a hand's width.
+    /// For links whose carriers are fitted already: a small wrist fits many places to within a
+    /// hand's width.
     pub(crate) fn fitted(&self) -> Self {
         Self { tolerance: self.tolerance.min(FITTED), ..*self }
     }
@@ -98,7 +102,8 @@ impl Beam<'_> {
             });
             next.extend(rest);
             sort(&mut next);
-            // Not one hypothesis explains more than the beams contradict: no robot of this model stands here.
+            // Not one hypothesis explains more than the beams contradict: no robot of this model
+            // stands here.
             let least = if free + 1 < n { -MOST_HIDDEN * self.weight(free) } else { 0.0 };
             if next.first().is_none_or(|h| h.score <= least) {
                 return Vec::new();
@@ -134,7 +139,8 @@ impl Beam<'_> {
         self.weighted(placed, &self.probes(placed, tolerance, 0..n_samples, &[]))
     }
 
-    /// What the scans say of the samples of each link, on top of what they say of those before them.
+    /// What the scans say of the samples of each link, on top of what they say of those before
+    /// them.
     fn probes(
         &self,
         placed: &[(usize, Pose)],
@@ -187,7 +193,8 @@ impl Beam<'_> {
             .collect()
     }
 
-    /// Start, span and number of steps of a joint's sweep: an arc step moves its samples by the tolerance at most.
+    /// Start, span and number of steps of a joint's sweep: an arc step moves its samples by the
+    /// tolerance at most.
     pub(crate) fn sweep(&self, free: usize) -> (f64, f64, usize) {
         let [low, high] = self.prepared.model.limits(free);
         let tolerance = self.tolerance;
@@ -215,7 +222,8 @@ impl Beam<'_> {
         *beam = kept;
     }
 
-    /// Whether two hypotheses agree to within `steps` sweep steps in all joints set, and in the base.
+    /// Whether two hypotheses agree to within `steps` sweep steps in all joints set, and in the
+    /// base.
     pub(crate) fn alike(&self, a: &Hypothesis, b: &Hypothesis, upto: usize, steps: f64) -> bool {
         let tolerance = self.tolerance;
         let shift =
@@ -229,11 +237,13 @@ impl Beam<'_> {
             })
     }
 
-    /// Shakes the joints set so far, and the base with the first of them, one by one, in halving steps, while the score of all
-    /// placed links rises: errors of a parent must not pile up in its children.
+    /// Shakes the joints set so far, and the base with the first of them, one by one, in halving
+    /// steps, while the score of all placed links rises: errors of a parent must not pile up in
+    /// its children.
     fn settle(&self, h: &mut Hypothesis, upto: usize) {
         let tolerance = (0.7 * self.tolerance) as f32;
-        // Scores of the links that each joint places, the base's first: a joint leaves those before it as they are.
+        // Scores of the links that each joint places, the base's first: a joint leaves those before
+        // it as they are.
         let placed = |j: usize| &self.prepared.placed_by[j];
         let mut parts: Vec<f64> = vec![self.score(h, &self.prepared.fixed, tolerance)];
         parts.extend((0..=upto).map(|j| self.score(h, placed(j), tolerance)));
@@ -267,7 +277,8 @@ impl Beam<'_> {
         h.score = parts.iter().sum();
     }
 
-    /// Takes the shaken hypothesis if its score is higher, with the scores of its parts; those before `first` stay.
+    /// Takes the shaken hypothesis if its score is higher, with the scores of its parts; those
+    /// before `first` stay.
     fn climb(
         &self,
         h: &mut Hypothesis,
@@ -294,8 +305,8 @@ impl Beam<'_> {
         }
     }
 
-    /// Values of a joint at which the score of some links is a local maximum, with that score: of every so many values of its sweep,
-    /// and then of those beside each maximum among them.
+    /// Values of a joint at which the score of some links is a local maximum, with that score: of
+    /// every so many values of its sweep, and then of those beside each maximum among them.
     pub(crate) fn peaks(
         &self,
         h: &Hypothesis,
@@ -345,8 +356,8 @@ impl Beam<'_> {
         peaks.into_iter().map(&mut highest).map(|(k, score)| (value(k), score)).collect()
     }
 
-    /// Steps from one value of a joint's sweep that is looked at to the next: two where they move the samples of the links that it
-    /// places by less than what those are told apart by.
+    /// Steps from one value of a joint's sweep that is looked at to the next: two where they move
+    /// the samples of the links that it places by less than what those are told apart by.
     fn stride(&self, free: usize) -> usize {
         let (_, span, n) = self.sweep(free);
         let arc = span / n as f64 * self.prepared.lever[free];

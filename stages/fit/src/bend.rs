@@ -1,6 +1,7 @@
-//! An adjusted posture in; out come other values of joints about its end that are worth a look (METHOD.md §9): of the one before
-//! its last, a wrist of which little is seen has many, and what hangs on its flange draws it to some of them; and of a tool's
-//! slides, which stand as well in a part that the tool holds.
+//! An adjusted posture in; out come other values of joints about its end that are worth a look
+//! (METHOD.md §9): of the one before its last, a wrist of which little is seen has many, and what
+//! hangs on its flange draws it to some of them; and of a tool's slides, which stand as well in a
+//! part that the tool holds.
 
 use contract::Fan;
 use std::f64::consts::TAU;
@@ -17,7 +18,8 @@ const APART: f64 = 0.035;
 const SHORT: f64 = 0.3;
 /// Most values.
 const N_VALUES: usize = 4;
-/// Steps of a slide, metres, and most of them. They are compared as they are: a refinement would be drawn to what the tool holds.
+/// Steps of a slide, metres, and most of them. They are compared as they are: a refinement would be
+/// drawn to what the tool holds.
 const SLIDE_STEP: f64 = 0.005;
 const MAX_SLIDES: f64 = 100.0;
 

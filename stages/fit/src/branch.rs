@@ -1,6 +1,6 @@
-//! A settled posture in; out come the closed loops that stand on the other of their two solutions, by the points and
-//! beams of their own links (METHOD.md §12): limits and closure say which solutions there are, the assembly mode of the zero
-//! posture stays where the points cannot tell.
+//! A settled posture in; out come the closed loops that stand on the other of their two solutions,
+//! by the points and beams of their own links (METHOD.md §12): limits and closure say which
+//! solutions there are, the assembly mode of the zero posture stays where the points cannot tell.
 
 use robot::Model;
 
@@ -8,10 +8,12 @@ use crate::beam::Hypothesis;
 use crate::judge::{Judgement, judged};
 use crate::refine::Refine;
 
-/// How much better the points and beams must like the other solution: shares of squares and of surface judged.
+/// How much better the points and beams must like the other solution: shares of squares and of
+/// surface judged.
 const CLEAR: (f64, f64) = (0.1, 0.1);
 
-/// Loops that stand otherwise than the model has them, and the model with them so; `None` where all stand as it has them.
+/// Loops that stand otherwise than the model has them, and the model with them so; `None` where all
+/// stand as it has them.
 pub(crate) fn branches(
     refine: &Refine<'_>,
     h: &Hypothesis,

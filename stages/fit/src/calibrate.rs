@@ -1,9 +1,9 @@
-//! A fit and its points in; out come where the robot's joints really are on their links, as far as the points tell, and
-//! the fit of the robot so corrected (METHOD.md §17).
+//! A fit and its points in; out come where the robot's joints really are on their links, as far as
+//! the points tell, and the fit of the robot so corrected (METHOD.md §17).
 //!
-//! Each free joint gets a shift and a turn of its frame with a prior beside base, posture and scans in one adjustment;
-//! about (or along) its own axis it gets none, since the joint itself moves there: what a controller's zero is off by
-//! no scan of one posture can tell.
+//! Each free joint gets a shift and a turn of its frame with a prior beside base, posture and scans
+//! in one adjustment; about (or along) its own axis it gets none, since the joint itself moves
+//! there: what a controller's zero is off by no scan of one posture can tell.
 
 use contract::{Calibration, Fan, Fit, JointFrame, Verdict};
 use geometry::{Pose, Vector, robust};
@@ -27,7 +27,8 @@ use crate::{Prepared, Scene, Settings, report, verdict};
 const N_STEPS: usize = 4;
 /// Standard deviation of what is not asked, relative to that of the prior.
 const FIXED: f64 = 1e-3;
-/// A joint this far off is worth a word: swing, radians (0.1°), and offset of its axis, metres (METHOD.md §17) …
+/// A joint this far off is worth a word: swing, radians (0.1°), and offset of its axis, metres
+/// (METHOD.md §17) …
 const WORTH: (f64, f64) = (0.001_75, 0.002);
 /// … if it is so many standard deviations.
 const CLEAR: f64 = 3.0;
@@ -76,8 +77,8 @@ pub fn calibrate(
     (model, out)
 }
 
-/// The model with its joints where the points have them, the adjustment of its base and posture, and where they are;
-/// from one point of `every`.
+/// The model with its joints where the points have them, the adjustment of its base and posture,
+/// and where they are; from one point of `every`.
 fn estimate(
     refine: &Refine<'_>,
     start: &Hypothesis,
@@ -115,8 +116,8 @@ fn estimate(
     }
 }
 
-/// The verdict on the nominal fit, had its joints been known as well as the calibrated ones are: that they are elsewhere is what it did
-/// not know.
+/// The verdict on the nominal fit, had its joints been known as well as the calibrated ones are:
+/// that they are elsewhere is what it did not know.
 fn as_known(nominal: &Refine<'_>, fit: &Fit, h: &Hypothesis, calibrated: &Fit) -> Verdict {
     let judgement = judged(nominal, h);
     let passed = |mut fit: Fit| {
@@ -131,7 +132,8 @@ fn as_known(nominal: &Refine<'_>, fit: &Fit, h: &Hypothesis, calibrated: &Fit) -
     passed(Fit { joints, covariance, ..fit.clone() })
 }
 
-/// What the nominal fit knows and the calibrated one keeps; and what the calibration found, in words.
+/// What the nominal fit knows and the calibrated one keeps; and what the calibration found, in
+/// words.
 fn keep(out: &mut Fit, fit: &Fit, found: Calibration) {
     out.runner_up.clone_from(&fit.runner_up);
     out.equals.clone_from(&fit.equals);
@@ -148,8 +150,8 @@ fn is_beside(frame: &JointFrame) -> bool {
     offset > WORTH.1 && offset > CLEAR * sigma
 }
 
-/// A bare flange that is clearly elsewhere fits its bolts at a wrong turn as well as at its own, and a wrong turn puts it
-/// elsewhere: any value may be right.
+/// A bare flange that is clearly elsewhere fits its bolts at a wrong turn as well as at its own,
+/// and a wrong turn puts it elsewhere: any value may be right.
 fn open_beside(refine: &Refine<'_>, frames: &[JointFrame], spins: &mut [Spin]) {
     let is_bare = |j: usize| refine.prepared.carried(j).len() == refine.prepared.placed_by[j].len();
     for spin in spins.iter_mut().filter(|s| is_bare(s.joint) && is_beside(&frames[s.joint])) {
@@ -180,9 +182,9 @@ fn words(frames: &[JointFrame]) -> Vec<String> {
     out
 }
 
-/// Whether the robot's joints are where its model has them, from a part of its points. Where they are not, base and
-/// joints may be off by what they would move if the places of the joints were free: their covariance is widened by
-/// that, and it is said.
+/// Whether the robot's joints are where its model has them, from a part of its points. Where they
+/// are not, base and joints may be off by what they would move if the places of the joints were
+/// free: their covariance is widened by that, and it is said.
 pub(crate) fn doubt(
     refine: &Refine<'_>,
     (best, spins): (&mut Adjusted, &mut [Spin]),
@@ -208,9 +210,9 @@ pub(crate) fn doubt(
     words
 }
 
-/// A surface that is off by less over its patches is that of its model, joints and all: metres, and in multiples of the
-/// scans' noise. Of robots that are their models it was 0 at 2 mm, up to 0.5 mm at 10 mm; with joints off by 2 mm and 0.1°
-/// 0.4 mm and more.
+/// A surface that is off by less over its patches is that of its model, joints and all: metres, and
+/// in multiples of the scans' noise. Of robots that are their models it was 0 at 2 mm, up to 0.5 mm
+/// at 10 mm; with joints off by 2 mm and 0.1° 0.4 mm and more.
 const SMOOTH: (f64, f64) = (0.000_25, 0.05);
 /// One point of so many is asked about the places of joints.
 const EVERY: usize = 4;
@@ -232,8 +234,8 @@ fn frames(nominal: &Model, model: &Model) -> Vec<JointFrame> {
     nominal.free.iter().map(of).collect()
 }
 
-/// Standard deviations of shifts and turns of a joint's frame before any point is looked at: what its joint does itself
-/// it does not.
+/// Standard deviations of shifts and turns of a joint's frame before any point is looked at: what
+/// its joint does itself it does not.
 fn prior(frame: &JointFrame, [shift, turn]: [f64; 2]) -> [f64; 6] {
     let along = frame.axis.map(f64::abs);
     let along = (0..3).max_by(|a, b| along[*a].total_cmp(&along[*b])).unwrap_or(0);
@@ -258,11 +260,11 @@ impl Normal {
     }
 }
 
-/// What several postures of one robot, or several robots of one model, say together of the places of its joints; `None`
-/// where they are of different models.
+/// What several postures of one robot, or several robots of one model, say together of the places
+/// of its joints; `None` where they are of different models.
 ///
-/// Value by value, not by their covariance: one wrist that stands wrong must not pull at joints that are right, and
-/// counts less the farther it is off.
+/// Value by value, not by their covariance: one wrist that stands wrong must not pull at joints
+/// that are right, and counts less the farther it is off.
 #[must_use]
 pub fn combine(all: &[&Calibration]) -> Option<Calibration> {
     let first = *all.first()?;
@@ -288,7 +290,8 @@ pub fn combine(all: &[&Calibration]) -> Option<Calibration> {
     Some(out)
 }
 
-/// What the points alone say of a value that was found with a prior: value and weight; `None` where they say nothing.
+/// What the points alone say of a value that was found with a prior: value and weight; `None` where
+/// they say nothing.
 fn told(value: f64, sigma: f64, prior: f64) -> Option<[f64; 2]> {
     let (whole, own) = (sigma.powi(-2), prior.powi(-2));
     let weight = whole - own;
@@ -347,7 +350,8 @@ fn with_sigmas(mut frames: Vec<JointFrame>, covariance: &DMatrix<f64>) -> Vec<Jo
 
 /// How links move with the places of joints.
 pub(crate) struct Frames {
-    /// For each joint: twists `[v, w]` in the base frame for unit shifts and turns along its frame's axes.
+    /// For each joint: twists `[v, w]` in the base frame for unit shifts and turns along its
+    /// frame's axes.
     twists: Vec<[[f64; 6]; 6]>,
     /// For each link, for each joint: whether the joint carries it.
     carries: Vec<Vec<bool>>,
@@ -373,7 +377,8 @@ impl Frames {
         Self { twists, carries }
     }
 
-    /// Derivatives of a residual at a point with a facet's normal (base frame) by the places of the joints.
+    /// Derivatives of a residual at a point with a facet's normal (base frame) by the places of the
+    /// joints.
     pub(crate) fn row(&self, link: usize, q: &Vector, n: &Vector, out: &mut [f64]) {
         let qxn = q.cross(n);
         for (f, twists) in self.twists.iter().enumerate() {

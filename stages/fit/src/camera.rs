@@ -1,9 +1,10 @@
-//! A posture adjusted to points of a depth camera in; out comes how far base and joints may be off beyond what the scatter of the
-//! points says (METHOD.md §14.6).
+//! A posture adjusted to points of a depth camera in; out comes how far base and joints may be off
+//! beyond what the scatter of the points says (METHOD.md §14.6).
 //!
-//! A camera has whole links off, each by an amount of its own: up to 15 mm where its neighbour is not, with hundreds of points
-//! and more on each (`scripts/camera_residuals.py`). Such errors leave no residuals, since the joints between the links follow them:
-//! they are laid on the links here, and the adjustment is asked how it would answer.
+//! A camera has whole links off, each by an amount of its own: up to 15 mm where its neighbour is
+//! not, with hundreds of points and more on each (`scripts/camera_residuals.py`). Such errors leave
+//! no residuals, since the joints between the links follow them: they are laid on the links here,
+//! and the adjustment is asked how it would answer.
 
 use contract::Fan;
 use geometry::{Point, Vector, robust};
@@ -22,7 +23,8 @@ use crate::sampled::Sampled;
 const LINK_OFF: f64 = 0.9;
 /// How far its ends are off by more than its middle, the same.
 const LINK_BENT: f64 = 0.6;
-/// Ways in which a link may be off: along the beams as a whole, and growing to either side of the image.
+/// Ways in which a link may be off: along the beams as a whole, and growing to either side of the
+/// image.
 const N_WAYS: usize = 3;
 /// Turns of the base that are tried, radians: 3°.
 const STEP: f64 = 0.052;
@@ -39,7 +41,8 @@ pub(crate) fn beyond(
     of_links(refine, best, points) + of_foot(refine, &best.hypothesis, near, fan)
 }
 
-/// Joints are no better known than to the farthest of other postures that explain the points nearly as well.
+/// Joints are no better known than to the farthest of other postures that explain the points nearly
+/// as well.
 pub(crate) fn spread<'a>(
     h: &Hypothesis,
     others: impl Iterator<Item = &'a Hypothesis>,
@@ -96,7 +99,8 @@ fn of_links(refine: &Refine<'_>, best: &Adjusted, points: &Sampled) -> DMatrix<f
 struct Seen {
     /// The mean of the points, metres.
     middle: Vector,
-    /// Two unit vectors across the beam, each with the standard deviation of the points along it, metres.
+    /// Two unit vectors across the beam, each with the standard deviation of the points along it,
+    /// metres.
     axes: [(Vector, f64); 2],
 }
 
@@ -128,8 +132,9 @@ impl Places {
     }
 }
 
-/// What turns of the base add, the first joint turned back, where the points of the foot leave them open all around: no more than
-/// a quarter turn is looked at where a scanner shows the foot (see `foot.rs`), and a camera bends it besides.
+/// What turns of the base add, the first joint turned back, where the points of the foot leave them
+/// open all around: no more than a quarter turn is looked at where a scanner shows the foot (see
+/// `foot.rs`), and a camera bends it besides.
 fn of_foot(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> DMatrix<f64> {
     let n = 6 + h.posture.len();
     let mut out = DMatrix::zeros(n, n);

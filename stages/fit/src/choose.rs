@@ -1,4 +1,5 @@
-//! Fits of all candidates in; out come those that can stand together: at most one for each body of points.
+//! Fits of all candidates in; out come those that can stand together: at most one for each body of
+//! points.
 
 use contract::{Fit, RunnerUp, Verdict};
 use geometry::{Aabb, Point};
@@ -8,7 +9,8 @@ use robot::Model;
 const OVERLAP: f64 = 0.25;
 /// Bases nearer than this compete whatever their boxes, metres.
 const SAME_BASE: f64 = 0.35;
-/// Two robots that cross share less of their surface than this: boxes about links hold more than the links.
+/// Two robots that cross share less of their surface than this: boxes about links hold more than
+/// the links.
 const CROSSED: f64 = 0.15;
 /// Samples of a link that are asked for that.
 const N_SAMPLES: usize = 200;
@@ -17,9 +19,10 @@ const ALIKE: f64 = 0.97;
 /// A model of another kind that explains this share of the best makes the best doubtful.
 const RIVAL: f64 = 0.90;
 
-/// Chooses among the fits, best explained first; the losers become runners-up of the winners. A fit that somebody vouches for
-/// (`is_known`) stands before all others, and as it is. A refused fit that explains the most keeps what is doubtful from standing
-/// there, since what stands there is none of them; what is trusted it does not.
+/// Chooses among the fits, best explained first; the losers become runners-up of the winners. A fit
+/// that somebody vouches for (`is_known`) stands before all others, and as it is. A refused fit
+/// that explains the most keeps what is doubtful from standing there, since what stands there is
+/// none of them; what is trusted it does not.
 #[must_use]
 pub fn choose(mut fits: Vec<Fit>, models: &[Model], is_known: impl Fn(&Fit) -> bool) -> Vec<Fit> {
     fits.sort_by(|a, b| {
@@ -89,9 +92,10 @@ fn compete(a: &Fit, a_box: &Aabb, b: &Fit, b_box: &Aabb) -> bool {
     smaller > 0.0 && volume(&shared) > OVERLAP * smaller
 }
 
-/// Whether two fits are of two robots whose arms cross: on bases of their own, and hardly any surface of one is within a link of
-/// the other. Doubtful ones of one model, too: each of two such arms is the other's likeliest other posture. What is refused
-/// bars nothing that stands apart from it.
+/// Whether two fits are of two robots whose arms cross: on bases of their own, and hardly any
+/// surface of one is within a link of the other. Doubtful ones of one model, too: each of two such
+/// arms is the other's likeliest other posture. What is refused bars nothing that stands apart from
+/// it.
 fn stand_apart(fits: [&Fit; 2], models: &[Model]) -> bool {
     let [a, b] = fits.map(|f| f.world_from_base.translation.vector);
     let is = |verdict: Verdict| move |f: &&Fit| f.verdict == verdict;
@@ -142,7 +146,8 @@ fn lose(winner: &mut Fit, loser: &Fit) {
     }
 }
 
-/// Notes a loser of another model at the winner where it explains nearly as much: as alike, or as a reason for doubt.
+/// Notes a loser of another model at the winner where it explains nearly as much: as alike, or as a
+/// reason for doubt.
 fn doubt(winner: &mut Fit, loser: &Fit) {
     if loser.model == winner.model || loser.verdict == Verdict::Refused {
         return;
@@ -164,7 +169,8 @@ mod tests {
     use Verdict::{Doubtful, Refused, Trusted};
     use contract::JointFit;
 
-    /// What stands, of fits on one base, each of a model of its own: verdict and explained surface, m².
+    /// What stands, of fits on one base, each of a model of its own: verdict and explained surface,
+    /// m².
     fn stands(fits: &[(Verdict, f64)], known: Option<usize>) -> Vec<(usize, Verdict)> {
         let models = vec![Model::default(); fits.len()];
         let fit = |(model, &(verdict, explained)): (usize, &(Verdict, f64))| {

@@ -1,5 +1,5 @@
-//! Places on the front of a body in; out comes what an adjustment of a robot of few boxes starts from where a scanner measured them:
-//! for tests.
+//! Places on the front of a body in; out comes what an adjustment of a robot of few boxes starts
+//! from where a scanner measured them: for tests.
 
 use contract::{MaskId, OneByOne, Region, ScanId, View};
 use geometry::{Aabb, Point, Pose};
@@ -9,7 +9,8 @@ use crate::beam::Hypothesis;
 use crate::refine::Refine;
 use crate::{Prepared, Scene, Settings};
 
-/// A chain of boxes about their joints: name, kind of the joint to the link before, and size, place and axis of that joint.
+/// A chain of boxes about their joints: name, kind of the joint to the link before, and size, place
+/// and axis of that joint.
 fn boxes(links: &[(&str, &str, [[f64; 3]; 3])]) -> robot::Model {
     let words = |v: &[f64; 3]| v.map(|v| v.to_string()).join(" ");
     let mut urdf = String::from("<robot name='boxes'>");
@@ -50,7 +51,8 @@ pub(crate) fn bar() -> robot::Model {
     ])
 }
 
-/// A foot far behind, a knuckle that bends about y, and a plate that turns on it about x: its front is 10 cm before the knuckle.
+/// A foot far behind, a knuckle that bends about y, and a plate that turns on it about x: its front
+/// is 10 cm before the knuckle.
 fn wrist() -> robot::Model {
     let (foot, knuckle, plate) = ([0.2; 3], [0.02; 3], [0.02, 0.1, 0.1]);
     boxes(&[
@@ -60,8 +62,8 @@ fn wrist() -> robot::Model {
     ])
 }
 
-/// The wrist, straight, and a scanner 3 m before it that measured places of its plate's front (y, z); it is looked at as bent and turned
-/// by so much, radians.
+/// The wrist, straight, and a scanner 3 m before it that measured places of its plate's front (y,
+/// z); it is looked at as bent and turned by so much, radians.
 pub(crate) fn before_plate(
     places: &[[f64; 2]],
     posture: [f64; 2],

@@ -1,7 +1,8 @@
 //! A link's mesh in; where a beam first meets it near a place, out.
 //!
-//! A sample stands for all of the surface that is nearer to it than to others: at bends its plane is off by a tenth of a
-//! millimetre, and beside an edge it may be that of the other face, millimetres off. The mesh itself knows.
+//! A sample stands for all of the surface that is nearer to it than to others: at bends its plane
+//! is off by a tenth of a millimetre, and beside an edge it may be that of the other face,
+//! millimetres off. The mesh itself knows.
 
 use geometry::{Aabb, Vector};
 use nalgebra::Vector3;
@@ -9,8 +10,8 @@ use robot::Mesh;
 
 /// Least edge of a cell, metres: a few triangles of a casting.
 const CELL: f32 = 0.008;
-/// Most cells of a link, 16 MiB, and most entries in them, ten times those of the finest: larger links, and those in the
-/// wrong unit, have larger cells.
+/// Most cells of a link, 16 MiB, and most entries in them, ten times those of the finest: larger
+/// links, and those in the wrong unit, have larger cells.
 const MAX_CELLS: f32 = 4e6;
 const MAX_ENTRIES: f32 = 2e7;
 /// Slices of a grid overlap by this share of a cell, so that rounding loses no corner.
@@ -21,10 +22,12 @@ const SEAM: f64 = 1e-4;
 /// Triangles of a mesh by the cells that they lie in.
 #[derive(Debug, Default)]
 pub(crate) struct Triangles {
-    /// Of each triangle, link frame, metres: in memory in the order of the cells, as beams ask for them.
+    /// Of each triangle, link frame, metres: in memory in the order of the cells, as beams ask for
+    /// them.
     corners: Vec<[[f32; 3]; 3]>,
     grid: Grid,
-    /// Whether there is any in each cell, 64 of them in a word: most cells on a beam's way are empty.
+    /// Whether there is any in each cell, 64 of them in a word: most cells on a beam's way are
+    /// empty.
     filled: Vec<u64>,
     /// Where each cell begins in `list`; one more for the end of the last.
     begins: Vec<u32>,
@@ -80,8 +83,8 @@ impl Triangles {
         self.filled[cell / 64] >> (cell % 64) & 1 == 0
     }
 
-    /// Where a beam (unit length) first meets the mesh on a stretch of it, `from` and `to` metres beyond a place on it; how
-    /// far beyond it that is, and where.
+    /// Where a beam (unit length) first meets the mesh on a stretch of it, `from` and `to` metres
+    /// beyond a place on it; how far beyond it that is, and where.
     pub(crate) fn first(&self, beam: (&Vector, &Vector), stretch: [f64; 2]) -> Option<(f64, Met)> {
         let mut best: Option<(f64, Vector, u32)> = None;
         for (cell, end) in self.grid.along_beam(beam, stretch) {
@@ -104,14 +107,16 @@ impl Triangles {
         best.map(|(t, n, triangle)| (t, met(beam, (t, n), triangle)))
     }
 
-    /// How far beyond a place on it a beam still meets a triangle that it met before, and the normal towards the scanner there.
+    /// How far beyond a place on it a beam still meets a triangle that it met before, and the
+    /// normal towards the scanner there.
     #[inline]
     pub(crate) fn again(&self, triangle: u32, beam: (&Vector, &Vector)) -> Option<(f64, Vector)> {
         crosses(&self.corners[triangle as usize], beam).map(|(t, n)| (t, towards(&n, beam.1)))
     }
 }
 
-/// Corners of the triangles that a list names, in the order in which it first does; it names them by their places in that then.
+/// Corners of the triangles that a list names, in the order in which it first does; it names them
+/// by their places in that then.
 fn in_order(mesh: &Mesh, list: &mut [u32]) -> Vec<[[f32; 3]; 3]> {
     let mut places = vec![None; mesh.triangles.len()];
     let mut out = Vec::with_capacity(places.len());
@@ -149,10 +154,11 @@ impl Grid {
         (((v - self.low[axis]) / self.edge) as usize).min(self.n[axis] - 1)
     }
 
-    /// The cells that a stretch of a beam passes through, one after the other, and where on the beam each ends (Amanatides
-    /// and Woo 1987).
+    /// The cells that a stretch of a beam passes through, one after the other, and where on the
+    /// beam each ends (Amanatides and Woo 1987).
     fn along_beam(&self, (at, ray): (&Vector, &Vector), [from, to]: [f64; 2]) -> Walk<'_> {
-        // Cells in a metre, and how far along the beam one is passed, with its sign: one division an axis.
+        // Cells in a metre, and how far along the beam one is passed, with its sign: one division
+        // an axis.
         let edge = f64::from(self.edge);
         let (inverse, each) = (1.0 / edge, [0, 1, 2].map(|i| edge / ray[i]));
         let start = [0, 1, 2].map(|i| (at[i] - f64::from(self.low[i])) * inverse);
@@ -233,7 +239,8 @@ struct Walk<'a> {
     at: Option<[isize; 3]>,
     /// Which way it goes on each axis.
     way: [isize; 3],
-    /// Where on the beam it enters the next cell on each axis, metres, and how far it is from one to the next.
+    /// Where on the beam it enters the next cell on each axis, metres, and how far it is from one
+    /// to the next.
     next: [f64; 3],
     each: [f64; 3],
     /// Where the stretch ends.
@@ -258,11 +265,12 @@ impl Iterator for Walk<'_> {
     }
 }
 
-/// The part of a convex polygon where a linear function is not below 0; a triangle cut on both sides of two axes has at most
-/// seven corners.
+/// The part of a convex polygon where a linear function is not below 0; a triangle cut on both
+/// sides of two axes has at most seven corners.
 fn cut(polygon: &[[f32; 3]], f: impl Fn([f32; 3]) -> f32) -> ([[f32; 3]; 8], usize) {
     let (mut out, mut n) = ([[0.0; 3]; 8], 0);
-    // Rounding may make more of what is thinner than it: what is beside those corners is not missed.
+    // Rounding may make more of what is thinner than it: what is beside those corners is not
+    // missed.
     let mut add = |p| {
         if n < out.len() {
             out[n] = p;
@@ -301,15 +309,16 @@ fn towards(n: &Vector, ray: &Vector) -> Vector {
     n / (n.norm() * -n.dot(ray).signum())
 }
 
-/// How far along a beam, from a place on it, it crosses a triangle, and the triangle's normal, of any length; `None` where it
-/// passes beside it (Möller and Trumbore 1997).
+/// How far along a beam, from a place on it, it crosses a triangle, and the triangle's normal, of
+/// any length; `None` where it passes beside it (Möller and Trumbore 1997).
 #[inline]
 fn crosses(corners: &[[f32; 3]; 3], (at, ray): (&Vector, &Vector)) -> Option<(f64, Vector)> {
     let [a, b, c] = corners.map(|corner| Vector::from(corner.map(f64::from)));
     let (u, v, w) = (b - a, c - a, at - a);
     let across = ray.cross(&v);
     let whole = u.dot(&across);
-    // Shares of the two edges in where the beam meets the plane, the whole of it being 1; along it there are none.
+    // Shares of the two edges in where the beam meets the plane, the whole of it being 1; along it
+    // there are none.
     let (sign, seam) = (whole.signum(), SEAM * whole.abs());
     let along_u = w.dot(&across) * sign;
     if !(along_u >= -seam && along_u <= whole.abs() + seam) {

@@ -1,5 +1,6 @@
-//! A model in; out comes the face of its flange, and which points lie in front of it: what a robot holds hangs there and
-//! nowhere else, so such points say nothing of the arm, and others beside the wrist speak against a posture.
+//! A model in; out comes the face of its flange, and which points lie in front of it: what a robot
+//! holds hangs there and nowhere else, so such points say nothing of the arm, and others beside the
+//! wrist speak against a posture.
 
 use geometry::Point;
 use robot::{JointKind, Model, Role};
@@ -19,7 +20,8 @@ pub(crate) struct Face {
 }
 
 impl Face {
-    /// The face of the last of the links `placed` by a model's last joint; `None` where that joint slides or a tool hangs there.
+    /// The face of the last of the links `placed` by a model's last joint; `None` where that joint
+    /// slides or a tool hangs there.
     pub(crate) fn of(model: &Model, placed: &[usize]) -> Option<Self> {
         let &link = placed.last()?;
         let joint = &model.joints[*model.free.last()?];

@@ -1,5 +1,5 @@
-//! The samples of a link's surface in; out come the same so that neighbours in space are neighbours in memory, and for any
-//! place near the surface which of them is the nearest.
+//! The samples of a link's surface in; out come the same so that neighbours in space are neighbours
+//! in memory, and for any place near the surface which of them is the nearest.
 
 use geometry::{NearestField, Vector};
 use robot::{CadCloud, Link};
@@ -12,7 +12,8 @@ use crate::normal::Place;
 const COARSE: (f32, f32, usize) = (0.025, 0.15, 2500);
 /// Largest voxel and reach of the fine field, metres: the reach of the last gates.
 const FINE: (f32, f32) = (0.007, 0.032);
-/// Voxel of the fine field against the spacing of the samples: with larger ones the nearest sample is missed …
+/// Voxel of the fine field against the spacing of the samples: with larger ones the nearest sample
+/// is missed …
 const VOXEL: f32 = 1.4;
 /// … but no more voxels than about so many.
 const MAX_VOXELS: f64 = 5e5;
@@ -48,7 +49,8 @@ pub(crate) struct Fields {
     triangles: OnceLock<Triangles>,
 }
 
-/// What tells a patch: the side that it looks to (two for each axis of the link's frame), and its cell.
+/// What tells a patch: the side that it looks to (two for each axis of the link's frame), and its
+/// cell.
 type PatchKey = (u8, [i32; 3]);
 
 impl Fields {

@@ -1,6 +1,6 @@
-//! An adjusted posture in; out comes how far its base may turn under the robot, the first joint turned back, before the points of
-//! the foot say no: a round foot of which little is seen may stand anyhow, and its valley of squares has no slope to tell
-//! the covariance so (METHOD.md §14).
+//! An adjusted posture in; out comes how far its base may turn under the robot, the first joint
+//! turned back, before the points of the foot say no: a round foot of which little is seen may
+//! stand anyhow, and its valley of squares has no slope to tell the covariance so (METHOD.md §14).
 
 use contract::Fan;
 use geometry::{Pose, Vector};
@@ -19,7 +19,8 @@ const STEP: f64 = 0.0087;
 const VALLEY: f64 = 0.035;
 
 impl Refine<'_> {
-    /// The covariance of base twist (base axes) and joints, widened by what the points of the foot leave open.
+    /// The covariance of base twist (base axes) and joints, widened by what the points of the foot
+    /// leave open.
     pub(crate) fn with_foot(
         &self,
         h: &Hypothesis,
@@ -70,8 +71,8 @@ impl<'a> Foot<'a> {
         other
     }
 
-    /// How far turns reach at which the points fit as well, of which so many err alike: the farthest of those tried where there are
-    /// too few points to tell, radians.
+    /// How far turns reach at which the points fit as well, of which so many err alike: the
+    /// farthest of those tried where there are too few points to tell, radians.
     pub(crate) fn reach(&self, angles: Vec<f64>, n_alike: f64, fan: &dyn Fan) -> f64 {
         let Self { refine, points, .. } = self;
         if points.len() < MIN_POINTS {
@@ -99,8 +100,8 @@ impl<'a> Foot<'a> {
     }
 }
 
-/// How far the turns reach at which the points fit as well as at the best one: `squares[turn].1[point]`. Points that no turn
-/// explains say nothing.
+/// How far the turns reach at which the points fit as well as at the best one:
+/// `squares[turn].1[point]`. Points that no turn explains say nothing.
 fn run(squares: &[(f64, Vec<f64>)], variance: f64) -> f64 {
     let most = 0.99 * f64::from(CAP).powi(2);
     let n_points = squares.first().map_or(0, |s| s.1.len());
@@ -119,7 +120,8 @@ mod tests {
     #[test]
     fn points_that_no_turn_explains_do_not_make_all_turns_as_good() {
         let clutter = f64::from(CAP).powi(2);
-        // One point on a box of the foot, which a turn by two steps leaves; a thousand on a crate beside it.
+        // One point on a box of the foot, which a turn by two steps leaves; a thousand on a crate
+        // beside it.
         let squares = |slope: f64| -> Vec<(f64, Vec<f64>)> {
             let turns = (-9..=9).map(|k| f64::from(k) * STEP);
             let of =

@@ -1,8 +1,9 @@
-//! Points of an adjustment in; out come the same without those on a flange that may be turned otherwise whose beams, which have a
-//! width, ended on more than one plane.
+//! Points of an adjustment in; out come the same without those on a flange that may be turned
+//! otherwise whose beams, which have a width, ended on more than one plane.
 //!
-//! What stands out from such a flange is in one place of many; its points pull at the wrist whichever way the flange is turned, and
-//! so does what a scanner makes of beams that end half beside an edge.
+//! What stands out from such a flange is in one place of many; its points pull at the wrist
+//! whichever way the flange is turned, and so does what a scanner makes of beams that end half
+//! beside an edge.
 
 use contract::Fan;
 use geometry::Vector;
@@ -13,15 +14,18 @@ use crate::pairs::{Known, Pair, Pairing};
 use crate::refine::Refine;
 use crate::sampled::Sampled;
 
-/// Radius of a beam at its scanner, metres, and what it grows by on each metre: those of the mixed pixels that are measured (`simulate`).
+/// Radius of a beam at its scanner, metres, and what it grows by on each metre: those of the mixed
+/// pixels that are measured (`simulate`).
 const RADIUS: (f64, f64) = (0.0011, 0.000_15);
 /// So many places on a beam's rim are looked at.
 const N_RIM: usize = 6;
-/// A beam ended on one plane where its rim is no farther from it, metres: what tessellation of the model leaves (`pairs.rs`).
+/// A beam ended on one plane where its rim is no farther from it, metres: what tessellation of the
+/// model leaves (`pairs.rs`).
 const FLAT: f64 = 3e-4;
 
-/// All of the points but those on what these joints turn whose beams did not end on one plane; all of them where without those
-/// another joint is not determined: a wrist of which little else is seen.
+/// All of the points but those on what these joints turn whose beams did not end on one plane; all
+/// of them where without those another joint is not determined: a wrist of which little else is
+/// seen.
 pub(crate) fn whole(
     refine: &Refine<'_>,
     (state, joints): (&State, &[usize]),

@@ -1,4 +1,5 @@
-//! A refined fit in; out comes what the beams say of each of its links, and one score for the whole.
+//! A refined fit in; out comes what the beams say of each of its links, and one score for the
+//! whole.
 
 use contract::LinkEvidence;
 use geometry::{Point, Probe};
@@ -7,8 +8,8 @@ use crate::beam::Hypothesis;
 use crate::refine::Refine;
 use crate::{Prepared, Scene, Settings};
 
-/// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans' own noise, not the
-/// fit's.
+/// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans'
+/// own noise, not the fit's.
 const TOLERANCE: (f64, f64) = (0.012, 0.04);
 
 /// Judgement of a posture.
@@ -85,11 +86,12 @@ pub(crate) fn judge(
     out
 }
 
-/// A link that moves less than this between two postures stands the same in both, metres: a beam's width and noise.
+/// A link that moves less than this between two postures stands the same in both, metres: a beam's
+/// width and noise.
 const MOVED: f64 = 0.02;
 
-/// How clearly the beams prefer one posture to another: difference of the share explained on the links that stand
-/// differently, about 0 for equals, 1 for right against nothing.
+/// How clearly the beams prefer one posture to another: difference of the share explained on the
+/// links that stand differently, about 0 for equals, 1 for right against nothing.
 pub(crate) fn margin(
     prepared: &Prepared<'_>,
     best: (&Hypothesis, &Judgement),

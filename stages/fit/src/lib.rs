@@ -1,9 +1,10 @@
 //! A candidate in, a fit out: which posture, where exactly, how sure.
 //!
-//! The way: beam search over the joints on the depth images (`beam`), joint Gauss–Newton over base and all joints on
-//! the points (`refine`), evidence and covariance (`judge`, `report`), verdict in words (`verdict`), and the choice
-//! among candidates that claim the same points (`choose`). Method and maths: METHOD.md §8–§14. Beside it stands the method
-//! of the source (METHOD.md §10, §21), link after link (`paper`).
+//! The way: beam search over the joints on the depth images (`beam`), joint Gauss–Newton over base
+//! and all joints on the points (`refine`), evidence and covariance (`judge`, `report`), verdict in
+//! words (`verdict`), and the choice among candidates that claim the same points (`choose`). Method
+//! and maths: METHOD.md §8–§14. Beside it stands the method of the source (METHOD.md §10, §21),
+//! link after link (`paper`).
 #![forbid(unsafe_code)]
 
 mod adjust;

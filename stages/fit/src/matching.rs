@@ -1,4 +1,5 @@
-//! A posture and points in; each point that may lie on the model, with the facet that is nearest to it, out.
+//! A posture and points in; each point that may lie on the model, with the facet that is nearest to
+//! it, out.
 
 use geometry::{Point, Pose, Vector};
 
@@ -63,7 +64,8 @@ impl<'a> Matching<'a> {
         let q = self.base_from_local * Point::from(m.p.map(f64::from));
         let x = pose * Point::from(facet.x.map(f64::from));
         let r = n.dot(&(q - x));
-        // Beside the surface's edge its plane means nothing: what hangs on a flange is wider than it.
+        // Beside the surface's edge its plane means nothing: what hangs on a flange is wider than
+        // it.
         let beside = (distance * distance - r * r).max(0.0).sqrt();
         if self.gate < FINE_REACH && beside > self.refine.beside(link).max(0.33 * self.gate) {
             return None;

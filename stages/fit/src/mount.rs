@@ -1,5 +1,6 @@
-//! An arm with a tool that stands as the points have it, and the holes that it may be bolted to; which of them explain the
-//! flange under it, out: the turn of the tool is the sum of the last joint's and the hole's, only the flange tells them apart.
+//! An arm with a tool that stands as the points have it, and the holes that it may be bolted to;
+//! which of them explain the flange under it, out: the turn of the tool is the sum of the last
+//! joint's and the hole's, only the flange tells them apart.
 
 use contract::Fan;
 use robot::Role;
@@ -11,11 +12,13 @@ use crate::spin::AS_GOOD;
 use crate::sweep::Sweep;
 use crate::turns;
 
-/// Turns of tool and flange that are tried are so many, or twice, and so on: every turn between holes, 15°, is one of them.
+/// Turns of tool and flange that are tried are so many, or twice, and so on: every turn between
+/// holes, 15°, is one of them.
 const N_HOLES: usize = 24;
 
-/// Share of the squares by which a side may be worse and still be as good: fingers and last joint stand as the first side
-/// has them. The wrong side of a two-finger gripper was the better one by 4.5 %; what is no side of it is worse by 36 %.
+/// Share of the squares by which a side may be worse and still be as good: fingers and last joint
+/// stand as the first side has them. The wrong side of a two-finger gripper was the better one by
+/// 4.5 %; what is no side of it is worse by 36 %.
 const UNPOLISHED: f64 = 0.10;
 
 /// A hole that a tool may be bolted to, and the value of the arm's last joint that goes with it.
@@ -46,7 +49,8 @@ impl<'a> Turning<'a> {
         (!tool.is_empty()).then_some(Self { sweep, own, tool, value })
     }
 
-    /// Distances of the points to some of the links at equal steps of a whole turn from where the joint stands, metres.
+    /// Distances of the points to some of the links at equal steps of a whole turn from where the
+    /// joint stands, metres.
     fn around(&self, n: usize, links: &[usize], fan: &dyn Fan) -> Vec<Vec<f32>> {
         fan.fan((0..n).collect(), |k| self.sweep.distances(self.at(k, n), links))
     }
@@ -58,8 +62,9 @@ impl<'a> Turning<'a> {
 }
 
 impl Refine<'_> {
-    /// All pairs of the joint `flange` and a hole that explain the points as well as the best one, best first; the holes
-    /// are turns of the tool about that joint, the posture is that of the hole at 0. Empty where the points are too few.
+    /// All pairs of the joint `flange` and a hole that explain the points as well as the best one,
+    /// best first; the holes are turns of the tool about that joint, the posture is that of the
+    /// hole at 0. Empty where the points are too few.
     pub(crate) fn bolts(
         &self,
         h: &Hypothesis,

@@ -6,7 +6,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::scene::Measured;
 
-/// Noise that is assumed where the points do not tell (shuffled files), metres: a common scanner on dark steel.
+/// Noise that is assumed where the points do not tell (shuffled files), metres: a common scanner on
+/// dark steel.
 const UNKNOWN: f64 = 0.003;
 /// Consecutive points nearer than this lie on one surface more often than not, metres.
 const NEIGHBOURS: f32 = 0.05;
@@ -19,14 +20,15 @@ const MIN_PATCH: (usize, usize) = (30, 40);
 /// Share of the patches that are taken for flat things: most scenes have as many.
 const FLAT: f64 = 0.05;
 
-/// Standard deviation of the points, metres: from one point to the next, or over a hand's width where that is more, as
-/// it is for depth cameras, whose neighbours err alike.
+/// Standard deviation of the points, metres: from one point to the next, or over a hand's width
+/// where that is more, as it is for depth cameras, whose neighbours err alike.
 pub(crate) fn of(views: &[&View], points: &[Measured], thin: &[u32], fan: &dyn Fan) -> f64 {
     let beams = between_neighbours(views, fan).unwrap_or(UNKNOWN);
     beams.max(over_patches(points, thin, fan).unwrap_or(0.0))
 }
 
-/// Noise along the beams: how far the middle one of three consecutive points lies off the line through the others.
+/// Noise along the beams: how far the middle one of three consecutive points lies off the line
+/// through the others.
 fn between_neighbours(views: &[&View], fan: &dyn Fan) -> Option<f64> {
     let mut off = fan.fan(views.to_vec(), bends).concat();
     let enough = off.len() >= MIN_TRIPLES;

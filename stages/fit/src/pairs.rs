@@ -1,5 +1,5 @@
-//! A state of the adjustment in; for each measured point the place on the model's surface that its beam ends on, and how far it
-//! is from there, out.
+//! A state of the adjustment in; for each measured point the place on the model's surface that its
+//! beam ends on, and how far it is from there, out.
 
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Matrix3, UnitQuaternion};
@@ -112,8 +112,8 @@ impl<'a> Pairing<'a> {
         (rotation.tr_mul(&(pair.p - origin)), rotation.tr_mul(&pair.n))
     }
 
-    /// A point of the scene with the surface that it lies on; `None` where it lies on none. What triangle its beam met is known from a
-    /// state like this one, or is kept for the next.
+    /// A point of the scene with the surface that it lies on; `None` where it lies on none. What
+    /// triangle its beam met is known from a state like this one, or is kept for the next.
     pub(crate) fn pair(&self, point: u32, known: &mut Option<Known>) -> Option<Pair> {
         let m = &self.refine.scene.points[point as usize];
         let view = usize::from(m.view);
@@ -142,11 +142,13 @@ impl<'a> Pairing<'a> {
             return None;
         }
         let facing = -n.dot(&ray);
-        // Surface that faces away from the scanner, or lies along the beam, cannot have given this point.
+        // Surface that faces away from the scanner, or lies along the beam, cannot have given this
+        // point.
         if range > 0.0 && facing <= MIN_FACING {
             return None;
         }
-        // A camera's errors are no jitter along the beam: what it sees from the side is off as far as the rest.
+        // A camera's errors are no jitter along the beam: what it sees from the side is off as far
+        // as the rest.
         let variance = if range > 0.0 && !is_camera {
             let across = (range * ANGLE_NOISE).powi(2) * (1.0 - facing * facing);
             self.sigma2 * facing * facing + across + SURFACE_NOISE * SURFACE_NOISE
@@ -156,8 +158,9 @@ impl<'a> Pairing<'a> {
         Some(Pair { link, patch, view, p, n, ray, beam: p - scanner, variance, r })
     }
 
-    /// Where a beam first meets the model about a point of it, whichever link: noise moves points along their beams, past
-    /// edges, round bends and behind what hides other surface, so that what is nearest is not always what was measured.
+    /// Where a beam first meets the model about a point of it, whichever link: noise moves points
+    /// along their beams, past edges, round bends and behind what hides other surface, so that
+    /// what is nearest is not always what was measured.
     fn first(&self, beam: (&Vector, &Vector), known: &mut Option<Known>) -> Option<Hit> {
         let (t, link, met) = self.meets(beam)?;
         let patch = self.refine.prepared.links[link].fields.patch_at(&met.x, &met.n)?;
@@ -165,7 +168,8 @@ impl<'a> Pairing<'a> {
         Some(self.hit((link, patch), (t, &met.n), beam.1))
     }
 
-    /// How far beyond a place on it a beam first meets the model, on which link, and where; `None` farther from it than the gate.
+    /// How far beyond a place on it a beam first meets the model, on which link, and where; `None`
+    /// farther from it than the gate.
     pub(crate) fn meets(&self, (p, ray): (&Vector, &Vector)) -> Option<(f64, usize, Met)> {
         let mut best: Option<(f64, usize, Met)> = None;
         self.placed.each(p.map(|v| v as f32).into(), |link| {
@@ -198,7 +202,8 @@ impl<'a> Pairing<'a> {
         Hit { link, patch, n, r: -t * n.dot(ray) }
     }
 
-    /// The facet nearest to a place, and not beside the surface's edge, where its plane means nothing.
+    /// The facet nearest to a place, and not beside the surface's edge, where its plane means
+    /// nothing.
     fn nearest(&self, at: &Vector) -> Option<Hit> {
         let Near { link, facet, .. } = self.placed.nearest(at.map(|v| v as f32).into())?;
         let fields = &self.refine.prepared.links[link].fields;

@@ -1,5 +1,6 @@
-//! A posture in; the places of the model's surface that beams went through, each with where its beam ended, out: the other
-//! way round than points look for the model (CAD to scan, METHOD.md §11), with visibility.
+//! A posture in; the places of the model's surface that beams went through, each with where its
+//! beam ended, out: the other way round than points look for the model (CAD to scan, METHOD.md
+//! §11), with visibility.
 
 use geometry::Vector;
 use geometry::depth::{rotate, rows, transform};
@@ -11,7 +12,8 @@ use crate::refine::Refine;
 
 /// Samples of a link that are asked: as many as tell a hypothesis in the search.
 const N_SAMPLES: usize = 100;
-/// A surface counts as pierced from this share of the gate on: what is nearer is the points' business …
+/// A surface counts as pierced from this share of the gate on: what is nearer is the points'
+/// business …
 const DEEP: f64 = 0.25;
 /// … but not from less than so many times the noise.
 const NOISES: f64 = 4.0;
@@ -19,7 +21,8 @@ const NOISES: f64 = 4.0;
 const MIN_GATE: f64 = 0.03;
 
 impl Refine<'_> {
-    /// Surface that stands before what a beam measured, by less than the gate: it has to give way along the beam.
+    /// Surface that stands before what a beam measured, by less than the gate: it has to give way
+    /// along the beam.
     pub(crate) fn pierced(&self, h: &Hypothesis, gate: f64) -> Vec<Match> {
         let mut out = Vec::new();
         if gate < MIN_GATE {
@@ -44,7 +47,8 @@ impl Refine<'_> {
         out
     }
 
-    /// The beam that went farthest beyond a place of the surface (local frame), and how far; `None` where none went through.
+    /// The beam that went farthest beyond a place of the surface (local frame), and how far; `None`
+    /// where none went through.
     fn farthest(&self, p: [f32; 3], n: [f32; 3], tolerance: f32) -> Option<(Vector, f32)> {
         let mut best: Option<(Vector, f32)> = None;
         for eye in self.scene.scouts.eyes() {

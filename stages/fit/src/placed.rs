@@ -1,4 +1,5 @@
-//! A posture in; its links with a surface where they stand, and for any point the nearest facet of them, out.
+//! A posture in; its links with a surface where they stand, and for any point the nearest facet of
+//! them, out.
 //!
 //! Most of the time goes by waiting for memory: places are looked up together.
 
@@ -111,7 +112,8 @@ impl<'a> Placed<'a> {
         self.nearest_of(&[point])[0]
     }
 
-    /// The same for some points, as many as there are lanes at most: the voxels of all are asked for, then the facets of all.
+    /// The same for some points, as many as there are lanes at most: the voxels of all are asked
+    /// for, then the facets of all.
     #[inline]
     fn nearest_of(&self, points: &[[f32; 3]]) -> [Option<Near>; LANES] {
         let local = lanes(points);

@@ -1,5 +1,5 @@
-//! A model in; out comes what every fit of it needs: nearest-sample fields, search samples, and which link is placed
-//! by which joint. Made once per model, shared by all its fits.
+//! A model in; out comes what every fit of it needs: nearest-sample fields, search samples, and
+//! which link is placed by which joint. Made once per model, shared by all its fits.
 
 use contract::Fan;
 use geometry::Point;
@@ -26,8 +26,8 @@ pub struct Prepared<'a> {
     pub(crate) fixed: Vec<usize>,
     /// No part of the robot gets farther from the base's origin, metres.
     pub(crate) reach: f64,
-    /// For each free joint: distance of the samples it places from its axis, 95th percentile, metres (1 for
-    /// prismatic joints, so that steps are in metres).
+    /// For each free joint: distance of the samples it places from its axis, 95th percentile,
+    /// metres (1 for prismatic joints, so that steps are in metres).
     pub(crate) lever: Vec<f64>,
     /// For each free joint: whether it moves nothing but the links that it places and the tool.
     pub(crate) leaf: Vec<bool>,
@@ -66,8 +66,8 @@ impl<'a> Prepared<'a> {
         Self::of((index, model), fields.into_iter())
     }
 
-    /// Prepares a model whose links are those of others, one after the other (an arm, and a tool on it), from what is known
-    /// of them.
+    /// Prepares a model whose links are those of others, one after the other (an arm, and a tool on
+    /// it), from what is known of them.
     #[must_use]
     pub fn joined(parts: &[&Prepared<'_>], whole: (usize, &'a Model)) -> Self {
         let links = parts.iter().flat_map(|part| part.links.iter());
@@ -179,7 +179,8 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// For each link, for each free joint: whether it moves the link (at a posture where no two effects cancel).
+/// For each link, for each free joint: whether it moves the link (at a posture where no two effects
+/// cancel).
 fn dependencies(model: &Model) -> Vec<Vec<bool>> {
     let mut posture = model.home();
     for (j, q) in posture.iter_mut().enumerate() {

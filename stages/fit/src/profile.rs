@@ -1,7 +1,9 @@
-//! An adjusted posture and its points in; how far joints that few points hold may stand from where they were adjusted to, out.
+//! An adjusted posture and its points in; how far joints that few points hold may stand from where
+//! they were adjusted to, out.
 //!
-//! The covariance takes the sum of squares for a parabola. Where a wrist shows two hundred points, most of them beside edges, it
-//! is none: which of them lie on the model at all changes as it bends, and another value may be as good or better.
+//! The covariance takes the sum of squares for a parabola. Where a wrist shows two hundred points,
+//! most of them beside edges, it is none: which of them lie on the model at all changes as it
+//! bends, and another value may be as good or better.
 
 use contract::Fan;
 
@@ -11,14 +13,16 @@ use crate::sampled::Sampled;
 
 /// Joints with more points on what they move are held by so many that the parabola is right.
 const MAX_POINTS: usize = 2000;
-/// Values on either side of a joint's own at which the points are asked, one standard deviation apart.
+/// Values on either side of a joint's own at which the points are asked, one standard deviation
+/// apart.
 const N_BESIDE: i32 = 6;
-/// Joints that are stated to be known so well are asked, radians: from 0.03° on it may be more than it should, up to 0.4°; beyond
-/// that it is wide enough, and six of it are another posture.
+/// Joints that are stated to be known so well are asked, radians: from 0.03° on it may be more than
+/// it should, up to 0.4°; beyond that it is wide enough, and six of it are another posture.
 const ASKED: [f64; 2] = [0.000_5, 0.007];
 
-/// Variance of each joint beyond what is stated, radians² or metres²: mean square of its values from its own, each as likely
-/// as the points about what the joint moves make it, where all else stays.
+/// Variance of each joint beyond what is stated, radians² or metres²: mean square of its values
+/// from its own, each as likely as the points about what the joint moves make it, where all else
+/// stays.
 pub(crate) fn beyond(
     refine: &Refine<'_>,
     best: &Adjusted,
@@ -56,8 +60,8 @@ fn costs(
     Some(fan.fan((-N_BESIDE..=N_BESIDE).collect(), cost))
 }
 
-/// Mean square of values that cost so much, in standard deviations: likelihoods are as wide as is stated on the whole, the
-/// parabola through both ends and the least cost has that width.
+/// Mean square of values that cost so much, in standard deviations: likelihoods are as wide as is
+/// stated on the whole, the parabola through both ends and the least cost has that width.
 fn mean_square(costs: &[f64]) -> f64 {
     let n = costs.len() / 2;
     let least = costs.iter().copied().fold(f64::INFINITY, f64::min);

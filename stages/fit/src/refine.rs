@@ -1,10 +1,11 @@
-//! A posture near the truth and points in; out come base and all joints at the least robust point-to-plane error
-//! (METHOD.md §11).
+//! A posture near the truth and points in; out come base and all joints at the least robust
+//! point-to-plane error (METHOD.md §11).
 //!
-//! Residual of a point q (base frame) at the facet (x, n) of a link: `r = n·(q − x)`. A joint moves the facet with
-//! the twist (v, w), so `∂r/∂θ = −(n·v + w·(q × n))`: exact, since x and n both move. The base moves the point's
-//! image the other way. In the rounds with wide gates surface that beams went through gives way along them, too
-//! (`pierced`). Sums run in the order of the points: the same bits on any machine with IEEE arithmetic.
+//! Residual of a point q (base frame) at the facet (x, n) of a link: `r = n·(q − x)`. A joint moves
+//! the facet with the twist (v, w), so `∂r/∂θ = −(n·v + w·(q × n))`: exact, since x and n both
+//! move. The base moves the point's image the other way. In the rounds with wide gates surface that
+//! beams went through gives way along them, too (`pierced`). Sums run in the order of the points:
+//! the same bits on any machine with IEEE arithmetic.
 
 use contract::Fan;
 use geometry::{Pose, Vector, robust};
@@ -50,8 +51,9 @@ pub(crate) const FINE_ROUNDS: [Round; 3] = [
 /// So many rounds end at a posture.
 pub(crate) const N_LAST_ROUNDS: usize = 4;
 
-/// Points that one thread works on at a time, of `n`: few enough that threads end together, as many as make what is joined after
-/// them worth it. Sums are taken chunk by chunk, so it does not depend on the threads.
+/// Points that one thread works on at a time, of `n`: few enough that threads end together, as many
+/// as make what is joined after them worth it. Sums are taken chunk by chunk, so it does not depend
+/// on the threads.
 pub(crate) fn chunk(n: usize) -> usize {
     (n / 16).clamp(1024, 8192)
 }
@@ -59,11 +61,12 @@ pub(crate) fn chunk(n: usize) -> usize {
 /// Distance from which the coarse field answers, metres: just inside the fine field's reach.
 pub(crate) const FINE_REACH: f64 = 0.026;
 
-/// A step by less than a tenth of a standard deviation, in every direction, is the last of its kind (squared): steps shrink
-/// threefold a round and more.
+/// A step by less than a tenth of a standard deviation, in every direction, is the last of its kind
+/// (squared): steps shrink threefold a round and more.
 const SMALL_STEP: f64 = 0.01;
 
-/// A point may lie beside the nearest sample by so many spacings of the samples and so many times the noise.
+/// A point may lie beside the nearest sample by so many spacings of the samples and so many times
+/// the noise.
 const BESIDE: (f64, f64) = (1.6, 1.5);
 
 /// Sums of one link's part of the normal equations.
@@ -154,8 +157,8 @@ impl Refine<'_> {
         self.prepared.model.poses(&h.posture).iter().map(|p| h.local_from_base * p).collect()
     }
 
-    /// Derivative of a residual at a point with a facet's normal (base frame) by base twist (translation, rotation about the base's origin; base axes) and
-    /// by each joint.
+    /// Derivative of a residual at a point with a facet's normal (base frame) by base twist
+    /// (translation, rotation about the base's origin; base axes) and by each joint.
     pub(crate) fn row(&self, q: &Vector, n: &Vector, twists: &[[f64; 6]], out: &mut [f64]) {
         let qxn = q.cross(n);
         for i in 0..3 {
@@ -200,7 +203,8 @@ impl Refine<'_> {
         sums
     }
 
-    /// Solves for the next step, with its square in standard deviations; `None` where the points say nothing.
+    /// Solves for the next step, with its square in standard deviations; `None` where the points
+    /// say nothing.
     fn step(&self, h: &Hypothesis, sums: &[Sums], round: &Round) -> Option<(DVector<f64>, f64)> {
         let n = 6 + h.posture.len();
         let (mut hessian, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -260,7 +264,8 @@ impl Refine<'_> {
             let up = plane_from_base.rotation.inverse() * Vector::z();
             let [ws, wt] = prior.sigma.map(|s| 1.0 / (s * s));
             let height = plane_from_base.translation.z;
-            // What points say stands on a plate before the plane is not pulled back to it (METHOD.md §5).
+            // What points say stands on a plate before the plane is not pulled back to it
+            // (METHOD.md §5).
             let far = height / (OFF_PLANE * prior.sigma[0]);
             let ws = ws / (1.0 + far * far).powi(2);
             for a in 0..3 {
@@ -269,7 +274,8 @@ impl Refine<'_> {
                     hessian[(a, b)] += ws * up[a] * up[b];
                 }
             }
-            // Tilt: the plane's normal in base axes is `up`; a small rotation w of the base changes it by −w × up.
+            // Tilt: the plane's normal in base axes is `up`; a small rotation w of the base changes
+            // it by −w × up.
             let tilt = Vector::z().cross(&up);
             for a in 0..2 {
                 gradient[3 + a] += -wt * tilt[a];

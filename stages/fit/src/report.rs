@@ -1,5 +1,6 @@
-//! The adjusted posture, the others that were looked at, and what the beams say in; out comes the fit as it is reported:
-//! values with their standard deviations, which joints are open, rivals, equals, verdict.
+//! The adjusted posture, the others that were looked at, and what the beams say in; out comes the
+//! fit as it is reported: values with their standard deviations, which joints are open, rivals,
+//! equals, verdict.
 
 use contract::{Certainty, Equal, Fan, Fit, JointFit, RunnerUp, ScanShare, ScanShift, Verdict};
 use geometry::{Pose, Vector};
@@ -27,15 +28,18 @@ use crate::wrist::Wrist;
 pub(crate) const EQUAL: f64 = 0.03;
 /// Margin up to which another value of the last joint is listed.
 const NEARLY_EQUAL: f64 = 0.12;
-/// Margin up to which another value of a slide that closes a tool leaves it open: what the tool holds looks like it where little of
-/// it is seen. Electrodes in plain view led by 0.6 and more, those in a part by 0.17 to 0.6 where they were right, by 0.18 where not.
+/// Margin up to which another value of a slide that closes a tool leaves it open: what the tool
+/// holds looks like it where little of it is seen. Electrodes in plain view led by 0.6 and more,
+/// those in a part by 0.17 to 0.6 where they were right, by 0.18 where not.
 const SLIDE_EQUAL: f64 = 0.3;
 /// Standard deviation from which on a joint is open: any value within degrees would do, radians.
 const OPEN_SIGMA: f64 = 0.02;
-/// Standard deviation of an angle of which nothing is known: any value of a whole turn, radians (π/√3).
+/// Standard deviation of an angle of which nothing is known: any value of a whole turn, radians
+/// (π/√3).
 const ANY_ANGLE: f64 = 1.813_799_364_234_217_8;
-/// What beams have against the best, where points speak for it, or points where beams do, counts so many times: a wrist that was
-/// 7° off was better by 0.19 for the beams, and worse by 0.03 for the points.
+/// What beams have against the best, where points speak for it, or points where beams do, counts so
+/// many times: a wrist that was 7° off was better by 0.19 for the beams, and worse by 0.03 for the
+/// points.
 const AGAINST: f64 = 3.0;
 /// Joints that differ by more are different answers, radians (2°) or metres.
 pub(crate) const OTHER: f64 = 0.035;
@@ -106,7 +110,8 @@ pub(crate) fn report(
     fit
 }
 
-/// Adds to the covariance of the joints what their valleys, others that may stand elsewhere and the wrist leave open.
+/// Adds to the covariance of the joints what their valleys, others that may stand elsewhere and the
+/// wrist leave open.
 fn widen(
     refine: &Refine<'_>,
     (best, wrist): (&Adjusted, Option<&Wrist>),
@@ -135,15 +140,16 @@ fn ranked<'o>(
 ) -> Vec<Rival<'o>> {
     let mut rivals: Vec<Rival<'o>> = fan.fan(others.iter().collect(), |other| {
         let [by_beams, by_points] = lead(refine, best, other, near);
-        // What either of them has against the best counts against it, more than what the other has for it.
+        // What either of them has against the best counts against it, more than what the other has
+        // for it.
         (by_beams.max(by_points) + AGAINST * by_beams.min(by_points).min(0.0), other)
     });
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
     rivals
 }
 
-/// Joints that may stand at several values are open; how far away the farthest value is, and how wide a run of values, all as
-/// good, spread, radians or metres.
+/// Joints that may stand at several values are open; how far away the farthest value is, and how
+/// wide a run of values, all as good, spread, radians or metres.
 fn spread_spins(
     h: &Hypothesis,
     (spins, several): (&[Spin], &[&Spin]),
@@ -167,7 +173,8 @@ fn sigma_of(covariance: &DMatrix<f64>, i: usize) -> f64 {
     covariance[(i, i)].max(0.0).sqrt()
 }
 
-/// The joints as they are reported; of each, whether it is open, and how far away the farthest of its other values is.
+/// The joints as they are reported; of each, whether it is open, and how far away the farthest of
+/// its other values is.
 fn joints(
     refine: &Refine<'_>,
     h: &Hypothesis,
@@ -200,8 +207,8 @@ fn joints(
     joints.collect()
 }
 
-/// Postures that explain the points as well: the first few of the rivals, and other values of last joints. Joints that are
-/// passed over make no rival another answer.
+/// Postures that explain the points as well: the first few of the rivals, and other values of last
+/// joints. Joints that are passed over make no rival another answer.
 fn equals(
     refine: &Refine<'_>,
     h: &Hypothesis,
@@ -229,7 +236,8 @@ fn equals(
     same.take(N_EQUALS).map(equal).chain(spun).collect()
 }
 
-/// What is said of a posture that is refused before it is worth a report: where it stood, and how much it explained.
+/// What is said of a posture that is refused before it is worth a report: where it stood, and how
+/// much it explained.
 pub(crate) fn refused(refine: &Refine<'_>, best: &Adjusted, judgement: &Judgement) -> Fit {
     let (model, h) = (refine.prepared.model, &best.hypothesis);
     let joint = |(free, value): (&usize, &f64)| JointFit {
@@ -292,9 +300,9 @@ fn share(refine: &Refine<'_>, best: &Adjusted) -> Option<ScanShare> {
     })
 }
 
-/// For each joint, whether the points leave it open: by its standard deviation, or because a posture that differs in
-/// this joint and few others explains the points as well (a flange with six bolts, a wrist seen from nowhere); and how
-/// far away the farthest such value is, radians.
+/// For each joint, whether the points leave it open: by its standard deviation, or because a
+/// posture that differs in this joint and few others explains the points as well (a flange with six
+/// bolts, a wrist seen from nowhere); and how far away the farthest such value is, radians.
 fn open_joints(
     refine: &Refine<'_>,
     covariance: &DMatrix<f64>,
@@ -307,7 +315,8 @@ fn open_joints(
     let mut spread = vec![0.0_f64; n];
     for (margin, (other, _)) in rivals {
         let apart: Vec<bool> = (0..n).map(|j| turn(h, other, j) > OTHER).collect();
-        // One joint alone, or the tail of the chain, can be open by symmetry; a flip further up is another answer.
+        // One joint alone, or the tail of the chain, can be open by symmetry; a flip further up is
+        // another answer.
         let first = apart.iter().position(|a| *a).unwrap_or(n);
         let is_alone = apart.iter().filter(|a| **a).count() == 1;
         let is_equal =
@@ -339,7 +348,8 @@ fn differs(a: &Hypothesis, b: &Hypothesis, passed: &[bool]) -> bool {
     shift > OTHER_BASE || (0..passed.len()).any(|j| !passed[j] && turn(a, b, j) > OTHER)
 }
 
-/// The value of a joint within its limits that is nearest to zero, and the others, where a whole turn changes nothing.
+/// The value of a joint within its limits that is nearest to zero, and the others, where a whole
+/// turn changes nothing.
 fn whole_turns(model: &Model, posture: &[f64], joint: usize) -> (f64, Vec<f64>) {
     let value = posture[joint];
     let index = model.free[joint];
@@ -352,7 +362,8 @@ fn whole_turns(model: &Model, posture: &[f64], joint: usize) -> (f64, Vec<f64>) 
     if slides || followed {
         return (value, Vec::new());
     }
-    // A refinement may have come from beyond a stop: a whole turn away the joint stands within its limits.
+    // A refinement may have come from beyond a stop: a whole turn away the joint stands within its
+    // limits.
     let first = ((low - value) / TAU).ceil() as i32;
     let last = ((high - value) / TAU).floor() as i32;
     let mut all: Vec<f64> = (first..=last).map(|k| value + TAU * f64::from(k)).collect();

@@ -1,8 +1,9 @@
-//! A settled posture and others in; out comes the best of them, its flips and other bends of its wrist looked at, too.
+//! A settled posture and others in; out comes the best of them, its flips and other bends of its
+//! wrist looked at, too.
 //!
-//! Beams and points decide together, on the links that stand differently: a small wrist turned by half a turn about both of
-//! its axes differs in a bolt or two, which beams alone do not tell; and a wrist among the points of what hangs on it is
-//! drawn to them, which beams do tell.
+//! Beams and points decide together, on the links that stand differently: a small wrist turned by
+//! half a turn about both of its axes differs in a bolt or two, which beams alone do not tell; and
+//! a wrist among the points of what hangs on it is drawn to them, which beams do tell.
 
 use contract::Fan;
 
@@ -29,8 +30,9 @@ const N_LOOKS: usize = 3;
 /// Slides that differ by more stand otherwise, metres.
 const SLID: f64 = 0.01;
 
-/// How clearly the beams, and the points, prefer a posture to another on the links that stand differently. Where only a tool's part slid
-/// the points do not count: they are of what the tool holds as well.
+/// How clearly the beams, and the points, prefer a posture to another on the links that stand
+/// differently. Where only a tool's part slid the points do not count: they are of what the tool
+/// holds as well.
 pub(crate) fn lead(
     refine: &Refine<'_>,
     best: (&Hypothesis, &Judgement),
@@ -51,7 +53,8 @@ fn is_slid(refine: &Refine<'_>, a: &Hypothesis, b: &Hypothesis) -> bool {
     slides.iter().any(|&j| turn(a, b, j) > SLID) && rest.iter().all(|&j| turn(a, b, j) <= OTHER)
 }
 
-/// The best of a posture, the others, and what is like it but for its wrist; all the rest joins the others.
+/// The best of a posture, the others, and what is like it but for its wrist; all the rest joins the
+/// others.
 pub(crate) fn best_of(
     beam: &Beam<'_>,
     refine: &Refine<'_>,
@@ -87,8 +90,9 @@ pub(crate) fn best_of(
     best
 }
 
-/// Others, of which those that move no link by as much as postures are compared by are adjusted like the best: polished from
-/// elsewhere a small wrist may be degrees off, on its way to the same posture.
+/// Others, of which those that move no link by as much as postures are compared by are adjusted
+/// like the best: polished from elsewhere a small wrist may be degrees off, on its way to the same
+/// posture.
 pub(crate) fn at_rest(
     refine: &Refine<'_>,
     (best, ..): &Settled,
@@ -108,7 +112,8 @@ pub(crate) fn at_rest(
     fan.fan(others.iter().collect(), at_rest)
 }
 
-/// Postures that explain nearly as much and that beams and points together hardly like less, best first, few.
+/// Postures that explain nearly as much and that beams and points together hardly like less, best
+/// first, few.
 fn near_rivals(
     (beam, refine): (&Beam<'_>, &Refine<'_>),
     others: &[Polished],

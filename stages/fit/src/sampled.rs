@@ -1,9 +1,11 @@
-//! Points that an adjustment is made of in; the same with what is known of where their beams end, in parts and chunks, out.
+//! Points that an adjustment is made of in; the same with what is known of where their beams end,
+//! in parts and chunks, out.
 
 use crate::pairs::Known;
 
-/// Chunks that points are summed up in, as far as that leaves so many points in one, at least and at most: each has sums of its own for
-/// hundreds of patches, all of which are joined in the end; more of them end on all threads together.
+/// Chunks that points are summed up in, as far as that leaves so many points in one, at least and
+/// at most: each has sums of its own for hundreds of patches, all of which are joined in the end;
+/// more of them end on all threads together.
 const N_CHUNKS: usize = 8;
 const CHUNK: [usize; 2] = [1024, 16_384];
 

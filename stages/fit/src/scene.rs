@@ -1,4 +1,5 @@
-//! The views of a region in; out comes what fits of any model read: the evidence, and thinned points with their scans.
+//! The views of a region in; out comes what fits of any model read: the evidence, and thinned
+//! points with their scans.
 
 use contract::{Fan, InstallationPlane, Region, View};
 use geometry::evidence::Cloud;
@@ -29,7 +30,8 @@ pub struct Scene<'a> {
     pub evidence: Evidence<'a>,
     /// The same of those views that suffice for a search.
     pub scouts: Evidence<'a>,
-    /// Noise of the ranges as the points themselves show it, metres, one sigma; not below the settings' least.
+    /// Noise of the ranges as the points themselves show it, metres, one sigma; not below the
+    /// settings' least.
     pub(crate) noise: f64,
     /// So many points err alike: 1 where each errs by itself.
     pub(crate) n_alike: f64,
@@ -154,7 +156,8 @@ fn thin(points: &[Measured], edge: f32) -> Vec<u32> {
     (0..points.len() as u32).filter(|&i| is_new(key(&points[i as usize]))).collect()
 }
 
-/// Spreads the numbers of cells over a table: a product is enough, and far cheaper than what withstands an attack.
+/// Spreads the numbers of cells over a table: a product is enough, and far cheaper than what
+/// withstands an attack.
 #[derive(Default)]
 struct CellHasher(u64);
 
@@ -168,7 +171,8 @@ impl Hasher for CellHasher {
     }
 
     fn write_u64(&mut self, key: u64) {
-        // 2⁶⁴ over the golden ratio (Knuth, vol. 3, 6.4); the best bits are the highest, and the table takes the lowest.
+        // 2⁶⁴ over the golden ratio (Knuth, vol. 3, 6.4); the best bits are the highest, and the
+        // table takes the lowest.
         self.0 = (self.0 ^ key).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
     }
 }

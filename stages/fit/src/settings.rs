@@ -15,11 +15,14 @@ pub enum Method {
 pub struct Settings {
     /// How postures are found.
     pub method: Method,
-    /// Hypotheses kept at each joint of the beam. METHOD.md §8: 150 lost none of 60; 100 lose at most one of 200.
+    /// Hypotheses kept at each joint of the beam. METHOD.md §8: 150 lost none of 60; 100 lose at
+    /// most one of 200.
     pub beam: usize,
-    /// Hypotheses that are settled (joints so far shaken, the base with the first of them) at each joint, best first.
+    /// Hypotheses that are settled (joints so far shaken, the base with the first of them) at each
+    /// joint, best first.
     pub settle: usize,
-    /// Samples of a link in the beam: the mean of 100 is known to 0.05, less than hypotheses differ by.
+    /// Samples of a link in the beam: the mean of 100 is known to 0.05, less than hypotheses
+    /// differ by.
     pub n_search: usize,
     /// Samples of a link in the final judgement.
     pub n_judge: usize,
@@ -33,34 +36,39 @@ pub struct Settings {
     pub n_polish: usize,
     /// Edge of the grid that thins points for refinement, metres.
     pub thin: f64,
-    /// Most points in the adjustment that is reported. Three hundred thousand left tips of robots with a million and more three
-    /// times as far off.
+    /// Most points in the adjustment that is reported. Three hundred thousand left tips of robots
+    /// with a million and more three times as far off.
     pub max_points: usize,
-    /// Points nearer than this to the installation plane are not the robot's, metres (3σ of 2 mm noise and more).
+    /// Points nearer than this to the installation plane are not the robot's, metres (3σ of 2 mm
+    /// noise and more).
     pub floor_band: f64,
     /// Range noise that is assumed at least, metres, one sigma.
     pub min_noise: f64,
-    /// The same of depth cameras, which err by half a percent of the metre or two from which they see arms, alike over a
-    /// link's width: what is even over a hand's width shows a part of that.
+    /// The same of depth cameras, which err by half a percent of the metre or two from which they
+    /// see arms, alike over a link's width: what is even over a hand's width shows a part of
+    /// that.
     pub camera_noise: f64,
     /// So many of its points err alike: those of a hand's width.
     pub camera_alike: f64,
-    /// Standard deviation of the base about the installation plane, metres and radians: feet are shimmed and floors
-    /// wavy.
+    /// Standard deviation of the base about the installation plane, metres and radians: feet are
+    /// shimmed and floors wavy.
     pub plane_sigma: [f64; 2],
-    /// The same where no plane is in view: any height, but upright as plumb as people bolt robots down.
+    /// The same where no plane is in view: any height, but upright as plumb as people bolt robots
+    /// down.
     pub guess_sigma: [f64; 2],
-    /// Standard deviations of a scan's errors of registration and range: shift on each axis, metres, turn about each
-    /// axis, radians (0.02°), range bias, metres (METHOD.md §11).
+    /// Standard deviations of a scan's errors of registration and range: shift on each axis,
+    /// metres, turn about each axis, radians (0.02°), range bias, metres (METHOD.md §11).
     pub scan_sigma: [f64; 3],
     /// Whether robots tell one another of the errors of scans that see several of them.
     pub together: bool,
-    /// Whether the places of the joints on their links are estimated, too: for robots that their models fit poorly.
+    /// Whether the places of the joints on their links are estimated, too: for robots that their
+    /// models fit poorly.
     pub calibrate: bool,
-    /// How far a joint may be from where its model has it, one sigma: shift on each axis, metres, turn about each axis,
-    /// radians (0.15°).
+    /// How far a joint may be from where its model has it, one sigma: shift on each axis, metres,
+    /// turn about each axis, radians (0.15°).
     pub frame_sigma: [f64; 2],
-    /// A joint is determined by the points if its standard deviation is below this, radians or metres.
+    /// A joint is determined by the points if its standard deviation is below this, radians or
+    /// metres.
     pub determined_sigma: f64,
     /// Lowest score that is reported at all.
     pub min_score: f64,

@@ -1,5 +1,5 @@
-//! A polished posture in; out come the same adjusted, with the values that the points leave to its last joints, and the report of the
-//! best, its wrist bent to where the points fit best.
+//! A polished posture in; out come the same adjusted, with the values that the points leave to its
+//! last joints, and the report of the best, its wrist bent to where the points fit best.
 
 use contract::{Fan, Fit};
 
@@ -51,13 +51,15 @@ pub(crate) fn settle(
     (best, judgement, spins)
 }
 
-/// A part of the points of the last adjustment is enough to choose what it is made of: one of so many, where that is more than links
-/// have at least.
+/// A part of the points of the last adjustment is enough to choose what it is made of: one of so
+/// many, where that is more than links have at least.
 const SETTLED: usize = 30;
-/// The same of depth cameras, whose points err alike over a hand's width: a wrist in eight views was lost with fewer.
+/// The same of depth cameras, whose points err alike over a hand's width: a wrist in eight views
+/// was lost with fewer.
 const OF_CAMERAS: usize = 15;
 
-/// A posture with the best values of its last joints, where one of them is another mode, not the same one found again.
+/// A posture with the best values of its last joints, where one of them is another mode, not the
+/// same one found again.
 pub(crate) fn better(posture: &[f64], spins: &[Spin]) -> Option<Vec<f64>> {
     let mut out = posture.to_vec();
     spins.iter().for_each(|s| out[s.joint] = s.values[0]);
@@ -85,7 +87,8 @@ pub(crate) fn finish(
     fit
 }
 
-/// The answer with its wrist bent to where the points fit best, and its points; how well they fit at other bends, where that is asked.
+/// The answer with its wrist bent to where the points fit best, and its points; how well they fit
+/// at other bends, where that is asked.
 fn bent(
     refine: &Refine<'_>,
     (best, points): (&mut Settled, &mut Sampled),
@@ -113,8 +116,8 @@ fn bent(
 /// So often at most.
 const N_BENT: usize = 2;
 
-/// The answer once more, on as many points as pay: only what is reported is worth them, not what it is chosen from. Those
-/// points.
+/// The answer once more, on as many points as pay: only what is reported is worth them, not what it
+/// is chosen from. Those points.
 fn sharpen(
     refine: &Refine<'_>,
     (best, judgement, spins): &mut Settled,

@@ -1,4 +1,5 @@
-//! One candidate in, one fit out: search, refine, judge; or nothing, where no posture explains what was measured.
+//! One candidate in, one fit out: search, refine, judge; or nothing, where no posture explains what
+//! was measured.
 
 use contract::{Candidate, Fan, Fit, OneByOne};
 use geometry::{Point, Pose};
@@ -18,9 +19,10 @@ use crate::{Prepared, Scene, Settings};
 /// Gate of the last rounds in multiples of the noise found, and its bounds, metres.
 const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
 
-/// Score of the best posture so far below which no other wrist makes it a robot: where beams tell, where they are a camera's,
-/// which bends surfaces, and where only points do. Of 250 robots among clutter, behind fences, with noise of 10 mm, none
-/// had less than 0.58 after the quick look; one whose balancer its model has fixed had 0.47; half of what small arms find in clutter
+/// Score of the best posture so far below which no other wrist makes it a robot: where beams tell,
+/// where they are a camera's, which bends surfaces, and where only points do. Of 250 robots among
+/// clutter, behind fences, with noise of 10 mm, none had less than 0.58 after the quick look; one
+/// whose balancer its model has fixed had 0.47; half of what small arms find in clutter
 /// has less than 0.45. An arm in a depth camera's cloud had 0.33, thirteen
 /// other places of that cloud at most 0.22.
 const HOPELESS_SCORE: [f64; 3] = [0.45, 0.25, 0.1];
@@ -30,8 +32,8 @@ pub(crate) const NEAR_MARGIN: f64 = 0.15;
 const COARSE_CAP: usize = 600;
 /// Points that are looked at for those, thinned evenly.
 const COARSE_NEAR: usize = 30_000;
-/// Distance from the roughly placed links within which points take part in the fine rounds, metres: just inside the
-/// reach of the fine field.
+/// Distance from the roughly placed links within which points take part in the fine rounds, metres:
+/// just inside the reach of the fine field.
 const FINE_GATE: f64 = 0.0255;
 
 /// Fits the candidate's model in the scene; `None` where nothing comes near.
@@ -81,8 +83,8 @@ pub fn fit(
     Some(Fit { other_branches: loops, ..fit })
 }
 
-/// The fit of a robot that stands where an earlier one had it, or near enough for the refinement; `None` where the beams
-/// contradict that.
+/// The fit of a robot that stands where an earlier one had it, or near enough for the refinement;
+/// `None` where the beams contradict that.
 #[must_use]
 pub fn again(
     before: &Fit,
@@ -115,8 +117,8 @@ const CLEAR_BASE: f64 = 0.35;
 /// Hypotheses of a quick look, and of those that are settled and refined.
 const QUICK: [usize; 3] = [25, 8, 3];
 
-/// Whether anything like the robot's arm stands on one of the bases. A right one may end with a wrong wrist in a quick
-/// look, but not without shoulder and elbow.
+/// Whether anything like the robot's arm stands on one of the bases. A right one may end with a
+/// wrong wrist in a quick look, but not without shoulder and elbow.
 fn is_promising(refine: &Refine<'_>, bases: &[Pose], near: &[u32], fan: &dyn Fan) -> bool {
     let found = quick(refine, bases, near, fan);
     found.is_some_and(|found| found.1.score >= hopeless(refine.scene))
@@ -146,8 +148,8 @@ fn hopeless(scene: &Scene<'_>) -> f64 {
     }
 }
 
-/// Where the refinement alone ends from a base (world) and a posture near the truth, without any search: for measuring
-/// how near a search must come.
+/// Where the refinement alone ends from a base (world) and a posture near the truth, without any
+/// search: for measuring how near a search must come.
 #[must_use]
 pub fn converge(
     prepared: &Prepared<'_>,
@@ -177,7 +179,8 @@ enum Look {
     Others,
 }
 
-/// Adds what is found beside the best of some postures, best first; `None` where it is too poor for a robot.
+/// Adds what is found beside the best of some postures, best first; `None` where it is too poor for
+/// a robot.
 fn look_beside(
     beam: &Beam<'_>,
     refine: &Refine<'_>,
@@ -195,8 +198,8 @@ fn look_beside(
             Look::Others => beam.alternatives(best, fan),
         };
         polished.extend(fan.fan(more, |h| {
-            // One joint of a fitted arm swept to a peak is less than a step off: what hangs beside its link must not draw it
-            // away within the gates of the coarse rounds.
+            // One joint of a fitted arm swept to a peak is less than a step off: what hangs beside
+            // its link must not draw it away within the gates of the coarse rounds.
             let start = match look {
                 Look::Again => roughly(refine, &h, near, NEAR_ROUNDS, fan),
                 Look::Others => h,
@@ -248,8 +251,8 @@ pub(crate) fn roughly(
     refine.run(h, &few, rounds, fan)
 }
 
-/// Points of a link in the fine rounds: enough to hold its pose to a fifth of a millimetre, which tells hypotheses
-/// apart.
+/// Points of a link in the fine rounds: enough to hold its pose to a fifth of a millimetre, which
+/// tells hypotheses apart.
 const POLISH_CAP: usize = 1000;
 /// Points that are looked at for those, thinned evenly.
 const POLISH_NEAR: usize = 60_000;
@@ -258,24 +261,14 @@ const POLISH_NEAR: usize = 60_000;
 pub(crate) type Polished = (Hypothesis, Judgement);
 
 /// Fine rounds, then the judgement.
-pub(crate) fn polish(
-    refine: &Refine<'_>,
-    h: &Hypothesis,
-    near: &[u32],
-    fan: &dyn Fan,
-) -> Polished {
+pub(crate) fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> Polished {
     let h = fine(refine, h, near, fan);
     let judgement = judged(refine, &h);
     (h, judgement)
 }
 
 /// Fine rounds on thinned points, with the gate that the noise asks for.
-pub(crate) fn fine(
-    refine: &Refine<'_>,
-    h: &Hypothesis,
-    near: &[u32],
-    fan: &dyn Fan,
-) -> Hypothesis {
+pub(crate) fn fine(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> Hypothesis {
     fine_on(refine, h, &few(refine, h, near, fan), fan)
 }
 
@@ -290,7 +283,8 @@ fn fine_on(refine: &Refine<'_>, h: &Hypothesis, few: &[u32], fan: &dyn Fan) -> H
     refine.run(&h, few, &last_rounds(refine, &h, few), fan)
 }
 
-/// The rounds that end at a posture, from one that is nearly it: with the gate that the noise there asks for.
+/// The rounds that end at a posture, from one that is nearly it: with the gate that the noise there
+/// asks for.
 fn last_rounds(refine: &Refine<'_>, h: &Hypothesis, few: &[u32]) -> Vec<Round> {
     let gate = (LAST_GATE.0 * refine.noise(h, few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
     vec![Round { gate, balanced: false }; N_LAST_ROUNDS]
@@ -298,7 +292,8 @@ fn last_rounds(refine: &Refine<'_>, h: &Hypothesis, few: &[u32]) -> Vec<Round> {
 
 /// The installation plane, at the height of the base's origin.
 fn prior(candidate: &Candidate, local_from_world: &Pose, settings: &Settings) -> Prior {
-    // The candidate's bases already stand on the plane: the first one tells the height of the origin above it.
+    // The candidate's bases already stand on the plane: the first one tells the height of the
+    // origin above it.
     let base = candidate.bases.first().map_or_else(Pose::identity, |b| local_from_world * b.0);
     let (at, turn) = (Translation3::from(base.translation.vector), candidate.plane.plane.frame());
     let is_guess = candidate.plane.is_guess();

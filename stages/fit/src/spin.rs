@@ -1,5 +1,6 @@
-//! An adjusted posture in; out come the other values of its last joints at which the points fit as well or better: a
-//! flange with six bolts looks the same every 60°, and only points on its small features tell (METHOD.md §9).
+//! An adjusted posture in; out come the other values of its last joints at which the points fit as
+//! well or better: a flange with six bolts looks the same every 60°, and only points on its small
+//! features tell (METHOD.md §9).
 
 use contract::Fan;
 use std::f64::consts::TAU;
@@ -11,12 +12,13 @@ use crate::turns;
 
 /// Values nearer than this to one another are one, radians: 3°.
 const APART: f64 = 0.052;
-/// Extra sum of squares, relative to the best's and in units of the noise's variance, up to which a value is as good:
-/// 3 % of the squares is less than what real castings differ by.
+/// Extra sum of squares, relative to the best's and in units of the noise's variance, up to which a
+/// value is as good: 3 % of the squares is less than what real castings differ by.
 pub(crate) const AS_GOOD: (f64, f64) = (0.03, 30.0);
 
-/// Another place where the points fit best is as good if it is no more clearly worse, see [`Sweep::clearly_worse`]: of flanges
-/// that bolts make look alike the right one was worse by up to 1.8; what is not alike by 3 and more.
+/// Another place where the points fit best is as good if it is no more clearly worse, see
+/// [`Sweep::clearly_worse`]: of flanges that bolts make look alike the right one was worse by up to
+/// 1.8; what is not alike by 3 and more.
 const TWIN: f64 = 2.5;
 
 /// Values of one joint.
@@ -25,12 +27,13 @@ pub(crate) struct Spin {
     pub(crate) joint: usize,
     /// All values at which the points fit as well as at the best one, best first.
     pub(crate) values: Vec<f64>,
-    /// How far around the posture's own value all values are as good, at most, radians: 0 where those beside it are worse.
+    /// How far around the posture's own value all values are as good, at most, radians: 0 where
+    /// those beside it are worse.
     pub(crate) extent: f64,
 }
 
-/// How far the run of values around `own` reaches, up or down, whose costs are within the limit; it may begin a little
-/// beside `own`, to which all points drew it, not those of the sweep alone.
+/// How far the run of values around `own` reaches, up or down, whose costs are within the limit; it
+/// may begin a little beside `own`, to which all points drew it, not those of the sweep alone.
 pub(crate) fn extent(costs: &[(f64, f64)], own: f64, limit: f64) -> f64 {
     let mut offsets: Vec<(f64, f64)> = costs.iter().map(|c| (c.0 - own, c.1)).collect();
     offsets.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,5 +1,6 @@
-//! A candidate and scans that contradict each other in; out come the groups of scans in which the robot stood still, as a
-//! fit with the others beside it: somebody moved the robot between two stations.
+//! A candidate and scans that contradict each other in; out come the groups of scans in which the
+//! robot stood still, as a fit with the others beside it: somebody moved the robot between two
+//! stations.
 
 use contract::words::count;
 use contract::{Candidate, Fan, Fit, InstallationPlane, Region, Verdict, View};
@@ -11,8 +12,8 @@ use crate::refine::Refine;
 use crate::solve::{NEAR_MARGIN, fit, quick};
 use crate::{Prepared, Scene, Settings};
 
-/// Share of a scan's judged surface of the moving links, explained less contradicted, from which on a posture that another
-/// scan tells stands in it too.
+/// Share of a scan's judged surface of the moving links, explained less contradicted, from which on
+/// a posture that another scan tells stands in it too.
 const AGREES: f64 = 0.35;
 /// Share of the moving surface that a scan must have judged to say anything.
 const MIN_JUDGED: f64 = 0.03;
@@ -32,8 +33,9 @@ pub struct Sights<'a> {
     pub floors: &'a [InstallationPlane],
 }
 
-/// What the scans say where they disagree: the fit of the scans that agree on the best posture, with a fit of the others
-/// beside it ([`Fit::stays`]); `None` where they do not disagree, or no group of them shows the robot plainly.
+/// What the scans say where they disagree: the fit of the scans that agree on the best posture,
+/// with a fit of the others beside it ([`Fit::stays`]); `None` where they do not disagree, or no
+/// group of them shows the robot plainly.
 #[must_use]
 pub fn stays(
     candidate: &Candidate,
@@ -93,7 +95,8 @@ pub fn stays(
     together(out, &left, &singles, (prepared, settings))
 }
 
-/// One fit of all groups; scans that show too little for a posture of their own go with the one that they bear out most.
+/// One fit of all groups; scans that show too little for a posture of their own go with the one
+/// that they bear out most.
 fn together(
     mut groups: Vec<(Fit, Hypothesis)>,
     left: &[usize],
@@ -128,7 +131,8 @@ fn together(
     Some(first)
 }
 
-/// Whether a scan shows what a posture asks for: explained, judged and whole surface of the moving links, m².
+/// Whether a scan shows what a posture asks for: explained, judged and whole surface of the moving
+/// links, m².
 fn bears_out([net, judged, whole]: &[f64; 3]) -> bool {
     *judged > MIN_JUDGED * whole && *net > AGREES * judged
 }
@@ -160,7 +164,8 @@ impl<'a> Single<'a> {
         Self { view, scene, found }
     }
 
-    /// What this scan says of a posture: explained less contradicted, judged and whole surface of the moving links, m².
+    /// What this scan says of a posture: explained less contradicted, judged and whole surface of
+    /// the moving links, m².
     fn says(&self, h: &Hypothesis, prepared: &Prepared<'_>, settings: &Settings) -> [f64; 3] {
         let refine = Refine { prepared, scene: &self.scene, settings, prior: None };
         let judgement = judged(&refine, h);

@@ -12,12 +12,14 @@ use crate::sampled::Sampled;
 
 /// One of so many points is looked at to see of which links there are more than enough.
 const SOME: usize = 4;
-/// Quarters of the points wanted of a link that are as good as all of them: a deviation grows by a seventh at most.
+/// Quarters of the points wanted of a link that are as good as all of them: a deviation grows by a
+/// seventh at most.
 const ENOUGH: usize = 3;
 
 impl Refine<'_> {
-    /// Of `points`, at most `cap` for each link that is nearest to them, evenly picked, and as many again of those that
-    /// lie near the robot but within no link's field: the large links must not outvote the wrist. Sorted.
+    /// Of `points`, at most `cap` for each link that is nearest to them, evenly picked, and as many
+    /// again of those that lie near the robot but within no link's field: the large links must
+    /// not outvote the wrist. Sorted.
     pub(crate) fn stratified(
         &self,
         h: &Hypothesis,
@@ -83,8 +85,9 @@ pub(crate) fn some(points: &[u32], n: usize) -> Cow<'_, [u32]> {
     }
 }
 
-/// No point farther than this from the surface takes part in the adjustment: in multiples of the noise, and its bounds,
-/// metres: what robots differ from their models by and more, within the reach of the fine field.
+/// No point farther than this from the surface takes part in the adjustment: in multiples of the
+/// noise, and its bounds, metres: what robots differ from their models by and more, within the
+/// reach of the fine field.
 const ADJUST_GATE: (f64, f64, f64) = (3.0, 0.02, 0.03);
 
 /// Links of a robot as it stands, with what lies about it: points are sorted by them.

@@ -1,4 +1,5 @@
-//! An adjusted posture, and joints that may stand at several values, in; how far the joints before them give way, out.
+//! An adjusted posture, and joints that may stand at several values, in; how far the joints before
+//! them give way, out.
 
 use contract::{Fan, OneByOne};
 use nalgebra::{DMatrix, DVector};
@@ -18,9 +19,9 @@ const N_SWAYS: usize = 8;
 /// … and values all around, where those are fewer.
 const N_AROUND: usize = 5;
 
-/// Covariance of the joints that comes from those that may stand at several values, radians² or metres²: a flange's
-/// bolts pull at the wrist, and which way they pull is as open as the flange. Each value is as likely as the others.
-/// `points` are those of the adjustment, as it ended.
+/// Covariance of the joints that comes from those that may stand at several values, radians² or
+/// metres²: a flange's bolts pull at the wrist, and which way they pull is as open as the flange.
+/// Each value is as likely as the others. `points` are those of the adjustment, as it ended.
 pub(crate) fn sway(
     refine: &Refine<'_>,
     best: &Adjusted,

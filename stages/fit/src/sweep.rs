@@ -1,5 +1,5 @@
-//! A posture and one of its joints in; out comes how far the points near the links that the joint moves are from the arm as
-//! it turns (METHOD.md §9).
+//! A posture and one of its joints in; out comes how far the points near the links that the joint
+//! moves are from the arm as it turns (METHOD.md §9).
 
 use geometry::Point;
 use geometry::depth::transform;
@@ -8,13 +8,15 @@ use crate::beam::Hypothesis;
 use crate::facets::Facet;
 use crate::refine::Refine;
 
-/// Arc between trial values at the joint's lever, metres: finer than the features that tell them apart.
+/// Arc between trial values at the joint's lever, metres: finer than the features that tell them
+/// apart.
 const STEP: f64 = 0.003;
 /// Largest step, radians: 1°.
 const MAX_STEP: f64 = 0.0175;
 /// Points farther than this from everything count as if they were so far, metres.
 pub(crate) const CAP: f32 = 0.015;
-/// Points in front of the flange's face count as if they were no farther, metres: something may hang there.
+/// Points in front of the flange's face count as if they were no farther, metres: something may
+/// hang there.
 const HELD: f32 = 0.5 * CAP;
 /// Points within this of the swept links take part, metres.
 const NEAR: f64 = 0.03;
@@ -85,8 +87,9 @@ impl<'a> Sweep<'a> {
         self.squares(turned).sum()
     }
 
-    /// How clearly a value of the joint is worse than one whose distances are given: what its squares exceed the other's by,
-    /// over what that would be if each point's excess were chance: a few strays say nothing, many points that agree much.
+    /// How clearly a value of the joint is worse than one whose distances are given: what its
+    /// squares exceed the other's by, over what that would be if each point's excess were
+    /// chance: a few strays say nothing, many points that agree much.
     pub(crate) fn clearly_worse(&self, value: f64, than: &[f32]) -> f64 {
         let own = self.distances(value, &self.moved);
         let (other, best) = ([own.as_slice()], [than]);
@@ -103,8 +106,9 @@ impl<'a> Sweep<'a> {
 }
 
 impl Refine<'_> {
-    /// How much worse another posture explains the points on the links that stand differently in it: the part of its
-    /// squared distances that the best one does without; about 0 for equals, negative where the other is better.
+    /// How much worse another posture explains the points on the links that stand differently in
+    /// it: the part of its squared distances that the best one does without; about 0 for
+    /// equals, negative where the other is better.
     pub(crate) fn worsening(&self, best: &Hypothesis, other: &Hypothesis, near: &[u32]) -> f64 {
         let moved = crate::judge::moved([self.prepared; 2], [best, other]);
         self.worsening_in(self, [best, other], &moved, near)
@@ -115,8 +119,8 @@ impl Refine<'_> {
         crate::judge::moved([self.prepared, other.prepared], [h, h])
     }
 
-    /// The same for a posture here and one of another model of the same robot; `moved` are the links that stand
-    /// differently.
+    /// The same for a posture here and one of another model of the same robot; `moved` are the
+    /// links that stand differently.
     pub(crate) fn worsening_in(
         &self,
         there: &Self,
@@ -138,8 +142,8 @@ impl Refine<'_> {
         (b - a) / b.max(a).max(points.len() as f64 * self.scene.noise * self.scene.noise)
     }
 
-    /// Sum of the squared distances of points, each the least of its own; those in front of the flange's face count less:
-    /// something may hang there.
+    /// Sum of the squared distances of points, each the least of its own; those in front of the
+    /// flange's face count less: something may hang there.
     pub(crate) fn squares(&self, h: &Hypothesis, points: &[u32], distances: &[&[f32]]) -> f64 {
         let held = self.held(h, points);
         let of = |i: usize| {
@@ -160,7 +164,8 @@ impl Refine<'_> {
         points.iter().map(|i| face.is_held(at(i))).collect()
     }
 
-    /// Points near the links whatever their joint's value: within their sphere about the joint's axis, thinned.
+    /// Points near the links whatever their joint's value: within their sphere about the joint's
+    /// axis, thinned.
     pub(crate) fn swept(&self, h: &Hypothesis, near: &[u32], moved: &[usize]) -> Vec<u32> {
         let spheres = self.spheres(h, moved);
         let inside = |i: &u32| {
@@ -184,7 +189,8 @@ impl Refine<'_> {
         links.iter().map(sphere).collect()
     }
 
-    /// Distance of each point from the surface of the chosen links along their normals, at most the cap, metres.
+    /// Distance of each point from the surface of the chosen links along their normals, at most the
+    /// cap, metres.
     pub(crate) fn distances(
         &self,
         h: &Hypothesis,

@@ -1,4 +1,5 @@
-//! Points with the facets that they lie on in; how many they are and how far off, link by link and all in all, out.
+//! Points with the facets that they lie on in; how many they are and how far off, link by link and
+//! all in all, out.
 
 use crate::pairs::Pair;
 
@@ -47,8 +48,8 @@ impl Tallies {
         self.links.iter().map(rms).collect()
     }
 
-    /// Robust standard deviation of the points, in those that were stated: by the median, as a few points are always
-    /// taken for those of another face.
+    /// Robust standard deviation of the points, in those that were stated: by the median, as a few
+    /// points are always taken for those of another face.
     pub(crate) fn scale(&self) -> f64 {
         let half = self.deviations.iter().sum::<u64>() / 2;
         let mut below = 0;
@@ -77,7 +78,8 @@ mod tests {
 
     #[test]
     fn the_noise_is_that_of_the_points_but_for_those_of_another_face() {
-        // Noise of a third of what is stated, evenly over its quantiles; every twentieth point 3 mm off.
+        // Noise of a third of what is stated, evenly over its quantiles; every twentieth point 3 mm
+        // off.
         let noise = |k: u32| 0.002 / 3.0 * 1.7 * (2.0 * f64::from(k % 1000) / 1000.0 - 1.0);
         let points = (0..20_000).map(|k| if k % 20 == 0 { 0.003 } else { noise(k) });
         let (first, rest): (Vec<_>, Vec<_>) = points.enumerate().partition(|(i, _)| i % 3 == 0);

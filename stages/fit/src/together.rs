@@ -1,9 +1,11 @@
-//! Robots that the same scans see, and what stands still about them, each with what it says of the scans' errors, in; base and
-//! joints of each robot by what all of them say of the scans, out (METHOD.md §18).
+//! Robots that the same scans see, and what stands still about them, each with what it says of the
+//! scans' errors, in; base and joints of each robot by what all of them say of the scans, out
+//! (METHOD.md §18).
 //!
-//! Near its minimum an adjustment is linear: what a robot's points say of the errors `e_i` of its scans is a normal distribution
-//! (information `Λ_i`, vector `η_i`), and robot and joints give way to them by `x_i = x̂_i + G_i (e_i − ê_i)`. Scans err alike near
-//! all robots but for what is each robot's own (its paint, the shape of its castings): `e_i = e + d_i`, `d_i ~ N(0, D_i)`. What the
+//! Near its minimum an adjustment is linear: what a robot's points say of the errors `e_i` of its
+//! scans is a normal distribution (information `Λ_i`, vector `η_i`), and robot and joints give way
+//! to them by `x_i = x̂_i + G_i (e_i − ê_i)`. Scans err alike near all robots but for what is each
+//! robot's own (its paint, the shape of its castings): `e_i = e + d_i`, `d_i ~ N(0, D_i)`. What the
 //! others say of `e` then takes the place of the prior of `e_i`, and no point is looked at again.
 
 use contract::{Fit, Overlap, Scan, ScanId, ScanShare, Verdict};
@@ -16,20 +18,25 @@ use crate::adjust::scan_priors;
 use crate::normal::N_SCAN;
 use crate::report::tip_sigma;
 
-/// What is a robot's own, one sigma: shift, metres, turn, radians, range bias, metres; its surface comes to the first.
+/// What is a robot's own, one sigma: shift, metres, turn, radians, range bias, metres; its surface
+/// comes to the first.
 const OWN: [f64; 3] = [0.000_3, 0.000_02, 0.000_5];
 /// How flat a piece of floor or wall is, and how well a scan has its middle, metres, one sigma.
 const FLAT: f64 = 0.002;
 /// Share of a prior's variance that this may be.
 const MOST_OWN: f64 = 0.5;
-/// A robot that others would move farther than this is none of whose scans err as theirs do, or is no robot: metres, radians.
+/// A robot that others would move farther than this is none of whose scans err as theirs do, or is
+/// no robot: metres, radians.
 const MAX_STEP: f64 = 0.01;
-/// The same of how much worse its own points would lie, in squared deviations for each unknown of its scans.
+/// The same of how much worse its own points would lie, in squared deviations for each unknown of
+/// its scans.
 const MAX_WORSE: f64 = 2.0;
-/// No variance shrinks to less than this share: what others say is no more than its own model of errors.
+/// No variance shrinks to less than this share: what others say is no more than its own model of
+/// errors.
 const LEAST_LEFT: f64 = 0.05;
 
-/// What one thing says of the errors that scans have everywhere: information and its vector, seven values a scan.
+/// What one thing says of the errors that scans have everywhere: information and its vector, seven
+/// values a scan.
 struct Told {
     scans: Vec<ScanId>,
     information: DMatrix<f64>,
@@ -47,8 +54,8 @@ struct Own {
     apart: [f64; N_SCAN],
 }
 
-/// Brings robots up to date with what others, and pieces of surface that stand still, say of their scans; those that stand in
-/// all scans only.
+/// Brings robots up to date with what others, and pieces of surface that stand still, say of their
+/// scans; those that stand in all scans only.
 pub fn together(
     fits: &mut [Fit],
     models: &[Model],
@@ -96,8 +103,8 @@ impl Own {
         Told::softened(self.scans.clone(), &self.information, &self.vector, &self.apart)
     }
 
-    /// The errors of its scans by what it and others say; `None` where no other says anything of them, or where what they say
-    /// is not to be believed.
+    /// The errors of its scans by what it and others say; `None` where no other says anything of
+    /// them, or where what they say is not to be believed.
     fn among<'t>(
         &self,
         others: impl Iterator<Item = &'t Told>,
@@ -130,7 +137,8 @@ impl Own {
 }
 
 impl Told {
-    /// What pieces of surface say of some scans: each is at an unknown place on which those that saw it agree.
+    /// What pieces of surface say of some scans: each is at an unknown place on which those that
+    /// saw it agree.
     fn by_surfaces(still: &[Overlap], all: &[Scan], scans: &[ScanId]) -> Option<Self> {
         let scanner = |id: &ScanId| {
             let scan = all.iter().find(|scan| scan.id == *id)?;
@@ -189,7 +197,8 @@ impl Told {
         Some(Self { scans, vector: share * vector, information })
     }
 
-    /// Adds what is told of some scans, the others of it known as priors say; whether it tells of any of them.
+    /// Adds what is told of some scans, the others of it known as priors say; whether it tells of
+    /// any of them.
     fn add_to(
         &self,
         scans: &[ScanId],
@@ -237,7 +246,8 @@ struct New {
 }
 
 impl New {
-    /// Brings a fit up to date; one that would move too far stays as it is, and so does a joint that nothing determines.
+    /// Brings a fit up to date; one that would move too far stays as it is, and so does a joint
+    /// that nothing determines.
     fn bring(&self, fit: &mut Fit, own: &Own, model: &Model, scans: &[Scan]) {
         let mut step = &own.gain * &self.step;
         let joints = fit.joints.iter().enumerate();
@@ -248,7 +258,8 @@ impl New {
         let n = step.len();
         let old = DMatrix::from_row_slice(n, n, &fit.covariance);
         let mut new = &old - &own.gain * &self.gained * own.gain.transpose();
-        // A variance that is nearly all the scans' would vanish: correlations stay, what is left is at least so much.
+        // A variance that is nearly all the scans' would vanish: correlations stay, what is left is
+        // at least so much.
         let left = (0..n).map(|i| new[(i, i)] / old[(i, i)].max(f64::MIN_POSITIVE));
         let least = left.fold(1.0, f64::min);
         if least < LEAST_LEFT {

@@ -1,5 +1,5 @@
-//! A fitted arm, a tool and the scene in; whether the tool hangs on the arm, how its joints stand, and the fit of both
-//! together out.
+//! A fitted arm, a tool and the scene in; whether the tool hangs on the arm, how its joints stand,
+//! and the fit of both together out.
 
 use contract::{Fan, Fit};
 use geometry::Pose;
@@ -15,15 +15,17 @@ use crate::sweep::MIN_POINTS;
 use crate::turns;
 use crate::{Prepared, Scene, Settings};
 
-/// Score of the tool's links from which on it is there: tools that are there have 0.69 and more, others that are taken
-/// for them up to 0.67.
+/// Score of the tool's links from which on it is there: tools that are there have 0.69 and more,
+/// others that are taken for them up to 0.67.
 const MIN_SCORE: f64 = 0.62;
-/// Share of the tool's surface that must have been judged: of tools that are there it was 0.4 and more.
+/// Share of the tool's surface that must have been judged: of tools that are there it was 0.4 and
+/// more.
 const MIN_SEEN: f64 = 0.20;
 /// Tolerance of the judgement, metres: an arm's flange is known to a millimetre.
 const TOLERANCE: f64 = 0.012;
-/// Share that points on nothing may have of those about the tool that are not the arm's: with tools that are there it is a few
-/// hundredths, more where they hold something; with other grippers that are taken for them, half and more.
+/// Share that points on nothing may have of those about the tool that are not the arm's: with tools
+/// that are there it is a few hundredths, more where they hold something; with other grippers that
+/// are taken for them, half and more.
 const MAX_STRANGE: f64 = 0.3;
 /// How far about the tool that is, and from which distance on a point is not on it, metres.
 const ABOUT: f64 = 0.02;
@@ -42,8 +44,9 @@ pub struct Tooled {
     pub explained: f64,
 }
 
-/// Where the tool stands if it is there. `tooled` is the arm with it, of which the first so many joints and links are
-/// the arm's; the arm stays as it was fitted, but for its last joint, which a bare flange may not tell.
+/// Where the tool stands if it is there. `tooled` is the arm with it, of which the first so many
+/// joints and links are the arm's; the arm stays as it was fitted, but for its last joint, which a
+/// bare flange may not tell.
 #[must_use]
 pub fn try_tool(
     fit: &Fit,
@@ -75,8 +78,8 @@ pub fn try_tool(
     Some(Tooled { world_from_base, posture: best.posture, explained })
 }
 
-/// Which holes the tool may be bolted to, given as turns about the arm's last joint `flange`, radians: all that explain the
-/// points as well as the best, best first.
+/// Which holes the tool may be bolted to, given as turns about the arm's last joint `flange`,
+/// radians: all that explain the points as well as the best, best first.
 #[must_use]
 pub fn bolt(
     start: &Tooled,
@@ -156,8 +159,8 @@ fn start(fit: &Fit, tooled: &Prepared<'_>, scene: &Scene<'_>) -> Hypothesis {
     }
 }
 
-/// Whether enough points lie on the links from `first` on and not on those before, and few about them on nothing: a bare flange
-/// has no such points, another gripper many that lie on nothing.
+/// Whether enough points lie on the links from `first` on and not on those before, and few about
+/// them on nothing: a bare flange has no such points, another gripper many that lie on nothing.
 fn has_own_points(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], first: usize) -> bool {
     let tool: Vec<_> = refine.prepared.frames(h).into_iter().filter(|(l, _)| *l >= first).collect();
     let is_about = |i: &u32| {
@@ -177,7 +180,8 @@ fn has_own_points(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], first: usiz
     beside.len() - n_strange >= MIN_POINTS && (n_strange as f64) < MAX_STRANGE * beside.len() as f64
 }
 
-/// Surface of the links from `first` on: explained less contradicted, judged, and the whole of it, m².
+/// Surface of the links from `first` on: explained less contradicted, judged, and the whole of it,
+/// m².
 fn of_tool(tooled: &Prepared<'_>, first: usize, judgement: &Judgement) -> [f64; 3] {
     (first..tooled.links.len()).fold([0.0; 3], |sum, l| {
         let [net, judged] = judgement.links[l];

@@ -10,32 +10,37 @@ use crate::turns;
 use crate::weak::weak;
 use crate::{Prepared, Scene};
 
-/// Share of seen-through samples on one link up to which a fit may be trusted, and from which it is refused.
+/// Share of seen-through samples on one link up to which a fit may be trusted, and from which it is
+/// refused.
 const LINK_VIOLATION: (f64, f64) = (0.06, 0.30);
 /// Share of seen-through samples over all links, likewise.
 const VIOLATION: (f64, f64) = (0.03, 0.15);
 /// Score below which a fit is not trusted, and below which it is refused.
 const SCORE: (f64, f64) = (0.60, 0.35);
-/// Residual, in multiples of the scans' noise and metres beyond, from which a surface fits too poorly to be trusted.
+/// Residual, in multiples of the scans' noise and metres beyond, from which a surface fits too
+/// poorly to be trusted.
 const POOR_RMS: (f64, f64) = (2.0, 0.0015);
-/// Score below which a surface that fits too poorly is refused: furniture has room for a small arm that is nowhere
-/// quite right.
+/// Score below which a surface that fits too poorly is refused: furniture has room for a small arm
+/// that is nowhere quite right.
 const POOR_SCORE: f64 = 0.52;
-/// Residual of points that fill the gate of the adjustment evenly, metres: of things that are near the model, not on it.
+/// Residual of points that fill the gate of the adjustment evenly, metres: of things that are near
+/// the model, not on it.
 const ANYTHING_RMS: f64 = 0.0072;
-/// Residual, in multiples of the scans' noise and metres beyond, from which a fit that leaves half of its joints open is
-/// lost: a post, a bench and a hose have room for a smooth small arm. What it found there had 4.7 mm and more at a noise
-/// of 2 mm; of 3648 right fits five left so much open, and had 2.6 mm at most there, 7.6 mm at one of 10 mm.
+/// Residual, in multiples of the scans' noise and metres beyond, from which a fit that leaves half
+/// of its joints open is lost: a post, a bench and a hose have room for a smooth small arm. What it
+/// found there had 4.7 mm and more at a noise of 2 mm; of 3648 right fits five left so much open,
+/// and had 2.6 mm at most there, 7.6 mm at one of 10 mm.
 const OPEN_RMS: (f64, f64) = (1.25, 0.002);
-/// Noise of a scanner from which on more of it is no excuse there, metres: in a corridor scanned with 9 mm, walls and cabinets
-/// had room for four small arms, 9.5 to 11.6 mm off.
+/// Noise of a scanner from which on more of it is no excuse there, metres: in a corridor scanned
+/// with 9 mm, walls and cabinets had room for four small arms, 9.5 to 11.6 mm off.
 const OPEN_NOISE: f64 = 0.005;
 /// Standard deviation up to which a joint counts as known for that, radians or metres.
 const KNOWN_SIGMA: f64 = contract::UNDETERMINED_SIGMA;
 /// Smallest share of the surface that must have been judged.
 const SEEN: f64 = 0.12;
-/// Share of the joints that are known at most where so little of a surface was seen that it may be anything: of the suites' right
-/// robots none had so little; a corner of a shelf had, of sixty models.
+/// Share of the joints that are known at most where so little of a surface was seen that it may be
+/// anything: of the suites' right robots none had so little; a corner of a shelf had, of sixty
+/// models.
 const LITTLE_KNOWN: f64 = 0.25;
 /// Share of a link's surface that beams must have judged for what they went through to count.
 const MIN_SEEN: f64 = 0.02;
@@ -45,7 +50,8 @@ const ROBOT_POINTS: usize = 100;
 const JOINT_POINTS: usize = 30;
 /// Play of a stop: a degree for joints that turn, a millimetre for those that slide.
 const STOP_PLAY: (f64, f64) = (0.0175, 0.001);
-/// Standard deviation from which on the values that are named are but some of those that a joint may have, radians (30°).
+/// Standard deviation from which on the values that are named are but some of those that a joint
+/// may have, radians (30°).
 const ANYWHERE: f64 = 0.52;
 /// Most values of a joint that are named.
 const MAX_VALUES: usize = 3;
@@ -72,8 +78,9 @@ impl Reasons {
     }
 }
 
-/// Sets verdict and reasons from what stands in the fit and the judgement; `held` are standard deviations of the joints as the scatter
-/// of the points has them, radians or metres, where those of the fit hold more.
+/// Sets verdict and reasons from what stands in the fit and the judgement; `held` are standard
+/// deviations of the joints as the scatter of the points has them, radians or metres, where those
+/// of the fit hold more.
 pub(crate) fn pass(
     fit: &mut Fit,
     prepared: &Prepared<'_>,
@@ -148,8 +155,9 @@ fn of_surface(
     }
 }
 
-/// Whether the joint that places a link and the one before it are known; else the link may well stand elsewhere, and the rest of
-/// the arm where it was found. A last joint does not count: at each of its values a flange is about where it is.
+/// Whether the joint that places a link and the one before it are known; else the link may well
+/// stand elsewhere, and the rest of the arm where it was found. A last joint does not count: at
+/// each of its values a flange is about where it is.
 fn is_held(sigmas: &[f64], prepared: &Prepared<'_>, link: usize) -> bool {
     let n = sigmas.len();
     let placed = (0..n).find(|&j| prepared.placed_by[j].contains(&link));
@@ -159,8 +167,9 @@ fn is_held(sigmas: &[f64], prepared: &Prepared<'_>, link: usize) -> bool {
     })
 }
 
-/// Whether a link hangs beside the chain, fixed or a multiple of a joint: rods and cylinders of closed loops, as models have them that
-/// do not describe the loop. Where such a one stands says nothing against the arm.
+/// Whether a link hangs beside the chain, fixed or a multiple of a joint: rods and cylinders of
+/// closed loops, as models have them that do not describe the loop. Where such a one stands says
+/// nothing against the arm.
 fn is_aside(model: &Model, link: usize) -> bool {
     let Some(j) = model.links[link].parent_joint else { return false };
     let is_simplified = matches!(model.joints[j].motion, Motion::Fixed | Motion::Mimic { .. });
@@ -197,7 +206,8 @@ fn of_joints(reasons: &mut Reasons, fit: &Fit, prepared: &Prepared<'_>, scene: &
             doubts.push(format!("joint '{}' stands beyond its limit", joint.name));
         }
     }
-    // A robot that is a hundredth smaller than its model leaves all of them open, each by half a degree.
+    // A robot that is a hundredth smaller than its model leaves all of them open, each by half a
+    // degree.
     if !fit.joints.iter().any(JointFit::is_determined) {
         doubts.push("the points determine none of its joints closely".into());
     }
@@ -219,9 +229,10 @@ fn n_known(fit: &Fit) -> [usize; 2] {
     [n, n - n_last]
 }
 
-/// Whether so few joints but the last are known of so many that it may be anything flat: on walls and jigs stood seven smooth
-/// small arms, of whose six or seven joints two were known at most; of 5488 right fits none had so few. A camera sees half of an
-/// arm, and bends that: of it no more can be asked.
+/// Whether so few joints but the last are known of so many that it may be anything flat: on walls
+/// and jigs stood seven smooth small arms, of whose six or seven joints two were known at most; of
+/// 5488 right fits none had so few. A camera sees half of an arm, and bends that: of it no more can
+/// be asked.
 fn leaves_most_open([n_but_last, n_joints]: [usize; 2]) -> bool {
     2 * n_but_last + 1 < n_joints
 }
@@ -231,8 +242,8 @@ fn is_scanned(scene: &Scene<'_>) -> bool {
     scene.evidence.has_beams() && !scene.has_camera()
 }
 
-/// Standard deviation of a joint by the covariance alone, radians or metres: a symmetric tool that may stand at several values
-/// stands the same at all of them, and only what moves it counts.
+/// Standard deviation of a joint by the covariance alone, radians or metres: a symmetric tool that
+/// may stand at several values stands the same at all of them, and only what moves it counts.
 fn own_sigma(fit: &Fit, j: usize) -> f64 {
     let n = 6 + fit.joints.len();
     fit.covariance.get((6 + j) * (n + 1)).map_or(fit.joints[j].sigma, |v| v.max(0.0).sqrt())
@@ -262,7 +273,8 @@ struct Off {
 }
 
 impl Off {
-    /// Of an RMS distance, metres, where the scans have so much noise; so many of the joints are known.
+    /// Of an RMS distance, metres, where the scans have so much noise; so many of the joints are
+    /// known.
     fn new((rms, noise): (f64, Noise), [n_known, n_joints]: [usize; 2]) -> Self {
         // A surface that fits badly and leaves the posture open may be anything, too.
         let is_open = 2 * n_known <= n_joints && rms > OPEN_RMS.0 * noise.least + OPEN_RMS.1;
@@ -273,7 +285,8 @@ impl Off {
     }
 }
 
-/// Whether what was adjusted is sure to be refused, whatever its wrist: its points are near the model, not on it.
+/// Whether what was adjusted is sure to be refused, whatever its wrist: its points are near the
+/// model, not on it.
 pub(crate) fn is_lost(best: &Adjusted, scene: &Scene<'_>) -> bool {
     let n_joints = best.hypothesis.posture.len();
     let is_known = |j: &usize| best.covariance[(6 + j, 6 + j)] < KNOWN_SIGMA * KNOWN_SIGMA;
@@ -281,7 +294,8 @@ pub(crate) fn is_lost(best: &Adjusted, scene: &Scene<'_>) -> bool {
     Off::new((best.rms(), Noise::of(scene)), [n_known, n_joints]).is_anything
 }
 
-/// Whether nothing that was measured speaks against a fit: if it is doubtful, then because too little of it was seen.
+/// Whether nothing that was measured speaks against a fit: if it is doubtful, then because too
+/// little of it was seen.
 #[must_use]
 pub fn is_uncontradicted(fit: &Fit, scene: &Scene<'_>) -> bool {
     let is_pierced =
@@ -304,7 +318,8 @@ fn beyond(prepared: &Prepared<'_>, j: usize, value: f64) -> f64 {
     (low - value).max(value - high) - play
 }
 
-/// What is said of a joint that is not determined: its standard deviation always, and other values that it may have.
+/// What is said of a joint that is not determined: its standard deviation always, and other values
+/// that it may have.
 fn not_determined(fit: &Fit, j: usize, slides: bool) -> String {
     let (joint, unit) = (&fit.joints[j], Unit::of(slides));
     let apart = |a: f64, b: f64| turns::apart(a, b) > KNOWN_SIGMA;

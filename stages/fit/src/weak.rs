@@ -1,4 +1,5 @@
-//! The covariance of a fit in; which unknowns trade against one another, in words, out (METHOD.md §14).
+//! The covariance of a fit in; which unknowns trade against one another, in words, out (METHOD.md
+//! §14).
 
 use contract::Fit;
 use nalgebra::DMatrix;
@@ -10,7 +11,8 @@ const OPEN: f64 = 0.09;
 /// Share of the direction from which on an unknown belongs to it.
 const PART: f64 = 0.35;
 
-/// A sentence for the weakest direction, where it joins several unknowns: the base's yaw and the joints that turn.
+/// A sentence for the weakest direction, where it joins several unknowns: the base's yaw and the
+/// joints that turn.
 pub(crate) fn weak(fit: &Fit, turning: &[usize]) -> Option<String> {
     let n = 6 + fit.joints.len();
     if fit.covariance.len() != n * n {

@@ -1,8 +1,10 @@
-//! An adjusted posture and its points in; out come other bends of the joint before an open flange, each at the turn of the flange
-//! that suits it best, and how well the points fit there (METHOD.md §9).
+//! An adjusted posture and its points in; out come other bends of the joint before an open flange,
+//! each at the turn of the flange that suits it best, and how well the points fit there (METHOD.md
+//! §9).
 //!
-//! A flange turned to where it is not pulls the wrist with it, by degrees where a hundred points lie on both: neither joint alone
-//! finds back, and the valley there is as narrow as the right one's.
+//! A flange turned to where it is not pulls the wrist with it, by degrees where a hundred points
+//! lie on both: neither joint alone finds back, and the valley there is as narrow as the right
+//! one's.
 
 use contract::Fan;
 use geometry::Point;
@@ -17,21 +19,25 @@ use crate::turns;
 
 /// More points on what the joint moves hold it, however the flange stands.
 const MAX_POINTS: usize = 3000;
-/// A joint that is stated better than this has one valley, radians (0.1°): those that were elsewhere were stated to 0.25° and more.
+/// A joint that is stated better than this has one valley, radians (0.1°): those that were
+/// elsewhere were stated to 0.25° and more.
 const KNOWN: f64 = 0.001_75;
 /// About so many of them are asked.
 const ASKED: usize = 400;
-/// Bends are tried up to this arc at the joint's lever to either side, and this far apart, metres: the gate of the adjustment, the
-/// noise of its points …
+/// Bends are tried up to this arc at the joint's lever to either side, and this far apart, metres:
+/// the gate of the adjustment, the noise of its points …
 const ARC: [f64; 2] = [0.015, 0.002];
 /// … and by no more than this, radians: 12 and 1°.
 const BEND: [f64; 2] = [0.21, 0.0175];
-/// Turns of the flange are tried this far apart, metres at its lever, but so many at least and at most.
+/// Turns of the flange are tried this far apart, metres at its lever, but so many at least and at
+/// most.
 const TURN_STEP: f64 = 0.006;
 const N_TURNS: [f64; 2] = [36.0, 90.0];
-/// What a bend's cost must be less by than the posture's own to be looked at: that of a point beside all surface.
+/// What a bend's cost must be less by than the posture's own to be looked at: that of a point
+/// beside all surface.
 const LEAD: f64 = 3.7;
-/// Costs by so much apart are as one for points that are right each by itself: those of a wrist lie side by side, and err alike.
+/// Costs by so much apart are as one for points that are right each by itself: those of a wrist lie
+/// side by side, and err alike.
 const ALIKE: f64 = 2.0;
 
 /// Bends of a wrist.
@@ -40,7 +46,8 @@ pub(crate) struct Wrist {
     pub(crate) joint: usize,
     /// Where it was adjusted to.
     own: f64,
-    /// Each with the best turn of the flange, and half the robust squares of all points over their variance.
+    /// Each with the best turn of the flange, and half the robust squares of all points over their
+    /// variance.
     bends: Vec<Bend>,
 }
 
@@ -109,7 +116,8 @@ impl Wrist {
         })
     }
 
-    /// Mean square of the bends from the posture's own, each as likely as the points make it, radians².
+    /// Mean square of the bends from the posture's own, each as likely as the points make it,
+    /// radians².
     pub(crate) fn variance(&self) -> f64 {
         let least = self.bends.iter().map(|b| b.cost).fold(f64::INFINITY, f64::min);
         let [sum, total] = self.bends.iter().fold([0.0; 2], |[sum, total], b| {
@@ -120,8 +128,9 @@ impl Wrist {
     }
 }
 
-/// How much better points fit where another adjustment ended, as the scans are off at the first: half their robust squares over their
-/// variance. Asked are those about what `joint` moves in either.
+/// How much better points fit where another adjustment ended, as the scans are off at the first:
+/// half their robust squares over their variance. Asked are those about what `joint` moves in
+/// either.
 pub(crate) fn gain(
     refine: &Refine<'_>,
     (state, points): (&State, &Sampled),

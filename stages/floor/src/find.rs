@@ -41,7 +41,8 @@ pub struct Ground {
     pub floor: Floor,
     /// Occupied space over all scans, floor and walls included.
     pub occupancy: Occupancy,
-    /// Patches of walls, ceilings and slopes, in the order of their tiles: what [`mounts`](fn@crate::mounts) is asked about.
+    /// Patches of walls, ceilings and slopes, in the order of their tiles: what
+    /// [`mounts`](fn@crate::mounts) is asked about.
     pub sides: Vec<PlanePatch>,
     /// Pieces of floor, walls and whatever else is flat that several scans saw.
     pub overlaps: Vec<Overlap>,
@@ -135,8 +136,8 @@ impl Fold for Find {
     }
 }
 
-/// Nearly horizontal and seen from above. Where the scanner is unknown, normals point up and only what lies
-/// around tells a ceiling.
+/// Nearly horizontal and seen from above. Where the scanner is unknown, normals point up and only
+/// what lies around tells a ceiling.
 fn faces_up(patch: &PlanePatch, settings: &Settings) -> bool {
     patch.plane.normal.z >= settings.max_patch_tilt.cos()
 }

@@ -10,9 +10,11 @@ use geometry::{Plane, Vector};
 const CEILING_ABOVE: f64 = 0.1;
 /// … and at least this share something below.
 const CEILING_BELOW: f64 = 0.3;
-/// Share of cells with something close above from which nobody can stand there: a slab under another.
+/// Share of cells with something close above from which nobody can stand there: a slab under
+/// another.
 const COVERED: f64 = 0.6;
-/// Half-width of the window around a ghost's beam in which the level above must have been seen, cells.
+/// Half-width of the window around a ghost's beam in which the level above must have been seen,
+/// cells.
 const NEAR_CELL: i32 = 1;
 
 /// Pieces at one height.
@@ -186,7 +188,8 @@ pub(crate) fn levels(
     out
 }
 
-/// Whether a level was seen from below, by what lies around it; where the scanner is known, its side is.
+/// Whether a level was seen from below, by what lies around it; where the scanner is known, its
+/// side is.
 fn is_ceiling(level: &Level, around: Around, patches: &[PlanePatch], scanners: &Scanners) -> bool {
     let known = weight(level, patches, |p| scanner(scanners, p.scan).is_some());
     if 2.0 * known >= weight(level, patches, |_| true) {
@@ -229,10 +232,12 @@ pub(crate) fn describe(level: &Level, patches: &[PlanePatch], settings: &Setting
     out
 }
 
-/// Share of a level's points whose scatter counts: the others lie on what was joined to it, plates and cables.
+/// Share of a level's points whose scatter counts: the others lie on what was joined to it, plates
+/// and cables.
 const SCATTERED: f64 = 0.9;
 
-/// How far points lie off the heights of a level, metres, one sigma: cell by cell, within their patches and with them.
+/// How far points lie off the heights of a level, metres, one sigma: cell by cell, within their
+/// patches and with them.
 fn scatter<'a>(level: &FloorLevel, patches: impl Iterator<Item = &'a PlanePatch>) -> f64 {
     let mut offs: Vec<(f64, u32)> = Vec::new();
     for patch in patches {

@@ -1,5 +1,5 @@
-//! Summaries of tiles in; floor levels, installation planes and the occupied space of the whole out. Knows no
-//! points: planes are joined by their moments, heights by ground cells.
+//! Summaries of tiles in; floor levels, installation planes and the occupied space of the whole
+//! out. Knows no points: planes are joined by their moments, heights by ground cells.
 #![forbid(unsafe_code)]
 
 mod column;

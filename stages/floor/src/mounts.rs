@@ -1,4 +1,5 @@
-//! Patches that do not face up in, planes that something may be bolted to out: ceilings, walls, tilted plates.
+//! Patches that do not face up in, planes that something may be bolted to out: ceilings, walls,
+//! tilted plates.
 
 use crate::union::Union;
 use contract::{InstallationPlane, PlanePatch, ScanId};
@@ -12,16 +13,17 @@ const MIN_AREA: f64 = 0.03;
 const SAME: (f64, f64) = (0.02, 0.052);
 /// Gap between patches of one plane, metres: what a foot hides.
 const GAP: f64 = 0.5;
-/// Most planes of one place that look down, most that lean, and most of the others: a hall has more and larger walls than plates,
-/// and of a plate that a foot leaves a rim of less is seen than of any cabinet.
+/// Most planes of one place that look down, most that lean, and most of the others: a hall has more
+/// and larger walls than plates, and of a plate that a foot leaves a rim of less is seen than of
+/// any cabinet.
 const MOST: [usize; 3] = [8, 12, 8];
 /// A normal that points so far down is a ceiling's, cosine (45°).
 const DOWN: f64 = -0.7;
 /// One that points so far up is a leaning plate's, cosine (10° from upright).
 const LEANS: f64 = 0.17;
 
-/// The largest planes of these patches: those that look down, those that lean and the others, each largest first; normals to the
-/// side that was seen.
+/// The largest planes of these patches: those that look down, those that lean and the others, each
+/// largest first; normals to the side that was seen.
 #[must_use]
 pub fn mounts(patches: &[&PlanePatch]) -> Vec<InstallationPlane> {
     let mut union = Union::new(patches.len());
@@ -60,7 +62,8 @@ fn one_plane(a: &PlanePatch, b: &PlanePatch) -> bool {
     step(a, b.moments.mean()).max(step(b, a.moments.mean())) < SAME.0
 }
 
-/// Joined plane of patches, each weighted by its area, with the largest area that one scan sees of it.
+/// Joined plane of patches, each weighted by its area, with the largest area that one scan sees of
+/// it.
 fn plane_of(members: &[&PlanePatch]) -> Option<InstallationPlane> {
     let first = members.first()?;
     let mut moments = Moments::new(first.moments.mean());

@@ -1,12 +1,13 @@
-//! Planar patches of tiles in; pieces of surface that several scans saw, and where each of them has it, out: they tell how far
-//! scans are off one another, as robots do.
+//! Planar patches of tiles in; pieces of surface that several scans saw, and where each of them has
+//! it, out: they tell how far scans are off one another, as robots do.
 
 use contract::{Overlap, PlanePatch, ScanId};
 use geometry::Vector;
 use geometry::narrow::floor_i32;
 use std::collections::BTreeMap;
 
-/// Edge of a cell whose patches are one piece, metres: floors and walls are flat to two millimetres in it.
+/// Edge of a cell whose patches are one piece, metres: floors and walls are flat to two millimetres
+/// in it.
 const EDGE: f64 = 1.0;
 /// Fewest points of a scan.
 const MIN_POINTS: f64 = 50.0;
@@ -15,7 +16,8 @@ const ALIKE: f64 = 0.999_66;
 /// No scan has it farther off the others than this, metres: else these are two surfaces.
 const APART: f64 = 0.02;
 
-/// A cell, and which way its surface looks: the axis nearest to its normal, and on which side of it.
+/// A cell, and which way its surface looks: the axis nearest to its normal, and on which side of
+/// it.
 type Key = ([i32; 3], u8);
 
 /// What scans saw of each piece.

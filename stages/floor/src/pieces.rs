@@ -1,4 +1,5 @@
-//! Patches in, pieces of level surface out: ground cells with heights, connected over tiles and scans.
+//! Patches in, pieces of level surface out: ground cells with heights, connected over tiles and
+//! scans.
 
 use crate::Settings;
 use crate::union::Union;
@@ -148,8 +149,8 @@ fn collect(nodes: &[Node], entries: &[Entry], node_of: &[usize], union: &mut Uni
     out
 }
 
-/// Mean plane of nodes, each cell with the same weight, normal up; and the RMS of heights about it. Cells far off
-/// are left out once. A single line of cells gives a horizontal plane.
+/// Mean plane of nodes, each cell with the same weight, normal up; and the RMS of heights about it.
+/// Cells far off are left out once. A single line of cells gives a horizontal plane.
 pub(crate) fn fit(nodes: &[Node]) -> Option<(Plane, f64)> {
     let first = nodes.first()?.place();
     let mut moments = Moments::new(first);

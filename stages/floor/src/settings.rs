@@ -7,20 +7,24 @@ pub struct Settings {
     pub max_tilt: f64,
     /// Largest tilt of a floor level, radians: 5°, since scanners on carts are not levelled.
     pub max_floor_tilt: f64,
-    /// Largest tilt of a single patch that may be part of one, radians: small patches know their normal badly.
+    /// Largest tilt of a single patch that may be part of one, radians: small patches know their
+    /// normal badly.
     pub max_patch_tilt: f64,
-    /// Step in height between neighbouring ground cells that is still one surface, metres: a floor tilted by 5°
-    /// steps 31 mm across the diagonal of a cell.
+    /// Step in height between neighbouring ground cells that is still one surface, metres: a floor
+    /// tilted by 5° steps 31 mm across the diagonal of a cell.
     pub max_step: f64,
-    /// Difference of height at which two separate pieces are one level, metres: scans are registered to a centimetre.
+    /// Difference of height at which two separate pieces are one level, metres: scans are
+    /// registered to a centimetre.
     pub level_tolerance: f64,
-    /// What a level may bend from one piece to the next, metres a metre of distance between them: 0.2°.
+    /// What a level may bend from one piece to the next, metres a metre of distance between them:
+    /// 0.2°.
     pub level_bend: f64,
     /// Largest difference of height of two pieces of one level, whatever their distance, metres.
     pub max_level_tolerance: f64,
     /// Least area of a floor level, m²: more than a table or a car roof.
     pub min_area: f64,
-    /// Least area in one piece of a level with something below it, m²: a mezzanine, not tables in a row.
+    /// Least area in one piece of a level with something below it, m²: a mezzanine, not tables in
+    /// a row.
     pub min_raised_area: f64,
     /// Share of a level's cells with something below from which it counts as raised.
     pub raised_share: f64,

@@ -1,4 +1,5 @@
-//! Horizontal patches in, installation planes out: what is not floor, but large enough for something to stand on.
+//! Horizontal patches in, installation planes out: what is not floor, but large enough for
+//! something to stand on.
 
 use crate::Settings;
 use crate::levels::{Level, Scanners, scanner, seen_through};
@@ -7,7 +8,8 @@ use crate::union::Union;
 use contract::{FloorLevel, InstallationPlane, PlanePatch, ScanId};
 use geometry::{Aabb, Moments, Plane, Vector};
 
-/// Least distance between planes of patches that is never told apart, metres: two scans of one plate.
+/// Least distance between planes of patches that is never told apart, metres: two scans of one
+/// plate.
 const SAME_HEIGHT: f64 = 0.005;
 /// How badly a small patch knows its tilt, radians: 1°.
 const TILT_ERROR: f64 = 0.0175;
@@ -54,7 +56,8 @@ fn is_floor(patch: &PlanePatch, levels: &[FloorLevel], settings: &Settings) -> b
     let p = patch.moments.mean();
     levels.iter().any(|level| {
         level.height(p.x, p.y).is_some_and(|h| {
-            // A large patch close to the floor is the floor of a scan that is registered a little higher.
+            // A large patch close to the floor is the floor of a scan that is registered a little
+            // higher.
             let band =
                 if patch.area > 1.0 { 2.5 * settings.floor_band } else { settings.floor_band };
             (p.z - h).abs() <= band.max(1.5 * patch.rms)

@@ -1,5 +1,5 @@
-//! Disjoint sets: pairs in, representatives out; the representative is always the smallest member, so that the
-//! answer does not depend on the order of the pairs.
+//! Disjoint sets: pairs in, representatives out; the representative is always the smallest member,
+//! so that the answer does not depend on the order of the pairs.
 
 /// Disjoint sets over `0..n`.
 #[derive(Debug)]

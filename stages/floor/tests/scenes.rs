@@ -29,7 +29,8 @@ struct Scene {
 }
 
 impl Scene {
-    /// Points every 2 cm on z = height(x, y) over a rectangle, as patches of `tile` metres, where `seen` holds.
+    /// Points every 2 cm on z = height(x, y) over a rectangle, as patches of `tile` metres, where
+    /// `seen` holds.
     fn surface(
         &mut self,
         scan: u32,

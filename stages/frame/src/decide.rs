@@ -6,28 +6,31 @@ use crate::{Session, search};
 use contract::Fan;
 use geometry::{Pose, Vector};
 
-/// Fewest surfels of surfaces that are not level that lie on the other session's: 6 m², and 2.4 m² where files state the
-/// pose.
+/// Fewest surfels of surfaces that are not level that lie on the other session's: 6 m², and 2.4 m²
+/// where files state the pose.
 const MIN_SAME: usize = 150;
 const MIN_SAME_STATED: usize = 60;
 /// Surfels of upright surfaces that hold a pose in each direction of the plan, at least: 1.2 m².
 const MIN_HOLD: f64 = 30.0;
-/// Least share of what can be compared that lies on the other session's surfaces: of the stated pose, and of one that
-/// was searched.
+/// Least share of what can be compared that lies on the other session's surfaces: of the stated
+/// pose, and of one that was searched.
 const MIN_SHARE_STATED: f64 = 0.7;
 const MIN_SHARE: f64 = 0.75;
 /// The same of the stated pose where no other place fits as well: much in the cell has changed.
 const MIN_SHARE_CHANGED: f64 = 0.4;
-/// A pose this near to the stated one is the stated one: metres, radians. The registration of each scan takes it back.
+/// A pose this near to the stated one is the stated one: metres, radians. The registration of each
+/// scan takes it back.
 const STATED: (f64, f64) = (0.03, 0.0035);
 /// The stated pose is looked for within this, metres, radians: 0.6°.
 const STATED_ABOUT: (f64, f64) = (0.15, 0.01);
 /// Poses that differ by more are of different places: metres, radians (1°).
 const PLACE: (f64, f64) = (0.3, 0.0175);
-/// Another place is asked for where at least this share of what lies on old surfaces under the best pose does so under it.
+/// Another place is asked for where at least this share of what lies on old surfaces under the best
+/// pose does so under it.
 const SERIOUS: f64 = 0.5;
-/// So many surfels more must speak against another place than against the best one: 8 m² of both sessions together, more
-/// than one thing that was moved from where its like stood (a loaded pallet has up to 3 m² in each session).
+/// So many surfels more must speak against another place than against the best one: 8 m² of both
+/// sessions together, more than one thing that was moved from where its like stood (a loaded pallet
+/// has up to 3 m² in each session).
 const MIN_MARGIN: i64 = 200;
 /// The same as a share of what lies on old surfaces under the best pose.
 const MARGIN_SHARE: f64 = 0.02;
@@ -41,7 +44,8 @@ pub struct Place {
     pub laid: Laid,
     /// What speaks for and against it.
     pub evidence: Evidence,
-    /// By how many surfels more the next best other place is contradicted; `None` where there is no other.
+    /// By how many surfels more the next best other place is contradicted; `None` where there is
+    /// no other.
     pub margin: Option<i64>,
 }
 
@@ -61,11 +65,13 @@ pub enum Answer {
 pub enum Refusal {
     /// Nothing of the new session lies well on the earlier one; the best of what was tried.
     Nothing(Option<Box<Place>>),
-    /// Several places fit, the best first: what tells them apart is less than what may have been moved.
+    /// Several places fit, the best first: what tells them apart is less than what may have been
+    /// moved.
     Several(Vec<Place>),
 }
 
-/// Whether new scans lie where they are stated to, `stated` being the earlier session's world from theirs.
+/// Whether new scans lie where they are stated to, `stated` being the earlier session's world from
+/// theirs.
 #[must_use]
 pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
     let chosen = Chosen::of(&new.surfels);
@@ -94,8 +100,8 @@ pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, O
     if is_borne_out(&place) { Ok(place) } else { Err(Some(Box::new(place))) }
 }
 
-/// Where the new session lies in the earlier one, searched over all shifts and yaws; `stated` is one of the poses that are
-/// asked for.
+/// Where the new session lies in the earlier one, searched over all shifts and yaws; `stated` is
+/// one of the poses that are asked for.
 ///
 /// # Errors
 /// No pose is clear.

@@ -1,5 +1,6 @@
-//! A pose of the new session in the earlier one in; which surfels of each lie on surfels of the other, and which lie where
-//! the beams of the other went through, out. Level surfaces are left out: a floor lies on itself wherever it is laid.
+//! A pose of the new session in the earlier one in; which surfels of each lie on surfels of the
+//! other, and which lie where the beams of the other went through, out. Level surfaces are left
+//! out: a floor lies on itself wherever it is laid.
 
 use crate::refine::Laid;
 use crate::surfels::{Surfel, Surfels};
@@ -7,7 +8,8 @@ use crate::{Panorama, Session};
 use geometry::{Pose, Vector};
 use nalgebra::Point3;
 
-/// Two surfels are of one plane where it passes this near to both, metres, with normals at most 37° apart …
+/// Two surfels are of one plane where it passes this near to both, metres, with normals at most 37°
+/// apart …
 const ON: f64 = 0.04;
 const ALIKE: f64 = 0.8;
 /// … and their middles at most so far apart, metres: a voxel and a half.
@@ -67,7 +69,8 @@ impl Evidence {
         self.n_where_old_saw_through + self.n_where_new_saw_through
     }
 
-    /// Share of the surfels that can be compared that lie on surfaces of the other session; 0 where none can.
+    /// Share of the surfels that can be compared that lie on surfaces of the other session; 0 where
+    /// none can.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.n_same() as f64 / (self.n_same() + self.n_against()).max(1) as f64
@@ -89,7 +92,8 @@ pub(crate) fn judge(old: &Session, new: &Session, laid: Laid) -> Judged {
             return State::Unknown;
         }
         match state(s, &pose, (&old.surfels, &old.eyes)) {
-            // Without beams, what stands where a floor or anything else was seen and it was not was not there.
+            // Without beams, what stands where a floor or anything else was seen and it was not was
+            // not there.
             State::Unknown if old.eyes.is_empty() && is_covered(s) => State::Through,
             state => state,
         }
@@ -122,8 +126,9 @@ pub(crate) fn judge(old: &Session, new: &Session, laid: Laid) -> Judged {
 }
 
 impl Judged {
-    /// How many surfels more speak against another pose than against this one, of what stands still. What is seen
-    /// through under both, since it was moved, is left out, and so is what lies on a robot under either.
+    /// How many surfels more speak against another pose than against this one, of what stands
+    /// still. What is seen through under both, since it was moved, is left out, and so is what
+    /// lies on a robot under either.
     pub(crate) fn margin_over(&self, other: &Self) -> i64 {
         let sides = [(&self.new, &other.new), (&self.old, &other.old)];
         let all = sides.into_iter().flat_map(|(own, other)| own.iter().zip(other));
@@ -136,7 +141,8 @@ impl Judged {
     }
 }
 
-/// What a session has where a surfel of the other one lies; `pose` brings that one's world into its own.
+/// What a session has where a surfel of the other one lies; `pose` brings that one's world into its
+/// own.
 fn state(surfel: &Surfel, pose: &Pose, (surfels, eyes): (&Surfels, &[Panorama])) -> State {
     let at = (pose * Point3::from(surfel.at)).coords;
     let normal = pose.rotation * surfel.normal;

@@ -9,15 +9,16 @@ use std::f32::consts::{FRAC_PI_2, PI};
 const CELL: f32 = 0.008_726_646;
 const N_ROWS: usize = 360;
 const N_COLS: usize = 720;
-/// A beam that ended so far behind a place, and a share of its range more, went through it, metres: noise, the voxel of
-/// a surfel, and what a pose that is not yet fine is off.
+/// A beam that ended so far behind a place, and a share of its range more, went through it, metres:
+/// noise, the voxel of a surfel, and what a pose that is not yet fine is off.
 const BEYOND: f32 = 0.15;
 const BEYOND_SHARE: f32 = 0.01;
 /// Farther places are not looked at, metres: a cell and its neighbours are half a metre wide there.
 const FARTHEST: f32 = 20.0;
 /// Nearer places are not looked at either, metres: tripods and persons beside them.
 const NEAREST: f32 = 0.5;
-/// Of a cell and its eight neighbours so many must have beams: one row of them may pass over all of a flat top.
+/// Of a cell and its eight neighbours so many must have beams: one row of them may pass over all of
+/// a flat top.
 const MIN_SEEN: usize = 6;
 
 /// How far the beams of one scanner went.
@@ -26,13 +27,15 @@ pub struct Panorama {
     /// Scan frame from the session's world about its origin.
     scan_from_local: Pose,
     at: Vector,
-    /// Nearest range of each cell, rows upwards, metres; infinite where there is none. After [`Panorama::finish`] that
-    /// of the cell and its neighbours, 0 where too few of them have beams.
+    /// Nearest range of each cell, rows upwards, metres; infinite where there is none. After
+    /// [`Panorama::finish`] that of the cell and its neighbours, 0 where too few of them have
+    /// beams.
     near: Vec<f32>,
 }
 
 impl Panorama {
-    /// An empty one for a scan with this pose in the session's world, whose coordinates are taken about `origin`.
+    /// An empty one for a scan with this pose in the session's world, whose coordinates are taken
+    /// about `origin`.
     #[must_use]
     pub fn new(world_from_scan: &Pose, origin: &Vector) -> Self {
         let mut local_from_scan = *world_from_scan;
@@ -72,7 +75,8 @@ impl Panorama {
         self
     }
 
-    /// Whether beams, all around, went on beyond a place (the session's world about its origin, metres).
+    /// Whether beams, all around, went on beyond a place (the session's world about its origin,
+    /// metres).
     #[inline]
     #[must_use]
     pub fn sees_through(&self, local: &Vector) -> bool {

@@ -1,8 +1,10 @@
-//! Surfels of two sessions in; plans of both as rasters, and where one lies best on the other over all shifts, out.
+//! Surfels of two sessions in; plans of both as rasters, and where one lies best on the other over
+//! all shifts, out.
 //!
-//! Olson (2009) and Hess et al. (2016) look for the pose of a scan by correlating rasters; here the correlation over all
-//! shifts is taken at once, by Fourier transforms. Walls are told apart by the side they face, so that a wall does not fit
-//! on one that faces elsewhere; and what stands in one session where the other has bare floor speaks against a shift.
+//! Olson (2009) and Hess et al. (2016) look for the pose of a scan by correlating rasters; here the
+//! correlation over all shifts is taken at once, by Fourier transforms. Walls are told apart by the
+//! side they face, so that a wall does not fit on one that faces elsewhere; and what stands in one
+//! session where the other has bare floor speaks against a shift.
 
 use crate::surfels::{Surfel, Surfels};
 use geometry::{Pose, Vector};
@@ -12,10 +14,12 @@ use rustfft::{Fft, FftPlanner};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-/// Edge of a cell, metres, at least; larger where a plan would have more than `MAX_CELLS` on a side.
+/// Edge of a cell, metres, at least; larger where a plan would have more than `MAX_CELLS` on a
+/// side.
 const CELL: f64 = 0.2;
 const MAX_CELLS: f64 = 1024.0;
-/// Surfels in a column count up to this number: a high wall must not outweigh all that stands before it.
+/// Surfels in a column count up to this number: a high wall must not outweigh all that stands
+/// before it.
 const MAX_HIGH: f32 = 5.0;
 /// A column of the earlier session is there or not.
 const THERE: f32 = 1.0;
@@ -58,7 +62,8 @@ pub(crate) struct Plans {
 struct Drawn(Vec<Vec<f32>>);
 
 impl Plans {
-    /// Draws an earlier session for new ones; `main` is the direction that most of its walls face, radians.
+    /// Draws an earlier session for new ones; `main` is the direction that most of its walls face,
+    /// radians.
     pub(crate) fn of(old: &Surfels, new: &Surfels, main: f64) -> Option<Self> {
         let (first, mut min, mut max) = (old.all.first()?.at, [0.0; 2], [0.0; 2]);
         for i in 0..2 {
@@ -169,7 +174,8 @@ impl Plans {
         let mut out: Vec<Peak> = Vec::new();
         for (score, i) in peaks {
             let cells = [i % nx, i / nx];
-            // What is drawn of the new session ends at twice its reach: larger shifts are negative ones.
+            // What is drawn of the new session ends at twice its reach: larger shifts are negative
+            // ones.
             let shift = [0, 1].map(|k| {
                 let (cell, n) = (cells[k] as f64, self.n[k] as f64);
                 let largest = n - 2.0 * self.reach / self.edge - 2.0;
@@ -193,7 +199,8 @@ impl Drawn {
     }
 }
 
-/// Each cell takes the largest of itself and a share of its neighbours, so that a shift by half a cell still fits.
+/// Each cell takes the largest of itself and a share of its neighbours, so that a shift by half a
+/// cell still fits.
 fn widened(raster: &[f32], [nx, ny]: [usize; 2]) -> Vec<f32> {
     const SHARE: f32 = 0.7;
     let value = |x: usize, y: usize| raster[y % ny * nx + x % nx];

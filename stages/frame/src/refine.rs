@@ -1,11 +1,12 @@
-//! A rough pose of the new session in the earlier one in; the pose that lays its planes on those of the earlier one, by
-//! shift and yaw, and how well that is determined, out.
+//! A rough pose of the new session in the earlier one in; the pose that lays its planes on those of
+//! the earlier one, by shift and yaw, and how well that is determined, out.
 
 use crate::surfels::{Surfel, Surfels, voxel};
 use geometry::{Pose, Vector};
 use nalgebra::{Matrix2, Matrix4, SymmetricEigen, Translation3, UnitQuaternion, Vector4};
 
-/// How far from a plane a surfel may lie to be laid on it, metres, round by round, from a pose of the search …
+/// How far from a plane a surfel may lie to be laid on it, metres, round by round, from a pose of
+/// the search …
 pub(crate) const WIDE: [f64; 12] =
     [0.35, 0.35, 0.3, 0.25, 0.2, 0.15, 0.12, 0.1, 0.08, 0.06, 0.05, 0.05];
 /// … and from the stated one.
@@ -22,10 +23,12 @@ const MAX_LAID: usize = 2500;
 const SETTLED: f64 = 1e-5;
 /// Weight of where a step begins, in surfels.
 const DAMPING: f64 = 0.5;
-/// Least standard deviation of a surfel's distance, metres: noise is averaged, registration of the session is not.
+/// Least standard deviation of a surfel's distance, metres: noise is averaged, registration of the
+/// session is not.
 const MIN_SCALE: f64 = 1e-3;
 
-/// Surfels of a square metre err alike: waves of a surface, and what scans of one session are off each other.
+/// Surfels of a square metre err alike: waves of a surface, and what scans of one session are off
+/// each other.
 const ALIKE_SURFELS: f64 = 25.0;
 
 /// A pose that was refined.
@@ -37,7 +40,8 @@ pub struct Laid {
     pub sigma: [f64; 4],
     /// Middle of what was laid, the earlier session's world about its origin, metres.
     pub about: Vector,
-    /// Upright surfaces that hold it in the direction in the plan in which it is held least, in surfels.
+    /// Upright surfaces that hold it in the direction in the plan in which it is held least, in
+    /// surfels.
     pub hold: f64,
     /// Surfels that were laid.
     pub n_pairs: usize,
@@ -66,7 +70,8 @@ impl Chosen {
         Self { surfels, middle }
     }
 
-    /// Lays them on the planes of an earlier session, from a pose on; `None` where too few of them lie near any.
+    /// Lays them on the planes of an earlier session, from a pose on; `None` where too few of them
+    /// lie near any.
     pub(crate) fn lay(&self, old: &Surfels, from: &Pose, gates: &[f64]) -> Option<Laid> {
         let mut pose = *from;
         let mut last = None;
@@ -163,7 +168,8 @@ fn moved(step: &Vector4<f64>, about: &Vector) -> Pose {
     Pose::from_parts(Translation3::from(about + shift - turn * about), turn)
 }
 
-/// How far two poses lay a place apart in the plan and height, metres, and how much they differ in yaw, radians.
+/// How far two poses lay a place apart in the plan and height, metres, and how much they differ in
+/// yaw, radians.
 pub(crate) fn apart(a: &Pose, b: &Pose, at: &Vector) -> (f64, f64) {
     let at = nalgebra::Point3::from(*at);
     ((a * at - b * at).norm(), a.rotation.angle_to(&b.rotation))

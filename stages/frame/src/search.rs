@@ -1,4 +1,5 @@
-//! Surfels of an earlier session and a new one in; poses of the new one that are worth a refinement, out.
+//! Surfels of an earlier session and a new one in; poses of the new one that are worth a
+//! refinement, out.
 
 use crate::plans::Plans;
 use crate::surfels::{Surfel, Surfels};
@@ -18,7 +19,8 @@ const LEAST_YAW: f64 = 0.25;
 /// Fewest upright surfels that tell yaws; otherwise all yaws are tried at this step, radians: 2°.
 const MIN_UPRIGHT: usize = 60;
 const YAW_STEP: f64 = TAU / 180.0;
-/// Heights: edge of a bin, metres, most heights that are tried, least share of the best, bins between two.
+/// Heights: edge of a bin, metres, most heights that are tried, least share of the best, bins
+/// between two.
 const HEIGHT: f64 = 0.02;
 const MAX_HEIGHTS: usize = 3;
 const LEAST_HEIGHT: f64 = 0.6;
@@ -26,7 +28,8 @@ const HEIGHT_APART: i32 = 8;
 /// Poses that are refined.
 const MAX_POSES: usize = 96;
 
-/// Poses of the new session in the earlier one, each about its own origin, the most promising first.
+/// Poses of the new session in the earlier one, each about its own origin, the most promising
+/// first.
 pub(crate) fn poses(old: &Surfels, new: &Surfels, fan: &dyn Fan) -> Vec<Pose> {
     let (yaws, main) = yaws(old, new);
     let Some(plans) = Plans::of(old, new, main) else { return Vec::new() };
@@ -47,7 +50,8 @@ pub(crate) fn poses(old: &Surfels, new: &Surfels, fan: &dyn Fan) -> Vec<Pose> {
     all.iter().flat_map(of).collect()
 }
 
-/// Turns from the new session to the earlier one that lay walls on walls; and which way most walls of the latter face.
+/// Turns from the new session to the earlier one that lay walls on walls; and which way most walls
+/// of the latter face.
 fn yaws(old: &Surfels, new: &Surfels) -> (Vec<f64>, f64) {
     let is_signed = |all: &Surfels| all.all.iter().filter(|s| s.is_upright()).all(|s| s.is_signed);
     let signed = is_signed(old) && is_signed(new);
@@ -117,7 +121,8 @@ fn histogram<'s>(upright: impl Iterator<Item = &'s Surfel>, is_signed: bool) -> 
     (0..N_BINS).map(|b| of(b).sqrt()).collect()
 }
 
-/// Differences in height that lay level surfaces on level surfaces of the same side, the best first.
+/// Differences in height that lay level surfaces on level surfaces of the same side, the best
+/// first.
 fn heights(old: &Surfels, new: &Surfels) -> Vec<f64> {
     let levels = |all: &Surfels, up: bool| {
         let mut out: BTreeMap<i32, f64> = BTreeMap::new();

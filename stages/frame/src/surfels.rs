@@ -4,20 +4,25 @@ use geometry::{Aabb, Moments, Vector};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::hash_map::Entry;
 
-/// Edge of a voxel, metres: some ten points of a scan that was thinned to 0.25° between beams, 10 m away.
+/// Edge of a voxel, metres: some ten points of a scan that was thinned to 0.25° between beams, 10 m
+/// away.
 pub(crate) const EDGE: f64 = 0.2;
-/// Where voxels begin, metres: floors and walls stand at round figures, and must not run along the borders of voxels.
+/// Where voxels begin, metres: floors and walls stand at round figures, and must not run along the
+/// borders of voxels.
 const BEGIN: f64 = 0.0371;
 /// Fewest points of a plane, and of something that is none.
 const MIN_FLAT: f64 = 6.0;
 const MIN_ROUGH: f64 = 3.0;
-/// A plane has at most this RMS distance from its points, metres: noise, and what scans of one session differ by.
+/// A plane has at most this RMS distance from its points, metres: noise, and what scans of one
+/// session differ by.
 const MAX_RMS: f64 = 0.012;
 /// A plane whose points lie on a line is none: least spread across it, metres.
 const MIN_SPREAD: f64 = 0.025;
-/// Normals are turned to the scanner where the beams come, on average, at least so steeply: sine of 3°.
+/// Normals are turned to the scanner where the beams come, on average, at least so steeply: sine of
+/// 3°.
 const SIGNED: f64 = 0.05;
-/// A surface whose normal has this height at least is level, at most this one upright: cosines of 11° and 78°.
+/// A surface whose normal has this height at least is level, at most this one upright: cosines of
+/// 11° and 78°.
 pub(crate) const LEVEL: f64 = 0.98;
 pub(crate) const UPRIGHT: f64 = 0.21;
 
@@ -94,7 +99,8 @@ impl Gathered {
         });
     }
 
-    /// The surfels; those within one of `may_move` (world of the session, metres) are of something that may move.
+    /// The surfels; those within one of `may_move` (world of the session, metres) are of something
+    /// that may move.
     #[must_use]
     pub fn surfels(&self, may_move: &[Aabb]) -> Surfels {
         let found = self.cells.iter().filter_map(|(at, cell)| Some((*at, cell.surfel()?)));
@@ -155,7 +161,8 @@ impl Surfel {
         self.is_flat() && self.normal.z.abs() <= UPRIGHT
     }
 
-    /// Cosine between its normal and another one; of normals whose side is not known, that to the nearer side.
+    /// Cosine between its normal and another one; of normals whose side is not known, that to the
+    /// nearer side.
     pub(crate) fn cosine(&self, normal: &Vector, is_signed: bool) -> f64 {
         let cosine = self.normal.dot(normal);
         if self.is_signed && is_signed { cosine } else { cosine.abs() }

@@ -1,4 +1,5 @@
-//! Rooms of planes with things in them, seen by scanners that see all of them from where they stand.
+//! Rooms of planes with things in them, seen by scanners that see all of them from where they
+//! stand.
 
 use crate::{Answer, Gathered, Panorama, Refusal, Session, at_stated, find, from_rough};
 use contract::OneByOne;
@@ -147,7 +148,8 @@ fn a_stated_frame_holds_although_much_has_changed() {
     assert!(shift < 0.004 && turn < 0.03, "{shift} m, {turn}°");
 }
 
-/// A line of `n` equal cells with a post between each two, in a hall that ends `beyond` metres from it.
+/// A line of `n` equal cells with a post between each two, in a hall that ends `beyond` metres from
+/// it.
 fn cells(n: usize, beyond: f64) -> World {
     let cell = |k: usize| {
         let x = beyond + 4.0 * k as f64;

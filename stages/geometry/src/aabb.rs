@@ -34,7 +34,8 @@ impl Aabb {
     /// Grows to hold `p`.
     #[inline]
     pub fn add(&mut self, p: [f64; 3]) {
-        // Plain comparisons: `f64::min` spends most of its time on NaN, which these pass over as well.
+        // Plain comparisons: `f64::min` spends most of its time on NaN, which these pass over as
+        // well.
         for i in 0..3 {
             self.min[i] = if p[i] < self.min[i] { p[i] } else { self.min[i] };
             self.max[i] = if p[i] > self.max[i] { p[i] } else { self.max[i] };

@@ -1,8 +1,9 @@
-//! Depth images: the points of one scan inside a region, as its scanner saw them. Points in; out comes, for any
-//! direction, how far the nearest and the farthest beam went.
+//! Depth images: the points of one scan inside a region, as its scanner saw them. Points in; out
+//! comes, for any direction, how far the nearest and the farthest beam went.
 //!
-//! A depth image is a pinhole raster towards the region (no trigonometry per look-up), with a pyramid above it.
-//! Each cell keeps the nearest and the farthest hit, so that a silhouette does not average robot and background.
+//! A depth image is a pinhole raster towards the region (no trigonometry per look-up), with a
+//! pyramid above it. Each cell keeps the nearest and the farthest hit, so that a silhouette does
+//! not average robot and background.
 
 use crate::Pose;
 use crate::level::Level;
@@ -48,7 +49,8 @@ pub fn transform(m: &Rows, p: [f32; 3]) -> [f32; 3] {
 /// Places that are asked about together.
 pub const LANES: usize = 16;
 
-/// Coordinates of [`LANES`] places, axis by axis: what is reckoned of all of them is so in vector registers.
+/// Coordinates of [`LANES`] places, axis by axis: what is reckoned of all of them is so in vector
+/// registers.
 pub type Lanes = [[f32; LANES]; 3];
 
 /// Places as lanes, the last one in those that are left over; at least one, at most [`LANES`].
@@ -85,7 +87,8 @@ pub fn rotate(m: &Rows, p: [f32; 3]) -> [f32; 3] {
 }
 
 impl DepthImage {
-    /// An empty raster of `2·half_tangent·focal` cells a side, looking along +z of the camera frame.
+    /// An empty raster of `2·half_tangent·focal` cells a side, looking along +z of the camera
+    /// frame.
     #[must_use]
     pub fn new(camera_from_local: Pose, half_tangent: f64, focal: f64) -> Self {
         let side = ((2.0 * half_tangent * focal).ceil().clamp(1.0, 8192.0)) as usize;
@@ -141,8 +144,9 @@ impl DepthImage {
         }
     }
 
-    /// Says for each cell that is empty with all its neighbours within `window` cells what that means (given the
-    /// direction in the camera frame, z = 1), and builds the coarser levels. Call once, after the last splat.
+    /// Says for each cell that is empty with all its neighbours within `window` cells what that
+    /// means (given the direction in the camera frame, z = 1), and builds the coarser levels.
+    /// Call once, after the last splat.
     pub fn finish(&mut self, window: i32, empty: impl Fn([f32; 3]) -> Empty) {
         let focal = self.focal;
         let base = &mut self.levels[0];
@@ -164,9 +168,10 @@ impl DepthImage {
         self.levels.iter_mut().for_each(Level::look_around);
     }
 
-    /// Takes back "no return" where others measured matter in that direction (local frame): beams that ought to have
-    /// ended and did not come back (too near, too dark, too shiny) prove no free space, nor do those within `window`
-    /// cells of them; nor does any, where a share of `blind` of that matter went unseen.
+    /// Takes back "no return" where others measured matter in that direction (local frame): beams
+    /// that ought to have ended and did not come back (too near, too dark, too shiny) prove no
+    /// free space, nor do those within `window` cells of them; nor does any, where a share of
+    /// `blind` of that matter went unseen.
     pub fn doubt<'m>(
         &mut self,
         matter: impl Iterator<Item = &'m [[f32; 3]]>,
@@ -206,8 +211,8 @@ impl DepthImage {
         self.build_levels();
     }
 
-    /// What the beams found at a camera-frame point, in a cell about `footprint` metres wide; `None` outside the
-    /// raster or where nothing is known.
+    /// What the beams found at a camera-frame point, in a cell about `footprint` metres wide;
+    /// `None` outside the raster or where nothing is known.
     #[inline]
     #[must_use]
     pub fn look(&self, camera: [f32; 3], footprint: f32) -> Option<Look> {
@@ -222,7 +227,8 @@ impl DepthImage {
         Some(Look { near, far, around, range })
     }
 
-    /// What is known at a place of the raster, in a cell of the level above that is about `cells` wide.
+    /// What is known at a place of the raster, in a cell of the level above that is about `cells`
+    /// wide.
     #[inline]
     fn cell(&self, [u, v]: [f32; 2], cells: f32) -> Option<[f32; 3]> {
         // floor(log2) by the exponent bits; below one cell is level 0.

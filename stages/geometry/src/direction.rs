@@ -1,14 +1,15 @@
-//! Directions of beams: unit vector to azimuth and elevation, and back, with a polynomial arctangent that is
-//! fast enough for every point of a scan.
+//! Directions of beams: unit vector to azimuth and elevation, and back, with a polynomial
+//! arctangent that is fast enough for every point of a scan.
 
-/// Azimuth in (−π, π] about +z from +x, by a polynomial; error below 2e-6 rad (0.0001°, a three-hundredth of
-/// a fine scanner step).
+/// Azimuth in (−π, π] about +z from +x, by a polynomial; error below 2e-6 rad (0.0001°, a
+/// three-hundredth of a fine scanner step).
 #[inline]
 #[must_use]
 pub fn fast_atan2(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     let (low, high) = if ax < ay { (ax, ay) } else { (ay, ax) };
-    // No branches, so that a loop over points becomes vector instructions; 0/tiny is the 0 that no direction has.
+    // No branches, so that a loop over points becomes vector instructions; 0/tiny is the 0 that no
+    // direction has.
     let t = low / if high == 0.0 { f32::MIN_POSITIVE } else { high };
     let s = t * t;
     // Minimax polynomial of atan on [0, 1], odd, seven terms.

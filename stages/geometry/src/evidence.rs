@@ -1,5 +1,6 @@
-//! Evidence for a body at a pose: the depth images of scans with beams, and the bare points of scans without.
-//! Surface samples in; a [`Probe`] out. The one place where "is it there?" is answered.
+//! Evidence for a body at a pose: the depth images of scans with beams, and the bare points of
+//! scans without. Surface samples in; a [`Probe`] out. The one place where "is it there?" is
+//! answered.
 
 use crate::probe::{Probe, probe};
 use crate::{Eye, NearestField, Pose};
@@ -30,10 +31,12 @@ impl Cloud {
     }
 }
 
-/// Price of a surface sample without a point near it, where no beam can say whether it is hidden: of a robot two or three
-/// scanners see a third to a half, so absence must cost something, but a right posture must stay above nothing.
+/// Price of a surface sample without a point near it, where no beam can say whether it is hidden:
+/// of a robot two or three scanners see a third to a half, so absence must cost something, but a
+/// right posture must stay above nothing.
 const ABSENT_PRICE: f32 = 0.25;
-/// A point is on a surface sample up to so far beside it, metres: points are thinned to [`Cloud`]'s edge.
+/// A point is on a surface sample up to so far beside it, metres: points are thinned to [`Cloud`]'s
+/// edge.
 const BESIDE: f32 = 0.02;
 
 impl<'a> Evidence<'a> {
@@ -62,7 +65,8 @@ impl<'a> Evidence<'a> {
         self.probe_more(Probe::default(), (points, normals), local_from_body, tolerance)
     }
 
-    /// The same with what was said `before` of other samples of the body: just as if all of them were asked about at once.
+    /// The same with what was said `before` of other samples of the body: just as if all of them
+    /// were asked about at once.
     #[must_use]
     pub fn probe_more(
         &self,
@@ -87,7 +91,8 @@ impl<'a> Evidence<'a> {
 }
 
 impl Cloud {
-    /// Judges samples by how far the nearest point is off the surface; how far beside says how dense the points are.
+    /// Judges samples by how far the nearest point is off the surface; how far beside says how
+    /// dense the points are.
     fn probe(
         &self,
         before: Probe,

@@ -1,5 +1,5 @@
-//! The depth images of one scanner in; for a place, those of them that may show it, and what it saw there, out: where they are
-//! the faces of a cube, mostly one is asked.
+//! The depth images of one scanner in; for a place, those of them that may show it, and what it saw
+//! there, out: where they are the faces of a cube, mostly one is asked.
 
 use crate::DepthImage;
 use crate::depth::{LANES, Lanes, Look, Looks, transform_lanes};
@@ -47,8 +47,8 @@ impl<'a> Eye<'a> {
         out
     }
 
-    /// What its beams found at a place of the local frame, in a cell about `footprint` metres wide; `None` where nothing is
-    /// known.
+    /// What its beams found at a place of the local frame, in a cell about `footprint` metres wide;
+    /// `None` where nothing is known.
     #[inline]
     #[must_use]
     pub fn look(&self, local: [f32; 3], footprint: f32) -> Option<Look> {
@@ -62,10 +62,11 @@ impl<'a> Eye<'a> {
 pub struct Faces {
     scanner: [f32; 3],
     all: Vec<usize>,
-    /// By axis and its side (−x, +x, −y, …): the image that looks along it. Empty where images are no faces of a cube.
+    /// By axis and its side (−x, +x, −y, …): the image that looks along it. Empty where images are
+    /// no faces of a cube.
     by_side: Option<[Vec<usize>; 6]>,
-    /// A place whose largest offset from the scanner is so many times the next is on one face alone: rasters end up to half
-    /// a cell beyond their edge.
+    /// A place whose largest offset from the scanner is so many times the next is on one face
+    /// alone: rasters end up to half a cell beyond their edge.
     apart: f32,
 }
 

@@ -1,10 +1,12 @@
-//! Nearest sample by look-up: samples of a surface in; out comes, for any place near it, the index of the nearest
-//! sample, in constant time. Keeps the index, not the distance, so that the true facet serves point-to-plane.
+//! Nearest sample by look-up: samples of a surface in; out comes, for any place near it, the index
+//! of the nearest sample, in constant time. Keeps the index, not the distance, so that the true
+//! facet serves point-to-plane.
 
 use crate::Aabb;
 use crate::spread::{Grid, N_LANES, spread};
 
-/// A voxel grid about a surface: each voxel within reach holds the index of the sample nearest to its middle.
+/// A voxel grid about a surface: each voxel within reach holds the index of the sample nearest to
+/// its middle.
 #[derive(Debug, Clone, Default)]
 pub struct NearestField {
     grid: Grid,
@@ -14,14 +16,16 @@ pub struct NearestField {
     cells: Vec<u32>,
 }
 
-/// Voxels across a brick, as a power of two: neighbours in space are neighbours in memory, on one page of it mostly.
+/// Voxels across a brick, as a power of two: neighbours in space are neighbours in memory, on one
+/// page of it mostly.
 const BRICK: u32 = N_LANES.ilog2();
 const IN_BRICK: u32 = (1 << BRICK) - 1;
 
 /// Most voxels of a field: a quarter of a gigabyte.
 pub const MAX_CELLS: f64 = 67e6;
 
-/// The edge, or the least wider one with which bounds take no more than the voxels that are allowed, in whole bricks.
+/// The edge, or the least wider one with which bounds take no more than the voxels that are
+/// allowed, in whole bricks.
 fn affordable(bounds: &Aabb, mut edge: f32) -> f32 {
     let brick = |edge: f32| f64::from(edge) * f64::from(1_u32 << BRICK);
     let n_cells = |edge: f32| {
@@ -35,8 +39,8 @@ fn affordable(bounds: &Aabb, mut edge: f32) -> f32 {
 }
 
 impl NearestField {
-    /// A field of voxels with this `edge` that reaches `reach` metres from the samples; with wider ones where it would take more
-    /// than [`MAX_CELLS`] of them.
+    /// A field of voxels with this `edge` that reaches `reach` metres from the samples; with wider
+    /// ones where it would take more than [`MAX_CELLS`] of them.
     #[must_use]
     pub fn new(points: &[[f32; 3]], edge: f32, reach: f32) -> Self {
         let bounds = Aabb::of(points.iter().map(|p| p.map(f64::from)));

@@ -1,5 +1,5 @@
-//! One resolution of a depth image: hits in; each cell's nearest and farthest, what its neighbours say, and the next coarser
-//! level, out.
+//! One resolution of a depth image: hits in; each cell's nearest and farthest, what its neighbours
+//! say, and the next coarser level, out.
 
 use crate::depth::{LANES, Lanes};
 
@@ -8,14 +8,15 @@ use crate::depth::{LANES, Lanes};
 pub(crate) struct Level {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// `[near, far, around]` in metres; NaN unknown, +∞ no return. Row-major. `around` is the smallest `near` of a cell
-    /// and its eight neighbours: at a silhouette the beams of one cell may all have missed a body that those of its
-    /// neighbour hit.
+    /// `[near, far, around]` in metres; NaN unknown, +∞ no return. Row-major. `around` is the
+    /// smallest `near` of a cell and its eight neighbours: at a silhouette the beams of one
+    /// cell may all have missed a body that those of its neighbour hit.
     pub(crate) cells: Vec<[f32; 3]>,
 }
 
 impl Level {
-    /// The cell of a hit given in the camera frame, and its range, metres; `None` outside of the raster.
+    /// The cell of a hit given in the camera frame, and its range, metres; `None` outside of the
+    /// raster.
     #[inline]
     pub(crate) fn find(&self, focal: f32, p: [f32; 3]) -> Option<(usize, f32)> {
         if p[2] <= 1e-3 {
@@ -46,8 +47,9 @@ impl Level {
         (at, range)
     }
 
-    /// Asks of each cell (its column and row) that is empty with all its neighbours within `window` cells whether it is one of
-    /// no return, and makes it that: a separable running maximum, of which no more rows are kept than it needs.
+    /// Asks of each cell (its column and row) that is empty with all its neighbours within `window`
+    /// cells whether it is one of no return, and makes it that: a separable running maximum, of
+    /// which no more rows are kept than it needs.
     pub(crate) fn each_open(&mut self, window: i32, is_silent: impl Fn(usize, usize) -> bool) {
         let (window, width) = (usize::try_from(window).unwrap_or(0), self.width);
         let n_kept = 2 * window + 1;
@@ -90,7 +92,8 @@ impl Level {
             for (pair, to) in row.chunks(2).zip(out) {
                 for from in pair {
                     to[0] = to[0].min(from[0]);
-                    // No return must not hide a hit from `far`; it stays only where the whole cell is empty.
+                    // No return must not hide a hit from `far`; it stays only where the whole cell
+                    // is empty.
                     to[1] = match (to[1].is_finite(), from[1].is_finite()) {
                         (true, false) => to[1],
                         (false, true) => from[1],
@@ -105,7 +108,8 @@ impl Level {
     /// Fills `around`.
     pub(crate) fn look_around(&mut self) {
         let width = self.width;
-        // Of three rows: the nearest of each cell and those beside it. `min` passes NaN over: unknown neighbours say nothing.
+        // Of three rows: the nearest of each cell and those beside it. `min` passes NaN over:
+        // unknown neighbours say nothing.
         let mut across = vec![vec![f32::NAN; width]; 3];
         let mut near = vec![f32::NAN; width];
         let mut n_read = 0;

@@ -1,6 +1,7 @@
 //! Mathematics on slices: poses, planes, directions, depth images, robust kernels.
 //!
-//! Numbers in, numbers out. Knows no files, no threads, no scans; doubt is an `Option`, never an error.
+//! Numbers in, numbers out. Knows no files, no threads, no scans; doubt is an `Option`, never an
+//! error.
 #![forbid(unsafe_code)]
 
 pub mod aabb;

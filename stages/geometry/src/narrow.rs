@@ -1,4 +1,5 @@
-//! Coordinates in; grid indices and short floats out, each with its range and what happens outside it.
+//! Coordinates in; grid indices and short floats out, each with its range and what happens outside
+//! it.
 
 /// A grid index from a coordinate: floor, saturating at the ends of `i32` (NaN gives 0).
 #[inline]

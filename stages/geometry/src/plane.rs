@@ -1,5 +1,5 @@
-//! Planes from sums: moments of points in, least-squares plane with its spread out. Moments add, so a
-//! region can grow, split over tiles and be joined without a second look at its points.
+//! Planes from sums: moments of points in, least-squares plane with its spread out. Moments add, so
+//! a region can grow, split over tiles and be joined without a second look at its points.
 
 use crate::Vector;
 use nalgebra::{Matrix3, SymmetricEigen, UnitQuaternion};
@@ -22,15 +22,16 @@ impl Plane {
         self.normal.dot(p) - self.offset
     }
 
-    /// The turn that brings z onto the normal and leaves the horizon as it is as far as can be: coordinates on the
-    /// plane are world coordinates where it is level.
+    /// The turn that brings z onto the normal and leaves the horizon as it is as far as can be:
+    /// coordinates on the plane are world coordinates where it is level.
     #[must_use]
     pub fn frame(&self) -> UnitQuaternion<f64> {
         let up = Vector::z();
         if self.normal.z > -0.7 {
             UnitQuaternion::rotation_between(&up, &self.normal).unwrap_or_default()
         } else {
-            // Hanging: half a turn about x first, since between opposite vectors no turn is the shortest.
+            // Hanging: half a turn about x first, since between opposite vectors no turn is the
+            // shortest.
             let over = UnitQuaternion::from_axis_angle(&Vector::x_axis(), std::f64::consts::PI);
             UnitQuaternion::rotation_between(&-up, &self.normal).unwrap_or_default() * over
         }
@@ -99,8 +100,8 @@ impl Moments {
         self.outer / self.n - mean * mean.transpose()
     }
 
-    /// Least-squares plane, RMS distance from it, and spread (standard deviations, metres) along its two
-    /// directions, larger first. `None` below three points or when all lie on a line.
+    /// Least-squares plane, RMS distance from it, and spread (standard deviations, metres) along
+    /// its two directions, larger first. `None` below three points or when all lie on a line.
     #[must_use]
     pub fn plane(&self) -> Option<PlaneFit> {
         if self.n < 3.0 {

@@ -1,11 +1,11 @@
-//! Judging a surface by the beams. Depth images and surface samples in; out comes whether a beam ended on each sample,
-//! went through it, or never got there.
+//! Judging a surface by the beams. Depth images and surface samples in; out comes whether a beam
+//! ended on each sample, went through it, or never got there.
 
 use crate::depth::{LANES, Looks, Rows, rotate, rows, transform};
 use crate::{Eye, Pose};
 
-/// Weight of a beam that did not come back, against one that hit something behind: black paint and glancing
-/// steel swallow beams too.
+/// Weight of a beam that did not come back, against one that hit something behind: black paint and
+/// glancing steel swallow beams too.
 pub const NO_RETURN_WEIGHT: f32 = 0.3;
 /// Cosine below which a surface is too oblique to be expected in the scan.
 pub const MIN_FACING: f32 = 0.15;
@@ -32,7 +32,8 @@ impl Probe {
         if self.n == 0 { 0.0 } else { self.score / self.n as f32 }
     }
 
-    /// Counts one sample: how far it is seen through and how well a beam ends on it, 0..1 each; through outweighs on.
+    /// Counts one sample: how far it is seen through and how well a beam ends on it, 0..1 each;
+    /// through outweighs on.
     #[inline]
     pub fn count(&mut self, through: f32, on: f32) {
         if through > 0.0 {
@@ -72,12 +73,13 @@ impl Probe {
 
 /// Price of a sample seen through, against one on the surface (METHOD.md §8).
 const SEEN_THROUGH_PRICE: f32 = 1.5;
-/// Price of a sample that no scan could judge: small, so that hiding is not rewarded (METHOD.md §8).
+/// Price of a sample that no scan could judge: small, so that hiding is not rewarded (METHOD.md
+/// §8).
 pub const HIDDEN_PRICE: f32 = 0.1;
 
-/// Judges surface samples (`points` with outward `normals`, in the frame of a body) with the body at
-/// `local_from_body`: one beam through a sample in any scan outweighs any match in another (METHOD.md §8).
-/// What is said of other samples `before` is counted already.
+/// Judges surface samples (`points` with outward `normals`, in the frame of a body) with the body
+/// at `local_from_body`: one beam through a sample in any scan outweighs any match in another
+/// (METHOD.md §8). What is said of other samples `before` is counted already.
 #[must_use]
 pub fn probe(
     eyes: &[Eye<'_>],
@@ -142,8 +144,8 @@ impl Block {
         }
     }
 
-    /// Which samples turn a front face to a scanner, without those that beams went wholly through: no other scan can make
-    /// them worse or better. Returns how many.
+    /// Which samples turn a front face to a scanner, without those that beams went wholly through:
+    /// no other scan can make them worse or better. Returns how many.
     #[inline]
     fn facing(&self, at: [f32; 3], which: &mut [u8; BLOCK + 1]) -> usize {
         let (p, normal) = (&self.p, &self.normal);
@@ -166,7 +168,8 @@ impl Block {
     }
 }
 
-/// How far beams went through places, and how well one ends on them, 0..1; neither where nothing is known.
+/// How far beams went through places, and how well one ends on them, 0..1; neither where nothing is
+/// known.
 #[inline]
 fn said(looks: &Looks, tolerance: f32) -> ([f32; LANES], [f32; LANES]) {
     let (mut through, mut on) = ([0.0; LANES], [0.0; LANES]);

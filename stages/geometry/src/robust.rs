@@ -1,6 +1,7 @@
 //! Robust kernels: residual and scale in, weight out.
 
-/// Tukey's biweight: `(1 − (r/c)²)²` inside `c`, zero outside. Redescending: an outlier has no pull at all.
+/// Tukey's biweight: `(1 − (r/c)²)²` inside `c`, zero outside. Redescending: an outlier has no pull
+/// at all.
 #[inline]
 #[must_use]
 pub fn tukey(residual: f64, scale: f64) -> f64 {
@@ -9,7 +10,8 @@ pub fn tukey(residual: f64, scale: f64) -> f64 {
     if v <= 0.0 { 0.0 } else { v * v }
 }
 
-/// Slope of Tukey's influence `w(r) r`: how much the pull of a residual grows with it; below its weight all over.
+/// Slope of Tukey's influence `w(r) r`: how much the pull of a residual grows with it; below its
+/// weight all over.
 #[inline]
 #[must_use]
 pub fn tukey_slope(residual: f64, scale: f64) -> f64 {
@@ -17,17 +19,20 @@ pub fn tukey_slope(residual: f64, scale: f64) -> f64 {
     if u2 >= 1.0 { 0.0 } else { (1.0 - u2) * (1.0 - 5.0 * u2) }
 }
 
-/// Most that a step by robust weights is lengthened: normal errors ask for 1.2, priors and wrong points for none.
+/// Most that a step by robust weights is lengthened: normal errors ask for 1.2, priors and wrong
+/// points for none.
 const MAX_STRETCH: f64 = 1.25;
 
-/// What a step by Tukey's weights is to be lengthened by, from the sums of weights and of slopes. The weights say less of residuals
-/// that change than of those that stand: a step by them alone goes five sixths of the way.
+/// What a step by Tukey's weights is to be lengthened by, from the sums of weights and of slopes.
+/// The weights say less of residuals that change than of those that stand: a step by them alone
+/// goes five sixths of the way.
 #[must_use]
 pub fn stretch(weights: f64, slopes: f64) -> f64 {
     if slopes > 0.0 { (weights / slopes).clamp(1.0, MAX_STRETCH) } else { MAX_STRETCH }
 }
 
-/// What Tukey's biweight makes of half a square, `∫ w(r) r dr`: `c²/6 (1 − (1 − (r/c)²)³)`, from `c` on the same for all.
+/// What Tukey's biweight makes of half a square, `∫ w(r) r dr`: `c²/6 (1 − (1 − (r/c)²)³)`, from
+/// `c` on the same for all.
 #[inline]
 #[must_use]
 pub fn tukey_cost(residual: f64, scale: f64) -> f64 {

@@ -1,8 +1,9 @@
 //! Samples and a grid in; voxel row by voxel row, the nearest sample to each voxel's middle out.
 //!
-//! Axis after axis, as exact distance transforms go (Felzenszwalb and Huttenlocher, Theory of Computing 8, 2012): the nearest of a
-//! row's samples, of these the nearest of a plane's rows, of these the nearest of all planes. Eight voxels of a row are judged
-//! together, and rows in order of their distance until none can be nearer.
+//! Axis after axis, as exact distance transforms go (Felzenszwalb and Huttenlocher, Theory of
+//! Computing 8, 2012): the nearest of a row's samples, of these the nearest of a plane's rows, of
+//! these the nearest of all planes. Eight voxels of a row are judged together, and rows in order of
+//! their distance until none can be nearer.
 
 use wide::f32x8;
 
@@ -43,8 +44,8 @@ impl Grid {
     }
 }
 
-/// The nearest samples known so far of eight voxels beside each other: x, y, z, and their numbers + 1 as bits, so that all
-/// four are chosen by the same comparison.
+/// The nearest samples known so far of eight voxels beside each other: x, y, z, and their numbers +
+/// 1 as bits, so that all four are chosen by the same comparison.
 type Eight = [f32x8; 4];
 
 /// No sample: so far away that its squared distance (1e18 m²) is beyond any reach.
@@ -111,8 +112,9 @@ struct Spread<'a> {
     middles: [Vec<f32>; 3],
 }
 
-/// Tells `take` the nearest samples (number + 1; 0 beyond `reach` metres) of eight voxels, for the row `[y, z]` and the first
-/// voxel's `x`; only where one of the eight has any. Lanes past the end of a row are told too.
+/// Tells `take` the nearest samples (number + 1; 0 beyond `reach` metres) of eight voxels, for the
+/// row `[y, z]` and the first voxel's `x`; only where one of the eight has any. Lanes past the end
+/// of a row are told too.
 pub(crate) fn spread(
     points: &[[f32; 3]],
     grid: Grid,
@@ -274,7 +276,8 @@ impl Spread<'_> {
     }
 }
 
-/// Keeps those of eight samples that are nearer to eight voxels' middles than the best so far, m²; whether any is.
+/// Keeps those of eight samples that are nearer to eight voxels' middles than the best so far, m²;
+/// whether any is.
 #[inline]
 fn keep_nearer(middles: [f32x8; 3], new: &Eight, best: &mut f32x8, kept: &mut Eight) -> bool {
     let [dx, dy, dz] = [0, 1, 2].map(|i| new[i] - middles[i]);

@@ -1,8 +1,10 @@
-//! One model and one region in; out come the base poses that the beams allow, grouped by place, best first.
+//! One model and one region in; out come the base poses that the beams allow, grouped by place,
+//! best first.
 //!
-//! Pose space is (x, y, yaw) on each plane that lies under something; coarse to fine, each level keeping the best.
-//! From the second level on the first moving link is swept over its joint and counts too, because many a box looks
-//! like a foot, but few look like a foot with a carousel on it.
+//! Pose space is (x, y, yaw) on each plane that lies under something; coarse to fine, each level
+//! keeping the best. From the second level on the first moving link is swept over its joint and
+//! counts too, because many a box looks like a foot, but few look like a foot with a carousel on
+//! it.
 
 use contract::{Candidate, Fan, InstallationPlane};
 use geometry::{Plane, Point, Pose, Vector};
@@ -55,22 +57,25 @@ impl Default for Settings {
     }
 }
 
-/// Heights above a plane at which a foot is looked for, metres: not the plane itself, and no higher than shoulders stand.
+/// Heights above a plane at which a foot is looked for, metres: not the plane itself, and no higher
+/// than shoulders stand.
 const FOOT_HEIGHTS: std::ops::Range<f64> = 0.03..1.2;
-/// A base may stand where, within this share of its radius, so many cells of the plane have so many points each.
+/// A base may stand where, within this share of its radius, so many cells of the plane have so many
+/// points each.
 const ABOUT: f64 = 0.8;
 const MIN_CELLS: usize = 3;
 const MIN_IN_CELL: u32 = 3;
-/// Mean score on a quarter of the samples, at the best of every other yaw, below which a place is not looked at any
-/// further; and by how much yaws may lag behind that best.
+/// Mean score on a quarter of the samples, at the best of every other yaw, below which a place is
+/// not looked at any further; and by how much yaws may lag behind that best.
 const HOPELESS: f64 = -0.2;
 const YAW_LAG: f64 = 0.35;
-/// Of so many guessed heights one is looked at coarsely, at most: two up and down are tried then, and one more.
+/// Of so many guessed heights one is looked at coarsely, at most: two up and down are tried then,
+/// and one more.
 const MAX_STRIDE: usize = 6;
 /// Tolerance of the coarse level in steps of its grid.
 const COARSE_REACH: f64 = 1.3;
-/// Share of the lowest score that a base must have after the coarse level, and after the next: on coarse grids the right
-/// one scores a little more or less than in the end.
+/// Share of the lowest score that a base must have after the coarse level, and after the next: on
+/// coarse grids the right one scores a little more or less than in the end.
 const SHORT: (f64, f64) = (0.4, 0.6);
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
@@ -142,7 +147,8 @@ impl<'a> BaseSearch<'a> {
         })
     }
 
-    /// The same on planes that are guesses, one close above the other: a few of them tell where to look at the others.
+    /// The same on planes that are guesses, one close above the other: a few of them tell where to
+    /// look at the others.
     #[must_use]
     pub fn on_guesses(self) -> Self {
         Self { is_guess: true, ..self }
@@ -172,7 +178,8 @@ impl<'a> BaseSearch<'a> {
         let yaw_step = coarse_yaw();
         let cells = self.breadth * self.n_cells();
         best(&mut trials, (self.settings.keep_feet * cells, QUOTA), step * 0.9, yaw_step * 0.9);
-        // Half of a cell has the height of a foot: what stands on it tells sooner than a closer look.
+        // Half of a cell has the height of a foot: what stands on it tells sooner than a closer
+        // look.
         let tolerance = self.coarse_tolerance();
         let mut trials = fan.fan(trials, |t| self.glance_at_first(&local[t.plane], t, tolerance));
         best(&mut trials, (self.settings.keep_coarse * cells, QUOTA), step * 0.9, yaw_step * 0.9);
@@ -193,7 +200,8 @@ impl<'a> BaseSearch<'a> {
         trials.retain(|t| t.said.score >= share * self.min_score);
     }
 
-    /// How many robot cells the region may hold, at least one: the more, the more places must go on.
+    /// How many robot cells the region may hold, at least one: the more, the more places must go
+    /// on.
     fn n_cells(&self) -> usize {
         let size = self.sight.region.bounds.size();
         ((size[0] * size[1] / CELL_AREA).round() as usize).clamp(1, MAX_CELLS)
@@ -216,7 +224,8 @@ impl<'a> BaseSearch<'a> {
         self.sight.of_grid((COARSE_REACH * self.coarse_step()) as f32)
     }
 
-    /// Which planes are looked at coarsely: the lowest of a stack of guessed heights and every few above it; else all.
+    /// Which planes are looked at coarsely: the lowest of a stack of guessed heights and every few
+    /// above it; else all.
     fn looked_at_coarsely(&self, planes: &[Plane]) -> Vec<usize> {
         let reach = COARSE_REACH * self.coarse_step();
         let stride = ((1.5 * reach / GUESS_STEP) as usize).clamp(1, MAX_STRIDE);
@@ -261,7 +270,8 @@ impl<'a> BaseSearch<'a> {
                     self.sight.glance(prefix(self.model, self.base, n_samples), &pose, tolerance)
                 })
             };
-            // A few samples at every other yaw tell most places to be hopeless, and most yaws of the others.
+            // A few samples at every other yaw tell most places to be hopeless, and most yaws of
+            // the others.
             let few: Vec<f64> =
                 (0..n).step_by(2).map(|k| ask(k, self.settings.n_coarse / 4).score).collect();
             let top = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
@@ -282,7 +292,8 @@ impl<'a> BaseSearch<'a> {
         fan.fan(places, place).into_iter().flatten().collect()
     }
 
-    /// Places on the plane, in its own coordinates, with points above it within the base's radius, in rows.
+    /// Places on the plane, in its own coordinates, with points above it within the base's radius,
+    /// in rows.
     fn occupied(&self, plane: &InstallationPlane, local: &Plane, step: f64) -> Vec<(f64, f64)> {
         let to_plane = local.frame().inverse();
         let span = |corners: [[f64; 3]; 8], i: usize| {
@@ -355,7 +366,8 @@ impl<'a> BaseSearch<'a> {
         self.sight.said(&self.sight.evidence.probe(cad.0, cad.1, &pose, tolerance))
     }
 
-    /// The base standing on the plane at a place (its own coordinates), turned by `yaw` about the plane's normal.
+    /// The base standing on the plane at a place (its own coordinates), turned by `yaw` about the
+    /// plane's normal.
     pub(crate) fn pose(&self, plane: &Plane, x: f64, y: f64, yaw: f64) -> Pose {
         let frame = plane.frame();
         let foot = frame * Vector::new(x, y, plane.offset - self.foot);

@@ -1,5 +1,5 @@
-//! A cluster in; out come the boxes of what may be bodies in it: the whole of a small one; of walls, fences and what
-//! touches them, the parts that are not flat.
+//! A cluster in; out come the boxes of what may be bodies in it: the whole of a small one; of
+//! walls, fences and what touches them, the parts that are not flat.
 
 use contract::{Cluster, Voxel};
 use geometry::{Aabb, Vector};
@@ -12,9 +12,11 @@ use crate::RegionSettings;
 const COLUMN: f64 = 1.0;
 /// Structure higher than this above its lowest point is no robot's, metres: ceilings, crane ways.
 const MAX_HEIGHT: f64 = 3.6;
-/// Thickness below which a column is a wall, fence or panel, metres, one sigma: voxels of 5 cm make a plane 2 cm thick.
+/// Thickness below which a column is a wall, fence or panel, metres, one sigma: voxels of 5 cm make
+/// a plane 2 cm thick.
 const FLAT: f64 = 0.045;
-/// Share of a column's voxels that two upright planes may leave over where walls meet, and how many of them.
+/// Share of a column's voxels that two upright planes may leave over where walls meet, and how many
+/// of them.
 const LEFT_OVER: (f64, f64) = (0.08, 60.0);
 /// Lowest corner of a room, metres: lower ones may be the body of a machine.
 const MIN_CORNER: f64 = 2.4;

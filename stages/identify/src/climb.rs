@@ -1,5 +1,5 @@
-//! Base poses of a level of the search and the next, finer grid in; poses about the best places that they lead to, with base
-//! and first link, out.
+//! Base poses of a level of the search and the next, finer grid in; poses about the best places
+//! that they lead to, with base and first link, out.
 
 use contract::Fan;
 use geometry::{Plane, Pose};
@@ -11,7 +11,8 @@ use crate::trial::{Said, Trial, best, prefix};
 
 /// Steps that a pose may go beyond its neighbours while it gets better.
 const CLIMB: usize = 3;
-/// Mean score on a quarter of the samples by which a pose may lag behind the best and still be looked at closely.
+/// Mean score on a quarter of the samples by which a pose may lag behind the best and still be
+/// looked at closely.
 pub(crate) const LAG: f64 = 0.15;
 
 /// Steps from a pose that is refined: planes up, along x and y, yaw.
@@ -32,7 +33,8 @@ impl Grid {
 }
 
 impl BaseSearch<'_> {
-    /// Goes from each trial to where it gets better and tries what is about that, on a finer grid, with base and first link.
+    /// Goes from each trial to where it gets better and tries what is about that, on a finer grid,
+    /// with base and first link.
     pub(crate) fn finer(
         &self,
         planes: &[Plane],
@@ -57,9 +59,9 @@ impl BaseSearch<'_> {
         out
     }
 
-    /// The neighbours of the best pose that steps to ever better ones lead to, those that may be as good: the coarse level may
-    /// have taken what stands beside a place for it. What hides a foot may look like one: the first link, at its likely poses on
-    /// the root, has a say.
+    /// The neighbours of the best pose that steps to ever better ones lead to, those that may be as
+    /// good: the coarse level may have taken what stands beside a place for it. What hides a
+    /// foot may look like one: the first link, at its likely poses on the root, has a say.
     fn climb(
         &self,
         planes: &[Plane],
@@ -95,7 +97,8 @@ impl BaseSearch<'_> {
         near.into_iter().map(|(_, trial)| trial).filter(|t| t.said.score >= least).collect()
     }
 
-    /// A pose moved by some steps, with what a few samples of base and first link say; `None` where there is no such plane.
+    /// A pose moved by some steps, with what a few samples of base and first link say; `None` where
+    /// there is no such plane.
     fn moved_by(
         &self,
         planes: &[Plane],

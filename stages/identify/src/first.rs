@@ -1,5 +1,5 @@
-//! A base pose under test in; out comes what the first moving link, swept over its joint, says of it: many a box looks like
-//! a foot, but few look like a foot with a carousel on it.
+//! A base pose under test in; out comes what the first moving link, swept over its joint, says of
+//! it: many a box looks like a foot, but few look like a foot with a carousel on it.
 
 use geometry::{Plane, Pose, Probe};
 use robot::Model;
@@ -9,10 +9,11 @@ use crate::base::BaseSearch;
 use crate::climb::LAG;
 use crate::trial::{Said, Trial, first_moving, of_judged, prefix};
 
-/// Tolerances at which base and first link are judged in the end, metres: half a step of the finest grid.
+/// Tolerances at which base and first link are judged in the end, metres: half a step of the finest
+/// grid.
 const JUDGE: (f32, f32) = (0.04, 0.06);
-/// Mean score of what could be judged: of the worse of base and first link, and of both. Of 125 robots that were found
-/// none is below 0.64 and 0.70.
+/// Mean score of what could be judged: of the worse of base and first link, and of both. Of 125
+/// robots that were found none is below 0.64 and 0.70.
 const LIKE: (f64, f64) = (0.5, 0.58);
 /// Base poses of a place that are asked for that.
 const N_LIKE: usize = 4;
@@ -59,8 +60,8 @@ impl First {
 }
 
 impl BaseSearch<'_> {
-    /// Whether what could be judged of the base and of the first link fits them: much of a cabinet has the height of a
-    /// foot, but not its shape.
+    /// Whether what could be judged of the base and of the first link fits them: much of a cabinet
+    /// has the height of a foot, but not its shape.
     fn is_like(&self, plane: &Plane, trial: &Trial) -> bool {
         if !self.sight.evidence.has_beams() {
             return true;
@@ -84,8 +85,9 @@ impl BaseSearch<'_> {
         base.min(first) >= LIKE.0 && 0.5 * (base + first) >= LIKE.1
     }
 
-    /// Whether a base pose of a place looks like the robot, perhaps one that is added. The best may be the right place turned wrongly: a foot of which plates
-    /// leave little says less of its yaw than what stands on it, so it is turned to where that little fits, and goes first.
+    /// Whether a base pose of a place looks like the robot, perhaps one that is added. The best may
+    /// be the right place turned wrongly: a foot of which plates leave little says less of its
+    /// yaw than what stands on it, so it is turned to where that little fits, and goes first.
     pub(crate) fn accept(&self, local: &[Plane], place: &mut Vec<Trial>) -> bool {
         if place.iter().take(N_LIKE).any(|trial| self.is_like(&local[trial.plane], trial)) {
             return true;
@@ -147,9 +149,9 @@ impl BaseSearch<'_> {
         Trial { said: self.joined(trial.said, first), first, ..trial }
     }
 
-    /// Poses of the first link in the root's frame that a few samples of it like best where the robot stands so; none where each
-    /// scan is asked by itself, and none on guessed heights: a camera sees too little of it (of twelve frames one was found, four
-    /// without).
+    /// Poses of the first link in the root's frame that a few samples of it like best where the
+    /// robot stands so; none where each scan is asked by itself, and none on guessed heights: a
+    /// camera sees too little of it (of twelve frames one was found, four without).
     pub(crate) fn likely_firsts(&self, plane: &Plane, trial: &Trial, tolerance: f32) -> Vec<Pose> {
         let is_asked = self.sight.each.is_empty() && !self.is_guess;
         let Some(first) = self.first.as_ref().filter(|_| is_asked) else {
@@ -161,7 +163,8 @@ impl BaseSearch<'_> {
         best.into_iter().take(N_LIKELY).map(|k| first.root_from_link[k]).collect()
     }
 
-    /// What a few samples of the first link say at a glance at the best of some poses in the root's frame.
+    /// What a few samples of the first link say at a glance at the best of some poses in the root's
+    /// frame.
     pub(crate) fn glance_at(
         &self,
         plane: &Plane,
@@ -186,7 +189,8 @@ impl BaseSearch<'_> {
         Said { score: mean(base.score, first.score), seen: mean(base.seen, first.seen) }
     }
 
-    /// Poses of the first link over its joint, and what a few samples say of each: most are hopeless.
+    /// Poses of the first link over its joint, and what a few samples say of each: most are
+    /// hopeless.
     fn sweep(
         &self,
         plane: &Plane,

@@ -1,15 +1,17 @@
-//! A grid of scores and the samples of a body in; out comes the mean score of the samples at a pose, in whole numbers: one
-//! look-up and one addition a sample.
+//! A grid of scores and the samples of a body in; out comes the mean score of the samples at a
+//! pose, in whole numbers: one look-up and one addition a sample.
 
 use crate::trial::Said;
 use geometry::Pose;
 use geometry::depth::{Rows, rows, transform};
 
-/// Unit of the scores in a grid: the price of a hidden sample is two of them, that of one seen through a hundred.
+/// Unit of the scores in a grid: the price of a hidden sample is two of them, that of one seen
+/// through a hundred.
 pub(crate) const SCORE_UNIT: f32 = 0.015;
 /// Score of a cell that no beam could judge; no other scores just this.
 pub(crate) const UNJUDGED: i8 = -2;
-/// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten are hidden.
+/// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten
+/// are hidden.
 pub(crate) const HIDDEN: f32 = UNJUDGED as f32 * -SCORE_UNIT;
 
 /// What each cell of a region scores at some tolerance.
@@ -46,7 +48,8 @@ impl<'a> Graded<'a> {
         m
     }
 
-    /// What samples (frame of the body) say with the body at a pose; what lies outside of the grid is hidden.
+    /// What samples (frame of the body) say with the body at a pose; what lies outside of the grid
+    /// is hidden.
     pub(crate) fn ask(&self, points: &[[f32; 3]], local_from_body: &Pose) -> Said {
         let m = self.cells_from(local_from_body);
         let score = |p: &[f32; 3]| {
@@ -79,8 +82,8 @@ impl<'a> Graded<'a> {
 }
 
 impl Stencil<'_> {
-    /// What the first `n` samples say with the body moved by `shift` (local, metres), to the nearest cell; `None` where some of
-    /// them would lie outside of the grid.
+    /// What the first `n` samples say with the body moved by `shift` (local, metres), to the
+    /// nearest cell; `None` where some of them would lie outside of the grid.
     pub(crate) fn ask(&self, shift: [f32; 3], n: usize) -> Option<Said> {
         let grid = &self.grid;
         let by = shift.map(|v| (v / grid.edge).round() as i32);

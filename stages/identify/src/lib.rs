@@ -1,6 +1,8 @@
-//! Clusters, planes and a library of models in; candidates out: where each model's foot may stand, and how turned.
+//! Clusters, planes and a library of models in; candidates out: where each model's foot may stand,
+//! and how turned.
 //!
-//! The search needs no clean cluster: it asks the beams, on the planes that something may stand on (METHOD.md §5–§7).
+//! The search needs no clean cluster: it asks the beams, on the planes that something may stand on
+//! (METHOD.md §5–§7).
 #![forbid(unsafe_code)]
 
 mod base;

@@ -1,5 +1,5 @@
-//! Clusters in; out come the regions of the world that are worth a search: groups of clusters that may be parts of
-//! one thing, not too small to be a robot.
+//! Clusters in; out come the regions of the world that are worth a search: groups of clusters that
+//! may be parts of one thing, not too small to be a robot.
 
 use contract::{Cluster, InstallationPlane, Region};
 use geometry::{Aabb, Plane, Point, Vector};
@@ -9,7 +9,8 @@ use crate::bodies::bodies;
 /// What is tuned.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegionSettings {
-    /// Clusters whose boxes come this near (metres) are one region: a thin arm may be cut from its body by shadow.
+    /// Clusters whose boxes come this near (metres) are one region: a thin arm may be cut from its
+    /// body by shadow.
     pub join_gap: f64,
     /// How far a region reaches beyond its clusters, metres.
     pub margin: f64,
@@ -21,12 +22,13 @@ pub struct RegionSettings {
     pub min_points: u64,
     /// A cluster smaller than this (metres, larger edge) joins a region but does not found one.
     pub min_seed: f64,
-    /// Largest edge of a region on the ground, metres; larger ones are cut into overlapping squares.
+    /// Largest edge of a region on the ground, metres; larger ones are cut into overlapping
+    /// squares.
     pub max_extent: f64,
     /// How far such squares overlap, metres: the reach of a large robot.
     pub overlap: f64,
-    /// A cluster longer than this (metres) is structure, walls and fences and what touches them: what is flat of it is
-    /// left out, the rest taken apart.
+    /// A cluster longer than this (metres) is structure, walls and fences and what touches them:
+    /// what is flat of it is left out, the rest taken apart.
     pub max_body: f64,
 }
 
@@ -76,25 +78,29 @@ pub fn regions(clusters: &[Cluster], settings: &RegionSettings) -> Vec<Region> {
     groups.iter().flat_map(|(b, _)| cut(b, settings)).map(|b| local(&b, settings.margin)).collect()
 }
 
-/// Distance between guessed heights, metres: the last tolerance of the base search forgives half of it.
+/// Distance between guessed heights, metres: the last tolerance of the base search forgives half of
+/// it.
 pub(crate) const GUESS_STEP: f64 = 0.03;
-/// How far below what is seen a foot may stand, metres: a camera often cuts off the lower half of a base.
+/// How far below what is seen a foot may stand, metres: a camera often cuts off the lower half of a
+/// base.
 const GUESS_BELOW: f64 = 0.5;
 
-/// Heights above the floor that a stand may have, metres: lower ones the fit takes up, higher ones are gantries.
+/// Heights above the floor that a stand may have, metres: lower ones the fit takes up, higher ones
+/// are gantries.
 const STANDS: (f64, f64) = (0.12, 1.5);
 
 /// Most guessed heights: six metres.
 const MAX_GUESSES: f64 = 200.0;
 
-/// Level planes at all heights of a box, where no plane is known to stand on. Their area is zero: no points carry
-/// them, so that a fit does not hold on to their height.
+/// Level planes at all heights of a box, where no plane is known to stand on. Their area is zero:
+/// no points carry them, so that a fit does not hold on to their height.
 #[must_use]
 pub fn guessed_planes(world: &Aabb) -> Vec<InstallationPlane> {
     level_planes(world, (world.min[2] - GUESS_BELOW, world.max[2] - 0.3))
 }
 
-/// The same above a floor (height, metres) in a box: a foot may hide all of the stand's top under it.
+/// The same above a floor (height, metres) in a box: a foot may hide all of the stand's top under
+/// it.
 #[must_use]
 pub fn stand_planes(world: &Aabb, floor: f64) -> Vec<InstallationPlane> {
     level_planes(world, (floor + STANDS.0, (floor + STANDS.1).min(world.max[2] - 0.3)))
@@ -103,8 +109,8 @@ pub fn stand_planes(world: &Aabb, floor: f64) -> Vec<InstallationPlane> {
 /// Thickest plate between a wall, a ceiling or a leaning plate and what is bolted to it, metres.
 const THICKEST: f64 = 0.15;
 
-/// Planes before walls, ceilings and leaning plates, as plates and brackets lie on them whose rims are too narrow to be planes of
-/// their own. Their area is zero, too.
+/// Planes before walls, ceilings and leaning plates, as plates and brackets lie on them whose rims
+/// are too narrow to be planes of their own. Their area is zero, too.
 #[must_use]
 pub fn raised_planes(mounts: &[InstallationPlane]) -> Vec<InstallationPlane> {
     let n = (THICKEST / GUESS_STEP).round() as usize;
@@ -118,7 +124,8 @@ pub fn raised_planes(mounts: &[InstallationPlane]) -> Vec<InstallationPlane> {
     mounts.iter().flat_map(|mount| (1..=n).map(move |k| raised(mount, k))).collect()
 }
 
-/// Whether one guessed plane is so many guesses above another: those before several walls follow one another, too.
+/// Whether one guessed plane is so many guesses above another: those before several walls follow
+/// one another, too.
 pub(crate) fn are_stacked(low: &Plane, high: &Plane, n: isize) -> bool {
     let off = high.offset - low.offset - n as f64 * GUESS_STEP;
     low.normal == high.normal && off.abs() < 0.1 * GUESS_STEP

@@ -1,4 +1,5 @@
-//! Base poses under test in; the best of them, few of each place, out; and the parts of a model that they are tested by.
+//! Base poses under test in; the best of them, few of each place, out; and the parts of a model
+//! that they are tested by.
 
 use geometry::Probe;
 use geometry::probe::HIDDEN_PRICE;
@@ -6,10 +7,11 @@ use robot::Model;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-/// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw leaves room for others, which
-/// fewer scans see.
+/// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw
+/// leaves room for others, which fewer scans see.
 pub(crate) const QUOTA: usize = 16;
-/// Radius of such a place, metres: the same at all levels, else a place would be many at the finest.
+/// Radius of such a place, metres: the same at all levels, else a place would be many at the
+/// finest.
 const PLACE: f64 = 0.2;
 
 /// A base pose under test.
@@ -21,7 +23,8 @@ pub(crate) struct Trial {
     pub(crate) plane: usize,
     /// Of the base, joined with that of the first moving link once it was looked at.
     pub(crate) said: Said,
-    /// Of the first moving link alone, at the place that this one was refined from; nothing before.
+    /// Of the first moving link alone, at the place that this one was refined from; nothing
+    /// before.
     pub(crate) first: Said,
 }
 
@@ -40,9 +43,9 @@ impl Said {
         Self { score, seen: f64::from(probe.seen()) }
     }
 
-    /// By which poses are told better from worse until few are left: between the mean score of all samples, by which what all
-    /// scans see of a cabinet outdoes what one of them sees of a robot, and that of the judged, by which a corner of anything
-    /// does.
+    /// By which poses are told better from worse until few are left: between the mean score of all
+    /// samples, by which what all scans see of a cabinet outdoes what one of them sees of a
+    /// robot, and that of the judged, by which a corner of anything does.
     pub(crate) fn rank(&self) -> f64 {
         self.score / self.seen.max(LEAST_SEEN).sqrt()
     }
@@ -88,8 +91,8 @@ pub(crate) fn prefix(model: &Model, link: usize, n: usize) -> (&[[f32; 3]], &[[f
     (&cad.points[..n], &cad.normals[..n])
 }
 
-/// Sorts best first and keeps up to `keep`, up to `quota` of one place, that differ from every better one by a step in place or
-/// yaw.
+/// Sorts best first and keeps up to `keep`, up to `quota` of one place, that differ from every
+/// better one by a step in place or yaw.
 pub(crate) fn best(
     trials: &mut Vec<Trial>,
     (keep, quota): (usize, usize),

@@ -1,5 +1,5 @@
-//! The evidence of a region in; out comes a grid of it: what the beams say about each place, looked up once for all models
-//! and all base poses of a search instead of once for each sample.
+//! The evidence of a region in; out comes a grid of it: what the beams say about each place, looked
+//! up once for all models and all base poses of a search instead of once for each sample.
 
 use contract::{Fan, Region, View};
 use geometry::depth::{LANES, Looks, lanes};
@@ -10,14 +10,15 @@ use std::sync::OnceLock;
 use crate::graded::{Graded, HIDDEN, SCORE_UNIT, Stencil, UNJUDGED};
 use crate::trial::Said;
 
-/// Edge of a cell, and of the cubes of points, metres: half of the finest tolerance that is asked of it.
+/// Edge of a cell, and of the cubes of points, metres: half of the finest tolerance that is asked
+/// of it.
 const EDGE: f32 = 0.03;
 /// Most cells; a larger region gets larger ones.
 const MAX_CELLS: f64 = 16e6;
 /// Least tolerance, in cells, for which the grid is asked.
 const COARSE: f32 = 1.4;
-/// Tolerances that the grid is asked for, from the least on, each so many times the one before: a twentieth more or less
-/// than was asked for tells no place from another.
+/// Tolerances that the grid is asked for, from the least on, each so many times the one before: a
+/// twentieth more or less than was asked for tells no place from another.
 const RUNG: f32 = 1.1;
 const N_RUNGS: usize = 16;
 /// Unit of the distances in a cell, metres.
@@ -35,7 +36,8 @@ struct Cell {
 }
 
 impl Cell {
-    /// What a sample at such a place scores, without regard to the side from which a beam comes, in [`SCORE_UNIT`]s.
+    /// What a sample at such a place scores, without regard to the side from which a beam comes, in
+    /// [`SCORE_UNIT`]s.
     fn score(self, tolerance: f32) -> i8 {
         let through = match self.ahead {
             NOTHING => NO_RETURN_WEIGHT,
@@ -95,7 +97,8 @@ impl<'a> Sight<'a> {
         Self { region, views, evidence: scouts, volume, each, all_spots, spots }
     }
 
-    /// The same for robots that moved between scans: what moves is looked for in each scan by itself.
+    /// The same for robots that moved between scans: what moves is looked for in each scan by
+    /// itself.
     #[must_use]
     pub fn apart(mut self) -> Self {
         let with_beams = self.views.iter().filter(|v| !v.images.is_empty());
@@ -105,8 +108,8 @@ impl<'a> Sight<'a> {
         self
     }
 
-    /// Lets only points count that are in none of the boxes (world, metres), and says how many there are higher than
-    /// `height` above the region's lowest, metres.
+    /// Lets only points count that are in none of the boxes (world, metres), and says how many
+    /// there are higher than `height` above the region's lowest, metres.
     pub fn pass_over(&mut self, boxes: &[Aabb], height: f64) -> usize {
         let origin = self.region.origin;
         let is_free = |spot: &&Spot| {
@@ -124,8 +127,8 @@ impl<'a> Sight<'a> {
         &self.spots
     }
 
-    /// A quick judgement of surface samples and their normals (frame of the body), to tell the hopeless: from the grid where
-    /// the tolerance allows.
+    /// A quick judgement of surface samples and their normals (frame of the body), to tell the
+    /// hopeless: from the grid where the tolerance allows.
     pub(crate) fn glance(
         &self,
         (points, normals): (&[[f32; 3]], &[[f32; 3]]),
@@ -138,8 +141,8 @@ impl<'a> Sight<'a> {
         }
     }
 
-    /// Samples of a body at a pose from which it will be moved about, for glances by the thousand; `None` where there is no
-    /// grid for the tolerance.
+    /// Samples of a body at a pose from which it will be moved about, for glances by the thousand;
+    /// `None` where there is no grid for the tolerance.
     pub(crate) fn stencil(
         &self,
         points: &[[f32; 3]],
@@ -159,7 +162,8 @@ impl<'a> Sight<'a> {
         if tolerance * RUNG >= least { tolerance.max(least) } else { tolerance }
     }
 
-    /// The length of as many whole cells of the grid as it holds, metres; itself where it holds none.
+    /// The length of as many whole cells of the grid as it holds, metres; itself where it holds
+    /// none.
     pub(crate) fn in_cells(&self, length: f64) -> f64 {
         let edge = self.volume.as_ref().map_or(f64::INFINITY, |volume| f64::from(volume.edge));
         if edge <= length { (length / edge).floor() * edge } else { length }
@@ -183,7 +187,8 @@ type Sum = (u64, [f64; 3], u32);
 
 /// The points of all views, cube by cube.
 fn spots(views: &[View], fan: &dyn Fan) -> Vec<Spot> {
-    // Beams beside each other mostly end in one cube: there are far fewer runs of points than points.
+    // Beams beside each other mostly end in one cube: there are far fewer runs of points than
+    // points.
     let of_view = |view: &View| {
         let mut runs: Vec<Sum> = Vec::new();
         for p in &view.points {
@@ -221,7 +226,8 @@ fn add((_, sum, n): &mut Sum, (_, more, n_more): &Sum) {
     *n += n_more;
 }
 
-/// The cube of a place in a region's frame, in the order of x, y, z: 21 bits each, 60 km either way.
+/// The cube of a place in a region's frame, in the order of x, y, z: 21 bits each, 60 km either
+/// way.
 fn cube(p: &[f32; 3]) -> u64 {
     const MIDDLE: i32 = 1 << 20;
     let along =

@@ -1,5 +1,5 @@
-//! E57 (ASTM E2807) files in; scans and their points out. The description is parsed by the crate `e57`, points are
-//! decoded here.
+//! E57 (ASTM E2807) files in; scans and their points out. The description is parsed by the crate
+//! `e57`, points are decoded here.
 
 mod look;
 mod packets;
@@ -195,7 +195,8 @@ fn describe(e: ::e57::Error) -> Error {
     Error::new(kind, what).because(e).hint("export the file anew")
 }
 
-/// Units of the file's coordinates: metres, by the standard. That the reference system has another unit is mentioned.
+/// Units of the file's coordinates: metres, by the standard. That the reference system has another
+/// unit is mentioned.
 fn units(reader: &E57Reader<BufReader<File>>, path: &Path, settings: &Settings) -> Result<Units> {
     let mut out = Units::of_format(Choice::read(&settings.units)?.of(path))?;
     let system = reader.coordinate_metadata().and_then(|text| units::of_wkt(text.as_bytes()));

@@ -1,4 +1,5 @@
-//! The first bytes of a file in; which point format it is out, or a refusal that says what to do instead.
+//! The first bytes of a file in; which point format it is out, or a refusal that says what to do
+//! instead.
 
 use contract::{Error, Format, Kind, Result};
 use std::fs::File;

@@ -1,23 +1,26 @@
-//! From the coordinates of a file to the scan frame: the stated pose and a few points in, a frame out whose
-//! coordinates stay small, and whose origin is the scanner where that can be true.
+//! From the coordinates of a file to the scan frame: the stated pose and a few points in, a frame
+//! out whose coordinates stay small, and whose origin is the scanner where that can be true.
 
 use contract::{Error, Result};
 use geometry::{Aabb, Point, Pose};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
-/// Farthest that a terrestrial scanner stands from what it measured, metres. Long-range scanners of quarries reach
-/// 2 to 6 km, those of plants 0.4 km; map coordinates (easting, northing) are tens of kilometres at the least.
+/// Farthest that a terrestrial scanner stands from what it measured, metres. Long-range scanners of
+/// quarries reach 2 to 6 km, those of plants 0.4 km; map coordinates (easting, northing) are tens
+/// of kilometres at the least.
 const FARTHEST_SCANNER: f64 = 8.0e3;
-/// Points nearer to their scanner than this are beams without return that the file has written as its origin, metres:
-/// no scanner and no camera measures within its own housing.
+/// Points nearer to their scanner than this are beams without return that the file has written as
+/// its origin, metres: no scanner and no camera measures within its own housing.
 pub(crate) const NO_RETURN: f64 = 0.01;
-/// The same about the origin of a file whose scanner is not known: rounding of map coordinates, metres.
+/// The same about the origin of a file whose scanner is not known: rounding of map coordinates,
+/// metres.
 const NO_POINT: f64 = 1e-6;
 
 /// How a file's coordinates become those of the scan frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Frame {
-    /// Turns the file's coordinates first; only where the scanner is not known and the file states a turn.
+    /// Turns the file's coordinates first; only where the scanner is not known and the file states
+    /// a turn.
     rotation: Option<UnitQuaternion<f64>>,
     /// Subtracted then, metres.
     shift: [f64; 3],
@@ -25,7 +28,8 @@ pub(crate) struct Frame {
     pub(crate) world_from_scan: Pose,
     /// Whether the origin of the scan frame is the scanner.
     pub(crate) scanner_known: bool,
-    /// Where beams without return are written, scan frame, and how near to it points are such, metres; 0 where none are.
+    /// Where beams without return are written, scan frame, and how near to it points are such,
+    /// metres; 0 where none are.
     no_return: ([f64; 3], f64),
 }
 
@@ -36,7 +40,8 @@ impl Frame {
         Self { rotation: None, shift: [0.0; 3], world_from_scan, scanner_known: true, no_return }
     }
 
-    /// World axes about a whole metre near `near` (a point in the file's frame), for points whose scanner is not known.
+    /// World axes about a whole metre near `near` (a point in the file's frame), for points whose
+    /// scanner is not known.
     pub(crate) fn about(world_from_file: Pose, near: [f64; 3]) -> Self {
         let origin = (world_from_file * Point::from(near)).coords.map(f64::round);
         let turned = world_from_file.rotation.angle() > 0.0;
@@ -87,13 +92,15 @@ impl Frame {
     }
 }
 
-/// Whether a scanner at the origin can have measured these points (file's frame): half of them within its reach.
+/// Whether a scanner at the origin can have measured these points (file's frame): half of them
+/// within its reach.
 pub(crate) fn within_reach(points: &[[f64; 3]]) -> bool {
     let near = points.iter().filter(|p| Vector3::from(**p).norm() <= FARTHEST_SCANNER).count();
     2 * near >= points.len()
 }
 
-/// A place near points in the file's frame: the middle of the stated bounds, else the middle one of the points.
+/// A place near points in the file's frame: the middle of the stated bounds, else the middle one of
+/// the points.
 pub(crate) fn near(bounds: Option<&Aabb>, points: &[[f64; 3]]) -> [f64; 3] {
     let mut middle = [0.0; 3];
     if points.is_empty() {
@@ -110,7 +117,8 @@ pub(crate) fn near(bounds: Option<&Aabb>, points: &[[f64; 3]]) -> [f64; 3] {
     }
 }
 
-/// A rotation from a stated quaternion; refused where it is none, brought to unit length where it nearly is.
+/// A rotation from a stated quaternion; refused where it is none, brought to unit length where it
+/// nearly is.
 pub(crate) fn rotation(wxyz: [f64; 4]) -> Result<UnitQuaternion<f64>> {
     let q = Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
     let norm = q.norm();

@@ -1,4 +1,5 @@
-//! Open inputs in; what is in them, and what will be worse for what they lack, out: for people and as JSON.
+//! Open inputs in; what is in them, and what will be worse for what they lack, out: for people and
+//! as JSON.
 
 use crate::bounds;
 use crate::raster::Steps;
@@ -57,10 +58,11 @@ pub struct ScanDescription {
     pub structured: bool,
     /// The lattice, where there is one.
     pub lattice: Option<LatticeText>,
-    /// Bounds of its points in the world, metres, where they are known: stated in the world, or the points were read for it.
+    /// Bounds of its points in the world, metres, where they are known: stated in the world, or
+    /// the points were read for it.
     pub bounds: Option<BoundsText>,
-    /// Bounds in the world, metres, where the file states them; those that an E57 file states in the frame of the scan hold all
-    /// points, but may be wider.
+    /// Bounds in the world, metres, where the file states them; those that an E57 file states in
+    /// the frame of the scan hold all points, but may be wider.
     pub stated_bounds: Option<BoundsText>,
     /// What is missing, and what will be worse for it.
     pub notes: Vec<String>,
@@ -101,7 +103,8 @@ pub struct BoundsText {
     pub max: [f64; 3],
 }
 
-/// Describes each input, in their order. E57 files that are not large are read for the bounds of their points.
+/// Describes each input, in their order. E57 files that are not large are read for the bounds of
+/// their points.
 #[must_use]
 pub fn describe(sources: &Sources, fan: &dyn Fan) -> Vec<Description> {
     let read = bounds::read(sources, fan);

@@ -1,5 +1,6 @@
-//! LAS and LAZ files in (versions 1.0 to 1.4, point formats 0 to 10); scans and strips out. Points come as runs of records, as
-//! they lie in the file or from the decompressor; no object is made for a point.
+//! LAS and LAZ files in (versions 1.0 to 1.4, point formats 0 to 10); scans and strips out. Points
+//! come as runs of records, as they lie in the file or from the decompressor; no object is made for
+//! a point.
 
 use crate::las_header::LasHeader;
 use crate::las_record::Decoder;
@@ -14,11 +15,13 @@ use contract::{Error, Format, Result};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Largest run of records that is decompressed from a stream at once, bytes: of usual records, more than a strip.
+/// Largest run of records that is decompressed from a stream at once, bytes: of usual records, more
+/// than a strip.
 const RUN_BYTES: usize = 16 << 20;
 
-/// Records of this length that are decompressed from a stream at once. A stream does not say how many there really are, and a
-/// header may state records of 64 KiB, so that a strip of them would take gigabytes before the first was read.
+/// Records of this length that are decompressed from a stream at once. A stream does not say how
+/// many there really are, and a header may state records of 64 KiB, so that a strip of them would
+/// take gigabytes before the first was read.
 fn at_once(record_len: usize) -> usize {
     (RUN_BYTES / record_len.max(1)).max(1)
 }
@@ -46,8 +49,9 @@ impl Records {
         Ok(Self { map, header, units, laz })
     }
 
-    /// At most `n` records from `first` on; `(place of the first one, records)`. Where records are compressed, the
-    /// run starts at the piece that holds `first`; where they are one stream, at the start of the file.
+    /// At most `n` records from `first` on; `(place of the first one, records)`. Where records are
+    /// compressed, the run starts at the piece that holds `first`; where they are one stream,
+    /// at the start of the file.
     pub(crate) fn run(&self, first: u64, n: usize) -> Result<(u64, Cow<'_, [u8]>)> {
         let n = n.min(usize::try_from(self.header.n_points.saturating_sub(first)).unwrap_or(n));
         let Some(laz) = &self.laz else {
@@ -75,8 +79,8 @@ impl Records {
         laz.pieces.get(laz.piece_of(first)).map_or(0, |p| p.first)
     }
 
-    /// Runs of records that can be read by themselves, of so many points where they are not compressed, and all that lies between
-    /// them; none where they are one stream.
+    /// Runs of records that can be read by themselves, of so many points where they are not
+    /// compressed, and all that lies between them; none where they are one stream.
     fn extents(&self, n: usize) -> Option<Box<dyn Iterator<Item = Extent> + Send + '_>> {
         let (header, n_bytes) = (&self.header, self.map.len() as u64);
         let Some(laz) = &self.laz else {
@@ -91,7 +95,8 @@ impl Records {
         (!is_stream).then(|| Box::new(Extent::cover(laz.pieces.iter().cloned(), n_bytes)) as _)
     }
 
-    /// Records of an uncompressed file. In range, since the count was checked against the file's length.
+    /// Records of an uncompressed file. In range, since the count was checked against the file's
+    /// length.
     fn mapped(&self, first: u64, n: usize) -> &[u8] {
         let from = self.header.points_at + first as usize * self.header.record_len;
         &self.map[from..from + n * self.header.record_len]
@@ -106,7 +111,8 @@ pub(crate) struct Las {
     scans: Vec<ScanSeed>,
     /// First and last place at which each scan was seen.
     extents: Vec<(u64, u64)>,
-    /// Whether a look at the file found all points inside the stated bounds: then a piece that is not is damaged.
+    /// Whether a look at the file found all points inside the stated bounds: then a piece that is
+    /// not is damaged.
     bounds_hold: bool,
     strip_points: usize,
 }
@@ -278,8 +284,8 @@ impl Las {
         runs.zip(places).flat_map(|(run, first)| self.decoder.decode(run, first, want)).collect()
     }
 
-    /// A damaged compressed run decodes without complaint, into nonsense: tell by the stated bounds, where these
-    /// were found to be right.
+    /// A damaged compressed run decodes without complaint, into nonsense: tell by the stated
+    /// bounds, where these were found to be right.
     fn check_bounds(&self, records: &[u8], first: u64) -> Result<()> {
         let header = &self.records.header;
         let (Some(bounds), true) = (&header.bounds, self.bounds_hold) else {

@@ -157,7 +157,8 @@ impl LasHeader {
         Ok(())
     }
 
-    /// Finds the records that matter among the variable length records; each is checked to lie before the points.
+    /// Finds the records that matter among the variable length records; each is checked to lie
+    /// before the points.
     fn walk_records(&mut self, raw: &las::raw::Header, data: &[u8]) -> Result<()> {
         let mut at = usize::from(raw.header_size);
         for i in 0..raw.number_of_variable_length_records {
@@ -196,13 +197,14 @@ impl LasHeader {
         Ok(())
     }
 
-    /// Number of points: the count that agrees with the bytes present, where a file states two that differ.
+    /// Number of points: the count that agrees with the bytes present, where a file states two that
+    /// differ.
     fn count(&mut self, raw: &las::raw::Header, n_bytes: usize) -> Result<u64> {
         let old = u64::from(raw.number_of_point_records);
         let new = raw.large_file.map_or(old, |large| large.number_of_point_records);
         let room = (self.points_end(raw, n_bytes) - self.points_at) as u64;
-        // A compressed point takes at least something: the arithmetic coder spends a thousandth of a bit at best,
-        // so a count can only be checked against the chunk table; see `laz`.
+        // A compressed point takes at least something: the arithmetic coder spends a thousandth of
+        // a bit at best, so a count can only be checked against the chunk table; see `laz`.
         let fits = |n: u64| {
             self.compressed || n.checked_mul(self.record_len as u64).is_some_and(|b| b <= room)
         };
@@ -215,7 +217,8 @@ impl LasHeader {
         }
         let there = room / self.record_len as u64;
         if fits(n) {
-            // A writer that was stopped before it could put the count right leaves less in the header than in the file.
+            // A writer that was stopped before it could put the count right leaves less in the
+            // header than in the file.
             if !self.compressed && there > n {
                 return Err(Error::bad_input(format!(
                     "{there} points are in the file, stated are only \"{n}\""
@@ -230,7 +233,8 @@ impl LasHeader {
             .hint("the file is truncated; copy or export it again"))
     }
 
-    /// Where points end at the latest: before records that follow them, where the header says where these start.
+    /// Where points end at the latest: before records that follow them, where the header says where
+    /// these start.
     fn points_end(&self, raw: &las::raw::Header, n_bytes: usize) -> usize {
         let extended = raw.evlr.filter(|e| e.number_of_evlrs > 0).map(|e| e.start_of_first_evlr);
         [raw.start_of_waveform_data_packet_record, extended]

@@ -1,5 +1,5 @@
-//! Bytes of LAS point records in; strips out. The table of the eleven point formats, and the one loop that every
-//! LAS and LAZ point goes through.
+//! Bytes of LAS point records in; strips out. The table of the eleven point formats, and the one
+//! loop that every LAS and LAZ point goes through.
 
 use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
@@ -36,7 +36,8 @@ const LAYOUTS: [Layout; 11] = [
     Layout { len: 67, modern: true, gps_time: Some(22), color: Some(30) },
 ];
 
-/// Records that are decoded together: small enough for the first-level cache, long enough for vector loops.
+/// Records that are decoded together: small enough for the first-level cache, long enough for
+/// vector loops.
 const BLOCK: usize = 64;
 /// Intensity lies at the same place in all formats.
 const INTENSITY: usize = 12;
@@ -112,7 +113,8 @@ fn in_scan(record: &[u8], frame: &Frame) -> [f64; 3] {
 struct Frame {
     m: [[f64; 3]; 3],
     t: [f64; 3],
-    /// Points nearer to the scanner than this are beams without return, metres; 0 where no scanner is known.
+    /// Points nearer to the scanner than this are beams without return, metres; 0 where no scanner
+    /// is known.
     no_return: f64,
 }
 
@@ -145,8 +147,9 @@ impl Decoder {
         self.layout.color.is_some()
     }
 
-    /// For the scans of a file with these poses, and whether the scanner is there; `scan_of_source` tells the scan of each source id (65,536 entries),
-    /// or is empty where there is only one scan.
+    /// For the scans of a file with these poses, and whether the scanner is there; `scan_of_source`
+    /// tells the scan of each source id (65,536 entries), or is empty where there is only one
+    /// scan.
     pub(crate) fn new(
         header: &LasHeader,
         poses: &[(Pose, bool)],
@@ -161,7 +164,8 @@ impl Decoder {
                     nalgebra::Vector3::from(header.offset) - world_from_scan.translation.vector;
                 let t = turn * from;
                 let m = [0, 1, 2].map(|i| [0, 1, 2].map(|j| turn[(i, j)] * header.scale[j]));
-                // Coordinates are whole steps of the scale: one step off is where it was meant to be.
+                // Coordinates are whole steps of the scale: one step off is where it was meant to
+                // be.
                 let step = header.scale.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
                 let no_return = if *is_scanner { NO_RETURN.max(step) } else { 0.0 };
                 Frame { m, t: [t.x, t.y, t.z], no_return }
@@ -191,8 +195,8 @@ impl Decoder {
         self.layout
     }
 
-    /// Strips of consecutive records, one for each scan that has points among them, by their first place.
-    /// `first` is the place of the first record.
+    /// Strips of consecutive records, one for each scan that has points among them, by their first
+    /// place. `first` is the place of the first record.
     pub(crate) fn decode(&self, records: &[u8], first: u64, want: Want) -> Vec<RawStrip> {
         let n = records.len() / self.record_len;
         if self.scan_of_source.is_empty() {
@@ -249,8 +253,8 @@ impl Decoder {
         }
     }
 
-    /// The same for a whole block of records, in loops without branches; false, and nothing done, where one of them is
-    /// withheld or not to be believed.
+    /// The same for a whole block of records, in loops without branches; false, and nothing done,
+    /// where one of them is withheld or not to be believed.
     fn add_block(&self, strip: &mut RawStrip, block: &[u8], frame: &Frame, place: u32) -> bool {
         let mut counts = [[0.0_f64; 3]; BLOCK];
         let mut withheld = false;

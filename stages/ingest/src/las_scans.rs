@@ -1,5 +1,5 @@
-//! The records of a LAS or LAZ file and the scanners known for it in; its scans out: which source id belongs to
-//! which scanner, and where the origin lies when no scanner is known.
+//! The records of a LAS or LAZ file and the scanners known for it in; its scans out: which source
+//! id belongs to which scanner, and where the origin lies when no scanner is known.
 
 use crate::frame::NO_RETURN;
 use crate::las::Records;
@@ -54,7 +54,8 @@ const CENSUS_ALL: u64 = 20_000_000;
 /// Number of windows, and records in each.
 const CENSUS_WINDOWS: u64 = 512;
 const CENSUS_RECORDS: usize = 512;
-/// A scanner farther than this from the middle of its points is probably given in another frame, metres.
+/// A scanner farther than this from the middle of its points is probably given in another frame,
+/// metres.
 const FAR_SCANNER: f64 = 2_000.0;
 
 /// What a look at the file shows.
@@ -149,7 +150,8 @@ fn by_source_id(
         let mut scan = seed(name, Some(id), Some(scanner.pose));
         scan.likely_points = seen.map(|seen| census.likely(seen.2, whole));
         found.scans.push(scan);
-        // Windows may miss its first and last points; a look between those seen is enough for a sample.
+        // Windows may miss its first and last points; a look between those seen is enough for a
+        // sample.
         found.extents.push(seen.map_or(whole, |seen| (seen.0, seen.1)));
     }
     let rest = census.ids.keys().any(|id| scan_of_source[usize::from(*id)] == NONE);
@@ -162,7 +164,8 @@ fn by_source_id(
     found.scan_of_source = scan_of_source;
 }
 
-/// Checks where a scan stands: its scanner where that is known, else how far its points lie apart; notes what is worth it.
+/// Checks where a scan stands: its scanner where that is known, else how far its points lie apart;
+/// notes what is worth it.
 fn check_place(scan: &mut ScanSeed, look: &Look, settings: &Settings) -> Result<()> {
     if scan.scanner_known {
         let n = look.n_at(scan.world_from_scan.translation.vector);

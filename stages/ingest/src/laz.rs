@@ -1,5 +1,6 @@
-//! The bytes of a LAZ file in; decompressed point records out, in file order. Every number that the decoder would
-//! believe (chunk table, layer sizes, counts) is checked against the bytes present before it sees them.
+//! The bytes of a LAZ file in; decompressed point records out, in file order. Every number that the
+//! decoder would believe (chunk table, layer sizes, counts) is checked against the bytes present
+//! before it sees them.
 
 use crate::las_header::LasHeader;
 use crate::reader::{Extent, Want};
@@ -12,7 +13,8 @@ use std::ops::Range;
 
 /// No real piece is compressed more than this many times; a larger claim would only cost memory.
 const MAX_RATIO: u64 = 250;
-/// Records of a piece that are believed whatever its size: 50,000 equal points take next to nothing. Bytes.
+/// Records of a piece that are believed whatever its size: 50,000 equal points take next to
+/// nothing. Bytes.
 const SMALL_PIECE: u64 = 4 << 20;
 
 /// How the points of a LAZ file are to be decompressed.
@@ -23,8 +25,8 @@ pub(crate) struct Laz {
     points_at: usize,
     n_points: u64,
     layered: bool,
-    /// Independently compressed runs of points (LAZ calls them chunks); empty where the file is one stream that can only be read
-    /// from its start.
+    /// Independently compressed runs of points (LAZ calls them chunks); empty where the file is
+    /// one stream that can only be read from its start.
     pub(crate) pieces: Vec<Extent>,
 }
 
@@ -52,7 +54,8 @@ impl Laz {
         let table = laz.read_table(data).map_err(|e| e.at("chunk table"));
         let pieces = match table {
             Ok(table) => table,
-            // A stream without table can still be read from its start, unless pieces are of unknown size.
+            // A stream without table can still be read from its start, unless pieces are of unknown
+            // size.
             Err(_) if laz.readable_without_table(data) => return Ok(laz),
             Err(error) => return Err(error),
         };
@@ -183,7 +186,8 @@ impl Laz {
         Ok(records)
     }
 
-    /// Layered pieces say how long each layer is, and the decoder allocates what they say: check it first.
+    /// Layered pieces say how long each layer is, and the decoder allocates what they say: check it
+    /// first.
     fn check_layers(&self, bytes: &[u8], n_expected: u64) -> Result<()> {
         if !self.layered {
             return Ok(());

@@ -1,12 +1,13 @@
-//! Intensities of a few points and their stated limits in; the span that is brought to 0..65535 out: the stated one, or where
-//! many lie outside it, the one that they have.
+//! Intensities of a few points and their stated limits in; the span that is brought to 0..65535
+//! out: the stated one, or where many lie outside it, the one that they have.
 
-/// Share of intensities outside the limits from which on the limits are wrong: fewer are single bright spots.
+/// Share of intensities outside the limits from which on the limits are wrong: fewer are single
+/// bright spots.
 const WRONG: f64 = 0.01;
 /// Fewer values tell nothing.
 const MIN_VALUES: usize = 50;
-/// Share of the lowest and of the highest that is left out where a span is taken from the values and they lie far from all
-/// others: marks for "none".
+/// Share of the lowest and of the highest that is left out where a span is taken from the values
+/// and they lie far from all others: marks for "none".
 const ODD: f64 = 0.001;
 /// How far that is, in spans of the others.
 const FAR: f64 = 0.5;
@@ -34,7 +35,8 @@ impl Span {
         value < self.min - slack || value > self.max + slack
     }
 
-    /// This span where the values keep to it, else the one that they have, and then what is said of it.
+    /// This span where the values keep to it, else the one that they have, and then what is said of
+    /// it.
     pub(crate) fn suited(self, values: &[f64], is_stated: bool) -> (Self, Option<String>) {
         let n_outside = values.iter().filter(|v| self.cuts(**v)).count();
         if values.len() < MIN_VALUES || n_outside as f64 <= WRONG * values.len() as f64 {

@@ -1,4 +1,5 @@
-//! Files in, strips out: the only reader of point formats. Knows how files are read, and nothing of what is in them.
+//! Files in, strips out: the only reader of point formats. Knows how files are read, and nothing of
+//! what is in them.
 #![deny(unsafe_code)]
 
 mod bounds;

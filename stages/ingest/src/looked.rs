@@ -1,5 +1,5 @@
-//! A scan of an open file in; what a sample of its points tells out: its raster, where most of it lies, and whether its scanner can have
-//! stood where it is said to.
+//! A scan of an open file in; what a sample of its points tells out: its raster, where most of it
+//! lies, and whether its scanner can have stood where it is said to.
 
 use crate::position;
 use crate::raster::{self, Raster, Steps};

@@ -1,9 +1,9 @@
 //! Path in, bytes out: the one place of the program that maps files into memory, inputs and the
 //! store alike.
 //!
-//! A file that is cut short, or a share that goes away, while it is mapped would end the program with a signal (SIGBUS). The
-//! signal is caught: the page that is missing is replaced by zeros, so that the reader comes to an end, and the map says
-//! that it is no longer whole.
+//! A file that is cut short, or a share that goes away, while it is mapped would end the program
+//! with a signal (SIGBUS). The signal is caught: the page that is missing is replaced by zeros, so
+//! that the reader comes to an end, and the map says that it is no longer whole.
 #![allow(unsafe_code)]
 
 use contract::{Error, Result};
@@ -163,8 +163,8 @@ mod guard {
     }
 
     fn install() {
-        // SAFETY: plain calls of the system with arguments of the right kind; the handler only touches atomics and calls
-        // what may be called in a handler.
+        // SAFETY: plain calls of the system with arguments of the right kind; the handler only
+        // touches atomics and calls what may be called in a handler.
         unsafe {
             let page = libc::sysconf(libc::_SC_PAGESIZE);
             PAGE.store(usize::try_from(page).unwrap_or(4096).max(1), SeqCst);
@@ -181,8 +181,9 @@ mod guard {
         info: *mut libc::siginfo_t,
         _: *mut libc::c_void,
     ) {
-        // SAFETY: the system gives a valid `info`; a page within a map of ours is replaced by one of zeros, which only
-        // readers of that map see; anything else ends as it would have without us.
+        // SAFETY: the system gives a valid `info`; a page within a map of ours is replaced by one
+        // of zeros, which only readers of that map see; anything else ends as it would have
+        // without us.
         unsafe {
             let at = (*info).si_addr() as usize;
             let within = |s: &&Slot| (s.begin.load(SeqCst)..s.end.load(SeqCst)).contains(&at);

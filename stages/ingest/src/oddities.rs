@@ -3,8 +3,8 @@
 use contract::quote;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// What was odd in one scan, counted while it was read with everything that the file says of it. Sums only: the same for any
-/// number of threads.
+/// What was odd in one scan, counted while it was read with everything that the file says of it.
+/// Sums only: the same for any number of threads.
 #[derive(Debug, Default)]
 pub(crate) struct Oddities {
     no_returns: AtomicU64,

@@ -1,5 +1,6 @@
-//! A sample of a scan's points in, as runs of neighbours in the order of the file; out comes whether a camera took them:
-//! its pixels lie at equal distances on a plane before it, a scanner's beams at equal angles.
+//! A sample of a scan's points in, as runs of neighbours in the order of the file; out comes
+//! whether a camera took them: its pixels lie at equal distances on a plane before it, a scanner's
+//! beams at equal angles.
 
 use crate::raster::{Axis, wrap};
 use crate::reader::Sampled;
@@ -11,17 +12,20 @@ const PAIRS: usize = 4_000;
 const MIN_PAIRS: usize = 500;
 /// Length of the mean direction below which no single picture holds the points: they lie all round.
 const MIN_MEAN: f64 = 0.6;
-/// Steps this near the most frequent one are the same, logarithm: coordinates in tenths of a millimetre jitter by 4 %.
+/// Steps this near the most frequent one are the same, logarithm: coordinates in tenths of a
+/// millimetre jitter by 4 %.
 const SAME: f64 = 0.06;
 /// Steps within this of it are asked for, logarithm: longer ones skip pixels.
 const NEAR: f64 = 0.5;
 /// Width of the bins that the most frequent step is looked for in, logarithm.
 const BIN: f64 = 0.03;
-/// Share of equal steps that makes a raster; cameras have 0.99 on their plane and up to 0.42 in angles.
+/// Share of equal steps that makes a raster; cameras have 0.99 on their plane and up to 0.42 in
+/// angles.
 const EVEN: f64 = 0.85;
 /// Share of equal angles from which on it is a scanner's.
 const SCANNER: f64 = 0.7;
-/// How far the axis of a picture may lie from the mean direction, and the first step that it is looked for with; tangents.
+/// How far the axis of a picture may lie from the mean direction, and the first step that it is
+/// looked for with; tangents.
 const AXIS: (i32, f64) = (5, 0.12);
 /// The last step of that: a degree off leaves steps equal to 2 %.
 const LAST_STEP: f64 = 0.01;
@@ -46,7 +50,8 @@ pub(crate) fn is_picture(sample: &[Sampled]) -> bool {
     !is_scanner && on_plane(&all, &pairs, &mean.normalize()) > EVEN
 }
 
-/// Largest share of equal steps on a plane before the eye, over the planes whose axes lie near a direction.
+/// Largest share of equal steps on a plane before the eye, over the planes whose axes lie near a
+/// direction.
 fn on_plane(all: &[Vector3<f64>], pairs: &[[usize; 2]], middle: &Vector3<f64>) -> f64 {
     let across = |of: &Vector3<f64>| {
         let x = of.cross(&Vector3::ith(of.iamin(), 1.0)).normalize();

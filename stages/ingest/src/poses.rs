@@ -1,4 +1,5 @@
-//! The scanners of `--scanners` in; those that are meant for a scan or a LAS file out, and which of them nobody asked for.
+//! The scanners of `--scanners` in; those that are meant for a scan or a LAS file out, and which of
+//! them nobody asked for.
 
 use crate::las_scans::LasScanner;
 use crate::scanners::{Scanner, Scanners};
@@ -31,8 +32,8 @@ impl<'a> Poses<'a> {
         Some(self.entries[at].world_from_scan)
     }
 
-    /// The scanners of a LAS or LAZ file: entries of its name; else those with a source id whose name is not that of
-    /// another input; else the only entry there is.
+    /// The scanners of a LAS or LAZ file: entries of its name; else those with a source id whose
+    /// name is not that of another input; else the only entry there is.
     pub(crate) fn of_las(&mut self, path: &Path) -> Vec<LasScanner> {
         let stem = stem(path);
         let named = |e: &Scanner| e.name.as_deref() == Some(stem.as_str());

@@ -1,9 +1,11 @@
-//! Points of a scan about its stated scanner in; out comes whether the scanner can have stood there.
+//! Points of a scan about its stated scanner in; out comes whether the scanner can have stood
+//! there.
 //!
-//! Each beam of a scanner comes back once: in whatever direction it looks, there is one surface, as dense as the beams. Seen from
-//! anywhere else, one surface lies before another, and both are in view as densely as if nothing stood before them. Edges
-//! are no such places, since there both surfaces lie side by side; nor are fences, since their wires and what lies
-//! behind them share the beams.
+//! Each beam of a scanner comes back once: in whatever direction it looks, there is one surface, as
+//! dense as the beams. Seen from anywhere else, one surface lies before another, and both are in
+//! view as densely as if nothing stood before them. Edges are no such places, since there both
+//! surfaces lie side by side; nor are fences, since their wires and what lies behind them share the
+//! beams.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -23,19 +25,21 @@ const MOST: usize = 64;
 const EDGES: [usize; 7] = [512, 256, 128, 64, 32, 16, 8];
 /// Bands of elevation, 10° each, in which cells should be equally full.
 const N_BANDS: usize = 18;
-/// A surface lies before another if their distance is larger than this, metres, and than this share of the nearer range: less
-/// may be one surface at a grazing angle.
+/// A surface lies before another if their distance is larger than this, metres, and than this share
+/// of the nearer range: less may be one surface at a grazing angle.
 const APART: (f64, f64) = (0.15, 0.08);
 /// Share of a cell's points that each of the two surfaces has at least.
 const EITHER: f64 = 0.25;
-/// Share of the points whose nearest neighbour in direction lies on the other surface from which on both fill the cell; where two
-/// surfaces lie side by side only those at the border do.
+/// Share of the points whose nearest neighbour in direction lies on the other surface from which on
+/// both fill the cell; where two surfaces lie side by side only those at the border do.
 const MIXED: f64 = 0.25;
-/// How much fuller than most cells of its band a cell is in which two surfaces are seen, each as densely as it was scanned.
+/// How much fuller than most cells of its band a cell is in which two surfaces are seen, each as
+/// densely as it was scanned.
 const FULLER: f64 = 1.35;
-/// Share of the cells with two surfaces in full from which on the position is wrong, and the least number of them. Of 66
-/// simulated scans from where they were taken one had 0.0007, all others less; of 49 said to be taken 0.5 to 3 m off, 41 have more
-/// than this (benches/README.md, Scanner positions). Real clouds of cameras had none.
+/// Share of the cells with two surfaces in full from which on the position is wrong, and the least
+/// number of them. Of 66 simulated scans from where they were taken one had 0.0007, all others
+/// less; of 49 said to be taken 0.5 to 3 m off, 41 have more than this (benches/README.md, Scanner
+/// positions). Real clouds of cameras had none.
 const WRONG: (f64, usize) = (0.002, 4);
 
 /// Part of what is said of a scan whose stated position is not used.
@@ -106,7 +110,8 @@ fn same(a: &Beam, b: &Beam) -> bool {
     a.cell == b.cell
 }
 
-/// The cell of a direction on a cube whose faces have so many along an edge, all about equally wide.
+/// The cell of a direction on a cube whose faces have so many along an edge, all about equally
+/// wide.
 fn cell(to: [f64; 3], edge: usize) -> u32 {
     let sizes = to.map(f64::abs);
     let axis = (0..3).fold(0, |most, i| if sizes[i] > sizes[most] { i } else { most });
@@ -174,7 +179,8 @@ fn nearest(beams: &[Beam], i: usize) -> &Beam {
 mod tests {
     use super::*;
 
-    /// What a scanner at the origin sees of a room with a pillar and a wire fence, 0.3° apart, as seen from elsewhere.
+    /// What a scanner at the origin sees of a room with a pillar and a wire fence, 0.3° apart, as
+    /// seen from elsewhere.
     fn room(from: [f64; 3]) -> Vec<[f32; 3]> {
         let mut out = Vec::new();
         for row in -200..200 {

@@ -1,5 +1,5 @@
-//! PTX (gridded text) files in; scans and their points out. A block a scan: columns, rows, four lines of the
-//! scanner's pose, the same as a 4 × 4 matrix, then a line a pixel, column by column.
+//! PTX (gridded text) files in; scans and their points out. A block a scan: columns, rows, four
+//! lines of the scanner's pose, the same as a 4 × 4 matrix, then a line a pixel, column by column.
 
 mod blocks;
 mod look;

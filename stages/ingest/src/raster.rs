@@ -1,5 +1,6 @@
-//! A sample of a scan's points in; the angular raster that suits it out: from native rows and columns where they are
-//! regular, else from the directions of the points. Never finer than about one point a pixel.
+//! A sample of a scan's points in; the angular raster that suits it out: from native rows and
+//! columns where they are regular, else from the directions of the points. Never finer than about
+//! one point a pixel.
 
 use crate::picture::is_picture;
 use crate::raster_free;
@@ -35,8 +36,8 @@ const MIN_POINTS: usize = 64;
 /// Native rows and columns worse than this are not used at all, pixels RMS.
 const MAX_IRREGULAR: f64 = 2.5;
 
-/// The raster of a scan from a sample of it, as runs of neighbours in the order of the file; `n_total` is the number
-/// of points of the scan. `None` where there are too few points to tell.
+/// The raster of a scan from a sample of it, as runs of neighbours in the order of the file;
+/// `n_total` is the number of points of the scan. `None` where there are too few points to tell.
 pub(crate) fn estimate(
     sample: &[Sampled],
     n_total: Option<u64>,

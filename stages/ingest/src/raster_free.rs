@@ -1,12 +1,13 @@
-//! Points without native rows and columns in, in the order of the file; the raster that their directions suggest
-//! out. Points in scan order tell both steps; depth images and shuffled points tell the density only.
+//! Points without native rows and columns in, in the order of the file; the raster that their
+//! directions suggest out. Points in scan order tell both steps; depth images and shuffled points
+//! tell the density only.
 
 use crate::raster::{Axis, Grid, median, wrap};
 use crate::reader::Sampled;
 use std::f64::consts::TAU;
 
-/// Neighbours in the file that are farther apart than this many spacings of the sample are not neighbours on the
-/// scanner: the points are shuffled.
+/// Neighbours in the file that are farther apart than this many spacings of the sample are not
+/// neighbours on the scanner: the points are shuffled.
 const SHUFFLED: f64 = 4.0;
 /// Steps between neighbours this far off the line's direction count as along it, share of the step.
 const ALONG: f64 = 0.35;
@@ -14,7 +15,8 @@ const ALONG: f64 = 0.35;
 const LINES: f64 = 0.6;
 /// Lines about another axis than z must be this much straighter to be believed.
 const STRAIGHTER: f64 = 0.6;
-/// Lines this straight about z are believed at once: step across the line, share of the step along it.
+/// Lines this straight about z are believed at once: step across the line, share of the step along
+/// it.
 const STRAIGHT: f64 = 1e-4;
 /// Directions steeper than this are left out where azimuth matters, radians (75°).
 const STEEP: f64 = 1.3;
@@ -120,8 +122,8 @@ impl Lines {
     }
 }
 
-/// Spacing of lines along `v`, from points that lie beside one another along `u`; `None` where the sample holds too
-/// few lines.
+/// Spacing of lines along `v`, from points that lie beside one another along `u`; `None` where the
+/// sample holds too few lines.
 fn across(angles: &[[f64; 2]], u: usize, v: usize, along: f64) -> Option<f64> {
     /// Lines farther apart than this many steps along the line are not neighbours.
     const FAR: f64 = 12.0;
@@ -134,11 +136,13 @@ fn across(angles: &[[f64; 2]], u: usize, v: usize, along: f64) -> Option<f64> {
         .map(|w| w[1].1 - w[0].1)
         .filter(|gap| *gap < FAR * along)
         .collect();
-    // Points of one line that share a cell differ by jitter only, which must not pass for the spacing.
+    // Points of one line that share a cell differ by jitter only, which must not pass for the
+    // spacing.
     (gaps.len() * 10 > angles.len()).then(|| mode(&gaps, 0.15 * along, FAR * along)).flatten()
 }
 
-/// The most frequent value in a range, on a scale of ratios: the median of the values about the fullest bin.
+/// The most frequent value in a range, on a scale of ratios: the median of the values about the
+/// fullest bin.
 fn mode(values: &[f64], min: f64, max: f64) -> Option<f64> {
     /// Ratio of neighbouring bins' limits.
     const RATIO: f64 = 1.06;
@@ -155,8 +159,8 @@ fn mode(values: &[f64], min: f64, max: f64) -> Option<f64> {
     median(&mut near)
 }
 
-/// Spacing of points if they lay on a square raster of azimuth and elevation: from the number of points in cells, as
-/// small as the sample allows. `None` where all points lie in one direction.
+/// Spacing of points if they lay on a square raster of azimuth and elevation: from the number of
+/// points in cells, as small as the sample allows. `None` where all points lie in one direction.
 fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
     /// Points in a cell that make its count certain to a fifth.
     const ENOUGH: usize = 30;
@@ -177,7 +181,8 @@ fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
         if counts.is_empty() {
             break;
         }
-        // The upper quartile of the points' cells: cells at the rim of the sample are only partly full.
+        // The upper quartile of the points' cells: cells at the rim of the sample are only partly
+        // full.
         let at = counts.len() * 3 / 4;
         let count = *counts.select_nth_unstable(at).1;
         if count < FEW || (found.is_some() && count < ENOUGH) {
@@ -189,8 +194,9 @@ fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
     found
 }
 
-/// Lengths of the mean phasor at frequencies that follow one another at equal distances: each value's phasor is turned on
-/// by the same angle every time, without a sine or cosine (thousands of turns leave a part in 10¹²).
+/// Lengths of the mean phasor at frequencies that follow one another at equal distances: each
+/// value's phasor is turned on by the same angle every time, without a sine or cosine (thousands of
+/// turns leave a part in 10¹²).
 struct Sweep {
     now: [Vec<f64>; 2],
     turn: [Vec<f64>; 2],
@@ -217,14 +223,15 @@ impl Sweep {
     }
 }
 
-/// The step near `step` that fits the angles best, and the middle of a pixel near their middle. Where they are not
-/// regular enough for a phase, the step stays and any phase will do.
+/// The step near `step` that fits the angles best, and the middle of a pixel near their middle.
+/// Where they are not regular enough for a phase, the step stays and any phase will do.
 fn sharpen(angles: &[[f64; 2]], axis: usize, step: f64) -> (f64, f64) {
     /// Points that are looked at: enough for a hundredth of a pixel.
     const POINTS: usize = 4_000;
     /// How far from the guess the step may lie.
     const REACH: f64 = 0.03;
-    /// Sharpness (length of the mean phasor) from which pixels hold one point each: jitter of 0.17 pixels.
+    /// Sharpness (length of the mean phasor) from which pixels hold one point each: jitter of 0.17
+    /// pixels.
     const SHARP: f64 = 0.55;
     let every = angles.len().div_ceil(POINTS);
     let values: Vec<f64> = angles.iter().step_by(every).map(|a| a[axis]).collect();

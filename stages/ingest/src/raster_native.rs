@@ -1,5 +1,6 @@
-//! Points with native rows and columns in; the regular raster that fits them best out, with how well it does. Rows
-//! are elevation and columns azimuth, about one of three axes, either way round, with or without a jump at ±π.
+//! Points with native rows and columns in; the regular raster that fits them best out, with how
+//! well it does. Rows are elevation and columns azimuth, about one of three axes, either way round,
+//! with or without a jump at ±π.
 
 use crate::raster::{Axis, Grid, median, wrap};
 use crate::reader::Sampled;
@@ -15,7 +16,8 @@ pub(crate) struct Native {
 
 /// Fewer rows or columns than this cannot be told from chance.
 const MIN_LINES: usize = 3;
-/// Azimuths of points steeper than this are left out: there a small error turns them far. Radians (75°).
+/// Azimuths of points steeper than this are left out: there a small error turns them far. Radians
+/// (75°).
 const STEEP: f64 = 1.3;
 /// Share of the largest residuals that is left out: mixed pixels and stray returns.
 const LEFT_OUT: f64 = 0.02;
@@ -102,8 +104,8 @@ impl Line {
         (line.slope.is_finite() && line.slope.abs() > 1e-7).then_some(line)
     }
 
-    /// Reweighted least squares, about the middle index, which becomes the phase: the rounding of the step to a
-    /// whole number of columns then does least harm.
+    /// Reweighted least squares, about the middle index, which becomes the phase: the rounding of
+    /// the step to a whole number of columns then does least harm.
     fn least_squares(lines: &[(f64, f64)], slope: f64) -> Option<Self> {
         let at = ((lines[0].0 + lines[lines.len() - 1].0) / 2.0).round();
         let mut offsets: Vec<f64> = lines.iter().map(|l| l.1 - slope * (l.0 - at)).collect();

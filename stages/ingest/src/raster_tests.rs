@@ -106,7 +106,8 @@ fn native_pixels_map_one_to_one() {
             near(raster.lattice.row_step, 0.11, 1e-3) && near(raster.lattice.col_step, 0.09, 1e-3)
         );
         assert!(alone(&points, &raster.lattice) > 0.999);
-        // The same native column is the same column of the lattice, also across the jump at 180 degrees.
+        // The same native column is the same column of the lattice, also across the jump at 180
+        // degrees.
         let cols: Vec<u32> = points
             .iter()
             .map(|p| {

@@ -1,4 +1,5 @@
-//! What every format gives: its masks and scans, a sample of each scan, and its points as strips in file order.
+//! What every format gives: its masks and scans, a sample of each scan, and its points as strips in
+//! file order.
 
 use crate::map::Mapped;
 use crate::oddities::Oddities;
@@ -23,7 +24,8 @@ pub(crate) struct MaskSeed {
     pub(crate) name: String,
     /// Valid points, where known without reading them.
     pub(crate) n_points: Option<u64>,
-    /// Points that the file states, those that are not valid with them; of no use but to guess how much there is.
+    /// Points that the file states, those that are not valid with them; of no use but to guess how
+    /// much there is.
     pub(crate) n_stated: Option<u64>,
 }
 
@@ -61,8 +63,9 @@ pub(crate) struct Sampled {
     pub(crate) native: Option<[u32; 2]>,
 }
 
-/// A strip with this file's own numbers for scan and mask. It holds no point only at the end of a mask whose length is
-/// not known beforehand and whose last points were dropped: `first_place` is then the length of the mask.
+/// A strip with this file's own numbers for scan and mask. It holds no point only at the end of a
+/// mask whose length is not known beforehand and whose last points were dropped: `first_place` is
+/// then the length of the mask.
 #[derive(Debug, Clone)]
 pub(crate) struct RawStrip {
     /// Index of the scan in this file.
@@ -80,8 +83,8 @@ pub(crate) struct RawStrip {
 /// Strips of one file, in its order.
 pub(crate) type RawStrips<'a> = Box<dyn Iterator<Item = Result<RawStrip>> + Send + 'a>;
 
-/// Consecutive bytes of a file that are points by themselves, so that any thread may read them; or that hold none. Extents
-/// cover a file from its first byte to its last.
+/// Consecutive bytes of a file that are points by themselves, so that any thread may read them; or
+/// that hold none. Extents cover a file from its first byte to its last.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Extent {
     /// Where its bytes lie in the file.
@@ -101,7 +104,8 @@ impl Extent {
         &file[self.bytes.start as usize..self.bytes.end as usize]
     }
 
-    /// Extents with points, and what lies before, between and behind them in a file of so many bytes.
+    /// Extents with points, and what lies before, between and behind them in a file of so many
+    /// bytes.
     pub(crate) fn cover(
         points: impl Iterator<Item = Self>,
         n_bytes: u64,
@@ -136,9 +140,11 @@ pub(crate) trait Reader: Send + Sync {
     fn scans(&self) -> &[ScanSeed];
     /// Up to `n` valid points of a scan, as runs of neighbours in file order spread over the scan.
     fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>>;
-    /// Up to `n` valid points of a scan, scan frame, metres, evenly spread over it; of a scan of more than `most` points over so many.
+    /// Up to `n` valid points of a scan, scan frame, metres, evenly spread over it; of a scan of
+    /// more than `most` points over so many.
     fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>>;
-    /// All valid points in file order. Ends with an error, never with a silent end, where the file is broken.
+    /// All valid points in file order. Ends with an error, never with a silent end, where the file
+    /// is broken.
     fn read(&self, want: Want) -> Result<Reading<'_>>;
     /// The points of an extent, from its bytes.
     fn decode(&self, extent: &Extent, _bytes: &[u8], _want: Want) -> Result<Vec<RawStrip>> {

@@ -3,42 +3,44 @@
 /// Tunables of this room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Points of a strip. 65,536: a message through a channel costs nothing at that size, and a strip (1 MB) fits
-    /// the second-level cache.
+    /// Points of a strip. 65,536: a message through a channel costs nothing at that size, and a
+    /// strip (1 MB) fits the second-level cache.
     pub strip_points: usize,
-    /// Largest XML section of an E57 file that is read, bytes. Real ones stay below 1 MB even with thousands of
-    /// images.
+    /// Largest XML section of an E57 file that is read, bytes. Real ones stay below 1 MB even with
+    /// thousands of images.
     pub max_xml_bytes: u64,
     /// Most elements, attributes and texts of that section: its reader keeps about 80 bytes of
     /// each.
     pub max_xml_nodes: u64,
-    /// Most attributes of one element of it: real ones have below ten, and its reader compares each
-    /// with all others.
+    /// Most attributes of one element of it: real ones have below ten, and its reader compares
+    /// each with all others.
     pub max_xml_attributes: u64,
     /// Largest `--scanners` file, bytes: 100,000 scanners fit.
     pub max_scanners_bytes: u64,
     /// Largest configuration, review, scene, path or list of readings, bytes: texts that people or
     /// small programs write.
     pub max_text_bytes: u64,
-    /// Points of a scan that the lattice is estimated from: angles to a hundredth of a pixel need no more.
+    /// Points of a scan that the lattice is estimated from: angles to a hundredth of a pixel need
+    /// no more.
     pub sample_points: usize,
-    /// Largest memory for one LAZ chunk once decompressed, bytes. Chunks have 50,000 points (2 MB) in practice; a
-    /// file in one piece is decompressed point by point and does not count.
+    /// Largest memory for one LAZ chunk once decompressed, bytes. Chunks have 50,000 points (2 MB)
+    /// in practice; a file in one piece is decompressed point by point and does not count.
     pub max_laz_chunk_bytes: u64,
-    /// Coordinates farther than this from the scanner, or from the middle of points without one, are not measured but
-    /// broken, metres: such points are dropped and counted. No terrestrial scanner reaches 10 km; files without
-    /// scanner may span a region, hence a hundred: as far as coordinates in steps of 0.1 mm reach (214 km).
+    /// Coordinates farther than this from the scanner, or from the middle of points without one,
+    /// are not measured but broken, metres: such points are dropped and counted. No
+    /// terrestrial scanner reaches 10 km; files without scanner may span a region, hence a
+    /// hundred: as far as coordinates in steps of 0.1 mm reach (214 km).
     pub max_range: f64,
-    /// Residual of native rows and columns from a regular lattice that is accepted, pixels RMS. Above it, native
-    /// pixels cannot map one to one anyway.
+    /// Residual of native rows and columns from a regular lattice that is accepted, pixels RMS.
+    /// Above it, native pixels cannot map one to one anyway.
     pub max_native_rms: f64,
-    /// Finest lattice step, radians (0.005°: below the best terrestrial scanners, 0.0018°, only in name: their beam
-    /// is wider).
+    /// Finest lattice step, radians (0.005°: below the best terrestrial scanners, 0.0018°, only in
+    /// name: their beam is wider).
     pub min_step: f64,
     /// Coarsest lattice step, radians (2°).
     pub max_step: f64,
-    /// Units of coordinates: `declared` for what each file declares, else one such as `mm`, `us-ft/m` (heights apart), or
-    /// `hall.las=ft,mm` (one file's own).
+    /// Units of coordinates: `declared` for what each file declares, else one such as `mm`,
+    /// `us-ft/m` (heights apart), or `hall.las=ft,mm` (one file's own).
     pub units: String,
 }
 

@@ -1,5 +1,5 @@
-//! A sample of each scan in; how far its points spread, and whether that can be a plant in the units that they are read
-//! in, out.
+//! A sample of each scan in; how far its points spread, and whether that can be a plant in the
+//! units that they are read in, out.
 
 use crate::sources::{File, Sources};
 use crate::units::{Origin, Unit, Units};
@@ -10,9 +10,11 @@ use geometry::{Aabb, Point, Pose};
 pub(crate) const N_LOOKED: usize = 4096;
 /// Fewer points spread over nothing in particular.
 const LEAST_POINTS: usize = 100;
-/// Share of the points on either side that count for nothing: strays, and what is seen through gates.
+/// Share of the points on either side that count for nothing: strays, and what is seen through
+/// gates.
 const TAIL: f64 = 0.05;
-/// No scan of a plant spreads farther, metres: halls measure hundreds of metres, scanners reach as far.
+/// No scan of a plant spreads farther, metres: halls measure hundreds of metres, scanners reach as
+/// far.
 const LARGEST: [f64; 3] = [2_000.0, 2_000.0, 200.0];
 /// No scan spreads over less, metres: the smallest arms are ten times as large.
 const SMALLEST: f64 = 0.02;
@@ -44,8 +46,9 @@ pub(crate) fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose
 }
 
 impl Sources {
-    /// Refuses inputs that cannot be of a plant in the units that they are read in: where nobody gave a unit or declared one,
-    /// clouds of kilometres; where somebody did, clouds of millimetres, too.
+    /// Refuses inputs that cannot be of a plant in the units that they are read in: where nobody
+    /// gave a unit or declared one, clouds of kilometres; where somebody did, clouds of
+    /// millimetres, too.
     ///
     /// # Errors
     /// The first such input, with what its points would measure and how to give the right unit.
@@ -67,7 +70,8 @@ impl Sources {
         })
     }
 
-    /// Where most points of the opened inputs lie in the world, metres, as far as samples tell; empty where they do not.
+    /// Where most points of the opened inputs lie in the world, metres, as far as samples tell;
+    /// empty where they do not.
     #[must_use]
     pub fn spread(&self) -> Aabb {
         let all = self.files.iter().flat_map(|file| file.spreads.iter().flatten());

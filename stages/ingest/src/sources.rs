@@ -1,5 +1,5 @@
-//! Paths in; open inputs out, numbered over all of them: inputs, masks, scans with their lattices, and the strips of
-//! each input on request.
+//! Paths in; open inputs out, numbered over all of them: inputs, masks, scans with their lattices,
+//! and the strips of each input on request.
 
 use crate::format::detect;
 use crate::las::Las;
@@ -46,7 +46,8 @@ pub struct Sources {
     n_before: [usize; 2],
 }
 
-/// Inputs of an earlier run, which are known but not open: those that are opened now are numbered after them.
+/// Inputs of an earlier run, which are known but not open: those that are opened now are numbered
+/// after them.
 #[derive(Debug, Clone, Default)]
 pub struct Before {
     /// In their order.
@@ -72,11 +73,12 @@ pub(crate) struct File {
     pub(crate) spreads: Vec<Option<Aabb>>,
 }
 
-/// Opens inputs: finds out what each is, reads and checks its header, and makes the lattices of scans whose scanner
-/// is known from a sample of their points.
+/// Opens inputs: finds out what each is, reads and checks its header, and makes the lattices of
+/// scans whose scanner is known from a sample of their points.
 ///
 /// # Errors
-/// The first input, in their order, that is broken or not read at all; the place starts with its path.
+/// The first input, in their order, that is broken or not read at all; the place starts with its
+/// path.
 pub fn open(
     paths: &[PathBuf],
     scanners: Option<&Scanners>,
@@ -121,11 +123,12 @@ pub fn open_after(
 }
 
 impl Sources {
-    /// The points of an input, in its order, read on the thread that asks; with everything that the file says of them, or coordinates
-    /// only.
+    /// The points of an input, in its order, read on the thread that asks; with everything that the
+    /// file says of them, or coordinates only.
     ///
     /// # Errors
-    /// An input that does not exist. Errors of the iterator name file and place; it ends after the first.
+    /// An input that does not exist. Errors of the iterator name file and place; it ends after the
+    /// first.
     pub fn strips(&self, input: InputId, want: Want) -> Result<Strips<'_>> {
         let (file, path) = self.open(input)?;
         let strips = reader::strips(&*file.reader, want).map_err(|e| e.at(path.display()))?;
@@ -199,7 +202,8 @@ impl Sources {
         &self.masks[self.n_before[1]..]
     }
 
-    /// Scale and offset, metres, of the LAS input with the finest steps; nothing where an input of another format is finer.
+    /// Scale and offset, metres, of the LAS input with the finest steps; nothing where an input of
+    /// another format is finer.
     #[must_use]
     pub fn las_quantum(&self) -> Option<([f64; 3], [f64; 3])> {
         /// Steps of formats that have none of their own, metres.
@@ -217,7 +221,8 @@ impl Sources {
         self.files.iter().any(|file| file.reader.has_color())
     }
 
-    /// Points that an opened input states, those that are not valid with them; `None` where it states none.
+    /// Points that an opened input states, those that are not valid with them; `None` where it
+    /// states none.
     #[must_use]
     pub fn n_stated(&self, input: InputId) -> Option<u64> {
         let first = self.inputs.len() - self.files.len();
@@ -288,8 +293,8 @@ impl Sources {
         Ok(())
     }
 
-    /// Looks at a sample of each scan for the raster that it was taken in, and whether its scanner can have stood where it is
-    /// said to.
+    /// Looks at a sample of each scan for the raster that it was taken in, and whether its scanner
+    /// can have stood where it is said to.
     fn find_lattices(&mut self, settings: &Settings, fan: &dyn Fan) -> Result<()> {
         let n_scans = |file: &File| file.reader.scans().len();
         let all = (self.files.iter().enumerate())
@@ -363,8 +368,8 @@ impl Weigh for Piece {
 }
 
 impl File {
-    /// What came of reading, if the file was whole all along: one that was cut short reads as zeros from there, and that it was
-    /// goes before what its reader makes of them.
+    /// What came of reading, if the file was whole all along: one that was cut short reads as zeros
+    /// from there, and that it was goes before what its reader makes of them.
     fn whole<T>(&self, read: Result<T>) -> Result<T> {
         self.reader.check().and(read)
     }

@@ -1,13 +1,16 @@
-//! A few points of a file in; the step that their coordinates come in, where it is coarse enough to matter, out.
+//! A few points of a file in; the step that their coordinates come in, where it is coarse enough to
+//! matter, out.
 //!
-//! Single precision holds 24 bits: a northing of 5,600,000 m comes in steps of half a metre, whatever the file says of itself.
+//! Single precision holds 24 bits: a northing of 5,600,000 m comes in steps of half a metre,
+//! whatever the file says of itself.
 
 use contract::{Error, Result};
 
-/// Steps from here on are worth a word, metres: the noise of a common scanner, beside which finer ones vanish.
+/// Steps from here on are worth a word, metres: the noise of a common scanner, beside which finer
+/// ones vanish.
 const COARSE: f64 = 0.003;
-/// Steps from here on are refused, metres: points are then off by as much as the links of a small arm are thick, so that no posture is
-/// told from another.
+/// Steps from here on are refused, metres: points are then off by as much as the links of a small
+/// arm are thick, so that no posture is told from another.
 const USELESS: f64 = 0.1;
 /// Fewer points tell nothing: what few points have in common may be chance.
 const MIN_POINTS: usize = 200;

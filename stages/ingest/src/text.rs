@@ -87,8 +87,8 @@ impl Lines {
     }
 }
 
-/// Parses the numbers of a line into `out` and returns how many there are: those beyond its length are counted only.
-/// The error is the word that is no number.
+/// Parses the numbers of a line into `out` and returns how many there are: those beyond its length
+/// are counted only. The error is the word that is no number.
 pub(crate) fn numbers(line: &[u8], out: &mut [f64]) -> std::result::Result<usize, String> {
     let mut n = 0;
     let mut rest = line;
@@ -123,8 +123,9 @@ fn shown(word: &[u8]) -> String {
     quote::shown(&String::from_utf8_lossy(&word[..word.len().min(40)])).into_owned()
 }
 
-/// The number that a line begins with, and its length; only the common case, exact: at most 15 digits with an optional
-/// point, so that both the digits and the power of ten are exact in `f64` and one division rounds once.
+/// The number that a line begins with, and its length; only the common case, exact: at most 15
+/// digits with an optional point, so that both the digits and the power of ten are exact in `f64`
+/// and one division rounds once.
 #[inline]
 fn plain(line: &[u8]) -> Option<(f64, usize)> {
     const POWERS: [f64; 16] =

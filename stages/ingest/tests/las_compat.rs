@@ -1,5 +1,6 @@
-//! Every LAS and LAZ file of public test suites: read in full, with the count and bounds that laspy 2.7 gives, or
-//! refused by name. The files are not part of the repository; without them these tests say that they were skipped.
+//! Every LAS and LAZ file of public test suites: read in full, with the count and bounds that laspy
+//! 2.7 gives, or refused by name. The files are not part of the repository; without them these
+//! tests say that they were skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::OneByOne;
@@ -84,7 +85,8 @@ const VALID: &[Row] = &[
     ("tbx__scale_offset_laz.laz", 5, 0, [0.0, 0.0, 0.0], [2.0, 3.0, 4.0]),
 ];
 
-/// Written by LASzip 1.2 as one stream; laspy cannot read it. Its uncompressed twin has 1065 points.
+/// Written by LASzip 1.2 as one stream; laspy cannot read it. Its uncompressed twin has 1065
+/// points.
 const OLD_STREAM: Row = (
     "pdal__simple-laszip-compressor-version-1.2r0.laz",
     1065,
@@ -93,7 +95,8 @@ const OLD_STREAM: Row = (
     [638_982.55, 853_535.43, 586.38],
 );
 
-/// Files whose points lie farther from one another than any scanner reaches, all of them: nothing would be left.
+/// Files whose points lie farther from one another than any scanner reaches, all of them: nothing
+/// would be left.
 const ABSURD: [&str; 6] = [
     "lgl__pdrf10-1.4.las",
     "lgl__pdrf10-1.4.laz",
@@ -208,7 +211,8 @@ fn broken_files_are_refused_by_name() {
     }
 }
 
-/// Reads all of a damaged copy: an error or an answer, but no panic, and no memory beyond what the file can hold.
+/// Reads all of a damaged copy: an error or an answer, but no panic, and no memory beyond what the
+/// file can hold.
 fn survives(path: &Path) -> bool {
     match open(&[path.to_owned()], None, &Settings::default(), &OneByOne) {
         Err(_) => false,
@@ -223,7 +227,8 @@ fn damage_is_an_error_or_harmless() {
     let Some(folder) = folder() else { return };
     let place = tempfile::tempdir().unwrap();
     let damaged = place.path().join("damaged");
-    // The decoder of LAZ panics on some damage, which is caught; keep its messages out of the output.
+    // The decoder of LAZ panics on some damage, which is caught; keep its messages out of the
+    // output.
     std::panic::set_hook(Box::new(|_| {}));
     let mut bad = None;
     for name in [

@@ -1,4 +1,5 @@
-//! LAS files made here: how scanners apply to them, what is dropped, and what lies in the header costs.
+//! LAS files made here: how scanners apply to them, what is dropped, and what lies in the header
+//! costs.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::OneByOne;
@@ -238,7 +239,8 @@ fn what_is_no_scan_is_refused_by_name() {
     assert!(open(&[], None, &settings, &OneByOne).is_err());
 }
 
-/// A measurement, not a test: `cargo test --release -p ingest --test las_scanners -- --ignored --nocapture`.
+/// A measurement, not a test: `cargo test --release -p ingest --test las_scanners -- --ignored
+/// --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn throughput() {

@@ -1,5 +1,6 @@
-//! What units the LAS and LAZ files of public test suites declare, in all their ways: read from WKT 1 and 2, GeoTIFF keys
-//! and numbers of systems. The files are not part of the repository; without them this test says that it was skipped.
+//! What units the LAS and LAZ files of public test suites declare, in all their ways: read from WKT
+//! 1 and 2, GeoTIFF keys and numbers of systems. The files are not part of the repository; without
+//! them this test says that it was skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::{Kind, OneByOne};

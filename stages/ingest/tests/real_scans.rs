@@ -1,5 +1,5 @@
-//! Real scans: the lattices that their points suggest, with scanners from a file of poses. The scans are not part of
-//! the repository; without them these tests say that they were skipped.
+//! Real scans: the lattices that their points suggest, with scanners from a file of poses. The
+//! scans are not part of the repository; without them these tests say that they were skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::{Lattice, OneByOne};

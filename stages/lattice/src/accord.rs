@@ -1,16 +1,19 @@
-//! The views of a region in; out comes where they contradict each other: missing returns where others measured matter, which
-//! prove nothing, and matter where others saw free space, which moved.
+//! The views of a region in; out comes where they contradict each other: missing returns where
+//! others measured matter, which prove nothing, and matter where others saw free space, which
+//! moved.
 
 use contract::{Fan, View};
 use geometry::Eye;
 use geometry::depth::{LANES, lanes};
 use geometry::narrow::floor_i32;
 
-/// Share of the matter measured by other scans that a scanner must have missed for its missing returns to mean nothing.
+/// Share of the matter measured by other scans that a scanner must have missed for its missing
+/// returns to mean nothing.
 const BLIND: f32 = 0.5;
 /// Half-width (cells) of the window about such matter in which missing returns mean nothing.
 const DOUBT_WINDOW: i32 = 3;
-/// Points of each scan that are asked, at most, and of all of them: more scans show the same things again.
+/// Points of each scan that are asked, at most, and of all of them: more scans show the same things
+/// again.
 const N_ASKED: usize = 100_000;
 const N_ASKED_OF_ALL: usize = 600_000;
 
@@ -19,8 +22,8 @@ fn step(view: &View, n_views: usize) -> usize {
     (view.points.len() / (N_ASKED_OF_ALL / n_views).clamp(1, N_ASKED)).max(1)
 }
 
-/// Lets the views of a region check each other's missing returns: where one scan measured matter, the silence of another
-/// is no free space (a scanner behind a near post, black or shiny surfaces).
+/// Lets the views of a region check each other's missing returns: where one scan measured matter,
+/// the silence of another is no free space (a scanner behind a near post, black or shiny surfaces).
 pub fn agree(views: &mut [View], fan: &dyn Fan) {
     let n = views.len();
     let asked = |view: &View| view.points.iter().step_by(step(view, n)).copied().collect();
@@ -44,8 +47,8 @@ const N_AT_A_TIME: usize = 8192;
 const CELL: f32 = 0.05;
 const MIN_IN_CELL: usize = 3;
 
-/// What was here for one scan and gone for another: middles of cells of 5 cm, local frame. Edges and wires make a few, what
-/// moved makes many.
+/// What was here for one scan and gone for another: middles of cells of 5 cm, local frame. Edges
+/// and wires make a few, what moved makes many.
 #[must_use]
 pub fn disagreement(views: &[View], fan: &dyn Fan) -> Vec<[f32; 3]> {
     let eyes: Vec<Eye<'_>> = views.iter().map(|v| Eye::new(&v.images)).collect();

@@ -1,5 +1,5 @@
-//! Tiles in, surfaces out: veils, normals, planar patches and occupied space of one tile at a time. Knows nothing
-//! of other tiles; what spans them is joined by floor and cluster.
+//! Tiles in, surfaces out: veils, normals, planar patches and occupied space of one tile at a time.
+//! Knows nothing of other tiles; what spans them is joined by floor and cluster.
 #![forbid(unsafe_code)]
 
 mod accord;

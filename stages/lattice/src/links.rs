@@ -1,4 +1,5 @@
-//! A raster in, its links out: which neighbouring pixels see one surface, and which pixels see none (veils).
+//! A raster in, its links out: which neighbouring pixels see one surface, and which pixels see none
+//! (veils).
 
 use crate::Settings;
 use crate::raster::{NONE, Raster};
@@ -15,8 +16,8 @@ pub(crate) const UP: usize = 3;
 pub(crate) const BROKEN: u8 = 0x80;
 /// How far a neighbour is searched, pixels: rebuilt rasters leave gaps of up to two.
 const REACH: usize = 3;
-/// Share of a step in range that may be missing in the next step of one grazing surface: directions are not
-/// exactly regular. At an edge before a flat background the whole step is missing.
+/// Share of a step in range that may be missing in the next step of one grazing surface: directions
+/// are not exactly regular. At an edge before a flat background the whole step is missing.
 const UNEVEN: f32 = 0.4;
 /// Cells of a piece of surface below which it may be a veil.
 const MIN_PIECE: usize = 4;
@@ -45,8 +46,8 @@ struct Rule {
     grazing: f32,
 }
 
-/// Links each pixel with its next neighbours along row and column: 0 for none, the distance in pixels for one on
-/// the same surface, the same with [`BROKEN`] for one on another surface.
+/// Links each pixel with its next neighbours along row and column: 0 for none, the distance in
+/// pixels for one on the same surface, the same with [`BROKEN`] for one on another surface.
 pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
     let (side, n_pixels) = (raster.side, raster.n_pixels());
     raster.links.clear();
@@ -110,8 +111,8 @@ fn link_one(
     }
 }
 
-/// Whether four neighbouring ranges lie on one plane seen at a grazing angle: the inverse range of a plane is
-/// straight along a line of the raster.
+/// Whether four neighbouring ranges lie on one plane seen at a grazing angle: the inverse range of
+/// a plane is straight along a line of the raster.
 #[inline]
 fn continues(ranges: [f32; 4], difference: f32, sigma: f32) -> bool {
     let [a, b, c, d] = ranges;
@@ -123,10 +124,12 @@ fn continues(ranges: [f32; 4], difference: f32, sigma: f32) -> bool {
     (va + vc - 2.0 * vb).abs() * b * b <= limit && (vb + vd - 2.0 * vc).abs() * c * c <= limit
 }
 
-/// Lists the veils of `raster`: pixels whose opposite neighbours along a row or a column both see another surface,
-/// one nearer and one farther, and small torn pieces between a near and a far surface.
+/// Lists the veils of `raster`: pixels whose opposite neighbours along a row or a column both see
+/// another surface, one nearer and one farther, and small torn pieces between a near and a far
+/// surface.
 ///
-/// A pixel nearer than both neighbours is a wire, one farther than both a slit: real matter, never a veil.
+/// A pixel nearer than both neighbours is a wire, one farther than both a slit: real matter, never
+/// a veil.
 pub(crate) fn veils(raster: &mut Raster) {
     let mut out = std::mem::take(&mut raster.veils);
     out.clear();

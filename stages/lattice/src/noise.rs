@@ -1,4 +1,5 @@
-//! Ranges of a raster in, range noise out: what the scanner promises, or more where the tile itself shows more.
+//! Ranges of a raster in, range noise out: what the scanner promises, or more where the tile itself
+//! shows more.
 
 use crate::Settings;
 
@@ -8,7 +9,8 @@ const N_BINS: usize = 16;
 const FIRST_EXPONENT: u32 = 127 - 4;
 /// Fewest samples of a bin that speak for themselves.
 const MIN_SAMPLES: usize = 48;
-/// Quantile of |second difference| that is taken: low, since edges and clutter only enlarge the rest.
+/// Quantile of |second difference| that is taken: low, since edges and clutter only enlarge the
+/// rest.
 const QUANTILE: f64 = 0.3;
 /// That quantile of |x| for a normal distribution of unit deviation.
 const QUANTILE_OF_NORMAL: f32 = 0.3853;
@@ -35,8 +37,9 @@ impl Noise {
         (self.base + self.growth * range) * self.factor[bin(range)]
     }
 
-    /// Measures the noise from second differences of the inverse range along rows and along columns: a plane has
-    /// next to none, at any incidence. The larger of both counts, since some scanners err by the line.
+    /// Measures the noise from second differences of the inverse range along rows and along
+    /// columns: a plane has next to none, at any incidence. The larger of both counts, since
+    /// some scanners err by the line.
     pub(crate) fn measure(&mut self, xyzr: &[[f32; 4]], side: usize, settings: &Settings) {
         self.base = settings.noise as f32;
         self.growth = settings.noise_growth as f32;
@@ -45,7 +48,8 @@ impl Noise {
         let limit = settings.noise_limit as f32;
         let mut factors = [None; N_BINS];
         for along in [1, side] {
-            // Where the raster is finer than the data, direct neighbours are missing: look one further.
+            // Where the raster is finer than the data, direct neighbours are missing: look one
+            // further.
             for step in [1, 2] {
                 self.samples.iter_mut().for_each(Vec::clear);
                 self.sample(xyzr, side, step, along);
@@ -72,7 +76,8 @@ impl Noise {
         }
     }
 
-    /// Gathers second differences over neighbours `step` pixels apart, `along` rows (1) or columns (one row).
+    /// Gathers second differences over neighbours `step` pixels apart, `along` rows (1) or columns
+    /// (one row).
     fn sample(&mut self, xyzr: &[[f32; 4]], side: usize, step: usize, along: usize) {
         // Every sixth pixel: thousands of samples a tile, at a small share of the work.
         let by = step * along;

@@ -1,5 +1,5 @@
-//! A linked raster in, normals out: cross products of differences between window means, O(1) a pixel for any
-//! window by summed-area tables.
+//! A linked raster in, normals out: cross products of differences between window means, O(1) a
+//! pixel for any window by summed-area tables.
 
 use crate::Settings;
 use crate::links::{BROKEN, linked};
@@ -7,13 +7,15 @@ use crate::raster::Raster;
 use crate::{Scratch, voxels};
 use contract::{Scan, Tile};
 
-/// Ten units a millimetre: window sums are exact integers modulo 2³², and a window never holds 200 km.
+/// Ten units a millimetre: window sums are exact integers modulo 2³², and a window never holds 200
+/// km.
 const UNIT: f32 = 1e4;
 /// [`BROKEN`] in any of the four links of a pixel.
 const ANY_BROKEN: u32 = u32::from_ne_bytes([BROKEN; 4]);
 /// Reach from which normals of neighbours may be shared: their windows are nearly the same …
 const SHARED_REACH: u8 = 2;
-/// … and largest turn between those at either end of four pixels, cosine of 2°: a pipe of 50 mm radius turns more.
+/// … and largest turn between those at either end of four pixels, cosine of 2°: a pipe of 50 mm
+/// radius turns more.
 const SHARED_COSINE: f32 = 0.999_39;
 /// Longest reach that is told apart, pixels.
 const MOST_REACH: u8 = 127;
@@ -53,8 +55,8 @@ impl Normals {
         self.borrow_at_borders(raster);
     }
 
-    /// The normals of a pixel and of those right, above and right above it. Where the first and the last agree, the surface is
-    /// flat, and the two between have the first's.
+    /// The normals of a pixel and of those right, above and right above it. Where the first and the
+    /// last agree, the surface is flat, and the two between have the first's.
     #[inline]
     fn compute_four(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
         let first = row * raster.side + col;
@@ -151,8 +153,8 @@ impl Normals {
         }
     }
 
-    /// Mean of the points of a window about `centre` ([`UNIT`]s), from the table's entries at its corners: low
-    /// left, low right, high left, high right. `None` where it is empty.
+    /// Mean of the points of a window about `centre` ([`UNIT`]s), from the table's entries at its
+    /// corners: low left, low right, high left, high right. `None` where it is empty.
     #[inline]
     fn mean(corners: [[i32; 4]; 4], centre: [i32; 3]) -> Option<[f32; 3]> {
         let [a, b, c, d] = corners;
@@ -177,7 +179,8 @@ impl Normals {
         let most = settings.max_window_pixels.max(1) as f32;
         let pixels =
             |step: f32, most: f32| ((window / step + 0.5).min(most) as usize).clamp(1, reach);
-        // Columns draw together towards the poles: there a window of the same width holds more of them.
+        // Columns draw together towards the poles: there a window of the same width holds more of
+        // them.
         let squeeze = raster.row_step / raster.col_step[row].min(raster.row_step);
         let (h, v) = (pixels(raster.col_step[row], most * squeeze), pixels(raster.row_step, most));
         let (r0, r1) = (row.saturating_sub(v), (row + v + 1).min(side));
@@ -248,9 +251,10 @@ impl Normals {
     }
 }
 
-/// Unit normals of a tile's points, in the order of its points, in the scan frame (as its coordinates are), towards
-/// the scanner. Where the scanner is unknown, the sign is such that the largest component of the normal is positive,
-/// so horizontal surfaces point up as long as the scan frame does. `None` for veils and where no surface was found.
+/// Unit normals of a tile's points, in the order of its points, in the scan frame (as its
+/// coordinates are), towards the scanner. Where the scanner is unknown, the sign is such that the
+/// largest component of the normal is positive, so horizontal surfaces point up as long as the scan
+/// frame does. `None` for veils and where no surface was found.
 #[must_use]
 pub fn normals(tile: &Tile, scan: &Scan, settings: &Settings) -> Vec<Option<[f32; 3]>> {
     let mut scratch = Scratch::default();
@@ -269,7 +273,8 @@ pub fn normals(tile: &Tile, scan: &Scan, settings: &Settings) -> Vec<Option<[f32
             if !raster.holds(at) || normals.error[at] == 0.0 {
                 return None;
             }
-            // A second return of the pixel only shares the normal if it lies on the same tangent plane.
+            // A second return of the pixel only shares the normal if it lies on the same tangent
+            // plane.
             let (n, q) = (normals.normal[at], raster.xyzr[at]);
             let off = n[0] * (p[0] - q[0]) + n[1] * (p[1] - q[1]) + n[2] * (p[2] - q[2]);
             (off.abs() <= 3.0 * raster.noise.sigma(q[3]) + 1e-3).then_some(n)

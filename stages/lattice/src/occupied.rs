@@ -108,7 +108,8 @@ mod tests {
         }
         let expected: Vec<([i32; 3], u32)> =
             expected.into_iter().map(|(k, n)| ([k[2], k[1], k[0]], n)).collect();
-        // x·(1/edge) and x/edge may round differently at a voxel's border: allow for very few of them.
+        // x·(1/edge) and x/edge may round differently at a voxel's border: allow for very few of
+        // them.
         let same = got
             .voxels
             .iter()

@@ -1,11 +1,13 @@
-//! A tile in, a dense raster out: nearest return of each pixel, its range, its links to neighbours, its veils.
+//! A tile in, a dense raster out: nearest return of each pixel, its range, its links to neighbours,
+//! its veils.
 
 use crate::Settings;
 use crate::links;
 use crate::noise::Noise;
 use contract::{Lattice, TILE_SIDE, Tile};
 
-/// Most that is skipped of a dense tile: every fourth row and column is read, a sixteenth of the pixels.
+/// Most that is skipped of a dense tile: every fourth row and column is read, a sixteenth of the
+/// pixels.
 const MAX_SKIP: u32 = 2;
 /// A pixel without a return.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -17,7 +19,8 @@ pub(crate) struct Raster {
     pub(crate) side: usize,
     /// Of a dense tile only each 2^skip-th row and column is read.
     pub(crate) skip: u32,
-    /// Index of the nearest return in the tile's points, [`NONE`] where the pixel is empty or a veil.
+    /// Index of the nearest return in the tile's points, [`NONE`] where the pixel is empty or a
+    /// veil.
     pub(crate) point: Vec<u32>,
     /// Scan frame and range, metres; range 0 where the pixel is empty.
     pub(crate) xyzr: Vec<[f32; 4]>,
@@ -36,8 +39,9 @@ pub(crate) struct Raster {
 }
 
 impl Raster {
-    /// Fills the raster with the nearest returns of `tile`, links them, and takes the veils out. 2^`skip` rows and columns
-    /// of the lattice become one: the first of their pixels that has a return stands for them.
+    /// Fills the raster with the nearest returns of `tile`, links them, and takes the veils out.
+    /// 2^`skip` rows and columns of the lattice become one: the first of their pixels that has
+    /// a return stands for them.
     pub(crate) fn fill(&mut self, tile: &Tile, lattice: &Lattice, skip: u32, settings: &Settings) {
         self.skip = skip;
         self.side = TILE_SIDE as usize >> skip;
@@ -90,8 +94,9 @@ impl Raster {
         (row >> self.skip) * self.side + (col >> self.skip)
     }
 
-    /// How much of a tile may be skipped whose points are no farther than `range`: as much as leaves them no farther from each
-    /// other than `spacing`, metres. A scan ten times as dense tells no more of floors and clusters, but takes ten times as long.
+    /// How much of a tile may be skipped whose points are no farther than `range`: as much as
+    /// leaves them no farther from each other than `spacing`, metres. A scan ten times as dense
+    /// tells no more of floors and clusters, but takes ten times as long.
     pub(crate) fn skip(range: f32, lattice: &Lattice, spacing: f64) -> u32 {
         let across = f64::from(range) * lattice.row_step.max(lattice.col_step);
         let is_dense = |skip: &u32| across > 0.0 && across * f64::from(1 << skip) <= spacing;
@@ -116,8 +121,8 @@ impl Raster {
     }
 }
 
-/// Which points of `tile` are veils (mixed pixels between a near edge and what lies behind), in the order of the
-/// tile's points. All `false` where the scan has no lattice: then nobody can tell.
+/// Which points of `tile` are veils (mixed pixels between a near edge and what lies behind), in the
+/// order of the tile's points. All `false` where the scan has no lattice: then nobody can tell.
 #[must_use]
 pub fn veils(tile: &Tile, scan: &contract::Scan, settings: &Settings) -> Vec<bool> {
     let mut out = vec![false; tile.len()];
@@ -131,9 +136,11 @@ pub fn veils(tile: &Tile, scan: &contract::Scan, settings: &Settings) -> Vec<boo
 }
 
 impl Raster {
-    /// Sets the flag of each veil point of the tile that filled this raster, of which it skipped nothing.
+    /// Sets the flag of each veil point of the tile that filled this raster, of which it skipped
+    /// nothing.
     pub(crate) fn flag_veils(&self, tile: &Tile, flags: &mut [bool]) {
-        // Points and veils are both sorted by pixel; of several returns in a pixel only the nearest was judged.
+        // Points and veils are both sorted by pixel; of several returns in a pixel only the nearest
+        // was judged.
         let mut at = 0;
         for &pixel in &self.veils {
             while at < tile.len() && tile.pixel[at] < pixel {

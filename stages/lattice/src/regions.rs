@@ -21,8 +21,9 @@ const SEED_STEP: usize = 3;
 const SEED_CLASSES: [f32; 4] = [0.026, 0.06, 0.12, 0.24];
 /// Points of the first refit.
 const FIRST_REFIT: usize = 12;
-/// Spread along a plane, in units of the spread across it, from which points know the plane's direction better than
-/// the seed's window does: close to the scanner, neighbours are nearer than their noise.
+/// Spread along a plane, in units of the spread across it, from which points know the plane's
+/// direction better than the seed's window does: close to the scanner, neighbours are nearer than
+/// their noise.
 const MIN_SLENDERNESS: f64 = 6.0;
 /// Angle that a pixel near a crease may show, as its window looks around the corner; cosine of 60°.
 const CREASE: f32 = 0.5;
@@ -225,7 +226,8 @@ impl Regions {
         sums.add(raster.xyzr[at]);
     }
 
-    /// Refits a grown region, lets go what does not lie on it, adds its border, and keeps it if it is large enough.
+    /// Refits a grown region, lets go what does not lie on it, adds its border, and keeps it if it
+    /// is large enough.
     fn settle(
         &mut self,
         first: usize,
@@ -288,8 +290,8 @@ impl Regions {
         self.members.truncate(first);
     }
 
-    /// Takes pixels around the region that lie on its plane, though their normals look around a crease or are
-    /// missing, as far as windows reach.
+    /// Takes pixels around the region that lie on its plane, though their normals look around a
+    /// crease or are missing, as far as windows reach.
     fn absorb(&mut self, first: usize, growth: &Growth, raster: &Raster, normals: &Normals) {
         let mut from = first;
         let most = self.members[first..]

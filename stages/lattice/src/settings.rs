@@ -9,19 +9,23 @@ pub struct Settings {
     pub noise_growth: f64,
     /// Noise of a beam's direction, radians: 19 seconds of arc, as data sheets say.
     pub angular_noise: f64,
-    /// How many times more noise than expected is believed where the tile shows it (depth cameras).
+    /// How many times more noise than expected is believed where the tile shows it (depth
+    /// cameras).
     pub noise_limit: f64,
     /// Incidence up to which neighbours are one surface whatever lies around them, radians: 80°.
     pub max_incidence: f64,
-    /// Incidence up to which neighbours are one surface if the next ones continue it, radians: 88°.
+    /// Incidence up to which neighbours are one surface if the next ones continue it, radians:
+    /// 88°.
     pub max_grazing: f64,
-    /// Half the window of a normal, metres: several steps of the raster at working range, less than a pipe.
+    /// Half the window of a normal, metres: several steps of the raster at working range, less
+    /// than a pipe.
     pub window: f64,
     /// Largest half window, pixels: keeps near surfaces cheap and local.
     pub max_window_pixels: u32,
     /// Least angle between normals of one plane that is tolerated, radians: 6°.
     pub normal_tolerance: f64,
-    /// Largest angle between normals of one plane that is tolerated, radians, where normals are noisy: 14°.
+    /// Largest angle between normals of one plane that is tolerated, radians, where normals are
+    /// noisy: 14°.
     pub max_normal_tolerance: f64,
     /// What a flat surface may deviate beside noise, metres.
     pub flatness: f64,
@@ -33,18 +37,22 @@ pub struct Settings {
     pub min_level_width: f64,
     /// Least area of any other patch, m².
     pub min_patch_area: f64,
-    /// Least width of any other patch, metres: wider than the flat strip on a pipe of 50 mm radius.
+    /// Least width of any other patch, metres: wider than the flat strip on a pipe of 50 mm
+    /// radius.
     pub min_patch_width: f64,
-    /// Tilt up to which a patch counts as nearly horizontal, radians: 8°, more than a floor may have.
+    /// Tilt up to which a patch counts as nearly horizontal, radians: 8°, more than a floor may
+    /// have.
     pub level_tilt: f64,
-    /// Distance of neighbouring points that suffices for floors, planes and occupied space, metres: of scans that are
-    /// denser, rows and columns are skipped there. A cable has more; scans of five million points have it at six metres.
+    /// Distance of neighbouring points that suffices for floors, planes and occupied space,
+    /// metres: of scans that are denser, rows and columns are skipped there. A cable has more;
+    /// scans of five million points have it at six metres.
     pub spacing: f64,
     /// Edge of an occupancy voxel, metres: finer than the gap between a robot and its fence.
     pub voxel: f64,
     /// Edge of the voxels that stand in for a lattice where the scanner is unknown, metres.
     pub surface_voxel: f64,
-    /// Noise of a surface where the scanner is unknown, metres: registered scans of several positions.
+    /// Noise of a surface where the scanner is unknown, metres: registered scans of several
+    /// positions.
     pub surface_noise: f64,
 }
 

@@ -26,8 +26,8 @@ impl Summarise {
         Self { scans, settings: *settings, with_planes: true }
     }
 
-    /// How much of a tile of a scan may be left out (see [`Tile::skip`]) whose points are mostly no farther than `range` from the
-    /// scanner, metres; nothing where that is not known (0).
+    /// How much of a tile of a scan may be left out (see [`Tile::skip`]) whose points are mostly no
+    /// farther than `range` from the scanner, metres; nothing where that is not known (0).
     #[must_use]
     pub fn skip(&self, scan: ScanId, range: f32) -> u32 {
         let at = self.scans.binary_search_by_key(&scan, |scan| scan.id);

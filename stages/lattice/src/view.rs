@@ -1,4 +1,5 @@
-//! Tiles of one scan in; out comes the scan's view of a region: depth images towards it, and its points inside.
+//! Tiles of one scan in; out comes the scan's view of a region: depth images towards it, and its
+//! points inside.
 
 use contract::{Lattice, MAX_SKIP, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, TilePoints, View};
 use geometry::depth::{Empty, LANES, Lanes, Rows, lanes, rows, transform, transform_lanes};
@@ -10,9 +11,11 @@ use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 pub struct ViewSettings {
     /// Width of a depth image's cell in beams: below about 1.3 a regular scan leaves holes.
     pub beams_per_cell: f64,
-    /// Smallest cell at the region's near side, metres: finer shows nothing that the search can use.
+    /// Smallest cell at the region's near side, metres: finer shows nothing that the search can
+    /// use.
     pub min_cell: f64,
-    /// Half-width (cells) of the window that must be empty around a cell before it counts as "no return".
+    /// Half-width (cells) of the window that must be empty around a cell before it counts as "no
+    /// return".
     pub empty_window: i32,
 }
 
@@ -22,13 +25,16 @@ impl Default for ViewSettings {
     }
 }
 
-/// Widest half tangent of a single image: beyond, a pinhole stretches too much, and the faces of a cube serve.
+/// Widest half tangent of a single image: beyond, a pinhole stretches too much, and the faces of a
+/// cube serve.
 const MAX_HALF_TANGENT: f64 = 1.6;
 
-/// Rows and columns of a lattice that a scan covers: `[first row, last row, first column, last column]`.
+/// Rows and columns of a lattice that a scan covers: `[first row, last row, first column, last
+/// column]`.
 pub type Extent = [u32; 4];
 
-/// Gathers one scan's view of a region, tile by tile; in the order of the tiles, so that it is the same each time.
+/// Gathers one scan's view of a region, tile by tile; in the order of the tiles, so that it is the
+/// same each time.
 #[derive(Debug)]
 pub struct ViewBuilder {
     view: View,
@@ -40,18 +46,19 @@ pub struct ViewBuilder {
     /// Cones from the scanner that together hold the region; none without scanner.
     cones: Option<Vec<Cone>>,
     empty_window: i32,
-    /// Of dense scans, one of each square of so many pixels (see [`Tile::skip`]) is enough to fill the cells of the images and to be
-    /// kept as points.
+    /// Of dense scans, one of each square of so many pixels (see [`Tile::skip`]) is enough to fill
+    /// the cells of the images and to be kept as points.
     skip: u32,
     /// The same of the points alone; no points without it.
     kept: Option<u32>,
-    /// Places in the mask of the view's points, where no lattice tells which of them are neighbours.
+    /// Places in the mask of the view's points, where no lattice tells which of them are
+    /// neighbours.
     places: Vec<u64>,
 }
 
 impl ViewBuilder {
-    /// An empty view of `region` from `scan`; `extent` is what the scan covers of its lattice, if known. Each
-    /// 2^`thin`-th row and column of its points is kept; none of them without it.
+    /// An empty view of `region` from `scan`; `extent` is what the scan covers of its lattice, if
+    /// known. Each 2^`thin`-th row and column of its points is kept; none of them without it.
     #[must_use]
     pub fn new(
         scan: &Scan,
@@ -90,8 +97,8 @@ impl ViewBuilder {
         }
     }
 
-    /// Whether the tile can hold anything that this view needs: for a scan with beams, everything in the cone of
-    /// the region, before and behind it.
+    /// Whether the tile can hold anything that this view needs: for a scan with beams, everything
+    /// in the cone of the region, before and behind it.
     #[must_use]
     pub fn wants(&self, at: TileAt) -> bool {
         if at.scan != self.view.scan {
@@ -215,13 +222,15 @@ struct Cone {
     angle: f64,
 }
 
-/// Pieces of a region on each axis, each with its cone: seen from close by, one cone around all of it would be the whole
-/// sphere, and all tiles of the scan would have to be read.
+/// Pieces of a region on each axis, each with its cone: seen from close by, one cone around all of
+/// it would be the whole sphere, and all tiles of the scan would have to be read.
 const PIECES: usize = 4;
-/// Room around each piece, metres: what a depth image shows beside the region must be there as well.
+/// Room around each piece, metres: what a depth image shows beside the region must be there as
+/// well.
 const BESIDE: f64 = 0.15;
 
-/// Cones around the pieces of a region; one that is the whole sphere where the scanner stands in or at a piece.
+/// Cones around the pieces of a region; one that is the whole sphere where the scanner stands in or
+/// at a piece.
 fn cones(scanner: &Point, region: &Region, local_from_scan: &Pose) -> Vec<Cone> {
     let (min, size) = (region.bounds.min, region.bounds.size());
     let half = Vector::from(size) * (0.5 / PIECES as f64);
@@ -242,8 +251,8 @@ fn cones(scanner: &Point, region: &Region, local_from_scan: &Pose) -> Vec<Cone> 
     all.unwrap_or_else(|| vec![Cone { axis: Vector::z(), angle: std::f64::consts::PI }])
 }
 
-/// Nothing of a robot is nearer to a scanner, metres, as a rule: from a scanner within a region its cells are as fine as from so
-/// far. At a third of that a robot at 5 m was seen in cells of 5 cm.
+/// Nothing of a robot is nearer to a scanner, metres, as a rule: from a scanner within a region its
+/// cells are as fine as from so far. At a third of that a robot at 5 m was seen in cells of 5 cm.
 const NEAREST: f64 = 1.0;
 
 /// Cells of an image in one unit of its plane, as fine as beams and settings allow.

@@ -1,5 +1,6 @@
-//! Points of a scan without known scanner in, planar patches and normals out: local planes by voxel moments, since
-//! there is no lattice. Nothing here can tell a veil, nor which side of a surface was seen.
+//! Points of a scan without known scanner in, planar patches and normals out: local planes by voxel
+//! moments, since there is no lattice. Nothing here can tell a veil, nor which side of a surface
+//! was seen.
 
 use crate::Settings;
 use crate::patch::{Ground, apply, from_sums, in_world, is_level, largest_first, world_rows};

@@ -1,4 +1,5 @@
-//! The lattice stage on a synthetic room: floor, pipes, veils, rings, and the same answer with used buffers.
+//! The lattice stage on a synthetic room: floor, pipes, veils, rings, and the same answer with used
+//! buffers.
 
 mod caster;
 

@@ -14,7 +14,8 @@ pub struct Attach {
     settings: Settings,
 }
 
-/// Voxels gathered so far; sorted and joined now and then so that memory follows the plant, not the scans.
+/// Voxels gathered so far; sorted and joined now and then so that memory follows the plant, not the
+/// scans.
 #[derive(Debug, Default)]
 pub struct Sum {
     voxels: Vec<ResidualVoxel>,
@@ -177,7 +178,8 @@ impl Fold for Attach {
 
     fn finish(&self, mut sum: Sum) -> Result<Attached> {
         sum.settle();
-        // Where a link fills a voxel, what is left in it is the link's roughness, and connects nothing.
+        // Where a link fills a voxel, what is left in it is the link's roughness, and connects
+        // nothing.
         let rest: Vec<ResidualVoxel> =
             sum.voxels.into_iter().filter(|v| v.n_residual > 0).collect();
         let places: Vec<Voxel> = rest.iter().map(|v| v.voxel).collect();
@@ -195,8 +197,8 @@ impl Fold for Attach {
 }
 
 impl Sum {
-    /// Sorts, and joins what is in one voxel. Joining does not depend on order, so neither does the answer on when
-    /// this happens.
+    /// Sorts, and joins what is in one voxel. Joining does not depend on order, so neither does the
+    /// answer on when this happens.
     fn settle(&mut self) {
         self.voxels.sort_by_key(|entry| entry.voxel);
         self.voxels.dedup_by(|later, kept| {

@@ -1,21 +1,24 @@
-//! Voxels of a change in; whether they are of something that beams do not go through, out: a fence of which another session
-//! misses a part has not gone.
+//! Voxels of a change in; whether they are of something that beams do not go through, out: a fence
+//! of which another session misses a part has not gone.
 
 use crate::tally::{Cell, Tally};
 use nalgebra::{Matrix3, Vector3};
 
-/// Share of a voxel's face that its points stand for, over all voxels of a change. Solid things make 0.6 and more even where
-/// they are seen askew; veils at edges 0.1, and a mesh of 4 mm wires 50 mm apart, which other beams go through, 0.16 and as
-/// much as 0.32 where beams are as wide as its wires.
+/// Share of a voxel's face that its points stand for, over all voxels of a change. Solid things
+/// make 0.6 and more even where they are seen askew; veils at edges 0.1, and a mesh of 4 mm wires
+/// 50 mm apart, which other beams go through, 0.16 and as much as 0.32 where beams are as wide as
+/// its wires.
 const MIN_COVER: f64 = 0.4;
-/// The same of what no beams of its own session go through, seen from askew from nearby: 0.37 of a pallet's top and sides.
+/// The same of what no beams of its own session go through, seen from askew from nearby: 0.37 of a
+/// pallet's top and sides.
 const MIN_CLOSED: f64 = 0.25;
-/// Share of the points of a change at whose places other beams of their own session may have gone on: past an edge, but
-/// not between wires, of which enough scans together cover a fence.
+/// Share of the points of a change at whose places other beams of their own session may have gone
+/// on: past an edge, but not between wires, of which enough scans together cover a fence.
 const MAX_PIERCED: f64 = 0.3;
 /// The same of a sheet, and of what is hardly covered.
 const MAX_PIERCED_SHEET: f64 = 0.05;
-/// Largest thickness of a sheet, as the standard deviation of its voxels across it, in voxels: two layers have 0.5, three 0.8.
+/// Largest thickness of a sheet, as the standard deviation of its voxels across it, in voxels: two
+/// layers have 0.5, three 0.8.
 const SHEET: f64 = 0.6;
 /// Largest vertical part of the direction across an upright sheet: 30°.
 const UPRIGHT: f64 = 0.5;
@@ -42,7 +45,8 @@ impl Tally {
         let is_tight = self.pierced(cells) <= most;
         is_tight
             && match shape {
-                // Enough scans together cover a mesh, and one that is near gives most of its points: each of them alone does not.
+                // Enough scans together cover a mesh, and one that is near gives most of its
+                // points: each of them alone does not.
                 Shape::Fence => self.cover_by_one(cells) >= MIN_COVER,
                 Shape::Sheet => cover >= MIN_COVER,
                 Shape::Body => cover >= MIN_CLOSED,
@@ -69,7 +73,8 @@ mod tests {
     use super::*;
     use crate::tally::{Seen, Tallying};
 
-    /// Points 1 cm apart on a plane through a direction on the ground, 1.5 m by 1 m, leaning by a slope; what one stands for, m².
+    /// Points 1 cm apart on a plane through a direction on the ground, 1.5 m by 1 m, leaning by a
+    /// slope; what one stands for, m².
     fn plane(along: f64, slope: f64, area: f64) -> Tally {
         let mut out = Tallying::default();
         for (i, j) in (0..150).flat_map(|i| (0..100).map(move |j| (i, j))) {

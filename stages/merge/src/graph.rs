@@ -9,7 +9,8 @@ pub(crate) struct Graph {
     /// Neighbours of voxel `i` are `to[starts[i]..starts[i + 1]]`, ascending.
     starts: Vec<usize>,
     to: Vec<u32>,
-    /// Length of each step in hundredths of an edge: whole numbers keep sums exact and ties alike everywhere.
+    /// Length of each step in hundredths of an edge: whole numbers keep sums exact and ties alike
+    /// everywhere.
     steps: Vec<u32>,
 }
 
@@ -72,8 +73,9 @@ impl Graph {
         out
     }
 
-    /// Length of the shortest way from any seed (hundredths of an edge, `u32::MAX` where there is none) and which
-    /// seed's `mark` it comes from; equal ways go to the smaller mark. Works inside what the seeds reach.
+    /// Length of the shortest way from any seed (hundredths of an edge, `u32::MAX` where there is
+    /// none) and which seed's `mark` it comes from; equal ways go to the smaller mark. Works
+    /// inside what the seeds reach.
     pub(crate) fn ways(&self, seeds: &[(usize, u32)], ways: &mut [(u32, u32)]) {
         let mut heap = BinaryHeap::new();
         for &(at, mark) in seeds {

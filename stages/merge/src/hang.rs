@@ -1,5 +1,5 @@
-//! Voxels that hang on robots in; convex pieces for each link, in its frame, within a budget of triangles, out: what a
-//! planner adds to the robot's own model.
+//! Voxels that hang on robots in; convex pieces for each link, in its frame, within a budget of
+//! triangles, out: what a planner adds to the robot's own model.
 
 use crate::Attached;
 use contract::{Fit, PointKind, RESIDUAL_EDGE, Voxel};
@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 /// What hangs on one robot: for links by their index, convex pieces in the link's frame.
 pub type Hanging = BTreeMap<usize, Vec<Mesh>>;
 
-/// Edge of the cells that pieces are made of, metres: a hose's bend keeps its shape; doubled until the budget holds.
+/// Edge of the cells that pieces are made of, metres: a hose's bend keeps its shape; doubled until
+/// the budget holds.
 const CELL: f64 = 0.12;
 /// Triangles for all that hangs on one robot: planners check each of them against each obstacle.
 const MAX_TRIANGLES: usize = 2000;

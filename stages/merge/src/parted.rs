@@ -1,5 +1,5 @@
-//! The voxels of a change and the size of a thing in; where such a thing and another one make up the change, standing side by
-//! side, the voxels of each out.
+//! The voxels of a change and the size of a thing in; where such a thing and another one make up
+//! the change, standing side by side, the voxels of each out.
 
 use crate::tally::{Cell, EDGE, REACH, connected};
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,11 +9,13 @@ const STEP: i32 = 2;
 /// Of the thing's ground at least this share must lie where the change is.
 const FILLED: f64 = 0.5;
 
-/// Heights of the change over its ground, in voxels: the top of each column, and how many voxels it has.
+/// Heights of the change over its ground, in voxels: the top of each column, and how many voxels it
+/// has.
 type Columns = BTreeMap<[i32; 2], (i32, usize)>;
 
-/// Parts a change into a thing of that size (metres, standing on the lowest voxel) and the rest, of which the tops tell that
-/// it is something else; `None` where no place of the thing makes that of it.
+/// Parts a change into a thing of that size (metres, standing on the lowest voxel) and the rest, of
+/// which the tops tell that it is something else; `None` where no place of the thing makes that of
+/// it.
 pub(crate) fn parted(cells: &[Cell], size: [f64; 3]) -> Option<[Vec<Cell>; 2]> {
     let steps = size.map(|s| ((s / EDGE).round() as i32).max(1));
     let low = cells.iter().map(|c| c[2]).min()?;
@@ -30,7 +32,8 @@ pub(crate) fn parted(cells: &[Cell], size: [f64; 3]) -> Option<[Vec<Cell>; 2]> {
     (off(&own)? < STEP && off(&rest)? >= STEP).then_some([own, rest])
 }
 
-/// What is connected and largest, and all else: a thing that stands askew has corners beyond its place.
+/// What is connected and largest, and all else: a thing that stands askew has corners beyond its
+/// place.
 fn largest(mut cells: BTreeSet<Cell>) -> (Vec<Cell>, Vec<Cell>) {
     let mut parts = Vec::new();
     while let Some(first) = cells.pop_first() {

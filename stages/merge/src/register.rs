@@ -1,8 +1,9 @@
-//! Surfaces that stood still, as the plant has them, and points of a new scan in; how far the scan is off them out.
+//! Surfaces that stood still, as the plant has them, and points of a new scan in; how far the scan
+//! is off them out.
 //!
-//! Points are compared with planes through the plant's own points, voxel by voxel: point-to-plane distances (Chen and
-//! Medioni 1992), one for each voxel, so that a dense wall counts no more than it covers, with Tukey weights, so that what
-//! was moved between the sessions counts nothing.
+//! Points are compared with planes through the plant's own points, voxel by voxel: point-to-plane
+//! distances (Chen and Medioni 1992), one for each voxel, so that a dense wall counts no more than
+//! it covers, with Tukey weights, so that what was moved between the sessions counts nothing.
 
 use geometry::{Moments, Plane, Point, Pose, Vector};
 use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector6};
@@ -11,14 +12,16 @@ use std::collections::hash_map::Entry;
 
 /// Edge of a voxel, metres: a hundred points of a common scan, and still flat where a machine is.
 const EDGE: f64 = 0.10;
-/// Where voxels begin, metres: floors and walls stand at round figures, and must not run along their borders.
+/// Where voxels begin, metres: floors and walls stand at round figures, and must not run along
+/// their borders.
 const BEGIN: f64 = 0.0371;
 /// A plane is made of this many points and has at most this RMS distance from them, metres.
 const MIN_POINTS: f64 = 12.0;
 const MAX_RMS: f64 = 0.008;
 /// A plane whose points lie on a line is none: least spread across it, metres.
 const MIN_SPREAD: f64 = 0.012;
-/// Points farther from a plane are of something else, metres: more than sessions are off each other.
+/// Points farther from a plane are of something else, metres: more than sessions are off each
+/// other.
 const GATE: f64 = 0.05;
 /// Fewest points of the new scan in a voxel.
 const MIN_NEW: usize = 3;
@@ -28,7 +31,8 @@ const MIN_CELLS: usize = 50;
 const PRIOR: [f64; 2] = [0.02, 0.003];
 /// Most rounds of weights.
 const ROUNDS: usize = 12;
-/// A step this small ends it: metres, radians. A micrometre is a hundredth of what is known of the shift.
+/// A step this small ends it: metres, radians. A micrometre is a hundredth of what is known of the
+/// shift.
 const SETTLED: f64 = 1e-6;
 /// Tukey's constant, and the median's ratio to a standard deviation.
 const TUKEY: f64 = 4.685;
@@ -51,7 +55,8 @@ pub struct Planes {
 pub struct Registration {
     /// Brings the scan's world into the plant's.
     pub plant_from_stated: Pose,
-    /// Standard deviation of the shift about the middle of the cell, metres, and of the turn, radians, axis by axis.
+    /// Standard deviation of the shift about the middle of the cell, metres, and of the turn,
+    /// radians, axis by axis.
     pub sigma: [f64; 6],
     /// Voxels that it is told by.
     pub n_surfaces: usize,
@@ -95,8 +100,8 @@ impl Surfaces {
 }
 
 impl Planes {
-    /// The rigid motion that lays points of a scan (its stated world, metres) on the planes, turned about `about`; `None`
-    /// where too few of them lie on any.
+    /// The rigid motion that lays points of a scan (its stated world, metres) on the planes, turned
+    /// about `about`; `None` where too few of them lie on any.
     #[must_use]
     pub fn register(&self, points: &[[f64; 3]], about: &Point) -> Option<Registration> {
         let (mut pose, mut sigma, mut rms) = (Pose::identity(), [0.0; 6], [None; 2]);
@@ -140,7 +145,8 @@ fn total(pose: &Pose, about: &Point) -> Vector6<f64> {
 }
 
 fn told(planes: &FxHashMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -> Vec<Told> {
-    // Neighbours among the points are mostly in one voxel, and ask once for its plane and its place among the sums.
+    // Neighbours among the points are mostly in one voxel, and ask once for its plane and its place
+    // among the sums.
     let mut sums: FxHashMap<[i32; 3], usize> = FxHashMap::default();
     let mut told: Vec<(usize, Told)> = Vec::new();
     let (mut last, mut known): (Option<[i32; 3]>, Option<(&Plane, usize)>) = (None, None);

@@ -1,4 +1,5 @@
-//! A place and the views of some scans in; whether their beams went through it, ended on it, or never got there, out.
+//! A place and the views of some scans in; whether their beams went through it, ended on it, or
+//! never got there, out.
 
 use contract::{Region, View};
 use geometry::Eye;
@@ -8,10 +9,12 @@ use geometry::depth::{LANES, Look, lanes};
 const BEYOND: f32 = 0.04;
 /// A beam that ended so near a place ended on it, metres: noise, registration and the cell's slope.
 const ON: f32 = 0.02;
-/// A beam that went on so far beyond a point of its own session passed through the thing that the point is of, metres: rows
-/// that graze a flat top end up to this far apart on it, 5 m away, 0.13° between rows, at 2°.
+/// A beam that went on so far beyond a point of its own session passed through the thing that the
+/// point is of, metres: rows that graze a flat top end up to this far apart on it, 5 m away, 0.13°
+/// between rows, at 2°.
 const PIERCED: f32 = 0.3;
-/// Beams farther apart than this at a place say nothing of that, metres: one row of them may pass over all of a flat top.
+/// Beams farther apart than this at a place say nothing of that, metres: one row of them may pass
+/// over all of a flat top.
 const MAX_GAP: f64 = 0.02;
 /// Width in which beams are asked, metres.
 const FOOTPRINT: f32 = 0.012;
@@ -47,7 +50,8 @@ impl<'a> Watch<'a> {
         Self { region, views }
     }
 
-    /// Whether a beam of any scan went on far beyond a place in the world, whatever others met there.
+    /// Whether a beam of any scan went on far beyond a place in the world, whatever others met
+    /// there.
     #[must_use]
     pub fn is_pierced(&self, world: [f64; 3]) -> bool {
         let goes_on = |look: Look| look.near.is_finite() && look.near - look.range > PIERCED;
@@ -67,7 +71,8 @@ impl<'a> Watch<'a> {
         self.looks(world).map(|(_, look)| Sight::of(&look)).max().unwrap_or_default()
     }
 
-    /// The same of many places, scan after scan: an image stays in the cache while neighbours are asked for.
+    /// The same of many places, scan after scan: an image stays in the cache while neighbours are
+    /// asked for.
     pub fn look_all(&self, world: &[[f64; 3]], out: &mut Vec<Sight>) {
         out.clear();
         out.resize(world.len(), Sight::Unseen);

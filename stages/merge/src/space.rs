@@ -1,14 +1,15 @@
-//! What the scans saw of the space around a robot, and its posture, in; voxels that are seen free and that the robot
-//! itself fills out.
+//! What the scans saw of the space around a robot, and its posture, in; voxels that are seen free
+//! and that the robot itself fills out.
 //!
-//! What a robot hides is unknown, not free: a voxel is free only where a beam went on beyond it. A beam that did not come
-//! back proves nothing.
+//! What a robot hides is unknown, not free: a voxel is free only where a beam went on beyond it. A
+//! beam that did not come back proves nothing.
 
 use contract::{Fan, Region, Space, SpaceKind, View};
 use geometry::{Aabb, Eye, Pose};
 use robot::Model;
 
-/// Half the diagonal of a cube of edge 1: a beam that ends this far beyond a voxel's middle has left it.
+/// Half the diagonal of a cube of edge 1: a beam that ends this far beyond a voxel's middle has
+/// left it.
 const HALF_DIAGONAL: f64 = 0.866;
 /// Range noise and rounding that a beam must go beyond that, metres.
 const BEYOND: f64 = 0.01;
@@ -30,8 +31,9 @@ impl<'a> Passed<'a> {
         Self { region, eyes: views.iter().map(|view| Eye::new(&view.images)).collect(), edge }
     }
 
-    /// Whether a beam went on beyond the voxel with this middle (world, metres), or beams got to the middle of each of its eighths: in a
-    /// voxel beside a surface none goes on, and where one ends in it there is a point, which makes of it what that is.
+    /// Whether a beam went on beyond the voxel with this middle (world, metres), or beams got to
+    /// the middle of each of its eighths: in a voxel beside a surface none goes on, and where
+    /// one ends in it there is a point, which makes of it what that is.
     #[must_use]
     pub fn is_free(&self, middle: [f64; 3]) -> bool {
         let beyond = (HALF_DIAGONAL * self.edge + BEYOND) as f32;
@@ -68,8 +70,8 @@ pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &dyn Fan) {
     });
 }
 
-/// Fills the body of a robot that stands with its links at `world_from_links`, what its surface encloses, with a kind: its own or
-/// another's.
+/// Fills the body of a robot that stands with its links at `world_from_links`, what its surface
+/// encloses, with a kind: its own or another's.
 pub fn stand(space: &mut Space, kind: SpaceKind, model: &Model, world_from_links: &[Pose]) {
     let grid = *space.grid();
     let mut body = Aabb::EMPTY;
@@ -97,7 +99,8 @@ mod tests {
     use geometry::depth::Empty;
     use geometry::{DepthImage, Point};
 
-    /// A scanner at the origin looks along x at a wall 4 m away, half of it behind a plate 2 m away.
+    /// A scanner at the origin looks along x at a wall 4 m away, half of it behind a plate 2 m
+    /// away.
     fn view() -> View {
         let turn = nalgebra::UnitQuaternion::from_axis_angle(
             &nalgebra::Vector3::y_axis(),

@@ -1,5 +1,6 @@
-//! Points of one session that stand still, with what the other session's beams say of their places, in; out come voxels: in
-//! which of them something stands, which of them changed, and how much of them is covered.
+//! Points of one session that stand still, with what the other session's beams say of their places,
+//! in; out come voxels: in which of them something stands, which of them changed, and how much of
+//! them is covered.
 
 use geometry::Aabb;
 use rustc_hash::FxHashMap;
@@ -20,8 +21,8 @@ pub(crate) const MIN_POINTS: u32 = 3;
 /// Share of a voxel's points whose places the other session must have seen empty, or not at all.
 const MIN_SHARE: f64 = 0.6;
 
-/// Points of one session by voxel: how many, and at how many places of theirs the other session saw nothing. Nothing depends on
-/// the order of the voxels.
+/// Points of one session by voxel: how many, and at how many places of theirs the other session saw
+/// nothing. Nothing depends on the order of the voxels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tally {
     cells: FxHashMap<Cell, Count>,
@@ -72,7 +73,8 @@ impl Count {
     }
 }
 
-/// Points of one scan that are still to be counted by voxel: neighbours in a scan mostly are in the same one, and cost no search for it.
+/// Points of one scan that are still to be counted by voxel: neighbours in a scan mostly are in the
+/// same one, and cost no search for it.
 #[derive(Debug, Default)]
 pub struct Tallying {
     cells: FxHashMap<Cell, Count>,
@@ -81,7 +83,8 @@ pub struct Tallying {
 }
 
 impl Tallying {
-    /// Adds a point that stands still, and for so much area across its beam, m²; and what the other session has at its place.
+    /// Adds a point that stands still, and for so much area across its beam, m²; and what the other
+    /// session has at its place.
     #[inline]
     pub fn add(&mut self, world: [f64; 3], area: f64, seen: Seen) {
         let cell = Tally::cell(world);
@@ -172,7 +175,8 @@ impl Tally {
         columns(cell, reach).any(|column| self.robots.range(column).next().is_some())
     }
 
-    /// Whether a voxel or one beside it holds points: what the other session has there, it has here as well.
+    /// Whether a voxel or one beside it holds points: what the other session has there, it has here
+    /// as well.
     #[must_use]
     pub fn has_some(&self, cell: &Cell) -> bool {
         self.cells.contains_key(cell) || around(cell, 1).any(|cell| self.cells.contains_key(&cell))
@@ -187,8 +191,8 @@ impl Tally {
         cells.iter().map(|c| u64::from(self.cells[c].n_points)).sum()
     }
 
-    /// Voxels that hold points, in and beside which the other session has nothing: of a wire or an edge it has a point
-    /// here and there.
+    /// Voxels that hold points, in and beside which the other session has nothing: of a wire or an
+    /// edge it has a point here and there.
     pub(crate) fn changed(&self, other: &Self) -> BTreeSet<Cell> {
         self.alone(other, |c| c.n_empty)
     }
@@ -219,7 +223,8 @@ impl Tally {
         area / (cells.len() as f64 * Self::FACE)
     }
 
-    /// Share of the points in some voxels at whose places another beam of their own session went on.
+    /// Share of the points in some voxels at whose places another beam of their own session went
+    /// on.
     pub(crate) fn pierced(&self, cells: &[Cell]) -> f64 {
         let n: u64 = cells.iter().map(|c| u64::from(self.cells[c].n_pierced)).sum();
         n as f64 / self.n_points(cells) as f64
@@ -240,7 +245,8 @@ fn columns(cell: &Cell, reach: i32) -> impl Iterator<Item = RangeInclusive<Cell>
     (-r..=r).flat_map(move |i| (-r..=r).map(move |j| column(i, j)))
 }
 
-/// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is new and belongs to it.
+/// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is
+/// new and belongs to it.
 pub(crate) fn connected(
     first: Cell,
     reach: i32,

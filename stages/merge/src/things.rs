@@ -1,5 +1,5 @@
-//! Voxels of what stands still in two sessions, and what each session's beams say of the other's, in; what appeared, went
-//! and moved out.
+//! Voxels of what stands still in two sessions, and what each session's beams say of the other's,
+//! in; what appeared, went and moved out.
 
 use crate::parted::parted;
 use crate::tally::{Cell, EDGE, REACH, Tally, bounds, connected};
@@ -7,27 +7,30 @@ use contract::Fan;
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Voxels with few points that are so many steps apart are of one thing: rows of beams that only graze it lie that far apart.
+/// Voxels with few points that are so many steps apart are of one thing: rows of beams that only
+/// graze it lie that far apart.
 const THIN_REACH: i32 = 3;
 /// A thing of which at least this share changed is looked at whole.
 const WHOLE: f64 = 0.2;
-/// Most voxels of a thing that is looked at whole: what is larger is structure that something stood against.
+/// Most voxels of a thing that is looked at whole: what is larger is structure that something stood
+/// against.
 const MAX_WHOLE: usize = 40_000;
-/// Of a thing that one session sees only in part, the other may see up to so many times the ground; where one of its sides is
-/// seen in all its length, that may be all that is seen.
+/// Of a thing that one session sees only in part, the other may see up to so many times the ground;
+/// where one of its sides is seen in all its length, that may be all that is seen.
 const MAX_PART: [f64; 2] = [2.5, 6.0];
-/// A change on so many times the ground of one in the other session may be that thing and another one beside it; one on more
-/// is no pair of things, and would take long to look through.
+/// A change on so many times the ground of one in the other session may be that thing and another
+/// one beside it; one on more is no pair of things, and would take long to look through.
 const WIDER: [f64; 2] = [1.4, 6.0];
-/// How much the sizes of a thing may differ between two sessions, which see other sides of it, but both its top: metres, and
-/// share of its sides and of its height.
+/// How much the sizes of a thing may differ between two sessions, which see other sides of it, but
+/// both its top: metres, and share of its sides and of its height.
 const SAME_SIZE: (f64, [f64; 3]) = (0.12, [0.2, 0.2, 0.1]);
-/// What has no more than this share of a thing's height, and its top as high as that one's, to so many metres, and the same
-/// sides, is its top seen over something that hides the rest.
+/// What has no more than this share of a thing's height, and its top as high as that one's, to so
+/// many metres, and the same sides, is its top seen over something that hides the rest.
 const FLAT: f64 = 0.5;
 const SAME_TOP: f64 = 0.08;
 
-/// So near each other are the ends of a thing of which something before it hides the middle, metres.
+/// So near each other are the ends of a thing of which something before it hides the middle,
+/// metres.
 const BESIDE: f64 = 0.1;
 
 /// What is tuned.
@@ -39,7 +42,8 @@ pub struct ThingSettings {
     pub min_voxels: usize,
     /// Fewest points of it.
     pub min_points: u32,
-    /// How near a robot's points a change is the robot's own, metres: what segmentation left of it.
+    /// How near a robot's points a change is the robot's own, metres: what segmentation left of
+    /// it.
     pub robot_margin: f64,
 }
 
@@ -89,8 +93,8 @@ struct Piece {
     bounds: Aabb,
     /// With rows of beams about it that graze the thing, and whatever else lies there.
     wide: Aabb,
-    /// Of all that it is connected with, where much of that changed: a thing pushed by less than its length stands in part
-    /// where it stood.
+    /// Of all that it is connected with, where much of that changed: a thing pushed by less than
+    /// its length stands in part where it stood.
     whole: Option<Aabb>,
 }
 
@@ -133,7 +137,8 @@ impl Tally {
         self.wholes(self.joined(out, thin))
     }
 
-    /// Changes, those in two of which one is as the other session has it and stands beside something else.
+    /// Changes, those in two of which one is as the other session has it and stands beside
+    /// something else.
     fn apart(&self, pieces: &[Piece], others: &[Piece], settings: &ThingSettings) -> Vec<Piece> {
         let two = |piece: &Piece| {
             let times = |other: &Aabb| ground(&piece.bounds) / ground(other);
@@ -217,7 +222,8 @@ impl Tally {
     }
 }
 
-/// What differs between two sessions: things that moved, then those that went, then those that appeared, each by size.
+/// What differs between two sessions: things that moved, then those that went, then those that
+/// appeared, each by size.
 #[must_use]
 pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings, fan: &dyn Fan) -> Vec<Thing> {
     let by_size = |mut pieces: Vec<Piece>| {
@@ -256,7 +262,8 @@ struct Pair {
     boxes: [Aabb; 2],
 }
 
-/// Adds to things of which one session saw pieces apart from each other what makes them as large as the other one saw them.
+/// Adds to things of which one session saw pieces apart from each other what makes them as large as
+/// the other one saw them.
 fn complete(moved: &mut [Pair], pieces: [&[Piece]; 2]) {
     for at in 0..moved.len() {
         for side in 0..2 {
@@ -278,8 +285,9 @@ fn complete(moved: &mut [Pair], pieces: [&[Piece]; 2]) {
     }
 }
 
-/// Whether a piece is an end of a thing of which `own` was seen, where the other session saw `other`: beside it, as high as it, and
-/// both together are more like that one, and no larger. A thing that was turned has other bounds.
+/// Whether a piece is an end of a thing of which `own` was seen, where the other session saw
+/// `other`: beside it, as high as it, and both together are more like that one, and no larger. A
+/// thing that was turned has other bounds.
 fn is_end(piece: &Aabb, own: &Aabb, other: &Aabb) -> bool {
     let with = sides(&own.union(piece));
     let (own_sides, other) = (sides(own), sides(other));
@@ -291,8 +299,8 @@ fn is_end(piece: &Aabb, own: &Aabb, other: &Aabb) -> bool {
         && all_off(&with) < all_off(&own_sides)
 }
 
-/// Which of those that went stands elsewhere and the bounds there and here, the most alike first chosen: a barrel must not take
-/// a pallet's new place.
+/// Which of those that went stands elsewhere and the bounds there and here, the most alike first
+/// chosen: a barrel must not take a pallet's new place.
 fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<Pair> {
     let pairs = (0..gone.len()).flat_map(|i| (0..filled.len()).map(move |j| (i, j)));
     let alike = pairs.filter_map(|(i, j)| {
@@ -329,7 +337,8 @@ fn thing(change: ThingChange, was: Option<&Piece>, is: Option<&Piece>) -> Thing 
     Thing { change, then, now, shift: None, volume, n_points, gone, filled }
 }
 
-/// A box that may be the top of another one, of which one session saw no more: then down to where the other stands.
+/// A box that may be the top of another one, of which one session saw no more: then down to where
+/// the other stands.
 fn lowered(top: &Aabb, other: &Aabb) -> Aabb {
     let is_flat = top.size()[2] < FLAT * other.size()[2];
     let is_as_high = (top.max[2] - other.max[2]).abs() <= SAME_TOP;
@@ -363,8 +372,8 @@ fn farthest_off(a: &Aabb, b: &Aabb) -> f64 {
     (0..3).map(|i| off(&a, &b, i)).fold(0.0, f64::max)
 }
 
-/// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may be one thing, of which
-/// one session saw less than the other.
+/// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may
+/// be one thing, of which one session saw less than the other.
 fn unlike(a: &Aabb, b: &Aabb) -> f64 {
     let (a, b) = (sides(a), sides(b));
     let (same, off) = (|i: usize| same(&a, &b, i), |i: usize| off(&a, &b, i));

@@ -1,5 +1,5 @@
-//! Voxels of what stood still in a session in; those regions of it out that no beam of another session reached: of them nobody
-//! can say whether they changed.
+//! Voxels of what stood still in a session in; those regions of it out that no beam of another
+//! session reached: of them nobody can say whether they changed.
 
 use crate::tally::{Cell, EDGE, REACH, Tally, bounds, connected};
 use crate::things::ThingSettings;
@@ -22,7 +22,8 @@ pub struct Unseen {
     pub cells: Vec<Cell>,
 }
 
-/// What stood then and was not looked at since, by size; specks are left out as among [`crate::things()`].
+/// What stood then and was not looked at since, by size; specks are left out as among
+/// [`crate::things()`].
 #[must_use]
 pub fn unseen(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Unseen> {
     let mut left: BTreeSet<Cell> = then.unseen(now);

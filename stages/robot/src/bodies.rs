@@ -1,4 +1,5 @@
-//! The bodies of a description in, the meshes of its links out; what cannot be read is a finding, not an end.
+//! The bodies of a description in, the meshes of its links out; what cannot be read is a finding,
+//! not an end.
 
 use crate::finding::Findings;
 use crate::load::Settings;
@@ -13,7 +14,8 @@ use std::sync::Arc;
 
 /// A link larger than this is drawn in millimetres, metres.
 const LARGEST_LINK: f64 = 30.0;
-/// Size from which on a link is refused, metres: no beam of a gantry is so long; a hand's width in millimetres is.
+/// Size from which on a link is refused, metres: no beam of a gantry is so long; a hand's width in
+/// millimetres is.
 const FAR_TOO_LARGE: f64 = 100.0;
 /// Size below which it is, metres: a millimetre in millimetres is as large.
 const FAR_TOO_SMALL: f64 = 1e-5;
@@ -146,8 +148,8 @@ impl Bodies<'_> {
     }
 }
 
-/// Which links are rigid with one that has a visual: their own collision bodies are capsules about that, drawn for checks of
-/// collisions, and no surface that a scan could show.
+/// Which links are rigid with one that has a visual: their own collision bodies are capsules about
+/// that, drawn for checks of collisions, and no surface that a scan could show.
 fn shown(tree: &Tree) -> Vec<bool> {
     let mut leader: Vec<usize> = (0..tree.links.len()).collect();
     for l in 0..leader.len() {

@@ -5,7 +5,8 @@ use crate::model::{Motion, Role};
 use crate::sheet::Sheet;
 use crate::tree::Tree;
 
-/// Joints from link `root` (included above it: nothing) to link `tip`, or `None` if `tip` does not hang on `root`.
+/// Joints from link `root` (included above it: nothing) to link `tip`, or `None` if `tip` does not
+/// hang on `root`.
 pub(crate) fn path(tree: &Tree, root: usize, tip: usize) -> Option<Vec<usize>> {
     let mut joints = Vec::new();
     let mut at = tip;
@@ -18,8 +19,8 @@ pub(crate) fn path(tree: &Tree, root: usize, tip: usize) -> Option<Vec<usize>> {
     Some(joints)
 }
 
-/// Joints of the main chain: as the sheet says, else the chain with most free joints, then the longest, then the
-/// first.
+/// Joints of the main chain: as the sheet says, else the chain with most free joints, then the
+/// longest, then the first.
 pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) -> Vec<usize> {
     let mut find = |name: &Option<String>| {
         let name = name.as_ref()?;

@@ -1,5 +1,5 @@
-//! The text of a URDF and where joints are against it in; the text with those joints' origins moved out, all else as it
-//! was written, but for the declared encoding: what comes out is UTF-8.
+//! The text of a URDF and where joints are against it in; the text with those joints' origins moved
+//! out, all else as it was written, but for the declared encoding: what comes out is UTF-8.
 
 use crate::encoding;
 use crate::load::Settings;
@@ -57,8 +57,8 @@ pub fn correct(text: &str, moves: &[(String, Pose)]) -> Result<String> {
     Ok(out)
 }
 
-/// An `<origin>` as it is written; what is no number counts as zero, as for the reader of models. `turns` says whether a
-/// quaternion counts.
+/// An `<origin>` as it is written; what is no number counts as zero, as for the reader of models.
+/// `turns` says whether a quaternion counts.
 fn pose(origin: &Node<'_, '_>, turns: bool) -> Pose {
     let vector = |name: &str| {
         let mut numbers = origin
@@ -93,7 +93,8 @@ mod tests {
 
     #[test]
     fn a_quaternion_is_moved_as_the_reader_reads_it() {
-        // A quarter turn about z, so that a move along x goes along y; version 1.0 passes the quaternion over.
+        // A quarter turn about z, so that a move along x goes along y; version 1.0 passes the
+        // quaternion over.
         let text = |version: &str| {
             format!(
                 "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?><robot{version}><joint name=\"a\">\

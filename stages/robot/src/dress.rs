@@ -11,9 +11,9 @@ const FLANGES: [&str; 3] = ["tool0", "flange", "tool"];
 const SAME_FRAME: f64 = 1e-3;
 
 impl Model {
-    /// Links that a tool may be bolted to: frames that hang rigidly on the last link that moves, those of the usual names
-    /// first, then the tip of the main chain and others without a body, and that link itself; those that stand alike
-    /// once.
+    /// Links that a tool may be bolted to: frames that hang rigidly on the last link that moves,
+    /// those of the usual names first, then the tip of the main chain and others without a
+    /// body, and that link itself; those that stand alike once.
     #[must_use]
     pub fn flanges(&self) -> Vec<usize> {
         let moves = |j: &&usize| self.joints[**j].kind != JointKind::Fixed;
@@ -46,9 +46,9 @@ impl Model {
         out
     }
 
-    /// How a tool stands on this link before it is turned: its z along the axis of the robot's last joint, away from the
-    /// body that carries the link, whichever way the link's own frame looks; and whether that joint turns the same way
-    /// about z (1) or the other (−1).
+    /// How a tool stands on this link before it is turned: its z along the axis of the robot's last
+    /// joint, away from the body that carries the link, whichever way the link's own frame
+    /// looks; and whether that joint turns the same way about z (1) or the other (−1).
     #[must_use]
     pub fn mount(&self, flange: usize) -> (UnitQuaternion<f64>, f64) {
         let poses = self.poses(&self.home());
@@ -71,8 +71,9 @@ impl Model {
         (turn, way)
     }
 
-    /// This robot with a tool's root link on one of its links, as [`Self::mount`] has it and turned by `mount` about its own
-    /// z, radians. A joint of the tool whose name the robot has already gets the tool's before it; its joints come after the robot's own.
+    /// This robot with a tool's root link on one of its links, as [`Self::mount`] has it and turned
+    /// by `mount` about its own z, radians. A joint of the tool whose name the robot has
+    /// already gets the tool's before it; its joints come after the robot's own.
     ///
     /// # Panics
     /// If there is no such link.

@@ -1,5 +1,6 @@
-//! Bytes of an XML file in, its text out, by byte order mark or declared encoding: UTF-8, UTF-16, ASCII and ISO-8859-1.
-//! Any other encoding is refused by its name, since a wrong guess changes the names of links and of files.
+//! Bytes of an XML file in, its text out, by byte order mark or declared encoding: UTF-8, UTF-16,
+//! ASCII and ISO-8859-1. Any other encoding is refused by its name, since a wrong guess changes the
+//! names of links and of files.
 
 use std::borrow::Cow;
 
@@ -19,7 +20,8 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
     }
 }
 
-/// UTF-16 that is declared and not there reads as the UTF-8 that it is: the declaration itself was found as such.
+/// UTF-16 that is declared and not there reads as the UTF-8 that it is: the declaration itself was
+/// found as such.
 fn by_declaration(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
     let Some(name) = declared(bytes) else {
         return utf8(bytes);

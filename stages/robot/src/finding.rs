@@ -30,8 +30,8 @@ pub struct Finding {
     pub way_out: String,
 }
 
-/// Most findings of a model of each severity: whoever mends a library reads no more, and a file of a few megabytes can be wrong
-/// in a hundred thousand places.
+/// Most findings of a model of each severity: whoever mends a library reads no more, and a file of
+/// a few megabytes can be wrong in a hundred thousand places.
 const MAX_FINDINGS: usize = 100;
 
 /// Findings of one model while it is read.

@@ -3,8 +3,8 @@
 use crate::model::Mesh;
 use parry3d::transformation::try_convex_hull;
 
-/// The convex hull of some points, metres, its triangles counter-clockwise from outside; `None` where they lie in a
-/// plane or are too few.
+/// The convex hull of some points, metres, its triangles counter-clockwise from outside; `None`
+/// where they lie in a plane or are too few.
 #[must_use]
 pub fn hull(points: &[[f32; 3]]) -> Option<Mesh> {
     let points: Vec<_> = points.iter().map(|p| glamx::Vec3::from_array(*p)).collect();

@@ -6,7 +6,8 @@ use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::f64::consts::PI;
 
-/// Fewer free joints in the main chain than this make a gripper or gun, not a robot: the smallest palletisers have four.
+/// Fewer free joints in the main chain than this make a gripper or gun, not a robot: the smallest
+/// palletisers have four.
 const MIN_ROBOT_JOINTS: usize = 3;
 
 impl Joint {
@@ -166,8 +167,8 @@ impl<'a> Placing<'a> {
 }
 
 impl Model {
-    /// No part of the robot gets farther from the base's origin, metres: sum of the distances from joint to joint along
-    /// the longest way, and the size of what hangs at its end.
+    /// No part of the robot gets farther from the base's origin, metres: sum of the distances from
+    /// joint to joint along the longest way, and the size of what hangs at its end.
     #[must_use]
     pub fn reach(&self) -> f64 {
         let mut longest = 0.0_f64;
@@ -179,7 +180,8 @@ impl Model {
         longest
     }
 
-    /// How far each link's origin gets from that of the base at most, metres: the distances from joint to joint, and strokes.
+    /// How far each link's origin gets from that of the base at most, metres: the distances from
+    /// joint to joint, and strokes.
     #[must_use]
     pub fn ways(&self) -> Vec<f64> {
         let mut ways = vec![0.0_f64; self.links.len()];
@@ -254,13 +256,15 @@ impl Model {
         Kinematics { base_from_link, twists }
     }
 
-    /// Value of each joint at a posture, in the order of `joints`: radians or metres; fixed joints zero.
+    /// Value of each joint at a posture, in the order of `joints`: radians or metres; fixed joints
+    /// zero.
     #[must_use]
     pub fn joint_values(&self, posture: &[f64]) -> Vec<f64> {
         Placing::closed(self, posture).values
     }
 
-    /// The largest opening of the closed loops at a posture, metres; zero for a robot without loops.
+    /// The largest opening of the closed loops at a posture, metres; zero for a robot without
+    /// loops.
     #[must_use]
     pub fn loop_gap(&self, posture: &[f64]) -> f64 {
         let placing = Placing::closed(self, posture);

@@ -1,4 +1,5 @@
-//! Robots as models: URDF, meshes, chains and loops in; kinematics and CAD clouds out. Knows no scans.
+//! Robots as models: URDF, meshes, chains and loops in; kinematics and CAD clouds out. Knows no
+//! scans.
 #![forbid(unsafe_code)]
 
 mod bodies;

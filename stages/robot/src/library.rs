@@ -17,7 +17,8 @@ pub struct Library {
 }
 
 impl Library {
-    /// Loads all models of a library; those that cannot be loaded are left out and explained in `findings`.
+    /// Loads all models of a library; those that cannot be loaded are left out and explained in
+    /// `findings`.
     ///
     /// # Errors
     /// If the folder cannot be read, or no model is left.
@@ -29,7 +30,8 @@ impl Library {
         library.checked(dir)
     }
 
-    /// Everything wrong with a library, and what is worth knowing; a library that cannot be opened is one finding.
+    /// Everything wrong with a library, and what is worth knowing; a library that cannot be opened
+    /// is one finding.
     #[must_use]
     pub fn lint(dir: &Path, settings: &Settings) -> Vec<Finding> {
         let settings = &Settings { clouds: false, ..*settings };
@@ -51,8 +53,9 @@ impl Library {
         library.findings
     }
 
-    /// The folders that hold models, sorted by name, and a library without models that says what was passed over:
-    /// for loading in parallel with [`Library::load_folder`], [`Library::add`] and [`Library::checked`].
+    /// The folders that hold models, sorted by name, and a library without models that says what
+    /// was passed over: for loading in parallel with [`Library::load_folder`], [`Library::add`]
+    /// and [`Library::checked`].
     ///
     /// # Errors
     /// If the folder cannot be read.

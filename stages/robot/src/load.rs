@@ -17,13 +17,16 @@ use std::path::{Path, PathBuf};
 /// What to load, and how finely.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Make CAD clouds. Without them loading takes a tenth of the time: for linting and simulation.
+    /// Make CAD clouds. Without them loading takes a tenth of the time: for linting and
+    /// simulation.
     pub clouds: bool,
     /// Distance between neighbouring samples, metres. 5 mm: the spacing of a scan at 10 m.
     pub spacing: f64,
-    /// Most samples of a link; a larger link gets a wider spacing. 60 k: one cubic metre's surface at 10 mm.
+    /// Most samples of a link; a larger link gets a wider spacing. 60 k: one cubic metre's surface
+    /// at 10 mm.
     pub max_samples: usize,
-    /// Largest mesh file that is read, bytes. 256 MiB: ten times the largest robot met, all links together.
+    /// Largest mesh file that is read, bytes. 256 MiB: ten times the largest robot met, all links
+    /// together.
     pub max_mesh_bytes: u64,
     /// What a COLLADA file may come to in memory and work, times its size and a megabyte more: a
     /// file names the same geometry again and again, and nodes that do. Real ones come to four
@@ -312,7 +315,8 @@ impl Loader<'_> {
         Some(moving)
     }
 
-    /// The new links and joints of a sub chain's URDF, its root renamed to the link of the main URDF that it is.
+    /// The new links and joints of a sub chain's URDF, its root renamed to the link of the main
+    /// URDF that it is.
     fn sub_urdf(
         &self,
         main: &Description,

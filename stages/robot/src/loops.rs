@@ -1,5 +1,5 @@
-//! Closed loops: values of the other joints in, values of the passive joints out; planar four-bars, cylinders and bars
-//! in closed form, anything else by Newton's method from the zero posture.
+//! Closed loops: values of the other joints in, values of the passive joints out; planar four-bars,
+//! cylinders and bars in closed form, anything else by Newton's method from the zero posture.
 
 use crate::kinematics::Placing;
 use crate::model::Model;
@@ -7,7 +7,8 @@ use geometry::{Point, Vector};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Steps from the zero posture for loops without a closed form: small enough to stay in the assembly mode.
+/// Steps from the zero posture for loops without a closed form: small enough to stay in the
+/// assembly mode.
 const N_STEPS: u32 = 8;
 /// Newton steps each; three are enough from a neighbouring posture.
 const N_NEWTON: u32 = 12;
@@ -174,8 +175,8 @@ impl ClosedLoop {
         }
     }
 
-    /// Gap of the pins and its derivatives by the passive joints, seen along the axis of the first revolute one; in
-    /// space where all slide.
+    /// Gap of the pins and its derivatives by the passive joints, seen along the axis of the first
+    /// revolute one; in space where all slide.
     fn equations(&self, placing: &Placing) -> (DVector<f64>, DMatrix<f64>) {
         let rows = self.directions(placing);
         let n = rows.len();
@@ -221,8 +222,8 @@ impl ClosedLoop {
         self.closures.iter().map(apart).fold(0.0, f64::max)
     }
 
-    /// Rates of the passive joints for a unit rate of free joint `free`, from the rates of all others (those of
-    /// the passive ones are zero).
+    /// Rates of the passive joints for a unit rate of free joint `free`, from the rates of all
+    /// others (those of the passive ones are zero).
     pub(crate) fn rates(&self, placing: &Placing, rates: &[f64]) -> Vec<f64> {
         let pin = &self.closures[0];
         let open = self.form != Form::General && self.gap(placing) > CLOSED;
@@ -285,8 +286,8 @@ impl ClosedLoop {
         axis.dot(&d.cross(&moves)) / d.norm_squared()
     }
 
-    /// The mode of the zero posture, where the passive joints are zero; `None` where the loop is stretched there and
-    /// both solutions are one.
+    /// The mode of the zero posture, where the passive joints are zero; `None` where the loop is
+    /// stretched there and both solutions are one.
     pub(crate) fn mode_at_zero(&self, placing: &Placing) -> Option<f64> {
         let pin = &self.closures[0];
         let (origin, axis) = placing.axis(self.passive[0]);
@@ -311,8 +312,8 @@ impl ClosedLoop {
     }
 }
 
-/// Direction from one end of a two-bar chain to its elbow; `d` is the way to the other end, `near` and `far` are the
-/// lengths of the bars. Out of reach: in line.
+/// Direction from one end of a two-bar chain to its elbow; `d` is the way to the other end, `near`
+/// and `far` are the lengths of the bars. Out of reach: in line.
 fn toward_elbow(d: &Vector, near: f64, far: f64, axis: &Vector, mode: f64) -> Vector {
     let d = across(*d, axis);
     let length = d.norm();
@@ -336,8 +337,8 @@ impl Model {
         out
     }
 
-    /// Whether a loop could stand on the other of its two solutions at a posture: it closes there, its joints stay
-    /// within their limits, and it is another solution.
+    /// Whether a loop could stand on the other of its two solutions at a posture: it closes there,
+    /// its joints stay within their limits, and it is another solution.
     #[must_use]
     pub fn has_other_branch(&self, at: usize, posture: &[f64]) -> bool {
         if matches!(self.loops[at].form, Form::Rr | Form::General) {

@@ -18,7 +18,8 @@ pub struct Mesh {
 /// Samples on the outer surface of a link, in the link's frame.
 ///
 /// # Law
-/// Any prefix is spread evenly over the surface, so that `points[..300]` is the coarse cloud and all of it the fine.
+/// Any prefix is spread evenly over the surface, so that `points[..300]` is the coarse cloud and
+/// all of it the fine.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct CadCloud {
     /// Positions, metres.
@@ -51,7 +52,8 @@ pub struct Link {
     pub role: Role,
     /// The joint that carries it; `None` for the root.
     pub parent_joint: Option<usize>,
-    /// Its surface; empty for frames without a body. Shared by copies of the model, as are its samples.
+    /// Its surface; empty for frames without a body. Shared by copies of the model, as are its
+    /// samples.
     pub mesh: Arc<Mesh>,
     /// Samples of its outer surface; empty where the mesh is.
     pub cad: Arc<CadCloud>,
@@ -77,7 +79,8 @@ pub enum JointKind {
 pub enum Motion {
     /// Its own entry in the posture.
     Free(usize),
-    /// `multiplier · posture[free] + offset` (URDF `<mimic>`; chains of mimics are already resolved).
+    /// `multiplier · posture[free] + offset` (URDF `<mimic>`; chains of mimics are already
+    /// resolved).
     Mimic {
         /// Entry in the posture that it follows.
         free: usize,
@@ -143,8 +146,8 @@ pub struct Model {
     pub main_chain: Vec<usize>,
     /// Symmetries that `robot.toml` names.
     pub symmetries: Vec<Symmetry>,
-    /// How far each link's mesh may be from the real surface, metres: index of the link and value, where
-    /// `robot.toml` says so.
+    /// How far each link's mesh may be from the real surface, metres: index of the link and value,
+    /// where `robot.toml` says so.
     pub mesh_sigmas: Vec<(usize, f64)>,
 }
 
@@ -153,8 +156,8 @@ pub struct Model {
 pub struct Kinematics {
     /// Pose of each link, base (root link) from link.
     pub base_from_link: Vec<Pose>,
-    /// For each link, for each free joint: the twist of the link in the base frame for a unit rate of that joint:
-    /// `[v, w]`, so that a point `p` (base frame, fixed to the link) moves with `v + w × p`. Exact: mimic and loop
-    /// joints on the way are in it.
+    /// For each link, for each free joint: the twist of the link in the base frame for a unit rate
+    /// of that joint: `[v, w]`, so that a point `p` (base frame, fixed to the link) moves with
+    /// `v + w × p`. Exact: mimic and loop joints on the way are in it.
     pub twists: Vec<Vec<[f64; 6]>>,
 }

@@ -8,7 +8,8 @@ use crate::urdf::Description;
 use geometry::Vector;
 use nalgebra::Unit;
 
-/// The joints that the loops of a sub chain set: those named, else the `moving` ones of its own URDF.
+/// The joints that the loops of a sub chain set: those named, else the `moving` ones of its own
+/// URDF.
 pub(crate) fn named_passive(
     description: &Description,
     sub_chain: &SubChain,

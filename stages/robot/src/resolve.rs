@@ -1,5 +1,5 @@
-//! A mesh path as a URDF has it in, a file inside the declared roots out. Never a process, never the network, never a
-//! file outside the model's or the library's folder, links on disk included.
+//! A mesh path as a URDF has it in, a file inside the declared roots out. Never a process, never
+//! the network, never a file outside the model's or the library's folder, links on disk included.
 
 use std::path::{Component, Path, PathBuf};
 

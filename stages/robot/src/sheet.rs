@@ -1,4 +1,5 @@
-//! `robot.toml` in: what a URDF cannot say (main chain, loops, tool, symmetries). README.md documents it.
+//! `robot.toml` in: what a URDF cannot say (main chain, loops, tool, symmetries). README.md
+//! documents it.
 
 use serde::Deserialize;
 

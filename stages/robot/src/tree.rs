@@ -1,5 +1,5 @@
-//! Links and joints as written in, a checked tree out: one root, unique names, parents before children, and what
-//! moves each joint.
+//! Links and joints as written in, a checked tree out: one root, unique names, parents before
+//! children, and what moves each joint.
 
 use crate::finding::Findings;
 use crate::model::{Joint, JointKind, Link, Motion, Role};
@@ -277,7 +277,8 @@ fn plain_joint(raw: &RawJoint, parent: usize, child: usize) -> Joint {
     }
 }
 
-/// Follows a chain of mimics to the free joint at its end: its entry, and the product of factors and offsets.
+/// Follows a chain of mimics to the free joint at its end: its entry, and the product of factors
+/// and offsets.
 fn follow(
     joint: &RawJoint,
     raw: &BTreeMap<&str, &RawJoint>,

@@ -1,5 +1,6 @@
-//! URDF text in, links and joints as written out. Cleans the text first (numbers, doubles, what we do not use), since
-//! the parser skips words that are no numbers, stops at a second material, and recurses as deep as the file says.
+//! URDF text in, links and joints as written out. Cleans the text first (numbers, doubles, what we
+//! do not use), since the parser skips words that are no numbers, stops at a second material, and
+//! recurses as deep as the file says.
 
 use crate::finding::Findings;
 use contract::words::count;
@@ -131,7 +132,8 @@ struct Cleaner<'a> {
     findings: &'a mut Findings,
     /// Whether `quat_xyzw` counts in this file.
     turns: bool,
-    /// Where lines of the file end: a file may be wrong in thousands of places, and each is to be named.
+    /// Where lines of the file end: a file may be wrong in thousands of places, and each is to be
+    /// named.
     ends: Vec<usize>,
 }
 

@@ -7,8 +7,8 @@ use ::robot::{Library, Motion, Settings};
 use common::sheets::{RPR, RRR, looped};
 use common::{Dice, Folder, arm, check_twists, free, joint, link, robot};
 
-/// Poses of tip links at random postures, by yourdfpy 0.0.60 (Python), an independent reader of URDF. Made once: three postures
-/// a model, uniform within the limits.
+/// Poses of tip links at random postures, by yourdfpy 0.0.60 (Python), an independent reader of
+/// URDF. Made once: three postures a model, uniform within the limits.
 const POSES: &str = include_str!("common/yourdfpy.jsonl");
 
 /// One of them: radians or metres by joint; the upper three rows of the matrix.

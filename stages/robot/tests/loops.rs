@@ -85,8 +85,8 @@ fn parallelograms_follow_their_mimic_and_fingers_nearly() {
         assert!((value(&model, &q, "joint_lever_a") - q3).abs() < 1e-9);
         assert!((value(&model, &q, "joint_lever_b") + q3).abs() < 1e-9);
         let mut q = dice.posture(&m900);
-        // Beyond −π/2 the bars have passed through one line and the other solution is as good; the real machine's
-        // coupled limits end before.
+        // Beyond −π/2 the bars have passed through one line and the other solution is as good; the
+        // real machine's coupled limits end before.
         let q3 = &mut q[free(&m900, "joint_3")];
         *q3 = q3.max(-1.5);
         let q3 = *q3;

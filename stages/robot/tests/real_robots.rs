@@ -17,7 +17,8 @@ fn every_shared_robot_loads() {
         "{:#?}",
         library.findings
     );
-    // As in the table of the collection: name, free joints, triangles (it leaves out the gripper's two boxes).
+    // As in the table of the collection: name, free joints, triangles (it leaves out the gripper's
+    // two boxes).
     let expected = [
         ("abb_irb2400_12_155", 6, 9254),
         ("abb_irb4600_20_250", 6, 36572),

@@ -9,9 +9,11 @@ use robot::{Kinematics, Model};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Samples of a link by which its uncertainty is judged: a share of the surface is enough for one figure a link.
+/// Samples of a link by which its uncertainty is judged: a share of the surface is enough for one
+/// figure a link.
 const N_SPREAD: usize = 64;
-/// A joint that the points do not determine is believed to this, radians or metres: its link was placed by search.
+/// A joint that the points do not determine is believed to this, radians or metres: its link was
+/// placed by search.
 const OPEN_SIGMA: f64 = 0.01;
 
 /// One link as it stands.
@@ -26,12 +28,14 @@ pub(crate) struct Link {
     pub(crate) reach: f64,
     /// Distance at which a point still belongs to it, metres.
     pub(crate) gate: f32,
-    /// Of the link that the robot stands on: the plane of its underside in the link's frame, unit normal and offset.
+    /// Of the link that the robot stands on: the plane of its underside in the link's frame, unit
+    /// normal and offset.
     foot: Option<([f32; 3], f32)>,
 }
 
 impl Link {
-    /// How far a point (link frame) is above what the robot stands on, metres; `None` for links that do not stand.
+    /// How far a point (link frame) is above what the robot stands on, metres; `None` for links
+    /// that do not stand.
     pub(crate) fn above_foot(&self, p: [f32; 3]) -> Option<f32> {
         self.foot.map(|(n, offset)| n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - offset)
     }
@@ -83,10 +87,7 @@ pub(crate) fn bodies(
 }
 
 /// For each model in use: the fields of its links that have a surface.
-fn fields(
-    used: &[(u16, &Fit, &Model)],
-    fan: &dyn Fan,
-) -> BTreeMap<usize, Vec<Option<Arc<Field>>>> {
+fn fields(used: &[(u16, &Fit, &Model)], fan: &dyn Fan) -> BTreeMap<usize, Vec<Option<Arc<Field>>>> {
     let models: BTreeMap<usize, &Model> = used.iter().map(|(_, fit, m)| (fit.model, *m)).collect();
     let links = models.iter().flat_map(|(at, model)| model.links.iter().map(move |l| (*at, l)));
     let made = |(at, link): (usize, &robot::Link)| (at, Field::new(&link.cad).map(Arc::new));
@@ -193,8 +194,8 @@ fn spread(
     if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
 }
 
-/// Covariance of base and joints; of the standard deviations alone where the fit gives no whole one or a joint is
-/// open: that errs on the wide side, and the gate's upper limit holds it.
+/// Covariance of base and joints; of the standard deviations alone where the fit gives no whole one
+/// or a joint is open: that errs on the wide side, and the gate's upper limit holds it.
 fn covariance(fit: &Fit) -> DMatrix<f64> {
     let n = 6 + fit.joints.len();
     let is_whole = fit.covariance.len() == n * n && fit.covariance.iter().all(|v| v.is_finite());

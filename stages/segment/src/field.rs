@@ -1,4 +1,5 @@
-//! A link's CAD cloud as a grid: a place in the link's frame in, distance to the nearest surface and its normal out.
+//! A link's CAD cloud as a grid: a place in the link's frame in, distance to the nearest surface
+//! and its normal out.
 
 use geometry::NearestField;
 use robot::CadCloud;
@@ -11,10 +12,12 @@ pub(crate) const FIELD_REACH: f32 = 0.16;
 /// Most cells of a grid; a larger link gets larger cells.
 const MAX_CELLS: f32 = 2.0e6;
 
-/// Rows of cells about a place, the nearest first: most samples of the others need not be looked at.
+/// Rows of cells about a place, the nearest first: most samples of the others need not be looked
+/// at.
 const ROWS: [(isize, isize); 9] =
     [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
-/// What distances to cells may be off, metres: they are a few metres long at most, and reckoned to seven digits.
+/// What distances to cells may be off, metres: they are a few metres long at most, and reckoned to
+/// seven digits.
 const ROUNDED: f32 = 1e-5;
 
 /// Samples sorted into cells, and for each cell how far it is from the surface.
@@ -93,19 +96,21 @@ impl Field {
         }
     }
 
-    /// The nearest place on the surface, where it is within a cell's edge; else `Err` of the rough distance, metres,
-    /// infinite beyond reach.
+    /// The nearest place on the surface, where it is within a cell's edge; else `Err` of the rough
+    /// distance, metres, infinite beyond reach.
     pub(crate) fn near(&self, p: [f32; 3]) -> Result<Near, f32> {
         let Some(sample) = self.nearest.nearest(p) else { return Err(f32::INFINITY) };
         let rough = square(minus(p, self.points[sample])).sqrt();
-        // The middle of a cell is at most 0.87 edges from `p`: a sample within one edge of that is 1.87 from the middle, so
-        // the middle's own is no farther from it, nor 2.74 from `p`.
+        // The middle of a cell is at most 0.87 edges from `p`: a sample within one edge of that is
+        // 1.87 from the middle, so the middle's own is no farther from it, nor 2.74 from
+        // `p`.
         if rough > 2.75 * self.edge {
             return Err(rough);
         }
         let (cell, mut best) = (self.cell(p), (f32::INFINITY, 0));
         let gaps = self.gaps(p, cell);
-        // A sample so far off is no nearer across the surface than that without the tangent's length.
+        // A sample so far off is no nearer across the surface than that without the tangent's
+        // length.
         let is_beyond = |square: f32, best: f32| {
             let reach = square.sqrt() - self.tangent - ROUNDED;
             reach > 0.0 && reach * reach > best
@@ -132,7 +137,8 @@ impl Field {
         }
     }
 
-    /// The nearest of a run of samples, where one is nearer than `best`: squared distance and sample.
+    /// The nearest of a run of samples, where one is nearer than `best`: squared distance and
+    /// sample.
     fn nearest_of(&self, p: [f32; 3], run: Range<usize>, mut best: (f32, usize)) -> (f32, usize) {
         let samples = self.points[run.clone()].iter().zip(&self.normals[run.clone()]);
         for (i, (point, n)) in run.zip(samples) {
@@ -151,7 +157,8 @@ impl Field {
         best
     }
 
-    /// On each axis, squared distances to the neighbours of the cell that a place lies in, the lower first, square metres.
+    /// On each axis, squared distances to the neighbours of the cell that a place lies in, the
+    /// lower first, square metres.
     fn gaps(&self, p: [f32; 3], cell: [usize; 3]) -> [[f32; 2]; 3] {
         std::array::from_fn(|i| {
             let low = self.min[i] + cell[i] as f32 * self.edge;
@@ -178,7 +185,8 @@ impl Field {
     }
 }
 
-/// Of the squared distances to both neighbours, that to the one on this side; none to the cell itself.
+/// Of the squared distances to both neighbours, that to the one on this side; none to the cell
+/// itself.
 fn gap(gaps: [f32; 2], side: isize) -> f32 {
     match side {
         0 => 0.0,

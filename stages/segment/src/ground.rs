@@ -1,12 +1,15 @@
-//! The floor as dense rasters: a place in, height above the floor and the default label out, in constant time.
+//! The floor as dense rasters: a place in, height above the floor and the default label out, in
+//! constant time.
 
 use crate::Settings;
 use contract::{Floor, FloorLevel, Label};
 use geometry::narrow::{floor_i32, local_f32};
 
-/// Largest dense raster, cells: 4 km² at 0.5 m. A level with stray cells farther apart is looked up by search.
+/// Largest dense raster, cells: 4 km² at 0.5 m. A level with stray cells farther apart is looked up
+/// by search.
 const MAX_CELLS: i64 = 1 << 24;
-/// Half thickness of a floor in multiples of what its points scatter: one point in 30,000 lies beyond …
+/// Half thickness of a floor in multiples of what its points scatter: one point in 30,000 lies
+/// beyond …
 const SCATTERS: f64 = 4.0;
 /// … and at least so much, metres: dust and paint.
 const MIN_BAND: f64 = 0.005;
@@ -62,8 +65,8 @@ impl Ground {
         }
     }
 
-    /// Height above the floor level that lies nearest below (or at most `floor_depth` above) a place in the world,
-    /// metres; `None` where no level is near.
+    /// Height above the floor level that lies nearest below (or at most `floor_depth` above) a
+    /// place in the world, metres; `None` where no level is near.
     #[inline]
     #[must_use]
     pub fn height_above(&self, world: [f64; 3]) -> Option<f64> {
@@ -141,7 +144,8 @@ impl Raster {
         Some(Self { per_metre: 1.0 / level.cell, min, width, heights, base, span })
     }
 
-    /// Bilinear height between cell middles, metres; where not all four are known, of those that are.
+    /// Bilinear height between cell middles, metres; where not all four are known, of those that
+    /// are.
     #[inline]
     fn height(&self, x: f64, y: f64) -> Option<f64> {
         let (u, v) = (x * self.per_metre - 0.5, y * self.per_metre - 0.5);

@@ -4,7 +4,8 @@ use contract::{Lattice, TILE_SIDE, Tile};
 
 const SIDE: i32 = TILE_SIDE as i32;
 const EMPTY: u32 = u32::MAX;
-/// Tangent of the steepest incidence at which neighbours still belong to one surface: 80° (METHOD.md §2).
+/// Tangent of the steepest incidence at which neighbours still belong to one surface: 80°
+/// (METHOD.md §2).
 const MAX_SLOPE: f32 = 5.67;
 /// Half the width over which a normal is taken, metres: 2 mm of noise then tilts it by about 5°.
 const NORMAL_SPAN: f32 = 0.015;
@@ -58,8 +59,8 @@ impl Raster {
         (ra - rb).abs() <= limit
     }
 
-    /// Whether a point hangs between an edge and what lies behind it: along a row or column it is cut off on both
-    /// sides.
+    /// Whether a point hangs between an edge and what lies behind it: along a row or column it is
+    /// cut off on both sides.
     pub(crate) fn is_veil(&self, tile: &Tile, i: usize) -> bool {
         let cut = |by: [i32; 2]| self.beside(tile, i, by).map(|other| !self.connected(i, other, 1));
         [[0, 1], [1, 0]].into_iter().any(|by| {
@@ -72,7 +73,8 @@ impl Raster {
         })
     }
 
-    /// Unit normal at a point from its neighbours on both sides, scan frame, sign arbitrary; `None` near edges.
+    /// Unit normal at a point from its neighbours on both sides, scan frame, sign arbitrary; `None`
+    /// near edges.
     pub(crate) fn normal(&self, tile: &Tile, i: usize) -> Option<[f32; 3]> {
         let pixels =
             ((NORMAL_SPAN / (self.ranges[i] * self.step).max(1e-6)).round() as i32).clamp(1, 12);

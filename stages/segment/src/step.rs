@@ -82,7 +82,8 @@ struct Seen<'a> {
 struct About<'a> {
     /// How far it is within the reach of a link, at most, metres.
     inset: f32,
-    /// Where fields tell: so many gates away, from which link, its distance, metres, and its surface's normal.
+    /// Where fields tell: so many gates away, from which link, its distance, metres, and its
+    /// surface's normal.
     best: Option<(f32, &'a Seen<'a>, f32, [f32; 3])>,
     /// The nearest by field, else by box: both distances, metres.
     rough: (f32, f32, Option<&'a Seen<'a>>),
@@ -93,8 +94,8 @@ fn effectors(model: Option<&Model>) -> Vec<bool> {
 }
 
 impl Segment {
-    /// Labels for these fits (the robots of the result, in its order; refused ones give none). `scans` in the order
-    /// of their numbers.
+    /// Labels for these fits (the robots of the result, in its order; refused ones give none).
+    /// `scans` in the order of their numbers.
     #[must_use]
     pub fn new(
         fits: &[Fit],
@@ -295,7 +296,8 @@ impl Map for Segment {
     }
 }
 
-/// Links that a point of a block may be near; those beyond the reach of all of them have no say in it.
+/// Links that a point of a block may be near; those beyond the reach of all of them have no say in
+/// it.
 fn near<'a>(seen: &[Seen<'a>], points: &[[f32; 3]]) -> Vec<Seen<'a>> {
     let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for p in points {

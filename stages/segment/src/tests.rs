@@ -1,4 +1,5 @@
-//! A box robot on a floor beside a wall, seen by one scanner with noise and mixed pixels: labels against truth.
+//! A box robot on a floor beside a wall, seen by one scanner with noise and mixed pixels: labels
+//! against truth.
 
 use crate::{Ground, Scratch, Segment, Settings};
 use contract::{

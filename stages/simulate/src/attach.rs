@@ -9,7 +9,8 @@ const ARC_PIECES: usize = 24;
 /// Sides of a hose.
 const HOSE_SIDES: usize = 14;
 
-/// A hose through points of the world: parabolas between them, hanging down by `sag` of each distance.
+/// A hose through points of the world: parabolas between them, hanging down by `sag` of each
+/// distance.
 pub(crate) fn hose(hose: &Hose, held: &[Point]) -> Solid {
     let mut path = vec![held[0]];
     for pair in held.windows(2) {

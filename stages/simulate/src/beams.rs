@@ -9,7 +9,8 @@ use obvhs::triangle::Triangle;
 
 type Vector = geometry::Vector;
 
-/// How far a triangle reaches beyond its edges, as a share of its size: about 60 roundings of single precision.
+/// How far a triangle reaches beyond its edges, as a share of its size: about 60 roundings of
+/// single precision.
 const HAIR: f32 = 4e-6;
 
 /// Where a beam ends.
@@ -23,7 +24,8 @@ pub(crate) struct Hit {
     pub(crate) surface: u32,
 }
 
-/// Triangles in a tree of boxes, two to a node: measured as fast as eight to a node, and built in half the time.
+/// Triangles in a tree of boxes, two to a node: measured as fast as eight to a node, and built in
+/// half the time.
 pub(crate) struct Beams {
     tree: Bvh2,
     triangles: Vec<RtTriangle>,
@@ -38,7 +40,8 @@ impl Beams {
         if plain.is_empty() {
             return Self { tree: Bvh2::default(), triangles: Vec::new(), surface_of: Vec::new() };
         }
-        // Long thin triangles (fence wires, walls) are split into several boxes: they would fill the tree with air.
+        // Long thin triangles (fence wires, walls) are split into several boxes: they would fill
+        // the tree with air.
         let settings = BvhBuildParams { pre_split: true, ..BvhBuildParams::medium_build() };
         let tree = build_bvh2_from_tris(&plain, settings, &mut std::time::Duration::default());
         // In the order of the leaves: no second look-up while a beam is followed.
@@ -63,14 +66,15 @@ impl Beams {
         }
         let triangle = hit.primitive_id;
         let single = f64::from(hit.t);
-        // Single precision finds the triangle; its plane gives the range. A grazing beam may leave the plane's
-        // answer worthless, and then the single-precision one stands.
+        // Single precision finds the triangle; its plane gives the range. A grazing beam may leave
+        // the plane's answer worthless, and then the single-precision one stands.
         let range = self.plane_range(triangle, origin, direction);
         let range = if (range - single).abs() < 1e-3 { range } else { single };
         Some(Hit { range, triangle, surface: self.surface_of[triangle as usize] })
     }
 
-    /// Range at which a beam meets the plane of a triangle, metres; infinite or negative where it does not.
+    /// Range at which a beam meets the plane of a triangle, metres; infinite or negative where it
+    /// does not.
     #[inline]
     pub(crate) fn plane_range(&self, triangle: u32, origin: &Vector, direction: &Vector) -> f64 {
         let (corner, normal) = self.plane(triangle);
@@ -91,8 +95,9 @@ impl Beams {
     }
 }
 
-/// Range at which a ray meets a triangle, infinite where it does not (Möller–Trumbore). Triangles are grown by a hair:
-/// beams of a regular raster fall exactly on edges that two triangles share, and single precision loses some of them.
+/// Range at which a ray meets a triangle, infinite where it does not (Möller–Trumbore). Triangles
+/// are grown by a hair: beams of a regular raster fall exactly on edges that two triangles share,
+/// and single precision loses some of them.
 #[inline(always)]
 fn meet(t: &RtTriangle, ray: &Ray) -> f32 {
     let c = t.v0 - ray.origin;

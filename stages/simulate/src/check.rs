@@ -1,10 +1,12 @@
-//! A scene in; the first thing that is wrong with it out. Limits keep a typing error from taking all memory.
+//! A scene in; the first thing that is wrong with it out. Limits keep a typing error from taking
+//! all memory.
 
 use crate::scene::{Scanner, Scene};
 use contract::{Error, Result};
 use std::collections::BTreeSet;
 
-/// Largest coordinate inside a scene, metres: beyond it single precision triangles are coarser than 0.1 mm.
+/// Largest coordinate inside a scene, metres: beyond it single precision triangles are coarser than
+/// 0.1 mm.
 const MAX_COORDINATE: f64 = 1000.0;
 /// Largest difference between true and stated poses, metres: stated ones may be those of a map.
 const MAX_STATED: f64 = 1e8;

@@ -1,4 +1,5 @@
-//! The forms in which beams leave the simulator: a scan's frame, and its columns as a structure of arrays.
+//! The forms in which beams leave the simulator: a scan's frame, and its columns as a structure of
+//! arrays.
 
 use crate::scene::Raster;
 use contract::Label;
@@ -21,8 +22,8 @@ pub struct ScanFrame {
     pub n_cols: u32,
 }
 
-/// Beams of some neighbouring columns of one scan, column by column, rows upwards: beam `i` is row `i % n_rows` of
-/// column `first_col + i / n_rows`.
+/// Beams of some neighbouring columns of one scan, column by column, rows upwards: beam `i` is row
+/// `i % n_rows` of column `first_col + i / n_rows`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SimColumns {
     /// First column.
@@ -33,16 +34,18 @@ pub struct SimColumns {
     pub hit: Vec<bool>,
     /// Measured range, metres; 0 where it did not come back.
     pub range: Vec<f64>,
-    /// Measured point in the scan frame (range along the stated direction), metres; zero where it did not come back.
+    /// Measured point in the scan frame (range along the stated direction), metres; zero where it
+    /// did not come back.
     pub xyz: Vec<[f64; 3]>,
     /// Strength of the return, 0..1.
     pub intensity: Vec<f32>,
     /// What the point belongs to; uncertain where the beam did not come back.
     pub label: Vec<Label>,
-    /// Index of the thing it belongs to in [`crate::Truth::objects`]; 0 where the beam did not come back.
+    /// Index of the thing it belongs to in [`crate::Truth::objects`]; 0 where the beam did not
+    /// come back.
     pub object: Vec<u16>,
-    /// Whether the range is a mean over surfaces more than 3 cm apart: the point may hang in the air, and its label
-    /// is that of the nearest part.
+    /// Whether the range is a mean over surfaces more than 3 cm apart: the point may hang in the
+    /// air, and its label is that of the nearest part.
     pub mixed: Vec<bool>,
 }
 

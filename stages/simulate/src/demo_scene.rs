@@ -10,13 +10,14 @@ use crate::spot::{Spot, scanner};
 use contract::{Error, Result};
 use robot::Model;
 
-/// Angle between the beams of the demo's scanners, degrees: 7.7 mm at 4 m, 3 million beams a scanner.
+/// Angle between the beams of the demo's scanners, degrees: 7.7 mm at 4 m, 3 million beams a
+/// scanner.
 const DEMO_STEP_DEG: f64 = 0.11;
 /// Middle in the flange's frame and size of the carton, metres.
 const CARTON: ([f64; 3], [f64; 3]) = ([0.0, 0.0, -0.33], [0.5, 0.35, 0.25]);
 
-/// The cell of the demo: hall, three demo robots in drawn postures with hoses, tool and carried box, furniture, four
-/// scanners. `models` must hold the demo robots.
+/// The cell of the demo: hall, three demo robots in drawn postures with hoses, tool and carried
+/// box, furniture, four scanners. `models` must hold the demo robots.
 ///
 /// # Errors
 /// `BadInput` where a demo robot is missing.
@@ -70,8 +71,9 @@ pub fn demo_scene(seed: u64, models: &[Model]) -> Result<Scene> {
     Ok(scene)
 }
 
-/// The protocol of the method's source: one robot on a floor, six scanners on a circle of 5 m at 1.6 m height, 2 mm
-/// noise. `posture` has one value for each free joint; `n_beams` is that of each scanner.
+/// The protocol of the method's source: one robot on a floor, six scanners on a circle of 5 m at
+/// 1.6 m height, 2 mm noise. `posture` has one value for each free joint; `n_beams` is that of each
+/// scanner.
 #[must_use]
 pub fn paper_scene(seed: u64, model: &Model, posture: &[f64], n_beams: u64) -> Scene {
     let joints = model.free.iter().zip(posture);

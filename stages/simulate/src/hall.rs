@@ -141,7 +141,8 @@ pub(crate) fn column(column: &Column, z: f64) -> Solid {
     Solid::of([shaft, foot]).at([column.xy[0], column.xy[1], z])
 }
 
-/// A fence over the ground: posts and panels (first), and what is in the panels where that is wire (second).
+/// A fence over the ground: posts and panels (first), and what is in the panels where that is wire
+/// (second).
 pub(crate) fn fence(fence: &Fence, ground: impl Fn(f64, f64) -> f64) -> (Solid, Solid) {
     let (dx, dy) = (fence.to[0] - fence.from[0], fence.to[1] - fence.from[1]);
     let length = dx.hypot(dy);

@@ -1,7 +1,7 @@
 //! A scene and robot models in; what a terrestrial laser scanner would see, with the truth, out.
 //!
-//! Robots of our own ([`demo_robots`]) and scenes of our own ([`demo_scene()`]) come with it, so that the whole way can
-//! be shown and measured on a bare machine.
+//! Robots of our own ([`demo_robots`]) and scenes of our own ([`demo_scene()`]) come with it, so
+//! that the whole way can be shown and measured on a bare machine.
 #![forbid(unsafe_code)]
 
 mod attach;

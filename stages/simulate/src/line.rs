@@ -1,7 +1,8 @@
-//! A seed and robot models in; a line of equal cells as it was scanned, and one of its cells as it was scanned again, out.
+//! A seed and robot models in; a line of equal cells as it was scanned, and one of its cells as it
+//! was scanned again, out.
 //!
-//! Robots take one of two postures and pallets one of two places, then and now: the cell that was scanned again may look
-//! more like its neighbour did than like itself.
+//! Robots take one of two postures and pallets one of two places, then and now: the cell that was
+//! scanned again may look more like its neighbour did than like itself.
 
 use crate::random::Random;
 use crate::scene::{

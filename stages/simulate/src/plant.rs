@@ -1,6 +1,6 @@
-//! A seed, robot models and what is wanted in; a cell, a line or a hall without robots, crowded as real ones are, out:
-//! robots of mixed models on floor and stands with hoses, tools and carried parts, between fences, conveyors, machines,
-//! posts and people.
+//! A seed, robot models and what is wanted in; a cell, a line or a hall without robots, crowded as
+//! real ones are, out: robots of mixed models on floor and stands with hoses, tools and carried
+//! parts, between fences, conveyors, machines, posts and people.
 
 use crate::hand::{part_in, tool_on};
 use crate::random::Random;

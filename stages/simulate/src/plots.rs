@@ -13,7 +13,8 @@ const PLOT: f64 = 6.0;
 /// Most beams of one scanner of a hall: what a real one makes in some minutes.
 const MAX_BEAMS: u64 = 20_000_000;
 
-/// A hall of `n_robots` robots of the library on plots of 6 m, with scanners for about `n_points` points.
+/// A hall of `n_robots` robots of the library on plots of 6 m, with scanners for about `n_points`
+/// points.
 ///
 /// # Errors
 /// `BadInput` where the library holds no robot, or one too large for its plot.
@@ -61,8 +62,8 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
     Ok(scene)
 }
 
-/// A stride that visits all of `n` places, near and far in turn: the one without common factor that is nearest to the
-/// golden section.
+/// A stride that visits all of `n` places, near and far in turn: the one without common factor that
+/// is nearest to the golden section.
 fn spread(n: usize) -> usize {
     let coprime = |k: &usize| {
         let (mut a, mut b) = (n, *k);

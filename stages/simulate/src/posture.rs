@@ -1,4 +1,5 @@
-//! A model and a place in; random postures that do not go through the floor or the robot itself out.
+//! A model and a place in; random postures that do not go through the floor or the robot itself
+//! out.
 
 use crate::random::Random;
 use contract::{Error, Result};
@@ -6,7 +7,8 @@ use geometry::{Point, Pose};
 use robot::{Mesh, Model};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Distance of the samples that stand for a link, metres: thinner parts than this may pass through one another.
+/// Distance of the samples that stand for a link, metres: thinner parts than this may pass through
+/// one another.
 const SPACING: f64 = 0.03;
 /// Samples of two links nearer than this touch, metres: most crossing surfaces have such a pair.
 const TOUCH: f64 = 0.02;
@@ -46,8 +48,8 @@ impl<'a> Postures<'a> {
         self
     }
 
-    /// A posture, uniform within the limits, in which every sample of every link but the root is `allowed` (a point
-    /// in the world) and no two links touch that do not do so by design.
+    /// A posture, uniform within the limits, in which every sample of every link but the root is
+    /// `allowed` (a point in the world) and no two links touch that do not do so by design.
     ///
     /// # Errors
     /// `BadInput` where thousands of postures were none: the place is too narrow for the model.

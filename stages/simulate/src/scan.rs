@@ -1,4 +1,5 @@
-//! A scanner and what stands around it in; beams with range, truth and flags, column by column, out.
+//! A scanner and what stands around it in; beams with range, truth and flags, column by column,
+//! out.
 
 use crate::beams::{Beams, Hit};
 use crate::columns::{Return, ScanFrame, SimColumns};
@@ -218,8 +219,9 @@ impl Station {
             })
     }
 
-    /// What a wide beam measures: its thin parts are grouped by range, the strongest group wins (the nearest of
-    /// equals), and its mean is the range. Returns the part nearest to that mean, the mean, and whether it is mixed.
+    /// What a wide beam measures: its thin parts are grouped by range, the strongest group wins
+    /// (the nearest of equals), and its mean is the range. Returns the part nearest to that
+    /// mean, the mean, and whether it is mixed.
     fn mix(
         &self,
         beams: &Beams,

@@ -1,4 +1,5 @@
-//! What a scanner is: its place, raster, range and errors. Numbers in a scene file in; directions of beams out.
+//! What a scanner is: its place, raster, range and errors. Numbers in a scene file in; directions
+//! of beams out.
 
 use crate::random::Random;
 use contract::{Error, Result};
@@ -34,7 +35,8 @@ pub struct Scanner {
     pub range_bias: f64,
     /// Share of beams that come back to nobody, 0..1.
     pub dropouts: f64,
-    /// Share of beams lost on a black surface that is seen edge-on, 0..1; less when seen straight, none on bright ones.
+    /// Share of beams lost on a black surface that is seen edge-on, 0..1; less when seen straight,
+    /// none on bright ones.
     pub dark_dropouts: f64,
     /// Beams have a width: what they measure at edges. None: infinitely thin beams.
     pub mixed: Option<Mixed>,
@@ -132,14 +134,15 @@ impl Raster {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mixed {
-    /// Thin beams that stand for one wide beam: its middle and the rest on a ring; cast only where a neighbouring
-    /// beam sees something else.
+    /// Thin beams that stand for one wide beam: its middle and the rest on a ring; cast only where
+    /// a neighbouring beam sees something else.
     pub sub_beams: u32,
     /// Radius of the beam where it leaves, metres.
     pub radius: f64,
     /// Growth of the radius, metres a metre.
     pub divergence: f64,
-    /// Parts nearer to one another than this are averaged into one range, farther ones compete, metres.
+    /// Parts nearer to one another than this are averaged into one range, farther ones compete,
+    /// metres.
     pub depth: f64,
 }
 
@@ -160,7 +163,8 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// That of a scan with this true pose, and this stated one: another frame of the world, for example.
+    /// That of a scan with this true pose, and this stated one: another frame of the world, for
+    /// example.
     #[must_use]
     pub fn between(world_from_scan: &Pose, stated: &Pose) -> Self {
         let error = world_from_scan.inverse() * stated;
@@ -171,7 +175,8 @@ impl Registration {
         }
     }
 
-    /// One that is drawn: standard deviations of the shift on each axis, metres, and of the turn about each, degrees.
+    /// One that is drawn: standard deviations of the shift on each axis, metres, and of the turn
+    /// about each, degrees.
     #[must_use]
     pub fn drawn([shift, turn]: [f64; 2], random: &mut Random) -> Self {
         let mut three = |sigma: f64| [(); 3].map(|()| sigma * random.normals()[0]);

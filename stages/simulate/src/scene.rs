@@ -1,4 +1,5 @@
-//! A scene file in (TOML); a checked description of hall, robots and scanners out. Opens no files: models are named.
+//! A scene file in (TOML); a checked description of hall, robots and scanners out. Opens no files:
+//! models are named.
 
 use contract::{Error, Result};
 use geometry::{Pose, Vector};
@@ -8,14 +9,16 @@ use serde::{Deserialize, Serialize};
 pub use crate::place::{Later, RobotPlace, Tool, ToolShape};
 pub use crate::scanner::{Mixed, Raster, Registration, Scanner};
 
-/// Everything that the virtual scanner needs. Metres, degrees where a name says so, world frame z up.
+/// Everything that the virtual scanner needs. Metres, degrees where a name says so, world frame z
+/// up.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Seed of all noise.
     #[serde(default)]
     pub seed: u64,
-    /// Added to every coordinate that leaves the simulator in the world frame (large map coordinates), metres.
+    /// Added to every coordinate that leaves the simulator in the world frame (large map
+    /// coordinates), metres.
     #[serde(default)]
     pub origin: [f64; 3],
     /// The building; none: nothing but the floor below and the sky above.
@@ -245,8 +248,8 @@ pub struct Anchor {
     pub xyz: [f64; 3],
 }
 
-/// A hose that hangs from anchor to anchor. It belongs to the first robot of which it is fixed to a link other than the
-/// root; without one it stands still and is fixed.
+/// A hose that hangs from anchor to anchor. It belongs to the first robot of which it is fixed to a
+/// link other than the root; without one it stands still and is fixed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hose {
@@ -344,7 +347,8 @@ impl Floor {
     pub fn base_height(&self, x: f64, y: f64) -> f64 {
         let tilt = self.tilt_deg.map(|a| a.to_radians().tan());
         let k = std::f64::consts::TAU / self.wave_length;
-        // The second wave is shorter and turned, so that the pattern does not repeat along the axes.
+        // The second wave is shorter and turned, so that the pattern does not repeat along the
+        // axes.
         let waves = 0.6 * (k * x).sin() * (k * y + 0.7).cos()
             + 0.4 * (1.37 * k * (0.8 * x - 0.6 * y)).sin();
         tilt[0] * x + tilt[1] * y + self.wave_amplitude * waves

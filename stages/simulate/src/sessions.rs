@@ -1,5 +1,5 @@
-//! A plant as it was scanned, and one cell of it as it was scanned again weeks later, in two scenes: a robot moved, a pallet
-//! was pushed, a barrel was taken away.
+//! A plant as it was scanned, and one cell of it as it was scanned again weeks later, in two
+//! scenes: a robot moved, a pallet was pushed, a barrel was taken away.
 
 use crate::plant::{Plant, plant};
 use crate::random::Random;

@@ -1,5 +1,5 @@
-//! A scene and robot models in; the triangles of each body, with what moves it, and whether one place sees another, out: the truth
-//! that paths of robots are judged by.
+//! A scene and robot models in; the triangles of each body, with what moves it, and whether one
+//! place sees another, out: the truth that paths of robots are judged by.
 
 use crate::beams::Beams;
 use crate::scene::Scene;
@@ -8,7 +8,8 @@ use contract::{PointKind, Result};
 use geometry::Point;
 use robot::Model;
 
-/// A place that a beam ends this little before is where the beam ends, metres: rounding of single precision in a hall.
+/// A place that a beam ends this little before is where the beam ends, metres: rounding of single
+/// precision in a hall.
 const AT: f64 = 1e-3;
 
 /// A body of a scene.
@@ -32,10 +33,12 @@ pub struct Shapes {
 }
 
 impl Shapes {
-    /// Of a scene with its robots in their first postures; `models` are the models that its robots name.
+    /// Of a scene with its robots in their first postures; `models` are the models that its robots
+    /// name.
     ///
     /// # Errors
-    /// `BadInput` where the scene names a model, link or joint that does not exist, or a number means nothing.
+    /// `BadInput` where the scene names a model, link or joint that does not exist, or a number
+    /// means nothing.
     pub fn of(scene: &Scene, models: &[Model]) -> Result<Self> {
         crate::check::check(scene)?;
         let world = World::new(scene, models)?;
@@ -69,7 +72,8 @@ impl Shapes {
         self.beams.cast(&from.coords, &along, (length - AT).max(0.0)).is_none()
     }
 
-    /// Whether a beam from a place through another one ends on something, no farther than so from where it begins, metres.
+    /// Whether a beam from a place through another one ends on something, no farther than so from
+    /// where it begins, metres.
     #[must_use]
     pub fn ends(&self, from: &Point, through: &Point, within: f64) -> bool {
         let along = (through - from).try_normalize(AT);

@@ -33,7 +33,8 @@ impl Simulator {
     /// Builds everything that stands in the scene; `models` are the models that its robots name.
     ///
     /// # Errors
-    /// `BadInput` where the scene names a model, link or joint that does not exist, or a number means nothing.
+    /// `BadInput` where the scene names a model, link or joint that does not exist, or a number
+    /// means nothing.
     pub fn new(scene: &Scene, models: &[Model]) -> Result<Self> {
         crate::check::check(scene)?;
         let (mut seen, mut states, mut state_of) = (Vec::new(), Vec::new(), Vec::new());
@@ -81,8 +82,9 @@ impl Simulator {
     /// Beams of some columns of one scan.
     ///
     /// # Law
-    /// A function of scene, scanner and column only: however the columns are split and in whatever order they are
-    /// asked for, the beams are the same. Each call casts one more column on either side, so ask for 16 or more.
+    /// A function of scene, scanner and column only: however the columns are split and in whatever
+    /// order they are asked for, the beams are the same. Each call casts one more column on
+    /// either side, so ask for 16 or more.
     ///
     /// # Panics
     /// If the scene has no scanner with this index.

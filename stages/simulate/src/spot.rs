@@ -1,4 +1,5 @@
-//! A place for a robot in a scene that is being made; the robot with a stand and a drawn posture out.
+//! A place for a robot in a scene that is being made; the robot with a stand and a drawn posture
+//! out.
 
 use crate::posture::Postures;
 use crate::random::Random;
@@ -62,7 +63,8 @@ impl Spot<'_> {
         let mut postures = Postures::new(model);
         if let Some((xyz, size)) = self.load {
             let link = model.links.iter().position(|l| l.name == "tool0");
-            // From the flange down to the bottom of the box, so that the tool between them is part of it.
+            // From the flange down to the bottom of the box, so that the tool between them is part
+            // of it.
             let (top, bottom) = (-0.04, xyz[2] - 0.5 * size[2]);
             let body = cuboid([size[0], size[1], top - bottom], 0.0).at([
                 xyz[0],
@@ -101,7 +103,8 @@ impl Spot<'_> {
     }
 }
 
-/// Boxes that arms must stay out of: furniture, and stands (a robot's own one up to just below its top).
+/// Boxes that arms must stay out of: furniture, and stands (a robot's own one up to just below its
+/// top).
 fn keep_out(scene: &Scene, own: &str) -> Vec<([f64; 3], [f64; 3])> {
     let around = |xy: [f64; 2], half: [f64; 2], low: f64, high: f64| {
         ([xy[0] - half[0], xy[1] - half[1], low], [xy[0] + half[0], xy[1] + half[1], high])

@@ -1,4 +1,5 @@
-//! Pictures of the demo robots and of the demo scene for people: run with `--ignored`, look into the folder that it names.
+//! Pictures of the demo robots and of the demo scene for people: run with `--ignored`, look into
+//! the folder that it names.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod library;

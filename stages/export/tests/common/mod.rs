@@ -1,4 +1,5 @@
-//! Points made by number in; tiles and clouds of them in a folder, and what is read of such files, out.
+//! Points made by number in; tiles and clouds of them in a folder, and what is read of such files,
+//! out.
 #![allow(dead_code, reason = "each test file uses some of it")]
 #![allow(unreachable_pub, reason = "of tests only")]
 

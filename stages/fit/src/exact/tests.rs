@@ -39,7 +39,8 @@ fn beams_meet_the_face_that_they_end_on() {
 
 #[test]
 fn meshes_of_any_size_are_looked_through() {
-    // The corner in millimetres, taken for metres: as many cells as memory stands, and the same answer.
+    // The corner in millimetres, taken for metres: as many cells as memory stands, and the same
+    // answer.
     let mesh = corner();
     let vertices = mesh.vertices.iter().map(|p| p.map(|v| 1000.0 * v)).collect();
     let large = Mesh { vertices, ..mesh };

@@ -1,5 +1,5 @@
-//! Normal equations with all that was added to them in; how well base, joints and the scans' errors are known, out
-//! (METHOD.md §14).
+//! Normal equations with all that was added to them in; how well base, joints and the scans' errors
+//! are known, out (METHOD.md §14).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,13 +7,14 @@ use super::{Normal, Patches};
 
 /// Beyond this factor the kernel says nothing any more.
 const MAX_FACTOR: f64 = 4.0;
-/// Least share of its stated variance that a point keeps: what is left without noise, of meshes and of rounding, is alike
-/// for many points.
+/// Least share of its stated variance that a point keeps: what is left without noise, of meshes and
+/// of rounding, is alike for many points.
 const MIN_SHARE: f64 = 0.3;
 
 impl Normal {
-    /// Covariance of base twist and joints: the inverse of the normal matrix, as wide as the residuals are, and wider in
-    /// every direction in which those of whole groups of patches pull harder than independent errors would.
+    /// Covariance of base twist and joints: the inverse of the normal matrix, as wide as the
+    /// residuals are, and wider in every direction in which those of whole groups of patches
+    /// pull harder than independent errors would.
     pub(crate) fn covariance(&self, of: &Patches) -> DMatrix<f64> {
         let groups = &of.groups;
         let n_robot = self.n_robot;
@@ -51,8 +52,8 @@ impl Normal {
         wide.view((0, 0), (n_robot, n_robot)).into_owned()
     }
 
-    /// What the residuals say of the scans' errors whatever the robot does, without the priors, and how the robot gives way to
-    /// each of them.
+    /// What the residuals say of the scans' errors whatever the robot does, without the priors, and
+    /// how the robot gives way to each of them.
     pub(crate) fn shared(&self) -> Option<[DMatrix<f64>; 2]> {
         let (n, n_scans) = (self.n_robot, self.n - self.n_robot);
         let robot = self.hessian.view((0, 0), (n, n)).into_owned().cholesky()?;
@@ -65,9 +66,9 @@ impl Normal {
         Some([gain, information / (share * stretch)])
     }
 
-    /// What the rows show of their own variance, over what was taken for it: `Σψ²/Σw`; and how much wider the kernel makes
-    /// errors than its weights say: `(Σw/Σψ′)²`. Where noise is not small against the gate, points beyond it are missing on
-    /// both sides.
+    /// What the rows show of their own variance, over what was taken for it: `Σψ²/Σw`; and how much
+    /// wider the kernel makes errors than its weights say: `(Σw/Σψ′)²`. Where noise is not
+    /// small against the gate, points beyond it are missing on both sides.
     pub(super) fn kernel_factors(&self) -> [f64; 2] {
         let [influence, slope, weight] = self.kernel;
         if slope <= 0.0 {
@@ -87,7 +88,8 @@ mod tests {
 
     #[test]
     fn deviations_are_those_of_the_residuals_and_of_the_prior() {
-        // Residuals of half the variance that is stated, on two patches; a prior that says as much as all of them.
+        // Residuals of half the variance that is stated, on two patches; a prior that says as much
+        // as all of them.
         let (n_rows, r, weight) = (1000, 0.002_f64, 1.0 / (2.0 * 0.002 * 0.002));
         let mut normal = Normal::new(1, 1, 2);
         for i in 0..n_rows {

@@ -1,5 +1,6 @@
-//! Where the patches of a link lie and how smoothly its surface is off in; out comes how offset and tilts of each patch follow
-//! from a field over the link, given by its values at a few nodes (METHOD.md §11.4).
+//! Where the patches of a link lie and how smoothly its surface is off in; out comes how offset and
+//! tilts of each patch follow from a field over the link, given by its values at a few nodes
+//! (METHOD.md §11.4).
 
 use geometry::Vector;
 use nalgebra::{DMatrix, RowVector3};
@@ -35,33 +36,37 @@ impl Place {
         Self { x, n, axes: [first, second] }
     }
 
-    /// What a residual at a place with a normal changes by if the patch is off by one along its normal, is tilted so that it is off
-    /// by one at half its edge, or lies beside where it should: that shows where it is bent, and in small things on it.
+    /// What a residual at a place with a normal changes by if the patch is off by one along its
+    /// normal, is tilted so that it is off by one at half its edge, or lies beside where it
+    /// should: that shows where it is bent, and in small things on it.
     #[inline]
     pub(crate) fn shape(&self, (at, n): &(Vector, Vector)) -> Shape {
         let ([s, t], [first, second]) = (self.along(at), &self.axes);
         Shape::new(1.0, s, t, first.dot(n), second.dot(n))
     }
 
-    /// Where a place is on the patch: along its two axes, in halves of a patch's edge from its middle.
+    /// Where a place is on the patch: along its two axes, in halves of a patch's edge from its
+    /// middle.
     fn along(&self, at: &Vector) -> [f64; 2] {
         let off = (at - self.x) / HALF_PATCH;
         self.axes.map(|axis| axis.dot(&off))
     }
 }
 
-/// Likeness of the surface's errors at two places, as it falls with their distance and that of their normals.
+/// Likeness of the surface's errors at two places, as it falls with their distance and that of
+/// their normals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Kernel {
     /// Metres.
     pub(super) length: f64,
-    /// Weight of the normals: 0 where a link is too thick or too thin all around, 1 where opposite sides are off apart.
+    /// Weight of the normals: 0 where a link is too thick or too thin all around, 1 where opposite
+    /// sides are off apart.
     pub(super) sides: f64,
 }
 
 impl Kernel {
-    /// Variance of the ways in which a patch may be off, over that of the field: tilts are its slopes, and what does not grow
-    /// thicker lies elsewhere.
+    /// Variance of the ways in which a patch may be off, over that of the field: tilts are its
+    /// slopes, and what does not grow thicker lies elsewhere.
     pub(super) fn variance(self) -> Square {
         let tilt = (HALF_PATCH / self.length).powi(2);
         let shift = if self.sides > 0.0 { 1.0 } else { 0.0 };
@@ -77,7 +82,8 @@ impl Kernel {
         (-0.5 * self.apart2(a, b)).exp()
     }
 
-    /// Offset and tilts of the patches for independent unit values of a field given by its nodes: three columns for each patch.
+    /// Offset and tilts of the patches for independent unit values of a field given by its nodes:
+    /// three columns for each patch.
     pub(super) fn basis(self, places: &[Place]) -> DMatrix<f64> {
         let nodes = self.nodes(places);
         let n = nodes.len();
@@ -94,7 +100,8 @@ impl Kernel {
                 row.copy_from(&RowVector3::new(like, s, t));
             }
         }
-        // The inverse first: it is small, and a product of matrices is sooner done than solving for many columns.
+        // The inverse first: it is small, and a product of matrices is sooner done than solving for
+        // many columns.
         let inverse =
             own.cholesky().and_then(|own| own.l().solve_lower_triangular(&DMatrix::identity(n, n)));
         inverse.map_or_else(|| DMatrix::zeros(0, basis.ncols()), |inverse| inverse * &basis)

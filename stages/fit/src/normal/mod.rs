@@ -1,8 +1,9 @@
-//! Residuals with their derivatives in; out come the normal equations of robot and scans with the offsets of the
-//! model's patches taken out in closed form, and their solution (METHOD.md §11).
+//! Residuals with their derivatives in; out come the normal equations of robot and scans with the
+//! offsets of the model's patches taken out in closed form, and their solution (METHOD.md §11).
 //!
-//! Residuals of patch c have `φ·u_c` in common: it is off as a whole, tilted, and what is on it shifted (`φ`: [`Place::shape`]).
-//! Sums over a patch are all that is needed of them: `A_c = Σ w J φᵀ`, `R_c = Σ w r φ`, `W_c = Σ w φ φᵀ`.
+//! Residuals of patch c have `φ·u_c` in common: it is off as a whole, tilted, and what is on it
+//! shifted (`φ`: [`Place::shape`]). Sums over a patch are all that is needed of them: `A_c = Σ w J
+//! φᵀ`, `R_c = Σ w r φ`, `W_c = Σ w φ φᵀ`.
 
 mod covariance;
 mod field;
@@ -40,7 +41,8 @@ pub(crate) struct Row<'a> {
 #[inline]
 pub(crate) fn add_scaled(sums: &mut [f64], factor: f64, row: &[f64]) {
     debug_assert_eq!(sums.len(), row.len());
-    // Rows are short: four at a time, what is left one by one. A plain loop takes sixteen at a time, and rows are shorter.
+    // Rows are short: four at a time, what is left one by one. A plain loop takes sixteen at a
+    // time, and rows are shorter.
     let (sums, sums_left) = sums.as_chunks_mut::<4>();
     let (row, row_left) = row.as_chunks::<4>();
     for (sums, row) in sums.iter_mut().zip(row) {
@@ -136,7 +138,8 @@ pub(crate) struct Normal {
     gradient: DVector<f64>,
     patches: Vec<Option<Patch>>,
     batch: Batch,
-    /// What the priors add to the normal matrix: how well they are known does not depend on the residuals.
+    /// What the priors add to the normal matrix: how well they are known does not depend on the
+    /// residuals.
     priors: DMatrix<f64>,
     /// Sums of the rows' influences, of slopes over variance, and of weights.
     kernel: [f64; 3],
@@ -230,8 +233,8 @@ impl Normal {
         self
     }
 
-    /// Takes the patches' offsets out, as smooth as told, or as is likeliest. Call once, after the last residual and all
-    /// priors.
+    /// Takes the patches' offsets out, as smooth as told, or as is likeliest. Call once, after the
+    /// last residual and all priors.
     pub(crate) fn close(&mut self, of: &Patches, told: Option<Smoothness>, fan: &dyn Fan) {
         self.flush();
         self.hessian.fill_upper_triangle_with_lower_triangle();
@@ -273,7 +276,8 @@ impl Normal {
             return None;
         }
         let [_, slopes, weights] = self.kernel;
-        // What points say gives way as the kernel does; priors are squares, and ask for no longer step.
+        // What points say gives way as the kernel does; priors are squares, and ask for no longer
+        // step.
         let of_points = &self.hessian - &self.priors;
         let hessian = of_points / robust::stretch(weights, slopes) + &self.priors;
         let step = hessian.cholesky()?.solve(&-&self.gradient);
@@ -282,7 +286,8 @@ impl Normal {
         Some(if longest > MAX_STEP { step * (MAX_STEP / longest) } else { step })
     }
 
-    /// Squared length of a step in stated standard deviations: no unknown moves by more than its root.
+    /// Squared length of a step in stated standard deviations: no unknown moves by more than its
+    /// root.
     pub(crate) fn deviations(&self, step: &DVector<f64>) -> f64 {
         step.dot(&(&self.hessian * step))
     }
@@ -303,8 +308,8 @@ const MIN_ROWS: usize = 30;
 /// Longest step of an adjustment, radians and metres.
 const MAX_STEP: f64 = 0.1;
 
-/// Variance of the patches' offsets, m²: that of their mean residuals beyond what noise explains, each weighted by how
-/// well it is known against an offset of a millimetre (METHOD.md §11).
+/// Variance of the patches' offsets, m²: that of their mean residuals beyond what noise explains,
+/// each weighted by how well it is known against an offset of a millimetre (METHOD.md §11).
 fn patch_variance<'a>(patches: impl Iterator<Item = &'a Patch>) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     for patch in patches.filter(|p| p.total() > 0.0) {

@@ -1,8 +1,10 @@
-//! Sums of residuals over the patches of a model's surface, and where those lie, in; out come the same sums with the ways in
-//! which patches may be off taken out, smooth over each link as far as the residuals say so (METHOD.md §11.4).
+//! Sums of residuals over the patches of a model's surface, and where those lie, in; out come the
+//! same sums with the ways in which patches may be off taken out, smooth over each link as far as
+//! the residuals say so (METHOD.md §11.4).
 //!
-//! A patch is off by `u_c = B_c·z + e_c`: a smooth field over its link, a Gaussian process given by its values at a few nodes
-//! (sparse approximation "FITC" of Snelson and Ghahramani, 2006), and a rest of its own. Both are integrated out.
+//! A patch is off by `u_c = B_c·z + e_c`: a smooth field over its link, a Gaussian process given by
+//! its values at a few nodes (sparse approximation "FITC" of Snelson and Ghahramani, 2006), and a
+//! rest of its own. Both are integrated out.
 
 use contract::Fan;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix};
@@ -47,13 +49,15 @@ pub(crate) enum Smoothness {
     Field(Kernel),
 }
 
-/// What castings, hulls and sheets are looked for as: lengths, metres, the middle one first; and whether their sides are off
-/// apart.
+/// What castings, hulls and sheets are looked for as: lengths, metres, the middle one first; and
+/// whether their sides are off apart.
 const LENGTHS: [f64; 3] = [0.2, 0.1, 0.4];
 const SIDES: [f64; 2] = [0.0, 1.0];
-/// What is off each patch by itself is so over this length, metres: its tilts are as large as such a field's.
+/// What is off each patch by itself is so over this length, metres: its tilts are as large as such
+/// a field's.
 const ROUGH: Kernel = Kernel { length: 0.1, sides: 1.0 };
-/// Share of the variance of a smooth offset that is a patch's own: a field is not the same all over it.
+/// Share of the variance of a smooth offset that is a patch's own: a field is not the same all over
+/// it.
 const OWN: f64 = 0.02;
 /// Smaller offsets are not worth a choice, metres.
 const NO_OFFSET: f64 = 1e-4;
@@ -118,8 +122,9 @@ struct Field {
     pull: DVector<f64>,
 }
 
-/// Takes the patches' offsets of variance `sigma2` out of the normal equations (with all priors, without the residuals' gradient)
-/// and of the patches' own sums. How smooth they were taken for: as told, or as is likeliest.
+/// Takes the patches' offsets of variance `sigma2` out of the normal equations (with all priors,
+/// without the residuals' gradient) and of the patches' own sums. How smooth they were taken for:
+/// as told, or as is likeliest.
 pub(super) fn take_out(
     (hessian, gradient): (&mut DMatrix<f64>, &mut DVector<f64>),
     (patches, of): (&mut [Option<Patch>], &Patches),
@@ -149,8 +154,8 @@ pub(super) fn take_out(
     smoothness
 }
 
-/// The smoothness under which the residuals are likeliest, whatever base, posture and scans are: first whether sides are off
-/// alike, at a middle length, then at which.
+/// The smoothness under which the residuals are likeliest, whatever base, posture and scans are:
+/// first whether sides are off alike, at a middle length, then at which.
 fn likeliest(
     equations: (&DMatrix<f64>, &DVector<f64>),
     links: &[Link],
@@ -309,7 +314,8 @@ mod tests {
     use contract::OneByOne;
     use nalgebra::Vector3;
 
-    /// A link of two sides, ten patches each along a line, on which an offset of `wave` lies; one unknown shifts all.
+    /// A link of two sides, ten patches each along a line, on which an offset of `wave` lies; one
+    /// unknown shifts all.
     fn link(wave: impl Fn(usize, f64) -> f64) -> (Vec<Option<Patch>>, Patches) {
         let (weight, mut patches, mut of) = (1e9, Vec::new(), Patches::default());
         for i in 0..20_usize {

@@ -1,5 +1,5 @@
-//! A posture with a joint's rough value in; its value by registration of the joint's links, tied to two points of the
-//! joint's axis, out (the source, Eq. 4.1; METHOD.md §10).
+//! A posture with a joint's rough value in; its value by registration of the joint's links, tied to
+//! two points of the joint's axis, out (the source, Eq. 4.1; METHOD.md §10).
 
 use geometry::{Point, Pose, Vector, robust};
 use robot::JointKind;
@@ -16,7 +16,8 @@ const MIN_POINTS: usize = 20;
 const STOP: f64 = 1.7e-6;
 /// Largest step, radians or metres: a rough value is not farther off.
 const MAX_STEP: f64 = 0.03;
-/// Closest points creep along smooth links: a step is stretched as its ratio to the one before tells, at most so much.
+/// Closest points creep along smooth links: a step is stretched as its ratio to the one before
+/// tells, at most so much.
 const MAX_STRETCH: f64 = 12.0;
 /// A normal must face the scanner by this cosine.
 const MIN_FACING: f64 = 0.15;
@@ -77,8 +78,8 @@ impl Paper<'_> {
         Some(about_axis(&from, &to, ([ends - half, ends + half], self.settings.axis_weight)))
     }
 
-    /// Closest points of the joint's links, and the measured points that they belong to, local frame; the farther half
-    /// of a skewed lot is left out.
+    /// Closest points of the joint's links, and the measured points that they belong to, local
+    /// frame; the farther half of a skewed lot is left out.
     fn pairs(
         &self,
         h: &Hypothesis,
@@ -149,8 +150,9 @@ impl Paper<'_> {
     }
 }
 
-/// Eq. 4.1 in closed form: the turn about an axis that best brings points onto others, by the rigid motion that also
-/// keeps two points of the axis, of so much weight against all others together, and its twist about that axis. Radians.
+/// Eq. 4.1 in closed form: the turn about an axis that best brings points onto others, by the rigid
+/// motion that also keeps two points of the axis, of so much weight against all others together,
+/// and its twist about that axis. Radians.
 fn about_axis(from: &[Vector], to: &[Vector], (ends, weight): ([Vector; 2], f64)) -> f64 {
     let each = weight * from.len() as f64;
     let (mut a, mut b, mut weights) = (from.to_vec(), to.to_vec(), vec![1.0; from.len()]);

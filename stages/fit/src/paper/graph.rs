@@ -1,5 +1,5 @@
-//! Points and their heights over a plane in; out come those near the plane along the surface, by Dijkstra's algorithm
-//! on the graph of nearest neighbours (the source, §3.1; METHOD.md §10).
+//! Points and their heights over a plane in; out come those near the plane along the surface, by
+//! Dijkstra's algorithm on the graph of nearest neighbours (the source, §3.1; METHOD.md §10).
 
 use geometry::Vector;
 use std::cmp::Reverse;
@@ -16,7 +16,8 @@ pub(super) fn farthest(
     distances(points, settings, height).into_iter().filter(|d| d.is_finite()).fold(0.0, f64::max)
 }
 
-/// Connected sets of the points whose distance from the plane along the surface is at most `limit`, largest first.
+/// Connected sets of the points whose distance from the plane along the surface is at most `limit`,
+/// largest first.
 pub(super) fn near_plane(
     points: &[Vector],
     settings: &PaperSettings,
@@ -53,7 +54,8 @@ pub(super) fn near_plane(
 /// Fewer points are no base.
 const MIN_POINTS: usize = 100;
 
-/// Distance of each point from the plane along the graph, metres; infinite where no way leads there.
+/// Distance of each point from the plane along the graph, metres; infinite where no way leads
+/// there.
 fn distances(
     points: &[Vector],
     settings: &PaperSettings,
@@ -132,7 +134,8 @@ mod tests {
 
     #[test]
     fn the_way_leads_over_the_surface_of_a_box() {
-        // A box of 0.4 × 0.4 × 0.3 m, sampled every 12 mm: from the ground up a side and to the middle of the top.
+        // A box of 0.4 × 0.4 × 0.3 m, sampled every 12 mm: from the ground up a side and to the
+        // middle of the top.
         let n = |v: f64| (v / 0.012).round() as i32;
         let mut points = Vec::new();
         for i in 0..=n(0.4) {

@@ -1,5 +1,5 @@
-//! Views in; out come angular lattices of their points, on which the point nearest to any place is found by looking at
-//! a few pixels (the source, §4).
+//! Views in; out come angular lattices of their points, on which the point nearest to any place is
+//! found by looking at a few pixels (the source, §4).
 
 use contract::View;
 use geometry::{Point, Vector, direction};
@@ -27,8 +27,8 @@ impl Lattices {
         Self(views.iter().filter_map(|view| Lattice::new(view)).collect())
     }
 
-    /// Distance from a surface sample (local frame) to the nearest measured point in the windows of the scans that it
-    /// faces, at most `cap`; `None` where it faces none.
+    /// Distance from a surface sample (local frame) to the nearest measured point in the windows of
+    /// the scans that it faces, at most `cap`; `None` where it faces none.
     pub(super) fn nearest(&self, p: &Point, n: &Vector, window: i32, cap: f64) -> Option<f64> {
         let mut best: Option<f64> = None;
         for lattice in &self.0 {
@@ -103,7 +103,8 @@ impl Lattice {
     }
 }
 
-/// Elevation and azimuth from the scanner, radians. A region that straddles ±180° makes a wide lattice, no wrong one.
+/// Elevation and azimuth from the scanner, radians. A region that straddles ±180° makes a wide
+/// lattice, no wrong one.
 fn angles(scanner: &Point, p: &Point) -> [f64; 2] {
     let d = p - scanner;
     let (azimuth, elevation, _) = direction::spherical([d.x as f32, d.y as f32, d.z as f32]);

@@ -1,10 +1,12 @@
-//! A region's points, the planes under it and a model in; the fit of the method's source out, link after link, as it is
-//! described there (§§3–6): the baseline that the other method is measured against.
+//! A region's points, the planes under it and a model in; the fit of the method's source out, link
+//! after link, as it is described there (§§3–6): the baseline that the other method is measured
+//! against.
 //!
-//! Installation plane, geodesic candidates of the base (`graph`), boxes and equal steps of yaw (`rough`), sparse ICP
-//! (`sparse`), then for each joint a sweep with nearest neighbours on the angular lattices (`lattice`, `sweep`) and the
-//! registration of its link tied to two points of the joint's axis, Eq. 4.1 (`axis`). Links of sub chains follow by the
-//! model's own inverse kinematics of loops. No free space, no joint adjustment.
+//! Installation plane, geodesic candidates of the base (`graph`), boxes and equal steps of yaw
+//! (`rough`), sparse ICP (`sparse`), then for each joint a sweep with nearest neighbours on the
+//! angular lattices (`lattice`, `sweep`) and the registration of its link tied to two points of the
+//! joint's axis, Eq. 4.1 (`axis`). Links of sub chains follow by the model's own inverse kinematics
+//! of loops. No free space, no joint adjustment.
 
 mod axis;
 mod graph;
@@ -25,7 +27,8 @@ use crate::judge::{evidence, judge};
 use crate::{Prepared, Scene, Settings};
 use lattice::Lattices;
 
-/// Stated for each joint: the source's own worst joint (Table 1), since the method gives no uncertainty.
+/// Stated for each joint: the source's own worst joint (Table 1), since the method gives no
+/// uncertainty.
 const SIGMA: f64 = 0.0094;
 /// Steps to each side when a base is settled.
 const N_SETTLE: i32 = 10;
@@ -77,8 +80,8 @@ pub fn fit(
 }
 
 impl Paper<'_> {
-    /// Poses of the base on a plane: one for each connected set of points that is as near to the plane, along the
-    /// surface, as the base is high.
+    /// Poses of the base on a plane: one for each connected set of points that is as near to the
+    /// plane, along the surface, as the base is high.
     fn bases(&self, plane: &Plane) -> Vec<Pose> {
         let s = self.settings;
         let points: Vec<Vector> = self
@@ -106,8 +109,8 @@ impl Paper<'_> {
         out
     }
 
-    /// Sparse registration; then the place and the yaw about it at which the base's own samples lie best, in equal
-    /// steps, and registration again.
+    /// Sparse registration; then the place and the yaw about it at which the base's own samples lie
+    /// best, in equal steps, and registration again.
     fn settle_base(&self, start: &Pose, candidates: &[Vector]) -> Pose {
         let mut pose = sparse::register(self, start, candidates);
         for [shift, turn] in self.settings.settle_steps {

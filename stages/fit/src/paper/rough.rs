@@ -1,5 +1,5 @@
-//! Points that may be a base, and the base's model, in; out comes where it stands, by boxes in the plane and equal
-//! steps of yaw (the source, §3.2).
+//! Points that may be a base, and the base's model, in; out comes where it stands, by boxes in the
+//! plane and equal steps of yaw (the source, §3.2).
 
 use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Matrix2, Rotation3, Translation3, Unit, UnitQuaternion, Vector2};
@@ -13,7 +13,8 @@ const SQUARE: f64 = 1.3;
 const N_FINE: usize = 6;
 /// … at least so far apart, radians: 20°.
 const APART: f64 = 0.35;
-/// A yaw off the boxes' axes by more than this is not tried where the boxes have axes, radians: 20°.
+/// A yaw off the boxes' axes by more than this is not tried where the boxes have axes, radians:
+/// 20°.
 const OFF_AXIS: f64 = 0.35;
 
 /// Local from base: the best yaws, best first.
@@ -84,7 +85,8 @@ impl Paper<'_> {
         self.prepared.model.poses(&self.prepared.model.home())[self.base]
     }
 
-    /// The closest point of a link's surface, and its normal, link frame; `None` beyond the field's reach.
+    /// The closest point of a link's surface, and its normal, link frame; `None` beyond the field's
+    /// reach.
     pub(super) fn closest(&self, link: usize, q: &Point) -> Option<(Point, Vector)> {
         let p = [q.x as f32, q.y as f32, q.z as f32];
         let fields = &self.prepared.links[link].fields;

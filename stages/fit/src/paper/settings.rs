@@ -15,7 +15,8 @@ pub struct Settings {
     pub foot_high: f64,
     /// Points higher above the plane are no base's, metres.
     pub max_height: f64,
-    /// Factor on, and addition to (metres), the base's largest distance from the plane along its surface.
+    /// Factor on, and addition to (metres), the base's largest distance from the plane along its
+    /// surface.
     pub geodesic_slack: [f64; 2],
     /// Most connected sets that are tried as a base.
     pub max_bases: usize,
@@ -23,7 +24,8 @@ pub struct Settings {
     pub yaw_step: [f64; 2],
     /// Steps along the axes of a registered base, metres, and of yaw, radians, round by round.
     pub settle_steps: [[f64; 2]; 2],
-    /// Distances beyond this count as this when yaws are compared, metres: missing sides must not shift it.
+    /// Distances beyond this count as this when yaws are compared, metres: missing sides must not
+    /// shift it.
     pub truncation: f64,
     /// Exponent of the sparse norm, 0..1.
     pub sparse_p: f64,
@@ -35,8 +37,8 @@ pub struct Settings {
     pub sweep_step: [f64; 2],
     /// Half width of the window on a lattice, pixels.
     pub window: i32,
-    /// Share of a link's samples that a quarter turn about its joint must move off its surface, else the child decides
-    /// too.
+    /// Share of a link's samples that a quarter turn about its joint must move off its surface,
+    /// else the child decides too.
     pub near_symmetric: f64,
     /// Weight of the two points of the axis in Eq. 4.1, against all correspondences together.
     pub axis_weight: f64,

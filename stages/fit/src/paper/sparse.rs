@@ -1,5 +1,6 @@
-//! Candidate points and a rough pose of the base in; the pose by sparse iterative closest points out: an ℓp norm, p < 1,
-//! minimised by alternating directions with multipliers (the source, §3.2; METHOD.md §10).
+//! Candidate points and a rough pose of the base in; the pose by sparse iterative closest points
+//! out: an ℓp norm, p < 1, minimised by alternating directions with multipliers (the source, §3.2;
+//! METHOD.md §10).
 
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};

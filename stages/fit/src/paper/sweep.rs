@@ -1,4 +1,5 @@
-//! A posture whose joints before one are set in; that joint's value by a sweep in equal steps out (the source, §4).
+//! A posture whose joints before one are set in; that joint's value by a sweep in equal steps out
+//! (the source, §4).
 
 use geometry::{Point, Pose, Vector};
 use robot::JointKind;
@@ -24,8 +25,8 @@ const BASE: Look = Look { n_samples: 960, cap: 0.05 };
 const OFF_SURFACE: f32 = 0.012;
 
 impl Paper<'_> {
-    /// The value with the smallest mean distance: that of the joint's own link, or, where that is nearly symmetric about
-    /// the joint's axis, together with the next one's best.
+    /// The value with the smallest mean distance: that of the joint's own link, or, where that is
+    /// nearly symmetric about the joint's axis, together with the next one's best.
     pub(super) fn sweep(&self, h: &Hypothesis, joint: usize) -> f64 {
         let next = (joint + 1..h.posture.len()).find(|&j| !self.prepared.placed_by[j].is_empty());
         let ahead = next.filter(|_| self.is_near_symmetric(joint));
@@ -97,8 +98,8 @@ impl Paper<'_> {
         self.off_links([base].into_iter(), None, BASE)
     }
 
-    /// Mean distance of the visible samples of links at poses from what was measured, metres: those that face a scanner and
-    /// are not within the link that carries them.
+    /// Mean distance of the visible samples of links at poses from what was measured, metres: those
+    /// that face a scanner and are not within the link that carries them.
     fn off_links(
         &self,
         links: impl Iterator<Item = (usize, Pose)>,

@@ -6,8 +6,8 @@ use geometry::Pose;
 
 const PRIORS: [f64; N_SCAN] = [1e5, 1e5, 1e5, 1e7, 1e7, 1e7, 1e6];
 
-/// A robot whose points say that the second of two scans needs 4 mm less along x than the first, and whose base follows the second
-/// one by so much.
+/// A robot whose points say that the second of two scans needs 4 mm less along x than the first,
+/// and whose base follows the second one by so much.
 fn own(share: f64) -> Own {
     let n = 2 * N_SCAN;
     let mut row = DVector::zeros(n);
@@ -79,7 +79,8 @@ fn a_scan_that_walls_see_off_moves_the_robot_that_it_alone_sees() {
     let ids = [ScanId(3), ScanId(5), ScanId(7)];
     let told = Told::by_surfaces(&still, &scans, &ids).expect("they overlap");
     let n = N_SCAN;
-    // Only that scan sees the robot: alone nothing is known of its errors, and the base follows them.
+    // Only that scan sees the robot: alone nothing is known of its errors, and the base follows
+    // them.
     let mut gain = DMatrix::zeros(6, n);
     (0..3).for_each(|i| gain[(i, i)] = 1.0);
     let robot = Own {

@@ -1,5 +1,5 @@
-//! The first records of a scan in; what they say of it out: where its points lie, whether beams without return are among them,
-//! how coarse its coordinates are, and what its intensities span.
+//! The first records of a scan in; what they say of it out: where its points lie, whether beams
+//! without return are among them, how coarse its coordinates are, and what its intensities span.
 
 use super::pages::Pages;
 use super::points::{Points, Wanted};

@@ -1,4 +1,5 @@
-//! E57 files whose points are odd: beams without return at the origin, intensities outside their limits, coarse coordinates.
+//! E57 files whose points are odd: beams without return at the origin, intensities outside their
+//! limits, coarse coordinates.
 
 use super::own_tests::{Own, record, write};
 use super::tests::{read, settings};
@@ -41,7 +42,8 @@ fn posed() -> Option<Transform> {
 #[test]
 fn returns_at_the_scanner_are_no_returns_and_keep_their_places() {
     let known = Own { transform: posed(), ..singles(with_no_returns(8000)) };
-    // Without a pose or rows and columns no scanner is known; the origin is no point of the room even so.
+    // Without a pose or rows and columns no scanner is known; the origin is no point of the room
+    // even so.
     let unknown = singles(with_no_returns(8000));
     let file = write("origin.e57", vec![known, unknown], |xml| xml);
     let reader = open(&file.0, &settings()).expect("valid");

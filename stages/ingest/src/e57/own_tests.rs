@@ -19,7 +19,8 @@ pub(super) fn record(name: RecordName, data_type: RecordDataType) -> Record {
     Record { name, data_type }
 }
 
-/// Structured, scaled integers of 21 bits, doubles and singles mixed, states, intensity, colour, odd widths.
+/// Structured, scaled integers of 21 bits, doubles and singles mixed, states, intensity, colour,
+/// odd widths.
 fn own(n_points: usize) -> Own {
     let scaled =
         RecordDataType::ScaledInteger { min: -1_000_000, max: 1_000_000, scale: 1e-4, offset: 0.5 };
@@ -99,7 +100,8 @@ fn own_file_comes_back_with_gaps_and_attributes() {
             assert_eq!(scans[0].xyz[at], [x as f32, y as f32, z as f32]);
             let want = [100.0 - y, 200.0 + x, 300.0 + z];
             assert!((0..3).all(|i| (scans[0].attributes.world[at][i] - want[i]).abs() < 1e-9));
-            // Half of them lie outside the limits that the file states, which are not believed then.
+            // Half of them lie outside the limits that the file states, which are not believed
+            // then.
             let level = ((n % 4096) as f64 / 4095.0 * 65_535.0).round() as u16;
             assert_eq!(scans[0].attributes.intensity[at], level);
             assert_eq!(scans[0].attributes.color[at][..2], [(n % 256) as u16 * 257, 65_535]);
@@ -119,8 +121,8 @@ fn own_file_comes_back_with_gaps_and_attributes() {
 #[test]
 fn bounds_of_a_turned_scan_are_those_of_its_points() {
     let mut turned = own(4000);
-    // A diagonal line, turned by 45°: the corners of its box lie far off it. It begins 35 mm from the
-    // scanner, where points are no beams without return.
+    // A diagonal line, turned by 45°: the corners of its box lie far off it. It begins 35 mm from
+    // the scanner, where points are no beams without return.
     for (n, point) in turned.points.iter_mut().enumerate() {
         let along = n.max(20) as f64 * 1e-3;
         point[0] = RecordValue::ScaledInteger((along * 1e4) as i64 - 5000);

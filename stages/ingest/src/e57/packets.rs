@@ -1,5 +1,5 @@
-//! Pages of one scan's section in, columns of numbers out, record by record in step over all fields. Knows that
-//! counts may lie: what the packets hold must be what the scan announces.
+//! Pages of one scan's section in, columns of numbers out, record by record in step over all
+//! fields. Knows that counts may lie: what the packets hold must be what the scan announces.
 
 use super::pages::Pages;
 use super::stream::Stream;
@@ -10,9 +10,11 @@ use e57::Record;
 const SECTION_HEADER: u64 = 32;
 /// Kind, flags, length and number of fields of a packet of points, bytes.
 const PACKET_HEADER: usize = 6;
-/// Largest run-ahead of one field before another, bytes. Writers fill packets of 64 KiB with all fields in step.
+/// Largest run-ahead of one field before another, bytes. Writers fill packets of 64 KiB with all
+/// fields in step.
 const MAX_AHEAD: usize = 16 << 20;
-/// Records that may take no bits at all: a scan whose every field is constant has a handful of points.
+/// Records that may take no bits at all: a scan whose every field is constant has a handful of
+/// points.
 const MAX_CONSTANT: u64 = 65_536;
 
 /// The packets of one scan, and what of them was not decoded yet.
@@ -31,7 +33,8 @@ pub(super) struct Packets {
 }
 
 impl Packets {
-    /// Opens the section at `file_offset` (on disk). `wanted[i]` tells whether field `i` will be decoded.
+    /// Opens the section at `file_offset` (on disk). `wanted[i]` tells whether field `i` will be
+    /// decoded.
     pub(super) fn open(
         mut pages: Pages,
         file_offset: u64,
@@ -120,8 +123,8 @@ impl Packets {
         Ok(())
     }
 
-    /// Number of records that can be decoded now, at least one and at most `most`; none at the end, which is checked
-    /// to be where it was announced.
+    /// Number of records that can be decoded now, at least one and at most `most`; none at the end,
+    /// which is checked to be where it was announced.
     pub(super) fn ready(&mut self, most: usize) -> Result<usize> {
         if self.n_left == 0 {
             return self.check_end().map(|()| 0);

@@ -1,5 +1,5 @@
-//! Places in an E57 file in, bytes out: pages of 1024 bytes, of which the last four are a checksum of the rest.
-//! Every checksum on the way is checked. Knows no packets and no points.
+//! Places in an E57 file in, bytes out: pages of 1024 bytes, of which the last four are a checksum
+//! of the rest. Every checksum on the way is checked. Knows no packets and no points.
 
 use contract::{Error, Result};
 use std::fs::File;
@@ -10,7 +10,8 @@ use std::path::Path;
 pub(super) const PAGE: u64 = 1024;
 /// Bytes of a page before its checksum.
 const PAYLOAD: u64 = PAGE - 4;
-/// Pages read at once: 256 KiB keeps a disk busy and the second-level cache warm, and holds any packet (64 KiB).
+/// Pages read at once: 256 KiB keeps a disk busy and the second-level cache warm, and holds any
+/// packet (64 KiB).
 const WINDOW: u64 = 256;
 
 /// An open file, seen without its checksums.
@@ -100,8 +101,8 @@ impl Pages {
         Ok(())
     }
 
-    /// Checks the pages of the window before page `until`: only those that are needed, so that damage elsewhere in
-    /// the file (a picture, another scan) is not mistaken for damage here.
+    /// Checks the pages of the window before page `until`: only those that are needed, so that
+    /// damage elsewhere in the file (a picture, another scan) is not mistaken for damage here.
     fn check(&mut self, until: u64) -> Result<()> {
         let done = self.checked.len() as u64 / PAYLOAD;
         for n in done..until - self.first {

@@ -12,8 +12,8 @@ use geometry::{Aabb, Point, Pose};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
-/// Share of the points looked at that lie at the origin of a file whose scanner is not known, from which on they are beams
-/// without return: a single one may have been measured.
+/// Share of the points looked at that lie at the origin of a file whose scanner is not known, from
+/// which on they are beams without return: a single one may have been measured.
 const NO_RETURNS: f64 = 0.005;
 /// Scans of fewer points are a writer's examples, and the origin may be one of their points.
 const FEW: usize = 64;
@@ -119,7 +119,8 @@ impl E57Scan {
         MaskSeed { name: name.into(), n_points: self.n_valid(), n_stated }
     }
 
-    /// Number of points that the file does not flag as invalid, where that is known without reading them.
+    /// Number of points that the file does not flag as invalid, where that is known without reading
+    /// them.
     fn n_valid(&self) -> Option<u64> {
         match self.state.map(|field| &self.prototype[field].data_type) {
             None | Some(RecordDataType::Integer { min: 0, max: 0 }) => Some(self.n_records),
@@ -174,7 +175,8 @@ impl E57Scan {
         })
     }
 
-    /// Finds intensity and colour and what their values span; whether the file states that of the intensity.
+    /// Finds intensity and colour and what their values span; whether the file states that of the
+    /// intensity.
     fn channels(&mut self, cloud: &PointCloud) -> bool {
         let channel = |name: RecordName, limits: Option<[&Option<RecordValue>; 2]>| {
             let field = cloud.prototype.iter().position(|r| r.name == name)?;
@@ -217,7 +219,8 @@ impl E57Scan {
         }
     }
 
-    /// The scan frame: the file's own where its origin can be the scanner, else one about the points.
+    /// The scan frame: the file's own where its origin can be the scanner, else one about the
+    /// points.
     fn judge(
         &self,
         cloud: &PointCloud,

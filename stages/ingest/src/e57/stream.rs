@@ -1,5 +1,5 @@
-//! Bytes of one field of the points in, numbers out: floats and bit-packed integers that run on from packet to
-//! packet.
+//! Bytes of one field of the points in, numbers out: floats and bit-packed integers that run on
+//! from packet to packet.
 
 use contract::{Error, Result};
 use e57::RecordDataType;
@@ -87,7 +87,8 @@ impl Stream {
         self.n_bits = self.n_bits - whole * 8 + bytes.len() as u64 * 8;
     }
 
-    /// Whether only the padding that ends a stream is left: integers are written in words of up to 64 bits.
+    /// Whether only the padding that ends a stream is left: integers are written in words of up to
+    /// 64 bits.
     pub(super) fn is_spent(&self) -> bool {
         let left = self.n_bits - self.at;
         match self.coding {

@@ -17,8 +17,8 @@ const N_SAMPLED_FROM: u64 = 4_000_000;
 /// Runs of a sample.
 const N_RUNS: u64 = 4;
 
-/// Most places that a strip spans, so that they fit 32 bits; only reached where thousands of millions of points in a
-/// row are broken.
+/// Most places that a strip spans, so that they fit 32 bits; only reached where thousands of
+/// millions of points in a row are broken.
 const MAX_SPAN: u64 = 1 << 31;
 
 /// Strips of one file.
@@ -112,8 +112,8 @@ impl<'a> Strips<'a> {
             self.named = strip.first_place + u64::from(*last) + 1;
             return Ok(Some(strip));
         }
-        // At the end. Where nobody knows how long the mask is, and its last points were dropped, a strip without
-        // points says it.
+        // At the end. Where nobody knows how long the mask is, and its last points were dropped, a
+        // strip without points says it.
         let told = self.file.masks[self.scan].n_points.is_some() || self.named == place;
         self.named = place;
         Ok((!told).then_some(RawStrip { first_place: place, ..strip }))

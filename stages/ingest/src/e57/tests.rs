@@ -130,7 +130,8 @@ fn same_as_others(path: &Path, expected: &[(usize, Summary)]) {
             continue;
         }
         if summary[2][0] > 1e9 {
-            // Coordinates of 10¹⁵ m: each point keeps its place, those far from the others are dropped.
+            // Coordinates of 10¹⁵ m: each point keeps its place, those far from the others are
+            // dropped.
             assert!(scan.place.len() < *n_points, "{place}");
             continue;
         }

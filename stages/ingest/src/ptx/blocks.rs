@@ -1,4 +1,5 @@
-//! A PTX file in; its blocks out: where each begins, its pose, how many lines hold a point. No point is kept.
+//! A PTX file in; its blocks out: where each begins, its pose, how many lines hold a point. No
+//! point is kept.
 
 use super::Block;
 use super::look::Look;
@@ -17,7 +18,8 @@ const RIGID: f64 = 1e-3;
 /// How far the stated scanner position may be from the matrix, metres, before it is mentioned.
 const SAME_POSITION: f64 = 1e-3;
 
-/// All blocks of the file, in its order, with what is missing in each; one unit of it has so many metres.
+/// All blocks of the file, in its order, with what is missing in each; one unit of it has so many
+/// metres.
 pub(super) fn find(path: &Path, metres: f64) -> Result<Vec<(Block, Vec<String>)>> {
     let n_bytes = std::fs::metadata(path)?.len();
     let mut lines = Lines::open(path, 0, 0)?;
@@ -119,7 +121,8 @@ fn count(lines: &Lines) -> Result<u64> {
     Ok(value as u64)
 }
 
-/// Scanner position, axes and matrix, brought to metres. Only the matrix counts; that the position differs is mentioned.
+/// Scanner position, axes and matrix, brought to metres. Only the matrix counts; that the position
+/// differs is mentioned.
 fn pose(lines: &mut Lines, metres: f64, notes: &mut Vec<String>) -> Result<Pose> {
     next(lines)?;
     let position = Vector3::from(lines.exactly::<3>()?) * metres;
@@ -145,8 +148,8 @@ fn pose(lines: &mut Lines, metres: f64, notes: &mut Vec<String>) -> Result<Pose>
     Ok(pose)
 }
 
-/// World from the file's frame. PTX multiplies row vectors from the left: the first three rows are the axes of the
-/// scanner in the world, the last its position.
+/// World from the file's frame. PTX multiplies row vectors from the left: the first three rows are
+/// the axes of the scanner in the world, the last its position.
 fn rigid(rows: [[f64; 4]; 4]) -> Result<Pose> {
     let axes = Matrix3::from_fn(|i, j| rows[j][i]);
     let position = Vector3::new(rows[3][0], rows[3][1], rows[3][2]);

@@ -1,5 +1,5 @@
-//! Some lines of a block in; what they say of all out: where its points lie, whether beams without return are among them, how
-//! coarse its coordinates are, and what its intensities span.
+//! Some lines of a block in; what they say of all out: where its points lie, whether beams without
+//! return are among them, how coarse its coordinates are, and what its intensities span.
 
 use crate::frame::NO_RETURN;
 use crate::levels::Span;
@@ -36,8 +36,8 @@ impl Look {
         Self { every, metres, points, n_first: 0, n_at_origin: 0, n_looked: 0, intensities }
     }
 
-    /// Takes a line with a point, the `n`th of them, of so many numbers; what is no number is refused when points are read, here
-    /// it is only left out.
+    /// Takes a line with a point, the `n`th of them, of so many numbers; what is no number is
+    /// refused when points are read, here it is only left out.
     pub(super) fn add(&mut self, n: u64, line: &[u8], n_columns: usize) {
         let is_first = self.points.len() < N_JUDGED;
         if !is_first && !n.is_multiple_of(self.every) {
@@ -71,7 +71,8 @@ impl Look {
         crate::steps::coarse(&self.points)
     }
 
-    /// Which intensities become 0 and 65535, and what is odd about that: the format has them from 0 to 1.
+    /// Which intensities become 0 and 65535, and what is odd about that: the format has them from 0
+    /// to 1.
     pub(super) fn intensity(&self) -> (Span, Option<String>) {
         Span { min: 0.0, max: 1.0 }.suited(&self.intensities, false)
     }

@@ -31,8 +31,8 @@ impl<'a> Points<'a> {
         Ok(Self { block, lines: Lines::open(&file.path, byte, line)?, n_read: 0, values: [0.0; 7] })
     }
 
-    /// Goes to the next line that the file does not flag as a beam without return; false after the block's last.
-    /// Only the first `n_wanted` numbers are parsed.
+    /// Goes to the next line that the file does not flag as a beam without return; false after the
+    /// block's last. Only the first `n_wanted` numbers are parsed.
     fn advance(&mut self, n_wanted: usize) -> Result<bool> {
         while self.n_read < self.block.n_lines {
             if !self.lines.advance()? {
@@ -58,7 +58,8 @@ impl<'a> Points<'a> {
         Ok(false)
     }
 
-    /// The current point in the scan frame, metres; `None` where it is broken, or lies at the scanner itself.
+    /// The current point in the scan frame, metres; `None` where it is broken, or lies at the
+    /// scanner itself.
     fn xyz(&self, max_range: f64) -> Option<[f64; 3]> {
         let p = self.in_scan();
         let is_good = p.iter().all(|v| v.abs() <= max_range) && !self.block.frame.is_no_return(p);

@@ -49,7 +49,8 @@ fn real_files_are_read_in_full() {
             assert_eq!(scans[n].place, (0..*n_points as u64).collect::<Vec<_>>(), "{name}");
             assert_eq!(reader.masks()[n].n_points, Some(*n_points as u64), "{name}");
             let got = scans[n].summary();
-            // Coordinates of a map about their own middle: 1 mm at 2 km; a rotation of six digits: 10 µm at 10 m.
+            // Coordinates of a map about their own middle: 1 mm at 2 km; a rotation of six digits:
+            // 10 µm at 10 m.
             let tolerance = if summary[0][0] > 1e4 { 2e-4 } else { 3e-5 };
             assert!((0..3).all(|k| off(&got[k], &summary[k]) < tolerance), "{name}: {got:?}");
             assert_eq!(scans[n].attributes.color.is_empty(), *n_columns < 6, "{name}");

@@ -53,7 +53,8 @@ impl Choice {
         Ok(choice)
     }
 
-    /// The units given for a file: its own, by its path, name, or name without suffix; else those for all.
+    /// The units given for a file: its own, by its path, name, or name without suffix; else those
+    /// for all.
     pub(crate) fn of(&self, path: &Path) -> Option<&Pair> {
         let own = self.own.iter().find(|(name, _)| is_named(path, name)).map(|(_, pair)| pair);
         own.or(self.all.as_ref())

@@ -42,13 +42,15 @@ pub(crate) struct Declaration {
 pub(crate) enum Sense {
     /// A unit.
     Unit(Unit),
-    /// Its name and its number of metres are of different units: that of the name, and that of the number.
+    /// Its name and its number of metres are of different units: that of the name, and that of the
+    /// number.
     Either(Unit, Unit),
     /// Nobody knows what it is.
     Nothing(String),
 }
 
-/// Units whose lengths differ by less are the same but for rounding, or the two kinds of foot (2e-6).
+/// Units whose lengths differ by less are the same but for rounding, or the two kinds of foot
+/// (2e-6).
 const SAME: f64 = 1e-3;
 
 /// Characters of a unit's name that are kept: nobody's unit has more.
@@ -74,8 +76,9 @@ impl Stated {
         let metres = self.metres.filter(|v| v.is_finite() && *v > 0.0);
         match (known::by_name(name), metres) {
             (Some(named), Some(metres)) if is_same(named.metres, metres) => {
-                // The number tells the two kinds of foot apart where the name does not. Files round that
-                // of the survey foot, which a map's coordinates are too large for.
+                // The number tells the two kinds of foot apart where the name does not. Files round
+                // that of the survey foot, which a map's coordinates are too large
+                // for.
                 let is_survey = (metres / known::US_FOOT - 1.0).abs() < 1e-9;
                 Sense::Unit(if is_survey {
                     Unit::new("US survey foot", known::US_FOOT)

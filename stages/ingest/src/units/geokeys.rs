@@ -63,7 +63,8 @@ pub(crate) fn read(directory: &[u8], doubles: &[u8]) -> Option<Declaration> {
     (found.system != System::Unknown || found.vertical.is_some()).then_some(found)
 }
 
-/// Said where the key of the unit and the system are not of one mind; the key counts, as with other readers.
+/// Said where the key of the unit and the system are not of one mind; the key counts, as with other
+/// readers.
 fn contradiction(name: &str, metres: f64, system: Option<super::Unit>) -> Option<String> {
     let system = system.filter(|unit| !super::declared::is_same(unit.metres, metres))?;
     Some(format!(

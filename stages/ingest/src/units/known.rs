@@ -1,5 +1,5 @@
-//! The name or number of a unit of length in; how many metres it is out. Units by number, and systems that are not in
-//! metres, come from the EPSG registry (`epsg.txt`).
+//! The name or number of a unit of length in; how many metres it is out. Units by number, and
+//! systems that are not in metres, come from the EPSG registry (`epsg.txt`).
 
 use super::Unit;
 
@@ -10,7 +10,8 @@ const METRE: u32 = 9001;
 /// Metres of a US survey foot: 1200/3937 by definition.
 pub(super) const US_FOOT: f64 = 1200.0 / 3937.0;
 
-/// Spellings of one unit, lower case without anything but letters and digits; its name for people; metres.
+/// Spellings of one unit, lower case without anything but letters and digits; its name for people;
+/// metres.
 type Spelled = (&'static [&'static str], &'static str, f64);
 
 /// Spellings in files and on the command line; those of the EPSG registry come after them.
@@ -45,7 +46,8 @@ pub(super) fn by_code(code: u32) -> Option<Unit> {
     units().find(|(known, _)| *known == code).map(|(_, unit)| exact(unit))
 }
 
-/// The unit of a system of the EPSG registry, `projected` or `vertical`: the metre where the list names no other.
+/// The unit of a system of the EPSG registry, `projected` or `vertical`: the metre where the list
+/// names no other.
 pub(super) fn of_system(kind: &str, code: u32) -> Option<Unit> {
     let holds = |range: &str| {
         let (first, last) = range.split_once('-').unwrap_or((range, range));

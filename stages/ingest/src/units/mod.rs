@@ -1,5 +1,5 @@
-//! What a file declares of its coordinates' units, what its format prescribes and what a person says in; how many metres
-//! they are out.
+//! What a file declares of its coordinates' units, what its format prescribes and what a person
+//! says in; how many metres they are out.
 
 mod choice;
 mod declared;
@@ -77,7 +77,8 @@ impl Unit {
 }
 
 impl Units {
-    /// Of a file whose records declare this, what counts first; `choice` is what a person gives for it.
+    /// Of a file whose records declare this, what counts first; `choice` is what a person gives for
+    /// it.
     ///
     /// # Errors
     /// Coordinates that are no lengths, or of which nobody can tell what they are.
@@ -188,7 +189,8 @@ fn refuse_angles(system: System) -> Result<()> {
     Err(Error::new(Kind::Unsupported, what))
 }
 
-/// The unit of heights. Where its name and its number contradict each other, the one that x and y have as well.
+/// The unit of heights. Where its name and its number contradict each other, the one that x and y
+/// have as well.
 fn heights(
     stated: Option<(Sense, &'static str)>,
     horizontal: Option<&Unit>,

@@ -133,7 +133,8 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// The keyword and its brackets that the text begins with; a text that ends early gives what there is.
+    /// The keyword and its brackets that the text begins with; a text that ends early gives what
+    /// there is.
     fn node(&mut self, depth: usize) -> Option<Node> {
         let keyword = self.word();
         if keyword.is_empty() || !(self.skip('[') || self.skip('(')) || depth > MAX_DEPTH {

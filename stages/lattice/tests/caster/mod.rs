@@ -226,8 +226,8 @@ pub const TABLE: usize = 3;
 pub const PEDESTAL: usize = 5;
 pub const FOOT: usize = 6;
 
-/// A room of 12 m × 9 m × 3 m with a tilted, wavy floor, a pipe of 50 mm radius, a table, a pedestal with a
-/// round foot on it that leaves a ring, a column.
+/// A room of 12 m × 9 m × 3 m with a tilted, wavy floor, a pipe of 50 mm radius, a table, a
+/// pedestal with a round foot on it that leaves a ring, a column.
 pub fn room(wave: f64) -> Scene {
     let whole = ([-6.0, 6.0], [-4.0, 5.0]);
     let shapes = vec![

@@ -137,7 +137,8 @@ fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
 fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
     let (mut then, mut now) = (Tallying::default(), Tallying::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.3, 0.9, 0.73], true);
-    // Rows of beams graze its top: one end is seen whole, of the other an edge. Something else came beside it.
+    // Rows of beams graze its top: one end is seen whole, of the other an edge. Something else came
+    // beside it.
     solid(&mut now, [5.0, 1.0, 0.02], [0.7, 0.85, 0.73], true);
     solid(&mut now, [6.1, 1.1, 0.27], [0.2, 0.7, 0.48], true);
     solid(&mut now, [5.0, 2.4, 0.02], [0.3, 0.3, 0.4], true);
@@ -153,7 +154,8 @@ fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
 fn an_end_beside_a_thing_that_was_turned_is_its_own() {
     let (mut then, mut now) = (Tallying::default(), Tallying::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.4, 0.73], true);
-    // Turned, it has narrower bounds; a post hides a strip of it. A lower thing beside it is another one.
+    // Turned, it has narrower bounds; a post hides a strip of it. A lower thing beside it is
+    // another one.
     solid(&mut now, [5.0, 1.0, 0.02], [1.1, 1.0, 0.73], true);
     solid(&mut now, [6.2, 1.2, 0.02], [0.25, 0.4, 0.73], true);
     solid(&mut now, [4.5, 1.2, 0.02], [0.25, 0.3, 0.4], true);

@@ -1,5 +1,6 @@
-//! A link's mesh and a place on it in; out: which side of the surface the world is on, if any. Vendors' meshes hold
-//! motors and bolts that no scanner sees, and faces that are turned the wrong way.
+//! A link's mesh and a place on it in; out: which side of the surface the world is on, if any.
+//! Vendors' meshes hold motors and bolts that no scanner sees, and faces that are turned the wrong
+//! way.
 
 use super::Sample;
 use crate::model::Mesh;
@@ -9,9 +10,11 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
 
 /// Rays over a hemisphere.
 const N_RAYS: usize = 24;
-/// Rays between two looks at whether the case is clear: each such set is spread over the hemisphere as the whole is.
+/// Rays between two looks at whether the case is clear: each such set is spread over the hemisphere
+/// as the whole is.
 const N_FIRST: usize = 4;
-/// Escaping rays that make a place visible: a single one may slip through a crack between badly joined triangles.
+/// Escaping rays that make a place visible: a single one may slip through a crack between badly
+/// joined triangles.
 const N_ESCAPES: usize = 2;
 /// Start of a ray above the surface, metres: above rounding, below any real gap.
 const LIFT: f32 = 1e-4;
@@ -82,8 +85,8 @@ impl Shell {
         }
     }
 
-    /// Whether a ray of the hemisphere about `normal` leaves the mesh for good. What stopped the same ray at the place before,
-    /// which is mostly beside this one, is tried first.
+    /// Whether a ray of the hemisphere about `normal` leaves the mesh for good. What stopped the
+    /// same ray at the place before, which is mostly beside this one, is tried first.
     fn escapes(
         &self,
         at: Vector3<f32>,
@@ -128,7 +131,8 @@ impl Blockers {
     }
 }
 
-/// Whether more rays would not change the answer, or only for a place that hardly any beam can reach.
+/// Whether more rays would not change the answer, or only for a place that hardly any beam can
+/// reach.
 fn is_clear(n_cast: usize, front: usize, back: usize) -> bool {
     let one_sided = front.max(back) >= N_ESCAPES && front.min(back) == 0;
     let hidden = n_cast >= N_RAYS / 2 && front + back == 0;
@@ -169,7 +173,8 @@ fn hits([a, e, f]: &[Vector3<f32>; 3], origin: &Vector3<f32>, direction: &Vector
     v >= -1e-5 && u + v <= 1.000_01 && f.dot(&q) * inverse > 0.0
 }
 
-/// Directions over the half space of +z, away from grazing, in an order whose first part is spread too.
+/// Directions over the half space of +z, away from grazing, in an order whose first part is spread
+/// too.
 fn hemisphere() -> [Vector3<f32>; N_RAYS] {
     std::array::from_fn(|k| {
         // Every sixth of a spiral first, then the rest.

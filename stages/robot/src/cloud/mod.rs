@@ -1,4 +1,5 @@
-//! A link's mesh in; samples of its outer surface with outward normals out, in an order whose prefixes are even.
+//! A link's mesh in; samples of its outer surface with outward normals out, in an order whose
+//! prefixes are even.
 
 mod exterior;
 mod spread;
@@ -7,12 +8,14 @@ use crate::model::{CadCloud, Mesh};
 use exterior::{Blockers, Shell, Side};
 use nalgebra::Vector3;
 
-/// Candidates for each sample that is kept: with fewer the spread gets holes, with more it only costs time.
+/// Candidates for each sample that is kept: with fewer the spread gets holes, with more it only
+/// costs time.
 const N_CANDIDATES: f64 = 2.5;
-/// Edge of the cells whose candidates are judged together, metres: parts smaller than this hide nothing that a
-/// scanner resolves.
+/// Edge of the cells whose candidates are judged together, metres: parts smaller than this hide
+/// nothing that a scanner resolves.
 const JUDGED_CELL: f32 = 0.015;
-/// Depth of such a cell along the normal, metres: the two sides of a sheet of metal are judged apart.
+/// Depth of such a cell along the normal, metres: the two sides of a sheet of metal are judged
+/// apart.
 const JUDGED_DEPTH: f32 = 0.004;
 
 /// A place on the surface.
@@ -46,8 +49,8 @@ impl Random {
     }
 }
 
-/// A link gets so many samples at least, as far as the least spacing allows: bolts and edges of a small wrist are what
-/// tells its pose, and a sample beside an edge has the wrong normal.
+/// A link gets so many samples at least, as far as the least spacing allows: bolts and edges of a
+/// small wrist are what tells its pose, and a sample beside an edge has the wrong normal.
 const MIN_SAMPLES: f64 = 12_000.0;
 /// Least spacing, metres: finer than the noise of any scanner.
 const MIN_SPACING: f64 = 0.002;
@@ -87,8 +90,8 @@ fn area(mesh: &Mesh, triangle: &[u32; 3]) -> f64 {
     0.5 * (b - a).cross(&(c - a)).norm()
 }
 
-/// About `n` places, each standing for the same area: one in each step of the summed area, low-discrepancy within
-/// large triangles.
+/// About `n` places, each standing for the same area: one in each step of the summed area,
+/// low-discrepancy within large triangles.
 fn candidates(
     mesh: &Mesh,
     areas: &[f64],

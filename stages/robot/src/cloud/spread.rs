@@ -1,5 +1,5 @@
-//! Candidates in; a subset out whose members keep their distance, in an order in which every prefix does so too: darts
-//! thrown with a radius that shrinks.
+//! Candidates in; a subset out whose members keep their distance, in an order in which every prefix
+//! does so too: darts thrown with a radius that shrinks.
 
 use super::{Random, Sample};
 
@@ -90,8 +90,8 @@ impl Grid {
         self.samples.push((*sample, std::mem::replace(&mut self.first[slot], at)));
     }
 
-    /// A sample that faces the same half of the world is nearer than the radius. The other side of a sheet is another
-    /// surface.
+    /// A sample that faces the same half of the world is nearer than the radius. The other side of
+    /// a sheet is another surface.
     fn is_taken(&self, sample: &Sample) -> bool {
         let (low, own) = (self.cell(sample, -0.5), self.cell(sample, 0.0));
         // Its own cell first: most that are taken are so by one of that.

@@ -1,5 +1,5 @@
-//! COLLADA text in, triangles out in the scene's frame, metres: node transforms and `<unit>` applied, `<up_axis>` not,
-//! as the viewers do for which robot makers draw their meshes.
+//! COLLADA text in, triangles out in the scene's frame, metres: node transforms and `<unit>`
+//! applied, `<up_axis>` not, as the viewers do for which robot makers draw their meshes.
 
 use super::Soup;
 use crate::load::Settings;
@@ -12,7 +12,8 @@ use std::collections::HashMap;
 const MAX_DEPTH: usize = 64;
 /// Nodes walked in all, since an instance may hold instances.
 const MAX_VISITS: usize = 100_000;
-/// A unit that differs from the metre by less is a rounded metre: a millionth of a robot is below any scanner.
+/// A unit that differs from the metre by less is a rounded metre: a millionth of a robot is below
+/// any scanner.
 const SAME_UNIT: f64 = 1e-6;
 /// What a file of any size may come to, times the growth that is allowed, bytes: small ones draw
 /// one bolt a hundred times.
@@ -127,7 +128,8 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    /// The element of that id in a mesh, else anywhere: real files give the same ids to each geometry.
+    /// The element of that id in a mesh, else anywhere: real files give the same ids to each
+    /// geometry.
     fn within(&self, mesh: Node<'a, 'i>, id: &str) -> Option<Node<'a, 'i>> {
         mesh.children()
             .find(|n| n.attribute("id") == Some(id))

@@ -1,4 +1,5 @@
-//! A mesh file in, triangles out. Broken files are named, never trusted: a count in a file allocates nothing.
+//! A mesh file in, triangles out. Broken files are named, never trusted: a count in a file
+//! allocates nothing.
 
 mod dae;
 mod obj;
@@ -63,8 +64,8 @@ fn text(bytes: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(bytes).map_err(|e| format!("not UTF-8 from byte {}", e.valid_up_to()))
 }
 
-/// Adds a soup to a link's mesh: scaled, placed, equal corners joined, triangles without area left out.
-/// Gives the number of triangles left out because a corner is no finite number.
+/// Adds a soup to a link's mesh: scaled, placed, equal corners joined, triangles without area left
+/// out. Gives the number of triangles left out because a corner is no finite number.
 pub(crate) fn append(
     mesh: &mut Mesh,
     soup: &Soup,

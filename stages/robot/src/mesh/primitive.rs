@@ -29,7 +29,8 @@ pub(crate) fn cuboid(size: [f64; 3]) -> Soup {
     soup
 }
 
-/// A body of revolution about z from its profile (radius, height), bottom to top; it should start and end at radius 0.
+/// A body of revolution about z from its profile (radius, height), bottom to top; it should start
+/// and end at radius 0.
 fn lathe(profile: &[(f64, f64)]) -> Soup {
     let mut soup = Soup::default();
     for &(radius, z) in profile {

@@ -1,4 +1,5 @@
-//! Sizes in; the pieces that robot links are cast and bolted from out. x forward, y left, z up; joints about y.
+//! Sizes in; the pieces that robot links are cast and bolted from out. x forward, y left, z up;
+//! joints about y.
 
 use crate::solid::{Ring, Solid, bolts, cuboid, disc, lathe, loft, prism, rounded, tube};
 use geometry::Point;
@@ -63,7 +64,8 @@ pub(super) fn hub(at: [f64; 2], radius: f64, y: [f64; 2]) -> Solid {
     let size = (0.14 * radius).min(0.022);
     let ring = bolts(8, 0.88 * radius, y[1], size);
     let other = bolts(8, 0.88 * radius, -y[0], size).turned([180.0, 0.0, 0.0]);
-    // The lathe's axis laid along +y: (x, y, z) goes to (x, z, −y), so that a hub is drawn upright with z = y.
+    // The lathe's axis laid along +y: (x, y, z) goes to (x, z, −y), so that a hub is drawn upright
+    // with z = y.
     Solid::of([lathe(&body, HUB_SIDES), ring, other]).along_y().at([at[0], 0.0, at[1]])
 }
 
@@ -137,7 +139,8 @@ pub(super) fn foot(size: [f64; 2], thick: f64) -> Solid {
     out
 }
 
-/// A round bar in the plane y = `y` from (x, z) to (x, z) with an eye at both ends: link rods and coupler bars.
+/// A round bar in the plane y = `y` from (x, z) to (x, z) with an eye at both ends: link rods and
+/// coupler bars.
 pub(super) fn bar(from: [f64; 2], to: [f64; 2], y: f64, radius: f64) -> Solid {
     let (p, q) = (Point::new(from[0], y, from[1]), Point::new(to[0], y, to[1]));
     let along = (q - p).normalize();
@@ -149,7 +152,8 @@ pub(super) fn bar(from: [f64; 2], to: [f64; 2], y: f64, radius: f64) -> Solid {
     ])
 }
 
-/// A tool plate on the plane x = 0, facing +x: disc, bolt ring, dowel and a plug on one side, so that its turn shows.
+/// A tool plate on the plane x = 0, facing +x: disc, bolt ring, dowel and a plug on one side, so
+/// that its turn shows.
 pub(super) fn tool_plate(radius: f64, thick: f64) -> Solid {
     let upright = Solid::of([
         disc(0.8 * radius, 0.0, 0.5 * thick, 0.0, 48),

@@ -1,5 +1,5 @@
-//! Nothing in; a library of three robots of our own, drawn by code, out: the files of `<model>/robot.urdf`, meshes,
-//! sub chains and `robot.toml`. Writes nothing itself.
+//! Nothing in; a library of three robots of our own, drawn by code, out: the files of
+//! `<model>/robot.urdf`, meshes, sub chains and `robot.toml`. Writes nothing itself.
 
 mod arm;
 mod castings;
@@ -13,12 +13,14 @@ pub use design::File;
 
 /// Name of the small six-axis robot, 1.1 m reach.
 pub const ARM: &str = "demo_arm_1100";
-/// Name of the seven-joint spot welder, 2.6 m reach, with balancer (RPR), parallelogram (RRR) and gun.
+/// Name of the seven-joint spot welder, 2.6 m reach, with balancer (RPR), parallelogram (RRR) and
+/// gun.
 pub const WELDER: &str = "demo_welder_2600";
 /// Name of the four-axis palletiser, 2.0 m reach, whose bars (RR) keep the wrist level.
 pub const PALLETISER: &str = "demo_palletiser_2000";
 
-/// All files of the library, paths relative to its folder with `/` between parts; by robot, then file.
+/// All files of the library, paths relative to its folder with `/` between parts; by robot, then
+/// file.
 #[must_use]
 pub fn files() -> Vec<File> {
     [arm::design(), palletiser::design(), welder::design()]

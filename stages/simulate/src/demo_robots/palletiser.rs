@@ -1,5 +1,5 @@
-//! Nothing in; the palletiser out: four axes, and bars (RR) that keep elbow plate and wrist level and drive the
-//! forearm from the carousel.
+//! Nothing in; the palletiser out: four axes, and bars (RR) that keep elbow plate and wrist level
+//! and drive the forearm from the carousel.
 
 use super::castings::{bar, boom, cheek, foot, hub, motor, pipe, rib, trunk};
 use super::design::{Design, Hinge, Part, SubChain};

@@ -1,5 +1,6 @@
-//! Nothing in; the large spot welder out: six turning axes, a gas-spring balancer (RPR), a parallelogram that drives
-//! the forearm (RRR), and a gun whose electrode slides as the seventh joint.
+//! Nothing in; the large spot welder out: six turning axes, a gas-spring balancer (RPR), a
+//! parallelogram that drives the forearm (RRR), and a gun whose electrode slides as the seventh
+//! joint.
 
 use super::castings::{boom, cheek, foot, hub, motor, pipe, rib, tool_plate, trunk};
 use super::design::{Design, Hinge, Part};

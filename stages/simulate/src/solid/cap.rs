@@ -12,7 +12,8 @@ pub(super) fn ears(polygon: &[[f64; 2]]) -> Vec<[u32; 3]> {
     let at = |i: u32| polygon[i as usize];
     while left.len() > 3 {
         let n = left.len();
-        // The fattest ear keeps slivers away; a polygon that has none (touches itself) is cut at its first corner.
+        // The fattest ear keeps slivers away; a polygon that has none (touches itself) is cut at
+        // its first corner.
         let best = (0..n)
             .filter_map(|k| {
                 let (a, b, c) = (left[(k + n - 1) % n], left[k], left[(k + 1) % n]);

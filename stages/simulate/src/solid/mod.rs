@@ -1,4 +1,5 @@
-//! Outlines, rings and paths in; closed triangle bodies out. What the hall and the demo robots are made of.
+//! Outlines, rings and paths in; closed triangle bodies out. What the hall and the demo robots are
+//! made of.
 
 mod cap;
 mod shapes;
@@ -9,7 +10,8 @@ use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Mesh;
 
-/// A closed body of triangles, counter-clockwise from outside, metres. Pieces of one body may overlap.
+/// A closed body of triangles, counter-clockwise from outside, metres. Pieces of one body may
+/// overlap.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Solid {
     /// Corners.

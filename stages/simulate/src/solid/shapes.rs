@@ -7,7 +7,8 @@ use std::f64::consts::TAU;
 /// A closed ring of corners, counter-clockwise seen from its outer end (the side the loft goes to).
 pub type Ring = Vec<Point>;
 
-/// A body between rings of equal length, closed at both ends (ends must be star-shaped about their middle).
+/// A body between rings of equal length, closed at both ends (ends must be star-shaped about their
+/// middle).
 #[must_use]
 pub fn loft(rings: &[Ring]) -> Solid {
     let n = rings.first().map_or(0, Vec::len);
@@ -34,8 +35,8 @@ pub fn loft(rings: &[Ring]) -> Solid {
     out
 }
 
-/// A rectangle with rounded corners in a plane z = constant: middle, full size in x and y, corner radius, and the
-/// number of steps of each corner.
+/// A rectangle with rounded corners in a plane z = constant: middle, full size in x and y, corner
+/// radius, and the number of steps of each corner.
 #[must_use]
 pub fn rounded(centre: [f64; 3], size: [f64; 2], radius: f64, steps: usize) -> Ring {
     let radius = radius.min(0.499 * size[0]).min(0.499 * size[1]);
@@ -56,7 +57,8 @@ pub fn rounded(centre: [f64; 3], size: [f64; 2], radius: f64, steps: usize) -> R
     out
 }
 
-/// A simple polygon (x, y; counter-clockwise) extruded from `z0` to `z1`, both ends chamfered by `chamfer` metres.
+/// A simple polygon (x, y; counter-clockwise) extruded from `z0` to `z1`, both ends chamfered by
+/// `chamfer` metres.
 #[must_use]
 pub fn prism(outline: &[[f64; 2]], z0: f64, z1: f64, chamfer: f64) -> Solid {
     let inner = cap::inset(outline, chamfer);
@@ -134,7 +136,8 @@ pub fn disc(radius: f64, z0: f64, z1: f64, chamfer: f64, n: usize) -> Solid {
     lathe(&[[radius - c, z0], [radius, z0 + c], [radius, z1 - c], [radius - c, z1]], n)
 }
 
-/// `count` hexagonal bolt heads upright on the plane z = `z`, on a circle of `radius`; `size` is a head's diameter.
+/// `count` hexagonal bolt heads upright on the plane z = `z`, on a circle of `radius`; `size` is a
+/// head's diameter.
 #[must_use]
 pub fn bolts(count: usize, radius: f64, z: f64, size: f64) -> Solid {
     Solid::of((0..count).map(|k| {
@@ -147,8 +150,8 @@ pub fn bolts(count: usize, radius: f64, z: f64, size: f64) -> Solid {
     }))
 }
 
-/// A round tube of `n` sides along a path of at least two points, with flat ends. The cross-section is carried along
-/// without twist.
+/// A round tube of `n` sides along a path of at least two points, with flat ends. The cross-section
+/// is carried along without twist.
 #[must_use]
 pub fn tube(path: &[Point], radius: f64, n: usize) -> Solid {
     let direction = |i: usize| -> Vector {
