@@ -5,16 +5,19 @@ use crate::engine::{Engine, Task};
 use crate::rescan::{State, tiles_of};
 use crate::reuse::Vouched;
 use crate::spaces::poses;
-use clearance::{CELL, Cells, Hung, Known, Obstacles, What};
-use contract::{Error, Fit, PointKind, Result, Space};
+use clearance::{CELL, Cells, Eye, Hung, Known, Obstacles, Shadow, What, hanging};
+use contract::{Error, Fit, PointKind, Result, Scan, Space};
 use export::{OldPoint, ResultFile, SpaceEntry, read_tile};
 use geometry::{Aabb, Point, Pose};
 use robot::Model;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Points of a tile that are looked at before each cell is kept once.
 const SETTLED: usize = 1 << 22;
+
+/// Scanners that are farther off tell few points about a robot, metres.
+const SCANNED_FROM: f64 = 30.0;
 
 /// A result.
 pub(super) struct Surroundings<'a> {
@@ -34,14 +37,18 @@ struct Sorting<'a> {
     link_from_base: Vec<Pose>,
     /// By link: whether joints move it.
     moves: &'a [bool],
+    /// By LAS `point_source_id`: what robots hide from the scanners that its points may be of.
+    shadows: BTreeMap<u16, Vec<&'a Shadow>>,
+    /// By LAS `point_source_id`, where it is that of one scanner: that scanner.
+    eyes: BTreeMap<u16, Eye>,
 }
 
 /// Points of a tile.
 struct Sorted {
     cells: Cells,
     n_waiting: usize,
-    /// Cells of points that hang on each link.
-    hung: BTreeMap<usize, BTreeSet<[i32; 3]>>,
+    /// Cells of points that hang on each link, and whether all beams to them grazed an edge.
+    hung: BTreeMap<usize, BTreeMap<[i32; 3], bool>>,
 }
 
 impl Surroundings<'_> {
@@ -55,9 +62,7 @@ impl Surroundings<'_> {
         engine: &Engine,
     ) -> Result<(Hung, Obstacles)> {
         let moves = robot.model.moving();
-        let sorting = sorting(robot, far, &moves);
-        let (cells, hung) = self.points(&sorting, engine)?;
-        let base_from_world = &sorting.base_from_world;
+        let base_from_world = &robot.fit.world_from_base.inverse();
         let standing = |(number, fit): &(usize, &Fit)| {
             // However it stood, it may stand so again.
             let all = std::iter::once(*fit).chain(&fit.stays);
@@ -69,6 +74,11 @@ impl Surroundings<'_> {
             all.map(placed).collect::<Vec<(i16, &Model, Vec<Pose>)>>()
         };
         let others: Vec<_> = others.iter().flat_map(standing).collect();
+        let shadows = self.shadows(robot, &others, engine)?;
+        let mut sorting = sorting(robot, far, &moves);
+        sorting.shadows = self.told_by(&shadows);
+        sorting.eyes = self.eyes(base_from_world);
+        let (cells, hung) = self.points(&sorting, engine)?;
         let read = |entry: &SpaceEntry| {
             self.files.compared(&entry.grid)?;
             entry.read(self.out)
@@ -92,7 +102,7 @@ impl Surroundings<'_> {
         let names = tiles_of(&self.files.manifest().files, edge, &[&world]);
         let las = self.state.records.las();
         let tiles = engine.fan_out(Task::new("points"), names, |name| {
-            let mut own = Sorted::new(sorting.far);
+            let mut own = Sorted::new(sorting);
             let (path, stated) = self.files.stated(&name)?;
             read_tile(&path, &las, stated, |points| {
                 points.iter().try_for_each(|p| self.sort(sorting, p, &mut own))?;
@@ -102,18 +112,75 @@ impl Surroundings<'_> {
             own.settle(0);
             Ok(own)
         })?;
-        let mut all = Sorted::new(sorting.far);
+        let mut all = Sorted::new(sorting);
         for own in tiles {
             all.cells.join(own.cells);
             for (link, cells) in own.hung {
-                all.hung.entry(link).or_default().extend(cells);
+                let own = all.hung.entry(link).or_default();
+                cells.into_iter().for_each(|(cell, is_grazed)| meet(own, cell, is_grazed));
             }
         }
         all.cells.settle();
-        let middle = |cell: &[i32; 3]| cell.map(|v| ((f64::from(v) + 0.5) * CELL) as f32);
-        let hung =
-            all.hung.into_iter().map(|(link, cells)| (link, cells.iter().map(middle).collect()));
+        let middle = |cell: [i32; 3]| cell.map(|v| ((f64::from(v) + 0.5) * CELL) as f32);
+        let hung = all.hung.into_iter().map(|(link, cells)| {
+            let all: Vec<_> = cells.into_iter().map(|(cell, told)| (middle(cell), told)).collect();
+            (link, hanging(&all))
+        });
         Ok((all.cells, hung.collect()))
+    }
+
+    /// What the robots that stand hide from each scanner that is known; frame of the base.
+    fn shadows(
+        &self,
+        robot: &Robot<'_>,
+        others: &[(i16, &Model, Vec<Pose>)],
+        engine: &Engine,
+    ) -> Result<Vec<(usize, Shadow)>> {
+        let own = robot.model.poses(&robot.found());
+        let others = others.iter().map(|(_, model, poses)| (*model, &poses[..]));
+        let all: Vec<(&Model, &[Pose])> =
+            std::iter::once((robot.model, &own[..])).chain(others).collect();
+        let scans = self.state.scans.iter().enumerate();
+        let base = robot.fit.world_from_base.translation.vector;
+        let is_near =
+            |scan: &Scan| (scan.world_from_scan.translation.vector - base).norm() < SCANNED_FROM;
+        let known = scans.filter(|(_, scan)| scan.lattice.is_some() && is_near(scan)).collect();
+        engine.fan_out(Task::new("outlines"), known, |(at, scan)| {
+            let eye = robot.fit.world_from_base.inverse()
+                * Point::from(scan.world_from_scan.translation.vector);
+            Ok((at, Shadow::new(&all, eye)))
+        })
+    }
+
+    /// The shadows by the `point_source_id` of the points that they may be of: those of files that
+    /// had such ids keep them, others have the number of their scan, from 1.
+    fn told_by<'s>(&self, shadows: &'s [(usize, Shadow)]) -> BTreeMap<u16, Vec<&'s Shadow>> {
+        let mut out: BTreeMap<u16, Vec<&Shadow>> = BTreeMap::new();
+        for (at, shadow) in shadows {
+            if let Some(id) = self.source_id(*at) {
+                out.entry(id).or_default().push(shadow);
+            }
+        }
+        out
+    }
+
+    fn source_id(&self, scan: usize) -> Option<u16> {
+        self.state.scans[scan].source_id.or(u16::try_from(scan + 1).ok())
+    }
+
+    /// The scanners that are known, where points tell of which they are.
+    fn eyes(&self, base_from_world: &Pose) -> BTreeMap<u16, Eye> {
+        let mut all: BTreeMap<u16, Vec<&Scan>> = BTreeMap::new();
+        for (at, scan) in self.state.scans.iter().enumerate() {
+            self.source_id(at).into_iter().for_each(|id| all.entry(id).or_default().push(scan));
+        }
+        let eye = |(id, scans): (u16, Vec<&Scan>)| {
+            let [scan] = scans[..] else { return None };
+            let lattice = scan.lattice.as_ref()?;
+            let at = base_from_world * Point::from(scan.world_from_scan.translation.vector);
+            Some((id, Eye { at, step: lattice.row_step.max(lattice.col_step) }))
+        };
+        all.into_iter().filter_map(eye).collect()
     }
 
     fn sort(&self, sorting: &Sorting<'_>, point: &OldPoint, into: &mut Sorted) -> Result<()> {
@@ -126,6 +193,9 @@ impl Surroundings<'_> {
         if !is_inside && !is_hung {
             return Ok(());
         }
+        into.cells.see(&p, point.source_id);
+        let shadows = sorting.shadows.get(&point.source_id);
+        let is_grazed = shadows.is_some_and(|all| all.iter().all(|shadow| shadow.is_grazed(&p)));
         let what = match label.kind {
             PointKind::Link if is_own => return Ok(()),
             PointKind::Attachment if is_own => {
@@ -134,7 +204,7 @@ impl Surroundings<'_> {
                     Some(link) => {
                         let own = sorting.link_from_base[link] * p;
                         let cell = own.coords.map(|v| (v / CELL).floor() as i32).into();
-                        into.hung.entry(link).or_default().insert(cell);
+                        meet(into.hung.entry(link).or_default(), cell, is_grazed);
                         return Ok(());
                     }
                     // What hangs on its foot stays where it is.
@@ -149,7 +219,7 @@ impl Surroundings<'_> {
             PointKind::Floor => What::Floor,
             _ => What::Uncertain,
         };
-        into.cells.add(p.coords.into(), what);
+        into.cells.add(p.coords.into(), what, (is_grazed, point.source_id));
         into.n_waiting += 1;
         Ok(())
     }
@@ -177,7 +247,14 @@ fn sorting<'m>(robot: &Robot<'_>, far: f64, moves: &'m [bool]) -> Sorting<'m> {
         far,
         link_from_base: model.poses(&posture).iter().map(Pose::inverse).collect(),
         moves,
+        shadows: BTreeMap::new(),
+        eyes: BTreeMap::new(),
     }
+}
+
+/// Adds a point to the cells that hang on a link.
+fn meet(cells: &mut BTreeMap<[i32; 3], bool>, cell: [i32; 3], is_grazed: bool) {
+    *cells.entry(cell).or_insert(is_grazed) &= is_grazed;
 }
 
 impl Sorting<'_> {
@@ -188,8 +265,9 @@ impl Sorting<'_> {
 }
 
 impl Sorted {
-    fn new(far: f64) -> Self {
-        Self { cells: Cells::within(far), n_waiting: 0, hung: BTreeMap::new() }
+    fn new(sorting: &Sorting<'_>) -> Self {
+        let cells = Cells::within(sorting.far, &sorting.eyes);
+        Self { cells, n_waiting: 0, hung: BTreeMap::new() }
     }
 
     fn settle(&mut self, most: usize) {

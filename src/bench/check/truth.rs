@@ -16,6 +16,11 @@ use std::collections::BTreeMap;
 
 /// Distances are told up to this, metres: farther is far.
 pub(super) const FAR: f64 = 0.1;
+/// So much farther than what is nearest each part is asked, metres: it need not be asked again until
+/// it has moved by as much.
+const AHEAD: f64 = 0.03;
+/// Sides of triangles of what stands within reach, metres, at most.
+const SHORT: f32 = 0.2;
 /// Nearer than this bodies touch, metres: rounding of single precision in a hall.
 pub(super) const TOUCH: f64 = 5e-4;
 /// No point moves farther from one posture that is looked at to the next, metres, wherever
@@ -24,6 +29,9 @@ const STEP: f64 = 2e-3;
 /// Distance of the places that are asked whether they were seen, metres; finer than the voxels that
 /// the product tells space by.
 const SAMPLE: f64 = 0.04;
+/// A place counts as seen where one so far beside it is, metres: less than half a voxel of those
+/// that the product tells space by.
+const SEEN_BESIDE: f64 = 0.02;
 /// Postures that are asked so are so far apart, metres.
 const SEEN_STEP: f64 = 0.02;
 /// Edge of the voxels that tell what the robot filled as it was scanned, metres, and the distance
@@ -43,6 +51,8 @@ struct Part {
     /// The triangle of what stands that was nearest last: near it in the next posture, too, which
     /// saves most of the others.
     last: Cell<Option<u32>>,
+    /// How far it kept from all when that was asked last, at least, and where its bounds were.
+    kept: Cell<Option<(f64, [Point; 8])>>,
 }
 
 /// A robot of a scene among all else.
@@ -87,13 +97,17 @@ impl<'a> Truth<'a> {
         let parts = own.clone().filter(|(link, _)| moves[*link]);
         let parts: Vec<Part> =
             parts.filter_map(|(link, shape)| Part::of(link, shape, &poses[link])).collect();
+        let foot = world_from_base.translation.vector.map(|v| v as f32);
+        let (foot, reach) = (Vec3::from_array(foot.into()), clearance::reach(model) as f32 + 0.5);
         let (mut corners, mut triangles, mut of) = (Vec::new(), Vec::new(), Vec::new());
         for (at, shape) in shapes.all.iter().enumerate().filter(|(_, s)| !is_own(s)) {
             for t in &shape.triangles {
-                let first = corners.len() as u32;
-                corners.extend(t.map(Vec3::from_array));
-                triangles.push([first, first + 1, first + 2]);
-                of.push(at as u32);
+                pieces(t.map(Vec3::from_array), (foot, reach), &mut |t| {
+                    let first = corners.len() as u32;
+                    corners.extend(t);
+                    triangles.push([first, first + 1, first + 2]);
+                    of.push(at as u32);
+                });
             }
         }
         let bad = |_| contract::Error::bad_input("nothing stands around the robot");
@@ -107,12 +121,20 @@ impl<'a> Truth<'a> {
         Ok(Self { model, world_from_base, parts, standing, of, shapes, scanners, own })
     }
 
-    /// How near a posture is to something, no farther than so, metres.
-    pub(super) fn gap(&self, posture: &[f64], within: f64) -> Nearest {
+    /// How near a posture is to something, no farther than [`FAR`], metres.
+    fn gap(&self, posture: &[f64]) -> Nearest {
         let poses = placed(self.model, &self.world_from_base, posture);
-        let mut best = Nearest { gap: within, ..Nearest::default() };
+        let mut best = Nearest { gap: FAR, ..Nearest::default() };
         for part in &self.parts {
-            if let Some((gap, triangle)) = self.nearest(part, &poses[part.link], best.gap) {
+            let pose = &poses[part.link];
+            let corners = part.bounds.corners().map(|c| pose * Point::from(c));
+            if part.keeps(&corners) >= best.gap {
+                continue;
+            }
+            let within = (best.gap + AHEAD).min(FAR);
+            let found = self.nearest(part, pose, within);
+            part.kept.set(Some((found.map_or(within, |(gap, _)| gap), corners)));
+            if let Some((gap, triangle)) = found.filter(|(gap, _)| *gap < best.gap) {
                 let name = self.shapes.all[self.of[triangle as usize] as usize].name.clone();
                 best = Nearest { gap, name, link: part.link, at: 0.0 };
             }
@@ -163,7 +185,7 @@ impl<'a> Truth<'a> {
         let mut step = 0;
         while step <= n {
             let at = step as f64 / n as f64;
-            let now = self.gap(&between(from, to, at), FAR);
+            let now = self.gap(&between(from, to, at));
             if now.gap < best.gap {
                 best = Nearest { at, ..now.clone() };
             }
@@ -196,7 +218,17 @@ impl<'a> Truth<'a> {
         })
     }
 
+    /// Whether a beam goes through the place, or as near to it as voxels of space are told apart.
     fn is_known(&self, p: &Point) -> bool {
+        let beside = |k: usize| {
+            let mut q = *p;
+            q[k / 2] += if k.is_multiple_of(2) { SEEN_BESIDE } else { -SEEN_BESIDE };
+            q
+        };
+        self.is_seen_at(p) || (0..6).any(|k| self.is_seen_at(&beside(k)))
+    }
+
+    fn is_seen_at(&self, p: &Point) -> bool {
         let (grid, filled) = &self.own;
         if grid.index(p.coords.into()).is_some_and(|at| filled[at]) {
             return true;
@@ -229,6 +261,14 @@ impl<'a> Truth<'a> {
 }
 
 impl Part {
+    /// How far it keeps from all with its bounds so, at least: no point of it went farther than
+    /// the corners of its bounds since that was asked.
+    fn keeps(&self, corners: &[Point; 8]) -> f64 {
+        let Some((kept, before)) = self.kept.get() else { return 0.0 };
+        let ways = before.iter().zip(corners).map(|(a, b)| (b - a).norm());
+        kept - ways.fold(0.0, f64::max)
+    }
+
     fn of(link: usize, shape: &Shape, world_from_link: &Pose) -> Option<Self> {
         let link_from_world = world_from_link.inverse();
         let inner = |p: &[f32; 3]| {
@@ -250,7 +290,7 @@ impl Part {
         }
         let samples = samples.into_values().collect();
         let mesh = TriMesh::new(corners, triangles).ok()?;
-        Some(Self { link, mesh, bounds, samples, last: Cell::new(None) })
+        Some(Self { link, mesh, bounds, samples, last: Cell::new(None), kept: Cell::new(None) })
     }
 }
 
@@ -267,6 +307,23 @@ fn filled<'s>(shapes: impl Iterator<Item = &'s Shape>) -> (SpaceGrid, Vec<bool>)
     surface.iter().for_each(|at| filled[*at] = true);
     grid.enclosed(&bounds, &surface).into_iter().for_each(|at| filled[at] = true);
     (grid, filled)
+}
+
+/// A triangle in pieces that are short where they are within reach: boxes about long ones that lie
+/// askew hold much that is far from them.
+fn pieces([a, b, c]: [Vec3; 3], near: (Vec3, f32), take: &mut impl FnMut([Vec3; 3])) {
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    let off = (low - near.0).max(near.0 - high).max(Vec3::ZERO).length();
+    let lengths = [(b - a).length(), (c - b).length(), (a - c).length()];
+    let longest = (0..3).max_by(|&i, &j| lengths[i].total_cmp(&lengths[j])).unwrap_or(0);
+    if lengths[longest] <= SHORT || off > near.1 {
+        return take([a, b, c]);
+    }
+    // Across its longest side.
+    let [a, b, c] = [[a, b, c], [b, c, a], [c, a, b]][longest];
+    let middle = (a + b) * 0.5;
+    pieces([a, middle, c], near, take);
+    pieces([middle, b, c], near, take);
 }
 
 /// Places on a triangle, about so far apart, metres.

@@ -24,6 +24,13 @@ const BESIDE: f32 = 0.1;
 /// labels end 6 to 12 mm off it. Of a thing that the robot touches all stays that is farther off.
 const OWN: f32 = 0.008;
 
+/// Space that no beam went through and that is so near to the robot as it was scanned is a gap
+/// between its parts or behind them, metres: what stands there reaches farther.
+const CREVICE: f32 = 0.025;
+
+/// Uncertain points so near to fixed ones are of what stands there, metres, and hang on nothing.
+const JOINED: f32 = 0.04;
+
 /// A link's surface, or what hangs on it.
 pub(crate) struct Part {
     pub(crate) link: usize,
@@ -38,6 +45,8 @@ pub(crate) struct Part {
 pub struct Body<'a> {
     pub(crate) model: &'a Model,
     pub(crate) parts: Vec<Part>,
+    /// Surfaces of links that no joint moves: what lies on them is the robot's, too.
+    still: Vec<Part>,
     margin: f32,
     /// Of points that hang on it nobody asks from farther away, metres.
     within: f32,
@@ -77,20 +86,21 @@ impl<'a> Body<'a> {
         let margin = margin as f32;
         let least = margin + BETWEEN + HALF_CELL;
         let moves = model.moving();
-        let moving: Vec<usize> = (0..model.links.len()).filter(|&l| moves[l]).collect();
-        let surfaces = fan.fan(moving.clone(), |link| {
+        let all: Vec<usize> = (0..model.links.len()).collect();
+        let surfaces = fan.fan(all, |link| {
             let (mesh, bounds) = (&model.links[link].mesh, model.links[link].bounds);
             let shape = Shape::surface(mesh, &bounds, least)?;
             Some(Part { link, hangs: false, is_doubtful: false, bounds, shape })
         });
-        let mut parts: Vec<Part> = surfaces.into_iter().flatten().collect();
+        let (mut parts, still): (Vec<Part>, Vec<Part>) =
+            surfaces.into_iter().flatten().partition(|part| moves[part.link]);
         let within = margin.max(BESIDE) + BETWEEN + largest as f32;
         for (link, points) in
-            hung.into_iter().filter(|(link, points)| moving.contains(link) && !points.is_empty())
+            hung.into_iter().filter(|(link, points)| moves[*link] && !points.is_empty())
         {
             parts.push(Part::hung(link, points, within));
         }
-        Self { model, parts, margin, within }
+        Self { model, parts, still, margin, within }
     }
 
     /// No part of it, nor of what hangs on it, gets farther from the base's origin, metres.
@@ -120,9 +130,9 @@ impl<'a> Body<'a> {
         }
         let poses = self.model.poses(found);
         let from_base = |link: usize| Flat::of(&poses[link].inverse());
-        let surfaces: Vec<(&Part, Flat)> = (self.parts.iter().filter(|part| !part.hangs))
-            .map(|part| (part, from_base(part.link)))
-            .collect();
+        let surfaces = self.parts.iter().filter(|part| !part.hangs).chain(&self.still);
+        let surfaces: Vec<(&Part, Flat)> =
+            surfaces.map(|part| (part, from_base(part.link))).collect();
         let is_own = |at: [f32; 3], within: f32| {
             surfaces.iter().any(|(part, link_from_base)| {
                 let p = link_from_base.of_point(at);
@@ -130,16 +140,22 @@ impl<'a> Body<'a> {
             })
         };
         let (mut doubtful, split) = (Hung::new(), around.split.clone());
+        let fixed = around.fixed(JOINED);
         around.replace(|at, o| match (near[at], o.what) {
             (None, _) => Replaced::Kept,
             (_, What::Fixed | What::Uncertain) if is_own(o.at, OWN) => Replaced::By(Vec::new()),
             (Some((_, part)), What::Uncertain) => {
                 let link = self.parts[part].link;
+                if fixed.is_near(o.at) {
+                    return Replaced::By(vec![Obstacle { what: What::Beside, ..*o }]);
+                }
                 doubtful.entry(link).or_default().push(from_base(link).of_point(o.at));
                 Replaced::By(vec![Obstacle { what: What::Beside, ..*o }])
             }
             (_, What::Unseen) => match split.parts(o) {
-                Some(parts) => Replaced::By(parts.filter(|p| !is_own(p.at, p.radius)).collect()),
+                Some(parts) => {
+                    Replaced::By(parts.filter(|p| !is_own(p.at, p.radius + CREVICE)).collect())
+                }
                 None => Replaced::Kept,
             },
             _ => Replaced::Kept,

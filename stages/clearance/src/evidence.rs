@@ -3,9 +3,10 @@
 //! A scan has strays: a beam that ends half on an edge and half behind it gives a point between the
 //! two, where nothing is, and a mask leaves some points of a robot to the fixed world. A point
 //! counts where others tell of the same surface, or of the same line, as those of a wire do. One
-//! that has neither, in space that beams went through, is evidence of nothing.
+//! that has neither, in space that beams went through, is evidence of nothing. What was told by
+//! beams that grazed the edge of a robot is evidence only where others tell of a surface.
 
-use crate::obstacles::{Obstacle, What, distance};
+use crate::obstacles::{HALF_CELL, Obstacle, What, distance};
 use contract::{Space, SpaceKind};
 use geometry::{Point, Pose};
 use rustc_hash::FxHashMap;
@@ -14,6 +15,8 @@ use rustc_hash::FxHashMap;
 const NEAR: f32 = 0.05;
 /// With so many neighbours a point is of a surface …
 const ENOUGH: usize = 8;
+/// … and with so many of one that needs no other proof …
+const SOLID: usize = 24;
 /// … or with this share of what half of all points have, where scans are sparse.
 const SHARE: f64 = 0.125;
 /// So many neighbours that are this near, metres, are a small thing: strays lie farther apart, over
@@ -31,40 +34,65 @@ const ON_LINE: usize = 3;
 /// seen.
 const UNKNOWN: usize = 2;
 
-/// Obstacles by the cubes of edge [`NEAR`] that they lie in.
+/// Obstacles by the cubes of edge [`NEAR`] that they lie in, but for those that only beams told
+/// which grazed an edge.
 struct Cubes<'a> {
     all: &'a [Obstacle],
     cubes: FxHashMap<[i32; 3], Vec<u32>>,
 }
 
 /// For each obstacle: whether it is evidence of something. Without space nothing is known to be
-/// seen, and all of them are.
+/// seen, and all of them are. `behind` tells, of those that are no thick surface, which lie behind
+/// what beams beside theirs met: they are taken as told by beams that grazed an edge.
 pub(crate) fn evident(
-    all: &[Obstacle],
+    all: &mut [Obstacle],
+    behind: impl Fn(&[Obstacle], &[bool]) -> Vec<bool>,
     space: Option<&Space>,
     world_from_base: &Pose,
 ) -> Vec<bool> {
     let mut out = vec![true; all.len()];
     let Some(space) = space else { return out };
+    // Of floors and other robots more is known than single points.
+    let is_asked = |o: &Obstacle| matches!(o.what, What::Fixed | What::Uncertain);
     let cubes = Cubes::of(all);
+    let thin: Vec<bool> = (all.iter())
+        .map(|o| is_asked(o) && !o.is_grazed && cubes.n_near(o, NEAR, SOLID) < SOLID)
+        .collect();
     let enough = cubes.enough();
-    for (at, o) in all.iter().enumerate() {
-        // Of floors and other robots more is known than single points.
-        if !matches!(o.what, What::Fixed | What::Uncertain) {
-            continue;
-        }
+    let is_behind = behind(all, &thin);
+    all.iter_mut().zip(is_behind).for_each(|(o, is_behind)| o.is_grazed |= is_behind);
+    let cubes = Cubes::of(all);
+    for (at, o) in all.iter().enumerate().filter(|(_, o)| is_asked(o)) {
         out[at] = cubes.n_near(o, NEAR, enough) >= enough
-            || cubes.n_near(o, CLOSE, TOGETHER) >= TOGETHER
-            || cubes.is_on_line(at)
-            || !is_seen(space, &(world_from_base * Point::from(o.at.map(f64::from))));
+            || !o.is_grazed
+                && (cubes.is_thing(at) || !is_seen(space, &(world_from_base * place(o))));
     }
     out
+}
+
+/// Of points that hang on a link, each with whether its beam grazed an edge, those that are evidence
+/// of something that hangs there.
+#[must_use]
+pub fn hanging(points: &[([f32; 3], bool)]) -> Vec<[f32; 3]> {
+    let obstacle = |&(at, is_grazed): &([f32; 3], bool)| Obstacle {
+        at,
+        radius: HALF_CELL,
+        what: What::Uncertain,
+        is_grazed,
+    };
+    let all: Vec<Obstacle> = points.iter().map(obstacle).collect();
+    let cubes = Cubes::of(&all);
+    let enough = cubes.enough();
+    let is_evident = |(at, o): &(usize, &Obstacle)| {
+        cubes.n_near(o, NEAR, enough) >= enough || !o.is_grazed && cubes.is_thing(*at)
+    };
+    all.iter().enumerate().filter(is_evident).map(|(_, o)| o.at).collect()
 }
 
 impl<'a> Cubes<'a> {
     fn of(all: &'a [Obstacle]) -> Self {
         let mut cubes: FxHashMap<[i32; 3], Vec<u32>> = FxHashMap::default();
-        for (at, o) in all.iter().enumerate() {
+        for (at, o) in all.iter().enumerate().filter(|(_, o)| !o.is_grazed) {
             cubes.entry(cube(o.at)).or_default().push(at as u32);
         }
         Self { all, cubes }
@@ -74,7 +102,10 @@ impl<'a> Cubes<'a> {
     fn around(&self, at: [f32; 3], n: i32) -> impl Iterator<Item = u32> + '_ {
         let [x, y, z] = cube(at);
         let side = 2 * n + 1;
-        (0..side * side * side).flat_map(move |i| {
+        let n_cubes = side * side * side;
+        // Its own first: there are neighbours enough, mostly.
+        (0..n_cubes).flat_map(move |i| {
+            let i = (i + n_cubes / 2) % n_cubes;
             let by = [i % side - n, i / side % side - n, i / (side * side) - n];
             self.cubes.get(&[x + by[0], y + by[1], z + by[2]]).into_iter().flatten().copied()
         })
@@ -84,7 +115,13 @@ impl<'a> Cubes<'a> {
     /// as far as `most`.
     fn n_near(&self, o: &Obstacle, within: f32, most: usize) -> usize {
         let is_near = |i: &u32| distance(self.all[*i as usize].at, o.at) < within;
-        self.around(o.at, 1).filter(is_near).take(most + 1).count().saturating_sub(1)
+        let itself = usize::from(!o.is_grazed);
+        self.around(o.at, 1).filter(is_near).take(most + itself).count().saturating_sub(itself)
+    }
+
+    /// Whether it belongs to a small thing or to a line.
+    fn is_thing(&self, at: usize) -> bool {
+        self.n_near(&self.all[at], CLOSE, TOGETHER) >= TOGETHER || self.is_on_line(at)
     }
 
     /// Neighbours that make a surface, here.
@@ -124,6 +161,10 @@ impl<'a> Cubes<'a> {
     }
 }
 
+fn place(o: &Obstacle) -> Point {
+    Point::from(o.at.map(f64::from))
+}
+
 fn cube(at: [f32; 3]) -> [i32; 3] {
     at.map(|v| (v / NEAR).floor() as i32)
 }
@@ -146,14 +187,23 @@ mod tests {
     use geometry::Aabb;
 
     fn told(points: &[[f32; 3]], kind: SpaceKind) -> Vec<bool> {
+        told_by(points, kind, false)
+    }
+
+    fn told_by(points: &[[f32; 3]], kind: SpaceKind, grazed: bool) -> Vec<bool> {
         // A wall 1 cm between points, far from all else, says how dense scans are.
         let wall = (0..2500).map(|i| [1.0, 0.01 * (i % 50) as f32, 0.01 * (i / 50) as f32]);
-        let obstacle = |at| Obstacle { at, radius: 0.0035, what: What::Fixed };
-        let all: Vec<Obstacle> = points.iter().copied().chain(wall).map(obstacle).collect();
+        let obstacle =
+            |(at, is_grazed)| Obstacle { at, radius: 0.0035, what: What::Fixed, is_grazed };
+        let mut all: Vec<Obstacle> = (points.iter().map(|p| (*p, grazed)))
+            .chain(wall.map(|p| (p, false)))
+            .map(obstacle)
+            .collect();
         let bounds = Aabb { min: [-1.5; 3], max: [1.5; 3] };
         let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
         space.voxels_mut().fill(kind);
-        let out = evident(&all, Some(&space), &Pose::identity());
+        let nothing = |all: &[Obstacle], _: &[bool]| vec![false; all.len()];
+        let out = evident(&mut all, nothing, Some(&space), &Pose::identity());
         assert!(out[points.len()..].iter().all(|is| *is), "the wall stands");
         out[..points.len()].to_vec()
     }
@@ -179,5 +229,24 @@ mod tests {
         let wire: Vec<[f32; 3]> =
             (0..9).map(|i| [noise(i), noise(i + 1), 0.04 * i as f32 - 0.16]).collect();
         assert_eq!(told(&wire, SpaceKind::Free), [true; 9]);
+    }
+
+    #[test]
+    fn of_what_hangs_strays_and_curtains_are_left_out() {
+        let hose = (0..40).map(|i| ([0.01 * i as f32, 0.0, 0.0], i % 5 == 0));
+        let curtain = (0..20).map(|i| ([0.0, 0.3, 0.01 * i as f32], true));
+        let all: Vec<_> = hose.chain(curtain).chain([([0.0, -0.4, 0.0], false)]).collect();
+        let left = hanging(&all);
+        assert_eq!(left, all[..40].iter().map(|(p, _)| *p).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn what_grazing_beams_told_stands_only_where_others_tell_a_surface() {
+        let curtain: Vec<[f32; 3]> = (0..30).map(|i| [0.0, 0.0, 0.01 * i as f32]).collect();
+        assert_eq!(told_by(&curtain, SpaceKind::Free, true), [false; 30]);
+        assert_eq!(told_by(&curtain, SpaceKind::Unknown, true), [false; 30]);
+        // At the wall they are of the wall.
+        let at_wall = [[0.99, 0.2, 0.2], [1.01, 0.305, 0.1]];
+        assert_eq!(told_by(&at_wall, SpaceKind::Free, true), [true; 2]);
     }
 }

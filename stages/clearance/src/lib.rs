@@ -9,11 +9,14 @@ mod body;
 mod evidence;
 mod obstacles;
 mod path;
+mod shadow;
 mod shape;
 
 pub use body::{Body, Hung, reach};
+pub use evidence::hanging;
 pub use obstacles::{CELL, Cells, FARTHEST, Known, Obstacles, What};
 pub use path::{Contact, Contacts, Leg, Looked, STEP, Walk, leg};
+pub use shadow::{Eye, Shadow};
 
 /// How a part of a robot stands to an obstacle; what is worse is greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -2,9 +2,12 @@
 //! frame of its base, metres.
 
 use crate::evidence::evident;
+use crate::shadow::{Eye, Front};
 use contract::{Space, SpaceKind};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Edge of the cells in which all points are one obstacle, metres: finer than planners' margins,
@@ -44,6 +47,8 @@ pub(crate) struct Obstacle {
     pub(crate) at: [f32; 3],
     pub(crate) radius: f32,
     pub(crate) what: What,
+    /// All beams that tell it grazed the edge of a robot (see [`crate::Shadow`]).
+    pub(crate) is_grazed: bool,
 }
 
 /// Obstacles beside each other.
@@ -60,7 +65,11 @@ pub(crate) struct Bin {
 pub struct Cells {
     /// Farthest from the base on each axis, metres.
     far: f64,
-    cells: Vec<(u64, What)>,
+    /// Place, what is there, whether the beam that told it grazed the edge of a robot, and the
+    /// `point_source_id` of its scanner.
+    cells: Vec<(u64, What, bool, u16)>,
+    /// By `point_source_id`: what each scanner measured, whatever it was.
+    fronts: BTreeMap<u16, Front>,
 }
 
 /// Where beams went, in the frame of the world.
@@ -101,17 +110,31 @@ pub(crate) struct Split {
 }
 
 impl Cells {
-    /// None, of points no farther from the base than so on each axis, metres.
+    /// None, of points no farther from the base than so on each axis, metres; and the scanners of
+    /// which it is known where they stood, by the `point_source_id` of their points.
     #[must_use]
-    pub fn within(far: f64) -> Self {
-        Self { far, cells: Vec::new() }
+    pub fn within(far: f64, eyes: &BTreeMap<u16, Eye>) -> Self {
+        let fronts = eyes.iter().map(|(source, eye)| (*source, Front::new(eye))).collect();
+        Self { far, cells: Vec::new(), fronts }
     }
 
-    /// Adds a point that is no farther, frame of the base.
-    pub fn add(&mut self, p: [f64; 3], what: What) {
+    /// A scanner measured a point that is no farther, whatever it is of; frame of the base.
+    pub fn see(&mut self, p: &Point, source: u16) {
+        if let Some(front) = self.fronts.get_mut(&source) {
+            front.add(p);
+        }
+    }
+
+    /// Adds a point that is no farther, frame of the base; its beam grazed the edge of a robot.
+    pub fn add(&mut self, p: [f64; 3], what: What, (is_grazed, source): (bool, u16)) {
         let most = f64::from((1_u32 << BITS) - 1);
         let place = |i: usize| ((p[i] + self.far) / CELL).clamp(0.0, most) as u64;
-        self.cells.push((place(0) << (2 * BITS) | place(1) << BITS | place(2), what));
+        self.cells.push((
+            place(0) << (2 * BITS) | place(1) << BITS | place(2),
+            what,
+            is_grazed,
+            source,
+        ));
     }
 
     /// Leaves each cell once. To be called after each tile: only what is kept grows.
@@ -123,15 +146,40 @@ impl Cells {
     /// Adds those of another part of the same room; to be settled behind the last.
     pub fn join(&mut self, other: Self) {
         self.cells.extend(other.cells);
+        for (source, front) in other.fronts {
+            if let Some(own) = self.fronts.get_mut(&source) {
+                own.join(front);
+            }
+        }
     }
 
-    fn obstacles(&self) -> impl Iterator<Item = Obstacle> {
+    /// Each place once for each kind of what is there.
+    fn obstacles(&self) -> Vec<Obstacle> {
         let mask = (1_u64 << BITS) - 1;
-        self.cells.iter().map(move |&(key, what)| {
+        let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
+        let obstacle = |alike: &[(u64, What, bool, u16)]| {
+            let (key, what, ..) = alike[0];
+            let is_grazed = alike.iter().all(|cell| cell.2);
             let cell = [key >> (2 * BITS), key >> BITS & mask, key & mask];
             let at = |i: usize| ((cell[i] as f64 + 0.5) * CELL - self.far) as f32;
-            Obstacle { at: [at(0), at(1), at(2)], radius: HALF_CELL, what }
-        })
+            Obstacle { at: [at(0), at(1), at(2)], radius: HALF_CELL, what, is_grazed }
+        };
+        alike.map(obstacle).collect()
+    }
+}
+
+impl Cells {
+    /// For each of its obstacles: whether beams beside those that told it met something before it,
+    /// by all scanners that told it; as far as `asks` wants to know.
+    fn behind(&self, all: &[Obstacle], asks: impl Fn(usize) -> bool) -> Vec<bool> {
+        let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
+        let is_behind = |(at, alike): (usize, &[(u64, What, bool, u16)])| {
+            let p = Point::from(all[at].at.map(f64::from));
+            let by = |source: u16| self.fronts.get(&source).is_some_and(|f| f.is_behind(&p));
+            // Those that grazed a robot tell nothing.
+            asks(at) && alike.iter().filter(|cell| !cell.2).all(|cell| by(cell.3))
+        };
+        alike.enumerate().map(is_behind).collect()
     }
 }
 
@@ -144,8 +192,9 @@ impl Obstacles {
         others: &[(i16, &Model, Vec<Pose>)],
         (space, known): (Option<&Space>, Known),
     ) -> Self {
-        let mut all: Vec<Obstacle> = cells.obstacles().collect();
-        let is_evident = evident(&all, space, &known.world_from_base);
+        let mut all: Vec<Obstacle> = cells.obstacles();
+        let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, |at| thin[at]);
+        let is_evident = evident(&mut all, behind, space, &known.world_from_base);
         let mut told = is_evident.into_iter();
         all.retain(|_| told.next().unwrap_or(true));
         for (number, model, poses) in others {
@@ -160,6 +209,16 @@ impl Obstacles {
         let mut out = Self { all, bins: Vec::new(), known, far: cells.far, split };
         out.sort();
         out
+    }
+
+    /// Places where something fixed is, and how near counts, metres.
+    pub(crate) fn fixed(&self, within: f32) -> Fixed {
+        let of = |o: &&Obstacle| o.what == What::Fixed;
+        let mut cubes: FxHashMap<[i32; 3], Vec<[f32; 3]>> = FxHashMap::default();
+        for o in self.all.iter().filter(of) {
+            cubes.entry(o.at.map(|v| (v / within).floor() as i32)).or_default().push(o.at);
+        }
+        Fixed { within, cubes }
     }
 
     /// Gathers obstacles in bins.
@@ -205,6 +264,23 @@ impl Obstacles {
     }
 }
 
+/// See [`Obstacles::fixed`].
+pub(crate) struct Fixed {
+    within: f32,
+    cubes: FxHashMap<[i32; 3], Vec<[f32; 3]>>,
+}
+
+impl Fixed {
+    pub(crate) fn is_near(&self, p: [f32; 3]) -> bool {
+        let [x, y, z] = p.map(|v| (v / self.within).floor() as i32);
+        (0..27).any(|i: i32| {
+            let cube = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
+            let own = self.cubes.get(&cube).into_iter().flatten();
+            own.into_iter().any(|q| distance(*q, p) < self.within)
+        })
+    }
+}
+
 impl Bin {
     fn of(own: &[Obstacle], from: usize) -> Self {
         let bounds = Aabb::of(own.iter().map(|o| o.at.map(f64::from)));
@@ -228,7 +304,7 @@ fn surface<'a>(
         link.cad.points.iter().map(move |p| {
             let at = pose * Point::from(p.map(f64::from));
             let at = at.coords.map(|v| v as f32).into();
-            Obstacle { at, radius, what: What::Robot(number) }
+            Obstacle { at, radius, what: What::Robot(number), is_grazed: false }
         })
     })
 }
@@ -259,6 +335,7 @@ impl Split {
                 at: std::array::from_fn(|i| middle[i] + by[i]),
                 radius,
                 what,
+                is_grazed: false,
             })
         })
     }
@@ -273,7 +350,12 @@ fn unseen(space: &Space, base_from_world: &Pose) -> impl Iterator<Item = Obstacl
         let middle = |i: usize| ((grid.first[i] + cell[i] as i64) as f64 + 0.5) * grid.edge;
         let p = base_from_world * Point::new(middle(0), middle(1), middle(2));
         let at = p.coords.map(|v| v as f32).into();
-        Obstacle { at, radius: (HALF_DIAGONAL * grid.edge) as f32, what: What::Unseen }
+        Obstacle {
+            at,
+            radius: (HALF_DIAGONAL * grid.edge) as f32,
+            what: What::Unseen,
+            is_grazed: false,
+        }
     })
 }
 

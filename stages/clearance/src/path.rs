@@ -321,8 +321,8 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
         let mut body = Body::new(&model, BTreeMap::new(), (margin, 0.0), &OneByOne);
-        let mut cells = Cells::within(crate::reach(&model) + margin + 0.1);
-        points.iter().for_each(|(p, what)| cells.add(*p, *what));
+        let mut cells = Cells::within(crate::reach(&model) + margin + 0.1, &BTreeMap::new());
+        points.iter().for_each(|(p, what)| cells.add(*p, *what, (false, 0)));
         cells.settle();
         let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
         let known = Known { world_from_base: Pose::identity(), bounds };

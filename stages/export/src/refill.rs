@@ -38,6 +38,8 @@ pub struct OldPoint {
     pub world: [f64; 3],
     /// What it was said to belong to.
     pub label: Label,
+    /// LAS `point_source_id`: the number of its scan, from 1, or what its LAS file had.
+    pub source_id: u16,
 }
 
 /// What a list of files says of a tile.
@@ -131,7 +133,8 @@ fn point(record: &[u8], las: &LasSettings) -> OldPoint {
     let at = if las.with_color { 36 } else { 30 };
     let index = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]).wrapping_sub(1) as i16;
     let label = Label { kind, robot: index(at), link: index(at + 2) };
-    OldPoint { world: [metres(0), metres(1), metres(2)], label }
+    let source_id = u16::from_le_bytes([record[20], record[21]]);
+    OldPoint { world: [metres(0), metres(1), metres(2)], label, source_id }
 }
 
 /// A tile that is read piece by piece.
@@ -177,6 +180,10 @@ impl<'a> Tile<'a> {
                 let read = sum_of(file.get_mut()).map_err(failed)?;
                 compare(path, stated, read)?;
             }
+            if !has_chunks(&mut file, expected as u64, las.record_len()).map_err(failed)? {
+                let what = "its table of chunks lies outside the file or states too many";
+                return Err(foreign().because(what));
+            }
             file.seek(SeekFrom::Start(expected as u64)).map_err(failed)?;
             let laz = crate::las::laz_vlr(las);
             let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;
@@ -217,6 +224,23 @@ impl<'a> Tile<'a> {
         self.left -= n;
         Ok(Some(bytes))
     }
+}
+
+/// Whether the table of chunks states no more of them than fit before it: each begins with a record
+/// as it is. The decoder takes memory for as many as are stated.
+fn has_chunks(file: &mut (impl Read + Seek), at: u64, record_len: usize) -> std::io::Result<bool> {
+    let mut word = [0; 8];
+    file.seek(SeekFrom::Start(at))?;
+    file.read_exact(&mut word)?;
+    let table = u64::from_le_bytes(word);
+    let n_bytes = file.seek(SeekFrom::End(0))?;
+    if table < at + 8 || table.saturating_add(8) > n_bytes {
+        return Ok(false);
+    }
+    file.seek(SeekFrom::Start(table))?;
+    file.read_exact(&mut word)?;
+    let [_, _, _, _, n @ ..] = word;
+    Ok(u64::from(u32::from_le_bytes(n)) <= (table - at - 8) / record_len as u64)
 }
 
 /// Length and sum of a whole file, from its beginning.

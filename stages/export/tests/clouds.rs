@@ -189,3 +189,36 @@ fn a_dropped_file_leaves_nothing_and_an_empty_cloud_is_whole() {
         assert!(read(&path).1.is_empty());
     }
 }
+
+#[test]
+fn a_tile_that_states_more_chunks_than_fit_takes_no_memory_for_them() {
+    let path = folder("chunks").join("a.laz");
+    let quantum = Quantum { scale: [1e-4; 3], offset: [0.0; 3] };
+    let settings = LasSettings { compress: true, ..LasSettings::new(quantum) };
+    let mut writer = LasWriter::create(&path, settings.clone()).expect("create");
+    let points = PointColumns {
+        world: &[[1.0, 2.0, 3.0]],
+        labels: &[Label::FIXED],
+        ..PointColumns::default()
+    };
+    writer.push(&points).expect("push");
+    writer.finish().expect("finish");
+    let n_read = |path| {
+        let mut n = 0;
+        export::read_tile(path, &settings, None, |points| {
+            n += points.len();
+            Ok(())
+        })
+        .map(|()| n)
+    };
+    assert_eq!(n_read(&path).expect("reads"), 1);
+    let mut bytes = std::fs::read(&path).expect("bytes");
+    let at = u32::from_le_bytes(bytes[96..100].try_into().expect("four")) as usize;
+    let table = u64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight")) as usize;
+    for n in [u32::MAX, 3] {
+        bytes[table + 4..table + 8].copy_from_slice(&n.to_le_bytes());
+        std::fs::write(&path, &bytes).expect("writes");
+        let error = n_read(&path).expect_err("too many");
+        assert!(error.to_string().contains("table of chunks"), "{error}");
+    }
+}

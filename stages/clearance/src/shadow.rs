@@ -1,0 +1,199 @@
+//! Robots as they were found, what was measured, and an eye, in; whether a point may come from a
+//! beam that met an edge before it, out.
+//!
+//! A beam has a width. One that meets an edge gives a range between those of the edge and of what is
+//! behind it, so a curtain of such points hangs behind every outline. Those of a robot move with it,
+//! and nothing is where they are.
+
+use geometry::{Point, Pose};
+use robot::Model;
+use rustc_hash::FxHashMap;
+
+/// A beam that passes nearer to a surface than this may have met it, metres: the radius of a beam,
+/// and what posture and model are off.
+const GRAZE: f64 = 0.02;
+/// Points nearer behind an edge than this are told by the surface, metres.
+const BEHIND: f64 = 0.03;
+/// So much farther does a surface count for each metre that a beam passes beside it: an outline is
+/// told by its edge, not by what bulges towards the eye beside it.
+const ASIDE: f64 = 2.0;
+/// Distance of the samples that tell a surface, metres.
+const SPACING: f64 = 0.01;
+
+/// What robots hide from an eye, and a rim around it.
+pub struct Shadow {
+    eye: Point,
+    /// Width of a direction, of a unit vector's components.
+    width: f64,
+    /// By direction: how far the surface is, metres.
+    near: FxHashMap<[i32; 3], f32>,
+}
+
+impl Shadow {
+    /// Of robots, each with its links' poses, as an eye sees them; all in one frame, metres.
+    #[must_use]
+    pub fn new(robots: &[(&Model, &[Pose])], eye: Point) -> Self {
+        let seen = |&(model, poses): &(&Model, &[Pose])| -> Vec<Point> {
+            let links = model.links.iter().zip(poses);
+            let own = links.flat_map(|(link, pose)| {
+                // Any prefix of the samples is spread evenly.
+                let share = (f64::from(link.cad.spacing) / SPACING).powi(2).min(1.0);
+                let n = (link.cad.points.len() as f64 * share).ceil() as usize;
+                link.cad.points[..n].iter().map(move |p| pose * Point::from(p.map(f64::from)))
+            });
+            own.collect()
+        };
+        let all: Vec<Point> = robots.iter().flat_map(seen).collect();
+        let nearest = all.iter().map(|p| (p - eye).norm()).fold(f64::INFINITY, f64::min);
+        let nearest = nearest.clamp(GRAZE, 1e3);
+        let mut out = Self { eye, width: 0.5 * GRAZE / nearest, near: FxHashMap::default() };
+        all.iter().for_each(|p| out.add(p));
+        out
+    }
+
+    /// Marks the directions about a place on a surface.
+    fn add(&mut self, p: &Point) {
+        let off = p - self.eye;
+        let far = off.norm();
+        if far < GRAZE {
+            return;
+        }
+        let (way, rim) = (off / far, (GRAZE + 0.5 * SPACING) / far);
+        let n = (rim / self.width).ceil() as i32;
+        let middle = self.cell(way.into());
+        let side = 2 * n + 1;
+        for i in 0..side.pow(3) {
+            let by = [i % side - n, i / side % side - n, i / (side * side) - n];
+            let cell: [i32; 3] = std::array::from_fn(|k| middle[k] + by[k]);
+            let at = cell.map(|c| (f64::from(c) + 0.5) * self.width);
+            let length = at.iter().map(|v| v * v).sum::<f64>().sqrt();
+            // Only cells that the unit sphere goes through are directions.
+            if (length - 1.0).abs() > self.width {
+                continue;
+            }
+            let aside = (0..3).map(|k| (at[k] / length - way[k]).powi(2)).sum::<f64>().sqrt();
+            if aside <= rim + self.width {
+                let told = (far + ASIDE * far * aside) as f32;
+                let near = self.near.entry(cell).or_insert(told);
+                *near = near.min(told);
+            }
+        }
+    }
+
+    fn cell(&self, way: [f64; 3]) -> [i32; 3] {
+        way.map(|v| (v / self.width).floor() as i32)
+    }
+
+    /// Whether the beam to a point may have met an edge before it.
+    #[must_use]
+    pub fn is_grazed(&self, p: &Point) -> bool {
+        let off = p - self.eye;
+        let far = off.norm();
+        let near = self.near.get(&self.cell((off / far.max(1e-9)).into()));
+        near.is_some_and(|near| far > f64::from(*near) + BEHIND)
+    }
+}
+
+/// A scanner: its `point_source_id` is that of no other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Eye {
+    /// Frame of the base, metres.
+    pub at: Point,
+    /// Angle between its beams, radians.
+    pub step: f64,
+}
+
+/// What a scanner measured, by direction: how near the nearest is.
+#[derive(Debug, Clone)]
+pub(crate) struct Front {
+    eye: Point,
+    width: f64,
+    near: FxHashMap<[i32; 3], f32>,
+}
+
+/// Beams are no narrower, radians: 3 mm wide at 3 m.
+const BEAM: f64 = 1e-3;
+/// What is nearer by less is of the same thing, metres: noise, and a surface that is seen askew.
+const BEFORE: f32 = 0.02;
+
+impl Front {
+    pub(crate) fn new(eye: &Eye) -> Self {
+        Self { eye: eye.at, width: eye.step.max(BEAM), near: FxHashMap::default() }
+    }
+
+    pub(crate) fn add(&mut self, p: &Point) {
+        let (cell, far) = self.cell(p);
+        let near = self.near.entry(cell).or_insert(far);
+        *near = near.min(far);
+    }
+
+    /// Adds what is nearer in another one of the same eye.
+    pub(crate) fn join(&mut self, other: Self) {
+        for (cell, far) in other.near {
+            let near = self.near.entry(cell).or_insert(far);
+            *near = near.min(far);
+        }
+    }
+
+    fn cell(&self, p: &Point) -> ([i32; 3], f32) {
+        let off = p - self.eye;
+        let far = off.norm().max(1e-9);
+        ((off / far / self.width).map(|v| v.floor() as i32).into(), far as f32)
+    }
+
+    /// Whether a beam beside that to a point, or the same, met something before it.
+    pub(crate) fn is_behind(&self, p: &Point) -> bool {
+        let ([x, y, z], far) = self.cell(p);
+        let beside = |i: i32| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
+        (0..27).any(|i| self.near.get(&beside(i)).is_some_and(|near| near + BEFORE < far))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use robot::Settings;
+
+    #[test]
+    fn points_behind_an_outline_are_grazed_and_no_others() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let urdf = "<robot name='post'><link name='foot'><visual><origin xyz='0 0 0.5'/>\
+            <geometry><cylinder radius='0.1' length='1'/></geometry></visual></link></robot>";
+        let path = dir.path().join("post.urdf");
+        std::fs::write(&path, urdf).expect("is written");
+        let (mut model, _) = Model::load_urdf(&path, "post", &Settings::default()).expect("loads");
+        model.sample(&Settings::default(), &contract::OneByOne);
+        let poses = vec![Pose::identity(); model.links.len()];
+        for far in [1.0, 3.0, 9.0] {
+            let shadow = Shadow::new(&[(&model, &poses)], Point::new(-far, 0.0, 0.5));
+            // By how far beside the outline, and how far behind the axis of the post.
+            let told = |aside: f64, behind: f64| {
+                let wide = (0.1 + aside) * (far + behind) / far;
+                [-wide, wide].map(|y| shadow.is_grazed(&Point::new(behind, y, 0.5)))
+            };
+            for behind in [0.08, 0.3, 2.0] {
+                assert_eq!(told(0.003, behind), [true; 2], "{far} {behind}");
+            }
+            // Beside it, away from it, and before it.
+            assert_eq!(told(0.02, 0.0), [false; 2], "{far}");
+            assert_eq!(told(0.06, 1.0), [false; 2], "{far}");
+            assert!(!shadow.is_grazed(&Point::new(-0.4, 0.0, 0.5)), "{far}");
+        }
+    }
+
+    #[test]
+    fn what_beams_met_before_is_told_beside_it_and_no_farther() {
+        let mut front = Front::new(&Eye { at: Point::new(0.0, 0.0, 1.0), step: 0.003 });
+        // A wire 2 m away.
+        (0..100).for_each(|i| front.add(&Point::new(2.0, 0.0, 0.5 + 0.006 * f64::from(i))));
+        for (p, is_behind) in [
+            ([2.06, 0.002, 0.8], true),
+            ([3.0, -0.004, 0.8], true),
+            ([2.01, 0.002, 0.8], false),
+            ([1.9, 0.0, 0.8], false),
+            ([2.06, 0.03, 0.8], false),
+        ] {
+            assert_eq!(front.is_behind(&Point::from(p)), is_behind, "{p:?}");
+        }
+    }
+}
