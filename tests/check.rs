@@ -113,3 +113,21 @@ fn a_path_is_free_only_where_all_is_known_and_nothing_near() {
         assert!(text.contains(said), "{text}");
     }
 }
+
+/// A cell that the bench draws, with wires in the robot's way: curtains of points behind outlines,
+/// strays, and gaps beside its own links are in nobody's way.
+#[test]
+fn small_moves_among_all_that_a_scan_gets_wrong_are_free_and_no_collision_is() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let args = ["bench", "check", "--cases", "1", "--first", "3", "--seed", "591", "--step", "0.25"];
+    let bench = program(dir.path(), &[&args[..], &["--out", "bench"]].concat());
+    assert!(bench.status.success(), "{}", String::from_utf8_lossy(&bench.stderr));
+    let text = std::fs::read_to_string(dir.path().join("bench/check.jsonl")).expect("rows");
+    let row: Value = serde_json::from_str(&text).expect("one row");
+    let paths = row["paths"].as_array().expect("paths");
+    let of = |truth: &str| paths.iter().filter(|p| p["truth"] == truth).collect::<Vec<_>>();
+    let (free, hits) = (of("free"), of("collides"));
+    assert!(free.len() >= 5 && hits.len() >= 3, "{row}");
+    assert!(hits.iter().all(|p| p["outcome"] != "free"), "{hits:?}");
+    assert!(free.iter().all(|p| p["outcome"] == "free"), "{free:?}");
+}

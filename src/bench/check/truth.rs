@@ -31,7 +31,7 @@ const STEP: f64 = 2e-3;
 const SAMPLE: f64 = 0.04;
 /// A place counts as seen where one so far beside it is, metres: less than half a voxel of those
 /// that the product tells space by.
-const SEEN_BESIDE: f64 = 0.02;
+const SEEN_BESIDE: f64 = 0.0125;
 /// Postures that are asked so are so far apart, metres.
 const SEEN_STEP: f64 = 0.02;
 /// Edge of the voxels that tell what the robot filled as it was scanned, metres, and the distance
