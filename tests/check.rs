@@ -119,7 +119,8 @@ fn a_path_is_free_only_where_all_is_known_and_nothing_near() {
 #[test]
 fn small_moves_among_all_that_a_scan_gets_wrong_are_free_and_no_collision_is() {
     let dir = tempfile::tempdir().expect("a folder");
-    let args = ["bench", "check", "--cases", "1", "--first", "3", "--seed", "591", "--step", "0.25"];
+    let args =
+        ["bench", "check", "--cases", "1", "--first", "3", "--seed", "591", "--step", "0.25"];
     let bench = program(dir.path(), &[&args[..], &["--out", "bench"]].concat());
     assert!(bench.status.success(), "{}", String::from_utf8_lossy(&bench.stderr));
     let text = std::fs::read_to_string(dir.path().join("bench/check.jsonl")).expect("rows");

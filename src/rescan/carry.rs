@@ -5,7 +5,7 @@
 use super::past::{Past, World};
 use crate::engine::{AllThreads, Engine, Task};
 use crate::store::Store;
-use contract::{Error, Result, Scan};
+use contract::{Error, Result, Scan, words};
 use export::CarriedEntry;
 use frame::{Answer, Gathered, Panorama, Place, Refusal, Session};
 use geometry::{Aabb, Point, Pose, Vector};
@@ -230,7 +230,8 @@ impl Sessions<'_> {
         let pose = world(&place.laid.old_from_new, old, new);
         let at = pose * Point::from(self.first());
         let yaw = pose.rotation.euler_angles().2.to_degrees();
-        format!("--frame {:.2},{:.2},{:.2},{yaw:.2}", at.x, at.y, at.z)
+        let [x, y, z, yaw] = [at.x, at.y, at.z, yaw].map(|v| words::fixed(v, 2));
+        format!("--frame {x},{y},{z},{yaw}")
     }
 }
 

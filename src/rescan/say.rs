@@ -8,7 +8,7 @@ use crate::labelling::Done;
 use crate::report::{dropped, id, input_entry, robot_entry};
 use crate::reuse::Digests;
 use crate::things::{ThingEntry, word};
-use contract::words::{count, triple};
+use contract::words::{count, fixed, triple};
 use contract::{Error, Kind, Result, quote};
 use export::{
     CarriedEntry, ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile,
@@ -292,7 +292,6 @@ impl Said<'_, '_> {
 
 /// Which frame the new scans are in.
 fn frame_in_words(frame: &CarriedEntry) -> String {
-    let [x, y, z] = frame.xyz;
     let [qx, qy, qz, qw] = frame.quat_xyzw;
     let yaw = (2.0 * (qw * qz + qx * qy)).atan2(1.0 - 2.0 * (qy * qy + qz * qz)).to_degrees();
     let (n, against) = (
@@ -300,8 +299,10 @@ fn frame_in_words(frame: &CarriedEntry) -> String {
         frame.n_where_old_saw_through + frame.n_where_new_saw_through,
     );
     format!(
-        "the new scans are in another frame, {}: the plant's is theirs turned by {yaw:.3}° and shifted by ({x:.3}, {y:.3}, {z:.3}) m; {:.1} % of the upright surfaces that both sessions can see agree",
+        "the new scans are in another frame, {}: the plant's is theirs turned by {}° and shifted by {} m; {:.1} % of the upright surfaces that both sessions can see agree",
         frame.by,
+        fixed(yaw, 3),
+        triple(frame.xyz, 3),
         100.0 * n as f64 / (n + against).max(1) as f64
     )
 }

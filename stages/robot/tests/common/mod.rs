@@ -175,3 +175,23 @@ pub fn check_twists(model: &Model, seed: u64) {
         }
     }
 }
+
+/// A robot of one mesh, and that mesh.
+pub fn meshed(path: &str, bytes: &[u8]) -> Folder {
+    Folder::new().with("robot.urdf", robot(&body(path))).with(path, bytes)
+}
+
+/// The links and the joint of a robot of one mesh.
+pub fn body(path: &str) -> String {
+    link("a")
+        + &format!(
+            "<link name='b'><visual><geometry><mesh filename='{path}'/></geometry></visual></link>"
+        )
+        + &joint("j", "revolute", "a", "b", "0 0 1", LIMIT)
+}
+
+/// Asks for a finding with these words.
+pub fn says(folder: &Folder, words: &str) {
+    let found = folder.lint();
+    assert!(found.iter().any(|f| f.contains(words)), "expected \"{words}\" in {found:#?}");
+}
