@@ -18,6 +18,8 @@ const MAX_LINES: usize = 450;
 const MAX_TEST_LINES: usize = 600;
 /// Longest function, lines, from its `fn` to its closing brace.
 const MAX_FN_LINES: usize = 60;
+/// Longest line of a comment, characters.
+const MAX_COMMENT: usize = 100;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -164,6 +166,26 @@ fn files_open_with_a_sentence_and_stay_short() {
         let most = if is_test { MAX_TEST_LINES } else { MAX_LINES };
         if n > most {
             faults.push(format!("{name} has {n} lines"));
+        }
+    }
+    report(&faults);
+}
+
+/// Texts between fences and tables are as wide as they are.
+#[test]
+fn comments_keep_to_their_width() {
+    let mut faults = Vec::new();
+    for (name, text) in all_files() {
+        let mut is_fenced = false;
+        for (at, line) in text.lines().enumerate() {
+            let words = line.trim_start();
+            let Some(words) = words.strip_prefix("//") else { continue };
+            let words = words.trim_start_matches(['/', '!', ' ']);
+            is_fenced ^= words.starts_with("```");
+            let is_free = is_fenced || words.starts_with('|');
+            if !is_free && line.chars().count() > MAX_COMMENT {
+                faults.push(format!("{name}:{}: longer than {MAX_COMMENT} columns", at + 1));
+            }
         }
     }
     report(&faults);

@@ -93,8 +93,8 @@ proptest! {
         prop_assert_eq!(seen, (0..n).collect::<Vec<_>>());
         let (now, peak) = live.both();
         prop_assert_eq!(now, 0);
-        // The channel before the step and the one after it, each over by one item at most; one item a worker; the one that the
-        // source has made and the one that the end holds.
+        // The channel before the step and the one after it, each over by one item at most; one
+        // item a worker; the one that the source has made and the one that the end holds.
         let most = 2 * channel_bytes.max(largest) + (n_workers + 4) * largest;
         prop_assert!(peak <= most as i64, "{} bytes alive, {} allowed", peak, most);
     }

@@ -31,7 +31,8 @@ macro_rules! settings {
                 Err(unknown(key))
             }
 
-            /// All of them with their values, in the order of rooms and fields: the record of a run.
+            /// All of them with their values, in the order of rooms and fields: the record of a
+            /// run.
             #[must_use]
             pub fn all(&self) -> Vec<(&'static str, toml::Value)> {
                 vec![$($((

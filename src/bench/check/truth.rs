@@ -16,8 +16,8 @@ use std::collections::BTreeMap;
 
 /// Distances are told up to this, metres: farther is far.
 pub(super) const FAR: f64 = 0.1;
-/// So much farther than what is nearest each part is asked, metres: it need not be asked again until
-/// it has moved by as much.
+/// So much farther than what is nearest each part is asked, metres: it need not be asked again
+/// until it has moved by as much.
 const AHEAD: f64 = 0.03;
 /// Sides of triangles of what stands within reach, metres, at most.
 const SHORT: f32 = 0.2;

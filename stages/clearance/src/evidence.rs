@@ -70,8 +70,8 @@ pub(crate) fn evident(
     out
 }
 
-/// Of points that hang on a link, each with whether its beam grazed an edge, those that are evidence
-/// of something that hangs there.
+/// Of points that hang on a link, each with whether its beam grazed an edge, those that are
+/// evidence of something that hangs there.
 #[must_use]
 pub fn hanging(points: &[([f32; 3], bool)]) -> Vec<[f32; 3]> {
     let obstacle = |&(at, is_grazed): &([f32; 3], bool)| Obstacle {

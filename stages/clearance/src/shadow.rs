@@ -1,9 +1,9 @@
 //! Robots as they were found, what was measured, and an eye, in; whether a point may come from a
 //! beam that met an edge before it, out.
 //!
-//! A beam has a width. One that meets an edge gives a range between those of the edge and of what is
-//! behind it, so a curtain of such points hangs behind every outline. Those of a robot move with it,
-//! and nothing is where they are.
+//! A beam has a width. One that meets an edge gives a range between those of the edge and of what
+//! is behind it, so a curtain of such points hangs behind every outline. Those of a robot move with
+//! it, and nothing is where they are.
 
 use geometry::{Point, Pose};
 use robot::Model;

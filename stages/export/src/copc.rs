@@ -1,8 +1,8 @@
 //! The tiles of a plant in; one COPC file of all their points, coarse to fine, out.
 //! `copc_converter` makes the octree out of core.
 //!
-//! COPC 1.0 (<https://copc.io>) is LAZ whose chunks are the nodes of an octree: viewers (Potree, QGIS) load no more of it than
-//! they show, and everything else reads it as LAZ.
+//! COPC 1.0 (<https://copc.io>) is LAZ whose chunks are the nodes of an octree: viewers (Potree,
+//! QGIS) load no more of it than they show, and everything else reads it as LAZ.
 
 use crate::atomic::AtomicFile;
 use contract::{Error, Kind, Result};

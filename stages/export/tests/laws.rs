@@ -112,7 +112,8 @@ proptest! {
             let off = a.inverse() * b;
             prop_assert!(off.translation.vector.norm() < NEAR && off.rotation.angle() < NEAR, "{}: {}", name, off);
         }
-        // Poses are products along the way from the root: a pose of a link is its parent's times its joint's.
+        // Poses are products along the way from the root: a pose of a link is its parent's times
+        // its joint's.
         let (at, values) = (model.poses(&posture), model.joint_values(&posture));
         for (joint, value) in model.joints.iter().zip(values) {
             let off = (at[joint.parent] * joint.parent_from_child(value)).inverse() * at[joint.child];

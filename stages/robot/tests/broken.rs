@@ -3,7 +3,7 @@
 
 mod common;
 
-use ::robot::{Library, Model, Settings, Severity};
+use ::robot::{Library, Model, Settings};
 use common::{Folder, LIMIT, arm, body, joint, link, meshed, robot, says};
 
 #[test]

@@ -2,8 +2,8 @@
 
 mod common;
 
-use ::robot::{Model, Settings, Severity};
-use common::{Folder, LIMIT, link, meshed, robot, says};
+use ::robot::Severity;
+use common::{Folder, LIMIT, link, meshed, says};
 
 /// A box with a turned joint: as text, its name and mesh file with a letter beyond ASCII.
 fn turned(declared: &str, version: &str, origin: &str) -> String {

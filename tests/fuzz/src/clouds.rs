@@ -1,5 +1,6 @@
-//! Point files in; the laws of reading held, out: places ascend and lie in their mask, columns are as long as one another,
-//! coordinates are finite, and how the reader cuts its strips changes no point.
+//! Point files in; the laws of reading held, out: places ascend and lie in their mask, columns are
+//! as long as one another, coordinates are finite, and how the reader cuts its strips changes no
+//! point.
 
 use crate::{file, refused};
 use contract::{OneByOne, Strip};
@@ -30,8 +31,9 @@ pub fn ptx(data: &[u8]) {
 const PAGE: usize = 1024;
 const PAYLOAD: usize = 1020;
 
-/// An E57 file of a case: the bytes before the first `<?xml` are its binary sections, which lie behind the header of 48 bytes;
-/// the rest is its description. Header and checksums, which no mutation would ever get right, are made here.
+/// An E57 file of a case: the bytes before the first `<?xml` are its binary sections, which lie
+/// behind the header of 48 bytes; the rest is its description. Header and checksums, which no
+/// mutation would ever get right, are made here.
 #[must_use]
 pub fn e57_file(data: &[u8]) -> Vec<u8> {
     let at = data.windows(5).position(|w| w == b"<?xml").unwrap_or(data.len());

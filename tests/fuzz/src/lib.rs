@@ -1,6 +1,7 @@
-//! Bytes from the fuzzer in; a panic where a reader breaks a law of the house, out. Laws that hold for every target: no panic,
-//! no more than [`MOST_BYTES`] of memory and [`MOST_SECONDS`] of processor time a case, and no error that calls itself a fault
-//! of the program. What else a target checks stands beside it.
+//! Bytes from the fuzzer in; a panic where a reader breaks a law of the house, out. Laws that hold
+//! for every target: no panic, no more than [`MOST_BYTES`] of memory and [`MOST_SECONDS`] of
+//! processor time a case, and no error that calls itself a fault of the program. What else a target
+//! checks stands beside it.
 
 pub mod clouds;
 pub mod own;
@@ -18,8 +19,8 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Most memory that one case may take, bytes. Inputs have some kilobytes.
 pub const MOST_BYTES: usize = 512 << 20;
-/// Most processor time that one case may take, all threads together, seconds. Instrumented code is several times slower than
-/// the program's.
+/// Most processor time that one case may take, all threads together, seconds. Instrumented code is
+/// several times slower than the program's.
 pub const MOST_SECONDS: f64 = 2.0;
 
 /// Counts what is allocated, since the fuzzer itself only samples it.
@@ -66,8 +67,9 @@ unsafe impl GlobalAlloc for Counted {
 #[global_allocator]
 static ALLOCATOR: Counted = Counted;
 
-/// Once, before the first case: panics that a fence of the program catches are no findings, all others are. Where
-/// `STILLPOINT_FUZZ_SEEDS` names a folder, the seeds of all targets are written there instead, and the process ends.
+/// Once, before the first case: panics that a fence of the program catches are no findings, all
+/// others are. Where `STILLPOINT_FUZZ_SEEDS` names a folder, the seeds of all targets are written
+/// there instead, and the process ends.
 pub fn begin() {
     if let Some(out) = std::env::var_os("STILLPOINT_FUZZ_SEEDS") {
         seeds::write(out.into());

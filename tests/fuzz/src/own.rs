@@ -1,5 +1,6 @@
-//! Files that only this program writes, in; they are read as they were written or refused, out. Where a digest guards a file, the
-//! target makes it right: it guards against damage, not against somebody who computes it anew.
+//! Files that only this program writes, in; they are read as they were written or refused, out.
+//! Where a digest guards a file, the target makes it right: it guards against damage, not against
+//! somebody who computes it anew.
 
 use crate::{file, folder, refused};
 use export::{LasSettings, MaskReader, Quantum, ResultFile, read_places, read_tile};

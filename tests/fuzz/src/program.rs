@@ -1,6 +1,7 @@
-//! Files that the program alone reads, in: its settings, reviews and paths; its store, plants, kept pieces and lists. They are read
-//! as they were written or refused, out. Where a digest guards a file, the target makes it right: it guards against damage, not
-//! against somebody who computes it anew.
+//! Files that the program alone reads, in: its settings, reviews and paths; its store, plants, kept
+//! pieces and lists. They are read as they were written or refused, out. Where a digest guards a
+//! file, the target makes it right: it guards against damage, not against somebody who computes it
+//! anew.
 
 use crate::{file, folder, refused};
 use contract::{InputId, Map as _, MaskId, Scan, ScanId, Strip};
@@ -20,7 +21,8 @@ const MOST: u64 = 1 << 26;
 /// Lengths of the headers of a store's two files, bytes.
 const HEADER: usize = 64;
 
-/// A store: four bytes that say how long the archive of its catalogue is, the archive, and the tiles behind their header.
+/// A store: four bytes that say how long the archive of its catalogue is, the archive, and the
+/// tiles behind their header.
 pub fn store(data: &[u8]) {
     static HEADS: OnceLock<[Vec<u8>; 2]> = OnceLock::new();
     let [catalogue, tiles] = HEADS.get_or_init(|| {

@@ -1,4 +1,5 @@
-//! Robot descriptions in; a model whose numbers all name something, or a finding that says why not, out.
+//! Robot descriptions in; a model whose numbers all name something, or a finding that says why not,
+//! out.
 
 use crate::{file, folder};
 use robot::{Library, Model, Settings, Severity};
@@ -82,7 +83,8 @@ fn load(folder: &Path) {
     }
 }
 
-/// All numbers of a model name something, its meshes are finite, and it stands somewhere in every posture.
+/// All numbers of a model name something, its meshes are finite, and it stands somewhere in every
+/// posture.
 fn check(model: &Model) {
     let (n_links, n_joints) = (model.links.len(), model.joints.len());
     assert_eq!(n_links, n_joints + 1, "a tree");

@@ -1,5 +1,6 @@
-//! A folder in; in it a folder for each target with small files to begin from, all made here, out. Whole files and odd ones: what
-//! a mutation would take long to find, such as another point format, is a file of its own.
+//! A folder in; in it a folder for each target with small files to begin from, all made here, out.
+//! Whole files and odd ones: what a mutation would take long to find, such as another point format,
+//! is a file of its own.
 
 mod clouds;
 mod texts;
