@@ -10,6 +10,7 @@ pub mod block;
 mod calibration;
 mod canvas;
 mod change_picture;
+mod chunks;
 mod clouds;
 mod copc;
 mod e57;

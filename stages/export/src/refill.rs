@@ -2,6 +2,7 @@
 //! ones of a tile that is being written. Records stay as they are, byte for byte.
 
 use crate::block::Straight;
+use crate::chunks;
 use crate::las::head;
 use crate::record::{CLASSES, Extent, LasSettings};
 use crate::spool::{Blocks, Spool};
@@ -180,12 +181,11 @@ impl<'a> Tile<'a> {
                 let read = sum_of(file.get_mut()).map_err(failed)?;
                 compare(path, stated, read)?;
             }
-            if !has_chunks(&mut file, expected as u64, las.record_len()).map_err(failed)? {
-                let what = "its table of chunks lies outside the file or states too many";
-                return Err(foreign().because(what));
-            }
-            file.seek(SeekFrom::Start(expected as u64)).map_err(failed)?;
             let laz = crate::las::laz_vlr(las);
+            let (at, of) = (expected as u64, (&laz, las.record_len()));
+            let fits = chunks::check(&mut file, at, of).map_err(failed)?;
+            fits.map_err(|what| foreign().because(what))?;
+            file.seek(SeekFrom::Start(at)).map_err(failed)?;
             let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;
             Records::Compressed(Box::new(reader))
         } else {
@@ -224,23 +224,6 @@ impl<'a> Tile<'a> {
         self.left -= n;
         Ok(Some(bytes))
     }
-}
-
-/// Whether the table of chunks states no more of them than fit before it: each begins with a record
-/// as it is. The decoder takes memory for as many as are stated.
-fn has_chunks(file: &mut (impl Read + Seek), at: u64, record_len: usize) -> std::io::Result<bool> {
-    let mut word = [0; 8];
-    file.seek(SeekFrom::Start(at))?;
-    file.read_exact(&mut word)?;
-    let table = u64::from_le_bytes(word);
-    let n_bytes = file.seek(SeekFrom::End(0))?;
-    if table < at + 8 || table.saturating_add(8) > n_bytes {
-        return Ok(false);
-    }
-    file.seek(SeekFrom::Start(table))?;
-    file.read_exact(&mut word)?;
-    let [_, _, _, _, n @ ..] = word;
-    Ok(u64::from(u32::from_le_bytes(n)) <= (table - at - 8) / record_len as u64)
 }
 
 /// Length and sum of a whole file, from its beginning.

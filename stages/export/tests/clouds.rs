@@ -191,7 +191,7 @@ fn a_dropped_file_leaves_nothing_and_an_empty_cloud_is_whole() {
 }
 
 #[test]
-fn a_tile_that_states_more_chunks_than_fit_takes_no_memory_for_them() {
+fn a_tile_that_states_more_than_fits_takes_no_memory_for_it() {
     let path = folder("chunks").join("a.laz");
     let quantum = Quantum { scale: [1e-4; 3], offset: [0.0; 3] };
     let settings = LasSettings { compress: true, ..LasSettings::new(quantum) };
@@ -215,10 +215,17 @@ fn a_tile_that_states_more_chunks_than_fit_takes_no_memory_for_them() {
     let mut bytes = std::fs::read(&path).expect("bytes");
     let at = u32::from_le_bytes(bytes[96..100].try_into().expect("four")) as usize;
     let table = u64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight")) as usize;
-    for n in [u32::MAX, 3] {
-        bytes[table + 4..table + 8].copy_from_slice(&n.to_le_bytes());
+    let mut wrong = |at: usize, n: u32, words: &str| {
+        let before: [u8; 4] = bytes[at..at + 4].try_into().expect("four");
+        bytes[at..at + 4].copy_from_slice(&n.to_le_bytes());
         std::fs::write(&path, &bytes).expect("writes");
-        let error = n_read(&path).expect_err("too many");
-        assert!(error.to_string().contains("table of chunks"), "{error}");
+        let error = n_read(&path).expect_err("it does not fit");
+        assert!(error.to_string().contains(words), "{error}");
+        bytes[at..at + 4].copy_from_slice(&before);
+    };
+    for n in [u32::MAX, 3] {
+        wrong(table + 4, n, "table of chunks");
     }
+    // Behind the first record and the number of points: how long each layer is.
+    wrong(at + 8 + settings.record_len() + 4, u32::MAX, "layers of");
 }

@@ -1,0 +1,74 @@
+//! A compressed tile in; whether its chunks and their layers fit into the file, out.
+//!
+//! The decoder takes memory for as many chunks as the table states, and for layers as long as each
+//! chunk states, before it reads any of them.
+
+use contract::fence;
+use laz::laszip::ChunkTable;
+use laz::{LazItemType, LazVlr};
+use std::io::{self, Read, Seek, SeekFrom};
+
+/// Checks the chunks of a file whose points begin at a place with the place of their table.
+///
+/// # Errors
+/// What does not fit, in words; a file that cannot be read.
+pub(crate) fn check(
+    file: &mut (impl Read + Seek),
+    at: u64,
+    (laz, record_len): (&LazVlr, usize),
+) -> io::Result<Result<(), String>> {
+    let n_bytes = file.seek(SeekFrom::End(0))?;
+    let table = number::<8>(file, at)?;
+    if table < at + 8 || table.saturating_add(8) > n_bytes {
+        return Ok(Err("its table of chunks lies outside the file".into()));
+    }
+    let n = number::<4>(file, table + 4)?;
+    if n > (table - at - 8) / record_len as u64 {
+        // Each begins with a record as it is.
+        return Ok(Err(format!("its table of chunks states {n} of them, which do not fit")));
+    }
+    file.seek(SeekFrom::Start(table))?;
+    let varying = laz.uses_variable_size_chunks();
+    let read = fence::fenced(|| ChunkTable::read(&mut &mut *file, varying));
+    let chunks = match read {
+        Ok(Ok(chunks)) => chunks,
+        Ok(Err(error)) => return Ok(Err(error.to_string())),
+        Err(panic) => return Ok(Err(panic)),
+    };
+    let n_layers: usize = laz.items().iter().map(|item| layers(item.item_type())).sum();
+    let head = (record_len + 4 + 4 * n_layers) as u64;
+    let mut from = at + 8;
+    for chunk in chunks.as_ref() {
+        let n_bytes = chunk.byte_count;
+        if n_bytes > table - from || n_bytes < head {
+            return Ok(Err(format!("a chunk cannot have {n_bytes} bytes here")));
+        }
+        let mut total = 0;
+        for layer in 0..n_layers {
+            total += number::<4>(file, from + (record_len + 4 + 4 * layer) as u64)?;
+        }
+        if total > n_bytes - head {
+            return Ok(Err(format!("layers of {total} bytes do not fit into a chunk")));
+        }
+        from += n_bytes;
+    }
+    Ok(Ok(()))
+}
+
+/// A whole number of so many bytes at a place, the lowest first.
+fn number<const N: usize>(file: &mut (impl Read + Seek), at: u64) -> io::Result<u64> {
+    let mut bytes = [0; 8];
+    file.seek(SeekFrom::Start(at))?;
+    file.read_exact(&mut bytes[..N])?;
+    Ok(u64::from_le_bytes(bytes))
+}
+
+/// Layers of an item of a record, in LAZ of LAS 1.4.
+fn layers(item: LazItemType) -> usize {
+    match item {
+        LazItemType::Point14 => 9,
+        LazItemType::RGBNIR14 => 2,
+        LazItemType::Byte14(n) => usize::from(n),
+        _ => 1,
+    }
+}
