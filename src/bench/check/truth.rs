@@ -26,11 +26,11 @@ pub(super) const TOUCH: f64 = 5e-4;
 /// No point moves farther from one posture that is looked at to the next, metres, wherever
 /// something is near.
 const STEP: f64 = 2e-3;
-/// Distance of the places that are asked whether they were seen, metres; finer than the voxels that
+/// Distance of the places that are asked whether they were seen, metres; finer than the eighths of
+/// voxels that the product tells space by.
+const SAMPLE: f64 = 0.02;
+/// A place counts as seen where one so far beside it is, metres: half an eighth of the voxels that
 /// the product tells space by.
-const SAMPLE: f64 = 0.04;
-/// A place counts as seen where one so far beside it is, metres: less than half a voxel of those
-/// that the product tells space by.
 const SEEN_BESIDE: f64 = 0.0125;
 /// Postures that are asked so are so far apart, metres.
 const SEEN_STEP: f64 = 0.02;
