@@ -8,7 +8,9 @@ use laz::laszip::ChunkTable;
 use laz::{LazItemType, LazVlr};
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Checks the chunks of a file whose points begin at a place with the place of their table.
+/// Checks the chunks of a file of so many points, which begin at a place with the place of their
+/// table. The decoder goes from chunk to chunk as layers and counts lead it: they must lead it as
+/// the table does.
 ///
 /// # Errors
 /// What does not fit, in words; a file that cannot be read.
@@ -16,7 +18,11 @@ pub(crate) fn check(
     file: &mut (impl Read + Seek),
     at: u64,
     (laz, record_len): (&LazVlr, usize),
+    n_points: u64,
 ) -> io::Result<Result<(), String>> {
+    if n_points == 0 {
+        return Ok(Ok(()));
+    }
     let n_bytes = file.seek(SeekFrom::End(0))?;
     let table = number::<8>(file, at)?;
     if table < at + 8 || table.saturating_add(8) > n_bytes {
@@ -37,7 +43,7 @@ pub(crate) fn check(
     };
     let n_layers: usize = laz.items().iter().map(|item| layers(item.item_type())).sum();
     let head = (record_len + 4 + 4 * n_layers) as u64;
-    let mut from = at + 8;
+    let (mut from, mut left) = (at + 8, n_points);
     for chunk in chunks.as_ref() {
         let n_bytes = chunk.byte_count;
         if n_bytes > table - from || n_bytes < head {
@@ -47,12 +53,17 @@ pub(crate) fn check(
         for layer in 0..n_layers {
             total += number::<4>(file, from + (record_len + 4 + 4 * layer) as u64)?;
         }
-        if total > n_bytes - head {
+        if total != n_bytes - head {
             return Ok(Err(format!("layers of {total} bytes do not fit into a chunk")));
         }
-        from += n_bytes;
+        let most = if varying { chunk.point_count } else { u64::from(laz.chunk_size()) };
+        let n = number::<4>(file, from + record_len as u64)?;
+        if n != most.min(left) {
+            return Ok(Err(format!("a chunk states {n} points where {} are due", most.min(left))));
+        }
+        (from, left) = (from + n_bytes, left - n);
     }
-    Ok(Ok(()))
+    Ok(if left == 0 { Ok(()) } else { Err(format!("{left} points are in no chunk")) })
 }
 
 /// A whole number of so many bytes at a place, the lowest first.

@@ -183,7 +183,7 @@ impl<'a> Tile<'a> {
             }
             let laz = crate::las::laz_vlr(las);
             let (at, of) = (expected as u64, (&laz, las.record_len()));
-            let fits = chunks::check(&mut file, at, of).map_err(failed)?;
+            let fits = chunks::check(&mut file, at, of, left).map_err(failed)?;
             fits.map_err(|what| foreign().because(what))?;
             file.seek(SeekFrom::Start(at)).map_err(failed)?;
             let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;

@@ -226,6 +226,7 @@ fn a_tile_that_states_more_than_fits_takes_no_memory_for_it() {
     for n in [u32::MAX, 3] {
         wrong(table + 4, n, "table of chunks");
     }
+    wrong(247, 2, "where 2 are due");
     // Behind the first record and the number of points: how long each layer is.
     wrong(at + 8 + settings.record_len() + 4, u32::MAX, "layers of");
 }
