@@ -431,7 +431,11 @@ mod tests {
         let body = Body::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
         let bounds = Aabb { min: [-9.0, -0.2, -9.0], max: [9.0, 9.0, 9.0] };
         let known = Known { world_from_base: Pose::identity(), bounds };
-        let around = Obstacles::new(&Cells::within(crate::reach(&model) + 0.2), &[], (None, known));
+        let around = Obstacles::new(
+            &Cells::within(crate::reach(&model) + 0.2, &BTreeMap::new()),
+            &[],
+            (None, known),
+        );
         let path = [vec![0.0], vec![-1.0]];
         let legs = legs(&body, &path);
         let walk = Walk::new((&body, &around), (&path, &legs), &[0.0]);
