@@ -72,8 +72,7 @@ impl Run<'_> {
         let given = self.given(&models_kept)?;
         let (sources, scans) = (&given.sources, &given.sources.scans);
 
-        // First pass: every point once, from files into lattice tiles of the store; inputs whose
-        // tiles are there are not read.
+        // First pass: every point once, from files into lattice tiles that are not there yet.
         let filling = Filling::new(sources, &job.means, output.tiles(), engine);
         let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, digests));
         let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
@@ -87,8 +86,7 @@ impl Run<'_> {
         let clusters = cluster::split(space, floor, &settings.cluster);
         let regions = identify::regions(&clusters, &settings.region);
 
-        // One task a region, and in it one a model: base poses, then postures; then those that can
-        // stand together.
+        // One task a region and model: base poses, postures; then those that can stand together.
         let of_plant = || Cache::new(output.fits(), digests.fits(&tiles, settings));
         let (fits_kept, pieces_kept) = (of_plant(), of_plant());
         let shelf = Shelf::new(&given.library.models);

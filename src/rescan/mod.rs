@@ -116,8 +116,7 @@ impl Rescan<'_> {
         let carried =
             carry::carry(&request.frame, (&past, stood), (&mut sources, &mut new), engine)?;
 
-        // Where the cell is, and how far the new scans are off what stood there: they are taken
-        // back by that.
+        // Where the cell is; the new scans are taken back by what they are off what stood there.
         let cell = session::bounds(&request.cell, base, (&fits, &models), (&sources, &new))?;
         let past = past.of_cell(cell);
         let shelf = Shelf::new(&library.models);
@@ -129,8 +128,7 @@ impl Rescan<'_> {
         };
         let (laid, between) = (&mut sources, (&past, &new));
         let on_shelf = &shelf;
-        // Reading waits for disks and for itself: what fits of the cell's robots need is made
-        // meanwhile.
+        // Reading waits for disks: what fits of the cell's robots need is made meanwhile.
         let ((), (registered, session)) = engine.beside("models", known, move || {
             let registered = session::register(between, laid, engine)?;
             let session = Session::new(floor, laid, between, on_shelf, settings, engine)?;

@@ -128,6 +128,7 @@ impl Front {
     }
 
     /// Adds what is nearer in another one of the same eye.
+    #[expect(clippy::iter_over_hash_type, reason = "the least does not depend on the order")]
     pub(crate) fn join(&mut self, other: Self) {
         for (cell, far) in other.near {
             let near = self.near.entry(cell).or_insert(far);

@@ -1,4 +1,5 @@
 //! URDFs and meshes that declare what readers differ in: encodings, quaternions, units.
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
 
