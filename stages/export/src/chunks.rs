@@ -3,10 +3,14 @@
 //! The decoder takes memory for as many chunks as the table states, and for layers as long as each
 //! chunk states, before it reads any of them.
 
+use crate::record::LasSettings;
 use contract::fence;
+use laz::LazVlr;
 use laz::laszip::ChunkTable;
-use laz::{LazItemType, LazVlr};
 use std::io::{self, Read, Seek, SeekFrom};
+
+/// Layers of what each point has, in LAZ of LAS 1.4.
+const POINT: usize = 9;
 
 /// Checks the chunks of a file of so many points, which begin at a place with the place of their
 /// table. The decoder goes from chunk to chunk as layers and counts lead it: they must lead it as
@@ -17,12 +21,13 @@ use std::io::{self, Read, Seek, SeekFrom};
 pub(crate) fn check(
     file: &mut (impl Read + Seek),
     at: u64,
-    (laz, record_len): (&LazVlr, usize),
+    (laz, las): (&LazVlr, &LasSettings),
     n_points: u64,
 ) -> io::Result<Result<(), String>> {
     if n_points == 0 {
         return Ok(Ok(()));
     }
+    let record_len = las.record_len();
     let n_bytes = file.seek(SeekFrom::End(0))?;
     let table = number::<8>(file, at)?;
     if table < at + 8 || table.saturating_add(8) > n_bytes {
@@ -41,7 +46,8 @@ pub(crate) fn check(
         Ok(Err(error)) => return Ok(Err(error.to_string())),
         Err(panic) => return Ok(Err(panic)),
     };
-    let n_layers: usize = laz.items().iter().map(|item| layers(item.item_type())).sum();
+    // Colours are one more, and so is each extra byte.
+    let n_layers = POINT + usize::from(las.with_color) + las.extra_len();
     let head = (record_len + 4 + 4 * n_layers) as u64;
     let (mut from, mut left) = (at + 8, n_points);
     for chunk in chunks.as_ref() {
@@ -72,14 +78,4 @@ fn number<const N: usize>(file: &mut (impl Read + Seek), at: u64) -> io::Result<
     file.seek(SeekFrom::Start(at))?;
     file.read_exact(&mut bytes[..N])?;
     Ok(u64::from_le_bytes(bytes))
-}
-
-/// Layers of an item of a record, in LAZ of LAS 1.4.
-fn layers(item: LazItemType) -> usize {
-    match item {
-        LazItemType::Point14 => 9,
-        LazItemType::RGBNIR14 => 2,
-        LazItemType::Byte14(n) => usize::from(n),
-        _ => 1,
-    }
 }

@@ -182,7 +182,7 @@ impl<'a> Tile<'a> {
                 compare(path, stated, read)?;
             }
             let laz = crate::las::laz_vlr(las);
-            let (at, of) = (expected as u64, (&laz, las.record_len()));
+            let (at, of) = (expected as u64, (&laz, las));
             let fits = chunks::check(&mut file, at, of, left).map_err(failed)?;
             fits.map_err(|what| foreign().because(what))?;
             file.seek(SeekFrom::Start(at)).map_err(failed)?;

@@ -212,6 +212,15 @@ fn a_tile_that_states_more_than_fits_takes_no_memory_for_it() {
         .map(|()| n)
     };
     assert_eq!(n_read(&path).expect("reads"), 1);
+    // With colours and bodies there are more layers.
+    for (with_color, with_bodies) in [(true, false), (false, true), (true, true)] {
+        let settings = LasSettings { with_color, with_bodies, ..settings.clone() };
+        let path = path.with_file_name("more.laz");
+        let mut writer = LasWriter::create(&path, settings.clone()).expect("create");
+        writer.push(&points).expect("push");
+        writer.finish().expect("finish");
+        export::read_tile(&path, &settings, None, |_| Ok(())).expect("reads");
+    }
     let mut bytes = std::fs::read(&path).expect("bytes");
     let at = u32::from_le_bytes(bytes[96..100].try_into().expect("four")) as usize;
     let table = u64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight")) as usize;
