@@ -8,6 +8,7 @@
 use crate::engine::{AllThreads, Engine, Hand, Handed, Task};
 use crate::job::Settings;
 use crate::store::Store;
+use attach::Hanging;
 use contract::{Cluster, Fit, Floor, Input, InputId, Result, Space};
 use export::{
     Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Spool,
@@ -15,7 +16,6 @@ use export::{
 };
 use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
-use merge::Hanging;
 use robot::Model;
 use segment::Ground;
 use std::path::Path;
@@ -40,7 +40,7 @@ pub(crate) struct Labelling<'a> {
     floor: &'a Floor,
     ground: Ground,
     settings: segment::Settings,
-    merge: merge::Settings,
+    attach: attach::Settings,
     /// World bounds of each scan's points, metres.
     bounds: Vec<Aabb>,
     export: export::Settings,
@@ -144,8 +144,8 @@ impl<'a> Labelling<'a> {
         }
         let export = settings.export;
         let bodies = export.bodies.then(|| Bodies::new(clusters));
-        let (settings, merge) = (settings.segment, settings.merge);
-        Self { fits, models, sources, floor, ground, settings, merge, bounds, export, bodies }
+        let (settings, attach) = (settings.segment, settings.attach);
+        Self { fits, models, sources, floor, ground, settings, attach, bounds, export, bodies }
     }
 
     /// The floor, for the label of a point that is near no robot.
@@ -157,7 +157,7 @@ impl<'a> Labelling<'a> {
     pub(crate) fn near_robots(&self, store: &Store, engine: &Engine) -> Result<Near> {
         let seen = (self.sources.scans.as_slice(), self.sources.masks.len());
         let place = (store, self.floor, seen);
-        Near::find((self.fits, self.models), place, (self.settings, self.merge), engine)
+        Near::find((self.fits, self.models), place, (self.settings, self.attach), engine)
     }
 
     /// Streams every input once more and writes its labels and tiles, clouds to another folder;

@@ -3,8 +3,8 @@
 
 use crate::engine::{AllThreads, Engine, Task};
 use crate::store::Store;
+use attach::{Attach, Hanging};
 use contract::{Fit, Floor, Fold, Label, MaskId, PlaceRun, Result, Scan, TileLabels};
-use merge::{Attach, Hanging};
 use robot::Model;
 use segment::Segment;
 use std::ops::Range;
@@ -22,10 +22,10 @@ impl Near {
     pub(crate) fn find(
         (fits, models): (&[Fit], &[Model]),
         (store, floor, (scans, n_masks)): (&Store, &Floor, (&[Scan], usize)),
-        (settings, merge): (segment::Settings, merge::Settings),
+        (settings, attach): (segment::Settings, attach::Settings),
         engine: &Engine,
     ) -> Result<Self> {
-        let attach = Attach::new(fits, models, merge);
+        let attach = Attach::new(fits, models, attach);
         let segment = || Segment::new(fits, models, floor, scans, settings, &AllThreads);
         let segment = engine.pool()?.install(segment);
         let regions = segment.regions();
@@ -51,7 +51,7 @@ impl Near {
         for own in &mut labels {
             PlaceRun::join(own);
         }
-        Ok(Self { labels, hanging: merge::hang(&attached, fits, models) })
+        Ok(Self { labels, hanging: attach::hang(&attached, fits, models) })
     }
 
     /// The labels of one mask, for places of which many are neighbours.

@@ -84,7 +84,7 @@ impl Run<'_> {
         let ground = ground_kept.get_or_compute("ground", || self.ground(scans, &store))?;
         let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
         let clusters = cluster::split(space, floor, &settings.cluster);
-        let regions = identify::regions(&clusters, &settings.region);
+        let regions = base_search::regions(&clusters, &settings.region);
 
         // One task a region and model: base poses, postures; then those that can stand together.
         let of_plant = || Cache::new(output.fits(), digests.fits(&tiles, settings));

@@ -34,10 +34,10 @@ impl Around<'_, '_> {
     /// went.
     pub(crate) fn all(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
         let (fits, models) = self.robots;
-        if !self.settings.merge.space {
+        if !self.settings.freespace.enabled {
             return Ok(vec![None; fits.len()]);
         }
-        let edge = self.settings.merge.space_edge;
+        let edge = self.settings.freespace.edge;
         let known = self.search.bounds().grown(edge);
         engine.fan_out(Task::new("space").large(), (0..fits.len()).collect(), |i| {
             let model = &models[fits[i].model];
@@ -60,7 +60,7 @@ impl Around<'_, '_> {
             return Ok(None);
         }
         let mut space = Space::unknown(grid);
-        merge::see(&mut space, &region, &views, &AllThreads);
+        freespace::see(&mut space, &region, &views, &AllThreads);
         Ok(Some(space))
     }
 
@@ -74,10 +74,10 @@ impl Around<'_, '_> {
         };
         for (_, fit) in fits.iter().enumerate().filter(|(i, fit)| is_other(*i, fit)) {
             let model = &models[fit.model];
-            merge::stand(space, SpaceKind::Other, model, &poses(fit, model));
+            freespace::stand(space, SpaceKind::Other, model, &poses(fit, model));
         }
         let own = &models[fits[robot].model];
-        merge::stand(space, SpaceKind::Robot, own, &poses(&fits[robot], own));
+        freespace::stand(space, SpaceKind::Robot, own, &poses(&fits[robot], own));
     }
 }
 

@@ -1,8 +1,8 @@
 //! A thing that appeared, went or moved in; its entry in `changes.json` and a line for people out.
 
+use change::{Thing, ThingChange};
 use contract::words::{fixed, triple};
 use geometry::Aabb;
-use merge::{Thing, ThingChange};
 use serde::{Deserialize, Serialize};
 
 /// A thing as `changes.json` has it.

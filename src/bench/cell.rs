@@ -147,7 +147,7 @@ impl Cell {
             engine.pass("surfaces", source, |f| f.map(&reads).map(&surfaces).fold(&gather))?;
         let clusters =
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
-        let regions = identify::regions(&clusters, &settings.region);
+        let regions = base_search::regions(&clusters, &settings.region);
         let search = Search::new(shelf, scans, &store, &ground, settings);
         if let Then::Converge(starts) = then {
             let here = starts.first().and_then(|start| nearest(&regions, &start.0));
@@ -168,7 +168,8 @@ impl Cell {
         }
         let seconds = started.elapsed().as_secs_f64();
         let place = (&store, &ground.surfaces.floor, (scans.as_slice(), scans.len()));
-        let near = Near::find((&fits, &models), place, (settings.segment, settings.merge), engine)?;
+        let near =
+            Near::find((&fits, &models), place, (settings.segment, settings.attach), engine)?;
         let n_robot_points = self.n_robot_points;
         let labels = Some((near, self.truth));
         Ok(Found { fits, n_robot_points, seconds, labels, ..Found::default() })

@@ -195,7 +195,7 @@ impl Place<'_> {
             report.warnings.push(what.into());
         }
         if robot.entry.space.is_none() {
-            let what = "the result knows no space about the robot, so nothing is known to be free: it takes scanner positions and --set merge.space=true";
+            let what = "the result knows no space about the robot, so nothing is known to be free: it takes scanner positions and --set freespace.enabled=true";
             report.warnings.push(what.into());
         }
         Ok(report)

@@ -93,7 +93,7 @@ fn stand(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> Stand {
     let count = |(v, n): ([i32; 3], f64)| ([v[2], v[1], v[0]], n.round().max(1.0) as u32);
     let voxels: Vec<(Voxel, u32)> = voxels.into_iter().map(count).collect();
     let clusters = cluster::split(&Occupancy { edge, voxels }, &floor, &settings.cluster);
-    let regions = identify::regions(&clusters, &settings.region);
+    let regions = base_search::regions(&clusters, &settings.region);
     let regions = regions.iter().map(|region| searched(&clusters, region)).collect();
     Stand { regions, has_floor: !floor.levels.is_empty() }
 }

@@ -23,6 +23,7 @@ macro_rules! settings {
             /// # Errors
             /// No such name, or a value of another kind.
             pub fn set(&mut self, key: &str, value: &toml::Value) -> Result<()> {
+                let key = &present_name(key);
                 $($(
                     if key == concat!(stringify!($room), ".", stringify!($field)) {
                         return assign(&mut self.$room.$field, key, value);
@@ -70,11 +71,11 @@ settings! {
     cluster: cluster::Settings {
         gap, clearance, slack, min_points,
     }
-    identify: identify::Settings {
+    base_search: base_search::Settings {
         n_coarse, n_fine, keep_feet, keep_coarse, keep_middle, max_places, bases_per_place, place_radius,
         min_score,
     }
-    region: identify::RegionSettings {
+    region: base_search::RegionSettings {
         join_gap, margin, min_height, min_extent, min_points, min_seed, max_extent, overlap,
         max_body,
     }
@@ -92,15 +93,33 @@ settings! {
         sigma_range, sigma_cad, min_gate, max_gate, floor_band, floor_depth, foot_band, reach,
         hand_reach,
     }
-    merge: merge::Settings {
-        contact, hold, cut, min_voxels, space_edge, space,
+    attach: attach::Settings {
+        contact, hold, cut, min_voxels,
     }
-    things: merge::ThingSettings {
+    freespace: freespace::Settings {
+        edge, enabled,
+    }
+    things: change::ThingSettings {
         min_size, min_voxels, min_points, robot_margin,
     }
     export: export::Settings {
         tiles, tile_edge, max_tiles, fixed_cloud, bodies, copc, compress, waiting_bytes,
     }
+}
+
+/// Beginnings of names that settings had in earlier versions, and those that they have now: job
+/// files and command lines that were written for them go on to work. The first that fits counts.
+const RENAMED: [(&str, &str); 4] = [
+    ("identify.", "base_search."),
+    ("merge.space_edge", "freespace.edge"),
+    ("merge.space", "freespace.enabled"),
+    ("merge.", "attach."),
+];
+
+/// The name that a setting has now, whatever it was called before.
+fn present_name(key: &str) -> String {
+    let renamed = RENAMED.iter().find_map(|(old, new)| Some((new, key.strip_prefix(old)?)));
+    renamed.map_or_else(|| key.into(), |(new, rest)| format!("{new}{rest}"))
 }
 
 fn unknown(key: &str) -> Error {
@@ -143,6 +162,14 @@ mod tests {
             settings.set(key, value).expect(key);
         }
         assert!(settings.all() == all);
+    }
+
+    #[test]
+    fn names_of_earlier_versions_are_understood() {
+        let mut settings = Settings::default();
+        settings.set("merge.space", &toml::Value::Boolean(false)).expect("a former name");
+        settings.set("merge.cut", &toml::Value::Float(0.5)).expect("a former name");
+        assert!(!settings.freespace.enabled && settings.attach.cut == 0.5);
     }
 
     #[test]

@@ -4,8 +4,8 @@
 use crate::spaces::poses;
 use contract::{Fit, Verdict};
 use fit::Scene;
+use freespace::{Sight, Watch};
 use geometry::{Aabb, Point, Pose, Vector};
-use merge::{Sight, Watch};
 use robot::Model;
 
 /// What stands so near a base was there before, or is its own: cables, plinth, metres.

@@ -2,8 +2,9 @@
 //! or all of them go, out: where one or the other is so, the records of those points need not be
 //! asked for one by one again.
 
+use change::Tally;
+use freespace::Sight;
 use geometry::Aabb;
-use merge::{Sight, Tally};
 use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Most voxels that are kept, one byte each: 30 x 30 x 9 m. Of larger cells each point is asked for

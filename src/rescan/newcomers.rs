@@ -8,9 +8,10 @@ use crate::labelling::Labelling;
 use crate::near::Near;
 use crate::search::Search;
 use crate::spaces::{region, standing};
+use change::Thing;
 use contract::{Fit, Region, Result, Verdict};
+use freespace::Watch;
 use geometry::Aabb;
-use merge::{Thing, Watch};
 use robot::Model;
 
 /// Smallest height and largest edge of a new thing that may be a robot, metres.

@@ -8,10 +8,12 @@ use crate::engine::{Engine, Task};
 use crate::near::Near;
 use crate::report::tiles;
 use crate::store::Store;
+use change::{Seen, Tally, Tallying};
 use contract::{Label, MAX_SKIP, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
 use export::MaskReader;
+use freespace::{Sight, Watch};
 use geometry::{Aabb, Point};
-use merge::{Seen, Sight, Surfaces, Tally, Tallying, Watch};
+use register::Surfaces;
 use std::collections::BTreeSet;
 
 /// One of so many points tells the surfaces, and of many points more are passed over, so that about

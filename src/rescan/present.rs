@@ -6,9 +6,11 @@ use crate::engine::Engine;
 use crate::near::Near;
 use crate::report::tiles;
 use crate::store::Store;
+use change::{Tally, Tallying};
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
+use freespace::{Sight, Watch};
 use geometry::{Aabb, Point};
-use merge::{Planes, Registration, Sight, Tally, Tallying, Watch};
+use register::{Planes, Registration};
 use segment::Ground;
 
 /// Points of a scan that are laid on the plant's surfaces, about.

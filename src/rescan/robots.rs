@@ -7,8 +7,8 @@ use crate::spaces::{poses, reach};
 use crate::tools::dress_in;
 use contract::{Error, Fit, Region, Result, Verdict};
 use fit::Scene;
+use freespace::{Sight, Watch};
 use geometry::{Aabb, Point, Pose, Vector};
-use merge::{Sight, Watch};
 use robot::{Library, Model};
 
 /// Points of each link's surface that the new scans are asked about.

@@ -8,13 +8,14 @@ use crate::labelling::Done;
 use crate::report::{dropped, id, input_entry, robot_entry};
 use crate::reuse::Digests;
 use crate::things::{ThingEntry, word};
+use change::Unseen;
 use contract::words::{count, fixed, triple};
 use contract::{Error, Kind, Result, quote};
 use export::{
     CarriedEntry, ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile,
     ScanLabels, draw_changes, write_table,
 };
-use merge::{Registration, Unseen};
+use register::Registration;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -223,8 +224,8 @@ impl Said<'_, '_> {
     fn draw(&self, changes: &[RobotChange]) -> export::Canvas {
         let things = self.found.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
             name: format!("T{} {}", k + 1, word(thing.change)),
-            gone: merge::Tally::middles(&thing.gone),
-            filled: merge::Tally::middles(&thing.filled),
+            gone: change::Tally::middles(&thing.gone),
+            filled: change::Tally::middles(&thing.filled),
             at: thing.now.or(thing.then).map(|b| b.center().into()).unwrap_or_default(),
         });
         let robots = self.found.robots.compared().into_iter().map(|i| {
@@ -239,7 +240,7 @@ impl Said<'_, '_> {
         let unseen: Vec<_> = unseen.copied().collect();
         draw_changes(
             &self.found.session.past.cell,
-            [&self.found.labels.now.solid(), &merge::Tally::middles(&unseen)],
+            [&self.found.labels.now.solid(), &change::Tally::middles(&unseen)],
             &things.collect::<Vec<_>>(),
             &robots.collect::<Vec<_>>(),
         )

@@ -14,13 +14,15 @@ use crate::search::{Search, Shelf};
 use crate::spaces::{reach, region, standing};
 use crate::store::Store;
 use crate::surfaces::{Gather, Ground, Surfaces};
+use change::{Tally, Thing, Unseen, things};
 use contract::{
     Cluster, Error, Fit, Floor, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View,
 };
+use freespace::Watch;
 use geometry::{Aabb, Pose};
 use ingest::Sources;
 use lattice::ViewSettings;
-use merge::{Registration, Tally, Thing, Unseen, Watch, things};
+use register::Registration;
 use robot::Model;
 use std::collections::BTreeSet;
 
@@ -252,7 +254,7 @@ impl<'a> Session<'a> {
         let mut out = Robots::default();
         let (search, watch) = (self.search(), self.watch());
         let old_watch = Watch::new(&self.cell, &self.old_views);
-        let regions = identify::regions(&self.clusters, &self.settings.region);
+        let regions = base_search::regions(&self.clusters, &self.settings.region);
         let here = here((fits, models), &self.past.cell);
         let looked = engine.fan_out(Task::new("fit").large(), here.clone(), |(i, _)| {
             look(&fits[i], models, (&search, [&watch, &old_watch], &regions))
@@ -329,7 +331,7 @@ impl<'a> Session<'a> {
         let (things, unseen) = engine.pool()?.install(|| {
             rayon::join(
                 || things(then, &now, settings, &AllThreads),
-                || merge::unseen(then, &now, settings),
+                || change::unseen(then, &now, settings),
             )
         });
         Ok(Labels { near, compared, things, unseen, now })

@@ -8,8 +8,8 @@ use crate::report::id;
 use crate::spaces::{Around, Spot, bounds, mark};
 use contract::{Result, Space, SpaceGrid, SpaceKind};
 use export::{SpaceEntry, write_space};
+use freespace::Passed;
 use geometry::Aabb;
-use merge::Passed;
 use std::path::Path;
 
 impl Written<'_, '_> {
@@ -18,7 +18,7 @@ impl Written<'_, '_> {
     pub(super) fn spaces(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
         let mut out: Vec<Option<Space>> = vec![None; self.fits.len()];
         let settings = self.session.settings;
-        if !settings.merge.space {
+        if !settings.freespace.enabled {
             return Ok(out);
         }
         let search = self.session.search();
@@ -45,7 +45,7 @@ impl Written<'_, '_> {
             entry.read(&self.base.out)
         };
         let old = self.entry(i).map(read).transpose()?;
-        let edge = old.as_ref().map_or(around.settings.merge.space_edge, |old| old.grid().edge);
+        let edge = old.as_ref().map_or(around.settings.freespace.edge, |old| old.grid().edge);
         let known = old.as_ref().map_or(Aabb::EMPTY, |old| old.grid().bounds());
         let known = known.union(&around.search.bounds().grown(edge));
         let fit = &self.fits[i];

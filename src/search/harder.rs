@@ -4,10 +4,10 @@
 use super::tried::Tried;
 use super::{GUESS_BREADTH, MAX_SUNK, SAME_BASE, Search, base, breadth};
 use crate::engine::AllThreads;
+use base_search::Sight;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Verdict};
 use fit::{Scene, Sights};
 use geometry::{Aabb, Point};
-use identify::Sight;
 use robot::Model;
 use std::collections::BTreeMap;
 
@@ -86,7 +86,7 @@ impl Search<'_, '_> {
         let mut fits = Vec::new();
         for (name, planes, breadth) in [
             (name.to_owned(), mounts.clone(), 1),
-            (format!("{name} raised"), identify::raised_planes(&mounts), RAISED_BREADTH),
+            (format!("{name} raised"), base_search::raised_planes(&mounts), RAISED_BREADTH),
         ] {
             let find = || self.candidates(sight, &planes, (MIN_MOUNT_SCORE, breadth));
             let mut hung = self.piece((scene.region, &name), find)?;
@@ -144,7 +144,7 @@ impl Search<'_, '_> {
         let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
         let Some(floor) = height.map(|h| at.z - h) else { return Ok(Vec::new()) };
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
-        let planes = identify::stand_planes(&region.world_bounds(), floor);
+        let planes = base_search::stand_planes(&region.world_bounds(), floor);
         let find = || self.candidates(sight, &planes, (MIN_STAND_SCORE, GUESS_BREADTH));
         let mut found = self.piece((region, "stands"), find)?;
         found.retain(|c| is_apart(c, &feet) && is_wanted(c));

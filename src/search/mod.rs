@@ -11,10 +11,10 @@ use crate::progress::Pieces;
 use crate::reuse::Cache;
 use crate::store::Store;
 use crate::surfaces::Ground;
+use base_search::{BaseSearch, Sight};
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
 use fit::{Method, Prepared, Scene, Sights};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
-use identify::{BaseSearch, Sight};
 use rayon::prelude::*;
 use robot::Model;
 use serde::Serialize;
@@ -198,7 +198,7 @@ impl<'a, 'm> Search<'a, 'm> {
         let guessed = planes.iter().all(InstallationPlane::is_guess);
         let search = |index: usize| {
             let model = (index, &self.shelf.models[index]);
-            let search = BaseSearch::new(model, sight, &self.settings.identify);
+            let search = BaseSearch::new(model, sight, &self.settings.base_search);
             let search = search.map(|s| if guessed { s.on_guesses() } else { s });
             let search = search.map(|s| s.at_least(min_score).broad(breadth));
             let found = search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default();
@@ -341,7 +341,7 @@ impl<'a, 'm> Search<'a, 'm> {
         // tried out.
         let has_beams = self.scans.iter().any(Scan::has_beams);
         if floor.levels.is_empty() && has_beams {
-            return identify::guessed_planes(&world);
+            return base_search::guessed_planes(&world);
         }
         floor.planes.iter().filter(|p| p.bounds.grown(0.3).touches(&world)).cloned().collect()
     }

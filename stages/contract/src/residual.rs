@@ -1,5 +1,5 @@
 //! What segmenting one tile leaves behind: labels that are certain, and the rest of the points near
-//! robots with their voxels, from which merge tells attachments from fixed things.
+//! robots with their voxels, from which `attach` tells attachments from fixed things.
 
 use crate::{Label, MaskId, TileAt, Voxel, Weigh};
 

@@ -1,5 +1,5 @@
 //! A tile and the fits in, labels of its points near robots out; beside it, the label that a point
-//! has by its place alone. Knows nothing of other tiles: what hangs on a robot is told by merge
+//! has by its place alone. Knows nothing of other tiles: what hangs on a robot is told by `attach`
 //! from the voxels left here.
 #![forbid(unsafe_code)]
 

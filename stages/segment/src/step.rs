@@ -208,7 +208,7 @@ impl Segment {
     /// Doubtful points and veils, by what their neighbours are.
     fn settle(&self, tile: &Tile, raster: Option<&Raster>, found: &mut [Found]) {
         let Some(raster) = raster else {
-            // Without neighbours a doubt stays one; merge sees it by its voxel.
+            // Without neighbours a doubt stays one; `attach` sees it by its voxel.
             for f in found.iter_mut() {
                 if let Found::Doubt(touch) = *f {
                     *f = Found::Residual(touch);

@@ -4,7 +4,7 @@
 use contract::{Cluster, InstallationPlane, Region};
 use geometry::{Aabb, Plane, Point, Vector};
 
-use crate::bodies::bodies;
+use crate::body_boxes::bodies;
 
 /// What is tuned.
 #[derive(Debug, Clone, PartialEq)]

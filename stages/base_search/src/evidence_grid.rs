@@ -7,7 +7,7 @@ use geometry::probe::{HIDDEN_PRICE, NO_RETURN_WEIGHT};
 use geometry::{Aabb, Evidence, Eye, Pose, Probe, Vector};
 use std::sync::OnceLock;
 
-use crate::graded::{Graded, HIDDEN, SCORE_UNIT, Stencil, UNJUDGED};
+use crate::score_grid::{Graded, HIDDEN, SCORE_UNIT, Stencil, UNJUDGED};
 use crate::trial::Said;
 
 /// Edge of a cell, and of the cubes of points, metres: half of the finest tolerance that is asked

@@ -1,7 +1,7 @@
 //! Voxels of a change in; whether they are of something that beams do not go through, out: a fence
 //! of which another session misses a part has not gone.
 
-use crate::tally::{Cell, Tally};
+use crate::occupancy::{Cell, Tally};
 use nalgebra::{Matrix3, Vector3};
 
 /// Share of a voxel's face that its points stand for, over all voxels of a change. Solid things
@@ -71,7 +71,7 @@ fn shape(cells: &[Cell]) -> Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tally::{Seen, Tallying};
+    use crate::occupancy::{Seen, Tallying};
 
     /// Points 1 cm apart on a plane through a direction on the ground, 1.5 m by 1 m, leaning by a
     /// slope; what one stands for, m².

@@ -1,7 +1,7 @@
 //! The voxels of a change and the size of a thing in; where such a thing and another one make up
 //! the change, standing side by side, the voxels of each out.
 
-use crate::tally::{Cell, EDGE, REACH, connected};
+use crate::occupancy::{Cell, EDGE, REACH, connected};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Tops so many voxels apart are not of one thing.

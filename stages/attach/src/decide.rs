@@ -1,7 +1,7 @@
 //! The fold: residual voxels of tiles in, the label of each voxel that hangs on a robot out.
 
 use crate::Settings;
-use crate::graph::Graph;
+use crate::voxel_graph::Graph;
 use contract::{
     Fit, Fold, Label, LinkAt, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Verdict, Voxel,
 };

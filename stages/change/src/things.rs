@@ -1,8 +1,8 @@
 //! Voxels of what stands still in two sessions, and what each session's beams say of the other's,
 //! in; what appeared, went and moved out.
 
-use crate::parted::parted;
-use crate::tally::{Cell, EDGE, REACH, Tally, bounds, connected};
+use crate::occupancy::{Cell, EDGE, REACH, Tally, bounds, connected};
+use crate::split::parted;
 use contract::Fan;
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};

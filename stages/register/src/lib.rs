@@ -4,6 +4,7 @@
 //! Points are compared with planes through the plant's own points, voxel by voxel: point-to-plane
 //! distances (Chen and Medioni 1992), one for each voxel, so that a dense wall counts no more than
 //! it covers, with Tukey weights, so that what was moved between the sessions counts nothing.
+#![forbid(unsafe_code)]
 
 use geometry::{Moments, Plane, Point, Pose, Vector};
 use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector6};

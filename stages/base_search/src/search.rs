@@ -11,12 +11,12 @@ use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 
-use crate::climb::Grid;
-use crate::first::First;
-use crate::graded::Stencil;
-use crate::sites::{GUESS_STEP, are_stacked};
+use crate::evidence_grid::Sight;
+use crate::first_link::First;
+use crate::hill_climb::Grid;
+use crate::regions::{GUESS_STEP, are_stacked};
+use crate::score_grid::Stencil;
 use crate::trial::{QUOTA, Said, Trial, base_link, best, coarse_yaw, prefix};
-use crate::volume::Sight;
 
 /// What is tuned.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,8 +5,8 @@ use contract::Fan;
 use geometry::{Plane, Pose};
 use std::collections::HashMap;
 
-use crate::base::BaseSearch;
-use crate::sites::are_stacked;
+use crate::regions::are_stacked;
+use crate::search::BaseSearch;
 use crate::trial::{Said, Trial, best, prefix};
 
 /// Steps that a pose may go beyond its neighbours while it gets better.

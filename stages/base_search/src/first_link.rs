@@ -5,8 +5,8 @@ use geometry::{Plane, Pose, Probe};
 use robot::Model;
 use std::f64::consts::TAU;
 
-use crate::base::BaseSearch;
-use crate::climb::LAG;
+use crate::hill_climb::LAG;
+use crate::search::BaseSearch;
 use crate::trial::{Said, Trial, first_moving, of_judged, prefix};
 
 /// Tolerances at which base and first link are judged in the end, metres: half a step of the finest

@@ -1,7 +1,7 @@
 //! Voxels of drawn things in; which of them moved, went and came, out.
 
 use super::*;
-use crate::tally::{Seen, Tallying};
+use crate::occupancy::{Seen, Tallying};
 use contract::OneByOne;
 
 fn found(then: Tallying, now: Tallying) -> Vec<Thing> {

@@ -5,15 +5,15 @@
 //! (METHOD.md §5–§7).
 #![forbid(unsafe_code)]
 
-mod base;
-mod bodies;
-mod climb;
-mod first;
-mod graded;
-mod sites;
+mod body_boxes;
+mod evidence_grid;
+mod first_link;
+mod hill_climb;
+mod regions;
+mod score_grid;
+mod search;
 mod trial;
-mod volume;
 
-pub use base::{BaseSearch, Settings};
-pub use sites::{RegionSettings, guessed_planes, raised_planes, regions, stand_planes};
-pub use volume::Sight;
+pub use evidence_grid::Sight;
+pub use regions::{RegionSettings, guessed_planes, raised_planes, regions, stand_planes};
+pub use search::{BaseSearch, Settings};

@@ -1,7 +1,7 @@
 //! Voxels of what stood still in a session in; those regions of it out that no beam of another
 //! session reached: of them nobody can say whether they changed.
 
-use crate::tally::{Cell, EDGE, REACH, Tally, bounds, connected};
+use crate::occupancy::{Cell, EDGE, REACH, Tally, bounds, connected};
 use crate::things::ThingSettings;
 use geometry::Aabb;
 use std::collections::BTreeSet;
@@ -48,7 +48,7 @@ pub fn unseen(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Unseen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tally::{Seen, Tallying};
+    use crate::occupancy::{Seen, Tallying};
 
     #[test]
     fn a_cabinet_that_no_new_beam_reached_is_said_to_be_so() {
