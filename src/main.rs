@@ -8,7 +8,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
     use_small_pages();
-    stillpoint::exit::exit(stillpoint::cli::main(std::env::args_os()))
+    stillpoint::cli::exit::exit(stillpoint::cli::main(std::env::args_os()))
 }
 
 /// Memory is handed from stage to stage in pieces of all sizes; in pages of 2 MiB the system clears

@@ -1,26 +1,24 @@
 //! The whole way of the data on one page: a job in, everything found and written, its outcome out.
 //! Nothing else decides order.
 
-use crate::calibrate::calibrate;
-use crate::copc;
+use crate::cache::input_tiles::Filling;
+use crate::cache::output::OutputDir;
+use crate::cache::{self, Cache, Digests, Key, OutputFile};
+use crate::detect::calibrate::calibrate;
+use crate::detect::ground::{Gather, Ground, Surfaces};
+use crate::detect::region_failures::Failures;
+use crate::detect::review::Review;
+use crate::detect::search::{Search, Shelf};
+use crate::detect::{library, tools};
 use crate::engine::{AllThreads, Engine, Task};
 use crate::estimate::Estimate;
-use crate::filling::Filling;
-use crate::job::{Job, Outcome, OutputDir, Settings};
-use crate::labelling::{Done, Labelling, Scope};
-use crate::lenient::Failures;
-use crate::library;
-use crate::report::Report;
-use crate::rescan::{Records, State};
-use crate::reuse::{self, Cache, Digests, Key, OutputFile};
-use crate::review::Review;
-use crate::search::{Search, Shelf};
-use crate::spaces::Around;
-use crate::store::Store;
-use crate::surfaces::{Gather, Ground, Surfaces};
-use crate::tile_bound;
-use crate::tools;
-use crate::units;
+use crate::job::{Job, Outcome, Settings, units};
+use crate::label::known_space::Around;
+use crate::label::labelling::{Done, Labelling, Scope};
+use crate::result::copc;
+use crate::result::plant_state::{Records, State};
+use crate::result::report::Report;
+use crate::store::{Store, spatial_tiles};
 use contract::{Cluster, Fit, Floor, Input, Region, Result, Scan, Space};
 use export::{COPC, ReviewEntry};
 use ingest::{Scanners, Sources};
@@ -76,7 +74,7 @@ impl Run<'_> {
         let filling = Filling::new(sources, &job.means, output.tiles(), engine);
         let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, digests));
         let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
-        let store = tile_bound::checked(Store::join(stores), scans, &settings.export, engine)?;
+        let store = spatial_tiles::checked(Store::join(stores), scans, &settings.export, engine)?;
 
         // On the tiles: local planes and occupied space, joined over tiles and scans; from here on
         // nothing is as large as the cloud.
@@ -119,7 +117,7 @@ impl Run<'_> {
         .finish(output)?;
         self.conclude((found.fits, floor), (sources, &tiles, &store), &written, &mut outcome)?;
         output.prune(&tiles, &[&ground_kept, &fits_kept], &models_kept);
-        outcome.reused = reuse::said(&[
+        outcome.reused = cache::said(&[
             ("models", models_kept.n_kept()),
             ("tiles", filling.n_kept()),
             ("fits", fits_kept.n_kept()),
@@ -153,7 +151,7 @@ impl Run<'_> {
         let surfaces = Surfaces::new(scans, &self.settings.lattice);
         let gather = Gather::new(scans, &self.settings.floor);
         let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
-        self.engine.pass(crate::report::tiles("surfaces", store), source, |f| {
+        self.engine.pass(crate::result::report::tiles("surfaces", store), source, |f| {
             f.map(&reads).map(&surfaces).fold(&gather)
         })
     }
@@ -234,7 +232,7 @@ impl Run<'_> {
         .write(next)?;
         let files = written.digests.iter().map(|sum| OutputFile::of(next, sum)).collect();
         let (to, made) = ((self.output, self.digests), (&*outcome, files));
-        outcome.told = reuse::publish(self.job, to, made, self.engine)?;
+        outcome.told = cache::publish(self.job, to, made, self.engine)?;
         Ok(())
     }
 }

@@ -204,7 +204,7 @@ fn grippers_are_found_on_real_flanges_and_turned_as_they_hang() {
 #[test]
 fn grippers_are_found_on_round_flanges() {
     let robots = tempfile::tempdir().expect("a folder");
-    stillpoint::demo::write_robots(robots.path()).expect("the library is written");
+    stillpoint::eval::demo::write_robots(robots.path()).expect("the library is written");
     if copy_real(&["robotiq_2f_85"], robots.path()) {
         check_tools(robots.path(), &["--seed", "87300", "--model", "palletiser,robotiq"]);
     }

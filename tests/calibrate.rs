@@ -5,9 +5,9 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
-use stillpoint::scanning::{Formats, scan_scene};
+use stillpoint::eval::demo::write_robots;
+use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 
 /// Shift of one joint of the true robot, metres, in the joint's frame.
 const SHIFT: [f64; 3] = [0.004, 0.0, -0.003];

@@ -8,11 +8,11 @@ use ingest::{Scanners, Sources};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
+use stillpoint::eval::demo::write_robots;
+use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 use stillpoint::job::{Given, Job, Means, Outcome};
 use stillpoint::plan;
-use stillpoint::scanning::{Formats, scan_scene};
 
 /// A hall with things that stand before its walls, and three scanners whose beams are 0.6° apart:
 /// sparser than any crew scans.

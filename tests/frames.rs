@@ -4,13 +4,13 @@
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
-use stillpoint::demo::write_robots;
+use stillpoint::cache::check;
 use stillpoint::engine::Engine;
+use stillpoint::eval::demo::write_robots;
+use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 use stillpoint::job::{Given, Job, Means, Outcome};
 use stillpoint::plan;
 use stillpoint::rescan::{Cell, Frame, Request, rescan};
-use stillpoint::reuse::check;
-use stillpoint::scanning::{Formats, scan_scene};
 
 /// A plant, what was scanned again of it, and another plant.
 struct Plant {

@@ -2,12 +2,12 @@
 //! its scans, and points are labelled by the posture of their scan.
 
 use std::path::Path;
-use stillpoint::compare::Agreement;
-use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
+use stillpoint::eval::compare::Agreement;
+use stillpoint::eval::demo::write_robots;
+use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 use stillpoint::job::{Given, Job, Means};
 use stillpoint::plan;
-use stillpoint::scanning::{Formats, scan_scene};
 
 const SEED: u64 = 5;
 /// Share of points of links and of what hangs on them that come out as such, and the other way

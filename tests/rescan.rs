@@ -5,14 +5,14 @@ use contract::SpaceKind;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use stillpoint::compare::Agreement;
-use stillpoint::demo::write_robots;
+use stillpoint::cache::{Manifest, check};
 use stillpoint::engine::Engine;
+use stillpoint::eval::compare::Agreement;
+use stillpoint::eval::demo::write_robots;
+use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 use stillpoint::job::{Given, Job, Means};
 use stillpoint::plan;
 use stillpoint::rescan::{Cell, Frame, Request, rescan};
-use stillpoint::reuse::{Manifest, check};
-use stillpoint::scanning::{Formats, scan_scene};
 
 const SEED: u64 = 11;
 /// Share of points of links and of what hangs on them that come out as such, and the other way

@@ -10,12 +10,12 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use stillpoint::check;
-use stillpoint::conversion::{Format, convert};
 use stillpoint::engine::Engine;
-use stillpoint::history;
 use stillpoint::job::{Given, Job, Means};
 use stillpoint::rescan::{Cell, Frame, Request, rescan};
-use stillpoint::{plan, reuse};
+use stillpoint::result::conversion::{Format, convert};
+use stillpoint::result::history;
+use stillpoint::{cache, plan};
 
 /// Beams of each of six scanners: as few as the robot is found with.
 const N_BEAMS: u64 = 250_000;
@@ -138,7 +138,7 @@ impl Plant {
 
     /// Files of which `verify` says that they are not what was written.
     fn verify(&self, out: &str) -> Came<Vec<String>> {
-        came(reuse::check(&self.at(out), &Engine::new(2)).map(|checked| checked.wrong))
+        came(cache::check(&self.at(out), &Engine::new(2)).map(|checked| checked.wrong))
     }
 
     /// What `check` says of a path that turns the robot to both sides.

@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use stillpoint::demo::write_robots;
+use stillpoint::eval::demo::write_robots;
 
 const US_FOOT: f64 = 1200.0 / 3937.0;
 /// A map in US survey feet.

@@ -3,12 +3,12 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use stillpoint::compare::Agreement;
-use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
+use stillpoint::eval::compare::Agreement;
+use stillpoint::eval::demo::write_robots;
+use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 use stillpoint::job::{Given, Job, Means};
 use stillpoint::plan;
-use stillpoint::scanning::{Formats, scan_scene};
 
 /// Beams of each of the six scanners: about 30 mm apart at 5 m, an eighth of what a crew would
 /// take.

@@ -7,14 +7,15 @@
 
 mod subject;
 mod surroundings;
+pub mod trajectory;
 mod words;
 
+use crate::cache::Vouched;
+use crate::detect::library;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::{Job, Means};
-use crate::library;
-use crate::rescan::{State, models_of};
-use crate::reuse::Vouched;
-use crate::trajectory::Trajectory;
+use crate::rescan::models_of;
+use crate::result::plant_state::State;
 use clearance::{Body, Contact, Contacts, FARTHEST, Obstacles, Walk};
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::ResultFile;
@@ -23,6 +24,7 @@ use robot::Model;
 use std::path::PathBuf;
 use subject::Robot;
 use surroundings::Surroundings;
+use trajectory::Trajectory;
 
 /// What is to be checked.
 #[derive(Debug, Clone)]

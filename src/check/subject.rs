@@ -1,9 +1,9 @@
 //! A robot of a result and a path in; the path as whole postures, what the joints cannot do, and
 //! what the path came to, out.
 
+use super::trajectory::Trajectory;
 use super::{Doubt, Outcome, Report, Request};
-use crate::reuse::Manifest;
-use crate::trajectory::Trajectory;
+use crate::cache::Manifest;
 use clearance::{Contact, Leg, Level, What};
 use contract::{Error, Fit, JointFit, Result, Verdict};
 use export::{RobotEntry, mesh_files};

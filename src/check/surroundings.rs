@@ -1,10 +1,11 @@
 //! A result and one of its robots in; what hangs on that robot, and all that stands around it, out.
 
 use super::Robot;
+use crate::cache::Vouched;
 use crate::engine::{Engine, Task};
-use crate::rescan::{State, tiles_of};
-use crate::reuse::Vouched;
-use crate::spaces::poses;
+use crate::label::known_space::poses;
+use crate::rescan::tiles_of;
+use crate::result::plant_state::State;
 use clearance::{CELL, Cells, Eye, Hung, Known, Obstacles, Shadow, What, hanging};
 use contract::{Error, Fit, PointKind, Result, Scan, Space};
 use export::{OldPoint, ResultFile, SpaceEntry, read_tile};

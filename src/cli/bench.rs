@@ -4,15 +4,15 @@ use super::bench_flags::{
     AccuracyFlags, Against, CheckBenchFlags, PlanBenchFlags, PlantFlags, RescanBenchFlags,
     ThroughputFlags,
 };
+use super::exit;
 use super::flags::Common;
 use super::say::Say;
-use crate::bench::check::{CheckBench, checks};
-use crate::bench::plan::{PlanBench, plans};
-use crate::bench::plant::{PlantBench, plants};
-use crate::bench::rescan::{RescanBench, rescans};
-use crate::bench::throughput::{ThroughputBench, throughput};
-use crate::bench::{Bench, accuracy};
-use crate::exit;
+use crate::eval::bench::check::{CheckBench, checks};
+use crate::eval::bench::plan::{PlanBench, plans};
+use crate::eval::bench::plant::{PlantBench, plants};
+use crate::eval::bench::rescan::{RescanBench, rescans};
+use crate::eval::bench::throughput::{ThroughputBench, throughput};
+use crate::eval::bench::{Bench, accuracy};
 use contract::{Error, Kind, Result};
 
 pub(super) fn bench_accuracy(flags: &AccuracyFlags, common: &Common, say: &Say) -> Result<u8> {

@@ -1,7 +1,7 @@
 //! Commands and flags of `bench`, as `clap` knows them.
 
-use crate::bench::frames::Suite;
-use crate::bench::throughput::Scanned;
+use crate::eval::bench::frames::Suite;
+use crate::eval::bench::throughput::Scanned;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 

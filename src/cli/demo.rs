@@ -1,9 +1,10 @@
 //! `demo`: nothing in; a virtual cell, what was found in it, and how that compares with the truth,
 //! out.
 
+use super::exit;
 use super::flags::{Common, DemoFlags};
 use super::say::Say;
-use crate::{demo, exit};
+use crate::eval::demo;
 use contract::Result;
 
 pub(super) fn demo(flags: &DemoFlags, common: &Common, say: &Say) -> Result<u8> {

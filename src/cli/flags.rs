@@ -4,10 +4,10 @@
 use super::bench_flags::BenchCommand;
 use super::say::LogFormat;
 use crate::check::Doubt;
-use crate::conversion::Format;
 use crate::engine::Engine;
+use crate::engine::progress::{Mode, Progress};
 use crate::job::{Given, Means};
-use crate::progress::{Mode, Progress};
+use crate::result::conversion::Format;
 use clap::{Args, Parser, Subcommand};
 use contract::Result;
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! `inspect`: inputs in; what is in them, and what will be worse for what they lack, out.
 
+use super::exit;
 use super::flags::{Common, InspectFlags, present};
 use super::say::Say;
 use crate::engine::AllThreads;
-use crate::exit;
 use contract::Result;
 use ingest::Scanners;
 

@@ -4,15 +4,16 @@
 mod bench;
 mod bench_flags;
 mod demo;
+pub mod exit;
 mod flags;
 mod inspect;
+mod keep_going;
 mod results;
 mod robots;
 mod run;
 mod say;
 mod simulate;
 
-use crate::exit;
 use bench_flags::BenchCommand;
 use clap::Parser;
 use contract::{Error, Kind, Result, fence};

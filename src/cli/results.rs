@@ -2,25 +2,26 @@
 //! they are whole, what is in them, their points in other formats, whether a path keeps clear of
 //! them, how they differ and which goes on from which, out.
 
+use super::exit;
 use super::flags::{
     CheckFlags, Common, DiffFlags, ExportFlags, HistoryFlags, OutFlags, ReportFlags,
 };
 use super::say::Say;
-use crate::changes::{changes, words};
-use crate::check::{self, Outcome as Clear, Request};
-use crate::conversion::convert;
-use crate::exit;
-use crate::history;
+use crate::cache::{Manifest, Vouched, result_of};
+use crate::check::{Outcome as Clear, Request};
 use crate::job::Outcome;
-use crate::reuse::{self, Manifest, Vouched, result_of};
-use crate::things::ThingEntry;
+use crate::result::changes::{changes, words};
+use crate::result::conversion::convert;
+use crate::result::history;
+use crate::result::objects::ThingEntry;
+use crate::{cache, check};
 use contract::words::count;
 use contract::{Error, Kind, Result};
 use std::path::Path;
 
 pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8> {
     let engine = common.engine(&common.means()?)?;
-    let checked = reuse::check(&flags.out, &engine)?;
+    let checked = cache::check(&flags.out, &engine)?;
     let n_files = checked.manifest.files.len();
     let n_bytes: u64 = checked.manifest.files.iter().map(|f| f.n_bytes).sum();
     match checked.wrong.split_first() {

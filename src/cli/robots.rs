@@ -1,10 +1,10 @@
 //! `robots lint`: a library in; what is wrong with it, in words or JSON, out. `robots calibrate`:
 //! results in; a corrected model out.
 
+use super::exit;
 use super::flags::{CalibrateFlags, Common, LintFlags};
 use super::say::Say;
-use crate::calibrate::{Wanted, together};
-use crate::exit;
+use crate::detect::calibrate::{Wanted, together};
 use contract::words::count;
 use contract::{Kind, Result, quote};
 use robot::{Finding, Library, Severity};

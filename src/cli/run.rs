@@ -3,17 +3,18 @@
 
 use super::flags::{Common, PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;
+use super::{exit, keep_going};
 use crate::engine::Engine;
 use crate::estimate::{estimate, with_missing};
+use crate::job::Job;
 use crate::rescan::{self, Cell, Frame, Request};
-use crate::{exit, job::Job, lenient};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use std::fmt::Write as _;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
     let (job, engine) = job(flags, common)?;
-    let mut outcome = lenient::run(&job, &engine).map_err(|e| with_missing(e, &job, &engine))?;
+    let mut outcome = keep_going::run(&job, &engine).map_err(|e| with_missing(e, &job, &engine))?;
     let _ = writeln!(outcome.summary, "result in {}", job.out.join("result.json").display());
     say.outcome(&outcome);
     Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })

@@ -1,9 +1,9 @@
 //! `simulate`: a scene in; scans and truth out.
 
+use super::exit;
 use super::flags::{Common, SimulateFlags};
 use super::say::Say;
-use crate::exit;
-use crate::scanning::{Formats, read_scene, scan_scene};
+use crate::eval::virtual_scan::{Formats, read_scene, scan_scene};
 use contract::words::count;
 use contract::{Error, Kind, Result};
 use robot::Library;

@@ -6,7 +6,7 @@
 //! It therefore keeps at most `cap_bytes` and one more item. An item heavier than the window
 //! travels alone.
 
-use crate::progress::Stage;
+use super::progress::Stage;
 use contract::{Error, Kind, Result};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

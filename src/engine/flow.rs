@@ -4,7 +4,7 @@
 use super::cancel::Cancel;
 use super::edge::{Onward, Put, Take, edge};
 use super::guard::guarded;
-use crate::progress::Stage;
+use super::progress::Stage;
 use contract::{Error, Fold, Kind, Map, Result, Weigh};
 use std::sync::Arc;
 use std::thread::{Builder, Scope};

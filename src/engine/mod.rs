@@ -17,13 +17,14 @@ mod flow;
 mod guard;
 #[cfg(test)]
 mod laws;
+pub mod progress;
 #[cfg(test)]
 mod tests;
 
-use crate::progress::{Amount, Pieces, Progress};
 use contract::{Error, Fan, Kind, Result, Weigh};
 use flow::Pass;
 pub(crate) use guard::guarded;
+use progress::{Amount, Pieces, Progress};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};

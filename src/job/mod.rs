@@ -1,13 +1,12 @@
 //! A job: flags and configuration in, everything that a run needs to know out, checked once.
 
 mod memory;
-mod output;
-mod places;
+pub(crate) mod places;
 mod settings;
+pub(crate) mod units;
 mod value;
 
 pub use memory::{memory_bytes, memory_words};
-pub use output::OutputDir;
 pub use settings::Settings;
 
 use crate::engine::CHANNEL_BYTES;
@@ -52,41 +51,6 @@ impl Job {
     pub fn new(inputs: Vec<PathBuf>, robots: PathBuf, out: PathBuf, means: Means) -> Self {
         let (scanners, review, keep_going, left_out) = (None, None, false, Vec::new());
         Self { inputs, robots, scanners, out, review, keep_going, left_out, means }
-    }
-
-    /// Keeps others out of an output folder for as long as what is returned lives.
-    ///
-    /// # Errors
-    /// Another run is at work in it.
-    pub fn hold(out: &Path) -> Result<std::fs::File> {
-        output::hold(out)
-    }
-
-    /// Keeps those who would write to an output folder out of it for as long as what is returned
-    /// lives.
-    ///
-    /// # Errors
-    /// A run is at work in it.
-    pub fn hold_shared(out: &Path) -> Result<std::fs::File> {
-        output::hold_shared(out)
-    }
-
-    /// Refuses an output folder that is, holds or lies in the result that a rescan goes on from.
-    ///
-    /// # Errors
-    /// It does.
-    pub(crate) fn apart(&self, base: &Path) -> Result<()> {
-        places::apart(base, &self.out)
-    }
-
-    /// Prepares the output folder.
-    ///
-    /// # Errors
-    /// Something to read that is not there or lies where the job writes; a path that is a file, or
-    /// that the system refuses.
-    pub fn output(&self) -> Result<OutputDir> {
-        self.check_places()?;
-        OutputDir::prepare(&self.out)
     }
 }
 

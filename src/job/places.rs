@@ -2,7 +2,7 @@
 //! what it reads.
 
 use super::Job;
-use crate::reuse::{FILES, FOLDERS, refuse_link};
+use crate::io::own_paths::{FILES, FOLDERS, refuse_link};
 use contract::{Error, Kind, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -50,6 +50,14 @@ impl Job {
         self.check_kept(&library, &out, &self.robots)
     }
 
+    /// Refuses an output folder that is, holds or lies in the result that a rescan goes on from.
+    ///
+    /// # Errors
+    /// It does.
+    pub(crate) fn apart(&self, base: &Path) -> Result<()> {
+        apart(base, &self.out)
+    }
+
     /// Refuses a path that the job reads where it writes.
     fn check_kept(&self, path: &Path, out: &Path, named: &Path) -> Result<()> {
         let Ok(inside) = path.strip_prefix(out) else { return Ok(()) };
@@ -76,7 +84,7 @@ fn usage(what: &str, path: &Path) -> Error {
 ///
 /// # Errors
 /// The first link.
-pub(super) fn refuse_links(out: &Path) -> Result<()> {
+pub(crate) fn refuse_links(out: &Path) -> Result<()> {
     for name in FILES.iter().chain(&[LIST, STORE]) {
         refuse_link(&out.join(name))?;
     }
@@ -100,7 +108,7 @@ pub(super) fn refuse_links(out: &Path) -> Result<()> {
 ///
 /// # Errors
 /// They are so.
-pub(crate) fn apart(base: &Path, out: &Path) -> Result<()> {
+fn apart(base: &Path, out: &Path) -> Result<()> {
     let (within, outside) = (real(out), real(base));
     let what = if within == outside {
         "a rescan does not write over the result it goes on from"

@@ -2,46 +2,43 @@
 //! cell brought up to date, and what changed, out. What the new scans do not touch is shared with
 //! the earlier result, byte for byte.
 
-mod base;
-mod carry;
-mod exchanged;
-mod fate;
-mod newcomers;
-mod past;
-mod places;
-mod present;
-#[cfg(fuzzing)]
-pub(crate) mod probe;
+mod appeared_robots;
+mod earlier_points;
+mod earlier_result;
+mod frame;
+mod known_space;
+mod new_points;
+mod other_model;
+mod output;
+mod report;
 mod robots;
-mod say;
 mod session;
-mod spaces;
-mod state;
-mod write;
+mod superseded;
+mod voxel_fates;
 
-pub use carry::Frame;
+pub use frame::Frame;
 
-pub(crate) use base::tiles_of;
+pub(crate) use earlier_result::tiles_of;
 pub(crate) use robots::models_of;
-pub(crate) use state::{Records, State};
 
+use crate::cache::input_tiles::Filling;
+use crate::cache::output::OutputDir;
+use crate::cache::{self, Cache, Digests, Key, OutputFile};
+use crate::detect::library;
+use crate::detect::search::Shelf;
 use crate::engine::{AllThreads, Engine};
-use crate::filling::Filling;
-use crate::job::{Job, Outcome, OutputDir};
-use crate::library;
-use crate::reuse::{self, Cache, Digests, Key, OutputFile};
-use crate::search::Shelf;
+use crate::job::{Job, Outcome, units};
+use crate::result::plant_state::State;
 use crate::store::Store;
-use crate::units;
-use base::Base;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
+use earlier_points::Past;
+use earlier_result::Base;
 use geometry::{Aabb, Pose};
 use ingest::{Scanners, Sources};
-use past::Past;
+use output::Written;
 use robot::Library;
 use session::{Robots, Session};
 use std::path::PathBuf;
-use write::Written;
 
 /// What is to be done.
 #[derive(Debug, Clone)]
@@ -114,7 +111,7 @@ impl Rescan<'_> {
         let past = Past::new(base, &scans, &old, Aabb::EMPTY)?;
         let stood = session::stood((&fits, &models));
         let carried =
-            carry::carry(&request.frame, (&past, stood), (&mut sources, &mut new), engine)?;
+            frame::carry(&request.frame, (&past, stood), (&mut sources, &mut new), engine)?;
 
         // Where the cell is; the new scans are taken back by what they are off what stood there.
         let cell = session::bounds(&request.cell, base, (&fits, &models), (&sources, &new))?;
@@ -152,7 +149,7 @@ impl Rescan<'_> {
         let (models, shared) = (shelved.n_kept(), written.n_shared);
         let tiles = ("tiles of new scans", n_kept);
         outcome.reused =
-            reuse::said(&[("models", models), tiles, ("files of the earlier result", shared)]);
+            cache::said(&[("models", models), tiles, ("files of the earlier result", shared)]);
         Ok(outcome)
     }
 
@@ -214,7 +211,7 @@ impl Rescan<'_> {
             ..base.state.clone()
         };
         state.write(output.next())?;
-        reuse::publish(job, (output, digests), (outcome, known), engine)
+        cache::publish(job, (output, digests), (outcome, known), engine)
     }
 }
 

@@ -1,10 +1,10 @@
 //! A robot of the earlier result, and what the new scans saw, in; how it stands now, or that it is
 //! gone, out.
 
-use super::exchanged::is_the_same;
-use crate::search::Search;
-use crate::spaces::{poses, reach};
-use crate::tools::dress_in;
+use super::other_model::is_the_same;
+use crate::detect::search::Search;
+use crate::detect::tools::dress_in;
+use crate::label::known_space::{poses, reach};
 use contract::{Error, Fit, Region, Result, Verdict};
 use fit::Scene;
 use freespace::{Sight, Watch};
@@ -136,7 +136,8 @@ pub(crate) fn look(
         // What is known of how it stood counts for how it stands, but only where all of that is
         // seen again.
         let sure = Fit { verdict: fit.verdict.max(before.verdict), ..fit.clone() };
-        let is_same = !crate::changes::stands_otherwise(before, &sure) && knows(&fit, before);
+        let is_same =
+            !crate::result::changes::stands_otherwise(before, &sure) && knows(&fit, before);
         match fit.verdict {
             Verdict::Trusted | Verdict::Doubtful if only_foot_turns(before, &fit, model) => {
                 return Ok((Now::Found(Box::new(before.clone())), None));
@@ -239,7 +240,7 @@ fn beside(region: &Region, base: Point) -> Region {
         bounds.min[i] = bounds.min[i].max(base[i] - FAR_REACH);
         bounds.max[i] = bounds.max[i].min(base[i] + FAR_REACH);
     }
-    crate::spaces::region(&bounds.center(), &bounds)
+    crate::label::known_space::region(&bounds.center(), &bounds)
 }
 
 /// The region of the new scans that a robot stands in; all that it can get to, where it stands in

@@ -1,19 +1,19 @@
 //! Earlier and new scans of a cell in; how its robots stand now, and what else is not where it was,
 //! out.
 
-use super::Cell;
-use super::base::Base;
-use super::past::{Compared, Past};
-use super::present::{self, Present};
+use super::earlier_points::{Compared, Past};
+use super::earlier_result::Base;
+use super::new_points::Present;
 use super::robots::{Now, look};
+use super::{Cell, new_points};
+use crate::detect::ground::{Gather, Ground, Surfaces};
+use crate::detect::search::{Search, Shelf};
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
-use crate::labelling::Labelling;
-use crate::near::Near;
-use crate::search::{Search, Shelf};
-use crate::spaces::{reach, region, standing};
+use crate::label::known_space::{reach, region, standing};
+use crate::label::labelling::Labelling;
+use crate::label::near_robots::Near;
 use crate::store::Store;
-use crate::surfaces::{Gather, Ground, Surfaces};
 use change::{Tally, Thing, Unseen, things};
 use contract::{
     Cluster, Error, Fit, Floor, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View,
@@ -170,7 +170,7 @@ pub(crate) fn register(
 ) -> Result<Vec<Option<Registration>>> {
     let planes = past.surfaces(engine)?.planes();
     let first = past.scans.len();
-    let found = present::register(&planes, (&sources.scans, first), (new, &past.cell), engine)?;
+    let found = new_points::register(&planes, (&sources.scans, first), (new, &past.cell), engine)?;
     for (scan, found) in sources.scans[first..].iter_mut().zip(&found) {
         if let Some(found) = found {
             scan.world_from_scan = found.plant_from_stated * scan.world_from_scan;
@@ -276,7 +276,7 @@ impl<'a> Session<'a> {
                         models.push(own);
                     }
                     out.in_cell.push(i);
-                    if is_anew || crate::changes::stands_otherwise(&fits[i], &fit) {
+                    if is_anew || crate::result::changes::stands_otherwise(&fits[i], &fit) {
                         out.changed.push(i);
                         out.left.push(bounds);
                     }
@@ -387,7 +387,7 @@ pub(crate) fn ground(
     let surfaces = if is_known && !with_walls { surfaces.without_planes() } else { surfaces };
     let gather = Gather::new(&sources.scans, &settings.floor);
     let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
-    let mut ground = engine.pass(crate::report::tiles("surfaces", store), source, |f| {
+    let mut ground = engine.pass(crate::result::report::tiles("surfaces", store), source, |f| {
         f.map(&reads).map(&surfaces).fold(&gather)
     })?;
     if is_known {

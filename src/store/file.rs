@@ -1,7 +1,8 @@
 //! Encoded tiles in, one after the other in a file, out; and tiles of it back while it is still
 //! being written.
 
-use super::catalogue::{self, TileEntry};
+use super::catalogue;
+use super::catalogue::TileEntry;
 use super::encode::Encoded;
 use super::record::N_LEVELS;
 use contract::{Error, Result};

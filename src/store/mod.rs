@@ -11,12 +11,13 @@ mod parts;
 mod record;
 mod scatter;
 mod sink;
+pub(crate) mod spatial_tiles;
 mod spill;
 #[cfg(test)]
 mod tests;
 mod writer;
 
-use crate::straight::Straight;
+use crate::io::direct::Straight;
 use catalogue::broken;
 use contract::{Error, MAX_SKIP, Map, Result, Scan, Tile, TileAt, TilePoints, Weigh};
 use geometry::{Aabb, Point, Pose};

@@ -3,7 +3,6 @@
 //! not come back. Where points do come back, the rest of their tile goes through a spill file, and
 //! the tile is written once more in the end.
 
-use super::catalogue;
 use super::encode::{Encode, Encoded};
 use super::file::TileFile;
 use super::parts::{LONGEST_SPAN, Part, Parts, span};
@@ -11,9 +10,9 @@ use super::record::Record;
 use super::scatter::Scattered;
 use super::spill::{Segment, Spill};
 use super::writer::Writer;
-use super::{CATALOGUE, Store, TILES, TileEntry};
+use super::{CATALOGUE, Store, TILES, TileEntry, catalogue};
+use crate::engine::progress::Amount;
 use crate::engine::{Engine, Task};
-use crate::progress::Amount;
 use contract::{Error, Result, Scan, TileAt};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

@@ -4,9 +4,9 @@
 
 use simulate::scene::Cuboid;
 use std::path::Path;
-use stillpoint::demo::write_robots;
 use stillpoint::engine::Engine;
-use stillpoint::scanning::{Formats, scan_scene};
+use stillpoint::eval::demo::write_robots;
+use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 
 /// A palletiser on a bare floor: `robots` and `scans` below a folder, with about so many beams of
 /// each scanner.

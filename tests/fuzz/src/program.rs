@@ -10,11 +10,12 @@ use std::path::Path;
 use std::sync::OnceLock;
 use stillpoint::engine::Engine;
 use stillpoint::job::{Given, Means};
-use stillpoint::reuse::Manifest;
-use stillpoint::review::Review;
+use stillpoint::cache::Manifest;
+use stillpoint::detect::review::Review;
 use stillpoint::store::{Scatter, Store};
-use stillpoint::trajectory::Trajectory;
-use stillpoint::{history, probes};
+use stillpoint::check::trajectory::Trajectory;
+use stillpoint::eval::fuzz_doors;
+use stillpoint::result::history;
 
 /// Longest text that is read, bytes: inputs of a target are shorter.
 const MOST: u64 = 1 << 26;
@@ -96,22 +97,22 @@ pub fn small_store(dir: &Path) {
 
 /// `plant.bin`, without format and digest.
 pub fn plant(data: &[u8]) {
-    file("plant/plant.bin", &probes::plant_file(data));
-    if let Err(error) = probes::plant(&folder().join("plant")) {
+    file("plant/plant.bin", &fuzz_doors::plant_file(data));
+    if let Err(error) = fuzz_doors::plant(&folder().join("plant")) {
         refused(&error);
     }
 }
 
 /// A kept piece: fits of a region, or a model of the library.
 pub fn pieces(data: &[u8]) {
-    let _ = probes::piece(data);
+    let _ = fuzz_doors::piece(data);
 }
 
 /// `manifest.json`.
 pub fn manifest(data: &[u8]) {
     static ONCE: OnceLock<()> = OnceLock::new();
     ONCE.get_or_init(|| drop(file("manifest/result.json", b"{}")));
-    file("manifest/manifest.json", &probes::list_file(data));
+    file("manifest/manifest.json", &fuzz_doors::list_file(data));
     let out = folder().join("manifest");
     match Manifest::read(&out) {
         Ok(manifest) => {
@@ -120,7 +121,7 @@ pub fn manifest(data: &[u8]) {
                 let is_name = |part| matches!(part, std::path::Component::Normal(_));
                 assert!(parts.clone().count() > 0 && parts.into_iter().all(is_name), "{listed:?}");
             }
-            match stillpoint::reuse::check(&out, &Engine::new(1)) {
+            match stillpoint::cache::check(&out, &Engine::new(1)) {
                 Ok(checked) => assert!(checked.wrong.len() <= manifest.files.len(), "once each"),
                 Err(error) => refused(&error),
             }

@@ -1,0 +1,102 @@
+//! An input in, the store of its tiles out: the one that is there from an earlier run, or a new
+//! one.
+
+use super::{Digests, Key, Pace};
+use crate::engine::{Engine, Task};
+use crate::io::read_parts::Reading;
+use crate::job::Means;
+use crate::store::{Scatter, Store};
+use contract::{Error, Input, Kind, Result, Weigh};
+use ingest::{Sources, Want};
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+
+/// Name of a store that is being filled, before the number of its input.
+const NEW: &str = "new-";
+
+/// What filling stores takes.
+pub(crate) struct Filling<'a> {
+    sources: &'a Sources,
+    means: &'a Means,
+    /// Where stores lie, each in a folder with the name of its key.
+    folder: PathBuf,
+    engine: &'a Engine,
+    /// Inputs whose tiles were there, and all that were asked for.
+    n_kept: Cell<[usize; 2]>,
+}
+
+impl<'a> Filling<'a> {
+    pub(crate) fn new(
+        sources: &'a Sources,
+        means: &'a Means,
+        folder: PathBuf,
+        engine: &'a Engine,
+    ) -> Self {
+        Self { sources, means, folder, engine, n_kept: Cell::default() }
+    }
+
+    /// Inputs whose tiles were there, of all that were asked for.
+    pub(crate) fn n_kept(&self) -> [usize; 2] {
+        self.n_kept.get()
+    }
+
+    /// The tiles of one input and their key. A store that is there and whole is believed; one that
+    /// is damaged is made again.
+    pub(crate) fn tiles_of(&self, input: &Input, digests: &Digests) -> Result<(Key, Store)> {
+        let scans = &self.sources.scans;
+        let first = scans.iter().find(|s| s.input == input.id).map_or(0, |s| s.id.0);
+        let resident_bytes = self.means.store_bytes() / self.sources.inputs.len().max(1);
+        let key = || digests.tiles(input, scans, &self.means.settings);
+        let [n_kept, n] = self.n_kept.get();
+        self.n_kept.set([n_kept, n + 1]);
+        let open = |key: &Key| Store::open(&self.folder.join(key.name()), first, resident_bytes);
+        if let Some((key, Ok(store))) = key().map(|key| (key.clone(), open(&key))) {
+            self.n_kept.set([n_kept + 1, n + 1]);
+            return Ok((key, store));
+        }
+        let new = self.folder.join(format!("{NEW}{}", input.id.0));
+        self.fill(&new, input, (first, resident_bytes), digests)?;
+        let key = key().ok_or_else(|| Error::new(Kind::Bug, "an input was not read"))?;
+        let place = self.folder.join(key.name());
+        let _ = std::fs::remove_dir_all(&place);
+        let moved = std::fs::rename(&new, &place);
+        moved.map_err(|e| Error::from(e).at(place.display()))?;
+        Ok((key.clone(), open(&key)?))
+    }
+
+    /// Reads an input into a new store; its digest beside that, if nobody knows it.
+    fn fill(
+        &self,
+        dir: &Path,
+        input: &Input,
+        (first, resident_bytes): (u32, usize),
+        digests: &Digests,
+    ) -> Result<()> {
+        let scans = &self.sources.scans;
+        // What a run that was cut short has left there would go along for ever.
+        let _ = std::fs::remove_dir_all(dir);
+        let mut sink = Store::create(dir, scans, first, self.means.ingest_bytes())?;
+        let scatter = Scatter::new(scans);
+        let amount = crate::result::report::amount(self.sources, input.id);
+        let reading = Reading { sources: self.sources, input, want: Want::Coordinates };
+        let pace = Pace::of(amount.points);
+        let lead = pace.lead();
+        let mut tree = digests.tree(input).filter(|_| self.sources.file(input.id).is_some());
+        let ingest = || {
+            let task = Task::new("ingest").of(amount);
+            reading.each(task, &scatter, tree.as_mut(), self.engine, |strip| {
+                lead.has_decoded(strip.n_points());
+                sink.add(&strip)
+            })?;
+            lead.end();
+            tree.take().map_or(Ok(()), |tree| digests.take(input, tree))
+        };
+        if digests.input(input).is_some() || self.sources.file(input.id).is_some() {
+            ingest()?;
+        } else {
+            self.engine.beside("digest", || digests.read(input, &pace), ingest)?;
+        }
+        digests.check(input)?;
+        sink.finish(self.engine, resident_bytes).map(drop)
+    }
+}

@@ -1,0 +1,56 @@
+//! A job of which parts may fail in; its outcome without those, which are named, out: a plant that
+//! runs overnight is not lost for one broken file.
+
+use crate::engine::Engine;
+use crate::job::{Job, Outcome};
+use crate::plan;
+use contract::{Error, Kind, Result};
+
+/// Does the main job; where it is asked for, without the inputs that cannot be read. Tiles of the
+/// others stay in the store, so that each is read once.
+///
+/// # Errors
+/// As [`plan::run`]; where failures are forgiven, those of the last input that is left.
+pub(super) fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
+    let mut job = job.clone();
+    loop {
+        let done = plan::run(&job, engine);
+        let Err(error) = &done else { return done };
+        let Some(at) = failed(&job, error) else { return done };
+        let path = job.inputs.remove(at);
+        engine.progress.say(&format!("{} is left out: {error}", path.display()));
+        job.left_out.push(format!("left out: {error}"));
+    }
+}
+
+/// The input that an error is of, where the job can go on without it.
+fn failed(job: &Job, error: &Error) -> Option<usize> {
+    let is_of_file = matches!(error.kind(), Kind::BadInput | Kind::Unsupported | Kind::Io);
+    if !job.keep_going || !is_of_file || job.inputs.len() < 2 {
+        return None;
+    }
+    let place = error.place()?;
+    job.inputs.iter().position(|path| place.starts_with(&path.display().to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{Given, Means};
+
+    fn job(keep_going: bool) -> Job {
+        let means = Means::of(&Given::default()).expect("defaults");
+        let inputs = vec!["a/one.e57".into(), "a/two.e57".into()];
+        Job { keep_going, ..Job::new(inputs, "r".into(), "o".into(), means) }
+    }
+
+    #[test]
+    fn only_errors_of_an_input_are_forgiven() {
+        let broken = Error::bad_input("damaged").at("page 3").at("a/two.e57");
+        assert_eq!(failed(&job(true), &broken), Some(1));
+        assert_eq!(failed(&job(false), &broken), None);
+        assert_eq!(failed(&job(true), &Error::bad_input("damaged").at("b/two.e57")), None);
+        let full = Error::new(Kind::OverBudget, "the disk is full").at("a/two.e57");
+        assert_eq!(failed(&job(true), &full), None);
+    }
+}

@@ -1,0 +1,79 @@
+//! Regions whose search fails by a fault of the program in; what to say of each, and the result of
+//! the others, out: where a job keeps going, one region does not cost the run.
+
+use crate::engine::guarded;
+use crate::job::Job;
+use contract::{Kind, Region, Result};
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+/// Regions that failed, in words, by their place.
+pub(crate) struct Failures {
+    is_forgiving: bool,
+    list: Mutex<BTreeMap<String, String>>,
+}
+
+impl Failures {
+    pub(crate) fn of(job: &Job) -> Self {
+        Self { is_forgiving: job.keep_going, list: Mutex::default() }
+    }
+
+    /// What `work` makes of a region; nothing where it fails by a fault of ours, and that is
+    /// forgiven.
+    pub(crate) fn spare<T: Default>(
+        &self,
+        region: &Region,
+        work: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        if !self.is_forgiving {
+            return work();
+        }
+        match guarded("fit", 0, work) {
+            Err(error) if error.kind() == Kind::Bug => {
+                let [x, y, z] = region.world_bounds().center().coords.into();
+                let what =
+                    format!("no robot is looked for near ({x:.1}, {y:.1}, {z:.1}) m: {error}");
+                let mut list = self.list.lock().expect("nobody panics while he holds the list");
+                list.insert(format!("{region:?}"), what);
+                Ok(T::default())
+            }
+            done => done,
+        }
+    }
+
+    /// All that was left out, in the order of inputs and places.
+    pub(crate) fn said(self, job: &Job) -> Vec<String> {
+        let list = self.list.into_inner().unwrap_or_default();
+        job.left_out.iter().cloned().chain(list.into_values()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{Given, Means};
+    use contract::Error;
+    use geometry::{Aabb, Point};
+
+    fn job(keep_going: bool) -> Job {
+        let means = Means::of(&Given::default()).expect("defaults");
+        let inputs = vec!["a/one.e57".into(), "a/two.e57".into()];
+        Job { keep_going, ..Job::new(inputs, "r".into(), "o".into(), means) }
+    }
+
+    #[test]
+    fn a_fault_in_one_region_is_named_and_the_others_count() {
+        let region = Region {
+            origin: Point::new(4.0, 0.0, 0.0),
+            bounds: Aabb { min: [-1.0; 3], max: [1.0; 3] },
+        };
+        let failures = Failures::of(&job(true));
+        let none: Vec<u8> = failures.spare(&region, || panic!("a fault")).expect("forgiven");
+        assert!(none.is_empty());
+        assert!(failures.spare(&region, || Err::<u8, _>(Error::new(Kind::Io, "disk"))).is_err());
+        let said = failures.said(&job(true));
+        assert!(said.len() == 1 && said[0].contains("(4.0, 0.0, 0.0)"), "{said:?}");
+        let strict = Failures::of(&job(false));
+        assert!(strict.spare(&region, || Err::<u8, _>(Error::new(Kind::Bug, "fault"))).is_err());
+    }
+}

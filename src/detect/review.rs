@@ -1,0 +1,391 @@
+//! What a person knows of the robots, as a file in; the fits with that applied, and what each entry
+//! of the file did, out.
+//!
+//! ```toml
+//! [[robot]]                     # one for each place that something is known of
+//! at = [2.7, 0.0, 0.3]          # near its base, world, metres
+//! radius = 0.5                  # how near, metres
+//! model = "kuka_kr10"           # no other model stands here
+//! verdict = "accept"            # or "reject": no robot stands here; left out: as the program finds
+//! joints = { joint_1 = 0.35 }   # near which posture it stands, radians or metres: the fit begins there; other joints as found, else 0
+//! rpy = [0.0, 0.0, 1.57]        # with joints: `at` is its base, so turned (URDF, radians); else the base that was found
+//! ```
+//!
+//! The file is the user's and is given again with every run, so what it says survives reruns.
+
+mod heard;
+
+use super::search::Search;
+use crate::engine::{AllThreads, Engine, Task};
+use crate::job::MAX_TEXT;
+use contract::words::triple;
+use contract::{Error, Fit, JointFit, Region, Result, Verdict};
+use export::ReviewEntry;
+use geometry::{Point, Pose};
+use nalgebra::{Translation3, UnitQuaternion};
+use robot::Model;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// How near a base must be to the place given, metres.
+const RADIUS: f64 = 0.5;
+
+/// The whole file.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Review {
+    /// What is known, place by place.
+    #[serde(default, rename = "robot")]
+    pub places: Vec<Place>,
+}
+
+/// What is known of one place.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Place {
+    /// Near the base, world, metres.
+    pub at: [f64; 3],
+    /// How near, metres.
+    #[serde(default = "radius")]
+    pub radius: f64,
+    /// The only model that may stand there.
+    #[serde(default)]
+    pub model: Option<String>,
+    /// What a person decided.
+    #[serde(default)]
+    pub verdict: Option<Decision>,
+    /// Values of joints near which it stands, by name, radians or metres; empty where that is not
+    /// known.
+    #[serde(default)]
+    pub joints: BTreeMap<String, f64>,
+    /// How its base is turned, roll, pitch and yaw as in URDF, radians; [`Place::at`] is the base
+    /// itself then.
+    #[serde(default)]
+    pub rpy: Option<[f64; 3]>,
+}
+
+/// What a person decided of a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Decision {
+    /// It stands there, as found.
+    Accept,
+    /// Nothing stands there.
+    Reject,
+}
+
+fn radius() -> f64 {
+    RADIUS
+}
+
+impl Review {
+    /// Reads a review.
+    ///
+    /// # Errors
+    /// A file that cannot be read or has more than `most` bytes, is no review, or names a model
+    /// that the library has not.
+    pub fn read(path: &Path, models: &[Model], most: u64) -> Result<Self> {
+        let bad = |what: String| {
+            Error::bad_input(what)
+                .at(path.display())
+                .hint("a review has [[robot]] with at, and radius, model, verdict, joints or rpy")
+        };
+        let text = ingest::read_text(path, most, MAX_TEXT)?;
+        let review: Self = toml::from_str(&text).map_err(|e| {
+            let line = e.span().map_or(1, |span| text[..span.start].lines().count().max(1));
+            bad(format!("line {line}: {}", e.message().trim().replace('\n', " ")))
+        })?;
+        for (k, place) in review.places.iter().enumerate() {
+            place.check(k + 1, models).map_err(bad)?;
+        }
+        Ok(review)
+    }
+
+    /// The fits of all candidates, those from postures that are given in the place of others; and
+    /// the numbers of the entries whose posture the scans do not bear out.
+    pub(crate) fn correct(
+        &self,
+        mut fits: Vec<Fit>,
+        (search, regions): (&Search<'_, '_>, &[Region]),
+        models: &[Model],
+        engine: &Engine,
+    ) -> Result<(Vec<Fit>, Vec<usize>)> {
+        let given = self.places.iter().enumerate().filter(|(_, place)| !place.joints.is_empty());
+        let starts: Vec<(usize, Fit)> =
+            given.filter_map(|(k, place)| Some((k, place.start(&fits, models)?))).collect();
+        let found = engine.fan_out(
+            Task::new("review").large(),
+            starts.iter().collect(),
+            |(_, start)| {
+                search.with_scene(start, regions, |scene, settings| {
+                    let prepared = search.shelf().prepared(start.model);
+                    fit::again(start, prepared, scene, settings, &AllThreads)
+                })
+            },
+        )?;
+        let mut wrong = Vec::new();
+        for ((k, _), fit) in starts.iter().zip(found) {
+            match fit.flatten() {
+                Some(fit) => {
+                    fits.retain(|f| !self.places[*k].has(f));
+                    fits.push(fit);
+                }
+                None => wrong.push(*k),
+            }
+        }
+        Ok((fits, wrong))
+    }
+
+    /// The fits of all candidates with what is known applied: where a robot is accepted, it alone
+    /// is left.
+    #[must_use]
+    pub fn apply(&self, mut fits: Vec<Fit>) -> Vec<Fit> {
+        for place in &self.places {
+            let here = |f: &Fit| place.has(f);
+            if place.verdict == Some(Decision::Reject) {
+                fits.retain(|f| !here(f));
+                continue;
+            }
+            if let Some(model) = &place.model {
+                fits.retain(|f| !here(f) || f.model_name == *model);
+            }
+            let Some(best) = place.best(&fits) else { continue };
+            if place.verdict == Some(Decision::Accept) {
+                let mut at = 0;
+                fits.retain(|f| {
+                    at += 1;
+                    at - 1 == best || !here(f)
+                });
+            }
+        }
+        self.accept(&mut fits);
+        fits
+    }
+
+    /// The robots that would be reported without the review, for [`Review::did`]; none where it has
+    /// no entry.
+    #[must_use]
+    pub(crate) fn without(&self, found: &[Fit], models: &[Model]) -> Vec<Fit> {
+        if self.places.is_empty() {
+            Vec::new()
+        } else {
+            fit::choose(found.to_vec(), models, |_| false)
+        }
+    }
+
+    /// What each entry did, in their order: robots that would be reported without the review, those
+    /// that are, and entries whose posture the scans do not bear out.
+    #[must_use]
+    pub(crate) fn did(&self, without: &[Fit], with: &[Fit], wrong: &[usize]) -> Vec<ReviewEntry> {
+        self.told(&heard::Heard { without, with, wrong })
+    }
+
+    /// Whether somebody accepts a fit.
+    #[must_use]
+    pub fn accepts(&self, fit: &Fit) -> bool {
+        self.places.iter().any(|p| p.verdict == Some(Decision::Accept) && p.has(fit))
+    }
+
+    /// Trusts what is accepted, whatever was found out about it since.
+    pub fn accept(&self, fits: &mut [Fit]) {
+        for fit in fits.iter_mut().filter(|f| self.accepts(f)) {
+            if fit.verdict != Verdict::Trusted {
+                fit.reasons.insert(0, "accepted in review".into());
+            }
+            fit.verdict = Verdict::Trusted;
+        }
+    }
+}
+
+impl Place {
+    /// Whether all of the entry with this number can be; else what cannot.
+    fn check(&self, number: usize, models: &[Model]) -> std::result::Result<(), String> {
+        let numbers = self.at.iter().chain([&self.radius]).chain(self.joints.values());
+        if !numbers.chain(self.rpy.iter().flatten()).all(|v| v.is_finite()) || self.radius <= 0.0 {
+            let what = "at, joints and rpy must be numbers, and radius one above 0";
+            return Err(format!("entry {number}, near {}: {what}", self.words()));
+        }
+        if self.rpy.is_some() && self.joints.is_empty() {
+            return Err(format!("rpy near {} belongs to no joints: give them, too", self.words()));
+        }
+        let Some(name) = &self.model else {
+            return if self.joints.is_empty() {
+                Ok(())
+            } else {
+                Err(format!("joints near {} belong to no model: give it, too", self.words()))
+            };
+        };
+        let Some(model) = models.iter().find(|m| m.name == *name) else {
+            return Err(format!("the library has no model \"{name}\""));
+        };
+        let known: Vec<&str> = model.free.iter().map(|&joint| &*model.joints[joint].name).collect();
+        match self.joints.keys().find(|joint| !known.contains(&joint.as_str())) {
+            Some(odd) => {
+                Err(format!("{name} has no joint \"{odd}\": there are {}", known.join(", ")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The fit that explains most here, by its place in the list.
+    fn best(&self, fits: &[Fit]) -> Option<usize> {
+        let here = fits.iter().enumerate().filter(|(_, f)| self.has(f));
+        here.max_by(|(_, a), (_, b)| by_rank(a, b)).map(|(at, _)| at)
+    }
+
+    /// Whether a fit stands here.
+    fn has(&self, fit: &Fit) -> bool {
+        let base = Point::from(fit.world_from_base.translation.vector);
+        (base - Point::from(self.at)).norm() <= self.radius
+    }
+
+    /// What the fit of the posture that is given begins with: on the base that is given, else that
+    /// of the best fit here.
+    fn start(&self, fits: &[Fit], models: &[Model]) -> Option<Fit> {
+        let index = models.iter().position(|m| Some(&m.name) == self.model.as_ref())?;
+        let own = fits.iter().filter(|f| f.model == index && self.has(f));
+        let best = own.max_by(|a, b| by_rank(a, b));
+        let turn = |[r, p, y]: [f64; 3]| UnitQuaternion::from_euler_angles(r, p, y);
+        let world_from_base = match (self.rpy, best) {
+            (None, Some(best)) => best.world_from_base,
+            (rpy, _) => {
+                Pose::from_parts(Translation3::from(self.at), turn(rpy.unwrap_or_default()))
+            }
+        };
+        let model = &models[index];
+        // They belong to the base that was found.
+        let best = best.filter(|_| self.rpy.is_none());
+        let found = |name: &str| best?.joints.iter().find(|j| j.name == name).map(|j| j.value);
+        let joint = |&joint: &usize| {
+            let name = model.joints[joint].name.clone();
+            let given = self.joints.get(&name).copied();
+            let value = given.or_else(|| found(&name)).unwrap_or(0.0);
+            JointFit { value, name, ..JointFit::default() }
+        };
+        Some(Fit {
+            model: index,
+            model_name: model.name.clone(),
+            world_from_base,
+            joints: model.free.iter().map(joint).collect(),
+            ..Fit::default()
+        })
+    }
+
+    /// The place for people.
+    fn words(&self) -> String {
+        triple(self.at, 2)
+    }
+}
+
+/// What is refused stands behind all else, as people are not shown it; then what explains more goes
+/// first.
+fn by_rank(a: &Fit, b: &Fit) -> std::cmp::Ordering {
+    let stands = |f: &Fit| f.verdict != Verdict::Refused;
+    stands(a).cmp(&stands(b)).then_with(|| a.explained.total_cmp(&b.explained))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn fit(model: &str, x: f64, explained: f64) -> Fit {
+        let world_from_base = Pose::translation(x, 0.0, 0.0);
+        Fit { model_name: model.into(), world_from_base, explained, ..Fit::default() }
+    }
+
+    pub(super) fn place(x: f64, model: Option<&str>, verdict: Option<Decision>) -> Place {
+        let (model, joints) = (model.map(Into::into), BTreeMap::new());
+        Place { at: [x, 0.0, 0.0], radius: RADIUS, model, verdict, joints, rpy: None }
+    }
+
+    #[test]
+    fn joints_that_nobody_names_start_where_they_were_found() {
+        let link = |name: &str| {
+            format!(
+                "<link name='{name}'><visual><geometry><box size='0.2 0.1 0.1'/></geometry></visual></link>"
+            )
+        };
+        let joint = |name: &str, parent: &str, child: &str| {
+            format!(
+                "<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/><axis xyz='0 0 1'/>\
+                 <limit lower='-3' upper='3' effort='1' velocity='1'/></joint>"
+            )
+        };
+        let links: String = ["foot", "trunk", "arm"].map(link).concat();
+        let joints = joint("turn", "foot", "trunk") + &joint("bend", "trunk", "arm");
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("arm.urdf");
+        let urdf = format!("<robot name='arm'>{links}{joints}</robot>");
+        std::fs::write(&path, urdf).expect("is written");
+        let models =
+            [Model::load_urdf(&path, "arm", &robot::Settings::default()).expect("loads").0];
+        let value =
+            |name: &str, value: f64| JointFit { name: name.into(), value, ..JointFit::default() };
+        let found =
+            Fit { joints: vec![value("turn", 0.3), value("bend", 0.9)], ..fit("arm", 0.1, 1.0) };
+        let given = Place {
+            joints: BTreeMap::from([("bend".to_string(), -1.2)]),
+            ..place(0.0, Some("arm"), None)
+        };
+        let values = |fits: &[Fit]| {
+            let start = given.start(fits, &models).expect("the model is known");
+            start.joints.iter().map(|j| j.value).collect::<Vec<_>>()
+        };
+        assert_eq!(values(&[found]), [0.3, -1.2]);
+        assert_eq!(values(&[]), [0.0, -1.2]);
+    }
+
+    #[test]
+    fn what_cannot_be_is_named_by_entry_and_line_in_plain_words() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("review.toml");
+        let said = |text: &str| {
+            std::fs::write(&path, text).expect("is written");
+            Review::read(&path, &[], 1 << 20).expect_err("cannot be").to_string()
+        };
+        let good = "[[robot]]\nat = [1.0, 2.0, 0.0]\n";
+        let radius = said(&format!("{good}[[robot]]\nat = [1.0, -0.001, 0.0]\nradius = 0.0\n"));
+        assert!(
+            radius.contains(
+                "entry 2, near (1.00, 0.00, 0.00): at, joints and rpy must be numbers, and radius one above 0"
+            ),
+            "{radius}"
+        );
+        let verdict = said(&format!("{good}verdict = \"acept\"\n"));
+        assert!(verdict.contains("review.toml: line 3: unknown variant `acept`"), "{verdict}");
+        for text in [radius, verdict] {
+            assert!(!text.contains('\n') && !text.contains("Place {"), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_person_knows_better() {
+        let review = Review {
+            places: vec![
+                place(0.0, Some("b"), Some(Decision::Accept)),
+                place(5.0, None, Some(Decision::Reject)),
+                place(9.0, Some("a"), None),
+            ],
+        };
+        let fits =
+            vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.0), fit("a", 5.1, 3.0), fit("a", 20.0, 1.0)];
+        let fits = review.apply(fits);
+        let left: Vec<(&str, Verdict)> = fits.iter().map(|f| (&*f.model_name, f.verdict)).collect();
+        assert_eq!(left, [("b", Verdict::Trusted), ("a", Verdict::Doubtful)]);
+        assert_eq!(fits[0].reasons, ["accepted in review"]);
+        // Without a model the best is meant, and its rivals stand back.
+        let review = Review { places: vec![place(0.0, None, Some(Decision::Accept))] };
+        let mut fits = review.apply(vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.9)]);
+        assert_eq!(fits.len(), 1);
+        assert!(review.accepts(&fits[0]) && fits[0].model_name == "a");
+        // What was refused was shown to nobody.
+        let refused = Fit { verdict: Verdict::Refused, ..fit("a", 0.1, 3.0) };
+        assert_eq!(review.apply(vec![refused, fit("b", -0.1, 1.9)])[0].model_name, "b");
+        // What a tool on its flange brings up since does not undo it.
+        (fits[0].verdict, fits[0].reasons) = (Verdict::Doubtful, vec!["few points".into()]);
+        review.accept(&mut fits);
+        assert_eq!(fits[0].verdict, Verdict::Trusted);
+        assert_eq!(fits[0].reasons, ["accepted in review", "few points"]);
+    }
+}

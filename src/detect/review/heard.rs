@@ -1,0 +1,261 @@
+//! A review, the robots that would be reported without it and those that are reported with it in;
+//! what each of its entries did, in a sentence, out: a person's word is never passed over in
+//! silence.
+
+use super::{Decision, Place, Review};
+use crate::result::report::id;
+use contract::words::fixed;
+use contract::{Fit, Verdict};
+use export::ReviewEntry;
+use geometry::Point;
+
+/// Bases nearer than this are of one robot, metres.
+const SAME_BASE: f64 = 0.35;
+
+/// What is compared to tell what an entry did.
+pub(super) struct Heard<'a> {
+    /// Robots that would be reported without the review.
+    pub(super) without: &'a [Fit],
+    /// Robots that are reported, in their order.
+    pub(super) with: &'a [Fit],
+    /// Entries, by number, whose posture the scans do not bear out.
+    pub(super) wrong: &'a [usize],
+}
+
+/// What an entry did, and whether a person should look at it again.
+struct Did {
+    what: String,
+    is_odd: bool,
+}
+
+impl Did {
+    fn as_asked(what: String) -> Self {
+        Self { what, is_odd: false }
+    }
+
+    fn odd(what: impl Into<String>) -> Self {
+        Self { what: what.into(), is_odd: true }
+    }
+}
+
+impl Review {
+    /// What each entry did, in their order.
+    pub(super) fn told(&self, heard: &Heard<'_>) -> Vec<ReviewEntry> {
+        let entry = |(k, place): (usize, &Place)| {
+            let Did { what, is_odd } = match place.verdict {
+                Some(Decision::Reject) => self.rejected(place, heard),
+                Some(Decision::Accept) => self.accepted(place, heard),
+                None => place.expected(heard),
+            };
+            let start = if place.joints.is_empty() {
+                ""
+            } else if heard.wrong.contains(&k) {
+                "; the posture that it gives is not what the scans show, and was not used"
+            } else {
+                "; the fit began at the posture that it gives"
+            };
+            let (word, at) = (place.word(), place.words());
+            let did = format!("{word} near {at}: {what}{start}");
+            let needs_look = is_odd || heard.wrong.contains(&k);
+            ReviewEntry { entry: k + 1, at: place.at, did, needs_look }
+        };
+        self.places.iter().enumerate().map(entry).collect()
+    }
+
+    fn rejected(&self, place: &Place, heard: &Heard<'_>) -> Did {
+        let gone: Vec<&Fit> = heard.without.iter().filter(|f| place.has(f)).collect();
+        if gone.is_empty() {
+            return Did::odd("nothing was found there, so it changed nothing");
+        }
+        let names: Vec<String> = gone.iter().map(|f| described(f)).collect();
+        let mut what = format!(
+            "{} is not reported; points there count as standing still",
+            names.join(" and ")
+        );
+        let is_trusted = gone.iter().any(|f| f.verdict == Verdict::Trusted);
+        if is_trusted {
+            what += "; the program trusted it: look whether this is meant";
+        }
+        if let Some(other) = self.other(place, Decision::Accept, heard) {
+            what +=
+                &format!("; entry {other} accepts a robot there, and a rejection goes before that");
+            return Did::odd(what);
+        }
+        Did { what, is_odd: is_trusted }
+    }
+
+    fn accepted(&self, place: &Place, heard: &Heard<'_>) -> Did {
+        let Some((at, fit)) = place.reported(heard.with) else {
+            return match self.other(place, Decision::Reject, heard) {
+                Some(other) => Did::odd(format!(
+                    "entry {other} rejects what stands there, and goes before: no robot is reported"
+                )),
+                None => Did::odd(place.missing()),
+            };
+        };
+        let name = format!("{} {}", id(at), fit.model_name);
+        let Some(before) = place.before(fit, heard.without) else {
+            let instead = heard.without.iter().filter(|f| place.has(f)).map(described);
+            let instead: Vec<String> = instead.collect();
+            return Did::as_asked(if instead.is_empty() {
+                format!("{name} is trusted; without it no robot would be reported there")
+            } else {
+                format!("{name} is trusted, instead of {}", instead.join(" and "))
+            });
+        };
+        Did::as_asked(if before.verdict == Verdict::Trusted {
+            format!("{name} was trusted without it, so it changed nothing")
+        } else {
+            let why = before.reasons.join("; ");
+            format!("{name} is trusted, which was {}: {why}", before.verdict.word())
+        })
+    }
+
+    /// Number of an entry of the other mind about a place: one that holds the same robot, or whose
+    /// middle it holds.
+    fn other(&self, place: &Place, verdict: Decision, heard: &Heard<'_>) -> Option<usize> {
+        let both = |p: &Place| {
+            heard.without.iter().any(|f| p.has(f) && place.has(f))
+                || p.is_within(place)
+                || place.is_within(p)
+        };
+        let at = self.places.iter().position(|p| p.verdict == Some(verdict) && both(p));
+        at.map(|at| at + 1)
+    }
+}
+
+impl Place {
+    /// What the entry asks for, in words.
+    fn word(&self) -> String {
+        let model = self.model.as_deref();
+        match self.verdict {
+            Some(Decision::Reject) => "reject".into(),
+            Some(Decision::Accept) => model.map_or("accept".into(), |m| format!("accept {m}")),
+            None => format!("expect {}", model.unwrap_or("a robot")),
+        }
+    }
+
+    /// What an entry without a verdict did.
+    fn expected(&self, heard: &Heard<'_>) -> Did {
+        let Some((at, fit)) = self.reported(heard.with) else { return Did::odd(self.missing()) };
+        let name = format!("{} {}", id(at), fit.model_name);
+        let others: Vec<String> = heard
+            .without
+            .iter()
+            .filter(|f| self.has(f) && f.model_name != fit.model_name)
+            .map(described)
+            .collect();
+        Did::as_asked(if others.is_empty() {
+            format!("{name} stands there, {}", fit.verdict.word())
+        } else {
+            let verdict = fit.verdict.word();
+            format!("{name} stands there, {verdict}, instead of {}", others.join(" and "))
+        })
+    }
+
+    /// What is said where no robot stands that should.
+    fn missing(&self) -> String {
+        let what = self.model.as_deref().unwrap_or("robot");
+        format!("none of the robots that were found stands there, so no {what} is reported")
+    }
+
+    /// The robot here that explains most, and its place among those that are reported.
+    fn reported<'f>(&self, with: &'f [Fit]) -> Option<(usize, &'f Fit)> {
+        self.best(with).map(|at| (at, &with[at]))
+    }
+
+    /// The same robot as it would be reported without the review.
+    fn before<'f>(&self, fit: &Fit, without: &'f [Fit]) -> Option<&'f Fit> {
+        let at = |f: &Fit| f.world_from_base.translation.vector;
+        without
+            .iter()
+            .filter(|f| self.has(f) && f.model_name == fit.model_name)
+            .find(|f| (at(f) - at(fit)).norm() < SAME_BASE)
+    }
+
+    /// Whether its middle lies within another place.
+    fn is_within(&self, other: &Self) -> bool {
+        (Point::from(self.at) - Point::from(other.at)).norm() <= other.radius
+    }
+}
+
+/// A robot in words: model, verdict, score.
+fn described(fit: &Fit) -> String {
+    format!("{} ({}, score {})", fit.model_name, fit.verdict.word(), fixed(fit.score, 2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::review::{tests::fit, tests::place};
+
+    fn told(places: Vec<Place>, without: &[Fit]) -> Vec<(String, bool)> {
+        let review = Review { places };
+        let with = review.apply(without.to_vec());
+        let heard = Heard { without, with: &with, wrong: &[] };
+        review.told(&heard).into_iter().map(|e| (e.did, e.needs_look)).collect()
+    }
+
+    fn trusted(model: &str, x: f64) -> Fit {
+        Fit { verdict: Verdict::Trusted, score: 0.93, ..fit(model, x, 1.0) }
+    }
+
+    #[test]
+    fn a_rejection_says_what_it_took_away_and_where_there_was_nothing() {
+        let reject = |x: f64| place(x, None, Some(Decision::Reject));
+        let doubtful = Fit { score: 0.5, ..fit("b", 5.0, 1.0) };
+        let said =
+            told(vec![reject(9.0), reject(5.1), reject(0.1)], &[trusted("a", 0.0), doubtful]);
+        let expected = [
+            (
+                "reject near (9.00, 0.00, 0.00): nothing was found there, so it changed nothing",
+                true,
+            ),
+            (
+                "reject near (5.10, 0.00, 0.00): b (doubtful, score 0.50) is not reported; points there count as standing still",
+                false,
+            ),
+            (
+                "reject near (0.10, 0.00, 0.00): a (trusted, score 0.93) is not reported; points there count as standing still; \
+                 the program trusted it: look whether this is meant",
+                true,
+            ),
+        ];
+        assert_eq!(said, expected.map(|(did, odd)| (did.to_owned(), odd)));
+    }
+
+    #[test]
+    fn accept_and_reject_of_one_place_name_each_other() {
+        let accept = place(0.0, None, Some(Decision::Accept));
+        let reject = place(0.2, None, Some(Decision::Reject));
+        for (n, places) in [(2, vec![accept.clone(), reject.clone()]), (1, vec![reject, accept])] {
+            let said = told(places, &[trusted("a", 0.1)]);
+            let [accepted, rejected] =
+                if n == 2 { [&said[0], &said[1]] } else { [&said[1], &said[0]] };
+            let goes_before = format!("entry {n} rejects what stands there, and goes before");
+            assert!(accepted.1 && accepted.0.contains(&goes_before), "{}", accepted.0);
+            let other = format!("entry {} accepts a robot there", 3 - n);
+            assert!(rejected.1 && rejected.0.contains(&other), "{}", rejected.0);
+        }
+    }
+
+    #[test]
+    fn what_is_accepted_says_what_it_was_and_what_is_missing_is_named() {
+        let doubtful = Fit { reasons: vec!["few points".into()], ..fit("b", 5.0, 1.0) };
+        let places = vec![
+            place(0.0, None, Some(Decision::Accept)),
+            place(5.0, None, Some(Decision::Accept)),
+            place(9.0, Some("c"), None),
+        ];
+        let said = told(places, &[trusted("a", 0.0), doubtful]);
+        let words: Vec<&str> =
+            said.iter().map(|(did, _)| did.split(": ").nth(1).unwrap_or("")).collect();
+        assert_eq!(words[0], "R1 a was trusted without it, so it changed nothing");
+        assert!(
+            said[1].0.ends_with("R2 b is trusted, which was doubtful: few points"),
+            "{}",
+            said[1].0
+        );
+        assert!(said[2].1 && said[2].0.starts_with("expect c near (9.00"), "{}", said[2].0);
+    }
+}

@@ -1,0 +1,368 @@
+//! A region in, the fits of all models in it out: reads the tiles that the region's views need, and
+//! sends every model of the library through base search and fit.
+
+mod fallback;
+mod tried;
+mod views;
+
+use super::ground::Ground;
+use crate::cache::Cache;
+use crate::engine::AllThreads;
+use crate::engine::progress::Pieces;
+use crate::job::Settings;
+use crate::store::Store;
+use base_search::{BaseSearch, Sight};
+use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
+use fit::{Method, Prepared, Scene, Sights};
+use geometry::{Aabb, Plane, Point, Pose, Vector};
+use rayon::prelude::*;
+use robot::Model;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
+use tried::Tried;
+
+/// A library with what fits of its models need, made when the first of them asks for it.
+pub(crate) struct Shelf<'a> {
+    models: &'a [Model],
+    prepared: Vec<OnceLock<Prepared<'a>>>,
+}
+
+impl<'a> Shelf<'a> {
+    pub(crate) fn new(models: &'a [Model]) -> Self {
+        Self { models, prepared: models.iter().map(|_| OnceLock::new()).collect() }
+    }
+
+    /// The library.
+    pub(crate) fn models(&self) -> &'a [Model] {
+        self.models
+    }
+
+    /// Makes what these models need now.
+    pub(crate) fn prepare(&self, names: &BTreeSet<&str>, fan: &dyn Fan) {
+        for (i, own) in self.prepared.iter().enumerate() {
+            if own.get().is_none() && names.contains(self.models[i].name.as_str()) {
+                let prepared = Prepared::new(i, &self.models[i], fan);
+                prepared.make_triangles(fan);
+                // Where another thread was first, that one stays.
+                own.set(prepared).ok();
+            }
+        }
+    }
+
+    /// Serial inside: a thread that waits for it never holds up its own work.
+    pub(crate) fn prepared(&self, index: usize) -> &Prepared<'a> {
+        self.prepared[index].get_or_init(|| Prepared::new(index, &self.models[index], &OneByOne))
+    }
+}
+
+/// Everything that the search of a region reads.
+pub(crate) struct Search<'a, 'm> {
+    shelf: &'a Shelf<'m>,
+    scans: &'a [Scan],
+    store: &'a Store,
+    ground: &'a Ground,
+    settings: &'a Settings,
+    /// Where what was found of a region piece by piece is kept, for a run that is cut short.
+    kept: Option<&'a Cache>,
+    /// Told of models that are searched for and candidates that are fitted.
+    pieces: Pieces,
+}
+
+/// A base farther below a floor belongs to a lower level, metres.
+const MAX_SUNK: f64 = 2.0;
+/// Candidates that are fitted at the same time; then it is asked which others they make needless.
+const BATCH: usize = 6;
+/// What is looked at of a robot to find its base reaches no farther from it, metres: foot and
+/// shoulder.
+const FOOT: f64 = 1.5;
+/// Bases nearer than this are at one place, metres.
+const SAME_BASE: f64 = 0.35;
+/// How far beside what is seen of a robot its base may be, metres.
+const FOOT_BESIDE: f64 = 0.3;
+/// Share of the score of a trusted robot's base below which another base at its place is needless.
+const FAR_WORSE: f64 = 0.7;
+/// So many times the base poses are looked at where heights are guessed: each place is there at
+/// many.
+const GUESS_BREADTH: usize = 8;
+
+impl<'a, 'm> Search<'a, 'm> {
+    pub(crate) fn new(
+        shelf: &'a Shelf<'m>,
+        scans: &'a [Scan],
+        store: &'a Store,
+        ground: &'a Ground,
+        settings: &'a Settings,
+    ) -> Self {
+        Self { shelf, scans, store, ground, settings, kept: None, pieces: Pieces::default() }
+    }
+
+    /// The same, which keeps what it finds of a region piece by piece.
+    #[must_use]
+    pub(crate) fn keeping(self, kept: &'a Cache) -> Self {
+        Self { kept: Some(kept), ..self }
+    }
+
+    /// What is told of models that are searched for and candidates that are fitted.
+    pub(crate) fn pieces(&self) -> &Pieces {
+        &self.pieces
+    }
+
+    /// A piece of what is found in a region: the one that is kept, else a new one.
+    fn piece<T: Serialize + DeserializeOwned>(
+        &self,
+        (region, name): (&Region, &str),
+        find: impl FnOnce() -> T,
+    ) -> Result<T> {
+        self.get_or_compute(&format!("{region:?} {name}"), || Ok(find()))
+    }
+
+    /// The piece of that name that is kept, else a new one.
+    pub(crate) fn get_or_compute<T: Serialize + DeserializeOwned>(
+        &self,
+        name: &str,
+        find: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        match self.kept {
+            Some(kept) => kept.get_or_compute(name, find),
+            None => find(),
+        }
+    }
+
+    /// The library.
+    pub(crate) fn shelf(&self) -> &'a Shelf<'m> {
+        self.shelf
+    }
+
+    /// Bounds of all points, world, metres.
+    pub(crate) fn bounds(&self) -> Aabb {
+        self.store.entries().iter().fold(Aabb::EMPTY, |all, entry| all.union(&entry.bounds))
+    }
+
+    /// Fits of all models in one region, whatever their verdict.
+    pub(crate) fn region(&self, region: &Region) -> Result<Vec<Fit>> {
+        self.region_about(region, None)
+    }
+
+    /// The same for those whose bases are so near a place (world, metres), where one is given.
+    pub(crate) fn region_about(
+        &self,
+        region: &Region,
+        about: Option<(Point, f64)>,
+    ) -> Result<Vec<Fit>> {
+        let wants = |at: &Point| about.is_none_or(|(place, radius)| (at - place).norm() < radius);
+        let is_wanted = |c: &Candidate| c.bases.first().is_some_and(|b| wants(&base(&b.0)));
+        let views = self.views(region)?;
+        let planes = self.planes(region);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
+        if self.settings.fit.method == Method::Paper {
+            let means = (&self.settings.fit, &self.settings.paper);
+            let models = (0..self.shelf.models.len()).into_par_iter();
+            let robots = models.filter(|&m| !self.shelf.models[m].is_tool());
+            let fit = |m: usize| fit::paper::fit(self.shelf.prepared(m), &scene, &planes, means);
+            return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
+        }
+        let feet = about.map_or(*region, |(place, radius)| feet(region, &place, radius));
+        let mut sight = Sight::new(&feet, &views, (&scene.evidence, &scene.scouts), &AllThreads);
+        let find = || self.candidates(&sight, &planes, (0.0, breadth(&planes)));
+        let mut candidates = self.piece((region, "candidates"), find)?;
+        candidates.retain(is_wanted);
+        let mut tried = Tried::default();
+        let mut fits = self.fits(&scene, &candidates, &mut tried)?;
+        // What stands on the floor explains most regions; ceilings and walls are asked where
+        // nothing does.
+        if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
+            fits.extend(self.on_mounts(&scene, &sight, &is_wanted, &mut tried)?);
+        }
+        // At one place all that could be left over was looked at already.
+        if about.is_none() {
+            fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits, &mut tried)?);
+            fits.extend(self.hung_beside(&scene, &mut sight, &fits, &mut tried)?);
+        }
+        fits.extend(self.on_stands(&scene, &mut sight, &fits, &is_wanted, &mut tried)?);
+        let sights = Sights { region, views: &views, floors: &planes };
+        fits.extend(self.moved(&fits, sight, &sights));
+        fits.retain(|fit| wants(&base(&fit.world_from_base)));
+        Ok(fits)
+    }
+
+    /// Where robots of all models may stand on some planes, best base first, those that score so
+    /// much; so many times the usual base poses are looked at.
+    fn candidates(
+        &self,
+        sight: &Sight<'_>,
+        planes: &[InstallationPlane],
+        (min_score, breadth): (f64, usize),
+    ) -> Vec<Candidate> {
+        let guessed = planes.iter().all(InstallationPlane::is_guess);
+        let search = |index: usize| {
+            let model = (index, &self.shelf.models[index]);
+            let search = BaseSearch::new(model, sight, &self.settings.base_search);
+            let search = search.map(|s| if guessed { s.on_guesses() } else { s });
+            let search = search.map(|s| s.at_least(min_score).broad(breadth));
+            let found = search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default();
+            self.pieces.done();
+            found
+        };
+        self.pieces.expect(self.shelf.models.len());
+        let models = (0..self.shelf.models.len()).into_par_iter();
+        let found: Vec<Vec<Candidate>> = models.map(search).collect();
+        let mut out: Vec<Candidate> =
+            found.into_iter().flatten().filter(|c| !c.bases.is_empty()).collect();
+        out.sort_by(|a, b| b.bases[0].1.total_cmp(&a.bases[0].1).then(a.model.cmp(&b.model)));
+        out
+    }
+
+    /// Fits of candidates, which come best base first: where a robot is trusted, bases that fit the
+    /// place far worse are not tried any more, nor are those that were tried before.
+    fn fits(
+        &self,
+        scene: &Scene<'_>,
+        candidates: &[Candidate],
+        tried: &mut Tried,
+    ) -> Result<Vec<Fit>> {
+        let (mut out, mut taken): (Vec<Fit>, Vec<(Point, f64)>) = (Vec::new(), Vec::new());
+        let new: Vec<&Candidate> = candidates.iter().filter(|c| !tried.knows(c)).collect();
+        for batch in new.chunks(BATCH) {
+            let is_open = |c: &&Candidate| {
+                let here = base(&c.bases[0].0);
+                !taken.iter().any(|(at, score)| {
+                    (at - here).norm() < SAME_BASE && c.bases[0].1 < FAR_WORSE * score
+                })
+            };
+            let open: Vec<&Candidate> = batch.iter().copied().filter(is_open).collect();
+            open.iter().for_each(|c| tried.add(c));
+            let fit = |c: &&Candidate| {
+                let find = || {
+                    let prepared = self.shelf.prepared(c.model);
+                    fit::fit(c, prepared, scene, &self.settings.fit, &AllThreads)
+                };
+                let fit = self.piece((scene.region, &format!("{} {:?}", c.model, c.bases)), find);
+                self.pieces.done();
+                fit
+            };
+            self.pieces.expect(open.len());
+            let found: Result<Vec<Option<Fit>>> = open.par_iter().map(fit).collect();
+            let found = found?;
+            for (fit, candidate) in found.into_iter().zip(open) {
+                let Some(fit) = fit else { continue };
+                if fit.verdict == Verdict::Trusted {
+                    taken.push((base(&fit.world_from_base), candidate.bases[0].1));
+                }
+                out.push(fit);
+            }
+        }
+        Ok(out)
+    }
+
+    /// The fit of a robot that stands in a region as an earlier one had it; `None` where it does
+    /// not.
+    pub(crate) fn again(
+        &self,
+        region: &Region,
+        before: &Fit,
+        model: &Model,
+    ) -> Result<Option<Fit>> {
+        let known = |name: &str| self.shelf.models.iter().position(|m| m.name == name);
+        let tool = before.tool.as_ref().map(|tool| tool.model.as_str());
+        let parts = [before.model_name.as_str()].into_iter().chain(tool).filter_map(known);
+        let parts: Vec<&Prepared<'_>> = parts.map(|part| self.shelf.prepared(part)).collect();
+        let prepared = Prepared::joined(&parts, (before.model, model));
+        self.in_scene(region, |scene, settings| {
+            fit::again(before, &prepared, scene, settings, &AllThreads)
+        })
+    }
+
+    /// The fit of a model on a base that is known, in the scene of the region about it.
+    pub(crate) fn on_base(&self, scene: &Scene<'_>, model: usize, base: &Pose) -> Option<Fit> {
+        let bounds = scene.region.world_bounds();
+        let normal = base.rotation * Vector::z();
+        let offset = normal.dot(&base.translation.vector);
+        let plane = Plane { normal, offset };
+        let plane = InstallationPlane { plane, bounds, area: 1.0, is_floor: false };
+        let candidate = Candidate { model, bounds, plane, bases: vec![(*base, 1.0)] };
+        let prepared = self.shelf.prepared(model);
+        fit::fit(&candidate, prepared, scene, &self.settings.fit, &AllThreads)
+    }
+
+    /// Does something with the scene of a region.
+    pub(crate) fn in_scene<T>(
+        &self,
+        region: &Region,
+        work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
+    ) -> Result<T> {
+        let views = self.views(region)?;
+        let planes = self.planes(region);
+        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
+        Ok(work(&scene, &self.settings.fit))
+    }
+
+    /// Does something with the scene that a fit stands in; `None` where it stands in none of the
+    /// regions.
+    pub(crate) fn with_scene<T>(
+        &self,
+        fit: &Fit,
+        regions: &[Region],
+        work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
+    ) -> Result<Option<T>> {
+        let at = base(&fit.world_from_base);
+        // Large regions overlap: an arm at the border of one is whole in the other.
+        let within = |r: &Region| {
+            let Aabb { min, max } = r.world_bounds();
+            (0..2).map(|i| (at[i] - min[i]).min(max[i] - at[i])).fold(f64::INFINITY, f64::min)
+        };
+        let homes =
+            regions.iter().filter(|r| r.world_bounds().grown(FOOT_BESIDE).contains(at.into()));
+        let home = homes.max_by(|a, b| within(a).total_cmp(&within(b)));
+        home.map(|region| self.in_scene(region, work)).transpose()
+    }
+
+    /// Where the refinement of a model alone ends from each of the starts.
+    pub(crate) fn converge(
+        &self,
+        region: &Region,
+        model: usize,
+        starts: &[(Pose, Vec<f64>)],
+    ) -> Result<Vec<(Pose, Vec<f64>)>> {
+        let prepared = self.shelf.prepared(model);
+        self.in_scene(region, |scene, settings| {
+            let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, scene, settings, (&s.0, &s.1));
+            starts.par_iter().map(end).collect()
+        })
+    }
+
+    /// Planes that a robot of this region may stand on; heights guessed all over the region where
+    /// the plant has no floor to go by (a camera's view, a cut-out).
+    fn planes(&self, region: &Region) -> Vec<InstallationPlane> {
+        let world = region.world_bounds();
+        let floor = &self.ground.surfaces.floor;
+        // Without beams nothing contradicts a wrong height, and every one of them would have to be
+        // tried out.
+        let has_beams = self.scans.iter().any(Scan::has_beams);
+        if floor.levels.is_empty() && has_beams {
+            return base_search::guessed_planes(&world);
+        }
+        floor.planes.iter().filter(|p| p.bounds.grown(0.3).touches(&world)).cloned().collect()
+    }
+}
+
+/// The part of a region in which bases are looked for that stand so near a place.
+fn feet(region: &Region, place: &Point, radius: f64) -> Region {
+    let (at, reach) = (place - region.origin, radius + FOOT);
+    let mut bounds = region.bounds;
+    for i in 0..2 {
+        bounds.min[i] = bounds.min[i].max(at[i] - reach);
+        bounds.max[i] = bounds.max[i].min(at[i] + reach);
+    }
+    Region { bounds, ..*region }
+}
+
+/// So many times the base poses are looked at on planes of a region.
+fn breadth(planes: &[InstallationPlane]) -> usize {
+    if planes.iter().all(InstallationPlane::is_guess) { GUESS_BREADTH } else { 1 }
+}
+
+fn base(world_from_base: &Pose) -> Point {
+    world_from_base.translation.vector.into()
+}

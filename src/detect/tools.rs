@@ -1,0 +1,216 @@
+//! Fits of arms and a library with tools in; fits of arms with what hangs on their flanges out, and
+//! the models that these fits are of.
+
+use super::search::{Search, Shelf};
+use crate::engine::{AllThreads, Engine, Task};
+use contract::{Certainty, Fit, JointFit, Mounted, Region, Result, Verdict};
+use fit::{Prepared, Scene, Settings, Tooled};
+use robot::Model;
+use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
+
+/// A tool stands at a multiple of 30° or 45° about the flange: bolt circles have 4, 6, 8 or 12
+/// holes.
+const MOUNTS: [f64; 2] = [FRAC_PI_6, FRAC_PI_4];
+/// Most other holes that are named.
+const MAX_NAMED: usize = 3;
+/// Fewest points on a tool: with less, a corner of any part will do.
+const MIN_POINTS: usize = 80;
+
+/// Gives fits whose loops stand otherwise than the library's model has them a model of their own.
+pub(crate) fn branch(mut fits: Vec<Fit>, models: &mut Vec<Model>) -> Vec<Fit> {
+    for fit in &mut fits {
+        if !fit.other_branches.is_empty() {
+            models.push(models[fit.model].with_other_branches(&fit.other_branches));
+            fit.model = models.len() - 1;
+        }
+        fit.stays = branch(std::mem::take(&mut fit.stays), models);
+    }
+    fits
+}
+
+/// The fits, those with a tool replaced by fits of both, whose models are added to `models`.
+pub(crate) fn dress(
+    fits: Vec<Fit>,
+    models: &mut Vec<Model>,
+    (search, regions): (&Search<'_, '_>, &[Region]),
+    engine: &Engine,
+) -> Result<Vec<Fit>> {
+    let fits = branch(fits, models);
+    let known: &[Model] = models;
+    if !known.iter().any(Model::is_tool) {
+        return Ok(fits);
+    }
+    let dressed = engine.fan_out(Task::new("tools").large(), fits, |fit| {
+        if !tells_tools(&fit) {
+            return Ok((fit, None));
+        }
+        let arm = &known[fit.model];
+        let find = || {
+            let dressed = search.with_scene(&fit, regions, |scene, settings| {
+                dress_one(&fit, arm, (known, search.shelf()), scene, settings)
+            })?;
+            Ok(dressed.flatten())
+        };
+        let dressed = search.get_or_compute(&format!("tool of {fit:?}"), find)?;
+        Ok(own(fit, arm, dressed, known))
+    })?;
+    Ok(adopt(dressed, models))
+}
+
+/// The same for a fit of one scene; with the model that it is of, where that is none of these.
+pub(crate) fn dress_in(
+    scene: &Scene<'_>,
+    fit: Fit,
+    models: &[Model],
+    (shelf, settings): (&Shelf<'_>, &Settings),
+) -> (Fit, Option<Model>) {
+    let has_other = !fit.other_branches.is_empty();
+    let branched = has_other.then(|| models[fit.model].with_other_branches(&fit.other_branches));
+    let arm = branched.as_ref().unwrap_or(&models[fit.model]);
+    let dress = || dress_one(&fit, arm, (models, shelf), scene, settings);
+    let dressed = tells_tools(&fit).then(dress).flatten();
+    let (fit, tooled) = own(fit, arm, dressed, models);
+    (fit, tooled.or(branched))
+}
+
+/// Whether tools are looked for: of a robot that moved, the scans of one posture may show too
+/// little of one.
+fn tells_tools(fit: &Fit) -> bool {
+    fit.verdict != Verdict::Refused && fit.stands_in.is_empty()
+}
+
+/// The fit with the tool that was found, and the model of both.
+fn own(fit: Fit, arm: &Model, dressed: Option<Dressed>, models: &[Model]) -> (Fit, Option<Model>) {
+    let Some((together, [tool, flange], mount)) = dressed else { return (fit, None) };
+    (together, Some(arm.with_tool(&models[tool], flange, mount)))
+}
+
+/// A fit of arm and tool, the tool's number in the library and the link that it hangs on, and its
+/// turn about it, radians.
+type Dressed = (Fit, [usize; 2], f64);
+
+/// The fits, those with a model of their own pointing at it among `models`.
+pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) -> Vec<Fit> {
+    let own = |(mut fit, model): (Fit, Option<Model>)| {
+        if let Some(model) = model {
+            fit.model = models.len();
+            models.push(model);
+        }
+        fit
+    };
+    fits.into_iter().map(own).collect()
+}
+
+/// One arm: the tool that explains most, if one is there.
+fn dress_one(
+    fit: &Fit,
+    arm: &Model,
+    (models, shelf): (&[Model], &Shelf<'_>),
+    scene: &Scene<'_>,
+    settings: &Settings,
+) -> Option<Dressed> {
+    // An arm whose loops stand otherwise has the links of its name.
+    let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);
+    let bare = shelf.prepared(bare);
+    let n_arm = arm.free.len();
+    let known = (models, shelf, bare);
+    let ([tool, flange], mut start) = best_tool(fit, arm, known, scene, settings)?;
+    let both = arm.with_tool(&models[tool], flange, 0.0);
+    let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
+    let holes = holes();
+    let way = arm.mount(flange).1;
+    let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
+    let bolts = fit::bolt(&start, (&prepared, n_arm - 1), &turns, scene, settings, &AllThreads);
+    // Where the flange does not tell, the first hole has it, and the last joint takes up the rest.
+    let bolt = bolts.iter().find(|b| b.hole == 0).or(bolts.first());
+    let mount = bolt.map_or(0.0, |bolt| {
+        start.posture[n_arm - 1] = bolt.value;
+        holes[bolt.hole]
+    });
+    let both = arm.with_tool(&models[tool], flange, mount);
+    let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
+    let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
+    let own = together.links.get(arm.links.len()..).unwrap_or_default();
+    let n_points: usize = own.iter().map(|link| link.n_points).sum();
+    if n_points < MIN_POINTS
+        || together.verdict == Verdict::Refused
+        || together.verdict < fit.verdict
+    {
+        return None;
+    }
+    let others = bolts.iter().filter(|b| holes[b.hole] != mount);
+    let alike: Vec<[f64; 2]> = others.map(|b| [holes[b.hole], b.value]).collect();
+    together.reasons.extend(in_words(&alike));
+    widen(&mut together.joints[n_arm - 1], &alike);
+    together.tool = Some(Mounted {
+        model: models[tool].name.clone(),
+        link: arm.links[flange].name.clone(),
+        mount,
+        alike,
+    });
+    together.runner_up = fit.runner_up.clone();
+    together.other_branches = fit.other_branches.clone();
+    together.alike = fit.alike.clone();
+    Some((together, [tool, flange], mount))
+}
+
+/// The tool that explains most of what hangs on one of the arm's flanges, if one is there: its
+/// number and the flange's link, and where it stands. `bare` is the arm.
+fn best_tool(
+    fit: &Fit,
+    arm: &Model,
+    (models, shelf, bare): (&[Model], &Shelf<'_>, &Prepared<'_>),
+    scene: &Scene<'_>,
+    settings: &Settings,
+) -> Option<([usize; 2], Tooled)> {
+    let own = [arm.free.len(), arm.links.len()];
+    let mut best: Option<([usize; 2], Tooled)> = None;
+    for flange in arm.flanges() {
+        for tool in (0..models.len()).filter(|&i| models[i].is_tool()) {
+            let both = arm.with_tool(&models[tool], flange, 0.0);
+            let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
+            let found = fit::try_tool(fit, (&prepared, own), scene, settings, &AllThreads);
+            let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
+            if let Some(found) = found.filter(better) {
+                best = Some(([tool, flange], found));
+            }
+        }
+    }
+    best
+}
+
+/// The arm's last joint may be as far off as at the other holes, each with the joint's value there,
+/// radians: the tool's place is known, not what of it is the hole's and what the joint's.
+fn widen(last: &mut JointFit, alike: &[[f64; 2]]) {
+    let apart = alike.iter().map(|[_, value]| fit::turns::apart(*value, last.value));
+    let spread = apart.fold(0.0, f64::max);
+    if !alike.is_empty() {
+        last.certainty = Certainty::Undetermined;
+    }
+    last.sigma = last.sigma.max(spread);
+}
+
+/// What is said where a flange looks the same at several holes.
+fn in_words(alike: &[[f64; 2]]) -> Option<String> {
+    let mut holes: Vec<f64> = alike.iter().map(|a| a[0].to_degrees()).collect();
+    holes.sort_by(f64::total_cmp);
+    holes.dedup();
+    let named: Vec<String> = holes.iter().take(MAX_NAMED).map(|deg| format!("{deg:.0}°")).collect();
+    let more = if holes.len() > MAX_NAMED { ", …" } else { "" };
+    (!named.is_empty()).then(|| {
+        let named = named.join(", ");
+        format!("the tool may as well be bolted on at {named}{more}, the last joint turned back")
+    })
+}
+
+/// All turns that a tool may be bolted on at, 0 first, radians.
+fn holes() -> Vec<f64> {
+    let all = MOUNTS.iter().flat_map(|step| {
+        let n = (TAU / step).round() as usize;
+        (0..n).map(move |k| k as f64 * step)
+    });
+    let mut all: Vec<f64> = all.collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+    all
+}

@@ -1,0 +1,283 @@
+//! A job in; what it will take of memory, disk and time, and what of it is there already, out. Some
+//! points are looked at to tell how much there is to search.
+
+mod rates;
+mod search;
+mod stand;
+
+use crate::cache::Digests;
+use crate::cache::output::OutputDir;
+use crate::detect::library;
+use crate::engine::{AllThreads, Engine};
+use crate::job::{Job, Settings, memory_words, units};
+use crate::store::spatial_tiles;
+use contract::words::count;
+use contract::{Error, Input, Kind, Result};
+use ingest::{Scanners, Sources};
+use rates::{COPC, INGEST, LOAD, REST, SPREAD};
+use serde::Serialize;
+use std::path::Path;
+
+pub use stand::{Searched, Stand};
+
+/// Bytes of a point in the store, with its share of catalogue and checksums.
+const STORE_BYTES: u64 = 18;
+/// Bytes of a point's labels: kind, robot, link.
+const LABEL_BYTES: u64 = 5;
+/// Share of their length that compressed clouds keep.
+const COMPRESSED: f64 = 0.35;
+/// Bytes of a point in a cloud, without and with colour.
+const CLOUD_BYTES: [u64; 2] = [34, 40];
+/// Bytes of a point that wait on disk while a COPC file is made.
+const COPC_BYTES: u64 = 40;
+/// Bytes of a point in a text file, about.
+const TEXT_BYTES: u64 = 45;
+/// Pictures, kept models, voxels and lists, bytes for each model of the library: 7 to 11 MB were
+/// measured in halls of none to two robots, and more robots stand in large plants.
+const EXTRA_BYTES: u64 = 16 << 20;
+/// Bytes of a spatial tile beside its points: header, and what of a disk's block is left empty.
+const TILE_BYTES: u64 = 4096;
+/// Memory of the program with an open library, and of each model and each point until the budget is
+/// full, bytes.
+const PROGRAM_BYTES: u64 = 160 << 20;
+const MODEL_BYTES: u64 = 24 << 20;
+const POINT_BYTES: u64 = 40;
+/// What is kept of each scan while a robot is searched, however little memory there is, bytes: a
+/// billion points of 20 scans took 0.8 GiB under 512 MiB. No more of them than about so many see a
+/// place.
+const SCAN_BYTES: u64 = 28 << 20;
+const SCANS: u64 = 24;
+
+/// What a job will take.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Points of all inputs, as far as they say; else by their length.
+    pub n_points: u64,
+    /// Units of the inputs' own coordinates, in words.
+    pub units: Vec<String>,
+    /// Models that are tried.
+    pub n_models: usize,
+    /// Resident memory at most, bytes: not above `--memory`, but where even one region of all
+    /// scans takes more.
+    pub memory_bytes: u64,
+    /// Disk for the store, bytes, where it is not there already.
+    pub store_bytes: u64,
+    /// Disk for what is written, bytes. Old results stay until the new ones are whole.
+    pub output_bytes: u64,
+    /// Spatial tiles, about, as far as samples of the scans tell, and at most: more end the run
+    /// before it writes any.
+    pub tiles: [u64; 2],
+    /// Free where both go, bytes; 0 where the system does not tell.
+    pub free_bytes: u64,
+    /// Time, seconds, least and most, where no other program takes the processors' time.
+    pub seconds: [f64; 2],
+    /// What seems to stand in the plant, where it was looked at.
+    pub stand: Option<Stand>,
+    /// Inputs whose tiles are there, of all.
+    pub kept_inputs: [usize; 2],
+    /// Whether nothing has changed, and nothing will be done.
+    pub unchanged: bool,
+}
+
+/// Estimates a job.
+///
+/// # Errors
+/// Inputs or a library that cannot be opened.
+pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
+    job.check_places()?;
+    let settings = &job.means.settings;
+    // Where no run has been, nothing is there to be used again, and no input need be read to tell.
+    let earlier = job.out.join("store").is_dir().then(|| Earlier::look(job, engine)).transpose()?;
+    let unchanged = earlier.as_ref().is_some_and(|e| e.unchanged);
+    let has_tiles = |i: &Input, sources: &Sources| {
+        earlier.as_ref().is_some_and(|e| e.has_tiles(i, sources, settings))
+    };
+    let (mut estimate, sources) = opened(job, has_tiles)?;
+    if unchanged {
+        (estimate.store_bytes, estimate.output_bytes, estimate.seconds) = (0, 0, [0.5; 2]);
+    } else {
+        estimate.look(job, &sources, engine)?;
+    }
+    Ok(Estimate { unchanged, ..estimate })
+}
+
+/// Opens what a job reads, and estimates it but for the search.
+fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<(Estimate, Sources)> {
+    let n_models = library::count(&job.robots)?;
+    let read = |path| Scanners::read(path, &job.means.settings.ingest);
+    let scanners = job.scanners.as_deref().map(read).transpose()?;
+    let sources =
+        ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest, &AllThreads)?;
+    units::check_plan(&job.robots, &sources)?;
+    Ok((Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)), sources))
+}
+
+/// An error of the job; where a disk was full, with what is missing there.
+pub(crate) fn with_missing(error: Error, job: &Job, engine: &Engine) -> Error {
+    if !error.is_full_disk() {
+        return error;
+    }
+    // Where there is no room even to look at what is kept, none of it is counted.
+    let estimate =
+        estimate(job, engine).or_else(|_| opened(job, |_, _| false).map(|opened| opened.0));
+    match estimate.map(|e| e.need().saturating_sub(e.free_bytes)) {
+        Ok(missing) if missing > 0 => error.hint(format!(
+            "about {} are missing: make room, or choose another --out; what was done is kept, and the next run goes on from it",
+            memory_words(missing)
+        )),
+        _ => error,
+    }
+}
+
+/// What an earlier run has left.
+struct Earlier {
+    output: OutputDir,
+    digests: Digests,
+    unchanged: bool,
+}
+
+impl Earlier {
+    fn look(job: &Job, engine: &Engine) -> Result<Self> {
+        let output = job.output()?;
+        let digests = Digests::of(job, &output, engine)?;
+        let result = digests.unchanged(job, &output)?;
+        Ok(Self { output, digests, unchanged: result.is_some() })
+    }
+
+    fn has_tiles(&self, input: &Input, sources: &Sources, settings: &Settings) -> bool {
+        let key = self.digests.tiles(input, &sources.scans, settings);
+        key.is_some_and(|key| self.output.has_tiles(&key))
+    }
+}
+
+impl Estimate {
+    /// Of opened inputs; `has_tiles` says whose tiles are there.
+    pub(crate) fn of(
+        job: &Job,
+        sources: &Sources,
+        n_models: usize,
+        has_tiles: impl Fn(&Input) -> bool,
+    ) -> Self {
+        let threads = job.means.n_threads as f64;
+        let (mut n, mut n_new, mut n_kept, mut seconds) = (0_u64, 0_u64, 0, 0.0);
+        // What a file states may be a lie of any size.
+        for input in &sources.inputs {
+            let own = points(sources, input);
+            n = n.saturating_add(own);
+            if has_tiles(input) {
+                n_kept += 1;
+                continue;
+            }
+            n_new = n_new.saturating_add(own);
+            let rate =
+                INGEST.iter().find(|(format, _)| *format == input.format).map_or(6e6, |r| r.1);
+            seconds += own as f64 / rate + own as f64 / REST[0];
+        }
+        seconds += REST[1..].iter().map(|rate| n as f64 / rate).sum::<f64>();
+        let models = n_models as u64;
+        let tiles = spatial_tiles::expected(&sources.spread(), n, &job.means.settings.export);
+        let cloud = CLOUD_BYTES[usize::from(sources.has_color())];
+        let export = &job.means.settings.export;
+        let body = if export.bodies { 4 } else { 0 };
+        let n_clouds = u64::from(export.tiles) + u64::from(export.fixed_cloud);
+        let share = if export.compress { COMPRESSED } else { 1.0 };
+        let clouds = ((n_clouds * (cloud + body)) as f64 * share).ceil() as u64;
+        let copc = if export.copc { COPC_BYTES + (cloud as f64 * COMPRESSED) as u64 } else { 0 };
+        let labelled = n.saturating_mul(LABEL_BYTES + clouds + copc);
+        seconds += if export.copc { n as f64 / COPC } else { 0.0 };
+        let base = PROGRAM_BYTES + models * MODEL_BYTES;
+        let memory = n.saturating_mul(POINT_BYTES).saturating_add(base);
+        let least = base + SCAN_BYTES * SCANS.min(sources.scans.len() as u64);
+        Self {
+            n_points: n,
+            units: units::said(sources),
+            n_models,
+            memory_bytes: memory.min(job.means.memory_bytes.max(least)),
+            store_bytes: n_new.saturating_mul(STORE_BYTES),
+            output_bytes: labelled
+                .saturating_add(models * EXTRA_BYTES)
+                .saturating_add(tiles[0].saturating_mul(TILE_BYTES)),
+            tiles,
+            free_bytes: free(&job.out),
+            seconds: [(seconds + library::bytes(&job.robots) as f64 / 1e6 * LOAD) / threads; 2],
+            stand: None,
+            kept_inputs: [n_kept, sources.inputs.len()],
+            unchanged: false,
+        }
+    }
+
+    /// Adds the time of the search, for what seems to stand in the plant.
+    fn look(&mut self, job: &Job, sources: &Sources, engine: &Engine) -> Result<()> {
+        let stand = stand::look(sources, &job.means.settings, engine)?;
+        let search = search::seconds(&stand, self.n_models) / job.means.n_threads as f64;
+        self.seconds = [self.seconds[0] + search / SPREAD, self.seconds[1] + search * SPREAD];
+        self.stand = Some(stand);
+        Ok(())
+    }
+
+    /// Disk that it takes, bytes.
+    fn need(&self) -> u64 {
+        self.store_bytes.saturating_add(self.output_bytes)
+    }
+
+    /// Refuses what the disk cannot hold, and more spatial tiles than there may be.
+    ///
+    /// # Errors
+    /// More is needed than is free or allowed.
+    pub fn checked(&self, out: &Path) -> Result<()> {
+        spatial_tiles::within(self.tiles)?;
+        let need = self.need();
+        if self.free_bytes == 0 || need <= self.free_bytes {
+            return Ok(());
+        }
+        let (need, free) = (memory_words(need), memory_words(self.free_bytes));
+        let what = format!("the disk is too small: \"{need}\" are needed, \"{free}\" are free");
+        Err(Error::new(Kind::OverBudget, what)
+            .hint("free some, or give an --out on another disk")
+            .at(out.display()))
+    }
+}
+
+impl std::fmt::Display for Estimate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [kept, all] = self.kept_inputs;
+        if self.unchanged {
+            return write!(f, "nothing has changed: the result that is there is used again");
+        }
+        let inputs = count(all as u64, "input");
+        writeln!(f, "points    {:.1} M in {inputs}", self.n_points as f64 / 1e6)?;
+        for line in &self.units {
+            writeln!(f, "unit      {line}")?;
+        }
+        writeln!(f, "models    {}", self.n_models)?;
+        writeln!(f, "memory    {} at most", memory_words(self.memory_bytes))?;
+        writeln!(
+            f,
+            "disk      {} to keep tiles, {} for results; {} free",
+            memory_words(self.store_bytes),
+            memory_words(self.output_bytes),
+            memory_words(self.free_bytes)
+        )?;
+        writeln!(f, "tiles     about {} spatial tiles, at most {}", self.tiles[0], self.tiles[1])?;
+        writeln!(f, "time      {:.0} to {:.0} s", self.seconds[0], self.seconds[1])?;
+        if let Some(stand) = &self.stand {
+            let regions = count(stand.regions.len() as u64, "region");
+            let area: f64 = stand.regions.iter().map(|r| r.size[0] * r.size[1]).sum();
+            writeln!(f, "search    {regions} of {area:.0} m² in all, as far as a glance tells")?;
+        }
+        write!(f, "kept      tiles of {kept} of {inputs}")
+    }
+}
+
+/// Points of an input: what it states, else what its length allows.
+fn points(sources: &Sources, input: &Input) -> u64 {
+    let scans = sources.scans.iter().filter(|s| s.input == input.id);
+    let in_scans: Option<u64> = scans.map(|s| s.stated_points).sum();
+    sources.n_stated(input.id).or(in_scans).unwrap_or(input.n_bytes / TEXT_BYTES)
+}
+
+/// Bytes that are free where a folder lies, or will.
+fn free(folder: &Path) -> u64 {
+    let there = folder.ancestors().find(|path| path.is_dir()).unwrap_or(Path::new("."));
+    fs4::available_space(there).unwrap_or(0)
+}

@@ -1,0 +1,209 @@
+//! A scene in; its scans in memory, and what the main job's own stages find in them, out.
+
+use crate::detect::calibrate::calibrate;
+use crate::detect::ground::{Gather, Surfaces};
+use crate::detect::search::{Search, Shelf};
+use crate::detect::tools;
+use crate::engine::{AllThreads, Engine};
+use crate::job::{Means, Settings};
+use crate::label::near_robots::Near;
+use crate::store::{Scatter, Store};
+use contract::{
+    Fit, InputId, Label, Lattice, Map, MaskId, Region, Result, Scan, ScanId, Strip, Verdict,
+};
+use geometry::Pose;
+use rayon::prelude::*;
+use robot::Model;
+use simulate::{Scene, SimColumns, Simulator};
+use std::path::Path;
+use std::time::Instant;
+
+/// A cell as its scanners saw it.
+#[derive(Default)]
+pub(super) struct Cell {
+    scans: Vec<Scan>,
+    strips: Vec<Strip>,
+    /// What each point of each scan truly lies on.
+    truth: Vec<Vec<Real>>,
+    /// For each thing of the scene, whether it is a hose.
+    hoses: Vec<bool>,
+    /// Points that truly lie on the robot.
+    n_robot_points: usize,
+}
+
+/// What a point truly lies on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Real {
+    pub(super) label: Label,
+    pub(super) on_hose: bool,
+}
+
+/// What was found, and how long it took.
+#[derive(Default)]
+pub(super) struct Found {
+    pub(super) fits: Vec<Fit>,
+    pub(super) n_robot_points: usize,
+    /// Seconds from the regions and the store to fits.
+    pub(super) seconds: f64,
+    /// Where the refinement alone ended from each start.
+    pub(super) ends: Vec<Start>,
+    /// What the points near robots are said to be, and for each scan what they are.
+    pub(super) labels: Option<(Near, Vec<Vec<Real>>)>,
+}
+
+/// World from base, and a posture.
+pub(super) type Start = (Pose, Vec<f64>);
+
+/// What is done beside the search.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Then<'a> {
+    /// Nothing.
+    Nothing,
+    /// No search: the first model's refinement alone, from each of these.
+    Converge(&'a [Start]),
+    /// What was found is adjusted once more, from the truth where that is given.
+    Adjust(Option<&'a Start>),
+}
+
+/// Columns cast at a time.
+const COLUMNS: u32 = 32;
+
+impl Cell {
+    /// Scans a scene. `models` are the true ones.
+    pub(super) fn scan(scene: &Scene, models: &[Model], engine: &Engine) -> Result<Self> {
+        let simulator = Simulator::new(scene, models)?;
+        let is_hose = |thing: &String| thing.starts_with("hose ");
+        let hoses = simulator.truth().objects.iter().map(is_hose).collect();
+        let mut cell = Self { hoses, ..Self::default() };
+        for k in 0..simulator.n_scans() {
+            let frame = simulator.frame(k);
+            let step = frame.raster.step().to_radians();
+            let (row, col) = (frame.raster.elevation(0), frame.raster.azimuth(0));
+            cell.scans.push(Scan {
+                id: ScanId(k as u32),
+                input: InputId(0),
+                mask: MaskId(k as u32),
+                name: frame.name.clone(),
+                source_id: None,
+                world_from_scan: frame.world_from_scan,
+                lattice: Some(Lattice::new(step, step, row, col)),
+                stated_bounds: None,
+                stated_points: None,
+                notes: Vec::new(),
+            });
+            let firsts: Vec<u32> = (0..frame.n_cols).step_by(COLUMNS as usize).collect();
+            let columns: Vec<SimColumns> = engine.pool()?.install(|| {
+                let cast = |c: u32| simulator.columns(k, c..(c + COLUMNS).min(frame.n_cols));
+                firsts.into_par_iter().map(cast).collect()
+            });
+            cell.truth.push(Vec::new());
+            let mut place = 0;
+            for c in &columns {
+                cell.add(k, c, &mut place);
+            }
+        }
+        Ok(cell)
+    }
+
+    fn add(&mut self, scan: usize, columns: &SimColumns, place: &mut u64) {
+        let hits: Vec<usize> = (0..columns.len()).filter(|&i| columns.hit[i]).collect();
+        let n_robot = hits.iter().filter(|&&i| columns.label[i].robot == 0).count();
+        self.n_robot_points += n_robot;
+        let on_hose = |i: usize| self.hoses.get(usize::from(columns.object[i])) == Some(&true);
+        let real = |&i: &usize| Real { label: columns.label[i], on_hose: on_hose(i) };
+        self.truth[scan].extend(hits.iter().map(real));
+        self.strips.push(Strip {
+            scan: ScanId(scan as u32),
+            mask: MaskId(scan as u32),
+            first_place: *place,
+            place: (0..hits.len() as u32).collect(),
+            xyz: hits.iter().map(|&i| columns.xyz[i].map(|v| v as f32)).collect(),
+            attributes: None,
+        });
+        *place += hits.len() as u64;
+    }
+
+    /// Sends the scans through the stages of the main job, from the store on; the models of the
+    /// shelf are tried.
+    pub(super) fn search(
+        self,
+        (shelf, then): (&Shelf<'_>, Then<'_>),
+        dir: &Path,
+        (settings, means, engine): (&Settings, &Means, &Engine),
+    ) -> Result<Found> {
+        let scans = &self.scans;
+        let scatter = Scatter::new(scans);
+        let mut sink = Store::create(dir, scans, 0, means.ingest_bytes())?;
+        for strip in self.strips {
+            sink.add(&scatter.apply(strip, &mut ())?)?;
+        }
+        let store = sink.finish(engine, means.store_bytes())?;
+        let names = shelf.models().iter().map(|m| m.name.as_str()).collect();
+        engine.pool()?.install(|| shelf.prepare(&names, &AllThreads));
+        let (surfaces, gather) =
+            (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
+        let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
+        let ground =
+            engine.pass("surfaces", source, |f| f.map(&reads).map(&surfaces).fold(&gather))?;
+        let clusters =
+            cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
+        let regions = base_search::regions(&clusters, &settings.region);
+        let search = Search::new(shelf, scans, &store, &ground, settings);
+        if let Then::Converge(starts) = then {
+            let here = starts.first().and_then(|start| nearest(&regions, &start.0));
+            let ends = here.map_or(Ok(Vec::new()), |region| search.converge(region, 0, starts))?;
+            let n_robot_points = self.n_robot_points;
+            return Ok(Found { ends, n_robot_points, ..Found::default() });
+        }
+        let started = Instant::now();
+        let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
+        let mut models = shelf.models().to_vec();
+        let mut fits = fit::choose(fits.into_iter().flatten().collect(), &models, |_| false);
+        fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
+        if settings.fit.calibrate {
+            fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
+        }
+        if let Then::Adjust(from) = then {
+            fits = adjusted(&fits, from, (&search, &regions), &models)?;
+        }
+        let seconds = started.elapsed().as_secs_f64();
+        let place = (&store, &ground.surfaces.floor, (scans.as_slice(), scans.len()));
+        let near =
+            Near::find((&fits, &models), place, (settings.segment, settings.attach), engine)?;
+        let n_robot_points = self.n_robot_points;
+        let labels = Some((near, self.truth));
+        Ok(Found { fits, n_robot_points, seconds, labels, ..Found::default() })
+    }
+}
+
+/// The region whose middle is nearest to a base.
+fn nearest<'r>(regions: &'r [Region], world_from_base: &Pose) -> Option<&'r Region> {
+    let apart = |r: &Region| (r.origin.coords - world_from_base.translation.vector).norm();
+    regions.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
+}
+
+/// Fits adjusted once more from where they ended, or from a start of the first one's robot; those
+/// that hold.
+fn adjusted(
+    fits: &[Fit],
+    from: Option<&Start>,
+    (search, regions): (&Search<'_, '_>, &[Region]),
+    models: &[Model],
+) -> Result<Vec<Fit>> {
+    let mut out = Vec::new();
+    for fit in fits.iter().filter(|fit| fit.verdict != Verdict::Refused) {
+        let mut before = fit.clone();
+        if let Some((world_from_base, posture)) = from {
+            before.world_from_base = *world_from_base;
+            before.joints.iter_mut().zip(posture).for_each(|(joint, q)| joint.value = *q);
+        }
+        if let Some(region) = nearest(regions, &before.world_from_base) {
+            out.extend(search.again(region, &before, &models[fit.model])?);
+        }
+        // The truth is one robot's.
+        if from.is_some() {
+            break;
+        }
+    }
+    Ok(out)
+}

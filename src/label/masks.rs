@@ -1,0 +1,123 @@
+//! Strips with labels in, in the order of each file; one triple of label arrays a mask out, an
+//! entry for every point that the file does not itself flag as invalid.
+
+use super::label_strips::Labelled;
+use super::labelling::MaskCount;
+use contract::{Error, Kind, Mask, Result};
+use export::{FileSum, LabelColumns, MaskWriter};
+use std::path::{Path, PathBuf};
+
+/// Writes the masks of all inputs.
+pub(crate) struct Masks {
+    out: PathBuf,
+    /// In the order of their numbers, which need not begin with 0.
+    masks: Vec<Mask>,
+    open: Vec<Option<Open>>,
+    counts: Vec<MaskCount>,
+}
+
+/// A mask that is being written. Strips of several scans of one LAS file share a mask, and their
+/// places interleave within one piece of the file: labels wait in a window until a strip begins
+/// behind all of them.
+struct Open {
+    writer: MaskWriter,
+    /// Labels of the places from `writer.len()` on; what no strip named stays uncertain.
+    window: LabelColumns,
+    n_named: u64,
+}
+
+impl Masks {
+    pub(crate) fn new(out: &Path, masks: &[Mask]) -> Self {
+        Self {
+            out: out.to_path_buf(),
+            masks: masks.to_vec(),
+            open: masks.iter().map(|_| None).collect(),
+            counts: vec![MaskCount::default(); masks.len()],
+        }
+    }
+
+    /// Takes the labels of a strip's points.
+    pub(crate) fn add(&mut self, strip: &Labelled) -> Result<()> {
+        let at = (strip.mask.0 - self.masks[0].id.0) as usize;
+        let slot = &mut self.open[at];
+        let open = match slot {
+            Some(open) => open,
+            None => slot.insert(Open::create(&self.out, &self.masks[at])?),
+        };
+        self.counts[at].n_moving += strip.n_moving;
+        open.add(strip)
+    }
+
+    /// Finishes all masks; what the file states beyond the last point is uncertain.
+    pub(crate) fn finish(self) -> Result<(Vec<MaskCount>, Vec<FileSum>)> {
+        let Self { out, masks, open, mut counts } = self;
+        let mut digests = Vec::new();
+        for ((mask, open), count) in masks.iter().zip(open).zip(&mut counts) {
+            let mut open = match open {
+                Some(open) => open,
+                None => Open::create(&out, mask)?,
+            };
+            open.flush(u64::MAX)?;
+            let missing = mask.n_points.unwrap_or(0).saturating_sub(open.writer.len());
+            open.pad(missing)?;
+            count.n_points = open.writer.len();
+            count.n_dropped = count.n_points - open.n_named;
+            digests.extend(open.writer.finish()?);
+        }
+        Ok((counts, digests))
+    }
+}
+
+/// Labels that are padded at a time.
+const PAD: usize = 1 << 16;
+
+impl Open {
+    fn create(out: &Path, mask: &Mask) -> Result<Self> {
+        let (writer, window) = (MaskWriter::create(out, mask.id)?, LabelColumns::default());
+        Ok(Self { writer, window, n_named: 0 })
+    }
+
+    fn add(&mut self, strip: &Labelled) -> Result<()> {
+        let n = strip.place.len();
+        if strip.first_place >= self.writer.len() + self.window.len() as u64 {
+            self.flush(strip.first_place)?;
+        }
+        let Some(start) = strip.first_place.checked_sub(self.writer.len()) else {
+            return Err(Error::new(Kind::Bug, "a strip came after its places were written"));
+        };
+        self.n_named += n as u64;
+        // Most strips have every place from their first to their last, and no other strip lies
+        // among them.
+        let is_dense = strip.place.last().is_none_or(|last| *last as usize + 1 == n);
+        if is_dense && start == 0 && self.window.is_empty() {
+            return self.writer.push(&strip.labels);
+        }
+        let end = start as usize + strip.place.last().map_or(0, |last| *last as usize + 1);
+        if end > self.window.len() {
+            self.window.pad(end);
+        }
+        for (i, place) in strip.place.iter().enumerate() {
+            self.window.set(start as usize + *place as usize, &strip.labels, i);
+        }
+        Ok(())
+    }
+
+    /// Writes the window, and uncertain labels up to `place`.
+    fn flush(&mut self, place: u64) -> Result<()> {
+        self.writer.push(&self.window)?;
+        self.window.clear();
+        if place == u64::MAX { Ok(()) } else { self.pad(place.saturating_sub(self.writer.len())) }
+    }
+
+    fn pad(&mut self, mut n: u64) -> Result<()> {
+        let mut uncertain = LabelColumns::default();
+        while n > 0 {
+            let some = n.min(PAD as u64) as usize;
+            uncertain.clear();
+            uncertain.pad(some);
+            self.writer.push(&uncertain)?;
+            n -= some as u64;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,144 @@
+//! Things that appeared in a cell in; the robots among them, and how they stood then where the
+//! earlier scans show them though their result missed them, out.
+
+use super::robots::{Now, look};
+use super::session::{Labels, Robots, Session, ground};
+use crate::detect::search::Search;
+use crate::engine::{Engine, Task};
+use crate::label::known_space::{region, standing};
+use crate::label::labelling::Labelling;
+use crate::label::near_robots::Near;
+use change::Thing;
+use contract::{Fit, Region, Result, Verdict};
+use freespace::Watch;
+use geometry::Aabb;
+use robot::Model;
+
+/// Smallest height and largest edge of a new thing that may be a robot, metres.
+const ROBOT_LIKE: [f64; 2] = [0.4, 0.5];
+/// Room about such a thing, metres; and about one that does not stand on the floor, since the arm
+/// of a robot whose foot stood still is a thing by itself.
+const ABOUT: [f64; 2] = [0.3, 1.0];
+/// What moved up or down by more than this may be no thing that somebody pushed, but an arm in
+/// place of one, metres.
+const LIFTED: f64 = 0.2;
+/// What begins less high above the floor stands on it, metres.
+const STANDS: f64 = 0.2;
+
+impl Session<'_> {
+    /// Robots among the things that appeared.
+    pub(crate) fn new_robots(
+        &self,
+        labels: &Labels,
+        (fits, models): (&[Fit], &mut Vec<Model>),
+        engine: &Engine,
+    ) -> Result<Vec<Fit>> {
+        let like =
+            |size: [f64; 3]| size[2] >= ROBOT_LIKE[0] && size.iter().any(|s| *s >= ROBOT_LIKE[1]);
+        // What stood elsewhere before, in the same shape and at the same height, is none.
+        let is_lifted = |thing: &&Thing| match (thing.then, thing.now) {
+            (Some(then), Some(now)) => (then.min[2] - now.min[2]).abs() > LIFTED,
+            (then, _) => then.is_none(),
+        };
+        let bounds = labels.things.iter().filter(is_lifted).filter_map(|thing| thing.now);
+        let regions: Vec<Region> = bounds
+            .filter(|bounds| like(bounds.size()))
+            .map(|bounds| region(&bounds.center(), &self.about(&bounds)))
+            .collect();
+        if regions.is_empty() {
+            return Ok(Vec::new());
+        }
+        // A new one may hang on a wall.
+        let walls = ground(self.floor, true, (self.sources, self.store), self.settings, engine)?;
+        let (scans, settings) = (&self.sources.scans, self.settings);
+        let search = Search::new(self.shelf, scans, self.store, &walls, settings);
+        let found = engine.fan_out(
+            Task::new("search").large().showing(search.pieces()),
+            regions.clone(),
+            |region| search.region(&region),
+        )?;
+        let found = found.into_iter().flatten().collect();
+        let is_new = |fit: &Fit| {
+            let at = fit.world_from_base.translation.vector;
+            let known = fits.iter().filter(|f| f.verdict != Verdict::Refused);
+            known.into_iter().all(|f| (f.world_from_base.translation.vector - at).norm() > 0.5)
+        };
+        let mut chosen = fit::choose(found, models, |_| false);
+        chosen.retain(is_new);
+        crate::detect::tools::dress(chosen, models, (&search, &regions), engine)
+    }
+
+    /// Where the robot may stand that a new thing is part of.
+    fn about(&self, thing: &Aabb) -> Aabb {
+        let [x, y, z] = [0, 1, 2].map(|i| 0.5 * (thing.min[i] + thing.max[i]));
+        let height = self.floor.height_above([x, y, z], 0.0);
+        let bottom = height.map_or(thing.min[2], |height| z - height);
+        let stands = thing.min[2] - bottom < STANDS;
+        let mut about = thing.grown(if stands { ABOUT[0] } else { ABOUT[1] });
+        about.min[2] = about.min[2].min(bottom - ABOUT[0]);
+        about
+    }
+
+    /// Takes newcomers among the robots of the cell.
+    pub(crate) fn join(
+        &self,
+        appeared: Vec<Fit>,
+        (fits, models): (&mut Vec<Fit>, &mut Vec<Model>),
+        robots: &mut Robots,
+        engine: &Engine,
+    ) -> Result<()> {
+        let stood = engine
+            .fan_out(Task::new("fit").large(), appeared.clone(), |fit| self.stood(&fit, models))?;
+        for (fit, stood) in appeared.into_iter().zip(stood) {
+            robots.in_cell.push(fits.len());
+            robots.changed.push(fits.len());
+            if let Some((mut stood, own)) = stood {
+                if let Some(own) = own {
+                    stood.model = models.len();
+                    models.push(own);
+                }
+                robots.left.push(standing(&stood, &models[stood.model]));
+                robots.missed.push((fits.len(), stood));
+            }
+            fits.push(fit);
+        }
+        Ok(())
+    }
+
+    /// How a robot that the earlier result does not have stood then, if its scans show it, too: it
+    /// did not appear.
+    fn stood(&self, now: &Fit, models: &[Model]) -> Result<Option<(Fit, Option<Model>)>> {
+        let search = Search::new(
+            self.shelf,
+            &self.sources.scans,
+            self.past.store,
+            &self.old_ground,
+            self.settings,
+        );
+        let watch = Watch::new(&self.cell, &self.old_views);
+        let (then, own) = look(now, models, (&search, [&watch, &self.watch()], &[]))?;
+        Ok(match then {
+            Now::Found(fit) | Now::Anew(fit, _) => Some((*fit, own)),
+            Now::Gone | Now::Unseen | Now::Open | Now::Lost => None,
+        })
+    }
+
+    /// Labels of points of the earlier scans on robots that their result missed; nothing where it
+    /// missed none.
+    pub(crate) fn missed(
+        &self,
+        (fits, models): (&[Fit], &[Model]),
+        robots: &Robots,
+        engine: &Engine,
+    ) -> Result<Option<Near>> {
+        if robots.missed.is_empty() {
+            return Ok(None);
+        }
+        let mut then: Vec<Fit> =
+            fits.iter().map(|fit| Fit { verdict: Verdict::Refused, ..fit.clone() }).collect();
+        robots.missed.iter().for_each(|(i, fit)| then[*i].clone_from(fit));
+        let ground = (self.past.store, self.floor, &[][..]);
+        let labelling = Labelling::new(&then, models, self.sources, ground, self.settings);
+        labelling.near_robots(self.past.store, engine).map(Some)
+    }
+}

@@ -1,0 +1,388 @@
+//! Points of earlier scans in a cell in; the surfaces that they lie on, what the new scans say of
+//! each of them, and which of them are superseded, out.
+
+use super::earlier_result::Base;
+use super::superseded::Places;
+use super::voxel_fates::Fates;
+use crate::engine::{Engine, Task};
+use crate::label::near_robots::Near;
+use crate::result::report::tiles;
+use crate::store::Store;
+use change::{Seen, Tally, Tallying};
+use contract::{Label, MAX_SKIP, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
+use export::MaskReader;
+use freespace::{Sight, Watch};
+use geometry::{Aabb, Point};
+use register::Surfaces;
+use std::collections::BTreeSet;
+
+/// One of so many points tells the surfaces, and of many points more are passed over, so that about
+/// so many do: a tenth of a voxel's points is enough for its plane.
+const SAMPLE: u64 = 5;
+const N_SAMPLED: u64 = 2_000_000;
+/// Places so far apart are read from the mask one after the other.
+const GAP: u64 = 1 << 14;
+
+/// Masks are read through where at least one place in so many is asked for.
+const SPARSE: u64 = 64;
+
+/// Earlier points in a cell.
+pub(crate) struct Past<'a> {
+    pub(crate) scans: &'a [Scan],
+    pub(crate) store: &'a Store,
+    pub(crate) cell: Aabb,
+    base: &'a Base,
+    masks: Vec<MaskReader>,
+    /// By mask: places that were superseded before, and how many points it has.
+    before: Vec<Vec<u64>>,
+    n_points: Vec<u64>,
+    tiles: Vec<usize>,
+}
+
+/// What the new scans say of the earlier points.
+pub(crate) struct Compared {
+    /// What stood there, by voxel.
+    pub(crate) then: Tally,
+    tiles: Vec<Looked>,
+    /// What becomes of them.
+    pub(crate) fates: Fates,
+    /// By mask: places where they saw a surface: it was measured anew.
+    anew: Vec<Places>,
+}
+
+/// What the new scans say of the points of one tile.
+#[derive(Default)]
+struct Looked {
+    mask: u32,
+    /// Places that their beams went through, with their voxels.
+    through: Vec<(u64, [i32; 3])>,
+    /// Places that belong to robots.
+    robots: Vec<(u64, i16)>,
+    /// Voxels of robots that the earlier result missed.
+    missed: BTreeSet<[i32; 3]>,
+    tally: Tally,
+}
+
+impl<'a> Past<'a> {
+    pub(crate) fn new(
+        base: &'a Base,
+        scans: &'a [Scan],
+        store: &'a Store,
+        cell: Aabb,
+    ) -> Result<Self> {
+        let (masks, before) = (base.masks(), base.superseded()?);
+        let n_points = base.result.labels.scans.iter().map(|s| s.n_points).collect();
+        Ok(Self { scans, store, cell, base, masks, before, n_points, tiles: store.touching(&cell) })
+    }
+
+    /// The same with another cell.
+    pub(crate) fn of_cell(self, cell: Aabb) -> Self {
+        Self { cell, tiles: self.store.touching(&cell), ..self }
+    }
+
+    /// The surfaces of what stood there.
+    pub(crate) fn surfaces(&self, engine: &Engine) -> Result<Surfaces> {
+        let (skip, step) = sampled((self.n_points() / N_SAMPLED).max(SAMPLE));
+        let (mut all, sample) = (Surfaces::default(), Sample { past: self, step });
+        let source = self.store.picks_once(self.tiles.clone(), skip);
+        let reads = self.store.reads();
+        engine.pass(self.task("register"), source, |f| {
+            f.map(&reads).map(&sample).for_each(|own| {
+                all.join(own.0);
+                Ok(())
+            })
+        })?;
+        Ok(all)
+    }
+
+    /// Asks the new scans about every point, and the earlier ones where those saw nothing.
+    pub(crate) fn look(
+        &self,
+        [watch, own]: [&Watch<'_>; 2],
+        missed: Option<&Near>,
+        engine: &Engine,
+    ) -> Result<Compared> {
+        let (mut then, mut tiles) = (Tally::default(), Vec::new());
+        let fates = Fates::of(&self.cell);
+        let anew: Vec<Places> = self.n_points.iter().map(|n| Places::of(*n)).collect();
+        let look = Look { past: self, watch, own, missed, fates: &fates, anew: &anew };
+        let source = self.store.picks_once(self.tiles.clone(), 0);
+        let reads = self.store.reads();
+        engine.pass(self.task("compare"), source, |f| {
+            f.map(&reads).map(&look).for_each(|mut looked| {
+                then.join(std::mem::take(&mut looked.tally));
+                tiles.push(looked);
+                Ok(())
+            })
+        })?;
+        Ok(Compared { then, tiles, fates, anew })
+    }
+
+    /// All places that are superseded now, by mask: those that were before, those that were
+    /// measured anew, those of things that are gone, and those of robots that stand otherwise.
+    pub(crate) fn superseded<'c>(
+        &self,
+        compared: &'c Compared,
+        gone: &BTreeSet<[i32; 3]>,
+        stands_otherwise: impl Fn(i16) -> bool,
+    ) -> &'c [Places] {
+        let all = &compared.anew;
+        for (own, before) in all.iter().zip(&self.before).filter(|(_, b)| !b.is_empty()) {
+            let mut own = own.adding();
+            before.iter().for_each(|place| own.add(*place));
+        }
+        for tile in &compared.tiles {
+            let mut own = all[tile.mask as usize].adding();
+            let away = tile.through.iter().filter(|(_, cell)| gone.contains(cell));
+            away.for_each(|(place, _)| own.add(*place));
+            let left = tile.robots.iter().filter(|(_, robot)| stands_otherwise(*robot));
+            left.for_each(|(place, _)| own.add(*place));
+        }
+        all
+    }
+
+    /// Voxels of robots that the earlier result missed: what the new scans see through of them is
+    /// gone.
+    pub(crate) fn missed(compared: &Compared) -> impl Iterator<Item = &[i32; 3]> {
+        compared.tiles.iter().flat_map(|tile| &tile.missed)
+    }
+
+    /// Whether a place of a mask was superseded before.
+    pub(crate) fn was_superseded(&self, mask: MaskId, place: u64) -> bool {
+        self.before[mask.0 as usize].binary_search(&place).is_ok()
+    }
+
+    /// How many of one mask were superseded before.
+    pub(crate) fn n_of(&self, mask: usize) -> usize {
+        self.before[mask].len()
+    }
+
+    /// How many were superseded before.
+    pub(crate) fn n_before(&self) -> u64 {
+        self.before.iter().map(|places| places.len() as u64).sum()
+    }
+
+    /// Points of the tiles that the cell touches.
+    fn n_points(&self) -> u64 {
+        self.tiles.iter().map(|&i| self.store.entries()[i].n_points).sum()
+    }
+
+    fn task(&self, name: &str) -> Task {
+        let items = self.tiles.len() as u64;
+        let amount = crate::engine::progress::Amount { items, points: self.n_points(), bytes: 0 };
+        tiles(name, self.store).of(amount)
+    }
+
+    fn scan(&self, tile: &Tile) -> (&Scan, MaskId) {
+        let scan = &self.scans[tile.at.scan.0 as usize];
+        (scan, scan.mask)
+    }
+
+    /// Labels of a tile's points.
+    fn labels(&self, mask: MaskId, places: &[u64], labels: &mut Vec<Label>) -> Result<()> {
+        if !places.is_empty() {
+            self.base.compare_mask(mask.0 as usize)?;
+        }
+        let mask = &self.masks[mask.0 as usize];
+        let of = |first: u64, last: u64| mask.range(first, (last - first + 1) as usize);
+        labels.clear();
+        let (Some(&first), Some(&last)) = (places.iter().min(), places.iter().max()) else {
+            return Ok(());
+        };
+        labels.resize(places.len(), Label::UNCERTAIN);
+        if (last - first) / SPARSE <= places.len() as u64 {
+            let read = of(first, last)?;
+            for (label, place) in labels.iter_mut().zip(places) {
+                *label = read.label((place - first) as usize)?;
+            }
+            return Ok(());
+        }
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_unstable_by_key(|&i| places[i]);
+        for group in order.chunk_by(|&a, &b| places[b] - places[a] < GAP) {
+            let first = places[group[0]];
+            let read = of(first, places[group[group.len() - 1]])?;
+            for &i in group {
+                labels[i] = read.label((places[i] - first) as usize)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How one of so many points is read: what is left out of each tile (see [`Tile::skip`]), and one
+/// of how many of the others.
+pub(crate) fn sampled(of: u64) -> (u32, usize) {
+    let skip = (of.max(1).ilog2() / 2).min(MAX_SKIP);
+    (skip, (of >> (2 * skip)) as usize)
+}
+
+/// The map that gathers surfaces.
+struct Sample<'a> {
+    past: &'a Past<'a>,
+    step: usize,
+}
+
+struct Sampled(Surfaces);
+
+impl Map for Sample<'_> {
+    type In = Tile;
+    type Out = Sampled;
+    type Scratch = ();
+
+    fn apply(&self, tile: Tile, (): &mut ()) -> Result<Sampled> {
+        let (scan, mask) = self.past.scan(&tile);
+        let old = &self.past.before[mask.0 as usize];
+        let mut out = Surfaces::default();
+        let in_world = World::from(scan);
+        for i in (0..tile.len()).step_by(self.step) {
+            let world = in_world.of(tile.xyz[i]);
+            let place = tile.first_place + u64::from(tile.place[i]);
+            if self.past.cell.contains(world) && old.binary_search(&place).is_err() {
+                out.add(world);
+            }
+        }
+        Ok(Sampled(out))
+    }
+}
+
+/// The points of a tile that are asked for; kept from tile to tile, since fresh memory costs more
+/// than what is done with it.
+#[derive(Default)]
+struct Asked {
+    places: Vec<u64>,
+    worlds: Vec<[f64; 3]>,
+    labels: Vec<Label>,
+    sights: Vec<Sight>,
+}
+
+/// The map that asks the new scans.
+struct Look<'a> {
+    past: &'a Past<'a>,
+    watch: &'a Watch<'a>,
+    /// Of the earlier scans.
+    own: &'a Watch<'a>,
+    /// Labels of robots that the earlier result missed.
+    missed: Option<&'a Near>,
+    fates: &'a Fates,
+    anew: &'a [Places],
+}
+
+impl Map for Look<'_> {
+    type In = Tile;
+    type Out = Looked;
+    type Scratch = Asked;
+
+    fn apply(&self, tile: Tile, asked: &mut Asked) -> Result<Looked> {
+        let (scan, mask) = self.past.scan(&tile);
+        let old = &self.past.before[mask.0 as usize];
+        let is_new = |place: u64| old.is_empty() || old.binary_search(&place).is_err();
+        let Asked { places, worlds, labels, sights } = asked;
+        places.clear();
+        worlds.clear();
+        let in_world = World::from(scan);
+        for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
+            let (world, place) = (in_world.of(*xyz), tile.first_place + u64::from(*place));
+            if self.past.cell.contains(world) && is_new(place) {
+                places.push(place);
+                worlds.push(world);
+            }
+        }
+        self.past.labels(mask, places, labels)?;
+        self.watch.look_all(worlds, sights);
+        let mut out = Looked { mask: mask.0, ..Looked::default() };
+        let mut tallying = Tallying::default();
+        let mut anew = self.anew[mask.0 as usize].adding();
+        let mut missed = self.missed.map(|near| near.of(mask));
+        let points = places.iter().zip(&*worlds).zip(labels.iter().zip(&*sights));
+        for ((&place, &world), (label, &sight)) in points {
+            let voxel = Tally::cell(world);
+            self.fates.add(voxel, sight);
+            match sight {
+                Sight::Onto => anew.add(place),
+                Sight::Through => out.through.push((place, voxel)),
+                Sight::Close | Sight::Hidden | Sight::Unseen => {}
+            }
+            let is_missed = missed.as_mut().and_then(|near| near.label(place));
+            if is_missed.is_some_and(|label| label.moves()) {
+                out.missed.insert(voxel);
+                tallying.add_robot(world);
+                continue;
+            }
+            match label.kind {
+                PointKind::Fixed => {
+                    tallying.add(world, area(scan, world), seen(sight, self.own, world));
+                }
+                PointKind::Link | PointKind::Attachment => {
+                    out.robots.push((place, label.robot));
+                    tallying.add_robot(world);
+                }
+                PointKind::Floor | PointKind::Uncertain => {}
+            }
+        }
+        out.tally = tallying.finish();
+        Ok(out)
+    }
+}
+
+/// What a session has at the place of another one's point, of which that one's own beams say
+/// whether it is of a mesh.
+pub(crate) fn seen(sight: Sight, own: &Watch<'_>, world: [f64; 3]) -> Seen {
+    match sight {
+        Sight::Through => Seen::Nothing { is_pierced: own.is_pierced(world) },
+        Sight::Onto | Sight::Close => Seen::Something,
+        Sight::Hidden | Sight::Unseen => Seen::Not,
+    }
+}
+
+/// Area across its beam that a point stands for, m²: that of its pixel, or of a voxel's share where
+/// no scanner is known.
+pub(crate) fn area(scan: &Scan, world: [f64; 3]) -> f64 {
+    let Some(lattice) = &scan.lattice else { return Tally::FACE };
+    let beam = Point::from(world) - Point::from(scan.world_from_scan.translation.vector);
+    lattice.row_step * lattice.col_step * beam.norm_squared()
+}
+
+/// Points of a scan in the world.
+pub(crate) struct World {
+    /// Rotation, by row.
+    rotation: [[f64; 3]; 3],
+    shift: [f64; 3],
+}
+
+impl World {
+    pub(crate) fn from(scan: &Scan) -> Self {
+        let pose = &scan.world_from_scan;
+        let rotation = pose.rotation.to_rotation_matrix().matrix().transpose();
+        Self { rotation: rotation.into(), shift: pose.translation.vector.into() }
+    }
+
+    /// A point of the scan in the world, metres.
+    #[inline]
+    pub(crate) fn of(&self, [x, y, z]: [f32; 3]) -> [f64; 3] {
+        let ([x, y, z], Self { rotation: r, shift }) =
+            ([f64::from(x), f64::from(y), f64::from(z)], self);
+        let one = |i: usize| r[i][0] * x + r[i][1] * y + r[i][2] * z + shift[i];
+        [one(0), one(1), one(2)]
+    }
+}
+
+impl Weigh for Sampled {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>()
+    }
+
+    fn n_points(&self) -> u64 {
+        0
+    }
+}
+
+impl Weigh for Looked {
+    fn weight_bytes(&self) -> usize {
+        size_of_val(&*self.through) + size_of_val(&*self.robots)
+    }
+
+    fn n_points(&self) -> u64 {
+        0
+    }
+}

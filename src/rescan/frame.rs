@@ -1,0 +1,376 @@
+//! The earlier session and new scans in; which frame the new scans are in, found by surfaces and
+//! beams of both where it is not that of the plant, out: the scans and their tiles are carried into
+//! the plant.
+
+use super::earlier_points::{Past, World};
+use crate::engine::{AllThreads, Engine, Task};
+use crate::store::Store;
+use contract::{Error, Result, Scan, words};
+use export::CarriedEntry;
+use frame::{Answer, Gathered, Panorama, Place, Refusal, Session};
+use geometry::{Aabb, Point, Pose, Vector};
+use ingest::Sources;
+use nalgebra::{Translation3, UnitQuaternion};
+
+/// What is said of the frame of new scans.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Frame {
+    /// Nothing: it is the plant's, unless surfaces say otherwise.
+    #[default]
+    Find,
+    /// It is the plant's.
+    Stated,
+    /// About where the first new scanner stands in the plant, metres, and by how much the new frame
+    /// is turned to be the plant's, degrees.
+    Rough([f64; 4]),
+}
+
+/// Where the new scans lie.
+#[derive(Default)]
+pub(crate) struct Carried {
+    /// The plant's frame from theirs; none where it is theirs, too.
+    pub(crate) plant_from_new: Option<Pose>,
+    /// The same with what speaks for it.
+    pub(crate) entry: Option<CarriedEntry>,
+    /// What is odd about it.
+    pub(crate) warnings: Vec<String>,
+}
+
+/// Angle between beams that are looked at, radians, at most: 0.25°; of a plant with many scans
+/// more.
+const STEP: f64 = 0.004_36;
+const MANY_SCANS: f64 = 16.0;
+/// Points of a scan without a raster that are looked at, about.
+const N_LOOSE: u64 = 1_000_000;
+/// Earlier scans whose beams are asked about the stated frame.
+const MAX_ASKED: usize = 8;
+/// Room about the new scans in which the earlier session is looked at for that, metres.
+const ROOM: f64 = 1.0;
+
+/// Finds the frame of the new scans, and carries them and their tiles into that of the plant;
+/// `stood` are the bounds of robots as they stood, world, metres.
+///
+/// # Errors
+/// `BadInput` where no frame is clear, or the given one is contradicted.
+pub(crate) fn carry(
+    wish: &Frame,
+    (past, stood): (&Past<'_>, Vec<Aabb>),
+    (sources, new): (&mut Sources, &mut Store),
+    engine: &Engine,
+) -> Result<Carried> {
+    let carried = Sessions { past, stood, new, sources, engine }.find(wish)?;
+    if let Some(motion) = &carried.plant_from_new {
+        for scan in &mut sources.scans[past.scans.len()..] {
+            scan.world_from_scan = motion * scan.world_from_scan;
+        }
+        new.carry(motion);
+    }
+    Ok(carried)
+}
+
+/// All that the frame is found from.
+struct Sessions<'a> {
+    past: &'a Past<'a>,
+    stood: Vec<Aabb>,
+    new: &'a Store,
+    sources: &'a Sources,
+    engine: &'a Engine,
+}
+
+impl Sessions<'_> {
+    fn find(&self, wish: &Frame) -> Result<Carried> {
+        let new = self.new_session()?;
+        let near = self.old_session(Some(&self.bounds().grown(ROOM)))?;
+        let stated = local(&Pose::identity(), &near, &new);
+        match wish {
+            Frame::Stated => {
+                let answer = frame::at_stated(&near, &new, &stated);
+                return self.as_stated(answer, (&near, &new));
+            }
+            Frame::Rough(rough) => {
+                let old = self.old_session(None)?;
+                return self.rough(*rough, (&old, &new));
+            }
+            Frame::Find => {}
+        }
+        match frame::at_stated(&near, &new, &stated) {
+            Answer::Holds(_) => return Ok(Carried::default()),
+            Answer::Near(place) => return Ok(carried(&place, "found", (&near, &new))),
+            Answer::Not(_) => {}
+        }
+        let old = self.old_session(None)?;
+        let stated = local(&Pose::identity(), &old, &new);
+        let found = self.engine.pool()?.install(|| frame::find(&old, &new, &stated, &AllThreads));
+        match found {
+            Ok(place) if frame::is_stated(&place, &stated, &new) => Ok(Carried::default()),
+            Ok(place) => Ok(carried(&place, "found", (&old, &new))),
+            Err(refusal) => Err(self.refused(&refusal, (&old, &new))),
+        }
+    }
+
+    /// The word of a person that the frame is the plant's: believed unless surfaces and beams
+    /// contradict it.
+    fn as_stated(&self, answer: Answer, both: (&Session, &Session)) -> Result<Carried> {
+        let warning = "too few surfaces of the new scans lie on the plant's to confirm the frame that --frame states";
+        match answer {
+            Answer::Holds(_) => Ok(Carried::default()),
+            Answer::Near(place) => Ok(carried(&place, "given", both)),
+            Answer::Not(Some(place)) if is_contradicted(&place) => Err(self.contradicted(&place)),
+            Answer::Not(_) if both.0.surfels.all.is_empty() => {
+                let what = "--frame says that the new scans are in the plant's frame, but no point of the plant lies where they do";
+                let hint = "leave --frame out, or give --frame X,Y,Z,YAW";
+                Err(Error::bad_input(what).at(self.input()).hint(hint))
+            }
+            Answer::Not(_) => Ok(Carried { warnings: vec![warning.into()], ..Carried::default() }),
+        }
+    }
+
+    fn rough(&self, rough: [f64; 4], both: (&Session, &Session)) -> Result<Carried> {
+        let plant_from_new = self.posed(rough);
+        match frame::from_rough(both.0, both.1, &local(&plant_from_new, both.0, both.1)) {
+            Ok(place) => Ok(carried(&place, "given", both)),
+            Err(Some(place)) => Err(self.contradicted(&place)),
+            Err(None) => {
+                let what = "no surfaces of the new scans lie near the plant's where --frame says that they stand";
+                Err(Error::bad_input(what)
+                    .at(self.input())
+                    .hint("give the place of the first new scanner in the plant to 0.3 m and 2°"))
+            }
+        }
+    }
+
+    /// The plant's frame from the new one, by the place of the first new scanner and a turn in
+    /// degrees.
+    fn posed(&self, [x, y, z, yaw]: [f64; 4]) -> Pose {
+        let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), yaw.to_radians());
+        let shift = Vector::new(x, y, z) - turn * self.first();
+        Pose::from_parts(Translation3::from(shift), turn)
+    }
+
+    /// Where the first new scanner stands in the new frame; the middle of its points where that is
+    /// not known.
+    fn first(&self) -> Vector {
+        let scans = self.scans();
+        scans.first().map_or_else(Vector::zeros, |scan| scan.world_from_scan.translation.vector)
+    }
+
+    fn scans(&self) -> &[Scan] {
+        &self.sources.scans[self.past.scans.len()..]
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.new.entries().iter().fold(Aabb::EMPTY, |all, e| all.union(&e.bounds))
+    }
+
+    fn input(&self) -> String {
+        let first = self.sources.opened().first();
+        first.map_or_else(String::new, |input| input.path.display().to_string())
+    }
+
+    fn new_session(&self) -> Result<Session> {
+        let origin = self.first().map(f64::round);
+        let all = (0..self.new.entries().len()).collect();
+        let gather = Gather { store: self.new, origin, superseded: None, bounds: None };
+        gather.session((self.scans(), all), (&[], usize::MAX), self.engine)
+    }
+
+    /// The earlier session, whole or as far as it lies within some bounds.
+    fn old_session(&self, bounds: Option<&Aabb>) -> Result<Session> {
+        let store = self.past.store;
+        let tiles = match bounds {
+            Some(bounds) => store.touching(bounds),
+            None => (0..store.entries().len()).collect(),
+        };
+        let first = tiles.first().map_or(0, |&i| store.entries()[i].at.scan.0 as usize);
+        let origin = self.past.scans.get(first).map_or_else(Vector::zeros, |scan| {
+            scan.world_from_scan.translation.vector.map(f64::round)
+        });
+        let gather = Gather { store, origin, superseded: Some(self.past), bounds };
+        let n_asked = if bounds.is_some() { MAX_ASKED } else { usize::MAX };
+        gather.session((self.past.scans, tiles), (&self.stood, n_asked), self.engine)
+    }
+
+    fn refused(&self, refusal: &Refusal, both: (&Session, &Session)) -> Error {
+        let way_out = "if they are of this plant, say about where the first new scanner stands in it and how far the new frame is turned (--frame X,Y,Z,YAW, metres and degrees; --frame same where the frame is the plant's), give scans that are registered to the plant, or scan more of what surrounds the cell";
+        let error = match refusal {
+            Refusal::Nothing(None) => Error::bad_input(
+                "the new scans are not in the plant's frame, and too few of their surfaces lie on the plant's in any other",
+            ),
+            Refusal::Nothing(Some(best)) => Error::bad_input(format!(
+                "the new scans are not in the plant's frame, and fit it nowhere well: at the best place {}",
+                in_words(best)
+            )),
+            Refusal::Several(places) => {
+                let told: Vec<String> = places.iter().map(|p| self.flag(p, both)).collect();
+                Error::bad_input(format!(
+                    "the new scans are not in the plant's frame, and fit at {} places that differ by no more than what may have been moved: {}",
+                    places.len(),
+                    told.join(", ")
+                ))
+            }
+        };
+        let way_out = match refusal {
+            Refusal::Several(_) => {
+                "choose one of these by its flag, or give scans that are registered to the plant"
+            }
+            Refusal::Nothing(_) => way_out,
+        };
+        error.at(self.input()).hint(way_out)
+    }
+
+    fn contradicted(&self, place: &Place) -> Error {
+        let what = format!("the frame that --frame states is contradicted: {}", in_words(place));
+        Error::bad_input(what).at(self.input()).hint(
+            "give the place of the first new scanner in the plant to 0.3 m and 2°, or leave --frame out",
+        )
+    }
+
+    /// A place as the flag that states it.
+    fn flag(&self, place: &Place, (old, new): (&Session, &Session)) -> String {
+        let pose = world(&place.laid.old_from_new, old, new);
+        let at = pose * Point::from(self.first());
+        let yaw = pose.rotation.euler_angles().2.to_degrees();
+        let [x, y, z, yaw] = [at.x, at.y, at.z, yaw].map(|v| words::fixed(v, 2));
+        format!("--frame {x},{y},{z},{yaw}")
+    }
+}
+
+/// Whether beams went through more than what agrees.
+fn is_contradicted(place: &Place) -> bool {
+    place.evidence.n_against() > place.evidence.n_same()
+}
+
+/// What speaks for and against a place.
+fn in_words(place: &Place) -> String {
+    let e = &place.evidence;
+    format!(
+        "{:.1} m² of upright surfaces agree, and beams went through {:.1} m² of them",
+        0.04 * e.n_same() as f64,
+        0.04 * e.n_against() as f64
+    )
+}
+
+/// Poses between worlds as poses between origins of sessions, and back.
+fn local(plant_from_new: &Pose, old: &Session, new: &Session) -> Pose {
+    Translation3::from(-old.surfels.origin)
+        * plant_from_new
+        * Translation3::from(new.surfels.origin)
+}
+
+fn world(old_from_new: &Pose, old: &Session, new: &Session) -> Pose {
+    Translation3::from(old.surfels.origin) * old_from_new * Translation3::from(-new.surfels.origin)
+}
+
+fn carried(place: &Place, by: &str, (old, new): (&Session, &Session)) -> Carried {
+    let pose = world(&place.laid.old_from_new, old, new);
+    let e = &place.evidence;
+    let entry = CarriedEntry {
+        by: by.into(),
+        xyz: pose.translation.vector.into(),
+        quat_xyzw: pose.rotation.coords.into(),
+        about: (place.laid.about + old.surfels.origin).into(),
+        sigma: place.laid.sigma,
+        rms: place.laid.rms,
+        n_on_old: e.n_on_old,
+        n_where_old_saw_through: e.n_where_old_saw_through,
+        n_on_new: e.n_on_new,
+        n_where_new_saw_through: e.n_where_new_saw_through,
+        margin: place.margin,
+    };
+    Carried { plant_from_new: Some(pose), entry: Some(entry), warnings: Vec::new() }
+}
+
+/// Reads a session.
+struct Gather<'a> {
+    store: &'a Store,
+    origin: Vector,
+    /// Whose superseded points are left out.
+    superseded: Option<&'a Past<'a>>,
+    /// Surfaces outside are left out, world, metres.
+    bounds: Option<&'a Aabb>,
+}
+
+impl Gather<'_> {
+    fn session(
+        &self,
+        (scans, tiles): (&[Scan], Vec<usize>),
+        (robots, n_asked): (&[Aabb], usize),
+        engine: &Engine,
+    ) -> Result<Session> {
+        let entries = self.store.entries();
+        // Of each scan: its tiles here, and how many points these have.
+        let mut own: Vec<(&Scan, Vec<usize>, u64)> =
+            scans.iter().map(|scan| (scan, Vec::new(), 0)).collect();
+        let first = scans.first().map_or(0, |scan| scan.id.0);
+        for i in tiles {
+            let (_, list, n) = &mut own[(entries[i].at.scan.0 - first) as usize];
+            list.push(i);
+            *n += entries[i].n_points;
+        }
+        own.retain(|(_, list, _)| !list.is_empty());
+        let mut order: Vec<usize> = (0..own.len()).collect();
+        order.sort_by_key(|&k| (std::cmp::Reverse(own[k].2), k));
+        let asked = &order[..order.len().min(n_asked)];
+        let step = STEP * (own.len() as f64 / MANY_SCANS).sqrt().max(1.0);
+        let mut all = Gathered::about(self.origin);
+        let mut eyes = Vec::new();
+        // Few scans at a time: what each of them adds is kept until it is joined to the rest.
+        let work: Vec<_> = own.iter().enumerate().collect();
+        for some in work.chunks(2 * engine.n_workers) {
+            let read =
+                engine.fan_out(Task::new("frame"), some.to_vec(), |(k, (scan, list, n))| {
+                    self.scan(scan, (list, *n), asked.contains(&k), step)
+                })?;
+            for (gathered, eye) in read {
+                all.join(gathered);
+                eyes.extend(eye);
+            }
+        }
+        Ok(Session { surfels: all.surfels(robots), eyes })
+    }
+
+    /// One scan: its surfaces, and how far its beams went if that is asked for.
+    fn scan(
+        &self,
+        scan: &Scan,
+        (tiles, n): (&[usize], u64),
+        is_asked: bool,
+        step: f64,
+    ) -> Result<(Gathered, Option<Panorama>)> {
+        let (skip, take) = match &scan.lattice {
+            Some(lattice) => {
+                let of = (step / lattice.row_step.max(lattice.col_step)).max(1.0);
+                ((of.log2() as u32).min(contract::MAX_SKIP), 1)
+            }
+            None => (0, (n / N_LOOSE).max(1) as usize),
+        };
+        let scanner = scan.lattice.map(|_| scan.world_from_scan.translation.vector);
+        let mut eye = (is_asked && scan.lattice.is_some())
+            .then(|| Panorama::new(&scan.world_from_scan, &self.origin));
+        let mut out = Gathered::about(self.origin);
+        let in_world = World::from(scan);
+        let entries = self.store.entries();
+        let is_own = |i: &usize| entries[*i].at.scan == scan.id;
+        let every: Vec<usize> = if eye.is_some() {
+            (0..entries.len()).filter(is_own).collect()
+        } else {
+            tiles.to_vec()
+        };
+        for i in every {
+            let is_here = tiles.binary_search(&i).is_ok();
+            let tile = self.store.tile(i, skip)?;
+            for (xyz, place) in tile.xyz.iter().zip(&tile.place).step_by(take) {
+                let place = tile.first_place + u64::from(*place);
+                if self.superseded.is_some_and(|past| past.was_superseded(scan.mask, place)) {
+                    continue;
+                }
+                eye.iter_mut().for_each(|eye| eye.add(*xyz));
+                let world = in_world.of(*xyz);
+                if is_here && self.bounds.is_none_or(|bounds| bounds.contains(world)) {
+                    out.add(world, scanner.as_ref());
+                }
+            }
+        }
+        Ok((out, eye.map(Panorama::finish)))
+    }
+}

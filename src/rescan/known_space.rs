@@ -1,0 +1,149 @@
+//! Spaces of robots as the earlier result has them, and what the new scans saw, in; spaces in and
+//! beside the cell, brought up to date, out. Points are marked into them while they are labelled
+//! and while tiles are written.
+
+use super::output::Written;
+use crate::engine::{Engine, Task};
+use crate::label::known_space::{Around, Spot, bounds, mark};
+use crate::result::report::id;
+use contract::{Result, Space, SpaceGrid, SpaceKind};
+use export::{SpaceEntry, write_space};
+use freespace::Passed;
+use geometry::Aabb;
+use std::path::Path;
+
+impl Written<'_, '_> {
+    /// By fit: spaces of robots that stand otherwise, and of others that reach to where points are
+    /// looked at again.
+    pub(super) fn spaces(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
+        let mut out: Vec<Option<Space>> = vec![None; self.fits.len()];
+        let settings = self.session.settings;
+        if !settings.freespace.enabled {
+            return Ok(out);
+        }
+        let search = self.session.search();
+        let around = Around { robots: (self.fits, self.models), search: &search, settings };
+        let places = self.places();
+        let meets = |i: usize| {
+            let grid = self.entry(i).map(|entry| entry.voxels().bounds());
+            grid.is_some_and(|grid| places.iter().any(|place| place.touches(&grid)))
+        };
+        let is_gone = |i: usize| self.robots.gone.contains(&i);
+        let is_renewed = |i: &usize| self.robots.changed.contains(i) || (!is_gone(*i) && meets(*i));
+        let renewed: Vec<usize> = (0..self.fits.len()).filter(is_renewed).collect();
+        let spaces = engine.fan_out(Task::new("space").large(), renewed.clone(), |i| {
+            self.space(i, &around, &places)
+        })?;
+        renewed.into_iter().zip(spaces).for_each(|(i, space)| out[i] = space);
+        Ok(out)
+    }
+
+    /// The space of one robot; points of the places are still to be marked.
+    fn space(&self, i: usize, around: &Around<'_, '_>, places: &[Aabb]) -> Result<Option<Space>> {
+        let read = |entry: &SpaceEntry| {
+            self.base.files.compared(&entry.grid)?;
+            entry.read(&self.base.out)
+        };
+        let old = self.entry(i).map(read).transpose()?;
+        let edge = old.as_ref().map_or(around.settings.freespace.edge, |old| old.grid().edge);
+        let known = old.as_ref().map_or(Aabb::EMPTY, |old| old.grid().bounds());
+        let known = known.union(&around.search.bounds().grown(edge));
+        let fit = &self.fits[i];
+        let reach = bounds(fit, self.models[fit.model].reach()).shared(&known);
+        let grid = SpaceGrid::over(&reach, edge);
+        let Some(old) = old.filter(|_| !places.is_empty()) else {
+            let mut seen = around.seen(i, grid)?;
+            seen.iter_mut().for_each(|space| around.stand(space, i));
+            return Ok(seen);
+        };
+        let mut space = Space::unknown(grid);
+        around.stand(&mut space, i);
+        let passed = Passed::new(&self.session.cell, &self.session.new_views, grid.edge);
+        renew(&mut space, &old, places, |middle| passed.is_free(middle));
+        Ok(Some(space))
+    }
+
+    /// Marks what is left of the old points and writes them; by fit, what is said of them.
+    pub(super) fn write_spaces(
+        &self,
+        mut spaces: Vec<Option<Space>>,
+        left: Vec<Spot>,
+        next: &Path,
+        engine: &Engine,
+    ) -> Result<Vec<Option<SpaceEntry>>> {
+        mark(&mut spaces, left);
+        engine.each(spaces.into_iter().enumerate().collect(), |(i, space)| {
+            space.map(|space| write_space(next, &id(i), &space)).transpose()
+        })
+    }
+
+    /// Where points of the earlier result are looked at again, one by one: the cell, and where
+    /// robots stood. Nowhere, where it has no tiles of them.
+    fn places(&self) -> Vec<Aabb> {
+        let has_tiles = self.base.state.records.tile_edge().is_some();
+        let places = self.robots.left.iter().chain([&self.session.past.cell]);
+        places.filter(|_| has_tiles).copied().collect()
+    }
+
+    /// What the earlier result says of the space of a robot.
+    fn entry(&self, robot: usize) -> Option<&SpaceEntry> {
+        self.base.result.robots.get(robot)?.space.as_ref()
+    }
+}
+
+/// Adds to a space that robots fill what is seen within some places, and what was known elsewhere.
+/// Which points the places hold is not known yet; what was seen free and is not seen now stays
+/// free.
+fn renew(space: &mut Space, old: &Space, places: &[Aabb], is_free: impl Fn([f64; 3]) -> bool) {
+    use SpaceKind::{Fixed, Free, Other, Robot, Unknown};
+    let grid = *space.grid();
+    for (at, voxel) in space.voxels_mut().iter_mut().enumerate() {
+        let middle = grid.middle(at);
+        let was = old.grid().index(middle).map_or(Unknown, |at| old.voxels()[at]);
+        if (*voxel, was) == (Unknown, Free) {
+            *voxel = Free;
+            continue;
+        }
+        let own = Aabb { min: middle, max: middle }.grown(0.5 * grid.edge);
+        let is_within = places.iter().any(|p| p.contains(own.min) && p.contains(own.max));
+        *voxel = match (*voxel, was) {
+            (Unknown, _) if is_within && is_free(middle) => Free,
+            (body, _) if is_within => body,
+            (body @ (Robot | Other), was) if was != Fixed => body,
+            (_, was) => was,
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn space(kinds: [SpaceKind; 4]) -> Space {
+        let bounds = Aabb { min: [0.0; 3], max: [0.4, 0.1, 0.1] };
+        let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));
+        space.voxels_mut().copy_from_slice(&kinds);
+        space
+    }
+
+    #[test]
+    fn voxels_are_renewed_where_points_are_looked_at_again_and_nowhere_else() {
+        use SpaceKind::{Fixed, Free, Other, Robot, Unknown};
+        // The place ends within the third voxel: that is not all looked at.
+        let place = Aabb { min: [-0.01; 3], max: [0.25, 0.11, 0.11] };
+        let after = |was, free: [bool; 4], bodies| {
+            let (mut space, old) = (space(bodies), space(was));
+            renew(&mut space, &old, &[place], |p| free[(p[0] / 0.1) as usize]);
+            space.voxels().to_vec()
+        };
+        let (unseen, nobody) = ([false; 4], [Unknown; 4]);
+        let seen = [true, false, true, true];
+        assert_eq!(after([Fixed; 4], seen, nobody), [Free, Unknown, Fixed, Fixed]);
+        let bodies = [Unknown, Other, Unknown, Robot];
+        assert_eq!(after([Free; 4], unseen, bodies), [Free, Other, Free, Robot]);
+        let was = [Robot, Other, Robot, Fixed];
+        assert_eq!(after(was, unseen, bodies), [Unknown, Other, Robot, Fixed]);
+        // A robot is where it stands, whatever beams are said to have gone through it.
+        assert_eq!(after([Unknown; 4], [true; 4], bodies), [Free, Other, Unknown, Robot]);
+    }
+}

@@ -1,0 +1,73 @@
+//! A result that is whole in; its points in another format out, in `OUT/export`. The next run into
+//! OUT takes away what is true of its points no longer, and says so.
+
+use super::copc;
+use crate::cache::{EXPORT, Vouched};
+use crate::engine::Engine;
+use crate::engine::progress::Amount;
+use crate::io::own_paths::straight;
+use crate::job::Job;
+use contract::{Error, Kind, Result};
+use export::{COPC, PLY, write_ply};
+use std::path::{Path, PathBuf};
+
+/// What points can be written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// One LAZ of all points, as an octree that viewers load piece by piece (Potree, QGIS)
+    Copc,
+    /// Two PLY files: what moves, and what stands still (Open3D, MeshLab)
+    Ply,
+}
+
+/// Names of all files that points are written to.
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    PLY.into_iter().chain([copc_name()])
+}
+
+/// The name of a COPC file without its folder.
+fn copc_name() -> &'static str {
+    COPC.rsplit('/').next().unwrap_or(COPC)
+}
+
+/// Writes the points of the result in `out`; the files' paths.
+///
+/// # Errors
+/// No result, or one without tiles; another run at work in it; files that cannot be read or
+/// written.
+pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBuf>> {
+    let files = Vouched::open(out)?;
+    // A result that was copied without its store has nobody at work in it.
+    let _lock = out.join("store").is_dir().then(|| Job::hold(out)).transpose()?;
+    let into = straight(out, EXPORT)?;
+    // Tiles as the list has them, each compared with it: what else lies in their folder is none of
+    // the result.
+    let listed = files.manifest().files.iter().map(|file| &*file.path);
+    let listed = listed.filter(|path| path.starts_with("tiles/")).collect();
+    let tiles = engine.fan_out("compare", listed, |name: &str| files.compared(name))?;
+    let written = match format {
+        Format::Copc => {
+            let to = into.join(copc_name());
+            let written = copc::write(&tiles, &to, &into.join("scratch"), engine);
+            let damaged = |e: Error| match e.kind() {
+                Kind::Bug => {
+                    e.hint("`stillpoint verify` says whether the result's tiles are whole")
+                }
+                _ => e,
+            };
+            written.map_err(damaged)?.then(|| vec![to])
+        }
+        Format::Ply => {
+            let stage = engine.progress.stage("ply", Amount::items(0));
+            let points = write_ply(&tiles, &into, || engine.cancel.check())?;
+            points.iter().for_each(|n| stage.add(0, n.iter().sum(), 0));
+            stage.finish();
+            points.map(|_| PLY.map(|name| into.join(name)).to_vec())
+        }
+    };
+    written.ok_or_else(|| {
+        Error::bad_input("the result has no tiles to read its points from")
+            .at(out.join("tiles").display())
+            .hint("run with --set export.tiles=true")
+    })
+}

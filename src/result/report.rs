@@ -1,0 +1,347 @@
+//! What a run came to in; `result.json`, the legend of the masks and a summary for people out.
+
+use super::advice::Lack;
+use crate::cache::Digests;
+use crate::cache::output::OutputDir;
+use crate::engine::Task;
+use crate::engine::progress::Amount;
+use crate::job::{Outcome, units};
+use crate::label::known_space::poses;
+use crate::label::labelling::{Done, MaskCount};
+use crate::store::Store;
+use contract::words::{Unit, count, fixed, triple};
+use contract::{Fit, Format, Input, InputId, JointFit, Mask, Result, Scan, Verdict, quote};
+use export::{
+    InputEntry, Labels, Places, ResultFile, ReviewEntry, RobotEntry, SCHEMA, ScanLabels,
+    SpaceEntry, StageEntry, write_table,
+};
+use ingest::{MISPLACED, Sources};
+use robot::{JointKind, Library, Model, Motion, Role};
+use std::fmt::Write as _;
+
+/// Everything that the result tells.
+pub(crate) struct Report<'a> {
+    pub(crate) digests: &'a Digests,
+    pub(crate) sources: &'a Sources,
+    pub(crate) store: &'a Store,
+    pub(crate) library: &'a Library,
+    /// Those that the fits are of: the library's, and arms with tools.
+    pub(crate) models: &'a [robot::Model],
+    pub(crate) fits: &'a [Fit],
+    /// Bodies above the floor, and the places about them that were searched for robots.
+    pub(crate) n_searched: [usize; 2],
+    pub(crate) written: &'a Done,
+    /// What each entry of the review did.
+    pub(crate) review: Vec<ReviewEntry>,
+    /// Inputs and regions that failed and were left out.
+    pub(crate) left_out: Vec<String>,
+}
+
+impl Report<'_> {
+    /// Writes the legend and the result, last of all files.
+    pub(crate) fn finish(&self, output: &OutputDir) -> Result<Outcome> {
+        let robots: Vec<RobotEntry> = self
+            .fits
+            .iter()
+            .enumerate()
+            .map(|(i, fit)| {
+                let space = self.written.spaces[i].clone();
+                robot_entry(i, fit, self.models, space)
+            })
+            .collect();
+        write_table(output.next(), &robots)?;
+        let warnings = self.warnings();
+        let masks = self.sources.masks.iter().zip(&self.written.masks);
+        let labels = Labels {
+            table: Labels::TABLE.into(),
+            scans: masks.map(|(mask, count)| ScanLabels::new(mask, count.n_points)).collect(),
+        };
+        let result = ResultFile {
+            schema: SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            robots,
+            labels,
+            inputs: self
+                .sources
+                .inputs
+                .iter()
+                .map(|i| input_entry(self.sources, i, self.digests, &self.written.masks))
+                .collect(),
+            stages: self.stages(),
+            warnings: warnings.clone(),
+            review: self.review.clone(),
+            rescan: None,
+        };
+        result.write(output.next())?;
+        let partial = !self.left_out.is_empty() || self.models_left_out().next().is_some();
+        Ok(Outcome { summary: self.summary(), warnings, partial, ..Outcome::default() })
+    }
+
+    /// Counts of each stage; no times, so that the same input gives the same bytes.
+    fn stages(&self) -> Vec<StageEntry> {
+        let n_points = self.written.masks.iter().map(|m| m.n_points).sum();
+        let entry =
+            |name: &str, n_in: u64, n_out: u64| StageEntry { name: name.into(), n_in, n_out };
+        vec![
+            entry("ingest", self.sources.inputs.len() as u64, n_points),
+            entry("cluster", n_points, self.n_searched[0] as u64),
+            entry("fit", self.n_searched[0] as u64, self.fits.len() as u64),
+            entry("label", n_points, self.written.masks.iter().map(|m| m.n_moving).sum()),
+        ]
+    }
+
+    /// The scans with points: of a large LAZ file it is not known beforehand whether any are of no
+    /// scanner that is given.
+    fn scans(&self) -> impl Iterator<Item = &Scan> {
+        let has_points = |scan: &&Scan| self.store.entries().iter().any(|e| e.at.scan == scan.id);
+        self.sources.scans.iter().filter(has_points)
+    }
+
+    /// Why models of the library could not be loaded.
+    fn models_left_out(&self) -> impl Iterator<Item = &robot::Finding> {
+        self.library.findings.iter().filter(|f| f.severity == robot::Severity::Error)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut out = self.sources.warnings.clone();
+        out.extend(self.sources.oddities());
+        out.extend(self.left_out.iter().cloned());
+        let odd = self.review.iter().filter(|entry| entry.needs_look);
+        out.extend(odd.map(ReviewEntry::words));
+        out.extend(self.models_left_out().map(|finding| {
+            let [model, place, what] =
+                [&finding.model, &finding.place, &finding.what].map(|part| quote::shown(part));
+            format!("robot model '{model}' is left out: {place}: {what}")
+        }));
+        out.extend(dropped(self.sources, &self.written.masks));
+        for scan in self.scans().filter(|s| !s.has_beams()) {
+            // A position that was given and is not used says why.
+            let why = scan.notes.iter().find(|note| note.contains(MISPLACED));
+            let why = why.map_or("its scanner's position is not known", String::as_str);
+            let name = quote::shown(&scan.name);
+            out.push(format!("scan '{name}': {why}: no proof of free space from it"));
+        }
+        if self.fits.is_empty() {
+            let scans: Vec<&Scan> = self.scans().collect();
+            let (tiles, models) = (self.store.entries(), &self.library.models[..]);
+            out.extend(
+                Lack { scans: &scans, tiles, models, n_places: self.n_searched[1] }.advice(),
+            );
+        }
+        out
+    }
+
+    /// Value and standard deviation of each joint.
+    fn say_posture(&self, text: &mut String, fit: &Fit) {
+        let model = &self.models[fit.model];
+        for (joint, &index) in fit.joints.iter().zip(&model.free) {
+            let slides = model.joints[index].kind == JointKind::Prismatic;
+            let _ = writeln!(text, "     {}", joint_line(joint, slides));
+        }
+    }
+
+    fn summary(&self) -> String {
+        let mut text = String::new();
+        let n_scans = count(self.scans().count() as u64, "scan");
+        let _ = writeln!(text, "{} in {n_scans}", count(self.fits.len() as u64, "robot"));
+        for line in units::said(self.sources) {
+            let _ = writeln!(text, "  unit {line}");
+        }
+        if self.fits.is_empty() {
+            let n_arms = self.library.models.iter().filter(|model| !model.is_tool()).count();
+            let places = count(self.n_searched[1] as u64, "place");
+            let models = count(n_arms as u64, "model");
+            let _ = writeln!(
+                text,
+                "  {places} as large as a robot searched for {models}: none of them stands there"
+            );
+        }
+        for (i, fit) in self.fits.iter().enumerate() {
+            let _ = writeln!(
+                text,
+                "  {} {} at {} m: {}, score {}, rms {:.1} mm",
+                id(i),
+                quote::shown(&fit.model_name),
+                triple(fit.world_from_base.translation.vector.into(), 3),
+                fit.verdict.word(),
+                fixed(fit.score, 2),
+                fit.rms * 1e3
+            );
+            if let Some(tool) = &fit.tool {
+                let turn = Unit::DEGREES.say(tool.mount, 0);
+                let _ = writeln!(text, "     carries {} on '{}' at {turn}", tool.model, tool.link);
+            }
+            self.say_posture(&mut text, fit);
+            let word = if fit.verdict == Verdict::Trusted { "note" } else { "why" };
+            for reason in &fit.reasons {
+                let _ = writeln!(text, "     {word}: {reason}");
+            }
+            for stay in &fit.stays {
+                let _ = writeln!(
+                    text,
+                    "     in {}: {}, score {}",
+                    count(stay.stands_in.len() as u64, "other scan"),
+                    stay.verdict.word(),
+                    fixed(stay.score, 2)
+                );
+                self.say_posture(&mut text, stay);
+            }
+        }
+        for entry in &self.review {
+            let _ = writeln!(text, "  {}", entry.words());
+        }
+        let n: u64 = self.written.masks.iter().map(|m| m.n_points).sum();
+        let moving: u64 = self.written.masks.iter().map(|m| m.n_moving).sum();
+        let _ = writeln!(text, "{} labelled, {moving} of them moving", count(n, "point"));
+        let tiles = count(self.written.clouds.tiles.len() as u64, "spatial tile");
+        let pictures = count(self.written.pictures.len() as u64, "picture");
+        let _ = writeln!(text, "{tiles}, {pictures}");
+        text
+    }
+}
+
+/// A joint as the summary has it: name, value, standard deviation, and a word where it is not
+/// determined.
+fn joint_line(joint: &JointFit, slides: bool) -> String {
+    let unit = Unit::of(slides);
+    let (value, sigma) = (unit.say(joint.value, 3), unit.deviation(joint.sigma));
+    format!("{:<24} {value:>11} ± {sigma}{}", quote::shown(&joint.name), joint.certainty.note())
+}
+
+/// The entry of a robot in the result; `models` are those that fits are of.
+pub(crate) fn robot_entry(
+    index: usize,
+    fit: &Fit,
+    models: &[Model],
+    space: Option<SpaceEntry>,
+) -> RobotEntry {
+    let model = &models[fit.model];
+    let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
+    let tip = tip(model).map(|l| (names[l].clone(), poses(fit, model)[l]));
+    let mut entry = RobotEntry { space, ..RobotEntry::new(&id(index), fit, &names, tip) };
+    stand(&mut entry, fit, models);
+    entry
+}
+
+/// Says where the links of a robot stand, and of the same robot in other scans.
+fn stand(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
+    let model = &models[fit.model];
+    let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    let joints = model.joints.iter().zip(model.joint_values(&posture));
+    let passive =
+        joints.filter(|(j, _)| matches!(j.motion, Motion::Mimic { .. } | Motion::Loop(_)));
+    entry.passive = Places(passive.map(|(j, value)| (j.name.clone(), value)).collect());
+    let slides = model.joints.iter().filter(|j| j.kind == JointKind::Prismatic);
+    entry.slides = slides.map(|j| j.name.clone()).collect();
+    let links = model.links.iter().zip(poses(fit, model));
+    entry.link_poses = Places(links.map(|(l, pose)| (l.name.clone(), (&pose).into())).collect());
+    for (entry, stay) in entry.stays.iter_mut().zip(&fit.stays) {
+        stand(entry, stay, models);
+    }
+}
+
+/// What is said of masks of the open inputs whose points were dropped in part.
+pub(crate) fn dropped(sources: &Sources, counts: &[MaskCount]) -> Vec<String> {
+    let masks = sources.opened_masks().iter().zip(counts).filter(|(_, count)| count.n_dropped > 0);
+    let say = |(mask, count): (&Mask, &MaskCount)| {
+        let (n, all) = (count.n_dropped, count.n_points);
+        format!(
+            "'{}': {n} of {all} points were dropped: withheld by the file, no numbers, or far from all others",
+            quote::shown(&mask.name)
+        )
+    };
+    masks.map(say).collect()
+}
+
+/// The entry of an input in the result; `counts` of the masks of the inputs that are open.
+pub(crate) fn input_entry(
+    sources: &Sources,
+    input: &Input,
+    digests: &Digests,
+    counts: &[MaskCount],
+) -> InputEntry {
+    let scans: Vec<_> = sources.scans.iter().filter(|s| s.input == input.id).collect();
+    let own = sources.opened_masks().iter().zip(counts).filter(|(m, _)| m.input == input.id);
+    let (n_points, n_dropped) =
+        own.fold((0, 0), |sum, (_, c)| (sum.0 + c.n_points, sum.1 + c.n_dropped));
+    InputEntry {
+        path: input.path.display().to_string(),
+        format: format_word(input.format).into(),
+        n_bytes: input.n_bytes,
+        digest: digests.input(input).unwrap_or_default().to_owned(),
+        n_scans: scans.len() as u32,
+        n_points,
+        n_dropped,
+        units: units::entry(sources, input),
+        notes: scans.iter().flat_map(|s| &s.notes).cloned().collect(),
+    }
+}
+
+/// What a robot is called, by its place among the fits.
+pub(crate) fn id(index: usize) -> String {
+    format!("R{}", index + 1)
+}
+
+/// The last link of the main chain.
+fn tip(model: &Model) -> Option<usize> {
+    (0..model.links.len()).rev().find(|&l| model.links[l].role == Role::Main)
+}
+
+/// Points that an input states, or its bytes, for progress.
+pub(crate) fn amount(sources: &Sources, input: InputId) -> Amount {
+    let stated = sources.masks.iter().filter(|m| m.input == input).map(|m| m.n_points.unwrap_or(0));
+    Amount { items: 0, points: stated.sum(), bytes: 0 }
+}
+
+/// A task over all tiles of a store.
+pub(crate) fn tiles(name: &str, store: &Store) -> Task {
+    Task::new(name).of(Amount {
+        items: store.entries().len() as u64,
+        points: store.n_points(),
+        bytes: 0,
+    })
+}
+
+fn format_word(format: Format) -> &'static str {
+    match format {
+        Format::E57 => "e57",
+        Format::Ptx => "ptx",
+        Format::Las => "las",
+        Format::Laz => "laz",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::Certainty;
+
+    #[test]
+    fn a_joint_has_its_deviation_always_and_the_word_that_fits_it() {
+        let joint = |value: f64, sigma: f64, certainty| JointFit {
+            name: "joint_a4".into(),
+            value: value.to_radians(),
+            sigma: sigma.to_radians(),
+            certainty,
+            ..JointFit::default()
+        };
+        let lines = [
+            joint_line(&joint(-0.000_1, 0.012, Certainty::Determined), false),
+            joint_line(&joint(57.483, 0.06, Certainty::Coarse), false),
+            joint_line(&joint(178.0, 103.9, Certainty::Undetermined), false),
+            joint_line(
+                &joint(0.25_f64.to_degrees(), 0.000_3_f64.to_degrees(), Certainty::Determined),
+                true,
+            ),
+        ];
+        assert_eq!(
+            lines,
+            [
+                "joint_a4                      0.000° ± 0.012°",
+                "joint_a4                     57.483° ± 0.060° coarse",
+                "joint_a4                    178.000° ± 103.9° undetermined",
+                "joint_a4                  250.000 mm ± 0.300 mm",
+            ]
+        );
+    }
+}
