@@ -24,9 +24,6 @@ pub(crate) fn check(
     (laz, las): (&LazVlr, &LasSettings),
     n_points: u64,
 ) -> io::Result<Result<(), String>> {
-    if n_points == 0 {
-        return Ok(Ok(()));
-    }
     let record_len = las.record_len();
     let n_bytes = file.seek(SeekFrom::End(0))?;
     let table = number::<8>(file, at)?;

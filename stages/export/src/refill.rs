@@ -150,6 +150,8 @@ struct Tile<'a> {
 }
 
 enum Records {
+    /// A tile of no points: its table of chunks is not looked at, whatever it states.
+    None,
     Plain(Straight),
     Compressed(Box<LasZipDecompressor<'static, BufReader<File>>>),
 }
@@ -180,6 +182,15 @@ impl<'a> Tile<'a> {
             if let Some(stated) = stated {
                 let read = sum_of(file.get_mut()).map_err(failed)?;
                 compare(path, stated, read)?;
+            }
+            if left == 0 {
+                return Ok(Self {
+                    path,
+                    records: Records::None,
+                    record_len: las.record_len(),
+                    left,
+                    sum,
+                });
             }
             let laz = crate::las::laz_vlr(las);
             let (at, of) = (expected as u64, (&laz, las));
@@ -213,6 +224,7 @@ impl<'a> Tile<'a> {
         }
         bytes.resize(n as usize * self.record_len, 0);
         let read = match &mut self.records {
+            Records::None => Ok(()),
             Records::Plain(file) => file.read_exact(bytes),
             Records::Compressed(reader) => reader.decompress_many(bytes),
         };

@@ -238,4 +238,9 @@ fn a_tile_that_states_more_than_fits_takes_no_memory_for_it() {
     wrong(247, 2, "where 2 are due");
     // Behind the first record and the number of points: how long each layer is.
     wrong(at + 8 + settings.record_len() + 4, u32::MAX, "layers of");
+    // A tile of no points is not decoded, whatever its table states.
+    bytes[247..255].copy_from_slice(&0_u64.to_le_bytes());
+    bytes[table + 4..table + 8].copy_from_slice(&u32::MAX.to_le_bytes());
+    std::fs::write(&path, &bytes).expect("writes");
+    assert_eq!(n_read(&path).expect("there is nothing to read"), 0);
 }
