@@ -12,7 +12,7 @@ fn main() -> ExitCode {
 }
 
 /// Memory is handed from stage to stage in pieces of all sizes; in pages of 2 MiB the system clears
-/// more of it than is used, which takes up to a fifth of a short run (benches/README.md).
+/// more of it than is used, which takes up to a fifth of a short run (benches/LEARNT.md).
 fn use_small_pages() {
     #[cfg(target_os = "linux")]
     {

@@ -38,8 +38,8 @@ const MIXED: f64 = 0.25;
 const FULLER: f64 = 1.35;
 /// Share of the cells with two surfaces in full from which on the position is wrong, and the least
 /// number of them. Of 66 simulated scans from where they were taken one had 0.0007, all others
-/// less; of 49 said to be taken 0.5 to 3 m off, 41 have more than this (benches/README.md, Scanner
-/// positions). Real clouds of cameras had none.
+/// less; of 49 said to be taken 0.5 to 3 m off, 41 have more than this (benches/LEARNT.md, stated
+/// scanner positions). Real clouds of cameras had none.
 const WRONG: (f64, usize) = (0.002, 4);
 
 /// Part of what is said of a scan whose stated position is not used.
