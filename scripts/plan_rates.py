@@ -17,7 +17,7 @@ STREAM = ["ingest", "digest", "store", "surfaces", "segment", "write", "space", 
 
 
 def features(row: dict) -> dict:
-    """What the search is predicted from; as in src/estimate/search.rs."""
+    """What the search is predicted from; as in src/estimate/search_time.rs."""
     regions = row["planned"]["stand"]["regions"]
     return {
         "REGION, a region": len(regions),

@@ -1,5 +1,14 @@
 //! How a run goes: plan, engine, store, command line, configuration, progress. Scans and a robot
 //! library in, postures and masks out. Knows no geometry: what is done stands in `stages/`.
+//!
+//! Rooms import only rooms below them, from the bottom up:
+//!
+//! ```text
+//! engine  io  job  store  cache  detect  label  result  estimate  rescan  check  plan  eval  cli
+//! ```
+//!
+//! Only the command line imports `eval`. `tests/house.rs` holds the order, and that no files import
+//! each other in a circle; `src/ARCHITECTURE.md` says what each room does.
 
 pub mod cache;
 pub mod check;

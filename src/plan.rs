@@ -1,29 +1,28 @@
 //! The whole way of the data on one page: a job in, everything found and written, its outcome out.
 //! Nothing else decides order.
 
-use crate::cache::input_tiles::Filling;
-use crate::cache::output::OutputDir;
-use crate::cache::{self, Cache, Digests, Key, OutputFile};
+use crate::cache::input_tiles::InputTiles;
+use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, WholeResult};
 use crate::detect::calibrate::calibrate;
-use crate::detect::ground::{Gather, Ground, Surfaces};
-use crate::detect::region_failures::Failures;
+use crate::detect::ground::Ground;
+use crate::detect::region_failures::RegionFailures;
 use crate::detect::review::Review;
-use crate::detect::search::{Search, Shelf};
+use crate::detect::robots::{FittedRobots, RobotList};
+use crate::detect::search::{PreparedLibrary, Search};
 use crate::detect::{library, tools};
 use crate::engine::{AllThreads, Engine, Task};
 use crate::estimate::Estimate;
 use crate::job::{Job, Outcome, Settings, units};
-use crate::label::known_space::Around;
-use crate::label::labelling::{Done, Labelling, Scope};
+use crate::label::known_space::KnownSpaces;
+use crate::label::labelling::{LabelFolders, Labelling, ScansToLabel, Scope, WrittenLabels};
 use crate::result::copc;
-use crate::result::plant_state::{Records, State};
+use crate::result::plant_state::{PlantState, Records};
 use crate::result::report::Report;
 use crate::store::{Store, spatial_tiles};
-use contract::{Cluster, Fit, Floor, Input, Region, Result, Scan, Space};
+use contract::{Cluster, Fit, Input, Result, Space};
 use export::{COPC, ReviewEntry};
 use ingest::{Scanners, Sources};
-use robot::{Library, Model};
-use std::path::PathBuf;
+use robot::Library;
 
 /// Does the main job.
 ///
@@ -48,17 +47,26 @@ struct Run<'a> {
 }
 
 /// What is known before any point is read.
-struct Given {
+struct Opened {
     library: Library,
     review: Review,
     sources: Sources,
 }
 
-/// The robots that were found.
-struct Robots {
-    fits: Vec<Fit>,
-    /// The library's models, and after them those with a tool, other loops or calibrated joints.
-    models: Vec<Model>,
+/// The plant as it was scanned, before anything is searched in it.
+#[derive(Clone, Copy)]
+struct ScannedPlant<'a> {
+    sources: &'a Sources,
+    /// Names of the tiles of each input.
+    tiles: &'a [Key],
+    store: &'a Store,
+    ground: &'a Ground,
+    clusters: &'a [Cluster],
+}
+
+/// The robots that were found, as far as the review lets them.
+struct ReviewedRobots {
+    robots: RobotList,
     /// What each entry of the review did.
     review: Vec<ReviewEntry>,
 }
@@ -67,19 +75,19 @@ impl Run<'_> {
     fn whole(&self) -> Result<Outcome> {
         let &Run { job, settings, output, digests, engine } = self;
         let models_kept = Cache::new(output.models(), digests.models(settings));
-        let given = self.given(&models_kept)?;
-        let (sources, scans) = (&given.sources, &given.sources.scans);
+        let opened = self.open(&models_kept)?;
+        let (sources, scans) = (&opened.sources, &opened.sources.scans);
 
         // First pass: every point once, from files into lattice tiles that are not there yet.
-        let filling = Filling::new(sources, &job.means, output.tiles(), engine);
-        let filled = sources.inputs.iter().map(|i| filling.tiles_of(i, digests));
-        let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
-        let store = spatial_tiles::checked(Store::join(stores), scans, &settings.export, engine)?;
+        let input_tiles = InputTiles::new(sources, &job.means, output.tiles(), engine);
+        let (tiles, store) = input_tiles.of_all(&sources.inputs, digests)?;
+        let store = spatial_tiles::checked(store, scans, &settings.export, engine)?;
 
         // On the tiles: local planes and occupied space, joined over tiles and scans; from here on
         // nothing is as large as the cloud.
         let ground_kept = Cache::new(output.fits(), digests.ground(&tiles, settings));
-        let ground = ground_kept.get_or_compute("ground", || self.ground(scans, &store))?;
+        let ground = || Ground::of_tiles(scans, &store, settings, engine);
+        let ground = ground_kept.get_or_compute("ground", ground)?;
         let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
         let clusters = cluster::split(space, floor, &settings.cluster);
         let regions = base_search::regions(&clusters, &settings.region);
@@ -87,51 +95,49 @@ impl Run<'_> {
         // One task a region and model: base poses, postures; then those that can stand together.
         let of_plant = || Cache::new(output.fits(), digests.fits(&tiles, settings));
         let (fits_kept, pieces_kept) = (of_plant(), of_plant());
-        let shelf = Shelf::new(&given.library.models);
-        let search = Search::new(&shelf, scans, &store, &ground, settings).keeping(&pieces_kept);
-        let failures = Failures::of(job);
+        let library = PreparedLibrary::new(&opened.library.models);
+        let search = Search::new(&library, scans, &store, &ground, settings);
+        let search = search.over(&regions).keeping(&pieces_kept);
+        let failures = RegionFailures::of(job);
         let task = Task::new("fit").large().showing(search.pieces());
         let found = engine.fan_out(task, regions.clone(), |region| {
             let find = || search.region(&region);
             failures.spare(&region, || fits_kept.get_or_compute(&format!("{region:?}"), find))
         })?;
-        let found = self.robots(found.concat(), (&search, &regions), (&given, &ground))?;
-        let (fits, models) = (&found.fits, &found.models);
-        let spaces = Around { robots: (fits, models), search: &search, settings }.all(engine)?;
-        drop(shelf);
+        let reviewed = self.robots(found.concat(), &search, &opened, &ground)?;
+        let robots = reviewed.robots;
+        let spaces = KnownSpaces { robots: robots.view(), search: &search, settings };
+        let spaces = spaces.all(engine)?;
+        drop(library);
 
         // Tiles near robots once more; then all points.
-        let written = self.label(&found, (sources, &store), (floor, &clusters), spaces)?;
-        let mut outcome = Report {
+        let (tiles, clusters) = (&tiles[..], &clusters[..]);
+        let plant = ScannedPlant { sources, tiles, store: &store, ground: &ground, clusters };
+        let written = self.label(plant, robots.view(), spaces)?;
+        let report = Report {
             digests,
             sources,
             store: &store,
-            library: &given.library,
-            models,
-            fits,
+            library: &opened.library,
+            robots: robots.view(),
             n_searched: [clusters.len(), regions.len()],
             written: &written,
-            review: found.review,
+            review: reviewed.review,
             left_out: failures.said(job),
-        }
-        .finish(output)?;
-        self.conclude((found.fits, floor), (sources, &tiles, &store), &written, &mut outcome)?;
-        output.prune(&tiles, &[&ground_kept, &fits_kept], &models_kept);
-        outcome.reused = cache::said(&[
-            ("models", models_kept.n_kept()),
-            ("tiles", filling.n_kept()),
-            ("fits", fits_kept.n_kept()),
-        ]);
+        };
+        let mut outcome = report.finish(output)?;
+        outcome.told = self.conclude(plant, robots.fits, &written, &outcome)?;
+        output.prune(tiles, &[&ground_kept, &fits_kept], &models_kept);
+        let n_kept = [models_kept.n_kept(), input_tiles.n_kept(), fits_kept.n_kept()];
+        outcome.reused = cache::reused_in_words(["models", "tiles", "fits"], n_kept);
         Ok(outcome)
     }
 
     /// Reads library and review, opens the scans, and sees that disk and memory are enough.
-    fn given(&self, models_kept: &Cache) -> Result<Given> {
+    fn open(&self, models_kept: &Cache) -> Result<Opened> {
         let &Run { job, settings, output, digests, engine } = self;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
-        let most = settings.ingest.max_text_bytes;
-        let read = |path: &PathBuf| Review::read(path, &library.models, most);
-        let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
+        let review = Review::of(job, &library.models)?;
         let read = |path| Scanners::read(path, &job.means.settings.ingest);
         let scanners = job.scanners.as_deref().map(read).transpose()?;
         let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
@@ -143,17 +149,7 @@ impl Run<'_> {
             key.is_some_and(|key| output.has_tiles(&key))
         };
         Estimate::of(job, &sources, library.models.len(), has_tiles).checked(output.out())?;
-        Ok(Given { library, review, sources })
-    }
-
-    /// One pass over the tiles: floor, walls and occupied space.
-    fn ground(&self, scans: &[Scan], store: &Store) -> Result<Ground> {
-        let surfaces = Surfaces::new(scans, &self.settings.lattice);
-        let gather = Gather::new(scans, &self.settings.floor);
-        let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
-        self.engine.pass(crate::result::report::tiles("surfaces", store), source, |f| {
-            f.map(&reads).map(&surfaces).fold(&gather)
-        })
+        Ok(Opened { library, review, sources })
     }
 
     /// Of all fits those that can stand together, with tools on their flanges, their joints
@@ -162,25 +158,26 @@ impl Run<'_> {
     fn robots(
         &self,
         found: Vec<Fit>,
-        place: (&Search<'_, '_>, &[Region]),
-        (given, ground): (&Given, &Ground),
-    ) -> Result<Robots> {
-        let (review, settings, mut models) =
-            (&given.review, self.settings, given.library.models.clone());
+        search: &Search<'_, '_>,
+        opened: &Opened,
+        ground: &Ground,
+    ) -> Result<ReviewedRobots> {
+        let (review, settings) = (&opened.review, self.settings);
+        let mut models = opened.library.models.clone();
         let without = review.without(&found, &models);
-        let (fits, wrong) = review.correct(found, place, &models, self.engine)?;
+        let (fits, wrong) = review.correct(found, search, &models, self.engine)?;
         let fits = fit::choose(review.apply(fits), &models, |fit| review.accepts(fit));
-        let mut fits = tools::dress(fits, &mut models, place, self.engine)?;
+        let mut fits = tools::attach_tools(fits, &mut models, search, self.engine)?;
         if settings.fit.calibrate {
-            fits = calibrate(fits, &mut models, place, self.engine)?;
+            fits = calibrate(fits, &mut models, search, self.engine)?;
         }
         review.accept(&mut fits);
         if settings.fit.together {
-            let (scans, still) = (&given.sources.scans[..], &ground.surfaces.overlaps);
+            let (scans, still) = (&opened.sources.scans[..], &ground.surfaces.overlaps);
             fit::together(&mut fits, &models, (scans, still), &settings.fit);
         }
         let review = review.did(&without, &fits, &wrong);
-        Ok(Robots { fits, models, review })
+        Ok(ReviewedRobots { robots: RobotList { fits, models }, review })
     }
 
     /// Which points near robots are links, and which hang on them; then the second pass: every
@@ -188,18 +185,19 @@ impl Run<'_> {
     /// around the robots.
     fn label(
         &self,
-        robots: &Robots,
-        (sources, store): (&Sources, &Store),
-        (floor, clusters): (&Floor, &[Cluster]),
+        plant: ScannedPlant<'_>,
+        robots: FittedRobots<'_>,
         spaces: Vec<Option<Space>>,
-    ) -> Result<Done> {
+    ) -> Result<WrittenLabels> {
         let (settings, next, engine) = (self.settings, self.output.next(), self.engine);
-        let ground = (store, floor, clusters);
-        let labelling = Labelling::new(&robots.fits, &robots.models, sources, ground, settings);
+        let ScannedPlant { sources, store, ground, clusters, .. } = plant;
+        let floor = &ground.surfaces.floor;
+        let scans = ScansToLabel { sources, store, floor, clusters };
+        let labelling = Labelling::new(robots, &scans, settings);
         let near = labelling.near_robots(store, engine)?;
-        let written = labelling
-            .write((&near, spaces), &Scope::default(), (next, next), engine)?
-            .finish(engine)?;
+        let to = LabelFolders { out: next, clouds: next };
+        let written = labelling.write(&near, spaces, &Scope::default(), to, engine)?;
+        let written = written.finish(engine)?;
         if settings.export.copc {
             copc::write(&export::tiles(next)?, &next.join(COPC), &self.output.scratch(), engine)?;
         }
@@ -207,32 +205,31 @@ impl Run<'_> {
     }
 
     /// All is whole, and of the inputs that the run began with: it takes the place of what was
-    /// there.
+    /// there; what was taken away beside it, in words.
     fn conclude(
         &self,
-        (fits, floor): (Vec<Fit>, &Floor),
-        (sources, tiles, store): (&Sources, &[Key], &Store),
-        written: &Done,
-        outcome: &mut Outcome,
-    ) -> Result<()> {
-        let next = self.output.next();
-        sources.inputs.iter().try_for_each(|input| self.digests.check(input))?;
-        State {
+        plant: ScannedPlant<'_>,
+        fits: Vec<Fit>,
+        written: &WrittenLabels,
+        outcome: &Outcome,
+    ) -> Result<Vec<String>> {
+        let &Run { job, settings, output, digests, engine } = self;
+        let (sources, next) = (plant.sources, output.next());
+        sources.inputs.iter().try_for_each(|input| digests.check(input))?;
+        PlantState {
             inputs: sources.inputs.clone(),
             masks: sources.masks.clone(),
             scans: sources.scans.clone(),
             frames: Vec::new(),
-            tiles: tiles.to_vec(),
-            contents: store.contents(),
-            floor: floor.clone(),
+            tiles: plant.tiles.to_vec(),
+            contents: plant.store.contents(),
+            floor: plant.ground.surfaces.floor.clone(),
             fits,
-            robots: self.job.robots.clone(),
-            records: Records::of(&written.las, &self.settings.export),
+            robots: job.robots.clone(),
+            records: Records::of(&written.las, &settings.export),
         }
         .write(next)?;
         let files = written.digests.iter().map(|sum| OutputFile::of(next, sum)).collect();
-        let (to, made) = ((self.output, self.digests), (&*outcome, files));
-        outcome.told = cache::publish(self.job, to, made, self.engine)?;
-        Ok(())
+        WholeResult { job, output, digests, outcome, files }.publish(engine)
     }
 }

@@ -10,7 +10,7 @@ use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 use stillpoint::job::{Given, Job, Means, Outcome};
 use stillpoint::plan;
-use stillpoint::rescan::{Cell, Frame, Request, rescan};
+use stillpoint::rescan::{Cell, Frame, RescanRequest, rescan};
 
 /// A plant, what was scanned again of it, and another plant.
 struct Plant {
@@ -74,7 +74,7 @@ impl Plant {
     fn rescan(&self, [base, input, out]: [&str; 3], frame: Frame) -> contract::Result<Outcome> {
         let scanners = input.ends_with("las").then(|| self.path("mapped/scanners.toml"));
         let job = Job { scanners, ..self.job(input, out) };
-        let request = Request { base: self.path(base), cell: Cell::Seen, frame, job };
+        let request = RescanRequest { base: self.path(base), cell: Cell::Seen, frame, job };
         rescan(&request, &Engine::new(2))
     }
 }

@@ -1,6 +1,9 @@
 //! The rules of the house that no compiler holds: who may import whom, what stages keep away from,
 //! how files begin.
 
+#[path = "house/imports.rs"]
+mod imports;
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

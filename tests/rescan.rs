@@ -12,7 +12,7 @@ use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 use stillpoint::job::{Given, Job, Means};
 use stillpoint::plan;
-use stillpoint::rescan::{Cell, Frame, Request, rescan};
+use stillpoint::rescan::{Cell, Frame, RescanRequest, rescan};
 
 const SEED: u64 = 11;
 /// Share of points of links and of what hangs on them that come out as such, and the other way
@@ -65,9 +65,9 @@ impl Plant {
         Job::new(inputs, self.path("robots"), self.path(out), means)
     }
 
-    fn request(&self, base: &str, out: &str) -> Request {
+    fn request(&self, base: &str, out: &str) -> RescanRequest {
         let (base, job) = (self.path(base), self.job("now", out));
-        Request { base, cell: Cell::Seen, frame: Frame::Find, job }
+        RescanRequest { base, cell: Cell::Seen, frame: Frame::Find, job }
     }
 
     fn run(&self, args: &[&str]) -> Output {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use stillpoint::check;
 use stillpoint::engine::Engine;
 use stillpoint::job::{Given, Job, Means};
-use stillpoint::rescan::{Cell, Frame, Request, rescan};
+use stillpoint::rescan::{Cell, Frame, RescanRequest, rescan};
 use stillpoint::result::conversion::{Format, convert};
 use stillpoint::result::history;
 use stillpoint::{cache, plan};
@@ -143,7 +143,7 @@ impl Plant {
 
     /// What `check` says of a path that turns the robot to both sides.
     fn check(&self) -> Came<Value> {
-        let request = check::Request {
+        let request = check::CheckRequest {
             out: self.at("out"),
             trajectory: self.at("path.csv"),
             robot: None,
@@ -183,7 +183,7 @@ impl Plant {
         let bounds = geometry::Aabb { min: [-2.0, -2.0, -0.5], max: [2.0, 2.0, 3.0] };
         let job = self.job("now", out);
         let cell = Cell::Box(bounds);
-        let request = Request { base: self.at("out"), cell, frame: Frame::Stated, job };
+        let request = RescanRequest { base: self.at("out"), cell, frame: Frame::Stated, job };
         came(rescan(&request, &Engine::new(2)))?;
         let mut all = files(&self.at(out));
         // What lies in the store is no part of the answer.
@@ -371,7 +371,7 @@ fn folders_that_lead_elsewhere(plant: &Plant) {
         came(plan::run(&job, &engine).map(drop)).expect_err("leads elsewhere"),
         came(
             rescan(
-                &Request {
+                &RescanRequest {
                     base: plant.at("out"),
                     cell: Cell::Seen,
                     frame: Frame::Stated,
@@ -394,7 +394,7 @@ fn folders_that_lead_elsewhere(plant: &Plant) {
     for out in ["out", "out/sub", "out/store/sub"] {
         let job = plant.job("now", out);
         let (base, cell, frame) = (plant.at("out"), Cell::Seen, Frame::Stated);
-        let request = Request { base, cell, frame, job };
+        let request = RescanRequest { base, cell, frame, job };
         assert_eq!(rescan(&request, &engine).expect_err(out).kind(), Kind::Usage, "{out}");
     }
 

@@ -34,18 +34,18 @@ pub(super) struct Stamp {
 
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-struct Seen {
+struct KnownFile {
     stamp: Stamp,
     digest: String,
 }
 
 /// Digests that are known.
-pub(super) struct Contents {
+pub(super) struct FileDigests {
     list: PathBuf,
-    seen: Mutex<BTreeMap<String, Seen>>,
+    seen: Mutex<BTreeMap<String, KnownFile>>,
 }
 
-impl Contents {
+impl FileDigests {
     /// What an earlier run left in the store; nothing where it left nothing that can be read.
     pub(super) fn open(store: &Path) -> Self {
         let list = store.join(LIST);
@@ -72,7 +72,7 @@ impl Contents {
 
     /// Takes the word of the one who wrote a file.
     pub(super) fn believe(&self, path: &Path, digest: &str) -> Result<()> {
-        let seen = Seen { stamp: Stamp::of(path)?, digest: digest.to_owned() };
+        let seen = KnownFile { stamp: Stamp::of(path)?, digest: digest.to_owned() };
         self.lock().insert(name(path)?, seen);
         Ok(())
     }
@@ -80,7 +80,8 @@ impl Contents {
     /// The digest of a file that has not changed since it was read.
     pub(super) fn known(&self, path: &Path, algorithm: Algorithm) -> Result<Option<String>> {
         let stamp = Stamp::of(path)?;
-        let is_known = |s: &&Seen| s.stamp == stamp && Algorithm::of(&s.digest) == Some(algorithm);
+        let is_known =
+            |s: &&KnownFile| s.stamp == stamp && Algorithm::of(&s.digest) == Some(algorithm);
         Ok(self.lock().get(&name(path)?).filter(is_known).map(|s| s.digest.clone()))
     }
 
@@ -104,7 +105,7 @@ impl Contents {
     pub(super) fn take(&self, path: &Path, stamp: Stamp, digest: &str) -> Result<()> {
         stamp.check(path)?;
         if stamp.is_settled() {
-            self.lock().insert(name(path)?, Seen { stamp, digest: digest.to_owned() });
+            self.lock().insert(name(path)?, KnownFile { stamp, digest: digest.to_owned() });
         }
         Ok(())
     }
@@ -129,7 +130,7 @@ impl Contents {
         Ok(format!("blake3:{}", hasher.finalize().to_hex()))
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, Seen>> {
+    fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, KnownFile>> {
         self.seen.lock().expect("no thread panics while it holds the list")
     }
 }
@@ -334,13 +335,13 @@ mod tests {
         let old = SystemTime::now() - Duration::from_secs(60);
         let set = |at| File::options().write(true).open(&path).and_then(|f| f.set_modified(at));
         set(old).expect("a time");
-        let contents = Contents::open(dir.path());
+        let contents = FileDigests::open(dir.path());
         let one = contents.digest(&path, Algorithm::Blake3).expect("reads");
         contents.keep().expect("writes");
         // Another content under the same length, time and number: believed, not read.
         std::fs::write(&path, b"two").expect("writes");
         set(old).expect("a time");
-        let again = Contents::open(dir.path());
+        let again = FileDigests::open(dir.path());
         assert_eq!(again.digest(&path, Algorithm::Blake3).expect("reads"), one);
         // Its time tells: read again.
         set(old + Duration::from_secs(1)).expect("a time");

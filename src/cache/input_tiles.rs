@@ -1,11 +1,13 @@
 //! An input in, the store of its tiles out: the one that is there from an earlier run, or a new
 //! one.
 
-use super::{Digests, Key, Pace};
+use super::digests::Digests;
+use super::file_digests::Pace;
+use super::key::Key;
 use crate::engine::{Engine, Task};
-use crate::io::read_parts::Reading;
+use crate::io::read_parts::InputReader;
 use crate::job::Means;
-use crate::store::{Scatter, Store};
+use crate::store::{Scatter, Store, TileSink};
 use contract::{Error, Input, Kind, Result, Weigh};
 use ingest::{Sources, Want};
 use std::cell::Cell;
@@ -15,7 +17,7 @@ use std::path::{Path, PathBuf};
 const NEW: &str = "new-";
 
 /// What filling stores takes.
-pub(crate) struct Filling<'a> {
+pub(crate) struct InputTiles<'a> {
     sources: &'a Sources,
     means: &'a Means,
     /// Where stores lie, each in a folder with the name of its key.
@@ -25,7 +27,7 @@ pub(crate) struct Filling<'a> {
     n_kept: Cell<[usize; 2]>,
 }
 
-impl<'a> Filling<'a> {
+impl<'a> InputTiles<'a> {
     pub(crate) fn new(
         sources: &'a Sources,
         means: &'a Means,
@@ -40,9 +42,16 @@ impl<'a> Filling<'a> {
         self.n_kept.get()
     }
 
+    /// The tiles of some inputs: their keys, and one store of all.
+    pub(crate) fn of_all(&self, inputs: &[Input], digests: &Digests) -> Result<(Vec<Key>, Store)> {
+        let filled = inputs.iter().map(|input| self.tiles_of(input, digests));
+        let (keys, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
+        Ok((keys, Store::join(stores)))
+    }
+
     /// The tiles of one input and their key. A store that is there and whole is believed; one that
     /// is damaged is made again.
-    pub(crate) fn tiles_of(&self, input: &Input, digests: &Digests) -> Result<(Key, Store)> {
+    fn tiles_of(&self, input: &Input, digests: &Digests) -> Result<(Key, Store)> {
         let scans = &self.sources.scans;
         let first = scans.iter().find(|s| s.input == input.id).map_or(0, |s| s.id.0);
         let resident_bytes = self.means.store_bytes() / self.sources.inputs.len().max(1);
@@ -55,7 +64,7 @@ impl<'a> Filling<'a> {
             return Ok((key, store));
         }
         let new = self.folder.join(format!("{NEW}{}", input.id.0));
-        self.fill(&new, input, (first, resident_bytes), digests)?;
+        self.fill(&new, input, first, resident_bytes, digests)?;
         let key = key().ok_or_else(|| Error::new(Kind::Bug, "an input was not read"))?;
         let place = self.folder.join(key.name());
         let _ = std::fs::remove_dir_all(&place);
@@ -69,16 +78,17 @@ impl<'a> Filling<'a> {
         &self,
         dir: &Path,
         input: &Input,
-        (first, resident_bytes): (u32, usize),
+        first: u32,
+        resident_bytes: usize,
         digests: &Digests,
     ) -> Result<()> {
         let scans = &self.sources.scans;
         // What a run that was cut short has left there would go along for ever.
         let _ = std::fs::remove_dir_all(dir);
-        let mut sink = Store::create(dir, scans, first, self.means.ingest_bytes())?;
+        let mut sink = TileSink::create(dir, scans, first, self.means.ingest_bytes())?;
         let scatter = Scatter::new(scans);
-        let amount = crate::result::report::amount(self.sources, input.id);
-        let reading = Reading { sources: self.sources, input, want: Want::Coordinates };
+        let reading = InputReader { sources: self.sources, input, want: Want::Coordinates };
+        let amount = reading.amount();
         let pace = Pace::of(amount.points);
         let lead = pace.lead();
         let mut tree = digests.tree(input).filter(|_| self.sources.file(input.id).is_some());
@@ -94,7 +104,7 @@ impl<'a> Filling<'a> {
         if digests.input(input).is_some() || self.sources.file(input.id).is_some() {
             ingest()?;
         } else {
-            self.engine.beside("digest", || digests.read(input, &pace), ingest)?;
+            self.engine.join("digest", || digests.read(input, &pace), ingest)?;
         }
         digests.check(input)?;
         sink.finish(self.engine, resident_bytes).map(drop)

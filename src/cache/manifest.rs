@@ -5,13 +5,13 @@
 //! be written there and the last to move, so that a run that is cut short while they move is
 //! finished by the next one.
 
-use super::file_digests::{Algorithm, Contents, walk};
+use super::file_digests::{Algorithm, FileDigests, walk};
 use crate::engine::Engine;
-use crate::io::own_paths::{is_own, straight};
+use crate::io::own_paths::{is_own, without_links};
 use crate::job::Outcome;
 use contract::{Error, Kind, Result};
-use export::FileSum;
-use export::atomic;
+use export::{COPC, FileSum, PLY, atomic};
+use geometry::Aabb;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -86,7 +86,7 @@ impl Manifest {
 
     /// The same, with the digest of the list: it names every byte of the result.
     pub(super) fn read_with_digest(out: &Path) -> Result<(Self, String)> {
-        let path = straight(out, LIST)?;
+        let path = without_links(out, LIST)?;
         let text = std::fs::read_to_string(&path).map_err(|e| {
             let hint = "give the --out folder of a run that has ended";
             Error::bad_input("this is no result: it has no list of its files")
@@ -124,7 +124,7 @@ impl Manifest {
     /// Files that the list of an output folder names, if there is a list, whatever version wrote
     /// it: those that a result has.
     fn named(out: &Path) -> Vec<OutputFile> {
-        let text = straight(out, LIST).ok().and_then(|path| std::fs::read(path).ok());
+        let text = without_links(out, LIST).ok().and_then(|path| std::fs::read(path).ok());
         let manifest = text.and_then(|text| serde_json::from_slice::<Self>(&text).ok());
         let mut files = manifest.map_or_else(Vec::new, |manifest| manifest.files);
         files.retain(|file| is_own(&file.path));
@@ -136,7 +136,8 @@ impl Manifest {
     pub(crate) fn write(
         next: &Path,
         key: Option<super::Key>,
-        (outcome, known): (&Outcome, Vec<OutputFile>),
+        outcome: &Outcome,
+        known: Vec<OutputFile>,
         engine: &Engine,
     ) -> Result<Self> {
         let key = key.ok_or_else(|| Error::new(Kind::Bug, "an input has no digest"))?;
@@ -171,7 +172,7 @@ impl Manifest {
         let old = Self::named(out);
         // Nothing is moved or taken away through a link.
         for file in manifest.files.iter().chain(&old) {
-            straight(out, &file.path)?;
+            without_links(out, &file.path)?;
         }
         // Where it has moved already, all but the list has: a run was cut short between the two.
         if next.join(RESULT).exists() {
@@ -236,8 +237,8 @@ fn same_points(old: &[OutputFile], new: &[OutputFile]) -> bool {
 /// named, too.
 fn forget_exports(out: &Path) -> Vec<String> {
     let mut told = Vec::new();
-    for name in crate::result::conversion::names() {
-        let Ok(path) = straight(out, &format!("{EXPORT}/{name}")) else { continue };
+    for name in export_names() {
+        let Ok(path) = without_links(out, &format!("{EXPORT}/{name}")) else { continue };
         let went = match std::fs::remove_file(&path) {
             Ok(()) => "was taken away",
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => continue,
@@ -259,7 +260,7 @@ fn forget_exports(out: &Path) -> Vec<String> {
 pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
     let (manifest, digest) = Manifest::read_with_digest(out)?;
     let look = |file: &OutputFile| -> Result<Option<String>> {
-        let path = match straight(out, &file.path) {
+        let path = match without_links(out, &file.path) {
             Ok(path) => path,
             Err(link) => return Ok(Some(link.to_string())),
         };
@@ -288,7 +289,7 @@ pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
 /// The list of `out`, if it is of `key` and every file is what it was, as far as lengths, times and
 /// known digests tell.
 pub(super) fn unchanged(
-    contents: &Contents,
+    contents: &FileDigests,
     out: &Path,
     key: &super::Key,
 ) -> Result<Option<Manifest>> {
@@ -341,4 +342,29 @@ fn remove(path: &PathBuf) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Names of all files that points are written to.
+fn export_names() -> impl Iterator<Item = &'static str> {
+    PLY.into_iter().chain([copc_name()])
+}
+
+/// The name of a COPC file without its folder.
+pub(crate) fn copc_name() -> &'static str {
+    COPC.rsplit('/').next().unwrap_or(COPC)
+}
+
+/// Names of spatial tiles of this edge, of all files of a result, that some boxes touch.
+pub(crate) fn tiles_of(files: &[OutputFile], edge: f64, touched: &[&Aabb]) -> Vec<String> {
+    let corner = |name: &str| {
+        let (x, y) = name.strip_prefix("tiles/")?.split_once('.')?.0.split_once('_')?;
+        let [x, y]: [i32; 2] = [x.parse().ok()?, y.parse().ok()?];
+        Some([x, y].map(|i| f64::from(i) * edge))
+    };
+    let is_touched = |at: [f64; 2]| {
+        let touches = |b: &&Aabb| (0..2).all(|i| b.max[i] >= at[i] && b.min[i] <= at[i] + edge);
+        touched.iter().any(touches)
+    };
+    let names = files.iter().map(|file| &file.path);
+    names.filter(|name| corner(name).is_some_and(is_touched)).cloned().collect()
 }

@@ -1,7 +1,9 @@
 //! The output folder of a run: where results go, where they lie until all are whole, and where the
 //! store is kept.
 
-use super::{Cache, Key, Manifest};
+use super::key::Key;
+use super::manifest::Manifest;
+use super::pieces::Cache;
 use crate::job::{Job, places};
 use crate::store::Store;
 use contract::{Error, Kind, Result};
@@ -123,14 +125,14 @@ impl OutputDir {
     pub(crate) fn prune(&self, tiles: &[Key], fits: &[&Cache], models: &Cache) {
         self.prune_tiles(tiles, models);
         let names: Vec<String> = fits.iter().map(|kept| kept.name()).collect();
-        super::prune(&self.fits(), &names);
+        prune(&self.fits(), &names);
     }
 
     /// The same without fits.
     pub(crate) fn prune_tiles(&self, tiles: &[Key], models: &Cache) {
         let names: Vec<String> = tiles.iter().map(|key| key.name().into()).collect();
-        super::prune(&self.tiles(), &names);
-        super::prune(&self.models(), &[models.name()]);
+        prune(&self.tiles(), &names);
+        prune(&self.models(), &[models.name()]);
     }
 
     /// Where a rescan makes the clouds of its new points; taken away by the next run where one is
@@ -194,6 +196,22 @@ fn sweep(store: &Path) {
             if entry.path().extension().is_some_and(|ending| ending == atomic::PART) {
                 let _ = std::fs::remove_file(entry.path());
             }
+        }
+    }
+}
+
+/// Removes what lies in a folder of pieces and is none of `used`.
+fn prune(folder: &Path, used: &[String]) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        if !used.iter().any(|u| name.to_str().is_some_and(|n| n.starts_with(u.as_str()))) {
+            let path = entry.path();
+            // Only space is lost where it stays.
+            let _ = if path.is_dir() {
+                std::fs::remove_dir_all(&path)
+            } else {
+                std::fs::remove_file(&path)
+            };
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Pieces that took long to find in (fits of a region, models of a library), a file of each out,
 //! and back: what an earlier run had found already.
 
-use super::Key;
+use super::key::Key;
 use contract::Result;
 use export::atomic;
 use serde::Serialize;
@@ -71,6 +71,16 @@ pub(crate) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
         return None;
     }
     postcard::from_bytes(body).ok()
+}
+
+/// What was kept of what was asked for (`[kept, all]`, for each name), in words; nothing of what
+/// was all new.
+pub(crate) fn reused_in_words<const N: usize>(
+    names: [&str; N],
+    n_kept: [[usize; 2]; N],
+) -> Vec<String> {
+    let kept = names.iter().zip(n_kept).filter(|(_, [kept, _])| *kept > 0);
+    kept.map(|(name, [kept, all])| format!("{name}: {kept} of {all}")).collect()
 }
 
 #[cfg(test)]

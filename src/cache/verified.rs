@@ -7,7 +7,7 @@
 
 use super::file_digests::Algorithm;
 use super::manifest::{LIST, Manifest, OutputFile, RESULT};
-use crate::io::own_paths::straight;
+use crate::io::own_paths::without_links;
 use contract::{Error, Result};
 use export::{ResultFile, Stated};
 use std::collections::HashMap;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// A result whose files are compared when they are asked for.
-pub(crate) struct Vouched {
+pub(crate) struct VerifiedFiles {
     out: PathBuf,
     manifest: Manifest,
     digest: String,
@@ -25,7 +25,7 @@ pub(crate) struct Vouched {
     compared: Vec<Mutex<bool>>,
 }
 
-impl Vouched {
+impl VerifiedFiles {
     /// Reads the list of a result.
     ///
     /// # Errors
@@ -83,7 +83,7 @@ impl Vouched {
     /// The bytes of a file, compared after they were read.
     ///
     /// # Errors
-    /// As [`Vouched::compared`].
+    /// As [`VerifiedFiles::compared`].
     pub(crate) fn bytes(&self, name: &str) -> Result<Vec<u8>> {
         let (path, file, _) = self.listed(name)?;
         let algorithm = algorithm(&path, file)?;
@@ -121,7 +121,7 @@ impl Vouched {
                 .hint("run the same job again")
         })?;
         let file = &self.manifest.files[at];
-        let path = straight(&self.out, name)?;
+        let path = without_links(&self.out, name)?;
         let meta = std::fs::metadata(&path);
         let meta = meta.map_err(|e| {
             Error::of_read("a file of the result cannot be read", &path, e).hint(HINT)
@@ -140,7 +140,7 @@ impl Vouched {
 /// # Errors
 /// There is none, or it is not what was written.
 pub(crate) fn result_of(path: &Path) -> Result<ResultFile> {
-    if path.is_dir() { Vouched::open(path)?.result() } else { ResultFile::read(path) }
+    if path.is_dir() { VerifiedFiles::open(path)?.result() } else { ResultFile::read(path) }
 }
 
 /// The way out of a file that is not what was written.
@@ -173,18 +173,18 @@ mod tests {
         std::fs::write(dir.path().join("labels/0.kind.npy"), b"labels").expect("writes");
         let outcome = Outcome { summary: "all \"well\"".into(), ..Outcome::default() };
         let key = Some(Key::of("test", &[]));
-        Manifest::write(dir.path(), key, (&outcome, Vec::new()), &Engine::new(1)).expect("lists");
+        Manifest::write(dir.path(), key, &outcome, Vec::new(), &Engine::new(1)).expect("lists");
         dir
     }
 
     #[test]
     fn what_was_changed_is_named_and_the_rest_is_read() {
         let dir = result();
-        let vouched = Vouched::open(dir.path()).expect("opens");
+        let vouched = VerifiedFiles::open(dir.path()).expect("opens");
         assert_eq!(vouched.bytes("plant.bin").expect("reads"), b"plant");
         let mask = vouched.compared("labels/0.kind.npy").expect("is whole");
         std::fs::write(&mask, b"lobels").expect("writes");
-        let again = Vouched::open(dir.path()).expect("opens");
+        let again = VerifiedFiles::open(dir.path()).expect("opens");
         for error in [
             again.compared("labels/0.kind.npy").expect_err("changed"),
             again.bytes("labels/0.kind.npy").expect_err("changed"),
@@ -213,14 +213,15 @@ mod tests {
             let mut changed = bytes.clone();
             changed[at] ^= 1;
             std::fs::write(&path, changed).expect("writes");
-            let error = Vouched::open(dir.path()).err().unwrap_or_else(|| panic!("byte {at}"));
+            let error =
+                VerifiedFiles::open(dir.path()).err().unwrap_or_else(|| panic!("byte {at}"));
             assert!(error.to_string().contains(LIST), "{error}");
         }
         for n in 0..bytes.len() {
             std::fs::write(&path, &bytes[..n]).expect("writes");
-            assert!(Vouched::open(dir.path()).is_err(), "{n} bytes");
+            assert!(VerifiedFiles::open(dir.path()).is_err(), "{n} bytes");
         }
         std::fs::write(&path, [&bytes[..], b"\n"].concat()).expect("writes");
-        assert!(Vouched::open(dir.path()).is_err(), "a line more");
+        assert!(VerifiedFiles::open(dir.path()).is_err(), "a line more");
     }
 }

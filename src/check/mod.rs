@@ -5,118 +5,44 @@
 //! space that no beam went through is not free, and what a part touched already where it was found
 //! is told apart, not forgotten.
 
+mod report;
 mod subject;
 mod surroundings;
 pub mod trajectory;
 mod words;
 
-use crate::cache::Vouched;
+pub use report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
+
+use crate::cache::VerifiedFiles;
 use crate::detect::library;
+use crate::detect::robots::RobotList;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::{Job, Means};
-use crate::rescan::models_of;
-use crate::result::plant_state::State;
-use clearance::{Body, Contact, Contacts, FARTHEST, Obstacles, Walk};
+use crate::result::plant_state::PlantState;
+use clearance::{Body, Contacts, FARTHEST, Obstacles, Walk};
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::ResultFile;
-use geometry::{Point, Pose};
 use robot::Model;
-use std::path::PathBuf;
-use subject::Robot;
+use subject::CheckedRobot;
 use surroundings::Surroundings;
 use trajectory::Trajectory;
-
-/// What is to be checked.
-#[derive(Debug, Clone)]
-pub struct Request {
-    /// Output folder of a run.
-    pub out: PathBuf,
-    /// File of the path.
-    pub trajectory: PathBuf,
-    /// Id of the robot; the only one that has all joints of the path where left out.
-    pub robot: Option<String>,
-    /// Library, where it is not where it was.
-    pub robots: Option<PathBuf>,
-    /// What is nearer is near, metres.
-    pub margin: f64,
-    /// Turning joints of the path are given in degrees.
-    pub degrees: bool,
-}
-
-/// What a path came to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Outcome {
-    /// Nothing is near, and all is known.
-    Free,
-    /// Nothing is near that was not as near where the robot was found; but not all is known.
-    Unknown,
-    /// Something is nearer than the margin.
-    Near,
-    /// Something is hit, or a joint cannot get there.
-    Blocked,
-}
-
-/// Why a path is not known to be free.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
-pub enum Doubt {
-    /// It leads through space that no beam went through
-    Unseen,
-    /// It comes nearer to uncertain points within 10 cm of where the robot was found: most are its
-    /// own and move with it, some may stand in its way
-    Beside,
-    /// Parts are as near to something as they were where the robot was found
-    AsFound,
-    /// The robot's posture is doubtful, not known well enough for the margin, or a joint is not
-    /// determined that the path leaves as found
-    Posture,
-}
-
-/// What was found.
-pub struct Report {
-    /// Id of the robot.
-    pub robot: String,
-    /// Names of its links.
-    pub links: Vec<String>,
-    /// World from its base.
-    pub world_from_base: Pose,
-    /// How near it comes to what.
-    pub contacts: Vec<Contact>,
-    /// What joints cannot do, in words, with the waypoint.
-    pub impossible: Vec<(f64, String)>,
-    /// Why it is not known to be free.
-    pub doubts: Vec<Doubt>,
-    /// What a person should know, in words.
-    pub warnings: Vec<String>,
-    /// The worst of all.
-    pub outcome: Outcome,
-    /// Waypoints, and postures that were looked at.
-    pub n_waypoints: usize,
-    /// See `n_waypoints`.
-    pub n_postures: usize,
-    /// When waypoints are reached, seconds, where the path says.
-    pub times: Vec<f64>,
-    /// What was asked for, metres.
-    pub margin: f64,
-    /// Ids of all robots, by their numbers.
-    pub ids: Vec<String>,
-}
 
 /// Checks a path.
 ///
 /// # Errors
 /// No result, or one without what this needs; a path that is none of the robot's; files that cannot
 /// be read.
-pub fn check(request: &Request, means: &Means, engine: &Engine) -> Result<Report> {
+pub fn check(request: &CheckRequest, means: &Means, engine: &Engine) -> Result<PathReport> {
     let path = Trajectory::read(&request.trajectory, means.settings.ingest.max_text_bytes)?;
-    let choose = |result: &ResultFile, state: &State| chosen(request, (result, state), &path);
-    at_robot(request, choose, (means, engine), |place| place.look(&path, engine))
+    let choose = |result: &ResultFile, state: &PlantState| chosen(request, result, state, &path);
+    at_robot(request, choose, means, engine, |place| place.look(&path, engine))
 }
 
 /// A robot of a result, and all that stands around it: its paths can be looked at one after the
 /// other.
-pub(crate) struct Place<'a> {
-    request: &'a Request,
-    robot: &'a Robot<'a>,
+pub(crate) struct RobotSite<'a> {
+    request: &'a CheckRequest,
+    robot: &'a CheckedRobot<'a>,
     body: Body<'a>,
     obstacles: Obstacles,
     /// Ids of all robots, by their numbers.
@@ -131,16 +57,17 @@ pub(crate) struct Place<'a> {
 /// No result, or one without what this needs; what `choose` and `then` end with; files that cannot
 /// be read.
 pub(crate) fn at_robot<T>(
-    request: &Request,
-    choose: impl FnOnce(&ResultFile, &State) -> Result<usize>,
-    (means, engine): (&Means, &Engine),
-    then: impl FnOnce(&Place<'_>) -> Result<T>,
+    request: &CheckRequest,
+    choose: impl FnOnce(&ResultFile, &PlantState) -> Result<usize>,
+    means: &Means,
+    engine: &Engine,
+    then: impl FnOnce(&RobotSite<'_>) -> Result<T>,
 ) -> Result<T> {
     let out = &request.out;
     // A result that was copied without its store has nobody at work in it.
     let _lock = out.join("store").is_dir().then(|| Job::hold_shared(out)).transpose()?;
-    let files = Vouched::open(out)?;
-    let (result, state) = (files.result()?, State::read(&files)?);
+    let files = VerifiedFiles::open(out)?;
+    let (result, state) = (files.result()?, PlantState::read(&files)?);
     if result.robots.len() != state.fits.len() {
         return Err(Error::bad_input("the result and what is kept beside it are not of one run")
             .at(out.display())
@@ -148,10 +75,10 @@ pub(crate) fn at_robot<T>(
     }
     let number = choose(&result, &state)?;
     let (fits, models) = stood(request, &state, means, engine)?;
-    let robots: Vec<Robot<'_>> = (fits.iter())
+    let robots: Vec<CheckedRobot<'_>> = (fits.iter())
         .map(|(number, fit)| {
             let (entry, model) = (&result.robots[*number], &models[fit.model]);
-            Robot { entry, number: *number, fit, model }
+            CheckedRobot { entry, number: *number, fit, model }
         })
         .collect();
     robots.iter().try_for_each(|robot| robot.is_of_the_library(files.manifest()))?;
@@ -161,10 +88,9 @@ pub(crate) fn at_robot<T>(
     let around = Surroundings { out, files: &files, state: &state, result: &result };
     let others: Vec<(usize, &Fit)> =
         fits.iter().filter(|(at, _)| *at != number).map(|(at, fit)| (*at, fit)).collect();
-    let (mut body, mut obstacles) =
-        surrounded(robot, (&around, &others, &models), request, engine)?;
+    let (mut body, mut obstacles) = surrounded(robot, &around, &others, &models, request, engine)?;
     body.stand(&robot.found(), &mut obstacles);
-    then(&Place {
+    then(&RobotSite {
         request,
         robot,
         body,
@@ -174,12 +100,12 @@ pub(crate) fn at_robot<T>(
     })
 }
 
-impl Place<'_> {
+impl RobotSite<'_> {
     /// Looks along a path.
     ///
     /// # Errors
     /// A path that is none of the robot's; cancelled.
-    pub(crate) fn look(&self, path: &Trajectory, engine: &Engine) -> Result<Report> {
+    pub(crate) fn look(&self, path: &Trajectory, engine: &Engine) -> Result<PathReport> {
         let &Self { request, robot, ref body, ref obstacles, .. } = self;
         let postures = robot.postures(path, request.degrees)?;
         let pairs: Vec<&[Vec<f64>]> = postures.windows(2).collect();
@@ -187,7 +113,7 @@ impl Place<'_> {
         let legs = engine.fan_out(Task::new("path"), pairs, lay)?;
         let walk = Walk::new((body, obstacles), (&postures, &legs), &robot.found());
         let contacts = contacts(&walk, engine)?;
-        let impossible = robot.impossible(&postures, (&legs, contacts.open()), request.degrees);
+        let impossible = robot.impossible(&postures, &legs, &contacts, request.degrees);
         let contacts = contacts.all();
         let mut report = robot.report(request, path, &contacts, impossible);
         report.n_postures = walk.n_postures();
@@ -206,9 +132,11 @@ impl Place<'_> {
 
 /// The robot with what hangs on it, and all that they can get near to.
 fn surrounded<'a>(
-    robot: &Robot<'a>,
-    (around, others, models): (&Surroundings<'_>, &[(usize, &Fit)], &[Model]),
-    request: &Request,
+    robot: &CheckedRobot<'a>,
+    around: &Surroundings<'_>,
+    others: &[(usize, &Fit)],
+    models: &[Model],
+    request: &CheckRequest,
     engine: &Engine,
 ) -> Result<(Body<'a>, Obstacles)> {
     let margin = request.margin;
@@ -218,7 +146,7 @@ fn surrounded<'a>(
             let what = format!("{} reaches {far:.0} m: that is too far to look", robot.entry.id);
             return Err(Error::new(Kind::Unsupported, what).hint("mend the limits of its slides"));
         }
-        let (hung, obstacles) = around.gather(robot, (others, models), far, engine)?;
+        let (hung, obstacles) = around.gather(robot, others, models, far, engine)?;
         let sizes = (margin, obstacles.largest());
         let body = engine.pool()?.install(|| Body::new(robot.model, hung, sizes, &AllThreads));
         let needed = body.farthest() + margin + BETWEEN;
@@ -252,8 +180,9 @@ fn contacts(walk: &Walk<'_>, engine: &Engine) -> Result<Contacts> {
 
 /// The number of the robot that is meant, of those that stand.
 fn chosen(
-    request: &Request,
-    (result, state): (&ResultFile, &State),
+    request: &CheckRequest,
+    result: &ResultFile,
+    state: &PlantState,
     path: &Trajectory,
 ) -> Result<usize> {
     let usage = |what: String, hint: String| Err(Error::new(Kind::Usage, what).hint(hint));
@@ -297,14 +226,14 @@ type Numbered = (usize, Fit);
 
 /// All robots that stand, by number, and their models.
 fn stood(
-    request: &Request,
-    state: &State,
+    request: &CheckRequest,
+    state: &PlantState,
     means: &Means,
     engine: &Engine,
 ) -> Result<(Vec<Numbered>, Vec<Model>)> {
     let dir = request.robots.as_deref().unwrap_or(&state.robots);
     let stands = |fit: &Fit| fit.verdict != Verdict::Refused;
-    let (numbers, mut fits): (Vec<usize>, Vec<Fit>) =
+    let (numbers, fits): (Vec<usize>, Vec<Fit>) =
         state.fits.iter().cloned().enumerate().filter(|(_, fit)| stands(fit)).unzip();
     let is_wanted = |name: &str| {
         let is_it = |fit: &Fit| {
@@ -315,20 +244,7 @@ fn stood(
     if fits.is_empty() {
         return Ok((Vec::new(), Vec::new()));
     }
-    let library = library::load_those(dir, is_wanted, (&means.settings.robot, None), engine)?;
-    let models = models_of(&mut fits, &library)?;
+    let library = library::load_those(dir, is_wanted, &means.settings.robot, None, engine)?;
+    let RobotList { fits, models } = library::robots_of(fits, &library)?;
     Ok((numbers.into_iter().zip(fits).collect(), models))
-}
-
-impl Report {
-    /// A point of the base's frame in the world.
-    fn world(&self, p: &Point) -> [f64; 3] {
-        (self.world_from_base * p).coords.into()
-    }
-
-    /// Whether the path may be gone where these doubts are allowed.
-    #[must_use]
-    pub fn passes(&self, allowed: &[Doubt]) -> bool {
-        self.outcome <= Outcome::Unknown && self.doubts.iter().all(|doubt| allowed.contains(doubt))
-    }
 }

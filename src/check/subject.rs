@@ -1,10 +1,10 @@
 //! A robot of a result and a path in; the path as whole postures, what the joints cannot do, and
 //! what the path came to, out.
 
+use super::report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
 use super::trajectory::Trajectory;
-use super::{Doubt, Outcome, Report, Request};
 use crate::cache::Manifest;
-use clearance::{Contact, Leg, Level, What};
+use clearance::{Contact, Contacts, Leg, Level, What};
 use contract::{Error, Fit, JointFit, Result, Verdict};
 use export::{RobotEntry, mesh_files};
 use robot::{JointKind, Model};
@@ -15,14 +15,14 @@ const LOOP_GAP: f64 = 1e-4;
 const ROUNDING: f64 = 1e-6;
 
 /// A robot of a result.
-pub(super) struct Robot<'a> {
+pub(super) struct CheckedRobot<'a> {
     pub(super) entry: &'a RobotEntry,
     pub(super) number: usize,
     pub(super) fit: &'a Fit,
     pub(super) model: &'a Model,
 }
 
-impl Robot<'_> {
+impl CheckedRobot<'_> {
     /// Refuses a model that is no longer the one that was found: by links, joints and triangles.
     pub(super) fn is_of_the_library(&self, manifest: &Manifest) -> Result<()> {
         let model = self.model;
@@ -81,14 +81,16 @@ impl Robot<'_> {
         Ok(path.points.iter().map(posture).collect())
     }
 
-    /// What its joints cannot do, and where on the path; closed loops stay `open` there, by so
-    /// much, metres.
+    /// What its joints cannot do, and where on the path; closed loops stay open as the
+    /// contacts say.
     pub(super) fn impossible(
         &self,
         path: &[Vec<f64>],
-        (legs, open): (&[Leg], (f64, f64)),
+        legs: &[Leg],
+        contacts: &Contacts,
         degrees: bool,
     ) -> Vec<(f64, String)> {
+        let (open_at, open) = contacts.open();
         let mut out = Vec::new();
         for (free, &joint) in self.model.free.iter().enumerate() {
             let joint = &self.model.joints[joint];
@@ -103,8 +105,8 @@ impl Robot<'_> {
                 format!("{name} is {value:.4}, beyond its limits {low:.4} to {high:.4}{hint}");
             out.push((at as f64, what));
         }
-        if open.1 > LOOP_GAP {
-            out.push((open.0, format!("a closed loop stays open by {:.1} mm", open.1 * 1e3)));
+        if open > LOOP_GAP {
+            out.push((open_at, format!("a closed loop stays open by {:.1} mm", open * 1e3)));
         }
         let jump = legs.iter().position(|leg| leg.jumps);
         out.extend(jump.map(|at| (at as f64, "a part jumps on the way from here".to_owned())));
@@ -148,37 +150,37 @@ impl Robot<'_> {
     /// What the path came to.
     pub(super) fn report(
         &self,
-        request: &Request,
+        request: &CheckRequest,
         path: &Trajectory,
         contacts: &[Contact],
         impossible: Vec<(f64, String)>,
-    ) -> Report {
+    ) -> PathReport {
         let warnings = self.uncertain(path, request.margin);
-        let mut doubts = if warnings.is_empty() { Vec::new() } else { vec![Doubt::Posture] };
+        let mut doubts = if warnings.is_empty() { Vec::new() } else { vec![PathDoubt::Posture] };
         let is_beside = |c: &Contact| c.what == What::Beside || c.is_doubtful;
         let stands = |c: &&Contact| !c.as_found && !is_beside(c);
         let is = |level: Level| contacts.iter().filter(stands).any(|c| c.level >= level);
         let has = |is: &dyn Fn(&Contact) -> bool| contacts.iter().any(is);
         // What was as near where it stood is no news: it stood there.
         if has(&Contact::is_unseen) {
-            doubts.push(Doubt::Unseen);
+            doubts.push(PathDoubt::Unseen);
         }
         if has(&|c| is_beside(c) && c.level > Level::Unseen && !c.as_found) {
-            doubts.push(Doubt::Beside);
+            doubts.push(PathDoubt::Beside);
         }
         if has(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c)) {
-            doubts.push(Doubt::AsFound);
+            doubts.push(PathDoubt::AsFound);
         }
         let outcome = if is(Level::Hit) || !impossible.is_empty() {
-            Outcome::Blocked
+            PathOutcome::Blocked
         } else if is(Level::Near) {
-            Outcome::Near
+            PathOutcome::Near
         } else if doubts.is_empty() {
-            Outcome::Free
+            PathOutcome::Free
         } else {
-            Outcome::Unknown
+            PathOutcome::Unknown
         };
-        Report {
+        PathReport {
             robot: self.entry.id.clone(),
             links: self.entry.links.clone(),
             world_from_base: self.fit.world_from_base,

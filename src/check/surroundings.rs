@@ -1,11 +1,10 @@
 //! A result and one of its robots in; what hangs on that robot, and all that stands around it, out.
 
-use super::Robot;
-use crate::cache::Vouched;
+use super::CheckedRobot;
+use crate::cache::{VerifiedFiles, tiles_of};
 use crate::engine::{Engine, Task};
 use crate::label::known_space::poses;
-use crate::rescan::tiles_of;
-use crate::result::plant_state::State;
+use crate::result::plant_state::PlantState;
 use clearance::{CELL, Cells, Eye, Hung, Known, Obstacles, Shadow, What, hanging};
 use contract::{Error, Fit, PointKind, Result, Scan, Space};
 use export::{OldPoint, ResultFile, SpaceEntry, read_tile};
@@ -23,8 +22,8 @@ const SCANNED_FROM: f64 = 30.0;
 /// A result.
 pub(super) struct Surroundings<'a> {
     pub(super) out: &'a Path,
-    pub(super) files: &'a Vouched,
-    pub(super) state: &'a State,
+    pub(super) files: &'a VerifiedFiles,
+    pub(super) state: &'a PlantState,
     pub(super) result: &'a ResultFile,
 }
 
@@ -57,8 +56,9 @@ impl Surroundings<'_> {
     /// base, metres: points, `others`, and space that no beam went through.
     pub(super) fn gather(
         &self,
-        robot: &Robot<'_>,
-        (others, models): (&[(usize, &Fit)], &[Model]),
+        robot: &CheckedRobot<'_>,
+        others: &[(usize, &Fit)],
+        models: &[Model],
         far: f64,
         engine: &Engine,
     ) -> Result<(Hung, Obstacles)> {
@@ -133,7 +133,7 @@ impl Surroundings<'_> {
     /// What the robots that stand hide from each scanner that is known; frame of the base.
     fn shadows(
         &self,
-        robot: &Robot<'_>,
+        robot: &CheckedRobot<'_>,
         others: &[(i16, &Model, Vec<Pose>)],
         engine: &Engine,
     ) -> Result<Vec<(usize, Shadow)>> {
@@ -239,7 +239,7 @@ impl Surroundings<'_> {
     }
 }
 
-fn sorting<'m>(robot: &Robot<'_>, far: f64, moves: &'m [bool]) -> Sorting<'m> {
+fn sorting<'m>(robot: &CheckedRobot<'_>, far: f64, moves: &'m [bool]) -> Sorting<'m> {
     let (fit, model) = (robot.fit, robot.model);
     let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     Sorting {

@@ -1,6 +1,6 @@
 //! What a path came to in; that for people and for programs out.
 
-use super::{Doubt, Outcome, Report};
+use super::report::{PathDoubt, PathOutcome, PathReport};
 use clearance::{Contact, Level, STEP, What};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -11,7 +11,7 @@ const SCHEMA: &str = "stillpoint.check/2";
 const NOT_CHECKED: &str = "the robot against itself, other robots in motion, the way to the first waypoint, joints that do not go \
      straight from one waypoint to the next, limits of joints that follow others, sides that nobody saw of what hangs on it";
 
-impl Outcome {
+impl PathOutcome {
     /// As it is written.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -24,7 +24,7 @@ impl Outcome {
     }
 }
 
-impl Doubt {
+impl PathDoubt {
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Unseen => "unseen",
@@ -55,7 +55,7 @@ fn level(contact: &Contact) -> &'static str {
     }
 }
 
-impl Report {
+impl PathReport {
     fn what(&self, what: What) -> String {
         match what {
             What::Fixed => "fixed".into(),
@@ -119,10 +119,12 @@ impl Report {
             );
         };
         let contact = match doubt {
-            Doubt::Unseen => worst(&Contact::is_unseen),
-            Doubt::Beside => worst(&|c| is_beside(c) && !c.as_found),
-            Doubt::AsFound => worst(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c)),
-            Doubt::Posture => None,
+            PathDoubt::Unseen => worst(&Contact::is_unseen),
+            PathDoubt::Beside => worst(&|c| is_beside(c) && !c.as_found),
+            PathDoubt::AsFound => {
+                worst(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c))
+            }
+            PathDoubt::Posture => None,
         };
         match contact.map(told) {
             Some((part, _, place)) => {

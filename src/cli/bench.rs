@@ -1,32 +1,37 @@
 //! `bench`: suites and numbers in; tables of what the program is worth out.
 
 use super::bench_flags::{
-    AccuracyFlags, Against, CheckBenchFlags, PlanBenchFlags, PlantFlags, RescanBenchFlags,
-    ThroughputFlags,
+    AccuracyFlags, Against, CheckBenchFlags, KeptFlags, PlanBenchFlags, PlantFlags,
+    RescanBenchFlags, SeedFlags, ThroughputFlags,
 };
 use super::exit;
 use super::flags::Common;
 use super::say::Say;
+use crate::eval::bench::accuracy::{AccuracyBench, accuracy};
 use crate::eval::bench::check::{CheckBench, checks};
+use crate::eval::bench::frames::frames;
 use crate::eval::bench::plan::{PlanBench, plans};
 use crate::eval::bench::plant::{PlantBench, plants};
-use crate::eval::bench::rescan::{RescanBench, rescans};
+use crate::eval::bench::request::{DrawnCases, PlantSize, RescanBench, RescanSuite};
+use crate::eval::bench::rescan::rescans;
 use crate::eval::bench::throughput::{ThroughputBench, throughput};
-use crate::eval::bench::{Bench, accuracy};
 use contract::{Error, Kind, Result};
 
 pub(super) fn bench_accuracy(flags: &AccuracyFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
     let engine = common.engine(&means)?;
-    let bench = Bench {
+    let bench = AccuracyBench {
+        drawn: DrawnCases {
+            first: flags.drawn.seeds.first,
+            seed: flags.drawn.seeds.seed,
+            robots: flags.robots.clone(),
+            out: flags.out.clone(),
+            keep: false,
+        },
         suites: flags.drawn.suite.clone(),
         n_cases: flags.drawn.cases,
-        first: flags.drawn.first,
-        seed: flags.drawn.seed,
-        robots: flags.drawn.robots.clone(),
         models: flags.model.clone(),
         whole_library: flags.against == Against::Library,
-        out: flags.out.clone(),
     };
     say.result(&accuracy(&bench, &means, &engine)?);
     Ok(exit::OK)
@@ -36,13 +41,9 @@ pub(super) fn bench_plant(flags: &PlantFlags, common: &Common, say: &Say) -> Res
     let means = common.means()?;
     let engine = common.engine(&means)?;
     let bench = PlantBench {
+        drawn: drawn(&flags.drawn.seeds, &flags.kept),
         suites: flags.drawn.suite.clone(),
         n_cases: flags.drawn.cases,
-        first: flags.drawn.first,
-        seed: flags.drawn.seed,
-        robots: flags.drawn.robots.clone(),
-        out: flags.out.clone(),
-        keep: flags.keep,
     };
     say.result(&plants(&bench, &means, &engine)?);
     Ok(exit::OK)
@@ -53,8 +54,8 @@ pub(super) fn bench_plan(flags: &PlanBenchFlags, common: &Common, say: &Say) -> 
     let engine = common.engine(&means)?;
     let bench = PlanBench {
         n_halls: flags.halls,
-        first: flags.first,
-        seed: flags.seed,
+        first: flags.seeds.first,
+        seed: flags.seeds.seed,
         robots: flags.robots.clone(),
         out: flags.out.clone(),
         keep: flags.keep,
@@ -66,24 +67,22 @@ pub(super) fn bench_plan(flags: &PlanBenchFlags, common: &Common, say: &Say) -> 
 pub(super) fn bench_rescan(flags: &RescanBenchFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
     // Of a case that fails the bench says so and goes on; a library that is not there fails all.
-    if let Some(robots) = &flags.robots {
+    if let Some(robots) = &flags.kept.robots {
         robot::Library::open(robots)?;
     }
     let engine = common.engine(&means)?;
     let bench = RescanBench {
+        drawn: drawn(&flags.seeds, &flags.kept),
         n_cases: flags.cases,
-        first: flags.first,
-        seed: flags.seed,
-        n_robots: flags.n_robots,
-        n_scanners: flags.scans,
-        step_deg: flags.step,
-        robots: flags.robots.clone(),
-        out: flags.out.clone(),
-        keep: flags.keep,
+        size: PlantSize { n_robots: flags.n_robots, n_scanners: flags.scans, step_deg: flags.step },
         alone: flags.alone,
         suite: flags.suite,
     };
-    say.result(&rescans(&bench, &means, &engine)?);
+    let table = match bench.suite {
+        RescanSuite::Same => rescans(&bench, &means, &engine)?,
+        RescanSuite::Frames | RescanSuite::Lines => frames(&bench, &means, &engine)?,
+    };
+    say.result(&table);
     Ok(exit::OK)
 }
 
@@ -91,16 +90,10 @@ pub(super) fn bench_check(flags: &CheckBenchFlags, common: &Common, say: &Say) -
     let means = common.means()?;
     let engine = common.engine(&means)?;
     let bench = CheckBench {
+        drawn: drawn(&flags.seeds, &flags.kept),
         n_cases: flags.cases,
-        first: flags.first,
-        seed: flags.seed,
-        n_robots: flags.n_robots,
-        n_scanners: flags.scans,
-        step_deg: flags.step,
+        size: PlantSize { n_robots: flags.n_robots, n_scanners: flags.scans, step_deg: flags.step },
         margin: flags.margin,
-        robots: flags.robots.clone(),
-        out: flags.out.clone(),
-        keep: flags.keep,
     };
     say.result(&checks(&bench, &means, &engine)?);
     Ok(exit::OK)
@@ -139,4 +132,10 @@ pub(super) fn bench_throughput(flags: &ThroughputFlags, common: &Common, say: &S
     };
     say.result(&throughput(&bench, &means, &engine)?);
     Ok(exit::OK)
+}
+
+/// The cases that flags ask for.
+fn drawn(seeds: &SeedFlags, kept: &KeptFlags) -> DrawnCases {
+    let KeptFlags { robots, out, keep } = kept.clone();
+    DrawnCases { first: seeds.first, seed: seeds.seed, robots, out, keep }
 }

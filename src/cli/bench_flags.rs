@@ -1,6 +1,6 @@
 //! Commands and flags of `bench`, as `clap` knows them.
 
-use crate::eval::bench::frames::Suite;
+use crate::eval::bench::request::RescanSuite;
 use crate::eval::bench::throughput::Scanned;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -26,9 +26,34 @@ pub(super) enum BenchCommand {
     Throughput(ThroughputFlags),
 }
 
-/// Cases that are drawn from seeds.
+/// Which cases are drawn from seeds.
 #[derive(Debug, Args)]
-pub(super) struct Drawn {
+pub(super) struct SeedFlags {
+    /// Number of the first of them, to look at single ones again
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub(super) first: usize,
+    /// Seed of all that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) seed: u64,
+}
+
+/// With which robots, and what is kept.
+#[derive(Debug, Clone, Args)]
+pub(super) struct KeptFlags {
+    /// Robot library (else the demo's robots)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// Where rows and tables go; scenes, scans and results are kept there, too, with --keep
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// Keep scenes, scans and results
+    #[arg(long, requires = "out")]
+    pub(super) keep: bool,
+}
+
+/// Cases of suites.
+#[derive(Debug, Args)]
+pub(super) struct SuiteFlags {
     /// Suites, by name (else all)
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub(super) suite: Vec<String>,
@@ -36,21 +61,17 @@ pub(super) struct Drawn {
     /// number)
     #[arg(long, value_name = "N")]
     pub(super) cases: Option<usize>,
-    /// Number of the first of them, to look at single ones again
-    #[arg(long, value_name = "K", default_value_t = 0)]
-    pub(super) first: usize,
-    /// Seed of all that is drawn
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) seed: u64,
-    /// Robot library (else the demo's robots)
-    #[arg(long, value_name = "DIR")]
-    pub(super) robots: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) seeds: SeedFlags,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct AccuracyFlags {
     #[command(flatten)]
-    pub(super) drawn: Drawn,
+    pub(super) drawn: SuiteFlags,
+    /// Robot library (else the demo's robots)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
     /// Only robots whose name holds one of these
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub(super) model: Vec<String>,
@@ -65,13 +86,9 @@ pub(super) struct AccuracyFlags {
 #[derive(Debug, Args)]
 pub(super) struct PlantFlags {
     #[command(flatten)]
-    pub(super) drawn: Drawn,
-    /// Where rows and tables go; scenes, scans and results are kept there, too, with --keep
-    #[arg(long, value_name = "DIR")]
-    pub(super) out: Option<PathBuf>,
-    /// Keep scenes, scans and results
-    #[arg(long, requires = "out")]
-    pub(super) keep: bool,
+    pub(super) drawn: SuiteFlags,
+    #[command(flatten)]
+    pub(super) kept: KeptFlags,
 }
 
 #[derive(Debug, Args)]
@@ -79,12 +96,8 @@ pub(super) struct PlanBenchFlags {
     /// Halls
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub(super) halls: usize,
-    /// Number of the first of them
-    #[arg(long, value_name = "K", default_value_t = 0)]
-    pub(super) first: usize,
-    /// Seed of all that is drawn
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) seed: u64,
+    #[command(flatten)]
+    pub(super) seeds: SeedFlags,
     /// Robot library that the halls' libraries are chosen from
     #[arg(long, value_name = "DIR")]
     pub(super) robots: PathBuf,
@@ -101,12 +114,8 @@ pub(super) struct RescanBenchFlags {
     /// Plants
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub(super) cases: usize,
-    /// Number of the first of them
-    #[arg(long, value_name = "K", default_value_t = 0)]
-    pub(super) first: usize,
-    /// Seed of all that is drawn
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) seed: u64,
+    #[command(flatten)]
+    pub(super) seeds: SeedFlags,
     /// Robots of each plant
     #[arg(long, value_name = "N", default_value_t = 4)]
     pub(super) n_robots: usize,
@@ -116,19 +125,12 @@ pub(super) struct RescanBenchFlags {
     /// Angle between beams, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.13)]
     pub(super) step: f64,
-    /// Robot library (else the demo's robots)
-    #[arg(long, value_name = "DIR")]
-    pub(super) robots: Option<PathBuf>,
-    /// Where rows go; scans and results are kept there, too, with --keep
-    #[arg(long, value_name = "DIR")]
-    pub(super) out: Option<PathBuf>,
-    /// Keep scans and results
-    #[arg(long, requires = "out")]
-    pub(super) keep: bool,
+    #[command(flatten)]
+    pub(super) kept: KeptFlags,
     /// Plants in one frame, new scans in frames that are drawn, or lines of equal cells in such
     /// frames
     #[arg(long, value_enum, value_name = "WHICH", default_value = "same")]
-    pub(super) suite: Suite,
+    pub(super) suite: RescanSuite,
     /// Do the main job on the new scans alone, too, to compare with
     #[arg(long)]
     pub(super) alone: bool,
@@ -139,12 +141,8 @@ pub(super) struct CheckBenchFlags {
     /// Cells
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub(super) cases: usize,
-    /// Number of the first of them
-    #[arg(long, value_name = "K", default_value_t = 0)]
-    pub(super) first: usize,
-    /// Seed of all that is drawn
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) seed: u64,
+    #[command(flatten)]
+    pub(super) seeds: SeedFlags,
     /// Robots of each cell
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) n_robots: usize,
@@ -157,15 +155,8 @@ pub(super) struct CheckBenchFlags {
     /// What comes nearer to a robot is in its way, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.02)]
     pub(super) margin: f64,
-    /// Robot library (else the demo's robots)
-    #[arg(long, value_name = "DIR")]
-    pub(super) robots: Option<PathBuf>,
-    /// Where rows and tables go; scenes, scans and results are kept there, too, with --keep
-    #[arg(long, value_name = "DIR")]
-    pub(super) out: Option<PathBuf>,
-    /// Keep scenes, scans and results
-    #[arg(long, requires = "out")]
-    pub(super) keep: bool,
+    #[command(flatten)]
+    pub(super) kept: KeptFlags,
 }
 
 #[derive(Debug, Args)]

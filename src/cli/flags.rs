@@ -3,7 +3,7 @@
 
 use super::bench_flags::BenchCommand;
 use super::say::LogFormat;
-use crate::check::Doubt;
+use crate::check::PathDoubt;
 use crate::engine::Engine;
 use crate::engine::progress::{Mode, Progress};
 use crate::job::{Given, Means};
@@ -182,7 +182,7 @@ pub(super) struct CheckFlags {
     pub(super) degrees: bool,
     /// What a path that passes may leave in doubt
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
-    pub(super) allow: Vec<Doubt>,
+    pub(super) allow: Vec<PathDoubt>,
     /// Robot library (else that of the run)
     #[arg(long, value_name = "DIR")]
     pub(super) robots: Option<PathBuf>,

@@ -7,13 +7,13 @@ use super::flags::{
     CheckFlags, Common, DiffFlags, ExportFlags, HistoryFlags, OutFlags, ReportFlags,
 };
 use super::say::Say;
-use crate::cache::{Manifest, Vouched, result_of};
-use crate::check::{Outcome as Clear, Request};
+use crate::cache::{Manifest, VerifiedFiles, result_of};
+use crate::check::{CheckRequest, PathOutcome as Clear};
 use crate::job::Outcome;
+use crate::result::changed_things::ThingEntry;
 use crate::result::changes::{changes, words};
 use crate::result::conversion::convert;
 use crate::result::history;
-use crate::result::objects::ThingEntry;
 use crate::{cache, check};
 use contract::words::count;
 use contract::{Error, Kind, Result};
@@ -44,7 +44,7 @@ pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8>
 }
 
 pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
-    let files = Vouched::open(&flags.out)?;
+    let files = VerifiedFiles::open(&flags.out)?;
     if let Some(path) = &flags.junit {
         export::write_junit(path, &files.result()?, files.manifest().partial)?;
     }
@@ -70,7 +70,7 @@ pub(super) fn check_path(flags: &CheckFlags, common: &Common, say: &Say) -> Resu
     }
     let means = common.means()?;
     let engine = common.engine(&means)?;
-    let request = Request {
+    let request = CheckRequest {
         out: flags.out.clone(),
         trajectory: flags.trajectory.clone(),
         robot: flags.robot.clone(),
@@ -110,7 +110,7 @@ pub(super) fn diff(flags: &DiffFlags, say: &Say) -> Result<u8> {
     let (then, now) = (result_of(&flags.then)?, result_of(&flags.now)?);
     let changes = changes(&then, &now);
     // Where the one goes on from the other, that one knows what else changed.
-    let digest = Vouched::open(&flags.then).ok().map(|files| files.digest().to_owned());
+    let digest = VerifiedFiles::open(&flags.then).ok().map(|files| files.digest().to_owned());
     let goes_on = digest.is_some() && now.rescan.as_ref().map(|r| &r.base) == digest.as_ref();
     let things = if goes_on { things(&flags.now)? } else { Vec::new() };
     if flags.json {
@@ -133,7 +133,7 @@ fn things(out: &Path) -> Result<Vec<ThingEntry>> {
     }
     const NAME: &str = "changes.json";
 
-    let text = Vouched::open(out)?.bytes(NAME)?;
+    let text = VerifiedFiles::open(out)?.bytes(NAME)?;
     let all: Changes = serde_json::from_slice(&text).map_err(|e| {
         let bad = Error::bad_input("the list of changes cannot be read").because(e);
         bad.at(out.join(NAME).display())

@@ -7,7 +7,7 @@ use super::{exit, keep_going};
 use crate::engine::Engine;
 use crate::estimate::{estimate, with_missing};
 use crate::job::Job;
-use crate::rescan::{self, Cell, Frame, Request};
+use crate::rescan::{self, Cell, Frame, RescanRequest};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use std::fmt::Write as _;
@@ -36,7 +36,7 @@ pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<
     let means = common.means()?;
     present(&flags.inputs)?;
     let engine = common.engine(&means)?;
-    let request = Request {
+    let request = RescanRequest {
         base: flags.base.clone(),
         cell: cell(flags)?,
         frame: frame(flags.frame.as_deref())?,

@@ -3,13 +3,13 @@
 //! in; one corrected model out.
 
 use super::search::Search;
-use super::tools::adopt;
+use super::tools::take_models;
 use crate::cache::result_of;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::io::copy_folder;
 use crate::job::MAX_TEXT;
 use contract::words::count;
-use contract::{Calibration, Error, Fit, Kind, Region, Result, Verdict};
+use contract::{Calibration, Error, Fit, Kind, Result, Verdict};
 use export::RobotEntry;
 use export::atomic;
 use fit::Prepared;
@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 pub(crate) fn calibrate(
     fits: Vec<Fit>,
     models: &mut Vec<Model>,
-    (search, regions): (&Search<'_, '_>, &[Region]),
+    search: &Search<'_, '_>,
     engine: &Engine,
 ) -> Result<Vec<Fit>> {
     let known: &[Model] = models;
@@ -33,13 +33,13 @@ pub(crate) fn calibrate(
         if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
             return Ok((fit, None));
         }
-        let found = search.with_scene(&fit, regions, |scene, settings| {
+        let found = search.with_scene(&fit, |scene, settings| {
             let prepared = Prepared::new(fit.model, &known[fit.model], &AllThreads);
             fit::calibrate(&fit, &prepared, scene, settings, &AllThreads)
         })?;
         Ok(found.map_or((fit, None), |(model, fit)| (fit, Some(model))))
     })?;
-    Ok(adopt(done, models))
+    Ok(take_models(done, models))
 }
 
 /// Which robots of the results are put together.
@@ -63,7 +63,7 @@ pub struct Together {
 /// A reading of a controller.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Reading {
+struct PostureReading {
     /// Output folder, as on the command line.
     result: PathBuf,
     /// Id of the robot in it.
@@ -74,9 +74,9 @@ struct Reading {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Readings {
+struct PostureReadings {
     #[serde(default)]
-    posture: Vec<Reading>,
+    posture: Vec<PostureReading>,
 }
 
 /// Puts together what the results say of the wanted robots; readings are a file and how many bytes
@@ -112,18 +112,20 @@ pub fn together(
     let Some(calibration) = fit::combine(&own.iter().collect::<Vec<_>>()) else {
         return usage(format!("the models of {model} have other joints"), "use one library");
     };
-    let zeros = readings.map(|file| zeros(file, &robots)).transpose()?.unwrap_or_default();
+    let zeros =
+        readings.map(|(file, most)| zeros(file, most, &robots)).transpose()?.unwrap_or_default();
     Ok(Together { model, n_postures: own.len(), calibration, zeros })
 }
 
 /// Offsets of joints' zeros: weighted means of what was found less what was read.
 fn zeros(
-    (file, most): (&Path, u64),
+    file: &Path,
+    most: u64,
     robots: &[(PathBuf, RobotEntry)],
 ) -> Result<BTreeMap<String, [f64; 2]>> {
     let bad = |e: String| Error::bad_input(e).at(file.display());
     let text = ingest::read_text(file, most, MAX_TEXT)?;
-    let readings: Readings = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
+    let readings: PostureReadings = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
     let mut sums: BTreeMap<String, [f64; 2]> = BTreeMap::new();
     for reading in &readings.posture {
         let is_it = |r: &&(PathBuf, RobotEntry)| r.0 == reading.result && r.1.id == reading.robot;

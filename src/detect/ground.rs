@@ -1,23 +1,25 @@
 //! Tiles in; what the scans cover, floor and occupied space out: the lattice stage's map and the
 //! floor stage's fold, joined so that one pass over the tiles serves both.
 
-use crate::store::TileEntry;
+use crate::engine::Engine;
+use crate::job::Settings;
+use crate::store::{Store, TileEntry};
 use contract::{Fold, Map, Result, Scan, ScanId, TILE_SIDE, Tile, TileSummary, Weigh};
 use lattice::{Extent, Summarise};
 use serde::{Deserialize, Serialize};
 
 /// The map: a tile's summary, and which rows and columns of its scan it covers.
-pub(crate) struct Surfaces(Summarise);
+struct Surfaces(Summarise);
 
 /// What one tile leaves behind.
-pub(crate) struct Surface {
+struct Surface {
     scan: ScanId,
     extent: Option<Extent>,
     summary: TileSummary,
 }
 
 /// The fold.
-pub(crate) struct Gather {
+struct GatherGround {
     find: floor::Find,
     n_scans: usize,
 }
@@ -31,24 +33,65 @@ pub(crate) struct Ground {
     pub(crate) extents: Vec<Option<Extent>>,
 }
 
+impl Ground {
+    /// One pass over the tiles of a store: floor, walls and occupied space.
+    ///
+    /// # Errors
+    /// A damaged tile; cancelled.
+    pub(crate) fn of_tiles(
+        scans: &[Scan],
+        store: &Store,
+        settings: &Settings,
+        engine: &Engine,
+    ) -> Result<Self> {
+        Self::gather(Surfaces::new(scans, &settings.lattice), scans, store, settings, engine)
+    }
+
+    /// The same without planes: for where floor and walls are known.
+    ///
+    /// # Errors
+    /// As of [`Ground::of_tiles`].
+    pub(crate) fn without_planes(
+        scans: &[Scan],
+        store: &Store,
+        settings: &Settings,
+        engine: &Engine,
+    ) -> Result<Self> {
+        let surfaces = Surfaces::new(scans, &settings.lattice).without_planes();
+        Self::gather(surfaces, scans, store, settings, engine)
+    }
+
+    fn gather(
+        surfaces: Surfaces,
+        scans: &[Scan],
+        store: &Store,
+        settings: &Settings,
+        engine: &Engine,
+    ) -> Result<Self> {
+        let gather = GatherGround::new(scans, &settings.floor);
+        let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
+        engine.pass(store.task("surfaces"), source, |f| f.map(&reads).map(&surfaces).fold(&gather))
+    }
+}
+
 impl Surfaces {
-    pub(crate) fn new(scans: &[Scan], settings: &lattice::Settings) -> Self {
+    fn new(scans: &[Scan], settings: &lattice::Settings) -> Self {
         Self(Summarise::new(scans, settings))
     }
 
     /// How much of a tile of the store may be left out.
-    pub(crate) fn skip(&self, entry: &TileEntry) -> u32 {
+    fn skip(&self, entry: &TileEntry) -> u32 {
         self.0.skip(entry.at.scan, entry.range)
     }
 
     /// The same without planes: for where floor and walls are known.
-    pub(crate) fn without_planes(self) -> Self {
+    fn without_planes(self) -> Self {
         Self(self.0.without_planes())
     }
 }
 
-impl Gather {
-    pub(crate) fn new(scans: &[Scan], settings: &floor::Settings) -> Self {
+impl GatherGround {
+    fn new(scans: &[Scan], settings: &floor::Settings) -> Self {
         Self { find: floor::Find::new(scans, settings), n_scans: scans.len() }
     }
 }
@@ -65,7 +108,7 @@ impl Map for Surfaces {
     }
 }
 
-impl Fold for Gather {
+impl Fold for GatherGround {
     type In = Surface;
     type Sum = (floor::Sum, Vec<Option<Extent>>);
     type Out = Ground;

@@ -1,9 +1,10 @@
 //! A folder in, the robot library out, its models loaded in parallel.
 
+use super::robots::RobotList;
 use crate::cache::Cache;
 use crate::engine::{AllThreads, Engine};
-use contract::Result;
-use robot::{Library, Settings};
+use contract::{Error, Fit, Result};
+use robot::{Library, Model, Settings};
 use std::path::Path;
 
 /// Models of a library, loadable or not.
@@ -34,14 +35,15 @@ pub(crate) fn load(
     kept: Option<&Cache>,
     engine: &Engine,
 ) -> Result<Library> {
-    load_those(dir, |_| true, (settings, kept), engine)?.checked(dir)
+    load_those(dir, |_| true, settings, kept, engine)?.checked(dir)
 }
 
 /// The same of those whose names are wanted; maybe none.
 pub(crate) fn load_those(
     dir: &Path,
     is_wanted: impl Fn(&str) -> bool,
-    (settings, kept): (&Settings, Option<&Cache>),
+    settings: &Settings,
+    kept: Option<&Cache>,
     engine: &Engine,
 ) -> Result<Library> {
     let (mut folders, mut library) = Library::open(dir)?;
@@ -64,4 +66,49 @@ pub(crate) fn load_those(
         library.add(model);
     }
     Ok(library)
+}
+
+/// Robots of an earlier result, with their models rebuilt from a library: those with tools, with
+/// other loops or calibrated after its own.
+///
+/// # Errors
+/// A model that the library no longer has.
+pub(crate) fn robots_of(mut fits: Vec<Fit>, library: &Library) -> Result<RobotList> {
+    let mut models = library.models.clone();
+    fits.iter_mut().try_for_each(|fit| own_model(fit, library, &mut models))?;
+    Ok(RobotList { fits, models })
+}
+
+/// Sets the model of a fit, and of the same robot as it stood in other scans; one that is no model
+/// of the library is added.
+fn own_model(fit: &mut Fit, library: &Library, models: &mut Vec<Model>) -> Result<()> {
+    let missing = |name: &str| {
+        let what = format!("the library has no model \"{name}\", which the earlier result found");
+        Error::bad_input(what).hint("give the library of the earlier run with --robots")
+    };
+    let known = |name: &str| library.model(name).ok_or_else(|| missing(name));
+    fit.model = known(&fit.model_name)?;
+    let mut own = (!fit.other_branches.is_empty())
+        .then(|| models[fit.model].with_other_branches(&fit.other_branches));
+    if let Some(tool) = &fit.tool {
+        let arm = own.as_ref().unwrap_or(&models[fit.model]);
+        let flange = arm.links.iter().position(|l| l.name == tool.link).ok_or_else(|| {
+            let what = format!("model \"{}\" has no link \"{}\"", arm.name, tool.link);
+            Error::bad_input(what).hint("give the library of the earlier run with --robots")
+        })?;
+        own = Some(arm.with_tool(&models[known(&tool.model)?], flange, tool.mount));
+    }
+    if let Some(found) = &fit.calibration {
+        let own = own.get_or_insert_with(|| models[fit.model].clone());
+        for joint in &mut own.joints {
+            if let Some(frame) = found.frames.iter().find(|f| f.name == joint.name) {
+                joint.parent_from_joint *= frame.moved();
+            }
+        }
+    }
+    if let Some(own) = own {
+        fit.model = models.len();
+        models.push(own);
+    }
+    fit.stays.iter_mut().try_for_each(|stay| own_model(stay, library, models))
 }

@@ -6,5 +6,7 @@ pub(crate) mod ground;
 pub(crate) mod library;
 pub(crate) mod region_failures;
 pub mod review;
+pub(crate) mod robot_id;
+pub(crate) mod robots;
 pub(crate) mod search;
 pub(crate) mod tools;

@@ -8,12 +8,12 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 /// Regions that failed, in words, by their place.
-pub(crate) struct Failures {
+pub(crate) struct RegionFailures {
     is_forgiving: bool,
     list: Mutex<BTreeMap<String, String>>,
 }
 
-impl Failures {
+impl RegionFailures {
     pub(crate) fn of(job: &Job) -> Self {
         Self { is_forgiving: job.keep_going, list: Mutex::default() }
     }
@@ -67,13 +67,13 @@ mod tests {
             origin: Point::new(4.0, 0.0, 0.0),
             bounds: Aabb { min: [-1.0; 3], max: [1.0; 3] },
         };
-        let failures = Failures::of(&job(true));
+        let failures = RegionFailures::of(&job(true));
         let none: Vec<u8> = failures.spare(&region, || panic!("a fault")).expect("forgiven");
         assert!(none.is_empty());
         assert!(failures.spare(&region, || Err::<u8, _>(Error::new(Kind::Io, "disk"))).is_err());
         let said = failures.said(&job(true));
         assert!(said.len() == 1 && said[0].contains("(4.0, 0.0, 0.0)"), "{said:?}");
-        let strict = Failures::of(&job(false));
+        let strict = RegionFailures::of(&job(false));
         assert!(strict.spare(&region, || Err::<u8, _>(Error::new(Kind::Bug, "fault"))).is_err());
     }
 }

@@ -13,20 +13,19 @@
 //!
 //! The file is the user's and is given again with every run, so what it says survives reruns.
 
-mod heard;
+mod effects;
 
 use super::search::Search;
 use crate::engine::{AllThreads, Engine, Task};
-use crate::job::MAX_TEXT;
+use crate::job::{Job, MAX_TEXT};
 use contract::words::triple;
-use contract::{Error, Fit, JointFit, Region, Result, Verdict};
-use export::ReviewEntry;
+use contract::{Error, Fit, JointFit, Result, Verdict};
 use geometry::{Point, Pose};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How near a base must be to the place given, metres.
 const RADIUS: f64 = 0.5;
@@ -37,13 +36,13 @@ const RADIUS: f64 = 0.5;
 pub struct Review {
     /// What is known, place by place.
     #[serde(default, rename = "robot")]
-    pub places: Vec<Place>,
+    pub places: Vec<ReviewPlace>,
 }
 
 /// What is known of one place.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Place {
+pub struct ReviewPlace {
     /// Near the base, world, metres.
     pub at: [f64; 3],
     /// How near, metres.
@@ -59,8 +58,8 @@ pub struct Place {
     /// known.
     #[serde(default)]
     pub joints: BTreeMap<String, f64>,
-    /// How its base is turned, roll, pitch and yaw as in URDF, radians; [`Place::at`] is the base
-    /// itself then.
+    /// How its base is turned, roll, pitch and yaw as in URDF, radians; [`ReviewPlace::at`] is the
+    /// base itself then.
     #[serde(default)]
     pub rpy: Option<[f64; 3]>,
 }
@@ -80,6 +79,16 @@ fn radius() -> f64 {
 }
 
 impl Review {
+    /// What is known of the robots of a job; nothing where it names no review.
+    ///
+    /// # Errors
+    /// As of [`Review::read`].
+    pub(crate) fn of(job: &Job, models: &[Model]) -> Result<Self> {
+        let most = job.means.settings.ingest.max_text_bytes;
+        let read = |path: &PathBuf| Self::read(path, models, most);
+        Ok(job.review.as_ref().map(read).transpose()?.unwrap_or_default())
+    }
+
     /// Reads a review.
     ///
     /// # Errors
@@ -107,7 +116,7 @@ impl Review {
     pub(crate) fn correct(
         &self,
         mut fits: Vec<Fit>,
-        (search, regions): (&Search<'_, '_>, &[Region]),
+        search: &Search<'_, '_>,
         models: &[Model],
         engine: &Engine,
     ) -> Result<(Vec<Fit>, Vec<usize>)> {
@@ -118,8 +127,8 @@ impl Review {
             Task::new("review").large(),
             starts.iter().collect(),
             |(_, start)| {
-                search.with_scene(start, regions, |scene, settings| {
-                    let prepared = search.shelf().prepared(start.model);
+                search.with_scene(start, |scene, settings| {
+                    let prepared = search.library().prepared(start.model);
                     fit::again(start, prepared, scene, settings, &AllThreads)
                 })
             },
@@ -174,13 +183,6 @@ impl Review {
         }
     }
 
-    /// What each entry did, in their order: robots that would be reported without the review, those
-    /// that are, and entries whose posture the scans do not bear out.
-    #[must_use]
-    pub(crate) fn did(&self, without: &[Fit], with: &[Fit], wrong: &[usize]) -> Vec<ReviewEntry> {
-        self.told(&heard::Heard { without, with, wrong })
-    }
-
     /// Whether somebody accepts a fit.
     #[must_use]
     pub fn accepts(&self, fit: &Fit) -> bool {
@@ -198,7 +200,7 @@ impl Review {
     }
 }
 
-impl Place {
+impl ReviewPlace {
     /// Whether all of the entry with this number can be; else what cannot.
     fn check(&self, number: usize, models: &[Model]) -> std::result::Result<(), String> {
         let numbers = self.at.iter().chain([&self.radius]).chain(self.joints.values());
@@ -294,9 +296,9 @@ mod tests {
         Fit { model_name: model.into(), world_from_base, explained, ..Fit::default() }
     }
 
-    pub(super) fn place(x: f64, model: Option<&str>, verdict: Option<Decision>) -> Place {
+    pub(super) fn place(x: f64, model: Option<&str>, verdict: Option<Decision>) -> ReviewPlace {
         let (model, joints) = (model.map(Into::into), BTreeMap::new());
-        Place { at: [x, 0.0, 0.0], radius: RADIUS, model, verdict, joints, rpy: None }
+        ReviewPlace { at: [x, 0.0, 0.0], radius: RADIUS, model, verdict, joints, rpy: None }
     }
 
     #[test]
@@ -324,7 +326,7 @@ mod tests {
             |name: &str, value: f64| JointFit { name: name.into(), value, ..JointFit::default() };
         let found =
             Fit { joints: vec![value("turn", 0.3), value("bend", 0.9)], ..fit("arm", 0.1, 1.0) };
-        let given = Place {
+        let given = ReviewPlace {
             joints: BTreeMap::from([("bend".to_string(), -1.2)]),
             ..place(0.0, Some("arm"), None)
         };

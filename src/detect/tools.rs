@@ -1,9 +1,9 @@
 //! Fits of arms and a library with tools in; fits of arms with what hangs on their flanges out, and
 //! the models that these fits are of.
 
-use super::search::{Search, Shelf};
+use super::search::{PreparedLibrary, Search};
 use crate::engine::{AllThreads, Engine, Task};
-use contract::{Certainty, Fit, JointFit, Mounted, Region, Result, Verdict};
+use contract::{Certainty, Fit, JointFit, Mounted, Result, Verdict};
 use fit::{Prepared, Scene, Settings, Tooled};
 use robot::Model;
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
@@ -29,10 +29,10 @@ pub(crate) fn branch(mut fits: Vec<Fit>, models: &mut Vec<Model>) -> Vec<Fit> {
 }
 
 /// The fits, those with a tool replaced by fits of both, whose models are added to `models`.
-pub(crate) fn dress(
+pub(crate) fn attach_tools(
     fits: Vec<Fit>,
     models: &mut Vec<Model>,
-    (search, regions): (&Search<'_, '_>, &[Region]),
+    search: &Search<'_, '_>,
     engine: &Engine,
 ) -> Result<Vec<Fit>> {
     let fits = branch(fits, models);
@@ -40,36 +40,37 @@ pub(crate) fn dress(
     if !known.iter().any(Model::is_tool) {
         return Ok(fits);
     }
-    let dressed = engine.fan_out(Task::new("tools").large(), fits, |fit| {
+    let attached = engine.fan_out(Task::new("tools").large(), fits, |fit| {
         if !tells_tools(&fit) {
             return Ok((fit, None));
         }
         let arm = &known[fit.model];
         let find = || {
-            let dressed = search.with_scene(&fit, regions, |scene, settings| {
-                dress_one(&fit, arm, (known, search.shelf()), scene, settings)
+            let attached = search.with_scene(&fit, |scene, settings| {
+                attach_one(&fit, arm, known, search.library(), scene, settings)
             })?;
-            Ok(dressed.flatten())
+            Ok(attached.flatten())
         };
-        let dressed = search.get_or_compute(&format!("tool of {fit:?}"), find)?;
-        Ok(own(fit, arm, dressed, known))
+        let attached = search.get_or_compute(&format!("tool of {fit:?}"), find)?;
+        Ok(own(fit, arm, attached, known))
     })?;
-    Ok(adopt(dressed, models))
+    Ok(take_models(attached, models))
 }
 
 /// The same for a fit of one scene; with the model that it is of, where that is none of these.
-pub(crate) fn dress_in(
+pub(crate) fn attach_tools_in(
     scene: &Scene<'_>,
     fit: Fit,
     models: &[Model],
-    (shelf, settings): (&Shelf<'_>, &Settings),
+    library: &PreparedLibrary<'_>,
+    settings: &Settings,
 ) -> (Fit, Option<Model>) {
     let has_other = !fit.other_branches.is_empty();
     let branched = has_other.then(|| models[fit.model].with_other_branches(&fit.other_branches));
     let arm = branched.as_ref().unwrap_or(&models[fit.model]);
-    let dress = || dress_one(&fit, arm, (models, shelf), scene, settings);
-    let dressed = tells_tools(&fit).then(dress).flatten();
-    let (fit, tooled) = own(fit, arm, dressed, models);
+    let attach = || attach_one(&fit, arm, models, library, scene, settings);
+    let attached = tells_tools(&fit).then(attach).flatten();
+    let (fit, tooled) = own(fit, arm, attached, models);
     (fit, tooled.or(branched))
 }
 
@@ -80,17 +81,22 @@ fn tells_tools(fit: &Fit) -> bool {
 }
 
 /// The fit with the tool that was found, and the model of both.
-fn own(fit: Fit, arm: &Model, dressed: Option<Dressed>, models: &[Model]) -> (Fit, Option<Model>) {
-    let Some((together, [tool, flange], mount)) = dressed else { return (fit, None) };
+fn own(
+    fit: Fit,
+    arm: &Model,
+    attached: Option<WithTool>,
+    models: &[Model],
+) -> (Fit, Option<Model>) {
+    let Some((together, [tool, flange], mount)) = attached else { return (fit, None) };
     (together, Some(arm.with_tool(&models[tool], flange, mount)))
 }
 
 /// A fit of arm and tool, the tool's number in the library and the link that it hangs on, and its
 /// turn about it, radians.
-type Dressed = (Fit, [usize; 2], f64);
+type WithTool = (Fit, [usize; 2], f64);
 
 /// The fits, those with a model of their own pointing at it among `models`.
-pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) -> Vec<Fit> {
+pub(crate) fn take_models(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) -> Vec<Fit> {
     let own = |(mut fit, model): (Fit, Option<Model>)| {
         if let Some(model) = model {
             fit.model = models.len();
@@ -102,21 +108,21 @@ pub(crate) fn adopt(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) ->
 }
 
 /// One arm: the tool that explains most, if one is there.
-fn dress_one(
+fn attach_one(
     fit: &Fit,
     arm: &Model,
-    (models, shelf): (&[Model], &Shelf<'_>),
+    models: &[Model],
+    library: &PreparedLibrary<'_>,
     scene: &Scene<'_>,
     settings: &Settings,
-) -> Option<Dressed> {
+) -> Option<WithTool> {
     // An arm whose loops stand otherwise has the links of its name.
     let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);
-    let bare = shelf.prepared(bare);
+    let bare = library.prepared(bare);
     let n_arm = arm.free.len();
-    let known = (models, shelf, bare);
-    let ([tool, flange], mut start) = best_tool(fit, arm, known, scene, settings)?;
+    let ([tool, flange], mut start) = best_tool(fit, arm, models, library, bare, scene, settings)?;
     let both = arm.with_tool(&models[tool], flange, 0.0);
-    let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
+    let prepared = Prepared::joined(&[bare, library.prepared(tool)], (fit.model, &both));
     let holes = holes();
     let way = arm.mount(flange).1;
     let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
@@ -128,7 +134,7 @@ fn dress_one(
         holes[bolt.hole]
     });
     let both = arm.with_tool(&models[tool], flange, mount);
-    let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
+    let prepared = Prepared::joined(&[bare, library.prepared(tool)], (fit.model, &both));
     let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
     let own = together.links.get(arm.links.len()..).unwrap_or_default();
     let n_points: usize = own.iter().map(|link| link.n_points).sum();
@@ -159,7 +165,9 @@ fn dress_one(
 fn best_tool(
     fit: &Fit,
     arm: &Model,
-    (models, shelf, bare): (&[Model], &Shelf<'_>, &Prepared<'_>),
+    models: &[Model],
+    library: &PreparedLibrary<'_>,
+    bare: &Prepared<'_>,
     scene: &Scene<'_>,
     settings: &Settings,
 ) -> Option<([usize; 2], Tooled)> {
@@ -168,7 +176,7 @@ fn best_tool(
     for flange in arm.flanges() {
         for tool in (0..models.len()).filter(|&i| models[i].is_tool()) {
             let both = arm.with_tool(&models[tool], flange, 0.0);
-            let prepared = Prepared::joined(&[bare, shelf.prepared(tool)], (fit.model, &both));
+            let prepared = Prepared::joined(&[bare, library.prepared(tool)], (fit.model, &both));
             let found = fit::try_tool(fit, (&prepared, own), scene, settings, &AllThreads);
             let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
             if let Some(found) = found.filter(better) {

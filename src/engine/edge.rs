@@ -16,7 +16,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 const LEAST_WEIGHT_BYTES: usize = 64;
 
 struct Edge<T> {
-    state: Mutex<State<T>>,
+    state: Mutex<EdgeState<T>>,
     /// The window has become emptier, or the next item another.
     room: Condvar,
     /// The next item has come, or no more will.
@@ -24,7 +24,7 @@ struct Edge<T> {
     cap_bytes: usize,
 }
 
-struct State<T> {
+struct EdgeState<T> {
     /// Items from position `next` on, with their weights; `None` where not yet come.
     window: VecDeque<Option<(Result<T>, usize)>>,
     /// Position of the next item out.
@@ -42,7 +42,7 @@ struct State<T> {
 impl<T> Edge<T> {
     /// Nothing panics while it holds this lock (items are dropped outside), so poison means
     /// nothing.
-    fn lock(&self) -> MutexGuard<'_, State<T>> {
+    fn lock(&self) -> MutexGuard<'_, EdgeState<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -61,7 +61,7 @@ pub(super) type Measure<T> = fn(&T) -> (u64, u64);
 
 /// A new edge that keeps about `cap_bytes`.
 pub(super) fn edge<T>(cap_bytes: usize) -> (Put<T>, Take<T>) {
-    let state = State {
+    let state = EdgeState {
         window: VecDeque::new(),
         next: 0,
         bytes: 0,

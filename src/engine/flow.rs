@@ -3,7 +3,7 @@
 
 use super::cancel::Cancel;
 use super::edge::{Onward, Put, Take, edge};
-use super::guard::guarded;
+use super::panic_guard::guarded;
 use super::progress::Stage;
 use contract::{Error, Fold, Kind, Map, Result, Weigh};
 use std::sync::Arc;

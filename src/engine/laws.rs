@@ -1,8 +1,7 @@
 //! The laws of the engine for passes drawn at random: lengths, workers, memory, failures, panics.
 
 use super::tests::{Digest, Heavy, Live, Number, Work, engine};
-use super::*;
-use contract::Fold;
+use contract::{Error, Fold, Kind, Result};
 use proptest::prelude::*;
 use std::sync::Arc;
 

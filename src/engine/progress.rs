@@ -3,13 +3,14 @@
 
 mod words;
 
+use super::amount::Amount;
 use contract::quote;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 use std::time::{Duration, Instant};
-use words::{json, words};
+use words::{StageState, json, words};
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -38,41 +39,6 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 const JSON_EVERY: Duration = Duration::from_secs(1);
 /// Time between two pictures of a bar.
 const BAR_EVERY: Duration = Duration::from_millis(120);
-
-/// Items, points and bytes; as a total, zero means not known.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Amount {
-    /// Number of items (strips, tiles, candidates).
-    pub items: u64,
-    /// Number of points.
-    pub points: u64,
-    /// Bytes.
-    pub bytes: u64,
-}
-
-impl Amount {
-    /// So many items.
-    #[must_use]
-    pub fn items(items: u64) -> Self {
-        Self { items, ..Self::default() }
-    }
-
-    /// So many points.
-    #[must_use]
-    pub fn points(points: u64) -> Self {
-        Self { points, ..Self::default() }
-    }
-
-    /// Share of `total` that is done, 0..1, by the first of points, bytes, items whose total is
-    /// known.
-    #[must_use]
-    pub fn share(&self, total: &Self) -> Option<f64> {
-        [(self.points, total.points), (self.bytes, total.bytes), (self.items, total.items)]
-            .into_iter()
-            .find(|(_, of)| *of > 0)
-            .map(|(done, of)| (done as f64 / of as f64).min(1.0))
-    }
-}
 
 /// What a stage did, for `result.json`.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,10 +75,10 @@ pub struct Stage(Arc<Running>);
 /// Pieces of work within the items of a stage, which become known while an item is worked on: each
 /// may take minutes. Clones share them.
 #[derive(Clone, Default)]
-pub struct Pieces(Arc<Inside>);
+pub struct Pieces(Arc<PieceCounts>);
 
 #[derive(Default)]
-struct Inside {
+struct PieceCounts {
     /// Pieces done, and pieces known so far.
     done: AtomicU64,
     known: AtomicU64,
@@ -326,23 +292,26 @@ impl Running {
 
     fn show(&self, seconds: f64, last: bool) {
         let done = self.done();
+        let state = StageState {
+            done: &done,
+            total: &self.total,
+            pieces: self.pieces.counts(),
+            seconds,
+            cpu_seconds: cpu_seconds() - self.start_cpu,
+            is_over: last,
+        };
         match (self.progress.0.mode, &self.bar) {
             (Mode::None, _) => {}
-            (Mode::Json, _) => self.progress.line(&json(
-                &self.name,
-                (&done, &self.total),
-                self.pieces.counts(),
-                ([seconds, cpu_seconds() - self.start_cpu], last),
-            )),
+            (Mode::Json, _) => self.progress.line(&json(&self.name, &state)),
             (_, Some(bar)) => {
                 let share = done.share(&self.total).unwrap_or(0.0);
                 bar.set_position((share * 1000.0) as u64);
                 bar.tick();
-                let message = words((&done, &self.total), self.pieces.counts(), (seconds, last));
+                let message = words(&state);
                 if last { bar.finish_with_message(message) } else { bar.set_message(message) }
             }
             (_, None) => {
-                let words = words((&done, &self.total), self.pieces.counts(), (seconds, last));
+                let words = words(&state);
                 self.progress.line(&format!("{}: {words}", self.name));
             }
         }

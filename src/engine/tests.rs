@@ -1,9 +1,10 @@
 //! The promises of the engine, each a test.
 
 use super::*;
-use contract::{Fold, Map};
+use contract::{Error, Fold, Kind, Map, Result, Weigh};
+use rayon::prelude::*;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, AtomicUsize, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -352,9 +353,9 @@ fn what_is_handed_over_comes_in_order_and_bounded() {
     let mut engine = Engine::new(2);
     engine.channel_bytes = 100;
     let (seen, n) = engine
-        .handing(
+        .pipe(
             "aside",
-            |items: Handed<'_, Heavy>| {
+            |items: PipedItems<'_, Heavy>| {
                 items.map(|item| item.map(|i| i.value)).collect::<Result<Vec<_>>>()
             },
             |hand| {
@@ -378,31 +379,31 @@ fn the_side_that_fails_first_says_why() {
     let engine = Engine::new(2);
     let failed = |what: &str| Error::new(Kind::Io, what.to_owned());
     let is = |e: Error, what: &str| assert!(e.to_string().contains(what), "{e}");
-    let all = |items: Handed<'_, Number>| items.map(|i| i.map(|_| 1)).sum::<Result<u32>>();
+    let all = |items: PipedItems<'_, Number>| items.map(|i| i.map(|_| 1)).sum::<Result<u32>>();
     // The one that hands over fails: the other side does not take what came for all.
     let whole = AtomicBool::new(false);
-    let aside = |items: Handed<'_, Number>| {
+    let aside = |items: PipedItems<'_, Number>| {
         let n = all(items)?;
         whole.store(true, Ordering::SeqCst);
         Ok(n)
     };
-    let work = |hand: Hand<'_, Number>| {
+    let work = |hand: PipeSender<'_, Number>| {
         hand(Number(1))?;
         Err::<(), _>(failed("disk of the work"))
     };
-    is(engine.handing("aside", aside, work).expect_err("fails"), "disk of the work");
+    is(engine.pipe("aside", aside, work).expect_err("fails"), "disk of the work");
     assert!(!whole.load(Ordering::SeqCst));
     // The other side fails, by itself or by a panic, early or after the last item.
-    let work = |hand: Hand<'_, Number>| (0..1000).try_for_each(|i| hand(Number(i)));
-    let few = |_: Handed<'_, Number>| Err::<(), _>(failed("disk of the other"));
-    is(engine.handing("aside", few, work).expect_err("fails"), "disk of the other");
-    let late = |items: Handed<'_, Number>| {
+    let work = |hand: PipeSender<'_, Number>| (0..1000).try_for_each(|i| hand(Number(i)));
+    let few = |_: PipedItems<'_, Number>| Err::<(), _>(failed("disk of the other"));
+    is(engine.pipe("aside", few, work).expect_err("fails"), "disk of the other");
+    let late = |items: PipedItems<'_, Number>| {
         all(items)?;
         Err::<(), _>(failed("no sync"))
     };
-    is(engine.handing("aside", late, work).expect_err("fails"), "no sync");
-    let panics = |_: Handed<'_, Number>| -> Result<()> { panic!("no such thing") };
-    is(engine.handing("aside", panics, work).expect_err("fails"), "no such thing");
-    let idle = |_: Handed<'_, Number>| Ok(());
-    assert_eq!(engine.handing("aside", idle, work).expect_err("fails").kind(), Kind::Bug);
+    is(engine.pipe("aside", late, work).expect_err("fails"), "no sync");
+    let panics = |_: PipedItems<'_, Number>| -> Result<()> { panic!("no such thing") };
+    is(engine.pipe("aside", panics, work).expect_err("fails"), "no such thing");
+    let idle = |_: PipedItems<'_, Number>| Ok(());
+    assert_eq!(engine.pipe("aside", idle, work).expect_err("fails").kind(), Kind::Bug);
 }

@@ -1,12 +1,11 @@
 //! A job in; what it will take of memory, disk and time, and what of it is there already, out. Some
 //! points are looked at to tell how much there is to search.
 
+mod expected_regions;
 mod rates;
-mod search;
-mod stand;
+mod search_time;
 
-use crate::cache::Digests;
-use crate::cache::output::OutputDir;
+use crate::cache::{Digests, OutputDir};
 use crate::detect::library;
 use crate::engine::{AllThreads, Engine};
 use crate::job::{Job, Settings, memory_words, units};
@@ -18,7 +17,7 @@ use rates::{COPC, INGEST, LOAD, REST, SPREAD};
 use serde::Serialize;
 use std::path::Path;
 
-pub use stand::{Searched, Stand};
+pub use expected_regions::{ExpectedRegion, ExpectedRegions};
 
 /// Bytes of a point in the store, with its share of catalogue and checksums.
 const STORE_BYTES: u64 = 18;
@@ -72,7 +71,7 @@ pub struct Estimate {
     /// Time, seconds, least and most, where no other program takes the processors' time.
     pub seconds: [f64; 2],
     /// What seems to stand in the plant, where it was looked at.
-    pub stand: Option<Stand>,
+    pub stand: Option<ExpectedRegions>,
     /// Inputs whose tiles are there, of all.
     pub kept_inputs: [usize; 2],
     /// Whether nothing has changed, and nothing will be done.
@@ -190,7 +189,7 @@ impl Estimate {
         let least = base + SCAN_BYTES * SCANS.min(sources.scans.len() as u64);
         Self {
             n_points: n,
-            units: units::said(sources),
+            units: units::in_words(sources),
             n_models,
             memory_bytes: memory.min(job.means.memory_bytes.max(least)),
             store_bytes: n_new.saturating_mul(STORE_BYTES),
@@ -208,8 +207,8 @@ impl Estimate {
 
     /// Adds the time of the search, for what seems to stand in the plant.
     fn look(&mut self, job: &Job, sources: &Sources, engine: &Engine) -> Result<()> {
-        let stand = stand::look(sources, &job.means.settings, engine)?;
-        let search = search::seconds(&stand, self.n_models) / job.means.n_threads as f64;
+        let stand = expected_regions::look(sources, &job.means.settings, engine)?;
+        let search = search_time::seconds(&stand, self.n_models) / job.means.n_threads as f64;
         self.seconds = [self.seconds[0] + search / SPREAD, self.seconds[1] + search * SPREAD];
         self.stand = Some(stand);
         Ok(())

@@ -1,7 +1,7 @@
 //! A result and the truth of its scene in; how far they agree, robot by robot and point by point,
 //! out.
 
-use super::confusion::Tally;
+use super::confusion::Confusion;
 use contract::words::{Unit, count};
 use contract::{Certainty, Error, Kind, Label, PointKind, Result};
 use export::{ResultFile, RobotEntry};
@@ -26,7 +26,7 @@ pub struct Agreement {
     /// Found robots that no true one explains.
     pub n_invented: usize,
     /// Its points, by what they are and what they are said to be.
-    pub points: Tally,
+    pub points: Confusion,
     /// For each thing of the scene: its points, and those of them that are said to move. Empty
     /// where the truth does not name things.
     pub by_object: Vec<[u64; 2]>,
@@ -44,12 +44,12 @@ pub struct RobotAgreement {
     /// Postures that it stood in while it was scanned.
     pub n_postures: usize,
     /// What was found at its place.
-    pub found: Option<Found>,
+    pub found: Option<FoundRobot>,
 }
 
 /// What was found at a true robot's place.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct FoundRobot {
     /// Its model, which may be the wrong one.
     pub model: String,
     /// Whether the true model is among those that it is said to be.
@@ -86,7 +86,7 @@ impl JointError {
     }
 }
 
-impl Found {
+impl FoundRobot {
     /// Largest error of a joint that turns and is said to be determined, degrees; of all that turn
     /// where none is.
     #[must_use]
@@ -123,7 +123,7 @@ impl Agreement {
         let mut agreement = Self {
             robots,
             n_invented,
-            points: Tally::new(truth.robots.iter().map(|r| r.links.len())),
+            points: Confusion::new(truth.robots.iter().map(|r| r.links.len())),
             by_object: vec![[0; 2]; truth.objects.len()],
             objects: truth.objects.clone(),
         };
@@ -184,7 +184,7 @@ impl Agreement {
     #[must_use]
     pub fn worst_joint_deg(&self) -> f64 {
         let found = self.robots.iter().filter_map(|r| r.found.as_ref());
-        found.map(Found::worst_joint_deg).fold(0.0, f64::max)
+        found.map(FoundRobot::worst_joint_deg).fold(0.0, f64::max)
     }
 
     /// A table for people.
@@ -253,7 +253,7 @@ fn match_robot(
             let found = std::iter::once(robot).chain(&robot.stays);
             found.map(|f| worst(&off(f, posture))).any(|worst| worst < SAME_POSTURE)
         };
-        Found {
+        FoundRobot {
             model: robot.model.clone(),
             is_right: robot.model == truth.model || robot.alike.contains(&truth.model),
             verdict: robot.verdict.clone(),

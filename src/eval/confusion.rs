@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 /// Counts of points by what they are and what they are said to be.
 #[derive(Debug, Clone, Default)]
-pub struct Tally {
+pub struct Confusion {
     /// Moving and said to be, moving and not said to be, not moving but said to be, the rest.
     pub moving: [u64; 4],
     /// Of links: with the right robot and link, all that are true links, all that are said to be
@@ -21,7 +21,7 @@ pub struct Tally {
     pub attached: [u64; 2],
 }
 
-impl Tally {
+impl Confusion {
     /// Nothing counted yet, of robots with so many links.
     pub fn new(n_links: impl Iterator<Item = usize>) -> Self {
         Self { by_link: n_links.map(|n| vec![[0; 3]; n]).collect(), ..Self::default() }

@@ -10,8 +10,7 @@
 //! OUT/truth/las/labels/0.* labels of the LAS file
 //! ```
 
-use crate::engine::progress::Amount;
-use crate::engine::{Engine, Task};
+use crate::engine::{Amount, Engine, Task};
 use crate::job::MAX_TEXT;
 use contract::{Error, Label, Map, MaskId, Result, Weigh};
 use export::atomic;
@@ -112,7 +111,7 @@ impl Files {
             .map(|from| Ok(Columns { range: from..(from + COLUMNS).min(frame.n_cols), n_rows }));
         let n_beams = u64::from(frame.n_rows) * u64::from(frame.n_cols);
         let task = Task::new(format!("scan {}", frame.name)).of(Amount::points(n_beams));
-        let mut known = self.labels.then(|| Known::create(truth, i)).transpose()?;
+        let mut known = self.labels.then(|| ScanTruth::create(truth, i)).transpose()?;
         let mut n_points = 0;
         let source_id = u16::try_from(i + 1).map_err(|_| {
             Error::bad_input(format!("LAS knows 65535 scanners at most, this is \"{}\"", i + 1))
@@ -135,7 +134,7 @@ impl Files {
                 None => seen.try_for_each(|s| s.map(drop)),
             }
         })?;
-        known.map_or(Ok(()), Known::finish)?;
+        known.map_or(Ok(()), ScanTruth::finish)?;
         Ok(n_points)
     }
 
@@ -151,12 +150,12 @@ impl Files {
 }
 
 /// What is true of the points of one scan.
-struct Known {
+struct ScanTruth {
     mask: MaskWriter,
     objects: NpyWriter<u16>,
 }
 
-impl Known {
+impl ScanTruth {
     fn create(truth: &Path, i: usize) -> Result<Self> {
         let objects = NpyWriter::create(truth.join(format!("labels/{i}.object.npy")))?;
         Ok(Self { mask: MaskWriter::create(truth, MaskId(i as u32))?, objects })
@@ -229,9 +228,9 @@ impl Weigh for Columns {
 }
 
 /// The same, cast.
-struct Seen(SimColumns);
+struct SimulatedColumns(SimColumns);
 
-impl Weigh for Seen {
+impl Weigh for SimulatedColumns {
     fn weight_bytes(&self) -> usize {
         self.0.len() * (size_of::<f64>() * 4 + size_of::<f32>() + size_of::<Label>() + 2)
     }
@@ -248,11 +247,11 @@ struct Cast<'a> {
 
 impl Map for Cast<'_> {
     type In = Columns;
-    type Out = Seen;
+    type Out = SimulatedColumns;
     type Scratch = ();
 
-    fn apply(&self, columns: Columns, (): &mut ()) -> Result<Seen> {
-        Ok(Seen(self.simulator.columns(self.scanner, columns.range)))
+    fn apply(&self, columns: Columns, (): &mut ()) -> Result<SimulatedColumns> {
+        Ok(SimulatedColumns(self.simulator.columns(self.scanner, columns.range)))
     }
 }
 

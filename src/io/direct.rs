@@ -8,20 +8,20 @@ use std::ops::{Deref, Range};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A file that many threads read, each piece of it once.
-pub(crate) struct Straight {
+pub(crate) struct DirectFile {
     file: File,
     /// Memory that no reader uses now: fresh memory costs as much as reading.
     free: Mutex<Vec<Block>>,
 }
 
 /// Bytes of a file in memory that is lent.
-pub(crate) struct Lent<'a> {
-    of: &'a Straight,
+pub(crate) struct LentBytes<'a> {
+    of: &'a DirectFile,
     block: Block,
     range: Range<usize>,
 }
 
-impl Straight {
+impl DirectFile {
     /// Of an open file; past the cache where that can be.
     pub(crate) fn past_cache(file: File) -> Self {
         let _ = set_direct(&file, true);
@@ -34,14 +34,14 @@ impl Straight {
     }
 
     /// `n` bytes from `start` on, or as many as there are.
-    pub(crate) fn read(&self, start: u64, n: usize) -> Result<Lent<'_>> {
+    pub(crate) fn read(&self, start: u64, n: usize) -> Result<LentBytes<'_>> {
         let mut block = self.free().pop().unwrap_or_default();
         let before = (start % PAGE as u64) as usize;
         let first = start - before as u64;
         let room = block.room((before + n).next_multiple_of(PAGE));
         let at = |n: usize| first + n as u64;
         let read = read_all(&self.file, room, |room, n| read_at(&self.file, room, at(n)))?;
-        Ok(Lent { of: self, block, range: before.min(read)..read.min(before + n) })
+        Ok(LentBytes { of: self, block, range: before.min(read)..read.min(before + n) })
     }
 
     fn free(&self) -> MutexGuard<'_, Vec<Block>> {
@@ -49,7 +49,7 @@ impl Straight {
     }
 }
 
-impl Deref for Lent<'_> {
+impl Deref for LentBytes<'_> {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
@@ -57,7 +57,7 @@ impl Deref for Lent<'_> {
     }
 }
 
-impl Drop for Lent<'_> {
+impl Drop for LentBytes<'_> {
     fn drop(&mut self) {
         self.of.free().push(std::mem::take(&mut self.block));
     }
@@ -84,7 +84,7 @@ mod tests {
         let bytes: Vec<u8> = (0..3 * PAGE + 77).map(|i| (i % 251) as u8).collect();
         std::fs::write(&path, &bytes).expect("writes");
         let open = || File::open(&path).expect("opens");
-        for file in [Straight::past_cache(open()), Straight::through_cache(open())] {
+        for file in [DirectFile::past_cache(open()), DirectFile::through_cache(open())] {
             for (start, n) in
                 [(0, 1), (5, PAGE), (PAGE - 1, PAGE + 2), (3 * PAGE, 77), (2 * PAGE + 9, 0)]
             {

@@ -14,7 +14,7 @@ const LEAF: u64 = CHUNK_LEN as u64;
 
 /// A part of the tree: so many bytes from a place of the file on, and what they come to.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Part {
+pub(crate) struct Subtree {
     start: u64,
     n_bytes: u64,
     value: ChainingValue,
@@ -22,13 +22,13 @@ pub(crate) struct Part {
 
 /// The tree of a file of known length; parts join as they come, in order.
 #[derive(Debug)]
-pub(crate) struct Tree {
+pub(crate) struct HashTree {
     n_bytes: u64,
     /// What is not joined yet, one behind the other.
-    parts: Vec<Part>,
+    parts: Vec<Subtree>,
 }
 
-impl Tree {
+impl HashTree {
     pub(crate) fn new(n_bytes: u64) -> Self {
         Self { n_bytes, parts: Vec::new() }
     }
@@ -46,10 +46,10 @@ impl Tree {
     }
 
     /// The parts of consecutive leaves of a file, from the place `start` on.
-    pub(crate) fn parts(start: u64, bytes: &[u8], n_bytes: u64) -> Vec<Part> {
+    pub(crate) fn parts(start: u64, bytes: &[u8], n_bytes: u64) -> Vec<Subtree> {
         if n_bytes <= LEAF {
             let value = *blake3::hash(bytes).as_bytes();
-            return vec![Part { start, n_bytes, value }; usize::from(!bytes.is_empty())];
+            return vec![Subtree { start, n_bytes, value }; usize::from(!bytes.is_empty())];
         }
         let mut parts = Vec::new();
         let (mut at, mut left) = (start, bytes);
@@ -60,14 +60,14 @@ impl Tree {
             let fits = (left.len() as u64 / LEAF).checked_ilog2().map_or(LEAF, |log| LEAF << log);
             let (own, next) = left.split_at(whole.min(fits).min(left.len() as u64) as usize);
             let value = Hasher::new().set_input_offset(at).update(own).finalize_non_root();
-            parts.push(Part { start: at, n_bytes: own.len() as u64, value });
+            parts.push(Subtree { start: at, n_bytes: own.len() as u64, value });
             (at, left) = (at + own.len() as u64, next);
         }
         parts
     }
 
     /// Adds the parts that come next in the file.
-    pub(crate) fn add(&mut self, parts: Vec<Part>) {
+    pub(crate) fn add(&mut self, parts: Vec<Subtree>) {
         for part in parts {
             self.parts.push(part);
             while let [.., left, right] = &*self.parts {
@@ -86,7 +86,7 @@ impl Tree {
     fn join(&mut self, n_bytes: u64) {
         if let (Some(right), Some(left)) = (self.parts.pop(), self.parts.pop()) {
             let value = merge_subtrees_non_root(&left.value, &right.value, Mode::Hash);
-            self.parts.push(Part { start: left.start, n_bytes, value });
+            self.parts.push(Subtree { start: left.start, n_bytes, value });
         }
     }
 
@@ -106,7 +106,7 @@ impl Tree {
     }
 }
 
-impl Weigh for Part {
+impl Weigh for Subtree {
     fn weight_bytes(&self) -> usize {
         size_of::<Self>()
     }
@@ -126,11 +126,11 @@ mod tests {
             let n = bytes.len();
             let mut cuts: Vec<usize> = cuts.into_iter().map(|at| at.min(n)).chain([0, n]).collect();
             cuts.sort_unstable();
-            let mut tree = Tree::new(n as u64);
+            let mut tree = HashTree::new(n as u64);
             for pair in cuts.windows(2) {
-                let own = Tree::own(&(pair[0] as u64..pair[1] as u64), n as u64);
+                let own = HashTree::own(&(pair[0] as u64..pair[1] as u64), n as u64);
                 let of = &bytes[own.start as usize..own.end as usize];
-                tree.add(Tree::parts(own.start, of, n as u64));
+                tree.add(HashTree::parts(own.start, of, n as u64));
             }
             prop_assert_eq!(tree.finish(), Some(blake3::hash(&bytes)));
         }
@@ -145,19 +145,19 @@ mod tests {
                 if n / step > 5000 {
                     continue;
                 }
-                let mut tree = Tree::new(n as u64);
+                let mut tree = HashTree::new(n as u64);
                 for start in (0..n).step_by(step) {
                     let piece = start as u64..(start + step).min(n) as u64;
-                    let own = Tree::own(&piece, n as u64);
+                    let own = HashTree::own(&piece, n as u64);
                     let of = &bytes[own.start as usize..own.end as usize];
-                    tree.add(Tree::parts(own.start, of, n as u64));
+                    tree.add(HashTree::parts(own.start, of, n as u64));
                 }
                 assert!(tree.parts.len() < 20, "parts join");
                 assert_eq!(tree.finish(), Some(blake3::hash(&bytes[..n])), "{n} by {step}");
             }
         }
-        let mut tree = Tree::new(3000);
-        tree.add(Tree::parts(0, &bytes[..2048], 3000));
+        let mut tree = HashTree::new(3000);
+        tree.add(HashTree::parts(0, &bytes[..2048], 3000));
         assert_eq!(tree.finish(), None);
     }
 }

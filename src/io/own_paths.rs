@@ -30,7 +30,7 @@ pub(crate) fn is_own(name: &str) -> bool {
 ///
 /// # Errors
 /// A link, with its path.
-pub(crate) fn straight(folder: &Path, name: &str) -> Result<PathBuf> {
+pub(crate) fn without_links(folder: &Path, name: &str) -> Result<PathBuf> {
     let mut path = folder.to_path_buf();
     for part in Path::new(name).components() {
         path.push(part);
@@ -90,8 +90,8 @@ mod tests {
         std::fs::create_dir_all(out.join("tiles")).expect("is made");
         std::fs::create_dir_all(dir.path().join("other")).expect("is made");
         std::os::unix::fs::symlink("../other", out.join("labels")).expect("is made");
-        assert!(straight(&out, "tiles/0_0.las").is_ok());
-        let error = straight(&out, "labels/0.kind.npy").expect_err("leads out");
+        assert!(without_links(&out, "tiles/0_0.las").is_ok());
+        let error = without_links(&out, "labels/0.kind.npy").expect_err("leads out");
         assert_eq!(error.kind(), contract::Kind::BadInput);
         assert!(
             error.to_string().starts_with(&out.join("labels").display().to_string()),

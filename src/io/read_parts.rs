@@ -1,9 +1,9 @@
 //! An input in, what a step makes of its strips out, in the order of the file: some threads read
 //! pieces of it, and sum them up where nobody knows its digest; others make points of them.
 
-use super::direct::{Lent, Straight};
-use super::hash_tree::{Part, Tree};
-use crate::engine::{Engine, Task};
+use super::direct::{DirectFile, LentBytes};
+use super::hash_tree::{HashTree, Subtree};
+use crate::engine::{Amount, Engine, Task};
 use contract::{Error, Input, Kind, Map, Result, Strip, Weigh};
 use ingest::{Extent, Piece, Sources, Want};
 
@@ -13,20 +13,27 @@ const CACHED: u64 = 1 << 30;
 
 /// How an input is read.
 #[derive(Clone, Copy)]
-pub(crate) struct Reading<'a> {
+pub(crate) struct InputReader<'a> {
     pub(crate) sources: &'a Sources,
     pub(crate) input: &'a Input,
     pub(crate) want: Want,
 }
 
-impl Reading<'_> {
+impl InputReader<'_> {
+    /// Points that the input states, for progress; 0 where it states none.
+    pub(crate) fn amount(&self) -> Amount {
+        let own = self.sources.masks.iter().filter(|m| m.input == self.input.id);
+        let stated = own.map(|m| m.n_points.unwrap_or(0));
+        Amount { items: 0, points: stated.sum(), bytes: 0 }
+    }
+
     /// Does `step` to each strip; hands what it makes of them to `sink`, in order. Digests the file
     /// up on the way where `tree` wants it and it is read in pieces.
     pub(crate) fn each<M: Map<In = Strip>>(
         &self,
         task: Task,
         step: &M,
-        mut tree: Option<&mut Tree>,
+        mut tree: Option<&mut HashTree>,
         engine: &Engine,
         mut sink: impl FnMut(M::Out) -> Result<()>,
     ) -> Result<()>
@@ -49,12 +56,16 @@ impl Reading<'_> {
     }
 
     /// The file, where it is read in pieces: the one that was opened, whatever has its name by now.
-    fn file(&self) -> Result<Option<Straight>> {
+    fn file(&self) -> Result<Option<DirectFile>> {
         let Some(file) = self.sources.file(self.input.id) else { return Ok(None) };
         let file = file.try_clone().map_err(|e| Error::from(e).at(self.input.path.display()))?;
         let n_bytes: u64 = self.sources.opened().iter().map(|input| input.n_bytes).sum();
         let is_large = n_bytes > CACHED;
-        Ok(Some(if is_large { Straight::past_cache(file) } else { Straight::through_cache(file) }))
+        Ok(Some(if is_large {
+            DirectFile::past_cache(file)
+        } else {
+            DirectFile::through_cache(file)
+        }))
     }
 }
 
@@ -74,7 +85,7 @@ impl<T: Weigh> Weigh for Many<T> {
 /// Reads the bytes of pieces.
 struct Load<'a> {
     input: &'a Input,
-    file: Option<&'a Straight>,
+    file: Option<&'a DirectFile>,
     /// Length of the file, where it is to be summed up.
     n_bytes: Option<u64>,
 }
@@ -82,7 +93,7 @@ struct Load<'a> {
 /// A piece whose bytes are there.
 enum Loaded<'a> {
     Strip(Strip),
-    Extent(Extent, Lent<'a>, Vec<Part>),
+    Extent(Extent, LentBytes<'a>, Vec<Subtree>),
     /// Bytes without points that nobody asked for.
     Nothing,
 }
@@ -103,7 +114,7 @@ impl<'a> Map for Load<'a> {
             }
         };
         let start = extent.bytes.start;
-        let own = self.n_bytes.map(|n_bytes| Tree::own(&extent.bytes, n_bytes));
+        let own = self.n_bytes.map(|n_bytes| HashTree::own(&extent.bytes, n_bytes));
         let end = own.as_ref().map_or(extent.bytes.end, |own| own.end.max(extent.bytes.end));
         let read = file.read(start, (end - start) as usize);
         let bytes = read.map_err(|e| Error::from(e).at(self.input.path.display()))?;
@@ -114,7 +125,7 @@ impl<'a> Map for Load<'a> {
         }
         let parts = own.zip(self.n_bytes).map_or_else(Vec::new, |(own, n_bytes)| {
             let (from, to) = (own.start - start, own.end.max(own.start) - start);
-            Tree::parts(own.start, &bytes[from as usize..to as usize], n_bytes)
+            HashTree::parts(own.start, &bytes[from as usize..to as usize], n_bytes)
         });
         Ok(Loaded::Extent(extent, bytes, parts))
     }
@@ -140,17 +151,17 @@ impl Weigh for Loaded<'_> {
 
 /// Decodes pieces, and does a step to each of their strips.
 struct OfStrips<'a, M> {
-    reading: Reading<'a>,
+    reading: InputReader<'a>,
     step: &'a M,
 }
 
 impl<'a, M: Map<In = Strip>> Map for OfStrips<'a, M> {
     type In = Loaded<'a>;
-    type Out = (Many<M::Out>, Many<Part>);
+    type Out = (Many<M::Out>, Many<Subtree>);
     type Scratch = M::Scratch;
 
     fn apply(&self, loaded: Loaded<'a>, scratch: &mut M::Scratch) -> Result<Self::Out> {
-        let Reading { sources, input, want, .. } = self.reading;
+        let InputReader { sources, input, want, .. } = self.reading;
         let (strips, parts) = match loaded {
             Loaded::Strip(strip) => (vec![strip], Vec::new()),
             Loaded::Extent(extent, bytes, parts) => {

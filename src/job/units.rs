@@ -9,7 +9,7 @@ use robot::Library;
 use std::path::Path;
 
 /// The units of inputs, in words: one line for all inputs of the same.
-pub(crate) fn said(sources: &Sources) -> Vec<String> {
+pub(crate) fn in_words(sources: &Sources) -> Vec<String> {
     let all = sources.opened().iter().filter_map(|input| sources.units(input.id));
     let all: Vec<String> = all.map(ToString::to_string).collect();
     let mut out: Vec<(&String, usize)> = Vec::new();

@@ -4,14 +4,14 @@ use contract::{Cluster, Voxel};
 use geometry::narrow::floor_i32;
 
 /// Clusters by voxel.
-pub(crate) struct Bodies {
+pub(crate) struct ClusterLookup {
     /// 1 / edge of a voxel, 1/m.
     inverse: f64,
     /// Sorted by voxel.
     voxels: Vec<(Voxel, u32)>,
 }
 
-impl Bodies {
+impl ClusterLookup {
     pub(crate) fn new(clusters: &[Cluster]) -> Self {
         let edge = clusters.first().map_or(1.0, |c| c.edge);
         let own = |c: &Cluster| c.voxels.iter().map(|v| (*v, c.id + 1)).collect::<Vec<_>>();
@@ -54,10 +54,12 @@ mod tests {
             n_points: 9,
             bounds: Aabb::EMPTY,
         };
-        let bodies =
-            Bodies::new(&[cluster(0, vec![[0, 0, 0], [-1, 0, 0]]), cluster(1, vec![[0, 9, 0]])]);
+        let bodies = ClusterLookup::new(&[
+            cluster(0, vec![[0, 0, 0], [-1, 0, 0]]),
+            cluster(1, vec![[0, 9, 0]]),
+        ]);
         let places = [[0.01, 0.01, 0.01], [-0.01, 0.01, 0.01], [0.02, 0.46, 0.0], [1.0, 0.0, 0.0]];
         assert_eq!(bodies.of(&places), [1, 1, 2, 0]);
-        assert_eq!(Bodies::new(&[]).of(&places), [0; 4]);
+        assert_eq!(ClusterLookup::new(&[]).of(&places), [0; 4]);
     }
 }

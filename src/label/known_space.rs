@@ -2,6 +2,7 @@
 //! it and other robots fill and which nobody has seen, out. Points are marked into it while they
 //! are labelled.
 
+use crate::detect::robots::FittedRobots;
 use crate::detect::search::Search;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
@@ -21,19 +22,19 @@ const BEHIND: f64 = 0.5;
 const UPRIGHT: f64 = 0.5;
 
 /// What spaces are made of.
-pub(crate) struct Around<'a, 's> {
+pub(crate) struct KnownSpaces<'a, 's> {
     /// Robots of the plant, and the models that they are of.
-    pub(crate) robots: (&'a [Fit], &'a [Model]),
+    pub(crate) robots: FittedRobots<'a>,
     /// Who has what the scans saw.
     pub(crate) search: &'a Search<'a, 's>,
     pub(crate) settings: &'a Settings,
 }
 
-impl Around<'_, '_> {
+impl KnownSpaces<'_, '_> {
     /// The spaces of all robots, in the order of the fits; none where no scan says where its beams
     /// went.
     pub(crate) fn all(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
-        let (fits, models) = self.robots;
+        let FittedRobots { fits, models } = self.robots;
         if !self.settings.freespace.enabled {
             return Ok(vec![None; fits.len()]);
         }
@@ -51,7 +52,7 @@ impl Around<'_, '_> {
     /// What beams went through about a robot, in these voxels; none where no scan says where its
     /// beams went.
     pub(crate) fn seen(&self, robot: usize, grid: SpaceGrid) -> Result<Option<Space>> {
-        let base: Point = self.robots.0[robot].world_from_base.translation.vector.into();
+        let base: Point = self.robots.fits[robot].world_from_base.translation.vector.into();
         let region = region(&base, &grid.bounds());
         let view =
             ViewSettings { min_cell: grid.edge / CELLS_PER_EDGE, ..self.settings.view.clone() };
@@ -66,7 +67,7 @@ impl Around<'_, '_> {
 
     /// Fills what robots fill, last the one whose space it is.
     pub(crate) fn stand(&self, space: &mut Space, robot: usize) {
-        let (fits, models) = self.robots;
+        let FittedRobots { fits, models } = self.robots;
         let bounds = space.grid().bounds();
         let is_other = |i: usize, fit: &Fit| {
             let stands = i != robot && fit.verdict != Verdict::Refused;
@@ -129,12 +130,12 @@ pub(crate) fn poses(fit: &Fit, model: &Model) -> Vec<Pose> {
 
 /// A point in a voxel of a space: number of the space, of the voxel, and what the point makes of
 /// it.
-pub(crate) type Spot = (usize, usize, SpaceKind);
+pub(crate) type VoxelMark = (usize, usize, SpaceKind);
 
 /// Grids of spaces, with their bounds in the world.
-pub(crate) struct Grids(Vec<Option<(SpaceGrid, Aabb)>>);
+pub(crate) struct SpaceGrids(Vec<Option<(SpaceGrid, Aabb)>>);
 
-impl Grids {
+impl SpaceGrids {
     pub(crate) fn of(spaces: &[Option<Space>]) -> Self {
         let grid = |s: &Option<Space>| s.as_ref().map(|s| (*s.grid(), s.grid().bounds()));
         Self(spaces.iter().map(grid).collect())
@@ -148,8 +149,8 @@ impl Grids {
         labels: &[Label],
         blocks: &[(Range<usize>, Aabb)],
         counts: impl Fn(usize) -> bool,
-    ) -> Vec<Spot> {
-        let mut out: Vec<Spot> = Vec::new();
+    ) -> Vec<VoxelMark> {
+        let mut out: Vec<VoxelMark> = Vec::new();
         for (s, grid) in self.0.iter().enumerate() {
             let Some((grid, bounds)) = grid else { continue };
             for (range, _) in blocks.iter().filter(|(_, own)| own.touches(bounds)) {
@@ -168,7 +169,7 @@ impl Grids {
 }
 
 /// Puts points into their spaces.
-pub(crate) fn mark(spaces: &mut [Option<Space>], spots: impl IntoIterator<Item = Spot>) {
+pub(crate) fn mark(spaces: &mut [Option<Space>], spots: impl IntoIterator<Item = VoxelMark>) {
     for (space, voxel, kind) in spots {
         spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));
     }

@@ -1,8 +1,8 @@
 //! A strip in; its labels, its records for the clouds, and what pictures and spaces take of it,
 //! out: the map of the second pass, so that those that write have only to copy.
 
-use super::cluster_lookup::Bodies;
-use super::known_space::{Grids, Spot};
+use super::cluster_lookup::ClusterLookup;
+use super::known_space::{SpaceGrids, VoxelMark};
 use contract::{Label, Map, MaskId, PlaceRun, PointKind, Result, Scan, Strip, Weigh};
 use export::{LabelColumns, Pack, Packed, PlanPicture, PointColumns};
 use geometry::{Aabb, Point, Pose};
@@ -22,7 +22,7 @@ pub(crate) struct LabelStrip<'a> {
     pub(crate) ground: &'a Ground,
     pub(crate) scans: &'a [Scan],
     /// Voxels of the robots' spaces.
-    pub(crate) grids: &'a Grids,
+    pub(crate) grids: &'a SpaceGrids,
     /// What the picture of each robot shows.
     pub(crate) shown: &'a [Aabb],
     pub(crate) plan: &'a PlanPicture,
@@ -33,11 +33,11 @@ pub(crate) struct LabelStrip<'a> {
     /// World as it is from the world as the file states it, by scan, where that differs.
     pub(crate) moved: &'a [Option<Pose>],
     /// Connected bodies, where points are to be told which is theirs.
-    pub(crate) bodies: Option<&'a Bodies>,
+    pub(crate) bodies: Option<&'a ClusterLookup>,
 }
 
 /// A labelled strip.
-pub(crate) struct Labelled {
+pub(crate) struct LabelledStrip {
     pub(crate) mask: MaskId,
     /// As in [`Strip`].
     pub(crate) first_place: u64,
@@ -45,17 +45,17 @@ pub(crate) struct Labelled {
     pub(crate) labels: LabelColumns,
     pub(crate) n_moving: u64,
     pub(crate) packed: Packed,
-    pub(crate) spots: Vec<Spot>,
+    pub(crate) spots: Vec<VoxelMark>,
     /// Points that pictures of robots show: number of the robot, world, label.
     pub(crate) shown: Vec<(usize, [f64; 3], Label)>,
 }
 
 impl Map for LabelStrip<'_> {
     type In = Strip;
-    type Out = Labelled;
+    type Out = LabelledStrip;
     type Scratch = ();
 
-    fn apply(&self, mut strip: Strip, (): &mut ()) -> Result<Labelled> {
+    fn apply(&self, mut strip: Strip, (): &mut ()) -> Result<LabelledStrip> {
         let scan = &self.scans[strip.scan.0 as usize];
         let moved = self.moved.get(strip.scan.0 as usize).and_then(Option::as_ref);
         let world = world(&mut strip, scan, moved);
@@ -80,7 +80,7 @@ impl Map for LabelStrip<'_> {
         let body = self.bodies.map(|bodies| bodies.of(&world)).unwrap_or_default();
         points.body = &body;
         self.plan.add(&world, &labels);
-        Ok(Labelled {
+        Ok(LabelledStrip {
             mask: strip.mask,
             first_place: strip.first_place,
             packed: self.packed(&points).map_err(|e| e.at(format!("scan '{}'", scan.name)))?,
@@ -193,7 +193,7 @@ fn world(strip: &mut Strip, scan: &Scan, moved: Option<&Pose>) -> Vec<[f64; 3]> 
     }
 }
 
-impl Weigh for Labelled {
+impl Weigh for LabelledStrip {
     fn weight_bytes(&self) -> usize {
         let (spots, shown) = (size_of_val(&*self.spots), size_of_val(&*self.shown));
         let place = size_of_val(&*self.place);

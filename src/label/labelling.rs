@@ -5,15 +5,16 @@
 //! leaves a sorted list of labels by place. Then each input is streamed once more: a point's label
 //! is that of the list, or else that of its place alone (floor or fixed).
 
-use super::cluster_lookup::Bodies;
-use super::known_space::{Grids, mark, poses};
-use super::label_strips::{LabelStrip, Labelled};
-use super::masks::Masks;
-use super::near_robots::Near;
-use crate::engine::{AllThreads, Engine, Hand, Handed, Task};
-use crate::io::read_parts::Reading;
+use super::cluster_lookup::ClusterLookup;
+use super::known_space::{SpaceGrids, mark, poses};
+use super::label_strips::{LabelStrip, LabelledStrip};
+use super::masks::{MaskCount, Masks};
+use super::near_robots::{NearRobots, ScansNearRobots};
+use crate::detect::robot_id::robot_id;
+use crate::detect::robots::FittedRobots;
+use crate::engine::{AllThreads, Engine, PipeSender, PipedItems, Task};
+use crate::io::read_parts::InputReader;
 use crate::job::Settings;
-use crate::result::report::id;
 use crate::store::Store;
 use attach::Hanging;
 use contract::{Cluster, Fit, Floor, Input, InputId, Result, Space};
@@ -44,7 +45,39 @@ pub(crate) struct Labelling<'a> {
     bounds: Vec<Aabb>,
     export: export::Settings,
     /// Where points are to be told which body is theirs.
-    bodies: Option<Bodies>,
+    bodies: Option<ClusterLookup>,
+}
+
+/// The scans whose points are labelled, and what stands in them besides robots.
+pub(crate) struct ScansToLabel<'a> {
+    pub(crate) sources: &'a Sources,
+    pub(crate) store: &'a Store,
+    pub(crate) floor: &'a Floor,
+    pub(crate) clusters: &'a [Cluster],
+}
+
+/// Where files go.
+#[derive(Clone, Copy)]
+pub(crate) struct LabelFolders<'l> {
+    /// Masks, tiles, pictures and files of robots.
+    pub(crate) out: &'l Path,
+    /// Clouds.
+    pub(crate) clouds: &'l Path,
+}
+
+/// What takes the points of the second pass, beside masks and clouds.
+struct PointTakers<'t> {
+    spaces: &'t mut [Option<Space>],
+    robots: &'t mut [RobotPicture],
+    tiles: &'t mut Option<Tiles>,
+}
+
+/// How points are labelled and packed.
+struct SecondPass<'p> {
+    near: &'p NearRobots,
+    scope: &'p Scope,
+    pack: &'p Pack,
+    out: &'p Path,
 }
 
 /// Which part of a plant is written: all of it, unless said otherwise.
@@ -63,7 +96,7 @@ pub(crate) struct Scope {
 }
 
 /// What was written.
-pub(crate) struct Done {
+pub(crate) struct WrittenLabels {
     pub(crate) clouds: Written,
     /// For each mask: entries, points that were dropped, and points that are said to move.
     pub(crate) masks: Vec<MaskCount>,
@@ -77,18 +110,10 @@ pub(crate) struct Done {
     pub(crate) las: LasSettings,
 }
 
-/// Counts of one mask.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct MaskCount {
-    pub(crate) n_points: u64,
-    pub(crate) n_dropped: u64,
-    pub(crate) n_moving: u64,
-}
-
 /// Masks and clouds that are written; the files of robots are still to be.
 pub(crate) struct Streamed<'l> {
     labelling: &'l Labelling<'l>,
-    near: &'l Near,
+    near: &'l NearRobots,
     /// By fit.
     spaces: Vec<Option<Space>>,
     /// Fits whose files are to be written, with their pictures.
@@ -96,7 +121,7 @@ pub(crate) struct Streamed<'l> {
     /// Tiles that were left open.
     open: Vec<Spool>,
     out: &'l Path,
-    done: Done,
+    done: WrittenLabels,
 }
 
 impl Streamed<'_> {
@@ -113,11 +138,11 @@ impl Streamed<'_> {
     }
 
     /// Writes the files of robots.
-    pub(crate) fn finish(mut self, engine: &Engine) -> Result<Done> {
+    pub(crate) fn finish(mut self, engine: &Engine) -> Result<WrittenLabels> {
         let shown = self.robots.iter().map(|(i, picture)| (*i, picture)).collect();
         let written = engine.each(shown, |(i, picture)| {
             let space = self.spaces[i].as_ref();
-            self.labelling.write_robot(i, &self.near.hanging[i], (space, picture), self.out)
+            self.labelling.write_robot(i, &self.near.hanging[i], space, picture, self.out)
         })?;
         for ((i, _), (space, names)) in self.robots.iter().zip(written) {
             self.done.spaces[*i] = space;
@@ -129,12 +154,12 @@ impl Streamed<'_> {
 
 impl<'a> Labelling<'a> {
     pub(crate) fn new(
-        fits: &'a [Fit],
-        models: &'a [Model],
-        sources: &'a Sources,
-        (store, floor, clusters): (&Store, &'a Floor, &[Cluster]),
+        robots: FittedRobots<'a>,
+        scans: &ScansToLabel<'a>,
         settings: &Settings,
     ) -> Self {
+        let FittedRobots { fits, models } = robots;
+        let &ScansToLabel { sources, store, floor, clusters } = scans;
         let ground = Ground::new(floor, &settings.segment);
         let mut bounds = vec![Aabb::EMPTY; sources.scans.len()];
         for entry in store.entries() {
@@ -142,7 +167,7 @@ impl<'a> Labelling<'a> {
             *scan = scan.union(&entry.bounds);
         }
         let export = settings.export;
-        let bodies = export.bodies.then(|| Bodies::new(clusters));
+        let bodies = export.bodies.then(|| ClusterLookup::new(clusters));
         let (settings, attach) = (settings.segment, settings.attach);
         Self { fits, models, sources, floor, ground, settings, attach, bounds, export, bodies }
     }
@@ -153,27 +178,30 @@ impl<'a> Labelling<'a> {
     }
 
     /// The labels of points near the robots, and what hangs on them.
-    pub(crate) fn near_robots(&self, store: &Store, engine: &Engine) -> Result<Near> {
-        let seen = (self.sources.scans.as_slice(), self.sources.masks.len());
-        let place = (store, self.floor, seen);
-        Near::find((self.fits, self.models), place, (self.settings, self.attach), engine)
+    pub(crate) fn near_robots(&self, store: &Store, engine: &Engine) -> Result<NearRobots> {
+        let robots = FittedRobots { fits: self.fits, models: self.models };
+        let (scans, n_masks) = (self.sources.scans.as_slice(), self.sources.masks.len());
+        let scans = ScansNearRobots { store, floor: self.floor, scans, n_masks };
+        NearRobots::find(robots, &scans, self.settings, self.attach, engine)
     }
 
     /// Streams every input once more and writes its labels and tiles, clouds to another folder;
     /// then what is said of robots.
     pub(crate) fn write<'l>(
         &'l self,
-        (near, mut spaces): (&'l Near, Vec<Option<Space>>),
+        near: &'l NearRobots,
+        mut spaces: Vec<Option<Space>>,
         scope: &Scope,
-        (out, clouds_out): (&'l Path, &Path),
+        to: LabelFolders<'l>,
         engine: &Engine,
     ) -> Result<Streamed<'l>> {
+        let out = to.out;
         let las = scope.las.clone().unwrap_or_else(|| self.las());
         let waiting_bytes = self.export.waiting_bytes.min(SPOOLED * engine.channel_bytes);
         let export = export::Settings { waiting_bytes, ..self.export };
         let records = export.records(&las);
         let mut tiles = Tiles::create(out, &records, &export)?;
-        let mut clouds = Clouds::create(clouds_out, &records, &export)?;
+        let mut clouds = Clouds::create(to.clouds, &records, &export)?;
         let mut masks = Masks::new(out, self.sources.opened_masks());
         let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
         let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
@@ -181,7 +209,7 @@ impl<'a> Labelling<'a> {
         let pack = Pack::of_clouds(&records, &export);
         // Tiles are as many bytes as masks and clouds: each has a thread that copies them to their
         // files.
-        let apart = |strips: Handed<'_, Labelled>| {
+        let apart = |strips: PipedItems<'_, LabelledStrip>| {
             for strip in strips {
                 let strip = strip?;
                 masks.add(&strip)?;
@@ -189,9 +217,11 @@ impl<'a> Labelling<'a> {
             }
             Ok((masks.finish()?, clouds.finish()?))
         };
-        let along = |hand: Hand<'_, Labelled>| {
-            let takers = (&mut spaces[..], &mut robots[..], &mut tiles);
-            let pictures = self.stream((near, scope), takers, &pack, (out, engine), hand)?;
+        let along = |hand: PipeSender<'_, LabelledStrip>| {
+            let pass = SecondPass { near, scope, pack: &pack, out };
+            let takers =
+                PointTakers { spaces: &mut spaces, robots: &mut robots, tiles: &mut tiles };
+            let pictures = self.stream(&pass, takers, engine, hand)?;
             let Some(tiles) = tiles else { return Ok((Vec::new(), Vec::new(), pictures)) };
             if scope.leaves_open {
                 return Ok((Vec::new(), tiles.open(), pictures));
@@ -200,11 +230,11 @@ impl<'a> Labelling<'a> {
             Ok((finished, Vec::new(), pictures))
         };
         let (((masks, mut digests), (moving, fixed)), (tiles, open, pictures)) =
-            engine.handing("clouds", apart, along)?;
+            engine.pipe("clouds", apart, along)?;
         let clouds = Written { tiles, robots: moving, fixed };
         digests.extend(clouds.sums().cloned());
         let said = vec![None; self.fits.len()];
-        let done = Done { clouds, masks, pictures, spaces: said, digests, las };
+        let done = WrittenLabels { clouds, masks, pictures, spaces: said, digests, las };
         let robots = chosen.into_iter().zip(robots).collect();
         Ok(Streamed { labelling: self, near, spaces, robots, open, out, done })
     }
@@ -213,13 +243,14 @@ impl<'a> Labelling<'a> {
     /// names of the plans drawn.
     fn stream(
         &self,
-        (near, scope): (&Near, &Scope),
-        (spaces, robots, tiles): (&mut [Option<Space>], &mut [RobotPicture], &mut Option<Tiles>),
-        pack: &Pack,
-        (out, engine): (&Path, &Engine),
-        hand: Hand<'_, Labelled>,
+        pass: &SecondPass<'_>,
+        takers: PointTakers<'_>,
+        engine: &Engine,
+        hand: PipeSender<'_, LabelledStrip>,
     ) -> Result<Vec<String>> {
-        let grids = Grids::of(spaces);
+        let &SecondPass { near, scope, pack, out } = pass;
+        let PointTakers { spaces, robots, tiles } = takers;
+        let grids = SpaceGrids::of(spaces);
         let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
         let (disks, mut pictures) = (engine.disks()?, Vec::new());
         for input in self.sources.opened() {
@@ -255,10 +286,10 @@ impl<'a> Labelling<'a> {
         input: &Input,
         label: &LabelStrip<'_>,
         engine: &Engine,
-        sink: impl FnMut(Labelled) -> Result<()>,
+        sink: impl FnMut(LabelledStrip) -> Result<()>,
     ) -> Result<()> {
-        let task = Task::new("write").of(crate::result::report::amount(self.sources, input.id));
-        let reading = Reading { sources: self.sources, input, want: Want::Everything };
+        let reading = InputReader { sources: self.sources, input, want: Want::Everything };
+        let task = Task::new("write").of(reading.amount());
         reading.each(task, label, None, engine, sink)
     }
 
@@ -268,10 +299,11 @@ impl<'a> Labelling<'a> {
         &self,
         i: usize,
         hanging: &Hanging,
-        (space, picture): (Option<&Space>, &RobotPicture),
+        space: Option<&Space>,
+        picture: &RobotPicture,
         out: &Path,
     ) -> Result<(Option<SpaceEntry>, [String; 2])> {
-        let (fit, id) = (&self.fits[i], id(i));
+        let (fit, id) = (&self.fits[i], robot_id(i));
         let model = &self.models[fit.model];
         export::write_robot(out, &id, fit, model, hanging)?;
         let space = space.map(|space| write_space(out, &id, space)).transpose()?;
@@ -315,7 +347,7 @@ impl<'a> Labelling<'a> {
             .enumerate()
             .map(|(i, f)| {
                 let p = f.world_from_base.translation.vector;
-                (id(i), [p.x, p.y])
+                (robot_id(i), [p.x, p.y])
             })
             .collect();
         let scanners: Vec<_> = self

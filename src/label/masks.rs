@@ -1,11 +1,18 @@
 //! Strips with labels in, in the order of each file; one triple of label arrays a mask out, an
 //! entry for every point that the file does not itself flag as invalid.
 
-use super::label_strips::Labelled;
-use super::labelling::MaskCount;
+use super::label_strips::LabelledStrip;
 use contract::{Error, Kind, Mask, Result};
 use export::{FileSum, LabelColumns, MaskWriter};
 use std::path::{Path, PathBuf};
+
+/// Counts of one mask.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MaskCount {
+    pub(crate) n_points: u64,
+    pub(crate) n_dropped: u64,
+    pub(crate) n_moving: u64,
+}
 
 /// Writes the masks of all inputs.
 pub(crate) struct Masks {
@@ -37,7 +44,7 @@ impl Masks {
     }
 
     /// Takes the labels of a strip's points.
-    pub(crate) fn add(&mut self, strip: &Labelled) -> Result<()> {
+    pub(crate) fn add(&mut self, strip: &LabelledStrip) -> Result<()> {
         let at = (strip.mask.0 - self.masks[0].id.0) as usize;
         let slot = &mut self.open[at];
         let open = match slot {
@@ -77,7 +84,7 @@ impl Open {
         Ok(Self { writer, window, n_named: 0 })
     }
 
-    fn add(&mut self, strip: &Labelled) -> Result<()> {
+    fn add(&mut self, strip: &LabelledStrip) -> Result<()> {
         let n = strip.place.len();
         if strip.first_place >= self.writer.len() + self.window.len() as u64 {
             self.flush(strip.first_place)?;

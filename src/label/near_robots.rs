@@ -1,39 +1,50 @@
 //! Fits and the tiles near them in; the labels of the points there, by place, and what hangs on
 //! each robot out.
 
-use crate::engine::{AllThreads, Engine, Task};
+use crate::detect::robots::FittedRobots;
+use crate::engine::{AllThreads, Amount, Engine, Task};
 use crate::store::Store;
 use attach::{Attach, Hanging};
-use contract::{Fit, Floor, Fold, Label, MaskId, PlaceRun, Result, Scan, TileLabels};
-use robot::Model;
+use contract::{Floor, Fold, Label, MaskId, PlaceRun, Result, Scan, TileLabels};
 use segment::Segment;
 use std::ops::Range;
 
+/// The scans in which points near robots are looked for.
+pub(crate) struct ScansNearRobots<'a> {
+    pub(crate) store: &'a Store,
+    pub(crate) floor: &'a Floor,
+    pub(crate) scans: &'a [Scan],
+    /// Masks of all inputs, also of those without scans here.
+    pub(crate) n_masks: usize,
+}
+
 /// What is known of points near robots.
-pub(crate) struct Near {
+pub(crate) struct NearRobots {
     /// Their labels: for each mask, by place.
     pub(crate) labels: Vec<Vec<PlaceRun<Label>>>,
     /// What hangs on each robot.
     pub(crate) hanging: Vec<Hanging>,
 }
 
-impl Near {
+impl NearRobots {
     /// Segments the tiles near robots, and decides over all scans what hangs on them.
     pub(crate) fn find(
-        (fits, models): (&[Fit], &[Model]),
-        (store, floor, (scans, n_masks)): (&Store, &Floor, (&[Scan], usize)),
-        (settings, attach): (segment::Settings, attach::Settings),
+        robots: FittedRobots<'_>,
+        scans: &ScansNearRobots<'_>,
+        segment: segment::Settings,
+        attach: attach::Settings,
         engine: &Engine,
     ) -> Result<Self> {
+        let FittedRobots { fits, models } = robots;
+        let &ScansNearRobots { store, floor, scans, n_masks } = scans;
         let attach = Attach::new(fits, models, attach);
-        let segment = || Segment::new(fits, models, floor, scans, settings, &AllThreads);
+        let segment = || Segment::new(fits, models, floor, scans, segment, &AllThreads);
         let segment = engine.pool()?.install(segment);
         let regions = segment.regions();
         let mut tiles: Vec<usize> = regions.iter().flat_map(|r| store.touching(r)).collect();
         tiles.sort_unstable();
         tiles.dedup();
-        let task =
-            Task::new("segment").of(crate::engine::progress::Amount::items(tiles.len() as u64));
+        let task = Task::new("segment").of(Amount::items(tiles.len() as u64));
         let mut sum = attach.empty();
         let mut labelled: Vec<TileLabels> = Vec::new();
         let reads = store.reads();

@@ -1,13 +1,15 @@
 //! Things that appeared in a cell in; the robots among them, and how they stood then where the
 //! earlier scans show them though their result missed them, out.
 
-use super::robots::{Now, look};
-use super::session::{Labels, Robots, Session, ground};
+use super::robots::{Now, Observed, look};
+use super::session::{CellComparison, CellLabels, ComparedRobots, ground};
+use crate::detect::robots::{FittedRobots, RobotList};
 use crate::detect::search::Search;
+use crate::detect::tools;
 use crate::engine::{Engine, Task};
 use crate::label::known_space::{region, standing};
-use crate::label::labelling::Labelling;
-use crate::label::near_robots::Near;
+use crate::label::labelling::{Labelling, ScansToLabel};
+use crate::label::near_robots::NearRobots;
 use change::Thing;
 use contract::{Fit, Region, Result, Verdict};
 use freespace::Watch;
@@ -25,14 +27,15 @@ const LIFTED: f64 = 0.2;
 /// What begins less high above the floor stands on it, metres.
 const STANDS: f64 = 0.2;
 
-impl Session<'_> {
+impl CellComparison<'_> {
     /// Robots among the things that appeared.
     pub(crate) fn new_robots(
         &self,
-        labels: &Labels,
-        (fits, models): (&[Fit], &mut Vec<Model>),
+        labels: &CellLabels,
+        plant: &mut RobotList,
         engine: &Engine,
     ) -> Result<Vec<Fit>> {
+        let RobotList { fits, models } = plant;
         let like =
             |size: [f64; 3]| size[2] >= ROBOT_LIKE[0] && size.iter().any(|s| *s >= ROBOT_LIKE[1]);
         // What stood elsewhere before, in the same shape and at the same height, is none.
@@ -49,9 +52,9 @@ impl Session<'_> {
             return Ok(Vec::new());
         }
         // A new one may hang on a wall.
-        let walls = ground(self.floor, true, (self.sources, self.store), self.settings, engine)?;
+        let walls = ground(self.floor, true, self.sources, self.store, self.settings, engine)?;
         let (scans, settings) = (&self.sources.scans, self.settings);
-        let search = Search::new(self.shelf, scans, self.store, &walls, settings);
+        let search = Search::new(self.library, scans, self.store, &walls, settings).over(&regions);
         let found = engine.fan_out(
             Task::new("search").large().showing(search.pieces()),
             regions.clone(),
@@ -65,7 +68,7 @@ impl Session<'_> {
         };
         let mut chosen = fit::choose(found, models, |_| false);
         chosen.retain(is_new);
-        crate::detect::tools::dress(chosen, models, (&search, &regions), engine)
+        tools::attach_tools(chosen, models, &search, engine)
     }
 
     /// Where the robot may stand that a new thing is part of.
@@ -83,10 +86,11 @@ impl Session<'_> {
     pub(crate) fn join(
         &self,
         appeared: Vec<Fit>,
-        (fits, models): (&mut Vec<Fit>, &mut Vec<Model>),
-        robots: &mut Robots,
+        plant: &mut RobotList,
+        robots: &mut ComparedRobots,
         engine: &Engine,
     ) -> Result<()> {
+        let RobotList { fits, models } = plant;
         let stood = engine
             .fan_out(Task::new("fit").large(), appeared.clone(), |fit| self.stood(&fit, models))?;
         for (fit, stood) in appeared.into_iter().zip(stood) {
@@ -109,14 +113,15 @@ impl Session<'_> {
     /// did not appear.
     fn stood(&self, now: &Fit, models: &[Model]) -> Result<Option<(Fit, Option<Model>)>> {
         let search = Search::new(
-            self.shelf,
+            self.library,
             &self.sources.scans,
             self.past.store,
             &self.old_ground,
             self.settings,
         );
-        let watch = Watch::new(&self.cell, &self.old_views);
-        let (then, own) = look(now, models, (&search, [&watch, &self.watch()], &[]))?;
+        let (watch, other) = (Watch::new(&self.cell, &self.old_views), self.watch());
+        let seen = Observed { search: &search, watch: &watch, other_session: &other, regions: &[] };
+        let (then, own) = look(now, models, &seen)?;
         Ok(match then {
             Now::Found(fit) | Now::Anew(fit, _) => Some((*fit, own)),
             Now::Gone | Now::Unseen | Now::Open | Now::Lost => None,
@@ -127,18 +132,21 @@ impl Session<'_> {
     /// missed none.
     pub(crate) fn missed(
         &self,
-        (fits, models): (&[Fit], &[Model]),
-        robots: &Robots,
+        plant: FittedRobots<'_>,
+        robots: &ComparedRobots,
         engine: &Engine,
-    ) -> Result<Option<Near>> {
+    ) -> Result<Option<NearRobots>> {
+        let FittedRobots { fits, models } = plant;
         if robots.missed.is_empty() {
             return Ok(None);
         }
         let mut then: Vec<Fit> =
             fits.iter().map(|fit| Fit { verdict: Verdict::Refused, ..fit.clone() }).collect();
         robots.missed.iter().for_each(|(i, fit)| then[*i].clone_from(fit));
-        let ground = (self.past.store, self.floor, &[][..]);
-        let labelling = Labelling::new(&then, models, self.sources, ground, self.settings);
+        let (sources, store, floor) = (self.sources, self.past.store, self.floor);
+        let scans = ScansToLabel { sources, store, floor, clusters: &[] };
+        let robots = FittedRobots { fits: &then, models };
+        let labelling = Labelling::new(robots, &scans, self.settings);
         labelling.near_robots(self.past.store, engine).map(Some)
     }
 }

@@ -1,12 +1,11 @@
 //! Points of earlier scans in a cell in; the surfaces that they lie on, what the new scans say of
 //! each of them, and which of them are superseded, out.
 
-use super::earlier_result::Base;
+use super::earlier_result::EarlierResult;
 use super::superseded::Places;
 use super::voxel_fates::Fates;
 use crate::engine::{Engine, Task};
-use crate::label::near_robots::Near;
-use crate::result::report::tiles;
+use crate::label::near_robots::NearRobots;
 use crate::store::Store;
 use change::{Seen, Tally, Tallying};
 use contract::{Label, MAX_SKIP, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
@@ -27,11 +26,11 @@ const GAP: u64 = 1 << 14;
 const SPARSE: u64 = 64;
 
 /// Earlier points in a cell.
-pub(crate) struct Past<'a> {
+pub(crate) struct EarlierPoints<'a> {
     pub(crate) scans: &'a [Scan],
     pub(crate) store: &'a Store,
     pub(crate) cell: Aabb,
-    base: &'a Base,
+    base: &'a EarlierResult,
     masks: Vec<MaskReader>,
     /// By mask: places that were superseded before, and how many points it has.
     before: Vec<Vec<u64>>,
@@ -63,9 +62,9 @@ struct Looked {
     tally: Tally,
 }
 
-impl<'a> Past<'a> {
+impl<'a> EarlierPoints<'a> {
     pub(crate) fn new(
-        base: &'a Base,
+        base: &'a EarlierResult,
         scans: &'a [Scan],
         store: &'a Store,
         cell: Aabb,
@@ -99,7 +98,7 @@ impl<'a> Past<'a> {
     pub(crate) fn look(
         &self,
         [watch, own]: [&Watch<'_>; 2],
-        missed: Option<&Near>,
+        missed: Option<&NearRobots>,
         engine: &Engine,
     ) -> Result<Compared> {
         let (mut then, mut tiles) = (Tally::default(), Vec::new());
@@ -169,8 +168,8 @@ impl<'a> Past<'a> {
 
     fn task(&self, name: &str) -> Task {
         let items = self.tiles.len() as u64;
-        let amount = crate::engine::progress::Amount { items, points: self.n_points(), bytes: 0 };
-        tiles(name, self.store).of(amount)
+        let amount = crate::engine::Amount { items, points: self.n_points(), bytes: 0 };
+        self.store.task(name).of(amount)
     }
 
     fn scan(&self, tile: &Tile) -> (&Scan, MaskId) {
@@ -219,7 +218,7 @@ pub(crate) fn sampled(of: u64) -> (u32, usize) {
 
 /// The map that gathers surfaces.
 struct Sample<'a> {
-    past: &'a Past<'a>,
+    past: &'a EarlierPoints<'a>,
     step: usize,
 }
 
@@ -258,12 +257,12 @@ struct Asked {
 
 /// The map that asks the new scans.
 struct Look<'a> {
-    past: &'a Past<'a>,
+    past: &'a EarlierPoints<'a>,
     watch: &'a Watch<'a>,
     /// Of the earlier scans.
     own: &'a Watch<'a>,
     /// Labels of robots that the earlier result missed.
-    missed: Option<&'a Near>,
+    missed: Option<&'a NearRobots>,
     fates: &'a Fates,
     anew: &'a [Places],
 }

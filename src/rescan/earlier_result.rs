@@ -1,10 +1,9 @@
 //! The result that a rescan goes on from: its folder in; what it found, and its files shared with
 //! the new result, out.
 
-use crate::cache::output::OutputDir;
-use crate::cache::{OutputFile, Vouched};
+use crate::cache::{Key, OutputDir, OutputFile, VerifiedFiles, tiles_of};
 use crate::job::Job;
-use crate::result::plant_state::State;
+use crate::result::plant_state::PlantState;
 use crate::store::Store;
 use contract::{Error, Kind, Result};
 use export::{MaskReader, ResultFile, ScanLabels, read_places};
@@ -12,17 +11,17 @@ use geometry::Aabb;
 use std::path::{Path, PathBuf};
 
 /// An earlier result that is whole.
-pub(crate) struct Base {
+pub(crate) struct EarlierResult {
     pub(crate) out: PathBuf,
     pub(crate) result: ResultFile,
-    pub(crate) state: State,
+    pub(crate) state: PlantState,
     /// Its files: what is read of them is compared with its list.
-    pub(crate) files: Vouched,
+    pub(crate) files: VerifiedFiles,
     /// Nobody rewrites it meanwhile.
     _lock: std::fs::File,
 }
 
-impl Base {
+impl EarlierResult {
     /// Reads what a result says of itself.
     ///
     /// # Errors
@@ -30,11 +29,11 @@ impl Base {
     pub(crate) fn open(out: &Path) -> Result<Self> {
         // A folder without a list is no result; one without its store is a result that cannot be
         // gone on from.
-        drop(Vouched::open(out)?);
+        drop(VerifiedFiles::open(out)?);
         let lock = Job::hold_shared(out)?;
         // Once more, since another run may have ended there meanwhile.
-        let files = Vouched::open(out)?;
-        let (result, state) = (files.result()?, State::read(&files)?);
+        let files = VerifiedFiles::open(out)?;
+        let (result, state) = (files.result()?, PlantState::read(&files)?);
         let base = Self { out: out.to_path_buf(), result, state, files, _lock: lock };
         for key in &base.state.tiles {
             let folder = base.tiles_folder().join(key.name());
@@ -64,7 +63,7 @@ impl Base {
 
     /// The store of its scans, as it lies with a new result.
     pub(crate) fn store(&self, output: &OutputDir, resident_bytes: usize) -> Result<Store> {
-        let open = |(input, key): (usize, &crate::cache::Key)| {
+        let open = |(input, key): (usize, &Key)| {
             let place = output.tiles().join(key.name());
             let mut store = Store::open(&place, self.state.first_scan(input), resident_bytes)?;
             // Its tiles are compared with its catalogue while they are read, and the catalogue here
@@ -138,21 +137,6 @@ impl Base {
         };
         self.result.labels.scans.iter().map(read).collect()
     }
-}
-
-/// Names of spatial tiles of this edge, of all files of a result, that some boxes touch.
-pub(crate) fn tiles_of(files: &[OutputFile], edge: f64, touched: &[&Aabb]) -> Vec<String> {
-    let corner = |name: &str| {
-        let (x, y) = name.strip_prefix("tiles/")?.split_once('.')?.0.split_once('_')?;
-        let [x, y]: [i32; 2] = [x.parse().ok()?, y.parse().ok()?];
-        Some([x, y].map(|i| f64::from(i) * edge))
-    };
-    let is_touched = |at: [f64; 2]| {
-        let touches = |b: &&Aabb| (0..2).all(|i| b.max[i] >= at[i] && b.min[i] <= at[i] + edge);
-        touched.iter().any(touches)
-    };
-    let names = files.iter().map(|file| &file.path);
-    names.filter(|name| corner(name).is_some_and(is_touched)).cloned().collect()
 }
 
 /// Every file of a folder under a second name; links where the system has them.

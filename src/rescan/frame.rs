@@ -2,7 +2,7 @@
 //! beams of both where it is not that of the plant, out: the scans and their tiles are carried into
 //! the plant.
 
-use super::earlier_points::{Past, World};
+use super::earlier_points::{EarlierPoints, World};
 use crate::engine::{AllThreads, Engine, Task};
 use crate::store::Store;
 use contract::{Error, Result, Scan, words};
@@ -27,7 +27,7 @@ pub enum Frame {
 
 /// Where the new scans lie.
 #[derive(Default)]
-pub(crate) struct Carried {
+pub(crate) struct CarriedSession {
     /// The plant's frame from theirs; none where it is theirs, too.
     pub(crate) plant_from_new: Option<Pose>,
     /// The same with what speaks for it.
@@ -54,11 +54,13 @@ const ROOM: f64 = 1.0;
 /// `BadInput` where no frame is clear, or the given one is contradicted.
 pub(crate) fn carry(
     wish: &Frame,
-    (past, stood): (&Past<'_>, Vec<Aabb>),
-    (sources, new): (&mut Sources, &mut Store),
+    past: &EarlierPoints<'_>,
+    stood: Vec<Aabb>,
+    sources: &mut Sources,
+    new: &mut Store,
     engine: &Engine,
-) -> Result<Carried> {
-    let carried = Sessions { past, stood, new, sources, engine }.find(wish)?;
+) -> Result<CarriedSession> {
+    let carried = FrameSearch { past, stood, new, sources, engine }.find(wish)?;
     if let Some(motion) = &carried.plant_from_new {
         for scan in &mut sources.scans[past.scans.len()..] {
             scan.world_from_scan = motion * scan.world_from_scan;
@@ -68,66 +70,77 @@ pub(crate) fn carry(
     Ok(carried)
 }
 
+/// What both sessions saw.
+#[derive(Clone, Copy)]
+struct BothSessions<'s> {
+    old: &'s Session,
+    new: &'s Session,
+}
+
 /// All that the frame is found from.
-struct Sessions<'a> {
-    past: &'a Past<'a>,
+struct FrameSearch<'a> {
+    past: &'a EarlierPoints<'a>,
     stood: Vec<Aabb>,
     new: &'a Store,
     sources: &'a Sources,
     engine: &'a Engine,
 }
 
-impl Sessions<'_> {
-    fn find(&self, wish: &Frame) -> Result<Carried> {
+impl FrameSearch<'_> {
+    fn find(&self, wish: &Frame) -> Result<CarriedSession> {
         let new = self.new_session()?;
         let near = self.old_session(Some(&self.bounds().grown(ROOM)))?;
         let stated = local(&Pose::identity(), &near, &new);
         match wish {
             Frame::Stated => {
                 let answer = frame::at_stated(&near, &new, &stated);
-                return self.as_stated(answer, (&near, &new));
+                return self.as_stated(answer, BothSessions { old: &near, new: &new });
             }
             Frame::Rough(rough) => {
                 let old = self.old_session(None)?;
-                return self.rough(*rough, (&old, &new));
+                return self.rough(*rough, BothSessions { old: &old, new: &new });
             }
             Frame::Find => {}
         }
         match frame::at_stated(&near, &new, &stated) {
-            Answer::Holds(_) => return Ok(Carried::default()),
-            Answer::Near(place) => return Ok(carried(&place, "found", (&near, &new))),
+            Answer::Holds(_) => return Ok(CarriedSession::default()),
+            Answer::Near(place) => {
+                return Ok(carried(&place, "found", BothSessions { old: &near, new: &new }));
+            }
             Answer::Not(_) => {}
         }
         let old = self.old_session(None)?;
         let stated = local(&Pose::identity(), &old, &new);
         let found = self.engine.pool()?.install(|| frame::find(&old, &new, &stated, &AllThreads));
         match found {
-            Ok(place) if frame::is_stated(&place, &stated, &new) => Ok(Carried::default()),
-            Ok(place) => Ok(carried(&place, "found", (&old, &new))),
-            Err(refusal) => Err(self.refused(&refusal, (&old, &new))),
+            Ok(place) if frame::is_stated(&place, &stated, &new) => Ok(CarriedSession::default()),
+            Ok(place) => Ok(carried(&place, "found", BothSessions { old: &old, new: &new })),
+            Err(refusal) => Err(self.refused(&refusal, BothSessions { old: &old, new: &new })),
         }
     }
 
     /// The word of a person that the frame is the plant's: believed unless surfaces and beams
     /// contradict it.
-    fn as_stated(&self, answer: Answer, both: (&Session, &Session)) -> Result<Carried> {
+    fn as_stated(&self, answer: Answer, both: BothSessions<'_>) -> Result<CarriedSession> {
         let warning = "too few surfaces of the new scans lie on the plant's to confirm the frame that --frame states";
         match answer {
-            Answer::Holds(_) => Ok(Carried::default()),
+            Answer::Holds(_) => Ok(CarriedSession::default()),
             Answer::Near(place) => Ok(carried(&place, "given", both)),
             Answer::Not(Some(place)) if is_contradicted(&place) => Err(self.contradicted(&place)),
-            Answer::Not(_) if both.0.surfels.all.is_empty() => {
+            Answer::Not(_) if both.old.surfels.all.is_empty() => {
                 let what = "--frame says that the new scans are in the plant's frame, but no point of the plant lies where they do";
                 let hint = "leave --frame out, or give --frame X,Y,Z,YAW";
                 Err(Error::bad_input(what).at(self.input()).hint(hint))
             }
-            Answer::Not(_) => Ok(Carried { warnings: vec![warning.into()], ..Carried::default() }),
+            Answer::Not(_) => {
+                Ok(CarriedSession { warnings: vec![warning.into()], ..CarriedSession::default() })
+            }
         }
     }
 
-    fn rough(&self, rough: [f64; 4], both: (&Session, &Session)) -> Result<Carried> {
+    fn rough(&self, rough: [f64; 4], both: BothSessions<'_>) -> Result<CarriedSession> {
         let plant_from_new = self.posed(rough);
-        match frame::from_rough(both.0, both.1, &local(&plant_from_new, both.0, both.1)) {
+        match frame::from_rough(both.old, both.new, &local(&plant_from_new, both.old, both.new)) {
             Ok(place) => Ok(carried(&place, "given", both)),
             Err(Some(place)) => Err(self.contradicted(&place)),
             Err(None) => {
@@ -170,8 +183,8 @@ impl Sessions<'_> {
     fn new_session(&self) -> Result<Session> {
         let origin = self.first().map(f64::round);
         let all = (0..self.new.entries().len()).collect();
-        let gather = Gather { store: self.new, origin, superseded: None, bounds: None };
-        gather.session((self.scans(), all), (&[], usize::MAX), self.engine)
+        let gather = SessionReader { store: self.new, origin, superseded: None, bounds: None };
+        gather.session(self.scans(), all, &[], usize::MAX, self.engine)
     }
 
     /// The earlier session, whole or as far as it lies within some bounds.
@@ -185,12 +198,12 @@ impl Sessions<'_> {
         let origin = self.past.scans.get(first).map_or_else(Vector::zeros, |scan| {
             scan.world_from_scan.translation.vector.map(f64::round)
         });
-        let gather = Gather { store, origin, superseded: Some(self.past), bounds };
+        let gather = SessionReader { store, origin, superseded: Some(self.past), bounds };
         let n_asked = if bounds.is_some() { MAX_ASKED } else { usize::MAX };
-        gather.session((self.past.scans, tiles), (&self.stood, n_asked), self.engine)
+        gather.session(self.past.scans, tiles, &self.stood, n_asked, self.engine)
     }
 
-    fn refused(&self, refusal: &Refusal, both: (&Session, &Session)) -> Error {
+    fn refused(&self, refusal: &Refusal, both: BothSessions<'_>) -> Error {
         let way_out = "if they are of this plant, say about where the first new scanner stands in it and how far the new frame is turned (--frame X,Y,Z,YAW, metres and degrees; --frame same where the frame is the plant's), give scans that are registered to the plant, or scan more of what surrounds the cell";
         let error = match refusal {
             Refusal::Nothing(None) => Error::bad_input(
@@ -226,7 +239,8 @@ impl Sessions<'_> {
     }
 
     /// A place as the flag that states it.
-    fn flag(&self, place: &Place, (old, new): (&Session, &Session)) -> String {
+    fn flag(&self, place: &Place, both: BothSessions<'_>) -> String {
+        let BothSessions { old, new } = both;
         let pose = world(&place.laid.old_from_new, old, new);
         let at = pose * Point::from(self.first());
         let yaw = pose.rotation.euler_angles().2.to_degrees();
@@ -261,7 +275,8 @@ fn world(old_from_new: &Pose, old: &Session, new: &Session) -> Pose {
     Translation3::from(old.surfels.origin) * old_from_new * Translation3::from(-new.surfels.origin)
 }
 
-fn carried(place: &Place, by: &str, (old, new): (&Session, &Session)) -> Carried {
+fn carried(place: &Place, by: &str, both: BothSessions<'_>) -> CarriedSession {
+    let BothSessions { old, new } = both;
     let pose = world(&place.laid.old_from_new, old, new);
     let e = &place.evidence;
     let entry = CarriedEntry {
@@ -277,24 +292,26 @@ fn carried(place: &Place, by: &str, (old, new): (&Session, &Session)) -> Carried
         n_where_new_saw_through: e.n_where_new_saw_through,
         margin: place.margin,
     };
-    Carried { plant_from_new: Some(pose), entry: Some(entry), warnings: Vec::new() }
+    CarriedSession { plant_from_new: Some(pose), entry: Some(entry), warnings: Vec::new() }
 }
 
 /// Reads a session.
-struct Gather<'a> {
+struct SessionReader<'a> {
     store: &'a Store,
     origin: Vector,
     /// Whose superseded points are left out.
-    superseded: Option<&'a Past<'a>>,
+    superseded: Option<&'a EarlierPoints<'a>>,
     /// Surfaces outside are left out, world, metres.
     bounds: Option<&'a Aabb>,
 }
 
-impl Gather<'_> {
+impl SessionReader<'_> {
     fn session(
         &self,
-        (scans, tiles): (&[Scan], Vec<usize>),
-        (robots, n_asked): (&[Aabb], usize),
+        scans: &[Scan],
+        tiles: Vec<usize>,
+        robots: &[Aabb],
+        n_asked: usize,
         engine: &Engine,
     ) -> Result<Session> {
         let entries = self.store.entries();
@@ -319,7 +336,7 @@ impl Gather<'_> {
         for some in work.chunks(2 * engine.n_workers) {
             let read =
                 engine.fan_out(Task::new("frame"), some.to_vec(), |(k, (scan, list, n))| {
-                    self.scan(scan, (list, *n), asked.contains(&k), step)
+                    self.scan(scan, list, *n, asked.contains(&k), step)
                 })?;
             for (gathered, eye) in read {
                 all.join(gathered);
@@ -333,7 +350,8 @@ impl Gather<'_> {
     fn scan(
         &self,
         scan: &Scan,
-        (tiles, n): (&[usize], u64),
+        tiles: &[usize],
+        n: u64,
         is_asked: bool,
         step: f64,
     ) -> Result<(Gathered, Option<Panorama>)> {

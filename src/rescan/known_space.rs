@@ -2,17 +2,18 @@
 //! beside the cell, brought up to date, out. Points are marked into them while they are labelled
 //! and while tiles are written.
 
-use super::output::Written;
+use super::found::Found;
+use crate::detect::robot_id::robot_id;
+use crate::detect::robots::FittedRobots;
 use crate::engine::{Engine, Task};
-use crate::label::known_space::{Around, Spot, bounds, mark};
-use crate::result::report::id;
+use crate::label::known_space::{KnownSpaces, VoxelMark, bounds, mark};
 use contract::{Result, Space, SpaceGrid, SpaceKind};
 use export::{SpaceEntry, write_space};
 use freespace::Passed;
 use geometry::Aabb;
 use std::path::Path;
 
-impl Written<'_, '_> {
+impl Found<'_, '_> {
     /// By fit: spaces of robots that stand otherwise, and of others that reach to where points are
     /// looked at again.
     pub(super) fn spaces(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
@@ -22,7 +23,8 @@ impl Written<'_, '_> {
             return Ok(out);
         }
         let search = self.session.search();
-        let around = Around { robots: (self.fits, self.models), search: &search, settings };
+        let robots = FittedRobots { fits: self.fits, models: self.models };
+        let around = KnownSpaces { robots, search: &search, settings };
         let places = self.places();
         let meets = |i: usize| {
             let grid = self.entry(i).map(|entry| entry.voxels().bounds());
@@ -39,7 +41,12 @@ impl Written<'_, '_> {
     }
 
     /// The space of one robot; points of the places are still to be marked.
-    fn space(&self, i: usize, around: &Around<'_, '_>, places: &[Aabb]) -> Result<Option<Space>> {
+    fn space(
+        &self,
+        i: usize,
+        around: &KnownSpaces<'_, '_>,
+        places: &[Aabb],
+    ) -> Result<Option<Space>> {
         let read = |entry: &SpaceEntry| {
             self.base.files.compared(&entry.grid)?;
             entry.read(&self.base.out)
@@ -67,13 +74,13 @@ impl Written<'_, '_> {
     pub(super) fn write_spaces(
         &self,
         mut spaces: Vec<Option<Space>>,
-        left: Vec<Spot>,
+        left: Vec<VoxelMark>,
         next: &Path,
         engine: &Engine,
     ) -> Result<Vec<Option<SpaceEntry>>> {
         mark(&mut spaces, left);
         engine.each(spaces.into_iter().enumerate().collect(), |(i, space)| {
-            space.map(|space| write_space(next, &id(i), &space)).transpose()
+            space.map(|space| write_space(next, &robot_id(i), &space)).transpose()
         })
     }
 

@@ -5,6 +5,7 @@
 mod appeared_robots;
 mod earlier_points;
 mod earlier_result;
+mod found;
 mod frame;
 mod known_space;
 mod new_points;
@@ -17,32 +18,30 @@ mod superseded;
 mod voxel_fates;
 
 pub use frame::Frame;
+pub use session::Cell;
 
-pub(crate) use earlier_result::tiles_of;
-pub(crate) use robots::models_of;
-
-use crate::cache::input_tiles::Filling;
-use crate::cache::output::OutputDir;
-use crate::cache::{self, Cache, Digests, Key, OutputFile};
+use crate::cache::input_tiles::InputTiles;
+use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, WholeResult};
 use crate::detect::library;
-use crate::detect::search::Shelf;
+use crate::detect::robots::RobotList;
+use crate::detect::search::PreparedLibrary;
 use crate::engine::{AllThreads, Engine};
 use crate::job::{Job, Outcome, units};
-use crate::result::plant_state::State;
+use crate::result::plant_state::PlantState;
 use crate::store::Store;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
-use earlier_points::Past;
-use earlier_result::Base;
+use earlier_points::EarlierPoints;
+use earlier_result::EarlierResult;
+use found::Found;
 use geometry::{Aabb, Pose};
 use ingest::{Scanners, Sources};
-use output::Written;
 use robot::Library;
-use session::{Robots, Session};
+use session::{BothScans, CellComparison, ComparedRobots};
 use std::path::PathBuf;
 
 /// What is to be done.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct RescanRequest {
     /// Output folder of the result that is gone on from.
     pub base: PathBuf,
     /// Which part of the plant.
@@ -54,23 +53,12 @@ pub struct Request {
     pub job: Job,
 }
 
-/// Which part of a plant was scanned again.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Cell {
-    /// Within these bounds, world, metres.
-    Box(Aabb),
-    /// All that these robots reach, by their ids.
-    Robots(Vec<String>),
-    /// What the new scans see well.
-    Seen,
-}
-
 /// Brings a cell up to date.
 ///
 /// # Errors
 /// A base that is no whole result, an input that is part of it already; what a run may end with.
-pub fn rescan(request: &Request, engine: &Engine) -> Result<Outcome> {
-    let base = Base::open(&request.base)?;
+pub fn rescan(request: &RescanRequest, engine: &Engine) -> Result<Outcome> {
+    let base = EarlierResult::open(&request.base)?;
     let job = job(request, &base)?;
     let output = job.output()?;
     let digests =
@@ -83,7 +71,7 @@ pub fn rescan(request: &Request, engine: &Engine) -> Result<Outcome> {
 
 /// A rescan that has something to do.
 struct Rescan<'a> {
-    base: &'a Base,
+    base: &'a EarlierResult,
     /// With the base's library and ways of writing.
     job: &'a Job,
     output: &'a OutputDir,
@@ -92,12 +80,12 @@ struct Rescan<'a> {
 }
 
 impl Rescan<'_> {
-    fn whole(&self, request: &Request) -> Result<Outcome> {
+    fn whole(&self, request: &RescanRequest) -> Result<Outcome> {
         let &Rescan { base, job, output, digests, engine } = self;
         let settings = &job.means.settings;
         base.share_store(output)?;
-        let shelved = Cache::new(output.models(), digests.models(settings));
-        let (library, mut sources) = self.given(&shelved)?;
+        let models_kept = Cache::new(output.models(), digests.models(settings));
+        let (library, mut sources) = self.given(&models_kept)?;
 
         // The new scans into tiles; those of the plant are there.
         let (tiles, mut new, n_kept) = self.tiles(&sources)?;
@@ -105,51 +93,49 @@ impl Rescan<'_> {
         let old = base.store(output, job.means.store_bytes())?;
 
         // Which frame the new scans are in: they are carried into that of the plant.
-        let mut fits = base.state.fits.clone();
-        let mut models = robots::models_of(&mut fits, &library)?;
+        let mut plant = library::robots_of(base.state.fits.clone(), &library)?;
         let scans = base.state.scans.clone();
-        let past = Past::new(base, &scans, &old, Aabb::EMPTY)?;
-        let stood = session::stood((&fits, &models));
-        let carried =
-            frame::carry(&request.frame, (&past, stood), (&mut sources, &mut new), engine)?;
+        let past = EarlierPoints::new(base, &scans, &old, Aabb::EMPTY)?;
+        let stood = session::stood(plant.view());
+        let wish = &request.frame;
+        let carried = frame::carry(wish, &past, stood, &mut sources, &mut new, engine)?;
 
         // Where the cell is; the new scans are taken back by what they are off what stood there.
-        let cell = session::bounds(&request.cell, base, (&fits, &models), (&sources, &new))?;
-        let past = past.of_cell(cell);
-        let shelf = Shelf::new(&library.models);
-        let names = session::known((&fits, &models), &cell);
-        let floor = (&base.state.floor, robots::hang(&fits, &past.cell));
+        let cell = session::bounds(&request.cell, base, plant.view(), &sources, &new)?;
+        let past = &past.of_cell(cell);
+        let prepared = &PreparedLibrary::new(&library.models);
+        let names = session::known(plant.view(), &cell);
+        let (floor, hangs) = (&base.state.floor, robots::hang(&plant.fits, &past.cell));
         let known = || {
-            shelf.prepare(&names, &OneByOne);
+            prepared.prepare(&names, &OneByOne);
             Ok(())
         };
-        let (laid, between) = (&mut sources, (&past, &new));
-        let on_shelf = &shelf;
+        let (sources_laid, store) = (&mut sources, &new);
         // Reading waits for disks: what fits of the cell's robots need is made meanwhile.
-        let ((), (registered, session)) = engine.beside("models", known, move || {
-            let registered = session::register(between, laid, engine)?;
-            let session = Session::new(floor, laid, between, on_shelf, settings, engine)?;
-            Ok((registered, session))
+        let ((), (registered, session)) = engine.join("models", known, move || {
+            let registered = session::register(past, store, sources_laid, engine)?;
+            let (sources, library) = (&*sources_laid, prepared);
+            let both = BothScans { floor, hangs, sources, past, store, library };
+            Ok((registered, CellComparison::new(both, settings, engine)?))
         })?;
 
         // Robots and things of the cell, then and now.
-        let (robots, labels) = session.compare((&mut fits, &mut models), engine)?;
+        let (robots, labels) = session.compare(&mut plant, engine)?;
 
         // New masks and records of the new scans, tiles of the cell anew, all the rest as it was.
-        let (session, robots) = (&session, &robots);
-        let (labels, models) = (&labels, &models);
-        let carried = &carried;
-        let found = Written { base, session, robots, labels, models, fits: &fits, carried };
-        let written = found.write(&registered, (output, digests), engine)?;
+        let (session, robots, labels, carried) = (&session, &robots, &labels, &carried);
+        let RobotList { fits, models } = &plant;
+        let found = Found { base, session, robots, labels, models, fits, carried };
+        let written = found.write(&registered, output, digests, engine)?;
         let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
         let mut outcome = written.outcome;
-        let kept = (&sources, (&*all, contents, carried.plant_from_new));
-        outcome.told = self.conclude((fits, robots), kept, (&outcome, written.known))?;
-        output.prune_tiles(&all, &shelved);
-        let (models, shared) = (shelved.n_kept(), written.n_shared);
-        let tiles = ("tiles of new scans", n_kept);
-        outcome.reused =
-            cache::said(&[("models", models), tiles, ("files of the earlier result", shared)]);
+        let frame = carried.plant_from_new;
+        let made = MadeAnew { robots, sources: &sources, tiles: &all, contents, frame };
+        outcome.told = self.conclude(plant.fits, made, written.known, &outcome)?;
+        output.prune_tiles(&all, &models_kept);
+        let names = ["models", "tiles of new scans", "files of the earlier result"];
+        let n_kept = [models_kept.n_kept(), n_kept, written.n_shared];
+        outcome.reused = cache::reused_in_words(names, n_kept);
         Ok(outcome)
     }
 
@@ -157,18 +143,17 @@ impl Rescan<'_> {
     /// already.
     fn tiles(&self, sources: &Sources) -> Result<(Vec<Key>, Store, [usize; 2])> {
         let &Rescan { base, job, output, digests, engine } = self;
-        let filling = Filling::new(sources, &job.means, output.tiles(), engine);
-        let filled = sources.opened().iter().map(|i| filling.tiles_of(i, digests));
-        let (tiles, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
+        let input_tiles = InputTiles::new(sources, &job.means, output.tiles(), engine);
+        let (tiles, store) = input_tiles.of_all(sources.opened(), digests)?;
         sources.opened().iter().try_for_each(|input| fresh(input, base, digests))?;
-        Ok((tiles, Store::join(stores), filling.n_kept()))
+        Ok((tiles, store, input_tiles.n_kept()))
     }
 
     /// Reads the library, and opens the new scans behind those of the base.
-    fn given(&self, shelved: &Cache) -> Result<(Library, Sources)> {
+    fn given(&self, models_kept: &Cache) -> Result<(Library, Sources)> {
         let &Rescan { base, job, engine, .. } = self;
         let settings = &job.means.settings;
-        let library = library::load(&job.robots, &settings.robot, Some(shelved), engine)?;
+        let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
         let read = |path| Scanners::read(path, &job.means.settings.ingest);
         let scanners = job.scanners.as_deref().map(read).transpose()?;
         let before = base.state.before();
@@ -186,11 +171,13 @@ impl Rescan<'_> {
     /// stand as they stood are handed on as the base has them.
     fn conclude(
         &self,
-        (mut fits, robots): (Vec<Fit>, &Robots),
-        (sources, (tiles, contents, frame)): (&Sources, Kept<'_>),
-        (outcome, known): (&Outcome, Vec<OutputFile>),
+        mut fits: Vec<Fit>,
+        made: MadeAnew<'_>,
+        files: Vec<OutputFile>,
+        outcome: &Outcome,
     ) -> Result<Vec<String>> {
         let &Rescan { base, job, output, digests, engine } = self;
+        let MadeAnew { robots, sources, tiles, contents, frame } = made;
         sources.opened().iter().try_for_each(|input| digests.check(input))?;
         let stays = |i: &usize| !robots.changed.contains(i) && !robots.gone.contains(i);
         for i in (0..base.state.fits.len()).filter(stays) {
@@ -199,7 +186,7 @@ impl Rescan<'_> {
         let mut frames = base.state.frames.clone();
         frames.resize(base.state.inputs.len(), None);
         frames.resize(sources.inputs.len(), frame);
-        let state = State {
+        let state = PlantState {
             frames,
             inputs: sources.inputs.clone(),
             masks: sources.masks.clone(),
@@ -211,16 +198,23 @@ impl Rescan<'_> {
             ..base.state.clone()
         };
         state.write(output.next())?;
-        cache::publish(job, (output, digests), (outcome, known), engine)
+        WholeResult { job, output, digests, outcome, files }.publish(engine)
     }
 }
 
-/// Tiles of all inputs, what their stores hold, and what carried the new scans into the plant's
-/// frame.
-type Kept<'a> = (&'a [Key], Vec<String>, Option<Pose>);
+/// What is not as it was in the earlier result.
+struct MadeAnew<'a> {
+    robots: &'a ComparedRobots,
+    sources: &'a Sources,
+    /// Tiles of all inputs, and what their stores hold.
+    tiles: &'a [Key],
+    contents: Vec<String>,
+    /// What carried the new scans into the plant's frame.
+    frame: Option<Pose>,
+}
 
 /// What a rescan is asked for beside its inputs and settings, for its digest.
-fn asked(request: &Request, base: &Base) -> String {
+fn asked(request: &RescanRequest, base: &EarlierResult) -> String {
     let frame = match request.frame {
         Frame::Find => String::new(),
         other => format!(" {other:?}"),
@@ -229,7 +223,7 @@ fn asked(request: &Request, base: &Base) -> String {
 }
 
 /// The job with the base's library and ways of writing.
-fn job(request: &Request, base: &Base) -> Result<Job> {
+fn job(request: &RescanRequest, base: &EarlierResult) -> Result<Job> {
     let mut job = request.job.clone();
     if job.robots.as_os_str().is_empty() {
         job.robots.clone_from(&base.state.robots);
@@ -245,7 +239,7 @@ fn job(request: &Request, base: &Base) -> Result<Job> {
 }
 
 /// Refuses an input that the base was made of.
-fn fresh(input: &Input, base: &Base, digests: &Digests) -> Result<()> {
+fn fresh(input: &Input, base: &EarlierResult, digests: &Digests) -> Result<()> {
     let own = digests.input(input).unwrap_or_default();
     match base.result.inputs.iter().find(|i| i.digest == own) {
         None => Ok(()),

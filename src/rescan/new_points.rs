@@ -3,8 +3,7 @@
 
 use super::earlier_points::{World, area, sampled, seen};
 use crate::engine::Engine;
-use crate::label::near_robots::Near;
-use crate::result::report::tiles;
+use crate::label::near_robots::NearRobots;
 use crate::store::Store;
 use change::{Tally, Tallying};
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
@@ -20,12 +19,13 @@ const N_LAID: u64 = 100_000;
 /// stood is seen.
 pub(crate) fn register(
     planes: &Planes,
-    (scans, first): (&[Scan], usize),
-    (store, cell): (&Store, &Aabb),
+    scans: &[Scan],
+    store: &Store,
+    cell: &Aabb,
     engine: &Engine,
 ) -> Result<Vec<Option<Registration>>> {
     let touching = store.touching(cell);
-    engine.fan_out("register", scans[first..].iter().collect(), |scan| {
+    engine.fan_out("register", scans.iter().collect(), |scan| {
         let entries = || touching.iter().filter(|&&i| store.entries()[i].at.scan == scan.id);
         let n: u64 = entries().map(|&i| store.entries()[i].n_points).sum();
         let (skip, step) = sampled((n / N_LAID).max(1));
@@ -41,9 +41,9 @@ pub(crate) fn register(
 }
 
 /// What stands still in a cell, and where the earlier scans saw nothing.
-pub(crate) struct Present<'a> {
+pub(crate) struct NewPoints<'a> {
     pub(crate) scans: &'a [Scan],
-    pub(crate) near: &'a Near,
+    pub(crate) near: &'a NearRobots,
     pub(crate) ground: &'a Ground,
     pub(crate) cell: Aabb,
     /// What stood there: the earlier scans are asked only where nothing of it is near.
@@ -57,12 +57,12 @@ pub(crate) struct Present<'a> {
 /// What one tile adds.
 pub(crate) struct Tallied(Tally);
 
-impl Present<'_> {
+impl NewPoints<'_> {
     pub(crate) fn tally(&self, store: &Store, engine: &Engine) -> Result<Tally> {
         let mut all = Tally::default();
         let source = store.picks_once(store.touching(&self.cell), 0);
         let reads = store.reads();
-        engine.pass(tiles("compare", store), source, |f| {
+        engine.pass(store.task("compare"), source, |f| {
             f.map(&reads).map(self).for_each(|own| {
                 all.join(own.0);
                 Ok(())
@@ -72,7 +72,7 @@ impl Present<'_> {
     }
 }
 
-impl Map for Present<'_> {
+impl Map for NewPoints<'_> {
     type In = Tile;
     type Out = Tallied;
     type Scratch = ();

@@ -1,46 +1,32 @@
 //! What a rescan found in; masks of the new scans, tiles of the cell anew, the rest of the earlier
 //! result shared, and the result that joins them, out.
 
-use super::earlier_points::Past;
-use super::earlier_result::Base;
-use super::frame::Carried;
+use super::earlier_points::EarlierPoints;
+use super::found::Found;
 use super::report;
-use super::report::Said;
-use super::session::{Labels, Robots, Session};
-use crate::cache::output::OutputDir;
-use crate::cache::{Digests, OutputFile};
+use super::report::RescanReport;
+use crate::cache::{Digests, OutputDir, OutputFile};
+use crate::detect::robot_id::robot_id;
+use crate::detect::robots::FittedRobots;
 use crate::engine::Engine;
 use crate::job::Outcome;
-use crate::label::known_space::{Grids, Spot};
+use crate::label::known_space::{SpaceGrids, VoxelMark};
 use crate::label::label_strips::blocks;
-use crate::label::labelling::{Labelling, Scope, Streamed};
+use crate::label::labelling::{LabelFolders, Labelling, Scope, Streamed};
 use crate::result::copc;
-use crate::result::report::id;
 use change::{Tally, ThingChange};
-use contract::{Fit, MaskId, Result};
+use contract::{MaskId, Result};
 use export::{COPC, FileSum, MaskFiles, NpyWriter, OldPoint, Spool};
 use freespace::{Sight, Watch};
 use geometry::Aabb;
 use register::Registration;
-use robot::Model;
 use std::cell::RefCell;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Everything that is written.
-pub(crate) struct Written<'a, 's> {
-    pub(crate) base: &'a Base,
-    pub(crate) session: &'a Session<'s>,
-    pub(crate) robots: &'a Robots,
-    pub(crate) labels: &'a Labels,
-    pub(crate) models: &'a [Model],
-    pub(crate) fits: &'a [Fit],
-    pub(crate) carried: &'a Carried,
-}
-
 /// What came of it.
-pub(crate) struct Out {
+pub(crate) struct WrittenResult {
     pub(crate) outcome: Outcome,
     /// Files whose checksums are known.
     pub(crate) known: Vec<OutputFile>,
@@ -48,37 +34,38 @@ pub(crate) struct Out {
     pub(crate) n_shared: [usize; 2],
 }
 
-impl Written<'_, '_> {
+impl Found<'_, '_> {
     pub(crate) fn write(
         &self,
         registered: &[Option<Registration>],
-        (output, digests): (&OutputDir, &Digests),
+        output: &OutputDir,
+        digests: &Digests,
         engine: &Engine,
-    ) -> Result<Out> {
+    ) -> Result<WrittenResult> {
         let next = output.next();
         let scratch = output.scratch();
         let gone = self.gone();
         // Places of old points are listed while the new ones are labelled and tiles are written.
         let lists = || self.lists(&gone, next);
         let own = self.session.own_fits(self.fits, self.robots);
-        let labelling = self.session.labelling(&own, self.models);
+        let labelling = self.session.labelling(FittedRobots { fits: &own, models: self.models });
         let rest = || {
-            let mut streamed = self.label(&labelling, registered, (next, &scratch), engine)?;
+            let mut streamed = self.label(&labelling, registered, next, &scratch, engine)?;
             let (open, spaces) = (streamed.take_open(), streamed.take_spaces());
-            let grids = Grids::of(&spaces);
-            let tiles = || self.tiles((open, &grids), &gone, (next, &scratch), engine);
+            let grids = SpaceGrids::of(&spaces);
+            let tiles = || self.tiles(open, &grids, &gone, next, &scratch, engine);
             let (mut done, mut touched) =
-                engine.beside("files of robots", || streamed.finish(engine), tiles)?;
+                engine.join("files of robots", || streamed.finish(engine), tiles)?;
             let left = std::mem::take(&mut touched.spots);
             done.spaces = self.write_spaces(spaces, left, next, engine)?;
             Ok((done, touched))
         };
-        let (lists, (mut done, touched)) = engine.beside("lists", lists, rest)?;
+        let (lists, (mut done, touched)) = engine.join("lists", lists, rest)?;
         let mut written: BTreeSet<String> = touched.names;
         written.extend(lists.grown);
         done.digests.extend(touched.digests.into_iter().chain(lists.digests));
         let _ = std::fs::remove_dir_all(&scratch);
-        let said = Said {
+        let said = RescanReport {
             found: self,
             done: &done,
             registered,
@@ -90,24 +77,29 @@ impl Written<'_, '_> {
         let spaces = done.spaces.iter().flatten();
         written.extend(spaces.flat_map(|s| [&s.grid, &s.octomap, &s.unknown]).cloned());
         let rewritten = self.robots.changed.iter().chain(&self.robots.gone);
-        let folders: Vec<String> = rewritten.map(|&i| id(i)).collect();
+        let folders: Vec<String> = rewritten.map(|&i| robot_id(i)).collect();
         let has_copc = self.base.has(COPC);
         written.extend(has_copc.then(|| COPC.to_string()));
         let is_new = |path: &str| written.contains(path) || is_of(path, &folders);
         let shared = self.base.share_files(next, is_new)?;
         if has_copc {
-            // It is made of all tiles, those that did not change, too.
-            let tiles = shared.iter().filter(|file| file.path.starts_with("tiles/")).collect();
-            engine.fan_out("compare", tiles, |file: &OutputFile| {
-                self.base.files.compared(&file.path).map(drop)
-            })?;
-            copc::write(&export::tiles(next)?, &next.join(COPC), &scratch, engine)?;
+            self.write_copc(&shared, output, engine)?;
         }
         let fresh = done.digests.iter().filter(|sum| sum.path.starts_with(next));
         let mut known: Vec<OutputFile> = fresh.map(|sum| OutputFile::of(next, sum)).collect();
         let n_shared = [shared.len(), shared.len() + known.len()];
         known.extend(shared);
-        Ok(Out { outcome, known, n_shared })
+        Ok(WrittenResult { outcome, known, n_shared })
+    }
+
+    /// The COPC file, which is made of all tiles, those that did not change, too.
+    fn write_copc(&self, shared: &[OutputFile], output: &OutputDir, engine: &Engine) -> Result<()> {
+        let (next, scratch) = (output.next(), output.scratch());
+        let tiles = shared.iter().filter(|file| file.path.starts_with("tiles/")).collect();
+        engine.fan_out("compare", tiles, |file: &OutputFile| {
+            self.base.files.compared(&file.path).map(drop)
+        })?;
+        copc::write(&export::tiles(next)?, &next.join(COPC), &scratch, engine).map(drop)
     }
 
     /// Masks of the new scans, clouds of their points in the cell; and files of robots that stand
@@ -116,7 +108,8 @@ impl Written<'_, '_> {
         &'l self,
         labelling: &'l Labelling<'l>,
         registered: &[Option<Registration>],
-        (next, scratch): (&'l Path, &Path),
+        next: &'l Path,
+        scratch: &'l Path,
         engine: &Engine,
     ) -> Result<Streamed<'l>> {
         let session = self.session;
@@ -128,7 +121,8 @@ impl Written<'_, '_> {
             las: Some(self.base.state.records.las()),
             leaves_open: true,
         };
-        labelling.write((&self.labels.near, spaces), &scope, (next, scratch), engine)
+        let to = LabelFolders { out: next, clouds: scratch };
+        labelling.write(&self.labels.near, spaces, &scope, to, engine)
     }
 
     /// Voxels of things that are gone and of robots that the earlier result missed, and those next
@@ -140,7 +134,7 @@ impl Written<'_, '_> {
             let steps = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
             steps.map(|[i, j, k]| [x + i, y + j, z + k]).collect::<Vec<_>>()
         };
-        let missed = Past::missed(&self.labels.compared);
+        let missed = EarlierPoints::missed(&self.labels.compared);
         things.flat_map(|t| &t.gone).chain(missed).flat_map(near).collect()
     }
 
@@ -189,9 +183,11 @@ impl Written<'_, '_> {
     /// (those of `open` are in it already) comes what is left of the old ones.
     fn tiles(
         &self,
-        (open, grids): (Vec<Spool>, &Grids),
+        open: Vec<Spool>,
+        grids: &SpaceGrids,
         gone: &BTreeSet<[i32; 3]>,
-        (next, scratch): (&Path, &Path),
+        next: &Path,
+        scratch: &Path,
         engine: &Engine,
     ) -> Result<Touched> {
         let las = self.base.state.records.las();
@@ -280,11 +276,11 @@ struct Touched {
     names: BTreeSet<String>,
     digests: Vec<FileSum>,
     /// Voxels of what is left of the old points.
-    spots: Vec<Spot>,
+    spots: Vec<VoxelMark>,
 }
 
 /// Voxels of those points that stay.
-fn spots_of(points: &[OldPoint], stays: &[bool], grids: &Grids) -> Vec<Spot> {
+fn spots_of(points: &[OldPoint], stays: &[bool], grids: &SpaceGrids) -> Vec<VoxelMark> {
     let (worlds, labels): (Vec<_>, Vec<_>) = points.iter().map(|p| (p.world, p.label)).unzip();
     grids.spots(&worlds, &labels, &blocks(&worlds), |i| stays[i])
 }

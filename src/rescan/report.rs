@@ -1,13 +1,14 @@
 //! What a rescan found in; the result of the whole plant, the list of changes as JSON, CSV and
 //! picture, and a summary for people, out.
 
-use super::output::Written;
+use super::found::Found;
 use crate::cache::Digests;
+use crate::detect::robot_id::robot_id;
 use crate::job::Outcome;
-use crate::label::labelling::Done;
+use crate::label::labelling::WrittenLabels;
+use crate::result::changed_things::{ThingEntry, word};
 use crate::result::changes::{Change, RobotChange, changes, of_missed, words};
-use crate::result::objects::{ThingEntry, word};
-use crate::result::report::{dropped, id, input_entry, robot_entry};
+use crate::result::report::{dropped, input_entry, robot_entry};
 use change::Unseen;
 use contract::words::{count, fixed, triple};
 use contract::{Error, Kind, Result, quote};
@@ -31,16 +32,16 @@ pub(crate) const NAMES: [&str; 6] = [
 ];
 
 /// Everything that is said.
-pub(crate) struct Said<'a, 's> {
-    pub(crate) found: &'a Written<'a, 's>,
-    pub(crate) done: &'a Done,
+pub(crate) struct RescanReport<'a, 's> {
+    pub(crate) found: &'a Found<'a, 's>,
+    pub(crate) done: &'a WrittenLabels,
     pub(crate) registered: &'a [Option<Registration>],
     /// By mask of the base: the list of its superseded places.
     pub(crate) lists: &'a [Option<String>],
     pub(crate) n_superseded: u64,
 }
 
-impl Said<'_, '_> {
+impl RescanReport<'_, '_> {
     pub(crate) fn finish(&self, digests: &Digests, next: &Path) -> Result<Outcome> {
         let result = self.result(digests);
         let robots = self.changes(&result);
@@ -54,7 +55,7 @@ impl Said<'_, '_> {
             "robots": robots,
             "things": self.found.labels.things.iter().map(ThingEntry::of).collect::<Vec<_>>(),
             "fixed_not_compared": self.found.labels.unseen.iter().map(region).collect::<Vec<_>>(),
-            "not_compared": self.found.robots.unseen.iter().map(|&i| id(i)).collect::<Vec<_>>(),
+            "not_compared": self.found.robots.unseen.iter().map(|&i| robot_id(i)).collect::<Vec<_>>(),
         });
         let text = serde_json::to_string_pretty(&all)
             .map_err(|e| Error::new(Kind::Bug, "changes cannot be written").because(e))?;
@@ -101,7 +102,7 @@ impl Said<'_, '_> {
             base: self.found.base.files.digest().to_owned(),
             cell: [cell.min, cell.max],
             inputs: sources.opened().iter().map(|i| i.id.0).collect(),
-            robots: self.found.robots.compared().into_iter().map(id).collect(),
+            robots: self.found.robots.compared().into_iter().map(robot_id).collect(),
             frame: self.found.carried.entry.clone(),
             scans: self.registrations(),
             n_superseded: self.n_superseded,
@@ -148,11 +149,11 @@ impl Said<'_, '_> {
 
     /// Robots of the cell, then and now.
     fn changes(&self, result: &ResultFile) -> Vec<RobotChange> {
-        let looked: Vec<String> = self.found.robots.compared().into_iter().map(id).collect();
+        let looked: Vec<String> = self.found.robots.compared().into_iter().map(robot_id).collect();
         let mut all = changes(&self.found.base.result, result);
         all.retain(|c| c.then.iter().chain(&c.now).any(|id| looked.contains(id)));
         for (i, stood) in &self.found.robots.missed {
-            let (own, id) = (&self.found.fits[*i], id(*i));
+            let (own, id) = (&self.found.fits[*i], robot_id(*i));
             all.iter_mut()
                 .filter(|c| c.now.as_ref() == Some(&id))
                 .for_each(|c| *c = of_missed(&id, stood, own));
@@ -160,13 +161,13 @@ impl Said<'_, '_> {
         // Where joints are left open, others alone do not say that a robot stands as it stood when
         // beams went through it.
         let contradicted: Vec<String> =
-            self.found.robots.contradicted.iter().copied().map(id).collect();
+            self.found.robots.contradicted.iter().copied().map(robot_id).collect();
         let open =
             all.iter_mut().filter(|c| c.change == Change::Same && !c.not_compared.is_empty());
         for robot in open.filter(|c| c.now.iter().any(|id| contradicted.contains(id))) {
             robot.change = Change::Moved;
         }
-        let lost: Vec<String> = self.found.robots.lost.iter().copied().map(id).collect();
+        let lost: Vec<String> = self.found.robots.lost.iter().copied().map(robot_id).collect();
         for robot in all.iter_mut().filter(|c| c.now.iter().any(|id| lost.contains(id))) {
             robot.change = Change::Moved;
             let joints = robot.joints.drain(..).map(|joint| joint.joint);
@@ -215,7 +216,7 @@ impl Said<'_, '_> {
     }
 
     fn place(&self, robot: &str) -> String {
-        let at = (0..self.found.fits.len()).find(|&i| id(i) == robot);
+        let at = (0..self.found.fits.len()).find(|&i| robot_id(i) == robot);
         let p =
             at.map(|i| self.found.fits[i].world_from_base.translation.vector).unwrap_or_default();
         format!("{:.3},{:.3},{:.3}", p.x, p.y, p.z)
@@ -230,11 +231,11 @@ impl Said<'_, '_> {
         });
         let robots = self.found.robots.compared().into_iter().map(|i| {
             let p = self.found.fits[i].world_from_base.translation.vector;
-            let own = Some(id(i));
+            let own = Some(robot_id(i));
             let change = changes.iter().find(|c| c.now == own || c.now.is_none() && c.then == own);
             let word = change.map(|c| &c.change).filter(|c| **c != Change::Same);
             let word = word.map_or_else(String::new, |change| format!(" {}", change.word()));
-            (format!("{}{word}", id(i)), [p.x, p.y])
+            (format!("{}{word}", robot_id(i)), [p.x, p.y])
         });
         let unseen = self.found.labels.unseen.iter().flat_map(|region| &region.cells);
         let unseen: Vec<_> = unseen.copied().collect();
@@ -272,7 +273,7 @@ impl Said<'_, '_> {
             let _ = writeln!(text, "  {}", ThingEntry::of(thing).words(k));
         }
         for &i in &self.found.robots.unseen {
-            let _ = writeln!(text, "  {} not compared: the new scans hardly see it", id(i));
+            let _ = writeln!(text, "  {} not compared: the new scans hardly see it", robot_id(i));
         }
         let unseen = &self.found.labels.unseen;
         if let Some(largest) = unseen.first() {

@@ -3,13 +3,13 @@
 
 use super::other_model::is_the_same;
 use crate::detect::search::Search;
-use crate::detect::tools::dress_in;
+use crate::detect::tools::attach_tools_in;
 use crate::label::known_space::{poses, reach};
-use contract::{Error, Fit, Region, Result, Verdict};
+use contract::{Fit, Region, Result, Verdict};
 use fit::Scene;
 use freespace::{Sight, Watch};
 use geometry::{Aabb, Point, Pose, Vector};
-use robot::{Library, Model};
+use robot::Model;
 
 /// Points of each link's surface that the new scans are asked about.
 const ASKED: usize = 400;
@@ -53,55 +53,10 @@ pub(crate) enum Now {
 
 /// What the new scans say of a posture: points of the surface that were judged, of all, and gone
 /// through, of the judged; and the same share of the link it stands on.
-struct Said {
+struct PostureEvidence {
     judged: f64,
     through: f64,
     foot: f64,
-}
-
-/// The models that earlier fits are of, rebuilt from a library: those with tools, with other loops
-/// or calibrated after its own.
-///
-/// # Errors
-/// A model that the library no longer has.
-pub(crate) fn models_of(fits: &mut [Fit], library: &Library) -> Result<Vec<Model>> {
-    let mut models = library.models.clone();
-    fits.iter_mut().try_for_each(|fit| own_model(fit, library, &mut models))?;
-    Ok(models)
-}
-
-/// Sets the model of a fit, and of the same robot as it stood in other scans; one that is no model
-/// of the library is added.
-fn own_model(fit: &mut Fit, library: &Library, models: &mut Vec<Model>) -> Result<()> {
-    let missing = |name: &str| {
-        let what = format!("the library has no model \"{name}\", which the earlier result found");
-        Error::bad_input(what).hint("give the library of the earlier run with --robots")
-    };
-    let known = |name: &str| library.model(name).ok_or_else(|| missing(name));
-    fit.model = known(&fit.model_name)?;
-    let mut own = (!fit.other_branches.is_empty())
-        .then(|| models[fit.model].with_other_branches(&fit.other_branches));
-    if let Some(tool) = &fit.tool {
-        let arm = own.as_ref().unwrap_or(&models[fit.model]);
-        let flange = arm.links.iter().position(|l| l.name == tool.link).ok_or_else(|| {
-            let what = format!("model \"{}\" has no link \"{}\"", arm.name, tool.link);
-            Error::bad_input(what).hint("give the library of the earlier run with --robots")
-        })?;
-        own = Some(arm.with_tool(&models[known(&tool.model)?], flange, tool.mount));
-    }
-    if let Some(found) = &fit.calibration {
-        let own = own.get_or_insert_with(|| models[fit.model].clone());
-        for joint in &mut own.joints {
-            if let Some(frame) = found.frames.iter().find(|f| f.name == joint.name) {
-                joint.parent_from_joint *= frame.moved();
-            }
-        }
-    }
-    if let Some(own) = own {
-        fit.model = models.len();
-        models.push(own);
-    }
-    fit.stays.iter_mut().try_for_each(|stay| own_model(stay, library, models))
 }
 
 /// Whether robots about a cell hang on walls or ceilings.
@@ -115,13 +70,25 @@ pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
 /// No robot of a library reaches farther than this from its base, but for those on rails, metres.
 const FAR_REACH: f64 = 4.0;
 
-/// Looks at one robot again, through the scans of this session and of the other; `regions` are
-/// those of this one. The model is its own, where it is none of the library.
+/// What the scans of two sessions show of a cell.
+pub(crate) struct Observed<'s, 'a, 'm> {
+    /// The search in the scans of this session.
+    pub(crate) search: &'s Search<'a, 'm>,
+    /// What these scans, and those of the other session, say of places.
+    pub(crate) watch: &'s Watch<'s>,
+    pub(crate) other_session: &'s Watch<'s>,
+    /// Regions of this session.
+    pub(crate) regions: &'s [Region],
+}
+
+/// Looks at one robot again, through the scans of this session and of the other. The model is its
+/// own, where it is none of the library.
 pub(crate) fn look(
     before: &Fit,
     models: &[Model],
-    (search, [watch, other_session], regions): (&Search<'_, '_>, [&Watch<'_>; 2], &[Region]),
+    seen: &Observed<'_, '_, '_>,
 ) -> Result<(Now, Option<Model>)> {
+    let &Observed { search, watch, other_session, regions } = seen;
     let model = &models[before.model];
     let said = said(before, model, watch);
     if said.judged < MIN_JUDGED {
@@ -152,7 +119,7 @@ pub(crate) fn look(
     if said.through < STANDS && before.verdict != Verdict::Refused {
         return Ok((Now::Unseen, None));
     }
-    Ok(match anew(before, models, (search, other_session, &near))? {
+    Ok(match anew(before, models, search, other_session, &near)? {
         Some((fit, own)) => (Now::Anew(Box::new(fit), said.through > CONTRADICTED), own),
         None if said.foot > GONE => (Now::Gone, None),
         None if said.through > CONTRADICTED => (Now::Lost, None),
@@ -196,7 +163,9 @@ fn knows(fit: &Fit, other: &Fit) -> bool {
 fn anew(
     before: &Fit,
     models: &[Model],
-    (search, other_session, near): (&Search<'_, '_>, &Watch<'_>, &Region),
+    search: &Search<'_, '_>,
+    other_session: &Watch<'_>,
+    near: &Region,
 ) -> Result<Option<(Fit, Option<Model>)>> {
     let world_from_base = &before.world_from_base;
     let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
@@ -225,9 +194,10 @@ fn anew(
             found = fit::choose(found, models, |_| false);
         }
         found.retain(|fit| is_here(&fit.world_from_base.translation.vector.into()));
-        let dressed =
-            found.into_iter().map(|fit| dress_in(scene, fit, models, (search.shelf(), settings)));
-        Ok(dressed.max_by(|(a, _), (b, _)| {
+        let with_tools = found
+            .into_iter()
+            .map(|fit| attach_tools_in(scene, fit, models, search.library(), settings));
+        Ok(with_tools.max_by(|(a, _), (b, _)| {
             a.verdict.cmp(&b.verdict).then_with(|| a.explained.total_cmp(&b.explained))
         }))
     })?
@@ -251,7 +221,7 @@ fn home(fit: &Fit, model: &Model, regions: &[Region]) -> Region {
     own.copied().unwrap_or_else(|| reach(fit, model))
 }
 
-fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> Said {
+fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> PostureEvidence {
     let (mut n, mut judged, mut through) = (0_usize, 0_usize, 0_usize);
     let mut foot = None;
     for (link, pose) in model.links.iter().zip(poses(fit, model)) {
@@ -268,7 +238,7 @@ fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> Said {
             foot = Some(gone as f64 / own as f64);
         }
     }
-    Said {
+    PostureEvidence {
         judged: judged as f64 / n.max(1) as f64,
         through: through as f64 / judged.max(1) as f64,
         foot: foot.unwrap_or(0.0),

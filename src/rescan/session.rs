@@ -1,18 +1,19 @@
 //! Earlier and new scans of a cell in; how its robots stand now, and what else is not where it was,
 //! out.
 
-use super::earlier_points::{Compared, Past};
-use super::earlier_result::Base;
-use super::new_points::Present;
-use super::robots::{Now, look};
-use super::{Cell, new_points};
-use crate::detect::ground::{Gather, Ground, Surfaces};
-use crate::detect::search::{Search, Shelf};
+use super::earlier_points::{Compared, EarlierPoints};
+use super::earlier_result::EarlierResult;
+use super::new_points;
+use super::new_points::NewPoints;
+use super::robots::{Now, Observed, look};
+use crate::detect::ground::Ground;
+use crate::detect::robots::{FittedRobots, RobotList};
+use crate::detect::search::{PreparedLibrary, Search};
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use crate::label::known_space::{reach, region, standing};
-use crate::label::labelling::Labelling;
-use crate::label::near_robots::Near;
+use crate::label::labelling::{Labelling, ScansToLabel};
+use crate::label::near_robots::NearRobots;
 use crate::store::Store;
 use change::{Tally, Thing, Unseen, things};
 use contract::{
@@ -23,8 +24,18 @@ use geometry::{Aabb, Pose};
 use ingest::Sources;
 use lattice::ViewSettings;
 use register::Registration;
-use robot::Model;
 use std::collections::BTreeSet;
+
+/// Which part of a plant was scanned again.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// Within these bounds, world, metres.
+    Box(Aabb),
+    /// All that these robots reach, by their ids.
+    Robots(Vec<String>),
+    /// What the new scans see well.
+    Seen,
+}
 
 /// How far from its scanner a new scan may see the cell, metres, where nobody says where it is: a
 /// robot cell.
@@ -36,17 +47,30 @@ const CELL_SPACING: f64 = 0.025;
 const LOOK_CELL: f64 = 0.3 / 400.0;
 /// Earlier scans that are asked what was there: those with most points in the cell.
 const MAX_ASKED: usize = 6;
-/// All that is asked while a cell is compared.
-pub(crate) struct Session<'a> {
+/// The scans of both sessions, and what is known of the plant.
+pub(crate) struct BothScans<'a> {
+    /// That of the plant.
+    pub(crate) floor: &'a Floor,
+    /// Whether robots of the cell hang on walls or ceilings.
+    pub(crate) hangs: bool,
     pub(crate) sources: &'a Sources,
-    pub(crate) past: &'a Past<'a>,
+    pub(crate) past: &'a EarlierPoints<'a>,
+    /// Tiles of the new scans.
+    pub(crate) store: &'a Store,
+    pub(crate) library: &'a PreparedLibrary<'a>,
+}
+
+/// All that is asked while a cell is compared.
+pub(crate) struct CellComparison<'a> {
+    pub(crate) sources: &'a Sources,
+    pub(crate) past: &'a EarlierPoints<'a>,
     pub(crate) store: &'a Store,
     pub(crate) ground: Ground,
     pub(crate) floor: &'a Floor,
     pub(crate) clusters: Vec<Cluster>,
     pub(crate) settings: &'a Settings,
     pub(crate) cell: Region,
-    pub(crate) shelf: &'a Shelf<'a>,
+    pub(crate) library: &'a PreparedLibrary<'a>,
     /// What the earlier scans cover, as far as they are asked.
     pub(crate) old_ground: Ground,
     /// What the new scans and the earlier ones saw of the cell.
@@ -56,7 +80,7 @@ pub(crate) struct Session<'a> {
 
 /// Robots of the plant after the comparison.
 #[derive(Default)]
-pub(crate) struct Robots {
+pub(crate) struct ComparedRobots {
     /// By place among the fits: seen as they stand now.
     pub(crate) in_cell: Vec<usize>,
     /// Stand otherwise, are of another model, or are new; or stand nobody knows how.
@@ -77,7 +101,7 @@ pub(crate) struct Robots {
     pub(crate) missed: Vec<(usize, Fit)>,
 }
 
-impl Robots {
+impl ComparedRobots {
     /// All that were compared, by place.
     pub(crate) fn compared(&self) -> BTreeSet<usize> {
         self.in_cell.iter().chain(&self.changed).chain(&self.gone).copied().collect()
@@ -85,8 +109,8 @@ impl Robots {
 }
 
 /// Labels and differences.
-pub(crate) struct Labels {
-    pub(crate) near: Near,
+pub(crate) struct CellLabels {
+    pub(crate) near: NearRobots,
     pub(crate) compared: Compared,
     pub(crate) things: Vec<Thing>,
     /// What stood in the cell and was not looked at.
@@ -98,10 +122,12 @@ pub(crate) struct Labels {
 /// Bounds of the cell that is meant.
 pub(crate) fn bounds(
     wish: &Cell,
-    base: &Base,
-    (fits, models): (&[Fit], &[Model]),
-    (sources, new): (&Sources, &Store),
+    base: &EarlierResult,
+    robots: FittedRobots<'_>,
+    sources: &Sources,
+    new: &Store,
 ) -> Result<Aabb> {
+    let FittedRobots { fits, models } = robots;
     let usage = |what: String| Err(Error::new(Kind::Usage, what));
     let all = new.entries().iter().fold(Aabb::EMPTY, |all, e| all.union(&e.bounds)).grown(0.1);
     let cell = match wish {
@@ -140,21 +166,23 @@ pub(crate) fn bounds(
 }
 
 /// What robots of the plant filled, world, metres.
-pub(crate) fn stood((fits, models): (&[Fit], &[Model])) -> Vec<Aabb> {
+pub(crate) fn stood(robots: FittedRobots<'_>) -> Vec<Aabb> {
+    let FittedRobots { fits, models } = robots;
     let all = fits.iter().filter(|fit| fit.verdict != Verdict::Refused);
     all.map(|fit| standing(fit, &models[fit.model])).collect()
 }
 
 /// Robots of the plant that reach into the cell, by place among the fits, and what they filled.
-fn here((fits, models): (&[Fit], &[Model]), cell: &Aabb) -> Vec<(usize, Aabb)> {
+fn here(robots: FittedRobots<'_>, cell: &Aabb) -> Vec<(usize, Aabb)> {
+    let FittedRobots { fits, models } = robots;
     let bounds = |(i, fit): (usize, &Fit)| (i, standing(fit, &models[fit.model]));
     let all = fits.iter().enumerate().filter(|(_, fit)| fit.verdict != Verdict::Refused);
     all.map(bounds).filter(|(_, bounds)| bounds.touches(cell)).collect()
 }
 
 /// Their models, with tools.
-pub(crate) fn known<'f>((fits, models): (&'f [Fit], &[Model]), cell: &Aabb) -> BTreeSet<&'f str> {
-    let here = here((fits, models), cell).into_iter().map(|(i, _)| &fits[i]);
+pub(crate) fn known<'f>(robots: FittedRobots<'f>, cell: &Aabb) -> BTreeSet<&'f str> {
+    let here = here(robots, cell).into_iter().map(|(i, _)| &robots.fits[i]);
     let names = here.flat_map(|fit| {
         let tool = fit.tool.as_ref().map(|tool| tool.model.as_str());
         [fit.model_name.as_str()].into_iter().chain(tool)
@@ -164,13 +192,14 @@ pub(crate) fn known<'f>((fits, models): (&'f [Fit], &[Model]), cell: &Aabb) -> B
 
 /// Lays the new scans on what stood in the cell; returns how far each was off.
 pub(crate) fn register(
-    (past, new): (&Past<'_>, &Store),
+    past: &EarlierPoints<'_>,
+    new: &Store,
     sources: &mut Sources,
     engine: &Engine,
 ) -> Result<Vec<Option<Registration>>> {
     let planes = past.surfaces(engine)?.planes();
     let first = past.scans.len();
-    let found = new_points::register(&planes, (&sources.scans, first), (new, &past.cell), engine)?;
+    let found = new_points::register(&planes, &sources.scans[first..], new, &past.cell, engine)?;
     for (scan, found) in sources.scans[first..].iter_mut().zip(&found) {
         if let Some(found) = found {
             scan.world_from_scan = found.plant_from_stated * scan.world_from_scan;
@@ -179,26 +208,23 @@ pub(crate) fn register(
     Ok(found)
 }
 
-impl<'a> Session<'a> {
-    /// Looks at the cell through earlier and new scans; `floor` is that of the plant, and `hang`
-    /// says whether robots of the cell hang on walls or ceilings.
+impl<'a> CellComparison<'a> {
+    /// Looks at the cell through earlier and new scans.
     pub(crate) fn new(
-        (floor, hang): (&'a Floor, bool),
-        sources: &'a Sources,
-        (past, store): (&'a Past<'a>, &'a Store),
-        shelf: &'a Shelf<'a>,
+        both: BothScans<'a>,
         settings: &'a Settings,
         engine: &Engine,
     ) -> Result<Self> {
+        let BothScans { floor, hangs, sources, past, store, library } = both;
         let scans = &sources.scans;
-        let ground = ground(floor, hang, (sources, store), settings, engine)?;
+        let ground = ground(floor, hangs, sources, store, settings, engine)?;
         let clusters =
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let cell = region(&past.cell.center(), &past.cell);
         let fine = ViewSettings { min_cell: LOOK_CELL, ..settings.view.clone() };
         let old_ground = asked(past, scans.len());
-        let old = Search::new(shelf, scans, past.store, &old_ground, settings);
-        let new = Search::new(shelf, scans, store, &ground, settings);
+        let old = Search::new(library, scans, past.store, &old_ground, settings);
+        let new = Search::new(library, scans, store, &ground, settings);
         let views = engine
             .fan_out(Task::new("views").large(), vec![&old, &new], |s| s.images(&cell, &fine))?;
         let [old_views, new_views] = views
@@ -213,7 +239,7 @@ impl<'a> Session<'a> {
             clusters,
             settings,
             cell,
-            shelf,
+            library,
             old_ground,
             new_views,
             old_views,
@@ -227,37 +253,40 @@ impl<'a> Session<'a> {
 
     /// The search in the new scans.
     pub(crate) fn search(&self) -> Search<'_, 'a> {
-        Search::new(self.shelf, &self.sources.scans, self.store, &self.ground, self.settings)
+        Search::new(self.library, &self.sources.scans, self.store, &self.ground, self.settings)
     }
 
     /// How the robots of the cell stand now, and what else differs; fits are brought up to date.
     pub(crate) fn compare(
         &self,
-        (fits, models): (&mut Vec<Fit>, &mut Vec<Model>),
+        plant: &mut RobotList,
         engine: &Engine,
-    ) -> Result<(Robots, Labels)> {
-        let mut robots = self.known_robots((fits, models), engine)?;
-        let mut labels = self.labels((fits, models), &robots, engine)?;
-        let appeared = self.new_robots(&labels, (fits, models), engine)?;
+    ) -> Result<(ComparedRobots, CellLabels)> {
+        let mut robots = self.known_robots(plant, engine)?;
+        let mut labels = self.labels(plant.view(), &robots, engine)?;
+        let appeared = self.new_robots(&labels, plant, engine)?;
         if !appeared.is_empty() {
-            self.join(appeared, (fits, models), &mut robots, engine)?;
-            labels = self.labels((fits, models), &robots, engine)?;
+            self.join(appeared, plant, &mut robots, engine)?;
+            labels = self.labels(plant.view(), &robots, engine)?;
         }
         Ok((robots, labels))
     }
 
-    fn known_robots(
-        &self,
-        (fits, models): (&mut Vec<Fit>, &mut Vec<Model>),
-        engine: &Engine,
-    ) -> Result<Robots> {
-        let mut out = Robots::default();
+    fn known_robots(&self, plant: &mut RobotList, engine: &Engine) -> Result<ComparedRobots> {
+        let mut out = ComparedRobots::default();
         let (search, watch) = (self.search(), self.watch());
         let old_watch = Watch::new(&self.cell, &self.old_views);
         let regions = base_search::regions(&self.clusters, &self.settings.region);
-        let here = here((fits, models), &self.past.cell);
+        let here = here(plant.view(), &self.past.cell);
+        let seen = Observed {
+            search: &search,
+            watch: &watch,
+            other_session: &old_watch,
+            regions: &regions,
+        };
+        let RobotList { fits, models } = plant;
         let looked = engine.fan_out(Task::new("fit").large(), here.clone(), |(i, _)| {
-            look(&fits[i], models, (&search, [&watch, &old_watch], &regions))
+            look(&fits[i], models, &seen)
         })?;
         for ((i, bounds), (now, own)) in here.into_iter().zip(looked) {
             let is_anew = matches!(now, Now::Anew(..));
@@ -306,18 +335,18 @@ impl<'a> Session<'a> {
     /// Labels of the new points, and what stands elsewhere than it did.
     fn labels(
         &self,
-        (fits, models): (&[Fit], &[Model]),
-        robots: &Robots,
+        plant: FittedRobots<'_>,
+        robots: &ComparedRobots,
         engine: &Engine,
-    ) -> Result<Labels> {
-        let own = self.own_fits(fits, robots);
-        let labelling = self.labelling(&own, models);
+    ) -> Result<CellLabels> {
+        let own = self.own_fits(plant.fits, robots);
+        let labelling = self.labelling(FittedRobots { fits: &own, ..plant });
         let near = labelling.near_robots(self.store, engine)?;
         let (watch, old_watch) = (self.watch(), Watch::new(&self.cell, &self.old_views));
-        let missed = self.missed((fits, models), robots, engine)?;
+        let missed = self.missed(plant, robots, engine)?;
         let compared = self.past.look([&watch, &old_watch], missed.as_ref(), engine)?;
         let then = &compared.then;
-        let present = Present {
+        let present = NewPoints {
             scans: &self.sources.scans,
             near: &near,
             ground: labelling.ground(),
@@ -334,11 +363,11 @@ impl<'a> Session<'a> {
                 || change::unseen(then, &now, settings),
             )
         });
-        Ok(Labels { near, compared, things, unseen, now })
+        Ok(CellLabels { near, compared, things, unseen, now })
     }
 
     /// The fits, those refused that the new scans have no say in: they give no labels here.
-    pub(crate) fn own_fits(&self, fits: &[Fit], robots: &Robots) -> Vec<Fit> {
+    pub(crate) fn own_fits(&self, fits: &[Fit], robots: &ComparedRobots) -> Vec<Fit> {
         let mut own = fits.to_vec();
         for (i, fit) in own.iter_mut().enumerate() {
             if !robots.in_cell.contains(&i) && !robots.as_it_stood.contains(&i) {
@@ -351,9 +380,11 @@ impl<'a> Session<'a> {
     }
 
     /// The labelling of the new points by these fits.
-    pub(crate) fn labelling<'b>(&'b self, fits: &'b [Fit], models: &'b [Model]) -> Labelling<'b> {
-        let ground = (self.store, &self.ground.surfaces.floor, &self.clusters[..]);
-        Labelling::new(fits, models, self.sources, ground, self.settings)
+    pub(crate) fn labelling<'b>(&'b self, robots: FittedRobots<'b>) -> Labelling<'b> {
+        let floor = &self.ground.surfaces.floor;
+        let (sources, store, clusters) = (self.sources, self.store, &self.clusters[..]);
+        let scans = ScansToLabel { sources, store, floor, clusters };
+        Labelling::new(robots, &scans, self.settings)
     }
 
     /// By scan: what carries it from its frame into the plant's and takes back how far it was off,
@@ -378,18 +409,14 @@ impl<'a> Session<'a> {
 pub(crate) fn ground(
     floor: &Floor,
     with_walls: bool,
-    (sources, store): (&Sources, &Store),
+    sources: &Sources,
+    store: &Store,
     settings: &Settings,
     engine: &Engine,
 ) -> Result<Ground> {
     let is_known = !floor.levels.is_empty();
-    let surfaces = Surfaces::new(&sources.scans, &settings.lattice);
-    let surfaces = if is_known && !with_walls { surfaces.without_planes() } else { surfaces };
-    let gather = Gather::new(&sources.scans, &settings.floor);
-    let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
-    let mut ground = engine.pass(crate::result::report::tiles("surfaces", store), source, |f| {
-        f.map(&reads).map(&surfaces).fold(&gather)
-    })?;
+    let gather = if is_known && !with_walls { Ground::without_planes } else { Ground::of_tiles };
+    let mut ground = gather(&sources.scans, store, settings, engine)?;
     if is_known {
         ground.surfaces.floor = floor.clone();
     }
@@ -397,7 +424,7 @@ pub(crate) fn ground(
 }
 
 /// What the earlier scans cover, as far as they are asked.
-fn asked(past: &Past<'_>, n_scans: usize) -> Ground {
+fn asked(past: &EarlierPoints<'_>, n_scans: usize) -> Ground {
     let mut n_points = vec![0_u64; n_scans];
     for &i in &past.store.touching(&past.cell) {
         let entry = &past.store.entries()[i];

@@ -2,13 +2,12 @@
 //! OUT takes away what is true of its points no longer, and says so.
 
 use super::copc;
-use crate::cache::{EXPORT, Vouched};
-use crate::engine::Engine;
-use crate::engine::progress::Amount;
-use crate::io::own_paths::straight;
+use crate::cache::{EXPORT, VerifiedFiles, copc_name};
+use crate::engine::{Amount, Engine};
+use crate::io::own_paths::without_links;
 use crate::job::Job;
 use contract::{Error, Kind, Result};
-use export::{COPC, PLY, write_ply};
+use export::{PLY, write_ply};
 use std::path::{Path, PathBuf};
 
 /// What points can be written as.
@@ -20,26 +19,16 @@ pub enum Format {
     Ply,
 }
 
-/// Names of all files that points are written to.
-pub(crate) fn names() -> impl Iterator<Item = &'static str> {
-    PLY.into_iter().chain([copc_name()])
-}
-
-/// The name of a COPC file without its folder.
-fn copc_name() -> &'static str {
-    COPC.rsplit('/').next().unwrap_or(COPC)
-}
-
 /// Writes the points of the result in `out`; the files' paths.
 ///
 /// # Errors
 /// No result, or one without tiles; another run at work in it; files that cannot be read or
 /// written.
 pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBuf>> {
-    let files = Vouched::open(out)?;
+    let files = VerifiedFiles::open(out)?;
     // A result that was copied without its store has nobody at work in it.
     let _lock = out.join("store").is_dir().then(|| Job::hold(out)).transpose()?;
-    let into = straight(out, EXPORT)?;
+    let into = without_links(out, EXPORT)?;
     // Tiles as the list has them, each compared with it: what else lies in their folder is none of
     // the result.
     let listed = files.manifest().files.iter().map(|file| &*file.path);

@@ -1,8 +1,8 @@
 //! The tiles of a result in; one COPC file of all their points out, its steps told as those of the
 //! run.
 
-use crate::engine::progress::{Amount, Progress, Stage};
-use crate::engine::{Cancel, Engine, guarded};
+use crate::engine::progress::{Progress, Stage};
+use crate::engine::{Amount, Cancel, Engine, guarded};
 use contract::Result;
 use export::CopcSteps;
 use std::path::{Path, PathBuf};

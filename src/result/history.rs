@@ -2,7 +2,7 @@
 //! much room each takes by itself, out. Results share files that are the same, so that any of them
 //! can be taken away without harm to the others.
 
-use crate::cache::{Manifest, Vouched};
+use crate::cache::{Manifest, VerifiedFiles};
 use crate::io::own_paths::refuse_link;
 use crate::job::{Job, memory_words};
 use contract::{Error, Kind, Result, quote};
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// One result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Session {
+pub struct PlantSession {
     /// Name of its folder.
     pub name: String,
     /// The session that it goes on from, where that lies here, too.
@@ -32,9 +32,9 @@ pub struct Session {
 
 /// What lies in a folder.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Sessions {
+pub struct SessionHistory {
     /// Each after the one that it goes on from, then by name.
-    pub sessions: Vec<Session>,
+    pub sessions: Vec<PlantSession>,
     /// Results that are not what was written, in words.
     pub damaged: Vec<String>,
 }
@@ -43,7 +43,7 @@ pub struct Sessions {
 ///
 /// # Errors
 /// A folder that cannot be read.
-pub fn sessions(folder: &Path) -> Result<Sessions> {
+pub fn sessions(folder: &Path) -> Result<SessionHistory> {
     let failed = |e: std::io::Error| Error::from(e).at(folder.display());
     let mut damaged = Vec::new();
     let mut found = Vec::new();
@@ -55,8 +55,8 @@ pub fn sessions(folder: &Path) -> Result<Sessions> {
     paths.sort();
     paths.retain(|path| refuse_link(path).is_ok() && Manifest::is_beside(path));
     for path in paths {
-        let read =
-            Vouched::open(&path).and_then(|files| Ok((files.digest().to_owned(), files.result()?)));
+        let read = VerifiedFiles::open(&path)
+            .and_then(|files| Ok((files.digest().to_owned(), files.result()?)));
         let (digest, result) = match read {
             Ok(read) => read,
             Err(error) => {
@@ -68,22 +68,23 @@ pub fn sessions(folder: &Path) -> Result<Sessions> {
         digests.insert(digest, name.clone());
         found.push((session(&path, name, &result)?, result.rescan.map(|r| r.base)));
     }
-    let mut left: Vec<Session> = found
+    let mut left: Vec<PlantSession> = found
         .into_iter()
         .map(|(session, base)| {
             let base = base.and_then(|digest| digests.get(&digest).cloned());
-            Session { base, ..session }
+            PlantSession { base, ..session }
         })
         .collect();
-    let mut out: Vec<Session> = Vec::new();
+    let mut out: Vec<PlantSession> = Vec::new();
     // Roots first; what goes on from nothing that is listed, as after a removal, is a root, too.
     while !left.is_empty() {
-        let is_next =
-            |s: &Session| s.base.as_ref().is_none_or(|base| out.iter().any(|o| o.name == *base));
+        let is_next = |s: &PlantSession| {
+            s.base.as_ref().is_none_or(|base| out.iter().any(|o| o.name == *base))
+        };
         let at = left.iter().position(is_next).unwrap_or(0);
         out.push(left.remove(at));
     }
-    Ok(Sessions { sessions: out, damaged })
+    Ok(SessionHistory { sessions: out, damaged })
 }
 
 /// The error for a folder that holds no results.
@@ -94,7 +95,7 @@ pub fn no_results(folder: &Path) -> Error {
         .hint("give the folder that output folders of runs lie in")
 }
 
-fn session(path: &Path, name: String, result: &ResultFile) -> Result<Session> {
+fn session(path: &Path, name: String, result: &ResultFile) -> Result<PlantSession> {
     let (mut n_bytes, mut n_own_bytes) = (0, 0);
     let mut folders = vec![path.to_path_buf()];
     while let Some(folder) = folders.pop() {
@@ -112,7 +113,7 @@ fn session(path: &Path, name: String, result: &ResultFile) -> Result<Session> {
     }
     let n_robots = result.robots.iter().filter(|r| r.verdict != "refused").count();
     let n_inputs = result.inputs.len();
-    Ok(Session { name, base: None, n_inputs, n_robots, n_bytes, n_own_bytes })
+    Ok(PlantSession { name, base: None, n_inputs, n_robots, n_bytes, n_own_bytes })
 }
 
 /// Under how many names a file is known.
@@ -161,7 +162,7 @@ pub fn remove(folder: &Path, name: &str) -> Result<()> {
 
 /// The sessions as a table for people.
 #[must_use]
-pub fn words(sessions: &[Session]) -> String {
+pub fn words(sessions: &[PlantSession]) -> String {
     let mut text = String::from(
         "session              goes on from         inputs  robots       size  by itself\n",
     );

@@ -2,11 +2,11 @@
 //! results differ, follow one another and are converted, out.
 
 pub(crate) mod advice;
+pub(crate) mod changed_things;
 pub mod changes;
 pub mod conversion;
 pub(crate) mod copc;
 pub mod history;
-pub(crate) mod objects;
 #[cfg(fuzzing)]
 pub(crate) mod plant_probe;
 pub(crate) mod plant_state;

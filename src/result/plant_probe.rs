@@ -1,7 +1,7 @@
 //! A door for the fuzz targets: the body of a plant's file in, whether a rescan would go on from
 //! it, out.
 
-use super::plant_state::{FORMAT, Records, State};
+use super::plant_state::{FORMAT, PlantState, Records};
 use crate::cache::written;
 use contract::{Fit, Floor, Format, Input, InputId, Mask, MaskId, Result, Scan, ScanId};
 use export::{LasSettings, Quantum};
@@ -30,7 +30,7 @@ pub(crate) fn body() -> Vec<u8> {
         notes: vec!["a note".into()],
     };
     let path = "a.las".into();
-    let state = State {
+    let state = PlantState {
         inputs: vec![Input { id: input, path, format: Format::Las, n_bytes: 9 }],
         masks: vec![Mask { id: mask, input, name: "a.las".into(), n_points: Some(7) }],
         scans: vec![scan],
@@ -47,7 +47,7 @@ pub(crate) fn body() -> Vec<u8> {
 
 /// Reads the file of a folder; all numbers in it must name what is there.
 pub(crate) fn read(out: &Path) -> Result<()> {
-    let state = State::parse(&std::fs::read(out.join("plant.bin"))?)?;
+    let state = PlantState::parse(&std::fs::read(out.join("plant.bin"))?)?;
     assert_eq!(state.tiles.len(), state.inputs.len(), "tiles of each input");
     for (input, key) in state.tiles.iter().enumerate() {
         let _ = state.first_scan(input);

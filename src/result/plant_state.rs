@@ -1,7 +1,7 @@
 //! What a run leaves for a later session of its plant, and that again: `plant.bin` beside the
 //! result.
 
-use crate::cache::{Key, Vouched, read, written};
+use crate::cache::{Key, VerifiedFiles, read, written};
 use contract::{Error, Fit, Floor, Input, Kind, Mask, Result, Scan};
 use export::{LasSettings, Quantum};
 use geometry::Pose;
@@ -16,7 +16,7 @@ pub(super) const FORMAT: &[u8] = b"stillpoint.plant/6\n";
 
 /// Scans, floor and robots of a plant as a run found them.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct State {
+pub(crate) struct PlantState {
     pub(crate) inputs: Vec<Input>,
     pub(crate) masks: Vec<Mask>,
     pub(crate) scans: Vec<Scan>,
@@ -87,7 +87,7 @@ impl Records {
     }
 }
 
-impl State {
+impl PlantState {
     /// Writes it beside a result.
     pub(crate) fn write(&self, out: &Path) -> Result<()> {
         let body = written(self).ok_or_else(|| Error::new(Kind::Bug, "a plant cannot be kept"))?;
@@ -98,7 +98,7 @@ impl State {
     ///
     /// # Errors
     /// There is none, or it is not what was written.
-    pub(crate) fn read(files: &Vouched) -> Result<Self> {
+    pub(crate) fn read(files: &VerifiedFiles) -> Result<Self> {
         Self::parse(&files.bytes(NAME)?).map_err(|e| e.at(NAME))
     }
 
@@ -161,7 +161,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let las = LasSettings::new(Quantum { scale: [1e-4; 3], offset: [0.0; 3] });
         let (input, id) = (contract::InputId(0), contract::MaskId(0));
-        let whole = State {
+        let whole = PlantState {
             inputs: vec![Input {
                 id: input,
                 path: "a.las".into(),
@@ -178,12 +178,12 @@ mod tests {
             robots: "robots".into(),
             records: Records::of(&las, &export::Settings::default()),
         };
-        let read_back = |state: &State| {
+        let read_back = |state: &PlantState| {
             state.write(dir.path()).expect("writes");
-            State::parse(&std::fs::read(dir.path().join(NAME)).expect("reads"))
+            PlantState::parse(&std::fs::read(dir.path().join(NAME)).expect("reads"))
         };
         assert!(read_back(&whole).is_ok());
-        let wrong: [fn(&mut State); 8] = [
+        let wrong: [fn(&mut PlantState); 8] = [
             |s| s.frames.push(None),
             |s| s.frames[0] = Some(Pose::translation(f64::NAN, 0.0, 0.0)),
             |s| s.masks[0].input.0 = 1,
@@ -210,7 +210,7 @@ mod tests {
     fn it_comes_back_and_damage_is_told() {
         let dir = tempfile::tempdir().expect("a folder");
         let las = LasSettings::new(Quantum { scale: [1e-4; 3], offset: [1e3, 0.0, 0.0] });
-        let state = State {
+        let state = PlantState {
             inputs: Vec::new(),
             masks: Vec::new(),
             scans: Vec::new(),
@@ -224,12 +224,12 @@ mod tests {
         };
         state.write(dir.path()).expect("writes");
         let path = dir.path().join(NAME);
-        let again = State::parse(&std::fs::read(&path).expect("reads")).expect("reads");
+        let again = PlantState::parse(&std::fs::read(&path).expect("reads")).expect("reads");
         assert_eq!((again.fits, again.records.las()), (state.fits, las));
         let mut bytes = std::fs::read(&path).expect("reads");
         *bytes.last_mut().expect("a byte") ^= 1;
-        assert!(State::parse(&bytes).expect_err("damaged").to_string().contains("damaged"));
-        let old = State::parse(b"stillpoint.plant/0\n");
+        assert!(PlantState::parse(&bytes).expect_err("damaged").to_string().contains("damaged"));
+        let old = PlantState::parse(b"stillpoint.plant/0\n");
         assert!(old.expect_err("old").to_string().contains("version"));
     }
 }

@@ -1,16 +1,16 @@
 //! What a run came to in; `result.json`, the legend of the masks and a summary for people out.
 
 use super::advice::Lack;
-use crate::cache::Digests;
-use crate::cache::output::OutputDir;
-use crate::engine::Task;
-use crate::engine::progress::Amount;
+use crate::cache::{Digests, OutputDir};
+use crate::detect::robot_id::robot_id;
+use crate::detect::robots::FittedRobots;
 use crate::job::{Outcome, units};
 use crate::label::known_space::poses;
-use crate::label::labelling::{Done, MaskCount};
+use crate::label::labelling::WrittenLabels;
+use crate::label::masks::MaskCount;
 use crate::store::Store;
 use contract::words::{Unit, count, fixed, triple};
-use contract::{Fit, Format, Input, InputId, JointFit, Mask, Result, Scan, Verdict, quote};
+use contract::{Fit, Format, Input, JointFit, Mask, Result, Scan, Verdict, quote};
 use export::{
     InputEntry, Labels, Places, ResultFile, ReviewEntry, RobotEntry, SCHEMA, ScanLabels,
     SpaceEntry, StageEntry, write_table,
@@ -25,12 +25,10 @@ pub(crate) struct Report<'a> {
     pub(crate) sources: &'a Sources,
     pub(crate) store: &'a Store,
     pub(crate) library: &'a Library,
-    /// Those that the fits are of: the library's, and arms with tools.
-    pub(crate) models: &'a [robot::Model],
-    pub(crate) fits: &'a [Fit],
+    pub(crate) robots: FittedRobots<'a>,
     /// Bodies above the floor, and the places about them that were searched for robots.
     pub(crate) n_searched: [usize; 2],
-    pub(crate) written: &'a Done,
+    pub(crate) written: &'a WrittenLabels,
     /// What each entry of the review did.
     pub(crate) review: Vec<ReviewEntry>,
     /// Inputs and regions that failed and were left out.
@@ -41,12 +39,13 @@ impl Report<'_> {
     /// Writes the legend and the result, last of all files.
     pub(crate) fn finish(&self, output: &OutputDir) -> Result<Outcome> {
         let robots: Vec<RobotEntry> = self
+            .robots
             .fits
             .iter()
             .enumerate()
             .map(|(i, fit)| {
                 let space = self.written.spaces[i].clone();
-                robot_entry(i, fit, self.models, space)
+                robot_entry(i, fit, self.robots.models, space)
             })
             .collect();
         write_table(output.next(), &robots)?;
@@ -85,7 +84,7 @@ impl Report<'_> {
         vec![
             entry("ingest", self.sources.inputs.len() as u64, n_points),
             entry("cluster", n_points, self.n_searched[0] as u64),
-            entry("fit", self.n_searched[0] as u64, self.fits.len() as u64),
+            entry("fit", self.n_searched[0] as u64, self.robots.fits.len() as u64),
             entry("label", n_points, self.written.masks.iter().map(|m| m.n_moving).sum()),
         ]
     }
@@ -121,7 +120,7 @@ impl Report<'_> {
             let name = quote::shown(&scan.name);
             out.push(format!("scan '{name}': {why}: no proof of free space from it"));
         }
-        if self.fits.is_empty() {
+        if self.robots.fits.is_empty() {
             let scans: Vec<&Scan> = self.scans().collect();
             let (tiles, models) = (self.store.entries(), &self.library.models[..]);
             out.extend(
@@ -133,7 +132,7 @@ impl Report<'_> {
 
     /// Value and standard deviation of each joint.
     fn say_posture(&self, text: &mut String, fit: &Fit) {
-        let model = &self.models[fit.model];
+        let model = &self.robots.models[fit.model];
         for (joint, &index) in fit.joints.iter().zip(&model.free) {
             let slides = model.joints[index].kind == JointKind::Prismatic;
             let _ = writeln!(text, "     {}", joint_line(joint, slides));
@@ -143,11 +142,11 @@ impl Report<'_> {
     fn summary(&self) -> String {
         let mut text = String::new();
         let n_scans = count(self.scans().count() as u64, "scan");
-        let _ = writeln!(text, "{} in {n_scans}", count(self.fits.len() as u64, "robot"));
-        for line in units::said(self.sources) {
+        let _ = writeln!(text, "{} in {n_scans}", count(self.robots.fits.len() as u64, "robot"));
+        for line in units::in_words(self.sources) {
             let _ = writeln!(text, "  unit {line}");
         }
-        if self.fits.is_empty() {
+        if self.robots.fits.is_empty() {
             let n_arms = self.library.models.iter().filter(|model| !model.is_tool()).count();
             let places = count(self.n_searched[1] as u64, "place");
             let models = count(n_arms as u64, "model");
@@ -156,11 +155,11 @@ impl Report<'_> {
                 "  {places} as large as a robot searched for {models}: none of them stands there"
             );
         }
-        for (i, fit) in self.fits.iter().enumerate() {
+        for (i, fit) in self.robots.fits.iter().enumerate() {
             let _ = writeln!(
                 text,
                 "  {} {} at {} m: {}, score {}, rms {:.1} mm",
-                id(i),
+                robot_id(i),
                 quote::shown(&fit.model_name),
                 triple(fit.world_from_base.translation.vector.into(), 3),
                 fit.verdict.word(),
@@ -218,7 +217,7 @@ pub(crate) fn robot_entry(
     let model = &models[fit.model];
     let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
     let tip = tip(model).map(|l| (names[l].clone(), poses(fit, model)[l]));
-    let mut entry = RobotEntry { space, ..RobotEntry::new(&id(index), fit, &names, tip) };
+    let mut entry = RobotEntry { space, ..RobotEntry::new(&robot_id(index), fit, &names, tip) };
     stand(&mut entry, fit, models);
     entry
 }
@@ -277,29 +276,9 @@ pub(crate) fn input_entry(
     }
 }
 
-/// What a robot is called, by its place among the fits.
-pub(crate) fn id(index: usize) -> String {
-    format!("R{}", index + 1)
-}
-
 /// The last link of the main chain.
 fn tip(model: &Model) -> Option<usize> {
     (0..model.links.len()).rev().find(|&l| model.links[l].role == Role::Main)
-}
-
-/// Points that an input states, or its bytes, for progress.
-pub(crate) fn amount(sources: &Sources, input: InputId) -> Amount {
-    let stated = sources.masks.iter().filter(|m| m.input == input).map(|m| m.n_points.unwrap_or(0));
-    Amount { items: 0, points: stated.sum(), bytes: 0 }
-}
-
-/// A task over all tiles of a store.
-pub(crate) fn tiles(name: &str, store: &Store) -> Task {
-    Task::new(name).of(Amount {
-        items: store.entries().len() as u64,
-        points: store.n_points(),
-        bytes: 0,
-    })
 }
 
 fn format_word(format: Format) -> &'static str {

@@ -4,19 +4,20 @@
 //! zeros), then an `rkyv` archive of exactly that length, and nothing more: `rkyv` may read
 //! trailing bytes as another answer.
 
-use super::encode::layout;
+use super::layout::{ALIGN, layout};
 use super::record::N_LEVELS;
-use contract::{Error, Result, ScanId, TileAt};
+use contract::{Error, Result, ScanId, TileAt, Weigh};
 use export::atomic;
 use geometry::Aabb;
 use rkyv::{Archive, Deserialize, Serialize};
 use std::path::Path;
 
+/// Name of the catalogue in the folder of a store.
+pub(super) const CATALOGUE: &str = "catalogue.rkyv";
+/// Name of the file of all tiles.
+pub(super) const TILES: &str = "tiles.bin";
 /// Length of the header of both files, bytes.
 pub(super) const HEADER_BYTES: u64 = 64;
-/// Tiles and their arrays begin at multiples of this, bytes: a cache line, and more than any cast
-/// needs.
-pub(super) const ALIGN: u64 = 64;
 /// Grows with any change of either file.
 const VERSION: u32 = 2;
 const CATALOGUE_MAGIC: &[u8; 8] = b"STILLCAT";
@@ -51,9 +52,19 @@ impl TileEntry {
     }
 }
 
+impl Weigh for TileEntry {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>()
+    }
+
+    fn n_points(&self) -> u64 {
+        self.n_points
+    }
+}
+
 /// A [`TileEntry`] in the archive.
 #[derive(Archive, Serialize, Deserialize)]
-struct Row {
+struct TileRow {
     at: [u32; 3],
     n_of: [u32; N_LEVELS],
     checksums: [u32; N_LEVELS],
@@ -69,7 +80,7 @@ struct Row {
 struct Rows {
     /// Length of the tile file.
     n_tile_bytes: u64,
-    rows: Vec<Row>,
+    rows: Vec<TileRow>,
 }
 
 /// The header of the tile file.
@@ -88,7 +99,7 @@ pub(super) fn write(
     n_tile_bytes: u64,
     first: u32,
 ) -> Result<()> {
-    let rows = entries.iter().map(|e| Row {
+    let rows = entries.iter().map(|e| TileRow {
         at: [e.at.scan.0 - first, e.at.row, e.at.col],
         n_of: e.n_of,
         checksums: e.checksums,

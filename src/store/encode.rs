@@ -4,12 +4,11 @@
 //! (f32 × 3), place (u32, less the tile's first place), pixel (u16). Who can do with a part of a
 //! dense tile reads its beginning.
 
-use super::catalogue::{ALIGN, TileEntry};
-use super::parts::Part;
-use super::record::{N_LEVELS, N_PIXELS, PixelOrder, Record};
+use super::catalogue::TileEntry;
+use super::layout::{blocks, layout};
+use super::record::{N_LEVELS, N_PIXELS, PixelOrder, Record, TilePart};
 use contract::{Map, Result, Scan, Tile, TilePoints, Weigh};
 use geometry::{Aabb, Pose};
-use std::ops::Range;
 
 #[cfg(target_endian = "big")]
 compile_error!("the store casts little-endian arrays");
@@ -56,11 +55,11 @@ impl Encode {
 }
 
 impl Map for Encode {
-    type In = Part;
+    type In = TilePart;
     type Out = Encoded;
     type Scratch = PixelOrder;
 
-    fn apply(&self, mut part: Part, order: &mut PixelOrder) -> Result<Encoded> {
+    fn apply(&self, mut part: TilePart, order: &mut PixelOrder) -> Result<Encoded> {
         Ok(self.encode(&mut part, order, Vec::new()))
     }
 }
@@ -69,7 +68,7 @@ impl Encode {
     /// The tile of some points, its bytes in memory that was used before.
     pub(super) fn encode(
         &self,
-        part: &mut Part,
+        part: &mut TilePart,
         order: &mut PixelOrder,
         mut bytes: Vec<u8>,
     ) -> Encoded {
@@ -125,23 +124,6 @@ fn range(records: &[Record]) -> f32 {
     }
     let at = ((ranges.len() - 1) as f64 * NEARER) as usize;
     *ranges.select_nth_unstable_by(at, f32::total_cmp).1
-}
-
-/// Offsets of the three arrays and of the end, for `n` points of a level.
-pub(super) fn layout(n: u64) -> [u64; 4] {
-    let place = (12 * n).next_multiple_of(ALIGN);
-    let pixel = (place + 4 * n).next_multiple_of(ALIGN);
-    [0, place, pixel, (pixel + 2 * n).next_multiple_of(ALIGN)]
-}
-
-/// Where each level lies in the bytes of a tile.
-pub(super) fn blocks(n_of: &[u32; N_LEVELS]) -> [Range<usize>; N_LEVELS] {
-    let mut end = 0;
-    n_of.map(|n| {
-        let start = end;
-        end += layout(u64::from(n))[3] as usize;
-        start..end
-    })
 }
 
 /// The points of a level of a tile in its (aligned) bytes, which have the length that [`layout`]

@@ -1,12 +1,12 @@
 //! Tiles as they were gathered in, in memory, in the spill file, or written too early; parts of at
 //! most [`TILE_POINTS`] out, whole and in the order of tiles.
 
+use super::buffer::{Buffer, TILE_POINTS};
 use super::encode::decode;
 use super::file::Early;
-use super::record::{N_LEVELS, Record};
-use super::sink::{Buffer, TILE_POINTS};
+use super::record::{N_LEVELS, Record, TilePart};
 use super::spill::{Segment, Spill};
-use contract::{Result, TileAt, Weigh};
+use contract::{Result, TileAt};
 
 /// Longest way from the first to the last place of one tile: places are kept as 32 bits from the
 /// first.
@@ -16,22 +16,6 @@ pub(super) const LONGEST_SPAN: u64 = u32::MAX as u64;
 pub(super) fn span(records: &[Record]) -> u64 {
     let places = || records.iter().map(Record::place);
     places().max().zip(places().min()).map_or(0, |(max, min)| max - min)
-}
-
-/// The points of a tile, or of a part of it that is small enough.
-pub(super) struct Part {
-    pub(super) at: TileAt,
-    pub(super) records: Vec<Record>,
-}
-
-impl Weigh for Part {
-    fn weight_bytes(&self) -> usize {
-        size_of::<Self>() + self.records.len() * Record::BYTES
-    }
-
-    fn n_points(&self) -> u64 {
-        self.records.len() as u64
-    }
 }
 
 /// Gives the tiles out, one after the other, each in parts of at most [`TILE_POINTS`].
@@ -59,7 +43,7 @@ impl Parts {
         Self { buffers: buffers.into_iter(), spill, early, current: None }
     }
 
-    fn part(&mut self) -> Result<Option<Part>> {
+    fn part(&mut self) -> Result<Option<TilePart>> {
         loop {
             let current = match &mut self.current {
                 Some(current) => current,
@@ -77,7 +61,7 @@ impl Parts {
                 self.current = None;
                 continue;
             }
-            return Ok(Some(Part { at, records }));
+            return Ok(Some(TilePart { at, records }));
         }
     }
 
@@ -142,7 +126,7 @@ impl Current {
 }
 
 impl Iterator for Parts {
-    type Item = Result<Part>;
+    type Item = Result<TilePart>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.part().transpose()

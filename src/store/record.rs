@@ -1,7 +1,7 @@
 //! A point on its way into a tile: what the spill file holds, 20 bytes a point.
 
 use bytemuck::{Pod, Zeroable};
-use contract::{MAX_SKIP, TILE_SIDE};
+use contract::{MAX_SKIP, TILE_SIDE, TileAt, Weigh};
 
 /// Coordinates, place in the mask (48 bits) and pixel within the tile.
 #[repr(C)]
@@ -99,6 +99,22 @@ impl PixelOrder {
         let at = &mut self.next[pixel];
         *at += 1;
         (usize::from(self.level[pixel]), *at as usize - 1)
+    }
+}
+
+/// The points of a tile, or of a part of it that is small enough.
+pub(super) struct TilePart {
+    pub(super) at: TileAt,
+    pub(super) records: Vec<Record>,
+}
+
+impl Weigh for TilePart {
+    fn weight_bytes(&self) -> usize {
+        size_of::<Self>() + self.records.len() * Record::BYTES
+    }
+
+    fn n_points(&self) -> u64 {
+        self.records.len() as u64
     }
 }
 

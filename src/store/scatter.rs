@@ -13,13 +13,13 @@ pub struct Scatter {
 /// Points of one strip, grouped by tile.
 pub struct Scattered {
     pub(super) scan: ScanId,
-    pub(super) runs: Vec<Run>,
+    pub(super) runs: Vec<TileRun>,
     pub(super) records: Vec<Record>,
 }
 
 /// Consecutive records of one tile.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Run {
+pub(super) struct TileRun {
     /// Row and column of the tile.
     pub(super) tile: [u32; 2],
     /// Number of records.
@@ -61,7 +61,9 @@ impl Map for Scatter {
 
 impl Weigh for Scattered {
     fn weight_bytes(&self) -> usize {
-        size_of::<Self>() + self.runs.len() * size_of::<Run>() + self.records.len() * Record::BYTES
+        size_of::<Self>()
+            + self.runs.len() * size_of::<TileRun>()
+            + self.records.len() * Record::BYTES
     }
 
     fn n_points(&self) -> u64 {
@@ -112,8 +114,8 @@ fn ground_pixels(points: &[[f32; 3]], pixels: &mut [Pixel; BLOCK]) {
 fn records(
     strip: &Strip,
     find: impl Fn(&[[f32; 3]], &mut [Pixel; BLOCK]),
-) -> (Vec<Run>, Vec<Record>) {
-    let mut runs: Vec<Run> = Vec::new();
+) -> (Vec<TileRun>, Vec<Record>) {
+    let mut runs: Vec<TileRun> = Vec::new();
     let mut last = [u32::MAX; 2];
     let mut start = 0;
     let mut records: Vec<Record> = Vec::with_capacity(strip.len());
@@ -125,7 +127,7 @@ fn records(
             if tile != last {
                 let n = records.len() + at - start;
                 if n > 0 {
-                    runs.push(Run { tile: last, n });
+                    runs.push(TileRun { tile: last, n });
                 }
                 (last, start) = (tile, records.len() + at);
             }
@@ -136,13 +138,13 @@ fn records(
         }));
     }
     if records.len() > start {
-        runs.push(Run { tile: last, n: records.len() - start });
+        runs.push(TileRun { tile: last, n: records.len() - start });
     }
     (runs, records)
 }
 
 /// Joins runs of the same tile, keeping their order within it.
-fn grouped(runs: &[Run], records: &[Record]) -> (Vec<Run>, Vec<Record>) {
+fn grouped(runs: &[TileRun], records: &[Record]) -> (Vec<TileRun>, Vec<Record>) {
     let mut order: Vec<([u32; 2], usize, usize)> = Vec::with_capacity(runs.len());
     let mut start = 0;
     for run in runs {
@@ -150,13 +152,13 @@ fn grouped(runs: &[Run], records: &[Record]) -> (Vec<Run>, Vec<Record>) {
         start += run.n;
     }
     order.sort_unstable();
-    let mut joined: Vec<Run> = Vec::new();
+    let mut joined: Vec<TileRun> = Vec::new();
     let mut out = Vec::with_capacity(records.len());
     for (tile, start, n) in order {
         out.extend_from_slice(&records[start..start + n]);
         match joined.last_mut() {
             Some(run) if run.tile == tile => run.n += n,
-            _ => joined.push(Run { tile, n }),
+            _ => joined.push(TileRun { tile, n }),
         }
     }
     (joined, out)

@@ -3,25 +3,22 @@
 //! not come back. Where points do come back, the rest of their tile goes through a spill file, and
 //! the tile is written once more in the end.
 
+use super::buffer::{Buffer, TILE_POINTS};
+use super::catalogue::{self, CATALOGUE, TILES, TileEntry};
 use super::encode::{Encode, Encoded};
 use super::file::TileFile;
-use super::parts::{LONGEST_SPAN, Part, Parts, span};
-use super::record::Record;
+use super::parts::{LONGEST_SPAN, Parts, span};
+use super::reader::Store;
+use super::record::{Record, TilePart};
 use super::scatter::Scattered;
-use super::spill::{Segment, Spill};
+use super::spill::Spill;
 use super::writer::Writer;
-use super::{CATALOGUE, Store, TILES, TileEntry, catalogue};
-use crate::engine::progress::Amount;
-use crate::engine::{Engine, Task};
+use crate::engine::{Amount, Engine, Task};
 use contract::{Error, Result, Scan, TileAt};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Most points of one tile: bounds what a worker holds. A square of ground of a dense cloud, or a
-/// lattice far coarser than its scan, may have more; then several tiles stand at the same
-/// [`TileAt`], cut in the order of places.
-pub const TILE_POINTS: usize = 1 << 21;
 /// Most room that a tile gets before it needs it, points: that of a scan with a point a pixel and a
 /// few more.
 const USUAL_POINTS: usize = (1 << 16) + (1 << 13);
@@ -52,28 +49,14 @@ pub struct TileSink {
     first: u32,
 }
 
-/// What is known of a tile.
-pub(super) struct Buffer {
-    pub(super) at: TileAt,
-    /// In memory.
-    pub(super) records: Vec<Record>,
-    /// In the spill file.
-    pub(super) segments: Vec<Segment>,
-    /// In the tile file, as the end knows it.
-    pub(super) written: Vec<TileEntry>,
-    is_written: bool,
-    /// All that came so far.
-    pub(super) n_points: usize,
-    last_place: u64,
-    pub(super) ascending: bool,
-    /// Number of the last strip that had points for it.
-    touched: u64,
-}
-
 impl TileSink {
-    /// A sink for the scans from `first` on that keeps about `budget_bytes` in memory. An older
-    /// store in `dir` is removed.
-    pub(super) fn new(dir: &Path, scans: &[Scan], first: u32, budget_bytes: usize) -> Result<Self> {
+    /// Begins a store in `dir` for strips of `scans` (all of a run, in their order) from the scan
+    /// `first` on; it keeps about `budget_bytes` in memory while it is filled. An older store in
+    /// `dir` is removed.
+    ///
+    /// # Errors
+    /// A folder or file that cannot be made.
+    pub fn create(dir: &Path, scans: &[Scan], first: u32, budget_bytes: usize) -> Result<Self> {
         std::fs::create_dir_all(dir)
             .map_err(|e| Error::of_file("the store cannot be made", dir, e))?;
         // Without its catalogue an old store is no store: nobody can take old tiles for new ones.
@@ -148,7 +131,7 @@ impl TileSink {
             (0..self.buffers.len()).filter(|&i| !self.buffers[i].records.is_empty()).collect();
         order.sort_by_key(|&i| (self.buffers[i].touched, i));
         let enough = self.budget_bytes.saturating_sub(BATCH_BYTES.min(self.budget_bytes / 4));
-        let mut batch: Vec<(usize, Part)> = Vec::new();
+        let mut batch: Vec<(usize, TilePart)> = Vec::new();
         for i in order {
             if self.bytes <= enough {
                 break;
@@ -163,7 +146,7 @@ impl TileSink {
                 && span(&records) <= LONGEST_SPAN;
             if early {
                 buffer.is_written = true;
-                batch.push((i, Part { at: buffer.at, records }));
+                batch.push((i, TilePart { at: buffer.at, records }));
                 continue;
             }
             let spill = match &mut self.spill {
@@ -206,50 +189,4 @@ impl TileSink {
 /// Tiles of which the memory may be free: a quarter of the budget, where each takes what most do.
 fn n_free(budget_bytes: usize) -> usize {
     (budget_bytes / 4 / (USUAL_POINTS * Record::BYTES)).min(MAX_FREE)
-}
-
-impl Buffer {
-    fn new(at: TileAt) -> Self {
-        Self {
-            at,
-            records: Vec::new(),
-            segments: Vec::new(),
-            written: Vec::new(),
-            n_points: 0,
-            last_place: 0,
-            ascending: true,
-            is_written: false,
-            touched: 0,
-        }
-    }
-
-    fn add(&mut self, records: &[Record]) {
-        // Within a run places ascend, as they do in strips.
-        let (Some(first), Some(last)) = (records.first(), records.last()) else { return };
-        self.ascending &= self.n_points == 0 || first.place() > self.last_place;
-        self.last_place = last.place();
-        self.n_points += records.len();
-        self.records.extend_from_slice(records);
-    }
-
-    /// Makes room for `n` more points, at first for `usual`; bytes that this takes. It grows by a
-    /// quarter: what waits is most of the memory of a run.
-    fn make_room(&mut self, n: usize, usual: usize) -> usize {
-        let (len, before) = (self.records.len(), self.records.capacity());
-        if len + n > before {
-            let more = if before == 0 { usual } else { len / 4 };
-            self.records.reserve_exact(more.max(n));
-        }
-        (self.records.capacity() - before) * Record::BYTES
-    }
-
-    /// Whether some of it was brought to disk before.
-    fn comes_back(&self) -> bool {
-        self.is_written || !self.segments.is_empty()
-    }
-
-    /// Whether all of it is written.
-    fn is_done(&self) -> bool {
-        self.records.is_empty() && self.segments.is_empty()
-    }
 }

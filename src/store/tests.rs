@@ -1,10 +1,16 @@
 //! The store from outside: whatever way points come in, the same tiles come out; damage is named.
 
+use super::catalogue::TILES;
+use super::record::N_LEVELS;
 use super::*;
 use crate::engine::Engine;
-use contract::{InputId, Kind, Lattice, MaskId, ScanId, Strip, TILE_SIDE};
-use geometry::Pose;
+use contract::{
+    InputId, Kind, Lattice, MAX_SKIP, MaskId, Scan, ScanId, Strip, TILE_SIDE, Tile, TileAt,
+    TilePoints,
+};
+use geometry::{Aabb, Pose};
 use std::io::{Seek, SeekFrom, Write};
+use std::path::Path;
 
 const SCAN_POINTS: usize = 60_000;
 
@@ -72,7 +78,7 @@ pub(super) fn build(
 ) -> (Store, u64) {
     let scans = scans();
     let engine = Engine::new(n_workers);
-    let mut sink = Store::create(dir, &scans, 0, budget_bytes).expect("begins");
+    let mut sink = TileSink::create(dir, &scans, 0, budget_bytes).expect("begins");
     let scatter = Scatter::new(&scans);
     engine
         .pass("read", strips.into_iter().map(Ok), |f| f.map(&scatter).for_each(|s| sink.add(&s)))
@@ -225,7 +231,7 @@ fn damage_is_named() {
     let (store, _) = build(dir.path(), strips(9000), usize::MAX, 1);
     let entry = store.entries()[0];
     let finest = (0..N_LEVELS).rfind(|&level| entry.n_of[level] > 0).expect("points");
-    let fine = entry.offset + encode::blocks(&entry.n_of)[finest].start as u64;
+    let fine = entry.offset + layout::blocks(&entry.n_of)[finest].start as u64;
     drop(store);
     let tiles = dir.path().join(TILES);
     let mut file = std::fs::OpenOptions::new().write(true).open(&tiles).expect("a file");

@@ -5,15 +5,14 @@
 use super::catalogue::TileEntry;
 use super::encode::{Encode, Encoded};
 use super::file::TileFile;
-use super::parts::Part;
-use super::record::{PixelOrder, Record};
+use super::record::{PixelOrder, Record, TilePart};
 use contract::{Error, Kind, Result};
 use crossbeam::channel::{Receiver, Sender, bounded, unbounded};
 use std::sync::Arc;
 use std::thread::{Builder, JoinHandle, ScopedJoinHandle};
 
 /// Tiles with the numbers of their buffers.
-type Batch = Vec<(usize, Part)>;
+type Batch = Vec<(usize, TilePart)>;
 /// The file, and the entries of what is in it.
 type Written = (TileFile, Vec<(usize, TileEntry)>);
 
@@ -87,7 +86,7 @@ fn work(
         for _ in 0..ENCODERS {
             let ((give, parts), (done, encoded)) = (bounded(WAITING), bounded(WAITING));
             let (free, rooms) = (free.clone(), rooms.clone());
-            let work = move || encode_all(encode, &parts, &done, (&free, &rooms));
+            let work = move || encode_all(encode, &parts, &done, &free, &rooms);
             encoders.push(start("store encoder").spawn_scoped(scope, work).map_err(failed)?);
             gives.push(give);
             takes.push(encoded);
@@ -112,9 +111,10 @@ fn work(
 /// Encodes tiles, in memory that was used before where there is some.
 fn encode_all(
     encode: &Encode,
-    parts: &Receiver<(usize, Part)>,
+    parts: &Receiver<(usize, TilePart)>,
     done: &Sender<(usize, Encoded)>,
-    (free, rooms): (&Sender<Vec<Record>>, &Receiver<Vec<u8>>),
+    free: &Sender<Vec<Record>>,
+    rooms: &Receiver<Vec<u8>>,
 ) {
     let mut order = PixelOrder::default();
     for (i, mut part) in parts {

@@ -1,7 +1,7 @@
 //! A region and the fits of what stands plainly in it in; the fits of what is harder to find out:
 //! on walls and ceilings, behind other things, on stands that nobody sees, moved between scans.
 
-use super::tried::Tried;
+use super::tried::TriedBases;
 use super::{GUESS_BREADTH, MAX_SUNK, SAME_BASE, Search, base, breadth};
 use crate::engine::AllThreads;
 use base_search::Sight;
@@ -51,9 +51,9 @@ impl Search<'_, '_> {
         scene: &Scene<'_>,
         sight: &Sight<'_>,
         is_wanted: &impl Fn(&Candidate) -> bool,
-        tried: &mut Tried,
+        tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
-        self.hung(scene, sight, ("mounts", is_wanted), tried)
+        self.hung(scene, sight, "mounts", is_wanted, tried)
     }
 
     /// Fits of robots that hang beside trusted ones, where much is left that those do not explain.
@@ -62,14 +62,14 @@ impl Search<'_, '_> {
         scene: &Scene<'_>,
         sight: &mut Sight<'_>,
         fits: &[Fit],
-        tried: &mut Tried,
+        tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
             // They were asked for in all of the region.
             return Ok(Vec::new());
         }
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
-        self.hung(scene, sight, ("mounts beside", &|c: &Candidate| is_apart(c, &feet)), tried)
+        self.hung(scene, sight, "mounts beside", &|c: &Candidate| is_apart(c, &feet), tried)
     }
 
     /// Fits on the region's ceilings, walls and tilted plates, of what is wanted of these
@@ -79,8 +79,9 @@ impl Search<'_, '_> {
         &self,
         scene: &Scene<'_>,
         sight: &Sight<'_>,
-        (name, is_wanted): (&str, &impl Fn(&Candidate) -> bool),
-        tried: &mut Tried,
+        name: &str,
+        is_wanted: &impl Fn(&Candidate) -> bool,
+        tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
         let mounts = self.mounts(scene.region);
         let mut fits = Vec::new();
@@ -88,8 +89,8 @@ impl Search<'_, '_> {
             (name.to_owned(), mounts.clone(), 1),
             (format!("{name} raised"), base_search::raised_planes(&mounts), RAISED_BREADTH),
         ] {
-            let find = || self.candidates(sight, &planes, (MIN_MOUNT_SCORE, breadth));
-            let mut hung = self.piece((scene.region, &name), find)?;
+            let find = || self.candidates(sight, &planes, MIN_MOUNT_SCORE, breadth);
+            let mut hung = self.piece(scene.region, &name, find)?;
             hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
             fits.extend(self.fits(scene, &few(hung, MAX_MOUNTS), tried)?);
             if fits.iter().any(|fit: &Fit| fit.verdict == Verdict::Trusted) {
@@ -118,13 +119,14 @@ impl Search<'_, '_> {
     pub(super) fn left_over(
         &self,
         scene: &Scene<'_>,
-        (sight, planes): (&mut Sight<'_>, &[InstallationPlane]),
+        sight: &mut Sight<'_>,
+        planes: &[InstallationPlane],
         fits: &[Fit],
-        tried: &mut Tried,
+        tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
-        let find = || self.candidates(sight, planes, (0.0, BREADTH.max(breadth(planes))));
-        let mut found = self.piece((scene.region, "left over"), find)?;
+        let find = || self.candidates(sight, planes, 0.0, BREADTH.max(breadth(planes)));
+        let mut found = self.piece(scene.region, "left over", find)?;
         found.retain(|c| is_apart(c, &feet));
         self.fits(scene, &few(found, MAX_LEFT_OVER), tried)
     }
@@ -137,7 +139,7 @@ impl Search<'_, '_> {
         sight: &mut Sight<'_>,
         fits: &[Fit],
         is_wanted: &impl Fn(&Candidate) -> bool,
-        tried: &mut Tried,
+        tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
         let region = scene.region;
         let at = region.origin;
@@ -145,8 +147,8 @@ impl Search<'_, '_> {
         let Some(floor) = height.map(|h| at.z - h) else { return Ok(Vec::new()) };
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
         let planes = base_search::stand_planes(&region.world_bounds(), floor);
-        let find = || self.candidates(sight, &planes, (MIN_STAND_SCORE, GUESS_BREADTH));
-        let mut found = self.piece((region, "stands"), find)?;
+        let find = || self.candidates(sight, &planes, MIN_STAND_SCORE, GUESS_BREADTH);
+        let mut found = self.piece(region, "stands", find)?;
         found.retain(|c| is_apart(c, &feet) && is_wanted(c));
         self.fits(scene, &few(found, MAX_MOUNTS), tried)
     }
@@ -165,7 +167,7 @@ impl Search<'_, '_> {
         }
         let trusted = || fits.iter().filter(|f| f.verdict == Verdict::Trusted);
         let taken: Vec<Aabb> =
-            trusted().flat_map(|f| boxes(f, &self.shelf.models[f.model])).collect();
+            trusted().flat_map(|f| boxes(f, &self.library.models[f.model])).collect();
         let is_much = sight.pass_over(&taken, MIN_STANDING) >= MIN_LEFT;
         is_much.then(|| trusted().map(|f| base(&f.world_from_base)).collect())
     }
@@ -177,11 +179,11 @@ impl Search<'_, '_> {
         if gone.len() < MIN_GONE {
             return Vec::new();
         }
-        let feet = self.candidates(&sight.apart(), sights.floors, (0.0, breadth(sights.floors)));
+        let feet = self.candidates(&sight.apart(), sights.floors, 0.0, breadth(sights.floors));
         let mut out: Vec<Fit> = Vec::new();
         let in_reach = |candidate: &&Candidate| {
             let here = base(&candidate.bases[0].0) - sights.region.origin.coords;
-            let reach = self.shelf.prepared(candidate.model).reach();
+            let reach = self.library.prepared(candidate.model).reach();
             let near = |p: &&[f32; 3]| (Point::from(p.map(f64::from)) - here).norm() < reach;
             gone.iter().filter(near).count() as f64 >= GONE_IN_REACH * gone.len() as f64
         };
@@ -192,7 +194,7 @@ impl Search<'_, '_> {
             if trusted.map(|f| base(&f.world_from_base)).any(|at| (at - here).norm() < SAME_BASE) {
                 continue;
             }
-            let prepared = self.shelf.prepared(candidate.model);
+            let prepared = self.library.prepared(candidate.model);
             let settings = &self.settings.fit;
             out.extend(fit::stays(candidate, prepared, sights, settings, &AllThreads));
         }

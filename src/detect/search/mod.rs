@@ -21,15 +21,15 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
-use tried::Tried;
+use tried::TriedBases;
 
 /// A library with what fits of its models need, made when the first of them asks for it.
-pub(crate) struct Shelf<'a> {
+pub(crate) struct PreparedLibrary<'a> {
     models: &'a [Model],
     prepared: Vec<OnceLock<Prepared<'a>>>,
 }
 
-impl<'a> Shelf<'a> {
+impl<'a> PreparedLibrary<'a> {
     pub(crate) fn new(models: &'a [Model]) -> Self {
         Self { models, prepared: models.iter().map(|_| OnceLock::new()).collect() }
     }
@@ -59,11 +59,13 @@ impl<'a> Shelf<'a> {
 
 /// Everything that the search of a region reads.
 pub(crate) struct Search<'a, 'm> {
-    shelf: &'a Shelf<'m>,
+    library: &'a PreparedLibrary<'m>,
     scans: &'a [Scan],
     store: &'a Store,
     ground: &'a Ground,
     settings: &'a Settings,
+    /// Regions of the plant, where whole robots of it are looked at again.
+    regions: &'a [Region],
     /// Where what was found of a region piece by piece is kept, for a run that is cut short.
     kept: Option<&'a Cache>,
     /// Told of models that are searched for and candidates that are fitted.
@@ -89,13 +91,20 @@ const GUESS_BREADTH: usize = 8;
 
 impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn new(
-        shelf: &'a Shelf<'m>,
+        library: &'a PreparedLibrary<'m>,
         scans: &'a [Scan],
         store: &'a Store,
         ground: &'a Ground,
         settings: &'a Settings,
     ) -> Self {
-        Self { shelf, scans, store, ground, settings, kept: None, pieces: Pieces::default() }
+        let (regions, kept, pieces) = (&[][..], None, Pieces::default());
+        Self { library, scans, store, ground, settings, regions, kept, pieces }
+    }
+
+    /// The same, which knows the regions of the plant.
+    #[must_use]
+    pub(crate) fn over(self, regions: &'a [Region]) -> Self {
+        Self { regions, ..self }
     }
 
     /// The same, which keeps what it finds of a region piece by piece.
@@ -112,7 +121,8 @@ impl<'a, 'm> Search<'a, 'm> {
     /// A piece of what is found in a region: the one that is kept, else a new one.
     fn piece<T: Serialize + DeserializeOwned>(
         &self,
-        (region, name): (&Region, &str),
+        region: &Region,
+        name: &str,
         find: impl FnOnce() -> T,
     ) -> Result<T> {
         self.get_or_compute(&format!("{region:?} {name}"), || Ok(find()))
@@ -131,8 +141,8 @@ impl<'a, 'm> Search<'a, 'm> {
     }
 
     /// The library.
-    pub(crate) fn shelf(&self) -> &'a Shelf<'m> {
-        self.shelf
+    pub(crate) fn library(&self) -> &'a PreparedLibrary<'m> {
+        self.library
     }
 
     /// Bounds of all points, world, metres.
@@ -158,17 +168,17 @@ impl<'a, 'm> Search<'a, 'm> {
         let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
         if self.settings.fit.method == Method::Paper {
             let means = (&self.settings.fit, &self.settings.paper);
-            let models = (0..self.shelf.models.len()).into_par_iter();
-            let robots = models.filter(|&m| !self.shelf.models[m].is_tool());
-            let fit = |m: usize| fit::paper::fit(self.shelf.prepared(m), &scene, &planes, means);
+            let models = (0..self.library.models.len()).into_par_iter();
+            let robots = models.filter(|&m| !self.library.models[m].is_tool());
+            let fit = |m: usize| fit::paper::fit(self.library.prepared(m), &scene, &planes, means);
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
         let feet = about.map_or(*region, |(place, radius)| feet(region, &place, radius));
         let mut sight = Sight::new(&feet, &views, (&scene.evidence, &scene.scouts), &AllThreads);
-        let find = || self.candidates(&sight, &planes, (0.0, breadth(&planes)));
-        let mut candidates = self.piece((region, "candidates"), find)?;
+        let find = || self.candidates(&sight, &planes, 0.0, breadth(&planes));
+        let mut candidates = self.piece(region, "candidates", find)?;
         candidates.retain(is_wanted);
-        let mut tried = Tried::default();
+        let mut tried = TriedBases::default();
         let mut fits = self.fits(&scene, &candidates, &mut tried)?;
         // What stands on the floor explains most regions; ceilings and walls are asked where
         // nothing does.
@@ -177,7 +187,7 @@ impl<'a, 'm> Search<'a, 'm> {
         }
         // At one place all that could be left over was looked at already.
         if about.is_none() {
-            fits.extend(self.left_over(&scene, (&mut sight, &planes), &fits, &mut tried)?);
+            fits.extend(self.left_over(&scene, &mut sight, &planes, &fits, &mut tried)?);
             fits.extend(self.hung_beside(&scene, &mut sight, &fits, &mut tried)?);
         }
         fits.extend(self.on_stands(&scene, &mut sight, &fits, &is_wanted, &mut tried)?);
@@ -193,11 +203,12 @@ impl<'a, 'm> Search<'a, 'm> {
         &self,
         sight: &Sight<'_>,
         planes: &[InstallationPlane],
-        (min_score, breadth): (f64, usize),
+        min_score: f64,
+        breadth: usize,
     ) -> Vec<Candidate> {
         let guessed = planes.iter().all(InstallationPlane::is_guess);
         let search = |index: usize| {
-            let model = (index, &self.shelf.models[index]);
+            let model = (index, &self.library.models[index]);
             let search = BaseSearch::new(model, sight, &self.settings.base_search);
             let search = search.map(|s| if guessed { s.on_guesses() } else { s });
             let search = search.map(|s| s.at_least(min_score).broad(breadth));
@@ -205,8 +216,8 @@ impl<'a, 'm> Search<'a, 'm> {
             self.pieces.done();
             found
         };
-        self.pieces.expect(self.shelf.models.len());
-        let models = (0..self.shelf.models.len()).into_par_iter();
+        self.pieces.expect(self.library.models.len());
+        let models = (0..self.library.models.len()).into_par_iter();
         let found: Vec<Vec<Candidate>> = models.map(search).collect();
         let mut out: Vec<Candidate> =
             found.into_iter().flatten().filter(|c| !c.bases.is_empty()).collect();
@@ -220,7 +231,7 @@ impl<'a, 'm> Search<'a, 'm> {
         &self,
         scene: &Scene<'_>,
         candidates: &[Candidate],
-        tried: &mut Tried,
+        tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
         let (mut out, mut taken): (Vec<Fit>, Vec<(Point, f64)>) = (Vec::new(), Vec::new());
         let new: Vec<&Candidate> = candidates.iter().filter(|c| !tried.knows(c)).collect();
@@ -235,10 +246,10 @@ impl<'a, 'm> Search<'a, 'm> {
             open.iter().for_each(|c| tried.add(c));
             let fit = |c: &&Candidate| {
                 let find = || {
-                    let prepared = self.shelf.prepared(c.model);
+                    let prepared = self.library.prepared(c.model);
                     fit::fit(c, prepared, scene, &self.settings.fit, &AllThreads)
                 };
-                let fit = self.piece((scene.region, &format!("{} {:?}", c.model, c.bases)), find);
+                let fit = self.piece(scene.region, &format!("{} {:?}", c.model, c.bases), find);
                 self.pieces.done();
                 fit
             };
@@ -264,10 +275,10 @@ impl<'a, 'm> Search<'a, 'm> {
         before: &Fit,
         model: &Model,
     ) -> Result<Option<Fit>> {
-        let known = |name: &str| self.shelf.models.iter().position(|m| m.name == name);
+        let known = |name: &str| self.library.models.iter().position(|m| m.name == name);
         let tool = before.tool.as_ref().map(|tool| tool.model.as_str());
         let parts = [before.model_name.as_str()].into_iter().chain(tool).filter_map(known);
-        let parts: Vec<&Prepared<'_>> = parts.map(|part| self.shelf.prepared(part)).collect();
+        let parts: Vec<&Prepared<'_>> = parts.map(|part| self.library.prepared(part)).collect();
         let prepared = Prepared::joined(&parts, (before.model, model));
         self.in_scene(region, |scene, settings| {
             fit::again(before, &prepared, scene, settings, &AllThreads)
@@ -282,7 +293,7 @@ impl<'a, 'm> Search<'a, 'm> {
         let plane = Plane { normal, offset };
         let plane = InstallationPlane { plane, bounds, area: 1.0, is_floor: false };
         let candidate = Candidate { model, bounds, plane, bases: vec![(*base, 1.0)] };
-        let prepared = self.shelf.prepared(model);
+        let prepared = self.library.prepared(model);
         fit::fit(&candidate, prepared, scene, &self.settings.fit, &AllThreads)
     }
 
@@ -303,7 +314,6 @@ impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn with_scene<T>(
         &self,
         fit: &Fit,
-        regions: &[Region],
         work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
     ) -> Result<Option<T>> {
         let at = base(&fit.world_from_base);
@@ -312,8 +322,8 @@ impl<'a, 'm> Search<'a, 'm> {
             let Aabb { min, max } = r.world_bounds();
             (0..2).map(|i| (at[i] - min[i]).min(max[i] - at[i])).fold(f64::INFINITY, f64::min)
         };
-        let homes =
-            regions.iter().filter(|r| r.world_bounds().grown(FOOT_BESIDE).contains(at.into()));
+        let holds = |r: &&Region| r.world_bounds().grown(FOOT_BESIDE).contains(at.into());
+        let homes = self.regions.iter().filter(holds);
         let home = homes.max_by(|a, b| within(a).total_cmp(&within(b)));
         home.map(|region| self.in_scene(region, work)).transpose()
     }
@@ -325,7 +335,7 @@ impl<'a, 'm> Search<'a, 'm> {
         model: usize,
         starts: &[(Pose, Vec<f64>)],
     ) -> Result<Vec<(Pose, Vec<f64>)>> {
-        let prepared = self.shelf.prepared(model);
+        let prepared = self.library.prepared(model);
         self.in_scene(region, |scene, settings| {
             let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, scene, settings, (&s.0, &s.1));
             starts.par_iter().map(end).collect()

@@ -11,9 +11,9 @@ const SAME: (f64, f64) = (0.01, 0.01);
 
 /// Models and the bases that they were fitted on.
 #[derive(Default)]
-pub(super) struct Tried(Vec<(usize, Vec<Pose>)>);
+pub(super) struct TriedBases(Vec<(usize, Vec<Pose>)>);
 
-impl Tried {
+impl TriedBases {
     pub(super) fn add(&mut self, candidate: &Candidate) {
         self.0.push((candidate.model, candidate.bases.iter().map(|base| base.0).collect()));
     }
@@ -51,7 +51,7 @@ mod tests {
             },
             bases: xs.iter().map(|x| (Pose::translation(*x, 0.0, 0.0), 0.5)).collect(),
         };
-        let mut tried = Tried::default();
+        let mut tried = TriedBases::default();
         assert!(!tried.knows(&candidate(0, &[1.0])));
         tried.add(&candidate(0, &[1.0, 2.0]));
         assert!(tried.knows(&candidate(0, &[2.001, 1.0])));

@@ -1,6 +1,6 @@
 //! How far a stage is, in; words for people, or JSON for programs, out.
 
-use super::Amount;
+use crate::engine::amount::Amount;
 use contract::words::count;
 
 /// Seconds to go at the rate so far.
@@ -9,11 +9,22 @@ fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
     Some(seconds * (1.0 - share) / share)
 }
 
-pub(super) fn words(
-    (done, total): (&Amount, &Amount),
-    [n_done, n_known]: [u64; 2],
-    (seconds, last): (f64, bool),
-) -> String {
+/// How far a stage is.
+pub(super) struct StageState<'a> {
+    /// What is done, and what there is in all.
+    pub(super) done: &'a Amount,
+    pub(super) total: &'a Amount,
+    /// Pieces that are done, and pieces that are known so far.
+    pub(super) pieces: [u64; 2],
+    /// Since it began; and processor time of the whole program since then.
+    pub(super) seconds: f64,
+    pub(super) cpu_seconds: f64,
+    /// Whether it has ended.
+    pub(super) is_over: bool,
+}
+
+pub(super) fn words(state: &StageState<'_>) -> String {
+    let &StageState { done, total, pieces: [n_done, n_known], seconds, is_over: last, .. } = state;
     let mut words = Vec::new();
     if let Some(share) = done.share(total) {
         words.push(format!("{:.0} %", 100.0 * share));
@@ -40,12 +51,10 @@ pub(super) fn words(
     words.join(", ")
 }
 
-pub(super) fn json(
-    name: &str,
-    (done, total): (&Amount, &Amount),
-    [n_done, n_known]: [u64; 2],
-    ([seconds, cpu_seconds], last): ([f64; 2], bool),
-) -> String {
+pub(super) fn json(name: &str, state: &StageState<'_>) -> String {
+    let &StageState { done, total, pieces: [n_done, n_known], seconds, cpu_seconds, is_over } =
+        state;
+    let last = is_over;
     let known = |n: u64| (n > 0).then_some(n);
     let rate = done.points as f64 / seconds.max(1e-3);
     serde_json::json!({
@@ -85,9 +94,16 @@ mod tests {
         assert_eq!(eta(&done, &total, 10.0), Some(30.0));
         assert_eq!(eta(&Amount::default(), &total, 10.0), None);
         assert_eq!(short(35_200_000.0), "35.2 M");
-        let fit = (&Amount::items(1), &Amount::items(4));
-        let said = words(fit, [17, 60], (9.0, false));
-        assert_eq!(said, "25 %, 1 item, 17 of 60 pieces known so far, 27 s to go");
-        assert_eq!(words(fit, [60, 60], (9.0, true)), "25 %, 1 item, done in 9.0 s");
+        let fit = StageState {
+            done: &Amount::items(1),
+            total: &Amount::items(4),
+            pieces: [17, 60],
+            seconds: 9.0,
+            cpu_seconds: 9.0,
+            is_over: false,
+        };
+        assert_eq!(words(&fit), "25 %, 1 item, 17 of 60 pieces known so far, 27 s to go");
+        let over = StageState { pieces: [60, 60], is_over: true, ..fit };
+        assert_eq!(words(&over), "25 %, 1 item, done in 9.0 s");
     }
 }

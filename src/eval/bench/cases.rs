@@ -1,7 +1,8 @@
 //! Cases in, each done in a folder of its own; their rows, kept as they come, and one table of them
 //! out.
 
-use super::Journal;
+use super::journal::Journal;
+use super::request::DrawnCases;
 use crate::engine::Engine;
 use contract::Result;
 use export::atomic;
@@ -18,21 +19,30 @@ pub(super) trait CaseRow: Serialize {
 }
 
 /// A row to fill in, and what it is filled from.
-pub(super) struct Case<R, T> {
+pub(super) struct CaseToRun<R, T> {
     /// Name of its folder, where it is kept.
     pub(super) name: String,
     pub(super) row: R,
     pub(super) of: T,
 }
 
+impl<R> CaseToRun<R, usize> {
+    /// The first `n` cases that are asked for, a seed each; each is made from its number.
+    pub(super) fn numbered(drawn: &DrawnCases, n: usize, row: impl Fn(u64) -> R) -> Vec<Self> {
+        let case = |k: usize| {
+            let seed = drawn.seed_of(k);
+            Self { name: seed.to_string(), row: row(seed), of: k }
+        };
+        drawn.numbers(n).map(case).collect()
+    }
+}
+
 /// Where cases are done, and what becomes of them.
 pub(super) struct Cases<'a> {
     /// Names the files of rows and table.
     pub(super) name: &'a str,
-    /// Where rows and table go; nowhere where left out.
-    pub(super) out: Option<&'a Path>,
-    /// Whether the folders of the cases are kept there.
-    pub(super) keep: bool,
+    /// Where rows and table go, and whether the folders of the cases are kept there.
+    pub(super) drawn: &'a DrawnCases,
     /// Where they are else.
     pub(super) temporary: &'a Path,
 }
@@ -41,24 +51,25 @@ impl Cases<'_> {
     /// Does all of them, one after the other: a case that fails is a row that says so.
     pub(super) fn run<R: CaseRow, T>(
         &self,
-        cases: Vec<Case<R, T>>,
+        cases: Vec<CaseToRun<R, T>>,
         case: impl Fn(&mut R, &T, &Path) -> Result<()>,
         table: impl Fn(&[R]) -> String,
         engine: &Engine,
     ) -> Result<String> {
+        let (out, keep) = (self.drawn.out.as_deref(), self.drawn.keep);
         let file = |ending: &str| format!("{}.{ending}", self.name);
-        let mut journal = self.out.map(|dir| Journal::create(dir, &file("jsonl"))).transpose()?;
+        let mut journal = out.map(|dir| Journal::create(dir, &file("jsonl"))).transpose()?;
         let mut rows = Vec::new();
-        for Case { name, mut row, of } in cases {
+        for CaseToRun { name, mut row, of } in cases {
             engine.cancel.check()?;
-            let dir = match (self.out, self.keep) {
+            let dir = match (out, keep) {
                 (Some(out), true) => out.join(name),
                 _ => self.temporary.join("case"),
             };
             if let Err(error) = case(&mut row, &of, &dir) {
                 row.fail(error.to_string());
             }
-            if !self.keep {
+            if !keep {
                 let _ = std::fs::remove_dir_all(&dir);
             }
             if let Some(journal) = &mut journal {
@@ -68,7 +79,7 @@ impl Cases<'_> {
             rows.push(row);
         }
         let table = table(&rows);
-        if let Some(dir) = self.out {
+        if let Some(dir) = out {
             atomic::write(&dir.join(file("md")), table.as_bytes())?;
         }
         Ok(table)

@@ -1,13 +1,14 @@
 //! A scene in; its scans in memory, and what the main job's own stages find in them, out.
 
 use crate::detect::calibrate::calibrate;
-use crate::detect::ground::{Gather, Surfaces};
-use crate::detect::search::{Search, Shelf};
+use crate::detect::ground::Ground;
+use crate::detect::robots::FittedRobots;
+use crate::detect::search::{PreparedLibrary, Search};
 use crate::detect::tools;
 use crate::engine::{AllThreads, Engine};
 use crate::job::{Means, Settings};
-use crate::label::near_robots::Near;
-use crate::store::{Scatter, Store};
+use crate::label::near_robots::{NearRobots, ScansNearRobots};
+use crate::store::{Scatter, TileSink};
 use contract::{
     Fit, InputId, Label, Lattice, Map, MaskId, Region, Result, Scan, ScanId, Strip, Verdict,
 };
@@ -20,7 +21,7 @@ use std::time::Instant;
 
 /// A cell as its scanners saw it.
 #[derive(Default)]
-pub(super) struct Cell {
+pub(super) struct ScannedCell {
     scans: Vec<Scan>,
     strips: Vec<Strip>,
     /// What each point of each scan truly lies on.
@@ -40,7 +41,7 @@ pub(super) struct Real {
 
 /// What was found, and how long it took.
 #[derive(Default)]
-pub(super) struct Found {
+pub(super) struct FoundInCell {
     pub(super) fits: Vec<Fit>,
     pub(super) n_robot_points: usize,
     /// Seconds from the regions and the store to fits.
@@ -48,7 +49,7 @@ pub(super) struct Found {
     /// Where the refinement alone ended from each start.
     pub(super) ends: Vec<Start>,
     /// What the points near robots are said to be, and for each scan what they are.
-    pub(super) labels: Option<(Near, Vec<Vec<Real>>)>,
+    pub(super) labels: Option<(NearRobots, Vec<Vec<Real>>)>,
 }
 
 /// World from base, and a posture.
@@ -68,7 +69,7 @@ pub(super) enum Then<'a> {
 /// Columns cast at a time.
 const COLUMNS: u32 = 32;
 
-impl Cell {
+impl ScannedCell {
     /// Scans a scene. `models` are the true ones.
     pub(super) fn scan(scene: &Scene, models: &[Model], engine: &Engine) -> Result<Self> {
         let simulator = Simulator::new(scene, models)?;
@@ -124,55 +125,55 @@ impl Cell {
     }
 
     /// Sends the scans through the stages of the main job, from the store on; the models of the
-    /// shelf are tried.
+    /// library are tried.
     pub(super) fn search(
         self,
-        (shelf, then): (&Shelf<'_>, Then<'_>),
+        library: &PreparedLibrary<'_>,
+        then: Then<'_>,
         dir: &Path,
-        (settings, means, engine): (&Settings, &Means, &Engine),
-    ) -> Result<Found> {
+        settings: &Settings,
+        means: &Means,
+        engine: &Engine,
+    ) -> Result<FoundInCell> {
         let scans = &self.scans;
         let scatter = Scatter::new(scans);
-        let mut sink = Store::create(dir, scans, 0, means.ingest_bytes())?;
+        let mut sink = TileSink::create(dir, scans, 0, means.ingest_bytes())?;
         for strip in self.strips {
             sink.add(&scatter.apply(strip, &mut ())?)?;
         }
         let store = sink.finish(engine, means.store_bytes())?;
-        let names = shelf.models().iter().map(|m| m.name.as_str()).collect();
-        engine.pool()?.install(|| shelf.prepare(&names, &AllThreads));
-        let (surfaces, gather) =
-            (Surfaces::new(scans, &settings.lattice), Gather::new(scans, &settings.floor));
-        let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
-        let ground =
-            engine.pass("surfaces", source, |f| f.map(&reads).map(&surfaces).fold(&gather))?;
+        let names = library.models().iter().map(|m| m.name.as_str()).collect();
+        engine.pool()?.install(|| library.prepare(&names, &AllThreads));
+        let ground = Ground::of_tiles(scans, &store, settings, engine)?;
         let clusters =
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let regions = base_search::regions(&clusters, &settings.region);
-        let search = Search::new(shelf, scans, &store, &ground, settings);
+        let search = Search::new(library, scans, &store, &ground, settings).over(&regions);
         if let Then::Converge(starts) = then {
             let here = starts.first().and_then(|start| nearest(&regions, &start.0));
             let ends = here.map_or(Ok(Vec::new()), |region| search.converge(region, 0, starts))?;
             let n_robot_points = self.n_robot_points;
-            return Ok(Found { ends, n_robot_points, ..Found::default() });
+            return Ok(FoundInCell { ends, n_robot_points, ..FoundInCell::default() });
         }
         let started = Instant::now();
         let fits = engine.fan_out("fit", regions.clone(), |region| search.region(&region))?;
-        let mut models = shelf.models().to_vec();
+        let mut models = library.models().to_vec();
         let mut fits = fit::choose(fits.into_iter().flatten().collect(), &models, |_| false);
-        fits = tools::dress(fits, &mut models, (&search, &regions), engine)?;
+        fits = tools::attach_tools(fits, &mut models, &search, engine)?;
         if settings.fit.calibrate {
-            fits = calibrate(fits, &mut models, (&search, &regions), engine)?;
+            fits = calibrate(fits, &mut models, &search, engine)?;
         }
         if let Then::Adjust(from) = then {
-            fits = adjusted(&fits, from, (&search, &regions), &models)?;
+            fits = adjusted(&fits, from, &search, &regions, &models)?;
         }
         let seconds = started.elapsed().as_secs_f64();
-        let place = (&store, &ground.surfaces.floor, (scans.as_slice(), scans.len()));
-        let near =
-            Near::find((&fits, &models), place, (settings.segment, settings.attach), engine)?;
+        let (floor, n_masks) = (&ground.surfaces.floor, scans.len());
+        let seen = ScansNearRobots { store: &store, floor, scans, n_masks };
+        let robots = FittedRobots { fits: &fits, models: &models };
+        let near = NearRobots::find(robots, &seen, settings.segment, settings.attach, engine)?;
         let n_robot_points = self.n_robot_points;
         let labels = Some((near, self.truth));
-        Ok(Found { fits, n_robot_points, seconds, labels, ..Found::default() })
+        Ok(FoundInCell { fits, n_robot_points, seconds, labels, ..FoundInCell::default() })
     }
 }
 
@@ -187,7 +188,8 @@ fn nearest<'r>(regions: &'r [Region], world_from_base: &Pose) -> Option<&'r Regi
 fn adjusted(
     fits: &[Fit],
     from: Option<&Start>,
-    (search, regions): (&Search<'_, '_>, &[Region]),
+    search: &Search<'_, '_>,
+    regions: &[Region],
     models: &[Model],
 ) -> Result<Vec<Fit>> {
     let mut out = Vec::new();

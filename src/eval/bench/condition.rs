@@ -1,12 +1,12 @@
 //! Names of suites and a seed in; cases, each with everything that its drawing needs, out.
 
-use super::Bench;
-use contract::{Error, Kind, Result};
+use super::request::{DrawnCases, check_suites};
+use contract::Result;
 use robot::Model;
 
 /// What a robot is bolted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum Mounting {
     /// The floor, or a stand on it.
     Floor,
     /// A block that is narrower than its foot, so that nobody sees what it stands on.
@@ -77,7 +77,7 @@ pub(super) struct Condition {
     /// Whether the arm of another robot crosses it.
     pub(super) crossed: bool,
     /// What the robot is bolted to.
-    pub(super) mount: Place,
+    pub(super) mount: Mounting,
     /// How far the plate of such a place stands out from under the foot, metres; 0: a large one.
     pub(super) rim: f64,
     /// Whether a wall, a ceiling or a large leaning plate is behind that plate.
@@ -111,7 +111,7 @@ pub(super) const PLAIN: Condition = Condition {
     hidden: 0.0,
     crossed: false,
     stand: 0.0,
-    mount: Place::Floor,
+    mount: Mounting::Floor,
     rim: 0.0,
     backed: false,
     way: Way::Whole,
@@ -135,7 +135,7 @@ const NARROW: f64 = 0.02;
 
 /// One cell to be drawn.
 #[derive(Debug, Clone)]
-pub(super) struct Case {
+pub(super) struct DrawnCase {
     pub(super) suite: &'static str,
     pub(super) seed: u64,
     /// Index in the library.
@@ -143,7 +143,7 @@ pub(super) struct Case {
     pub(super) condition: Condition,
 }
 
-impl Case {
+impl DrawnCase {
     /// Whether it is measured beside the product: its figures are not the product's.
     pub(super) fn is_baseline(&self) -> bool {
         self.condition.way != Way::Whole
@@ -159,10 +159,10 @@ impl Case {
 const CASES_OF_A_ROBOT: u64 = 1000;
 
 /// A suite: name, number of cases for each model, and the condition of its k-th case.
-type Suite = (&'static str, usize, fn(usize) -> Condition);
+type AccuracySuite = (&'static str, usize, fn(usize) -> Condition);
 
 /// All suites, in the order of METHOD.md §19.
-const SUITES: &[Suite] = &[
+const SUITES: &[AccuracySuite] = &[
     ("paper", 3, |_| Condition { n_beams: 5e7, noise: 0.0, ..PLAIN }),
     ("source", 3, |_| Condition { n_beams: 5e7, noise: 0.0, way: Way::Sequential, ..PLAIN }),
     ("models", 3, |_| PLAIN),
@@ -202,19 +202,19 @@ const SUITES: &[Suite] = &[
     ("branches", 3, |_| Condition { other_branch: true, ..PLAIN }),
     ("tools", 3, |_| Condition { tool: true, ..PLAIN }),
     ("mounts", 6, |k| Condition {
-        mount: [Place::Ceiling, Place::Wall, Place::Tilted][k % 3],
+        mount: [Mounting::Ceiling, Mounting::Wall, Mounting::Tilted][k % 3],
         rim: [0.0, RIM][k % 2],
         mixed: true,
         ..PLAIN
     }),
     ("plates", 6, |k| Condition {
-        mount: [Place::Ceiling, Place::Wall, Place::Tilted][k % 3],
+        mount: [Mounting::Ceiling, Mounting::Wall, Mounting::Tilted][k % 3],
         rim: NARROW,
         backed: true,
         mixed: true,
         ..PLAIN
     }),
-    ("pillars", 6, |_| Condition { mount: Place::Pillar, mixed: true, ..PLAIN }),
+    ("pillars", 6, |_| Condition { mount: Mounting::Pillar, mixed: true, ..PLAIN }),
     ("basin", 7, |k| Condition { perturbed_deg: PERTURBED_DEG[k % 7], ..PLAIN }),
     ("unknown", 20, |k| Condition {
         n_scanners: 6 - k % 5,
@@ -226,16 +226,26 @@ const SUITES: &[Suite] = &[
     }),
 ];
 
+/// Which suites are asked for, and how many cases of each.
+pub(super) struct Suites<'a> {
+    /// All where empty.
+    pub(super) names: &'a [String],
+    /// The suite's own number where left out.
+    pub(super) n_cases: Option<usize>,
+    pub(super) drawn: &'a DrawnCases,
+}
+
 /// The cases that are asked for, suite by suite, model by model.
-pub(super) fn cases(bench: &Bench, models: &[Model], chosen: &[usize]) -> Result<Vec<Case>> {
+pub(super) fn cases(
+    asked: &Suites<'_>,
+    models: &[Model],
+    chosen: &[usize],
+) -> Result<Vec<DrawnCase>> {
     let names: Vec<&str> = SUITES.iter().map(|s| s.0).collect();
-    if let Some(odd) = bench.suites.iter().find(|s| !names.contains(&s.as_str())) {
-        return Err(Error::new(Kind::Usage, format!("there is no suite \"{odd}\""))
-            .hint(format!("there are {}", names.join(", "))));
-    }
+    check_suites(asked.names, &names)?;
     let mut out = Vec::new();
     for (name, n, condition) in SUITES {
-        if !bench.suites.is_empty() && !bench.suites.iter().any(|s| s == name) {
+        if !asked.names.is_empty() && !asked.names.iter().any(|s| s == name) {
             continue;
         }
         for &model in chosen {
@@ -250,9 +260,9 @@ pub(super) fn cases(bench: &Bench, models: &[Model], chosen: &[usize]) -> Result
             // A model's cases do not change when others join the library.
             let own =
                 models[model].name.bytes().fold(0_u64, |a, b| a.wrapping_mul(31) + u64::from(b));
-            for k in bench.first..bench.first + bench.n_cases.unwrap_or(*n) {
-                let seed = bench.seed * 1_000_000 + own % 1000 * CASES_OF_A_ROBOT + k as u64;
-                out.push(Case { suite: name, seed, model, condition: condition(k) });
+            for k in asked.drawn.numbers(asked.n_cases.unwrap_or(*n)) {
+                let seed = asked.drawn.seed * 1_000_000 + own % 1000 * CASES_OF_A_ROBOT + k as u64;
+                out.push(DrawnCase { suite: name, seed, model, condition: condition(k) });
             }
         }
     }

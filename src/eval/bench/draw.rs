@@ -1,9 +1,9 @@
 //! A case in; the scene that its seed draws, with the true base and posture, out.
 
 use super::cell::Start;
-use super::condition::{Case, Condition, Place};
+use super::condition::{Condition, DrawnCase, Mounting};
 use super::obstacles::Standing;
-use super::{borne, obstacles, shape};
+use super::{carried_items, obstacles, shape};
 use contract::Result;
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -17,7 +17,7 @@ use simulate::{Postures, Scene};
 use std::f64::consts::TAU;
 
 /// A case, drawn.
-pub(super) struct Drawn {
+pub(super) struct DrawnCell {
     pub(super) scene: Scene,
     pub(super) world_from_base: Pose,
     pub(super) posture: Vec<f64>,
@@ -49,9 +49,9 @@ const STAND_SIDE: f64 = 1.4;
 const PILLAR: [f64; 2] = [0.25, 1.2];
 const NARROW: f64 = 0.7;
 
-impl Drawn {
+impl DrawnCell {
     /// The library as it really is: the true robot's shape may differ from its model.
-    pub(super) fn models(&self, models: &[Model], case: &Case) -> Vec<Model> {
+    pub(super) fn models(&self, models: &[Model], case: &DrawnCase) -> Vec<Model> {
         let mut out = models.to_vec();
         out[case.model] = out[case.model].with_other_branches(&self.other_branches);
         if case.condition.warp > 0.0 {
@@ -96,7 +96,7 @@ fn flange(arm: &Model) -> usize {
 }
 
 /// The tool of a case and how it is bolted on, where its condition wants one.
-pub(super) fn mount(case: &Case, models: &[Model]) -> Option<Mount> {
+pub(super) fn mount(case: &DrawnCase, models: &[Model]) -> Option<Mount> {
     let tools: Vec<usize> = (0..models.len()).filter(|&i| models[i].is_tool()).collect();
     if !case.condition.tool || tools.is_empty() {
         return None;
@@ -111,12 +111,12 @@ pub(super) fn mount(case: &Case, models: &[Model]) -> Option<Mount> {
 }
 
 /// Draws a case of a model.
-pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
+pub(super) fn draw(case: &DrawnCase, model: &Model) -> Result<DrawnCell> {
     let c = &case.condition;
     let mut random = Random::keyed(&[case.seed, 0xACC]);
     let mut scene = empty(case.seed, &mut random);
     let (stand, side) = match c.mount {
-        Place::Pillar => (random.between(PILLAR[0], PILLAR[1]), NARROW * narrower(model)),
+        Mounting::Pillar => (random.between(PILLAR[0], PILLAR[1]), NARROW * narrower(model)),
         _ if c.stand > 0.0 && random.unit() < 0.5 => (random.between(0.15, c.stand), STAND_SIDE),
         _ => (0.0, STAND_SIDE),
     };
@@ -154,15 +154,15 @@ pub(super) fn draw(case: &Case, model: &Model) -> Result<Drawn> {
     });
     let reach = reach(model, &world_from_base, &posture);
     around(&mut scene, c.clutter, reach[0], &mut random);
-    borne::hoses(&mut scene, model, c.clutter, &mut random);
-    borne::load(&mut scene, model, (c.laden, reach[0]), &mut random);
+    carried_items::hoses(&mut scene, model, c.clutter, &mut random);
+    carried_items::load(&mut scene, model, c.laden, reach[0], &mut random);
     scanners(&mut scene, c, reach, &mut random);
     let circle = circle(reach);
     let standing = Standing { model, world_from_base, posture: &posture, reach: reach[0], circle };
     let beside = obstacles::add(&mut scene, &standing, case)?;
     let has_branch = |at: &usize| c.other_branch && model.has_other_branch(*at, &posture);
     let other_branches = (0..model.loops.len()).find(has_branch).into_iter().collect();
-    Ok(Drawn { scene, world_from_base, posture, other_branches, beside })
+    Ok(DrawnCell { scene, world_from_base, posture, other_branches, beside })
 }
 
 /// A scene of this seed with nothing but a floor, as level as floors are.
@@ -197,10 +197,10 @@ fn plate(
 ) -> Option<Pose> {
     let size = reach(model, &Pose::identity(), &model.home());
     let (z, lean) = match c.mount {
-        Place::Floor | Place::Pillar => return None,
-        Place::Ceiling => (0.6 + 1.1 * size[0].max(size[1]), 180.0),
-        Place::Wall => (0.4 + size[0].max(size[1]) * random.between(0.7, 0.9), 90.0),
-        Place::Tilted => (random.between(0.7, 1.0), random.between(10.0, 45.0)),
+        Mounting::Floor | Mounting::Pillar => return None,
+        Mounting::Ceiling => (0.6 + 1.1 * size[0].max(size[1]), 180.0),
+        Mounting::Wall => (0.4 + size[0].max(size[1]) * random.between(0.7, 0.9), 90.0),
+        Mounting::Tilted => (random.between(0.7, 1.0), random.between(10.0, 45.0)),
     };
     let heading = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw);
     let lean = UnitQuaternion::from_euler_angles(f64::to_radians(lean), 0.0, 0.0);
@@ -238,7 +238,7 @@ fn plate(
 
 /// Starts of the refinement alone, where the case asks for it: the truth, then every joint and the
 /// base off by something.
-pub(super) fn starts(case: &Case, drawn: &Drawn) -> Vec<Start> {
+pub(super) fn starts(case: &DrawnCase, drawn: &DrawnCell) -> Vec<Start> {
     let off = case.condition.perturbed_deg.to_radians();
     if off == 0.0 {
         return Vec::new();

@@ -2,17 +2,16 @@
 //! cells, out: which of them a rescan laid on the plant, how exactly, which it refused, and which
 //! it laid on a wrong place.
 
-use super::cases::{Case, CaseRow, Cases};
-use super::rescan::RescanBench;
-use super::robots_of;
-use crate::cache::Vouched;
+use super::cases::{CaseRow, CaseToRun, Cases};
+use super::request::{RescanBench, RescanSuite};
+use crate::cache::VerifiedFiles;
 use crate::detect::library;
 use crate::engine::Engine;
 use crate::eval::virtual_scan::{Formats, scan_scene};
 use crate::job::{Job, Means};
 use crate::plan;
-use crate::rescan::{Cell, Frame, Request, rescan};
-use crate::result::plant_state::State;
+use crate::rescan::{Cell, Frame, RescanRequest, rescan};
+use crate::result::plant_state::PlantState;
 use contract::{Error, Kind, Result};
 use export::ResultFile;
 use geometry::{Pose, Vector};
@@ -20,22 +19,10 @@ use nalgebra::{Translation3, UnitQuaternion};
 use serde::Serialize;
 use simulate::random::Random;
 use simulate::scene::Registration;
-use simulate::{Ends, Line, Plant, Scene, line, sessions};
+use simulate::{Ends, Line, Scene, line, sessions};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
-
-/// What is drawn.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Suite {
-    /// Plants of which one cell is scanned again, in the plant's frame.
-    #[default]
-    Same,
-    /// The same, the new scans in frames that are drawn.
-    Frames,
-    /// Lines of equal cells, the new scans in frames that are drawn.
-    Lines,
-}
 
 /// Shift of a frame, metres, at most.
 const SHIFT: f64 = 50.0;
@@ -46,7 +33,7 @@ const N_CELLS: usize = 5;
 
 /// One case.
 #[derive(Debug, Clone, Default, Serialize)]
-struct Row {
+struct FrameRow {
     seed: u64,
     failed: Option<String>,
     /// What stands at the ends of a line.
@@ -67,35 +54,37 @@ struct Row {
     seconds: f64,
 }
 
-/// Runs the cases; returns the table.
-pub(super) fn frames(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {
+/// Draws plants or lines whose new scans are in frames of their own, and rescans them; returns the
+/// table.
+pub fn frames(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
-    let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
+    let robots = bench.drawn.library(temporary.path())?;
     let quiet = engine.quiet();
-    let name = if bench.suite == Suite::Lines { "lines" } else { "frames" };
-    let (out, keep) = (bench.out.as_deref(), bench.keep);
-    let place = Cases { name, out, keep, temporary: temporary.path() };
-    let seed = |k: usize| bench.seed * 100_000 + k as u64;
-    let draw = |k: usize| Case {
-        name: seed(k).to_string(),
-        row: Row { seed: seed(k), ..Row::default() },
-        of: k,
-    };
-    let cases = (bench.first..bench.first + bench.n_cases).map(draw).collect();
-    let case = |row: &mut Row, k: &usize, dir: &Path| {
-        case(row, (bench, *k), (&robots, dir), (means, &quiet))
+    let name = if bench.suite == RescanSuite::Lines { "lines" } else { "frames" };
+    let place = Cases { name, drawn: &bench.drawn, temporary: temporary.path() };
+    let cases = CaseToRun::numbered(&bench.drawn, bench.n_cases, |seed| FrameRow {
+        seed,
+        ..FrameRow::default()
+    });
+    let case = |row: &mut FrameRow, k: &usize, dir: &Path| {
+        case(row, &FrameCase { bench, number: *k, robots: &robots, means, engine: &quiet }, dir)
     };
     place.run(cases, case, table, engine)
 }
 
-fn case(
-    row: &mut Row,
-    (bench, k): (&RescanBench, usize),
-    (robots, dir): (&Path, &Path),
-    (means, engine): (&Means, &Engine),
-) -> Result<()> {
+/// Which case is asked for, and what it is done with.
+struct FrameCase<'a> {
+    bench: &'a RescanBench,
+    number: usize,
+    robots: &'a Path,
+    means: &'a Means,
+    engine: &'a Engine,
+}
+
+fn case(row: &mut FrameRow, asked: &FrameCase<'_>, dir: &Path) -> Result<()> {
+    let &FrameCase { bench, number, robots, means, engine } = asked;
     let models = library::load(robots, &means.settings.robot, None, engine)?.models;
-    let [then, mut now] = scenes(row, (bench, k), &models)?;
+    let [then, mut now] = scenes(row, bench, number, &models)?;
     let frame = drawn(row);
     for scanner in &mut now.scanners {
         let (real, stated) = (scanner.world_from_scan()?, scanner.stated_world_from_scan()?);
@@ -110,7 +99,7 @@ fn case(
         Job::new(inputs, robots.to_path_buf(), dir.join(out), means.clone())
     };
     plan::run(&job("then", "base"), engine)?;
-    let request = Request {
+    let request = RescanRequest {
         base: dir.join("base"),
         cell: Cell::Seen,
         frame: Frame::Find,
@@ -120,7 +109,7 @@ fn case(
     let came = rescan(&request, engine);
     row.seconds = started.elapsed().as_secs_f64();
     match came {
-        Ok(_) => judge(row, (&then, &now), &dir.join("again")),
+        Ok(_) => judge(row, &then, &now, &dir.join("again")),
         Err(error) if error.kind() == Kind::BadInput => {
             row.came = "refused".into();
             row.why = Some(error.to_string());
@@ -132,30 +121,22 @@ fn case(
 
 /// The sessions of a case.
 fn scenes(
-    row: &mut Row,
-    (bench, k): (&RescanBench, usize),
+    row: &mut FrameRow,
+    bench: &RescanBench,
+    number: usize,
     models: &[robot::Model],
 ) -> Result<[Scene; 2]> {
-    if bench.suite == Suite::Lines {
-        let ends = [Ends::Open, Ends::Long, Ends::Walls][k % 3];
+    if bench.suite == RescanSuite::Lines {
+        let ends = [Ends::Open, Ends::Long, Ends::Walls][number % 3];
         row.ends = Some(format!("{ends:?}"));
-        let wanted = Line { seed: row.seed, n_cells: N_CELLS, step_deg: bench.step_deg, ends };
+        let wanted = Line { seed: row.seed, n_cells: N_CELLS, step_deg: bench.size.step_deg, ends };
         return Ok(line(&wanted, models)?.0);
     }
-    let wanted = Plant {
-        seed: row.seed,
-        n_robots: bench.n_robots,
-        n_rows: bench.n_robots.div_ceil(5),
-        n_scanners: bench.n_scanners,
-        step_deg: bench.step_deg,
-        is_tight: false,
-        moves: false,
-    };
-    sessions(&wanted, models)
+    sessions(&bench.size.plant(row.seed), models)
 }
 
 /// A frame: what brings coordinates of the plant into those that files state.
-fn drawn(row: &mut Row) -> Pose {
+fn drawn(row: &mut FrameRow) -> Pose {
     let mut random = Random::keyed(&[row.seed, 0xF4A]);
     let (far, way) = (random.between(0.0, SHIFT), random.between(0.0, std::f64::consts::TAU));
     let yaw = random.between(-180.0, 180.0);
@@ -166,8 +147,8 @@ fn drawn(row: &mut Row) -> Pose {
 }
 
 /// Compares poses of the new scans, as they were laid, with the true ones.
-fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()> {
-    let laid = &State::read(&Vouched::open(out)?)?.scans[then.scanners.len()..];
+fn judge(row: &mut FrameRow, then: &Scene, now: &Scene, out: &Path) -> Result<()> {
+    let laid = &PlantState::read(&VerifiedFiles::open(out)?)?.scans[then.scanners.len()..];
     for (scan, scanner) in laid.iter().zip(&now.scanners) {
         let real = scanner.world_from_scan()?;
         let off = real.inverse() * scan.world_from_scan;
@@ -187,7 +168,7 @@ fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()>
     Ok(())
 }
 
-impl CaseRow for Row {
+impl CaseRow for FrameRow {
     fn fail(&mut self, why: String) {
         self.failed = Some(why);
     }
@@ -218,7 +199,7 @@ impl CaseRow for Row {
     }
 }
 
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[FrameRow]) -> String {
     let n = |came: &str| rows.iter().filter(|r| r.failed.is_none() && r.came == came).count();
     let n_failed = rows.iter().filter(|r| r.failed.is_some()).count();
     let mut out = format!(

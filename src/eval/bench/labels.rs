@@ -1,15 +1,17 @@
 //! What the points of a cell are said to be, and what they are, in; how well links, hoses and fixed
 //! points are told out.
 
-use super::cell::Found;
-use super::plant::MIN_LINK_POINTS;
-use crate::eval::confusion::Tally;
+use super::cell::FoundInCell;
+use crate::eval::confusion::Confusion;
 use contract::{Label, MaskId};
 use serde::Serialize;
 
+/// A link with fewer points has no say in the median of links.
+pub(super) const MIN_LINK_POINTS: u64 = 50;
+
 /// How well the labels of a case are.
 #[derive(Debug, Clone, Default, Serialize)]
-pub(super) struct Told {
+pub(super) struct LabelScores {
     /// Intersection over union of each link of the robot that has points enough.
     pub(super) links: Vec<f64>,
     /// Points of hoses that hang on the robot: said to move, and all.
@@ -20,12 +22,12 @@ pub(super) struct Told {
     pub(super) fixed: [u64; 2],
 }
 
-impl Told {
+impl LabelScores {
     /// Compares the labels with the truth, where robot 0 is what the fit `here` found, if any did,
     /// with so many links. Of points of other robots nothing is asked.
-    pub(super) fn of(found: &Found, here: Option<usize>, n_links: usize) -> Option<Self> {
+    pub(super) fn of(found: &FoundInCell, here: Option<usize>, n_links: usize) -> Option<Self> {
         let (near, truth) = found.labels.as_ref()?;
-        let mut tally = Tally::new(std::iter::once(n_links));
+        let mut tally = Confusion::new(std::iter::once(n_links));
         let mut hoses = [0; 2];
         for (scan, points) in truth.iter().enumerate() {
             let mut said = near.of(MaskId(scan as u32));

@@ -1,207 +1,27 @@
-//! `bench accuracy`: suites of drawn cells in; how well postures, standard deviations and verdicts
-//! hold, as tables, out.
-//!
-//! Each case is drawn from a seed, scanned in memory by the virtual scanner and sent through the
-//! same stages as the main job, from strips of points on: nothing but the scans' points and stated
-//! poses goes in. Suites and their goals follow METHOD.md §19.
+//! Benches: cells and plants drawn from seeds, scanned and searched; errors against the truth, and
+//! speed and memory beside the machine's limits, as tables.
 
-mod borne;
+pub mod accuracy;
+mod carried_items;
 mod cases;
 mod cell;
 pub mod check;
 mod condition;
 mod draw;
 pub mod frames;
-mod growth;
+mod journal;
 mod labels;
-mod limits;
+mod machine_limits;
 mod obstacles;
+mod other_tables;
 pub mod plan;
 pub mod plant;
 mod plot;
+mod process_watch;
+pub mod request;
 pub mod rescan;
 mod score;
 mod shape;
-mod special;
 mod table;
 pub mod throughput;
-mod watch;
-
-use super::demo;
-use crate::detect::library;
-use crate::detect::search::Shelf;
-use crate::engine::Engine;
-use crate::job::Means;
-use cell::{Cell, Then};
-use condition::{Case, Way, cases};
-use contract::{Error, Kind, Result};
-use export::atomic;
-use fit::Method;
-use robot::Model;
-use score::{Row, score};
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
-
-/// What is asked for.
-#[derive(Debug, Clone)]
-pub struct Bench {
-    /// Names of suites; all where empty.
-    pub suites: Vec<String>,
-    /// Cases of each suite; its own number where left out.
-    pub n_cases: Option<usize>,
-    /// Number of the first of them.
-    pub first: usize,
-    /// First seed.
-    pub seed: u64,
-    /// Robot library; the demo's robots where left out.
-    pub robots: Option<PathBuf>,
-    /// Only models whose name holds one of these; all where empty.
-    pub models: Vec<String>,
-    /// Whether each cell is searched for all models of the library, or for the right one only.
-    pub whole_library: bool,
-    /// Where rows and tables go; nowhere where left out.
-    pub out: Option<PathBuf>,
-}
-
-/// The library that is asked for; else the demo's, written below a folder.
-fn robots_of(asked: Option<&Path>, folder: &Path) -> Result<PathBuf> {
-    if let Some(dir) = asked {
-        return Ok(dir.to_path_buf());
-    }
-    let robots = folder.join("robots");
-    demo::write_robots(&robots)?;
-    Ok(robots)
-}
-
-/// Runs the suites; returns the table.
-pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String> {
-    let temporary = tempfile::tempdir()?;
-    let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
-    let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
-    let chosen = chosen(&models, &bench.models)?;
-    let cases = cases(bench, &models, &chosen)?;
-    let mut journal =
-        bench.out.as_deref().map(|dir| Journal::create(dir, "accuracy.jsonl")).transpose()?;
-    let library = Shelf::new(&models);
-    let mut rows = Vec::with_capacity(cases.len());
-    let store = tempfile::tempdir()?;
-    // What stages say of single cells would drown what is said of cases.
-    let mut quiet = Engine::new(engine.n_workers);
-    quiet.cancel = engine.cancel.clone();
-    for (i, case) in cases.iter().enumerate() {
-        engine.cancel.check()?;
-        let row = run(case, &library, bench.whole_library, (store.path(), means, &quiet));
-        let line = row.line();
-        if let Some(journal) = &mut journal {
-            journal.add(&row)?;
-        }
-        engine.progress.say(&format!("{}/{} {line}", i + 1, cases.len()));
-        rows.push(row);
-    }
-    let table = table::table(&rows) + &special::tables(&rows);
-    if let Some(dir) = &bench.out {
-        atomic::write(&dir.join("accuracy.md"), table.as_bytes())?;
-        atomic::write(&dir.join("accuracy.csv"), table::csv(&rows).as_bytes())?;
-        atomic::write(&dir.join("accuracy.json"), json(&rows)?.as_bytes())?;
-        atomic::write(&dir.join("errors.svg"), plot::errors(&rows).as_bytes())?;
-        atomic::write(&dir.join("reliability.svg"), plot::reliability(&rows).as_bytes())?;
-    }
-    Ok(table)
-}
-
-/// All rows, with the version that they were measured with.
-fn json(rows: &[Row]) -> Result<String> {
-    let whole = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "rows": rows });
-    serde_json::to_string_pretty(&whole)
-        .map_err(|e| Error::new(Kind::Bug, "rows cannot be written").because(e))
-}
-
-/// Standard deviations of shift and turn of scans that are taken to be where they are said to be: a
-/// nanometre, a nanoradian.
-const HELD: f64 = 1e-9;
-
-/// One case; what goes wrong in it is a row, too.
-fn run(
-    case: &Case,
-    library: &Shelf<'_>,
-    whole_library: bool,
-    (store, means, engine): (&Path, &Means, &Engine),
-) -> Row {
-    let models = library.models();
-    let started = Instant::now();
-    let mount = draw::mount(case, models);
-    let mut real = models.to_vec();
-    if let Some(mount) = &mount {
-        real[case.model] = mount.tooled(models, case.model);
-    }
-    let seen = draw::draw(case, &real[case.model]).and_then(|drawn| {
-        let few = few(case, models, whole_library);
-        let cell = Cell::scan(&drawn.scene, &drawn.models(&real, case), engine)?;
-        let mut settings = means.settings.clone();
-        let truth = (drawn.world_from_base, drawn.posture.clone());
-        let starts = draw::starts(case, &drawn);
-        let then = match case.condition.way {
-            Way::FromTruth => Then::Adjust(Some(&truth)),
-            Way::SequentialAdjusted => Then::Adjust(None),
-            _ if !starts.is_empty() => Then::Converge(&starts),
-            _ => Then::Nothing,
-        };
-        match case.condition.way {
-            Way::Sequential | Way::SequentialAdjusted => settings.fit.method = Method::Paper,
-            Way::ScansHeld => settings.fit.scan_sigma[..2].fill(HELD),
-            Way::Whole | Way::FromTruth => {}
-        }
-        settings.fit.calibrate |= case.condition.calibrate;
-        let search =
-            |shelf: &Shelf<'_>| cell.search((shelf, then), store, (&settings, means, engine));
-        let found = match &few {
-            Some(few) => search(&Shelf::new(few)),
-            None => search(library),
-        }?;
-        Ok((drawn, found))
-    });
-    match seen {
-        Ok((drawn, found)) => score(case, (&real, mount.as_ref()), &drawn, &found),
-        Err(error) => {
-            Row::failed(case, &models[case.model], &error, started.elapsed().as_secs_f64())
-        }
-    }
-}
-
-/// Models that a case is searched for, where they are not all of the library.
-fn few(case: &Case, models: &[Model], whole_library: bool) -> Option<Vec<Model>> {
-    if whole_library && case.condition.perturbed_deg == 0.0 {
-        return None;
-    }
-    let tools = models.iter().filter(|m| case.condition.tool && m.is_tool());
-    Some(std::iter::once(&models[case.model]).chain(tools).cloned().collect())
-}
-
-/// Indices of the robots whose names are asked for.
-fn chosen(models: &[Model], names: &[String]) -> Result<Vec<usize>> {
-    let wanted = |m: &Model| names.is_empty() || names.iter().any(|n| m.name.contains(n.as_str()));
-    let out: Vec<usize> =
-        (0..models.len()).filter(|&i| !models[i].is_tool() && wanted(&models[i])).collect();
-    if out.is_empty() {
-        return Err(Error::new(Kind::Usage, "no robot of the library has such a name"));
-    }
-    Ok(out)
-}
-
-/// Rows as they come, one JSON object a line: a run that is stopped has lost nothing.
-struct Journal(std::fs::File, PathBuf);
-
-impl Journal {
-    fn create(dir: &Path, name: &str) -> Result<Self> {
-        let path = dir.join(name);
-        let made = std::fs::create_dir_all(dir).and_then(|()| std::fs::File::create(&path));
-        Ok(Self(made.map_err(|e| Error::from(e).at(path.display()))?, path))
-    }
-
-    fn add(&mut self, row: &impl serde::Serialize) -> Result<()> {
-        let text = serde_json::to_string(row)
-            .map_err(|e| Error::new(Kind::Bug, "a row cannot be written").because(e))?;
-        writeln!(self.0, "{text}").map_err(|e| Error::from(e).at(self.1.display()))
-    }
-}
+mod time_plot;

@@ -2,7 +2,7 @@
 //! plates about its foot, a conveyor that touches it, a fence on three sides, another robot whose
 //! arm crosses it.
 
-use super::condition::{Case, Condition};
+use super::condition::{Condition, DrawnCase};
 use contract::Result;
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -43,7 +43,11 @@ pub(super) struct Standing<'a> {
 ///
 /// # Errors
 /// `BadInput` where that has no room.
-pub(super) fn add(scene: &mut Scene, robot: &Standing<'_>, case: &Case) -> Result<Option<Vector>> {
+pub(super) fn add(
+    scene: &mut Scene,
+    robot: &Standing<'_>,
+    case: &DrawnCase,
+) -> Result<Option<Vector>> {
     let (c, mut random) = (&case.condition, Random::keyed(&[case.seed, 0x0B5]));
     if c.hidden > 0.0 {
         hide(scene, robot, c, &mut random);
@@ -56,8 +60,8 @@ fn hide(scene: &mut Scene, robot: &Standing<'_>, c: &Condition, random: &mut Ran
     let Some(foot) = robot.model.links.iter().find(|link| !link.bounds.is_empty()) else { return };
     let size = foot.bounds.size();
     let middle = robot.world_from_base * foot.bounds.center();
-    plates(scene, robot, (middle, [size[0], size[1], c.hidden * size[2]]), random);
-    conveyor(scene, robot, (middle, 0.5 * size[0].max(size[1])), random);
+    plates(scene, robot, middle, [size[0], size[1], c.hidden * size[2]], random);
+    conveyor(scene, robot, middle, 0.5 * size[0].max(size[1]), random);
     fences(scene, robot, random);
 }
 
@@ -65,7 +69,8 @@ fn hide(scene: &mut Scene, robot: &Standing<'_>, c: &Condition, random: &mut Ran
 fn plates(
     scene: &mut Scene,
     robot: &Standing<'_>,
-    (middle, size): (Point, [f64; 3]),
+    middle: Point,
+    size: [f64; 3],
     random: &mut Random,
 ) {
     let (_, _, yaw) = robot.world_from_base.rotation.euler_angles();
@@ -89,7 +94,8 @@ fn plates(
 fn conveyor(
     scene: &mut Scene,
     robot: &Standing<'_>,
-    (middle, radius): (Point, f64),
+    middle: Point,
+    radius: f64,
     random: &mut Random,
 ) {
     let gap = radius + PLATES[0] + PLATES[1] + 0.5 * CONVEYOR[0];

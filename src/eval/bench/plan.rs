@@ -2,9 +2,9 @@
 //! asked what they will take and then done; what was predicted beside what was measured, out. The
 //! rows hold what `scripts/plan_rates.py` measures rates from.
 
-use super::Journal;
+use super::journal::Journal;
+use super::process_watch::{Watched, watch};
 use super::throughput::{Scanned, ThroughputBench, arguments, scan};
-use super::watch::{Watched, watch};
 use crate::detect::library;
 use crate::engine::Engine;
 use crate::estimate::{Estimate, estimate};
@@ -58,7 +58,7 @@ struct Hall {
 
 /// One hall.
 #[derive(Debug, Clone, Serialize)]
-struct Row {
+struct PlanRow {
     seed: u64,
     n_robots: usize,
     n_scans: usize,
@@ -98,7 +98,7 @@ pub fn plans(bench: &PlanBench, means: &Means, engine: &Engine) -> Result<String
     let mut rows = Vec::new();
     for k in bench.first..bench.first + bench.n_halls {
         engine.cancel.check()?;
-        let row = run(bench, &Hall::drawn(bench.seed * 1000 + k as u64, &names), (means, engine))?;
+        let row = run(bench, &Hall::drawn(bench.seed * 1000 + k as u64, &names), means, engine)?;
         journal.add(&row)?;
         engine.progress.say(&line(&row));
         rows.push(row);
@@ -124,7 +124,7 @@ impl Hall {
     }
 }
 
-fn run(bench: &PlanBench, hall: &Hall, (means, engine): (&Means, &Engine)) -> Result<Row> {
+fn run(bench: &PlanBench, hall: &Hall, means: &Means, engine: &Engine) -> Result<PlanRow> {
     let dir = bench.out.join(hall.seed.to_string());
     let (robots, scans, out) = (dir.join("robots"), dir.join("scans"), dir.join("result"));
     for model in &hall.models {
@@ -148,7 +148,7 @@ fn run(bench: &PlanBench, hall: &Hall, (means, engine): (&Means, &Engine)) -> Re
             truth: false,
         };
         let quiet = engine.quiet();
-        scan(&drawing, (hall.n_beams, hall.n_scans), &scans, &robots, (means, &quiet))?;
+        scan(&drawing, hall.n_beams, hall.n_scans, &scans, &robots, means, &quiet)?;
     }
     let _ = std::fs::remove_dir_all(&out);
     let scanners = hall.format != Scanned::E57;
@@ -163,7 +163,7 @@ fn run(bench: &PlanBench, hall: &Hall, (means, engine): (&Means, &Engine)) -> Re
     let store_bytes = size(&out.join("store"))?;
     let output_bytes = size(&out)? - store_bytes;
     let _ = std::fs::remove_dir_all(if bench.keep { &out } else { &dir });
-    Ok(Row {
+    Ok(PlanRow {
         seed: hall.seed,
         n_robots: hall.n_robots,
         n_scans: hall.n_scans,
@@ -198,7 +198,7 @@ fn load() -> f64 {
     text.split(' ').next().and_then(|first| first.parse().ok()).unwrap_or(f64::NAN)
 }
 
-impl Row {
+impl PlanRow {
     /// Processor time of the run, shared among its threads, seconds: its time on a machine that
     /// does nothing else.
     fn alone(&self) -> f64 {
@@ -206,7 +206,7 @@ impl Row {
     }
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &PlanRow) -> String {
     let [least, most] = row.planned.seconds;
     format!(
         "hall {}: {} robots, {} models, {:.1} M points: {:.0} s of processors, {:.0} s; planned {least:.0} to {most:.0} s in {:.1} s",
@@ -221,13 +221,13 @@ fn line(row: &Row) -> String {
 }
 
 /// Predicted beside measured, a line each.
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[PlanRow]) -> String {
     let mut out = String::from(
         "| hall | robots | models | M points | plan took, s | time planned, s | measured, s | processors / threads, s | that / planned | memory planned | measured | disk planned | measured | load |\n",
     );
     let _ = writeln!(out, "|{}", " --- |".repeat(14));
     for row in rows {
-        let Row { planned, measured, .. } = row;
+        let PlanRow { planned, measured, .. } = row;
         let [least, most] = planned.seconds;
         let middle = (least * most).sqrt();
         let _ = writeln!(

@@ -1,17 +1,19 @@
 //! `bench plant`: suites of drawn cells and lines in; scanned to files, sent through the main job,
 //! and compared with the truth robot by robot and point by point, as a table, out.
 
-use super::cases::{Case, CaseRow, Cases};
-use super::condition::{Condition, PLAIN, Place};
+use super::cases::{CaseRow, CaseToRun, Cases};
+use super::condition;
+use super::condition::{Condition, Mounting, PLAIN};
 use super::draw::draw;
-use super::{chosen, condition, robots_of};
+use super::labels::MIN_LINK_POINTS;
+use super::request::{DrawnCases, check_suites, chosen};
 use crate::detect::library;
 use crate::engine::Engine;
 use crate::eval::compare::Agreement;
 use crate::eval::virtual_scan::{Formats, scan_scene};
 use crate::job::{Job, Means};
 use crate::plan;
-use contract::{Error, Kind, Result};
+use contract::{Error, Result};
 use export::atomic;
 use robot::Model;
 use serde::Serialize;
@@ -25,20 +27,12 @@ use std::time::Instant;
 /// What is asked for.
 #[derive(Debug, Clone)]
 pub struct PlantBench {
+    /// Seed, library and folders.
+    pub drawn: DrawnCases,
     /// Names of suites; all where empty.
     pub suites: Vec<String>,
     /// Cases of each suite; its own number where left out.
     pub n_cases: Option<usize>,
-    /// Number of the first of them.
-    pub first: usize,
-    /// First seed.
-    pub seed: u64,
-    /// Robot library; the demo's robots where left out.
-    pub robots: Option<PathBuf>,
-    /// Where rows and tables go; nowhere where left out.
-    pub out: Option<PathBuf>,
-    /// Whether scenes, scans and results are kept there.
-    pub keep: bool,
 }
 
 /// A cell of three robots.
@@ -61,7 +55,7 @@ enum Drawing {
     /// A plant whose scans are registered as scans usually are.
     Shifted(Plant),
     /// One robot in clutter, bolted to such a thing.
-    Hung(Place),
+    Hung(Mounting),
 }
 
 impl Drawing {
@@ -81,7 +75,7 @@ impl Drawing {
                 let model = robots[seed as usize % robots.len()];
                 let condition =
                     Condition { mount: *mount, mixed: true, clutter: 0.7, n_beams: 2e6, ..PLAIN };
-                let case = condition::Case { suite: "mounts", seed, model, condition };
+                let case = condition::DrawnCase { suite: "mounts", seed, model, condition };
                 Ok(draw(&case, &models[model])?.scene)
             }
         }
@@ -97,12 +91,12 @@ fn shift(scanner: &mut Scanner, seed: u64, k: usize) {
 }
 
 /// A suite: name, number of cases, and what the k-th is drawn from.
-type Suite = (&'static str, usize, fn(usize) -> Drawing);
+type PlantSuite = (&'static str, usize, fn(usize) -> Drawing);
 
 /// Name of the suite whose robots nobody knows.
 const STRANGERS: &str = "strangers";
 
-const SUITES: &[Suite] = &[
+const SUITES: &[PlantSuite] = &[
     ("cells", 20, |_| Drawing::Plant(CELL)),
     ("lines", 5, |k| {
         Drawing::Plant(Plant { n_robots: 8 + k % 5, n_rows: 2, n_scanners: 10, ..CELL })
@@ -115,17 +109,15 @@ const SUITES: &[Suite] = &[
     ("registered", 10, |k| {
         Drawing::Shifted(Plant { n_robots: [4, 1][k % 2], n_scanners: [6, 4][k % 2], ..CELL })
     }),
-    ("mounts", 12, |k| Drawing::Hung([Place::Ceiling, Place::Wall, Place::Tilted][k % 3])),
+    ("mounts", 12, |k| Drawing::Hung([Mounting::Ceiling, Mounting::Wall, Mounting::Tilted][k % 3])),
 ];
 
-/// A link with fewer points has no say in the median of links.
-pub(super) const MIN_LINK_POINTS: u64 = 50;
 /// A thing with fewer points is not asked whether it was lost.
 const MIN_OBJECT_POINTS: u64 = 200;
 
 /// One case.
 #[derive(Debug, Clone, Default, Serialize)]
-struct Row {
+struct PlantRow {
     suite: String,
     seed: u64,
     failed: Option<String>,
@@ -160,35 +152,28 @@ struct Row {
 /// Runs the suites; returns the table.
 pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
-    let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
+    let robots = bench.drawn.library(temporary.path())?;
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     chosen(&models, &[])?;
-    let known = Known { folder: robots, models, kept: temporary.path().join("models") };
+    let known = KnownRobots { folder: robots, models, kept: temporary.path().join("models") };
     let quiet = engine.quiet();
-    let place = Cases {
-        name: "plant",
-        out: bench.out.as_deref(),
-        keep: bench.keep,
-        temporary: temporary.path(),
-    };
-    let case = |row: &mut Row, of: &Drawing, dir: &Path| run(row, of, &known, dir, (means, &quiet));
+    let place = Cases { name: "plant", drawn: &bench.drawn, temporary: temporary.path() };
+    let case =
+        |row: &mut PlantRow, of: &Drawing, dir: &Path| run(row, of, &known, dir, means, &quiet);
     place.run(cases(bench)?, case, table, engine)
 }
 
-fn cases(bench: &PlantBench) -> Result<Vec<Case<Row, Drawing>>> {
+fn cases(bench: &PlantBench) -> Result<Vec<CaseToRun<PlantRow, Drawing>>> {
     let names: Vec<&str> = SUITES.iter().map(|s| s.0).collect();
-    if let Some(odd) = bench.suites.iter().find(|s| !names.contains(&s.as_str())) {
-        return Err(Error::new(Kind::Usage, format!("there is no suite \"{odd}\""))
-            .hint(format!("there are {}", names.join(", "))));
-    }
+    check_suites(&bench.suites, &names)?;
     let wanted = |name: &str| bench.suites.is_empty() || bench.suites.iter().any(|s| s == name);
     let mut out = Vec::new();
     for (at, (name, n, draw)) in SUITES.iter().enumerate() {
-        for k in bench.first..bench.first + bench.n_cases.unwrap_or(*n) {
-            let seed = bench.seed * 100_000 + at as u64 * 1000 + k as u64;
+        for k in bench.drawn.numbers(bench.n_cases.unwrap_or(*n)) {
+            let seed = bench.drawn.seed * 100_000 + at as u64 * 1000 + k as u64;
             if wanted(name) {
-                let row = Row { suite: (*name).into(), seed, ..Row::default() };
-                out.push(Case { name: format!("{name}-{seed}"), row, of: draw(k) });
+                let row = PlantRow { suite: (*name).into(), seed, ..PlantRow::default() };
+                out.push(CaseToRun { name: format!("{name}-{seed}"), row, of: draw(k) });
             }
         }
     }
@@ -196,7 +181,7 @@ fn cases(bench: &PlantBench) -> Result<Vec<Case<Row, Drawing>>> {
 }
 
 /// The robots that stand in the plants.
-struct Known {
+struct KnownRobots {
     folder: PathBuf,
     models: Vec<Model>,
     /// Where the first run leaves them as it loaded them, for those after it.
@@ -205,11 +190,12 @@ struct Known {
 
 /// One case: drawn, scanned, run, compared.
 fn run(
-    row: &mut Row,
+    row: &mut PlantRow,
     drawing: &Drawing,
-    known: &Known,
+    known: &KnownRobots,
     dir: &Path,
-    (means, engine): (&Means, &Engine),
+    means: &Means,
+    engine: &Engine,
 ) -> Result<()> {
     let models = &known.models;
     let scene = drawing.scene(row.seed, models)?;
@@ -260,7 +246,7 @@ fn link_others(library: &Path, to: &Path, without: &[&str]) -> Result<()> {
     Ok(())
 }
 
-fn judge(row: &mut Row, agreement: &Agreement) {
+fn judge(row: &mut PlantRow, agreement: &Agreement) {
     row.n_robots = agreement.robots.len();
     row.n_invented = agreement.n_invented;
     row.n_moved = agreement.robots.iter().filter(|r| r.n_postures > 1).count();
@@ -302,7 +288,7 @@ fn judge(row: &mut Row, agreement: &Agreement) {
     }
 }
 
-impl CaseRow for Row {
+impl CaseRow for PlantRow {
     fn fail(&mut self, why: String) {
         self.failed = Some(why);
     }
@@ -337,13 +323,13 @@ impl CaseRow for Row {
 }
 
 /// All suites for people.
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[PlantRow]) -> String {
     let mut out = String::from(
         "| suite | cases | robots | found | right model | trusted | wrong, trusted | invented | moved, seen | F1 median / least | link IoU median / 10 % | attachments | fixed lost mean / largest % | thing that lost most % | s median |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for (name, ..) in SUITES {
-        let own: Vec<&Row> = rows.iter().filter(|r| r.suite == *name).collect();
+        let own: Vec<&PlantRow> = rows.iter().filter(|r| r.suite == *name).collect();
         if !own.is_empty() {
             let _ = writeln!(out, "| {name} | {} | {} |", counts(&own), figures(&own));
         }
@@ -358,8 +344,8 @@ fn table(rows: &[Row]) -> String {
 }
 
 /// Robots of a suite, as cells of its row.
-fn counts(own: &[&Row]) -> String {
-    let sum = |of: fn(&Row) -> usize| own.iter().map(|r| of(r)).sum::<usize>();
+fn counts(own: &[&PlantRow]) -> String {
+    let sum = |of: fn(&PlantRow) -> usize| own.iter().map(|r| of(r)).sum::<usize>();
     format!(
         "{} | {} | {} | {} | {} | {} | {} | {} of {}",
         own.len(),
@@ -375,8 +361,8 @@ fn counts(own: &[&Row]) -> String {
 }
 
 /// Labels and time of a suite, as cells of its row; a dash where nothing was to be compared.
-fn figures(own: &[&Row]) -> String {
-    let sorted = |of: &dyn Fn(&Row) -> Vec<f64>| {
+fn figures(own: &[&PlantRow]) -> String {
+    let sorted = |of: &dyn Fn(&PlantRow) -> Vec<f64>| {
         let done = own.iter().filter(|r| r.failed.is_none());
         let mut all: Vec<f64> = done.flat_map(|r| of(r)).collect();
         all.sort_by(f64::total_cmp);
@@ -387,7 +373,7 @@ fn figures(own: &[&Row]) -> String {
         all.get(index).map_or("–".into(), |v| format!("{v:.digits$}"))
     };
     // What no robot explains is not to be labelled as one's.
-    let is_asked = |r: &Row| r.n_robots > 0 && r.suite != STRANGERS;
+    let is_asked = |r: &PlantRow| r.n_robots > 0 && r.suite != STRANGERS;
     let f1 = sorted(&|r| if is_asked(r) { vec![r.f1] } else { vec![] });
     let ious = sorted(&|r| r.ious.clone());
     let attached = sorted(&|r| r.attached.filter(|_| is_asked(r)).into_iter().collect());

@@ -1,7 +1,7 @@
 //! Rows in; two pictures as SVG out: how the errors of each suite are spread, and how they compare
 //! with what was stated.
 
-use super::score::Row;
+use super::score::AccuracyRow;
 use std::fmt::Write as _;
 
 /// Size of a picture and its margins, units of the picture.
@@ -15,7 +15,7 @@ const COLOURS: [&str; 8] =
     ["#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#17becf", "#7f7f7f"];
 
 /// Share of the determined joints with an error up to so much, suite by suite.
-pub(super) fn errors(rows: &[Row]) -> String {
+pub(super) fn errors(rows: &[AccuracyRow]) -> String {
     let x = |e: f64| {
         let t = (e.clamp(ERRORS[0], ERRORS[1]) / ERRORS[0]).ln() / (ERRORS[1] / ERRORS[0]).ln();
         MARGIN[0] + t * (SIZE[0] - 2.0 * MARGIN[0] - 100.0)
@@ -32,7 +32,7 @@ pub(super) fn errors(rows: &[Row]) -> String {
 }
 
 /// Share of the determined joints with a z up to so much; the last line is what it should be.
-pub(super) fn reliability(rows: &[Row]) -> String {
+pub(super) fn reliability(rows: &[AccuracyRow]) -> String {
     let x = |z: f64| MARGIN[0] + z.clamp(0.0, Z) / Z * (SIZE[0] - 2.0 * MARGIN[0] - 100.0);
     let ticks: Vec<(f64, String)> = (0..=4).map(|z| (x(f64::from(z)), z.to_string())).collect();
     let mut series: Vec<(String, Vec<f64>)> = suites(rows)
@@ -48,7 +48,7 @@ pub(super) fn reliability(rows: &[Row]) -> String {
     picture("share of determined joints against error / stated σ", &ticks, series, x)
 }
 
-fn suites(rows: &[Row]) -> Vec<String> {
+fn suites(rows: &[AccuracyRow]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for row in rows.iter().filter(|r| r.n_starts == 0 && !r.is_baseline) {
         if !out.contains(&row.suite) {

@@ -1,14 +1,13 @@
 //! Seeds and sizes in; plants of which one cell is scanned again, what the rescan found of what was
 //! changed, what it invented, and its time beside a run of the whole, out.
 
-use super::cases::{Case, CaseRow, Cases};
-use super::frames::{Suite, frames};
-use super::robots_of;
-use super::watch::{command, watch};
+use super::cases::{CaseRow, CaseToRun, Cases};
+use super::process_watch::{command, watch};
+use super::request::RescanBench;
 use crate::cache::Manifest;
 use crate::detect::library;
 use crate::engine::Engine;
-use crate::eval::compare::{Agreement, Found, RobotAgreement};
+use crate::eval::compare::{Agreement, FoundRobot, RobotAgreement};
 use crate::eval::virtual_scan::{Formats, scan_scene};
 use crate::job::Means;
 use contract::{Error, Result};
@@ -16,44 +15,17 @@ use export::ResultFile;
 use geometry::Vector;
 use serde::Serialize;
 use serde_json::Value;
-use simulate::{Plant, Scene, sessions};
+use simulate::{Scene, sessions};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-
-/// What is drawn.
-#[derive(Debug, Clone)]
-pub struct RescanBench {
-    /// Cases.
-    pub n_cases: usize,
-    /// Number of the first of them.
-    pub first: usize,
-    /// Seed of all.
-    pub seed: u64,
-    /// Robots of each plant, and scanners.
-    pub n_robots: usize,
-    /// See `n_robots`.
-    pub n_scanners: usize,
-    /// Angle between beams, degrees.
-    pub step_deg: f64,
-    /// Robot library; the demo's robots where left out.
-    pub robots: Option<PathBuf>,
-    /// Where rows go, and scans and results with `keep`.
-    pub out: Option<PathBuf>,
-    /// Keep scenes, scans and results.
-    pub keep: bool,
-    /// What is drawn.
-    pub suite: Suite,
-    /// Do the main job on the new scans alone, too, to compare with.
-    pub alone: bool,
-}
+use std::path::Path;
 
 /// A found thing nearer to a true one than this is it, metres.
 const SAME_THING: f64 = 0.35;
 
 /// One case.
 #[derive(Debug, Clone, Default, Serialize)]
-struct Row {
+struct RescanRow {
     seed: u64,
     failed: Option<String>,
     n_points: u64,
@@ -80,49 +52,31 @@ struct Row {
     seconds: [f64; 2],
 }
 
-/// Runs the cases; returns the table.
+/// Draws plants in one frame, scans one cell again and rescans it; returns the table.
 pub fn rescans(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {
-    if bench.suite != Suite::Same {
-        return frames(bench, means, engine);
-    }
     let temporary = tempfile::tempdir()?;
-    let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
+    let robots = bench.drawn.library(temporary.path())?;
     let quiet = engine.quiet();
-    let place = Cases {
-        name: "rescan",
-        out: bench.out.as_deref(),
-        keep: bench.keep,
-        temporary: temporary.path(),
-    };
-    let seed = |k: usize| bench.seed * 100_000 + k as u64;
-    let draw = |k: usize| Case {
-        name: seed(k).to_string(),
-        row: Row { seed: seed(k), ..Row::default() },
-        of: (),
-    };
-    let cases = (bench.first..bench.first + bench.n_cases).map(draw).collect();
+    let place = Cases { name: "rescan", drawn: &bench.drawn, temporary: temporary.path() };
+    let cases = CaseToRun::numbered(&bench.drawn, bench.n_cases, |seed| RescanRow {
+        seed,
+        ..RescanRow::default()
+    });
     let case =
-        |row: &mut Row, _: &(), dir: &Path| case(row, bench, (&robots, dir), (means, &quiet));
+        |row: &mut RescanRow, _: &usize, dir: &Path| case(row, bench, &robots, dir, means, &quiet);
     place.run(cases, case, table, engine)
 }
 
 fn case(
-    row: &mut Row,
+    row: &mut RescanRow,
     bench: &RescanBench,
-    (robots, dir): (&Path, &Path),
-    (means, engine): (&Means, &Engine),
+    robots: &Path,
+    dir: &Path,
+    means: &Means,
+    engine: &Engine,
 ) -> Result<()> {
     let models = library::load(robots, &means.settings.robot, None, engine)?.models;
-    let wanted = Plant {
-        seed: row.seed,
-        n_robots: bench.n_robots,
-        n_rows: bench.n_robots.div_ceil(5),
-        n_scanners: bench.n_scanners,
-        step_deg: bench.step_deg,
-        is_tight: false,
-        moves: false,
-    };
-    let [then, now] = sessions(&wanted, &models)?;
+    let [then, now] = sessions(&bench.size.plant(row.seed), &models)?;
     let formats = Formats { las: false, ..Formats::ALL };
     let scanned = |scene: &Scene, name: &str| {
         let scans = dir.join(name);
@@ -136,7 +90,7 @@ fn case(
     // Each as a process of its own, as a user starts them.
     let run = |name: &str, scans: &Path, out: &str, more: &[String]| {
         let out = dir.join(out);
-        let mut all = command(name, &scans.join("scans.e57"), (robots, &out), means)?;
+        let mut all = command(name, &scans.join("scans.e57"), robots, &out, means)?;
         all.extend_from_slice(more);
         Ok::<_, Error>((watch(&all)?.seconds, out))
     };
@@ -158,7 +112,7 @@ fn case(
         row.joint[i] = joint(agreement);
         row.f1[i] = agreement.points.f1();
     }
-    judge(row, (&then, &now), &again)?;
+    judge(row, &then, &now, &again)?;
     row.n_same = same(&base, &again)?;
     Ok(())
 }
@@ -173,11 +127,11 @@ fn on_disk(path: &Path) -> Result<()> {
 /// found.
 fn joint(agreement: &Agreement) -> f64 {
     let found = agreement.robots.first().and_then(|robot| robot.found.as_ref());
-    found.map_or(f64::NAN, Found::worst_joint_deg)
+    found.map_or(f64::NAN, FoundRobot::worst_joint_deg)
 }
 
 /// Compares the list of changes with what was changed.
-fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()> {
+fn judge(row: &mut RescanRow, then: &Scene, now: &Scene, out: &Path) -> Result<()> {
     let path = out.join("changes.json");
     let text = std::fs::read_to_string(&path).map_err(|e| Error::from(e).at(path.display()))?;
     let changes: Value = serde_json::from_str(&text)
@@ -186,7 +140,7 @@ fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()>
     let result = ResultFile::read(out)?;
     let barrel = then.columns.iter().find(|c| c.name == "barrel").map(|c| c.xy).unwrap_or_default();
     judge_robots(row, &list("robots"), now, &result);
-    judge_things(row, &list("things"), (then, now), barrel);
+    judge_things(row, &list("things"), then, now, barrel);
     row.unseen = list("fixed_not_compared").iter().any(|region| {
         let inside = |i: usize| {
             let corner = |k: usize| region["bounds"][k][i].as_f64().unwrap_or(f64::NAN);
@@ -199,7 +153,7 @@ fn judge(row: &mut Row, (then, now): (&Scene, &Scene), out: &Path) -> Result<()>
 }
 
 /// Robots that are said to differ: the first one moved, no other did.
-fn judge_robots(row: &mut Row, robots: &[Value], now: &Scene, result: &ResultFile) {
+fn judge_robots(row: &mut RescanRow, robots: &[Value], now: &Scene, result: &ResultFile) {
     let base = Vector::from(now.robots[0].xyz);
     for robot in robots.iter().filter(|r| r["change"]["kind"] != "same") {
         let id = robot["now"].as_str().or(robot["then"].as_str()).unwrap_or_default();
@@ -215,7 +169,13 @@ fn judge_robots(row: &mut Row, robots: &[Value], now: &Scene, result: &ResultFil
 
 /// Things that are said to differ: the pallet is elsewhere now, and the barrel, which stood at this
 /// place, is gone.
-fn judge_things(row: &mut Row, things: &[Value], (then, now): (&Scene, &Scene), barrel: [f64; 2]) {
+fn judge_things(
+    row: &mut RescanRow,
+    things: &[Value],
+    then: &Scene,
+    now: &Scene,
+    barrel: [f64; 2],
+) {
     let middle = |thing: &Value, when: &str| {
         let corner = |k: usize, i: usize| thing[when][k][i].as_f64();
         let at = |i: usize| Some(0.5 * (corner(0, i)? + corner(1, i)?));
@@ -268,7 +228,7 @@ fn same(base: &Path, out: &Path) -> Result<[usize; 2]> {
     Ok([old.iter().filter(|(path, digest)| new.get(*path) == Some(digest)).count(), old.len()])
 }
 
-impl CaseRow for Row {
+impl CaseRow for RescanRow {
     fn fail(&mut self, why: String) {
         self.failed = Some(why);
     }
@@ -312,7 +272,7 @@ fn alone([own, alone]: [f64; 2], digits: usize) -> String {
     }
 }
 
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[RescanRow]) -> String {
     let mut out = String::from(
         "| seed | points, new | whole s | again s | share | robot, pallet, barrel | invented | joint ° | F1 | tiles the same | robots |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );

@@ -1,9 +1,9 @@
 //! A drawn cell and what was found in it in; one row of figures out.
 
-use super::cell::{Found, Start};
-use super::condition::Case;
-use super::draw::{Drawn, Mount};
-use super::labels::Told;
+use super::cell::{FoundInCell, Start};
+use super::condition::DrawnCase;
+use super::draw::{DrawnCell, Mount};
+use super::labels::LabelScores;
 use contract::{Calibration, Error, Fit, Verdict};
 use fit::turns;
 use geometry::{Point, Pose, Vector};
@@ -44,7 +44,7 @@ pub(super) struct JointRow {
 
 /// One case.
 #[derive(Debug, Clone, Default, Serialize)]
-pub(super) struct Row {
+pub(super) struct AccuracyRow {
     pub(super) suite: String,
     /// Whether it is of a method that the product is measured against.
     pub(super) is_baseline: bool,
@@ -86,14 +86,14 @@ pub(super) struct Row {
     pub(super) reasons: Vec<String>,
     pub(super) seconds: f64,
     /// How well its points are labelled.
-    pub(super) labels: Option<Told>,
+    pub(super) labels: Option<LabelScores>,
     /// Where joints were found to be and where they are, where that was asked for.
     #[serde(skip)]
     pub(super) calibration: Option<(Calibration, Vec<Pose>)>,
 }
 
-impl Row {
-    fn new(case: &Case, model: &Model) -> Self {
+impl AccuracyRow {
+    fn new(case: &DrawnCase, model: &Model) -> Self {
         Self {
             model: model.name.clone(),
             suite: case.suite.into(),
@@ -105,7 +105,7 @@ impl Row {
     }
 
     /// A case that could not be done.
-    pub(super) fn failed(case: &Case, model: &Model, error: &Error, seconds: f64) -> Self {
+    pub(super) fn failed(case: &DrawnCase, model: &Model, error: &Error, seconds: f64) -> Self {
         Self { failed: Some(error.to_string()), seconds, ..Self::new(case, model) }
     }
 
@@ -126,7 +126,13 @@ impl Row {
     /// The refinement alone: which starts came home, to the truth or to where the start at the
     /// truth itself ended: a few points on a small wrist pull it off. What a wrist of round
     /// parts leaves open does not count.
-    fn with_ends(mut self, case: &Case, model: &Model, drawn: &Drawn, found: &Found) -> Self {
+    fn with_ends(
+        mut self,
+        case: &DrawnCase,
+        model: &Model,
+        drawn: &DrawnCell,
+        found: &FoundInCell,
+    ) -> Self {
         let n = model.free.len();
         let Some(((_, from_truth), ends)) = found.ends.split_first() else { return self };
         let home = |(_, posture): &&Start| {
@@ -171,11 +177,12 @@ impl Row {
 
 /// The figures of a case.
 pub(super) fn score(
-    case: &Case,
-    (models, mount): (&[Model], Option<&Mount>),
-    drawn: &Drawn,
-    found: &Found,
-) -> Row {
+    case: &DrawnCase,
+    models: &[Model],
+    mount: Option<&Mount>,
+    drawn: &DrawnCell,
+    found: &FoundInCell,
+) -> AccuracyRow {
     let model = &models[case.model];
     let base = drawn.world_from_base.translation.vector;
     let apart = |f: &Fit| (f.world_from_base.translation.vector - base).norm();
@@ -187,11 +194,11 @@ pub(super) fn score(
     let is_other =
         |f: &&Fit| here.is_none_or(|h| !std::ptr::eq(*f, h)) && !is_beside(f, model, drawn);
     let others: Vec<&Fit> = found.fits.iter().filter(is_other).collect();
-    let mut row = Row {
+    let mut row = AccuracyRow {
         n_robot_points: found.n_robot_points,
         n_invented: others.len(),
         seconds: found.seconds,
-        ..Row::new(case, model)
+        ..AccuracyRow::new(case, model)
     };
     row.invented = others
         .into_iter()
@@ -201,7 +208,7 @@ pub(super) fn score(
         return row.with_ends(case, model, drawn, found);
     }
     let index = found.fits.iter().position(|f| here.is_some_and(|fit| std::ptr::eq(f, fit)));
-    row.labels = Told::of(found, index, model.links.len());
+    row.labels = LabelScores::of(found, index, model.links.len());
     let Some(fit) = here else { return row };
     row.found = Some(fit.model_name.clone());
     row.verdict = fit.verdict.word().into();
@@ -213,7 +220,7 @@ pub(super) fn score(
     row.reasons = fit.reasons.clone();
     row.calibration = calibration(case, models, drawn, fit);
     if fit.model_name == model.name && fit.joints.len() == model.free.len() {
-        row.joints = joints(model, fit, (&drawn.posture, mount));
+        row.joints = joints(model, fit, &drawn.posture, mount);
         displacements(&mut row, model, fit, drawn);
         sub_links(&mut row, model, fit, drawn);
     }
@@ -231,9 +238,9 @@ pub(super) fn score(
 /// Where a fit found the joints to be and where they are, each as it is from the model, where that
 /// was asked for.
 fn calibration(
-    case: &Case,
+    case: &DrawnCase,
     models: &[Model],
-    drawn: &Drawn,
+    drawn: &DrawnCell,
     fit: &Fit,
 ) -> Option<(Calibration, Vec<Pose>)> {
     let (model, found) = (&models[case.model], fit.calibration.as_ref()?);
@@ -244,14 +251,14 @@ fn calibration(
 }
 
 /// Whether a fit is that of the other robot of a cell, of which nothing is asked.
-fn is_beside(fit: &Fit, model: &Model, drawn: &Drawn) -> bool {
+fn is_beside(fit: &Fit, model: &Model, drawn: &DrawnCell) -> bool {
     let apart = |base: Vector| (fit.world_from_base.translation.vector - base).norm();
     fit.model_name == model.name && drawn.beside.is_some_and(|base| apart(base) < SAME_PLACE)
 }
 
 /// The hole that a tool is bolted to and the arm's last joint are one turn: only their sum is
 /// compared.
-fn joints(model: &Model, fit: &Fit, (posture, mount): (&[f64], Option<&Mount>)) -> Vec<JointRow> {
+fn joints(model: &Model, fit: &Fit, posture: &[f64], mount: Option<&Mount>) -> Vec<JointRow> {
     let bolted = fit.tool.as_ref().map_or(0.0, |t| t.mount);
     let turned =
         |j: usize| mount.filter(|m| m.n_arm == j + 1).map_or(0.0, |m| m.way * (bolted - m.turn));
@@ -295,7 +302,7 @@ fn is_right(joint: &JointRow, index: usize, fit: &Fit) -> bool {
 }
 
 /// Errors of the links that follow through loops.
-fn sub_links(row: &mut Row, model: &Model, fit: &Fit, drawn: &Drawn) {
+fn sub_links(row: &mut AccuracyRow, model: &Model, fit: &Fit, drawn: &DrawnCell) {
     let fitted: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     row.loop_gap = model.loop_gap(&fitted);
     let (ours, theirs) = (
@@ -310,7 +317,7 @@ fn sub_links(row: &mut Row, model: &Model, fit: &Fit, drawn: &Drawn) {
 }
 
 /// Errors of the tip and of all surfaces.
-fn displacements(row: &mut Row, model: &Model, fit: &Fit, drawn: &Drawn) {
+fn displacements(row: &mut AccuracyRow, model: &Model, fit: &Fit, drawn: &DrawnCell) {
     let fitted: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     let (ours, theirs) = (model.poses(&fitted), model.poses(&drawn.posture));
     if let Some(tip) = model.main_chain.last().map(|&j| model.joints[j].child) {

@@ -1,20 +1,20 @@
 //! Rows in; the table for people and the one for programs out.
 
-use super::labels::{Told, share_of};
-use super::score::Row;
+use super::labels::{LabelScores, share_of};
+use super::score::AccuracyRow;
 use contract::quote;
 use std::fmt::Write as _;
 
 /// One line a suite: what was found, how exact it is, whether standard deviations and verdicts
 /// hold.
-pub(super) fn table(rows: &[Row]) -> String {
+pub(super) fn table(rows: &[AccuracyRow]) -> String {
     let mut out = String::from(
         "| suite | cases | found | model | right | trusted | wrong, trusted | invented | rms ° | max ° | median worst ° \
          | base mm | tip mm | tip, world mm | surface mm | z rms | z > 3 \
          | link IoU | hoses % | lost % | s |\n",
     );
     out.push_str(&format!("|{}\n", " --- |".repeat(21)));
-    let rows: Vec<&Row> = rows.iter().filter(|r| r.n_starts == 0).collect();
+    let rows: Vec<&AccuracyRow> = rows.iter().filter(|r| r.n_starts == 0).collect();
     let mut suites: Vec<&str> = Vec::new();
     for row in &rows {
         if !suites.contains(&row.suite.as_str()) {
@@ -22,18 +22,19 @@ pub(super) fn table(rows: &[Row]) -> String {
         }
     }
     for suite in suites {
-        let own: Vec<&Row> = rows.iter().copied().filter(|r| r.suite == suite).collect();
+        let own: Vec<&AccuracyRow> = rows.iter().copied().filter(|r| r.suite == suite).collect();
         line(&mut out, suite, &own);
     }
     // A baseline's figures are not the product's.
-    let ours: Vec<&Row> = rows.iter().copied().filter(|r| !r.is_baseline).collect();
+    let ours: Vec<&AccuracyRow> = rows.iter().copied().filter(|r| !r.is_baseline).collect();
     line(&mut out, "**whole**", &ours);
     out.push_str(
         "\nErrors of the joints that a fit says the points determine, over the right fits; base, tip (in the base's frame, \
          and in the world) and 95 % of the surface: medians / largest; z: error over stated standard deviation. Labels, median / worst: intersection over \
          union of links, share of hoses' points said to move, share of fixed points said to move.\n",
     );
-    let wrong: Vec<&Row> = ours.into_iter().filter(|r| !r.right || r.n_invented > 0).collect();
+    let wrong: Vec<&AccuracyRow> =
+        ours.into_iter().filter(|r| !r.right || r.n_invented > 0).collect();
     if !wrong.is_empty() {
         out.push_str("\nNot right, or with a robot too many:\n\n");
         wrong.iter().for_each(|row| {
@@ -43,15 +44,15 @@ pub(super) fn table(rows: &[Row]) -> String {
     out
 }
 
-fn line(out: &mut String, name: &str, rows: &[&Row]) {
-    let n = |what: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| what(r)).count();
-    let trusted = |r: &Row| r.verdict == "trusted";
-    let right: Vec<&Row> = rows.iter().copied().filter(|r| r.right).collect();
+fn line(out: &mut String, name: &str, rows: &[&AccuracyRow]) {
+    let n = |what: &dyn Fn(&AccuracyRow) -> bool| rows.iter().filter(|r| what(r)).count();
+    let trusted = |r: &AccuracyRow| r.verdict == "trusted";
+    let right: Vec<&AccuracyRow> = rows.iter().copied().filter(|r| r.right).collect();
     let errors: Vec<f64> = degrees(&right, |r| r.turning().map(|j| j.error.to_degrees()).collect());
     let z: Vec<f64> = degrees(&right, |r| r.determined().map(|j| j.error / j.sigma).collect());
     let rms = |v: &[f64]| (v.iter().fold(0.0, |sum, x| sum + x * x) / v.len().max(1) as f64).sqrt();
     let largest = |v: &[f64]| v.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-    let millimetres = |what: &dyn Fn(&Row) -> f64| {
+    let millimetres = |what: &dyn Fn(&AccuracyRow) -> f64| {
         let mut v: Vec<f64> = right.iter().map(|r| what(r) * 1e3).collect();
         format!("{:.2} / {:.2}", median(&mut v), largest(&v))
     };
@@ -77,23 +78,24 @@ fn line(out: &mut String, name: &str, rows: &[&Row]) {
         millimetres(&|r| r.surface[1]),
         rms(&z),
         share * 100.0,
-        shares(told(&right, |t| t.links.clone()), f64::min, (1.0, 4)),
-        shares(told(&right, |t| share_of(t.hoses).into_iter().collect()), f64::min, (100.0, 2)),
+        shares(told(&right, |t| t.links.clone()), f64::min, 1.0, 4),
+        shares(told(&right, |t| share_of(t.hoses).into_iter().collect()), f64::min, 100.0, 2),
         shares(
             told(rows, |t| share_of([t.fixed[1], t.fixed[0]]).into_iter().collect()),
             f64::max,
-            (100.0, 4)
+            100.0,
+            4
         ),
         median(&mut seconds),
     );
 }
 
-fn degrees(rows: &[&Row], each: impl Fn(&Row) -> Vec<f64>) -> Vec<f64> {
+fn degrees(rows: &[&AccuracyRow], each: impl Fn(&AccuracyRow) -> Vec<f64>) -> Vec<f64> {
     rows.iter().flat_map(|r| each(r)).collect()
 }
 
 /// Figures of the labels of each case.
-fn told(rows: &[&Row], each: impl Fn(&Told) -> Vec<f64>) -> Vec<f64> {
+fn told(rows: &[&AccuracyRow], each: impl Fn(&LabelScores) -> Vec<f64>) -> Vec<f64> {
     rows.iter().filter_map(|r| r.labels.as_ref()).flat_map(each).collect()
 }
 
@@ -101,7 +103,8 @@ fn told(rows: &[&Row], each: impl Fn(&Told) -> Vec<f64>) -> Vec<f64> {
 fn shares(
     mut values: Vec<f64>,
     worst: impl Fn(f64, f64) -> f64,
-    (factor, digits): (f64, usize),
+    factor: f64,
+    digits: usize,
 ) -> String {
     let Some(end) = values.iter().copied().reduce(worst) else { return "–".into() };
     format!("{:.digits$} / {:.digits$}", factor * median(&mut values), factor * end)
@@ -112,7 +115,7 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 /// One line a joint.
-pub(super) fn csv(rows: &[Row]) -> String {
+pub(super) fn csv(rows: &[AccuracyRow]) -> String {
     let mut out = String::from(
         "suite,model,seed,scanners,robot_points,found,verdict,right,joint,truth,error,sigma,determined\n",
     );

@@ -2,8 +2,8 @@
 //! job in a process of its own; points a second of every stage beside what the machine can do, and
 //! resident memory, out.
 
-use super::limits::{Copied, copy, forget, memory};
-use super::watch::{Watched, command, watch};
+use super::machine_limits::{Copied, copy, forget, memory};
+use super::process_watch::{Watched, command, watch};
 use crate::detect::library;
 use crate::engine::Engine;
 use crate::eval::demo;
@@ -64,7 +64,7 @@ const DOME: f64 = 130.0 * 360.0;
 
 /// One size.
 #[derive(Debug, Clone, Serialize)]
-struct Row {
+struct ThroughputRow {
     n_points: u64,
     n_bytes: u64,
     n_scans: usize,
@@ -92,7 +92,7 @@ pub fn throughput(bench: &ThroughputBench, means: &Means, engine: &Engine) -> Re
     let mut rows = Vec::new();
     for &size in &bench.sizes {
         engine.cancel.check()?;
-        let row = run(bench, size, &robots, (means, engine))?;
+        let row = run(bench, size, &robots, means, engine)?;
         engine.progress.say(&line(&row));
         rows.push(row);
         let whole = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "rows": rows });
@@ -102,7 +102,7 @@ pub fn throughput(bench: &ThroughputBench, means: &Means, engine: &Engine) -> Re
         atomic::write(&bench.out.join("throughput.md"), table(&rows).as_bytes())?;
         atomic::write(
             &bench.out.join("throughput.svg"),
-            super::growth::plot(&points(&rows)).as_bytes(),
+            super::time_plot::plot(&points(&rows)).as_bytes(),
         )?;
     }
     Ok(table(&rows))
@@ -112,8 +112,9 @@ fn run(
     bench: &ThroughputBench,
     size: u64,
     robots: &Path,
-    (means, engine): (&Means, &Engine),
-) -> Result<Row> {
+    means: &Means,
+    engine: &Engine,
+) -> Result<ThroughputRow> {
     let n_scans = bench.n_scans.unwrap_or(size.div_ceil(SCAN_BEAMS).max(2) as usize);
     let dir = bench.out.join(format!("{size}"));
     let scans = dir.join("scans");
@@ -124,7 +125,7 @@ fn run(
     // The scanners' poses are the last to be written before the truth: with them all is there.
     let n_points = match counted(&scans) {
         Some(n) if input.exists() => n,
-        _ => scan(bench, (size, n_scans), &scans, robots, (means, engine))?,
+        _ => scan(bench, size, n_scans, &scans, robots, means, engine)?,
     };
     let n_bytes = std::fs::metadata(&input).map_err(|e| Error::from(e).at(input.display()))?.len();
     let copied = copy(&input, MOST_COPIED)?;
@@ -144,16 +145,28 @@ fn run(
     runs.swap(0, median);
     let (n_robots, format) = (bench.n_robots, bench.format);
     let memory = memory();
-    Ok(Row { n_points, n_bytes, n_scans, n_robots, format, copied, memory, n_trusted, runs })
+    Ok(ThroughputRow {
+        n_points,
+        n_bytes,
+        n_scans,
+        n_robots,
+        format,
+        copied,
+        memory,
+        n_trusted,
+        runs,
+    })
 }
 
 /// Draws the plant and scans it; returns its number of points.
 pub(super) fn scan(
     bench: &ThroughputBench,
-    (size, n_scans): (u64, usize),
+    size: u64,
+    n_scans: usize,
     scans: &Path,
     robots: &Path,
-    (means, engine): (&Means, &Engine),
+    means: &Means,
+    engine: &Engine,
 ) -> Result<u64> {
     let models = library::load(robots, &means.settings.robot, None, engine)?.models;
     let plant = Plant {
@@ -182,7 +195,7 @@ pub(super) fn scan(
 /// Points of scans that are there already.
 fn counted(scans: &Path) -> Option<u64> {
     #[derive(Deserialize)]
-    struct Truth {
+    struct TruthFile {
         scans: Vec<Scan>,
     }
     #[derive(Deserialize)]
@@ -190,7 +203,7 @@ fn counted(scans: &Path) -> Option<u64> {
         n_points: u64,
     }
     let text = std::fs::read_to_string(scans.join("truth/truth.json")).ok()?;
-    let truth: Truth = serde_json::from_str(&text).ok()?;
+    let truth: TruthFile = serde_json::from_str(&text).ok()?;
     Some(truth.scans.iter().map(|s| s.n_points).sum())
 }
 
@@ -210,7 +223,7 @@ pub(super) fn arguments(
     out: &Path,
     means: &Means,
 ) -> Result<Vec<String>> {
-    let mut out = command("run", input, (robots, out), means)?;
+    let mut out = command("run", input, robots, out, means)?;
     if input.extension().is_some_and(|e| e == "las") {
         out.extend(["--scanners".into(), scans.join("scanners.toml").display().to_string()]);
     }
@@ -222,7 +235,7 @@ fn made(dir: &Path) -> Result<&Path> {
     Ok(dir)
 }
 
-impl Row {
+impl ThroughputRow {
     fn median(&self) -> &Watched {
         &self.runs[0]
     }
@@ -237,7 +250,7 @@ impl Row {
     }
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &ThroughputRow) -> String {
     format!(
         "{:.0} M points: {:.1} s, {:.2} M points/s, {:.2} × copying the file, {} resident",
         row.n_points as f64 / 1e6,
@@ -248,7 +261,7 @@ fn line(row: &Row) -> String {
     )
 }
 
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[ThroughputRow]) -> String {
     let mut out = String::from(
         "| points | input | scans | robots, trusted | s | spread | M points/s | × copy | CPU s | resident | without mapped files |\n",
     );
@@ -281,7 +294,7 @@ fn table(rows: &[Row]) -> String {
 }
 
 /// Every stage of the median run.
-fn stages(out: &mut String, row: &Row) {
+fn stages(out: &mut String, row: &ThroughputRow) {
     let _ = writeln!(
         out,
         "\n{:.1} M points; copying the file, synced: {:.2} GB/s; copying memory, one thread: {:.1} GB/s.\n\n\
@@ -305,8 +318,8 @@ fn stages(out: &mut String, row: &Row) {
 }
 
 /// Points, seconds, and seconds of a copy of each size.
-fn points(rows: &[Row]) -> Vec<[f64; 3]> {
-    let of = |row: &Row| {
+fn points(rows: &[ThroughputRow]) -> Vec<[f64; 3]> {
+    let of = |row: &ThroughputRow| {
         [row.n_points as f64, row.median().seconds, row.copied.seconds_for(row.n_bytes)]
     };
     rows.iter().map(of).collect()

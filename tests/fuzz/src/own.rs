@@ -11,7 +11,9 @@ pub fn result(data: &[u8]) {
         Ok(result) => {
             let path = folder().join("result/again.json");
             #[cfg(feature = "program")]
-            let _ = stillpoint::result::changes::words(&stillpoint::result::changes::changes(&result, &result));
+            let _ = stillpoint::result::changes::words(&stillpoint::result::changes::changes(
+                &result, &result,
+            ));
             export::write_junit(&folder().join("result/junit.xml"), &result, true).expect("writes");
             for robot in &result.robots {
                 if let Some(space) = &robot.space {

@@ -8,14 +8,14 @@ use contract::{InputId, Map as _, MaskId, Scan, ScanId, Strip};
 use geometry::{Aabb, Pose};
 use std::path::Path;
 use std::sync::OnceLock;
-use stillpoint::engine::Engine;
-use stillpoint::job::{Given, Means};
 use stillpoint::cache::Manifest;
-use stillpoint::detect::review::Review;
-use stillpoint::store::{Scatter, Store};
 use stillpoint::check::trajectory::Trajectory;
+use stillpoint::detect::review::Review;
+use stillpoint::engine::Engine;
 use stillpoint::eval::fuzz_doors;
+use stillpoint::job::{Given, Means};
 use stillpoint::result::history;
+use stillpoint::store::{Scatter, Store, TileSink};
 
 /// Longest text that is read, bytes: inputs of a target are shorter.
 const MOST: u64 = 1 << 26;
@@ -89,7 +89,7 @@ pub fn small_store(dir: &Path) {
         attributes: None,
     };
     let scans = [scan];
-    let mut sink = Store::create(dir, &scans, 0, 1 << 20).expect("a store can be made");
+    let mut sink = TileSink::create(dir, &scans, 0, 1 << 20).expect("a store can be made");
     let strip = Scatter::new(&scans).apply(strip, &mut ()).expect("a strip has tiles");
     sink.add(&strip).expect("a store takes a strip");
     drop(sink.finish(&Engine::new(1), 1 << 20).expect("a store can be ended"));

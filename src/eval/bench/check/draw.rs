@@ -31,7 +31,7 @@ const LENGTH: [f64; 2] = [1.0, 2.5];
 /// What a path was drawn as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Drawn {
+pub(super) enum PathKind {
     /// A few joints turned by little.
     Small,
     /// To a posture of its own.
@@ -45,7 +45,7 @@ pub(super) enum Drawn {
 /// From how a robot stands, joints going straight.
 #[derive(Debug, Clone)]
 pub(super) struct DrawnPath {
-    pub(super) drawn: Drawn,
+    pub(super) drawn: PathKind,
     pub(super) to: Vec<f64>,
 }
 
@@ -70,10 +70,9 @@ pub(super) fn cell(wanted: &Plant, models: &[Model]) -> Result<(Scene, Vec<Vec<D
         let mut own = Vec::new();
         for k in 0..N_THIN {
             let name = format!("thin {k} of {}", scene.robots[robot].name);
-            if let Some((thing, to)) = thin(&scene, models, robot, (&standing, &name), &mut random)?
-            {
+            if let Some((thing, to)) = thin(&scene, models, robot, &standing, &name, &mut random)? {
                 scene.hoses.push(thing);
-                own.push(DrawnPath { drawn: Drawn::Thin, to });
+                own.push(DrawnPath { drawn: PathKind::Thin, to });
             }
         }
         paths.push(own);
@@ -81,29 +80,36 @@ pub(super) fn cell(wanted: &Plant, models: &[Model]) -> Result<(Scene, Vec<Vec<D
     Ok((scene, paths))
 }
 
-/// The model of a robot of a scene, and its posture.
-pub(super) fn robot_of<'m>(
-    scene: &Scene,
-    models: &'m [Model],
-    robot: usize,
-) -> Option<(&'m Model, Vec<f64>)> {
-    let place = &scene.robots[robot];
-    let model = models.iter().find(|m| m.name == place.model)?;
-    let home = model.home().into_iter().zip(&model.free);
-    let value = |(home, joint): (f64, &usize)| {
-        place.posture.get(&model.joints[*joint].name).copied().unwrap_or(home)
-    };
-    Some((model, home.map(value).collect()))
+/// A robot of a scene, as it stands.
+pub(super) struct SceneRobot<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) number: usize,
+    pub(super) model: &'a Model,
+    pub(super) posture: Vec<f64>,
+    world_from_base: Pose,
+}
+
+impl<'a> SceneRobot<'a> {
+    /// The robot of this number; none where its model is not among these.
+    pub(super) fn of(scene: &'a Scene, models: &'a [Model], number: usize) -> Option<Self> {
+        let place = &scene.robots[number];
+        let model = models.iter().find(|m| m.name == place.model)?;
+        let home = model.home().into_iter().zip(&model.free);
+        let value = |(home, joint): (f64, &usize)| {
+            place.posture.get(&model.joints[*joint].name).copied().unwrap_or(home)
+        };
+        let (posture, world_from_base) = (home.map(value).collect(), place.world_from_base());
+        Some(Self { scene, number, model, posture, world_from_base })
+    }
 }
 
 /// Places on the robots as they stand, world, metres.
 fn standing(scene: &Scene, models: &[Model]) -> Vec<Point> {
     let mut out = Vec::new();
     for robot in 0..scene.robots.len() {
-        let Some((model, posture)) = robot_of(scene, models, robot) else { continue };
-        let base = scene.robots[robot].world_from_base();
-        for (link, pose) in model.links.iter().zip(model.poses(&posture)) {
-            out.extend(places(&link.cad.points, &(base * pose)));
+        let Some(robot) = SceneRobot::of(scene, models, robot) else { continue };
+        for (link, pose) in robot.model.links.iter().zip(robot.model.poses(&robot.posture)) {
+            out.extend(places(&link.cad.points, &(robot.world_from_base * pose)));
         }
     }
     out
@@ -121,15 +127,16 @@ fn thin(
     scene: &Scene,
     models: &[Model],
     robot: usize,
-    (standing, name): (&[Point], &str),
+    standing: &[Point],
+    name: &str,
     random: &mut Random,
 ) -> Result<Option<(Hose, Vec<f64>)>> {
-    let Some((model, from)) = robot_of(scene, models, robot) else { return Ok(None) };
-    let base = scene.robots[robot].world_from_base();
+    let Some(robot) = SceneRobot::of(scene, models, robot) else { return Ok(None) };
+    let (model, from, base) = (robot.model, &robot.posture[..], robot.world_from_base);
     let moves = model.moving();
     for _ in 0..N_TRIES {
-        let to = target(scene, (model, &base), &from, random)?;
-        let there = model.poses(&between(&from, &to, random.between(0.3, 1.0)));
+        let to = target(&robot, random)?;
+        let there = model.poses(&between(from, &to, random.between(0.3, 1.0)));
         let links: Vec<usize> = (0..model.links.len())
             .filter(|&l| moves[l] && !model.links[l].cad.points.is_empty())
             .collect();
@@ -166,37 +173,33 @@ fn off(p: &Point, [a, b]: &[Point; 2]) -> f64 {
 }
 
 /// A posture some way to another one that the robot can stand in.
-fn target(
-    scene: &Scene,
-    (model, base): (&Model, &Pose),
-    from: &[f64],
-    random: &mut Random,
-) -> Result<Vec<f64>> {
+fn target(robot: &SceneRobot<'_>, random: &mut Random) -> Result<Vec<f64>> {
+    let &SceneRobot { scene, model, ref posture, world_from_base: base, .. } = robot;
     let above = |p: &Point| p.z > scene.ground(p.x, p.y);
-    let to = Postures::new(model).draw(random, base, above)?;
-    Ok(between(from, &to, random.between(0.3, 1.0)))
+    let to = Postures::new(model).draw(random, &base, above)?;
+    Ok(between(posture, &to, random.between(0.3, 1.0)))
 }
 
 /// Paths of a robot, beside those into thin things.
 pub(super) fn paths(
-    scene: &Scene,
-    (model, base, from): (&Model, &Pose, &[f64]),
+    robot: &SceneRobot<'_>,
     truth: &Truth<'_>,
     random: &mut Random,
 ) -> Result<Vec<DrawnPath>> {
+    let (model, from) = (robot.model, &robot.posture[..]);
     let mut out = Vec::new();
     for _ in 0..N_SMALL {
-        out.push(DrawnPath { drawn: Drawn::Small, to: small(model, from, random) });
+        out.push(DrawnPath { drawn: PathKind::Small, to: small(model, from, random) });
     }
     for _ in 0..N_FAR {
-        let to = target(scene, (model, base), from, random)?;
-        out.push(DrawnPath { drawn: Drawn::Far, to });
+        let to = target(robot, random)?;
+        out.push(DrawnPath { drawn: PathKind::Far, to });
     }
     for _ in 0..N_HIT {
         for _ in 0..N_TRIES {
-            let to = target(scene, (model, base), from, random)?;
+            let to = target(robot, random)?;
             if truth.along(from, &to, TOUCH).gap <= TOUCH {
-                out.push(DrawnPath { drawn: Drawn::Hit, to });
+                out.push(DrawnPath { drawn: PathKind::Hit, to });
                 break;
             }
         }

@@ -2,13 +2,14 @@
 //! the meshes tell whether they collide; false alarms and misses, by reason, out.
 
 mod draw;
+mod row;
 mod table;
 mod truth;
 
-use super::cases::{Case, CaseRow, Cases};
-use super::robots_of;
+use super::cases::{CaseToRun, Cases};
+use super::request::{DrawnCases, PlantSize};
 use crate::check::trajectory::Trajectory;
-use crate::check::{Place, Report, Request, at_robot};
+use crate::check::{CheckRequest, PathReport, RobotSite, at_robot};
 use crate::detect::library;
 use crate::engine::Engine;
 use crate::eval::compare::Agreement;
@@ -16,10 +17,10 @@ use crate::eval::virtual_scan::{Formats, scan_scene};
 use crate::job::{Job, Means};
 use crate::plan;
 use contract::{Error, Result};
-use draw::{Drawn, DrawnPath};
+use draw::{DrawnPath, SceneRobot};
 use export::{ResultFile, atomic};
 use robot::Model;
-use serde::Serialize;
+use row::{CheckRow, PathRow, True};
 use simulate::random::Random;
 use simulate::{Plant, Scene, Shapes};
 use std::path::{Path, PathBuf};
@@ -29,74 +30,14 @@ use truth::{TOUCH, Truth};
 /// What is drawn.
 #[derive(Debug, Clone)]
 pub struct CheckBench {
+    /// Seed, library and folders.
+    pub drawn: DrawnCases,
     /// Cells.
     pub n_cases: usize,
-    /// Number of the first of them.
-    pub first: usize,
-    /// Seed of all.
-    pub seed: u64,
-    /// Robots of each cell.
-    pub n_robots: usize,
-    /// Scanners of each cell.
-    pub n_scanners: usize,
-    /// Angle between beams, degrees.
-    pub step_deg: f64,
+    /// Robots and scanners of each cell.
+    pub size: PlantSize,
     /// What is nearer to a robot is in its way, metres.
     pub margin: f64,
-    /// Robot library; the demo's robots where left out.
-    pub robots: Option<PathBuf>,
-    /// Where rows and tables go; scenes, scans and results, too, with `keep`.
-    pub out: Option<PathBuf>,
-    /// Keep scenes, scans and results.
-    pub keep: bool,
-}
-
-/// What the scene says of a path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum True {
-    /// It keeps the margin, and scanners saw all of its space and the margin about it.
-    Free,
-    /// It keeps the margin.
-    Unseen,
-    /// It comes nearer than the margin, and touches nothing.
-    Grazes,
-    /// It touches something.
-    Collides,
-}
-
-/// A path that was checked.
-#[derive(Debug, Clone, Serialize)]
-struct PathRow {
-    robot: String,
-    model: String,
-    drawn: Drawn,
-    truth: True,
-    /// Metres, to what, and where on the way.
-    gap: f64,
-    nearest: String,
-    at: f64,
-    /// What the check said.
-    outcome: String,
-    doubts: Vec<String>,
-    /// What comes near, the worst first.
-    contacts: Vec<String>,
-    /// Waypoints, to look at it again.
-    from: Vec<f64>,
-    to: Vec<f64>,
-}
-
-/// A cell.
-#[derive(Debug, Clone, Default, Serialize)]
-struct Row {
-    seed: u64,
-    failed: Option<String>,
-    n_robots: usize,
-    /// Robots that were found as what they are.
-    n_checked: usize,
-    paths: Vec<PathRow>,
-    /// Scanning, the main job, and checking with its truth, seconds.
-    seconds: [f64; 3],
 }
 
 /// Runs the cells; returns the table.
@@ -105,27 +46,20 @@ struct Row {
 /// A library that cannot be read, files that cannot be written.
 pub fn checks(bench: &CheckBench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
-    let robots = robots_of(bench.robots.as_deref(), temporary.path())?;
+    let robots = bench.drawn.library(temporary.path())?;
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     let quiet = engine.quiet();
-    let place = Cases {
-        name: "check",
-        out: bench.out.as_deref(),
-        keep: bench.keep,
-        temporary: temporary.path(),
-    };
-    let seed = |k: usize| bench.seed * 100_000 + k as u64;
-    let draw = |k: usize| Case {
-        name: seed(k).to_string(),
-        row: Row { seed: seed(k), ..Row::default() },
-        of: (),
-    };
-    let cases = (bench.first..bench.first + bench.n_cases).map(draw).collect();
-    let case = |row: &mut Row, _: &(), dir: &Path| {
+    let place = Cases { name: "check", drawn: &bench.drawn, temporary: temporary.path() };
+    let cases = CaseToRun::numbered(&bench.drawn, bench.n_cases, |seed| CheckRow {
+        seed,
+        ..CheckRow::default()
+    });
+    let case = |row: &mut CheckRow, _: &usize, dir: &Path| {
         Bench { bench, models: &models, robots: &robots, means, engine: &quiet }.case(row, dir)
     };
-    let all = |rows: &[Row]| {
+    let all = |rows: &[CheckRow]| {
         let csv = bench
+            .drawn
             .out
             .as_deref()
             .map(|dir| atomic::write(&dir.join("check.csv"), table::csv(rows).as_bytes()));
@@ -148,17 +82,9 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn case(&self, row: &mut Row, dir: &Path) -> Result<()> {
+    fn case(&self, row: &mut CheckRow, dir: &Path) -> Result<()> {
         let &Self { bench, models, engine, .. } = self;
-        let wanted = Plant {
-            seed: row.seed,
-            n_robots: bench.n_robots,
-            n_rows: 1,
-            n_scanners: bench.n_scanners,
-            step_deg: bench.step_deg,
-            is_tight: false,
-            moves: false,
-        };
+        let wanted = Plant { n_rows: 1, ..bench.size.plant(row.seed) };
         let started = Instant::now();
         let (scene, thin) = draw::cell(&wanted, models)?;
         std::fs::create_dir_all(dir).map_err(|e| Error::from(e).at(dir.display()))?;
@@ -182,7 +108,9 @@ impl Bench<'_> {
                 .is_some_and(|found| found.model == scene.robots[robot].model);
             if is_found {
                 row.n_checked += 1;
-                row.paths.extend(self.robot((&scene, &shapes, robot), thin, &job.out, row.seed)?);
+                if let Some(robot) = SceneRobot::of(&scene, models, robot) {
+                    row.paths.extend(self.robot(&robot, &shapes, thin, &job.out, row.seed)?);
+                }
             }
         }
         row.seconds[2] = started.elapsed().as_secs_f64();
@@ -192,19 +120,17 @@ impl Bench<'_> {
     /// All paths of one robot.
     fn robot(
         &self,
-        (scene, shapes, robot): (&Scene, &Shapes, usize),
+        robot: &SceneRobot<'_>,
+        shapes: &Shapes,
         mut paths: Vec<DrawnPath>,
         out: &Path,
         seed: u64,
     ) -> Result<Vec<PathRow>> {
-        let Some((model, from)) = draw::robot_of(scene, self.models, robot) else {
-            return Ok(Vec::new());
-        };
-        let truth = Truth::new(scene, shapes, (robot, model, &from))?;
-        let mut random = Random::keyed(&[seed, robot as u64, 0x9A7]);
-        let base = scene.robots[robot].world_from_base();
-        paths.extend(draw::paths(scene, (model, &base, &from), &truth, &mut random)?);
-        let request = Request {
+        let &SceneRobot { scene, number, model, .. } = robot;
+        let truth = Truth::new(scene, shapes, number, model, &robot.posture)?;
+        let mut random = Random::keyed(&[seed, number as u64, 0x9A7]);
+        paths.extend(draw::paths(robot, &truth, &mut random)?);
+        let request = CheckRequest {
             out: out.to_path_buf(),
             trajectory: PathBuf::new(),
             robot: None,
@@ -212,22 +138,23 @@ impl Bench<'_> {
             margin: self.bench.margin,
             degrees: false,
         };
-        let choose = |result: &ResultFile, _: &_| number(result, scene, robot);
-        let look = |place: &Place<'_>| {
-            let one =
-                |path: &DrawnPath| self.path(place, (scene, robot), (model, &from, path), &truth);
+        let choose = |result: &ResultFile, _: &_| nearest(result, scene, number);
+        let look = |place: &RobotSite<'_>| {
+            let one = |path: &DrawnPath| self.path(place, robot, path, &truth);
             paths.iter().map(one).collect::<Result<Vec<PathRow>>>()
         };
-        at_robot(&request, choose, (self.means, self.engine), look)
+        at_robot(&request, choose, self.means, self.engine, look)
     }
 
+    /// One path.
     fn path(
         &self,
-        place: &Place<'_>,
-        (scene, robot): (&Scene, usize),
-        (model, from, path): (&Model, &[f64], &DrawnPath),
+        place: &RobotSite<'_>,
+        robot: &SceneRobot<'_>,
+        path: &DrawnPath,
         truth: &Truth<'_>,
     ) -> Result<PathRow> {
+        let (model, from) = (robot.model, &robot.posture[..]);
         self.engine.cancel.check()?;
         let margin = self.bench.margin;
         let asked = Trajectory {
@@ -244,7 +171,7 @@ impl Bench<'_> {
             _ => True::Unseen,
         };
         Ok(PathRow {
-            robot: scene.robots[robot].name.clone(),
+            robot: robot.scene.robots[robot.number].name.clone(),
             model: model.name.clone(),
             drawn: path.drawn,
             truth: is,
@@ -261,7 +188,7 @@ impl Bench<'_> {
 }
 
 /// The number in the result of a robot of the scene: the one that stands nearest.
-fn number(result: &ResultFile, scene: &Scene, robot: usize) -> Result<usize> {
+fn nearest(result: &ResultFile, scene: &Scene, robot: usize) -> Result<usize> {
     let at = geometry::Vector::from(scene.robots[robot].xyz);
     let off = |i: &usize| (geometry::Vector::from(result.robots[*i].base_pose.xyz) - at).norm();
     let stands = |i: &usize| result.robots[*i].verdict != "refused";
@@ -271,7 +198,7 @@ fn number(result: &ResultFile, scene: &Scene, robot: usize) -> Result<usize> {
 }
 
 /// What comes near, in words.
-fn contacts(report: &Report) -> Vec<String> {
+fn contacts(report: &PathReport) -> Vec<String> {
     let words = |c: &clearance::Contact| {
         let as_found = if c.as_found { ", as found" } else { "" };
         let hangs = if c.hangs { " (hangs)" } else { "" };
@@ -291,67 +218,4 @@ fn contacts(report: &Report) -> Vec<String> {
         )
     };
     report.contacts.iter().map(words).collect()
-}
-
-impl PathRow {
-    /// It keeps the margin, and something is said to be in its way.
-    fn is_wolf(&self) -> bool {
-        matches!(self.truth, True::Free | True::Unseen)
-            && matches!(&*self.outcome, "near" | "blocked")
-    }
-
-    /// The reason that counts: the worst contact's kind, or the doubts.
-    fn why(&self) -> String {
-        if matches!(&*self.outcome, "near" | "blocked") {
-            let worst = self.contacts.first().map_or("a joint cannot get there", |c| c);
-            let hangs = if worst.contains("(hangs)") { ", what hangs on it" } else { "" };
-            let kind: Vec<&str> = worst.split(' ').take(2).collect();
-            return kind.join(" ") + hangs;
-        }
-        self.doubts.join(", ")
-    }
-
-    fn line(&self) -> String {
-        format!(
-            "{} ({}) {:?} {:?} {:.4} m {} at {:.2}: {} [{}] {}",
-            self.robot,
-            self.model,
-            self.drawn,
-            self.truth,
-            self.gap,
-            self.nearest,
-            self.at,
-            self.outcome,
-            self.doubts.join(" "),
-            self.contacts.first().map_or("", |c| c),
-        )
-    }
-}
-
-impl CaseRow for Row {
-    fn fail(&mut self, why: String) {
-        self.failed = Some(why);
-    }
-
-    fn line(&self) -> String {
-        if let Some(why) = &self.failed {
-            return format!("{}: failed: {why}", self.seed);
-        }
-        let count = |is: &dyn Fn(&PathRow) -> bool| self.paths.iter().filter(|p| is(p)).count();
-        format!(
-            "{}: {} of {} robots, {} paths; free in seen space {}, of them called free {}; colliding {}, missed {}; free, called near or blocked {}; scan {:.1} s, run {:.1} s, check {:.1} s",
-            self.seed,
-            self.n_checked,
-            self.n_robots,
-            self.paths.len(),
-            count(&|p| p.truth == True::Free),
-            count(&|p| p.truth == True::Free && p.outcome == "free"),
-            count(&|p| p.truth == True::Collides),
-            count(&|p| p.truth == True::Collides && p.outcome == "free"),
-            count(&PathRow::is_wolf),
-            self.seconds[0],
-            self.seconds[1],
-            self.seconds[2],
-        )
-    }
 }

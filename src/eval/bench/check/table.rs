@@ -1,12 +1,13 @@
 //! Paths that were checked, with what is true of them, in; tables for people and a line a path for
 //! programs out.
 
-use super::{PathRow, Row, True};
-use crate::check::Outcome;
+use super::row::{CheckRow, PathRow, True};
+use crate::check::PathOutcome;
 use std::fmt::Write as _;
 
 /// All outcomes, as columns.
-const OUTCOMES: [Outcome; 4] = [Outcome::Free, Outcome::Unknown, Outcome::Near, Outcome::Blocked];
+const OUTCOMES: [PathOutcome; 4] =
+    [PathOutcome::Free, PathOutcome::Unknown, PathOutcome::Near, PathOutcome::Blocked];
 
 /// What is true of a path, in words.
 fn words(of: True) -> &'static str {
@@ -19,7 +20,7 @@ fn words(of: True) -> &'static str {
 }
 
 /// Counts, shares and reasons.
-pub(super) fn table(rows: &[Row]) -> String {
+pub(super) fn table(rows: &[CheckRow]) -> String {
     let all: Vec<&PathRow> = rows.iter().flat_map(|r| &r.paths).collect();
     let mut out = String::from(
         "| what is true of a path | paths | free | unknown | near | blocked |\n| --- | --- | --- | --- | --- | --- |\n",
@@ -31,7 +32,7 @@ pub(super) fn table(rows: &[Row]) -> String {
         let _ = writeln!(out, "| {} | {} | {} |", words(of), own.len(), counts.join(" | "));
     }
     let count = |is: &dyn Fn(&PathRow) -> bool| all.iter().filter(|p| is(p)).count();
-    let free = |p: &PathRow| p.outcome == Outcome::Free.word();
+    let free = |p: &PathRow| p.outcome == PathOutcome::Free.word();
     let seen = count(&|p| p.truth == True::Free);
     let right = count(&|p| p.truth == True::Free && free(p));
     let _ = writeln!(
@@ -78,7 +79,7 @@ fn reasons(head: &str, all: &[&PathRow], is: &dyn Fn(&PathRow) -> bool) -> Strin
 }
 
 /// One line a path.
-pub(super) fn csv(rows: &[Row]) -> String {
+pub(super) fn csv(rows: &[CheckRow]) -> String {
     let mut out =
         String::from("seed,path,robot,model,drawn,truth,gap_m,nearest,outcome,doubts,contacts\n");
     for row in rows {

@@ -42,7 +42,7 @@ const OWN_SAMPLE: f64 = 0.008;
 const RANGE: f64 = 80.0;
 
 /// A body that moves with a link, in its frame.
-struct Part {
+struct MeshPart {
     link: usize,
     mesh: TriMesh,
     bounds: Aabb,
@@ -59,7 +59,7 @@ struct Part {
 pub(super) struct Truth<'a> {
     model: &'a Model,
     world_from_base: Pose,
-    parts: Vec<Part>,
+    parts: Vec<MeshPart>,
     standing: TriMesh,
     /// Index of the shape of each triangle of what stands.
     of: Vec<u32>,
@@ -87,7 +87,9 @@ impl<'a> Truth<'a> {
     pub(super) fn new(
         scene: &Scene,
         shapes: &'a Shapes,
-        (robot, model, posture): (usize, &'a Model, &[f64]),
+        robot: usize,
+        model: &'a Model,
+        posture: &[f64],
     ) -> Result<Self> {
         let world_from_base = scene.robots[robot].world_from_base();
         let poses = placed(model, &world_from_base, posture);
@@ -95,14 +97,14 @@ impl<'a> Truth<'a> {
         let is_own = |s: &&Shape| s.robot == Some(robot);
         let own = shapes.all.iter().filter(is_own).filter_map(|s| Some((s.link?, s)));
         let parts = own.clone().filter(|(link, _)| moves[*link]);
-        let parts: Vec<Part> =
-            parts.filter_map(|(link, shape)| Part::of(link, shape, &poses[link])).collect();
+        let parts: Vec<MeshPart> =
+            parts.filter_map(|(link, shape)| MeshPart::of(link, shape, &poses[link])).collect();
         let foot = world_from_base.translation.vector.map(|v| v as f32);
         let (foot, reach) = (Vec3::from_array(foot.into()), clearance::reach(model) as f32 + 0.5);
         let (mut corners, mut triangles, mut of) = (Vec::new(), Vec::new(), Vec::new());
         for (at, shape) in shapes.all.iter().enumerate().filter(|(_, s)| !is_own(s)) {
             for t in &shape.triangles {
-                pieces(t.map(Vec3::from_array), (foot, reach), &mut |t| {
+                pieces(t.map(Vec3::from_array), foot, reach, &mut |t| {
                     let first = corners.len() as u32;
                     corners.extend(t);
                     triangles.push([first, first + 1, first + 2]);
@@ -143,7 +145,7 @@ impl<'a> Truth<'a> {
     }
 
     /// The nearest triangle to a part, where one is nearer than that.
-    fn nearest(&self, part: &Part, world_from_link: &Pose, within: f64) -> Option<(f64, u32)> {
+    fn nearest(&self, part: &MeshPart, world_from_link: &Pose, within: f64) -> Option<(f64, u32)> {
         let (best, link_from_world) = (Cell::new(within as f32), world_from_link.inverse());
         let turn = link_from_world.rotation.to_rotation_matrix().into_inner().map(f64::abs);
         let is_near = |node: &BvhNode| {
@@ -260,7 +262,7 @@ impl<'a> Truth<'a> {
     }
 }
 
-impl Part {
+impl MeshPart {
     /// How far it keeps from all with its bounds so, at least: no point of it went farther than
     /// the corners of its bounds since that was asked.
     fn keeps(&self, corners: &[Point; 8]) -> f64 {
@@ -311,19 +313,19 @@ fn filled<'s>(shapes: impl Iterator<Item = &'s Shape>) -> (SpaceGrid, Vec<bool>)
 
 /// A triangle in pieces that are short where they are within reach: boxes about long ones that lie
 /// askew hold much that is far from them.
-fn pieces([a, b, c]: [Vec3; 3], near: (Vec3, f32), take: &mut impl FnMut([Vec3; 3])) {
+fn pieces([a, b, c]: [Vec3; 3], near: Vec3, within: f32, take: &mut impl FnMut([Vec3; 3])) {
     let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-    let off = (low - near.0).max(near.0 - high).max(Vec3::ZERO).length();
+    let off = (low - near).max(near - high).max(Vec3::ZERO).length();
     let lengths = [(b - a).length(), (c - b).length(), (a - c).length()];
     let longest = (0..3).max_by(|&i, &j| lengths[i].total_cmp(&lengths[j])).unwrap_or(0);
-    if lengths[longest] <= SHORT || off > near.1 {
+    if lengths[longest] <= SHORT || off > within {
         return take([a, b, c]);
     }
     // Across its longest side.
     let [a, b, c] = [[a, b, c], [b, c, a], [c, a, b]][longest];
     let middle = (a + b) * 0.5;
-    pieces([a, middle, c], near, take);
-    pieces([middle, b, c], near, take);
+    pieces([a, middle, c], near, within, take);
+    pieces([middle, b, c], near, within, take);
 }
 
 /// Places on a triangle, about so far apart, metres.

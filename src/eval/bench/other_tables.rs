@@ -1,7 +1,7 @@
 //! Rows in; tables of what is measured otherwise than by suites out: the source's Table 1, closed
 //! loops, the basin.
 
-use super::score::{JointRow, Row};
+use super::score::{AccuracyRow, JointRow};
 use contract::{Calibration, JointFrame};
 use geometry::Pose;
 use std::fmt::Write as _;
@@ -21,7 +21,7 @@ const PRINTED: [[[f64; 2]; 3]; 7] = [
 const N_POSTURES: usize = 3;
 
 /// All of them that the rows have something for.
-pub(super) fn tables(rows: &[Row]) -> String {
+pub(super) fn tables(rows: &[AccuracyRow]) -> String {
     let mut out = table_1(rows);
     out.push_str(&baselines(rows));
     out.push_str(&loops(rows));
@@ -31,10 +31,10 @@ pub(super) fn tables(rows: &[Row]) -> String {
 }
 
 /// Errors of each joint as the source prints them, ours beside them in the same cells.
-fn table_1(rows: &[Row]) -> String {
+fn table_1(rows: &[AccuracyRow]) -> String {
     let mut out = String::new();
     for model in models(rows, "source") {
-        let of = |suite: &str| -> Vec<&Row> {
+        let of = |suite: &str| -> Vec<&AccuracyRow> {
             let own = rows.iter().filter(|r| r.suite == suite && r.model == model);
             own.take(N_POSTURES).collect()
         };
@@ -77,25 +77,27 @@ const WAYS: [&str; 5] =
 
 /// What others reach in the cells of `registration` that all of them were given, and what none can
 /// better, over the joints that the product says there to be determined.
-fn baselines(rows: &[Row]) -> String {
+fn baselines(rows: &[AccuracyRow]) -> String {
     let given = |way: &str| rows.iter().any(|r| r.suite == way);
     let ways: Vec<&str> = WAYS.into_iter().filter(|way| given(way)).collect();
     let mut out = String::new();
     if ways.len() < 2 || ways[0] != WAYS[0] {
         return out;
     }
-    let of = |way: &str, cell: &Row| {
+    let of = |way: &str, cell: &AccuracyRow| {
         rows.iter().find(|r| r.suite == way && r.model == cell.model && r.seed == cell.seed)
     };
-    let shared = |cell: &&Row| cell.suite == WAYS[0] && ways.iter().all(|w| of(w, cell).is_some());
-    let cells: Vec<&Row> = rows.iter().filter(shared).collect();
+    let shared =
+        |cell: &&AccuracyRow| cell.suite == WAYS[0] && ways.iter().all(|w| of(w, cell).is_some());
+    let cells: Vec<&AccuracyRow> = rows.iter().filter(shared).collect();
     out.push_str("\nIn the same cells, over the joints that the product says to be determined; found: model and place are right.\n\n");
     out.push_str(
         "| way | found | rms ° | largest ° | tip mm, largest |\n| --- | --- | --- | --- | --- |\n",
     );
     for way in ways {
         let pairs = cells.iter().filter_map(|ours| Some((of(way, ours)?, *ours)));
-        let found: Vec<(&Row, &Row)> = pairs.filter(|(row, _)| row.right_model).collect();
+        let found: Vec<(&AccuracyRow, &AccuracyRow)> =
+            pairs.filter(|(row, _)| row.right_model).collect();
         let joints = found.iter().flat_map(|(row, ours)| row.joints.iter().zip(&ours.joints));
         let known = joints.filter(|(_, ours)| ours.determined && !ours.slides);
         let errors: Vec<f64> = known.map(|(joint, _)| joint.error.abs().to_degrees()).collect();
@@ -114,7 +116,7 @@ fn baselines(rows: &[Row]) -> String {
 }
 
 /// Links that follow through closed loops.
-fn loops(rows: &[Row]) -> String {
+fn loops(rows: &[AccuracyRow]) -> String {
     let mut out = String::new();
     let each =
         ["loops", "branches"].map(|suite| models(rows, suite).into_iter().map(move |m| (suite, m)));
@@ -124,7 +126,7 @@ fn loops(rows: &[Row]) -> String {
             out.push_str("\nLinks of closed loops, in the frame of the base, largest over the right fits:\n\n");
             out.push_str("| suite | model | right | turn ° | shift mm | closure m |\n| --- | --- | --- | --- | --- | --- |\n");
         }
-        let most = |of: &dyn Fn(&Row) -> f64| own().map(of).fold(0.0, f64::max);
+        let most = |of: &dyn Fn(&AccuracyRow) -> f64| own().map(of).fold(0.0, f64::max);
         let n = rows.iter().filter(|r| r.suite == suite && r.model == model).count();
         let _ = writeln!(
             out,
@@ -140,7 +142,7 @@ fn loops(rows: &[Row]) -> String {
 
 /// Where joints are against their models, found from single postures and from all of a robot's
 /// together.
-fn calibration(rows: &[Row]) -> String {
+fn calibration(rows: &[AccuracyRow]) -> String {
     let mut out = String::new();
     for model in models(rows, "calibration") {
         if out.is_empty() {
@@ -215,7 +217,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// How near a search must come.
-fn basin(rows: &[Row]) -> String {
+fn basin(rows: &[AccuracyRow]) -> String {
     let mut steps: Vec<f64> =
         rows.iter().filter(|r| r.n_starts > 0).map(|r| r.perturbed_deg).collect();
     steps.sort_by(f64::total_cmp);
@@ -237,7 +239,7 @@ fn basin(rows: &[Row]) -> String {
     out
 }
 
-fn models(rows: &[Row], suite: &str) -> Vec<String> {
+fn models(rows: &[AccuracyRow], suite: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for row in rows.iter().filter(|r| r.suite == suite) {
         if !out.contains(&row.model) {

@@ -45,12 +45,7 @@ pub(super) fn hoses(scene: &mut Scene, model: &Model, chance: f64, random: &mut 
 
 /// A gripper with a part, a dress pack along the forearm and a rag on the upper arm, each with this
 /// chance; all as large as befits a robot of this reach, metres.
-pub(super) fn load(
-    scene: &mut Scene,
-    model: &Model,
-    (chance, reach): (f64, f64),
-    random: &mut Random,
-) {
+pub(super) fn load(scene: &mut Scene, model: &Model, chance: f64, reach: f64, random: &mut Random) {
     let mut there = || random.unit() < chance;
     let [has_part, has_pack, has_rag] = [there(), there(), there()];
     let links = bodies(model);
@@ -63,16 +58,16 @@ pub(super) fn load(
     if let (true, Some(&forearm)) = (has_pack, links.get(3)) {
         let thick = (0.05 * reach).clamp(0.03, 0.12);
         let length = 0.6 * model.links[forearm].bounds.size().into_iter().fold(0.0, f64::max);
-        scene.carried.push(laid(model, forearm, "dress pack", (SHELL, [length, thick, thick])));
+        scene.carried.push(laid(model, forearm, "dress pack", SHELL, [length, thick, thick]));
     }
     if let (true, Some(&upper)) = (has_rag, links.get(2)) {
         let side = (0.12 * reach).clamp(0.08, 0.3);
-        scene.carried.push(laid(model, upper, "rag", (LAID, [side, 0.7 * side, 0.01])));
+        scene.carried.push(laid(model, upper, "rag", LAID, [side, 0.7 * side, 0.01]));
     }
 }
 
 /// A box of a size on top of a link, along its longest side, so far from its surface, metres.
-fn laid(model: &Model, link: usize, name: &str, (gap, size): (f64, [f64; 3])) -> Carried {
+fn laid(model: &Model, link: usize, name: &str, gap: f64, size: [f64; 3]) -> Carried {
     let (at, away) = top(model, link);
     let extent = model.links[link].bounds.size();
     let longest = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);

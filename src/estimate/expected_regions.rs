@@ -37,16 +37,16 @@ const STEP: f64 = 0.02;
 
 /// What seems to stand in a plant.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Stand {
+pub struct ExpectedRegions {
     /// Regions that would be searched, largest first.
-    pub regions: Vec<Searched>,
+    pub regions: Vec<ExpectedRegion>,
     /// Whether a floor was seen; else all heights are tried.
     pub has_floor: bool,
 }
 
 /// A region that would be searched.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Searched {
+pub struct ExpectedRegion {
     /// Its extent along each axis, metres.
     pub size: [f64; 3],
     /// Points above the floor in it, about.
@@ -57,7 +57,11 @@ pub struct Searched {
 
 /// Looks at some points of all inputs. An input that is broken where it is looked at gives no
 /// points: the run says what is wrong with it.
-pub(super) fn look(sources: &Sources, settings: &Settings, engine: &Engine) -> Result<Stand> {
+pub(super) fn look(
+    sources: &Sources,
+    settings: &Settings,
+    engine: &Engine,
+) -> Result<ExpectedRegions> {
     let inputs = sources.opened();
     let all: u64 = inputs.iter().filter_map(|input| sources.n_stated(input.id)).sum();
     let of_input = |input: &Input| {
@@ -79,7 +83,7 @@ pub(super) fn look(sources: &Sources, settings: &Settings, engine: &Engine) -> R
 }
 
 /// What stands where these points are, each of which stands for so many.
-fn stand(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> Stand {
+fn stand(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> ExpectedRegions {
     let edge = settings.lattice.voxel;
     let mut voxels: BTreeMap<[i32; 3], f64> = BTreeMap::new();
     for (points, each) in seen {
@@ -95,13 +99,13 @@ fn stand(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> Stand {
     let clusters = cluster::split(&Occupancy { edge, voxels }, &floor, &settings.cluster);
     let regions = base_search::regions(&clusters, &settings.region);
     let regions = regions.iter().map(|region| searched(&clusters, region)).collect();
-    Stand { regions, has_floor: !floor.levels.is_empty() }
+    ExpectedRegions { regions, has_floor: !floor.levels.is_empty() }
 }
 
 /// What clusters have in a region.
-fn searched(clusters: &[Cluster], region: &Region) -> Searched {
+fn searched(clusters: &[Cluster], region: &Region) -> ExpectedRegion {
     let world = region.world_bounds();
-    let mut out = Searched { size: region.bounds.size(), n_points: 0, n_voxels: 0 };
+    let mut out = ExpectedRegion { size: region.bounds.size(), n_points: 0, n_voxels: 0 };
     for cluster in clusters.iter().filter(|c| c.bounds.touches(&world)) {
         let is_in = |v: &&Voxel| world.contains(v.map(|i| (f64::from(i) + 0.5) * cluster.edge));
         let n = cluster.voxels.iter().filter(is_in).count();
@@ -176,7 +180,7 @@ mod tests {
         }
     }
 
-    fn hall(boxes: &[([f64; 3], [f64; 3])]) -> Stand {
+    fn hall(boxes: &[([f64; 3], [f64; 3])]) -> ExpectedRegions {
         let mut points = Vec::new();
         // A floor that leans, a ceiling as wide, and walls.
         for i in 0..500 {
@@ -203,7 +207,7 @@ mod tests {
         assert!(seen.has_floor);
         assert_eq!(seen.regions.len(), 2, "{seen:?}");
         for (min, max) in boxes {
-            let fits = |r: &Searched| {
+            let fits = |r: &ExpectedRegion| {
                 // A region reaches 0.4 m beyond what stands in it, and voxels are 5 cm.
                 (0..2).all(|i| (r.size[i] - (max[i] - min[i]) - 0.8).abs() < 0.15)
             };
@@ -215,6 +219,6 @@ mod tests {
 
     #[test]
     fn nothing_has_no_floor() {
-        assert_eq!(stand(&[], &Settings::default()), Stand::default());
+        assert_eq!(stand(&[], &Settings::default()), ExpectedRegions::default());
     }
 }

@@ -1,11 +1,11 @@
 //! What seems to stand in a plant and the number of models in; processor time of the search out.
 
+use super::expected_regions::{ExpectedRegion, ExpectedRegions};
 use super::rates::{AREA, REGION, SURFACE};
-use super::stand::{Searched, Stand};
 
 /// Processor time of the search, seconds.
-pub(super) fn seconds(stand: &Stand, n_models: usize) -> f64 {
-    let of_region = |r: &Searched| {
+pub(super) fn seconds(stand: &ExpectedRegions, n_models: usize) -> f64 {
+    let of_region = |r: &ExpectedRegion| {
         let (area, surface) = (r.size[0] * r.size[1], r.n_voxels as f64 / 1000.0);
         REGION + AREA * area * n_models as f64 + SURFACE * surface
     };
@@ -18,8 +18,8 @@ mod tests {
 
     #[test]
     fn a_crowded_hall_takes_longer_than_an_empty_one_and_many_models_longer_than_few() {
-        let region = Searched { size: [4.0, 5.0, 2.5], n_points: 100_000, n_voxels: 10_000 };
-        let hall = |n: usize| Stand { regions: vec![region; n], has_floor: true };
+        let region = ExpectedRegion { size: [4.0, 5.0, 2.5], n_points: 100_000, n_voxels: 10_000 };
+        let hall = |n: usize| ExpectedRegions { regions: vec![region; n], has_floor: true };
         assert_eq!(seconds(&hall(0), 10), 0.0);
         // 0.6 s, 20 m² for ten models, and ten thousand voxels.
         let one = seconds(&hall(1), 10);

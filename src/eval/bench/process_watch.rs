@@ -40,7 +40,8 @@ pub(super) struct Watched {
 pub(super) fn command(
     name: &str,
     input: &Path,
-    (robots, out): (&Path, &Path),
+    robots: &Path,
+    out: &Path,
     means: &Means,
 ) -> Result<Vec<String>> {
     let text = |path: &Path| path.display().to_string();

@@ -2,8 +2,8 @@
 //! what each of its entries did, in a sentence, out: a person's word is never passed over in
 //! silence.
 
-use super::{Decision, Place, Review};
-use crate::result::report::id;
+use super::{Decision, Review, ReviewPlace};
+use crate::detect::robot_id::robot_id;
 use contract::words::fixed;
 use contract::{Fit, Verdict};
 use export::ReviewEntry;
@@ -13,22 +13,22 @@ use geometry::Point;
 const SAME_BASE: f64 = 0.35;
 
 /// What is compared to tell what an entry did.
-pub(super) struct Heard<'a> {
+struct WithAndWithout<'a> {
     /// Robots that would be reported without the review.
-    pub(super) without: &'a [Fit],
+    without: &'a [Fit],
     /// Robots that are reported, in their order.
-    pub(super) with: &'a [Fit],
+    with: &'a [Fit],
     /// Entries, by number, whose posture the scans do not bear out.
-    pub(super) wrong: &'a [usize],
+    wrong: &'a [usize],
 }
 
 /// What an entry did, and whether a person should look at it again.
-struct Did {
+struct Effect {
     what: String,
     is_odd: bool,
 }
 
-impl Did {
+impl Effect {
     fn as_asked(what: String) -> Self {
         Self { what, is_odd: false }
     }
@@ -39,33 +39,40 @@ impl Did {
 }
 
 impl Review {
+    /// What each entry did, in their order: robots that would be reported without the review, those
+    /// that are, and entries whose posture the scans do not bear out.
+    #[must_use]
+    pub(crate) fn did(&self, without: &[Fit], with: &[Fit], wrong: &[usize]) -> Vec<ReviewEntry> {
+        self.told(&WithAndWithout { without, with, wrong })
+    }
+
     /// What each entry did, in their order.
-    pub(super) fn told(&self, heard: &Heard<'_>) -> Vec<ReviewEntry> {
-        let entry = |(k, place): (usize, &Place)| {
-            let Did { what, is_odd } = match place.verdict {
-                Some(Decision::Reject) => self.rejected(place, heard),
-                Some(Decision::Accept) => self.accepted(place, heard),
-                None => place.expected(heard),
+    fn told(&self, robots: &WithAndWithout<'_>) -> Vec<ReviewEntry> {
+        let entry = |(k, place): (usize, &ReviewPlace)| {
+            let Effect { what, is_odd } = match place.verdict {
+                Some(Decision::Reject) => self.rejected(place, robots),
+                Some(Decision::Accept) => self.accepted(place, robots),
+                None => place.expected(robots),
             };
             let start = if place.joints.is_empty() {
                 ""
-            } else if heard.wrong.contains(&k) {
+            } else if robots.wrong.contains(&k) {
                 "; the posture that it gives is not what the scans show, and was not used"
             } else {
                 "; the fit began at the posture that it gives"
             };
             let (word, at) = (place.word(), place.words());
             let did = format!("{word} near {at}: {what}{start}");
-            let needs_look = is_odd || heard.wrong.contains(&k);
+            let needs_look = is_odd || robots.wrong.contains(&k);
             ReviewEntry { entry: k + 1, at: place.at, did, needs_look }
         };
         self.places.iter().enumerate().map(entry).collect()
     }
 
-    fn rejected(&self, place: &Place, heard: &Heard<'_>) -> Did {
-        let gone: Vec<&Fit> = heard.without.iter().filter(|f| place.has(f)).collect();
+    fn rejected(&self, place: &ReviewPlace, robots: &WithAndWithout<'_>) -> Effect {
+        let gone: Vec<&Fit> = robots.without.iter().filter(|f| place.has(f)).collect();
         if gone.is_empty() {
-            return Did::odd("nothing was found there, so it changed nothing");
+            return Effect::odd("nothing was found there, so it changed nothing");
         }
         let names: Vec<String> = gone.iter().map(|f| described(f)).collect();
         let mut what = format!(
@@ -76,34 +83,34 @@ impl Review {
         if is_trusted {
             what += "; the program trusted it: look whether this is meant";
         }
-        if let Some(other) = self.other(place, Decision::Accept, heard) {
+        if let Some(other) = self.other(place, Decision::Accept, robots) {
             what +=
                 &format!("; entry {other} accepts a robot there, and a rejection goes before that");
-            return Did::odd(what);
+            return Effect::odd(what);
         }
-        Did { what, is_odd: is_trusted }
+        Effect { what, is_odd: is_trusted }
     }
 
-    fn accepted(&self, place: &Place, heard: &Heard<'_>) -> Did {
-        let Some((at, fit)) = place.reported(heard.with) else {
-            return match self.other(place, Decision::Reject, heard) {
-                Some(other) => Did::odd(format!(
+    fn accepted(&self, place: &ReviewPlace, robots: &WithAndWithout<'_>) -> Effect {
+        let Some((at, fit)) = place.reported(robots.with) else {
+            return match self.other(place, Decision::Reject, robots) {
+                Some(other) => Effect::odd(format!(
                     "entry {other} rejects what stands there, and goes before: no robot is reported"
                 )),
-                None => Did::odd(place.missing()),
+                None => Effect::odd(place.missing()),
             };
         };
-        let name = format!("{} {}", id(at), fit.model_name);
-        let Some(before) = place.before(fit, heard.without) else {
-            let instead = heard.without.iter().filter(|f| place.has(f)).map(described);
+        let name = format!("{} {}", robot_id(at), fit.model_name);
+        let Some(before) = place.before(fit, robots.without) else {
+            let instead = robots.without.iter().filter(|f| place.has(f)).map(described);
             let instead: Vec<String> = instead.collect();
-            return Did::as_asked(if instead.is_empty() {
+            return Effect::as_asked(if instead.is_empty() {
                 format!("{name} is trusted; without it no robot would be reported there")
             } else {
                 format!("{name} is trusted, instead of {}", instead.join(" and "))
             });
         };
-        Did::as_asked(if before.verdict == Verdict::Trusted {
+        Effect::as_asked(if before.verdict == Verdict::Trusted {
             format!("{name} was trusted without it, so it changed nothing")
         } else {
             let why = before.reasons.join("; ");
@@ -113,9 +120,14 @@ impl Review {
 
     /// Number of an entry of the other mind about a place: one that holds the same robot, or whose
     /// middle it holds.
-    fn other(&self, place: &Place, verdict: Decision, heard: &Heard<'_>) -> Option<usize> {
-        let both = |p: &Place| {
-            heard.without.iter().any(|f| p.has(f) && place.has(f))
+    fn other(
+        &self,
+        place: &ReviewPlace,
+        verdict: Decision,
+        robots: &WithAndWithout<'_>,
+    ) -> Option<usize> {
+        let both = |p: &ReviewPlace| {
+            robots.without.iter().any(|f| p.has(f) && place.has(f))
                 || p.is_within(place)
                 || place.is_within(p)
         };
@@ -124,7 +136,7 @@ impl Review {
     }
 }
 
-impl Place {
+impl ReviewPlace {
     /// What the entry asks for, in words.
     fn word(&self) -> String {
         let model = self.model.as_deref();
@@ -136,16 +148,18 @@ impl Place {
     }
 
     /// What an entry without a verdict did.
-    fn expected(&self, heard: &Heard<'_>) -> Did {
-        let Some((at, fit)) = self.reported(heard.with) else { return Did::odd(self.missing()) };
-        let name = format!("{} {}", id(at), fit.model_name);
-        let others: Vec<String> = heard
+    fn expected(&self, robots: &WithAndWithout<'_>) -> Effect {
+        let Some((at, fit)) = self.reported(robots.with) else {
+            return Effect::odd(self.missing());
+        };
+        let name = format!("{} {}", robot_id(at), fit.model_name);
+        let others: Vec<String> = robots
             .without
             .iter()
             .filter(|f| self.has(f) && f.model_name != fit.model_name)
             .map(described)
             .collect();
-        Did::as_asked(if others.is_empty() {
+        Effect::as_asked(if others.is_empty() {
             format!("{name} stands there, {}", fit.verdict.word())
         } else {
             let verdict = fit.verdict.word();
@@ -189,11 +203,11 @@ mod tests {
     use super::*;
     use crate::detect::review::{tests::fit, tests::place};
 
-    fn told(places: Vec<Place>, without: &[Fit]) -> Vec<(String, bool)> {
+    fn told(places: Vec<ReviewPlace>, without: &[Fit]) -> Vec<(String, bool)> {
         let review = Review { places };
         let with = review.apply(without.to_vec());
-        let heard = Heard { without, with: &with, wrong: &[] };
-        review.told(&heard).into_iter().map(|e| (e.did, e.needs_look)).collect()
+        let robots = WithAndWithout { without, with: &with, wrong: &[] };
+        review.told(&robots).into_iter().map(|e| (e.did, e.needs_look)).collect()
     }
 
     fn trusted(model: &str, x: f64) -> Fit {

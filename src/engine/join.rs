@@ -1,16 +1,16 @@
 //! Work beside other work: two closures in, what both came to out. One may hand items to the other,
 //! in order, bounded by bytes.
 
-use super::Engine;
 use super::cancel::Cancel;
 use super::edge::{Onward, edge};
-use super::guard::guarded;
+use super::panic_guard::guarded;
+use super::runner::Engine;
 use contract::{Error, Kind, Result, Weigh};
 
 /// Items as they are handed over, up to an error of whom they come from.
-pub type Handed<'i, T> = &'i mut dyn Iterator<Item = Result<T>>;
+pub type PipedItems<'i, T> = &'i mut dyn Iterator<Item = Result<T>>;
 /// Hands an item over; an error where nobody takes any more.
-pub type Hand<'h, T> = &'h mut dyn FnMut(T) -> Result<()>;
+pub type PipeSender<'h, T> = &'h mut dyn FnMut(T) -> Result<()>;
 
 impl Engine {
     /// Does `aside` on a thread of its own while `work` is done on this one; the error of the work
@@ -18,7 +18,7 @@ impl Engine {
     ///
     /// # Errors
     /// Those of both; a panic of either is a bug.
-    pub fn beside<T: Send, U>(
+    pub fn join<T: Send, U>(
         &self,
         name: &str,
         aside: impl FnOnce() -> Result<T> + Send,
@@ -38,17 +38,17 @@ impl Engine {
     /// one.
     ///
     /// # Errors
-    /// As of [`Engine::beside`].
-    pub fn handing<I: Weigh + Send, T: Send, U>(
+    /// As of [`Engine::join`].
+    pub fn pipe<I: Weigh + Send, T: Send, U>(
         &self,
         name: &str,
-        aside: impl FnOnce(Handed<'_, I>) -> Result<T> + Send,
-        work: impl FnOnce(Hand<'_, I>) -> Result<U>,
+        aside: impl FnOnce(PipedItems<'_, I>) -> Result<T> + Send,
+        work: impl FnOnce(PipeSender<'_, I>) -> Result<U>,
     ) -> Result<(T, U)> {
         let (put, take) = edge(self.channel_bytes);
         let mut is_refused = false;
         let refused = &mut is_refused;
-        let both = self.beside(
+        let both = self.join(
             name,
             move || {
                 let mut items = std::iter::from_fn(|| take.take().map(|(_, item)| item));
