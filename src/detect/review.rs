@@ -21,6 +21,7 @@ use crate::job::MAX_TEXT;
 use contract::words::triple;
 use contract::{Error, Fit, JointFit, Region, Result, Verdict};
 use export::ReviewEntry;
+use fit::verdict::{self, VerdictEvent};
 use geometry::{Point, Pose};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
@@ -190,10 +191,7 @@ impl Review {
     /// Trusts what is accepted, whatever was found out about it since.
     pub fn accept(&self, fits: &mut [Fit]) {
         for fit in fits.iter_mut().filter(|f| self.accepts(f)) {
-            if fit.verdict != Verdict::Trusted {
-                fit.reasons.insert(0, "accepted in review".into());
-            }
-            fit.verdict = Verdict::Trusted;
+            verdict::apply(fit, &VerdictEvent::Accepted);
         }
     }
 }

@@ -135,7 +135,7 @@ impl Session<'_> {
             return Ok(None);
         }
         let mut then: Vec<Fit> =
-            fits.iter().map(|fit| Fit { verdict: Verdict::Refused, ..fit.clone() }).collect();
+            fits.iter().map(|fit| Fit { is_without_labels: true, ..fit.clone() }).collect();
         robots.missed.iter().for_each(|(i, fit)| then[*i].clone_from(fit));
         let ground = (self.past.store, self.floor, &[][..]);
         let labelling = Labelling::new(&then, models, self.sources, ground, self.settings);

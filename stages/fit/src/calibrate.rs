@@ -20,8 +20,9 @@ use crate::settle::better;
 use crate::solve::NEAR_MARGIN;
 use crate::spin::Spin;
 use crate::strata::adjusted_points;
+use crate::verdict::{self, JudgedFit, VerdictEvent};
 use crate::wrist::Wrist;
-use crate::{Prepared, Scene, Settings, report, verdict};
+use crate::{Prepared, Scene, Settings, report};
 
 /// Steps of the joints' places: each after an adjustment of all the rest.
 const N_STEPS: usize = 4;
@@ -71,7 +72,8 @@ pub fn calibrate(
     let wrist = Wrist::of(&refine, (&done, &turns), &points, fan);
     let done = (done, judgement, turns);
     let mut out = report::report(&refine, &done, &[], (&near, &points), wrist.as_ref(), fan);
-    out.verdict = out.verdict.min(as_known(&Refine { prepared, ..refine }, fit, &h, &out));
+    let nominal = as_known(&Refine { prepared, ..refine }, fit, &h, &out);
+    verdict::apply(&mut out, &VerdictEvent::Calibrated(nominal));
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();
     keep(&mut out, fit, Calibration { frames, prior: settings.frame_sigma, link_rms });
     (model, out)
@@ -120,16 +122,14 @@ fn estimate(
 /// that they are elsewhere is what it did not know.
 fn as_known(nominal: &Refine<'_>, fit: &Fit, h: &Hypothesis, calibrated: &Fit) -> Verdict {
     let judgement = judged(nominal, h);
-    let passed = |mut fit: Fit| {
-        verdict::pass(&mut fit, nominal.prepared, nominal.scene, (&judgement, None));
-        fit.verdict
-    };
+    let (prepared, scene) = (nominal.prepared, nominal.scene);
+    let judged = JudgedFit { prepared, scene, judgement: &judgement, held: None };
     // Others than the points may have made it doubtful.
-    if fit.verdict < passed(fit.clone()) {
+    if fit.verdict < verdict::by_rules(fit, &judged) {
         return fit.verdict;
     }
     let (joints, covariance) = (calibrated.joints.clone(), calibrated.covariance.clone());
-    passed(Fit { joints, covariance, ..fit.clone() })
+    verdict::by_rules(&Fit { joints, covariance, ..fit.clone() }, &judged)
 }
 
 /// What the nominal fit knows and the calibrated one keeps; and what the calibration found, in
@@ -140,7 +140,7 @@ fn keep(out: &mut Fit, fit: &Fit, found: Calibration) {
     out.alike.clone_from(&fit.alike);
     out.tool.clone_from(&fit.tool);
     out.other_branches.clone_from(&fit.other_branches);
-    out.reasons.extend(words(&found.frames));
+    verdict::note(out, words(&found.frames));
     out.calibration = Some(found);
 }
 

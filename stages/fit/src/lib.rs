@@ -50,7 +50,7 @@ mod tallies;
 mod together;
 mod tool;
 pub mod turns;
-mod verdict;
+pub mod verdict;
 mod weak;
 mod wrist;
 
@@ -64,4 +64,3 @@ pub use solve::{again, converge, fit};
 pub use stays::{Sights, stays};
 pub use together::together;
 pub use tool::{Tooled, bolt, fit_tool, try_tool};
-pub use verdict::is_uncontradicted;

@@ -2,7 +2,7 @@
 //! fit as it is reported: values with their standard deviations, which joints are open, rivals,
 //! equals, verdict.
 
-use contract::{Certainty, Equal, Fan, Fit, JointFit, RunnerUp, ScanShare, ScanShift, Verdict};
+use contract::{Certainty, Equal, Fan, Fit, JointFit, RunnerUp, ScanShare, ScanShift};
 use geometry::{Pose, Vector};
 use nalgebra::{DMatrix, DVector};
 use robot::{Model, Motion};
@@ -21,7 +21,7 @@ use crate::solve::Polished;
 use crate::spin::Spin;
 use crate::sway::sway;
 use crate::turns;
-use crate::verdict::{self, RIVAL};
+use crate::verdict::{self, JudgedFit, RIVAL, VerdictEvent};
 use crate::wrist::Wrist;
 
 /// Margin up to which another posture counts as equally good.
@@ -106,7 +106,8 @@ pub(crate) fn report(
         equals: equals(refine, h, &rivals, (&passed, &several)),
         ..Fit::default()
     };
-    verdict::pass(&mut fit, prepared, refine.scene, (judgement, Some(&held)));
+    let scene = refine.scene;
+    verdict::decide(&mut fit, &JudgedFit { prepared, scene, judgement, held: Some(&held) });
     fit
 }
 
@@ -247,7 +248,7 @@ pub(crate) fn refused(refine: &Refine<'_>, best: &Adjusted, judgement: &Judgemen
         certainty: Certainty::Undetermined,
         equivalents: Vec::new(),
     };
-    Fit {
+    let mut fit = Fit {
         model: refine.prepared.index,
         model_name: model.name.clone(),
         world_from_base: refine.scene.world_from_local() * h.local_from_base,
@@ -255,9 +256,10 @@ pub(crate) fn refused(refine: &Refine<'_>, best: &Adjusted, judgement: &Judgemen
         score: judgement.score,
         explained: judgement.explained,
         rms: best.rms(),
-        verdict: Verdict::Refused,
         ..Fit::default()
-    }
+    };
+    verdict::apply(&mut fit, &VerdictEvent::Lost);
+    fit
 }
 
 fn runner_up(model: &Model, best: &Judgement, (margin, (_, other)): &Rival<'_>) -> RunnerUp {

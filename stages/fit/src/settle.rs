@@ -16,6 +16,7 @@ use crate::solve::Polished;
 use crate::spin::Spin;
 use crate::strata::adjusted_points;
 use crate::turns;
+use crate::verdict;
 use crate::wrist::{self, Wrist};
 
 /// A posture adjusted, with the values that the points leave to its last joints.
@@ -83,7 +84,7 @@ pub(crate) fn finish(
     let misfits = doubt(refine, (&mut best.0, &mut best.2), all, fan);
     let others = at_rest(refine, &best, others, (near, all), fan);
     let mut fit = report(refine, &best, &others, (near, &points), wrist.as_ref(), fan);
-    fit.reasons.extend(misfits);
+    verdict::note(&mut fit, misfits);
     fit
 }
 
