@@ -14,27 +14,13 @@ mod words;
 
 use contract::{Fit, Verdict};
 
+use crate::Scene;
 use crate::adjust::Adjusted;
-use crate::judge::Judgement;
-use crate::{Prepared, Scene};
 use evidence::FitEvidence;
+pub(crate) use evidence::JudgedFit;
 use rule::{AlsoAsked, Answers, EventRow, Property, Quantity, RowOutcome, VerdictChange, filled};
 use table::RULES;
 pub(crate) use thresholds::{MIN_AGREEING, RIVAL};
-
-/// What a fit is judged by, besides its own values.
-#[derive(Clone, Copy)]
-pub(crate) struct JudgedFit<'a> {
-    /// The model.
-    pub(crate) prepared: &'a Prepared<'a>,
-    /// What was measured.
-    pub(crate) scene: &'a Scene<'a>,
-    /// What the beams say of the fitted posture.
-    pub(crate) judgement: &'a Judgement,
-    /// Standard deviations of the joints by the scatter of the points, radians or metres, where
-    /// those of the fit's covariance hold more.
-    pub(crate) held: Option<&'a [f64]>,
-}
 
 /// What is found out about a fit after its own evidence was judged, and bears on the verdict.
 #[derive(Debug, Clone, Copy, PartialEq)]

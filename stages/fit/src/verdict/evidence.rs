@@ -7,10 +7,25 @@ use robot::{JointKind, Model, Motion, Role};
 
 use super::rule::{Answers, Property, Quantity, Subject};
 use super::thresholds::{KNOWN_SIGMA, MOST_EXCUSED_NOISE, STOP_PLAY};
-use super::{JudgedFit, words};
+use super::words;
 use crate::adjust::Adjusted;
+use crate::judge::Judgement;
 use crate::weak::weak;
 use crate::{Prepared, Scene};
+
+/// What a fit is judged by, besides its own values.
+#[derive(Clone, Copy)]
+pub(crate) struct JudgedFit<'a> {
+    /// The model.
+    pub(crate) prepared: &'a Prepared<'a>,
+    /// What was measured.
+    pub(crate) scene: &'a Scene<'a>,
+    /// What the beams say of the fitted posture.
+    pub(crate) judgement: &'a Judgement,
+    /// Standard deviations of the joints by the scatter of the points, radians or metres, where
+    /// those of the fit's covariance hold more.
+    pub(crate) held: Option<&'a [f64]>,
+}
 
 /// All that the rules ask for.
 #[derive(Debug, Clone, Default)]
