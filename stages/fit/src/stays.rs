@@ -3,13 +3,13 @@
 //! stations.
 
 use contract::words::count;
-use contract::{Candidate, Fan, Fit, InstallationPlane, Region, Verdict, View};
+use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Verdict, View};
 use geometry::{Point, Pose};
 
-use crate::beam::Hypothesis;
 use crate::judge::judged;
-use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, fit, quick};
+use crate::problem::Problem;
+use crate::solve::{fit, quick};
+use crate::state::Hypothesis;
 use crate::verdict::{self, MIN_AGREEING, VerdictEvent};
 use crate::{Prepared, Scene, Settings};
 
@@ -153,17 +153,16 @@ impl<'a> Single<'a> {
         let bases: Vec<Pose> =
             candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
         let base = bases.first().map_or_else(Point::origin, |b| b.translation.vector.into());
-        let [near, _] = scene.within(&base, prepared.reach + NEAR_MARGIN);
-        let refine = Refine { prepared, scene: &scene, settings, prior: None };
-        let found = quick(&refine, &bases, &near, fan).map(|(h, _)| h);
+        let nearby = scene.nearby(prepared, &base);
+        let problem = Problem::new(prepared, &scene, settings, fan).with_points(&nearby);
+        let found = quick(&problem, &bases).map(|found| found.hypothesis);
         Self { view, scene, found }
     }
 
     /// What this scan says of a posture: explained less contradicted, judged and whole surface of
     /// the moving links, m².
     fn says(&self, h: &Hypothesis, prepared: &Prepared<'_>, settings: &Settings) -> [f64; 3] {
-        let refine = Refine { prepared, scene: &self.scene, settings, prior: None };
-        let judgement = judged(&refine, h);
+        let judgement = judged(&Problem::new(prepared, &self.scene, settings, &OneByOne), h);
         let moving = (0..prepared.links.len()).filter(|l| !prepared.fixed.contains(l));
         moving.fold([0.0; 3], |sum, l| {
             let [net, judged] = judgement.links[l];

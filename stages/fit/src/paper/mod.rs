@@ -22,8 +22,8 @@ use nalgebra::{Translation3, UnitQuaternion};
 
 pub use settings::Settings as PaperSettings;
 
-use crate::beam::Hypothesis;
 use crate::judge::{evidence, judge};
+use crate::state::Hypothesis;
 use crate::verdict::{self, VerdictEvent};
 use crate::{Prepared, Scene, Settings};
 use lattice::Lattices;

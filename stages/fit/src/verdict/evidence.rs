@@ -10,7 +10,7 @@ use super::thresholds::{KNOWN_SIGMA, MOST_EXCUSED_NOISE, STOP_PLAY};
 use super::words;
 use crate::adjust::Adjusted;
 use crate::judge::Judgement;
-use crate::weak::weak;
+use crate::modes::trade_off;
 use crate::{Prepared, Scene};
 
 /// What a fit is judged by, besides its own values.
@@ -148,7 +148,7 @@ impl FitEvidence {
             margin: fit.runner_up.as_ref().map_or(f64::INFINITY, |rival| rival.margin),
             has_scanners,
             is_only_scanners: has_scanners && !scene.has_camera(),
-            trade_off: weak(fit, &turning),
+            trade_off: trade_off(fit, &turning),
             links: (0..fit.links.len()).map(|l| LinkSeen::of(fit, l, (prepared, held))).collect(),
             joints: (0..n).map(|j| JointKnown::of(fit, j, prepared)).collect(),
         }
