@@ -1,12 +1,13 @@
 //! Fits a robot model to the scans of a region: base pose, posture, covariance and verdict.
 //!
-//! [`fit`] runs through five phases, each of which reads what the one before returned: a beam search
-//! over the joints on depth images (`search`), Gauss–Newton over base and joints on thinned points
-//! (`refine`), one adjustment of base, joints and scan errors on many points (`adjust`), all other
-//! postures that explain the points as well (`modes`), and the report with its verdict (`assess`).
-//! `solve.rs` holds their order and every loop over alternatives. Below all phases lie what they
-//! share: the model made ready (`model`), the region (`scene`), what is asked (`problem`), a posture
-//! and the errors of scans (`state`), and which point belongs to which surface (`correspond`).
+//! [`fit`] runs through five phases, each of which reads what the one before returned: a beam
+//! search over the joints on depth images (`search`), Gauss–Newton over base and joints on thinned
+//! points (`refine`), one adjustment of base, joints and scan errors on many points (`adjust`), all
+//! other postures that explain the points as well (`modes`), and the report with its verdict
+//! (`assess`). `solve.rs` holds their order and every loop over alternatives. Below all phases lie
+//! what they share: the model made ready (`model`), the region (`scene`), what is asked
+//! (`problem`), a posture and the errors of scans (`state`), and which point belongs to which
+//! surface (`correspond`).
 //!
 //! Beside it stand the fit of tools ([`fit_tool`]), the places of joints on their links
 //! ([`calibrate()`]), scans in which a robot stands differently ([`stays`](fn@stays)), the choice
