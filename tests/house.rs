@@ -15,6 +15,8 @@ const SHARED: [&str; 3] = ["geometry", "contract", "robot"];
 const MAY_READ: [&str; 3] = ["ingest", "robot", "export"];
 /// Files that may hold unsafe code: memory maps.
 const MAY_BE_UNSAFE: [&str; 1] = ["stages/ingest/src/map.rs"];
+/// The only file that assigns the verdict on a fit, or changes its reasons.
+const WRITES_VERDICTS: &str = "stages/fit/src/verdict.rs";
 /// Longest file, lines: 400 is the aim, 450 the end.
 const MAX_LINES: usize = 450;
 /// Longest file of tests, lines: cases in a row read well.
@@ -262,6 +264,70 @@ fn unsafe_code_stands_where_it_is_named() {
         }
     }
     report(&faults);
+}
+
+/// Whether a line of code assigns the verdict on a fit or changes its reasons. What is written in
+/// words, or into a row of a measurement, is no verdict on a fit any more.
+fn writes_a_verdict(line: &str) -> bool {
+    const CHANGES: [&str; 6] = ["push(", "extend(", "insert(", "splice(", "clear(", "retain("];
+    let is_path = |c: char| c.is_alphanumeric() || "_.[]".contains(c);
+    let is_changed = |field: &str| {
+        let assigned = line.split(&format!("{field} =")).nth(1);
+        let mut lent = line.split("&mut ").skip(1);
+        assigned.is_some_and(|behind| !behind.starts_with('='))
+            || lent.any(|path| path.split(|c| !is_path(c)).next().unwrap_or("").ends_with(field))
+            || CHANGES.iter().any(|call| line.contains(&format!("{field}.{call}")))
+    };
+    let is_made = line.split("verdict: ").nth(1).is_some_and(|behind| {
+        let value = behind.split([',', '}']).next().unwrap_or("");
+        let is_copied = value.contains(".verdict") && !value.contains(".clone()");
+        value.starts_with("Verdict::") || is_copied && !value.starts_with("Verdict")
+    });
+    let is_elsewhere = line.contains(".word()") || line.trim_start().starts_with("row.");
+    !is_elsewhere && (is_made || is_changed(".verdict") || is_changed(".reasons"))
+}
+
+/// A verdict is written where the table of its rules is applied; others report what they found out.
+#[test]
+fn one_file_writes_the_verdict() {
+    let mut faults = Vec::new();
+    for (name, text) in all_files() {
+        if name == WRITES_VERDICTS {
+            continue;
+        }
+        for line in code(&name, &text).lines().filter(|line| writes_a_verdict(line)) {
+            let line = line.trim();
+            faults.push(format!("{name}: `{line}`: report it by `fit::verdict::apply` or `note`"));
+        }
+    }
+    report(&faults);
+}
+
+#[test]
+fn what_writes_a_verdict_is_told_from_what_reads_one() {
+    let writes = [
+        "fit.verdict = Verdict::Doubtful;",
+        "out.verdict = out.verdict.min(other);",
+        "Fit { verdict: Verdict::Refused, ..fit.clone() }",
+        "Fit { verdict: fit.verdict.max(before.verdict), ..fit.clone() }",
+        "std::mem::swap(&mut a.verdict, &mut verdict);",
+        "fit.reasons.push(why);",
+        "fit.reasons = vec![why];",
+    ];
+    let reads = [
+        "if fit.verdict == Verdict::Trusted {",
+        "verdict::apply(&mut sure, &VerdictEvent::SeenAgain(before.verdict));",
+        "row.reasons = fit.reasons.clone();",
+        "pub verdict: Verdict,",
+        "let is = |verdict: Verdict| move |f: &&Fit| f.verdict == verdict;",
+        "pub verdict: Option<Decision>,",
+        "verdict: fit.verdict.word().into(),",
+        "verdict: robot.verdict.clone(),",
+        "reasons: fit.reasons.clone(),",
+        "all.extend(fit.reasons.iter().cloned());",
+    ];
+    assert_eq!(writes.iter().find(|line| !writes_a_verdict(line)), None);
+    assert_eq!(reads.iter().find(|line| writes_a_verdict(line)), None);
 }
 
 #[test]

@@ -20,6 +20,7 @@ use crate::engine::{AllThreads, Engine, Task};
 use crate::job::{Job, MAX_TEXT};
 use contract::words::triple;
 use contract::{Error, Fit, JointFit, Result, Verdict};
+use fit::verdict::{self, VerdictEvent};
 use geometry::{Point, Pose};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
@@ -192,10 +193,7 @@ impl Review {
     /// Trusts what is accepted, whatever was found out about it since.
     pub fn accept(&self, fits: &mut [Fit]) {
         for fit in fits.iter_mut().filter(|f| self.accepts(f)) {
-            if fit.verdict != Verdict::Trusted {
-                fit.reasons.insert(0, "accepted in review".into());
-            }
-            fit.verdict = Verdict::Trusted;
+            verdict::apply(fit, &VerdictEvent::Accepted);
         }
     }
 }

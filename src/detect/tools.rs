@@ -146,7 +146,7 @@ fn attach_one(
     }
     let others = bolts.iter().filter(|b| holes[b.hole] != mount);
     let alike: Vec<[f64; 2]> = others.map(|b| [holes[b.hole], b.value]).collect();
-    together.reasons.extend(in_words(&alike));
+    fit::verdict::note(&mut together, in_words(&alike));
     widen(&mut together.joints[n_arm - 1], &alike);
     together.tool = Some(Mounted {
         model: models[tool].name.clone(),

@@ -141,7 +141,7 @@ impl CellComparison<'_> {
             return Ok(None);
         }
         let mut then: Vec<Fit> =
-            fits.iter().map(|fit| Fit { verdict: Verdict::Refused, ..fit.clone() }).collect();
+            fits.iter().map(|fit| Fit { is_without_labels: true, ..fit.clone() }).collect();
         robots.missed.iter().for_each(|(i, fit)| then[*i].clone_from(fit));
         let (sources, store, floor) = (self.sources, self.past.store, self.floor);
         let scans = ScansToLabel { sources, store, floor, clusters: &[] };

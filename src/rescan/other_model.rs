@@ -28,7 +28,7 @@ pub(crate) fn is_the_same(
     other_session: &Watch<'_>,
 ) -> bool {
     fit.verdict == Verdict::Trusted
-        || fit::is_uncontradicted(fit, scene)
+        || fit::verdict::is_uncontradicted(fit, scene)
             && strange(fit, model, scene, other_session) <= MAX_STRANGE
 }
 

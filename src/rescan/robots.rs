@@ -7,6 +7,7 @@ use crate::detect::tools::attach_tools_in;
 use crate::label::known_space::{poses, reach};
 use contract::{Fit, Region, Result, Verdict};
 use fit::Scene;
+use fit::verdict::{self, VerdictEvent};
 use freespace::{Sight, Watch};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
@@ -102,7 +103,8 @@ pub(crate) fn look(
     {
         // What is known of how it stood counts for how it stands, but only where all of that is
         // seen again.
-        let sure = Fit { verdict: fit.verdict.max(before.verdict), ..fit.clone() };
+        let mut sure = fit.clone();
+        verdict::apply(&mut sure, &VerdictEvent::SeenAgain(before.verdict));
         let is_same =
             !crate::result::changes::stands_otherwise(before, &sure) && knows(&fit, before);
         match fit.verdict {

@@ -19,6 +19,7 @@ use change::{Tally, Thing, Unseen, things};
 use contract::{
     Cluster, Error, Fit, Floor, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View,
 };
+use fit::verdict::{self, VerdictEvent};
 use freespace::Watch;
 use geometry::{Aabb, Pose};
 use ingest::Sources;
@@ -314,8 +315,7 @@ impl<'a> CellComparison<'a> {
                 Now::Gone => {
                     out.gone.push(i);
                     out.left.push(bounds);
-                    fits[i].verdict = Verdict::Refused;
-                    fits[i].reasons = vec!["it is gone: the new scans see through it".into()];
+                    verdict::apply(&mut fits[i], &VerdictEvent::Gone);
                 }
                 // Labels by a posture that is none could take a fixed thing for a link: it gives
                 // none.
@@ -323,9 +323,7 @@ impl<'a> CellComparison<'a> {
                     out.changed.push(i);
                     out.lost.push(i);
                     out.left.push(bounds);
-                    fits[i].verdict = Verdict::Doubtful;
-                    let why = "the new scans contradict this posture and show no other";
-                    fits[i].reasons = vec![why.into()];
+                    verdict::apply(&mut fits[i], &VerdictEvent::Contradicted);
                 }
             }
         }
@@ -366,13 +364,12 @@ impl<'a> CellComparison<'a> {
         Ok(CellLabels { near, compared, things, unseen, now })
     }
 
-    /// The fits, those refused that the new scans have no say in: they give no labels here.
+    /// The fits; those that the new scans have no say in give no labels here.
     pub(crate) fn own_fits(&self, fits: &[Fit], robots: &ComparedRobots) -> Vec<Fit> {
         let mut own = fits.to_vec();
         for (i, fit) in own.iter_mut().enumerate() {
-            if !robots.in_cell.contains(&i) && !robots.as_it_stood.contains(&i) {
-                fit.verdict = Verdict::Refused;
-            }
+            fit.is_without_labels =
+                !robots.in_cell.contains(&i) && !robots.as_it_stood.contains(&i);
             fit.stands_in.clear();
             fit.stays.clear();
         }

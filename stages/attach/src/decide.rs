@@ -2,9 +2,7 @@
 
 use crate::Settings;
 use crate::voxel_graph::Graph;
-use contract::{
-    Fit, Fold, Label, LinkAt, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Verdict, Voxel,
-};
+use contract::{Fit, Fold, Label, LinkAt, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
 use robot::Model;
 
 /// Decides what hangs on which link.
@@ -65,7 +63,7 @@ impl Attach {
     #[must_use]
     pub fn new(fits: &[Fit], models: &[Model], settings: Settings) -> Self {
         let moving = fits.iter().map(|fit| match models.get(fit.model) {
-            Some(model) if fit.verdict != Verdict::Refused => model.moving(),
+            Some(model) if fit.gives_labels() => model.moving(),
             _ => Vec::new(),
         });
         Self { moving: moving.collect(), settings }

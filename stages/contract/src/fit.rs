@@ -260,4 +260,22 @@ pub struct Fit {
     pub verdict: Verdict,
     /// Why, in words; empty only for a plain `Trusted`.
     pub reasons: Vec<String>,
+    /// Whether it gives no labels although it is not refused, in a run that knows better where its
+    /// points are: kept within the run, and not in files.
+    #[serde(skip)]
+    pub is_without_labels: bool,
+}
+
+impl Fit {
+    /// Whether points are labelled by this fit.
+    #[must_use]
+    pub fn gives_labels(&self) -> bool {
+        self.label_verdict() != Verdict::Refused
+    }
+
+    /// The verdict as the labels have it: refused where the fit gives none.
+    #[must_use]
+    pub fn label_verdict(&self) -> Verdict {
+        if self.is_without_labels { Verdict::Refused } else { self.verdict }
+    }
 }

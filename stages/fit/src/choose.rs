@@ -5,6 +5,8 @@ use contract::{Fit, RunnerUp, Verdict};
 use geometry::{Aabb, Point};
 use robot::Model;
 
+use crate::verdict::{self, VerdictEvent};
+
 /// Two fits compete where this share of the smaller one's box is shared.
 const OVERLAP: f64 = 0.25;
 /// Bases nearer than this compete whatever their boxes, metres.
@@ -16,8 +18,6 @@ const CROSSED: f64 = 0.15;
 const N_SAMPLES: usize = 200;
 /// A model that explains this share of what the best explains, as well, is alike.
 const ALIKE: f64 = 0.97;
-/// A model of another kind that explains this share of the best makes the best doubtful.
-const RIVAL: f64 = 0.90;
 
 /// Chooses among the fits, best explained first; the losers become runners-up of the winners. A fit
 /// that somebody vouches for (`is_known`) stands before all others, and as it is. A refused fit
@@ -146,8 +146,8 @@ fn lose(winner: &mut Fit, loser: &Fit) {
     }
 }
 
-/// Notes a loser of another model at the winner where it explains nearly as much: as alike, or as a
-/// reason for doubt.
+/// Notes a loser of another model at the winner where it explains nearly as much: as alike, or else
+/// as a rival, by which the winner may become doubtful.
 fn doubt(winner: &mut Fit, loser: &Fit) {
     if loser.model == winner.model || loser.verdict == Verdict::Refused {
         return;
@@ -155,11 +155,8 @@ fn doubt(winner: &mut Fit, loser: &Fit) {
     let share = loser.explained / winner.explained;
     if share > ALIKE {
         winner.alike.push(loser.model_name.clone());
-    } else if share > RIVAL && winner.verdict == Verdict::Trusted {
-        winner.verdict = Verdict::Doubtful;
-        winner
-            .reasons
-            .push(format!("model '{}' explains the points nearly as well", loser.model_name));
+    } else {
+        verdict::apply(winner, &VerdictEvent::RivalModel { model: &loser.model_name, share });
     }
 }
 

@@ -1,12 +1,10 @@
-//! Places on the front of a body in; out comes what an adjustment of a robot of few boxes starts
-//! from where a scanner measured them: for tests.
+//! Problems for tests: a robot of few boxes, of whose front a scanner measured some places.
 
 use contract::{MaskId, OneByOne, Region, ScanId, View};
 use geometry::{Aabb, Point, Pose};
 
-use crate::adjust::State;
-use crate::beam::Hypothesis;
-use crate::refine::Refine;
+use crate::problem::{AdjustState, Problem};
+use crate::state::Hypothesis;
 use crate::{Prepared, Scene, Settings};
 
 /// A chain of boxes about their joints: name, kind of the joint to the link before, and size, place
@@ -67,14 +65,14 @@ fn wrist() -> robot::Model {
 pub(crate) fn before_plate(
     places: &[[f64; 2]],
     posture: [f64; 2],
-    look: impl Fn(&Refine<'_>, &State),
+    look: impl Fn(&Problem<'_>, &AdjustState),
 ) {
     let places = places.iter().map(|[y, z]| (Point::new(0.6, *y, *z), 0.0));
     measured(&wrist(), places, &posture, look);
 }
 
 /// A foot, a plate that turns before it and a jaw that slides on that; nothing of them is measured.
-pub(crate) fn with_jaw(look: impl Fn(&Refine<'_>, &State)) {
+pub(crate) fn with_jaw(look: impl Fn(&Problem<'_>, &AdjustState)) {
     let (foot, plate, jaw) = ([0.2; 3], [0.02, 0.1, 0.1], [0.02; 3]);
     let model = boxes(&[
         ("foot", "", [foot, [0.0; 3], [0.0; 3]]),
@@ -85,14 +83,14 @@ pub(crate) fn with_jaw(look: impl Fn(&Refine<'_>, &State)) {
 }
 
 /// The cubes, and a scanner 3 m before the front (x = 0.1) that measured these places of it (y, z).
-pub(crate) fn before_front(places: &[[f64; 2]], look: impl Fn(&Refine<'_>, &State)) {
+pub(crate) fn before_front(places: &[[f64; 2]], look: impl Fn(&Problem<'_>, &AdjustState)) {
     seen(places.iter().map(|[y, z]| (*y, *z, 0.0)), look);
 }
 
 /// The same with ranges off by so much, metres.
 pub(crate) fn seen(
     places: impl Iterator<Item = (f64, f64, f64)>,
-    look: impl Fn(&Refine<'_>, &State),
+    look: impl Fn(&Problem<'_>, &AdjustState),
 ) {
     measured(&cubes(), places.map(|(y, z, off)| (Point::new(0.1, y, z), off)), &[0.0], look);
 }
@@ -101,7 +99,7 @@ fn measured(
     model: &robot::Model,
     places: impl Iterator<Item = (Point, f64)>,
     posture: &[f64],
-    look: impl Fn(&Refine<'_>, &State),
+    look: impl Fn(&Problem<'_>, &AdjustState),
 ) {
     let prepared = Prepared::new(0, model, &OneByOne);
     prepared.make_triangles(&OneByOne);
@@ -122,8 +120,7 @@ fn measured(
     let region = Region { origin: Point::origin(), bounds: Aabb::EMPTY };
     let (views, settings) = ([view], Settings::default());
     let scene = Scene::new(&region, &views, &[], &settings, &OneByOne);
-    let refine = Refine { prepared: &prepared, scene: &scene, settings: &settings, prior: None };
-    let hypothesis =
-        Hypothesis { local_from_base: Pose::identity(), posture: posture.to_vec(), score: 0.0 };
-    look(&refine, &State::at(&hypothesis, &scene));
+    let problem = Problem::new(&prepared, &scene, &settings, &OneByOne);
+    let hypothesis = Hypothesis::at(Pose::identity(), posture.to_vec());
+    look(&problem, &AdjustState::at(&hypothesis, &scene));
 }

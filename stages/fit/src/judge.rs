@@ -4,8 +4,8 @@
 use contract::LinkEvidence;
 use geometry::{Point, Probe};
 
-use crate::beam::Hypothesis;
-use crate::refine::Refine;
+use crate::problem::Problem;
+use crate::state::Hypothesis;
 use crate::{Prepared, Scene, Settings};
 
 /// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans'
@@ -30,9 +30,9 @@ pub(crate) struct Judgement {
 }
 
 /// The judgement with the tolerance that the scans' noise asks for.
-pub(crate) fn judged(refine: &Refine<'_>, h: &Hypothesis) -> Judgement {
-    let tolerance = (4.0 * refine.scene.noise).clamp(TOLERANCE.0, TOLERANCE.1);
-    judge(refine.prepared, refine.scene, refine.settings, h, tolerance)
+pub(crate) fn judged(problem: &Problem<'_>, h: &Hypothesis) -> Judgement {
+    let tolerance = (4.0 * problem.scene.noise).clamp(TOLERANCE.0, TOLERANCE.1);
+    judge(problem.prepared, problem.scene, problem.settings, h, tolerance)
 }
 
 /// Judges a posture to within `tolerance` metres.

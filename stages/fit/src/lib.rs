@@ -1,67 +1,72 @@
-//! A candidate in, a fit out: which posture, where exactly, how sure.
+//! Fits a robot model to the scans of a region: base pose, posture, covariance and verdict.
 //!
-//! The way: beam search over the joints on the depth images (`beam`), joint Gauss–Newton over base
-//! and all joints on the points (`refine`), evidence and covariance (`judge`, `report`), verdict in
-//! words (`verdict`), and the choice among candidates that claim the same points (`choose`). Method
-//! and maths: METHOD.md §8–§14. Beside it stands the method of the source (METHOD.md §10, §21),
-//! link after link (`paper`).
+//! [`fit`] runs through five phases, each of which reads what the one before returned: a beam
+//! search over the joints on depth images (`search`), Gauss–Newton over base and joints on thinned
+//! points (`refine`), one adjustment of base, joints and scan errors on many points (`adjust`), all
+//! other postures that explain the points as well (`modes`), and the report with its verdict
+//! (`assess`). `solve.rs` holds their order and every loop over alternatives. Below all phases lie
+//! what they share: the model made ready (`model`), the region (`scene`), what is asked
+//! (`problem`), a posture and the errors of scans (`state`), and which point belongs to which
+//! surface (`correspond`).
+//!
+//! Beside it stand the fit of tools ([`fit_tool`]), the places of joints on their links
+//! ([`calibrate()`]), scans in which a robot stands differently ([`stays`](fn@stays)), the choice
+//! among fits that claim the same points ([`choose`](fn@choose)), and the common adjustment of all
+//! robots ([`together`]). Method and maths: METHOD.md §8–§18.
+//!
+//! Lengths are metres, angles radians. `world_from_base` takes base to world coordinates.
+//!
+//! ```
+//! use contract::{Candidate, Fit, InstallationPlane, OneByOne, Region, View};
+//! use fit::{Prepared, Scene, Settings};
+//!
+//! /// The fit of a model where it may stand, by the views of a region with these planes;
+//! /// `None` where nothing that was measured comes near the model.
+//! fn fit_there(
+//!     candidate: &Candidate,
+//!     model: &robot::Model,
+//!     region: &Region,
+//!     views: &[View],
+//!     planes: &[InstallationPlane],
+//! ) -> Option<Fit> {
+//!     let settings = Settings::default();
+//!     let prepared = Prepared::new(candidate.model, model, &OneByOne);
+//!     let scene = Scene::new(region, views, planes, &settings, &OneByOne);
+//!     fit::fit(candidate, &prepared, &scene, &settings, &OneByOne)
+//! }
+//! ```
 #![forbid(unsafe_code)]
 
 mod adjust;
-mod alternatives;
-mod beam;
-mod bend;
-mod branch;
+mod assess;
 mod calibrate;
-mod camera;
 mod choose;
+mod correspond;
 #[cfg(test)]
 mod cubes;
-mod exact;
-mod face;
-mod facets;
-mod foot;
-mod footprint;
 mod judge;
-mod matching;
-mod mount;
-mod noise;
-mod normal;
-mod pairs;
+mod model;
+mod modes;
 pub mod paper;
-mod pierced;
-mod placed;
-mod prepared;
-mod profile;
+mod plant;
+mod problem;
 mod refine;
-mod report;
-mod rivals;
-mod sampled;
 mod scene;
+mod search;
 mod settings;
-mod settle;
 mod solve;
-mod spin;
+mod state;
 mod stays;
-mod strata;
-mod sway;
-mod sweep;
-mod tallies;
-mod together;
 mod tool;
 pub mod turns;
-mod verdict;
-mod weak;
-mod wrist;
+pub mod verdict;
 
 pub use calibrate::{calibrate, combine};
 pub use choose::choose;
-pub use mount::Bolt;
-pub use prepared::Prepared;
+pub use model::Prepared;
+pub use plant::together;
 pub use scene::Scene;
 pub use settings::{Method, Settings};
 pub use solve::{again, converge, fit};
 pub use stays::{Sights, stays};
-pub use together::together;
-pub use tool::{Tooled, bolt, fit_tool, try_tool};
-pub use verdict::is_uncontradicted;
+pub use tool::{Bolt, Tooled, bolt, fit_tool, try_tool};

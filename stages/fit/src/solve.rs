@@ -1,40 +1,70 @@
-//! One candidate in, one fit out: search, refine, judge; or nothing, where no posture explains what
-//! was measured.
+//! The fit of one model to one scene, on one page: search, refine, adjust, ask for other postures,
+//! assess.
+//!
+//! | phase | returns | in |
+//! | --- | --- | --- |
+//! | search the joints with beams | [`Hypothesis`] | `search` |
+//! | refine base and joints on thinned points | [`Refined`] | `refine` |
+//! | adjust base, joints and scans on many points | [`Settled`] | `adjust` |
+//! | find all that explains the points as well | [`Answer`] | `modes` |
+//! | state how well everything is known, and judge | [`Fit`] | `assess` |
+//!
+//! No phase calls an earlier one. Where another posture has to be refined and adjusted in turn, the
+//! loop stands here: [`add_found_beside`] over what a search finds beside the best, [`settle`] over
+//! the modes of leaf joints, [`best_of`] over flipped and bent wrists, [`bend_wrist`] over bends at
+//! an open flange.
 
 use contract::{Candidate, Fan, Fit, OneByOne};
 use geometry::{Point, Pose};
-use nalgebra::Translation3;
 
-use crate::beam::{Beam, Hypothesis};
-use crate::branch::branches;
-use crate::judge::{Judgement, judge, judged};
-use crate::refine::{COARSE_ROUNDS, FINE_ROUNDS, N_LAST_ROUNDS, NEAR_ROUNDS, Prior, Refine, Round};
-use crate::report::refused;
-use crate::rivals::best_of;
-use crate::settle::{finish, settle};
-use crate::strata::some;
-use crate::verdict::is_lost;
+use crate::adjust::{Adjust, on_whole_beams};
+use crate::assess::{refused, report};
+use crate::calibrate::doubt_places;
+use crate::correspond::{AdjustPoints, adjusted_points};
+use crate::judge::{Judgement, judged};
+use crate::modes::{
+    Answer, MODES, OtherEnd, OtherLoops, Settled, WristModes, ahead, bends, better_leaves,
+    close_rivals, gain, is_on_its_way, leaf_modes, other_loops, slides,
+};
+use crate::problem::{Prior, Problem, SweepSteps};
+use crate::refine::{COARSE_ROUNDS, Refined, approach, best_first, coarse, polish, polish_near};
+use crate::search::BeamSearch;
+use crate::state::Hypothesis;
+use crate::verdict::{self, is_lost};
 use crate::{Prepared, Scene, Settings};
 
-/// Gate of the last rounds in multiples of the noise found, and its bounds, metres.
-const LAST_GATE: (f64, f64, f64) = (4.5, 0.008, 0.025);
+/// Score of the best posture so far below which no other wrist makes it a robot.
+///
+/// Of 250 robots among clutter, behind fences, with noise of 10 mm, none had less than 0.58 after
+/// the quick look; one whose balancer its model has fixed had 0.47; half of what small arms find in
+/// clutter has less than 0.45. An arm in a depth camera's cloud had 0.33, thirteen other places of
+/// that cloud at most 0.22.
+struct HopelessScore {
+    /// Where beams of scanners tell.
+    scanner: f64,
+    /// Where beams are a depth camera's, which bends surfaces.
+    camera: f64,
+    /// Where only points tell.
+    points: f64,
+}
 
-/// Score of the best posture so far below which no other wrist makes it a robot: where beams tell,
-/// where they are a camera's, which bends surfaces, and where only points do. Of 250 robots among
-/// clutter, behind fences, with noise of 10 mm, none had less than 0.58 after the quick look; one
-/// whose balancer its model has fixed had 0.47; half of what small arms find in clutter
-/// has less than 0.45. An arm in a depth camera's cloud had 0.33, thirteen
-/// other places of that cloud at most 0.22.
-const HOPELESS_SCORE: [f64; 3] = [0.45, 0.25, 0.1];
-/// How far beyond its reach points may still be the robot's, metres: an error of the base.
-pub(crate) const NEAR_MARGIN: f64 = 0.15;
-/// Points of a link in the coarse rounds: enough to hold its pose to a millimetre.
-const COARSE_CAP: usize = 600;
-/// Points that are looked at for those, thinned evenly.
-const COARSE_NEAR: usize = 30_000;
-/// Distance from the roughly placed links within which points take part in the fine rounds, metres:
-/// just inside the reach of the fine field.
-const FINE_GATE: f64 = 0.0255;
+const HOPELESS_SCORE: HopelessScore = HopelessScore { scanner: 0.45, camera: 0.25, points: 0.1 };
+/// Score of a base from which on the full search is made at once.
+const CLEAR_BASE: f64 = 0.35;
+/// Hypotheses of a quick look: kept at each joint, settled, and refined.
+const QUICK_BEAM: usize = 25;
+const QUICK_SETTLED: usize = 8;
+const QUICK_REFINED: usize = 3;
+/// Most rounds in which the best one's wrist is flipped and bent, where another takes its place.
+const N_WRIST_ROUNDS: usize = 3;
+/// Most times that the wrist of the answer is bent.
+const N_BENDS: usize = 2;
+/// One point of so many of the last adjustment is enough to choose what it is made of, where that
+/// is more than links have at least.
+const SETTLED_PART: usize = 30;
+/// The same of depth cameras, whose errors are alike over a hand's width: a wrist in eight views
+/// was lost with fewer points.
+const SETTLED_PART_OF_CAMERAS: usize = 15;
 
 /// Fits the candidate's model in the scene; `None` where nothing comes near.
 #[must_use]
@@ -48,39 +78,45 @@ pub fn fit(
     let local_from_world = scene.world_from_local().inverse();
     let bases: Vec<Pose> =
         candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
-    let prior = Some(prior(candidate, &local_from_world, settings));
-    let refine = Refine { prepared, scene, settings, prior };
     let base = bases.first().map_or_else(Point::origin, |b| Point::from(b.translation.vector));
-    let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
+    let nearby = scene.nearby(prepared, &base);
+    let prior = Some(Prior::of(candidate, &local_from_world, settings));
+    let plain = Problem::new(prepared, scene, settings, fan).with_points(&nearby);
+    let problem = Problem { prior, ..plain };
     let is_clear = candidate.bases.first().is_some_and(|b| b.1 >= CLEAR_BASE);
-    if !is_clear && !is_promising(&refine, &bases, &near, fan) {
+    if !is_clear && !is_promising(&problem, &bases) {
         return None;
     }
-    let beam = Beam::new(prepared, scene, settings);
-    let closer = beam.fitted();
-    let found = beam.run(&bases, fan);
-    let refined = rough(&beam, &refine, found, &near, fan);
-    let mut polished = fan.fan(refined, |h| polish(&refine, &h, &near, fan));
-    sort(&mut polished);
-    look_beside(&closer, &refine, &mut polished, &near, fan)?;
-    let (best, judgement) = polished.first()?;
-    if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
+    fit_from(&problem, &bases)
+}
+
+/// The phases in their order, from base poses in the local frame.
+fn fit_from(problem: &Problem<'_>, bases: &[Pose]) -> Option<Fit> {
+    let search = BeamSearch::new(problem);
+    let found = coarsely(problem, &search, bases);
+    let mut refined = problem.fan.fan(found, |h| polish(problem, &h));
+    best_first(&mut refined);
+    let closer = search.fitted();
+    add_found_beside(problem, &closer, &mut refined)?;
+    let best = refined.first()?;
+    if !is_reported(&best.judgement, problem.settings) {
         return None;
     }
-    let best = settle(&refine, best, (&near, &all), fan);
-    if is_lost(&best.0, scene) {
-        return Some(refused(&refine, &best.0, &best.1));
+    let best = settle(problem, &best.hypothesis);
+    if is_lost(&best.adjusted, problem.scene) {
+        return Some(refused(problem, &best.adjusted, &best.judgement));
     }
-    let best = best_of(&closer, &refine, best, &mut polished, (&near, &all), fan);
-    let other = branches(&refine, &best.0.hypothesis, &best.1, &near);
-    let Some((loops, model)) = other else {
-        return Some(finish(&refine, best, &polished, (&near, &all), fan));
-    };
-    let own = prepared.moved(&model);
-    let refine = Refine { prepared: &own, ..refine };
-    let best = settle(&refine, &best.0.hypothesis, (&near, &all), fan);
-    let fit = finish(&refine, best, &polished, (&near, &all), fan);
-    Some(Fit { other_branches: loops, ..fit })
+    let best = best_of(problem, &closer, best, &mut refined);
+    match other_loops(problem, &best.adjusted.hypothesis, &best.judgement) {
+        None => Some(finish(problem, best, &refined)),
+        Some(OtherLoops { loops, model }) => {
+            let own = problem.prepared.moved(&model);
+            let problem = Problem { prepared: &own, ..*problem };
+            let best = settle(&problem, &best.adjusted.hypothesis);
+            let fit = finish(&problem, best, &refined);
+            Some(Fit { other_branches: loops, ..fit })
+        }
+    }
 }
 
 /// The fit of a robot that stands where an earlier one had it, or near enough for the refinement;
@@ -93,59 +129,19 @@ pub fn again(
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Option<Fit> {
-    let refine = Refine { prepared, scene, settings, prior: None };
-    let start = Hypothesis {
-        local_from_base: scene.world_from_local().inverse() * before.world_from_base,
-        posture: before.joints.iter().map(|joint| joint.value).collect(),
-        score: 0.0,
-    };
-    let base = Point::from(start.local_from_base.translation.vector);
-    let [near, all] = scene.within(&base, prepared.reach + NEAR_MARGIN);
-    let polished = polish(&refine, &roughly(&refine, &start, &near, NEAR_ROUNDS, fan), &near, fan);
-    if polished.1.score < settings.min_score || polished.1.violation > settings.max_violation {
+    let posture = before.joints.iter().map(|joint| joint.value).collect();
+    let start = scene.hypothesis(&before.world_from_base, posture);
+    let nearby = scene.nearby(prepared, &Point::from(start.local_from_base.translation.vector));
+    let problem = Problem::new(prepared, scene, settings, fan).with_points(&nearby);
+    let refined = polish_near(&problem, &start);
+    if !is_reported(&refined.judgement, settings) {
         return None;
     }
-    let best = settle(&refine, &polished.0, (&near, &all), fan);
-    let fit = finish(&refine, best, &[polished], (&near, &all), fan);
+    let best = settle(&problem, &refined.hypothesis);
+    let fit = finish(&problem, best, &[refined]);
     // `prepared` is of the model with all that.
     let (tool, other_branches) = (before.tool.clone(), before.other_branches.clone());
     Some(Fit { tool, other_branches, calibration: before.calibration.clone(), ..fit })
-}
-
-/// Score of a base from which on the search is made at once.
-const CLEAR_BASE: f64 = 0.35;
-/// Hypotheses of a quick look, and of those that are settled and refined.
-const QUICK: [usize; 3] = [25, 8, 3];
-
-/// Whether anything like the robot's arm stands on one of the bases. A right one may end with a
-/// wrong wrist in a quick look, but not without shoulder and elbow.
-fn is_promising(refine: &Refine<'_>, bases: &[Pose], near: &[u32], fan: &dyn Fan) -> bool {
-    let found = quick(refine, bases, near, fan);
-    found.is_some_and(|found| found.1.score >= hopeless(refine.scene))
-}
-
-/// A quick look with few hypotheses: the best posture.
-pub(crate) fn quick(
-    refine: &Refine<'_>,
-    bases: &[Pose],
-    near: &[u32],
-    fan: &dyn Fan,
-) -> Option<Polished> {
-    let [beam, settle, n_refine] = QUICK;
-    let quick = Settings { beam, settle, n_refine, n_polish: 1, ..refine.settings.clone() };
-    let search = Beam::new(refine.prepared, refine.scene, &quick);
-    let refine = Refine { settings: &quick, prior: refine.prior, ..*refine };
-    let best = rough(&search, &refine, search.run(bases, fan), near, fan).into_iter().next();
-    best.map(|h| polish(&refine, &h, near, fan))
-}
-
-fn hopeless(scene: &Scene<'_>) -> f64 {
-    let [scanner, camera, points] = HOPELESS_SCORE;
-    match (scene.evidence.has_beams(), scene.has_camera()) {
-        (true, false) => scanner,
-        (true, true) => camera,
-        (false, _) => points,
-    }
 }
 
 /// Where the refinement alone ends from a base (world) and a posture near the truth, without any
@@ -157,146 +153,215 @@ pub fn converge(
     settings: &Settings,
     (world_from_base, posture): (&Pose, &[f64]),
 ) -> (Pose, Vec<f64>) {
-    let world_from_local = scene.world_from_local();
-    let refine = Refine { prepared, scene, settings, prior: None };
-    let h = Hypothesis {
-        local_from_base: world_from_local.inverse() * world_from_base,
-        posture: posture.to_vec(),
-        score: 0.0,
+    let start = scene.hypothesis(world_from_base, posture.to_vec());
+    let nearby = scene.nearby(prepared, &Point::from(start.local_from_base.translation.vector));
+    let problem = Problem::new(prepared, scene, settings, &OneByOne).with_points(&nearby);
+    let end = polish(&problem, &approach(&problem, &start, &COARSE_ROUNDS)).hypothesis;
+    (scene.world_from_local() * end.local_from_base, end.posture)
+}
+
+/// Whether what the beams say of a posture is worth a report.
+fn is_reported(judgement: &Judgement, settings: &Settings) -> bool {
+    judgement.score >= settings.min_score && judgement.violation <= settings.max_violation
+}
+
+/// Whether anything like the robot's arm stands on one of the bases. A right one may end with a
+/// wrong wrist in a quick look, but not without shoulder and elbow.
+fn is_promising(problem: &Problem<'_>, bases: &[Pose]) -> bool {
+    let found = quick(problem, bases);
+    found.is_some_and(|found| found.judgement.score >= hopeless(problem.scene))
+}
+
+fn hopeless(scene: &Scene<'_>) -> f64 {
+    match (scene.evidence.has_beams(), scene.has_camera()) {
+        (true, false) => HOPELESS_SCORE.scanner,
+        (true, true) => HOPELESS_SCORE.camera,
+        (false, _) => HOPELESS_SCORE.points,
+    }
+}
+
+/// A quick look with few hypotheses: the best posture.
+pub(crate) fn quick(problem: &Problem<'_>, bases: &[Pose]) -> Option<Refined> {
+    let settings = Settings {
+        beam: QUICK_BEAM,
+        settle: QUICK_SETTLED,
+        n_refine: QUICK_REFINED,
+        n_polish: 1,
+        ..problem.settings.clone()
     };
-    let base = Point::from(h.local_from_base.translation.vector);
-    let [near, _] = scene.within(&base, prepared.reach + NEAR_MARGIN);
-    let (end, _) =
-        polish(&refine, &roughly(&refine, &h, &near, &COARSE_ROUNDS, &OneByOne), &near, &OneByOne);
-    (world_from_local * end.local_from_base, end.posture)
+    let problem = Problem { settings: &settings, ..*problem };
+    let best = coarsely(&problem, &BeamSearch::new(&problem), bases).into_iter().next();
+    best.map(|h| polish(&problem, &h))
 }
 
-/// What is looked for beside a polished posture.
-enum Look {
-    /// Links that the beams contradict, anew.
-    Again,
-    /// Other postures that may explain as much.
-    Others,
+/// The search over some bases, and coarse rounds for the best that it finds.
+fn coarsely(problem: &Problem<'_>, search: &BeamSearch<'_>, bases: &[Pose]) -> Vec<Hypothesis> {
+    let found = search.varied(search.run(bases), problem.settings.n_refine);
+    coarse(problem, &search.steps, found)
 }
 
-/// Adds what is found beside the best of some postures, best first; `None` where it is too poor for
-/// a robot.
-fn look_beside(
-    beam: &Beam<'_>,
-    refine: &Refine<'_>,
-    polished: &mut Vec<Polished>,
-    near: &[u32],
-    fan: &dyn Fan,
+/// Adds what a search finds beside the best of some postures, best first: links that the beams
+/// contradict, anew; then other postures that may explain as much. `None` where the best is too
+/// poor for a robot.
+fn add_found_beside(
+    problem: &Problem<'_>,
+    search: &BeamSearch<'_>,
+    refined: &mut Vec<Refined>,
 ) -> Option<()> {
-    for look in [Look::Again, Look::Others] {
-        let Some((best, judgement)) = polished.first() else { break };
-        if judgement.score < hopeless(refine.scene) {
+    for is_contradicted in [true, false] {
+        let Some(best) = refined.first() else { break };
+        if best.judgement.score < hopeless(problem.scene) {
             return None;
         }
-        let more = match look {
-            Look::Again => beam.again(best, judgement, fan),
-            Look::Others => beam.alternatives(best, fan),
+        let more = match is_contradicted {
+            true => search.again(&best.hypothesis, &best.judgement),
+            false => search.alternatives(&best.hypothesis),
         };
-        polished.extend(fan.fan(more, |h| {
+        refined.extend(problem.fan.fan(more, |h| match is_contradicted {
+            true => polish_near(problem, &h),
             // One joint of a fitted arm swept to a peak is less than a step off: what hangs beside
             // its link must not draw it away within the gates of the coarse rounds.
-            let start = match look {
-                Look::Again => roughly(refine, &h, near, NEAR_ROUNDS, fan),
-                Look::Others => h,
-            };
-            polish(refine, &start, near, fan)
+            false => polish(problem, &h),
         }));
-        sort(polished);
+        best_first(refined);
     }
     Some(())
 }
 
-fn sort(polished: &mut [Polished]) {
-    polished.sort_by(|a, b| b.1.explained.total_cmp(&a.1.explained));
+/// Adjusts a posture; where another value of its leaf joints fits the points better, that one.
+pub(crate) fn settle(problem: &Problem<'_>, h: &Hypothesis) -> Settled {
+    let Problem { prepared, scene, settings, .. } = *problem;
+    let part = if scene.has_camera() { SETTLED_PART_OF_CAMERAS } else { SETTLED_PART };
+    let mut points = adjusted_points(problem, h, settings.max_points / part);
+    let loose: Vec<usize> = (0..h.posture.len()).filter(|&j| prepared.leaf[j]).collect();
+    let adjust = Adjust::new(problem);
+    let mut best = Adjust { loose: &loose, ..adjust }.run(h, &mut points);
+    let mut leaves = leaf_modes(problem, &best.hypothesis);
+    // The same points of the same links; what is known of the scans stays.
+    let mut state = best.state();
+    let other = better_leaves(&best.hypothesis.posture, &leaves);
+    if let Some(posture) = &other {
+        state.hypothesis.posture.clone_from(posture);
+        leaves.iter().for_each(|s| points.forget(&prepared.carried(s.joint)));
+    }
+    if !loose.is_empty() {
+        best = adjust.run_from(state, &mut points);
+    }
+    if other.is_some() {
+        leaves = leaf_modes(problem, &best.hypothesis);
+    }
+    let judgement = judged(problem, &best.hypothesis);
+    Settled { adjusted: best, judgement, leaves }
 }
 
-/// Coarse rounds for the best of the beam; near twins are dropped.
-fn rough(
-    beam: &Beam<'_>,
-    refine: &Refine<'_>,
-    found: Vec<Hypothesis>,
-    near: &[u32],
-    fan: &dyn Fan,
-) -> Vec<Hypothesis> {
-    let settings = refine.settings;
-    let mut out: Vec<(Hypothesis, f64)> = Vec::new();
-    let last = found.first().map_or(0, |h| h.posture.len().saturating_sub(1));
-    let found = beam.varied(found, settings.n_refine);
-    for h in fan.fan(found, |h| roughly(refine, &h, near, &COARSE_ROUNDS, fan)) {
-        if out.iter().any(|(k, _)| beam.alike(k, &h, last, 0.7)) {
+/// The best of a posture, the others, and what is like it but for its wrist; all the rest joins the
+/// others.
+fn best_of(
+    problem: &Problem<'_>,
+    search: &BeamSearch<'_>,
+    best: Settled,
+    others: &mut Vec<Refined>,
+) -> Settled {
+    let (fan, steps) = (problem.fan, &search.steps);
+    let mut best = best;
+    let mut rivals = close_rivals(problem, steps, others, &best);
+    for _ in 0..N_WRIST_ROUNDS {
+        let before = best.adjusted.hypothesis.clone();
+        rivals.extend(fan.fan(search.flips(&before), |flipped| polish_near(problem, &flipped)));
+        best = better_of(problem, best, rivals, others);
+        let h = &best.adjusted.hypothesis;
+        let mut bent = fan.fan(bends(problem, h), |bent| polish(problem, &bent));
+        bent.extend(slides(problem, h));
+        rivals = close_rivals(problem, steps, &bent, &best);
+        others.extend(bent);
+        best = better_of(problem, best, rivals, others);
+        // What took its place has flips of its own.
+        if is_same_arm(steps, &before, &best.adjusted.hypothesis) {
+            break;
+        }
+        rivals = Vec::new();
+    }
+    best
+}
+
+/// Whether two postures agree in all joints but the last.
+fn is_same_arm(steps: &SweepSteps<'_>, before: &Hypothesis, after: &Hypothesis) -> bool {
+    let last = before.posture.len().saturating_sub(2);
+    steps.alike(before, after, last, MODES.rival.same_steps)
+}
+
+/// The best of a posture and its rivals, each adjusted; all the rest joins the others.
+fn better_of(
+    problem: &Problem<'_>,
+    mut best: Settled,
+    rivals: Vec<Refined>,
+    others: &mut Vec<Refined>,
+) -> Settled {
+    for rival in rivals {
+        let explained = best.judgement.explained;
+        if rival.judgement.explained < explained - MODES.rival.flip_short * explained.abs() {
+            others.push(rival);
             continue;
         }
-        let judgement = judge(refine.prepared, refine.scene, settings, &h, 0.03);
-        out.push((h, judgement.explained));
+        let mut other = settle(problem, &rival.hypothesis);
+        if ahead(problem, &best, &other.refined()) < 0.0 {
+            std::mem::swap(&mut best, &mut other);
+        }
+        others.push(other.refined());
     }
-    out.sort_by(|a, b| b.1.total_cmp(&a.1));
-    out.truncate(settings.n_polish);
-    out.into_iter().map(|(h, _)| h).collect()
+    best
 }
 
-/// Coarse rounds on few points of each link.
-pub(crate) fn roughly(
-    refine: &Refine<'_>,
-    h: &Hypothesis,
-    near: &[u32],
-    rounds: &[Round],
-    fan: &dyn Fan,
-) -> Hypothesis {
-    let few = refine.stratified(h, &some(near, COARSE_NEAR), (rounds[0].gate, COARSE_CAP), fan);
-    refine.run(h, &few, rounds, fan)
+/// The answer on all points that pay, with all that explains them about as well, as it is reported.
+pub(crate) fn finish(problem: &Problem<'_>, mut best: Settled, others: &[Refined]) -> Fit {
+    let mut points = sharpen(problem, &mut best);
+    let wrist = bend_wrist(problem, &mut best, &mut points);
+    let misfits = doubt_places(problem, &mut best);
+    let h = &best.adjusted.hypothesis;
+    let at_rest = |other: &Refined| match is_on_its_way(problem, h, &other.hypothesis) {
+        true => settle(problem, &other.hypothesis).refined(),
+        false => other.clone(),
+    };
+    let others = problem.fan.fan(others.iter().collect(), at_rest);
+    let mut fit = report(problem, &Answer { best, points, wrist, others });
+    verdict::note(&mut fit, misfits);
+    fit
 }
 
-/// Points of a link in the fine rounds: enough to hold its pose to a fifth of a millimetre, which
-/// tells hypotheses apart.
-const POLISH_CAP: usize = 1000;
-/// Points that are looked at for those, thinned evenly.
-const POLISH_NEAR: usize = 60_000;
-
-/// A posture on thinned points, with what the beams say of it.
-pub(crate) type Polished = (Hypothesis, Judgement);
-
-/// Fine rounds, then the judgement.
-pub(crate) fn polish(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> Polished {
-    let h = fine(refine, h, near, fan);
-    let judgement = judged(refine, &h);
-    (h, judgement)
+/// Adjusts the answer once more, on as many points as pay: only what is reported is worth them, not
+/// what it is chosen from. Those points.
+fn sharpen(problem: &Problem<'_>, best: &mut Settled) -> AdjustPoints {
+    let state = best.adjusted.state();
+    let points = adjusted_points(problem, &state.hypothesis, problem.settings.max_points);
+    let open = best.open_leaves();
+    let mut points = on_whole_beams(problem, &state, &open, points);
+    // An open flange need not come to rest.
+    let adjust = Adjust { loose: &open, ..Adjust::new(problem) };
+    best.adjusted = adjust.run_from(state.with_open_smoothness(), &mut points);
+    best.judgement = judged(problem, &best.adjusted.hypothesis);
+    points
 }
 
-/// Fine rounds on thinned points, with the gate that the noise asks for.
-pub(crate) fn fine(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> Hypothesis {
-    fine_on(refine, h, &few(refine, h, near, fan), fan)
-}
-
-/// Points for that.
-fn few(refine: &Refine<'_>, h: &Hypothesis, near: &[u32], fan: &dyn Fan) -> Vec<u32> {
-    refine.stratified(h, &some(near, POLISH_NEAR), (FINE_GATE, POLISH_CAP), fan)
-}
-
-/// The same on points that are chosen.
-fn fine_on(refine: &Refine<'_>, h: &Hypothesis, few: &[u32], fan: &dyn Fan) -> Hypothesis {
-    let h = refine.run(h, few, &FINE_ROUNDS, fan);
-    refine.run(&h, few, &last_rounds(refine, &h, few), fan)
-}
-
-/// The rounds that end at a posture, from one that is nearly it: with the gate that the noise there
-/// asks for.
-fn last_rounds(refine: &Refine<'_>, h: &Hypothesis, few: &[u32]) -> Vec<Round> {
-    let gate = (LAST_GATE.0 * refine.noise(h, few, 0.022)).clamp(LAST_GATE.1, LAST_GATE.2);
-    vec![Round { gate, balanced: false }; N_LAST_ROUNDS]
-}
-
-/// The installation plane, at the height of the base's origin.
-fn prior(candidate: &Candidate, local_from_world: &Pose, settings: &Settings) -> Prior {
-    // The candidate's bases already stand on the plane: the first one tells the height of the
-    // origin above it.
-    let base = candidate.bases.first().map_or_else(Pose::identity, |b| local_from_world * b.0);
-    let (at, turn) = (Translation3::from(base.translation.vector), candidate.plane.plane.frame());
-    let is_guess = candidate.plane.is_guess();
-    let sigma = if is_guess { settings.guess_sigma } else { settings.plane_sigma };
-    Prior { local_from_plane: Pose::from_parts(at, turn), sigma }
+/// Bends the wrist of the answer to where the points fit best; how well they fit at other bends,
+/// where that is asked.
+fn bend_wrist(
+    problem: &Problem<'_>,
+    best: &mut Settled,
+    points: &mut AdjustPoints,
+) -> Option<WristModes> {
+    for _ in 0..N_BENDS {
+        let state = best.adjusted.state();
+        let wrist = WristModes::of(problem, &best.adjusted, &best.leaves, points)?;
+        let Some(start) = wrist.better(&state.hypothesis) else { return Some(wrist) };
+        let mut other = best.clone();
+        other.adjusted.hypothesis = start;
+        let others = sharpen(problem, &mut other);
+        let end = OtherEnd { hypothesis: &other.adjusted.hypothesis, points: &others };
+        if gain(problem, &state, points, &end, wrist.joint) <= 0.0 {
+            return Some(wrist);
+        }
+        other.leaves = leaf_modes(problem, &other.adjusted.hypothesis);
+        (*best, *points) = (other, others);
+    }
+    WristModes::of(problem, &best.adjusted, &best.leaves, points)
 }

@@ -3,13 +3,14 @@
 //! stations.
 
 use contract::words::count;
-use contract::{Candidate, Fan, Fit, InstallationPlane, Region, Verdict, View};
+use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Verdict, View};
 use geometry::{Point, Pose};
 
-use crate::beam::Hypothesis;
 use crate::judge::judged;
-use crate::refine::Refine;
-use crate::solve::{NEAR_MARGIN, fit, quick};
+use crate::problem::Problem;
+use crate::solve::{fit, quick};
+use crate::state::Hypothesis;
+use crate::verdict::{self, MIN_AGREEING, VerdictEvent};
 use crate::{Prepared, Scene, Settings};
 
 /// Share of a scan's judged surface of the moving links, explained less contradicted, from which on
@@ -19,8 +20,6 @@ const AGREES: f64 = 0.35;
 const MIN_JUDGED: f64 = 0.03;
 /// Most postures of one robot that are told apart.
 const MAX_STAYS: usize = 4;
-/// Scans that must agree on a posture for it to be trusted.
-const MIN_AGREEING: usize = 2;
 
 /// What is seen of a region, scan by scan.
 #[derive(Debug, Clone, Copy)]
@@ -78,10 +77,7 @@ pub fn stays(
             }
             continue;
         };
-        if own.len() < MIN_AGREEING {
-            found.verdict = Verdict::Doubtful;
-            found.reasons.push("only one scan shows this posture".into());
-        }
+        verdict::apply(&mut found, &VerdictEvent::ScansAgree(own.len()));
         found.stands_in = views.iter().map(|v| v.scan).collect();
         // It did not move its base.
         candidate.bases = vec![(found.world_from_base, candidate.bases[0].1)];
@@ -118,16 +114,15 @@ fn together(
     });
     let mut first = fits.next()?;
     first.stays = fits.collect();
-    if n_silent > 0 {
-        first.reasons.push(format!(
-            "in {} it stands in no posture that was found",
-            count(n_silent as u64, "scan")
-        ));
-    }
-    first.reasons.push(match first.stays.len() {
+    let silent = (n_silent > 0).then(|| {
+        let scans = count(n_silent as u64, "scan");
+        format!("in {scans} it stands in no posture that was found")
+    });
+    let moved = match first.stays.len() {
         0 => "scans contradict one another about it: some of them bear this posture out".into(),
         n => format!("it moved between scans: {} postures", 1 + n),
-    });
+    };
+    verdict::note(&mut first, silent.into_iter().chain([moved]));
     Some(first)
 }
 
@@ -158,17 +153,16 @@ impl<'a> Single<'a> {
         let bases: Vec<Pose> =
             candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();
         let base = bases.first().map_or_else(Point::origin, |b| b.translation.vector.into());
-        let [near, _] = scene.within(&base, prepared.reach + NEAR_MARGIN);
-        let refine = Refine { prepared, scene: &scene, settings, prior: None };
-        let found = quick(&refine, &bases, &near, fan).map(|(h, _)| h);
+        let nearby = scene.nearby(prepared, &base);
+        let problem = Problem::new(prepared, &scene, settings, fan).with_points(&nearby);
+        let found = quick(&problem, &bases).map(|found| found.hypothesis);
         Self { view, scene, found }
     }
 
     /// What this scan says of a posture: explained less contradicted, judged and whole surface of
     /// the moving links, m².
     fn says(&self, h: &Hypothesis, prepared: &Prepared<'_>, settings: &Settings) -> [f64; 3] {
-        let refine = Refine { prepared, scene: &self.scene, settings, prior: None };
-        let judgement = judged(&refine, h);
+        let judgement = judged(&Problem::new(prepared, &self.scene, settings, &OneByOne), h);
         let moving = (0..prepared.links.len()).filter(|l| !prepared.fixed.contains(l));
         moving.fold([0.0; 3], |sum, l| {
             let [net, judged] = judgement.links[l];

@@ -2,7 +2,7 @@
 
 use crate::Settings;
 use crate::field::{FIELD_REACH, Field};
-use contract::{Fan, Fit, ScanId, Verdict};
+use contract::{Fan, Fit, ScanId};
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::{DMatrix, DVector};
 use robot::{Kinematics, Model};
@@ -72,7 +72,7 @@ pub(crate) fn bodies(
     let used = all.filter_map(|(robot, fit)| {
         // Labels hold a robot as i16.
         let (robot, model) = (i16::try_from(robot).ok()?, models.get(fit.model)?);
-        let is_used = fit.verdict != Verdict::Refused && fit.joints.len() == model.free.len();
+        let is_used = fit.gives_labels() && fit.joints.len() == model.free.len();
         is_used.then_some((robot.unsigned_abs(), fit, model))
     });
     let used: Vec<(u16, &Fit, &Model)> = used.collect();

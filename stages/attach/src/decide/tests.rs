@@ -1,7 +1,7 @@
 //! Hoses, tools, workpieces and walls beside a two-link robot.
 
 use super::*;
-use contract::JointFit;
+use contract::{JointFit, Verdict};
 use geometry::{Aabb, Pose, Vector};
 use robot::{Joint, JointKind, Link, Motion, Role};
 use std::sync::Arc;

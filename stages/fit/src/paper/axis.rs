@@ -6,7 +6,7 @@ use robot::JointKind;
 
 use super::Paper;
 use super::sparse::rigid;
-use crate::beam::Hypothesis;
+use crate::state::Hypothesis;
 
 /// Most points of a registration.
 const MAX_POINTS: usize = 12_000;

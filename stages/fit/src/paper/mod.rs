@@ -16,14 +16,15 @@ mod settings;
 mod sparse;
 mod sweep;
 
-use contract::{Fit, InstallationPlane, JointFit, Verdict};
+use contract::{Fit, InstallationPlane, JointFit};
 use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 
 pub use settings::Settings as PaperSettings;
 
-use crate::beam::Hypothesis;
 use crate::judge::{evidence, judge};
+use crate::state::Hypothesis;
+use crate::verdict::{self, VerdictEvent};
 use crate::{Prepared, Scene, Settings};
 use lattice::Lattices;
 
@@ -179,7 +180,7 @@ impl Paper<'_> {
         let none = vec![0; model.links.len()];
         let rms = vec![0.0; model.links.len()];
         let origin = Translation3::from(self.scene.region.origin.coords);
-        Some(Fit {
+        let mut fit = Fit {
             model: self.prepared.index,
             model_name: model.name.clone(),
             world_from_base: Pose::from_parts(origin, UnitQuaternion::identity()) * base,
@@ -189,9 +190,9 @@ impl Paper<'_> {
             explained: judgement.explained,
             links: evidence(self.prepared, &judgement, &none, &rms),
             rough,
-            verdict: Verdict::Doubtful,
-            reasons: vec!["the source's method says nothing of how sure it is".into()],
             ..Fit::default()
-        })
+        };
+        verdict::apply(&mut fit, &VerdictEvent::LinkAfterLink);
+        Some(fit)
     }
 }

@@ -6,7 +6,7 @@ use robot::JointKind;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::Paper;
-use crate::beam::Hypothesis;
+use crate::state::Hypothesis;
 
 /// How closely a link is looked at.
 #[derive(Clone, Copy)]
