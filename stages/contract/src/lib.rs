@@ -1,6 +1,7 @@
-//! The types that stages share: scan, lattice, strip, tile, planes, cluster, candidate, fit, label,
-//! errors, and the two shapes of a step; and how names are quoted and panics caught. How anything
-//! is computed is in `geometry` or in the stage that does it.
+//! The types that stages share (scan, lattice, strip, tile, planes, cluster, candidate, fit, label,
+//! errors), the traits of a step, and helpers to quote names and to catch panics.
+//!
+//! No algorithm is in this crate: those are in `geometry` or in the stage that uses them.
 #![forbid(unsafe_code)]
 
 mod candidate;
