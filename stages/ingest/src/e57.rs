@@ -185,14 +185,14 @@ fn check_header(pages: &mut Pages, settings: &Settings) -> Result<()> {
 fn describe(e: ::e57::Error) -> Error {
     let (kind, what) = match &e {
         ::e57::Error::NotImplemented { .. } => {
-            (Kind::Unsupported, "description of the file holds what is not read")
+            (Kind::Unsupported, "description of the file has unsupported content")
         }
         ::e57::Error::Internal { .. } => {
-            (Kind::BadInput, "description of the file confuses its reader")
+            (Kind::BadInput, "description of the file cannot be parsed")
         }
         _ => (Kind::BadInput, "description of the file is broken"),
     };
-    Error::new(kind, what).because(e).hint("export the file anew")
+    Error::new(kind, what).because(e).hint("export the file again")
 }
 
 /// Units of the file's coordinates, which are metres by the standard; a reference system with

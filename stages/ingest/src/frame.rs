@@ -126,7 +126,7 @@ pub(crate) fn rotation(wxyz: [f64; 4]) -> Result<UnitQuaternion<f64>> {
         return Err(Error::bad_input(format!(
             "rotation of the pose is not a unit quaternion, its length is \"{norm}\""
         ))
-        .hint("mend the pose in the software that wrote the file"));
+        .hint("correct the pose in the software that wrote the file"));
     }
     Ok(UnitQuaternion::from_quaternion(q))
 }

@@ -94,7 +94,7 @@ impl LasHeader {
         header.walk_records(&raw, data)?;
         header.n_points = header.count(&raw, data.len())?;
         if header.n_points > 0 && header.bounds.is_none() {
-            header.notes.push("the stated bounds make no sense and are not used".into());
+            header.notes.push("the stated bounds are not plausible and are not used".into());
         }
         Ok(header)
     }
@@ -223,7 +223,7 @@ impl LasHeader {
                     "{there} points are in the file, stated are only \"{n}\""
                 ))
                 .at("header")
-                .hint("the header lies: export the file again, or put the count right"));
+                .hint("the header is wrong: export the file again, or correct the count"));
             }
             return Ok(n);
         }

@@ -213,7 +213,7 @@ fn check_distance(
     }
     if distance > FAR_SCANNER {
         scan.notes.push(format!(
-            "the scanner lies {distance:.0} m from the middle of the points: is its position in their frame?"
+            "the scanner lies {distance:.0} m from the middle of the points: check that its position is in their frame"
         ));
     }
     Ok(())

@@ -64,7 +64,7 @@ pub(crate) fn refuse(step: f64) -> Result<()> {
         return Ok(());
     }
     let what = format!(
-        "coordinates come in steps of {}: no robot can be told in such points",
+        "coordinates come in steps of {}: no robot can be recognised in such points",
         length(step)
     );
     Err(Error::bad_input(what)

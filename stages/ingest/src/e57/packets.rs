@@ -88,7 +88,7 @@ impl Packets {
         if self.has_bytes(file_offset).unwrap_or(false) {
             return Err(Error::bad_input("no points are announced, but there are some")
                 .at(format!("byte {file_offset}"))
-                .hint("its header lies: export the file anew"));
+                .hint("its header is wrong: export the file again"));
         }
         Ok(self)
     }
@@ -119,7 +119,7 @@ impl Packets {
                 self.end - self.at,
                 self.n_records
             ))
-            .hint("the file is truncated or its header lies: export it anew"));
+            .hint("the file is truncated or its header is wrong: export it again"));
         }
         Ok(())
     }
@@ -141,7 +141,7 @@ impl Packets {
                     self.n_records - self.n_left,
                     self.n_records
                 ))
-                .hint("the file is truncated or its header lies: export it anew"));
+                .hint("the file is truncated or its header is wrong: export it again"));
             }
         }
     }
@@ -204,11 +204,11 @@ impl Packets {
             return Err(Error::new(
                 Kind::Unsupported,
                 format!(
-                    "one field lies farther from the others than is read, bytes \"{MAX_AHEAD}\""
+                    "one field is farther ahead of the others than is supported, bytes \"{MAX_AHEAD}\""
                 ),
             )
             .at(format!("page {}", Pages::page(self.at)))
-            .hint("export the file anew"));
+            .hint("export the file again"));
         }
         Ok(())
     }
@@ -231,7 +231,7 @@ impl Packets {
             self.n_records
         ))
         .at(format!("page {}", Pages::page(self.at.saturating_sub(1))))
-        .hint("the header lies: export the file anew"))
+        .hint("the header is wrong: export the file again"))
     }
 }
 

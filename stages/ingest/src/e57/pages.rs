@@ -112,7 +112,7 @@ impl Pages {
             if crc32c::crc32c(payload).to_be_bytes() != stated {
                 return Err(Error::bad_input("page is damaged, its checksum does not match")
                     .at(format!("page {}", self.first + n))
-                    .hint("copy the file again, or export it anew"));
+                    .hint("copy or export the file again"));
             }
             self.checked.extend_from_slice(payload);
         }

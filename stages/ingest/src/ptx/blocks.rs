@@ -52,7 +52,7 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
             .error(format!(
                 "file is too short for the announced columns and rows, \"{n_cols} x {n_rows}\""
             ))
-            .hint("the file is truncated or its header lies: export it anew"));
+            .hint("the file is truncated or its header is wrong: export it again"));
     };
     let pose = pose(lines, metres, &mut notes)?;
     let points_at = (lines.end(), lines.number());
@@ -62,7 +62,7 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
         if !lines.advance()? {
             return Err(lines
                 .error(format!("scan ends after {n} of its announced points, \"{n_lines}\""))
-                .hint("the file is truncated or its header lies: export it anew"));
+                .hint("the file is truncated or its header is wrong: export it again"));
         }
         if n == 0 {
             n_columns = columns(lines)?;

@@ -48,7 +48,7 @@ pub(crate) fn read(directory: &[u8], doubles: &[u8]) -> Option<Declaration> {
                 Some(unit.into())
             }
             None => {
-                found.remarks.push(format!("the GeoTIFF keys name a unit that is none: {code}"));
+                found.remarks.push(format!("the GeoTIFF keys name an unknown unit: {code}"));
                 None
             }
         },

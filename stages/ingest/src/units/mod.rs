@@ -97,7 +97,7 @@ impl Units {
             }
             Some(Sense::Nothing(name)) => {
                 let name = quote::shown(&name);
-                remarks.push(format!("its {} names a unit that nobody knows: '{name}'", first.by));
+                remarks.push(format!("its {} names a unit that is not known: '{name}'", first.by));
                 None
             }
             None => None,
@@ -209,7 +209,7 @@ fn heights(
         Some((Sense::Unit(unit), _)) => Some(unit),
         Some((Sense::Nothing(name), by)) => {
             let name = quote::shown(&name);
-            remarks.push(format!("its {by} names a unit of heights that nobody knows: '{name}'"));
+            remarks.push(format!("its {by} names a unit of heights that is not known: '{name}'"));
             None
         }
         Some((Sense::Either(name, number), by)) => {
