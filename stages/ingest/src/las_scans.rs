@@ -54,6 +54,7 @@ pub(crate) const NO_SCANNER: &str = "the scanner's position is not known: no fre
 const CENSUS_ALL: u64 = 20_000_000;
 /// Number of windows.
 const CENSUS_WINDOWS: u64 = 512;
+/// Number of records in each window.
 const CENSUS_RECORDS: usize = 512;
 /// A scanner farther than this from the middle of its points was probably given in another frame,
 /// metres.

@@ -14,6 +14,7 @@ const BLIND: f32 = 0.5;
 const DOUBT_WINDOW: i32 = 3;
 /// Largest number of points of a scan that are tested; more show the same surfaces again.
 const N_ASKED: usize = 100_000;
+/// Largest number of points of all scans together that are tested.
 const N_ASKED_OF_ALL: usize = 600_000;
 
 /// Distance between the points of a scan that are tested.
@@ -44,6 +45,7 @@ const FOOTPRINT: f32 = 0.03;
 const N_AT_A_TIME: usize = 8192;
 /// Edge of the cells in which contradictions are counted, metres.
 const CELL: f32 = 0.05;
+/// Number of contradicting points from which on a cell counts.
 const MIN_IN_CELL: usize = 3;
 
 /// Centres of 5 cm cells (local frame, metres) in which one scan measured a surface and another saw

@@ -8,6 +8,7 @@ use las::raw;
 const WKT_COUNTS: u16 = 1 << 4;
 /// Length of the header of a variable length record, bytes.
 const HEADER: usize = 54;
+/// Length of the header of an extended variable length record, bytes.
 const EXTENDED: usize = 60;
 /// Longest record that is read, bytes: texts of reference systems have a few thousand.
 const MAX_BYTES: usize = 1 << 20;
