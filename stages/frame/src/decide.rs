@@ -13,7 +13,7 @@ const MIN_SAME_STATED: usize = 60;
 /// Smallest number of upright surfels that determine a pose in each horizontal direction: 1.2 m².
 const MIN_HOLD: f64 = 30.0;
 /// Smallest share of the comparable surfels that lie on the other session's surfaces, for the
-/// stated pose and for a searched one.
+/// stated pose.
 const MIN_SHARE_STATED: f64 = 0.7;
 /// The corresponding share for a searched pose.
 const MIN_SHARE: f64 = 0.75;
@@ -122,7 +122,7 @@ pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Resul
             apart_ones.push(laid);
         }
     }
-    // A pose with little on the earlier session is judged, but its details are dropped.
+    // Poses with few surfels on the earlier session are dropped here, to save memory.
     let judged = fan.fan(apart_ones, |laid| {
         let judged = judge(old, new, laid);
         (judged.evidence.n_same() >= MIN_SAME_STATED).then_some(judged)
