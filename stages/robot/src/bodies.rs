@@ -44,7 +44,8 @@ impl Bodies<'_> {
                     self.body(mesh, body, &place, findings);
                 }
                 if !mesh.triangles.is_empty() {
-                    let what = "has no visual; its collision mesh is used instead and may be a hull";
+                    let what =
+                        "has no visual; its collision mesh is used instead and may be a hull";
                     findings.warn(&place, what, "add a visual");
                 }
             }

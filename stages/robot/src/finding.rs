@@ -55,7 +55,9 @@ impl Findings {
             Finding {
                 model: self.model.clone(),
                 severity,
-                what: format!("there are more than these {MAX_FINDINGS}; the others are not listed"),
+                what: format!(
+                    "there are more than these {MAX_FINDINGS}; the others are not listed"
+                ),
                 place: String::new(),
                 way_out: "correct those that are listed first".to_owned(),
             }

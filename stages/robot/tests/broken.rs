@@ -67,7 +67,11 @@ fn capsules_about_a_link_that_has_a_visual_are_no_surface() {
         let capsule = &model.links[model.link("capsule").unwrap()];
         assert_eq!(!capsule.mesh.triangles.is_empty(), stands_in, "{kind}");
         assert_eq!(!capsule.bounds.is_empty(), stands_in, "{kind}");
-        assert_eq!(findings.iter().any(|f| f.what.contains("is used instead")), stands_in, "{kind}");
+        assert_eq!(
+            findings.iter().any(|f| f.what.contains("is used instead")),
+            stands_in,
+            "{kind}"
+        );
     }
 }
 

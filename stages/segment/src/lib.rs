@@ -1,5 +1,5 @@
 //! Labels the points of one tile that are near fitted robots, and gives the default label of all
-//! other points. The crate never looks at other tiles: `merge` decides what is attached to a robot,
+//! other points. The crate never looks at other tiles: `attach` decides what is attached to a robot,
 //! from the voxels that remain here.
 //!
 //! # Example

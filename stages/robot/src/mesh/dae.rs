@@ -180,9 +180,7 @@ impl<'a, 'i> Scene<'a, 'i> {
                 },
                 "instance_geometry" => match target() {
                     Some(geometry) => self.geometry(geometry, &scene_from_node)?,
-                    None => {
-                        self.soup.note("an instance of a geometry outside the file is ignored")
-                    }
+                    None => self.soup.note("an instance of a geometry outside the file is ignored"),
                 },
                 "instance_controller" => self.soup.note("a skinned geometry is ignored"),
                 _ => {}
