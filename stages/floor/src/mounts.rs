@@ -9,8 +9,10 @@ use geometry::{Aabb, Moments, Vector};
 pub(crate) const MIN_PATCH: f64 = 0.02;
 /// Smallest area of such a plane, m²: half of a rim of 6 cm about the foot of a small arm.
 const MIN_AREA: f64 = 0.03;
-/// Largest distance (metres) and angle (radians, 3°) between patches of one plane.
-const SAME: (f64, f64) = (0.02, 0.052);
+/// Largest distance between patches of one plane, metres.
+const SAME_PLANE_DISTANCE: f64 = 0.02;
+/// Largest angle between the normals of patches of one plane, radians (3°).
+const SAME_PLANE_ANGLE: f64 = 0.052;
 /// Largest gap between patches of one plane, metres: what a foot hides.
 const GAP: f64 = 0.5;
 /// Largest numbers of planes of one place: of those that look down, of those that lean, and of the
@@ -54,12 +56,13 @@ pub fn mounts(patches: &[&PlanePatch]) -> Vec<InstallationPlane> {
 }
 
 fn one_plane(a: &PlanePatch, b: &PlanePatch) -> bool {
-    if a.plane.normal.dot(&b.plane.normal) < SAME.1.cos() || !a.bounds.grown(GAP).touches(&b.bounds)
+    if a.plane.normal.dot(&b.plane.normal) < SAME_PLANE_ANGLE.cos()
+        || !a.bounds.grown(GAP).touches(&b.bounds)
     {
         return false;
     }
     let step = |of: &PlanePatch, at: Vector| of.plane.distance(&at).abs();
-    step(a, b.moments.mean()).max(step(b, a.moments.mean())) < SAME.0
+    step(a, b.moments.mean()).max(step(b, a.moments.mean())) < SAME_PLANE_DISTANCE
 }
 
 /// The joined plane of patches, each weighted by its area; its own area is the largest that a

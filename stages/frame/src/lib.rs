@@ -18,10 +18,11 @@
 //! use frame::{Answer, Gathered, Panorama, Session, at_stated};
 //! use geometry::{Pose, Vector, direction::unit};
 //!
-//! // A scanner in a room of 10 m × 7 m × 4 m. let at = Vector::new(4.0, 3.0, 1.7); let pose =
-//! Pose::translation(at.x, at.y, at.z); let (mut eye, mut points) = (Panorama::new(&pose,
-//! &Vector::zeros()), Gathered::about(Vector::zeros())); for (row, col) in
-//! (-220..220).flat_map(|row| (0..900).map(move |col| (row, col))) {
+//! // A scanner in a room of 10 m × 7 m × 4 m.
+//! let (at, origin) = (Vector::new(4.0, 3.0, 1.7), Vector::zeros());
+//! let mut eye = Panorama::new(&Pose::translation(at.x, at.y, at.z), &origin);
+//! let mut points = Gathered::about(origin);
+//! for (row, col) in (-220..220).flat_map(|row| (0..900).map(move |col| (row, col))) {
 //!     let angle = |i: i32| (f64::from(i) * 0.4 + 0.1).to_radians();
 //!     let along = unit(angle(col), angle(row));
 //!     let to = |i: usize| if along[i] > 0.0 { [10.0, 7.0, 4.0][i] - at[i] } else { -at[i] };
