@@ -1,5 +1,5 @@
 //! Labels the points of one tile that are near fitted robots, and gives the default label of all
-//! other points. The crate never looks at other tiles: `attach` decides what is attached to a robot,
+//! other points. The crate never looks at other tiles: `attach` decides what belongs to a robot,
 //! from the voxels that remain here.
 //!
 //! # Example
@@ -21,9 +21,9 @@
 //! assert_eq!(ground.label([1.0, 2.0, 0.003]).kind, PointKind::Floor);
 //! assert_eq!(ground.label([1.0, 2.0, 0.5]).kind, PointKind::Fixed);
 //!
-//! // Near robots the step `Segment` labels the points, tile by tile; without fits it has no
-//! region. let (fits, scans): (Vec<Fit>, Vec<Scan>) = (vec![], vec![]); let step =
-//! segment::Segment::new(&fits, &[], &floor, &scans, settings, &OneByOne);
+//! // Near robots the step labels the points, tile by tile; without fits it has no region.
+//! let (fits, scans): (Vec<Fit>, Vec<Scan>) = (vec![], vec![]);
+//! let step = segment::Segment::new(&fits, &[], &floor, &scans, settings, &OneByOne);
 //! assert!(step.regions().is_empty());
 //! ```
 #![forbid(unsafe_code)]
