@@ -12,7 +12,7 @@
 //! | text on a terminal | [`printed`] | odd characters become `\u{…}`; line breaks and tabs stay |
 //! | JSON text | [`json`] | odd characters within its strings become `\u…`; the value is the same |
 //! | a string of YAML | [`yaml`] | in double quotes, odd characters become `\u…` or `\U…` |
-//! | text and attributes of XML | [`xml`] | references for what XML can hold; what it cannot becomes `\u{…}` |
+//! | text and attributes of XML | [`xml`] | references; what XML cannot hold becomes `\u{…}` |
 //! | a cell of CSV | [`csv`] | in double quotes; no spreadsheet takes it for a formula |
 //! | a part of a file's name | [`file_name`] | letters and digits of ASCII; all else becomes `_` |
 

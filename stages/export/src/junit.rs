@@ -6,7 +6,7 @@
 //! | a trusted robot | passes |
 //! | a doubtful or refused robot | fails, its reasons in the message |
 //! | a joint that is determined or coarse, of a trusted robot | passes |
-//! | an undetermined joint, or any joint of a robot that is not trusted | is skipped with its value |
+//! | an undetermined joint, or a joint of a robot that is not trusted | is skipped with its value |
 //! | a run that left something out | a case of its own that fails |
 
 use crate::atomic;
