@@ -201,7 +201,11 @@ fn poses_and_fields_that_make_no_sense_are_refused() {
         ("<cartesianZ", "<sphericalZ", "tag"),
         ("scale=\"0.0001\"", "scale=\"0\"", "scale"),
         ("fileOffset=\"48\"", "fileOffset=\"4800000\"", "offset"),
-        ("type=\"Integer\" minimum=\"0\" maximum=\"999\"", "type=\"String\"", "unsupported content"),
+        (
+            "type=\"Integer\" minimum=\"0\" maximum=\"999\"",
+            "type=\"String\"",
+            "unsupported content",
+        ),
     ];
     for (n, (from, to, words)) in cases.into_iter().enumerate() {
         let error = mended(&format!("mended-{n}.e57"), from, to)
