@@ -1,5 +1,5 @@
-//! A robot and what hangs on it in; at one posture, which of its parts are near to which obstacles,
-//! out.
+//! A robot with the points attached to it: which of its parts are near which obstacles in a
+//! posture.
 
 use crate::Level;
 use crate::obstacles::{Bin, HALF_CELL, Obstacle, Obstacles, Replaced, What};
@@ -10,45 +10,47 @@ use geometry::{Aabb, Point, Pose};
 use robot::{Link, Model};
 use std::collections::BTreeMap;
 
-/// Points that hang on the links of a robot, by link, in its frame, metres.
+/// Points attached to the links of a robot, by index of the link, link frame, metres.
 pub type Hung = BTreeMap<usize, Vec<[f32; 3]>>;
 
-/// Between two postures of a path each part may be so much farther, metres.
+/// Distance that a part may move between two examined postures of a path, metres.
 const BETWEEN: f32 = 0.5 * STEP as f32;
 
-/// So near to where it was scanned uncertain points are the robot's own most likely, metres: edges,
-/// cables and covers that its model lacks.
+/// Distance from the robot as scanned within which uncertain points are most likely its own,
+/// metres: edges, cables and covers that its model lacks.
 const BESIDE: f32 = 0.1;
 
-/// So near to the surface of a link, as it was scanned, a point is of that link, metres: links of
-/// labels end 6 to 12 mm off it. Of a thing that the robot touches all stays that is farther off.
+/// Distance from a link's surface as scanned within which a point belongs to the link, metres: the
+/// labels of links reach 6 to 12 mm. Of a thing that touches the robot, all points farther off
+/// stay.
 const OWN: f32 = 0.008;
 
-/// Space that no beam went through and that is so near to the robot as it was scanned is a gap
-/// between its parts or behind them, metres: what stands there reaches farther.
+/// Distance from the robot as scanned within which unseen space is a gap between its parts or
+/// behind them, metres; an object that stands there would reach farther.
 const CREVICE: f32 = 0.025;
 
-/// Uncertain points so near to fixed ones are of what stands there, metres, and hang on nothing.
+/// Distance from fixed points within which uncertain points belong to the fixed object and are not
+/// attached to the robot, metres.
 const JOINED: f32 = 0.04;
 
-/// A link's surface, or what hangs on it.
+/// The surface of a link, or the points attached to it.
 pub(crate) struct Part {
     pub(crate) link: usize,
     pub(crate) hangs: bool,
-    /// Uncertain points beside the link: nobody knows whether they hang on it.
+    /// Whether it consists of uncertain points beside the link, which may or may not be attached.
     pub(crate) is_doubtful: bool,
     bounds: Aabb,
     shape: Shape,
 }
 
-/// All that moves with the joints of a robot.
+/// Everything that moves with the joints of a robot.
 pub struct Body<'a> {
     pub(crate) model: &'a Model,
     pub(crate) parts: Vec<Part>,
-    /// Surfaces of links that no joint moves: what lies on them is the robot's, too.
+    /// Surfaces of links that no joint moves; points on them belong to the robot, too.
     still: Vec<Part>,
     margin: f32,
-    /// Of points that hang on it nobody asks from farther away, metres.
+    /// Largest distance at which attached points are looked up, metres.
     within: f32,
 }
 
@@ -59,28 +61,28 @@ impl Part {
     }
 }
 
-/// A part near to an obstacle.
+/// A part that is near an obstacle.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Touch {
     pub(crate) part: usize,
     pub(crate) obstacle: usize,
     pub(crate) level: Level,
-    /// At least so far, metres.
+    /// Lower bound of their distance, metres.
     pub(crate) gap: f32,
 }
 
-/// All that is near at one posture.
+/// All parts that are near something in one posture.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Near {
-    /// By part, then obstacle.
+    /// Sorted by part, then by obstacle.
     pub(crate) touches: Vec<Touch>,
     /// Parts that reach into space of which nothing is known.
     pub(crate) outside: Vec<usize>,
 }
 
 impl<'a> Body<'a> {
-    /// The parts of a model that its joints move, and what hangs on them; `margin` is what is near,
-    /// `largest` the radius of the largest obstacle, metres.
+    /// The moving parts of a model with the attached points `hung`. `margin` is the distance below
+    /// which an obstacle counts as near, and `largest` the radius of the largest obstacle, metres.
     #[must_use]
     pub fn new(model: &'a Model, hung: Hung, (margin, largest): (f64, f64), fan: &dyn Fan) -> Self {
         let margin = margin as f32;
@@ -103,7 +105,7 @@ impl<'a> Body<'a> {
         Self { model, parts, still, margin, within }
     }
 
-    /// No part of it, nor of what hangs on it, gets farther from the base's origin, metres.
+    /// Upper bound of the distance of all parts from the base's origin in any posture, metres.
     #[must_use]
     pub fn farthest(&self) -> f64 {
         let ways = self.model.ways();
@@ -111,15 +113,15 @@ impl<'a> Body<'a> {
         self.parts.iter().map(far).fold(0.0, f64::max)
     }
 
-    /// Bounds of its parts in the frames of their links.
+    /// Index of the link and bounds (link frame, metres) of each part.
     pub(crate) fn bounds(&self) -> impl Iterator<Item = (usize, &Aabb)> {
         self.parts.iter().map(|part| (part.link, &part.bounds))
     }
 
-    /// Looks at the obstacles from where the robot was scanned: points on its own surface, or
-    /// inside, are its own, whatever a mask says of them, and what it filled itself is no
-    /// unseen space. Uncertain points beside it are told apart: they may stand there, and they may
-    /// hang on the part that is nearest and move with it.
+    /// Removes from `around` what belongs to the robot itself in the posture `found`, in which it
+    /// was scanned: points on or inside its surface, whatever their label, and unseen space that
+    /// the robot filled. Uncertain points beside it count twice: as obstacles [`What::Beside`], and
+    /// as points that may be attached to the nearest part and move with it.
     pub fn stand(&mut self, found: &[f64], around: &mut Obstacles) {
         let mut near: Vec<Option<(f32, usize)>> = vec![None; around.all.len()];
         for Touch { part, obstacle, gap, .. } in self.within(BESIDE, found, around).touches {
@@ -166,7 +168,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// All that is nearer than the margin at a posture.
+    /// Everything that is nearer than the margin in a posture.
     pub(crate) fn near(&self, posture: &[f64], around: &Obstacles) -> Near {
         self.within(self.margin, posture, around)
     }
@@ -202,7 +204,7 @@ impl<'a> Body<'a> {
             return;
         }
         let own = bin.range.clone().zip(&around.all[bin.range.clone()]);
-        // Points tell no more than what they were made for.
+        // Attached points give distances only up to the limit they were prepared for.
         if part.shape.tells_all() {
             match part.shape.gap(middle, within) {
                 Gap::Far => return,
@@ -214,7 +216,7 @@ impl<'a> Body<'a> {
             }
         }
         for (obstacle, o) in own {
-            // Points beside the robot are not in their own way.
+            // Points that may be attached to the robot are no obstacle to themselves.
             if part.is_doubtful && o.what == What::Beside {
                 continue;
             }
@@ -248,7 +250,7 @@ fn touch(
     (o, margin): (&Obstacle, f32),
     gap: f32,
 ) -> Option<Touch> {
-    // Between two postures it may be half a step nearer.
+    // Between two postures the obstacle may be nearer by half a step.
     let gap = gap - o.radius - BETWEEN;
     let level = match o.what {
         _ if gap > margin => return None,
@@ -264,14 +266,14 @@ fn inside(part: usize, obstacle: usize, o: &Obstacle) -> Touch {
     Touch { part, obstacle, level, gap: 0.0 }
 }
 
-/// No link of a robot gets farther from its base's origin, metres.
+/// Upper bound of the distance of all links from the base's origin in any posture, metres.
 #[must_use]
 pub fn reach(model: &Model) -> f64 {
     let far = |(link, way): (&Link, f64)| farthest(&link.bounds) + way;
     model.links.iter().zip(model.ways()).map(far).fold(0.0, f64::max)
 }
 
-/// Of all places of a box in a link's frame, from its origin, metres.
+/// Largest distance of a place in a box from the origin of the link's frame, metres.
 fn farthest(bounds: &Aabb) -> f64 {
     if bounds.is_empty() {
         return 0.0;
@@ -287,7 +289,7 @@ fn is_near(bounds: &Aabb, p: [f32; 3], within: f32) -> bool {
     (0..3).map(|i| outside(i).powi(2)).sum::<f64>() <= f64::from(within).powi(2)
 }
 
-/// A pose for many points.
+/// A pose in single precision, for many points.
 struct Flat {
     rotation: [[f32; 3]; 3],
     shift: [f32; 3],

@@ -1,49 +1,50 @@
-//! Points around a robot in; those of them that are evidence of something, out.
+//! Selects the points around a robot that are evidence of an object, and drops stray points.
 //!
-//! A scan has strays: a beam that ends half on an edge and half behind it gives a point between the
-//! two, where nothing is, and a mask leaves some points of a robot to the fixed world. A point
-//! counts where others tell of the same surface, or of the same line, as those of a wire do. One
-//! that has neither, in space that beams went through, is evidence of nothing. What was told by
-//! beams that grazed the edge of a robot is evidence only where others tell of a surface.
+//! Scans have stray points: a beam that hits an edge partly gives a point between the edge and the
+//! surface behind it, where nothing is, and masks leave some points of a robot to the fixed world.
+//! A point counts if other points lie on the same surface, or on the same line, as the points of a
+//! wire do. A point without either is dropped if it lies in space that beams passed through. Points
+//! of beams that grazed the edge of a robot count only as part of a surface.
 
 use crate::obstacles::{HALF_CELL, Obstacle, What, distance};
 use contract::{Space, SpaceKind};
 use geometry::{Point, Pose};
 use rustc_hash::FxHashMap;
 
-/// Neighbours on a surface are this near, metres: the edge of the voxels that space is told by.
+/// Largest distance between neighbours on a surface, metres: the edge of the voxels of known space.
 const NEAR: f32 = 0.05;
-/// With so many neighbours a point is of a surface …
+/// Number of neighbours from which on a point belongs to a surface.
 const ENOUGH: usize = 8;
-/// … and with so many of one that needs no other proof …
+/// Number of neighbours from which on a surface needs no other proof.
 const SOLID: usize = 24;
-/// … or with this share of what half of all points have, where scans are sparse.
+/// In sparse scans, number of neighbours that suffices, as share of the median over all points.
 const SHARE: f64 = 0.125;
-/// So many neighbours that are this near, metres, are a small thing: strays lie farther apart, over
-/// the depth of what an edge hides.
+/// Distance within which [`TOGETHER`] neighbours make a small object, metres; stray points lie
+/// farther apart, over the depth that an edge hides.
 const CLOSE: f32 = 0.025;
+/// Number of neighbours within [`CLOSE`] that make a small object.
 const TOGETHER: usize = 3;
-/// Neighbours on a line are this near, metres: beams as far apart as 15 mm meet a wire of 4 mm four
-/// times on twice that way.
+/// Largest distance between neighbours on a line, metres: beams 15 mm apart hit a wire of 4 mm
+/// about four times on twice this length.
 const ALONG: f32 = 0.15;
-/// A line is this thick, metres: wires, a scanner's noise, and the edge of a cell.
+/// Thickness of a line, metres: the wire, the scanner's noise, and the edge of a cell.
 const ACROSS: f32 = 0.010;
-/// So many others make a line.
+/// Number of other points that make a line.
 const ON_LINE: usize = 3;
-/// Of the six voxels beside that of a point so many may be unknown where its surroundings count as
-/// seen.
+/// Largest number of unknown voxels among the six beside that of a point for its surroundings to
+/// count as seen.
 const UNKNOWN: usize = 2;
 
-/// Obstacles by the cubes of edge [`NEAR`] that they lie in, but for those that only beams told
-/// which grazed an edge.
+/// Obstacles by the cube of edge [`NEAR`] that holds them, without those that only grazing beams
+/// measured.
 struct Cubes<'a> {
     all: &'a [Obstacle],
     cubes: FxHashMap<[i32; 3], Vec<u32>>,
 }
 
-/// For each obstacle: whether it is evidence of something. Without space nothing is known to be
-/// seen, and all of them are. `behind` tells, of those that are no thick surface, which lie behind
-/// what beams beside theirs met: they are taken as told by beams that grazed an edge.
+/// For each obstacle, whether it is evidence of an object. Without `space` nothing is known to be
+/// seen, and all obstacles are. `behind` tells, for those that are no thick surface, which lie
+/// behind something that neighbouring beams hit; these are treated as measured by grazing beams.
 pub(crate) fn evident(
     all: &mut [Obstacle],
     behind: impl Fn(&[Obstacle], &[bool]) -> Vec<bool>,
@@ -52,7 +53,7 @@ pub(crate) fn evident(
 ) -> Vec<bool> {
     let mut out = vec![true; all.len()];
     let Some(space) = space else { return out };
-    // Of floors and other robots more is known than single points.
+    // Floors and other robots are not known from single points only.
     let is_asked = |o: &Obstacle| matches!(o.what, What::Fixed | What::Uncertain);
     let cubes = Cubes::of(all);
     let thin: Vec<bool> = (all.iter())
@@ -70,8 +71,8 @@ pub(crate) fn evident(
     out
 }
 
-/// Of points that hang on a link, each with whether its beam grazed an edge, those that are
-/// evidence of something that hangs there.
+/// Selects, from points attached to a link (each with whether its beam grazed an edge), those that
+/// are evidence of an attached object.
 #[must_use]
 pub fn hanging(points: &[([f32; 3], bool)]) -> Vec<[f32; 3]> {
     let obstacle = |&(at, is_grazed): &([f32; 3], bool)| Obstacle {
@@ -98,12 +99,12 @@ impl<'a> Cubes<'a> {
         Self { all, cubes }
     }
 
-    /// Obstacles of the cubes about a place, so many cubes away on each axis.
+    /// Obstacles in the cubes about a place, up to `n` cubes away along each axis.
     fn around(&self, at: [f32; 3], n: i32) -> impl Iterator<Item = u32> + '_ {
         let [x, y, z] = cube(at);
         let side = 2 * n + 1;
         let n_cubes = side * side * side;
-        // Its own first: there are neighbours enough, mostly.
+        // The cube of the place first, since it mostly holds enough neighbours.
         (0..n_cubes).flat_map(move |i| {
             let i = (i + n_cubes / 2) % n_cubes;
             let by = [i % side - n, i / side % side - n, i / (side * side) - n];
@@ -111,22 +112,22 @@ impl<'a> Cubes<'a> {
         })
     }
 
-    /// Neighbours of an obstacle nearer than so, no more than [`NEAR`], metres; itself not counted,
-    /// as far as `most`.
+    /// Number of other obstacles within `within` metres of an obstacle, which is at most [`NEAR`];
+    /// counting stops at `most`.
     fn n_near(&self, o: &Obstacle, within: f32, most: usize) -> usize {
         let is_near = |i: &u32| distance(self.all[*i as usize].at, o.at) < within;
         let itself = usize::from(!o.is_grazed);
         self.around(o.at, 1).filter(is_near).take(most + itself).count().saturating_sub(itself)
     }
 
-    /// Whether it belongs to a small thing or to a line.
+    /// Whether an obstacle belongs to a small object or to a line.
     fn is_thing(&self, at: usize) -> bool {
         self.n_near(&self.all[at], CLOSE, TOGETHER) >= TOGETHER || self.is_on_line(at)
     }
 
-    /// Neighbours that make a surface, here.
+    /// Number of neighbours that makes a surface at the density of these scans.
     fn enough(&self) -> usize {
-        /// Points that are asked: enough for a median.
+        /// Number of points from which the median is taken.
         const ASKED: usize = 2000;
         let step = self.all.len() / ASKED + 1;
         let most = (ENOUGH as f64 / SHARE) as usize;
@@ -137,7 +138,7 @@ impl<'a> Cubes<'a> {
         ((median as f64 * SHARE) as usize).clamp(1, ENOUGH)
     }
 
-    /// Whether enough others lie on a line through an obstacle.
+    /// Whether enough other obstacles lie on a line through an obstacle.
     fn is_on_line(&self, at: usize) -> bool {
         let here = self.all[at].at;
         let reach = (ALONG / NEAR).ceil() as i32;
@@ -149,7 +150,7 @@ impl<'a> Cubes<'a> {
             .map(off)
             .filter(|v| length(*v) < ALONG)
             .collect();
-        // Those that are too near tell no direction.
+        // Points that are too near define no direction.
         near.iter().filter(|v| length(**v) > 2.0 * ACROSS).any(|v| {
             let unit = v.map(|c| c / length(*v));
             let across = |w: &&[f32; 3]| {
@@ -169,7 +170,7 @@ fn cube(at: [f32; 3]) -> [i32; 3] {
     at.map(|v| (v / NEAR).floor() as i32)
 }
 
-/// Whether beams went through the space beside a place of the world.
+/// Whether beams passed through the space beside a place in the world.
 fn is_seen(space: &Space, p: &Point) -> bool {
     let grid = space.grid();
     let is_unknown = |k: &usize| {
@@ -191,7 +192,7 @@ mod tests {
     }
 
     fn told_by(points: &[[f32; 3]], kind: SpaceKind, grazed: bool) -> Vec<bool> {
-        // A wall 1 cm between points, far from all else, says how dense scans are.
+        // A distant wall with 1 cm between points sets the density of the scan.
         let wall = (0..2500).map(|i| [1.0, 0.01 * (i % 50) as f32, 0.01 * (i / 50) as f32]);
         let obstacle =
             |(at, is_grazed)| Obstacle { at, radius: 0.0035, what: What::Fixed, is_grazed };
@@ -212,7 +213,7 @@ mod tests {
     fn strays_in_seen_space_are_evidence_of_nothing() {
         let strays = [[0.0, 0.0, 0.0], [0.03, 0.02, -0.02], [-0.02, 0.05, 0.05], [0.3, 0.3, 0.1]];
         assert_eq!(told(&strays, SpaceKind::Free), [false; 4]);
-        // Where no beam went through, each of them may be something.
+        // Where no beam passed, each of them may be an object.
         assert_eq!(told(&strays, SpaceKind::Unknown), [true; 4]);
     }
 
@@ -224,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_wire_that_few_beams_met_stays() {
-        // 4 cm between points, and a noise of 3 mm.
+        // Points 4 cm apart with a noise of 3 mm.
         let noise = |i: usize| [0.003, -0.002, 0.001, -0.003][i % 4];
         let wire: Vec<[f32; 3]> =
             (0..9).map(|i| [noise(i), noise(i + 1), 0.04 * i as f32 - 0.16]).collect();
@@ -245,7 +246,7 @@ mod tests {
         let curtain: Vec<[f32; 3]> = (0..30).map(|i| [0.0, 0.0, 0.01 * i as f32]).collect();
         assert_eq!(told_by(&curtain, SpaceKind::Free, true), [false; 30]);
         assert_eq!(told_by(&curtain, SpaceKind::Unknown, true), [false; 30]);
-        // At the wall they are of the wall.
+        // Points at the wall belong to the wall.
         let at_wall = [[0.99, 0.2, 0.2], [1.01, 0.305, 0.1]];
         assert_eq!(told_by(&at_wall, SpaceKind::Free, true), [true; 2]);
     }

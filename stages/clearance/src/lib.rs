@@ -1,8 +1,37 @@
-//! A robot, what stands around it and a path of postures in; where on the way it comes near to
-//! what, out.
+//! Checks a path of robot postures against its surroundings: where on the path which part comes
+//! near which obstacle.
 //!
-//! In doubt it is near: points count as balls that hold all of their cell, and between two postures
-//! of the path each part may be half a step farther.
+//! The check is conservative: points count as balls that contain their whole cell, and between two
+//! examined postures each part is assumed to move up to half a step farther.
+//!
+//! # Example
+//! ```
+//! use clearance::{Body, Cells, Contacts, Known, Obstacles, Walk, What, leg, reach};
+//! use geometry::{Aabb, Pose};
+//! # let folder = tempfile::tempdir()?;
+//! # let beam = "<origin xyz='0.5 0 0'/><geometry><box size='1 0.1 0.1'/></geometry>";
+//! # std::fs::write(folder.path().join("robot.urdf"), format!("<robot name='arm'>
+//! #   <link name='foot'/><link name='beam'><visual>{beam}</visual></link>
+//! #   <joint name='j' type='revolute'><parent link='foot'/><child link='beam'/>
+//! #   <axis xyz='0 0 1'/><limit lower='-3' upper='3'/></joint></robot>"))?;
+//! let model = robot::Model::load(folder.path(), &robot::Settings::default())?.0; // 1 m about z
+//! let (margin, found) = (0.02, vec![0.0]);
+//! let mut cells = Cells::within(reach(&model) + margin, &Default::default());
+//! (0..40).for_each(|i| cells.add([0.0, 0.9, 0.01 * f64::from(i - 20)], What::Fixed, (false, 0)));
+//! cells.settle();
+//! let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
+//! let known = Known { world_from_base: Pose::identity(), bounds };
+//! let mut around = Obstacles::new(&cells, &[], (None, known));
+//! let mut body = Body::new(&model, Default::default(), (margin, 0.0), &contract::OneByOne);
+//! body.stand(&found, &mut around);
+//! let path = [found.clone(), vec![2.0]]; // the beam turns past a post at 90°
+//! let legs = [leg(&body, &path[0], &path[1])];
+//! let walk = Walk::new((&body, &around), (&path, &legs), &found);
+//! let mut contacts = Contacts::default();
+//! (0..walk.n_pieces()).for_each(|piece| walk.add(walk.look(piece), &mut contacts));
+//! assert_eq!(contacts.all()[0].what, What::Fixed);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![forbid(unsafe_code)]
 
 mod body;
@@ -18,15 +47,15 @@ pub use obstacles::{CELL, Cells, FARTHEST, Known, Obstacles, What};
 pub use path::{Contact, Contacts, Leg, Looked, STEP, Walk, leg};
 pub use shadow::{Eye, Shadow};
 
-/// How a part of a robot stands to an obstacle; what is worse is greater.
+/// How close a part of a robot is to an obstacle; a greater level is worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// In space that no beam went through.
+    /// The part reaches into space that no beam passed through.
     Unseen,
-    /// Nearer than the margin.
+    /// The obstacle is nearer than the margin.
     Near,
-    /// It touches the surface of the part.
+    /// The obstacle touches the surface of the part.
     Hit,
-    /// It lies inside of the part.
+    /// The obstacle lies inside the part.
     Inside,
 }

@@ -1,5 +1,5 @@
-//! Points around a robot in, tile by tile; balls that hold them, gathered in bins, out. All in the
-//! frame of its base, metres.
+//! Obstacles around a robot: balls that contain the points of a cell, sorted into bins. All
+//! coordinates are in the frame of the robot's base, metres.
 
 use crate::evidence::evident;
 use crate::shadow::{Eye, Front};
@@ -10,122 +10,124 @@ use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Edge of the cells in which all points are one obstacle, metres: finer than planners' margins,
-/// and the floor of a cell in such cells fits into memory.
+/// Edge of the cells in which all points become one obstacle, metres: finer than the margins of
+/// planners, and coarse enough for the floor of a robot cell to fit into memory.
 pub const CELL: f64 = 0.004;
 /// Half the diagonal of a cube of edge 1.
 const HALF_DIAGONAL: f64 = 0.8661;
-/// Radius of a ball that holds a cell, metres.
+/// Radius of a ball that contains a cell, metres.
 pub(crate) const HALF_CELL: f32 = (HALF_DIAGONAL * CELL) as f32;
-/// Edge of a bin, metres: about as many cells of a surface as bins about a robot.
+/// Edge of a bin, metres: a bin has about as many cells of a surface as there are bins about a
+/// robot.
 const BIN: f64 = 0.16;
-/// Bits of a cell's place on each axis.
+/// Number of bits of a cell's position along each axis.
 const BITS: u32 = 20;
-/// Farthest from a base that points are told apart, metres: 2 km.
+/// Largest distance from a base at which points can be told apart, metres: 2 km.
 pub const FARTHEST: f64 = 0.5 * CELL * (1_u32 << BITS) as f64;
 
-/// What an obstacle is.
+/// The kind of an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum What {
     /// Points that stand still.
     Fixed,
     /// Points of the floor.
     Floor,
-    /// Points of which nobody knows.
+    /// Uncertain points.
     Uncertain,
-    /// Those of them beside where the robot stood when it was scanned: most are its own.
+    /// Uncertain points beside the robot as it was scanned; most are its own.
     Beside,
-    /// Points and surface of the robot with this number.
+    /// Points and surface of the robot with this index.
     Robot(i16),
-    /// Space that no beam went through.
+    /// Space that no beam passed through.
     Unseen,
 }
 
-/// A ball.
+/// An obstacle as a ball.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Obstacle {
     pub(crate) at: [f32; 3],
     pub(crate) radius: f32,
     pub(crate) what: What,
-    /// All beams that tell it grazed the edge of a robot (see [`crate::Shadow`]).
+    /// Whether all beams that measured it grazed the edge of a robot (see [`crate::Shadow`]).
     pub(crate) is_grazed: bool,
 }
 
-/// Obstacles beside each other.
+/// Neighbouring obstacles.
 #[derive(Debug, Clone)]
 pub(crate) struct Bin {
     pub(crate) middle: [f32; 3],
-    /// Of a ball about the middle that holds all of them.
+    /// Radius of the ball about the centre that contains all of them, metres.
     pub(crate) radius: f32,
     pub(crate) range: Range<usize>,
 }
 
-/// Cells that hold points, each once for each kind of them.
+/// Cells that hold points, once for each kind of obstacle.
 #[derive(Debug, Clone, Default)]
 pub struct Cells {
-    /// Farthest from the base on each axis, metres.
+    /// Largest distance from the base along each axis, metres.
     far: f64,
-    /// Place, what is there, whether the beam that told it grazed the edge of a robot, and the
-    /// `point_source_id` of its scanner.
+    /// Position, kind, whether the beam grazed the edge of a robot, and `point_source_id` of the
+    /// scanner.
     cells: Vec<(u64, What, bool, u16)>,
-    /// By `point_source_id`: what each scanner measured, whatever it was.
+    /// Nearest measurements of each scanner, whatever they belong to, by `point_source_id`.
     fronts: BTreeMap<u16, Front>,
 }
 
-/// Where beams went, in the frame of the world.
+/// The part of space that beams passed through, in the world frame.
 #[derive(Debug, Clone)]
 pub struct Known {
-    /// World from base.
+    /// Pose of the robot's base in the world, metres.
     pub world_from_base: Pose,
-    /// Bounds of the space of which anything is known; empty where nothing is.
+    /// Bounds of the known space in the world, metres; empty where nothing is known.
     pub bounds: Aabb,
 }
 
-/// What becomes of an obstacle.
+/// What happens to an obstacle in [`Obstacles::replace`].
 pub(crate) enum Replaced {
-    /// It stays.
+    /// It is kept.
     Kept,
-    /// Others, or none.
+    /// It is replaced by these, or removed if there are none.
     By(Vec<Obstacle>),
 }
 
-/// All that stands around a robot.
+/// All obstacles around a robot.
 #[derive(Debug, Clone)]
 pub struct Obstacles {
     pub(crate) all: Vec<Obstacle>,
     pub(crate) bins: Vec<Bin>,
     pub(crate) known: Known,
-    /// Farthest from the base on each axis that points were gathered, metres.
+    /// Distance from the base along each axis up to which points were collected, metres.
     far: f64,
     pub(crate) split: Split,
 }
 
-/// How a voxel of unseen space is told by parts.
+/// How a voxel of unseen space is divided into parts.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Split {
-    /// Their middles from that of the voxel, frame of the base, metres.
+    /// Centres of the parts relative to that of the voxel, base frame, metres.
     offsets: Vec<[f32; 3]>,
-    /// Of balls that hold them, metres.
+    /// Radius of balls that contain a part, metres.
     radius: f32,
 }
 
 impl Cells {
-    /// None, of points no farther from the base than so on each axis, metres; and the scanners of
-    /// which it is known where they stood, by the `point_source_id` of their points.
+    /// Empty cells for points up to `far` metres from the base along each axis. `eyes` are the
+    /// scanners with known position, by the `point_source_id` of their points.
     #[must_use]
     pub fn within(far: f64, eyes: &BTreeMap<u16, Eye>) -> Self {
         let fronts = eyes.iter().map(|(source, eye)| (*source, Front::new(eye))).collect();
         Self { far, cells: Vec::new(), fronts }
     }
 
-    /// A scanner measured a point that is no farther, whatever it is of; frame of the base.
+    /// Records that a scanner measured a point (base frame, at most `far` away), whatever it is.
     pub fn see(&mut self, p: &Point, source: u16) {
         if let Some(front) = self.fronts.get_mut(&source) {
             front.add(p);
         }
     }
 
-    /// Adds a point that is no farther, frame of the base; its beam grazed the edge of a robot.
+    /// Adds a point (base frame, at most `far` away) with whether its beam grazed the edge of a
+    /// robot, and the `point_source_id` of its scanner.
     pub fn add(&mut self, p: [f64; 3], what: What, (is_grazed, source): (bool, u16)) {
         let most = f64::from((1_u32 << BITS) - 1);
         let place = |i: usize| ((p[i] + self.far) / CELL).clamp(0.0, most) as u64;
@@ -137,13 +139,13 @@ impl Cells {
         ));
     }
 
-    /// Leaves each cell once. To be called after each tile: only what is kept grows.
+    /// Removes duplicate cells. Call it after each tile, so that only distinct cells take memory.
     pub fn settle(&mut self) {
         self.cells.sort_unstable();
         self.cells.dedup();
     }
 
-    /// Adds those of another part of the same room; to be settled behind the last.
+    /// Adds the cells of another part of the same surroundings; call [`Cells::settle`] at the end.
     pub fn join(&mut self, other: Self) {
         self.cells.extend(other.cells);
         for (source, front) in other.fronts {
@@ -153,7 +155,7 @@ impl Cells {
         }
     }
 
-    /// Each place once for each kind of what is there.
+    /// One obstacle for each cell and kind.
     fn obstacles(&self) -> Vec<Obstacle> {
         let mask = (1_u64 << BITS) - 1;
         let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
@@ -169,14 +171,14 @@ impl Cells {
 }
 
 impl Cells {
-    /// For each of its obstacles: whether beams beside those that told it met something before it,
-    /// by all scanners that told it; as far as `asks` wants to know.
+    /// For each obstacle, whether neighbouring beams hit something in front of it, according to all
+    /// scanners that measured it; only computed where `asks` holds.
     fn behind(&self, all: &[Obstacle], asks: impl Fn(usize) -> bool) -> Vec<bool> {
         let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
         let is_behind = |(at, alike): (usize, &[(u64, What, bool, u16)])| {
             let p = Point::from(all[at].at.map(f64::from));
             let by = |source: u16| self.fronts.get(&source).is_some_and(|f| f.is_behind(&p));
-            // Those that grazed a robot tell nothing.
+            // Beams that grazed a robot are no evidence.
             asks(at) && alike.iter().filter(|cell| !cell.2).all(|cell| by(cell.3))
         };
         alike.enumerate().map(is_behind).collect()
@@ -184,8 +186,8 @@ impl Cells {
 }
 
 impl Obstacles {
-    /// Those of the cells, of other robots (number, model, base of this one from their links) and
-    /// of the space that no beam went through, as far as it is known.
+    /// The obstacles from the cells, from other robots (index, model, poses of their links in this
+    /// robot's base frame), and from unseen space, as far as space is known.
     #[must_use]
     pub fn new(
         cells: &Cells,
@@ -211,7 +213,7 @@ impl Obstacles {
         out
     }
 
-    /// Places where something fixed is, and how near counts, metres.
+    /// An index of the fixed obstacles for queries within `within` metres.
     pub(crate) fn fixed(&self, within: f32) -> Fixed {
         let of = |o: &&Obstacle| o.what == What::Fixed;
         let mut cubes: FxHashMap<[i32; 3], Vec<[f32; 3]>> = FxHashMap::default();
@@ -221,7 +223,7 @@ impl Obstacles {
         Fixed { within, cubes }
     }
 
-    /// Gathers obstacles in bins.
+    /// Sorts the obstacles into bins.
     fn sort(&mut self) {
         let bin = |o: &Obstacle| o.at.map(|v| (f64::from(v) / BIN).floor() as i32);
         self.all.sort_by_key(bin);
@@ -233,7 +235,7 @@ impl Obstacles {
         }
     }
 
-    /// Takes each obstacle as what `of` makes of it: one, several or none.
+    /// Replaces each obstacle by the result of `of`.
     pub(crate) fn replace(&mut self, mut of: impl FnMut(usize, &Obstacle) -> Replaced) {
         let mut all = Vec::with_capacity(self.all.len());
         for (at, o) in self.all.iter().enumerate() {
@@ -246,14 +248,14 @@ impl Obstacles {
         self.sort();
     }
 
-    /// Radius of the largest, metres.
+    /// Radius of the largest obstacle, metres.
     #[must_use]
     pub fn largest(&self) -> f64 {
         self.all.iter().map(|o| f64::from(o.radius)).fold(0.0, f64::max)
     }
 
-    /// Whether a box of a link reaches to where nobody looked for points, or into space of which
-    /// nothing is known.
+    /// Whether a box of a link extends beyond the volume in which points were collected, or beyond
+    /// the known space.
     pub(crate) fn leaves(&self, bounds: &Aabb, base_from_link: &Pose) -> bool {
         let pose = self.known.world_from_base * base_from_link;
         let is_known = |c: [f64; 3]| {
@@ -264,7 +266,7 @@ impl Obstacles {
     }
 }
 
-/// See [`Obstacles::fixed`].
+/// The fixed obstacles, see [`Obstacles::fixed`].
 pub(crate) struct Fixed {
     within: f32,
     cubes: FxHashMap<[i32; 3], Vec<[f32; 3]>>,
@@ -291,7 +293,7 @@ impl Bin {
     }
 }
 
-/// The surface of another robot: what no scan saw of it is there all the same.
+/// Samples of the surface of another robot, including what no scan saw of it.
 fn surface<'a>(
     number: i16,
     model: &'a Model,
@@ -299,7 +301,7 @@ fn surface<'a>(
 ) -> impl Iterator<Item = Obstacle> + 'a {
     let links = model.links.iter().zip(poses);
     links.flat_map(move |(link, pose)| {
-        // Samples are spread unevenly: gaps between them are wider than they are on average.
+        // Samples are spread unevenly, so that some gaps are wider than the mean spacing.
         let radius = 2.0 * link.cad.spacing;
         link.cad.points.iter().map(move |p| {
             let at = pose * Point::from(p.map(f64::from));
@@ -309,12 +311,12 @@ fn surface<'a>(
     })
 }
 
-/// Parts on each axis that a voxel of unseen space is told by: balls of them bulge by less than a
-/// margin.
+/// Number of parts of a voxel of unseen space along each axis: their balls exceed the voxel by less
+/// than a margin.
 const PARTS: usize = 4;
 
 impl Split {
-    /// Of voxels of this edge, metres.
+    /// Parts of voxels with this edge, metres.
     fn of(edge: f64, base_from_world: &Pose) -> Self {
         let step = edge / PARTS as f64;
         let at = |k: usize| (k as f64 - 0.5 * (PARTS - 1) as f64) * step;
@@ -326,7 +328,7 @@ impl Split {
         Self { offsets, radius: (HALF_DIAGONAL * step) as f32 }
     }
 
-    /// The parts of a voxel of unseen space; nothing for all else, and for parts themselves.
+    /// The parts of a voxel of unseen space; `None` for other obstacles, and for parts themselves.
     pub(crate) fn parts(&self, o: &Obstacle) -> Option<impl Iterator<Item = Obstacle> + '_> {
         let is_whole = o.what == What::Unseen && o.radius > 1.5 * self.radius;
         let (middle, what, radius) = (o.at, o.what, self.radius);
@@ -341,7 +343,7 @@ impl Split {
     }
 }
 
-/// Voxels that no beam went through: balls that hold them.
+/// Balls that contain the voxels that no beam passed through.
 fn unseen(space: &Space, base_from_world: &Pose) -> impl Iterator<Item = Obstacle> {
     let grid = *space.grid();
     let voxels = space.voxels().iter().enumerate();

@@ -1,5 +1,5 @@
-//! Postures of a path in; postures so close to each other that nothing is missed between them, and
-//! where on the way which part is near to what, out.
+//! Walks along a path in postures so close that nothing is missed between them, and reports where
+//! on the path which part is near which obstacle.
 
 use crate::Level;
 use crate::body::{Body, Near, Touch};
@@ -7,87 +7,86 @@ use crate::obstacles::{Obstacles, What};
 use geometry::Point;
 use std::collections::BTreeMap;
 
-/// No point of the robot moves farther from one posture that is looked at to the next, metres.
+/// Largest distance that any point of the robot moves between two examined postures, metres.
 pub const STEP: f64 = 0.01;
-/// A first guess of steps: so far do joints go in one, radians or metres. Arcs differ from their
-/// chords by less than 0.2 % then.
+/// Largest joint motion of a step in the first guess, radians or metres; arcs then differ from
+/// their chords by less than 0.2 %.
 const TURN: f64 = 0.1;
-/// Most postures between two waypoints: a metre of reach turned about once takes 630.
+/// Largest number of postures between two waypoints; a full turn at a reach of one metre takes 630.
 const MAX_STEPS: usize = 1 << 14;
-/// Postures that are looked at together.
+/// Number of postures that are examined as one piece of work.
 const PIECE: usize = 8;
 
-/// The way from one waypoint to the next, joints going straight.
+/// The motion from one waypoint to the next, linear in the joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Leg {
-    /// Postures that are looked at, the first one included, the last one not.
+    /// Number of postures to examine, including the first waypoint and not the last.
     pub n_steps: usize,
-    /// Some part jumps: a closed loop falls over to its other solution.
+    /// Whether a part jumps because a closed loop changes to its other solution.
     pub jumps: bool,
 }
 
-/// Where on the way a part is near to something: waypoints are numbered from 0, and 1.5 lies midway
-/// between the second and the third.
+/// A stretch of a path on which a part is near something. Places on a path are counted in waypoints
+/// from 0: 1.5 is midway between the second and the third.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
     /// Index of the link.
     pub link: usize,
-    /// It is what hangs on the link, not the link itself.
+    /// Whether points attached to the link are near, and not the link itself.
     pub hangs: bool,
-    /// Nobody knows whether it hangs there: uncertain points beside the link as it was scanned.
+    /// Whether it is uncertain that these points are attached to the link.
     pub is_doubtful: bool,
-    /// To what.
+    /// The kind of the obstacle.
     pub what: What,
-    /// How near at worst.
+    /// The worst level on the stretch.
     pub level: Level,
-    /// It is not nearer than where it was found; to obstacles that it was as near to.
+    /// Whether the part was as near to these obstacles in the posture in which it was scanned.
     pub as_found: bool,
-    /// Where that begins first and ends last.
+    /// Place on the path where the contact first begins.
     pub from: f64,
-    /// See `from`.
+    /// Place on the path where it last ends.
     pub to: f64,
-    /// At how many of the postures that are looked at.
+    /// Number of examined postures with the contact.
     pub n_postures: usize,
-    /// Where it is worst.
+    /// Place on the path where it is worst.
     pub worst: f64,
-    /// It is at least so far there, metres.
+    /// Lower bound of the distance there, metres.
     pub gap: f64,
-    /// One of the obstacles there, frame of the base, metres; nothing for space beyond all that is
-    /// known.
+    /// One of the obstacles there, base frame, metres; `None` for space beyond everything known.
     pub at: Option<Point>,
-    /// Cells of obstacles there.
+    /// Number of obstacle cells there.
     pub n: usize,
 }
 
 impl Contact {
-    /// It leads into space of which nothing is known, and did not so where the robot was found;
-    /// beyond all that is known nobody can tell.
+    /// Whether the part moves into unseen space in which it was not when scanned; beyond everything
+    /// known this cannot be told, and counts.
     #[must_use]
     pub fn is_unseen(&self) -> bool {
         self.level == Level::Unseen && (!self.as_found || self.at.is_none())
     }
 }
 
-/// Which part, to what, and whether only as it was found.
+/// Index of the part, kind of the obstacle, and whether it was as near when scanned.
 type Key = (usize, What, bool);
 
-/// A path that is looked at piece by piece.
+/// A path that is examined piece by piece.
 pub struct Walk<'a> {
     body: &'a Body<'a>,
     around: &'a Obstacles,
     path: &'a [Vec<f64>],
     legs: &'a [Leg],
-    /// Number of the first posture of each leg, and of the last waypoint.
+    /// Index of the first posture of each leg, and of the last waypoint.
     first: Vec<usize>,
     found: AsFound,
 }
 
-/// What is near at the postures of a piece, and how far closed loops stay open there, metres.
+/// The contacts at the postures of a piece, and the gap of closed loops there, metres.
 pub struct Looked(Vec<(f64, Told, f64)>);
 
 impl<'a> Walk<'a> {
-    /// Along the waypoints (at least one), with a leg from each to the next; `found` is the posture
-    /// that the robot was scanned in.
+    /// A walk along waypoints (at least one) with a leg from each to the next; `found` is the
+    /// posture in which the robot was scanned.
     #[must_use]
     pub fn new(
         (body, around): (&'a Body<'a>, &'a Obstacles),
@@ -113,7 +112,7 @@ impl<'a> Walk<'a> {
         self.n_postures().div_ceil(PIECE)
     }
 
-    /// Looks at a piece; none of them asks for another.
+    /// Examines a piece, independently of all others.
     #[must_use]
     pub fn look(&self, piece: usize) -> Looked {
         let own = piece * PIECE..((piece + 1) * PIECE).min(self.n_postures());
@@ -132,7 +131,7 @@ impl<'a> Walk<'a> {
         Looked(own.map(look).collect())
     }
 
-    /// Adds what was near in the next piece.
+    /// Adds the contacts of the next piece.
     pub fn add(&self, looked: Looked, to: &mut Contacts) {
         for (place, told, open) in looked.0 {
             to.add((self.body, self.around), place, told);
@@ -143,14 +142,14 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// How many postures lie between a waypoint and the next.
+/// The leg between two waypoints: the number of postures to examine.
 #[must_use]
 pub fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
     let turn = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
     let mut n_steps = ((turn / TURN).ceil() as usize).clamp(1, MAX_STEPS);
     loop {
         let longest = longest(body, from, to, n_steps);
-        // Whole turns in a step would look like none.
+        // A step of whole turns would look like no motion.
         if longest <= STEP && turn <= TURN * n_steps as f64 {
             return Leg { n_steps, jumps: false };
         }
@@ -162,8 +161,8 @@ pub fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
     }
 }
 
-/// The longest way of any point of the robot from one of the postures to the next, metres: that of
-/// a corner of its bounds.
+/// Largest distance that any point of the robot moves from one posture to the next, metres, from
+/// the corners of its bounds.
 fn longest(body: &Body<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
     let corners = |step: usize| -> Vec<Point> {
         let poses = body.model.poses(&between(from, to, step as f64 / n_steps as f64));
@@ -177,7 +176,7 @@ fn longest(body: &Body<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
         let now = corners(step);
         let ways = before.iter().zip(&now).map(|(a, b)| (b - a).norm());
         longest = ways.fold(longest, f64::max);
-        // Twice as many steps are wanted anyway.
+        // The number of steps is doubled in any case.
         if longest > 2.0 * STEP {
             break;
         }
@@ -186,15 +185,15 @@ fn longest(body: &Body<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
     longest
 }
 
-/// The posture at a share of the way.
+/// The posture at a share of the leg, 0..1.
 fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
     from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect()
 }
 
-/// What comes nearer by less is as near as before, metres: scans are no finer.
+/// An approach by less counts as unchanged distance, metres; scans are no finer.
 const ROUNDING: f32 = 2e-3;
 
-/// How near parts were to obstacles where the robot was found.
+/// Distances of parts from obstacles in the posture in which the robot was scanned.
 struct AsFound {
     touches: BTreeMap<(usize, usize), (Level, f32)>,
     outside: Vec<usize>,
@@ -212,8 +211,8 @@ impl AsFound {
     }
 }
 
-/// What is near at one posture, the worst of each kind: how near, at least so far, which obstacle,
-/// how many.
+/// The worst contact of each kind in one posture: level, lower bound of the distance (metres),
+/// index of the obstacle, number of obstacles.
 type Told = BTreeMap<Key, (Level, f32, Option<usize>, usize)>;
 
 fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
@@ -233,11 +232,11 @@ fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
     out
 }
 
-/// All postures at which the same part is near to the same thing are one contact.
+/// Joins the contacts of all postures: one for each part and kind of obstacle.
 #[derive(Debug, Clone, Default)]
 pub struct Contacts {
     all: BTreeMap<Key, Contact>,
-    /// Where closed loops stay open most, and how far, metres.
+    /// Place on the path where closed loops are open most, and their gap, metres.
     open: (f64, f64),
 }
 
@@ -272,13 +271,13 @@ impl Contacts {
         }
     }
 
-    /// Where closed loops stay open most, and how far, metres.
+    /// Place on the path where closed loops are open most, and their gap, metres.
     #[must_use]
     pub fn open(&self) -> (f64, f64) {
         self.open
     }
 
-    /// The worst first.
+    /// All contacts, the worst first.
     #[must_use]
     pub fn all(self) -> Vec<Contact> {
         let mut all: Vec<Contact> = self.all.into_values().collect();
@@ -336,19 +335,19 @@ mod tests {
 
     #[test]
     fn a_post_in_the_way_is_hit_where_it_stands() {
-        // Half a turn; the post stands 90° on, 0.9 m away.
+        // Half a turn; a post stands at 90°, 0.9 m away.
         let post: Vec<_> =
             (0..100).map(|k| ([0.0, 0.9, 0.002 * f64::from(k) - 0.1], What::Fixed)).collect();
         let found = walk(&post, &[0.0, std::f64::consts::PI], 0.0, 0.02);
         let [hit] = &found[..] else { panic!("one contact: {found:?}") };
         assert!(!hit.as_found && hit.level >= Level::Hit && hit.gap == 0.0, "{hit:?}");
-        // The beam's side is 5 cm off its middle: 3.2° before, and as much behind; the margin and
-        // half a step more.
+        // The beam's side is 5 cm from its axis, which is 3.2° on either side of the post, plus the
+        // margin and half a step.
         let share = (0.05_f64 / 0.9).asin() / std::f64::consts::PI;
         assert!(hit.from < 0.5 - share && hit.from > 0.5 - 1.8 * share, "{hit:?}");
         assert!(hit.to > 0.5 + share && hit.to < 0.5 + 1.8 * share, "{hit:?}");
         assert!((hit.at.expect("a point") - Point::new(0.0, 0.9, 0.0)).norm() < 0.12);
-        // Beyond its end nothing is hit; within the margin it is near.
+        // Beyond its end nothing is hit, but within the margin it is near.
         let beyond = |off: f64| vec![([0.0, 1.0 + off, 0.0], What::Fixed)];
         assert!(walk(&beyond(0.04), &[0.0, 3.0], 0.0, 0.02).is_empty());
         let near = walk(&beyond(0.015), &[0.0, 3.0], 0.0, 0.02);
@@ -358,15 +357,15 @@ mod tests {
 
     #[test]
     fn what_it_touched_where_it_was_found_is_told_apart_until_it_comes_nearer() {
-        // At its end, 1 cm away, as found; and a post that it turns into.
+        // A point at its end, 1 cm away as found, and a post that it turns into.
         let points = [([1.01, 0.0, 0.0], What::Uncertain), ([0.0, 0.8, 0.0], What::Fixed)];
         let found = walk(&points, &[0.0, 1.6], 0.0, 0.02);
         let levels: Vec<_> =
             found.iter().map(|c| (c.what, c.level >= Level::Hit, c.as_found)).collect();
         assert_eq!(levels, [(What::Fixed, true, false), (What::Beside, false, true)]);
-        // The same point is none of its own where it was found elsewhere.
+        // If it was found elsewhere, the same point is not its own.
         assert!(walk(&points[..1], &[0.0, 1.6], 1.6, 0.02).iter().all(|c| !c.as_found));
-        // It was near where it was found, and is inside on the way.
+        // A point that was near where it was found, and is inside on the path.
         let points = [([0.9, 0.06, 0.0], What::Fixed)];
         let found = walk(&points, &[0.0, 0.1], 0.0, 0.02);
         assert!(found.iter().any(|c| c.level >= Level::Hit && !c.as_found), "{found:?}");
@@ -374,7 +373,7 @@ mod tests {
 
     #[test]
     fn what_was_near_outside_is_not_as_found_inside() {
-        // Beside the beam, 15 mm off its side; it is pushed into by 10 mm and no more.
+        // A point 15 mm beside the beam, into which the beam moves by 10 mm.
         let points = [([0.5, 0.065, 0.0], What::Fixed)];
         let found = walk(&points, &[0.0, 0.05], 0.0, 0.02);
         assert!(found.iter().any(|c| c.level == Level::Inside && !c.as_found), "{found:?}");
@@ -382,7 +381,7 @@ mod tests {
 
     #[test]
     fn points_on_its_own_surface_are_no_obstacle() {
-        // A patch that a mask left to the fixed world, so far off the beam's side.
+        // A patch at a distance from the beam's side that a mask left to the fixed world.
         let patch = |off: f64| -> Vec<_> {
             let at =
                 |k: u32| [0.4 + 0.01 * f64::from(k % 10), 0.05 + off, 0.01 * f64::from(k / 10)];
@@ -395,7 +394,7 @@ mod tests {
 
     #[test]
     fn uncertain_points_beside_it_may_move_with_it() {
-        // Above the beam's end; and a post that the beam passes below, but not they.
+        // Points above the beam's end, and a post that the beam passes below, but they do not.
         let beside = (0..8).map(|k| ([0.9, 0.0, 0.07 + 0.01 * f64::from(k)], What::Uncertain));
         let post = std::iter::once(([0.0, 0.9, 0.12], What::Fixed));
         let points: Vec<_> = beside.chain(post).collect();

@@ -1,36 +1,36 @@
-//! Robots as they were found, what was measured, and an eye, in; whether a point may come from a
-//! beam that met an edge before it, out.
+//! Tells which points may be artefacts of beams that hit the edge of a robot in front of them.
 //!
-//! A beam has a width. One that meets an edge gives a range between those of the edge and of what
-//! is behind it, so a curtain of such points hangs behind every outline. Those of a robot move with
-//! it, and nothing is where they are.
+//! A beam has a width. If it hits an edge, its range lies between those of the edge and of the
+//! surface behind, so that a curtain of such points hangs behind every outline. Those of a robot
+//! move with it, and nothing is where they are.
 
 use geometry::{Point, Pose};
 use robot::Model;
 use rustc_hash::FxHashMap;
 
-/// A beam that passes nearer to a surface than this may have met it, metres: the radius of a beam,
-/// and what posture and model are off.
+/// A beam may hit a surface that it passes at this distance or less, metres: the radius of a beam,
+/// and the errors of posture and model.
 const GRAZE: f64 = 0.02;
-/// Points nearer behind an edge than this are told by the surface, metres.
+/// Points nearer than this behind an edge belong to the surface itself, metres.
 const BEHIND: f64 = 0.03;
-/// So much farther does a surface count for each metre that a beam passes beside it: an outline is
-/// told by its edge, not by what bulges towards the eye beside it.
+/// By how much farther a surface counts for each metre that a beam passes beside it: an outline is
+/// given by its edge, not by parts beside it that bulge towards the scanner.
 const ASIDE: f64 = 2.0;
-/// Distance of the samples that tell a surface, metres.
+/// Spacing of the samples of a surface, metres.
 const SPACING: f64 = 0.01;
 
-/// What robots hide from an eye, and a rim around it.
+/// The directions in which robots hide space from a scanner, with a rim around them.
 pub struct Shadow {
     eye: Point,
-    /// Width of a direction, of a unit vector's components.
+    /// Width of a cell of directions, in components of a unit vector.
     width: f64,
-    /// By direction: how far the surface is, metres.
+    /// Distance of the surface in each direction, metres.
     near: FxHashMap<[i32; 3], f32>,
 }
 
 impl Shadow {
-    /// Of robots, each with its links' poses, as an eye sees them; all in one frame, metres.
+    /// The shadow of robots (each with the poses of its links) as seen from `eye`; all in one
+    /// frame, metres.
     #[must_use]
     pub fn new(robots: &[(&Model, &[Pose])], eye: Point) -> Self {
         let seen = |&(model, poses): &(&Model, &[Pose])| -> Vec<Point> {
@@ -67,7 +67,7 @@ impl Shadow {
             let cell: [i32; 3] = std::array::from_fn(|k| middle[k] + by[k]);
             let at = cell.map(|c| (f64::from(c) + 0.5) * self.width);
             let length = at.iter().map(|v| v * v).sum::<f64>().sqrt();
-            // Only cells that the unit sphere goes through are directions.
+            // Only cells that the unit sphere intersects are directions.
             if (length - 1.0).abs() > self.width {
                 continue;
             }
@@ -84,7 +84,7 @@ impl Shadow {
         way.map(|v| (v / self.width).floor() as i32)
     }
 
-    /// Whether the beam to a point may have met an edge before it.
+    /// Whether the beam to a point may have hit an edge in front of it.
     #[must_use]
     pub fn is_grazed(&self, p: &Point) -> bool {
         let off = p - self.eye;
@@ -94,16 +94,16 @@ impl Shadow {
     }
 }
 
-/// A scanner: its `point_source_id` is that of no other.
+/// A scanner with a `point_source_id` of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Eye {
-    /// Frame of the base, metres.
+    /// Position in the base frame, metres.
     pub at: Point,
     /// Angle between its beams, radians.
     pub step: f64,
 }
 
-/// What a scanner measured, by direction: how near the nearest is.
+/// The nearest measurement of a scanner in each direction.
 #[derive(Debug, Clone)]
 pub(crate) struct Front {
     eye: Point,
@@ -111,9 +111,10 @@ pub(crate) struct Front {
     near: FxHashMap<[i32; 3], f32>,
 }
 
-/// Beams are no narrower, radians: 3 mm wide at 3 m.
+/// Smallest width of a beam, radians: 3 mm at 3 m.
 const BEAM: f64 = 1e-3;
-/// What is nearer by less is of the same thing, metres: noise, and a surface that is seen askew.
+/// A point that is nearer by less belongs to the same object, metres: noise, and surfaces seen at
+/// an angle.
 const BEFORE: f32 = 0.02;
 
 impl Front {
@@ -127,7 +128,7 @@ impl Front {
         *near = near.min(far);
     }
 
-    /// Adds what is nearer in another one of the same eye.
+    /// Adds the measurements of another front of the same scanner.
     #[expect(clippy::iter_over_hash_type, reason = "the least does not depend on the order")]
     pub(crate) fn join(&mut self, other: Self) {
         for (cell, far) in other.near {
@@ -142,7 +143,7 @@ impl Front {
         ((off / far / self.width).map(|v| v.floor() as i32).into(), far as f32)
     }
 
-    /// Whether a beam beside that to a point, or the same, met something before it.
+    /// Whether the beam to a point, or a neighbouring one, hit something in front of it.
     pub(crate) fn is_behind(&self, p: &Point) -> bool {
         let ([x, y, z], far) = self.cell(p);
         let beside = |i: i32| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
@@ -167,7 +168,7 @@ mod tests {
         let poses = vec![Pose::identity(); model.links.len()];
         for far in [1.0, 3.0, 9.0] {
             let shadow = Shadow::new(&[(&model, &poses)], Point::new(-far, 0.0, 0.5));
-            // By how far beside the outline, and how far behind the axis of the post.
+            // By distance beside the outline and behind the axis of the post.
             let told = |aside: f64, behind: f64| {
                 let wide = (0.1 + aside) * (far + behind) / far;
                 [-wide, wide].map(|y| shadow.is_grazed(&Point::new(behind, y, 0.5)))
@@ -175,7 +176,7 @@ mod tests {
             for behind in [0.08, 0.3, 2.0] {
                 assert_eq!(told(0.003, behind), [true; 2], "{far} {behind}");
             }
-            // Beside it, away from it, and before it.
+            // Beside the post, away from it, and in front of it.
             assert_eq!(told(0.02, 0.0), [false; 2], "{far}");
             assert_eq!(told(0.06, 1.0), [false; 2], "{far}");
             assert!(!shadow.is_grazed(&Point::new(-0.4, 0.0, 0.5)), "{far}");

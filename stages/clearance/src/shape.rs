@@ -1,5 +1,5 @@
-//! The surface of a link, or points that hang on it, in; how far a place is from it, out. All in
-//! the frame of the link, metres.
+//! Distances from the surface of a link, or from points attached to it. All coordinates are in the
+//! frame of the link, metres.
 
 use crate::obstacles::{HALF_CELL, distance};
 use contract::{Space, SpaceGrid, SpaceKind};
@@ -8,43 +8,43 @@ use glamx::Vec3;
 use parry3d::shape::{CompositeShapeRef, TriMesh};
 use robot::Mesh;
 
-/// Smallest edge of the voxels that tell what a link encloses, metres, and how many of them a link
-/// may have before they are wider.
+/// Smallest edge of the voxels for what a link encloses, metres. They are wider where there would
+/// be more than [`N_INSIDE`].
 const INSIDE_EDGE: f64 = 0.004;
+/// Largest number of these voxels for one link.
 const N_INSIDE: f64 = 4e6;
 /// Diagonal of a cube of edge 1.
 const DIAGONAL: f64 = 1.7321;
-/// Edge of the voxels that tell which hanging point is nearest, metres.
+/// Edge of the voxels that give the nearest attached point, metres.
 const HUNG_EDGE: f32 = 0.01;
-/// So much farther than is asked they tell it, metres: their own diagonal, also where they had to
-/// be widened.
+/// Further reach of these voxels, metres: their own diagonal, even where they had to be widened.
 const HUNG_REACH: f32 = 0.1;
 
-/// A place seen from a shape.
+/// The distance of a place from a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Gap {
-    /// Farther than was asked for.
+    /// It is farther than the limit of the query.
     Far,
-    /// So far from its surface, at least, metres.
+    /// Lower bound of the distance from the surface, metres.
     At(f32),
-    /// Enclosed by it, away from its surface.
+    /// The place is enclosed by the shape, away from its surface.
     Inside,
 }
 
-/// What is not to touch anything.
+/// A shape whose distance from obstacles is checked.
 pub(crate) enum Shape {
-    /// Triangles, and what they enclose.
+    /// Triangles, and the voxels that they enclose.
     Surface(Box<TriMesh>, Space),
-    /// Points.
+    /// Attached points, with an index of the nearest one.
     Hung(Vec<[f32; 3]>, NearestField),
 }
 
 impl Shape {
-    /// Of which nobody asks for less than `least` metres. Nothing for a mesh without triangles.
+    /// A shape for queries of at least `least` metres; `None` for a mesh without triangles.
     pub(crate) fn surface(mesh: &Mesh, bounds: &Aabb, least: f32) -> Option<Self> {
         let corners = mesh.vertices.iter().map(|v| Vec3::from_array(*v)).collect();
         let triangles = TriMesh::new(corners, mesh.triangles.clone()).ok()?;
-        // A place that is farther than is asked is in no voxel of the surface, so it is told on
+        // A place farther than the limit lies in no voxel of the surface, so that it is known on
         // which side it is.
         let widest = (f64::from(least) / DIAGONAL).max(INSIDE_EDGE);
         let volume: f64 = bounds.size().iter().map(|s| s.max(INSIDE_EDGE)).product();
@@ -52,14 +52,14 @@ impl Shape {
         Some(Self::Surface(Box::new(triangles), enclosed(mesh, bounds, edge)))
     }
 
-    /// Points that are told from up to `most` away.
+    /// A shape of attached points for queries of at most `most` metres.
     pub(crate) fn hung(points: Vec<[f32; 3]>, most: f32) -> Self {
         let field = NearestField::new(&points, HUNG_EDGE, most + HUNG_REACH);
         Self::Hung(points, field)
     }
 
-    /// How far a place is, if it is `within` metres. What is enclosed is inside, however near to
-    /// the surface.
+    /// Distance of a place, if it is at most `within` metres. Enclosed places are inside, however
+    /// near the surface is.
     pub(crate) fn gap(&self, p: [f32; 3], within: f32) -> Gap {
         match self {
             Self::Surface(_, inside) if encloses(inside, p) => Gap::Inside,
@@ -70,8 +70,8 @@ impl Shape {
             }
             Self::Hung(points, field) => match field.nearest(p) {
                 Some(i) => {
-                    // The one nearest to the middle of the voxel may be farther by that, and each
-                    // stands for a cell.
+                    // The point nearest to the centre of the voxel may be farther by the diagonal,
+                    // and each point stands for a cell.
                     let off = DIAGONAL as f32 / field.grid().1 + HALF_CELL;
                     let gap = (distance(points[i], p) - off).max(0.0);
                     if gap <= within { Gap::At(gap) } else { Gap::Far }
@@ -81,7 +81,7 @@ impl Shape {
         }
     }
 
-    /// Whether it tells distances however large they are.
+    /// Whether it gives distances without limit.
     pub(crate) fn tells_all(&self) -> bool {
         matches!(self, Self::Surface(..))
     }
@@ -92,7 +92,8 @@ fn encloses(inside: &Space, p: [f32; 3]) -> bool {
     at.is_some_and(|at| inside.voxels()[at] == SpaceKind::Robot)
 }
 
-/// What cannot be reached from outside without crossing the mesh; its surface is not in it.
+/// The voxels that cannot be reached from outside without crossing the mesh, without those of its
+/// surface.
 fn enclosed(mesh: &Mesh, bounds: &Aabb, edge: f64) -> Space {
     let grid = SpaceGrid::over(&bounds.grown(2.0 * edge), edge);
     let mut space = Space::unknown(grid);
@@ -113,9 +114,9 @@ fn enclosed(mesh: &Mesh, bounds: &Aabb, edge: f64) -> Space {
     space
 }
 
-/// Places on a triangle no farther apart than that along two of its sides.
+/// Samples of a triangle, at most `apart` from each other along two of its sides.
 fn samples([a, b, c]: [Vec3; 3], apart: f32, mut take: impl FnMut(Vec3)) {
-    // From the corner between the two shorter sides: needles have few places.
+    // From the corner between the two shorter sides, so that needles give few samples.
     let lengths = [(c - b).length(), (c - a).length(), (b - a).length()];
     let longest = (0..3).max_by(|&i, &j| lengths[i].total_cmp(&lengths[j])).unwrap_or(0);
     let [from, u, v] = [[a, b, c], [b, c, a], [c, a, b]][longest];
@@ -152,14 +153,14 @@ mod tests {
         let Gap::At(gap) = shape.gap([0.25, 0.1, -0.1], 0.1) else { panic!("near") };
         assert!((gap - 0.05).abs() < 1e-6, "{gap}");
         assert_eq!(shape.gap([0.0; 3], 0.1), Gap::Inside);
-        // However little is asked, each place is told on which side it is.
+        // The side is right whatever the limit of the query is.
         for (margin, k) in [0.0085, 0.02].into_iter().flat_map(|m| (1..20).map(move |k| (m, k))) {
             let shape = Shape::surface(&mesh, &bounds, margin).expect("triangles");
             let off = 0.01 * k as f32 - 0.0005;
             let gap = shape.gap([0.2 - off, 0.0137, -0.0049], margin);
             assert!(off < 0.007 || gap == Gap::Inside, "{margin} {off}: {gap:?}");
         }
-        // Where one of its sides is missing, nothing is enclosed.
+        // A cube with a side missing encloses nothing.
         let open = Mesh { triangles: mesh.triangles[2..].to_vec(), ..mesh };
         let shape = Shape::surface(&open, &bounds, 0.03).expect("triangles");
         assert_eq!(shape.gap([0.0; 3], 0.1), Gap::Far);

@@ -1,9 +1,9 @@
-//! Voxels and floor in, voxels above the floor out.
+//! Selects the occupied voxels above the floor.
 
 use crate::{Counted, Settings};
 use contract::{Floor, FloorLevel, Occupancy};
 
-/// Voxels whose bottom lies above the floor, in their order.
+/// The voxels whose bottom lies above the floor, in their order.
 pub(crate) fn above(occupancy: &Occupancy, floor: &Floor, settings: &Settings) -> Vec<Counted> {
     if floor.levels.is_empty() {
         return occupancy.voxels.clone();
@@ -34,18 +34,18 @@ pub(crate) fn above(occupancy: &Occupancy, floor: &Floor, settings: &Settings) -
         .collect()
 }
 
-/// Heights of one level by column of voxels: each column is asked for once a layer.
+/// Cached heights of one level by voxel column, so that each column is computed only once.
 #[derive(Debug, Default)]
 struct Patch {
-    /// Lowest voxel column held.
+    /// Lowest voxel column of the cache.
     first: [i32; 2],
     size: [usize; 2],
-    /// NaN not asked yet, +∞ unknown.
+    /// Heights, metres; NaN where not yet computed, +∞ where unknown.
     heights: Vec<f64>,
 }
 
-/// Most columns that are remembered: 32 MB of heights a level, a hall of 100 m × 100 m at 5 cm.
-/// Larger ones are looked up each time.
+/// Largest number of cached columns: 32 MB of heights a level, a hall of 100 m × 100 m at 5 cm.
+/// Heights of larger levels are computed each time.
 const MOST: usize = 1 << 22;
 
 impl Patch {
@@ -64,7 +64,7 @@ impl Patch {
         held.is_finite().then_some(*held)
     }
 
-    /// Makes room for all columns over the level, if they are not too many.
+    /// Allocates the cache for all columns over the level, if they are not too many.
     fn open(&mut self, level: &FloorLevel, edge: f64) {
         let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
         for (cell, _) in &level.heights {

@@ -1,9 +1,9 @@
-//! Sorted voxels in, the number of the connected set of each out. Rows are cut into runs and runs
-//! of near rows joined, so that the work grows with the number of voxels only.
+//! Finds connected sets of sorted voxels. Rows are cut into runs and neighbouring runs are joined,
+//! so that the work is linear in the number of voxels.
 
 use crate::Counted;
 
-/// Consecutive voxels of one row, gaps bridged.
+/// Consecutive voxels of one row, with small gaps bridged.
 struct Run {
     first: i32,
     last: i32,
@@ -16,16 +16,16 @@ struct Row {
     runs: std::ops::Range<usize>,
 }
 
-/// Number of the set of each voxel: 0, 1, … in the order of the sets' first voxels. Two voxels
-/// belong together if they differ by at most `gap + 1` along each axis. `voxels` must be sorted by
-/// (z, y, x).
+/// Index of the connected set of each voxel: 0, 1, … in the order of the sets' first voxels. Two
+/// voxels are connected if they differ by at most `gap + 1` along each axis. `voxels` must be
+/// sorted by (z, y, x).
 pub(crate) fn connect(voxels: &[Counted], gap: i32) -> Vec<u32> {
     let reach = gap.saturating_add(1);
     let (rows, runs, run_of) = cut(voxels, reach);
     let mut parent: Vec<u32> = (0..runs.len() as u32).collect();
     for dz in -reach..=0 {
         for dy in -reach..=reach {
-            // Rows before this one only; each pair of rows is met once.
+            // Only earlier rows, so that each pair of rows is visited once.
             if (dz, dy) < (0, 0) {
                 join_rows(&rows, &runs, (dz, dy), reach, &mut parent);
             }
@@ -68,9 +68,9 @@ fn cut(voxels: &[Counted], reach: i32) -> (Vec<Row>, Vec<Run>, Vec<u32>) {
     (rows, runs, run_of)
 }
 
-/// Joins runs of each row with those of the row that lies `(dz, dy)` from it.
+/// Joins the runs of each row with those of the row at offset `(dz, dy)`.
 fn join_rows(rows: &[Row], runs: &[Run], (dz, dy): (i32, i32), reach: i32, parent: &mut [u32]) {
-    // Both walk through the sorted rows once.
+    // Both sequences of rows are sorted and walked through once.
     let mut other = 0;
     for row in rows {
         let wanted = (row.z.saturating_add(dz), row.y.saturating_add(dy));

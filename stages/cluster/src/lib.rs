@@ -1,5 +1,20 @@
-//! Occupied space and floor in, clusters out: connected sets of what stands above the floor, over
-//! all scans.
+//! Splits the occupied space above the floor into clusters: connected bodies, over all scans.
+//!
+//! # Example
+//! ```
+//! use contract::{Floor, Occupancy};
+//!
+//! // Two cubes of 10 × 10 × 10 voxels of 5 cm, one metre apart, with 4 points in each voxel.
+//! let cube = |x0: i32| (0..1000).map(move |i| ([x0 + i % 10, i / 10 % 10, i / 100], 4));
+//! let mut voxels: Vec<_> = cube(0).chain(cube(30)).collect();
+//! voxels.sort_by_key(|&([x, y, z], _)| (z, y, x));
+//! let occupancy = Occupancy { edge: 0.05, voxels };
+//!
+//! // No floor level is known, so that all of the occupied space is kept.
+//! let clusters = cluster::split(&occupancy, &Floor::default(), &cluster::Settings::default());
+//! assert_eq!(clusters.len(), 2);
+//! assert_eq!(clusters[0].n_points, 4000);
+//! ```
 #![forbid(unsafe_code)]
 
 mod above;
@@ -11,16 +26,15 @@ use geometry::Aabb;
 /// Settings of the cluster stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Empty voxels that a cluster may bridge: 1, since thin and distant parts leave holes at 5
-    /// cm.
+    /// Number of empty voxels that a cluster may bridge. The default of 1 allows for the holes that
+    /// thin and distant parts have at 5 cm.
     pub gap: i32,
-    /// Least height of a voxel's bottom above the floor, metres: three times the noise of a common
-    /// scanner.
+    /// Smallest height of a voxel's bottom above the floor, metres; the default is three times the
+    /// noise of a common scanner.
     pub clearance: f64,
-    /// Depth below a level down to which a voxel still counts as that level's noise or dirt,
-    /// metres.
+    /// Depth below a level down to which a voxel counts as noise or dirt of that level, metres.
     pub slack: f64,
-    /// Fewest points of a cluster: fewer are dust.
+    /// Smallest number of points of a cluster; fewer are dust.
     pub min_points: u64,
 }
 
@@ -30,10 +44,10 @@ impl Default for Settings {
     }
 }
 
-/// Clusters of what stands above the floor, most points first. Where no floor is known, of
-/// everything.
+/// Splits the occupied space above the floor into clusters, most points first. Where no floor is
+/// known, all of the occupied space is used.
 ///
-/// What lies below every known level at its place is dropped: mirror images and noise.
+/// Voxels below every known level at their place are dropped: mirror images and noise.
 #[must_use]
 pub fn split(occupancy: &Occupancy, floor: &Floor, settings: &Settings) -> Vec<Cluster> {
     let kept = above::above(occupancy, floor, settings);
@@ -57,7 +71,7 @@ pub fn split(occupancy: &Occupancy, floor: &Floor, settings: &Settings) -> Vec<C
         cluster.bounds.add(low.map(|v| v + occupancy.edge));
     }
     clusters.retain(|c| c.n_points >= settings.min_points);
-    // Stable: equal ones stay in the order of their first voxels.
+    // A stable sort: equal clusters stay in the order of their first voxels.
     clusters.sort_by_key(|c| std::cmp::Reverse((c.n_points, c.voxels.len())));
     for (id, cluster) in clusters.iter_mut().enumerate() {
         cluster.id = id as u32;

@@ -1,4 +1,4 @@
-//! Small scenes of voxels in, clusters as expected out.
+//! Clusters of small scenes of voxels.
 
 use super::*;
 use contract::FloorLevel;
@@ -33,7 +33,7 @@ fn floor(height: impl Fn(f64, f64) -> f64) -> Floor {
     Floor { levels: vec![level], planes: Vec::new() }
 }
 
-/// Sets by comparing every pair: slow, but nobody doubts it.
+/// The reference: connected sets by comparing every pair of voxels.
 fn by_pairs(voxels: &[Counted], reach: i32) -> Vec<usize> {
     let mut set: Vec<usize> = (0..voxels.len()).collect();
     loop {
@@ -90,7 +90,7 @@ fn two_boxes_on_a_wavy_floor_are_two_clusters_and_the_floor_is_none() {
     }
     voxels.extend(cube([20, 20, 1], 12));
     voxels.extend(cube([60, 20, 0], 8));
-    // A mirror image below the floor, and one voxel bridged across a gap.
+    // A mirror image below the floor, and a voxel that is connected across a gap.
     voxels.extend(cube([20, 20, -30], 6));
     voxels.push([20, 33, 6]);
     let got = split(&occupancy(voxels), &floor(wave), &Settings::default());

@@ -1,36 +1,36 @@
-//! Errors by what a caller can do about them; one type for all rooms, since a stage's errors only
-//! travel up.
+//! The error type of all crates, classified by what a caller can do about it. There is one type
+//! for the whole workspace because a stage's errors are only ever passed upwards.
 
 use crate::quote;
 use crate::words::without_numbers;
 use std::fmt;
 use std::path::Path;
 
-/// What a caller can do about an error. As many kinds as there are reactions; each has an exit
-/// code.
+/// What a caller can do about an error. Each kind has an exit code; there are as many kinds as
+/// there are different reactions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Kind {
-    /// The input is broken or contradicts itself: mend or replace it. Exit code 4.
+    /// The input is broken or contradicts itself; repair or replace it. Exit code 4.
     BadInput,
-    /// The input may be right, but is of a kind that is not read: convert it. Exit code 4.
+    /// The input may be valid, but is of a kind that is not supported; convert it. Exit code 4.
     Unsupported,
-    /// The machine refused: disk, permission, network share. Exit code 1.
+    /// The operating system refused an operation: disk, permission, network share. Exit code 1.
     Io,
-    /// A limit (memory, disk) would be broken: raise it or take less input. Exit code 5.
+    /// A limit on memory or disk would be exceeded; raise it or reduce the input. Exit code 5.
     OverBudget,
     /// Flags or settings contradict one another. Exit code 2.
     Usage,
-    /// Somebody pressed Ctrl-C. Exit code 130.
+    /// The user interrupted the program with Ctrl-C. Exit code 130.
     Cancelled,
-    /// Ours: please report it. Exit code 1.
+    /// A fault of the program itself, to be reported. Exit code 1.
     Bug,
 }
 
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What went wrong, where, why.
+/// An error: what went wrong, where, the cause, and what the user can do about it.
 ///
 /// Messages are half sentences: lower case, no full stop, the offending value in quotes, last.
 #[derive(Debug)]
@@ -46,18 +46,18 @@ struct Inner {
 }
 
 impl Error {
-    /// An error of `kind`; `what` is a half sentence.
+    /// Makes an error of this kind; `what` is a half sentence.
     pub fn new(kind: Kind, what: impl Into<String>) -> Self {
         Self(Box::new(Inner { kind, what: what.into(), place: None, hint: None, source: None }))
     }
 
-    /// Broken input.
+    /// Makes an error of kind [`Kind::BadInput`].
     pub fn bad_input(what: impl Into<String>) -> Self {
         Self::new(Kind::BadInput, what)
     }
 
-    /// What the system refuses about a file; a disk that is full is a limit, which the user can
-    /// lift.
+    /// Makes an error from what the operating system reports about a file that is written or
+    /// listed. A full disk is [`Kind::OverBudget`], since the user can make room.
     pub fn of_file(what: impl Into<String>, path: &Path, cause: std::io::Error) -> Self {
         let is_full = is_full(&cause);
         let kind = if is_full { Kind::OverBudget } else { Kind::Io };
@@ -68,8 +68,8 @@ impl Error {
         })
     }
 
-    /// What the system refuses about a file that is to be read: one that is not there, no longer or
-    /// not as a file, or that ends early, is bad input.
+    /// Makes an error from what the operating system reports about a file that is read. A file that
+    /// is missing, is no regular file or ends early is [`Kind::BadInput`].
     pub fn of_read(what: impl Into<String>, path: &Path, cause: std::io::Error) -> Self {
         let is_bad = is_missing(&cause);
         let kind = if is_bad { Kind::BadInput } else { Kind::Io };
@@ -80,21 +80,21 @@ impl Error {
         })
     }
 
-    /// Whether it is for want of room on a disk.
+    /// Whether the cause is a full disk.
     #[must_use]
     pub fn is_full_disk(&self) -> bool {
         let cause = self.0.source.as_ref().and_then(|s| s.downcast_ref::<std::io::Error>());
         cause.is_some_and(is_full)
     }
 
-    /// Keeps the cause.
+    /// Attaches the error that caused this one.
     #[must_use]
     pub fn because(mut self, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         self.0.source = Some(source.into());
         self
     }
 
-    /// Says where; the innermost place wins, an outer one is put before it.
+    /// Attaches the place of the error. Outer places are put in front of inner ones.
     #[must_use]
     pub fn at(mut self, place: impl fmt::Display) -> Self {
         self.0.place = Some(match self.0.place.take() {
@@ -104,21 +104,21 @@ impl Error {
         self
     }
 
-    /// Forgets where, for who says it himself.
+    /// Drops the place, for callers that print it themselves.
     #[must_use]
     pub fn without_place(mut self) -> Self {
         self.0.place = None;
         self
     }
 
-    /// The same of another kind.
+    /// Changes the kind and keeps the rest.
     #[must_use]
     pub fn of_kind(mut self, kind: Kind) -> Self {
         self.0.kind = kind;
         self
     }
 
-    /// Says the way out.
+    /// Attaches what the user can do about it.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.0.hint = Some(hint.into());
@@ -131,13 +131,13 @@ impl Error {
         self.0.kind
     }
 
-    /// Where it happened, if known.
+    /// Where the error happened, if known.
     #[must_use]
     pub fn place(&self) -> Option<&str> {
         self.0.place.as_deref()
     }
 
-    /// The way out, if known.
+    /// What the user can do about it, if known.
     #[must_use]
     pub fn way_out(&self) -> Option<&str> {
         self.0.hint.as_deref()
@@ -147,7 +147,7 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(place) = &self.0.place {
-            // A path may hold anything, a line break among it; `what` and its source are sentences.
+            // Only the place is quoted: a path may hold line breaks, `what` and its source may not.
             write!(f, "{}: ", quote::shown(place))?;
         }
         f.write_str(&without_numbers(&self.0.what))?;
@@ -184,8 +184,8 @@ impl From<std::io::Error> for Error {
     }
 }
 
-/// Whether a file that is to be read is not there, is none, or ends early: the input is to be
-/// mended, not the machine.
+/// Whether a file that should be read is missing, is no regular file, or ends early. Then the
+/// user must repair the input; nothing is wrong with the machine.
 fn is_missing(cause: &std::io::Error) -> bool {
     use std::io::ErrorKind::{IsADirectory, NotADirectory, NotFound, UnexpectedEof};
     matches!(cause.kind(), NotFound | IsADirectory | NotADirectory | UnexpectedEof)

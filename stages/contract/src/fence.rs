@@ -1,26 +1,26 @@
-//! Code that may panic in; its value, or the words of its panic, out.
+//! Runs code that may panic and returns its value or the message of the panic.
 //!
-//! Decoders of other projects panic on some damaged files, and a step of ours may hold a fault.
-//! Neither may end the program without a word, and neither may write to standard error by itself:
-//! whoever put up the fence says what happened, in the format that the user asked for.
+//! Decoders of other projects panic on some damaged files, and a step of this program may have a
+//! fault. Neither may end the program silently or write to standard error by itself: the caller
+//! of [`fenced`] reports what happened, in the format that the user asked for.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Fences that stand at this moment, on all threads.
+/// Number of [`fenced`] calls that are running now, on all threads.
 static STANDING: AtomicUsize = AtomicUsize::new(0);
-/// Words and source line of panics that nobody has asked for yet, the oldest first.
+/// Messages and source lines of panics that were not yet picked up, the oldest first.
 static NOTED: Mutex<Vec<(String, String)>> = Mutex::new(Vec::new());
-/// Most panics that are noted at the same time: one a thread, and some to spare.
+/// Largest number of panics kept at a time: one for each thread, and some to spare.
 const MAX_NOTED: usize = 64;
 
-/// Runs code that may panic. What it leaves half-done after a panic must not be used again; hence
-/// no `UnwindSafe` is asked for.
+/// Runs code that may panic. Data that the code was changing when it panicked must not be used
+/// again; that is why no `UnwindSafe` is required.
 ///
 /// # Errors
-/// The words of the panic and, where [`note`] was told, its line of source; in one line.
+/// The message of the panic on one line, with its source line where [`note`] was called.
 pub fn fenced<T>(run: impl FnOnce() -> T) -> std::result::Result<T, String> {
     let mut run = Some(run);
     let mut out = None;
@@ -28,14 +28,14 @@ pub fn fenced<T>(run: impl FnOnce() -> T) -> std::result::Result<T, String> {
     out.ok_or_else(|| "the step did not run".to_owned())
 }
 
-/// The fence itself, compiled once.
+/// The part of [`fenced`] that does not depend on its type, compiled once.
 fn caught(run: &mut dyn FnMut()) -> std::result::Result<(), String> {
     STANDING.fetch_add(1, Ordering::Relaxed);
     let done = catch_unwind(AssertUnwindSafe(run));
     STANDING.fetch_sub(1, Ordering::Relaxed);
     done.map_err(|panic| {
         let what = words(panic.as_ref());
-        // Dropping a payload may panic in its turn; nothing may escape from here.
+        // Dropping a panic's payload may panic again, and nothing may escape from here.
         std::mem::forget(panic);
         match line_of(&what) {
             Some(line) => format!("{} ({line})", one_line(&what)),
@@ -44,18 +44,18 @@ fn caught(run: &mut dyn FnMut()) -> std::result::Result<(), String> {
     })
 }
 
-/// Whether a panic at this moment would be caught by a fence.
+/// Whether a panic on this thread would now be caught by [`fenced`].
 #[must_use]
 pub fn is_fenced() -> bool {
     STANDING.load(Ordering::Relaxed) > 0
 }
 
-/// Notes where a panic came from, for the fence that catches it: for a panic hook, which is then to
-/// say nothing itself.
+/// Notes the source line of a panic for the [`fenced`] call that catches it. A panic hook calls
+/// this and then prints nothing itself.
 pub fn note(panic: &PanicHookInfo<'_>) {
     let line = panic.location().map_or_else(String::new, |at| {
-        // The last three parts of a path name package and file; what comes before differs from
-        // machine to machine.
+        // The last three parts of the path name package and file; those before differ between
+        // machines.
         let parts: Vec<&str> = at.file().split(['/', '\\']).collect();
         format!("{}:{}", parts[parts.len().saturating_sub(4)..].join("/"), at.line())
     });
@@ -66,7 +66,7 @@ pub fn note(panic: &PanicHookInfo<'_>) {
     noted.push((words(panic.payload()), line));
 }
 
-/// The line that a panic of these words came from; forgotten from then on.
+/// Takes the source line that was noted for a panic with this message.
 fn line_of(what: &str) -> Option<String> {
     let mut noted = NOTED.lock().unwrap_or_else(PoisonError::into_inner);
     let at = noted.iter().position(|(words, _)| words == what)?;

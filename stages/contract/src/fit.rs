@@ -1,4 +1,4 @@
-//! A fit: which robot, where, in which posture, and how far to trust it.
+//! A fit: a robot model found in the scans, with base pose, posture, uncertainty and verdict.
 
 use crate::Certainty;
 use geometry::Pose;
@@ -10,17 +10,17 @@ use serde::{Deserialize, Serialize};
     Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
 pub enum Verdict {
-    /// Wrong, or not this robot: not used for labels.
+    /// The fit is wrong, or it is another robot; it gives no labels.
     Refused,
-    /// May be right: a person should look.
+    /// The fit may be right; a person should check it.
     #[default]
     Doubtful,
-    /// Right as far as the points can tell.
+    /// The fit is right as far as the points can tell.
     Trusted,
 }
 
 impl Verdict {
-    /// As in `result.json`.
+    /// The word for the verdict in `result.json`.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -31,153 +31,155 @@ impl Verdict {
     }
 }
 
-/// One joint of a fit.
+/// The fitted value of one joint.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointFit {
-    /// As in the URDF.
+    /// Name of the joint in the URDF.
     pub name: String,
-    /// Radians, or metres for prismatic joints.
+    /// Value, radians; metres for prismatic joints.
     pub value: f64,
-    /// Standard deviation, same unit; that of any angle, π/√3, where the points say nothing of it.
+    /// Standard deviation in the same unit. Where the points say nothing of a revolute joint it is
+    /// that of a uniform angle, π/√3.
     pub sigma: f64,
-    /// How well the points tell it.
+    /// How well the points determine the value.
     pub certainty: Certainty,
-    /// Other values within the limits, whole turns away, at which the robot stands the same.
+    /// Other values within the limits at which the robot stands the same, whole turns away.
     pub equivalents: Vec<f64>,
 }
 
 impl JointFit {
-    /// Whether the points determine it.
+    /// Whether the points determine the value.
     #[must_use]
     pub fn is_determined(&self) -> bool {
         self.certainty == Certainty::Determined
     }
 }
 
-/// What the scans say of one link at the fitted posture.
+/// What the scans say of one link in the fitted posture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LinkEvidence {
-    /// As in the URDF.
+    /// Name of the link in the URDF.
     pub name: String,
-    /// Share of its outer surface that some beam could judge, 0..1.
+    /// Share of the link's outer surface that at least one beam could judge, 0..1.
     pub seen: f64,
-    /// Of the judged: share with a beam ending on it.
+    /// Share of the judged surface on which a beam ends, 0..1.
     pub matched: f64,
-    /// Of the judged: share that a beam went through.
+    /// Share of the judged surface that a beam passes through, 0..1.
     pub violated: f64,
-    /// Number of points within the gate.
+    /// Number of points within the gate (the largest distance at which a point counts).
     pub n_points: usize,
-    /// RMS distance of those points, metres.
+    /// RMS distance of those points from the surface, metres.
     pub rms: f64,
 }
 
-/// The best other explanation.
+/// The best other explanation of the points: another model, or the same one elsewhere.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunnerUp {
-    /// Its model.
+    /// Name of its model in the library.
     pub model: String,
     /// Its score, on the scale of [`Fit::score`].
     pub score: f64,
     /// Whether it is the same model in another posture.
     pub same_model: bool,
-    /// How clearly the beams prefer the best, on the surface of the links that stand differently:
-    /// about 0 for equals.
+    /// How clearly the beams prefer the fit to this explanation, judged on the surface of the links
+    /// that stand differently: about 0 where neither is better.
     pub margin: f64,
 }
 
-/// How a scan differs from its stated pose near a robot.
+/// Difference of a scan from its stated pose, as estimated near one robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScanShift {
-    /// Whose.
+    /// The scan.
     pub scan: crate::ScanId,
-    /// Shift that its points need at the robot's base, metres, world axes.
+    /// Shift that the scan's points need at the robot's base, metres, world axes.
     pub shift: [f64; 3],
-    /// Turn that they need about the scanner, radians, world axes.
+    /// Rotation that they need about the scanner, rotation vector, radians, world axes.
     pub turn: [f64; 3],
-    /// Its ranges are too long by this, metres.
+    /// By how much the scan's ranges are too long, metres.
     pub range_bias: f64,
 }
 
-/// What a robot's points say of the errors of the scans that see it, for others that the same scans
-/// see: of each scan its shift, metres, its turn about its scanner, radians, both world axes, and
-/// its range bias, metres: seven values, scan after scan.
+/// The information of one robot's points about the errors of the scans that see it, used to
+/// estimate these errors from all robots together. Each scan has seven values: shift (metres),
+/// rotation vector about its scanner (radians), both in world axes, and range bias (metres).
+/// The values of the scans follow one another in the order of `scans`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ScanShare {
-    /// Whose.
+    /// The scans.
     pub scans: Vec<crate::ScanId>,
-    /// Errors as this robot alone tells them, with the prior.
+    /// Errors as estimated from this robot alone, prior included, 7 values a scan.
     pub errors: Vec<f64>,
-    /// Information of its points alone, prior left out, row-major.
+    /// Information matrix of the robot's points alone, prior left out, row-major, (7·n scans)².
     pub information: Vec<f64>,
-    /// By how much base twist (world axes at the base: translation, rotation) and joints give way
-    /// to each of them, row-major.
+    /// Derivative of base twist (translation, rotation; world axes at the base) and free joints by
+    /// each scan error, row-major: one row a parameter, one column an error.
     pub gain: Vec<f64>,
 }
 
-/// Another posture that explains the points as well.
+/// Another posture of the same robot that explains the points as well.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Equal {
-    /// Free joints, in the order of the model, radians or metres.
+    /// Values of the free joints, in the order of the model, radians or metres.
     pub posture: Vec<f64>,
-    /// As [`RunnerUp::margin`].
+    /// How clearly the beams prefer the fit, as in [`RunnerUp::margin`].
     pub margin: f64,
 }
 
-/// A tool on a robot's flange.
+/// A tool from the library on a robot's flange.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mounted {
-    /// Its name in the library.
+    /// Name of the tool's model in the library.
     pub model: String,
-    /// The robot's link that it is bolted to.
+    /// The robot's link that the tool is bolted to.
     pub link: String,
-    /// Turn of its root about the axis of the robot's last joint, along that link's own axis,
-    /// radians.
+    /// Rotation of the tool's root link about the axis of the robot's last joint, radians.
     pub mount: f64,
-    /// Other such turns, and the last joint's value with each, radians, that explain the points as
-    /// well.
+    /// Other mounting rotations that explain the points as well, each with the value of the last
+    /// joint that belongs to it, radians.
     pub alike: Vec<[f64; 2]>,
 }
 
-/// Where a joint really is, against its model.
+/// The estimated frame of a joint relative to its frame in the model.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointFrame {
-    /// As in the URDF.
+    /// Name of the joint in the URDF.
     pub name: String,
-    /// Its axis, joint's frame.
+    /// Axis of the joint, unit length, joint frame.
     pub axis: [f64; 3],
-    /// Whether it slides along it; else it turns about it.
+    /// Whether the joint slides along the axis; otherwise it turns about it.
     pub slides: bool,
-    /// Shift of its origin, joint's frame of the model, metres.
+    /// Shift of the joint's origin, joint frame of the model, metres.
     pub shift: [f64; 3],
-    /// Turn of its frame, joint's frame of the model, radians; about the axis zero, since the
-    /// joint itself turns there.
+    /// Rotation vector of the joint's frame, joint frame of the model, radians. Its component along
+    /// the axis is zero, since the joint's own value takes that part.
     pub turn: [f64; 3],
-    /// Standard deviations of both, axis by axis.
+    /// Standard deviations of `shift` (metres) and `turn` (radians), axis by axis.
     pub sigma: [f64; 6],
 }
 
 impl JointFrame {
-    /// The joint's own frame from the model's: what the joint's origin is moved by, joint's frame,
-    /// metres.
+    /// The pose `model_joint_from_joint`: what the joint's origin in the model is moved by, metres.
     #[must_use]
     pub fn moved(&self) -> Pose {
         let turn = UnitQuaternion::from_scaled_axis(self.turn.into());
         Pose::from_parts(Translation3::from(self.shift), turn)
     }
 
-    /// How far its axis leans from the model's, radians, and standard deviation.
+    /// Angle between the joint's axis and the model's, and its standard deviation, radians.
     #[must_use]
     pub fn swing(&self) -> [f64; 2] {
         self.across(self.turn, [3, 4, 5])
     }
 
-    /// How far its axis runs beside the model's, metres, and standard deviation.
+    /// Distance of the joint's axis from the model's at the origin, and its standard deviation,
+    /// metres.
     #[must_use]
     pub fn offset(&self) -> [f64; 2] {
         self.across(self.shift, [0, 1, 2])
     }
 
-    /// Size of the part of a vector across the axis, and its standard deviation.
+    /// Length of the component of `v` across the axis, and its standard deviation; `at` are the
+    /// indices of its three deviations in `sigma`.
     fn across(&self, v: [f64; 3], at: [usize; 3]) -> [f64; 2] {
         let along: f64 = (0..3).map(|i| v[i] * self.axis[i]).sum();
         let part = [0, 1, 2].map(|i| v[i] - along * self.axis[i]);
@@ -188,77 +190,78 @@ impl JointFrame {
     }
 }
 
-/// How a robot differs from its model, as far as its points tell.
+/// How a robot differs from its model, as far as its points can tell.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Its free joints, in the order of the model.
+    /// The frames of the free joints, in the order of the model.
     pub frames: Vec<JointFrame>,
-    /// Standard deviations of the prior: shift, metres, turn, radians.
+    /// Standard deviations of the prior: of each shift, metres, and of each rotation, radians.
     pub prior: [f64; 2],
-    /// RMS distance of each link's points from its surface before and after, metres.
+    /// For each link the RMS distance of its points from its surface before and after, metres.
     pub link_rms: Vec<[f64; 2]>,
 }
 
 /// A robot found in the scans.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
-    /// Index into the library.
+    /// Index of the model in the library.
     pub model: usize,
-    /// Name in the library.
+    /// Name of the model in the library.
     pub model_name: String,
-    /// World from base link (the root of the URDF's tree), metres.
+    /// Pose of the base link (the root of the URDF's tree) in the world, metres.
     pub world_from_base: Pose,
-    /// Standard deviations of the base: x, y, z (metres), rotations about x, y, z (radians), world
-    /// axes at the base.
+    /// Standard deviations of the base: translation along x, y, z (metres), rotation about x, y, z
+    /// (radians), world axes at the base.
     pub base_sigma: [f64; 6],
-    /// Free joints, in the order of the model.
+    /// The free joints, in the order of the model.
     pub joints: Vec<JointFit>,
-    /// Covariance of (base twist: translation, rotation about the base's origin, world axes; free
-    /// joints), row-major, (6+n)².
+    /// Covariance of the base twist (translation, then rotation about the base's origin, world
+    /// axes; metres and radians) and of the n free joints, row-major, (6+n)².
     pub covariance: Vec<f64>,
-    /// Share explained less share contradicted, −1.5..1.
+    /// Share of the surface that is explained less the share that is contradicted, −1.5..1.
     pub score: f64,
-    /// Surface explained less 1.5 × surface contradicted, m²: compares models of different size.
+    /// Surface explained less 1.5 × surface contradicted, m²: comparable between models of
+    /// different size.
     pub explained: f64,
     /// RMS distance of the points of the robot from its surface, metres.
     pub rms: f64,
-    /// How far the robot's surface is off the model's, standard deviation over patches of a hand's
-    /// width, metres.
+    /// Standard deviation of the robot's true surface from the model's, averaged over patches of
+    /// about 0.1 m, metres.
     pub surface_sigma: f64,
-    /// Standard deviation of the place of the main chain's tip in the base's frame, metres.
+    /// Standard deviation of the position of the main chain's tip in the base frame, metres.
     pub tip_sigma: f64,
-    /// How the scans stand to one another, as far as the points of the robot tell.
+    /// Errors of the scans' stated poses, as far as the points of the robot tell.
     pub scans: Vec<ScanShift>,
-    /// The same for others; nothing where a scanner is unknown.
+    /// The robot's part in the joint estimate of these errors; `None` where a scanner's position
+    /// is unknown.
     pub share: Option<ScanShare>,
-    /// One for each link of the model, in its order.
+    /// Evidence for each link of the model, in the order of the model.
     pub links: Vec<LinkEvidence>,
-    /// Scans in which it stands so, if it moved between scans; else empty: in all of them.
+    /// Scans in which the robot stands so; empty if it stands so in all scans.
     pub stands_in: Vec<crate::ScanId>,
-    /// How it stands in other scans, if it moved between scans.
+    /// Its postures in the other scans, if it moved between scans.
     pub stays: Vec<Fit>,
-    /// The best other explanation, if any came near.
+    /// The best other explanation, if one came near.
     pub runner_up: Option<RunnerUp>,
-    /// Other postures that explain the points as well (a symmetric link, a wrist that nobody saw),
-    /// best first.
+    /// Other postures that explain the points as well (a symmetric link, a wrist that no beam
+    /// reached), best first.
     pub equals: Vec<Equal>,
-    /// Posture after the sweeps and before the registration, where the method goes link after
-    /// link; else empty.
+    /// Posture before registration, for methods that search link by link; empty for others.
     pub rough: Vec<f64>,
-    /// Closed loops, by their place in the model, that stand on the other of their two solutions
-    /// than at the model's zero.
+    /// Indices of the closed loops of the model that stand on the other of their two solutions
+    /// than at the model's zero posture.
     pub other_branches: Vec<usize>,
-    /// The tool of the library that it carries, if one was found; its joints follow the robot's
-    /// own.
+    /// The tool from the library that the robot carries, if one was found; its joints follow the
+    /// robot's own in `joints`.
     pub tool: Option<Mounted>,
-    /// Where its joints really are, where that was asked for; base and joints are those of the
-    /// robot so corrected.
+    /// The calibrated joint frames, where calibration was requested. Base and joints are then
+    /// those of the calibrated robot.
     pub calibration: Option<Calibration>,
-    /// Other models that fit as well where the points can tell.
+    /// Names of other models that explain the points as well.
     pub alike: Vec<String>,
-    /// How far to trust it.
+    /// How far the fit may be trusted.
     pub verdict: Verdict,
-    /// Why, in words; empty only for a plain `Trusted`.
+    /// Reasons for the verdict, in words; empty only for a trusted fit without remarks.
     pub reasons: Vec<String>,
     /// Whether it gives no labels although it is not refused, in a run that knows better where its
     /// points are: kept within the run, and not in files.

@@ -1,27 +1,27 @@
-//! Labels: what a point belongs to.
+//! Labels of points: fixed, part of a robot, attachment, floor or uncertain.
 
-/// What kind of thing a point belongs to; the numbers are those of `labels/N.kind.npy`.
+/// What a point belongs to; the numbers are those of `labels/N.kind.npy`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum PointKind {
-    /// Stands still.
+    /// Something that stands still.
     Fixed = 0,
-    /// A robot's link, its foot too.
+    /// A link of a robot, its foot included.
     Link = 1,
-    /// Attachment, effector or carried part.
+    /// What moves with a robot and is not in its model: attachment, tool or carried part.
     Attachment = 2,
     /// Floor.
     Floor = 3,
-    /// In doubt, dropped or never seen: counts as fixed for planning.
+    /// Unknown: in doubt, dropped, or never measured. Path planning treats it as fixed.
     Uncertain = 255,
 }
 
 impl PointKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 5] =
         [Self::Fixed, Self::Link, Self::Attachment, Self::Floor, Self::Uncertain];
 
-    /// The one of that number; `None` for a number that is none's.
+    /// The kind with this number; `None` where no kind has it.
     #[inline]
     #[must_use]
     pub fn of(number: u8) -> Option<Self> {
@@ -39,23 +39,23 @@ impl PointKind {
 /// The label of one point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Label {
-    /// What kind of thing.
+    /// What the point belongs to.
     pub kind: PointKind,
-    /// Index into the result's robots, −1 for none.
+    /// Index into the robots of the result; −1 for none.
     pub robot: i16,
-    /// Index into that robot's links, −1 for none.
+    /// Index into the links of that robot; −1 for none.
     pub link: i16,
 }
 
 impl Label {
-    /// Stands still.
+    /// The label of fixed points.
     pub const FIXED: Self = Self { kind: PointKind::Fixed, robot: -1, link: -1 };
-    /// Floor.
+    /// The label of floor points.
     pub const FLOOR: Self = Self { kind: PointKind::Floor, robot: -1, link: -1 };
-    /// In doubt.
+    /// The label of uncertain points.
     pub const UNCERTAIN: Self = Self { kind: PointKind::Uncertain, robot: -1, link: -1 };
 
-    /// Whether it belongs to a robot, or to what hangs on one.
+    /// Whether the point moves with a robot: a link, or something attached to one.
     #[inline]
     #[must_use]
     pub fn moves(&self) -> bool {

@@ -1,23 +1,24 @@
-//! The angular raster of a scan: direction in, row and column out, and back.
+//! The angular raster of a scan: converts directions to rows and columns and back.
 
 use geometry::direction::{spherical, unit};
 use nalgebra::UnitQuaternion;
 use serde::{Deserialize, Serialize};
 
 /// A regular raster of elevation (rows, upwards) and azimuth (columns, counter-clockwise) about the
-/// axis of the lattice frame, covering the whole sphere; only the pixels that a scan fills exist in
-/// tiles.
+/// z axis of the lattice frame. It covers the whole sphere; tiles hold only the pixels that a scan
+/// has points in.
 ///
 /// A file's native rows and columns choose its steps and phase where they are regular to 0.3
 /// pixels; otherwise the steps come from the directions of the points. A pixel may then hold two
 /// returns or none: consumers must not rely on one each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Lattice {
-    /// Turns the scan frame so that the scanner's spin axis is z (identity for most scanners).
+    /// Rotation from the scan frame to the lattice frame, whose z is the scanner's spin axis;
+    /// identity for most scanners.
     pub lattice_from_scan: UnitQuaternion<f64>,
     /// Elevation step between rows, radians.
     pub row_step: f64,
-    /// Azimuth step between columns, radians; a whole number of columns make a turn.
+    /// Azimuth step between columns, radians; a full turn is a whole number of columns.
     pub col_step: f64,
     /// Elevation of the middle of row 0, radians, at or below −π/2 + `row_step`.
     pub first_elevation: f64,
@@ -27,23 +28,23 @@ pub struct Lattice {
     pub n_rows: u32,
     /// Number of columns of a full turn.
     pub n_cols: u32,
-    /// Whether a camera took the points, whose pixels are only nearly regular in angles, and whose
-    /// depths err alike over a hand's width.
+    /// Whether the points come from a depth camera. Its pixels are only nearly regular in angles,
+    /// and its depth errors are correlated over about 0.1 m.
     pub is_camera: bool,
 }
 
 /// A pixel of a lattice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Pixel {
-    /// From the lowest elevation up.
+    /// Row, counted from the lowest elevation upwards.
     pub row: u32,
-    /// Counter-clockwise.
+    /// Column, counted counter-clockwise.
     pub col: u32,
 }
 
 impl Lattice {
-    /// A lattice with these steps; columns are rounded so that a whole number makes a turn, and the
-    /// phase is such that a pixel's middle lies at (`elevation`, `azimuth`).
+    /// A lattice with these steps (radians). The column step is rounded so that a full turn is a
+    /// whole number of columns; the middle of a pixel lies at (`elevation`, `azimuth`), radians.
     #[must_use]
     pub fn new(row_step: f64, col_step: f64, elevation: f64, azimuth: f64) -> Self {
         use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -72,22 +73,24 @@ impl Lattice {
         (self.nearest(row, col), range)
     }
 
-    /// The pixel nearest to a place (see [`Lattice::place`]); columns are wrapped, rows clamped.
+    /// The pixel nearest to a fractional row and column (see [`Lattice::place`]); columns wrap
+    /// around, rows are clamped.
     #[inline]
     #[must_use]
     pub fn nearest(&self, row: f64, col: f64) -> Pixel {
         let row = nearest(row).clamp(0, i64::from(self.n_rows) - 1);
         let n_cols = i64::from(self.n_cols);
         let mut col = nearest(col);
-        // Nearly always inside already: a division for each point would cost more than all the
-        // rest.
+        // The column is nearly always in range already; a remainder for each point would take
+        // longer than the rest of this function.
         if col < 0 || col >= n_cols {
             col = col.rem_euclid(n_cols);
         }
         Pixel { row: row as u32, col: col as u32 }
     }
 
-    /// Row, column (fractions; column not wrapped) and range (metres) of a point in the scan frame.
+    /// Fractional row, fractional column (not wrapped) and range (metres) of a point in the scan
+    /// frame, metres.
     #[inline]
     #[must_use]
     pub fn place(&self, scan: [f32; 3]) -> (f64, f64, f32) {
@@ -105,7 +108,7 @@ impl Lattice {
         )
     }
 
-    /// Unit direction of the middle of a pixel, scan frame.
+    /// Unit direction through the middle of a pixel, scan frame.
     #[must_use]
     pub fn direction(&self, pixel: Pixel) -> [f64; 3] {
         let lattice = unit(
@@ -116,7 +119,8 @@ impl Lattice {
         [scan.x, scan.y, scan.z]
     }
 
-    /// The directions of a rectangle of pixels: `[first row, last row, first column, last column]`.
+    /// The solid angle of a rectangle of pixels: `[first row, last row, first column,
+    /// last column]`, all included.
     #[must_use]
     pub fn window(&self, [first_row, last_row, first_col, last_col]: [u32; 4]) -> Window {
         use std::f64::consts::{FRAC_PI_2, PI};
@@ -140,21 +144,21 @@ impl Lattice {
     }
 }
 
-/// The directions of a rectangle of pixels, told without an angle being reckoned.
+/// The directions that fall into a rectangle of pixels, tested without computing an angle.
 #[derive(Debug, Clone, Copy)]
 pub struct Window {
     lattice_from_scan: [[f32; 3]; 3],
-    /// Of the lowest and the highest elevation.
+    /// Sines of the lowest and the highest elevation.
     sines: [f32; 2],
-    /// Where its columns begin and end: directions in the lattice's plane.
+    /// Unit vectors in the lattice's xy plane where the columns begin and end.
     sides: [[f32; 2]; 2],
-    /// More than half a turn, and a whole one.
+    /// Whether the columns span more than half a turn, and whether they span a whole turn.
     is_wide: bool,
     is_round: bool,
 }
 
 impl Window {
-    /// Whether a direction of the scan frame, of any length, is in it.
+    /// Whether a direction of any length, scan frame, falls into the rectangle.
     #[inline]
     #[must_use]
     pub fn holds(&self, scan: [f32; 3]) -> bool {
@@ -164,15 +168,14 @@ impl Window {
         let is_at_height = (z >= self.sines[0] * range) & (z < self.sines[1] * range);
         let [first, last] = self.sides.map(|[cos, sin]| cos * y - sin * x);
         let (is_past_first, is_before_last) = (first >= 0.0, last < 0.0);
-        // Without branches: many directions are asked about at once.
+        // Without branches, so that the compiler can vectorise a loop over many directions.
         let is_between = is_past_first & is_before_last;
         let is_either = (is_past_first | is_before_last) & self.is_wide;
         is_at_height & (self.is_round | is_either | is_between)
     }
 }
 
-/// `floor(value + ½)`, without the call into the mathematics library that `f64::floor` is on a
-/// plain x86-64.
+/// `floor(value + ½)` without `f64::floor`, which is a library call on x86-64 without SSE4.1.
 #[inline]
 fn nearest(value: f64) -> i64 {
     let value = value + 0.5;
@@ -224,7 +227,7 @@ mod tests {
             for (row, col) in (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))) {
                 let at = Pixel { row, col };
                 let d = lattice.direction(at).map(|v| (v * 7.0) as f32);
-                // Near the poles a pixel has no side.
+                // Near the poles rounding may put a pixel's middle into another pixel.
                 if lattice.pixel(d).0 != at {
                     continue;
                 }

@@ -1,6 +1,21 @@
-//! The types that stages share: scan, lattice, strip, tile, planes, cluster, candidate, fit, label,
-//! errors, and the two shapes of a step; and how names are quoted and panics caught. How anything
-//! is computed is in `geometry` or in the stage that does it.
+//! The types that stages share (scan, lattice, strip, tile, planes, cluster, candidate, fit, label,
+//! errors), the traits of a step, and helpers to quote names and to catch panics.
+//!
+//! No algorithm is in this crate: those are in `geometry` or in the stage that uses them.
+//!
+//! # Example
+//! A lattice converts points of a scan to pixels and back to directions:
+//! ```
+//! use contract::Lattice;
+//!
+//! let step = 0.1_f64.to_radians(); // between rows and between columns
+//! let lattice = Lattice::new(step, step, 0.0, 0.0);
+//! let (pixel, range) = lattice.pixel([3.0, 4.0, 0.0]); // scan frame, metres
+//! assert_eq!(range, 5.0);
+//! let direction = lattice.direction(pixel); // unit vector, scan frame
+//! let cosine = direction[0] * 0.6 + direction[1] * 0.8;
+//! assert!(cosine > step.cos());
+//! ```
 #![forbid(unsafe_code)]
 
 mod candidate;

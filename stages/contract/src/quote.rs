@@ -1,27 +1,26 @@
-//! Text that people or files chose (names of scans, models, links, joints; paths) in; the same as
-//! each medium may hold it, out.
+//! Quotes text that people or files chose (names of scans, models, links and joints; paths) for
+//! the medium that it is written to.
 //!
-//! Such a name may hold anything: an escape sequence that clears a terminal, a character that turns
-//! the direction of writing round, a line break, a zero. Inside the program it stays as it is,
-//! since it identifies something; it is quoted where it leaves, by one of these functions and by no
-//! other means.
+//! Such text may hold anything: an escape sequence that clears a terminal, a character that
+//! reverses the writing direction, a line break, a zero. Inside the program it stays unchanged,
+//! since it identifies something. Where it leaves the program it is quoted by one of these
+//! functions and by no other means.
 //!
 //! | medium | function | what it does |
 //! | --- | --- | --- |
 //! | a name within a line for people | [`shown`] | odd characters and line breaks become `\u{…}` |
-//! | text on a terminal | [`printed`] | the same, line breaks and tabs stay |
+//! | text on a terminal | [`printed`] | odd characters become `\u{…}`; line breaks and tabs stay |
 //! | JSON text | [`json`] | odd characters within its strings become `\u…`; the value is the same |
 //! | a string of YAML | [`yaml`] | in double quotes, odd characters become `\u…` or `\U…` |
-//! | text and attributes of XML | [`xml`] | references for what XML can hold; what it cannot becomes `\u{…}` |
+//! | text and attributes of XML | [`xml`] | references; what XML cannot hold becomes `\u{…}` |
 //! | a cell of CSV | [`csv`] | in double quotes; no spreadsheet takes it for a formula |
 //! | a part of a file's name | [`file_name`] | letters and digits of ASCII; all else becomes `_` |
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// Characters that nobody sees, or that change how others are shown: control characters, marks of
-/// direction, separators of lines, spaces without width, tags, and what Unicode says is no
-/// character.
+/// Whether a character is invisible or changes how others are shown: control characters, marks of
+/// writing direction, line separators, spaces without width, tags, and Unicode non-characters.
 #[must_use]
 pub fn is_odd(c: char) -> bool {
     c.is_control()
@@ -32,7 +31,7 @@ pub fn is_odd(c: char) -> bool {
         || u32::from(c) & 0xfffe == 0xfffe
 }
 
-/// Each character for which `is_meant` holds, in the form that `write` gives it.
+/// The text with each character for which `is_meant` holds replaced by what `write` appends.
 fn replaced(
     text: &str,
     is_meant: impl Fn(char) -> bool,
@@ -52,20 +51,20 @@ fn escape(out: &mut String, c: char) {
     out.extend(c.escape_unicode());
 }
 
-/// A name within a line for people.
+/// Quotes a name that stands within a line for people.
 #[must_use]
 pub fn shown(text: &str) -> Cow<'_, str> {
     replaced(text, is_odd, escape)
 }
 
-/// Text for a terminal or a log, with its own line breaks and tabs.
+/// Quotes text for a terminal or a log; its line breaks and tabs stay.
 #[must_use]
 pub fn printed(text: &str) -> Cow<'_, str> {
     replaced(text, |c| is_odd(c) && !matches!(c, '\n' | '\t'), escape)
 }
 
-/// Text that is JSON: the same value, in which no odd character stands as itself. Outside of
-/// strings JSON has none but line breaks and tabs, which stay.
+/// Escapes odd characters in JSON text, which keeps its value. Outside of strings JSON holds no odd
+/// characters but line breaks and tabs, which stay.
 #[must_use]
 pub fn json(text: &str) -> Cow<'_, str> {
     replaced(
@@ -79,7 +78,7 @@ pub fn json(text: &str) -> Cow<'_, str> {
     )
 }
 
-/// A string of YAML, in double quotes.
+/// Writes a string of YAML, in double quotes.
 #[must_use]
 pub fn yaml(text: &str) -> String {
     let is_meant = |c: char| is_odd(c) || matches!(c, '"' | '\\');
@@ -93,9 +92,9 @@ pub fn yaml(text: &str) -> String {
     format!("\"{inner}\"")
 }
 
-/// Text of XML, or the value of an attribute. It is read back as it was, but for characters that no
-/// XML 1.0 document may hold, not even by reference: these become `\u{…}`. Where people are to read
-/// the value, quote [`shown`] text.
+/// Quotes text of XML or the value of an attribute. A reader gets back the same text, except for
+/// characters that no XML 1.0 document may hold, not even by reference: these become `\u{…}`. Where
+/// people read the value, quote the text with [`shown`] first.
 #[must_use]
 pub fn xml(text: &str) -> Cow<'_, str> {
     let is_meant = |c: char| is_odd(c) || matches!(c, '&' | '<' | '>' | '"' | '\'');
@@ -114,8 +113,8 @@ pub fn xml(text: &str) -> Cow<'_, str> {
     })
 }
 
-/// A cell of CSV, in double quotes. One that a spreadsheet would take for a formula begins with an
-/// apostrophe, which spreadsheets take for "this is text"; a number stays a number.
+/// Writes a cell of CSV, in double quotes. Text that a spreadsheet would evaluate as a formula gets
+/// an apostrophe in front, which marks it as text; a number stays a number.
 #[must_use]
 pub fn csv(text: &str) -> String {
     let shown = shown(text);
@@ -126,7 +125,7 @@ pub fn csv(text: &str) -> String {
     format!("\"{mark}{}\"", shown.replace('"', "\"\""))
 }
 
-/// A part of a file's name that every file system knows.
+/// Turns a name into a part of a file name that is valid on every file system.
 #[must_use]
 pub fn file_name(text: &str) -> String {
     text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
@@ -137,7 +136,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Any text, with many of the characters that are quoted.
+    /// Arbitrary text with many of the characters that are quoted.
     fn text() -> impl Strategy<Value = String> {
         let odd = "\u{1b}\u{0}\r\n\t\u{202e}\u{85}\u{e0041}\u{feff}\u{fffe}\"'<>&=@+-\\{}]".chars();
         let odd = prop::sample::select(odd.collect::<Vec<_>>());
@@ -150,12 +149,12 @@ mod tests {
         fn each_medium_reads_back_what_was_meant(text in text()) {
             prop_assert!(!shown(&text).contains(is_odd));
             prop_assert!(!printed(&text).contains(|c| is_odd(c) && c != '\n' && c != '\t'));
-            // JSON: the same value.
+            // JSON: the value must stay the same.
             let json_text = serde_json::to_string(&text).expect("a string is JSON");
             let quoted = json(&json_text);
             prop_assert!(!quoted.contains(is_odd), "{}", quoted);
             prop_assert_eq!(&serde_json::from_str::<String>(&quoted).expect("JSON"), &text);
-            // XML: the same text, but for what XML cannot hold.
+            // XML: the text must stay the same, except for characters that XML cannot hold.
             let file = format!("<a b=\"{0}\">{0}</a>", xml(&text));
             prop_assert!(!file.contains(is_odd), "{}", file);
             let document = roxmltree::Document::parse(&file).expect("well-formed XML");
@@ -168,12 +167,12 @@ mod tests {
                 .collect();
             prop_assert_eq!(document.root_element().attribute("b"), Some(&*expected));
             prop_assert_eq!(document.root_element().text().unwrap_or(""), &*expected);
-            // CSV: one cell, which is no formula.
+            // CSV: the result must be one cell that is not a formula.
             let cell = csv(&text);
             let inner = cell.strip_prefix('"').and_then(|c| c.strip_suffix('"')).expect("in quotes");
             prop_assert!(!inner.replace("\"\"", "").contains('"') && !inner.contains(is_odd));
             prop_assert!(!inner.starts_with(['=', '+', '-', '@']) || inner.parse::<f64>().is_ok());
-            // A name of a file.
+            // File name: only ASCII letters, digits and underscores may be left.
             prop_assert!(file_name(&text).bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_'));
         }
     }

@@ -1,43 +1,44 @@
-//! What segmenting one tile leaves behind: labels that are certain, and the rest of the points near
-//! robots with their voxels, from which `attach` tells attachments from fixed things.
+//! The result of segmenting one tile: labels that are certain, and the remaining points near robots
+//! with their voxels, from which `attach` tells attachments from fixed things.
 
 use crate::{Label, MaskId, TileAt, Voxel, Weigh};
 
 /// Edge of a residual voxel, metres: a welding hose is two of them thick. Voxel `[i, j, k]` spans
-/// `[i·edge, (i+1)·edge)` along x, and so on, in the world.
+/// `[i·edge, (i+1)·edge)` along world x, and likewise along y and z.
 pub const RESIDUAL_EDGE: f64 = 0.02;
 
-/// A link of a robot of the result.
+/// A link of a robot of the result, by index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LinkAt {
-    /// Index into the result's robots (the fits).
+    /// Index into the robots (fits) of the result.
     pub robot: u16,
-    /// Index into that robot's links.
+    /// Index into the links of that robot.
     pub link: u16,
 }
 
-/// A voxel with points near a robot, floor left out.
+/// A voxel with points near a robot; floor points are not counted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResidualVoxel {
-    /// Which, by [`RESIDUAL_EDGE`].
+    /// Index of the voxel, of edge [`RESIDUAL_EDGE`].
     pub voxel: Voxel,
-    /// Points in it that are not yet labelled.
+    /// Number of points in it that have no label yet.
     pub n_residual: u32,
-    /// Points in it that belong to a link.
+    /// Number of points in it that belong to a link.
     pub n_link: u32,
     /// The link nearest to any of its points.
     pub nearest: LinkAt,
-    /// Distance of the nearest point to that link's surface, metres; infinite beyond the field's
+    /// Distance of the nearest point from that link's surface, metres; infinite beyond the reach of
+    /// the link's distance field.
     /// reach.
     pub distance: f32,
-    /// Lies at the border of the region: what is in it may go on outside.
+    /// Whether it lies at the border of the region, so that its body may continue outside.
     pub at_border: bool,
-    /// Stands on the floor.
+    /// Whether it stands on the floor.
     pub grounded: bool,
 }
 
 impl ResidualVoxel {
-    /// Adds what another tile or scan saw of the same voxel; the order of joining does not matter.
+    /// Adds what another tile or scan saw of the same voxel; the order of joining has no effect.
     pub fn join(&mut self, other: &Self) {
         self.n_residual = self.n_residual.saturating_add(other.n_residual);
         self.n_link = self.n_link.saturating_add(other.n_link);
@@ -52,24 +53,24 @@ impl ResidualVoxel {
     }
 }
 
-/// What one tile's points are, as far as one tile can tell.
+/// The labels of one tile's points, as far as one tile alone determines them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TileLabels {
-    /// Which tile.
+    /// The tile.
     pub at: TileAt,
     /// The mask that its points belong to.
     pub mask: MaskId,
-    /// Certain labels other than the default of the place, by place.
+    /// Certain labels that differ from the default, by place in the mask.
     pub labels: Vec<PlaceRun<Label>>,
-    /// Points to be settled by their voxel, by place.
+    /// Points whose label depends on their voxel, by place in the mask.
     pub residuals: Vec<PlaceRun<Voxel>>,
-    /// The voxels of `residuals` and of points on links, sorted by voxel, each once.
+    /// The voxels of `residuals` and of points on links, sorted by voxel, without duplicates.
     pub voxels: Vec<ResidualVoxel>,
 }
 
 impl TileLabels {
-    /// Labels of all points that differ from fixed, by place, once the label of each residual voxel
-    /// is known.
+    /// Labels of all points that are not plain fixed points, by place in the mask, once `label_of`
+    /// gives the label of each residual voxel.
     #[must_use]
     pub fn settle(&self, label_of: impl Fn(Voxel) -> Label) -> Vec<PlaceRun<Label>> {
         let mut out = self.labels.clone();
@@ -80,38 +81,37 @@ impl TileLabels {
     }
 }
 
-/// Consecutive places of a mask that share something: points of a scan in the order of measurement
-/// mostly do.
+/// A run of consecutive places of a mask with one value. Neighbouring points of a scan mostly have
+/// the same label, so runs are much shorter than one value a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlaceRun<T> {
-    /// First of them.
+    /// First place of the run.
     pub first: u64,
-    /// How many.
+    /// Number of places.
     pub n: u32,
-    /// What they share.
+    /// The value of all of them.
     pub what: T,
 }
 
 impl<T: Copy + PartialEq> PlaceRun<T> {
-    /// A single place.
+    /// A run of a single place.
     #[must_use]
     pub fn one(place: u64, what: T) -> Self {
         Self { first: place, n: 1, what }
     }
 
-    /// The same places with something else.
+    /// A run of the same places with another value.
     pub fn of<U>(&self, what: U) -> PlaceRun<U> {
         PlaceRun { first: self.first, n: self.n, what }
     }
 
-    /// The place after the last.
+    /// The place after the last one.
     #[must_use]
     pub fn end(&self) -> u64 {
         self.first + u64::from(self.n)
     }
 
-    /// Sorts runs, which have no place in common, and joins those that follow each other and share
-    /// the same.
+    /// Sorts runs that do not overlap, and joins those that follow one another with equal values.
     pub fn join(runs: &mut Vec<Self>) {
         runs.sort_unstable_by_key(|run| run.first);
         runs.dedup_by(|later, kept| {
@@ -157,7 +157,7 @@ mod tests {
             PlaceRun::join(&mut runs);
             let places = |run: &PlaceRun<u8>| (run.first..run.end()).map(|p| (p, run.what)).collect::<Vec<_>>();
             prop_assert_eq!(runs.iter().flat_map(places).collect::<Vec<_>>(), known);
-            // As few as can be: neighbours differ.
+            // No two neighbouring runs may be left that could be joined.
             let differ = |w: &[PlaceRun<u8>]| w[0].end() < w[1].first || w[0].what != w[1].what;
             prop_assert!(runs.windows(2).all(differ));
             let mut again = runs.clone();

@@ -1,4 +1,4 @@
-//! Inputs, scans and masks: what was found in the files, before any point is read.
+//! Inputs, scans and masks: what the headers of the files say before any point is read.
 
 use crate::Lattice;
 use geometry::{Aabb, Pose};
@@ -8,83 +8,83 @@ use std::path::PathBuf;
 /// Index of an input file, in the order of the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct InputId(pub u32);
-/// Index of a scan over all inputs, in their order.
+/// Index of a scan over all inputs, in the order of the inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ScanId(pub u32);
-/// Index of a mask over all inputs, in their order.
+/// Index of a mask over all inputs, in the order of the inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct MaskId(pub u32);
 
-/// A point format that is read.
+/// A point file format that can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Format {
-    /// ASTM E2807.
+    /// ASTM E2807 (E57).
     E57,
-    /// Leica's gridded text.
+    /// Leica's gridded text format.
     Ptx,
     /// ASPRS LAS 1.0–1.4.
     Las,
-    /// LAS, compressed.
+    /// Compressed LAS.
     Laz,
 }
 
 /// One input file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Input {
-    /// Its place on the command line.
+    /// Index of the file on the command line.
     pub id: InputId,
-    /// As given.
+    /// Path as given by the user.
     pub path: PathBuf,
-    /// What it is.
+    /// Format of the file, by its content.
     pub format: Format,
     /// Length of the file, bytes.
     pub n_bytes: u64,
 }
 
-/// The points of one output triple (`labels/N.*.npy`): one scan of an E57 or PTX file, one LAS or
-/// LAZ file whole.
+/// The points that share one triple of output files (`labels/N.*.npy`): one scan of an E57 or PTX
+/// file, or a whole LAS or LAZ file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Mask {
-    /// Its number.
+    /// Index of the mask.
     pub id: MaskId,
-    /// Where its points come from.
+    /// The input file of its points.
     pub input: InputId,
-    /// Name for people: scan name, or file name.
+    /// Display name: that of the scan, or of the file.
     pub name: String,
-    /// Points that the file does not itself flag as invalid: the length of the mask. For text
-    /// formats it is known only once read, and then `None` here.
+    /// Length of the mask: the number of points that the file does not flag as invalid. Text
+    /// formats state no number, so it is `None` until the file was read.
     pub n_points: Option<u64>,
 }
 
 /// All points measured from one scanner position.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scan {
-    /// Its number.
+    /// Index of the scan.
     pub id: ScanId,
-    /// Where its points come from.
+    /// The input file of its points.
     pub input: InputId,
-    /// The mask that labels its points (several scans of one LAS file share one).
+    /// The mask that labels its points; all scans of one LAS file share a mask.
     pub mask: MaskId,
-    /// Name for people.
+    /// Display name.
     pub name: String,
-    /// LAS `point_source_id` of its points, where scans of one file are told apart by it.
+    /// The `point_source_id` of its points, where it tells the scans of a LAS file apart.
     pub source_id: Option<u16>,
-    /// Pose of the scanner. Where the scanner's position is not known: a translation near the
-    /// points, so that coordinates about it stay small.
+    /// Pose of the scanner in the world, metres. Where the scanner's position is unknown this is a
+    /// translation near the points, so that coordinates in the scan frame stay small.
     pub world_from_scan: Pose,
-    /// The angular raster; `None` where the scanner's position is not known: then there is no
-    /// free-space evidence.
+    /// The angular raster; `None` where the scanner's position is unknown, so that beams cannot
+    /// prove free space.
     pub lattice: Option<Lattice>,
-    /// Bounds in the world, metres, where the file states them; may be wrong, so only a hint.
+    /// Bounds in the world, metres, where the file states them; they may be wrong.
     pub stated_bounds: Option<Aabb>,
-    /// Number of valid points as stated by the file, where stated.
+    /// Number of valid points, where the file states it; it may be wrong.
     pub stated_points: Option<u64>,
-    /// What is missing and what will be worse for it, in words.
+    /// Messages about what the file lacks and which results suffer from it.
     pub notes: Vec<String>,
 }
 
 impl Scan {
-    /// Whether beams of this scan can prove free space.
+    /// Whether the beams of this scan are known and can prove free space.
     #[must_use]
     pub fn has_beams(&self) -> bool {
         self.lattice.is_some()

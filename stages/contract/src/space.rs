@@ -1,60 +1,61 @@
-//! Space around a robot as voxels: seen free, something fixed, the robot itself, another robot, or
-//! unknown.
+//! A voxel grid of the space around a robot. Each voxel is free, fixed, part of the robot, part of
+//! another robot, or unknown.
 
 use crate::{Label, PointKind};
 use geometry::Aabb;
 
-/// What a voxel is; the numbers are those of the files.
+/// State of a voxel; the numbers are those of the output files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SpaceKind {
-    /// No beam went through it, and no point lies in it.
+    /// No beam passed through it and no point lies in it.
     Unknown = 0,
-    /// A beam went through it.
+    /// At least one beam passed through it.
     Free = 1,
-    /// Points lie in it that stand still, or may.
+    /// Points in it stand still or may stand still.
     Fixed = 2,
-    /// The robot's own body, or points that move with it.
+    /// It belongs to the robot's own body, or its points move with the robot.
     Robot = 3,
-    /// The body of another robot, or points that move with that.
+    /// It belongs to another robot's body, or its points move with that robot.
     Other = 4,
 }
 
 impl SpaceKind {
-    /// All of them.
+    /// All states.
     pub const ALL: [Self; 5] = [Self::Unknown, Self::Free, Self::Fixed, Self::Robot, Self::Other];
 
-    /// Whether a robot would hit it: what stands still, and other robots as they were found.
+    /// Whether a moving robot would collide with it: fixed things, and other robots as found.
     #[must_use]
     pub fn is_obstacle(self) -> bool {
         matches!(self, Self::Fixed | Self::Other)
     }
 }
 
-/// Where voxels lie: aligned to whole multiples of their edge from the origin of the world.
+/// Placement of the voxels: aligned to whole multiples of the edge from the world's origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpaceGrid {
     /// Edge of a voxel, metres.
     pub edge: f64,
-    /// Place of the first voxel's corner in the world, in edges.
+    /// Lowest corner of the first voxel in the world, in units of the edge.
     pub first: [i64; 3],
-    /// Number of voxels on each axis.
+    /// Number of voxels along x, y and z.
     pub size: [usize; 3],
 }
 
-/// Voxels about one robot.
+/// The state of each voxel around one robot.
 #[derive(Debug, Clone)]
 pub struct Space {
     grid: SpaceGrid,
-    /// z runs fastest, then y.
+    /// The voxels; z varies fastest, then y.
     voxels: Vec<SpaceKind>,
 }
 
-/// Most voxels of one space: a robot of the largest kind at the default edge has 3 million.
+/// Largest number of voxels of one grid; the largest robots need 3 million at the default edge.
 const MAX_VOXELS: f64 = 64e6;
 
 impl SpaceGrid {
-    /// Over bounds in the world, metres. The edge grows where they would take too many voxels.
+    /// A grid over bounds in the world, metres. The edge is widened where there would be too many
+    /// voxels.
     #[must_use]
     pub fn over(bounds: &Aabb, edge: f64) -> Self {
         let volume: f64 = bounds.size().iter().map(|s| s.max(edge)).product();
@@ -65,7 +66,7 @@ impl SpaceGrid {
         Self { edge, first, size }
     }
 
-    /// Bounds in the world, metres.
+    /// Bounds of the grid in the world, metres.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         let at = |i: usize, v: i64| (self.first[i] + v) as f64 * self.edge;
@@ -75,7 +76,7 @@ impl SpaceGrid {
         }
     }
 
-    /// The voxel of a point in the world.
+    /// Index of the voxel of a point in the world, metres; `None` outside of the grid.
     #[must_use]
     pub fn index(&self, p: [f64; 3]) -> Option<usize> {
         let mut out = 0;
@@ -89,22 +90,22 @@ impl SpaceGrid {
         Some(out)
     }
 
-    /// The place of a voxel on each axis.
+    /// Position of a voxel along x, y and z, from its index.
     #[must_use]
     pub fn cell(&self, at: usize) -> [usize; 3] {
         let [_, y, z] = self.size;
         [at / (y * z), at / z % y, at % z]
     }
 
-    /// The middle of a voxel in the world, metres.
+    /// Centre of a voxel in the world, metres.
     #[must_use]
     pub fn middle(&self, at: usize) -> [f64; 3] {
         let cell = self.cell(at);
         std::array::from_fn(|i| ((self.first[i] + cell[i] as i64) as f64 + 0.5) * self.edge)
     }
 
-    /// Voxels that cannot be reached from outside of `bounds` without crossing those of a surface:
-    /// what it encloses. Ascending.
+    /// Indices of the voxels that a `surface` (indices of voxels) encloses: those that cannot be
+    /// reached from outside of `bounds` (world, metres) without crossing it. Ascending.
     #[must_use]
     pub fn enclosed(&self, bounds: &Aabb, surface: &[usize]) -> Vec<usize> {
         let cell = |p: [f64; 3], up: bool| -> [usize; 3] {
@@ -151,38 +152,38 @@ impl SpaceGrid {
 }
 
 impl Space {
-    /// Space that nobody knows anything of.
+    /// A grid of unknown voxels.
     #[must_use]
     pub fn unknown(grid: SpaceGrid) -> Self {
         Self { grid, voxels: vec![SpaceKind::Unknown; grid.size.iter().product()] }
     }
 
-    /// Where its voxels lie.
+    /// Placement of the voxels.
     #[must_use]
     pub fn grid(&self) -> &SpaceGrid {
         &self.grid
     }
 
-    /// All voxels, to be filled.
+    /// All voxels, for writing; z varies fastest, then y.
     pub fn voxels_mut(&mut self) -> &mut [SpaceKind] {
         &mut self.voxels
     }
 
-    /// All voxels; z runs fastest, then y.
+    /// All voxels; z varies fastest, then y.
     #[must_use]
     pub fn voxels(&self) -> &[SpaceKind] {
         &self.voxels
     }
 
-    /// Volume of one kind, m³.
+    /// Volume of all voxels of one state, m³.
     #[must_use]
     pub fn volume(&self, kind: SpaceKind) -> f64 {
         let n = self.voxels.iter().filter(|v| **v == kind).count();
         n as f64 * self.grid.edge.powi(3)
     }
 
-    /// Puts a labelled point into a voxel. What stands still beats all, another robot the own one:
-    /// an obstacle is never lost.
+    /// Adds a labelled point to a voxel. Fixed overrides every other state, and another robot
+    /// overrides the robot's own body, so that an obstacle is never lost.
     pub fn mark(&mut self, index: usize, voxel: SpaceKind) {
         let rank = |kind| match kind {
             SpaceKind::Unknown | SpaceKind::Free => 0,
@@ -196,7 +197,7 @@ impl Space {
         }
     }
 
-    /// What a point with this label makes of its voxel in the space of the robot of this number.
+    /// The state that a point with this label gives its voxel in the space of robot `robot`.
     #[must_use]
     pub fn kind_of(label: Label, robot: usize) -> SpaceKind {
         match label.kind {

@@ -1,14 +1,14 @@
-//! The shapes of a step. The engine owns threads, order, budget and errors, so that a step stays
-//! one screen.
+//! The traits of a processing step. The engine that runs steps owns threads, order, memory budget
+//! and error handling, so that a step contains only its algorithm.
 
 use crate::Result;
 use std::sync::{Mutex, PoisonError};
 
-/// How many bytes an item keeps in memory: channels are bounded by it.
+/// An item that knows how much memory it takes, so that channels can be bounded by bytes.
 pub trait Weigh {
-    /// Bytes kept, roughly.
+    /// Approximate memory of the item, bytes.
     fn weight_bytes(&self) -> usize;
-    /// Points in it, for progress; 0 where it holds none.
+    /// Number of points in it, for progress; 0 where it holds none.
     fn n_points(&self) -> u64 {
         0
     }
@@ -40,51 +40,52 @@ impl<A: Weigh, B: Weigh> Weigh for (A, B) {
     }
 }
 
-/// One item in, one item out; remembers nothing.
+/// A step that turns each item into one item and keeps no state.
 pub trait Map: Sync {
-    /// What comes in.
+    /// Type of the items that it takes.
     type In: Send;
-    /// What goes out.
+    /// Type of the items that it returns.
     type Out: Send;
-    /// Memory that one worker reuses from item to item; must not change the answer.
+    /// Memory that one worker reuses from item to item; it must not affect the result.
     type Scratch: Default;
-    /// Makes one item of one item.
+    /// Turns one item into another.
     fn apply(&self, item: Self::In, scratch: &mut Self::Scratch) -> Result<Self::Out>;
 }
 
-/// Many items in, one answer out.
+/// A step that reduces many items to one result.
 ///
 /// # Law
-/// Cut the stream anywhere, fold both halves, join in order: the answer is the same.
+/// If the stream is cut anywhere, both parts are folded apart, and their sums are joined in order,
+/// the result is the same.
 pub trait Fold {
-    /// What comes in.
+    /// Type of the items that it takes.
     type In: Send;
-    /// What is kept while items come in.
+    /// State that is kept while items come in.
     type Sum: Send;
-    /// What goes out.
+    /// Type of the result.
     type Out;
     /// The sum of no items.
     fn empty(&self) -> Self::Sum;
-    /// Adds one item.
+    /// Adds one item to a sum.
     fn add(&self, sum: &mut Self::Sum, item: Self::In) -> Result<()>;
-    /// Joins the sum of later items to that of earlier ones.
+    /// Adds the sum of later items to the sum of earlier ones.
     fn join(&self, earlier: &mut Self::Sum, later: Self::Sum) -> Result<()>;
-    /// Makes the answer.
+    /// Computes the result from the sum of all items.
     fn finish(&self, sum: Self::Sum) -> Result<Self::Out>;
 }
 
-/// Independent pieces of work inside one step: who calls the step says on which threads they are
-/// done.
+/// Runs independent pieces of work inside one step; the caller of the step decides on which
+/// threads.
 ///
-/// Steps take it as `&dyn Fan`: were they generic over it, all of their code would be compiled anew
-/// in the crate that calls them.
+/// Steps take it as `&dyn Fan`. If they were generic over it, their whole code would be compiled
+/// again in the crate that calls them.
 pub trait Fan: Sync {
-    /// Does `work` on each number below `n`, once; in any order.
+    /// Calls `work` once for each number below `n`, in any order.
     fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync));
 }
 
 impl dyn Fan + '_ {
-    /// Does `work` on each item; results in the order of the items, whatever the order of the work.
+    /// Calls `work` for each item and returns the results in the order of the items.
     pub fn fan<T: Send, U: Send>(&self, items: Vec<T>, work: impl Fn(T) -> U + Sync) -> Vec<U> {
         let items: Vec<Mutex<Option<T>>> = items.into_iter().map(|i| Mutex::new(Some(i))).collect();
         let done: Vec<Mutex<Option<U>>> = items.iter().map(|_| Mutex::new(None)).collect();
@@ -99,7 +100,7 @@ impl dyn Fan + '_ {
     }
 }
 
-/// All pieces on the calling thread.
+/// A [`Fan`] that runs all pieces on the calling thread, one after the other.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct OneByOne;
 

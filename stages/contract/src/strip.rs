@@ -1,41 +1,41 @@
-//! A strip: consecutive points of one scan as they were read, in the order of the file.
+//! A strip: consecutive points of one scan, in the order of the file.
 
 use crate::{MaskId, ScanId, Weigh};
 
-/// Consecutive points of one scan, in the order of the file; points that the file flags as invalid
-/// are not in it.
+/// Consecutive points of one scan, in the order of the file. Points that the file flags as invalid
+/// are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Strip {
-    /// Whose points these are.
+    /// The scan of the points.
     pub scan: ScanId,
-    /// The mask that labels them.
+    /// The mask that labels the points.
     pub mask: MaskId,
-    /// Place in the mask of the smallest place here.
+    /// Smallest place in the mask of the points of this strip.
     pub first_place: u64,
-    /// Place in the mask of each point, less `first_place`; ascending. Points that were dropped
-    /// (not a number, not finite) leave a gap.
+    /// Place in the mask of each point, less `first_place`; ascending. Points with coordinates that
+    /// are not finite are dropped and leave a gap.
     pub place: Vec<u32>,
-    /// Scan frame, metres.
+    /// Coordinates in the scan frame, metres.
     pub xyz: Vec<[f32; 3]>,
-    /// Everything else that the file says of the points; only where asked for.
+    /// All other attributes of the points in the file, where requested.
     pub attributes: Option<Attributes>,
 }
 
-/// Columns beside the coordinates, one entry a point of the strip; a column that the file lacks is
-/// empty.
+/// Attributes beside the coordinates, one entry a point of the strip. A column is empty where the
+/// file lacks the attribute.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Attributes {
     /// World coordinates as the file states them (with its pose applied), metres.
     pub world: Vec<[f64; 3]>,
-    /// 0..65535.
+    /// Intensity, scaled to 0..65535.
     pub intensity: Vec<u16>,
-    /// 0..65535 a channel.
+    /// Red, green and blue, each scaled to 0..65535.
     pub color: Vec<[u16; 3]>,
-    /// LAS GPS time.
+    /// GPS time of LAS, unchanged.
     pub gps_time: Vec<f64>,
-    /// LAS classification as read.
+    /// Classification of LAS, unchanged.
     pub classification: Vec<u8>,
-    /// LAS point source id.
+    /// Point source id of LAS, unchanged.
     pub source_id: Vec<u16>,
 }
 
@@ -46,7 +46,7 @@ impl Strip {
         self.xyz.len()
     }
 
-    /// Holds no point.
+    /// Whether the strip has no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.xyz.is_empty()

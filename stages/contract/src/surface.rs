@@ -1,4 +1,4 @@
-//! Planes and occupied space: what floor and cluster need, small enough to keep for a whole plant.
+//! Planes and occupied space of a whole plant, reduced to what the stages floor and cluster need.
 
 use crate::{ScanId, Weigh};
 use geometry::{Aabb, Moments, Plane};
@@ -7,41 +7,39 @@ use serde::{Deserialize, Serialize};
 /// A planar region of one tile, in the world frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanePatch {
-    /// Who saw it.
+    /// The scan that saw the region.
     pub scan: ScanId,
-    /// Least-squares plane; its normal points to the scanner (or up, where there is none).
+    /// Least-squares plane. Its normal points to the scanner, or upwards where that is unknown.
     pub plane: Plane,
-    /// Moments of its points: patches are joined by joining these.
+    /// Moments of the points; patches are joined by joining their moments.
     pub moments: Moments,
-    /// RMS distance of its points from the plane, metres.
+    /// RMS distance of the points from the plane, metres.
     pub rms: f64,
-    /// Bounds of its points, metres.
+    /// Bounds of the points in the world, metres.
     pub bounds: Aabb,
-    /// Area covered by its points, m² (from solid angle, range and incidence; not from its
-    /// outline).
+    /// Area that the points cover, m²: from solid angle, range and incidence, not from the outline.
     pub area: f64,
-    /// Ground cells (0.25 m, index = floor(x/0.25), floor(y/0.25)) that its points touch, sorted,
-    /// with the number of points and the sum of their z (metres) in each; only for nearly
-    /// horizontal patches.
+    /// Ground cells that the points touch, sorted: index (floor(x/0.25 m), floor(y/0.25 m)), number
+    /// of points, and sum of their z (metres). Empty where the patch is not nearly horizontal.
     pub ground: Vec<([i32; 2], u32, f64)>,
 }
 
-/// A piece of surface that several scans saw.
+/// A piece of surface that several scans measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Overlap {
-    /// Its normal, to the scanners, world, unit length.
+    /// Unit normal towards the scanners, world.
     pub normal: [f64; 3],
-    /// Where each of them has it: middle of its points, world, metres.
+    /// For each scan the centroid of its points on the surface, world, metres.
     pub seen: Vec<(ScanId, [f64; 3])>,
 }
 
-/// Occupied voxels with the number of points in each: sorted by (z, y, x), each voxel once.
+/// Occupied voxels with the number of points in each, sorted by (z, y, x), without duplicates.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Occupancy {
-    /// Edge of a voxel, metres. Voxel `[i, j, k]` spans `[i·edge, (i+1)·edge)` along x, and so on,
-    /// in the world.
+    /// Edge of a voxel, metres. Voxel `[i, j, k]` spans `[i·edge, (i+1)·edge)` along world x, and
+    /// likewise along y and z.
     pub edge: f64,
-    /// Voxel and points in it.
+    /// Index of each voxel and number of points in it.
     pub voxels: Vec<([i32; 3], u32)>,
 }
 
@@ -75,16 +73,16 @@ impl Occupancy {
     }
 }
 
-/// What one tile leaves behind for floor and cluster.
+/// Summary of one tile for the stages floor and cluster.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TileSummary {
     /// Number of points.
     pub n_points: u64,
-    /// Points taken for veils (mixed pixels between a near edge and what lies behind).
+    /// Number of veil points: mixed pixels between a near edge and the surface behind it.
     pub n_veils: u64,
     /// Planar regions, largest first.
     pub patches: Vec<PlanePatch>,
-    /// Occupied space, veils left out.
+    /// Occupied space; veil points are left out.
     pub occupancy: Occupancy,
 }
 
@@ -101,25 +99,25 @@ impl Weigh for TileSummary {
 /// One level of the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FloorLevel {
-    /// Mean plane, normal up.
+    /// Mean plane; its normal points upwards.
     pub plane: Plane,
-    /// RMS of its cells' heights about the mean plane, metres (waviness).
+    /// RMS deviation of the cells' heights from the mean plane (waviness), metres.
     pub waviness: f64,
-    /// How far its points lie off its heights, metres, one sigma: noise, registration, and waves
-    /// smaller than a cell.
+    /// Standard deviation of the points from the height of their cell, metres: noise, registration
+    /// errors, and waves shorter than a cell.
     pub scatter: f64,
     /// Area, m².
     pub area: f64,
     /// Edge of a cell of the height map, metres.
     pub cell: f64,
-    /// Cells of the ground (index = floor(x/cell), floor(y/cell)) and the floor's height in each,
-    /// metres; sorted.
+    /// Height of the floor in each cell with index (floor(x/cell), floor(y/cell)), metres; sorted.
     pub heights: Vec<([i32; 2], f64)>,
 }
 
 impl FloorLevel {
-    /// Height of the floor at a place, metres: bilinear between the heights at cell middles, the
-    /// mean plane where they are missing. `None` farther than two cells from any known cell.
+    /// Height of the floor at (x, y), metres: interpolated between the heights at the middles of
+    /// cells, or that of the mean plane where these are missing. `None` farther than two cells from
+    /// any known cell.
     #[must_use]
     pub fn height(&self, x: f64, y: f64) -> Option<f64> {
         let (u, v) = (x / self.cell - 0.5, y / self.cell - 0.5);
@@ -146,7 +144,7 @@ impl FloorLevel {
         near.then(|| self.mean_height(x, y))
     }
 
-    /// Height of the mean plane at a place, metres.
+    /// Height of the mean plane at (x, y), metres.
     #[must_use]
     pub fn mean_height(&self, x: f64, y: f64) -> f64 {
         let n = self.plane.normal;
@@ -161,37 +159,36 @@ impl FloorLevel {
 /// A horizontal plane that a robot may stand on: a floor level, or a stand, pedestal or table top.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InstallationPlane {
-    /// Normal up (away from the body that carries it).
+    /// The plane; its normal points upwards, away from the body that carries the plane.
     pub plane: Plane,
-    /// Bounds of its points, metres.
+    /// Bounds of the points on it in the world, metres.
     pub bounds: Aabb,
-    /// Area covered by points, m²; 0 for a height that is only guessed.
+    /// Area covered by points, m²; 0 for a height that is assumed without points.
     pub area: f64,
     /// Whether it is a floor level.
     pub is_floor: bool,
 }
 
 impl InstallationPlane {
-    /// Whether no points carry it: a height that is tried because none is seen.
+    /// Whether no points carry the plane: its height is assumed because no plane was found.
     #[must_use]
     pub fn is_guess(&self) -> bool {
         self.area == 0.0
     }
 }
 
-/// The floor of the plant: its levels, largest first, and the smaller planes that something may
-/// stand on.
+/// The floor of the plant, with its levels and the smaller planes that a robot may stand on.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Floor {
-    /// Largest first; none where nothing like a floor was found.
+    /// The levels, largest first; empty where no floor was found.
     pub levels: Vec<FloorLevel>,
-    /// Floor levels and stand-sized horizontal planes, by height then area.
+    /// Floor levels and horizontal planes of the size of a stand, sorted by height, then area.
     pub planes: Vec<InstallationPlane>,
 }
 
 impl Floor {
-    /// Height above the floor level that lies nearest below or at `p` (by at most `slack` metres
-    /// above `p`); `None` where no level is known.
+    /// Height of `p` (world, metres) above the nearest floor level below it, metres. A level counts
+    /// as below if it is at most `slack` metres above `p`. `None` where no level is known.
     #[must_use]
     pub fn height_above(&self, p: [f64; 3], slack: f64) -> Option<f64> {
         self.levels

@@ -1,5 +1,5 @@
-//! A tile: the points of a rectangle of one lattice; the unit of disk layout, of parallel work, of
-//! reuse.
+//! A tile: the points of a rectangle of one lattice. Tiles are the unit of disk layout, of parallel
+//! work and of reuse between runs.
 
 use crate::{Pixel, ScanId, Weigh};
 use geometry::Aabb;
@@ -7,15 +7,15 @@ use std::collections::BTreeMap;
 
 /// Pixels along each side of a tile.
 pub const TILE_SIDE: u32 = 256;
-/// Most that can be left out of a tile: of each 8 × 8 pixels one stays.
+/// Largest level of subsampling: of each 8 × 8 pixels one is kept.
 pub const MAX_SKIP: u32 = 3;
 
-/// Which rectangle of which scan. For a scan without lattice: which square of the ground, 256 × 256
-/// cells of 0.05 m about the scan's origin, row from y, column from x, both offset by 2²⁰ tiles so
-/// that they stay positive.
+/// Position of a tile. With a lattice: which 256 × 256 pixels of it. For a scan without lattice:
+/// which square of the ground, 256 × 256 cells of 0.05 m about the scan's origin, with the row from
+/// y and the column from x, both offset by 2²⁰ tiles so that they are never negative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TileAt {
-    /// Whose lattice.
+    /// The scan of the points.
     pub scan: ScanId,
     /// Row of the tile: pixel row / 256.
     pub row: u32,
@@ -23,32 +23,32 @@ pub struct TileAt {
     pub col: u32,
 }
 
-/// Points of one tile, sorted by pixel, then by place in the mask: all of them, or of each square
-/// of pixels those of one.
+/// The points of one tile, sorted by pixel, then by place in the mask: all of them, or a subsample
+/// with one pixel of each square of pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tile {
-    /// Where it lies.
+    /// Position of the tile.
     pub at: TileAt,
-    /// Smallest place in the mask of the points here.
+    /// Smallest place in the mask of the points of this tile.
     pub first_place: u64,
     /// Place in the mask of each point, less `first_place`.
     pub place: Vec<u32>,
     /// Pixel within the tile: row·256 + column.
     pub pixel: Vec<u16>,
-    /// Scan frame, metres.
+    /// Coordinates in the scan frame, metres.
     pub xyz: Vec<[f32; 3]>,
-    /// Bounds of all of its points in the world, metres.
+    /// Bounds of all points of the tile in the world, metres; those left out count too.
     pub bounds: Aabb,
-    /// Of each square of 2^`skip` by 2^`skip` pixels only the points of the first pixel that has
-    /// some are here …
+    /// Level of subsampling: of each square of 2^`skip` by 2^`skip` pixels only the points of the
+    /// first pixel that has any are kept.
     pub skip: u32,
-    /// … of so many that the tile has.
+    /// Number of points of the tile before subsampling.
     pub n_all: u64,
 }
 
-/// Points of a tile where they lie, not copied: those of pixels that are the first ones with points
-/// in their squares of 2^`skip` by 2^`skip` pixels, and not in larger ones (of 2^[`MAX_SKIP`] at
-/// most).
+/// The points of a tile that one level of subsampling adds, borrowed where they lie. They belong to
+/// pixels that are the first ones with points in their squares of 2^`skip` by 2^`skip` pixels, and
+/// not in larger squares, up to 2^[`MAX_SKIP`].
 #[derive(Debug, Clone, Copy)]
 pub struct TilePoints<'a> {
     /// As in [`Tile`].
@@ -61,7 +61,7 @@ pub struct TilePoints<'a> {
     pub pixel: &'a [u16],
     /// As in [`Tile`].
     pub xyz: &'a [[f32; 3]],
-    /// See above.
+    /// Level of subsampling that adds these points.
     pub skip: u32,
 }
 
@@ -77,13 +77,13 @@ impl Tile {
         self.xyz.len()
     }
 
-    /// Holds no point.
+    /// Whether the tile has no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.xyz.is_empty()
     }
 
-    /// The same of which more is left out.
+    /// The tile subsampled to level `skip`.
     #[must_use]
     pub fn thinned(&self, skip: u32) -> Self {
         let square = |pixel: u16| ((pixel >> 8) >> skip, (pixel & 255) >> skip);
@@ -102,7 +102,7 @@ impl Tile {
         }
     }
 
-    /// Pixel of the whole lattice of point `i`.
+    /// Pixel of point `i` in the whole lattice.
     #[must_use]
     pub fn pixel_at(&self, i: usize) -> Pixel {
         let pixel = u32::from(self.pixel[i]);

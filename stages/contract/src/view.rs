@@ -1,20 +1,20 @@
-//! What the scans saw of a region: depth images and points about a local origin; what a fit reads.
+//! What the scans saw of a region: depth images and points about a local origin, for a fit.
 
 use crate::{MaskId, ScanId};
 use geometry::{Aabb, DepthImage, Point};
 
-/// A piece of the world with a local frame: world axes, shifted to `origin`, so that f32 is exact
-/// enough.
+/// A part of the world with a local frame: world axes, shifted to `origin`, so that the precision
+/// of `f32` is sufficient.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {
     /// Origin of the local frame in the world, metres.
     pub origin: Point,
-    /// Bounds in the local frame, metres.
+    /// Bounds of the region in the local frame, metres.
     pub bounds: Aabb,
 }
 
 impl Region {
-    /// Bounds in the world, metres.
+    /// Bounds of the region in the world, metres.
     #[must_use]
     pub fn world_bounds(&self) -> Aabb {
         let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] + self.origin[i]);
@@ -25,33 +25,33 @@ impl Region {
 /// One scan's view of a region.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// Whose view.
+    /// The scan.
     pub scan: ScanId,
     /// The mask of its points.
     pub mask: MaskId,
-    /// Where the scanner stands in the local frame; `None` where unknown, and then `images` is
+    /// Position of the scanner in the local frame, metres; `None` where unknown. Then `images` is
     /// empty.
     pub scanner: Option<Point>,
     /// Angle between neighbouring beams, radians; 0 where unknown.
     pub beam_step: f64,
-    /// Whether a camera took it: neighbouring points err alike.
+    /// Whether a depth camera measured the points, so that neighbouring errors are correlated.
     pub is_camera: bool,
     /// Depth images that together cover the region.
     pub images: Vec<DepthImage>,
-    /// The scan's points inside the region's bounds, local frame, metres: neighbours follow one
-    /// another.
+    /// The scan's points inside the region's bounds, local frame, metres, in the order of the
+    /// lattice, so that neighbours follow one another.
     pub points: Vec<[f32; 3]>,
 }
 
-/// Views that a search looks through: more tell it little, and cost it as much as the first.
+/// Largest number of views that a search uses; more of them add little and cost as much each.
 const MAX_SCOUTS: usize = 8;
-/// Scanners nearer to each other than this, seen from the region's middle, see the same side of it;
-/// cosine of 25°.
+/// Cosine of 25°: two scanners see the same side of a region if the directions to them from its
+/// centre differ by less.
 const SAME_SIDE: f64 = 0.906;
 
 impl View {
-    /// The views that a search goes by, where there are many: those with most points, of scanners
-    /// on different sides first. In their order.
+    /// The views that a search uses where there are many: at most eight, in the order of `views`.
+    /// Those of scanners on different sides of `region` go first, then those with most points.
     #[must_use]
     pub fn scouts<'a>(views: &[&'a Self], region: &Region) -> Vec<&'a Self> {
         if views.len() <= MAX_SCOUTS {

@@ -1,14 +1,14 @@
-//! Numbers and what the system says in; how people read them out: counts with their nouns, values
-//! without a sign before nothing, joints' values in degrees or millimetres, errors of the system
-//! without their numbers.
+//! Formats numbers and system messages for people: counts with their nouns, values without a minus
+//! sign before zero, joint values in degrees or millimetres, and operating system errors without
+//! their numbers.
 
-/// A number with its noun, which stands in the singular: `1 robot`, `2 robots`, `0 entries`.
+/// A count with its noun in the right number: `1 robot`, `2 robots`, `0 entries`.
 #[must_use]
 pub fn count(n: u64, noun: &str) -> String {
     format!("{n} {}", plural(n, noun))
 }
 
-/// A noun as it stands behind a number.
+/// The singular or plural of `noun` for a count of `n`.
 #[must_use]
 pub fn plural(n: u64, noun: &str) -> String {
     if n == 1 {
@@ -22,7 +22,7 @@ pub fn plural(n: u64, noun: &str) -> String {
     }
 }
 
-/// A value with so many decimals; one that rounds to zero has no sign.
+/// A value with this many decimals; a value that rounds to zero has no sign.
 #[must_use]
 pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
@@ -32,56 +32,56 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Three values with so many decimals, in brackets.
+/// Three values with this many decimals each, in brackets.
 #[must_use]
 pub fn triple(values: [f64; 3], decimals: usize) -> String {
     let [x, y, z] = values.map(|v| fixed(v, decimals));
     format!("({x}, {y}, {z})")
 }
 
-/// What people read the values of a joint in.
+/// The unit in which joint values are shown to people.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
-    /// So many of it are one radian or one metre.
+    /// Number of these units in one radian or one metre.
     pub factor: f64,
-    /// As it stands behind a value, with a space where there is one.
+    /// Symbol after a value, with a leading space where the unit has one.
     pub symbol: &'static str,
 }
 
 impl Unit {
-    /// Of joints that turn: degrees.
+    /// Degrees, for revolute joints.
     pub const DEGREES: Self = Self { factor: 180.0 / std::f64::consts::PI, symbol: "°" };
-    /// Of joints that slide: millimetres.
+    /// Millimetres, for prismatic joints.
     pub const MILLIMETRES: Self = Self { factor: 1e3, symbol: " mm" };
 
-    /// That of a joint that slides, or turns.
+    /// The unit of a joint that slides (`true`) or turns (`false`).
     #[must_use]
     pub fn of(slides: bool) -> Self {
         if slides { Self::MILLIMETRES } else { Self::DEGREES }
     }
 
-    /// A value (radians or metres) with so many decimals and the unit.
+    /// A value (radians or metres) in this unit with this many decimals and the symbol.
     #[must_use]
     pub fn say(self, value: f64, decimals: usize) -> String {
         fixed(value * self.factor, decimals) + self.symbol
     }
 
-    /// A value and its standard deviation (radians or metres), three decimals each; of a deviation
-    /// of a whole degree or millimetre one is enough.
+    /// A value and its standard deviation (radians or metres) in this unit, with three decimals
+    /// each; a deviation of a whole unit or more has one.
     #[must_use]
     pub fn say_both(self, value: f64, sigma: f64) -> String {
         format!("{} ± {}", self.say(value, 3), self.deviation(sigma))
     }
 
-    /// A standard deviation (radians or metres) as it stands behind ±.
+    /// A standard deviation (radians or metres) in this unit, as it is shown after `±`.
     #[must_use]
     pub fn deviation(self, sigma: f64) -> String {
         self.say(sigma, if sigma * self.factor < 1.0 { 3 } else { 1 })
     }
 }
 
-/// What the system says, without the numbers that it has for it: ` (os error 2)` tells people
-/// nothing.
+/// A message of the operating system without its error number, such as ` (os error 2)`, which means
+/// nothing to users.
 #[must_use]
 pub fn without_numbers(text: &str) -> String {
     const MARK: &str = " (os error ";

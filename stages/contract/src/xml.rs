@@ -1,33 +1,36 @@
-//! Bytes of an XML file in; whether a reader of XML may be given them, out. Readers keep every
-//! element and attribute in memory, many times larger than it is written, and compare each
-//! attribute of an element with all others of it.
+//! Checks the bytes of an XML file before an XML reader may parse them. Readers keep each element
+//! and attribute in memory, at many times its size in the file, and compare each attribute of an
+//! element with all its others, so that a small file could exhaust memory or time.
 
-/// What an XML file may hold.
+/// Limits on the content of an XML file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct XmlLimits {
-    /// Elements, attributes and pieces of text in all. A reader keeps about 80 bytes of each.
+    /// Largest number of elements, attributes and texts together; a reader keeps about 80 bytes of
+    /// each.
     pub max_nodes: u64,
-    /// Attributes of one element.
+    /// Largest number of attributes of one element.
     pub max_attributes: u64,
-    /// The room whose settings `max_xml_nodes` and `max_xml_attributes` these are, for messages.
+    /// Name of the group of settings that holds `max_xml_nodes` and `max_xml_attributes`, for
+    /// messages.
     pub room: &'static str,
 }
 
-/// Elements in one another: formats that are read here have below 40, and readers may call
-/// themselves for each.
+/// Largest depth of nested elements. The formats that are read have below 40, and readers may
+/// recurse once for each.
 const MAX_DEPTH: u64 = 256;
-/// Namespaces that one file declares: real files have below 20, and readers hand each on to every
-/// element that declares one.
+/// Largest number of namespace declarations in a file. Real files have below 20, and readers pass
+/// each on to every nested element that declares one.
 const MAX_NAMESPACES: u64 = 256;
 
-/// Counts what is in XML, without looking at whether it is well-formed: that is the reader's work.
+/// Counts the nodes of an XML file without checking that it is well-formed, which is the reader's
+/// task.
 ///
 /// # Errors
-/// More than the limits allow, in words, with the line and the setting that lifts it.
+/// The limit that is exceeded, in words, with the line and the setting that raises it.
 pub fn check_xml(bytes: &[u8], limits: &XmlLimits) -> Result<(), String> {
     let mut count = Count { bytes, limits, at: 0, n_nodes: 0, n_namespaces: 0, depth: 0 };
     while let Some(n) = bytes[count.at..].iter().position(|b| *b == b'<') {
-        // Text before it, white space included.
+        // The text before the tag counts as a node; white space is text, too.
         count.nodes(u64::from(n > 0))?;
         count.at += n + 1;
         let rest = &bytes[count.at..];
@@ -62,15 +65,15 @@ struct Count<'a> {
 }
 
 impl Count<'_> {
-    /// Goes on behind the next `end`, which begins `from` bytes on at the earliest; to the end
-    /// where there is none.
+    /// Moves behind the next `end` that begins at least `from` bytes further on, or to the end of
+    /// the file if there is none.
     fn skip(&mut self, from: usize, end: &[u8]) {
         let rest = self.bytes.get(self.at + from..).unwrap_or_default();
         let found = rest.windows(end.len()).position(|w| w == end);
         self.at = found.map_or(self.bytes.len(), |n| self.at + from + n + end.len());
     }
 
-    /// The start tag that begins here, behind its `<`.
+    /// Reads the start tag that begins here, behind its `<`.
     fn element(&mut self) -> Result<(), String> {
         let (mut quote, mut n_attributes, mut word) = (None, 0, self.at);
         let mut last = b' ';
@@ -102,7 +105,7 @@ impl Count<'_> {
         Ok(())
     }
 
-    /// The `n`-th attribute of an element, whose name begins at `word`.
+    /// Checks the `n`-th attribute of an element, whose name begins at `word`.
     fn attribute(&mut self, n: u64, word: usize) -> Result<(), String> {
         if n > self.limits.max_attributes {
             let (what, most) = ("attributes of one element", self.limits.max_attributes);
@@ -155,7 +158,7 @@ mod tests {
         assert!(few.contains("more than 10") && few.contains("robot.max_xml_nodes"), "{few}");
         let wide = check(text, 100, 1).expect_err("more");
         assert!(wide.contains("by line 2") && wide.contains("robot.max_xml_attributes"), "{wide}");
-        // What is not well-formed is the reader's to refuse.
+        // Files that are not well-formed pass; the reader refuses them.
         for torn in
             ["<", "<a", "<a b='", "<!--", "<![CDATA[", "<?", "</", "<!", "no tag", "<a b=>=>"]
         {
@@ -168,7 +171,7 @@ mod tests {
         let deep = |n: usize| "<a>".repeat(n) + &"</a>".repeat(n);
         assert_eq!(check(&deep(256), 10_000, 10), Ok(()));
         assert!(check(&deep(257), 10_000, 10).expect_err("deep").contains("in one another"));
-        // One behind the other is not deep.
+        // Elements that follow one another are not nested.
         assert_eq!(check(&"<a></a><b/>".repeat(1000), 10_000, 10), Ok(()));
         let names = |n: usize| (0..n).map(|i| format!("<a xmlns:n{i}='u'/>")).collect::<String>();
         assert_eq!(check(&names(256), 10_000, 10), Ok(()));

@@ -1,5 +1,5 @@
-//! Files that exist whole or not at all: bytes in; a temporary name until the end, then a sync and
-//! a rename.
+//! Files that are either complete or absent: they are written under a temporary name, synced, and
+//! then renamed.
 
 use crate::block::{self, Block};
 use contract::{Error, Result};
@@ -7,27 +7,30 @@ use std::fs::{File, OpenOptions};
 use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Ending of a file that is not yet whole.
+/// File name extension of a file that is not complete.
 pub const PART: &str = "part";
 
-/// Bytes that are gathered before they go to a file: disks write pieces of this size at nearly
-/// their full rate.
+/// Number of bytes that are buffered before they are written: at this size disks reach nearly their
+/// full rate.
 const GATHER: usize = 1 << 19;
 
-/// A file that takes its own name only when it is committed; dropped before, it is removed. What is
-/// written is gathered, and goes to disk past the system's cache as long as it is one long stream.
+/// A file that gets its final name on commit; if it is dropped before, it is removed. Writes are
+/// buffered, and bypass the page cache as long as the file is written sequentially.
 pub struct AtomicFile {
     file: Option<File>,
     part: PathBuf,
     path: PathBuf,
     waiting: Block,
-    /// Whether the file is written past the cache; `None` before the first piece, that of a small
-    /// file is its last.
+    /// Whether writes bypass the page cache; `None` before the first full buffer, which small files
+    /// never reach.
     direct: Option<bool>,
 }
 
 impl AtomicFile {
-    /// Opens `<path>.part` for writing and reading; its folder is made where it is missing.
+    /// Opens `<path>.part` for writing and reading; creates its folder if needed.
+    ///
+    /// # Errors
+    /// If folder or file cannot be created.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
@@ -46,32 +49,38 @@ impl AtomicFile {
         Ok(Self { file, part, path, waiting, direct: None })
     }
 
-    /// The name that it will have.
+    /// The final name of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The name that it has until then, for those who write by name.
+    /// The temporary name of the file, for callers that open it by name.
     pub(crate) fn part(&self) -> &Path {
         &self.part
     }
 
-    /// The file once more, for reading what was written so far.
+    /// Flushes the buffer and opens the file a second time, for reading what was written so far.
+    ///
+    /// # Errors
+    /// If the buffer cannot be written or the file cannot be opened.
     pub fn again(&mut self) -> std::io::Result<File> {
         self.settle()?;
         File::open(&self.part)
     }
 
-    /// Brings the bytes to disk, then gives the file its name, replacing what had it.
+    /// Syncs the file to disk and renames it, replacing any file of that name.
+    ///
+    /// # Errors
+    /// If the file cannot be written or renamed.
     pub fn commit(mut self) -> Result<()> {
         let settled = self.settle();
         let file = self.file.take().expect("taken only here and on drop");
         let done = settled.and_then(|()| file.sync_all());
         let done = done.and_then(|()| std::fs::rename(&self.part, &self.path));
         done.map_err(|e| Error::of_file("file cannot be finished", &self.path, e))?;
-        // The new name itself must survive a power cut; where folders cannot be opened (Windows) it
-        // does anyway.
+        // The folder is synced, so that the new name survives a power cut. Where folders cannot be
+        // opened (Windows), it does so anyway.
         if let Some(folder) = self.path.parent().and_then(|f| File::open(f).ok()) {
             let _ = folder.sync_all();
         }
@@ -82,7 +91,7 @@ impl AtomicFile {
         self.file.as_mut().expect("taken only by commit and drop")
     }
 
-    /// Writes what waits: whole pages past the cache, as long as there were no others before.
+    /// Writes the buffer: whole pages past the cache, as long as all writes before were such.
     fn write_waiting(&mut self) -> std::io::Result<()> {
         let Self { file: Some(file), waiting, direct, .. } = self else { return Ok(()) };
         let direct = direct.get_or_insert_with(|| block::set_direct(file, true));
@@ -91,7 +100,7 @@ impl AtomicFile {
         written
     }
 
-    /// Writes all that waits; from now on through the cache, since what follows begins anywhere.
+    /// Writes the whole buffer. Later writes use the cache, since they may begin anywhere.
     fn settle(&mut self) -> std::io::Result<()> {
         if self.direct == Some(true) {
             let _ = block::set_direct(self.file(), false);
@@ -102,13 +111,16 @@ impl AtomicFile {
 }
 
 /// Writes a whole file at once.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     file.write_all(bytes).map_err(|e| Error::of_file("file cannot be written", path, e))?;
     file.commit()
 }
 
-/// The name of a file while it is not yet whole.
+/// The temporary name of a file.
 pub(crate) fn part_of(path: &Path) -> PathBuf {
     let mut name = path.file_name().map(std::ffi::OsStr::to_os_string).unwrap_or_default();
     name.push(".");
@@ -119,8 +131,8 @@ pub(crate) fn part_of(path: &Path) -> PathBuf {
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if self.file.take().is_some() {
-            // Nothing more can be done about a leftover that refuses to go; it never had a final
-            // name.
+            // If the temporary file cannot be removed there is nothing more to do; it never had its
+            // final name.
             let _ = std::fs::remove_file(&self.part);
         }
     }
@@ -135,7 +147,7 @@ impl Write for AtomicFile {
         Ok(bytes.len() - left)
     }
 
-    /// Nothing: what waits goes to the file when it is read, when it is much, and at the end.
+    /// Does nothing: the buffer is written when it is full, when the file is read, and at the end.
     fn flush(&mut self) -> std::io::Result<()> {
         Ok(())
     }

@@ -1,24 +1,22 @@
-//! Bytes in, one after the other; whole pages of memory out, aligned as disks want them, so that
-//! what is large goes to its file, and comes from it, past the system's cache.
+//! Page-aligned buffers for writing and reading large files past the operating system's page cache.
 //!
-//! A plant's outputs are larger than any cache, and nobody reads them at once: copied into fresh
-//! pages of the cache they take a processor and most of the disk's rate. Where a file system knows
-//! no such writes, they go through its cache.
+//! The outputs of a plant are larger than any cache and are not read again soon. Copying them into
+//! the cache would cost much of a processor and of the disk's rate. Where a file system does not
+//! support such writes, they go through its cache.
 
 use bytemuck::{Pod, Zeroable};
 use std::fs::File;
 use std::io::{Error, ErrorKind, IoSlice, Read, Result, Seek, SeekFrom, Write};
 
-/// Bytes that memory and places of a file are aligned to: a multiple of the sectors of all common
-/// disks.
+/// Alignment of memory and file offsets, bytes: a multiple of the sector size of all common disks.
 pub const PAGE: usize = 4096;
 
-/// Memory that is aligned to its length.
+/// Memory with an alignment of its own length.
 #[repr(C, align(4096))]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Page([u8; PAGE]);
 
-/// Aligned memory that is filled from its beginning.
+/// A buffer of aligned memory.
 #[derive(Default)]
 pub struct Block {
     pages: Vec<Page>,
@@ -26,19 +24,18 @@ pub struct Block {
 }
 
 impl Block {
-    /// What it was filled with.
+    /// The bytes that were filled in.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &bytemuck::cast_slice(&self.pages)[..self.n_bytes]
     }
 
-    /// Takes as many bytes as it has room for, where it may hold `capacity` (whole pages); returns
-    /// the others.
+    /// Appends as many bytes as fit into `capacity` (whole pages), and returns the others.
     pub(crate) fn fill<'a>(&mut self, bytes: &'a [u8], capacity: usize) -> &'a [u8] {
         let (now, later) = bytes.split_at(bytes.len().min(capacity - self.n_bytes));
         let end = self.n_bytes + now.len();
         if end > self.pages.len() * PAGE {
-            // Files are mostly small: memory grows with what comes.
+            // Most files are small, so that memory grows with the content.
             let n_pages = end.next_power_of_two().clamp(PAGE, capacity) / PAGE;
             self.pages.resize(n_pages, Page::zeroed());
         }
@@ -47,7 +44,7 @@ impl Block {
         later
     }
 
-    /// Room for so many bytes, to be read into; what was there is forgotten.
+    /// A buffer of `n_bytes` to read into; its previous content is lost.
     pub fn room(&mut self, n_bytes: usize) -> &mut [u8] {
         self.n_bytes = n_bytes;
         let n_pages = n_bytes.div_ceil(PAGE);
@@ -57,14 +54,14 @@ impl Block {
         &mut bytemuck::cast_slice_mut(&mut self.pages)[..n_bytes]
     }
 
-    /// Forgets its bytes, but not its memory.
+    /// Empties the buffer and keeps its memory.
     pub(crate) fn clear(&mut self) {
         self.n_bytes = 0;
     }
 }
 
-/// Has an open file written and read past the system's cache from now on, or through it again;
-/// whether it is past it now. It never is but on Linux, and there not on all file systems.
+/// Switches an open file to bypass the page cache, or back. Returns whether it now bypasses the
+/// cache, which only some file systems of Linux support.
 #[must_use]
 pub fn set_direct(file: &File, is_direct: bool) -> bool {
     #[cfg(target_os = "linux")]
@@ -83,8 +80,8 @@ pub fn set_direct(file: &File, is_direct: bool) -> bool {
     }
 }
 
-/// Writes all of some slices. Where the file is `direct` (see [`set_direct`]), and its system takes
-/// that back, through the cache.
+/// Writes all of some slices. If the operating system refuses a write to a `direct` file (see
+/// [`set_direct`]), the cache is used.
 pub(crate) fn write_all(
     file: &mut File,
     slices: &mut [IoSlice<'_>],
@@ -105,11 +102,11 @@ pub(crate) fn write_all(
     Ok(())
 }
 
-/// Reads as much as there is room for, or as there is; returns how much that was. Where the file is
-/// direct, and its system takes that back, through the cache.
+/// Reads until the buffer is full or the file ends, and returns the number of bytes. If the
+/// operating system refuses a read from a direct file, the cache is used.
 ///
 /// # Errors
-/// What the reads say.
+/// If the file cannot be read.
 pub fn read_all(
     file: &File,
     room: &mut [u8],
@@ -130,19 +127,19 @@ pub fn read_all(
     Ok(n)
 }
 
-/// Bytes that are read at once: disks give pieces of this size at nearly their full rate.
+/// Number of bytes that are read at once: at this size disks reach nearly their full rate.
 const AT_ONCE: usize = 1 << 19;
 
-/// Reads a file straight on, past the system's cache where that can be.
+/// Reads a file sequentially, past the page cache where possible.
 pub(crate) struct Straight {
     file: File,
     block: Block,
-    /// Bytes of the block that were given out.
+    /// Number of bytes of the block that were returned.
     n_given: usize,
 }
 
 impl Straight {
-    /// From a place of the file on.
+    /// Starts at an offset of the file.
     pub(crate) fn new(mut file: File, start: u64) -> Result<Self> {
         let n_given = start as usize % PAGE;
         file.seek(SeekFrom::Start(start - n_given as u64))?;

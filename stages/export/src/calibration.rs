@@ -1,40 +1,40 @@
-//! What a calibration found in; its part of `result.json` out, and back.
+//! The calibration of a robot's joints in `result.json`.
 
 use crate::places::Places;
 use crate::result::finite;
 use contract::{Calibration, Fit, JointFrame};
 use serde::{Deserialize, Serialize};
 
-/// How a robot differs from its model.
+/// The calibration of a robot: how it differs from its model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CalibrationEntry {
-    /// Its free joints.
+    /// The frames of its free joints.
     pub joints: Vec<FrameEntry>,
-    /// Standard deviations that were assumed beforehand: shift, metres, turn, radians.
+    /// Standard deviations of the prior: of each shift, metres, and of each rotation, radians.
     pub prior: [f64; 2],
-    /// RMS distance of each link's points from its surface, metres: as in the model, and
-    /// corrected.
+    /// For each link the RMS distance of its points from its surface, metres: with the model as it
+    /// is, and calibrated.
     pub link_rms: Places<[Option<f64>; 2]>,
 }
 
-/// Where a joint is against its model, in the joint's own frame.
+/// The frame of a joint relative to the model, in the joint's own frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameEntry {
     /// Name of the joint.
     pub joint: String,
-    /// Its axis.
+    /// Axis of the joint, unit length.
     pub axis: [f64; 3],
-    /// Whether it slides.
+    /// Whether the joint slides along the axis.
     pub slides: bool,
-    /// Shift of its origin, metres.
+    /// Shift of the joint's origin, metres.
     pub shift: [f64; 3],
-    /// Turn of its frame, radians.
+    /// Rotation vector of the joint's frame, radians.
     pub turn: [f64; 3],
-    /// Standard deviations of both.
+    /// Standard deviations of `shift` (metres) and `turn` (radians).
     pub sigma: [f64; 6],
-    /// How far its axis runs beside the model's, metres, and standard deviation.
+    /// Distance of the joint's axis from the model's, and its standard deviation, metres.
     pub offset: [f64; 2],
-    /// How far its axis leans, radians, and standard deviation.
+    /// Angle between the joint's axis and the model's, and its standard deviation, radians.
     pub swing: [f64; 2],
 }
 
@@ -49,7 +49,7 @@ impl CalibrationEntry {
         }
     }
 
-    /// As the fit had it.
+    /// The calibration as the fit had it.
     #[must_use]
     pub fn calibration(&self) -> Calibration {
         let frame = |e: &FrameEntry| JointFrame {

@@ -1,18 +1,18 @@
-//! A picture in memory: pixels, lines, discs and words in, PNG out.
+//! A picture in memory, drawn with pixels, discs and text, and written as PNG.
 
 use crate::atomic;
 use contract::{Error, Kind, Result};
 use font8x8::UnicodeFonts;
 use std::path::Path;
 
-/// A colour, 0..255 a channel.
+/// A colour: red, green and blue, 0..255.
 pub type Rgb = [u8; 3];
 
-/// Paper.
+/// Colour of the background.
 pub(crate) const WHITE: Rgb = [255, 255, 255];
-/// Ink.
+/// Colour of text and lines.
 pub(crate) const INK: Rgb = [30, 34, 40];
-/// Eight colours that people with any colour vision can tell apart (after Okabe and Ito), without
+/// Eight colours that can be told apart with any colour vision (after Okabe and Ito), without
 /// black.
 const COLORS: [Rgb; 8] = [
     [0, 114, 178],
@@ -46,7 +46,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// White paper.
+    /// A white picture, size in pixels.
     #[must_use]
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, pixels: vec![WHITE; width * height] }
@@ -64,7 +64,7 @@ impl Canvas {
         self.height
     }
 
-    /// Colours a pixel; outside the paper nothing happens.
+    /// Colours a pixel; pixels outside the picture are ignored.
     pub fn set(&mut self, x: i64, y: i64, color: Rgb) {
         if x >= 0 && y >= 0 && (x as usize) < self.width && (y as usize) < self.height {
             self.pixels[y as usize * self.width + x as usize] = color;
@@ -91,8 +91,8 @@ impl Canvas {
         }
     }
 
-    /// Writes words, `size` times 8 pixels high, on a white ground; what the font lacks becomes a
-    /// question mark.
+    /// Writes text, `size` times 8 pixels high, on a white background. Characters that the font
+    /// lacks become question marks.
     pub fn text(&mut self, x: i64, y: i64, size: i64, color: Rgb, words: &str) {
         let n = words.chars().count() as i64;
         self.fill(x - size, y - size, n * 8 * size + 2 * size, 10 * size, WHITE);
@@ -116,7 +116,7 @@ impl Canvas {
         }
     }
 
-    /// Puts another picture onto this one.
+    /// Copies another picture onto this one.
     pub fn paste(&mut self, x: i64, y: i64, other: &Self) {
         for v in 0..other.height {
             for u in 0..other.width {
@@ -125,7 +125,10 @@ impl Canvas {
         }
     }
 
-    /// Writes a PNG.
+    /// Writes a PNG file.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let failed = |e: png::EncodingError| {
             Error::new(Kind::Bug, "picture does not encode").because(e).at(path.display())
@@ -134,7 +137,7 @@ impl Canvas {
         let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
-        // A rescan draws a dozen pictures while tiles wait for the same threads.
+        // A rescan draws a dozen pictures while tiles need the same threads.
         encoder.set_compression(png::Compression::Fast);
         let mut writer = encoder.write_header().map_err(failed)?;
         writer.write_image_data(self.pixels.as_flattened()).map_err(failed)?;
@@ -143,7 +146,7 @@ impl Canvas {
     }
 }
 
-/// A colour between two: `share` 0 is the first.
+/// A mixture of two colours; at a `share` of 0 it is the first.
 pub(crate) fn blend(a: Rgb, b: Rgb, share: f64) -> Rgb {
     [0, 1, 2].map(|i| {
         (f64::from(a[i]) + (f64::from(b[i]) - f64::from(a[i])) * share.clamp(0.0, 1.0)).round()

@@ -1,14 +1,15 @@
-//! A cell that was scanned again: what stands in it, what went and what came, in; a picture from
-//! above and one from the side out.
+//! Draws a cell that was scanned again, from above and from the side: what stands, what went and
+//! what appeared.
 
 use crate::canvas::{Canvas, INK, Rgb, blend};
 use geometry::Aabb;
 
-/// Longer side of the picture from above, pixels.
+/// Longer side of the view from above, pixels.
 const SIDE: f64 = 900.0;
-/// Room about the pictures, pixels.
+/// Margin around the views, pixels.
 const MARGIN: i64 = 30;
-/// What stands higher than this in the cell is not drawn, metres: a ceiling would hide all.
+/// Height above the bottom of the cell up to which things are drawn, metres; a ceiling would hide
+/// everything.
 const SHOWN: f64 = 3.0;
 /// What stands, what nobody looked at, what went, what came.
 const STANDS: Rgb = [150, 156, 164];
@@ -16,21 +17,21 @@ const UNSEEN: Rgb = [240, 228, 66];
 const GONE: Rgb = [213, 94, 0];
 const FILLED: Rgb = [0, 158, 115];
 
-/// A thing that is not where it was.
+/// A thing that changed between two sessions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChangedThing {
-    /// Its name and what became of it.
+    /// Its name with what happened to it.
     pub name: String,
-    /// Places that are empty now, and places that are filled now, world, metres.
+    /// Places that are empty now, world, metres.
     pub gone: Vec<[f64; 3]>,
-    /// See `gone`.
+    /// Places that are filled now, world, metres.
     pub filled: Vec<[f64; 3]>,
-    /// Where its name stands, world, metres.
+    /// Position of its name in the picture, world, metres.
     pub at: [f64; 3],
 }
 
-/// Draws the cell: places where something stands, those where something stood that was not looked
-/// at again, things that changed, robots with the places of their bases, world, metres.
+/// Draws a cell: places where something stands, places where something stood that were not seen
+/// again, things that changed, and robots with the positions of their bases; world, metres.
 #[must_use]
 pub fn draw_changes(
     cell: &Aabb,
@@ -43,7 +44,7 @@ pub fn draw_changes(
     let pixels = size.map(|s| (s * scale) as i64 + 1);
     let (width, top) = (pixels[0].max(520) + 2 * MARGIN, pixels[1] + 2 * MARGIN);
     let mut canvas = Canvas::new(width as usize, (top + pixels[2] + MARGIN) as usize);
-    // North is up; below it the cell from the south.
+    // North is up; below the view from above is the view from the south.
     let place = |p: &[f64; 3]| {
         let [x, y, z] = [0, 1, 2].map(|i| ((p[i] - cell.min[i]) * scale) as i64);
         [(MARGIN + x, MARGIN + pixels[1] - y), (MARGIN + x, top + pixels[2] - z)]

@@ -1,7 +1,7 @@
-//! A compressed tile in; whether its chunks and their layers fit into the file, out.
+//! Checks that the chunks and layers of a compressed tile fit into its file.
 //!
-//! The decoder takes memory for as many chunks as the table states, and for layers as long as each
-//! chunk states, before it reads any of them.
+//! The decoder allocates memory for as many chunks as the table states, and for layers as long as
+//! each chunk states, before it reads them.
 
 use crate::record::LasSettings;
 use contract::fence;
@@ -9,15 +9,15 @@ use laz::LazVlr;
 use laz::laszip::ChunkTable;
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Layers of what each point has, in LAZ of LAS 1.4.
+/// Number of layers that every point has, in LAZ of LAS 1.4.
 const POINT: usize = 9;
 
-/// Checks the chunks of a file of so many points, which begin at a place with the place of their
-/// table. The decoder goes from chunk to chunk as layers and counts lead it: they must lead it as
-/// the table does.
+/// Checks the chunks of a file with `n_points` points, which begin with the offset of their table.
+/// The decoder moves from chunk to chunk by the stated layers and counts, which must lead to the
+/// same offsets as the table.
 ///
 /// # Errors
-/// What does not fit, in words; a file that cannot be read.
+/// If the file cannot be read; the inner error says in words what does not fit.
 pub(crate) fn check(
     file: &mut (impl Read + Seek),
     at: u64,
@@ -32,7 +32,7 @@ pub(crate) fn check(
     }
     let n = number::<4>(file, table + 4)?;
     if n > (table - at - 8) / record_len as u64 {
-        // Each begins with a record as it is.
+        // Each chunk begins with an uncompressed record.
         return Ok(Err(format!("its table of chunks states {n} of them, which do not fit")));
     }
     file.seek(SeekFrom::Start(table))?;
@@ -43,7 +43,7 @@ pub(crate) fn check(
         Ok(Err(error)) => return Ok(Err(error.to_string())),
         Err(panic) => return Ok(Err(panic)),
     };
-    // Colours are one more, and so is each extra byte.
+    // Colour adds one layer, and so does each extra byte.
     let n_layers = POINT + usize::from(las.with_color) + las.extra_len();
     let head = (record_len + 4 + 4 * n_layers) as u64;
     let (mut from, mut left) = (at + 8, n_points);
@@ -69,7 +69,7 @@ pub(crate) fn check(
     Ok(if left == 0 { Ok(()) } else { Err(format!("{left} points are in no chunk")) })
 }
 
-/// A whole number of so many bytes at a place, the lowest first.
+/// A little-endian number of `N` bytes at an offset.
 fn number<const N: usize>(file: &mut (impl Read + Seek), at: u64) -> io::Result<u64> {
     let mut bytes = [0; 8];
     file.seek(SeekFrom::Start(at))?;

@@ -1,4 +1,4 @@
-//! Packed strips in, in any order; the cloud of all that moves, and that of all that does not, out.
+//! Writes two clouds: one of all points that move, and one of all others.
 
 use crate::las::{LasSummary, LasWriter};
 use crate::pack::Packed;
@@ -8,14 +8,14 @@ use crate::summed::FileSum;
 use contract::Result;
 use std::path::Path;
 
-/// What [`Tiles`](crate::Tiles) and [`Clouds`] wrote.
+/// The files that [`Tiles`](crate::Tiles) and [`Clouds`] wrote.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Written {
-    /// Tiles, by row then column.
+    /// The tiles, sorted by row, then column.
     pub tiles: Vec<LasSummary>,
-    /// Links and attachments.
+    /// The cloud of links and attachments.
     pub robots: LasSummary,
-    /// All the rest, where asked for.
+    /// The cloud of all other points, if it was requested.
     pub fixed: Option<LasSummary>,
 }
 
@@ -35,10 +35,10 @@ pub struct Clouds {
 }
 
 impl Clouds {
-    /// Opens the clouds under the output folder, of records as `las` has them.
+    /// Opens the clouds in the output folder `out`, with records as `las` says.
     ///
     /// # Errors
-    /// A file that cannot be made.
+    /// If a file cannot be created.
     pub fn create(out: &Path, las: &LasSettings, settings: &Settings) -> Result<Self> {
         let open = |name: &str| {
             LasWriter::create(out.join(format!("clouds/{name}.{}", las.ending())), las.clone())
@@ -51,7 +51,7 @@ impl Clouds {
     /// Adds a packed strip.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// If a file cannot be written.
     pub fn add(&mut self, packed: &Packed) -> Result<()> {
         for (run, records) in packed.runs(self.record_len) {
             if run.moves {
@@ -63,10 +63,11 @@ impl Clouds {
         Ok(())
     }
 
-    /// Finishes the files; with the tiles, all that was written.
+    /// Finishes the files and returns their summaries: that of the moving points, and that of the
+    /// others if it was requested.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// If a file cannot be written.
     pub fn finish(self) -> Result<(LasSummary, Option<LasSummary>)> {
         Ok((self.robots.finish()?, self.fixed.map(LasWriter::finish).transpose()?))
     }

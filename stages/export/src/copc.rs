@@ -1,8 +1,8 @@
-//! The tiles of a plant in; one COPC file of all their points, coarse to fine, out.
-//! `copc_converter` makes the octree out of core.
+//! Writes one COPC file with all points of a plant's tiles; the crate `copc_converter` builds the
+//! octree out of core.
 //!
-//! COPC 1.0 (<https://copc.io>) is LAZ whose chunks are the nodes of an octree: viewers (Potree,
-//! QGIS) load no more of it than they show, and everything else reads it as LAZ.
+//! COPC 1.0 (<https://copc.io>) is LAZ whose chunks are the nodes of an octree. Viewers (Potree,
+//! QGIS) load only what they show, and all other programs read it as LAZ.
 
 use crate::atomic::AtomicFile;
 use contract::{Error, Kind, Result};
@@ -11,36 +11,36 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Its name, relative to an output folder.
+/// Path of the file relative to the output folder.
 pub const COPC: &str = "clouds/plant.copc.laz";
 
-/// What the octree is built within, bytes; and points that are built together, for which that is
-/// enough. Not what a run may use: how points are grouped decides the bytes of the file.
+/// Memory within which the octree is built, bytes. It does not depend on the memory that a run may
+/// use, since the grouping of points decides the bytes of the file.
 const BUDGET: u64 = 256 << 20;
 const TOGETHER: u64 = 200_000;
-/// Day and year of creation in a LAS header: zero in all files of ours, so that the same points are
-/// the same bytes.
+/// Offset and content of day and year of creation in a LAS header: zero in all files written here,
+/// so that the same points give the same bytes.
 const CREATED: (u64, [u8; 4]) = (90, [0; 4]);
 
-/// What is to be told of the conversion's steps, from any thread.
+/// Receives the progress of the conversion, from any thread.
 pub trait CopcSteps: Send + Sync {
-    /// A step begins that has so much to do, points or nodes.
+    /// A step begins, with its total number of points or nodes.
     fn begins(&self, step: &'static str, total: u64);
-    /// So much of it is done.
+    /// Number of them that are done.
     fn is_at(&self, done: u64);
-    /// It has ended; an error ends the conversion.
+    /// The step has ended; an error ends the conversion.
     ///
     /// # Errors
-    /// The run is cancelled.
+    /// If the run is cancelled.
     fn ends(&self) -> Result<()>;
 }
 
-/// Writes a file of some tiles (see [`tiles`]); false where there are none. It keeps files as large
-/// as the cloud under `scratch` meanwhile, and works on the threads of the pool that it is called
-/// in.
+/// Writes a COPC file of some tiles (see [`tiles`]), with temporary files as large as the cloud
+/// under `scratch`. Returns false where there are no tiles. It uses the threads of the pool in
+/// which it is called.
 ///
 /// # Errors
-/// Files that cannot be read or written; a step that is to be the last.
+/// If files cannot be read or written, or if `steps` ends the conversion.
 pub fn write_copc(
     tiles: &[PathBuf],
     to: &Path,
@@ -80,10 +80,10 @@ pub fn write_copc(
     Ok(true)
 }
 
-/// The tiles that lie in an output folder, in the order of their names.
+/// The tiles in an output folder, sorted by name.
 ///
 /// # Errors
-/// A folder that cannot be read.
+/// If the folder cannot be read.
 pub fn tiles(out: &Path) -> Result<Vec<PathBuf>> {
     let folder = out.join("tiles");
     let failed = |e| Error::of_file("tiles cannot be listed", &folder, e);
@@ -95,13 +95,13 @@ pub fn tiles(out: &Path) -> Result<Vec<PathBuf>> {
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<std::io::Result<Vec<PathBuf>>>()
         .map_err(failed)?;
-    // What systems leave in folders is no tile.
+    // Other files, which operating systems may leave in folders, are ignored.
     tiles.retain(|path| path.extension().is_some_and(|e| e == "las" || e == "laz"));
     tiles.sort();
     Ok(tiles)
 }
 
-/// An error of the conversion; one of the disk stays one.
+/// Translates an error of the conversion; errors of the disk stay such.
 fn failed(error: copc_converter::Error, path: &Path) -> Error {
     if let copc_converter::Error::Internal(causes) = &error
         && let Some(io) = causes.chain().find_map(|c| c.downcast_ref::<std::io::Error>())
@@ -113,7 +113,7 @@ fn failed(error: copc_converter::Error, path: &Path) -> Error {
     Error::new(Kind::Bug, "the COPC file cannot be made").because(error).at(path.display())
 }
 
-/// Hands on what the conversion says.
+/// Forwards the progress of the conversion.
 struct Observer<S>(Arc<S>);
 
 impl<S: CopcSteps> copc_converter::ProgressObserver for Observer<S> {

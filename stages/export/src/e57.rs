@@ -1,4 +1,4 @@
-//! Simulated scans: grid points in, one E57 file with poses, rows and columns out.
+//! Writes simulated scans to an E57 file with poses, rows and columns.
 
 use crate::atomic::AtomicFile;
 use contract::{Error, Kind, Result};
@@ -11,12 +11,12 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What is said of one scan.
+/// The description of one scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridScan {
-    /// Name for people.
+    /// Name of the scan.
     pub name: String,
-    /// Pose of the scanner.
+    /// Pose of the scanner in the world, metres.
     pub world_from_scan: Pose,
     /// Number of rows of the raster.
     pub n_rows: u32,
@@ -27,13 +27,13 @@ pub struct GridScan {
 /// One beam of a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridPoint {
-    /// Scan frame, metres; `None` where nothing came back.
+    /// Coordinates in the scan frame, metres; `None` for a beam without return.
     pub xyz: Option<[f32; 3]>,
     /// Row of the raster.
     pub row: u32,
     /// Column of the raster.
     pub col: u32,
-    /// 0..65535.
+    /// Intensity, 0..65535.
     pub intensity: u16,
 }
 
@@ -46,8 +46,11 @@ pub struct E57Scans {
 }
 
 impl E57Scans {
-    /// Opens the file. Its identifiers come from its name, so that the same scene gives the same
-    /// bytes.
+    /// Opens the file. Its identifiers are derived from its name, so that the same scene gives the
+    /// same bytes.
+    ///
+    /// # Errors
+    /// If the file cannot be created.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
         let file = Arc::new(Mutex::new(Straight::new(AtomicFile::create(&path)?)));
@@ -60,7 +63,10 @@ impl E57Scans {
         Ok(Self { writer, file, path, n_scans: 0 })
     }
 
-    /// Appends a scan; points are taken one by one, in any order. Returns how many were written.
+    /// Appends a scan with its points in any order, and returns the number of points written.
+    ///
+    /// # Errors
+    /// If a pixel lies outside the raster, or if the file cannot be written.
     pub fn add(
         &mut self,
         scan: &GridScan,
@@ -87,7 +93,7 @@ impl E57Scans {
         let mut n = 0;
         for point in points {
             let point = point?;
-            // The crate would cut off the bits that do not fit.
+            // The crate would silently cut off bits that do not fit.
             if point.row >= scan.n_rows || point.col >= scan.n_cols {
                 let at = format!("{}, {}", point.row, point.col);
                 return Err(Error::new(
@@ -96,7 +102,8 @@ impl E57Scans {
                 ));
             }
             let [x, y, z] = point.xyz.unwrap_or_default();
-            // State 2: no coordinates at all, and readers that look only at "not 0" are right too.
+            // State 2 means no valid coordinates; readers that test only for "not 0" are right,
+            // too.
             let state = if point.xyz.is_some() { 0 } else { 2 };
             let values = vec![
                 RecordValue::Single(x),
@@ -114,7 +121,10 @@ impl E57Scans {
         Ok(n)
     }
 
-    /// Writes the index and gives the file its name.
+    /// Writes the index and renames the file to its final name.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn finish(self) -> Result<()> {
         let Self { mut writer, file, path, .. } = self;
         writer.finalize().map_err(|e| failed(e, &path))?;
@@ -148,8 +158,8 @@ fn failed(e: e57::Error, path: &Path) -> Error {
     Error::new(Kind::Io, "e57 file cannot be written").because(e).at(path.display())
 }
 
-/// An identifier made of a name and a number (128 bits of FNV-1a): unique in the file, the same
-/// every time.
+/// An identifier from a name and a number (128 bits of FNV-1a): unique in the file and
+/// reproducible.
 fn guid(name: &str, number: u64) -> String {
     let mut hash = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d_u128;
     for byte in name.bytes().chain(number.to_le_bytes()) {
@@ -159,18 +169,18 @@ fn guid(name: &str, number: u64) -> String {
     format!("{{{}-{}-{}-{}-{}}}", &h[..8], &h[8..12], &h[12..16], &h[16..20], &h[20..])
 }
 
-/// Bytes gathered before they go to the file: the crate writes pages of 1 KiB, with a look at the
-/// position of each.
+/// Number of bytes that are buffered: the crate writes pages of 1 KiB and queries the position for
+/// each.
 const GATHER: usize = 1 << 20;
 
-/// A file that is written almost straight on: seeking costs nothing, and writes are gathered.
+/// A file that is written almost sequentially: seeking is free, and writes are buffered.
 struct Straight {
     file: AtomicFile,
-    /// Where the next byte goes.
+    /// Position of the next byte.
     at: u64,
-    /// Length of the file with what is gathered.
+    /// Length of the file including the buffer.
     end: u64,
-    /// Gathered bytes, which begin at `from`.
+    /// The buffer, which begins at offset `from`.
     gathered: Vec<u8>,
     from: u64,
 }
@@ -190,7 +200,7 @@ impl Straight {
     }
 }
 
-/// A handle on it: the crate keeps its writer and gives none back.
+/// A shared handle to the file: the crate keeps its writer and does not return it.
 struct Shared(Arc<Mutex<Straight>>);
 
 impl Shared {
@@ -214,7 +224,7 @@ impl Write for Shared {
         Ok(bytes.len())
     }
 
-    /// Nothing: what is gathered goes to the file when it is read, when it is much, and at the end.
+    /// Does nothing: the buffer is written when it is full, when the file is read, and at the end.
     fn flush(&mut self) -> std::io::Result<()> {
         Ok(())
     }

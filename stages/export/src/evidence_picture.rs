@@ -1,6 +1,5 @@
-//! One robot's fit in; a page that a person checks in ten seconds out: how far its points are from
-//! the posture's surface, where each joint stands within its limits, what the scans say of each
-//! link, verdict and runner-up.
+//! Draws the review page of one robot, for a check at a glance: distances of its points from the
+//! fitted surface, each joint within its limits, the evidence for each link, verdict and runner-up.
 
 use crate::canvas::{Canvas, INK, Rgb};
 use crate::robot_picture::{FULL, RobotPicture, residual_color};
@@ -8,18 +7,18 @@ use contract::words::Unit;
 use contract::{Certainty, Fit, Verdict};
 use robot::{Joint, JointKind, Model};
 
-/// Width of the page and of one picture on it, pixels.
+/// Width of the page, pixels.
 const WIDTH: i64 = 1126;
 const SIDE: i64 = 560;
 /// Height of a line, pixels.
 const LINE: i64 = 16;
-/// Left end and width of the bar of a joint's limits, pixels.
+/// Left end and width of the bar that shows a joint's limits, pixels.
 const BAR: (i64, i64) = (190, 300);
-/// Left end of the table of links.
+/// Left end of the table of links, pixels.
 const LINKS: i64 = 700;
-/// Limits of a joint that has none, radians: a turn to each side.
+/// Range that is drawn for a joint without limits, radians: a turn to each side.
 const NO_LIMITS: [f64; 2] = [-std::f64::consts::TAU, std::f64::consts::TAU];
-/// Characters of a line over the whole page.
+/// Number of characters of a line across the page.
 const LINE_CHARS: usize = 136;
 const GREY: Rgb = [150, 154, 162];
 const PALE: Rgb = [226, 229, 234];
@@ -27,7 +26,7 @@ const RED: Rgb = [196, 30, 40];
 const AMBER: Rgb = [176, 106, 0];
 const BLUE: Rgb = [0, 90, 170];
 
-/// Draws the page; `title` names robot, model and verdict.
+/// Draws the review page; `title` names robot, model and verdict.
 #[must_use]
 pub fn draw_evidence(title: &str, picture: &RobotPicture, fit: &Fit, model: &Model) -> Canvas {
     let words = words(fit);
@@ -84,8 +83,8 @@ fn certainty_color(certainty: Certainty) -> Rgb {
     }
 }
 
-/// One joint: its limits as a bar, on it the value with its standard deviation, and values that fit
-/// as well.
+/// Draws one joint: a bar for its limits, the value with its standard deviation, and other values
+/// that fit as well.
 fn row(canvas: &mut Canvas, y: i64, (fit, at): (&Fit, usize), own: &Joint) {
     let joint = &fit.joints[at];
     let [low, high] = own.limits.unwrap_or(NO_LIMITS);
@@ -108,7 +107,7 @@ fn row(canvas: &mut Canvas, y: i64, (fit, at): (&Fit, usize), own: &Joint) {
     canvas.text(BAR.0 + BAR.1 + 12, y, 1, color, &words);
 }
 
-/// What the colours of the residuals mean.
+/// Draws the legend of the residual colours.
 fn scale(canvas: &mut Canvas, y: i64) {
     let n = 21;
     for i in 0..n {
@@ -120,7 +119,7 @@ fn scale(canvas: &mut Canvas, y: i64) {
     canvas.text(60 + 12 * n + 6, y + 1, 1, GREY, &format!("+{full} before the surface"));
 }
 
-/// Verdict, reasons and the runner-up, in lines as long as the page.
+/// Verdict, reasons and runner-up, wrapped to the width of the page.
 fn words(fit: &Fit) -> Vec<String> {
     let mut all = vec![format!(
         "{}: score {:.3}, rms {:.2} mm",

@@ -1,12 +1,12 @@
-//! A result in, a JUnit file out: each robot is a test case and each of its joints one, so that a
-//! build server shows what nobody knows beside what is wrong.
+//! Writes a result as a JUnit file. Each robot and each of its joints is a test case, so that a
+//! build server shows what is unknown beside what is wrong.
 //!
 //! | what | case |
 //! | --- | --- |
 //! | a trusted robot | passes |
 //! | a doubtful or refused robot | fails, its reasons in the message |
 //! | a joint that is determined or coarse, of a trusted robot | passes |
-//! | a joint that is undetermined, or of a robot that is not trusted | is skipped, its value and standard deviation in the message |
+//! | an undetermined joint, or a joint of a robot that is not trusted | is skipped with its value |
 //! | a run that left something out | a case of its own that fails |
 
 use crate::atomic;
@@ -17,12 +17,12 @@ use contract::{Certainty, Result, Verdict, quote};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What a case came to.
+/// The result of a test case.
 enum Outcome {
     Passes,
-    /// Type and message.
+    /// It fails, with the type of the failure and a message.
     Fails(String, String),
-    /// Message.
+    /// It is skipped, with a message.
     Skipped(String),
 }
 
@@ -31,11 +31,14 @@ struct Case {
     class: String,
     name: String,
     outcome: Outcome,
-    /// Lines for whoever looks at the case.
+    /// Further lines of output.
     output: Vec<String>,
 }
 
-/// Writes the file; `is_partial` where the run left out inputs, models or regions that failed.
+/// Writes the file; `is_partial` says that the run left out inputs, models or regions that failed.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_junit(path: &Path, result: &ResultFile, is_partial: bool) -> Result<()> {
     atomic::write(path, junit(result, is_partial).as_bytes())
 }
@@ -65,7 +68,7 @@ fn junit(result: &ResultFile, is_partial: bool) -> String {
     text + "</testsuite>\n</testsuites>\n"
 }
 
-/// The case of a run that left something out.
+/// The test case of a run that left something out.
 fn left_out(result: &ResultFile) -> Case {
     let why = format!("inputs, models or regions were left out: {}", result.warnings.join("; "));
     Case {
@@ -76,7 +79,7 @@ fn left_out(result: &ResultFile) -> Case {
     }
 }
 
-/// The cases of a robot: itself, its joints, and the same of how it stands in other scans.
+/// The test cases of a robot: the robot, its joints, and its postures in other scans.
 fn of_robot(cases: &mut Vec<Case>, robot: &RobotEntry) {
     let scans: Vec<String> = robot.stands_in.iter().map(u32::to_string).collect();
     let stands =
@@ -108,7 +111,7 @@ fn of_robot(cases: &mut Vec<Case>, robot: &RobotEntry) {
     robot.stays.iter().for_each(|stay| of_robot(cases, stay));
 }
 
-/// What is not known is skipped, not passed: a value that may be any other is no value.
+/// An undetermined joint is skipped and does not pass: its value may be any other.
 fn of_joint(robot: &RobotEntry, joint: &JointWords<'_>, is_trusted: bool) -> Outcome {
     let said = joint.say();
     if !is_trusted {
@@ -145,12 +148,12 @@ impl Case {
     }
 }
 
-/// Text for people in XML.
+/// Text for people, quoted for XML.
 fn for_people(text: &str) -> String {
     quote::xml(&quote::shown(text)).into_owned()
 }
 
-/// Lines of it.
+/// Several such lines.
 fn lines(all: &[String]) -> String {
     all.iter().map(|line| for_people(line)).collect::<Vec<_>>().join("\n")
 }
@@ -232,7 +235,7 @@ joint &apos;wrist&apos; is undetermined (± 103.9°): it may as well stand at 2.
         old.certainty.0.clear();
         let words = old.posture().map(|joint| joint.certainty.word()).collect::<Vec<_>>();
         assert_eq!(words, ["coarse", "determined", "undetermined"]);
-        // Narrow, but one of several answers.
+        // A small deviation, but one of several possible values.
         old.sigma.0[0].1 = 1e-4;
         assert_eq!(old.posture().next().map(|a| a.certainty), Some(Certainty::Undetermined));
     }

@@ -1,5 +1,4 @@
-//! LAS 1.4 and LAZ: points in, one file out; counts and bounds are written into the header at the
-//! end.
+//! Writes a LAS 1.4 or LAZ file; counts and bounds are written to the header at the end.
 
 use crate::atomic::AtomicFile;
 use crate::pack::{Pack, PointColumns};
@@ -12,23 +11,24 @@ use laz::{LasZipCompressor, LazItemRecordBuilder, LazItemType, LazVlr};
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Bytes gathered before they go to the file.
+/// Number of bytes that are buffered before they are written.
 const GATHER: usize = 1 << 18;
-/// LAS global encoding: the reference system, if any, is WKT, as formats 6 and up demand.
+/// Bit of the LAS global encoding: the reference system, if any, is WKT, as formats 6 and up
+/// require.
 const WKT: u16 = 1 << 4;
-/// LAS global encoding: GPS times are adjusted standard time.
+/// Bit of the LAS global encoding: GPS times are adjusted standard time.
 const STANDARD_TIME: u16 = 1;
 
-/// What was written.
+/// The summary of a written file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LasSummary {
-    /// Where.
+    /// Path of the file.
     pub path: PathBuf,
     /// Number of points.
     pub n_points: u64,
-    /// Bounds as in the header, metres; empty without points.
+    /// Bounds as in the header, metres; empty where there are no points.
     pub bounds: Aabb,
-    /// Of the file, where it was not compressed.
+    /// Length and checksum of the file, if it is not compressed.
     pub sum: Option<FileSum>,
 }
 
@@ -48,7 +48,10 @@ pub struct LasWriter {
 }
 
 impl LasWriter {
-    /// Opens the file; whether it is compressed is up to `settings`, not to its name.
+    /// Opens the file. `settings` decide whether it is compressed, whatever its name is.
+    ///
+    /// # Errors
+    /// If the file cannot be created.
     pub fn create(path: impl Into<PathBuf>, settings: LasSettings) -> Result<Self> {
         let path = path.into();
         let head = head(&settings, &Extent::default())?;
@@ -74,13 +77,16 @@ impl LasWriter {
     }
 
     /// Appends points.
+    ///
+    /// # Errors
+    /// If a point does not fit into LAS coordinates, or if the file cannot be written.
     pub fn push(&mut self, points: &PointColumns<'_>) -> Result<()> {
         let packed = self.pack.pack(points).map_err(|e| e.at(self.path.display()))?;
         packed.runs.iter().for_each(|run| self.extent.join(&run.extent));
         self.gather(&packed.bytes)
     }
 
-    /// Appends records that were encoded elsewhere.
+    /// Appends records that are encoded already.
     pub(crate) fn push_records(&mut self, records: &[u8], extent: &Extent) -> Result<()> {
         self.extent.join(extent);
         self.gather(records)
@@ -100,7 +106,10 @@ impl LasWriter {
         written.map_err(|e| Error::of_file("cloud cannot be written", &self.path, e))
     }
 
-    /// Writes counts and bounds, and gives the file its name.
+    /// Writes counts and bounds to the header, and renames the file to its final name.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn finish(mut self) -> Result<LasSummary> {
         self.flush()?;
         let Self { sink, settings, extent, path, .. } = self;
@@ -145,7 +154,7 @@ pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     let bounds =
         if extent.n > 0 { bounds(settings, extent) } else { Aabb { min: [0.0; 3], max: [0.0; 3] } };
     let version = las::Version::new(1, 4);
-    // The older formats say it in the older field, too, where it fits.
+    // Older formats state the count in the legacy field as well, where it fits.
     let short = u32::try_from(extent.n).ok().filter(|_| settings.short);
     let header_size = version.header_size();
     let mut by_return = [0; 15];
@@ -187,8 +196,7 @@ pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
     Ok(out)
 }
 
-/// The variable length records: those of the settings, that of the extra bytes, that of the
-/// compression.
+/// The variable length records: those of the settings, of the extra bytes and of the compression.
 fn records(settings: &LasSettings) -> Result<Vec<raw::Vlr>> {
     let mut records = Vec::new();
     for vlr in &settings.vlrs {
@@ -237,7 +245,7 @@ fn extra_bytes(settings: &LasSettings) -> Vec<u8> {
         let start = out.len();
         out.extend([0, 0, *kind, 0]);
         out.extend(text::<32>(name));
-        // Unused, no-data, least, largest, scale and offset: none of them given.
+        // The optional fields (no data, minimum, maximum, scale, offset) stay unset.
         out.resize(start + 160, 0);
         out.extend(text::<32>(what));
     }
@@ -256,7 +264,7 @@ pub(crate) fn laz_vlr(settings: &LasSettings) -> LazVlr {
     LazVlr::from_laz_items(items.build())
 }
 
-/// Zero-padded text, cut at `N` bytes.
+/// Text padded with zeros or cut to `N` bytes.
 fn text<const N: usize>(s: &str) -> [u8; N] {
     let mut out = [0; N];
     let n = s.len().min(N);

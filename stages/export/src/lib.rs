@@ -1,8 +1,25 @@
-//! The plant in, files out: masks, result, clouds, scans, pictures. The only writer of formats;
-//! decides nothing.
+//! Writes all output files: masks, `result.json`, clouds, scans and pictures. No other crate knows
+//! their formats, and this crate makes no decisions about their content.
 //!
-//! Every file is written under a temporary name, synced, and gets its own name only when it is
-//! whole.
+//! Every file is written under a temporary name, synced, and renamed when it is complete.
+//!
+//! # Example
+//! ```
+//! use contract::{Label, MaskId};
+//! use export::{LabelColumns, MaskFiles, MaskReader, MaskWriter};
+//!
+//! // The labels of two points, written as three NumPy arrays and read back.
+//! let out = tempfile::tempdir()?;
+//! let mut mask = MaskWriter::create(out.path(), MaskId(0))?;
+//! mask.push(&LabelColumns::of(&[Label::FLOOR, Label::FIXED]))?;
+//! let sums = mask.finish()?;
+//! assert!(sums[0].path.ends_with("labels/0.kind.npy"));
+//!
+//! let files = MaskFiles::of(MaskId(0));
+//! let reader = MaskReader::new(out.path(), [&files.kind, &files.robot, &files.link]);
+//! assert_eq!(reader.range(0, 2)?.label(0)?, Label::FLOOR);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![forbid(unsafe_code)]
 
 pub mod atomic;

@@ -1,29 +1,29 @@
-//! The labels of one mask: labels in the order of the input in, three arrays out; and back.
+//! Writes and reads the labels of a mask as three NumPy arrays, in the order of the input.
 
 use crate::npy::{self, NpyWriter};
 use crate::summed::FileSum;
 use contract::{Error, Label, MaskId, PointKind, Result};
 use std::path::{Path, PathBuf};
 
-/// The files of one mask, relative to the output folder.
+/// Paths of the files of one mask, relative to the output folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MaskFiles {
-    /// Kinds, u8.
+    /// Array of kinds, u8.
     pub kind: String,
-    /// Robots, i16.
+    /// Array of robots, i16.
     pub robot: String,
-    /// Links, i16.
+    /// Array of links, i16.
     pub link: String,
 }
 
 impl MaskFiles {
-    /// Name of the list of places of a mask that later scans have superseded.
+    /// Path of the list of places of a mask that later scans supersede.
     #[must_use]
     pub fn superseded(mask: MaskId) -> String {
         format!("labels/{}.superseded.npy", mask.0)
     }
 
-    /// Names of the files of a mask.
+    /// Paths of the files of a mask.
     #[must_use]
     pub fn of(mask: MaskId) -> Self {
         let name = |what: &str| format!("labels/{}.{what}.npy", mask.0);
@@ -31,7 +31,7 @@ impl MaskFiles {
     }
 }
 
-/// Labels as the three arrays have them.
+/// Labels as three columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct LabelColumns {
     kind: Vec<u8>,
@@ -40,7 +40,7 @@ pub struct LabelColumns {
 }
 
 impl LabelColumns {
-    /// The columns of some labels.
+    /// The columns of these labels.
     #[must_use]
     pub fn of(labels: &[Label]) -> Self {
         Self {
@@ -56,57 +56,57 @@ impl LabelColumns {
         self.kind.len()
     }
 
-    /// Holds none.
+    /// Whether there are no labels.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.kind.is_empty()
     }
 
-    /// Makes it `n` long, filled up with uncertain ones.
+    /// Extends the columns to `n` labels with uncertain ones.
     pub fn pad(&mut self, n: usize) {
         self.kind.resize(n, Label::UNCERTAIN.kind as u8);
         self.robot.resize(n, Label::UNCERTAIN.robot);
         self.link.resize(n, Label::UNCERTAIN.link);
     }
 
-    /// Copies one label.
+    /// Copies label `i` of `from` to position `at`.
     pub fn set(&mut self, at: usize, from: &Self, i: usize) {
         self.kind[at] = from.kind[i];
         self.robot[at] = from.robot[i];
         self.link[at] = from.link[i];
     }
 
-    /// Forgets all of them, but not its memory.
+    /// Removes all labels and keeps the memory.
     pub fn clear(&mut self) {
         self.kind.clear();
         self.robot.clear();
         self.link.clear();
     }
 
-    /// Memory that it takes, bytes.
+    /// Memory of the columns, bytes.
     #[must_use]
     pub fn weight_bytes(&self) -> usize {
         self.len() * 5
     }
 }
 
-/// Reads labels back, a range of places at a time.
+/// Reads ranges of the labels of a mask.
 #[derive(Debug, Clone)]
 pub struct MaskReader {
     paths: [PathBuf; 3],
 }
 
 impl MaskReader {
-    /// The mask of an output folder with these files.
+    /// A reader of these files (kind, robot, link) in an output folder.
     #[must_use]
     pub fn new(out: &Path, [kind, robot, link]: [&str; 3]) -> Self {
         Self { paths: [kind, robot, link].map(|name| out.join(name)) }
     }
 
-    /// Labels of `n` places from `first` on.
+    /// The labels of `n` places from `first` on.
     ///
     /// # Errors
-    /// A file that is missing or too short.
+    /// If a file is missing or too short.
     pub fn range(&self, first: u64, n: usize) -> Result<MaskRange<'_>> {
         let [kind, robot, link] = [1, 2, 2];
         let read = |at: usize, len: usize| npy::read_bytes(&self.paths[at], first, n, len);
@@ -115,7 +115,7 @@ impl MaskReader {
     }
 }
 
-/// Labels of neighbouring places.
+/// The labels of consecutive places.
 #[derive(Debug)]
 pub struct MaskRange<'a> {
     path: &'a Path,
@@ -125,10 +125,10 @@ pub struct MaskRange<'a> {
 }
 
 impl MaskRange<'_> {
-    /// The `i`-th of them.
+    /// The label of place `first + i`.
     ///
     /// # Errors
-    /// A kind that is none.
+    /// If the file holds a number that is no kind.
     #[inline]
     pub fn label(&self, i: usize) -> Result<Label> {
         let broken = || Error::bad_input(format!("there is no kind \"{}\"", self.kind[i]));
@@ -146,7 +146,10 @@ pub struct MaskWriter {
 }
 
 impl MaskWriter {
-    /// Opens the three files under the output folder.
+    /// Opens the three files in the output folder.
+    ///
+    /// # Errors
+    /// If a file cannot be created.
     pub fn create(out: &Path, mask: MaskId) -> Result<Self> {
         let files = MaskFiles::of(mask);
         Ok(Self {
@@ -156,26 +159,32 @@ impl MaskWriter {
         })
     }
 
-    /// Number of entries so far: the place of the next.
+    /// Number of entries so far, which is the place of the next one.
     #[must_use]
     pub fn len(&self) -> u64 {
         self.kind.len()
     }
 
-    /// Holds no entry.
+    /// Whether there are no entries.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.kind.is_empty()
     }
 
     /// Appends the labels of the next points.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
     pub fn push(&mut self, labels: &LabelColumns) -> Result<()> {
         self.kind.push(&labels.kind)?;
         self.robot.push(&labels.robot)?;
         self.link.push(&labels.link)
     }
 
-    /// Gives the files their names.
+    /// Finishes the files and returns their checksums.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
     pub fn finish(self) -> Result<[FileSum; 3]> {
         Ok([self.kind.finish()?, self.robot.finish()?, self.link.finish()?])
     }

@@ -1,4 +1,4 @@
-//! NumPy arrays: values in, a version 1.0 `.npy` file out, whose length is written at the end.
+//! Writes NumPy arrays (`.npy`, version 1.0) whose length becomes known at the end.
 
 use crate::summed::{FileSum, SummedFile};
 use contract::{Error, Result};
@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 /// A type of array element.
 pub trait Element: Copy {
-    /// NumPy's name for it.
+    /// The type's name in NumPy.
     const DESCR: &'static str;
-    /// Its length, bytes.
+    /// Length of an element, bytes.
     const LEN: usize;
-    /// Writes its little-endian bytes.
+    /// Writes the element as little-endian bytes.
     fn put(self, bytes: &mut [u8]);
 }
 
@@ -52,11 +52,12 @@ impl Element for i16 {
     }
 }
 
-/// Length of magic and header, bytes: room for any length, a multiple of 64 as NumPy asks for.
+/// Length of magic number and header, bytes: enough for any length, and a multiple of 64 as NumPy
+/// requires.
 const HEADER: usize = 128;
 
-/// The bytes of `n` elements, `len` bytes each, from the `first` on, of a file that [`NpyWriter`]
-/// wrote.
+/// The bytes of `n` elements of `len` bytes each, from element `first` on, of a file that
+/// [`NpyWriter`] wrote.
 pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Result<Vec<u8>> {
     let mut bytes = vec![0; n * len];
     let read = File::open(path).and_then(|mut file| {
@@ -67,16 +68,16 @@ pub(crate) fn read_bytes(path: &Path, first: u64, n: usize, len: usize) -> Resul
     Ok(bytes)
 }
 
-/// Bytes of the elements of a file that [`NpyWriter`] wrote.
+/// Number of bytes of the elements of a file that [`NpyWriter`] wrote.
 pub(crate) fn n_bytes(path: &Path) -> std::io::Result<u64> {
     Ok(std::fs::metadata(path)?.len().saturating_sub(HEADER as u64))
 }
 
-/// All of a list of places (u64, ascending) in a mask of `n_points` entries that [`NpyWriter`]
+/// Reads a list of places (u64, ascending) in a mask of `n_points` entries that [`NpyWriter`]
 /// wrote.
 ///
 /// # Errors
-/// A file that cannot be read, or whose places do not ascend or are none of the mask's.
+/// If the file cannot be read, or if its places do not ascend or lie outside the mask.
 pub fn read_places(path: &Path, n_points: u64) -> Result<Vec<u64>> {
     let n_bytes =
         std::fs::metadata(path).map_err(|e| Error::of_read("list cannot be read", path, e))?.len();
@@ -102,7 +103,10 @@ pub struct NpyWriter<T> {
 }
 
 impl<T: Element> NpyWriter<T> {
-    /// Opens the file; its length need not be known.
+    /// Opens the file; the length of the array need not be known.
+    ///
+    /// # Errors
+    /// If the file cannot be created.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
         let file = SummedFile::create(&path, &header::<T>("(0,)"))?;
@@ -110,6 +114,9 @@ impl<T: Element> NpyWriter<T> {
     }
 
     /// Appends values.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn push(&mut self, values: &[T]) -> Result<()> {
         self.bytes.resize(values.len() * T::LEN, 0);
         for (value, bytes) in values.iter().zip(self.bytes.chunks_exact_mut(T::LEN)) {
@@ -127,19 +134,22 @@ impl<T: Element> NpyWriter<T> {
         self.n
     }
 
-    /// Holds no value.
+    /// Whether there are no values.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.n == 0
     }
 
-    /// Writes the length and gives the file its name.
+    /// Writes the length and renames the file to its final name.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn finish(self) -> Result<FileSum> {
         let n = self.n;
         self.end(&format!("({n},)"))
     }
 
-    /// The same for an array of three dimensions, whose last one runs fastest.
+    /// Finishes the file as an array of three dimensions, the last of which varies fastest.
     pub(crate) fn finish_as(self, [x, y, z]: &[usize; 3]) -> Result<FileSum> {
         debug_assert_eq!(self.n, (x * y * z) as u64);
         self.end(&format!("({x}, {y}, {z})"))
@@ -150,7 +160,7 @@ impl<T: Element> NpyWriter<T> {
     }
 }
 
-/// Magic, version and dictionary, padded to [`HEADER`] bytes.
+/// Magic number, version and dictionary, padded to [`HEADER`] bytes.
 fn header<T: Element>(shape: &str) -> Vec<u8> {
     let mut out = b"\x93NUMPY\x01\x00".to_vec();
     out.extend(((HEADER - 10) as u16).to_le_bytes());

@@ -1,41 +1,40 @@
-//! A voxel grid in, an OctoMap binary tree (`.bt`) out, as ROS and MoveIt load it.
+//! Writes a voxel grid as an OctoMap binary tree (`.bt`), as ROS and MoveIt load it.
 //!
-//! Format: Hornung et al., *OctoMap*, Autonomous Robots 34 (2013), and its reference
-//! implementation: a text header, then for each inner node two bytes, two bits a child (`01` free,
-//! `10` occupied, `11` inner, `00` unknown; lowest bits first), depth first. The tree is 16 levels
-//! deep about the origin.
+//! The format is that of Hornung et al., *OctoMap*, Autonomous Robots 34 (2013), and its reference
+//! implementation: a text header, then two bytes for each inner node, depth first. Each child has
+//! two bits (`01` free, `10` occupied, `11` inner, `00` unknown), lowest bits first. The tree has
+//! 16 levels and is centred at the origin.
 
 use crate::atomic;
 use contract::{Error, Kind, Result};
 use std::path::Path;
 
-/// Levels of the tree below its root.
+/// Number of levels of the tree below its root.
 const DEPTH: u32 = 16;
-/// Voxels from the tree's corner to its middle.
+/// Number of voxels from the tree's corner to its centre.
 pub(crate) const HALF: i64 = 1 << (DEPTH - 1);
 
-/// Occupied, free, or not known.
+/// Whether a voxel is occupied; `None` where unknown.
 pub(crate) type Known = Option<bool>;
 
-/// A grid of voxels: place of the first in edges from the tree's origin, number on each axis, and
-/// what they are.
+/// A voxel grid: position of the first voxel in edges from the tree's origin, size, and content.
 pub(crate) struct Grid<'a> {
     pub(crate) first: [i64; 3],
     pub(crate) size: [usize; 3],
-    /// Metres.
+    /// Edge of a voxel, metres.
     pub(crate) edge: f64,
-    /// Whether the voxel with this index (z fastest, then y) is occupied.
+    /// State of the voxel with this index; z varies fastest, then y.
     pub(crate) known: &'a dyn Fn(usize) -> Known,
 }
 
-/// What a cube of the tree is.
+/// The content of a cube of the tree.
 enum Node {
     Leaf(Known),
-    /// Its bytes and those of all below, and how many nodes they are, itself counted.
+    /// An inner node: the bytes of the node and all below, and their number of nodes.
     Inner(Vec<u8>, u64),
 }
 
-/// Writes the tree.
+/// Writes the tree of a grid.
 pub(crate) fn write(path: &Path, grid: &Grid<'_>) -> Result<()> {
     let fits =
         (0..3).all(|i| grid.first[i] >= -HALF && grid.first[i] + grid.size[i] as i64 <= HALF);
@@ -56,7 +55,7 @@ pub(crate) fn write(path: &Path, grid: &Grid<'_>) -> Result<()> {
 }
 
 impl Grid<'_> {
-    /// The cube with this corner, `2^level` voxels wide.
+    /// The node of the cube with this corner, `2^level` voxels wide.
     fn node(&self, corner: [i64; 3], level: u32) -> Node {
         let width = 1_i64 << level;
         let apart = |i: usize| {

@@ -1,36 +1,35 @@
-//! Columns of labelled points in; their LAS records, in runs of one spatial tile, out. No object is
-//! made for a point, and nothing is shared, so that workers pack strips while one thread writes
-//! them.
+//! Encodes labelled points as LAS records, in runs that belong to one spatial tile. Nothing is
+//! shared, so that several workers encode strips while one thread writes them.
 
 use crate::record::{Extent, LasSettings, Quantum, class_of, too_far};
 use crate::settings::Settings;
 use contract::{Label, PointKind, Result};
 use geometry::narrow::floor_i32;
 
-/// Runs shorter than this on average are worth joining: a look-up of a tile costs as much as
-/// copying that many records.
+/// Mean length of runs below which they are joined: looking up a tile costs as much as copying this
+/// number of records.
 const SHORT_RUN: usize = 8;
-/// Added to a number below 2³¹, it leaves the nearest whole number in the low 32 bits: 1.5 · 2⁵².
+/// Added to a number below 2³¹ it leaves the nearest integer in the low 32 bits: 1.5 · 2⁵².
 const NEAREST: f64 = 6_755_399_441_055_744.0;
 
-/// Points to be written; a column that is unknown is empty, all others have the same length.
+/// Points to be written. A column of unknown values is empty; all others have the same length.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PointColumns<'a> {
-    /// World, metres.
+    /// World coordinates, metres.
     pub world: &'a [[f64; 3]],
-    /// What each point belongs to.
+    /// Label of each point.
     pub labels: &'a [Label],
-    /// 0..65535.
+    /// Intensity, 0..65535.
     pub intensity: &'a [u16],
-    /// 0..65535 a channel; written by format 7 only.
+    /// Red, green and blue, 0..65535; written in format 7 only.
     pub color: &'a [[u16; 3]],
     /// GPS time, seconds.
     pub gps_time: &'a [f64],
-    /// Connected body + 1, 0 for the floor; written where asked for.
+    /// Index of the connected body + 1, 0 for the floor; written if requested.
     pub body: &'a [u32],
-    /// LAS point source id.
+    /// Point source id of each point.
     pub source_id: &'a [u16],
-    /// Point source id of all points where the column is empty.
+    /// Point source id of all points, if the column is empty.
     pub scan: u16,
 }
 
@@ -39,12 +38,12 @@ pub struct PointColumns<'a> {
 pub(crate) struct Run {
     /// Row and column of the tile.
     pub(crate) tile: [i32; 2],
-    /// Links and attachments.
+    /// Whether the points belong to links and attachments.
     pub(crate) moves: bool,
     pub(crate) extent: Extent,
 }
 
-/// Records of a strip.
+/// The encoded records of a strip.
 #[derive(Debug, Clone, Default)]
 pub struct Packed {
     pub(crate) bytes: Vec<u8>,
@@ -52,13 +51,13 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Memory that it takes, bytes.
+    /// Memory of the records, bytes.
     #[must_use]
     pub fn weight_bytes(&self) -> usize {
         self.bytes.len() + size_of_val(&*self.runs)
     }
 
-    /// Its runs, each with its records, whose length is given, bytes.
+    /// The runs with their records of `record_len` bytes each.
     pub(crate) fn runs(&self, record_len: usize) -> impl Iterator<Item = (&Run, &[u8])> {
         let mut rest = &*self.bytes;
         self.runs.iter().map(move |run| {
@@ -69,19 +68,19 @@ impl Packed {
     }
 }
 
-/// Turns points into records.
+/// Encodes points as records.
 #[derive(Debug, Clone)]
 pub struct Pack {
     las: LasSettings,
-    /// Metres; without tiles all points lie in one.
+    /// Edge of a tile, metres; without tiles all points belong to one.
     tile_edge: Option<f64>,
-    /// Whether any cloud holds what stands still.
+    /// Whether any file holds points that do not move.
     with_fixed: bool,
     class_of_kind: [u8; 256],
 }
 
 impl Pack {
-    /// For one cloud of all points.
+    /// An encoder for a single file of all points.
     pub(crate) fn new(las: &LasSettings) -> Self {
         let mut class_of_kind = [1; 256];
         for kind in PointKind::ALL {
@@ -90,7 +89,7 @@ impl Pack {
         Self { las: las.clone(), tile_edge: None, with_fixed: true, class_of_kind }
     }
 
-    /// For the tiles and clouds that are asked for.
+    /// An encoder for the tiles and clouds that `settings` request.
     #[must_use]
     pub fn of_clouds(las: &LasSettings, settings: &Settings) -> Self {
         Self {
@@ -100,16 +99,17 @@ impl Pack {
         }
     }
 
-    /// Whether the clouds hold points with this label at all.
+    /// Whether points with this label are written to any file.
     #[must_use]
     pub fn takes(&self, label: &Label) -> bool {
         self.with_fixed || label.moves()
     }
 
-    /// The records of some points, in their order where they are in the order of a scan: then
-    /// neighbours share a tile.
+    /// Encodes points. They keep their order, in which neighbours should share a tile, as in a
+    /// scan.
     ///
     /// # Errors
+    /// If a point does not fit into the integers of LAS.
     /// A point that the integers of LAS cannot hold.
     pub fn pack(&self, points: &PointColumns<'_>) -> Result<Packed> {
         let n = points.world.len();
@@ -135,7 +135,7 @@ impl Pack {
             record[12..14].copy_from_slice(&intensity.to_le_bytes());
         }
         let source = points.source_id.get(i).copied().unwrap_or(points.scan).to_le_bytes();
-        // Return 1 of 1.
+        // Return 1 of 1 return.
         if self.las.short {
             record[14] = 0b00_001_001;
             record[18..20].copy_from_slice(&source);
@@ -165,7 +165,7 @@ impl Pack {
         }
     }
 
-    /// The tile of a place, and its bounds, metres: least and most of x and y.
+    /// The tile of a place, and its lowest and highest x and y, metres.
     fn tile(&self, p: &[f64; 3]) -> ([i32; 2], [f64; 4]) {
         let Some(edge) = self.tile_edge else {
             return ([0; 2], [f64::MIN, f64::MAX, f64::MIN, f64::MAX]);
@@ -177,7 +177,7 @@ impl Pack {
 
     fn runs(&self, points: &PointColumns<'_>, steps: &[[i32; 3]]) -> Vec<Run> {
         let mut runs: Vec<Run> = Vec::new();
-        // Most points lie in the tile of the one before.
+        // Most points lie in the same tile as the point before.
         let (mut tile, mut bounds) = ([0; 2], [f64::NAN; 4]);
         for ((p, label), step) in points.world.iter().zip(points.labels).zip(steps) {
             let moves = label.moves();
@@ -199,7 +199,7 @@ impl Pack {
 }
 
 impl Packed {
-    /// Joins runs of one tile, keeping their order within it.
+    /// Joins the runs of each tile and keeps the order of points within it.
     fn joined(self, record_len: usize) -> Self {
         let mut start = 0;
         let mut order: Vec<([i32; 2], bool, usize, Extent)> = Vec::with_capacity(self.runs.len());
@@ -221,13 +221,12 @@ impl Packed {
     }
 }
 
-/// Whole steps of coordinates, in one loop without calls that the compiler turns into vector
-/// instructions.
+/// Coordinates in whole steps, in one loop without calls that the compiler vectorises.
 fn steps(world: &[[f64; 3]], quantum: &Quantum) -> Result<Vec<[i32; 3]>> {
     let (inverse, offset) = (quantum.scale.map(|s| 1.0 / s), quantum.offset);
     let scaled =
         |p: &[f64; 3]| -> [f64; 3] { std::array::from_fn(|i| (p[i] - offset[i]) * inverse[i]) };
-    // Written so that what is no number is far, too.
+    // Written so that NaN counts as too far.
     let is_far = |at: &[f64; 3]| !at.iter().all(|v| v.abs() < f64::from(i32::MAX));
     let mut far = false;
     let steps = world.iter().map(|p| {

@@ -1,4 +1,4 @@
-//! Named values in; a JSON object that keeps their order out, and back.
+//! A JSON object whose names keep their order.
 
 use serde::de::{MapAccess, Visitor};
 use serde::ser::SerializeMap;

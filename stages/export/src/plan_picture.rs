@@ -1,25 +1,25 @@
-//! The plan of an input: labelled points in, a picture of the plant from above out.
+//! Draws the plan of an input: the plant from above, by its labelled points.
 
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, robot_color};
 use contract::{Label, PointKind};
 use geometry::Aabb;
 use std::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
 
-/// Finest cell, metres.
+/// Smallest cell, metres.
 const MIN_CELL: f64 = 0.05;
-/// Most cells along a side; a larger plant gets larger cells.
+/// Largest number of cells along a side; a larger plant gets larger cells.
 const MAX_SIDE: f64 = 2400.0;
-/// Fewest pixels along the longer side of the picture; small cells are drawn larger.
+/// Smallest length of the longer side, pixels; cells are drawn larger to reach it.
 const MIN_PIXELS: usize = 900;
-/// Room about the plan, pixels.
+/// Margin around the plan, pixels.
 const MARGIN: i64 = 24;
 
-/// Counts of points by cell of the ground. Workers count into it side by side: sums know no order.
+/// Counts of points by ground cell. Workers count concurrently, since sums do not depend on order.
 #[derive(Debug)]
 pub struct PlanPicture {
     min: [f64; 2],
     cell: f64,
-    /// Cells a metre.
+    /// Number of cells per metre.
     per_metre: f64,
     width: usize,
     height: usize,
@@ -32,12 +32,12 @@ struct Cell {
     n_fixed: AtomicU32,
     n_uncertain: AtomicU32,
     n_moving: AtomicU32,
-    /// Highest of `u16::MAX - robot` seen here, which is the lowest robot; 0 for none.
+    /// Largest `u16::MAX - robot` in the cell, which gives the lowest robot; 0 for none.
     robot: AtomicU16,
 }
 
 impl PlanPicture {
-    /// A plan of these bounds of the world; points outside are passed over.
+    /// A plan of these bounds (world, metres); points outside are ignored.
     #[must_use]
     pub fn new(bounds: &Aabb) -> Self {
         let known = !bounds.is_empty()
@@ -56,9 +56,9 @@ impl PlanPicture {
         }
     }
 
-    /// Adds labelled points of the world.
+    /// Adds labelled points, world, metres.
     pub fn add(&self, world: &[[f64; 3]], labels: &[Label]) {
-        // Neighbours mostly fall into the same cell: they are counted together.
+        // Neighbouring points mostly fall into the same cell and are counted together.
         let mut last = (None, Label::FIXED);
         let mut n = 0;
         for (p, label) in world.iter().zip(labels) {
@@ -88,8 +88,8 @@ impl PlanPicture {
         count.fetch_add(n, Relaxed);
     }
 
-    /// Draws the plan: robots with their names and places of their bases, scanners with theirs,
-    /// world, metres.
+    /// Draws the plan with robots (names and positions of bases) and scanners (names and
+    /// positions); world, metres.
     #[must_use]
     pub fn draw(
         &self,
@@ -131,7 +131,7 @@ impl PlanPicture {
         canvas
     }
 
-    /// A bar of a round length, about a quarter of the plan.
+    /// Draws a scale bar of a round length, about a quarter of the plan.
     fn scale_bar(&self, canvas: &mut Canvas, zoom: i64, y: i64) {
         let quarter = self.width as f64 * self.cell / 4.0;
         let metres = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0]
@@ -155,7 +155,8 @@ impl PlanPicture {
         }
     }
 
-    /// Points in a well filled cell: the 98th percentile of those that hold any standing point.
+    /// Number of points in a well filled cell: the 98th percentile of the cells with standing
+    /// points.
     fn full(&self) -> f64 {
         let mut counts: Vec<u32> =
             self.cells.iter().map(Cell::n_standing).filter(|n| *n > 0).collect();
@@ -193,7 +194,7 @@ impl Cell {
         }
         let standing = f64::from(self.n_standing());
         if standing > 0.0 {
-            // The logarithm shows a cable beside a wall.
+            // A logarithmic scale makes a cable beside a wall visible.
             let share = (1.0 + standing).ln() / (1.0 + full).ln();
             return blend(FLOOR, [60, 64, 70], 0.25 + 0.75 * share);
         }

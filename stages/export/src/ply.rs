@@ -1,5 +1,5 @@
-//! The tiles of a result in; two PLY files of their points out, one of what moves and one of what
-//! stands still, for viewers and libraries that read no LAS (Open3D, MeshLab).
+//! Writes the points of a result as two PLY files, one of what moves and one of what stands still,
+//! for viewers and libraries that do not read LAS (Open3D, MeshLab).
 
 use crate::atomic::AtomicFile;
 use crate::refill::KINDS;
@@ -7,20 +7,21 @@ use contract::{Error, Kind, PointKind, Result};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Their names: what moves, what stands still.
+/// Names of the files: moving points, fixed points.
 pub const PLY: [&str; 2] = ["robots.ply", "fixed.ply"];
 
-/// Points that are read at a time.
+/// Number of points that are read at a time.
 const PIECE: u64 = 1 << 16;
-/// Length of a header, bytes: a comment makes it so long, so that the number of points can be
-/// written last.
+/// Length of the header, bytes. A comment pads it, so that the number of points can be written
+/// last.
 const HEADER: usize = 512;
 
-/// Writes [`PLY`] into a folder, of some tiles (see [`tiles`](fn@crate::tiles)); `told` is asked
-/// before each whether to go on. Numbers of points; none where there are no tiles.
+/// Writes [`PLY`] to a folder, from some tiles (see [`tiles`](fn@crate::tiles)). Before each tile
+/// `told` decides whether to continue. Returns the numbers of points, `None` where there are no
+/// tiles.
 ///
 /// # Errors
-/// Files that cannot be read or written; what `told` says, which ends the work.
+/// If files cannot be read or written, or if `told` ends the work.
 pub fn write_ply(
     tiles: &[PathBuf],
     into: &Path,
@@ -36,7 +37,7 @@ pub fn write_ply(
             .hint("`stillpoint verify` says whether the result is whole")
     };
     let open = |tile: &Path| las::Reader::from_path(tile).map_err(|e| bad(e, tile));
-    // All tiles of a result have the same records.
+    // All tiles of a result have the same record format.
     let has_color = open(&tiles[0])?.header().point_format().has_color;
     let [moving, fixed] = PLY.map(|name| Ply::create(&into.join(name), has_color));
     let (mut moving, mut fixed) = (moving?, fixed?);
@@ -86,7 +87,7 @@ impl Ply {
         record[..24].copy_from_slice(numbers.as_flattened());
         record[24..28].copy_from_slice(&i32::from(point.intensity).to_le_bytes());
         record[28] = kind as u8;
-        // Fields `RobotId` and `LinkId`: numbers from 1 on, 0 for none.
+        // `RobotId` and `LinkId` are index + 1, 0 for none.
         let index = |at: usize| {
             let bytes = point.extra_bytes.get(at..at + 2).unwrap_or(&[0, 0]);
             (i32::from(u16::from_le_bytes([bytes[0], bytes[1]])) - 1).to_le_bytes()
@@ -108,14 +109,14 @@ impl Ply {
     }
 }
 
-/// Length of a point without its colour, bytes.
+/// Length of a point without colour, bytes.
 const BARE: usize = 37;
-/// Length of a point with its colour, bytes.
+/// Length of a point with colour, bytes.
 const RECORD: usize = BARE + 3;
 
-/// Numbers are `int`, since the tensor reader of Open3D passes over `short`, `ushort` and `uint`;
-/// bytes are `uint8`, since meshio takes `uchar` for signed; names begin with `scalar_`, since
-/// CloudCompare takes no others where nobody answers its questions. See `scripts/cross`.
+/// The header. Numbers are `int`, since Open3D's tensor reader ignores `short`, `ushort` and
+/// `uint`; bytes are `uint8`, since meshio takes `uchar` for signed; names begin with `scalar_`,
+/// since CloudCompare ignores others when it runs without dialogs. See `scripts/cross`.
 fn header(n: u64, has_color: bool) -> Result<Vec<u8>> {
     let color = if has_color {
         "property uint8 red\nproperty uint8 green\nproperty uint8 blue\n"

@@ -1,27 +1,26 @@
-//! The entry of a robot in; its joints as people read them, each with its standard deviation and
-//! how well it is known, out.
+//! The joints of a robot's entry for people: value, standard deviation and certainty.
 
 use crate::result::RobotEntry;
 use contract::words::Unit;
 use contract::{Certainty, DETERMINED_SIGMA};
 
-/// A joint of an entry.
+/// A joint of a robot's entry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointWords<'a> {
-    /// As in the URDF.
+    /// Name in the URDF.
     pub name: &'a str,
-    /// Radians or metres.
+    /// Value, radians or metres.
     pub value: f64,
-    /// Standard deviation, same unit.
+    /// Standard deviation in the same unit.
     pub sigma: f64,
-    /// How well it is known.
+    /// How well the points determine it.
     pub certainty: Certainty,
-    /// What people read it in.
+    /// Unit in which it is shown.
     pub unit: Unit,
 }
 
 impl JointWords<'_> {
-    /// Value, standard deviation, and a word where it is not determined: `57.483° ± 0.060° coarse`.
+    /// Value, standard deviation, and a word unless it is determined: `57.483° ± 0.060° coarse`.
     #[must_use]
     pub fn say(&self) -> String {
         self.unit.say_both(self.value, self.sigma) + self.certainty.note()
@@ -29,11 +28,11 @@ impl JointWords<'_> {
 }
 
 impl RobotEntry {
-    /// Its joints, in the order of the model.
+    /// The joints in the order of the model.
     pub fn posture(&self) -> impl Iterator<Item = JointWords<'_>> {
         self.joints.0.iter().map(|(name, value)| {
             let sigma = of(&self.sigma.0, name).unwrap_or(f64::NAN);
-            // Results of earlier versions say whether the points determine a joint, and no more.
+            // Results of earlier versions say only whether a joint is determined.
             let has_others =
                 || of(&self.determined.0, name) == Some(false) && sigma < DETERMINED_SIGMA;
             let guess = || Certainty::of(sigma, has_others(), DETERMINED_SIGMA);
@@ -44,7 +43,7 @@ impl RobotEntry {
     }
 }
 
-/// What is known of the thing with that name.
+/// The value with that name.
 fn of<T: Copy>(places: &[(String, T)], name: &str) -> Option<T> {
     places.iter().find(|(n, _)| n == name).map(|(_, value)| *value)
 }

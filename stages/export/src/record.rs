@@ -1,10 +1,9 @@
-//! What LAS records hold: kinds in, classes out; coordinates in, whole steps out; the settings of a
-//! file.
+//! The content of LAS records: classes of kinds, coordinates in steps, and the settings of a file.
 
 use contract::{Error, Kind, PointKind};
 use geometry::Aabb;
 
-/// Kind, LAS class (2 is the standard's ground, 64 and up are the user's) and name.
+/// Kind, LAS class (2 is the standard's ground, 64 and up are user-defined) and name.
 pub(crate) const CLASSES: [(PointKind, u8, &str); 5] = [
     (PointKind::Floor, 2, "floor"),
     (PointKind::Fixed, 64, "fixed"),
@@ -22,15 +21,15 @@ pub fn class_of(kind: PointKind) -> u8 {
 /// Scale and offset of LAS coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantum {
-    /// Metres of one step on each axis.
+    /// Length of one step on each axis, metres.
     pub scale: [f64; 3],
-    /// Metres of step zero.
+    /// Coordinate of step zero on each axis, metres.
     pub offset: [f64; 3],
 }
 
 impl Quantum {
-    /// Steps of 0.1 mm about the middle of `bounds`, rounded to whole kilometres where the middle
-    /// is farther than one from zero, so that tiles of one plant share it.
+    /// Steps of 0.1 mm about the middle of `bounds`. The offset is rounded to whole kilometres
+    /// where the middle is more than one away from zero, so that all tiles of a plant share it.
     #[must_use]
     pub fn around(bounds: &Aabb) -> Self {
         let middle = bounds.center();
@@ -41,9 +40,9 @@ impl Quantum {
         Self { scale: [FINE; 3], offset }
     }
 
-    /// `wanted`, as an input has it, where its steps hold these bounds and some room around them;
-    /// else the finest steps of a power of ten that do, no finer than those that are wanted, or
-    /// than 0.1 mm where none are.
+    /// The quantum `wanted`, that of an input, if its steps can hold `bounds` with some margin.
+    /// Else the finest steps of a power of ten that can, not finer than the wanted ones, or than
+    /// 0.1 mm if none are wanted.
     #[must_use]
     pub fn holding(bounds: &Aabb, wanted: Option<Self>) -> Self {
         if let Some(wanted) = wanted
@@ -63,7 +62,7 @@ impl Quantum {
         own
     }
 
-    /// Whether its whole steps reach all of these bounds.
+    /// Whether its range of steps covers these bounds.
     fn holds(&self, bounds: &Aabb) -> bool {
         (0..3).all(|axis| {
             let steps = |at: f64| ((at - self.offset[axis]) / self.scale[axis]).abs();
@@ -72,52 +71,52 @@ impl Quantum {
     }
 }
 
-/// Steps of coordinates where no input says any, metres: a tenth of what scanners resolve.
+/// Steps where no input has a scale, metres: a tenth of the resolution of scanners.
 const FINE: f64 = 1e-4;
-/// Room around what is written, metres: a later session adds points beside them, in the same steps.
+/// Margin around the bounds, metres: a later session may add points beside them in the same steps.
 const ROOM: f64 = 1_000.0;
-/// Steps that a coordinate of LAS can count from its offset on.
+/// Largest number of steps of a LAS coordinate from its offset.
 const MOST_STEPS: f64 = i32::MAX as f64;
 /// Steps that are tried, metres.
 const STEPS: [f64; 12] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2];
 
-/// A variable length record to pass on, such as the reference system of an input.
+/// A variable length record that is copied, such as the reference system of an input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RawVlr {
-    /// Who defined it.
+    /// Organisation that defined it.
     pub user_id: String,
-    /// Its number there.
+    /// Number among that organisation's records.
     pub record_id: u16,
-    /// In words.
+    /// Description in words.
     pub description: String,
     /// Its content.
     pub data: Vec<u8>,
 }
 
-/// What a LAS file holds and how.
+/// The format of a LAS file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LasSettings {
-    /// Scale and offset.
+    /// Scale and offset of coordinates.
     pub quantum: Quantum,
-    /// With colour (format 7) or without (format 6).
+    /// Whether points have colour (format 7) or not (format 6).
     pub with_color: bool,
-    /// With classes and the extra fields `RobotId` and `LinkId`.
+    /// Whether points have classes and the extra fields `RobotId` and `LinkId`.
     pub with_labels: bool,
-    /// With the extra field `BodyId`.
+    /// Whether points have the extra field `BodyId`.
     pub with_bodies: bool,
-    /// Format 0 instead: 20 bytes a point with place, intensity and source, and nothing else of
-    /// all this.
+    /// Whether format 0 is written instead, with 20 bytes a point for coordinates, intensity and
+    /// source, and none of the above.
     pub short: bool,
-    /// Compressed (LAZ).
+    /// Whether the file is compressed (LAZ).
     pub compress: bool,
-    /// GPS times are adjusted standard time, as in the input's header.
+    /// Whether GPS times are adjusted standard time, as in the input's header.
     pub standard_gps_time: bool,
-    /// Records to pass on.
+    /// Variable length records that are copied.
     pub vlrs: Vec<RawVlr>,
 }
 
 impl LasSettings {
-    /// Labelled, without colour, not compressed.
+    /// Settings for labelled points without colour and without compression.
     #[must_use]
     pub fn new(quantum: Quantum) -> Self {
         Self {
@@ -142,7 +141,7 @@ impl LasSettings {
         }
     }
 
-    /// How names of its files end.
+    /// File name extension.
     #[must_use]
     pub fn ending(&self) -> &'static str {
         if self.compress { "laz" } else { "las" }
@@ -158,7 +157,7 @@ impl LasSettings {
         }
     }
 
-    /// Length of our extra fields, bytes: two u16 for robot and link, a u32 for the body.
+    /// Length of the extra fields, bytes: two u16 for robot and link, a u32 for the body.
     pub(crate) fn extra_len(&self) -> usize {
         if self.short {
             return 0;
@@ -167,11 +166,11 @@ impl LasSettings {
     }
 }
 
-/// What a header must say of its points.
+/// Count and bounds of points, as a header states them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extent {
     pub(crate) n: u64,
-    /// In steps.
+    /// Smallest coordinates, in steps.
     pub(crate) min: [i32; 3],
     pub(crate) max: [i32; 3],
 }
@@ -226,13 +225,13 @@ mod tests {
 
     #[test]
     fn steps_of_the_whole_range_leave_room_and_stay_fine() {
-        // Scale = extent / (2³¹ - 1), offset = the least coordinate: the last point is on the edge.
+        // Scale = extent / (2³¹ − 1) and offset = least coordinate put the last point on the edge.
         let bounds = Aabb { min: [100.0, 200.0, 0.0], max: [160.0, 230.0, 8.0] };
         let scale = bounds.size().map(|side| side / f64::from(i32::MAX));
         let own = Quantum::holding(&bounds, Some(Quantum { scale, offset: bounds.min }));
         assert_eq!(own.scale, [1e-6; 3], "as fine as there is room for");
         assert!(own.holds(&bounds.grown(ROOM)));
-        // A step below zero is legal; bounds of a header would be turned round.
+        // A negative step is legal, but would reverse the bounds of a header.
         let own = Quantum::holding(&bounds, Some(quantum(-1e-3, [0.0; 3])));
         assert_eq!(own.scale, [1e-3; 3]);
     }
@@ -243,7 +242,7 @@ mod tests {
         let own = Quantum::holding(&bounds, None);
         assert_eq!(own.scale, [1e-3, 1e-4, 1e-4]);
         assert!(own.holds(&bounds));
-        // Nothing holds that; it is finite all the same.
+        // No step can hold that; the result is finite all the same.
         let own = Quantum::holding(&Aabb { min: [-1e300; 3], max: [1e300; 3] }, None);
         assert!(own.scale.iter().chain(&own.offset).all(|v| v.is_finite()));
     }

@@ -1,5 +1,5 @@
-//! A spatial tile of an earlier result in; its points that are not superseded out, behind the new
-//! ones of a tile that is being written. Records stay as they are, byte for byte.
+//! Copies the points of an earlier result's tile that are not superseded to a tile that is being
+//! written, behind its new points. Records are copied byte for byte.
 
 use crate::block::Straight;
 use crate::chunks;
@@ -14,7 +14,7 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
 
-/// What points of each class are.
+/// Kind of each LAS class.
 pub(crate) const KINDS: [PointKind; 256] = {
     let mut kinds = [PointKind::Uncertain; 256];
     let mut i = 0;
@@ -24,42 +24,42 @@ pub(crate) const KINDS: [PointKind; 256] = {
     }
     kinds
 };
-/// Records that are read at a time: what is made of them stays in a processor's own cache.
+/// Number of records that are read at a time; they stay in a core's own cache.
 const PIECE: u64 = 1 << 12;
 
-/// Bytes that are summed up at a time.
+/// Number of bytes that are summed at a time.
 const SUMMED: usize = 1 << 18;
-/// Bytes that wait for a tile.
+/// Number of bytes that are buffered for a tile.
 const WAITING: usize = 1 << 20;
 
 /// A point of an earlier result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OldPoint {
-    /// World, metres.
+    /// World coordinates, metres.
     pub world: [f64; 3],
-    /// What it was said to belong to.
+    /// Label in the earlier result.
     pub label: Label,
-    /// LAS `point_source_id`: the number of its scan, from 1, or what its LAS file had.
+    /// LAS `point_source_id`: number of its scan, from 1, or that of its LAS file.
     pub source_id: u16,
 }
 
-/// What a list of files says of a tile.
+/// Length and checksum of a tile, as a list of files states them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stated {
-    /// Its length, bytes.
+    /// Length, bytes.
     pub n_bytes: u64,
-    /// CRC-32C (Castagnoli) of all of them.
+    /// CRC-32C (Castagnoli) of all bytes.
     pub crc32c: u32,
 }
 
 impl Spool {
-    /// Adds the points of a tile of ours, with records as its own, that `keep` wants: it is asked
-    /// piece by piece, and answers for each point. Where a sum is `stated`, the tile is
-    /// compared with it while it is read.
+    /// Adds the points of a tile with the same record format for which `keep` returns true; `keep`
+    /// is called piece by piece. If `stated` is given, the tile is compared with it while it is
+    /// read.
     ///
     /// # Errors
-    /// A tile that is not one of ours, is not as stated or cannot be read; a file that cannot be
-    /// written.
+    /// If the tile was not written by this program, differs from `stated` or cannot be read, or if
+    /// the new tile cannot be written.
     pub fn take_from(
         &mut self,
         old: &Path,
@@ -84,13 +84,13 @@ impl Spool {
     }
 }
 
-/// Hands over the points of a tile of ours, with records as `las` has them, piece by piece. Where a
-/// sum is `stated`, the tile is compared with it while it is read: what was taken is of no use
-/// where that fails at its end.
+/// Passes the points of a tile with records as `las` says to `take`, piece by piece. If `stated` is
+/// given, the tile is compared with it while it is read; if that fails at the end, everything that
+/// was taken is invalid.
 ///
 /// # Errors
-/// A tile that is not one of ours, is not as stated or cannot be read; what `take` says, which ends
-/// the work.
+/// If the tile was not written by this program, differs from `stated` or cannot be read, or if
+/// `take` ends the work.
 pub fn read_tile(
     path: &Path,
     las: &LasSettings,
@@ -107,7 +107,7 @@ pub fn read_tile(
     Ok(())
 }
 
-/// Runs of records that stay.
+/// The runs of consecutive records that stay.
 fn runs(stays: &[bool]) -> impl Iterator<Item = Range<usize>> {
     let mut at = 0;
     let runs = stays.chunk_by(|a, b| a == b).map(move |run| {
@@ -117,7 +117,7 @@ fn runs(stays: &[bool]) -> impl Iterator<Item = Range<usize>> {
     runs.filter(|(stays, _)| *stays).map(|(_, run)| run)
 }
 
-/// Coordinates as the record has them.
+/// Coordinates of a record, in steps.
 #[inline]
 fn steps(record: &[u8]) -> [i32; 3] {
     let int = |at: usize| {
@@ -144,8 +144,8 @@ struct Tile<'a> {
     records: Records,
     record_len: usize,
     left: u64,
-    /// What it should come to, and what was read so far does; where that is known and it is read
-    /// from its beginning to its end.
+    /// The stated sum and the sum of what was read, if a sum is stated and the file is read
+    /// sequentially.
     sum: Option<(Stated, Stated)>,
 }
 
@@ -177,8 +177,7 @@ impl<'a> Tile<'a> {
             header.large_file.map(|large| large.number_of_point_records).ok_or_else(foreign)?;
         let mut sum = None;
         let records = if las.compress {
-            // Chunks are read as their table says, not one behind the other: it is summed up
-            // before.
+            // Chunks are read by the table and not sequentially, so that the file is summed first.
             if let Some(stated) = stated {
                 let read = sum_of(file.get_mut()).map_err(failed)?;
                 compare(path, stated, read)?;
@@ -213,7 +212,7 @@ impl<'a> Tile<'a> {
         Ok(Self { path, records, record_len: las.record_len(), left, sum })
     }
 
-    /// The next records, read into `bytes`; `None` behind the last.
+    /// The next records, read into `bytes`; `None` at the end.
     fn piece<'b>(&mut self, bytes: &'b mut Vec<u8>) -> Result<Option<&'b [u8]>> {
         let n = self.left.min(PIECE);
         if n == 0 {
@@ -238,7 +237,7 @@ impl<'a> Tile<'a> {
     }
 }
 
-/// Length and sum of a whole file, from its beginning.
+/// Length and checksum of a whole file.
 fn sum_of(file: &mut File) -> std::io::Result<Stated> {
     let (mut bytes, mut sum) = (vec![0; SUMMED], Stated { n_bytes: 0, crc32c: 0 });
     file.seek(SeekFrom::Start(0))?;
@@ -252,7 +251,7 @@ fn sum_of(file: &mut File) -> std::io::Result<Stated> {
     }
 }
 
-/// Refuses a tile that is not what was written.
+/// Refuses a tile whose length or checksum differs from the stated one.
 fn compare(path: &Path, stated: Stated, read: Stated) -> Result<()> {
     if stated == read {
         return Ok(());

@@ -1,5 +1,5 @@
-//! `result.json`: what was found, how sure that is, and from what; schema `stillpoint.result/1`,
-//! which grows by adding fields. Numbers that are not finite are written as null.
+//! `result.json`: what was found, how certain it is, and from which inputs. The schema is
+//! `stillpoint.result/1`, which grows by adding fields. Numbers that are not finite become null.
 
 use crate::calibration::CalibrationEntry;
 use crate::mask::MaskFiles;
@@ -14,27 +14,27 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema.
 pub const SCHEMA: &str = "stillpoint.result/1";
 
-/// The whole file.
+/// The content of `result.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResultFile {
     /// [`SCHEMA`].
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// Robots; their places here are the numbers in the masks.
+    /// The robots; their indices are those of the masks.
     pub robots: Vec<RobotEntry>,
-    /// Where the masks are.
+    /// Paths of the masks.
     pub labels: Labels,
-    /// What was read.
+    /// The inputs that were read.
     pub inputs: Vec<InputEntry>,
-    /// What was done.
+    /// The stages that ran.
     pub stages: Vec<StageEntry>,
-    /// What a person should know, in words.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// What each entry of the review did, where there was one.
+    /// Effect of each entry of the review, if one was given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub review: Vec<ReviewEntry>,
-    /// Which result it goes on from, where one cell was scanned again.
+    /// The earlier result, if one cell was scanned again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rescan: Option<RescanEntry>,
 }
@@ -42,110 +42,111 @@ pub struct ResultFile {
 /// One robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotEntry {
-    /// `R1`, `R2` …
+    /// Identifier: `R1`, `R2` …
     pub id: String,
-    /// Name in the library.
+    /// Name of the model in the library.
     pub model: String,
-    /// Name of the link that `base_pose` places.
+    /// Name of the link whose pose is `base_pose`.
     pub base_link: String,
-    /// World from base link.
+    /// Pose of the base link in the world.
     pub base_pose: BasePose,
-    /// Its standard deviation.
+    /// Standard deviation of the base.
     pub base_sigma: BaseSigma,
-    /// Value of each joint, radians or metres, in the order of the model.
+    /// Value of each free joint, radians or metres, in the order of the model.
     pub joints: Places<f64>,
-    /// Joints whose values are metres; those of the others are radians.
+    /// Names of the joints whose values are metres; those of all others are radians.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub slides: Vec<String>,
-    /// Standard deviation of each joint, same unit; that of any angle, π/√3, where the points say
-    /// nothing of it.
+    /// Standard deviation of each free joint in the same unit; π/√3, that of a uniform angle, where
+    /// the points say nothing of it.
     pub sigma: Places<f64>,
-    /// Values of the joints that follow those, by a rule of the model or as a closed loop needs
-    /// it, same units.
+    /// Values of the joints that follow the free ones by a rule or in a closed loop, in the same
+    /// units.
     #[serde(default)]
     pub passive: Places<f64>,
-    /// Whether the points determine each joint.
+    /// Whether the points determine each free joint.
     #[serde(default)]
     pub determined: Places<bool>,
-    /// The same in three words: `determined`, `coarse` or `undetermined`.
+    /// How well they do: `determined`, `coarse` or `undetermined`.
     #[serde(default)]
     pub certainty: Places<Certainty>,
-    /// Names of the links; their places here are the numbers in the masks.
+    /// Names of the links; their indices are those of the masks.
     pub links: Vec<String>,
-    /// World from each link.
+    /// Pose of each link in the world.
     #[serde(default)]
     pub link_poses: Places<BasePose>,
     /// `trusted`, `doubtful` or `refused`.
     pub verdict: String,
-    /// Share explained less share contradicted.
+    /// Share of the surface that is explained less the share that is contradicted.
     pub score: Option<f64>,
     /// RMS distance of its points from its surface, metres.
     #[serde(default)]
     pub rms: Option<f64>,
-    /// Why not plainly trusted, in words.
+    /// Reasons for the verdict, in words.
     #[serde(default)]
     pub reasons: Vec<String>,
-    /// The best other explanation.
+    /// The best other explanation of the points.
     #[serde(default)]
     pub runner_up: Option<RunnerUpEntry>,
-    /// Other postures that explain the points as well: a flange with six bolts, a wrist that
-    /// nobody saw.
+    /// Other postures that explain the points as well, for example at a flange with six bolts or
+    /// with a wrist that no beam reached.
     #[serde(default)]
     pub equals: Vec<EqualEntry>,
-    /// Other values within the limits, whole turns away, at which the robot stands the same, by
-    /// joint.
+    /// For each joint other values within its limits, whole turns away, at which the robot stands
+    /// the same.
     #[serde(default)]
     pub equivalents: Places<Vec<f64>>,
-    /// The tool of the library that it carries; its joints and links follow the robot's own.
+    /// The tool that it carries; the tool's joints and links follow the robot's own.
     #[serde(default)]
     pub tool: Option<ToolEntry>,
-    /// Where its joints are against the model, where that was asked for: base and joints are then
-    /// those of the robot so corrected.
+    /// Calibrated joint frames, if requested; base and joints are then those of the calibrated
+    /// robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationEntry>,
-    /// Models that fit as well where the points can tell.
+    /// Names of other models that explain the points as well.
     #[serde(default)]
     pub alike: Vec<String>,
-    /// How far the robot's surface is off the model's, standard deviation over patches of a hand's
-    /// width, metres.
+    /// Standard deviation of the robot's true surface from the model's, averaged over patches of
+    /// about 0.1 m, metres.
     #[serde(default)]
     pub surface_sigma: Option<f64>,
-    /// Standard deviation of the tip's place in the frame of the base, metres.
+    /// Standard deviation of the tip's position in the base frame, metres.
     #[serde(default)]
     pub tip_sigma: Option<f64>,
-    /// How the scans stand to one another near the robot.
+    /// Errors of the scans' stated poses near the robot.
     #[serde(default)]
     pub scans: Vec<ShiftEntry>,
-    /// Numbers of the scans in which it stands so, if it moved between scans; else empty: in all.
+    /// Numbers of the scans in which it stands so, if it moved between scans; empty means all
+    /// scans.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stands_in: Vec<u32>,
-    /// The same robot as it stands in other scans, if it moved between scans.
+    /// Its postures in other scans, if it moved between scans.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stays: Vec<RobotEntry>,
-    /// What is known of the space around it: what a robot hides is unknown, not free.
+    /// The known space around it; what a robot hides is unknown, not free.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub space: Option<SpaceEntry>,
-    /// Where the tip of the main chain is.
+    /// Pose of the tip of the main chain.
     #[serde(default)]
     pub tip: Option<TipPose>,
-    /// What the scans say of each link.
+    /// Evidence of the scans for each link.
     #[serde(default)]
     pub evidence: Vec<LinkEntry>,
 }
 
-/// A pose, to world from link.
+/// A pose of a link in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BasePose {
     /// Position, metres.
     pub xyz: [f64; 3],
-    /// Rotation, unit quaternion.
+    /// Rotation as a unit quaternion.
     pub quat_wxyz: [f64; 4],
 }
 
 impl From<&Pose> for BasePose {
     fn from(pose: &Pose) -> Self {
         let (p, q) = (pose.translation, pose.rotation);
-        // One of the two quaternions of a rotation: the same rotation gives the same text.
+        // Of the two quaternions of a rotation always the same is written.
         let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
         Self { xyz: [p.x, p.y, p.z], quat_wxyz: [q.w, q.i, q.j, q.k].map(|v| sign * v + 0.0) }
     }
@@ -154,49 +155,49 @@ impl From<&Pose> for BasePose {
 /// Standard deviations of a base.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BaseSigma {
-    /// World axes, metres.
+    /// Of the position, along world axes, metres.
     pub xyz: [Option<f64>; 3],
-    /// About world axes, radians.
+    /// Of the rotation, about world axes, radians.
     pub rotation: [Option<f64>; 3],
 }
 
-/// Pose of the last link of the main chain.
+/// Pose of the tip of the main chain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TipPose {
     /// Name of the link.
     pub link: String,
-    /// World from that link.
+    /// Pose of the link in the world.
     pub pose: BasePose,
 }
 
-/// What the scans say of a link.
+/// Evidence of the scans for a link.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LinkEntry {
     /// Name of the link.
     pub link: String,
-    /// Share of its surface that some beam could judge.
+    /// Share of its surface that at least one beam could judge.
     pub seen: Option<f64>,
-    /// Of the judged, share with a beam ending on it.
+    /// Share of the judged surface on which a beam ends.
     pub matched: Option<f64>,
-    /// Of the judged, share that a beam went through.
+    /// Share of the judged surface that a beam passed through.
     pub violated: Option<f64>,
-    /// Points within the gate.
+    /// Number of points within the gate.
     pub n_points: usize,
-    /// RMS distance of those, metres.
+    /// RMS distance of these points from the surface, metres.
     pub rms: Option<f64>,
 }
 
-/// The best other explanation.
+/// The best other explanation of the points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunnerUpEntry {
-    /// Its model.
+    /// Name of its model.
     pub model: String,
-    /// Its score.
+    /// Score, comparable with that of the robot.
     pub score: Option<f64>,
     /// Whether it is the same model in another posture.
     pub same_model: bool,
-    /// How clearly the beams prefer the best, on the links that stand differently: about 0 for
-    /// equals, 1 for clear.
+    /// How clearly the beams prefer the robot to it, on the links that stand differently: about 0
+    /// for equally good ones, 1 for a clear preference.
     #[serde(default)]
     pub margin: Option<f64>,
 }
@@ -204,12 +205,11 @@ pub struct RunnerUpEntry {
 /// A tool on a robot's flange.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ToolEntry {
-    /// Its name in the library.
+    /// Name of its model in the library.
     pub model: String,
     /// The robot's link that it is bolted to.
     pub link: String,
-    /// Turn of its root about the axis of the robot's last joint, along that link's own axis,
-    /// radians.
+    /// Rotation of its root link about the axis of the robot's last joint, radians.
     pub mount: f64,
 }
 
@@ -218,29 +218,29 @@ pub struct ToolEntry {
 pub struct EqualEntry {
     /// Value of each joint, radians or metres.
     pub joints: Places<f64>,
-    /// As in [`RunnerUpEntry`].
+    /// How clearly the beams prefer the robot's posture, as in [`RunnerUpEntry`].
     pub margin: Option<f64>,
 }
 
-/// How a scan is off its stated pose near a robot, as far as the robot's points tell.
+/// Difference of a scan from its stated pose, as estimated near one robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ShiftEntry {
     /// Number of the scan, in the order of the inputs.
     pub scan: u32,
-    /// Shift that its points need at the robot's base, metres, world axes.
+    /// Shift that the scan's points need at the robot's base, metres, world axes.
     pub shift: [f64; 3],
-    /// Turn that they need about the scanner, radians, world axes.
+    /// Rotation vector that they need about the scanner, radians, world axes.
     pub turn: [f64; 3],
-    /// Its ranges are too long by this, metres.
+    /// By how much the scan's ranges are too long, metres.
     pub range_bias: f64,
 }
 
-/// Where the masks are.
+/// Paths of the masks.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Labels {
-    /// The legend.
+    /// Path of the legend.
     pub table: String,
-    /// One for each mask.
+    /// The files of each mask.
     pub scans: Vec<ScanLabels>,
 }
 
@@ -249,50 +249,50 @@ pub struct Labels {
 pub struct ScanLabels {
     /// Name of the scan, or of the LAS file.
     pub scan: String,
-    /// Index into `inputs`.
+    /// Index of its input in `inputs`.
     pub input: u32,
-    /// Entries in each file.
+    /// Number of entries of each file.
     pub n_points: u64,
-    /// Kinds, u8.
+    /// Path of the array of kinds, u8.
     pub kind: String,
-    /// Robots, i16.
+    /// Path of the array of robots, i16.
     pub robot: String,
-    /// Links, i16.
+    /// Path of the array of links, i16.
     pub link: String,
-    /// Points that a later scan has replaced or proved gone: their places in the mask, u64,
-    /// ascending. They are no part of the plant any more, whatever their labels say.
+    /// Path of the list of places (u64, ascending) of points that a later scan replaced or proved
+    /// gone. Whatever their labels say, they are not part of the plant any more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub superseded: Option<String>,
 }
 
-/// An input as it was read.
+/// An input that was read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InputEntry {
-    /// As given.
+    /// Path as given by the user.
     pub path: String,
     /// `e57`, `ptx`, `las` or `laz`.
     pub format: String,
-    /// Length, bytes.
+    /// Length of the file, bytes.
     pub n_bytes: u64,
-    /// Digest of the bytes, with its method, such as `blake3:…`; empty where none was taken.
+    /// Digest of the file with its method, such as `blake3:…`; empty where none was computed.
     pub digest: String,
-    /// Scans in it.
+    /// Number of scans.
     pub n_scans: u32,
-    /// Points that the file does not flag as invalid.
+    /// Number of points that the file does not flag as invalid.
     pub n_points: u64,
-    /// Of those, points that were dropped (not finite).
+    /// Number of these points that were dropped, since they are not finite.
     pub n_dropped: u64,
-    /// Units that its coordinates were read in; all that is written is in metres.
+    /// Units of the coordinates in the file; everything that is written is in metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<UnitsEntry>,
-    /// What is missing in it and what is worse for that.
+    /// Messages about what the file lacks and which results suffer from it.
     pub notes: Vec<String>,
 }
 
-/// Units of an input's own coordinates.
+/// Units of an input's coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UnitsEntry {
-    /// In words, with where they come from.
+    /// Units and their source, in words.
     pub text: String,
     /// `given`, `declared`, `format` (the format prescribes them) or `assumed`.
     pub origin: String,
@@ -300,19 +300,19 @@ pub struct UnitsEntry {
     pub metres: [f64; 3],
 }
 
-/// A stage as it ran. Holds nothing that differs from run to run, such as times.
+/// A stage that ran, without anything that differs from run to run, such as times.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StageEntry {
-    /// Its name.
+    /// Name of the stage.
     pub name: String,
-    /// Items that went in.
+    /// Number of items that went in.
     pub n_in: u64,
-    /// Items that came out.
+    /// Number of items that came out.
     pub n_out: u64,
 }
 
 impl RobotEntry {
-    /// The entry of the robot with this id; names of the model's links in their order.
+    /// The entry of the robot with this id; `links` are the names of the model's links in order.
     #[must_use]
     pub fn new(id: &str, fit: &Fit, links: &[String], tip: Option<(String, Pose)>) -> Self {
         let sigma = |range: usize| finite(fit.base_sigma[range]);
@@ -401,12 +401,12 @@ impl From<&contract::LinkEvidence> for LinkEntry {
 }
 
 impl Labels {
-    /// Name of the legend.
+    /// Path of the legend.
     pub const TABLE: &'static str = "labels/table.json";
 }
 
 impl ScanLabels {
-    /// The entry of a mask with so many entries.
+    /// The entry of a mask with `n_points` entries.
     #[must_use]
     pub fn new(mask: &Mask, n_points: u64) -> Self {
         let MaskFiles { kind, robot, link } = MaskFiles::of(mask.id);
@@ -415,12 +415,12 @@ impl ScanLabels {
     }
 }
 
-/// Something of each joint of a fit, by name.
+/// A property of each joint of a fit, by name.
 fn each<T>(fit: &Fit, of: impl Fn(&JointFit) -> T) -> Vec<(String, T)> {
     fit.joints.iter().map(|joint| (joint.name.clone(), of(joint))).collect()
 }
 
-/// The number, if it is one.
+/// The number, if it is finite.
 pub(crate) fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

@@ -1,4 +1,4 @@
-//! The path of a `result.json` in, what it says out; and back.
+//! Reads and writes `result.json`.
 
 use crate::atomic;
 use crate::result::{ResultFile, SCHEMA};
@@ -6,20 +6,20 @@ use contract::{Error, Kind, Result};
 use std::path::Path;
 
 impl ResultFile {
-    /// Reads the `result.json` of an output folder, or of a file of that kind.
+    /// Reads the `result.json` of an output folder, or the file that `path` names.
     ///
     /// # Errors
-    /// There is none, or it is of another version.
+    /// If there is none, or if it has another version.
     pub fn read(path: &Path) -> Result<Self> {
         let file = if path.is_dir() { path.join("result.json") } else { path.to_path_buf() };
         let text = std::fs::read(&file).map_err(|e| broken(e.to_string(), &file))?;
         Self::parse(&text, &file)
     }
 
-    /// The same of bytes that were read already.
+    /// Reads a result from bytes; `file` is their place in errors.
     ///
     /// # Errors
-    /// Bytes that are no result of this version; the place is `file`.
+    /// If the bytes are no result of this version.
     pub fn parse(bytes: &[u8], file: &Path) -> Result<Self> {
         let result: Self =
             serde_json::from_slice(bytes).map_err(|e| broken(e.to_string(), file))?;
@@ -30,11 +30,11 @@ impl ResultFile {
         }
     }
 
-    /// Writes `result.json` under the output folder: the last file of a run, so that its presence
-    /// says that all the others are whole.
+    /// Writes `result.json` to the output folder. It is the last file of a run, so that its
+    /// presence says that all others are complete.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// If the file cannot be written.
     pub fn write(&self, out: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self)
             .map_err(|e| Error::new(Kind::Bug, "result does not serialize").because(e))?;

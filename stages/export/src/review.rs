@@ -1,23 +1,23 @@
-//! What an entry of a review did, as `result.json` has it.
+//! The effect of an entry of a review, in `result.json`.
 
 use serde::{Deserialize, Serialize};
 
-/// One entry of the file that a person gave with `--review`.
+/// One entry of a `--review` file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReviewEntry {
-    /// Its number in the file, from 1 on.
+    /// Number of the entry in the file, from 1.
     pub entry: usize,
-    /// The place that it speaks of, world, metres.
+    /// Place that it refers to, world, metres.
     pub at: [f64; 3],
-    /// What it asked for and what that did, in a sentence.
+    /// What it asked for and what effect that had, in a sentence.
     pub did: String,
-    /// Whether a person should look at it again: it did nothing, contradicts another, or takes
-    /// away what the scans show.
+    /// Whether a person should check it again: it had no effect, contradicts another entry, or
+    /// rejects what the scans show.
     pub needs_look: bool,
 }
 
 impl ReviewEntry {
-    /// For people.
+    /// The entry in words.
     #[must_use]
     pub fn words(&self) -> String {
         format!("review, entry {}: {}", self.entry, self.did)

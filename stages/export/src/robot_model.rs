@@ -1,11 +1,10 @@
-//! A fitted robot and what hangs on it in; its model as a planner loads it out: a URDF with its
-//! meshes and the hanging things as convex pieces of their links, and the posture as YAML and CSV.
-//!
+//! Writes a fitted robot as planners load it: a URDF with meshes, attached things as convex pieces
+//! of its links, and the posture as YAML and CSV.
 //! ```text
-//! robots/R1/robot.urdf        links, joints, limits; closed loops are open, their joints stand as found in joints.csv
+//! robots/R1/robot.urdf        links, joints, limits; closed loops are open, see joints.csv
 //! robots/R1/meshes/*.stl      metres, frames of the links
 //! robots/R1/joints.yaml       name: value, as ROS loads it
-//! robots/R1/joints.csv        name, value, unit, standard deviation, whether it is determined, limits, how well it is known
+//! robots/R1/joints.csv        name, value, unit, deviation, determined, limits, certainty
 //! ```
 
 use crate::atomic;
@@ -16,7 +15,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Writes the robot with this id; `hanging` has convex pieces by link.
+/// Writes the robot with this id; `hanging` holds convex pieces by index of the link.
+///
+/// # Errors
+/// If a file cannot be written.
 pub fn write_robot(
     out: &Path,
     id: &str,
@@ -58,8 +60,8 @@ pub fn write_robot(
     Ok(folder)
 }
 
-/// Files of the links' own meshes, relative to the output folder, of the robot with this id, and
-/// their lengths in bytes; none for links without a body.
+/// Path (relative to the output folder) and length in bytes of each link's mesh file, for the robot
+/// with this id; `None` for links without a body.
 #[must_use]
 pub fn mesh_files(id: &str, model: &Model) -> Vec<Option<(String, u64)>> {
     let of_link = |(link, name): (&robot::Link, String)| {
@@ -69,11 +71,11 @@ pub fn mesh_files(id: &str, model: &Model) -> Vec<Option<(String, u64)>> {
     model.links.iter().zip(file_names(model)).map(of_link).collect()
 }
 
-/// Bytes of an STL file before its triangles, and of each of them.
+/// Length of the head of an STL file, bytes.
 const STL_HEAD: u64 = 84;
 const STL_TRIANGLE: u64 = 50;
 
-/// A name for the files of each link: letters that every file system knows, each once.
+/// A unique name for the files of each link, valid on every file system.
 fn file_names(model: &Model) -> Vec<String> {
     let all = model.links.iter().enumerate();
     all.map(|(l, link)| format!("{l:02}_{}", quote::file_name(&link.name))).collect()
@@ -120,7 +122,7 @@ fn origin(pose: &Pose) -> String {
     )
 }
 
-/// Value of every joint that moves, passive ones of loops included, by name.
+/// Index and value of every joint that moves, including those of closed loops.
 fn values(fit: &Fit, model: &Model) -> Vec<(usize, f64)> {
     let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     let all = model.joint_values(&posture);
@@ -154,7 +156,7 @@ fn yaml(fit: &Fit, model: &Model) -> String {
     text
 }
 
-/// What is known of a joint of the model; nothing of one that follows others.
+/// The fit of a joint of the model; `None` if it follows other joints.
 fn joint_fit<'a>(fit: &'a Fit, model: &Model, joint: usize) -> Option<&'a JointFit> {
     model.free.iter().position(|&f| f == joint).and_then(|free| fit.joints.get(free))
 }
@@ -175,7 +177,7 @@ fn csv(fit: &Fit, model: &Model) -> String {
     text
 }
 
-/// Binary STL.
+/// A mesh as binary STL.
 fn stl(mesh: &Mesh) -> Vec<u8> {
     let mut out = vec![0_u8; 80];
     out.extend((mesh.triangles.len() as u32).to_le_bytes());

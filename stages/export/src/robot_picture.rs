@@ -1,6 +1,5 @@
-//! One robot from four sides: its fitted posture and the labelled points about it in; a picture of
-//! points by link with the posture's outline over them out. An outline beside its points is a wrong
-//! posture, at a glance.
+//! Draws one robot from four sides: the labelled points by link, with the outline of the fitted
+//! posture over them. An outline beside its points shows a wrong posture at a glance.
 
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, link_color};
 use contract::{Fan, Label, PointKind};
@@ -10,14 +9,14 @@ use robot::Model;
 
 /// Edge of one view, pixels.
 const SIDE: usize = 560;
-/// Room about the robot, metres.
+/// Margin around the robot, metres.
 const AROUND: f64 = 0.25;
-/// A step in depth that is an outline, metres.
+/// Step in depth that is drawn as outline, metres.
 const STEP: f32 = 0.04;
-/// A turn of the surface that is an edge: cosine of 40°.
+/// Angle of the surface that is drawn as edge: cosine of 40°.
 const TURN: f32 = 0.766;
 
-/// Gathers points of one robot; bounded by the size of its views.
+/// Collects the points of one robot; its memory is bounded by the size of the views.
 pub struct RobotPicture {
     robot: i16,
     bounds: Aabb,
@@ -27,19 +26,19 @@ pub struct RobotPicture {
 
 struct View {
     name: &'static str,
-    /// Right and down in pixels, away from the eye in metres.
+    /// Rows of the transform to pixels to the right, pixels down, and metres away from the viewer.
     view_from_world: Rows,
-    /// Points are given about it, so that f32 is exact enough.
+    /// Subtracted from points, so that `f32` is precise enough.
     origin: Point,
     points: Vec<(f32, Rgb)>,
     outline: Vec<bool>,
-    /// Depth of the posture's surface and cosine to the eye; of its points nearest to the eye, the
-    /// distance from it.
+    /// For each pixel the depth of the posture's surface and the cosine of its angle to the viewer,
+    /// and the distance of the nearest point from it.
     surface: Vec<(f32, f32)>,
     residuals: Vec<(f32, f32)>,
 }
 
-/// What of the posture shows in a pixel.
+/// The part of the posture that is visible in a pixel.
 #[derive(Clone, Copy)]
 struct Shown {
     depth: f32,
@@ -50,8 +49,7 @@ struct Shown {
 const NOTHING: Shown = Shown { depth: f32::INFINITY, link: u16::MAX, normal: [0.0; 3] };
 
 impl RobotPicture {
-    /// The views of the robot with this index in the labels, its links standing at
-    /// `world_from_link`.
+    /// The views of the robot with this index in the labels and with links at `world_from_link`.
     #[must_use]
     pub fn new(robot: i16, model: &Model, world_from_link: &[Pose], fan: &dyn Fan) -> Self {
         let mut bounds = Aabb::EMPTY;
@@ -79,13 +77,13 @@ impl RobotPicture {
         Self { robot, bounds: shown.grown(AROUND), links, views }
     }
 
-    /// What it shows, world, metres.
+    /// Bounds of what the views show, world, metres.
     #[must_use]
     pub fn bounds(&self) -> &Aabb {
         &self.bounds
     }
 
-    /// Adds a labelled point of the world; points away from the robot are passed over.
+    /// Adds a labelled point (world, metres); points away from the robot are ignored.
     #[inline]
     pub fn add(&mut self, world: [f64; 3], label: Label) {
         if !self.bounds.contains(world) {
@@ -100,7 +98,7 @@ impl RobotPicture {
         }
     }
 
-    /// Draws the four views with a legend; `title` says model and verdict.
+    /// Draws the four views with a legend; `title` names model and verdict.
     #[must_use]
     pub fn draw(&self, title: &str) -> Canvas {
         let n_rows = self.links.len().div_ceil(4);
@@ -119,8 +117,8 @@ impl RobotPicture {
         canvas
     }
 
-    /// The views from front and side with how far the points of its links are from the posture's
-    /// surface.
+    /// Draws the views from the front and the side by distance of the links' points from the
+    /// posture's surface.
     pub(crate) fn residuals(&self) -> [Canvas; 2] {
         [self.views[0].draw_residuals(), self.views[1].draw_residuals()]
     }
@@ -171,7 +169,7 @@ impl View {
         }
     }
 
-    /// The pixel of a point of the world, and its depth.
+    /// The pixel of a point (world, metres) and its depth.
     fn pixel(&self, world: [f64; 3]) -> Option<(usize, usize, f32)> {
         let local = [0, 1, 2].map(|i| (world[i] - self.origin[i]) as f32);
         let [u, v, depth] = transform(&self.view_from_world, local);
@@ -179,14 +177,14 @@ impl View {
         inside.then_some((u as usize, v as usize, depth))
     }
 
-    /// Notes how far a point of the robot is from the surface that shows in its pixel, if it is the
-    /// nearest to the eye: by depth, as the surface leans.
+    /// Stores the distance of a point of the robot from the surface that is visible in its pixel,
+    /// if the point is the nearest to the viewer; measured across the surface.
     fn measure(&mut self, world: [f64; 3]) {
         let Some((u, v, depth)) = self.pixel(world) else { return };
         let (surface, facing) = self.surface[v * SIDE + u];
         let off = (surface - depth) * facing;
         let pixel = &mut self.residuals[v * SIDE + u];
-        // Points of surfaces behind say nothing of the one that shows.
+        // Points of surfaces behind the visible one do not count.
         if off.abs() < HIDDEN && (depth, off) < *pixel {
             *pixel = (depth, off);
         }
@@ -194,20 +192,20 @@ impl View {
 
     fn splat(&mut self, world: [f64; 3], color: Rgb, is_ours: bool) {
         let Some((u, v, mut depth)) = self.pixel(world) else { return };
-        // Fixed things before the robot must not hide it.
+        // Fixed things in front of the robot must not hide it.
         depth += if is_ours { 0.0 } else { 1e3 };
-        // Two pixels wide, so that a scan's spacing does not look like paper.
+        // Points are two pixels wide, so that the gaps of a scan do not look like background.
         for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             let (x, y) = ((u + x).min(SIDE - 1), (v + y).min(SIDE - 1));
             let pixel = &mut self.points[y * SIDE + x];
-            // Equal depths go to the smaller colour: the order of points must not show.
+            // At equal depth the smaller colour wins, so that the order of points has no effect.
             if (depth, color) < (pixel.0, pixel.1) {
                 *pixel = (depth, color);
             }
         }
     }
 
-    /// Draws the posture into a depth buffer and keeps its edges.
+    /// Draws the posture into a depth buffer and extracts its edges.
     fn outline(&mut self, model: &Model, world_from_link: &[Pose]) {
         let mut shown = vec![NOTHING; SIDE * SIDE];
         let local_from_world = Pose::from_parts((-self.origin.coords).into(), Default::default());
@@ -258,7 +256,7 @@ impl View {
 }
 
 impl View {
-    /// Red where points lie before the surface, blue where behind, white where on it.
+    /// Draws points red in front of the surface, blue behind it, and white on it.
     fn draw_residuals(&self) -> Canvas {
         let mut canvas = Canvas::new(SIDE, SIDE);
         for v in 0..SIDE {
@@ -279,17 +277,17 @@ impl View {
     }
 }
 
-/// Colour of a distance from the surface, metres: full at [`FULL`].
+/// Colour of a distance from the surface, metres; saturated at [`FULL`].
 pub(crate) fn residual_color(off: f32) -> Rgb {
     let share = f64::from((off.abs() / FULL).min(1.0));
     blend([246, 244, 214], if off > 0.0 { [196, 30, 40] } else { [20, 70, 190] }, share)
 }
 
-/// Distance from the surface that has the full colour, metres.
+/// Distance from the surface at which the colour is saturated, metres.
 pub(crate) const FULL: f32 = 0.010;
-/// Farther than this a point is of another surface, metres.
+/// Distance beyond which a point belongs to another surface, metres.
 const HIDDEN: f32 = 0.04;
-/// Surface that no point was labelled on.
+/// Colour of surface without points.
 const UNSEEN: Rgb = [206, 208, 214];
 
 fn is_edge(a: &Shown, b: &Shown) -> bool {
@@ -310,8 +308,8 @@ fn normal(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3] {
     [n.x as f32, n.y as f32, n.z as f32]
 }
 
-/// Fills the pixels whose middle lies inside a triangle (pixels right and down, depth), the nearest
-/// surface winning.
+/// Fills the pixels whose centre lies inside a triangle (pixels right, pixels down, depth) where it
+/// is nearest.
 fn fill_triangle(shown: &mut [Shown], corners: [[f32; 3]; 3], normal: [f32; 3], link: u16) {
     let [a, b, c] = corners;
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);

@@ -1,70 +1,71 @@
-//! What a result says of the session that it goes on from.
+//! The rescan of a cell in `result.json`.
 
 use serde::{Deserialize, Serialize};
 
 /// A cell that was scanned again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RescanEntry {
-    /// Digest of the list of the result that it goes on from.
+    /// Digest of the file list of the earlier result.
     pub base: String,
-    /// Bounds of the cell, world, metres: least and greatest corner.
+    /// Bounds of the cell, world, metres: lowest and highest corner.
     pub cell: [[f64; 3]; 2],
-    /// Inputs of this session, by their place among the inputs.
+    /// Indices of the inputs of this session.
     pub inputs: Vec<u32>,
-    /// Robots that were looked at again.
+    /// Ids of the robots that were searched again.
     pub robots: Vec<String>,
-    /// The frame that the new scans are in, where it is not the plant's.
+    /// The frame of the new scans, if it is not the plant's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<CarriedEntry>,
-    /// How the new scans stood to the plant, once they are in its frame.
+    /// Registration errors of the new scans, in the plant's frame.
     pub scans: Vec<RegistrationEntry>,
-    /// Points of older scans that the new ones replace or prove gone.
+    /// Number of points of older scans that the new ones replace or prove gone.
     pub n_superseded: u64,
-    /// What changed, relative to this file.
+    /// Path of the list of changes, relative to this file.
     pub changes: String,
 }
 
-/// How far a new scan was off the plant; its points are written as they are when that is taken
-/// back.
+/// Registration error of a new scan relative to the plant; the scan's points are written with the
+/// correction applied.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RegistrationEntry {
     /// Name of the scan.
     pub scan: String,
-    /// Shift that lays it on the plant, at the middle of the cell, metres, world axes.
+    /// Shift that aligns the scan with the plant, at the centre of the cell, metres, world axes.
     pub shift: [f64; 3],
-    /// Turn about there, radians, world axes.
+    /// Rotation vector about that centre, radians, world axes.
     pub turn: [f64; 3],
-    /// Standard deviations of both.
+    /// Standard deviations of `shift` (metres) and `turn` (radians).
     pub sigma: [f64; 6],
     /// RMS distance from the plant's surfaces before and after, metres.
     pub rms: [f64; 2],
 }
 
-/// The frame of new scans, found by the surfaces and beams of both sessions, and what speaks for
-/// it. Evidence is counted in pieces of 0.04 m² of surfaces that are not level.
+/// The frame of new scans, with the evidence for it. Evidence is counted in pieces of 0.04 m² of
+/// surfaces that are not level.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CarriedEntry {
-    /// `found`, or `given` with `--frame` and refined.
+    /// `found`, or `given` if `--frame` gave it and it was refined.
     pub by: String,
-    /// A place in the plant is the turned place in the new frame and this, metres …
+    /// Translation of the pose `plant_from_new_frame`, metres.
     pub xyz: [f64; 3],
-    /// … turned by this.
+    /// Rotation of that pose, unit quaternion.
     pub quat_xyzw: [f64; 4],
-    /// Middle of what was laid on the plant, plant's frame, metres.
+    /// Centroid of the aligned surfaces, plant frame, metres.
     pub about: [f64; 3],
-    /// Standard deviations of x, y, z, metres, and of the turn about z, radians, at that place.
+    /// Standard deviations of x, y, z (metres) and of the rotation about z (radians), at that
+    /// place.
     pub sigma: [f64; 4],
     /// RMS distance of the new surfaces from the plant's, metres.
     pub rms: f64,
-    /// New surfaces that lie on surfaces of the plant.
+    /// Number of new surface pieces that lie on surfaces of the plant.
     pub n_on_old: usize,
-    /// New surfaces where earlier beams went through.
+    /// Number of new surface pieces where earlier beams passed through.
     pub n_where_old_saw_through: usize,
-    /// Surfaces of the plant near the new scanners that lie on new surfaces.
+    /// Number of surface pieces of the plant, near the new scanners, that lie on new surfaces.
     pub n_on_new: usize,
-    /// Surfaces of the plant where new beams went through.
+    /// Number of surface pieces of the plant where new beams passed through.
     pub n_where_new_saw_through: usize,
-    /// By how much more the next best place is contradicted; none where no other place fits half
-    /// as well.
+    /// By how many more pieces the next best place is contradicted; `None` where no other place
+    /// fits half as well.
     pub margin: Option<i64>,
 }

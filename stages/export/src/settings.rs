@@ -1,30 +1,30 @@
-//! What can be tuned in writing; defaults in, no file knows another number.
+//! The settings of this crate with their defaults; no other file has tunable numbers.
 
 use crate::record::LasSettings;
 
-/// Tunables of this room.
+/// Settings of writing clouds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Whether all points are written with their labels, in spatial tiles (`tiles/`).
+    /// Whether all points are written with labels in spatial tiles (`tiles/`).
     pub tiles: bool,
-    /// Edge of a tile, metres: half a robot cell, so that a rescan of one rewrites little beside
-    /// it.
+    /// Edge of a tile, metres: half a robot cell, so that the rescan of a cell rewrites little
+    /// beside it.
     pub tile_edge: f64,
-    /// Spatial tiles at most: a square kilometre in tiles of 5 m. Points that are spread wider, by
-    /// a wrong unit or by strays, would fill a disk with files of a few points each.
+    /// Largest number of spatial tiles; the default covers a square kilometre in tiles of 5 m.
+    /// Points that are spread more widely, by a wrong unit or by stray points, would fill a disk
+    /// with files of a few points each.
     pub max_tiles: usize,
-    /// Whether all that does not move is written as one cloud too (`clouds/fixed`). It is what
-    /// most planners read, and twice the disk; a plant is read by tiles, whose classes tell
-    /// the same.
+    /// Whether all points that do not move are also written as one cloud (`clouds/fixed`). Most
+    /// planners read that, but it doubles the disk space; the classes of the tiles tell the same.
     pub fixed_cloud: bool,
-    /// Whether records hold the number of the connected body that a point belongs to (`BodyId`).
+    /// Whether records hold the number of the connected body of a point (`BodyId`).
     pub bodies: bool,
-    /// Whether all points are written as one COPC file too (`clouds/plant.copc.laz`), made of the
-    /// tiles: an octree that viewers load piece by piece.
+    /// Whether all points are also written as one COPC file (`clouds/plant.copc.laz`), an octree
+    /// that viewers load piece by piece.
     pub copc: bool,
-    /// Whether clouds are compressed (LAZ): a quarter of the disk, at a tenth of the speed.
+    /// Whether clouds are compressed (LAZ): a quarter of the disk space at a tenth of the speed.
     pub compress: bool,
-    /// Records that wait in memory for their tile, bytes.
+    /// Memory for records that wait to be written to their tiles, bytes.
     pub waiting_bytes: usize,
 }
 
@@ -44,7 +44,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What records of tiles and clouds hold that are otherwise as `las` says.
+    /// The record format of tiles and clouds: `las` with the extra fields that are set here.
     #[must_use]
     pub fn records(&self, las: &LasSettings) -> LasSettings {
         LasSettings { compress: self.compress, with_bodies: self.bodies, ..las.clone() }

@@ -1,9 +1,9 @@
-//! The space around a robot in; its voxels as a NumPy array and as octrees out.
+//! Writes and reads the voxels of the space around a robot, as a NumPy array and as octrees.
 //!
 //! ```text
-//! robots/R1/space.npy      kinds by [x][y][z]: 0 unknown, 1 free, 2 fixed, 3 the robot, 4 another robot
-//! robots/R1/space.bt       OctoMap: fixed and other robots are occupied, free and the robot are free, unknown is not in it
-//! robots/R1/unknown.bt     OctoMap: unknown is occupied, all else is free: what a planner must not take for free
+//! robots/R1/space.npy      states by [x][y][z]: 0 unknown, 1 free, 2 fixed, 3 robot, 4 other robot
+//! robots/R1/space.bt       OctoMap: fixed and other robots occupied, free and robot free
+//! robots/R1/unknown.bt     OctoMap: unknown occupied, all else free; to be avoided like obstacles
 //! ```
 
 use crate::npy::{self, NpyWriter};
@@ -12,43 +12,43 @@ use contract::{Error, Result, Space, SpaceGrid, SpaceKind};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What is known of the space around a robot, and where it is written.
+/// The known space around a robot, and the paths of its files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpaceEntry {
-    /// Kinds of voxels, by `[x][y][z]`, relative to the output folder: 0 unknown, 1 free, 2 fixed,
-    /// 3 the robot, 4 another robot.
+    /// Path of the array of states, by `[x][y][z]`, relative to the output folder: 0 unknown, 1
+    /// free, 2 fixed, 3 the robot, 4 another robot.
     pub grid: String,
-    /// Octree of what is fixed or another robot, and what is free.
+    /// Path of the octree in which fixed things and other robots are occupied.
     pub octomap: String,
-    /// Octree in which what is unknown is occupied.
+    /// Path of the octree in which unknown voxels are occupied.
     pub unknown: String,
     /// Edge of a voxel, metres.
     pub edge: f64,
-    /// Corner of the first voxel, world, metres.
+    /// Lowest corner of the first voxel, world, metres.
     pub origin: [f64; 3],
-    /// Number of voxels on each axis.
+    /// Number of voxels along x, y and z.
     pub size: [usize; 3],
-    /// World from the octrees' frame: a shift, metres; zero unless the plant is far from its
-    /// origin.
+    /// Translation from the octrees' frame to the world, metres; zero unless the plant is far from
+    /// its origin.
     pub octomap_shift: [f64; 3],
-    /// Volume that no beam has seen, m³.
+    /// Volume of unknown voxels, m³.
     pub unknown_m3: f64,
-    /// Volume that beams went through, m³.
+    /// Volume of free voxels, m³.
     pub free_m3: f64,
 }
 
 impl SpaceEntry {
-    /// Its voxels, as it states them.
+    /// Placement of the voxels.
     #[must_use]
     pub fn voxels(&self) -> SpaceGrid {
         let first = self.origin.map(|v| (v / self.edge).round() as i64);
         SpaceGrid { edge: self.edge, first, size: self.size }
     }
 
-    /// Reads its voxels back.
+    /// Reads the voxels from the output folder `out`.
     ///
     /// # Errors
-    /// A file that cannot be read, or is not of these voxels.
+    /// If the file cannot be read, or if it has another number of voxels.
     pub fn read(&self, out: &Path) -> Result<Space> {
         let path = out.join(&self.grid);
         let bad = |what: &str| {
@@ -57,8 +57,8 @@ impl SpaceEntry {
         };
         let grid = self.voxels();
         let n = self.size.iter().try_fold(1_usize, |n, s| n.checked_mul(*s));
-        // What the list says of its size is believed only where the file is as long.
-        // A file of no voxels need not even be an array.
+        // The stated size is believed only if the file has that length; a file of no voxels may be
+        // no array at all.
         let n = n.filter(|n| *n > 0 && npy::n_bytes(&path).is_ok_and(|there| there == *n as u64));
         let n = n.ok_or_else(|| {
             bad("the voxels of a robot's space are not as many as they are said to be")
@@ -73,6 +73,9 @@ impl SpaceEntry {
 }
 
 /// Writes the space of the robot with this id.
+///
+/// # Errors
+/// If a file cannot be written.
 pub fn write_space(out: &Path, id: &str, space: &Space) -> Result<SpaceEntry> {
     let folder = format!("robots/{id}");
     let name = |file: &str| format!("{folder}/{file}");
@@ -81,7 +84,7 @@ pub fn write_space(out: &Path, id: &str, space: &Space) -> Result<SpaceEntry> {
     let kinds: Vec<u8> = space.voxels().iter().map(|v| *v as u8).collect();
     array.push(&kinds)?;
     array.finish_as(&grid.size)?;
-    // An octree reaches 32768 voxels to each side of its origin.
+    // An octree covers 32768 voxels to each side of its origin.
     let is_near = (0..3).all(|i| grid.first[i].abs() + (grid.size[i] as i64) < HALF);
     let shift = if is_near { [0; 3] } else { grid.first };
     let first = std::array::from_fn(|i| grid.first[i] - shift[i]);

@@ -1,5 +1,5 @@
-//! Records in, piece by piece; one spatial tile out. It keeps no file open: records wait in blocks
-//! of memory and are appended.
+//! Writes one spatial tile piece by piece. No file is kept open: records wait in memory blocks and
+//! are appended.
 
 use crate::atomic::part_of;
 use crate::block::{self, Block};
@@ -11,16 +11,16 @@ use std::fs::{File, OpenOptions};
 use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Blocks in which records wait, bytes. They are used again and again: fresh memory costs as much
-/// as copying into it.
+/// Size of a block of waiting records, bytes. Blocks are reused, since new memory costs as much as
+/// copying into it.
 const BLOCK_BYTES: usize = 128 << 10;
-/// Fewest blocks, however little memory there is.
+/// Smallest number of blocks, however little memory is allowed.
 const MIN_BLOCKS: usize = 4;
 
-/// Memory of the records that wait.
+/// The pool of blocks for waiting records.
 pub(crate) struct Blocks {
     pub(crate) empty: Vec<Block>,
-    /// Of which there may be at most so many more.
+    /// Number of blocks that may still be allocated.
     left: usize,
 }
 
@@ -40,29 +40,30 @@ impl Blocks {
     }
 }
 
-/// A tile that grows by appending.
+/// A tile that grows by appending records.
 pub struct Spool {
     path: PathBuf,
     las: LasSettings,
-    /// Where records go: the LAS file to be; for LAZ, bare records that are compressed at the end.
+    /// Temporary file of the records: the LAS file to be, or bare records that are compressed at
+    /// the end.
     part: PathBuf,
-    /// Bytes that wait, all blocks but the last full.
+    /// Waiting records; all blocks but the last are full.
     pub(crate) blocks: Vec<Block>,
     pub(crate) extent: Extent,
     body: BodySum,
-    /// What the file begins with: room for its header, bytes; and what of that is not written yet.
+    /// The part of the header that is not yet written.
     head: Vec<u8>,
     n_head: usize,
     is_begun: bool,
-    /// Whether the file is written past the system's cache, as it is while only full blocks are.
+    /// Whether writes bypass the page cache, which they do as long as all are full blocks.
     direct: bool,
 }
 
 impl Spool {
-    /// A tile without points, of records as `las` has them.
+    /// A tile without points, with records as `las` says.
     ///
     /// # Errors
-    /// Settings that make no header.
+    /// If the settings give no valid header.
     pub fn create(path: PathBuf, las: &LasSettings) -> Result<Self> {
         let part = part_of(&path.with_extension("records"));
         let head = if las.compress { Vec::new() } else { head(las, &Extent::default())? };
@@ -72,24 +73,24 @@ impl Spool {
         Ok(Self { path, las, part, blocks, extent, body, head, n_head, is_begun, direct })
     }
 
-    /// The name that it will have.
+    /// The final name of the tile.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What its records hold.
+    /// The record format of the tile.
     pub(crate) fn las(&self) -> &LasSettings {
         &self.las
     }
 
-    /// Its points.
+    /// Number of points.
     #[must_use]
     pub fn n_points(&self) -> u64 {
         self.extent.n
     }
 
-    /// Adds records behind all others; `blocks` is memory in which they wait.
+    /// Appends records; `blocks` is the pool in which they wait.
     pub(crate) fn push(
         &mut self,
         mut records: &[u8],
@@ -104,14 +105,14 @@ impl Spool {
             }
             match blocks.take() {
                 Some(block) => self.blocks.push(block),
-                // All of them are full.
+                // All of the tile's blocks are full.
                 None => self.append(blocks, self.blocks.len())?,
             }
         }
     }
 
-    /// Takes as many records as the last block has room for; returns the others. A record may lie
-    /// in two blocks.
+    /// Copies as many records as fit into the last block, and returns the others. A record may be
+    /// split between two blocks.
     pub(crate) fn fill<'a>(&mut self, records: &'a [u8]) -> &'a [u8] {
         let Some(last) = self.blocks.last_mut() else { return records };
         if !self.head.is_empty() {
@@ -121,13 +122,13 @@ impl Spool {
         last.fill(records, BLOCK_BYTES)
     }
 
-    /// Appends the first `n` blocks that wait, and gives them back.
+    /// Writes the first `n` waiting blocks to the file and returns them to the pool.
     pub(crate) fn append(&mut self, blocks: &mut Blocks, n: usize) -> Result<()> {
         blocks.empty.extend(self.write(n)?);
         Ok(())
     }
 
-    /// The same; returns them.
+    /// Writes the first `n` waiting blocks to the file and returns them.
     pub(crate) fn write(&mut self, n: usize) -> Result<Vec<Block>> {
         let first = &self.blocks[..n];
         self.direct &= first.iter().all(|block| block.bytes().len() == BLOCK_BYTES);
@@ -149,8 +150,7 @@ impl Spool {
         Ok(written)
     }
 
-    /// The file, to be written from its end on; the first time, what an earlier run left behind
-    /// goes.
+    /// Opens the file for appending; the first time a file left by an earlier run is replaced.
     fn open(&self) -> std::io::Result<File> {
         let mut options = OpenOptions::new();
         if self.is_begun {
@@ -161,17 +161,17 @@ impl Spool {
         }
     }
 
-    /// Brings it to disk and gives it its name.
+    /// Writes what waits, syncs the file and renames it to its final name.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// If the file cannot be written.
     pub fn finish(mut self) -> Result<LasSummary> {
         let n = self.blocks.len();
         self.append(&mut Blocks::new(0), n)?;
         if self.las.compress { self.compress() } else { self.seal() }
     }
 
-    /// Writes the header and gives the file its name.
+    /// Writes the header and renames the file to its final name.
     fn seal(&self) -> Result<LasSummary> {
         let head = head(&self.las, &self.extent)?;
         let sealed = OpenOptions::new().write(true).open(&self.part).and_then(|mut file| {
@@ -189,13 +189,13 @@ impl Spool {
         })
     }
 
-    /// Compresses the spooled records.
+    /// Compresses the records of the temporary file.
     fn compress(&self) -> Result<LasSummary> {
         let las = &self.las;
         let failed = |e| Error::of_file("tile cannot be read again", &self.part, e);
         let mut writer = LasWriter::create(&self.path, las.clone())?;
         let mut file = File::open(&self.part).map_err(failed)?;
-        // All of it with the first piece.
+        // The whole extent goes with the first piece.
         let mut extent = self.extent;
         let mut left = self.extent.n as usize * las.record_len();
         let mut piece = vec![0; 8192 * las.record_len()];
@@ -212,8 +212,8 @@ impl Spool {
 impl Drop for Spool {
     fn drop(&mut self) {
         if self.is_begun {
-            // After a rename there is nothing left; a leftover that refuses to go never had a final
-            // name.
+            // After a rename there is nothing left; a temporary file that cannot be removed never
+            // had its final name.
             let _ = std::fs::remove_file(&self.part);
         }
     }

@@ -1,23 +1,23 @@
-//! Bytes in, one after the other, and what shall stand before them in the end; a file and its
-//! checksum out. Its bytes need not be read again to be listed.
+//! Files whose checksum is computed while they are written, although their head is written last, so
+//! that they need not be read again.
 
 use crate::atomic::AtomicFile;
 use contract::{Error, Result};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// A file that was written: its length and CRC-32C.
+/// Length and CRC-32C of a written file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileSum {
-    /// Where.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Its length, bytes.
+    /// Length, bytes.
     pub n_bytes: u64,
-    /// CRC-32C (Castagnoli) of all of them.
+    /// CRC-32C (Castagnoli) of all bytes.
     pub crc32c: u32,
 }
 
-/// Checksum of what comes after a head.
+/// Checksum of what follows a head.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct BodySum {
     n_bytes: u64,
@@ -30,7 +30,7 @@ impl BodySum {
         self.crc32c = crc32c::crc32c_append(self.crc32c, bytes);
     }
 
-    /// That of the whole file.
+    /// The checksum of the whole file, with its head.
     pub(crate) fn behind(&self, head: &[u8], path: &Path) -> FileSum {
         let n = self.n_bytes as usize;
         let crc32c = crc32c::crc32c_combine(crc32c::crc32c(head), self.crc32c, n);
@@ -45,14 +45,14 @@ pub(crate) struct SummedFile {
 }
 
 impl SummedFile {
-    /// Opens the file and writes a head that is only as long as the last one will be.
+    /// Opens the file and writes a placeholder of the same length as the final head.
     pub(crate) fn create(path: &Path, head: &[u8]) -> Result<Self> {
         let mut file = AtomicFile::create(path)?;
         file.write_all(head).map_err(|e| Error::of_file("file cannot be written", path, e))?;
         Ok(Self { file, body: BodySum::default() })
     }
 
-    /// Writes the head, and gives the file its name.
+    /// Writes the head, and renames the file to its final name.
     pub(crate) fn finish(self, head: &[u8]) -> Result<FileSum> {
         let Self { mut file, body } = self;
         let path = file.path().to_path_buf();
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn the_sum_is_that_of_the_file() {
         let path = std::env::temp_dir().join(format!("stillpoint-summed-{}", std::process::id()));
-        // The last is longer than what goes past the system's cache at once.
+        // The last length is more than what is written past the page cache at once.
         for n in [0, 1, 70_000, 3 << 19, 2_000_001] {
             let mut file = SummedFile::create(&path, b"head").expect("opens");
             let body: Vec<u8> = (0..n).map(|i| (i * 7 % 251) as u8).collect();

@@ -1,4 +1,4 @@
-//! The legend of the masks: robots in, `labels/table.json` out.
+//! Writes the legend of masks and clouds, `labels/table.json`.
 
 use crate::atomic;
 use crate::record::CLASSES;
@@ -7,7 +7,10 @@ use contract::{Error, Kind, PointKind, Result};
 use serde_json::json;
 use std::path::Path;
 
-/// Writes `labels/table.json`: what the numbers in the masks and in the clouds mean.
+/// Writes `labels/table.json`: the meaning of the numbers in masks and clouds.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_table(out: &Path, robots: &[RobotEntry]) -> Result<()> {
     let kinds = [
         (PointKind::Fixed, "fixed"),

@@ -1,8 +1,8 @@
-//! Packed strips in, in any order; spatial tiles of all points out.
+//! Writes all points as spatial tiles.
 //!
-//! Tiles are as many as the plant is large, so none of them keeps a file open: records wait in
-//! blocks of memory, bounded in number, and where none is left those of the fullest tiles are
-//! appended to their files, side by side.
+//! A large plant has many tiles, so none of them keeps a file open. Records wait in a bounded
+//! number of memory blocks; when none is left, the fullest tiles are appended to their files in
+//! parallel.
 
 use crate::las::LasSummary;
 use crate::pack::{Packed, Run};
@@ -23,11 +23,10 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Tiles under the output folder, of records as `las` has them; `None` where they are not asked
-    /// for.
+    /// Tiles in the output folder, with records as `las` says; `None` where none are requested.
     ///
     /// # Errors
-    /// A folder that cannot be made.
+    /// If the folder cannot be created.
     pub fn create(out: &Path, las: &LasSettings, settings: &Settings) -> Result<Option<Self>> {
         if !settings.tiles {
             return Ok(None);
@@ -39,11 +38,11 @@ impl Tiles {
         Ok(Some(Self { out: out.to_path_buf(), las: las.clone(), tiles: BTreeMap::new(), blocks }))
     }
 
-    /// Adds a packed strip; where no more records may wait, those of some tiles are written by
+    /// Adds an encoded strip. When no more records may wait, those of some tiles are written by
     /// `fan`.
     ///
     /// # Errors
-    /// A tile that cannot be written.
+    /// If a tile cannot be written.
     pub fn add(&mut self, packed: &Packed, fan: &dyn Fan) -> Result<()> {
         let mut runs = packed.runs(self.las.record_len());
         runs.try_for_each(|(run, records)| self.spool(run, records, fan))
@@ -70,23 +69,23 @@ impl Tiles {
         Ok(())
     }
 
-    /// Finishes all tiles, side by side; by row then column.
+    /// Finishes all tiles in parallel and returns their summaries, sorted by row, then column.
     ///
     /// # Errors
-    /// A tile that cannot be written, the first of them.
+    /// The error of the first tile that cannot be written.
     pub fn finish(self, fan: &dyn Fan) -> Result<Vec<LasSummary>> {
         fan.fan(self.open(), Spool::finish).into_iter().collect()
     }
 
-    /// All tiles as they are, still to be finished; by row then column.
+    /// The unfinished tiles, sorted by row, then column.
     #[must_use]
     pub fn open(self) -> Vec<Spool> {
         self.tiles.into_values().collect()
     }
 }
 
-/// Appends the fullest tiles to their files, side by side, until half of the blocks are free: full
-/// blocks, as long as there are some.
+/// Appends the fullest tiles to their files in parallel until half of the blocks are free; only
+/// full blocks, as long as there are any.
 fn relieve(
     tiles: &mut BTreeMap<[i32; 2], Spool>,
     blocks: &mut Blocks,

@@ -1,4 +1,4 @@
-//! Tiles, clouds, and the same points in other formats are written and read back point by point.
+//! Tiles, clouds and other formats hold the same points when they are read back one by one.
 
 mod common;
 
@@ -109,8 +109,8 @@ fn ply_files_hold_each_point_once_moving_and_fixed_apart() {
     for (name, n) in export::PLY.iter().zip(n) {
         let (header, points) = ply(&out.join("export").join(name));
         assert!(header.contains(&format!("element vertex {n}\n")), "{header}");
-        // Open3D's tensor reader passes over most of these types, and meshio takes `uchar` for
-        // signed; CloudCompare's command line passes over other names.
+        // Open3D's tensor reader ignores most other types, meshio takes `uchar` for signed, and
+        // CloudCompare's command line ignores other names.
         for kept in ["scalar_kind", "scalar_robot", "scalar_link"] {
             assert!(header.contains(&format!(" {kept}\n")), "{header}");
         }
@@ -138,7 +138,7 @@ fn ply_files_hold_each_point_once_moving_and_fixed_apart() {
     let int = |p: &[u8; 40], at: usize| {
         i64::from(i32::from_le_bytes(p[at..at + 4].try_into().expect("four bytes")))
     };
-    // Colours, as the tiles have them.
+    // Colours are those of the tiles.
     assert!(whole.iter().any(|p| p[37..] != [0; 3]));
     let mut found: Vec<([u64; 3], [i64; 3])> = (whole.iter())
         .map(|p| ([0, 1, 2].map(|i| number(p, i)), [24, 29, 33].map(|at| int(p, at))))
@@ -212,7 +212,7 @@ fn a_tile_that_states_more_than_fits_takes_no_memory_for_it() {
         .map(|()| n)
     };
     assert_eq!(n_read(&path).expect("reads"), 1);
-    // With colours and bodies there are more layers.
+    // Colours and bodies add layers.
     for (with_color, with_bodies) in [(true, false), (false, true), (true, true)] {
         let settings = LasSettings { with_color, with_bodies, ..settings.clone() };
         let path = path.with_file_name("more.laz");
@@ -236,7 +236,7 @@ fn a_tile_that_states_more_than_fits_takes_no_memory_for_it() {
         wrong(table + 4, n, "table of chunks");
     }
     wrong(247, 2, "where 2 are due");
-    // Behind the first record and the number of points: how long each layer is.
+    // Behind the first record and the number of points are the lengths of the layers.
     wrong(at + 8 + settings.record_len() + 4, u32::MAX, "layers of");
     // A tile of no points is not decoded, whatever its table states.
     bytes[247..255].copy_from_slice(&0_u64.to_le_bytes());

@@ -1,5 +1,4 @@
-//! Robots drawn at random in; the law of what is written of them, out: whoever loads it has the
-//! same robot.
+//! Random robots that are written and loaded again are the same robots.
 
 use contract::{Fit, JointFit};
 use export::write_robot;
@@ -9,10 +8,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Robots that are drawn: each is written to disk and loaded twice.
+/// Number of random robots; each is written to disk and loaded twice.
 const N_CASES: u32 = 64;
-/// Nine digits behind the point are written; a chain of eight joints adds them up. Metres and
-/// radians.
+/// Tolerance, metres and radians: nine decimals are written, and a chain of eight joints adds up
+/// their errors.
 const NEAR: f64 = 1e-7;
 
 /// A joint: kind, parent (among the links before it), origin, turn, axis, limits.
@@ -28,7 +27,7 @@ fn joints() -> impl Strategy<Value = Vec<Drawn>> {
     prop::collection::vec(joint, 1..8)
 }
 
-/// The description of such a robot; the fifth kind follows the first joint.
+/// The URDF of such a robot; the fifth kind of joint follows the first joint.
 fn urdf(joints: &[Drawn]) -> String {
     let mut text = String::from("<robot name='drawn'>");
     for i in 0..=joints.len() {
@@ -77,7 +76,7 @@ proptest! {
     fn a_robot_that_is_written_is_the_same_robot(joints in joints(), at in prop::collection::vec(0.0..1.0, 8)) {
         let dir = tempfile::tempdir().expect("a folder");
         let text = urdf(&joints);
-        // Where the first joint is fixed, nothing can follow it: such a description is refused.
+        // Where the first joint is fixed nothing can follow it, and the URDF is refused.
         let Some(model) = load(&dir.path().join("a.urdf"), Some(&text)) else {
             prop_assert!(joints[0].0 == 3, "{}", text);
             return Ok(());
@@ -102,7 +101,7 @@ proptest! {
         let again = load(&dir.path().join("robots/R1/robot.urdf"), None).expect("loads");
         prop_assert_eq!(again.free.len(), model.free.len());
         let name = |m: &Model, l: usize| m.links[l].name.clone();
-        // Links in any order: by name.
+        // Compared by name, since links may come in any order.
         let poses = |m: &Model| -> BTreeMap<String, geometry::Pose> {
             let by_name: BTreeMap<&str, f64> = fit.joints.iter().map(|j| (&*j.name, j.value)).collect();
             let posture: Vec<f64> = m.free.iter().map(|f| by_name[&*m.joints[*f].name]).collect();
@@ -119,7 +118,7 @@ proptest! {
             let off = (at[joint.parent] * joint.parent_from_child(value)).inverse() * at[joint.child];
             prop_assert!(off.translation.vector.norm() < 1e-12 && off.rotation.angle() < 1e-7, "{}", off);
         }
-        // The table says of each joint what the model has.
+        // The table has the model's value for each joint.
         let csv = std::fs::read_to_string(dir.path().join("robots/R1/joints.csv")).expect("is there");
         for line in csv.lines().skip(1) {
             let cells: Vec<&str> = line.split(',').collect();

@@ -1,5 +1,5 @@
-//! Names that hold anything (escape sequences, line breaks, marks of direction, formulas) in; files
-//! that their readers take for what they are, out.
+//! Files with arbitrary names in them (escape sequences, line breaks, direction marks, formulas)
+//! stay valid for their readers.
 
 use contract::{Fit, JointFit, Verdict, quote};
 use export::{Labels, ResultFile, RobotEntry, SCHEMA, write_junit, write_robot};
@@ -7,11 +7,11 @@ use robot::{Model, Settings};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// ESC and a sequence that clears the screen, a zero, a bell, a line break, a mark of direction,
-/// what XML marks with, a quote.
+/// An escape sequence that clears the screen, a zero, a bell, a line break, a direction mark, the
+/// special characters of XML, and a non-character.
 const ODD: &str = "a\u{1b}[2J\u{0}\u{7}\r\nb\u{202e}c<&>\"'d\u{ffff}e";
 
-/// What a URDF can say: XML has no ESC and no zero.
+/// The part of that which a URDF can hold: XML has no ESC and no zero.
 const ODD_IN_XML: &str = "a\r\n\tb\u{202e}c<&>\"'d\u{9b}2J";
 
 fn model(dir: &Path) -> Model {
@@ -66,7 +66,7 @@ fn the_urdf_of_a_robot_with_odd_names_loads_and_its_names_are_the_same() {
     assert_eq!(again.joints[0].name, model.joints[0].name);
     let yaml = std::fs::read_to_string(folder.join("joints.yaml")).expect("is there");
     assert!(is_clean(&yaml), "{yaml:?}");
-    // A name of a joint that is a formula to spreadsheets is none, and stays on one line.
+    // A joint name that a spreadsheet would evaluate is quoted, and stays on one line.
     let csv = std::fs::read_to_string(folder.join("joints.csv")).expect("is there");
     assert!(is_clean(&csv) && csv.lines().count() == 2, "{csv:?}");
     assert!(csv.lines().nth(1).is_some_and(|line| line.starts_with("\"'=")), "{csv:?}");

@@ -1,6 +1,5 @@
-//! Writes a small output folder of every kind of file, reads it back with the crates that others
-//! use, and has `scripts/check_outputs.py` look at it with laspy, pye57 and PDAL where Python has
-//! them.
+//! Writes a small output folder with every kind of file, reads it back with other crates, and runs
+//! `scripts/check_outputs.py` on it, which uses laspy, pye57 and PDAL where Python has them.
 #![allow(clippy::print_stderr)]
 
 mod common;

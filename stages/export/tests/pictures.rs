@@ -1,4 +1,4 @@
-//! A plant and a robot of boxes, drawn: what comes out is a picture of the size that was asked for.
+//! Pictures of a plant and a robot made of boxes have the right size and show the robot.
 
 use contract::{Label, PointKind};
 use export::*;

@@ -1,32 +1,32 @@
-//! Occupancy and ground cells in, what lies above and below a surface out.
+//! What occupied space lies above and below a surface, by ground cell.
 
 use crate::pieces::{GROUND, Node};
 use contract::Occupancy;
 
-/// Share of a surface's cells with occupied space in bands below and above it.
+/// Shares of a surface's cells with occupied space in bands below and above it, 0..1.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Around {
-    /// Anything deeper than [`NEAR`].
+    /// Anything lower than [`NEAR`] below the surface.
     pub(crate) below: f64,
-    /// Between [`NEAR`] and [`TALL`] below.
+    /// Anything between [`NEAR`] and [`TALL`] below the surface.
     pub(crate) near_below: f64,
-    /// Between [`NEAR`] and [`TALL`] above.
+    /// Anything between [`NEAR`] and [`TALL`] above the surface.
     pub(crate) near_above: f64,
-    /// Anything higher than [`NEAR`].
+    /// Anything higher than [`NEAR`] above the surface.
     pub(crate) above: f64,
 }
 
-/// Where surroundings begin, metres from the surface: beyond noise and waviness.
+/// Distance from the surface at which its surroundings begin, metres: beyond noise and waviness.
 const NEAR: f64 = 0.15;
-/// How far a person's space reaches, metres.
+/// Height of the space that a person needs, metres.
 const TALL: f64 = 1.5;
-/// Fewest points of a voxel that count: one stray point is nothing.
+/// Smallest number of points of a voxel that counts; fewer may be stray points.
 const MIN_POINTS: u32 = 3;
 
-/// Voxels by ground cell: ready to be asked about many surfaces.
+/// Occupied voxels by ground cell, for look-ups under many surfaces.
 #[derive(Debug)]
 pub(crate) struct Columns {
-    /// Ground cell and height of the voxel's middle, sorted.
+    /// Ground cell and height of the voxel's centre (metres), sorted.
     voxels: Vec<([i32; 2], f32)>,
 }
 
@@ -48,7 +48,7 @@ impl Columns {
         Self { voxels }
     }
 
-    /// What lies around a surface.
+    /// The occupied space around a surface.
     pub(crate) fn around(&self, nodes: &[Node]) -> Around {
         let mut n = [0_u32; 4];
         for node in nodes {

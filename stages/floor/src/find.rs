@@ -1,4 +1,4 @@
-//! The fold: summaries in, floor and occupancy out.
+//! The step that reduces the summaries of all tiles to floor and occupied space.
 
 use crate::Settings;
 use crate::column::Columns;
@@ -21,39 +21,40 @@ pub struct Find {
     settings: Settings,
 }
 
-/// What is kept while summaries come in.
+/// State that is kept while summaries come in.
 #[derive(Debug, Clone, Default)]
 pub struct Sum {
     n_points: u64,
     n_veils: u64,
     patches: Vec<PlanePatch>,
-    /// Those that do not face up.
+    /// Patches that do not face up.
     sides: Vec<PlanePatch>,
     overlaps: Overlaps,
-    /// Each at least twice the size of the next, so that all of them are merged in n·log n.
+    /// Partial occupancies, each at least twice the size of the next, so that merging all of them
+    /// takes O(n log n).
     occupancies: Vec<Occupancy>,
 }
 
-/// What the whole leaves behind.
+/// Floor, occupied space and other planar surfaces of a plant.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ground {
-    /// Levels and installation planes.
+    /// Floor levels and installation planes.
     pub floor: Floor,
     /// Occupied space over all scans, floor and walls included.
     pub occupancy: Occupancy,
-    /// Patches of walls, ceilings and slopes, in the order of their tiles: what
-    /// [`mounts`](fn@crate::mounts) is asked about.
+    /// Patches of walls, ceilings and slopes, in the order of their tiles, as input of
+    /// [`mounts`](fn@crate::mounts).
     pub sides: Vec<PlanePatch>,
-    /// Pieces of floor, walls and whatever else is flat that several scans saw.
+    /// Pieces of floor, walls and other flat surfaces that several scans saw.
     pub overlaps: Vec<Overlap>,
     /// Number of points.
     pub n_points: u64,
-    /// Points taken for veils.
+    /// Number of points that were classified as veil points.
     pub n_veils: u64,
 }
 
 impl Find {
-    /// For summaries of tiles of these scans.
+    /// A step for the tiles of these scans.
     #[must_use]
     pub fn new(scans: &[Scan], settings: &Settings) -> Self {
         let mut scanners: Vec<_> = scans
@@ -79,7 +80,7 @@ impl Sum {
         }
     }
 
-    /// Merges the last two.
+    /// Merges the last two partial occupancies.
     fn fuse(&mut self) {
         if let (Some(later), Some(earlier)) = (self.occupancies.pop(), self.occupancies.last_mut())
         {
@@ -136,13 +137,13 @@ impl Fold for Find {
     }
 }
 
-/// Nearly horizontal and seen from above. Where the scanner is unknown, normals point up and only
-/// what lies around tells a ceiling.
+/// Whether a patch is nearly horizontal and was seen from above. Where the scanner is unknown all
+/// normals point up, and a ceiling is recognised later by what lies around it.
 fn faces_up(patch: &PlanePatch, settings: &Settings) -> bool {
     patch.plane.normal.z >= settings.max_patch_tilt.cos()
 }
 
-/// Floor and installation planes from patches (in the order of their tiles) and occupied space.
+/// Finds floor and installation planes in patches (in the order of their tiles) and occupied space.
 #[must_use]
 pub fn find(
     patches: &[PlanePatch],

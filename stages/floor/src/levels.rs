@@ -1,4 +1,4 @@
-//! Pieces of level surface in, floor levels out: what is large, low and seen from above.
+//! Finds floor levels among pieces of level surface: those that are large, low and seen from above.
 
 use crate::Settings;
 use crate::column::{Around, Columns};
@@ -6,36 +6,36 @@ use crate::pieces::{GROUND, Node, Piece, fit, height};
 use contract::{FloorLevel, PlanePatch, ScanId};
 use geometry::{Plane, Vector};
 
-/// Ceilings, where nobody knows the scanner: at most this share has something above.
+/// Largest share of a ceiling's cells with something above, where the scanner is unknown.
 const CEILING_ABOVE: f64 = 0.1;
-/// … and at least this share something below.
+/// Smallest share of a ceiling's cells with something below.
 const CEILING_BELOW: f64 = 0.3;
-/// Share of cells with something close above from which nobody can stand there: a slab under
+/// Share of cells with something close above from which on nobody can stand there: a slab under
 /// another.
 const COVERED: f64 = 0.6;
-/// Half-width of the window around a ghost's beam in which the level above must have been seen,
-/// cells.
+/// Half-width of the window about the beam to a mirror image in which the level above must have
+/// been seen, cells.
 const NEAR_CELL: i32 = 1;
 
-/// Pieces at one height.
+/// Pieces of level surface at one height.
 #[derive(Debug, Clone)]
 pub(crate) struct Level {
     /// Cells of all its pieces, sorted by cell.
     pub(crate) nodes: Vec<Node>,
-    /// Patches it is made of, ascending.
+    /// Indices of its patches, ascending.
     pub(crate) patches: Vec<usize>,
-    /// Mean plane, normal up.
+    /// Mean plane; its normal points up.
     pub(crate) plane: Plane,
-    /// RMS of heights about it, metres.
+    /// RMS of heights about the mean plane, metres.
     pub(crate) waviness: f64,
     /// Area of its largest piece, m².
     pub(crate) largest: f64,
 }
 
-/// Where scanners stand: `None` where unknown; sorted by scan.
+/// Positions of the scanners (world, metres; `None` where unknown), sorted by scan.
 pub(crate) type Scanners = [(ScanId, Option<Vector>)];
 
-/// Position of a scanner, if known.
+/// Position of a scanner in the world, metres, if known.
 pub(crate) fn scanner(scanners: &Scanners, id: ScanId) -> Option<Vector> {
     scanners.binary_search_by_key(&id, |s| s.0).ok().and_then(|i| scanners[i].1)
 }
@@ -52,7 +52,7 @@ impl Level {
         self.nodes.len() as f64 * GROUND * GROUND
     }
 
-    /// Whether `piece` continues this level; `far` is the distance between them, metres.
+    /// Whether `piece` belongs to this level: heights agree within what its distance allows.
     fn continues(&self, piece: &Piece, settings: &Settings) -> bool {
         let mut off: Vec<f64> = piece
             .nodes
@@ -77,7 +77,7 @@ impl Level {
     }
 
     fn join(&mut self, piece: Piece) {
-        // Small pieces do not move the plane enough to pay for a fit each.
+        // Small pieces hardly change the plane, so that a new fit for each is not worth its time.
         let refit = piece.nodes.len() * 20 >= self.nodes.len();
         self.nodes.extend(piece.nodes);
         self.nodes.sort_by(|a, b| a.cell.cmp(&b.cell).then(a.z.total_cmp(&b.z)));
@@ -90,7 +90,7 @@ impl Level {
         }
     }
 
-    /// Share of its points that were seen through `upper`, a level above it.
+    /// Share of its points that were seen through `upper`, a level above it: a mirror image.
     pub(crate) fn ghost_share(
         &self,
         upper: &Self,
@@ -134,16 +134,17 @@ pub(crate) fn seen_through(patch: &PlanePatch, from: Vector, upper: &Level) -> f
     n as f64 / patch.ground.len().max(1) as f64
 }
 
-/// What the pieces are.
+/// Pieces, sorted into floor and ceilings.
 #[derive(Debug, Default)]
 pub(crate) struct Levels {
-    /// Floor, largest first.
+    /// Floor levels, largest first.
     pub(crate) floor: Vec<Level>,
-    /// Patches of ceilings, ascending: their scanner is unknown, and nothing can stand on them.
+    /// Indices of the patches of ceilings, ascending. Their scanners are unknown; nothing can stand
+    /// on them.
     pub(crate) ceilings: Vec<usize>,
 }
 
-/// Gathers pieces into levels and tells which are floor.
+/// Groups pieces into levels and selects those that are floor.
 pub(crate) fn levels(
     pieces: Vec<Piece>,
     patches: &[PlanePatch],
@@ -155,7 +156,7 @@ pub(crate) fn levels(
     for piece in pieces {
         match groups.iter_mut().find(|group| group.continues(&piece, settings)) {
             Some(group) => group.join(piece),
-            // Crumbs may join a level, but found none: what is one cell large is no floor.
+            // A piece of a single cell may join a level, but is too small to begin one.
             None if piece.nodes.len() > 1 => groups.extend(Level::new(piece)),
             None => {}
         }
@@ -188,14 +189,14 @@ pub(crate) fn levels(
     out
 }
 
-/// Whether a level was seen from below, by what lies around it; where the scanner is known, its
-/// side is.
+/// Whether a level was seen from below, judged by what lies around it. Where the scanner is known,
+/// the normals of the patches tell the side.
 fn is_ceiling(level: &Level, around: Around, patches: &[PlanePatch], scanners: &Scanners) -> bool {
     let known = weight(level, patches, |p| scanner(scanners, p.scan).is_some());
     if 2.0 * known >= weight(level, patches, |_| true) {
         return false;
     }
-    // A ceiling has nothing above, or, as a slab, the next storey's floor close above.
+    // Above a ceiling there is nothing, or the floor of the next storey close above.
     let bare = around.above < CEILING_ABOVE && around.below > CEILING_BELOW;
     bare || around.near_above > COVERED
 }
@@ -204,7 +205,7 @@ fn weight(level: &Level, patches: &[PlanePatch], wanted: impl Fn(&PlanePatch) ->
     level.patches.iter().map(|&i| &patches[i]).filter(|p| wanted(p)).map(|p| p.moments.n).sum()
 }
 
-/// The level as others see it: mean plane and height map.
+/// The level's mean plane and height map.
 pub(crate) fn describe(level: &Level, patches: &[PlanePatch], settings: &Settings) -> FloorLevel {
     let cell = settings.height_cell;
     let mut offs: Vec<([i32; 2], f64)> = level
@@ -220,7 +221,7 @@ pub(crate) fn describe(level: &Level, patches: &[PlanePatch], settings: &Setting
     let heights = offs
         .chunk_by(|a, b| a.0 == b.0)
         .map(|same| {
-            // The median of a cell: a plate that was joined to the floor must not lift it.
+            // The median of the cell: a plate that was joined to the floor must not lift it.
             let off = 0.5 * (same[(same.len() - 1) / 2].1 + same[same.len() / 2].1);
             let [x, y] = same[0].0.map(|i| (f64::from(i) + 0.5) * cell);
             (same[0].0, height(&level.plane, x, y) + off)
@@ -232,12 +233,12 @@ pub(crate) fn describe(level: &Level, patches: &[PlanePatch], settings: &Setting
     out
 }
 
-/// Share of a level's points whose scatter counts: the others lie on what was joined to it, plates
-/// and cables.
+/// Share of a level's points that count for its scatter; the others lie on things that were joined
+/// to it, such as plates and cables.
 const SCATTERED: f64 = 0.9;
 
-/// How far points lie off the heights of a level, metres, one sigma: cell by cell, within their
-/// patches and with them.
+/// Standard deviation of the points from the heights of a level, metres: the spread within patches
+/// and the differences of patches, cell by cell.
 fn scatter<'a>(level: &FloorLevel, patches: impl Iterator<Item = &'a PlanePatch>) -> f64 {
     let mut offs: Vec<(f64, u32)> = Vec::new();
     for patch in patches {

@@ -1,29 +1,31 @@
-//! Patches that do not face up in, planes that something may be bolted to out: ceilings, walls,
-//! tilted plates.
+//! Finds planes that something may be bolted to among patches that do not face up: ceilings, walls
+//! and tilted plates.
 
 use crate::union::Union;
 use contract::{InstallationPlane, PlanePatch, ScanId};
 use geometry::{Aabb, Moments, Vector};
 
-/// Least area of a patch that is kept for this, m²: less says little of where a plane lies.
+/// Smallest area of a patch that is used, m²: a smaller one determines its plane poorly.
 pub(crate) const MIN_PATCH: f64 = 0.02;
-/// Least area of such a plane, m²: half of a rim of 6 cm about the foot of a small arm.
+/// Smallest area of such a plane, m²: half of a rim of 6 cm about the foot of a small arm.
 const MIN_AREA: f64 = 0.03;
-/// Planes of patches that differ by less are one, metres, and their normals, radians (3°).
-const SAME: (f64, f64) = (0.02, 0.052);
-/// Gap between patches of one plane, metres: what a foot hides.
+/// Largest distance between patches of one plane, metres.
+const SAME_PLANE_DISTANCE: f64 = 0.02;
+/// Largest angle between the normals of patches of one plane, radians (3°).
+const SAME_PLANE_ANGLE: f64 = 0.052;
+/// Largest gap between patches of one plane, metres: what a foot hides.
 const GAP: f64 = 0.5;
-/// Most planes of one place that look down, most that lean, and most of the others: a hall has more
-/// and larger walls than plates, and of a plate that a foot leaves a rim of less is seen than of
-/// any cabinet.
+/// Largest numbers of planes of one place: of those that look down, of those that lean, and of the
+/// others. A hall has more and larger walls than plates, and less is seen of a plate's rim around a
+/// foot than of any cabinet, so that one common limit would keep cabinets only.
 const MOST: [usize; 3] = [8, 12, 8];
-/// A normal that points so far down is a ceiling's, cosine (45°).
+/// A plane looks down (ceiling) if the z of its normal is below this, the cosine of 135°.
 const DOWN: f64 = -0.7;
-/// One that points so far up is a leaning plate's, cosine (10° from upright).
+/// A plane leans (plate) if the z of its normal is above this, 10° from upright.
 const LEANS: f64 = 0.17;
 
-/// The largest planes of these patches: those that look down, those that lean and the others, each
-/// largest first; normals to the side that was seen.
+/// The largest planes of these patches: those that look down, those that lean, and the others, each
+/// group with the largest first. Normals point to the side that was seen.
 #[must_use]
 pub fn mounts(patches: &[&PlanePatch]) -> Vec<InstallationPlane> {
     let mut union = Union::new(patches.len());
@@ -54,16 +56,17 @@ pub fn mounts(patches: &[&PlanePatch]) -> Vec<InstallationPlane> {
 }
 
 fn one_plane(a: &PlanePatch, b: &PlanePatch) -> bool {
-    if a.plane.normal.dot(&b.plane.normal) < SAME.1.cos() || !a.bounds.grown(GAP).touches(&b.bounds)
+    if a.plane.normal.dot(&b.plane.normal) < SAME_PLANE_ANGLE.cos()
+        || !a.bounds.grown(GAP).touches(&b.bounds)
     {
         return false;
     }
     let step = |of: &PlanePatch, at: Vector| of.plane.distance(&at).abs();
-    step(a, b.moments.mean()).max(step(b, a.moments.mean())) < SAME.0
+    step(a, b.moments.mean()).max(step(b, a.moments.mean())) < SAME_PLANE_DISTANCE
 }
 
-/// Joined plane of patches, each weighted by its area, with the largest area that one scan sees of
-/// it.
+/// The joined plane of patches, each weighted by its area; its own area is the largest that a
+/// single scan sees.
 fn plane_of(members: &[&PlanePatch]) -> Option<InstallationPlane> {
     let first = members.first()?;
     let mut moments = Moments::new(first.moments.mean());
@@ -88,7 +91,7 @@ mod tests {
     use super::*;
     use geometry::Plane;
 
-    /// A square of a side, metres, at a place, that faces along a normal.
+    /// A square with this side (metres), centre and normal.
     fn patch(at: [f64; 3], normal: Vector, side: f64) -> PlanePatch {
         let frame = Plane { normal, offset: 0.0 }.frame();
         let (mut moments, mut bounds) = (Moments::new(Vector::zeros()), Aabb::EMPTY);

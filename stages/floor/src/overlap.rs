@@ -1,35 +1,35 @@
-//! Planar patches of tiles in; pieces of surface that several scans saw, and where each of them has
-//! it, out: they tell how far scans are off one another, as robots do.
+//! Collects pieces of surface that several scans saw, with the place where each scan has it. Like
+//! robots, they tell how the registrations of the scans differ.
 
 use contract::{Overlap, PlanePatch, ScanId};
 use geometry::Vector;
 use geometry::narrow::floor_i32;
 use std::collections::BTreeMap;
 
-/// Edge of a cell whose patches are one piece, metres: floors and walls are flat to two millimetres
-/// in it.
+/// Edge of the cells in which patches form one piece, metres: floors and walls are flat to two
+/// millimetres within it.
 const EDGE: f64 = 1.0;
-/// Fewest points of a scan.
+/// Smallest number of points of one scan on a piece.
 const MIN_POINTS: f64 = 50.0;
-/// Cosine of the angle by which scans may differ about a piece's normal, 1.5°: else it is none.
+/// Cosine of the largest angle between the normals of two scans on a piece (1.5°); beyond, it is no
+/// common surface.
 const ALIKE: f64 = 0.999_66;
-/// No scan has it farther off the others than this, metres: else these are two surfaces.
+/// Largest distance between the surfaces of two scans, metres; beyond, they are two surfaces.
 const APART: f64 = 0.02;
 
-/// A cell, and which way its surface looks: the axis nearest to its normal, and on which side of
-/// it.
+/// A cell, and the axis and side to which its surface faces (the axis nearest to the normal).
 type Key = ([i32; 3], u8);
 
-/// What scans saw of each piece.
+/// What each scan saw of each piece.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Overlaps(BTreeMap<Key, Vec<Seen>>);
 
-/// What one scan saw of one.
+/// What one scan saw of one piece.
 #[derive(Debug, Clone)]
 struct Seen {
     scan: ScanId,
     n: f64,
-    /// Sums over its points, metres, of places and of normals.
+    /// Sums of places (metres) and of normals over its points.
     place: Vector,
     normal: Vector,
 }
@@ -60,7 +60,7 @@ impl Overlaps {
         }
     }
 
-    /// Those that two scans saw, or more.
+    /// The pieces that at least two scans saw.
     pub(crate) fn finish(self) -> Vec<Overlap> {
         self.0.into_values().filter_map(overlap).collect()
     }
@@ -118,7 +118,7 @@ mod tests {
         assert_eq!(found.len(), 1);
         let z = |k: usize| found[0].seen[k].1[2];
         assert!((z(1) - z(0) - 0.003).abs() < 1e-12 && found[0].normal == [0.0, 0.0, 1.0]);
-        // One scan alone, two surfaces, and two that lean.
+        // A single scan, two surfaces, and two surfaces at an angle give no overlap.
         assert!(told(&[patch(0, 0.5, 0.0), patch(0, 0.52, 0.0)]).is_empty());
         assert!(told(&[patch(0, 0.5, 0.0), patch(1, 0.56, 0.0)]).is_empty());
         assert!(told(&[patch(0, 0.5, 0.0), patch(1, 0.5, 0.1)]).is_empty());

@@ -1,4 +1,4 @@
-//! Patches in, pieces of level surface out: ground cells with heights, connected over tiles and
+//! Connects patches to pieces of level surface: ground cells with heights, over all tiles and
 //! scans.
 
 use crate::Settings;
@@ -6,7 +6,7 @@ use crate::union::Union;
 use contract::PlanePatch;
 use geometry::{Moments, Plane, Vector};
 
-/// Edge of a ground cell, metres, as `PlanePatch::ground` says.
+/// Edge of a ground cell, metres; must be that of `PlanePatch::ground`.
 pub(crate) const GROUND: f64 = 0.25;
 
 /// Height of a surface in one ground cell.
@@ -21,7 +21,7 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    /// Middle of the cell at the surface, metres.
+    /// Centre of the cell at the height of the surface, world, metres.
     pub(crate) fn place(&self) -> Vector {
         let [x, y] = self.cell.map(|i| (f64::from(i) + 0.5) * GROUND);
         Vector::new(x, y, self.z)
@@ -44,7 +44,7 @@ impl Piece {
     }
 }
 
-/// One patch in one ground cell.
+/// The part of one patch in one ground cell.
 struct Entry {
     cell: [i32; 2],
     z: f64,
@@ -52,7 +52,7 @@ struct Entry {
     patch: usize,
 }
 
-/// Connects the ground cells of those `patches` for which `wanted` holds; largest piece first.
+/// Connects the ground cells of those `patches` for which `wanted` holds; the largest piece first.
 pub(crate) fn pieces(
     patches: &[PlanePatch],
     wanted: impl Fn(&PlanePatch) -> bool,
@@ -76,7 +76,7 @@ pub(crate) fn pieces(
     collect(&nodes, &entries, &node_of, &mut union)
 }
 
-/// Entries of one cell within a step of each other become one node.
+/// Merges the entries of one cell whose heights differ by less than a step to one node.
 fn merge_heights(entries: &[Entry], settings: &Settings) -> (Vec<Node>, Vec<usize>) {
     let mut nodes: Vec<Node> = Vec::new();
     let mut node_of = Vec::with_capacity(entries.len());
@@ -114,7 +114,8 @@ fn join_cells(nodes: &[Node], union: &mut Union, settings: &Settings) {
     }
 }
 
-/// Joins nodes that one patch covers: it was seen as one surface, whatever stands before it.
+/// Joins nodes that one patch covers: the patch was seen as one surface, even if something stands
+/// in front of it.
 fn join_patches(entries: &[Entry], node_of: &[usize], n_patches: usize, union: &mut Union) {
     let mut first = vec![usize::MAX; n_patches];
     for (e, &node) in entries.iter().zip(node_of) {
@@ -144,13 +145,13 @@ fn collect(nodes: &[Node], entries: &[Entry], node_of: &[usize], union: &mut Uni
         piece.patches.sort_unstable();
         piece.patches.dedup();
     }
-    // Stable: pieces of one size stay in the order of their first cells.
+    // A stable sort: pieces of equal size stay in the order of their first cells.
     out.sort_by_key(|piece| std::cmp::Reverse(piece.nodes.len()));
     out
 }
 
-/// Mean plane of nodes, each cell with the same weight, normal up; and the RMS of heights about it.
-/// Cells far off are left out once. A single line of cells gives a horizontal plane.
+/// Mean plane of nodes, each cell with the same weight and the normal up, with the RMS of heights
+/// about it. Outliers are left out once. A single row of cells gives a horizontal plane.
 pub(crate) fn fit(nodes: &[Node]) -> Option<(Plane, f64)> {
     let first = nodes.first()?.place();
     let mut moments = Moments::new(first);
@@ -173,7 +174,8 @@ pub(crate) fn fit(nodes: &[Node]) -> Option<(Plane, f64)> {
     Some((plane, rms(&plane)))
 }
 
-/// Least-squares plane with normal up; horizontal through the mean where the points have no width.
+/// Least-squares plane with its normal up; horizontal through the mean where the points lie on a
+/// line.
 pub(crate) fn upward(moments: &Moments) -> Plane {
     let flat = Plane { normal: Vector::z(), offset: moments.mean().z };
     match moments.plane() {
@@ -184,7 +186,7 @@ pub(crate) fn upward(moments: &Moments) -> Plane {
     }
 }
 
-/// Height of a plane at a place, metres.
+/// Height of a plane at (x, y), metres.
 pub(crate) fn height(plane: &Plane, x: f64, y: f64) -> f64 {
     (plane.offset - plane.normal.x * x - plane.normal.y * y) / plane.normal.z
 }

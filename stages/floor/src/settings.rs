@@ -1,48 +1,49 @@
-//! What can be tuned when planes become floor: plain numbers, each with its unit and reason.
+//! The settings of the floor stage, each with its unit and reason.
 
 /// Settings of the floor stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Largest tilt of an installation plane that is not floor, radians: 3° (METHOD.md §5).
+    /// Largest tilt of an installation plane other than the floor, radians: 3° (METHOD.md §5).
     pub max_tilt: f64,
     /// Largest tilt of a floor level, radians: 5°, since scanners on carts are not levelled.
     pub max_floor_tilt: f64,
-    /// Largest tilt of a single patch that may be part of one, radians: small patches know their
-    /// normal badly.
+    /// Largest tilt of a single patch of a floor level, radians: small patches determine their
+    /// normal poorly.
     pub max_patch_tilt: f64,
-    /// Step in height between neighbouring ground cells that is still one surface, metres: a floor
+    /// Largest step in height between neighbouring ground cells of one surface, metres: a floor
     /// tilted by 5° steps 31 mm across the diagonal of a cell.
     pub max_step: f64,
-    /// Difference of height at which two separate pieces are one level, metres: scans are
+    /// Difference in height at which two separate pieces belong to one level, metres: scans are
     /// registered to a centimetre.
     pub level_tolerance: f64,
-    /// What a level may bend from one piece to the next, metres a metre of distance between them:
-    /// 0.2°.
+    /// Further difference in height that is allowed for each metre between the pieces, metres a
+    /// metre: 0.2°.
     pub level_bend: f64,
-    /// Largest difference of height of two pieces of one level, whatever their distance, metres.
+    /// Largest difference in height of two pieces of one level at any distance, metres.
     pub max_level_tolerance: f64,
-    /// Least area of a floor level, m²: more than a table or a car roof.
+    /// Smallest area of a floor level, m²: more than a table or a car roof.
     pub min_area: f64,
-    /// Least area in one piece of a level with something below it, m²: a mezzanine, not tables in
-    /// a row.
+    /// Smallest area of a single piece of a level with something below it, m²: a mezzanine counts,
+    /// a row of tables does not.
     pub min_raised_area: f64,
-    /// Share of a level's cells with something below from which it counts as raised.
+    /// Share of a level's cells with something below from which on the level counts as raised.
     pub raised_share: f64,
     /// Largest waviness of a level, RMS, metres.
     pub max_waviness: f64,
-    /// Edge of a cell of the height map, metres: follows waves of some metres, averages noise.
+    /// Edge of a cell of the height map, metres: it follows waves of some metres and averages
+    /// noise.
     pub height_cell: f64,
-    /// Fewest points of a ground cell that say its height.
+    /// Smallest number of points of a ground cell that gives a height.
     pub min_cell_points: u32,
-    /// Share of beams through a level above from which a surface is its mirror image.
+    /// Share of beams through a level above from which on a surface is a mirror image.
     pub ghost_share: f64,
-    /// Least visible area of an installation plane, m²: the ring around a robot's foot.
+    /// Smallest visible area of an installation plane, m²: the ring around a robot's foot.
     pub min_stand_area: f64,
-    /// Distance from the floor below which a plane is the floor itself, metres.
+    /// Height above the floor below which a plane is the floor itself, metres.
     pub floor_band: f64,
-    /// Most installation planes that are kept beside floor levels: the largest.
+    /// Largest number of installation planes beside floor levels; the largest are kept.
     pub max_stands: usize,
-    /// Gap between patches of one installation plane, metres: what a foot or a cable hides.
+    /// Largest gap between patches of one installation plane, metres: what a foot or cable hides.
     pub stand_gap: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Horizontal patches in, installation planes out: what is not floor, but large enough for
-//! something to stand on.
+//! Finds installation planes among horizontal patches: planes that are no floor, but large enough
+//! for a robot to stand on.
 
 use crate::Settings;
 use crate::levels::{Level, Scanners, scanner, seen_through};
@@ -8,13 +8,13 @@ use crate::union::Union;
 use contract::{FloorLevel, InstallationPlane, PlanePatch, ScanId};
 use geometry::{Aabb, Moments, Plane, Vector};
 
-/// Least distance between planes of patches that is never told apart, metres: two scans of one
+/// Distance between patches below which they always belong to one plane, metres: two scans of one
 /// plate.
 const SAME_HEIGHT: f64 = 0.005;
-/// How badly a small patch knows its tilt, radians: 1°.
+/// Error of the tilt of a small patch, radians: 1°.
 const TILT_ERROR: f64 = 0.0175;
 
-/// Joins patches that face up into planes; the largest ones, largest first.
+/// Joins patches that face up to planes and returns the largest ones, largest first.
 pub(crate) fn stands(
     patches: &[PlanePatch],
     floor: (&[Level], &[FloorLevel]),
@@ -56,7 +56,7 @@ fn is_floor(patch: &PlanePatch, levels: &[FloorLevel], settings: &Settings) -> b
     let p = patch.moments.mean();
     levels.iter().any(|level| {
         level.height(p.x, p.y).is_some_and(|h| {
-            // A large patch close to the floor is the floor of a scan that is registered a little
+            // A large patch close to the floor is the floor of a scan that is registered slightly
             // higher.
             let band =
                 if patch.area > 1.0 { 2.5 * settings.floor_band } else { settings.floor_band };
@@ -65,7 +65,7 @@ fn is_floor(patch: &PlanePatch, levels: &[FloorLevel], settings: &Settings) -> b
     })
 }
 
-/// Whether a patch was seen through a floor level: a mirror image.
+/// Whether a patch was seen through a floor level and is therefore a mirror image.
 fn is_ghost(
     patch: &PlanePatch,
     levels: &[Level],
@@ -77,9 +77,9 @@ fn is_ghost(
     })
 }
 
-/// Whether two patches are parts of one plane.
+/// Whether two patches belong to one plane.
 fn one_plane(a: &PlanePatch, b: &PlanePatch, settings: &Settings) -> bool {
-    // Heights differ little, so the gap is asked for in plan only.
+    // Heights differ little, so that only the horizontal gap matters.
     let gap = |i: usize| (a.bounds.min[i] - b.bounds.max[i]).max(b.bounds.min[i] - a.bounds.max[i]);
     if gap(0).max(gap(1)) > settings.stand_gap {
         return false;
@@ -88,13 +88,13 @@ fn one_plane(a: &PlanePatch, b: &PlanePatch, settings: &Settings) -> bool {
     let step = |plane: &Plane, at: Vector| plane.distance(&at).abs();
     let far = (p - q).norm();
     let limit = SAME_HEIGHT + 1.5 * (a.rms + b.rms) / 2.0;
-    // The larger patch knows its tilt better: its plane is asked first and must hold.
+    // The larger patch determines its tilt better, so that its plane is tested and must hold.
     let (large, small) = if a.area >= b.area { (a, q) } else { (b, p) };
     let reach = large.area.sqrt().max(0.05);
     step(&large.plane, small) <= limit + TILT_ERROR * (far - reach).max(0.0) * 0.25
 }
 
-/// Joined plane of patches, each weighted by its area; `None` if it is small or tilted.
+/// The joined plane of patches, each weighted by its area; `None` if it is too small or tilted.
 fn plane_of(members: &[&PlanePatch], settings: &Settings) -> Option<InstallationPlane> {
     let mut moments = Moments::new(members.first()?.moments.mean());
     let mut bounds = Aabb::EMPTY;
@@ -108,7 +108,7 @@ fn plane_of(members: &[&PlanePatch], settings: &Settings) -> Option<Installation
         bounds = bounds.union(&patch.bounds);
     }
     let area = best_scan(members);
-    // `plane()` asks for three points; weights are areas, so scale them up to count as points.
+    // `plane()` requires three points; the weights are areas, which are scaled to count as points.
     let scale = 1e4;
     moments.n *= scale;
     moments.sum *= scale;
@@ -132,7 +132,7 @@ fn plane_of(members: &[&PlanePatch], settings: &Settings) -> Option<Installation
     })
 }
 
-/// Area that the scan sees that sees most of it: scans see the same area again.
+/// Largest area that a single scan sees; areas of several scans would count the same surface twice.
 fn best_scan(members: &[&PlanePatch]) -> f64 {
     let mut areas: Vec<(ScanId, f64)> = members.iter().map(|p| (p.scan, p.area)).collect();
     areas.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));

@@ -1,5 +1,5 @@
-//! Disjoint sets: pairs in, representatives out; the representative is always the smallest member,
-//! so that the answer does not depend on the order of the pairs.
+//! Disjoint sets (union-find). The representative of a set is always its smallest member, so that
+//! the result does not depend on the order in which sets are joined.
 
 /// Disjoint sets over `0..n`.
 #[derive(Debug)]
@@ -8,12 +8,12 @@ pub(crate) struct Union {
 }
 
 impl Union {
-    /// `n` sets of one member each.
+    /// Makes `n` sets of one member each.
     pub(crate) fn new(n: usize) -> Self {
         Self { parent: (0..n as u32).collect() }
     }
 
-    /// Smallest member of the set that holds `i`.
+    /// The smallest member of the set that holds `i`.
     pub(crate) fn find(&mut self, i: usize) -> usize {
         let mut at = i as u32;
         while self.parent[at as usize] != at {

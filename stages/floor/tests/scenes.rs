@@ -1,4 +1,4 @@
-//! Synthetic patches of rooms in, floor as built out; and the law of the fold at every cut.
+//! Floors of synthetic rooms are found as built, and the law of the fold holds at every cut.
 
 use contract::{
     Floor, Fold, InputId, Lattice, MaskId, Occupancy, PlanePatch, Scan, ScanId, TileSummary,
@@ -29,8 +29,8 @@ struct Scene {
 }
 
 impl Scene {
-    /// Points every 2 cm on z = height(x, y) over a rectangle, as patches of `tile` metres, where
-    /// `seen` holds.
+    /// Adds points every 2 cm on z = height(x, y) over a rectangle where `seen` holds, as patches
+    /// of `tile` metres.
     fn surface(
         &mut self,
         scan: u32,
@@ -97,7 +97,7 @@ fn wavy(x: f64, y: f64) -> f64 {
 fn tilted_wavy_floor_with_a_larger_ceiling_tables_and_a_ring() {
     let mut scene = Scene::default();
     let scans = [scan(0, Some([0.0, 0.0, 1.6])), scan(1, Some([2.0, 1.0, 1.6]))];
-    // Both see the floor in part and the ceiling whole.
+    // Both scans see a part of the floor and all of the ceiling.
     scene.surface(0, ROOM, 1.0, wavy, |x, y| (x + y) % 2.0 > -0.5 && !(x.abs() < 1.0 && y > 2.0));
     scene.surface(1, ROOM, 1.0, |x, y| wavy(x, y) + 0.004, |x, _| x > 0.0);
     for s in 0..2 {
@@ -118,7 +118,7 @@ fn tilted_wavy_floor_with_a_larger_ceiling_tables_and_a_ring() {
     );
     let level = &floor.levels[0];
     assert!(level.area > 35.0 && level.waviness < 0.008, "{} {}", level.area, level.waviness);
-    // Noise of 2 mm, two scans 4 mm apart, and what waves inside a cell.
+    // Noise of 2 mm, two scans 4 mm apart, and waves within a cell.
     assert!((0.003..0.006).contains(&level.scatter), "{}", level.scatter);
     for (x, y) in [(-2.5, 0.5), (2.5, 2.2), (3.2, -2.0), (1.0, 1.0)] {
         let off = level.height(x, y).expect("known floor") - wavy(x, y);
@@ -166,7 +166,7 @@ fn floor_in_small_pieces_between_machines() {
 fn mirror_images_below_the_floor_are_refused() {
     let mut scene = Scene::default();
     scene.surface(0, ROOM, 1.0, |_, _| 0.0, |x, y| !(x > 3.0 && y > 4.0));
-    // The ceiling's image in a glossy floor, and a table's.
+    // Mirror images of the ceiling and of a table in a glossy floor.
     scene.surface(0, [[-3.0, 3.0], [-2.0, 4.0]], 1.0, |_, _| -3.0, |_, _| true);
     scene.surface(0, [[1.0, 2.0], [1.0, 2.0]], 1.0, |_, _| -0.8, |_, _| true);
     let floor = scene.find(&[scan(0, Some([0.0, 0.0, 1.6]))]);
@@ -209,7 +209,7 @@ fn cut_anywhere_the_answer_is_the_same() {
             n_points: 10,
             n_veils: i as u64,
             patches: vec![patch.clone()],
-            // Overlapping shares, so that voxels meet again and again.
+            // The shares overlap, so that the same voxels come from several parts.
             occupancy: Occupancy {
                 edge: 0.05,
                 voxels: voxels.iter().skip(i % 3).step_by(1 + i % 5).copied().collect(),

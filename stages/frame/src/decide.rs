@@ -1,4 +1,4 @@
-//! Judged poses in; the one that is clear, or what keeps each from being so, out.
+//! Decides which judged pose of the new scans to take, or why none is clear enough.
 
 use crate::judge::{Evidence, Judged, judge};
 use crate::refine::{Chosen, Laid, NEAR, WIDE, apart};
@@ -6,72 +6,73 @@ use crate::{Session, search};
 use contract::Fan;
 use geometry::{Pose, Vector};
 
-/// Fewest surfels of surfaces that are not level that lie on the other session's: 6 m², and 2.4 m²
-/// where files state the pose.
+/// Smallest number of non-level surfels on surfaces of the other session for a searched pose: 6 m².
 const MIN_SAME: usize = 150;
+/// The corresponding number where the files state the pose: 2.4 m².
 const MIN_SAME_STATED: usize = 60;
-/// Surfels of upright surfaces that hold a pose in each direction of the plan, at least: 1.2 m².
+/// Smallest number of upright surfels that determine a pose in each horizontal direction: 1.2 m².
 const MIN_HOLD: f64 = 30.0;
-/// Least share of what can be compared that lies on the other session's surfaces: of the stated
-/// pose, and of one that was searched.
+/// Smallest share of the comparable surfels that lie on the other session's surfaces, for the
+/// stated pose.
 const MIN_SHARE_STATED: f64 = 0.7;
+/// The corresponding share for a searched pose.
 const MIN_SHARE: f64 = 0.75;
-/// The same of the stated pose where no other place fits as well: much in the cell has changed.
+/// The same share for the stated pose if no other place fits as well: much in the cell has changed.
 const MIN_SHARE_CHANGED: f64 = 0.4;
-/// A pose this near to the stated one is the stated one: metres, radians. The registration of each
-/// scan takes it back.
+/// Largest difference of a pose that counts as the stated one: metres, radians. The registration of
+/// each scan corrects that much.
 const STATED: (f64, f64) = (0.03, 0.0035);
-/// The stated pose is looked for within this, metres, radians: 0.6°.
+/// Largest correction of the stated pose: metres, radians (0.6°).
 const STATED_ABOUT: (f64, f64) = (0.15, 0.01);
-/// Poses that differ by more are of different places: metres, radians (1°).
+/// Poses that differ by more belong to different places: metres, radians (1°).
 const PLACE: (f64, f64) = (0.3, 0.0175);
-/// Another place is asked for where at least this share of what lies on old surfaces under the best
-/// pose does so under it.
+/// Another place is a rival if at least this share of the surfels that lie on old surfaces in the
+/// best pose also do so in it.
 const SERIOUS: f64 = 0.5;
-/// So many surfels more must speak against another place than against the best one: 8 m² of both
-/// sessions together, more than one thing that was moved from where its like stood (a loaded pallet
-/// has up to 3 m² in each session).
+/// By how many more surfels a rival must be contradicted than the best place: 8 m² of both sessions
+/// together, more than one object that was moved to a similar place (a loaded pallet has up to 3 m²
+/// in each session).
 const MIN_MARGIN: i64 = 200;
-/// The same as a share of what lies on old surfaces under the best pose.
+/// The same margin as share of the surfels that lie on old surfaces in the best pose.
 const MARGIN_SHARE: f64 = 0.02;
-/// Places that are told to a person, at most.
+/// Largest number of places that are reported to the user.
 const MAX_TOLD: usize = 4;
 
 /// A pose of the new session in the earlier one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// The pose, each session about its own origin, and how well it is determined.
+    /// The pose, each session about its own origin, with its uncertainty.
     pub laid: Laid,
-    /// What speaks for and against it.
+    /// The evidence for and against it.
     pub evidence: Evidence,
-    /// By how many surfels more the next best other place is contradicted; `None` where there is
-    /// no other.
+    /// By how many more surfels the next best place is contradicted; `None` where there is no other
+    /// place.
     pub margin: Option<i64>,
 }
 
-/// What is said of the stated pose.
+/// The result of checking the stated pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Answer {
-    /// It holds.
+    /// The stated pose is right.
     Holds(Place),
-    /// It nearly holds: so far off, clearly.
+    /// The stated pose is nearly right; the place has the correction.
     Near(Place),
-    /// It is contradicted, or too little speaks for it.
+    /// The stated pose is contradicted, or has too little evidence.
     Not(Option<Place>),
 }
 
 /// Why no pose is taken.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Refusal {
-    /// Nothing of the new session lies well on the earlier one; the best of what was tried.
+    /// Nothing of the new session fits the earlier one well; the best pose that was tried.
     Nothing(Option<Box<Place>>),
-    /// Several places fit, the best first: what tells them apart is less than what may have been
-    /// moved.
+    /// Several places fit, the best first; they differ by no more evidence than objects that were
+    /// moved could account for.
     Several(Vec<Place>),
 }
 
-/// Whether new scans lie where they are stated to, `stated` being the earlier session's world from
-/// theirs.
+/// Checks whether new scans lie where they are stated to; `stated` is the pose
+/// `old_world_from_new_world`.
 #[must_use]
 pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
     let chosen = Chosen::of(&new.surfels);
@@ -82,7 +83,7 @@ pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
     if !is_borne_out(&place) || !is_within(STATED_ABOUT) {
         return Answer::Not(Some(place));
     }
-    // A few centimetres are believed only where surfaces hold the pose in all directions.
+    // A correction of centimetres is accepted only if surfaces determine all directions.
     if is_within(STATED) || place.laid.hold < MIN_HOLD {
         Answer::Holds(place)
     } else {
@@ -90,21 +91,21 @@ pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
     }
 }
 
-/// The pose near a rough one that a person gives, and whether surfaces and beams bear it out.
+/// Refines a rough pose that a user gives, and checks it against surfaces and beams.
 ///
 /// # Errors
-/// The pose as far as it could be refined, where they do not.
+/// If they contradict the pose or do not confirm it, with the pose as far as it could be refined.
 pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, Option<Box<Place>>> {
     let laid = Chosen::of(&new.surfels).lay(&old.surfels, rough, &WIDE).ok_or(None)?;
     let place = plain(&judge(old, new, laid));
     if is_borne_out(&place) { Ok(place) } else { Err(Some(Box::new(place))) }
 }
 
-/// Where the new session lies in the earlier one, searched over all shifts and yaws; `stated` is
-/// one of the poses that are asked for.
+/// Finds where the new session lies in the earlier one, over all shifts and yaws; `stated` is tried
+/// as one of the poses.
 ///
 /// # Errors
-/// No pose is clear.
+/// If no pose is clear.
 pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Result<Place, Refusal> {
     let chosen = Chosen::of(&new.surfels);
     let mut poses = search::poses(&old.surfels, &new.surfels, fan);
@@ -121,7 +122,7 @@ pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Resul
             apart_ones.push(laid);
         }
     }
-    // Of a pose that lays little on the earlier session, no more is kept.
+    // Poses with few surfels on the earlier session are dropped here, to save memory.
     let judged = fan.fan(apart_ones, |laid| {
         let judged = judge(old, new, laid);
         (judged.evidence.n_same() >= MIN_SAME_STATED).then_some(judged)
@@ -131,14 +132,14 @@ pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Resul
     clear(&places(judged, &at), stated, &at)
 }
 
-/// Whether a pose is the stated one, as near as the registration of each scan can tell.
+/// Whether a place is the stated pose, within what the registration of each scan corrects.
 #[must_use]
 pub fn is_stated(place: &Place, stated: &Pose, new: &Session) -> bool {
     let off = apart(&place.laid.old_from_new, stated, &middle(new));
     off.0 <= STATED.0 && off.1 <= STATED.1
 }
 
-/// The best of each place.
+/// The best judged pose of each place.
 fn places(judged: Vec<Judged>, at: &Vector) -> Vec<Judged> {
     let mut out: Vec<Judged> = Vec::new();
     for one in judged {
@@ -153,7 +154,7 @@ fn places(judged: Vec<Judged>, at: &Vector) -> Vec<Judged> {
     out
 }
 
-/// The first of some places, if it is clear.
+/// The best of these places, if it is clear.
 fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal> {
     let Some((best, others)) = places.split_first() else { return Err(Refusal::Nothing(None)) };
     let mut place = plain(best);
@@ -167,7 +168,7 @@ fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal
         others.iter().filter(|o| o.evidence.n_same() as f64 >= SERIOUS * n_same).collect();
     let margin = |other: &&Judged| best.margin_over(other);
     place.margin = serious.iter().map(margin).min();
-    // That the files state it speaks for a pose as much as what stands there.
+    // A pose that the files state needs no margin: the statement is evidence for it.
     let least = if is_stated { 0 } else { MIN_MARGIN.max((MARGIN_SHARE * n_same) as i64) };
     let rivals: Vec<Place> =
         serious.iter().filter(|o| margin(o) < least).map(|o| plain(o)).take(MAX_TOLD - 1).collect();
@@ -187,12 +188,12 @@ fn is_good(place: &Place, min_share: f64) -> bool {
         && place.evidence.share() >= min_share
 }
 
-/// Whether enough speaks for a pose that somebody states.
+/// Whether the evidence confirms a pose that a user states.
 fn is_borne_out(place: &Place) -> bool {
     place.evidence.n_same() >= MIN_SAME_STATED && place.evidence.share() >= MIN_SHARE_STATED
 }
 
-/// Where poses of a new session are compared.
+/// The point of a new session at which poses are compared.
 fn middle(new: &Session) -> Vector {
     let n = new.surfels.all.len().max(1) as f64;
     new.surfels.all.iter().map(|s| s.at).sum::<Vector>() / n

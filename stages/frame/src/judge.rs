@@ -1,6 +1,6 @@
-//! A pose of the new session in the earlier one in; which surfels of each lie on surfels of the
-//! other, and which lie where the beams of the other went through, out. Level surfaces are left
-//! out: a floor lies on itself wherever it is laid.
+//! Judges a pose of the new session: which surfels of each session lie on surfels of the other, and
+//! which lie where beams of the other passed through. Level surfaces do not count, since a floor
+//! fits on itself in any place.
 
 use crate::refine::Laid;
 use crate::surfels::{Surfel, Surfels};
@@ -8,43 +8,43 @@ use crate::{Panorama, Session};
 use geometry::{Pose, Vector};
 use nalgebra::Point3;
 
-/// Two surfels are of one plane where it passes this near to both, metres, with normals at most 37°
-/// apart …
+/// Two surfels belong to one plane if it passes both at this distance or less, metres.
 const ON: f64 = 0.04;
+/// Smallest cosine between the normals of two surfels of one plane (37°).
 const ALIKE: f64 = 0.8;
-/// … and their middles at most so far apart, metres: a voxel and a half.
+/// Largest distance between the centres of such surfels, metres: a voxel and a half.
 const ABOUT: f64 = 0.3;
-/// Surfels of which one is not flat are the same thing where their middles are so near, metres.
+/// Distance of centres below which surfels of which one is not flat are the same object, metres.
 const NEAR: f64 = 0.15;
-/// Surfels of the earlier session are asked for up to this distance from a new scanner, metres.
+/// Largest distance of surfels of the earlier session from a new scanner, metres.
 const FARTHEST: f64 = 20.0;
 
-/// What the other session has where a surfel lies.
+/// What the other session has at the place of a surfel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) enum State {
-    /// Nothing is known: no beam got there.
+    /// Nothing is known, since no beam got there.
     #[default]
     Unknown,
     /// The same surface.
     Same,
-    /// The same surface, of a robot, which may have moved.
+    /// The same surface, but of a robot, which may have moved.
     SameRobot,
-    /// Beams went through.
+    /// Beams passed through.
     Through,
 }
 
-/// What speaks for and against a pose, in surfels of surfaces that are not level (0.04 m² each).
+/// Evidence for and against a pose, in non-level surfels (0.04 m² each).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Evidence {
-    /// New surfels on surfaces of the earlier session.
+    /// Number of new surfels on surfaces of the earlier session.
     pub n_on_old: usize,
-    /// New surfels where beams of the earlier session went through.
+    /// Number of new surfels where beams of the earlier session passed through.
     pub n_where_old_saw_through: usize,
-    /// All new surfels.
+    /// Number of all new surfels.
     pub n_new: usize,
-    /// Surfels of the earlier session, near the new scanners, on surfaces of the new one.
+    /// Number of surfels of the earlier session, near the new scanners, on surfaces of the new one.
     pub n_on_new: usize,
-    /// Surfels of the earlier session where new beams went through.
+    /// Number of surfels of the earlier session where new beams passed through.
     pub n_where_new_saw_through: usize,
 }
 
@@ -57,32 +57,32 @@ pub(crate) struct Judged {
 }
 
 impl Evidence {
-    /// Surfels that lie on surfaces of the other session.
+    /// Number of surfels that lie on surfaces of the other session.
     #[must_use]
     pub fn n_same(&self) -> usize {
         self.n_on_old + self.n_on_new
     }
 
-    /// Surfels where beams of the other session went through.
+    /// Number of surfels where beams of the other session passed through.
     #[must_use]
     pub fn n_against(&self) -> usize {
         self.n_where_old_saw_through + self.n_where_new_saw_through
     }
 
-    /// Share of the surfels that can be compared that lie on surfaces of the other session; 0 where
-    /// none can.
+    /// Share of the comparable surfels that lie on surfaces of the other session; 0 where none can
+    /// be compared.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.n_same() as f64 / (self.n_same() + self.n_against()).max(1) as f64
     }
 
-    /// For the order of poses: what speaks for it, less twice what speaks against it.
+    /// Rank of a pose: number of surfels for it less twice the number against it.
     pub(crate) fn score(&self) -> i64 {
         self.n_same() as i64 - 2 * self.n_against() as i64
     }
 }
 
-/// Asks both sessions.
+/// Judges a pose by both sessions.
 pub(crate) fn judge(old: &Session, new: &Session, laid: Laid) -> Judged {
     let pose = laid.old_from_new;
     let back = pose.inverse();
@@ -92,8 +92,8 @@ pub(crate) fn judge(old: &Session, new: &Session, laid: Laid) -> Judged {
             return State::Unknown;
         }
         match state(s, &pose, (&old.surfels, &old.eyes)) {
-            // Without beams, what stands where a floor or anything else was seen and it was not was
-            // not there.
+            // Without beams, an object where the other session saw a floor or anything else, but
+            // not the object, was not there.
             State::Unknown if old.eyes.is_empty() && is_covered(s) => State::Through,
             state => state,
         }
@@ -126,9 +126,9 @@ pub(crate) fn judge(old: &Session, new: &Session, laid: Laid) -> Judged {
 }
 
 impl Judged {
-    /// How many surfels more speak against another pose than against this one, of what stands
-    /// still. What is seen through under both, since it was moved, is left out, and so is what
-    /// lies on a robot under either.
+    /// By how many more surfels of fixed objects another pose is contradicted than this one.
+    /// Surfels that are seen through in both poses (a moved object) and those on a robot in either
+    /// pose do not count.
     pub(crate) fn margin_over(&self, other: &Self) -> i64 {
         let sides = [(&self.new, &other.new), (&self.old, &other.old)];
         let all = sides.into_iter().flat_map(|(own, other)| own.iter().zip(other));
@@ -141,8 +141,8 @@ impl Judged {
     }
 }
 
-/// What a session has where a surfel of the other one lies; `pose` brings that one's world into its
-/// own.
+/// What a session has at the place of a surfel of the other one; `pose` converts from the other's
+/// world to its own.
 fn state(surfel: &Surfel, pose: &Pose, (surfels, eyes): (&Surfels, &[Panorama])) -> State {
     let at = (pose * Point3::from(surfel.at)).coords;
     let normal = pose.rotation * surfel.normal;

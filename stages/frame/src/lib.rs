@@ -1,5 +1,5 @@
-//! Surfaces and beams of an earlier session and of new scans in; where the frame of the new scans
-//! lies in that of the earlier session, and how clearly, out.
+//! Finds where the frame of new scans lies in that of an earlier session, from surfaces and beams
+//! of both, and how clearly.
 //!
 //! 1. Each session is described by surfels: one voxel of 0.2 m, its mean point and normal
 //!    ([`Gathered`], [`Surfels`]); and by panoramas: how far the beams of a scanner went in each
@@ -11,7 +11,29 @@
 //! 4. Each refined pose is judged (`judge`): which surfels lie on surfels of the other session, and
 //!    which lie where the beams of the other session went through.
 //! 5. The best pose is taken only if every other place that fits about as well is contradicted by
-//!    much more of what stands still than could have been moved (`decide`).
+//!    many more surfels of fixed objects than moved objects could account for (`decide`).
+//!
+//! # Example
+//! ```
+//! use frame::{Answer, Gathered, Panorama, Session, at_stated};
+//! use geometry::{Pose, Vector, direction::unit};
+//!
+//! // A scanner in a room of 10 m × 7 m × 4 m.
+//! let (at, origin) = (Vector::new(4.0, 3.0, 1.7), Vector::zeros());
+//! let mut eye = Panorama::new(&Pose::translation(at.x, at.y, at.z), &origin);
+//! let mut points = Gathered::about(origin);
+//! for (row, col) in (-220..220).flat_map(|row| (0..900).map(move |col| (row, col))) {
+//!     let angle = |i: i32| (f64::from(i) * 0.4 + 0.1).to_radians();
+//!     let along = unit(angle(col), angle(row));
+//!     let to = |i: usize| if along[i] > 0.0 { [10.0, 7.0, 4.0][i] - at[i] } else { -at[i] };
+//!     let range = (0..3).map(|i| to(i) / along[i]).fold(f64::INFINITY, f64::min);
+//!     eye.add(along.map(|v| (v * range) as f32));
+//!     points.add((at + Vector::from(along) * range).into(), Some(&at));
+//! }
+//! let session = Session { surfels: points.surfels(&[]), eyes: vec![eye.finish()] };
+//! // The scans lie on themselves where they are stated to.
+//! assert!(matches!(at_stated(&session, &session, &Pose::identity()), Answer::Holds(_)));
+//! ```
 #![forbid(unsafe_code)]
 
 mod decide;
@@ -30,11 +52,11 @@ pub use panorama::Panorama;
 pub use refine::Laid;
 pub use surfels::{Gathered, Surfel, Surfels};
 
-/// What one session knows: its surfaces, and how far its beams went.
+/// The surfaces of one session, and how far its beams went.
 #[derive(Debug, Clone, Default)]
 pub struct Session {
-    /// Its surfaces, about an origin of its own.
+    /// Surfaces, about an origin of the session's own.
     pub surfels: Surfels,
-    /// Its scanners, about the same origin.
+    /// Scanners, about the same origin.
     pub eyes: Vec<Panorama>,
 }

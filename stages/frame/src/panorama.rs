@@ -1,4 +1,4 @@
-//! Points of one scan in; how far its beams went in each direction, in a coarse raster, out.
+//! How far the beams of one scan went in each direction, as a coarse raster.
 
 use geometry::direction::spherical;
 use geometry::{Pose, Vector};
@@ -9,33 +9,35 @@ use std::f32::consts::{FRAC_PI_2, PI};
 const CELL: f32 = 0.008_726_646;
 const N_ROWS: usize = 360;
 const N_COLS: usize = 720;
-/// A beam that ended so far behind a place, and a share of its range more, went through it, metres:
-/// noise, the voxel of a surfel, and what a pose that is not yet fine is off.
+/// Distance behind a place at which a beam must end to have passed
+/// through the place, metres: noise, the voxel of a surfel, and the error of a rough pose.
 const BEYOND: f32 = 0.15;
+/// Share of the range that is added to [`BEYOND`].
 const BEYOND_SHARE: f32 = 0.01;
-/// Farther places are not looked at, metres: a cell and its neighbours are half a metre wide there.
+/// Largest range of places that are tested, metres: there a cell with its neighbours is half a
+/// metre wide.
 const FARTHEST: f32 = 20.0;
-/// Nearer places are not looked at either, metres: tripods and persons beside them.
+/// Smallest range of places that are tested, metres: nearer there are tripods and people.
 const NEAREST: f32 = 0.5;
-/// Of a cell and its eight neighbours so many must have beams: one row of them may pass over all of
-/// a flat top.
+/// Number of a cell and its eight neighbours that must have beams: a single row of them may pass
+/// just above a flat top.
 const MIN_SEEN: usize = 6;
 
 /// How far the beams of one scanner went.
 #[derive(Debug, Clone)]
 pub struct Panorama {
-    /// Scan frame from the session's world about its origin.
+    /// Pose `scan_from_local`; the local frame is the session's world about its origin.
     scan_from_local: Pose,
     at: Vector,
     /// Nearest range of each cell, rows upwards, metres; infinite where there is none. After
-    /// [`Panorama::finish`] that of the cell and its neighbours, 0 where too few of them have
-    /// beams.
+    /// [`Panorama::finish`] the nearest range of the cell and its neighbours, 0 where too few of
+    /// them have beams.
     near: Vec<f32>,
 }
 
 impl Panorama {
-    /// An empty one for a scan with this pose in the session's world, whose coordinates are taken
-    /// about `origin`.
+    /// An empty panorama for a scan with this pose in the session's world; coordinates are relative
+    /// to `origin`.
     #[must_use]
     pub fn new(world_from_scan: &Pose, origin: &Vector) -> Self {
         let mut local_from_scan = *world_from_scan;
@@ -55,7 +57,7 @@ impl Panorama {
         }
     }
 
-    /// After the last point: each cell takes the nearest range of its neighbourhood.
+    /// Gives each cell the nearest range of its neighbourhood; to be called after the last point.
     #[must_use]
     pub fn finish(mut self) -> Self {
         let raw = std::mem::take(&mut self.near);
@@ -75,8 +77,8 @@ impl Panorama {
         self
     }
 
-    /// Whether beams, all around, went on beyond a place (the session's world about its origin,
-    /// metres).
+    /// Whether all beams about a place (the session's world about its origin, metres) went on
+    /// beyond it.
     #[inline]
     #[must_use]
     pub fn sees_through(&self, local: &Vector) -> bool {
@@ -89,14 +91,15 @@ impl Panorama {
             && self.near[row * N_COLS + col] > range + BEYOND + BEYOND_SHARE * range
     }
 
-    /// Where the scanner stands, the session's world about its origin, metres.
+    /// Position of the scanner in the session's world about its origin, metres.
     #[must_use]
     pub fn at(&self) -> Vector {
         self.at
     }
 }
 
-/// Row and column of a point of the scan frame, and its range; no cell for what is no direction.
+/// Row and column of a point in the scan frame and its range; no cell for a point without
+/// direction.
 #[inline]
 fn cell(scan: [f32; 3]) -> (Option<[usize; 2]>, f32) {
     let (azimuth, elevation, range) = spherical(scan);

@@ -1,10 +1,10 @@
-//! Surfels of two sessions in; plans of both as rasters, and where one lies best on the other over
-//! all shifts, out.
+//! Draws the surfels of two sessions as plans, and finds the shifts at which one plan fits best on
+//! the other.
 //!
-//! Olson (2009) and Hess et al. (2016) look for the pose of a scan by correlating rasters; here the
-//! correlation over all shifts is taken at once, by Fourier transforms. Walls are told apart by the
-//! side they face, so that a wall does not fit on one that faces elsewhere; and what stands in one
-//! session where the other has bare floor speaks against a shift.
+//! Olson (2009) and Hess et al. (2016) find the pose of a scan by correlating rasters. Here the
+//! correlation over all shifts is computed at once by Fourier transforms. Walls are drawn by the
+//! side that they face, so that a wall does not fit on one that faces another way, and an object of
+//! one session on bare floor of the other counts against a shift.
 
 use crate::surfels::{Surfel, Surfels};
 use geometry::{Pose, Vector};
@@ -14,43 +14,46 @@ use rustfft::{Fft, FftPlanner};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-/// Edge of a cell, metres, at least; larger where a plan would have more than `MAX_CELLS` on a
+/// Smallest edge of a cell, metres; it is larger where a plan would have more than `MAX_CELLS` on a
 /// side.
 const CELL: f64 = 0.2;
+/// Largest number of cells along a side of a plan.
 const MAX_CELLS: f64 = 1024.0;
-/// Surfels in a column count up to this number: a high wall must not outweigh all that stands
-/// before it.
+/// Largest count of surfels in a column: a high wall must not outweigh all objects in front of it.
 const MAX_HIGH: f32 = 5.0;
-/// A column of the earlier session is there or not.
+/// Count of an occupied column of the earlier session.
 const THERE: f32 = 1.0;
-/// Layers: upright surfaces by the side they face, what is not flat, and bare floor.
+/// Layers of a plan: upright surfaces by the side they face, surfaces that are not flat, bare
+/// floor.
 const SIDES: usize = 4;
 const ROUGH: usize = SIDES;
 const BARE: usize = SIDES + 1;
 const N_LAYERS: usize = SIDES + 2;
-/// Weight of what stands where the other session has bare floor.
+/// Weight of objects where the other session has bare floor.
 const AGAINST: f32 = 1.0;
-/// Farthest from its middle that a session is drawn, metres.
+/// Largest distance from its centre up to which a session is drawn, metres.
 const REACH: f64 = 40.0;
-/// Peaks of one yaw: fewest metres between two, most of them, and least share of the highest.
+/// Smallest distance between two peaks of one yaw, metres.
 const PEAK_APART: f64 = 0.7;
+/// Largest number of peaks of one yaw.
 const MAX_PEAKS: usize = 20;
+/// Smallest height of a peak, as share of the highest.
 const LEAST_PEAK: f32 = 0.3;
 
-/// A shift in the plan, metres, and how well it fits.
+/// A horizontal shift (metres) with its score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Peak {
     pub(crate) shift: [f64; 2],
     pub(crate) score: f32,
 }
 
-/// The plan of an earlier session, transformed.
+/// The Fourier transform of an earlier session's plan.
 pub(crate) struct Plans {
     edge: f64,
     n: [usize; 2],
-    /// Corner of the raster, metres.
+    /// Lowest corner of the raster, metres.
     corner: [f64; 2],
-    /// How far about its origin the new session is drawn, metres.
+    /// Distance about its origin up to which the new session is drawn, metres.
     reach: f64,
     /// Direction that side 0 faces, radians.
     main: f64,
@@ -58,12 +61,12 @@ pub(crate) struct Plans {
     fft: Fourier,
 }
 
-/// Layers of one session on a raster.
+/// The layers of one session on a raster.
 struct Drawn(Vec<Vec<f32>>);
 
 impl Plans {
-    /// Draws an earlier session for new ones; `main` is the direction that most of its walls face,
-    /// radians.
+    /// Draws an earlier session for comparison with new ones; `main` is the direction that most of
+    /// its walls face, radians.
     pub(crate) fn of(old: &Surfels, new: &Surfels, main: f64) -> Option<Self> {
         let (first, mut min, mut max) = (old.all.first()?.at, [0.0; 2], [0.0; 2]);
         for i in 0..2 {
@@ -84,13 +87,13 @@ impl Plans {
                 if layer == BARE { raster.clone() } else { widened(raster, n) }
             });
         let mut all: Vec<Vec<f32>> = widened.collect();
-        // What stands anywhere, for new bare floor.
+        // A layer of all objects, to compare with new bare floor.
         all.push((0..n[0] * n[1]).map(|i| drawn.stands(i)).collect());
         plans.layers = all.iter().map(|raster| plans.fft.forward(raster)).collect();
         Some(plans)
     }
 
-    /// Where a new session, turned by a yaw about its origin, fits.
+    /// The shifts at which a new session, turned by `yaw` (radians) about its origin, fits.
     pub(crate) fn peaks(&self, new: &Surfels, yaw: f64) -> Vec<Peak> {
         let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector::z_axis(), yaw);
         let pose = Pose::from_parts(nalgebra::Translation3::identity(), turn);
@@ -113,7 +116,7 @@ impl Plans {
         self.highest(&score, corner)
     }
 
-    /// Draws surfels at a pose; a column counts up to `most`.
+    /// Draws surfels at a pose; the count of a column is limited to `most`.
     fn draw<'s>(
         &self,
         surfels: impl Iterator<Item = &'s Surfel>,
@@ -148,7 +151,7 @@ impl Plans {
         for layer in &mut layers {
             layer.iter_mut().for_each(|v| *v = v.min(most));
         }
-        // Floor is bare where nothing stands on it, nor beside.
+        // Floor is bare where no object stands on it or beside.
         let drawn = Drawn(layers);
         let stands: Vec<f32> = (0..nx * ny).map(|i| drawn.stands(i)).collect();
         let beside = widened(&stands, self.n);
@@ -157,7 +160,7 @@ impl Plans {
         Drawn(layers)
     }
 
-    /// Highest peaks of a score over all shifts.
+    /// The highest peaks of a score over all shifts.
     fn highest(&self, score: &[f32], corner: [f64; 2]) -> Vec<Peak> {
         let [nx, ny] = self.n;
         let top = score.iter().copied().fold(0.0, f32::max);
@@ -174,7 +177,7 @@ impl Plans {
         let mut out: Vec<Peak> = Vec::new();
         for (score, i) in peaks {
             let cells = [i % nx, i / nx];
-            // What is drawn of the new session ends at twice its reach: larger shifts are negative
+            // The new session is drawn up to twice its reach, so that larger shifts are negative
             // ones.
             let shift = [0, 1].map(|k| {
                 let (cell, n) = (cells[k] as f64, self.n[k] as f64);
@@ -193,14 +196,14 @@ impl Plans {
 }
 
 impl Drawn {
-    /// How much stands in a cell.
+    /// How many surfels of objects a cell has.
     fn stands(&self, i: usize) -> f32 {
         self.0[..BARE].iter().map(|layer| layer[i]).sum::<f32>().min(MAX_HIGH)
     }
 }
 
-/// Each cell takes the largest of itself and a share of its neighbours, so that a shift by half a
-/// cell still fits.
+/// Gives each cell the largest of its value and a share of its neighbours', so that a shift by half
+/// a cell still fits.
 fn widened(raster: &[f32], [nx, ny]: [usize; 2]) -> Vec<f32> {
     const SHARE: f32 = 0.7;
     let value = |x: usize, y: usize| raster[y % ny * nx + x % nx];
@@ -212,7 +215,7 @@ fn widened(raster: &[f32], [nx, ny]: [usize; 2]) -> Vec<f32> {
     (0..raster.len()).map(of).collect()
 }
 
-/// The next number with small factors, for which transforms are fast.
+/// The next larger number with small prime factors, for which transforms are fast.
 fn good_size(n: usize) -> usize {
     let is_good = |n: &usize| {
         let mut n = *n;
@@ -226,10 +229,10 @@ fn good_size(n: usize) -> usize {
     (n.max(8)..).find(is_good).unwrap_or(n)
 }
 
-/// Transforms in the plane.
+/// Two-dimensional Fourier transforms.
 struct Fourier {
     n: [usize; 2],
-    /// Along x and y; forward and backward.
+    /// Transforms along x and y, forward and backward.
     plans: [[Arc<dyn Fft<f32>>; 2]; 2],
 }
 

@@ -1,62 +1,61 @@
-//! A rough pose of the new session in the earlier one in; the pose that lays its planes on those of
-//! the earlier one, by shift and yaw, and how well that is determined, out.
+//! Refines a rough pose of the new session by shift and yaw, so that its planes lie on those of the
+//! earlier session (point to plane), and estimates its uncertainty.
 
 use crate::surfels::{Surfel, Surfels, voxel};
 use geometry::{Pose, Vector};
 use nalgebra::{Matrix2, Matrix4, SymmetricEigen, Translation3, UnitQuaternion, Vector4};
 
-/// How far from a plane a surfel may lie to be laid on it, metres, round by round, from a pose of
-/// the search …
+/// Largest distance of a surfel from a plane in each round, metres, from a pose of the search.
 pub(crate) const WIDE: [f64; 12] =
     [0.35, 0.35, 0.3, 0.25, 0.2, 0.15, 0.12, 0.1, 0.08, 0.06, 0.05, 0.05];
-/// … and from the stated one.
+/// The same from the stated pose.
 pub(crate) const NEAR: [f64; 8] = [0.12, 0.12, 0.1, 0.1, 0.08, 0.06, 0.05, 0.05];
-/// Cosine between normals of one surface in both sessions: 25°.
+/// Smallest cosine between the normals of one surface in both sessions: 25°.
 const ALIKE: f64 = 0.9;
-/// Steps along the normal in which a plane is looked for, metres.
+/// Length of a step along the normal in the search for a plane, metres.
 const STEP: f64 = 0.1;
-/// Fewest pairs that lay a session.
+/// Smallest number of pairs of surfel and plane.
 const MIN_PAIRS: usize = 30;
-/// Surfels of each kind, level and not, that are laid at most: evenly chosen, more say the same.
+/// Largest number of surfels of each kind (level and other), chosen evenly; more add nothing.
 const MAX_LAID: usize = 2500;
-/// A step this small ends the rounds of the last gate, metres and radians.
+/// Length of a step that ends the rounds of the last gate, metres and radians.
 const SETTLED: f64 = 1e-5;
-/// Weight of where a step begins, in surfels.
+/// Damping of a step, in surfels.
 const DAMPING: f64 = 0.5;
-/// Least standard deviation of a surfel's distance, metres: noise is averaged, registration of the
-/// session is not.
+/// Smallest standard deviation of a surfel's distance, metres: noise averages out, errors of the
+/// session's registration do not.
 const MIN_SCALE: f64 = 1e-3;
 
-/// Surfels of a square metre err alike: waves of a surface, and what scans of one session are off
-/// each other.
+/// Number of surfels with correlated errors, those of a square metre: waves of a surface, and
+/// registration errors within a session.
 const ALIKE_SURFELS: f64 = 25.0;
 
-/// A pose that was refined.
+/// A refined pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Laid {
-    /// The earlier session's world from that of the new one, each about its own origin.
+    /// Pose of the new session's world in the earlier one's, each about its own origin, metres.
     pub old_from_new: Pose,
-    /// Standard deviations of x, y, z, metres, and yaw, radians, at the place `about`.
+    /// Standard deviations of x, y, z (metres) and yaw (radians) at the place `about`.
     pub sigma: [f64; 4],
-    /// Middle of what was laid, the earlier session's world about its origin, metres.
+    /// Centroid of the surfels used, the earlier session's world about its origin, metres.
     pub about: Vector,
-    /// Upright surfaces that hold it in the direction in the plan in which it is held least, in
-    /// surfels.
+    /// Number of upright surfels that determine it in the horizontal direction in which they are
+    /// fewest.
     pub hold: f64,
-    /// Surfels that were laid.
+    /// Number of surfels used.
     pub n_pairs: usize,
     /// RMS distance of the surfels from the planes, metres.
     pub rms: f64,
 }
 
-/// Surfels of a new session that are laid on an earlier one.
+/// The surfels of a new session that are used for refinement.
 pub(crate) struct Chosen {
     surfels: Vec<Surfel>,
     middle: Vector,
 }
 
 impl Chosen {
-    /// Evenly from all flat ones.
+    /// Chooses evenly from all flat surfels.
     pub(crate) fn of(new: &Surfels) -> Self {
         let flat =
             |level: bool| new.all.iter().filter(move |s| s.is_flat() && s.is_level() == level);
@@ -70,14 +69,14 @@ impl Chosen {
         Self { surfels, middle }
     }
 
-    /// Lays them on the planes of an earlier session, from a pose on; `None` where too few of them
-    /// lie near any.
+    /// Refines a pose by the planes of an earlier session; `None` where too few surfels lie near
+    /// any plane.
     pub(crate) fn lay(&self, old: &Surfels, from: &Pose, gates: &[f64]) -> Option<Laid> {
         let mut pose = *from;
         let mut last = None;
         for gate in gates {
             let sums = self.sums(old, &pose, *gate)?;
-            // What no plane tells stays as it was.
+            // Damping keeps what no plane determines unchanged.
             let step = (sums.normal + Matrix4::identity() * DAMPING).try_inverse()? * sums.right;
             let about = (pose * nalgebra::Point3::from(self.middle)).coords;
             pose = moved(&step, &about) * pose;
@@ -132,7 +131,7 @@ struct Sums {
     n: usize,
 }
 
-/// The plane of an earlier session nearest to a place along a normal.
+/// The plane of an earlier session that is nearest to a place along a normal.
 fn nearest(
     old: &Surfels,
     at: &Vector,
@@ -161,15 +160,15 @@ fn nearest(
     best.map(|(_, i)| i)
 }
 
-/// A motion by shift and yaw about a place.
+/// The motion by a shift and a yaw about a place.
 fn moved(step: &Vector4<f64>, about: &Vector) -> Pose {
     let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), step[3]);
     let shift = Vector::new(step[0], step[1], step[2]);
     Pose::from_parts(Translation3::from(about + shift - turn * about), turn)
 }
 
-/// How far two poses lay a place apart in the plan and height, metres, and how much they differ in
-/// yaw, radians.
+/// Distance between the images of a place under two poses (horizontal and vertical together),
+/// metres, and difference of the yaws, radians.
 pub(crate) fn apart(a: &Pose, b: &Pose, at: &Vector) -> (f64, f64) {
     let at = nalgebra::Point3::from(*at);
     ((a * at - b * at).norm(), a.rotation.angle_to(&b.rotation))

@@ -1,5 +1,4 @@
-//! Surfels of an earlier session and a new one in; poses of the new one that are worth a
-//! refinement, out.
+//! Searches for poses of the new session in the earlier one that are worth refining.
 
 use crate::plans::Plans;
 use crate::surfels::{Surfel, Surfels};
@@ -9,23 +8,29 @@ use nalgebra::{Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Bins of the histogram of directions that walls face, and its blur, bins: 0.5° and 1°.
+/// Number of bins of the histogram of wall directions (0.5° each).
 const N_BINS: usize = 720;
+/// Standard deviation of the blur of that histogram, bins.
 const BLUR: f64 = 2.0;
-/// Yaws: fewest bins between two, most of them, least share of the best.
+/// Smallest distance between two yaws, bins.
 const YAW_APART: usize = 6;
+/// Largest number of yaws.
 const MAX_YAWS: usize = 10;
+/// Smallest score of a yaw, as share of the best.
 const LEAST_YAW: f64 = 0.25;
-/// Fewest upright surfels that tell yaws; otherwise all yaws are tried at this step, radians: 2°.
+/// Number of upright surfels below which all yaws are tried, in steps of [`YAW_STEP`] radians (2°).
 const MIN_UPRIGHT: usize = 60;
+/// Step in which all yaws are tried, radians.
 const YAW_STEP: f64 = TAU / 180.0;
-/// Heights: edge of a bin, metres, most heights that are tried, least share of the best, bins
-/// between two.
+/// Edge of a bin of heights, metres.
 const HEIGHT: f64 = 0.02;
+/// Largest number of heights that are tried.
 const MAX_HEIGHTS: usize = 3;
+/// Smallest score of a height, as share of the best.
 const LEAST_HEIGHT: f64 = 0.6;
+/// Smallest distance between two heights, bins.
 const HEIGHT_APART: i32 = 8;
-/// Poses that are refined.
+/// Largest number of poses that are refined.
 const MAX_POSES: usize = 96;
 
 /// Poses of the new session in the earlier one, each about its own origin, the most promising
@@ -50,8 +55,8 @@ pub(crate) fn poses(old: &Surfels, new: &Surfels, fan: &dyn Fan) -> Vec<Pose> {
     all.iter().flat_map(of).collect()
 }
 
-/// Turns from the new session to the earlier one that lay walls on walls; and which way most walls
-/// of the latter face.
+/// Yaws from the new session to the earlier one that align walls, radians, and the direction that
+/// most walls of the earlier session face.
 fn yaws(old: &Surfels, new: &Surfels) -> (Vec<f64>, f64) {
     let is_signed = |all: &Surfels| all.all.iter().filter(|s| s.is_upright()).all(|s| s.is_signed);
     let signed = is_signed(old) && is_signed(new);
@@ -90,7 +95,7 @@ fn yaws(old: &Surfels, new: &Surfels) -> (Vec<f64>, f64) {
             chosen.push(peak);
         }
     }
-    // Between bins: the top of a parabola.
+    // The vertex of a parabola gives a maximum between bins.
     let fine = |b: usize| {
         let (l, m, r) = (at(b + N_BINS - 1), at(b), at(b + 1));
         let curve = l - 2.0 * m + r;
@@ -100,7 +105,7 @@ fn yaws(old: &Surfels, new: &Surfels) -> (Vec<f64>, f64) {
     (chosen.into_iter().map(fine).collect(), main)
 }
 
-/// How many surfels face each direction, blurred; both ways where sides are not known.
+/// Blurred number of surfels that face each direction; both directions where sides are unknown.
 fn histogram<'s>(upright: impl Iterator<Item = &'s Surfel>, is_signed: bool) -> Vec<f64> {
     let mut raw = vec![0.0; N_BINS];
     for surfel in upright {
@@ -117,12 +122,11 @@ fn histogram<'s>(upright: impl Iterator<Item = &'s Surfel>, is_signed: bool) -> 
             .map(|k| raw[(b + N_BINS + k - reach) % N_BINS] * weight(k.abs_diff(reach)))
             .sum()
     };
-    // A room's longest wall must not decide alone.
+    // The root keeps the longest wall of a room from deciding alone.
     (0..N_BINS).map(|b| of(b).sqrt()).collect()
 }
 
-/// Differences in height that lay level surfaces on level surfaces of the same side, the best
-/// first.
+/// Differences in height that align level surfaces of the same side, metres, the best first.
 fn heights(old: &Surfels, new: &Surfels) -> Vec<f64> {
     let levels = |all: &Surfels, up: bool| {
         let mut out: BTreeMap<i32, f64> = BTreeMap::new();

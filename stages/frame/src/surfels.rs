@@ -1,32 +1,34 @@
-//! Points with the places of their scanners in; one surfel a voxel, with an index by place, out.
+//! Reduces the points of a session to surfels: one for each voxel, with an index by place.
 
 use geometry::{Aabb, Moments, Vector};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::hash_map::Entry;
 
-/// Edge of a voxel, metres: some ten points of a scan that was thinned to 0.25° between beams, 10 m
-/// away.
+/// Edge of a voxel, metres: at 10 m it holds some ten points of a scan thinned to 0.25° between
+/// beams.
 pub(crate) const EDGE: f64 = 0.2;
-/// Where voxels begin, metres: floors and walls stand at round figures, and must not run along the
-/// borders of voxels.
+/// Offset of the voxels, metres: floors and walls stand at round coordinates and must not coincide
+/// with borders of voxels.
 const BEGIN: f64 = 0.0371;
-/// Fewest points of a plane, and of something that is none.
+/// Smallest number of points of a flat surfel.
 const MIN_FLAT: f64 = 6.0;
+/// Smallest number of points of a surfel that is not flat.
 const MIN_ROUGH: f64 = 3.0;
-/// A plane has at most this RMS distance from its points, metres: noise, and what scans of one
-/// session differ by.
+/// Largest RMS distance of points from their plane, metres: noise, and registration errors within a
+/// session.
 const MAX_RMS: f64 = 0.012;
-/// A plane whose points lie on a line is none: least spread across it, metres.
+/// Smallest spread of points across the line along which they lie most, metres; below, they define
+/// no plane.
 const MIN_SPREAD: f64 = 0.025;
-/// Normals are turned to the scanner where the beams come, on average, at least so steeply: sine of
-/// 3°.
+/// A normal is turned towards the scanner if the mean beam meets the plane at least this steeply:
+/// sine of 3°.
 const SIGNED: f64 = 0.05;
-/// A surface whose normal has this height at least is level, at most this one upright: cosines of
-/// 11° and 78°.
+/// Smallest z of a level surface's normal: cosine of 11°.
 pub(crate) const LEVEL: f64 = 0.98;
+/// Largest z of an upright surface's normal: cosine of 78°.
 pub(crate) const UPRIGHT: f64 = 0.21;
 
-/// Points of a session by voxel. Nothing depends on the order of the voxels.
+/// The points of a session by voxel. No result depends on the order of the voxels.
 #[derive(Debug, Clone)]
 pub struct Gathered {
     origin: Vector,
@@ -36,18 +38,18 @@ pub struct Gathered {
 #[derive(Debug, Clone)]
 struct Cell {
     moments: Moments,
-    /// Sum of the unit vectors from the points to their scanners; zero where these are not known.
+    /// Sum of the unit vectors from the points to their scanners; zero where scanners are unknown.
     towards: Vector,
 }
 
-/// What lies in one voxel.
+/// The points of one voxel, reduced to a point and a normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surfel {
-    /// Mean of its points, metres about the session's origin.
+    /// Mean of the points relative to the session's origin, metres.
     pub at: Vector,
-    /// Unit normal of the plane through them; zero where they lie on none.
+    /// Unit normal of the plane of the points; zero where they lie on no plane.
     pub normal: Vector,
-    /// Whether the normal points to the scanners.
+    /// Whether the normal points towards the scanners; otherwise its sign is arbitrary.
     pub is_signed: bool,
     /// Whether a robot stood there, which may have moved since.
     pub may_move: bool,
@@ -56,23 +58,23 @@ pub struct Surfel {
 /// The surfels of a session, ordered by voxel.
 #[derive(Debug, Clone, Default)]
 pub struct Surfels {
-    /// What is subtracted from coordinates of the session, metres: they may be those of a map.
+    /// Subtracted from coordinates of the session, which may be those of a map, metres.
     pub origin: Vector,
-    /// In the order of their voxels.
+    /// The surfels in the order of their voxels.
     pub all: Vec<Surfel>,
     index: FxHashMap<[i32; 3], u32>,
-    /// Columns of voxels in which there is any.
+    /// Columns of voxels with at least one surfel.
     columns: FxHashSet<[i32; 2]>,
 }
 
 impl Gathered {
-    /// For points about an origin (world of the session, metres).
+    /// An empty collection about an origin (world of the session, metres).
     #[must_use]
     pub fn about(origin: Vector) -> Self {
         Self { origin, cells: FxHashMap::default() }
     }
 
-    /// Adds a point, and where its scanner stands if that is known; world of the session, metres.
+    /// Adds a point and the position of its scanner, if known; world of the session, metres.
     pub fn add(&mut self, world: [f64; 3], scanner: Option<&Vector>) {
         let world = Vector::from(world);
         let p = world - self.origin;
@@ -86,7 +88,7 @@ impl Gathered {
         }
     }
 
-    /// Adds those of others about the same origin.
+    /// Adds the points of another collection about the same origin.
     pub fn join(&mut self, other: Self) {
         debug_assert_eq!(self.origin, other.origin, "two origins");
         other.cells.into_iter().for_each(|(at, cell)| match self.cells.entry(at) {
@@ -99,8 +101,8 @@ impl Gathered {
         });
     }
 
-    /// The surfels; those within one of `may_move` (world of the session, metres) are of something
-    /// that may move.
+    /// Computes the surfels. Those within one of the boxes `may_move` (world of the session,
+    /// metres) belong to something that may have moved.
     #[must_use]
     pub fn surfels(&self, may_move: &[Aabb]) -> Surfels {
         let found = self.cells.iter().filter_map(|(at, cell)| Some((*at, cell.surfel()?)));
@@ -149,20 +151,20 @@ impl Surfel {
         self.normal != Vector::zeros()
     }
 
-    /// Whether it is flat and level: of a floor, a ceiling, a table.
+    /// Whether it is flat and level, as on a floor, a ceiling or a table.
     #[must_use]
     pub fn is_level(&self) -> bool {
         self.normal.z.abs() >= LEVEL
     }
 
-    /// Whether it is flat and upright: of a wall, a cabinet, a fence.
+    /// Whether it is flat and upright, as on a wall, a cabinet or a fence.
     #[must_use]
     pub fn is_upright(&self) -> bool {
         self.is_flat() && self.normal.z.abs() <= UPRIGHT
     }
 
-    /// Cosine between its normal and another one; of normals whose side is not known, that to the
-    /// nearer side.
+    /// Cosine of the angle between its normal and another one. If the sign of either is arbitrary,
+    /// the absolute value.
     pub(crate) fn cosine(&self, normal: &Vector, is_signed: bool) -> f64 {
         let cosine = self.normal.dot(normal);
         if self.is_signed && is_signed { cosine } else { cosine.abs() }
@@ -170,7 +172,7 @@ impl Surfel {
 }
 
 impl Surfels {
-    /// The surfel of the voxel with this index.
+    /// Index of the surfel of this voxel.
     #[inline]
     pub(crate) fn of(&self, voxel: &[i32; 3]) -> Option<usize> {
         self.index.get(voxel).map(|i| *i as usize)
@@ -182,7 +184,7 @@ impl Surfels {
         self.columns.contains(&[i, j])
     }
 
-    /// The surfels of the voxel that holds a place and of the 26 about it.
+    /// Indices of the surfels in the voxel of a place and its 26 neighbours.
     pub(crate) fn about(&self, at: &Vector) -> impl Iterator<Item = usize> + '_ {
         let [i, j, k] = voxel(at);
         let steps = (0..27).map(|n| [n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1]);

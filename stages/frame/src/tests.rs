@@ -1,12 +1,11 @@
-//! Rooms of planes with things in them, seen by scanners that see all of them from where they
-//! stand.
+//! Synthetic rooms with boxes in them; scanners see everything from where they stand.
 
 use crate::{Answer, Gathered, Panorama, Refusal, Session, at_stated, find, from_rough};
 use contract::OneByOne;
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 
-/// A box: least and greatest corner, metres.
+/// A box: lowest and highest corner, metres.
 type Block = [[f64; 3]; 2];
 
 /// A room with blocks in it.
@@ -39,12 +38,12 @@ impl World {
         nearest
     }
 
-    /// What scanners at these places see, in the frame that `stated` brings the world into.
+    /// The session of scanners at these places; `stated` converts the world to the session's frame.
     fn session(&self, scanners: &[[f64; 3]], stated: &Pose) -> Session {
         self.seen(scanners, stated, true)
     }
 
-    /// The same, with the places of the scanners or without.
+    /// A session with known or unknown scanner positions.
     fn seen(&self, scanners: &[[f64; 3]], stated: &Pose, is_known: bool) -> Session {
         let origin = (stated * nalgebra::Point3::from(scanners[0])).coords.map(f64::round);
         let mut gathered = Gathered::about(origin);
@@ -79,7 +78,7 @@ fn frame(shift: [f64; 3], yaw_deg: f64) -> Pose {
     Pose::from_parts(Translation3::from(Vector::from(shift)), turn)
 }
 
-/// The earlier session's world from the new one, each about its own origin, as it truly is.
+/// The true pose of the new session's world in the earlier one, each about its own origin.
 fn truth(old: &Session, new: &Session, stated: &Pose) -> Pose {
     Translation3::from(-old.surfels.origin)
         * stated.inverse()
@@ -91,7 +90,7 @@ fn off(found: &Pose, truth: &Pose) -> (f64, f64) {
     ((found * at - truth * at).norm(), found.rotation.angle_to(&truth.rotation).to_degrees())
 }
 
-/// Cabinets and posts that make a room unlike itself turned by half.
+/// A room with cabinets and posts that make it differ from itself turned by half a turn.
 fn furnished() -> World {
     let blocks = vec![
         [[1.0, 1.0, 0.0], [1.6, 2.5, 1.8]],
@@ -124,7 +123,7 @@ fn scans_in_any_frame_are_laid_on_the_plant() {
         let found = find(&old, &new, &as_stated, &OneByOne).expect("a clear place");
         let (shift, turn) = off(&found.laid.old_from_new, &truth(&old, &new, &stated));
         assert!(shift < 0.004 && turn < 0.03, "{shift} m, {turn}°: {found:?}");
-        // The standard deviation is of the order of the error, and evidence is told for what it is.
+        // The stated uncertainty must be of the order of the error.
         assert!(found.laid.sigma[..3].iter().all(|s| (1e-5..0.003).contains(s)), "{found:?}");
         assert!(found.evidence.share() > 0.9 && found.margin.is_none_or(|m| m > 200), "{found:?}");
     }
@@ -139,7 +138,7 @@ fn a_stated_frame_holds_although_much_has_changed() {
     let as_stated = truth(&old, &new, &Pose::identity());
     let Answer::Holds(place) = at_stated(&old, &new, &as_stated) else { panic!("it holds") };
     assert!(place.evidence.n_where_new_saw_through > 50, "{place:?}");
-    // A few centimetres off is nearly there, and is taken back.
+    // A frame wrong by a few centimetres is corrected.
     let near = frame([0.05, 0.02, 0.0], 0.2);
     let new = changed.session(&NEW, &near);
     let as_stated = truth(&old, &new, &Pose::identity());
@@ -148,8 +147,7 @@ fn a_stated_frame_holds_although_much_has_changed() {
     assert!(shift < 0.004 && turn < 0.03, "{shift} m, {turn}°");
 }
 
-/// A line of `n` equal cells with a post between each two, in a hall that ends `beyond` metres from
-/// it.
+/// A line of `n` equal cells with posts between them, in a hall that ends `beyond` metres after it.
 fn cells(n: usize, beyond: f64) -> World {
     let cell = |k: usize| {
         let x = beyond + 4.0 * k as f64;
@@ -169,7 +167,7 @@ fn a_line_of_equal_cells_is_refused_unless_its_ends_decide() {
         let scanners = |k: usize| {
             [beyond + 4.0 * k as f64 + 1.8, if k.is_multiple_of(2) { 1.0 } else { 6.0 }, 1.7]
         };
-        // Only the middle of the line was scanned: its ends are far, and speak little.
+        // Only the middle of the line was scanned, so that its ends add little evidence.
         let middle = [0, 1, 2, 3, 4].map(|k| n / 2 - 2 + k);
         let old = world.session(&middle.map(scanners), &Pose::identity());
         let stated = frame([4.0, 0.0, 0.0], 0.0);
@@ -183,8 +181,8 @@ fn a_line_of_equal_cells_is_refused_unless_its_ends_decide() {
             }
             Err(Refusal::Several(places)) => {
                 assert!(!is_clear && places.len() > 1, "{places:?}");
-                // A person's word decides, as far as surfaces bear it out.
-                // A turn about the scanner, not about a far origin.
+                // A rough pose from the user decides, if surfaces confirm it. It is a turn about
+                // the scanner, not about a far origin.
                 let about = Translation3::from(new.eyes[0].at() + new.surfels.origin);
                 let rough =
                     frame([-3.85, 0.1, 0.0], 0.0) * about * frame([0.0; 3], 1.0) * about.inverse();

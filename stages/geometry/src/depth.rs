@@ -1,19 +1,19 @@
-//! Depth images: the points of one scan inside a region, as its scanner saw them. Points in; out
-//! comes, for any direction, how far the nearest and the farthest beam went.
+//! Depth images: for any direction from a scanner into a region, how far the nearest and the
+//! farthest beam went.
 //!
-//! A depth image is a pinhole raster towards the region (no trigonometry per look-up), with a
-//! pyramid above it. Each cell keeps the nearest and the farthest hit, so that a silhouette does
-//! not average robot and background.
+//! A depth image is a pinhole raster towards the region, so that a look-up needs no trigonometry,
+//! with a pyramid of coarser levels above it. Each cell keeps its nearest and its farthest hit, so
+//! that robot and background are not averaged at a silhouette.
 
 use crate::Pose;
 use crate::level::Level;
 
-/// What a cell without a hit means.
+/// The meaning of a cell without a hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Empty {
-    /// Beams went there and none came back: free space, or dark or shiny matter.
+    /// Beams were sent there and none returned: free space, or a dark or shiny surface.
     NoReturn,
-    /// No beam went there, or nobody knows.
+    /// No beam was sent there, or it is not known whether one was.
     Unknown,
 }
 
@@ -21,43 +21,43 @@ pub enum Empty {
 #[derive(Debug, Clone)]
 pub struct DepthImage {
     camera_from_local: Pose,
-    /// The same for inner loops.
+    /// `camera_from_local` as rows of `f32`, for inner loops.
     pub(crate) rows: Rows,
     pub(crate) scanner: crate::Point,
-    /// Cells of level 0 per unit tangent.
+    /// Cells of level 0 per unit of tangent.
     focal: f32,
     levels: Vec<Level>,
 }
 
-/// `a_from_b` as three rows of four f32, for inner loops.
+/// A pose `a_from_b` as three rows of four `f32` (rotation and translation), for inner loops.
 pub type Rows = [[f32; 4]; 3];
 
-/// A pose as three rows of four f32.
+/// Converts a pose to [`Rows`].
 #[must_use]
 pub fn rows(pose: &Pose) -> Rows {
     let m = pose.to_homogeneous();
     std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)] as f32))
 }
 
-/// Applies [`Rows`] to a point.
+/// Applies a pose to a point, metres.
 #[inline]
 #[must_use]
 pub fn transform(m: &Rows, p: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2] + m[r][3])
 }
 
-/// Places that are asked about together.
+/// Number of places that are looked up together.
 pub const LANES: usize = 16;
 
-/// Coordinates of [`LANES`] places, axis by axis: what is reckoned of all of them is so in vector
-/// registers.
+/// Coordinates of [`LANES`] places, axis by axis, so that arithmetic on all of them is done in
+/// vector registers.
 pub type Lanes = [[f32; LANES]; 3];
 
-/// Places as lanes, the last one in those that are left over; at least one, at most [`LANES`].
+/// Arranges 1 to [`LANES`] places as [`Lanes`]; the last place fills the lanes that are left over.
 #[inline]
 #[must_use]
 pub fn lanes(places: &[[f32; 3]]) -> Lanes {
-    // A loop is inlined where arrays made of closures are not.
+    // The compiler inlines this loop, but not `array::from_fn` with a closure.
     let mut out = [[0.0; LANES]; 3];
     for i in 0..LANES {
         let place = places[i.min(places.len() - 1)];
@@ -66,7 +66,7 @@ pub fn lanes(places: &[[f32; 3]]) -> Lanes {
     out
 }
 
-/// Applies [`Rows`] to places, each as [`transform`] does.
+/// Applies a pose to places; the result is the same as that of [`transform`] for each of them.
 #[inline]
 #[must_use]
 pub fn transform_lanes(m: &Rows, p: &Lanes) -> Lanes {
@@ -79,7 +79,7 @@ pub fn transform_lanes(m: &Rows, p: &Lanes) -> Lanes {
     out
 }
 
-/// Applies the rotation of [`Rows`] to a direction.
+/// Applies the rotation of a pose to a direction.
 #[inline]
 #[must_use]
 pub fn rotate(m: &Rows, p: [f32; 3]) -> [f32; 3] {
@@ -95,43 +95,43 @@ impl DepthImage {
         let cells = vec![[f32::NAN; 3]; side * side];
         let level = Level { width: side, height: side, cells };
         let rows = rows(&camera_from_local);
-        // To a micrometre, so that images of one scanner agree.
+        // Rounded to a micrometre, so that all images of one scanner agree on its position.
         let scanner = camera_from_local.inverse() * crate::Point::origin();
         let scanner = scanner.map(|v| (v * 1e6).round() * 1e-6);
         Self { camera_from_local, rows, scanner, focal: focal as f32, levels: vec![level] }
     }
 
-    /// Where the scanner stands, in the local frame.
+    /// Position of the scanner in the local frame, metres.
     #[must_use]
     pub fn scanner(&self) -> crate::Point {
         self.scanner
     }
 
-    /// Camera frame from local frame; the camera looks along its +z.
+    /// Pose `camera_from_local`; the camera looks along its +z.
     #[must_use]
     pub fn camera_from_local(&self) -> &Pose {
         &self.camera_from_local
     }
 
-    /// Cells of level 0 per unit tangent.
+    /// Number of cells of level 0 per unit of tangent.
     #[must_use]
     pub fn focal(&self) -> f32 {
         self.focal
     }
 
-    /// Adds a hit given in the camera frame. Outside the raster it is passed over.
+    /// Adds a hit, camera frame, metres. Hits outside the raster are ignored.
     #[inline]
     pub fn splat(&mut self, camera: [f32; 3]) {
         let focal = self.focal;
         let level = &mut self.levels[0];
         if let Some((at, range)) = level.find(focal, camera) {
             let cell = &mut level.cells[at];
-            // `min`/`max` of f32 pass NaN over, which is what an empty cell needs.
+            // `f32::min` and `f32::max` ignore NaN, which is the value of an empty cell.
             *cell = [cell[0].min(range), cell[1].max(range), f32::NAN];
         }
     }
 
-    /// The same for the first `n` of some lanes.
+    /// Adds the first `n` of these hits, as [`DepthImage::splat`] does.
     #[inline]
     pub fn splat_lanes(&mut self, camera: &Lanes, n: usize) {
         let focal = self.focal;
@@ -144,9 +144,9 @@ impl DepthImage {
         }
     }
 
-    /// Says for each cell that is empty with all its neighbours within `window` cells what that
-    /// means (given the direction in the camera frame, z = 1), and builds the coarser levels.
-    /// Call once, after the last splat.
+    /// Decides what the empty cells mean and builds the coarser levels. A cell whose neighbours
+    /// within `window` cells are all empty gets what `empty` returns for its direction (camera
+    /// frame, z = 1); other empty cells are unknown. Call it once, after the last hit.
     pub fn finish(&mut self, window: i32, empty: impl Fn([f32; 3]) -> Empty) {
         let focal = self.focal;
         let base = &mut self.levels[0];
@@ -158,7 +158,7 @@ impl DepthImage {
         self.build_levels();
     }
 
-    /// The coarser levels, from level 0.
+    /// Builds the coarser levels from level 0.
     fn build_levels(&mut self) {
         self.levels.truncate(1);
         while self.levels[self.levels.len() - 1].width > 8 && self.levels.len() < 8 {
@@ -168,10 +168,10 @@ impl DepthImage {
         self.levels.iter_mut().for_each(Level::look_around);
     }
 
-    /// Takes back "no return" where others measured matter in that direction (local frame): beams
-    /// that ought to have ended and did not come back (too near, too dark, too shiny) prove no
-    /// free space, nor do those within `window` cells of them; nor does any, where a share of
-    /// `blind` of that matter went unseen.
+    /// Withdraws "no return" where other scans measured a surface in that direction (`local`
+    /// frame). Beams that should have ended there and did not return (too near, too dark, too
+    /// shiny) prove no free space, and neither do those within `window` cells of them. Where a
+    /// share of more than `blind` of those surfaces was missed, no "no return" is trusted.
     pub fn doubt<'m>(
         &mut self,
         matter: impl Iterator<Item = &'m [[f32; 3]]>,
@@ -211,8 +211,8 @@ impl DepthImage {
         self.build_levels();
     }
 
-    /// What the beams found at a camera-frame point, in a cell about `footprint` metres wide;
-    /// `None` outside the raster or where nothing is known.
+    /// What the beams found in the direction of a point (camera frame, metres), in a cell about
+    /// `footprint` metres wide; `None` outside the raster or where nothing is known.
     #[inline]
     #[must_use]
     pub fn look(&self, camera: [f32; 3], footprint: f32) -> Option<Look> {
@@ -227,11 +227,11 @@ impl DepthImage {
         Some(Look { near, far, around, range })
     }
 
-    /// What is known at a place of the raster, in a cell of the level above that is about `cells`
-    /// wide.
+    /// Nearest, farthest and surrounding range at raster coordinates (u, v), from the pyramid level
+    /// whose cells are about `cells` cells of level 0 wide.
     #[inline]
     fn cell(&self, [u, v]: [f32; 2], cells: f32) -> Option<[f32; 3]> {
-        // floor(log2) by the exponent bits; below one cell is level 0.
+        // The exponent bits give floor(log2); anything below one cell is level 0.
         let level = ((cells.max(1.0).to_bits() >> 23) as usize - 127).min(self.levels.len() - 1);
         let scale = 1.0 / (1u32 << level) as f32;
         let base = &self.levels[0];
@@ -243,7 +243,7 @@ impl DepthImage {
         (!cell[0].is_nan()).then_some(cell)
     }
 
-    /// The same as [`DepthImage::look`] for lanes of the camera frame.
+    /// Looks up several places of the camera frame, each as [`DepthImage::look`] does.
     #[inline]
     #[must_use]
     pub fn look_lanes(&self, camera: &Lanes, footprint: f32) -> Looks {
@@ -253,11 +253,11 @@ impl DepthImage {
         let mut out = Looks::NOTHING;
         let mut at = [[0_u32; LANES]; 3];
         let [x, y, z] = camera;
-        // One loop without branches, so that it becomes vector instructions; then one of look-ups.
+        // The first loop has no branches, so that it is vectorised; the second does the look-ups.
         for i in 0..LANES {
             let inverse = self.focal / z[i];
             let (u, v) = (x[i] * inverse + 0.5 * width, y[i] * inverse + 0.5 * height);
-            // As in `cell`.
+            // The level is chosen as in `cell`.
             let cells = (footprint * inverse).max(1.0);
             let level = ((cells.to_bits() >> 23) - 127).min(most);
             let scale = f32::from_bits((127 - level) << 23);
@@ -276,7 +276,7 @@ impl DepthImage {
         out
     }
 
-    /// The same for a point of the local frame.
+    /// Looks up a point of the local frame, metres, as [`DepthImage::look`] does.
     #[inline]
     #[must_use]
     pub fn look_at(&self, local: [f32; 3], footprint: f32) -> Option<Look> {
@@ -287,7 +287,7 @@ impl DepthImage {
 /// What the beams found in the direction of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// Nearest hit in the cell, metres; infinite where beams went and none came back.
+    /// Nearest hit in the cell, metres; infinite where beams were sent and none returned.
     pub near: f32,
     /// Farthest hit in the cell, metres.
     pub far: f32,
@@ -297,21 +297,21 @@ pub struct Look {
     pub range: f32,
 }
 
-/// What the beams found in the directions of lanes; as in [`Look`].
+/// What the beams found in the directions of [`LANES`] places, one entry a place as in [`Look`].
 #[derive(Debug, Clone, Copy)]
 pub struct Looks {
-    /// NaN where nothing is known.
+    /// Nearest hit, metres; NaN where nothing is known.
     pub near: [f32; LANES],
-    /// Without meaning there, as the next.
+    /// Farthest hit, metres; without meaning where `near` is NaN.
     pub far: [f32; LANES],
-    /// As in [`Look`].
+    /// Nearest hit in the cell and its neighbours, metres; without meaning where `near` is NaN.
     pub around: [f32; LANES],
-    /// As in [`Look`].
+    /// Range of the place itself, metres.
     pub range: [f32; LANES],
 }
 
 impl Looks {
-    /// Nothing is known anywhere.
+    /// Looks of which nothing is known.
     pub(crate) const NOTHING: Self = Self {
         near: [f32::NAN; LANES],
         far: [f32::NAN; LANES],
@@ -319,7 +319,7 @@ impl Looks {
         range: [0.0; LANES],
     };
 
-    /// Of one lane; `None` where nothing is known.
+    /// The look of one lane; `None` where nothing is known.
     #[inline]
     #[must_use]
     pub fn get(&self, i: usize) -> Option<Look> {
@@ -327,7 +327,7 @@ impl Looks {
         (!near.is_nan()).then_some(Look { near, far, around, range: self.range[i] })
     }
 
-    /// Sets one lane.
+    /// Sets the look of one lane.
     #[inline]
     pub(crate) fn set(&mut self, i: usize, look: &Look) {
         let Look { near, far, around, range } = *look;

@@ -1,18 +1,18 @@
-//! Directions of beams: unit vector to azimuth and elevation, and back, with a polynomial
+//! Converts between beam directions as vectors and as azimuth and elevation, with a polynomial
 //! arctangent that is fast enough for every point of a scan.
 
-/// Azimuth in (−π, π] about +z from +x, by a polynomial; error below 2e-6 rad (0.0001°, a
-/// three-hundredth of a fine scanner step).
+/// Azimuth of (x, y) in (−π, π] about +z from +x, radians, by a polynomial. The error is below
+/// 2e-6 rad (0.0001°), less than a hundredth of the step of a fine scan.
 #[inline]
 #[must_use]
 pub fn fast_atan2(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     let (low, high) = if ax < ay { (ax, ay) } else { (ay, ax) };
-    // No branches, so that a loop over points becomes vector instructions; 0/tiny is the 0 that no
-    // direction has.
+    // Without branches, so that a loop over points is vectorised. The zero vector gives
+    // 0/tiny = 0.
     let t = low / if high == 0.0 { f32::MIN_POSITIVE } else { high };
     let s = t * t;
-    // Minimax polynomial of atan on [0, 1], odd, seven terms.
+    // Minimax polynomial of the arctangent on [0, 1]: odd, seven terms.
     let mut r = 0.002_823_638_8_f32;
     r = r * s - 0.015_956_933;
     r = r * s + 0.042_504_99;
@@ -40,7 +40,7 @@ pub fn spherical(p: [f32; 3]) -> (f32, f32, f32) {
     (fast_atan2(p[1], p[0]), fast_atan2(p[2], flat), range)
 }
 
-/// Unit vector of an azimuth and elevation, radians.
+/// Unit vector of an azimuth and an elevation, radians.
 #[inline]
 #[must_use]
 pub fn unit(azimuth: f64, elevation: f64) -> [f64; 3] {

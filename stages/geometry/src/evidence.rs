@@ -1,21 +1,22 @@
-//! Evidence for a body at a pose: the depth images of scans with beams, and the bare points of
-//! scans without. Surface samples in; a [`Probe`] out. The one place where "is it there?" is
-//! answered.
+//! Judges whether a body stands at a pose, from the depth images of scans with known scanner
+//! positions and the bare points of the other scans.
+//!
+//! All stages ask this question through [`Evidence::probe`], so that it has one answer.
 
 use crate::probe::{Probe, probe};
 use crate::{Eye, NearestField, Pose};
 use std::sync::Arc;
 
-/// Everything that was measured in a region.
+/// All measurements of a region.
 #[derive(Debug, Clone, Default)]
 pub struct Evidence<'a> {
-    /// Scans whose scanner is known.
+    /// Scanners whose position is known.
     eyes: Vec<Eye<'a>>,
-    /// Points of the scans whose scanner is not known.
+    /// Points of scans whose scanner position is not known.
     cloud: Option<Arc<Cloud>>,
 }
 
-/// Points without beams: they can say "something is here", never "nothing is here".
+/// Points without beams: they can prove that something is at a place, but never that it is free.
 #[derive(Debug, Clone)]
 pub struct Cloud {
     points: Vec<[f32; 3]>,
@@ -23,7 +24,8 @@ pub struct Cloud {
 }
 
 impl Cloud {
-    /// A cloud that knows its surroundings up to `reach` metres, to about `edge` metres.
+    /// A cloud of `points` (local frame, metres) with a nearest-point grid of voxels of `edge` that
+    /// reaches `reach` from the points, metres.
     #[must_use]
     pub fn new(points: Vec<[f32; 3]>, edge: f32, reach: f32) -> Self {
         let field = NearestField::new(&points, edge, reach);
@@ -31,29 +33,30 @@ impl Cloud {
     }
 }
 
-/// Price of a surface sample without a point near it, where no beam can say whether it is hidden:
-/// of a robot two or three scanners see a third to a half, so absence must cost something, but a
-/// right posture must stay above nothing.
+/// Price of a surface sample without a nearby point where no beam can say whether it is hidden. Two
+/// or three scanners see a third to a half of a robot, so absence must cost something, but the
+/// right posture must still score above zero.
 const ABSENT_PRICE: f32 = 0.25;
-/// A point is on a surface sample up to so far beside it, metres: points are thinned to [`Cloud`]'s
-/// edge.
+/// Largest distance along the surface between a sample and the point that confirms it, metres; the
+/// points are thinned to the edge of a [`Cloud`]'s voxels.
 const BESIDE: f32 = 0.02;
 
 impl<'a> Evidence<'a> {
-    /// Of scans whose scanner is known, those with images, and of points without beams.
+    /// Collects scanners with at least one image, and points without beams.
     #[must_use]
     pub fn new(eyes: impl IntoIterator<Item = Eye<'a>>, cloud: Option<Arc<Cloud>>) -> Self {
         Self { eyes: eyes.into_iter().filter(|eye| !eye.is_blind()).collect(), cloud }
     }
 
-    /// The scans whose scanner is known.
+    /// The scanners whose position is known.
     #[must_use]
     pub fn eyes(&self) -> &[Eye<'a>] {
         &self.eyes
     }
 
-    /// Judges surface samples (`points` with outward `normals`, frame of the body) with the body at
-    /// `local_from_body`, to within `tolerance` metres.
+    /// Judges surface samples of a body that stands at `local_from_body`. `points` (metres) and
+    /// outward unit `normals` are given in the body's frame; a beam that ends within `tolerance`
+    /// metres of a sample confirms it.
     #[must_use]
     pub fn probe(
         &self,
@@ -65,8 +68,8 @@ impl<'a> Evidence<'a> {
         self.probe_more(Probe::default(), (points, normals), local_from_body, tolerance)
     }
 
-    /// The same with what was said `before` of other samples of the body: just as if all of them
-    /// were asked about at once.
+    /// Adds further samples to the result `before` of other samples of the same body. The sum is
+    /// the same as if all samples had been judged in one call.
     #[must_use]
     pub fn probe_more(
         &self,
@@ -83,7 +86,7 @@ impl<'a> Evidence<'a> {
         }
     }
 
-    /// Whether anything here can prove that space is free.
+    /// Whether any scan here can prove that space is free.
     #[must_use]
     pub fn has_beams(&self) -> bool {
         !self.eyes.is_empty()
@@ -91,8 +94,8 @@ impl<'a> Evidence<'a> {
 }
 
 impl Cloud {
-    /// Judges samples by how far the nearest point is off the surface; how far beside says how
-    /// dense the points are.
+    /// Judges samples by the distance of the nearest point from the surface; its distance along
+    /// the surface must not exceed the spacing of the points.
     fn probe(
         &self,
         before: Probe,

@@ -1,10 +1,10 @@
-//! The depth images of one scanner in; for a place, those of them that may show it, and what it saw
-//! there, out: where they are the faces of a cube, mostly one is asked.
+//! Chooses, among the depth images of one scanner, those that can show a place. Where the images
+//! are the faces of a cube, usually only one has to be looked up.
 
 use crate::DepthImage;
 use crate::depth::{LANES, Lanes, Look, Looks, transform_lanes};
 
-/// A scanner with its images.
+/// A scanner with its depth images.
 #[derive(Debug, Clone)]
 pub struct Eye<'a> {
     images: Vec<&'a DepthImage>,
@@ -12,7 +12,7 @@ pub struct Eye<'a> {
 }
 
 impl<'a> Eye<'a> {
-    /// A scanner with all of its images.
+    /// A scanner with all of its depth images, which must share their scanner position.
     #[must_use]
     pub fn new(images: impl IntoIterator<Item = &'a DepthImage>) -> Self {
         let images: Vec<&DepthImage> = images.into_iter().collect();
@@ -20,19 +20,19 @@ impl<'a> Eye<'a> {
         Self { images, faces }
     }
 
-    /// Whether it has no image.
+    /// Whether the scanner has no image.
     pub(crate) fn is_blind(&self) -> bool {
         self.images.is_empty()
     }
 
-    /// Where it stands, local frame, metres.
+    /// Position of the scanner in the local frame, metres.
     #[inline]
     #[must_use]
     pub fn at(&self) -> [f32; 3] {
         self.faces.scanner
     }
 
-    /// The same as [`Eye::look`] for places of the local frame.
+    /// Looks up several places of the local frame, each as [`Eye::look`] does.
     #[inline]
     #[must_use]
     pub fn look_lanes(&self, local: &Lanes, footprint: f32) -> Looks {
@@ -47,8 +47,8 @@ impl<'a> Eye<'a> {
         out
     }
 
-    /// What its beams found at a place of the local frame, in a cell about `footprint` metres wide;
-    /// `None` where nothing is known.
+    /// What the scanner's beams found in the direction of a place (local frame, metres), in a cell
+    /// about `footprint` metres wide; `None` where nothing is known.
     #[inline]
     #[must_use]
     pub fn look(&self, local: [f32; 3], footprint: f32) -> Option<Look> {
@@ -57,21 +57,21 @@ impl<'a> Eye<'a> {
     }
 }
 
-/// Which images of a scanner lie towards a place.
+/// An index from directions to the images of one scanner that cover them.
 #[derive(Debug, Clone)]
 pub struct Faces {
     scanner: [f32; 3],
     all: Vec<usize>,
-    /// By axis and its side (−x, +x, −y, …): the image that looks along it. Empty where images are
-    /// no faces of a cube.
+    /// Indices of images by the axis and side along which they look (−x, +x, −y, …); `None` where
+    /// the images are not the faces of a cube.
     by_side: Option<[Vec<usize>; 6]>,
-    /// A place whose largest offset from the scanner is so many times the next is on one face
-    /// alone: rasters end up to half a cell beyond their edge.
+    /// If the largest coordinate of a place (scanner as origin) is at least this multiple of the
+    /// next one, the place lies on one face only; rasters extend up to half a cell beyond the edge.
     apart: f32,
 }
 
 impl Faces {
-    /// Of images of one scanner.
+    /// Builds the index for the images of one scanner.
     #[must_use]
     pub fn new<'i>(images: impl IntoIterator<Item = &'i DepthImage>) -> Self {
         let images: Vec<&DepthImage> = images.into_iter().collect();
@@ -93,7 +93,7 @@ impl Faces {
         }
     }
 
-    /// The images, by their numbers, that a place of the local frame may be on; it is on no other.
+    /// Indices of the images that a place of the local frame may lie on; it lies on no other one.
     #[inline]
     #[must_use]
     pub fn towards(&self, local: [f32; 3]) -> &[usize] {
@@ -108,7 +108,7 @@ impl Faces {
         &by_side[2 * axis + usize::from(d[axis] > 0.0)]
     }
 
-    /// The one image that all of some places may be on, where there is one.
+    /// The one image that all of these places may lie on, if there is one.
     #[inline]
     #[must_use]
     pub fn of_all(&self, local: &Lanes) -> Option<usize> {

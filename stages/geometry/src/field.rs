@@ -1,31 +1,31 @@
-//! Nearest sample by look-up: samples of a surface in; out comes, for any place near it, the index
-//! of the nearest sample, in constant time. Keeps the index, not the distance, so that the true
-//! facet serves point-to-plane.
+//! A grid that gives the nearest surface sample to any place near the surface in constant time. It
+//! keeps the sample's index instead of a distance, so that point-to-plane distances can be computed
+//! from the sample's own facet.
 
 use crate::Aabb;
 use crate::spread::{Grid, N_LANES, spread};
 
-/// A voxel grid about a surface: each voxel within reach holds the index of the sample nearest to
-/// its middle.
+/// A voxel grid about a surface. Each voxel within reach holds the index of the sample that is
+/// nearest to the voxel's centre.
 #[derive(Debug, Clone, Default)]
 pub struct NearestField {
     grid: Grid,
-    /// Bricks on each axis, see [`BRICK`].
+    /// Number of bricks along each axis, see [`BRICK`].
     bricks: [usize; 3],
-    /// Index of the nearest sample + 1; 0 beyond reach. Brick after brick, x fastest.
+    /// Index of the nearest sample plus one, 0 beyond reach; brick after brick, x fastest.
     cells: Vec<u32>,
 }
 
-/// Voxels across a brick, as a power of two: neighbours in space are neighbours in memory, on one
-/// page of it mostly.
+/// Base-two logarithm of the voxels along the edge of a brick. Bricks keep voxels that are
+/// neighbours in space on the same memory page.
 const BRICK: u32 = N_LANES.ilog2();
 const IN_BRICK: u32 = (1 << BRICK) - 1;
 
-/// Most voxels of a field: a quarter of a gigabyte.
+/// Largest number of voxels of a field; they take a quarter of a gigabyte.
 pub const MAX_CELLS: f64 = 67e6;
 
-/// The edge, or the least wider one with which bounds take no more than the voxels that are
-/// allowed, in whole bricks.
+/// `edge`, widened as little as needed so that the bounds take at most [`MAX_CELLS`] voxels in
+/// whole bricks, metres.
 fn affordable(bounds: &Aabb, mut edge: f32) -> f32 {
     let brick = |edge: f32| f64::from(edge) * f64::from(1_u32 << BRICK);
     let n_cells = |edge: f32| {
@@ -39,8 +39,8 @@ fn affordable(bounds: &Aabb, mut edge: f32) -> f32 {
 }
 
 impl NearestField {
-    /// A field of voxels with this `edge` that reaches `reach` metres from the samples; with wider
-    /// ones where it would take more than [`MAX_CELLS`] of them.
+    /// A field over samples (metres) with voxels of `edge` metres that reaches `reach` metres from
+    /// the samples. The voxels are wider where there would be more than [`MAX_CELLS`] of them.
     #[must_use]
     pub fn new(points: &[[f32; 3]], edge: f32, reach: f32) -> Self {
         let bounds = Aabb::of(points.iter().map(|p| p.map(f64::from)));
@@ -55,7 +55,7 @@ impl NearestField {
         let grid = Grid { origin, edge, inverse_edge: 1.0 / edge, size };
         let cells = vec![0; bricks.iter().product::<usize>() << (3 * BRICK)];
         let mut field = Self { grid, bricks, cells };
-        // What is beyond reach is not told, so memory of bricks there is never touched.
+        // Voxels beyond reach are never written, so that their memory is never touched.
         spread(points, grid, reach, |first, samples| {
             let at = field.at(first);
             field.cells[at..at + N_LANES].copy_from_slice(samples);
@@ -63,7 +63,7 @@ impl NearestField {
         field
     }
 
-    /// The same for samples with other numbers.
+    /// The same field, with sample `i` replaced by sample `numbers[i]`.
     #[must_use]
     pub fn renumbered(mut self, numbers: &[u32]) -> Self {
         for cell in self.cells.iter_mut().filter(|cell| **cell > 0) {
@@ -80,7 +80,8 @@ impl NearestField {
         ((brick << BRICK | z) << BRICK | y) << BRICK | x
     }
 
-    /// Index of the sample nearest to `p` (to within a voxel's half diagonal); `None` beyond reach.
+    /// Index of the sample nearest to `p`, to within half the diagonal of a voxel; `None` beyond
+    /// reach.
     #[inline]
     #[must_use]
     pub fn nearest(&self, p: [f32; 3]) -> Option<usize> {
@@ -88,26 +89,27 @@ impl NearestField {
         (self.cells[at] as usize).checked_sub(1)
     }
 
-    /// Where its grid begins, metres, and how many voxels there are in a metre.
+    /// Lowest corner of the grid, metres, and number of voxels per metre.
     #[must_use]
     pub fn grid(&self) -> ([f32; 3], f32) {
         (self.grid.origin, self.grid.inverse_edge)
     }
 
-    /// Voxels on each axis.
+    /// Number of voxels along each axis.
     #[must_use]
     pub fn size(&self) -> [usize; 3] {
         self.grid.size
     }
 
-    /// The same as [`NearestField::nearest`] for any place in a voxel of the grid; `None` outside.
+    /// Index of the sample nearest to the centre of a voxel; `None` beyond reach or outside the
+    /// grid.
     #[inline]
     #[must_use]
     pub fn in_voxel(&self, index: [u32; 3]) -> Option<usize> {
         (*self.cells.get(self.at(index))? as usize).checked_sub(1)
     }
 
-    /// Bytes kept.
+    /// Memory of the field, bytes.
     #[must_use]
     pub fn weight_bytes(&self) -> usize {
         self.cells.len() * 4

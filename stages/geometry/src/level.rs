@@ -1,5 +1,5 @@
-//! One resolution of a depth image: hits in; each cell's nearest and farthest, what its neighbours
-//! say, and the next coarser level, out.
+//! One resolution level of a depth image: the nearest and the farthest hit of each cell and its
+//! neighbours, and how the next coarser level is made.
 
 use crate::depth::{LANES, Lanes};
 
@@ -8,15 +8,15 @@ use crate::depth::{LANES, Lanes};
 pub(crate) struct Level {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// `[near, far, around]` in metres; NaN unknown, +∞ no return. Row-major. `around` is the
-    /// smallest `near` of a cell and its eight neighbours: at a silhouette the beams of one
-    /// cell may all have missed a body that those of its neighbour hit.
+    /// `[near, far, around]` in metres, row-major; NaN where unknown, +∞ where no beam returned.
+    /// `around` is the smallest `near` of the cell and its eight neighbours: at a silhouette all
+    /// beams of one cell may have missed a body that those of the next cell hit.
     pub(crate) cells: Vec<[f32; 3]>,
 }
 
 impl Level {
-    /// The cell of a hit given in the camera frame, and its range, metres; `None` outside of the
-    /// raster.
+    /// Index of the cell of a hit and its range, metres, from the hit in the camera frame; `None`
+    /// outside of the raster.
     #[inline]
     pub(crate) fn find(&self, focal: f32, p: [f32; 3]) -> Option<(usize, f32)> {
         if p[2] <= 1e-3 {
@@ -30,7 +30,7 @@ impl Level {
         inside.then(|| (v as usize * self.width + u as usize, range))
     }
 
-    /// The same for lanes; `u32::MAX` outside.
+    /// Indices and ranges of several hits; the index is `u32::MAX` outside of the raster.
     #[inline]
     pub(crate) fn find_lanes(&self, focal: f32, [x, y, z]: &Lanes) -> ([u32; LANES], [f32; LANES]) {
         let (width, height) = (self.width as f32, self.height as f32);
@@ -47,9 +47,9 @@ impl Level {
         (at, range)
     }
 
-    /// Asks of each cell (its column and row) that is empty with all its neighbours within `window`
-    /// cells whether it is one of no return, and makes it that: a separable running maximum, of
-    /// which no more rows are kept than it needs.
+    /// Marks cells as "no return": those that are empty with all neighbours within `window` cells
+    /// and for whose column and row `is_silent` holds. The neighbourhood is a separable running
+    /// maximum, so that only as many rows are kept as it needs.
     pub(crate) fn each_open(&mut self, window: i32, is_silent: impl Fn(usize, usize) -> bool) {
         let (window, width) = (usize::try_from(window).unwrap_or(0), self.width);
         let n_kept = 2 * window + 1;
@@ -58,7 +58,7 @@ impl Level {
         let mut n_read = 0;
         for v in 0..self.height {
             let rows = v.saturating_sub(window)..(v + window + 1).min(self.height);
-            // Before any of their own cells is made one of no return.
+            // These rows must be read before any of their own cells is marked.
             for v in n_read..rows.end {
                 let near = &mut near_hit[v % n_kept];
                 near.fill(false);
@@ -75,7 +75,7 @@ impl Level {
                 let near = is_near.iter_mut().zip(&near_hit[v % n_kept]);
                 near.for_each(|(own, near)| *own |= *near);
             }
-            // Of all cells, in vector registers, sooner than of each that is open.
+            // `is_silent` is asked for all cells of the row, so that the loop is vectorised.
             let open = silent.iter_mut().zip(&is_near).enumerate();
             open.for_each(|(u, (silent, is_near))| *silent = !*is_near & is_silent(u, v));
             let row = self.cells[v * width..(v + 1) * width].iter_mut().zip(&silent);
@@ -83,7 +83,7 @@ impl Level {
         }
     }
 
-    /// The next coarser level, without `around`.
+    /// The next coarser level; its `around` is not yet filled.
     pub(crate) fn halved(&self) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mut cells = vec![[f32::NAN; 3]; width * height];
@@ -92,8 +92,8 @@ impl Level {
             for (pair, to) in row.chunks(2).zip(out) {
                 for from in pair {
                     to[0] = to[0].min(from[0]);
-                    // No return must not hide a hit from `far`; it stays only where the whole cell
-                    // is empty.
+                    // "No return" must not hide a hit from `far`; it stays only where the whole
+                    // cell is empty.
                     to[1] = match (to[1].is_finite(), from[1].is_finite()) {
                         (true, false) => to[1],
                         (false, true) => from[1],
@@ -105,11 +105,11 @@ impl Level {
         Self { width, height, cells }
     }
 
-    /// Fills `around`.
+    /// Fills the `around` values of all cells.
     pub(crate) fn look_around(&mut self) {
         let width = self.width;
-        // Of three rows: the nearest of each cell and those beside it. `min` passes NaN over:
-        // unknown neighbours say nothing.
+        // For each of three rows: the nearest hit of each cell and those beside it. `f32::min`
+        // ignores NaN, so unknown neighbours have no effect.
         let mut across = vec![vec![f32::NAN; width]; 3];
         let mut near = vec![f32::NAN; width];
         let mut n_read = 0;

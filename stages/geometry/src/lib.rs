@@ -1,7 +1,28 @@
-//! Mathematics on slices: poses, planes, directions, depth images, robust kernels.
+//! Geometry on slices: poses, planes, directions, depth images, nearest-sample fields and robust
+//! kernels.
 //!
-//! Numbers in, numbers out. Knows no files, no threads, no scans; doubt is an `Option`, never an
-//! error.
+//! The crate knows no files, threads or scans. Functions return an `Option` where there is no
+//! answer, and never an error.
+//!
+//! # Example
+//! A depth image tells whether a scanner saw a surface, looked through a place, or saw nothing:
+//! ```
+//! use geometry::{DepthImage, Evidence, Eye, Pose, depth::Empty};
+//!
+//! // The scanner stands at the origin and looks along +z at a wall 5 m away.
+//! let mut image = DepthImage::new(Pose::identity(), 0.5, 100.0);
+//! for (x, y) in (-240..=240).flat_map(|x| (-240..=240).map(move |y| (x, y))) {
+//!     image.splat([x as f32 * 0.01, y as f32 * 0.01, 5.0]);
+//! }
+//! image.finish(1, |_| Empty::Unknown);
+//!
+//! let evidence = Evidence::new([Eye::new([&image])], None);
+//! let (samples, normals) = ([[0.0_f32, 0.0, 0.0]], [[0.0_f32, 0.0, -1.0]]);
+//! let on_wall = Pose::translation(0.0, 0.0, 5.0); // local_from_body, metres
+//! assert_eq!(evidence.probe(&samples, &normals, &on_wall, 0.01).n_on, 1);
+//! let before_wall = Pose::translation(0.0, 0.0, 3.0);
+//! assert_eq!(evidence.probe(&samples, &normals, &before_wall, 0.01).n_through, 1);
+//! ```
 #![forbid(unsafe_code)]
 
 pub mod aabb;
@@ -25,7 +46,7 @@ pub use field::NearestField;
 pub use plane::{Moments, Plane};
 pub use probe::Probe;
 
-/// A rigid motion `a_from_b`: takes coordinates in frame `b` to frame `a`, metres.
+/// A rigid motion `a_from_b`: it converts coordinates from frame `b` to frame `a`, metres.
 pub type Pose = nalgebra::Isometry3<f64>;
 /// A position, metres.
 pub type Point = nalgebra::Point3<f64>;

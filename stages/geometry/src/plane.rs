@@ -1,11 +1,11 @@
-//! Planes from sums: moments of points in, least-squares plane with its spread out. Moments add, so
-//! a region can grow, split over tiles and be joined without a second look at its points.
+//! Least-squares planes from moments (sums of points and of their products). Moments can be added,
+//! so a region can grow, be split over tiles and be joined without reading its points again.
 
 use crate::Vector;
 use nalgebra::{Matrix3, SymmetricEigen, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-/// The plane `normal · p = offset`, normal of unit length, metres.
+/// The plane `normal · p = offset`, with a normal of unit length, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plane {
     /// Unit normal.
@@ -22,43 +22,44 @@ impl Plane {
         self.normal.dot(p) - self.offset
     }
 
-    /// The turn that brings z onto the normal and leaves the horizon as it is as far as can be:
-    /// coordinates on the plane are world coordinates where it is level.
+    /// A rotation that turns z onto the normal and keeps the x and y axes as near to the world's as
+    /// possible; for a level plane it is the identity.
     #[must_use]
     pub fn frame(&self) -> UnitQuaternion<f64> {
         let up = Vector::z();
         if self.normal.z > -0.7 {
             UnitQuaternion::rotation_between(&up, &self.normal).unwrap_or_default()
         } else {
-            // Hanging: half a turn about x first, since between opposite vectors no turn is the
-            // shortest.
+            // For a plane that faces down, turn half a turn about x first: between opposite vectors
+            // no shortest rotation is defined.
             let over = UnitQuaternion::from_axis_angle(&Vector::x_axis(), std::f64::consts::PI);
             UnitQuaternion::rotation_between(&-up, &self.normal).unwrap_or_default() * over
         }
     }
 
-    /// The same plane seen from the other side.
+    /// The same plane with its normal reversed.
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self { normal: -self.normal, offset: -self.offset }
     }
 }
 
-/// Sums of points up to second order about a fixed `origin` (keeps f64 exact far from zero).
+/// Moments of points up to second order about a fixed `origin`, which keeps them precise far from
+/// the world's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Moments {
-    /// What is subtracted from each point before it is summed, metres.
+    /// Subtracted from each point before it is summed, metres.
     pub origin: Vector,
-    /// Number of points (or their weights).
+    /// Number of points, or sum of their weights.
     pub n: f64,
-    /// Sum of points about `origin`.
+    /// Sum of the points relative to `origin`, metres.
     pub sum: Vector,
-    /// Sum of outer products about `origin`.
+    /// Sum of the outer products of the points relative to `origin`, m².
     pub outer: Matrix3<f64>,
 }
 
 impl Moments {
-    /// Nothing summed yet.
+    /// The moments of no points about an origin.
     #[must_use]
     pub fn new(origin: Vector) -> Self {
         Self { origin, n: 0.0, sum: Vector::zeros(), outer: Matrix3::zeros() }
@@ -73,7 +74,7 @@ impl Moments {
         self.outer += q * q.transpose();
     }
 
-    /// Adds all of `other`, moved to this origin.
+    /// Adds the moments of `other`, shifted to this origin.
     pub fn join(&mut self, other: &Self) {
         let shift = other.origin - self.origin;
         self.outer += other.outer
@@ -84,13 +85,13 @@ impl Moments {
         self.n += other.n;
     }
 
-    /// Centre of the points; the origin for none.
+    /// Centroid of the points, metres; the origin where there are none.
     #[must_use]
     pub fn mean(&self) -> Vector {
         if self.n > 0.0 { self.origin + self.sum / self.n } else { self.origin }
     }
 
-    /// Covariance of the points, m²; zero for none.
+    /// Covariance of the points, m²; zero where there are none.
     #[must_use]
     pub fn covariance(&self) -> Matrix3<f64> {
         if self.n <= 0.0 {
@@ -100,8 +101,8 @@ impl Moments {
         self.outer / self.n - mean * mean.transpose()
     }
 
-    /// Least-squares plane, RMS distance from it, and spread (standard deviations, metres) along
-    /// its two directions, larger first. `None` below three points or when all lie on a line.
+    /// The least-squares plane with RMS distance and spread. `None` for fewer than three points or
+    /// where all lie on a line.
     #[must_use]
     pub fn plane(&self) -> Option<PlaneFit> {
         if self.n < 3.0 {
@@ -121,16 +122,17 @@ impl Moments {
     }
 }
 
-/// What [`Moments::plane`] finds.
+/// A least-squares plane, see [`Moments::plane`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneFit {
     /// The plane; the sign of its normal is arbitrary.
     pub plane: Plane,
-    /// RMS distance of the points from it, metres.
+    /// RMS distance of the points from the plane, metres.
     pub rms: f64,
-    /// Standard deviations along the plane, larger first, metres.
+    /// Standard deviations of the points along the two directions of the plane, larger first,
+    /// metres.
     pub spread: [f64; 2],
-    /// Unit direction of the larger spread.
+    /// Unit direction of the larger standard deviation.
     pub along: Vector,
 }
 

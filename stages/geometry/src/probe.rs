@@ -1,39 +1,40 @@
-//! Judging a surface by the beams. Depth images and surface samples in; out comes whether a beam
-//! ended on each sample, went through it, or never got there.
+//! Judges surface samples against depth images: whether a beam ended on each sample, passed through
+//! it, or never reached it.
 
 use crate::depth::{LANES, Looks, Rows, rotate, rows, transform};
 use crate::{Eye, Pose};
 
-/// Weight of a beam that did not come back, against one that hit something behind: black paint and
-/// glancing steel swallow beams too.
+/// Weight of a beam that did not return, relative to one that hit something behind the sample:
+/// black paint and steel at a grazing angle swallow beams, too.
 pub const NO_RETURN_WEIGHT: f32 = 0.3;
-/// Cosine below which a surface is too oblique to be expected in the scan.
+/// Cosine of the angle of incidence below which a surface is too oblique to appear in a scan.
 pub const MIN_FACING: f32 = 0.15;
 
-/// What the beams say about a set of surface samples at one pose.
+/// Counts of what the beams say about a set of surface samples at one pose.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Probe {
-    /// Sum over samples of: −β·violation, or match in 0..1, or −γ where hidden.
+    /// Sum over the samples of −β·violation where seen through, a match in 0..1 where a beam ends
+    /// on the sample, and −γ where it is hidden (METHOD.md §8).
     pub score: f32,
     /// Number of samples.
     pub n: u32,
-    /// Samples that some beam could judge (on the surface or seen through).
+    /// Number of samples that at least one beam could judge (hit or seen through).
     pub n_seen: u32,
-    /// Samples with a beam ending on them, within the tolerance.
+    /// Number of samples with a beam that ends within the tolerance.
     pub n_on: u32,
-    /// Samples that a beam passed through by more than twice the tolerance.
+    /// Number of samples that a beam passed by more than twice the tolerance.
     pub n_through: u32,
 }
 
 impl Probe {
-    /// Mean score of a sample, in −β..1; 0 for none.
+    /// Mean score of a sample, in −β..1; 0 where there are no samples.
     #[must_use]
     pub fn mean(&self) -> f32 {
         if self.n == 0 { 0.0 } else { self.score / self.n as f32 }
     }
 
-    /// Counts one sample: how far it is seen through and how well a beam ends on it, 0..1 each;
-    /// through outweighs on.
+    /// Counts one sample: `through` says how far it is seen through, `on` how well a beam ends on
+    /// it, each in 0..1. Being seen through outweighs a match.
     #[inline]
     pub fn count(&mut self, through: f32, on: f32) {
         if through > 0.0 {
@@ -58,28 +59,29 @@ impl Probe {
         self.n_through += other.n_through;
     }
 
-    /// Share of judged samples that a beam passed through.
+    /// Share of the judged samples that a beam passed through, 0..1.
     #[must_use]
     pub fn violation(&self) -> f32 {
         self.n_through as f32 / self.n_seen.max(1) as f32
     }
 
-    /// Share of samples that could be judged.
+    /// Share of the samples that could be judged, 0..1.
     #[must_use]
     pub fn seen(&self) -> f32 {
         self.n_seen as f32 / self.n.max(1) as f32
     }
 }
 
-/// Price of a sample seen through, against one on the surface (METHOD.md §8).
+/// Price of a sample that is seen through, relative to one that is hit (METHOD.md §8).
 const SEEN_THROUGH_PRICE: f32 = 1.5;
-/// Price of a sample that no scan could judge: small, so that hiding is not rewarded (METHOD.md
-/// §8).
+/// Price of a sample that no scan could judge (METHOD.md §8): above zero, so that poses that hide
+/// the body gain nothing, and small, since most of a body is always hidden.
 pub const HIDDEN_PRICE: f32 = 0.1;
 
-/// Judges surface samples (`points` with outward `normals`, in the frame of a body) with the body
-/// at `local_from_body`: one beam through a sample in any scan outweighs any match in another
-/// (METHOD.md §8). What is said of other samples `before` is counted already.
+/// Judges surface samples of a body that stands at `local_from_body`; `points` (metres) and outward
+/// unit `normals` are given in the body's frame. A beam that passes through a sample in one scan
+/// outweighs a match in any other (METHOD.md §8). The result includes `before`, that of other
+/// samples.
 #[must_use]
 pub fn probe(
     eyes: &[Eye<'_>],
@@ -98,15 +100,15 @@ pub fn probe(
     out
 }
 
-/// Samples that are judged together: what is reckoned of all of them becomes vector instructions.
+/// Number of samples that are judged together, so that the loops over them are vectorised.
 const BLOCK: usize = 80;
 
-/// Samples in the local frame, and what is known of them so far.
+/// Samples in the local frame and what is known of them so far.
 struct Block {
     n: usize,
     p: [[f32; BLOCK]; 3],
     normal: [[f32; BLOCK]; 3],
-    /// How far beams went through each, and how well one ends on it, 0..1.
+    /// For each sample how far beams pass through it and how well one ends on it, 0..1 each.
     through: [f32; BLOCK],
     on: [f32; BLOCK],
 }
@@ -126,7 +128,7 @@ impl Block {
         out
     }
 
-    /// Adds what one scanner saw.
+    /// Adds what one scanner saw of the samples.
     #[inline]
     fn ask(&mut self, eye: &Eye<'_>, tolerance: f32) {
         let mut which = [0_u8; BLOCK + 1];
@@ -144,18 +146,20 @@ impl Block {
         }
     }
 
-    /// Which samples turn a front face to a scanner, without those that beams went wholly through:
-    /// no other scan can make them worse or better. Returns how many.
+    /// Writes to `which` the indices of the samples that face the scanner at `at`, and returns
+    /// their number. Samples that are already fully seen through are left out: no other scan can
+    /// change their score.
     #[inline]
     fn facing(&self, at: [f32; 3], which: &mut [u8; BLOCK + 1]) -> usize {
         let (p, normal) = (&self.p, &self.normal);
         let mut is_facing = [false; BLOCK];
-        // The bound tells the compiler that no index is beyond the arrays.
+        // The `min` tells the compiler that no index is out of bounds.
         for i in 0..self.n.min(BLOCK) {
             let ray = [at[0] - p[0][i], at[1] - p[1][i], at[2] - p[2][i]];
             let along = normal[0][i] * ray[0] + normal[1][i] * ray[1] + normal[2][i] * ray[2];
             let far = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
-            // A beam through a body enters by a front face: back faces tell nothing new.
+            // A beam through a body enters by a face towards the scanner, so faces away from it add
+            // nothing.
             let is_front = along > 0.0 && along * along >= MIN_FACING * MIN_FACING * far;
             is_facing[i] = is_front && self.through[i] < 1.0;
         }
@@ -168,8 +172,8 @@ impl Block {
     }
 }
 
-/// How far beams went through places, and how well one ends on them, 0..1; neither where nothing is
-/// known.
+/// For each look, how far beams passed through the place and how well one ends on it, 0..1 each;
+/// both are 0 where nothing is known.
 #[inline]
 fn said(looks: &Looks, tolerance: f32) -> ([f32; LANES], [f32; LANES]) {
     let (mut through, mut on) = ([0.0; LANES], [0.0; LANES]);
@@ -180,7 +184,7 @@ fn said(looks: &Looks, tolerance: f32) -> ([f32; LANES], [f32; LANES]) {
         let gone = ((ahead - tolerance) * per_tolerance).min(1.0);
         let gone = if ahead == f32::INFINITY { NO_RETURN_WEIGHT } else { gone };
         let off = (near - range).abs().min((far - range).abs());
-        // What is not known is NaN: it is neither, though beams beside it went on.
+        // Where `near` is NaN nothing is known, even if beams in neighbouring cells went on.
         let is_through = (ahead > tolerance) & !near.is_nan();
         through[i] = if is_through { gone } else { 0.0 };
         on[i] = if is_through { 0.0 } else { (1.0 - off * per_tolerance).max(0.0) };
@@ -227,7 +231,7 @@ mod tests {
         assert_eq!((hidden.n_seen, hidden.n_on), (0, 0));
     }
 
-    /// One sample after the other, each asked of one scanner after the other.
+    /// The reference: judges one sample after the other, by one scanner after the other.
     fn one_by_one(
         eyes: &[Eye<'_>],
         (points, normals): (&[[f32; 3]], &[[f32; 3]]),
@@ -295,7 +299,7 @@ mod tests {
                 let together = of(Probe::default(), 0..n);
                 let each = one_by_one(&eyes, (&points, &normals), &pose, tolerance);
                 assert_eq!(together, each);
-                // A part of them, and then the rest.
+                // Judging a part and then the rest must give the same.
                 assert_eq!(of(of(Probe::default(), 0..n / 3), n / 3..n), together);
                 assert!(n < 16 || each.n_seen > 0);
             }

@@ -1,7 +1,7 @@
-//! Robust kernels: residual and scale in, weight out.
+//! Robust kernels: the weight of a residual at a given scale.
 
-/// Tukey's biweight: `(1 − (r/c)²)²` inside `c`, zero outside. Redescending: an outlier has no pull
-/// at all.
+/// Tukey's biweight: `(1 − (r/c)²)²` for `|r| < c` and zero beyond, with `r` the residual and `c`
+/// the scale in the same unit. It is redescending: an outlier has no influence at all.
 #[inline]
 #[must_use]
 pub fn tukey(residual: f64, scale: f64) -> f64 {
@@ -10,8 +10,8 @@ pub fn tukey(residual: f64, scale: f64) -> f64 {
     if v <= 0.0 { 0.0 } else { v * v }
 }
 
-/// Slope of Tukey's influence `w(r) r`: how much the pull of a residual grows with it; below its
-/// weight all over.
+/// Derivative of Tukey's influence `w(r)·r` by the residual: how much the pull of a residual grows
+/// with it. It never exceeds the weight `w(r)`.
 #[inline]
 #[must_use]
 pub fn tukey_slope(residual: f64, scale: f64) -> f64 {
@@ -19,20 +19,20 @@ pub fn tukey_slope(residual: f64, scale: f64) -> f64 {
     if u2 >= 1.0 { 0.0 } else { (1.0 - u2) * (1.0 - 5.0 * u2) }
 }
 
-/// Most that a step by robust weights is lengthened: normal errors ask for 1.2, priors and wrong
-/// points for none.
+/// Largest factor by which a step with robust weights is lengthened. Normally distributed errors
+/// ask for 1.2; priors and outliers ask for none.
 const MAX_STRETCH: f64 = 1.25;
 
-/// What a step by Tukey's weights is to be lengthened by, from the sums of weights and of slopes.
-/// The weights say less of residuals that change than of those that stand: a step by them alone
-/// goes five sixths of the way.
+/// Factor by which a Gauss-Newton step with Tukey's weights should be lengthened, from the sums of
+/// weights and of slopes. The weights overestimate how fast the pull changes with the residual, so
+/// that a step by them alone covers only about five sixths of the way.
 #[must_use]
 pub fn stretch(weights: f64, slopes: f64) -> f64 {
     if slopes > 0.0 { (weights / slopes).clamp(1.0, MAX_STRETCH) } else { MAX_STRETCH }
 }
 
-/// What Tukey's biweight makes of half a square, `∫ w(r) r dr`: `c²/6 (1 − (1 − (r/c)²)³)`, from
-/// `c` on the same for all.
+/// Cost whose derivative is Tukey's influence, `∫ w(r) r dr` = `c²/6 (1 − (1 − (r/c)²)³)`; constant
+/// from `|r| = c` on.
 #[inline]
 #[must_use]
 pub fn tukey_cost(residual: f64, scale: f64) -> f64 {
@@ -41,7 +41,7 @@ pub fn tukey_cost(residual: f64, scale: f64) -> f64 {
     scale * scale / 6.0 * (1.0 - v * v * v)
 }
 
-/// Median by selection, reordering `values`; `None` for none. NaN sorts last.
+/// Median by selection, which reorders `values`; `None` where there are none. NaN sorts last.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     if values.is_empty() {
         return None;

@@ -1,35 +1,35 @@
-//! Samples and a grid in; voxel row by voxel row, the nearest sample to each voxel's middle out.
+//! Computes for each voxel of a grid which sample is nearest to its centre.
 //!
-//! Axis after axis, as exact distance transforms go (Felzenszwalb and Huttenlocher, Theory of
-//! Computing 8, 2012): the nearest of a row's samples, of these the nearest of a plane's rows, of
-//! these the nearest of all planes. Eight voxels of a row are judged together, and rows in order of
-//! their distance until none can be nearer.
+//! It works axis by axis, as exact distance transforms do (Felzenszwalb and Huttenlocher, Theory of
+//! Computing 8, 2012): first the nearest sample within each row, then the nearest of all rows in a
+//! plane, then the nearest of all planes. Eight voxels of a row are handled together, and rows are
+//! visited in order of distance until no further one can be nearer.
 
 use wide::f32x8;
 
-/// Voxels of a row that are judged together.
+/// Number of voxels of a row that are handled together.
 pub(crate) const N_LANES: usize = 8;
 
-/// Where voxels lie.
+/// Placement of the voxels.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Grid {
-    /// Where the first voxel begins, metres.
+    /// Lowest corner of the first voxel, metres.
     pub(crate) origin: [f32; 3],
-    /// Of a voxel, metres.
+    /// Edge of a voxel, metres.
     pub(crate) edge: f32,
-    /// Voxels in a metre.
+    /// Number of voxels per metre.
     pub(crate) inverse_edge: f32,
-    /// Voxels on each axis.
+    /// Number of voxels along each axis.
     pub(crate) size: [usize; 3],
 }
 
 impl Grid {
-    /// The middles of `n` voxels along `axis`, metres.
+    /// Centres of the first `n` voxels along `axis`, metres.
     fn middles(&self, axis: usize, n: usize) -> Vec<f32> {
         (0..n).map(|place| self.origin[axis] + (place as f32 + 0.5) * self.edge).collect()
     }
 
-    /// The voxel of a place; `None` outside.
+    /// The voxel of a place, metres; `None` outside of the grid.
     #[inline]
     pub(crate) fn index(&self, p: [f32; 3]) -> Option<[u32; 3]> {
         let mut index = [0; 3];
@@ -44,23 +44,23 @@ impl Grid {
     }
 }
 
-/// The nearest samples known so far of eight voxels beside each other: x, y, z, and their numbers +
-/// 1 as bits, so that all four are chosen by the same comparison.
+/// The nearest samples known so far for eight voxels of a row: x, y, z, and the sample's number
+/// plus one as bits, so that one comparison selects all four.
 type Eight = [f32x8; 4];
 
-/// No sample: so far away that its squared distance (1e18 m²) is beyond any reach.
+/// No sample: so far away that its squared distance (1e18 m²) exceeds any reach.
 const NONE: Eight = [FAR, FAR, FAR, f32x8::ZERO];
 const FAR: f32x8 = f32x8::splat(1e9);
 
-/// The numbers + 1 of eight samples.
+/// The numbers plus one of eight samples.
 fn numbers(eight: &Eight) -> [u32; N_LANES] {
     eight[3].to_array().map(f32::to_bits)
 }
 
-/// Voxels of one plane.
+/// The nearest samples of the voxels of one plane.
 struct Plane {
     eights: Vec<Eight>,
-    /// Whether any of eight voxels has a sample.
+    /// For each group of eight voxels, whether any of them has a sample.
     is_told: Vec<bool>,
 }
 
@@ -80,17 +80,17 @@ impl Plane {
     }
 }
 
-/// A row of a plane: its eights, and which of them have a sample.
+/// One row of a plane: its groups of eight voxels, and which groups have a sample.
 type Told<'a> = (&'a [Eight], &'a [bool]);
 
-/// A row whose samples are at least so far away from another row, m².
+/// A row with a lower bound of the squared distance of its samples from another row, m².
 struct Line<'a> {
     beyond2: f32,
     eights: &'a [Eight],
     is_told: &'a [bool],
 }
 
-/// A sample and the voxel that it is in.
+/// A sample with the voxel that holds it.
 struct Seed {
     /// Row of the grid: `z * size.y + y`.
     row: usize,
@@ -98,23 +98,24 @@ struct Seed {
     sample: u32,
 }
 
-/// What is on its way: see [`spread`].
+/// The inputs and constants of one run of [`spread`].
 struct Spread<'a> {
     points: &'a [[f32; 3]],
     grid: Grid,
-    /// Squared reach, m².
+    /// Square of the reach, m².
     limit: f32,
-    /// Planes or rows on either side that can hold a sample within reach.
+    /// Number of planes or rows on either side that can hold a sample within reach.
     n_rings: usize,
-    /// Eights of a row.
+    /// Number of groups of eight voxels in a row.
     n_eights: usize,
-    /// Middles of voxels on each axis, metres; of x up to the end of the last eight.
+    /// Centres of the voxels along each axis, metres; those of x go up to the end of the last
+    /// group.
     middles: [Vec<f32>; 3],
 }
 
-/// Tells `take` the nearest samples (number + 1; 0 beyond `reach` metres) of eight voxels, for the
-/// row `[y, z]` and the first voxel's `x`; only where one of the eight has any. Lanes past the end
-/// of a row are told too.
+/// Finds the nearest sample to each voxel of a grid within `reach` metres. Calls `take` with the
+/// first voxel (x) and the row (y, z) of each group of eight voxels of which any has a sample, and
+/// with eight sample numbers plus one, 0 beyond reach. A group may extend past the end of its row.
 pub(crate) fn spread(
     points: &[[f32; 3]],
     grid: Grid,
@@ -151,7 +152,7 @@ pub(crate) fn spread(
 }
 
 impl Spread<'_> {
-    /// All samples, in the order of their voxels.
+    /// All samples in the order of their voxels.
     fn seeds(&self) -> Vec<Seed> {
         let [n_x, n_y, _] = self.grid.size;
         let key = |(i, p): (u32, &[f32; 3])| {
@@ -167,7 +168,7 @@ impl Spread<'_> {
         keys.into_iter().map(seed).collect()
     }
 
-    /// The nearest of a row's own samples, for each row of the plane.
+    /// For each row of the plane, the nearest of the row's own samples.
     fn along_rows(&self, seeds: &[Seed], z: usize, rows: &mut Plane) {
         let n_y = self.grid.size[1];
         let mut best = vec![FAR; self.n_eights];
@@ -178,7 +179,7 @@ impl Spread<'_> {
             let mut left = seeds;
             while let Some(x) = left.first().map(|seed| seed.x) {
                 let (here, others) = left.split_at(left.partition_point(|seed| seed.x == x));
-                // Beyond its neighbours these are nearer.
+                // Beyond this voxel the next sample of the row is nearer.
                 let after = others.first().map_or(self.grid.size[0] - 1, |seed| seed.x);
                 let first = before.max(x.saturating_sub(self.n_rings));
                 let last = after.min(x + self.n_rings);
@@ -197,7 +198,7 @@ impl Spread<'_> {
         }
     }
 
-    /// Of the rows' nearest samples, the nearest of the plane.
+    /// The nearest sample of the plane, from the nearest samples of its rows.
     fn across_rows(&self, rows: &Plane, z: usize, plane: &mut Plane) {
         let mut lines = Vec::new();
         for y in 0..self.grid.size[1] {
@@ -211,7 +212,7 @@ impl Spread<'_> {
         }
     }
 
-    /// Of the planes' nearest samples, the nearest of all.
+    /// The nearest sample of all, from the nearest samples of the planes.
     fn across_planes(
         &self,
         planes: &[Plane],
@@ -230,7 +231,7 @@ impl Spread<'_> {
         }
     }
 
-    /// The lines at `place`, then those on either side of it among `n`, ring by ring.
+    /// The line at `place` and then those on either side of it among `n`, by growing distance.
     fn outwards<'b>(
         &self,
         lines: &mut Vec<Line<'b>>,
@@ -251,7 +252,7 @@ impl Spread<'_> {
         }
     }
 
-    /// The middles of eight voxels.
+    /// The centres of the eight voxels of a group.
     #[inline]
     fn middles_of(&self, [eight, y, z]: [usize; 3]) -> [f32x8; 3] {
         let lanes = &self.middles[0][eight * N_LANES..(eight + 1) * N_LANES];
@@ -259,7 +260,8 @@ impl Spread<'_> {
         [x, f32x8::splat(self.middles[1][y]), f32x8::splat(self.middles[2][z])]
     }
 
-    /// The nearest samples to eight voxels of those that lines know; `None` where no voxel has any.
+    /// The nearest samples to a group of eight voxels among the samples of these lines; `None`
+    /// where none of the voxels has one.
     #[inline]
     fn nearest(&self, lines: &[Line], place: [usize; 3]) -> Option<Eight> {
         let middles = self.middles_of(place);
@@ -276,8 +278,8 @@ impl Spread<'_> {
     }
 }
 
-/// Keeps those of eight samples that are nearer to eight voxels' middles than the best so far, m²;
-/// whether any is.
+/// Replaces those samples in `kept` for which the one in `new` is nearer to the voxel's centre.
+/// `best` holds the squared distances of the kept ones, m². Returns whether any was replaced.
 #[inline]
 fn keep_nearer(middles: [f32x8; 3], new: &Eight, best: &mut f32x8, kept: &mut Eight) -> bool {
     let [dx, dy, dz] = [0, 1, 2].map(|i| new[i] - middles[i]);

@@ -1,6 +1,6 @@
-//! Open inputs in; the bounds of the points of each scan out, where that takes a second or two. An
-//! E57 file states bounds in the frame of the scan: turned into the world they hold all points, but
-//! may be much wider.
+//! The world bounds of each scan's points, where finding them takes a second or two. An E57 file
+//! states bounds in the frame of the scan; a box of these in the world holds all points, but may be
+//! much wider than they are, so that the points are read instead.
 
 use crate::reader::Want;
 use crate::sources::Sources;
@@ -8,11 +8,12 @@ use contract::{Fan, Format, Input, Result};
 use geometry::{Aabb, Point};
 use std::collections::BTreeMap;
 
-/// Most points of an input that are read for its bounds: one thread decodes 20 million a second.
+/// Largest number of points of an input that are read for its bounds; one thread decodes 20 million
+/// a second.
 const MOST_READ: u64 = 20_000_000;
 
-/// Bounds of scans in the world, metres, by their number: those of inputs that were read. An input
-/// that cannot be read has none; a run says why.
+/// World bounds of scans by scan number, metres, for the inputs that were read. An input that
+/// cannot be read is left out here; a run reports its error.
 pub(crate) fn read(sources: &Sources, fan: &dyn Fan) -> BTreeMap<u32, Aabb> {
     let is_small = |input: &&Input| sources.n_stated(input.id).is_some_and(|n| n <= MOST_READ);
     let inputs: Vec<&Input> =

@@ -1,4 +1,4 @@
-//! For tests: reads files whole, keeps places and world coordinates, and breaks copies of files.
+//! Helpers for tests: read files whole, keep places and world coordinates, and damage copies.
 
 use crate::Settings;
 use crate::reader::{self, Reader, Want};
@@ -6,10 +6,10 @@ use contract::{Attributes, Result};
 use geometry::Point;
 use std::path::{Path, PathBuf};
 
-/// What was read of one scan.
+/// The points that were read of one scan.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Read {
-    /// Length of the mask, as far as it is told.
+    /// Length of the mask, as far as the strips tell it.
     pub(crate) n_places: u64,
     /// Places in the mask.
     pub(crate) place: Vec<u64>,
@@ -17,7 +17,7 @@ pub(crate) struct Read {
     pub(crate) xyz: Vec<[f32; 3]>,
     /// World, metres.
     pub(crate) world: Vec<[f64; 3]>,
-    /// Where asked for.
+    /// Attributes, if they were requested.
     pub(crate) attributes: Attributes,
 }
 
@@ -36,7 +36,7 @@ impl Read {
     }
 }
 
-/// Reads all scans of an open file, and checks what holds for every strip of every file.
+/// Reads all scans of an open file, and checks the properties that every strip must have.
 pub(crate) fn read_all(reader: &dyn Reader, want: Want, settings: &Settings) -> Result<Vec<Read>> {
     let mut out = vec![Read::default(); reader.scans().len()];
     for strip in reader::strips(reader, want)? {
@@ -75,7 +75,7 @@ pub(crate) fn read_all(reader: &dyn Reader, want: Want, settings: &Settings) -> 
     Ok(out)
 }
 
-/// A folder of the shared scans; `None`, and said so, where this machine does not have it.
+/// A folder of shared scans; `None`, with a message, where this machine does not have it.
 pub(crate) fn shared(folder: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scans").join(folder);
     if !path.is_dir() {
@@ -90,11 +90,11 @@ pub(crate) fn skipped(folder: &str) {
     println!("skipped: no shared scans '{folder}'");
 }
 
-/// A file that is gone when the test ends.
+/// A file that is removed when the test ends.
 pub(crate) struct Scratch(pub(crate) PathBuf);
 
 impl Scratch {
-    /// A file of this name, which must be unique over all tests.
+    /// Creates a file with this name, which must be unique over all tests.
     pub(crate) fn new(name: &str, bytes: &[u8]) -> Self {
         let path =
             std::env::temp_dir().join(format!("stillpoint-ingest-{}-{name}", std::process::id()));
@@ -109,7 +109,7 @@ impl Drop for Scratch {
     }
 }
 
-/// A small generator of numbers for breaking files (SplitMix64).
+/// A small random generator for damaging files (SplitMix64).
 pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {

@@ -1,5 +1,5 @@
-//! E57 (ASTM E2807) files in; scans and their points out. The description is parsed by the crate
-//! `e57`, points are decoded here.
+//! Reads scans and points of E57 files (ASTM E2807). The XML description is parsed by the crate
+//! `e57`; the points are decoded here.
 
 mod look;
 mod packets;
@@ -21,9 +21,9 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// Bytes of the description that are read at a time: as many as [`Pages::read`] gives.
+/// Number of bytes of the description that are read at a time: the most that [`Pages::read`] gives.
 const AT_ONCE: usize = 64 << 10;
-/// Bytes of the file's header.
+/// Length of the file header, bytes.
 const HEADER: usize = 48;
 
 /// An open E57 file.
@@ -33,7 +33,7 @@ struct E57File {
     masks: Vec<MaskSeed>,
     scans: Vec<ScanSeed>,
     files: Vec<E57Scan>,
-    /// One a scan.
+    /// Counts of odd points, one entry a scan.
     oddities: Vec<Oddities>,
     facts: Vec<(String, String)>,
     units: Units,
@@ -119,7 +119,7 @@ impl Reader for E57File {
     }
 }
 
-/// Checks the header before anything is sized by it.
+/// Checks the header before any of its numbers is used as a size.
 fn check_header(pages: &mut Pages, settings: &Settings) -> Result<()> {
     let header: [u8; HEADER] = pages.read(0, HEADER)?.try_into().expect("as long as asked");
     let number =
@@ -165,8 +165,8 @@ fn check_header(pages: &mut Pages, settings: &Settings) -> Result<()> {
         ))
         .at(place));
     }
-    // Every page of the description is checked here, so that an error names it; and what is in it
-    // counted, before its reader keeps all of it.
+    // Each page of the description is checked here, so that an error names the page, and its nodes
+    // are counted before the XML reader keeps all of them.
     let mut text = Vec::new();
     while (text.len() as u64) < len {
         let n = (len as usize - text.len()).min(AT_ONCE);
@@ -181,22 +181,22 @@ fn check_header(pages: &mut Pages, settings: &Settings) -> Result<()> {
     check_xml(&text, &limits).map_err(|what| Error::bad_input(what).at("description"))
 }
 
-/// An error of the crate that parses descriptions, in our words.
+/// Translates an error of the crate that parses descriptions.
 fn describe(e: ::e57::Error) -> Error {
     let (kind, what) = match &e {
         ::e57::Error::NotImplemented { .. } => {
-            (Kind::Unsupported, "description of the file holds what is not read")
+            (Kind::Unsupported, "description of the file has unsupported content")
         }
         ::e57::Error::Internal { .. } => {
-            (Kind::BadInput, "description of the file confuses its reader")
+            (Kind::BadInput, "description of the file cannot be parsed")
         }
         _ => (Kind::BadInput, "description of the file is broken"),
     };
-    Error::new(kind, what).because(e).hint("export the file anew")
+    Error::new(kind, what).because(e).hint("export the file again")
 }
 
-/// Units of the file's coordinates: metres, by the standard. That the reference system has another
-/// unit is mentioned.
+/// Units of the file's coordinates, which are metres by the standard; a reference system with
+/// another unit is mentioned.
 fn units(reader: &E57Reader<BufReader<File>>, path: &Path, settings: &Settings) -> Result<Units> {
     let mut out = Units::of_format(Choice::read(&settings.units)?.of(path))?;
     let system = reader.coordinate_metadata().and_then(|text| units::of_wkt(text.as_bytes()));
@@ -211,7 +211,7 @@ fn units(reader: &E57Reader<BufReader<File>>, path: &Path, settings: &Settings) 
     Ok(out)
 }
 
-/// What the file says of itself.
+/// Facts about the file from its header, for `inspect`.
 fn facts(reader: &E57Reader<BufReader<File>>) -> Vec<(String, String)> {
     let header = reader.header();
     let clouds = reader.pointclouds();
@@ -238,7 +238,7 @@ fn facts(reader: &E57Reader<BufReader<File>>) -> Vec<(String, String)> {
     facts
 }
 
-/// What one scan holds, in words.
+/// The fields of one scan, in words.
 fn fields(cloud: &::e57::PointCloud) -> String {
     let mut words = vec![format!("{} records", cloud.records)];
     let flags = [

@@ -1,19 +1,18 @@
-//! The first bytes of a file in; which point format it is out, or a refusal that says what to do
-//! instead.
+//! Detects the point format of a file by its first bytes, or refuses it with advice on what to do.
 
 use contract::{Error, Format, Kind, Result};
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-/// Enough for the first lines of a text format.
+/// Number of bytes that are looked at, enough for the first lines of a text format.
 const HEAD_BYTES: u64 = 512;
-/// Bit of the point format of a LAS header that marks compressed points.
+/// Bits of the point format in a LAS header that mark compressed points.
 const COMPRESSED: u8 = 0b1100_0000;
-/// Where the point format stands in a LAS header.
+/// Offset of the point format in a LAS header.
 const POINT_FORMAT_AT: usize = 104;
 
-/// Tells the format by the first bytes; the suffix only makes the refusal clearer.
+/// Detects the format by the first bytes; the suffix only makes the error message clearer.
 pub(crate) fn detect(path: &Path) -> Result<Format> {
     let mut head = Vec::new();
     File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
@@ -34,7 +33,7 @@ pub(crate) fn detect(path: &Path) -> Result<Format> {
     Err(refusal(&head, &suffix))
 }
 
-/// Two lines of one whole number, then one of three numbers.
+/// Whether a file begins with two lines of one whole number each and then one of three numbers.
 fn is_ptx(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
     let mut lines = text.lines().map(|l| l.split_whitespace().collect::<Vec<_>>());

@@ -1,35 +1,35 @@
-//! From the coordinates of a file to the scan frame: the stated pose and a few points in, a frame
-//! out whose coordinates stay small, and whose origin is the scanner where that can be true.
+//! Chooses the scan frame, from the stated pose and a few points, so that coordinates in it stay
+//! small and its origin is the scanner where that is possible.
 
 use contract::{Error, Result};
 use geometry::{Aabb, Point, Pose};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
-/// Farthest that a terrestrial scanner stands from what it measured, metres. Long-range scanners of
-/// quarries reach 2 to 6 km, those of plants 0.4 km; map coordinates (easting, northing) are tens
-/// of kilometres at the least.
+/// Largest distance of a terrestrial scanner from what it measures, metres. Long-range scanners for
+/// quarries reach 2 to 6 km, those for plants 0.4 km; map coordinates (easting, northing) are at
+/// least tens of kilometres.
 const FARTHEST_SCANNER: f64 = 8.0e3;
-/// Points nearer to their scanner than this are beams without return that the file has written as
-/// its origin, metres: no scanner and no camera measures within its own housing.
+/// Distance from the scanner within which points are beams without return that the file writes as
+/// its origin, metres: no scanner or camera measures within its own housing.
 pub(crate) const NO_RETURN: f64 = 0.01;
-/// The same about the origin of a file whose scanner is not known: rounding of map coordinates,
-/// metres.
+/// The corresponding distance from the origin of a file whose scanner is unknown, metres: the
+/// rounding of map coordinates.
 const NO_POINT: f64 = 1e-6;
 
-/// How a file's coordinates become those of the scan frame.
+/// Conversion from a file's coordinates to those of the scan frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Frame {
-    /// Turns the file's coordinates first; only where the scanner is not known and the file states
-    /// a turn.
+    /// Rotation that is applied first; only where the scanner is unknown and the file states a
+    /// rotation.
     rotation: Option<UnitQuaternion<f64>>,
-    /// Subtracted then, metres.
+    /// Subtracted after the rotation, metres.
     shift: [f64; 3],
-    /// Pose of the scan frame.
+    /// Pose of the scan frame in the world.
     pub(crate) world_from_scan: Pose,
     /// Whether the origin of the scan frame is the scanner.
     pub(crate) scanner_known: bool,
-    /// Where beams without return are written, scan frame, and how near to it points are such,
-    /// metres; 0 where none are.
+    /// Place where beams without return are written (scan frame, metres), and the distance within
+    /// which points count as such, metres; 0 where there are none.
     no_return: ([f64; 3], f64),
 }
 
@@ -40,8 +40,8 @@ impl Frame {
         Self { rotation: None, shift: [0.0; 3], world_from_scan, scanner_known: true, no_return }
     }
 
-    /// World axes about a whole metre near `near` (a point in the file's frame), for points whose
-    /// scanner is not known.
+    /// A frame with world axes and an origin at whole metres near `near` (a point in the file
+    /// frame), for points whose scanner is unknown.
     pub(crate) fn about(world_from_file: Pose, near: [f64; 3]) -> Self {
         let origin = (world_from_file * Point::from(near)).coords.map(f64::round);
         let turned = world_from_file.rotation.angle() > 0.0;
@@ -57,25 +57,25 @@ impl Frame {
         }
     }
 
-    /// The same where the file writes beams without return as its origin.
+    /// The same frame for a file that writes beams without return as its origin.
     pub(crate) fn without_origin(self) -> Self {
         let no_return = (self.scan_from_file([0.0; 3]), NO_POINT);
         Self { no_return, ..self }
     }
 
-    /// The same where the origin is a point as any other.
+    /// The same frame for a file in which a point at the origin is a measured point.
     pub(crate) fn with_origin(self) -> Self {
         Self { no_return: ([0.0; 3], 0.0), ..self }
     }
 
-    /// Whether a place in the scan frame is no return but the mark of a beam without.
+    /// Whether a place in the scan frame marks a beam without return.
     #[inline]
     pub(crate) fn is_no_return(&self, p: [f64; 3]) -> bool {
         let (at, reach) = self.no_return;
         (0..3).map(|i| (p[i] - at[i]).powi(2)).sum::<f64>() < reach * reach
     }
 
-    /// A point of the file in the scan frame, metres.
+    /// Converts a point of the file to the scan frame, metres.
     #[inline]
     pub(crate) fn scan_from_file(&self, p: [f64; 3]) -> [f64; 3] {
         let p = match &self.rotation {
@@ -85,21 +85,21 @@ impl Frame {
         [p[0] - self.shift[0], p[1] - self.shift[1], p[2] - self.shift[2]]
     }
 
-    /// Whether the scan frame differs from the file's by a shift alone; then the shift, metres.
+    /// The shift between file and scan frame, metres, where they differ by nothing else.
     #[inline]
     pub(crate) fn shift_only(&self) -> Option<[f64; 3]> {
         self.rotation.is_none().then_some(self.shift)
     }
 }
 
-/// Whether a scanner at the origin can have measured these points (file's frame): half of them
-/// within its reach.
+/// Whether a scanner at the origin can have measured these points (file frame): at least half of
+/// them are within its reach.
 pub(crate) fn within_reach(points: &[[f64; 3]]) -> bool {
     let near = points.iter().filter(|p| Vector3::from(**p).norm() <= FARTHEST_SCANNER).count();
     2 * near >= points.len()
 }
 
-/// A place near points in the file's frame: the middle of the stated bounds, else the middle one of
+/// A place near the points in the file frame: the centre of the stated bounds, else the median of
 /// the points.
 pub(crate) fn near(bounds: Option<&Aabb>, points: &[[f64; 3]]) -> [f64; 3] {
     let mut middle = [0.0; 3];
@@ -117,17 +117,16 @@ pub(crate) fn near(bounds: Option<&Aabb>, points: &[[f64; 3]]) -> [f64; 3] {
     }
 }
 
-/// A rotation from a stated quaternion; refused where it is none, brought to unit length where it
-/// nearly is.
+/// The rotation of a stated quaternion, normalised; refused where it is far from unit length.
 pub(crate) fn rotation(wxyz: [f64; 4]) -> Result<UnitQuaternion<f64>> {
     let q = Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
     let norm = q.norm();
-    // Files carry 6 to 17 digits; beyond one in a thousand it is not rounding.
+    // Files carry 6 to 17 digits, so a deviation above one in a thousand is no rounding.
     if !norm.is_finite() || (norm - 1.0).abs() > 1e-3 {
         return Err(Error::bad_input(format!(
             "rotation of the pose is not a unit quaternion, its length is \"{norm}\""
         ))
-        .hint("mend the pose in the software that wrote the file"));
+        .hint("correct the pose in the software that wrote the file"));
     }
     Ok(UnitQuaternion::from_quaternion(q))
 }

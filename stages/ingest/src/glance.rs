@@ -1,35 +1,35 @@
-//! An open input in; some of its points, spread over it as well as its format lets, out: enough to
-//! guess what stands in a plant without reading all of it.
+//! Takes a small sample of the points of an input, spread over it as well as its format allows,
+//! to estimate what is in a plant without reading all points.
 
 use crate::reader::{Extent, RawStrip, RawStrips, Reading, Want};
 use crate::sources::{File, Sources};
 use contract::{Fan, InputId, Result};
 use geometry::Point;
 
-/// How much is looked at.
+/// Size of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sample {
-    /// Points that are decoded, about, at most.
+    /// Approximate largest number of points that are decoded.
     pub n_decoded: u64,
-    /// Points that are kept of those, about, at most.
+    /// Approximate largest number of points that are kept.
     pub n_kept: u64,
 }
 
-/// What was seen of an input.
+/// A sample of an input's points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Glance {
-    /// Points, world, metres.
+    /// The points, world, metres.
     pub points: Vec<[f64; 3]>,
-    /// Points that were decoded to choose them from.
+    /// Number of points that were decoded for it.
     pub n_decoded: u64,
 }
 
 impl Sources {
-    /// Looks at points of an input: of formats that are read in pieces at every few pieces, of E57
-    /// files at the beginning of each scan, of others at the beginning of the file.
+    /// Samples the points of an input: of a format that is read in pieces from every few pieces, of
+    /// an E57 file from the beginning of each scan, of others from the beginning of the file.
     ///
     /// # Errors
-    /// An input that is broken where it was looked at, with its path.
+    /// If the input is broken where it is read; the error names its path.
     pub fn glance(&self, input: InputId, sample: Sample, fan: &dyn Fan) -> Result<Glance> {
         let (file, path) = self.open(input)?;
         self.glanced(file, sample, fan).map_err(|e| e.at(path.display()))
@@ -70,7 +70,7 @@ impl Sources {
         })
     }
 
-    /// Every so many of the points of strips, until so many are decoded.
+    /// Keeps one of every few points of the strips, until enough are decoded.
     fn thinned(
         &self,
         file: &File,

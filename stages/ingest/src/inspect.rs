@@ -1,5 +1,5 @@
-//! Open inputs in; what is in them, and what will be worse for what they lack, out: for people and
-//! as JSON.
+//! Describes the content of inputs, and which results suffer from what they lack, for people and as
+//! JSON.
 
 use crate::bounds;
 use crate::raster::Steps;
@@ -15,96 +15,96 @@ use std::fmt;
 /// What one input holds.
 #[derive(Debug, Clone, Serialize)]
 pub struct Description {
-    /// As given.
+    /// Path as given by the user.
     pub path: String,
     /// `E57`, `PTX`, `LAS` or `LAZ`.
     pub format: &'static str,
     /// Length of the file, bytes.
     pub n_bytes: u64,
-    /// Units of its coordinates as they stand in the file; all lengths here are metres.
+    /// Units of the coordinates in the file; all lengths given here are in metres.
     pub units: Units,
-    /// What the file says of itself, in the order of the reader.
+    /// Facts that the file states, in the order of the reader.
     pub facts: Vec<Fact>,
-    /// Points that the file does not flag as invalid, where known without reading them.
+    /// Number of points that the file does not flag as invalid, where known without reading it.
     pub n_points: Option<u64>,
-    /// In the order of the file.
+    /// The scans, in the order of the file.
     pub scans: Vec<ScanDescription>,
 }
 
-/// One thing that a file says of itself.
+/// A fact that a file states.
 #[derive(Debug, Clone, Serialize)]
 pub struct Fact {
-    /// What it is.
+    /// Name of the fact.
     pub name: String,
-    /// As text.
+    /// Value as text.
     pub value: String,
 }
 
-/// What one scan holds.
+/// The content of one scan.
 #[derive(Debug, Clone, Serialize)]
 pub struct ScanDescription {
-    /// Name for people.
+    /// Display name.
     pub name: String,
-    /// LAS point source id, where scans are told apart by it.
+    /// Point source id of LAS, where scans are told apart by it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub source_id: Option<u16>,
-    /// Number of points, where stated.
+    /// Number of points, where the file states it.
     pub n_points: Option<u64>,
     /// Whether the scanner's position is known.
     pub scanner_known: bool,
     /// Pose of the scan frame in the world.
     pub world_from_scan: PoseText,
-    /// Whether rows and columns of the file map to the lattice one to one.
+    /// Whether the file's rows and columns map to pixels of the lattice one to one.
     pub structured: bool,
     /// The lattice, where there is one.
     pub lattice: Option<LatticeText>,
-    /// Bounds of its points in the world, metres, where they are known: stated in the world, or
-    /// the points were read for it.
+    /// Bounds of the points in the world, metres, where they are stated in the world or were
+    /// computed from the points.
     pub bounds: Option<BoundsText>,
-    /// Bounds in the world, metres, where the file states them; those that an E57 file states in
-    /// the frame of the scan hold all points, but may be wider.
+    /// Stated bounds in the world, metres. Those that an E57 file states in the scan frame hold all
+    /// points, but may be wider than they are.
     pub stated_bounds: Option<BoundsText>,
-    /// What is missing, and what will be worse for it.
+    /// Messages about what is missing and which results suffer from it.
     pub notes: Vec<String>,
 }
 
-/// A pose.
+/// A pose, as shown to people.
 #[derive(Debug, Clone, Serialize)]
 pub struct PoseText {
-    /// Metres.
+    /// Translation, metres.
     pub xyz: [f64; 3],
-    /// Unit quaternion.
+    /// Rotation as a unit quaternion.
     pub quat_wxyz: [f64; 4],
 }
 
-/// A lattice.
+/// A lattice, as shown to people.
 #[derive(Debug, Clone, Serialize)]
 pub struct LatticeText {
     /// Elevation step, degrees.
     pub row_step_deg: f64,
     /// Azimuth step, degrees.
     pub col_step_deg: f64,
-    /// Rows of the whole sphere.
+    /// Number of rows of the whole sphere.
     pub n_rows: u32,
-    /// Columns of a turn.
+    /// Number of columns of a full turn.
     pub n_cols: u32,
-    /// Axis of the scan frame that the scanner spins about.
+    /// Axis of the scan frame about which the scanner spins.
     pub axis: &'static str,
-    /// `rows and columns`, `irregular rows and columns` or `directions`.
+    /// Source of the steps: `rows and columns`, `irregular rows and columns` or `directions`.
     pub from: &'static str,
 }
 
-/// Bounds.
+/// An axis-aligned bounding box.
 #[derive(Debug, Clone, Serialize)]
 pub struct BoundsText {
-    /// Metres.
+    /// Smallest corner, metres.
     pub min: [f64; 3],
-    /// Metres.
+    /// Largest corner, metres.
     pub max: [f64; 3],
 }
 
-/// Describes each input, in their order. E57 files that are not large are read for the bounds of
-/// their points.
+/// Describes each input, in the order of the inputs. E57 files that are not large are read for the
+/// bounds of their points.
 #[must_use]
 pub fn describe(sources: &Sources, fan: &dyn Fan) -> Vec<Description> {
     let read = bounds::read(sources, fan);
@@ -257,7 +257,7 @@ impl fmt::Display for ScanDescription {
         }
         match (&self.bounds, &self.stated_bounds) {
             (Some(b), _) => writeln!(f, "    bounds: {} to {}", metres(&b.min), metres(&b.max))?,
-            // Too many points to read them for that.
+            // The file has too many points to compute the bounds from them.
             (None, Some(b)) => writeln!(
                 f,
                 "    bounds: within {} to {}, as stated in the frame of the scan",

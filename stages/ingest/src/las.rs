@@ -1,6 +1,6 @@
-//! LAS and LAZ files in (versions 1.0 to 1.4, point formats 0 to 10); scans and strips out. Points
-//! come as runs of records, as they lie in the file or from the decompressor; no object is made for
-//! a point.
+//! Reads LAS and LAZ files (versions 1.0 to 1.4, point formats 0 to 10) as scans and strips. Points
+//! are handled as runs of records, as they lie in the file or come from the decompressor, without
+//! an object for each point.
 
 use crate::las_header::LasHeader;
 use crate::las_record::Decoder;
@@ -15,30 +15,30 @@ use contract::{Error, Format, Result};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Largest run of records that is decompressed from a stream at once, bytes: of usual records, more
-/// than a strip.
+/// Largest number of bytes of records that are decompressed from a stream at once: of records of
+/// usual length more than a strip.
 const RUN_BYTES: usize = 16 << 20;
 
-/// Records of this length that are decompressed from a stream at once. A stream does not say how
-/// many there really are, and a header may state records of 64 KiB, so that a strip of them would
-/// take gigabytes before the first was read.
+/// Number of records of this length that are decompressed from a stream at once. A stream does not
+/// tell how many records there really are, and a header may state records of 64 KiB, so that a
+/// buffer for a strip of them could take gigabytes before the first record is read.
 fn at_once(record_len: usize) -> usize {
     (RUN_BYTES / record_len.max(1)).max(1)
 }
 
-/// The records of a file, whichever way they are stored.
+/// The records of a file, compressed or not.
 pub(crate) struct Records {
     map: Mapped,
-    /// Header, checked, in metres.
+    /// The checked header, in metres.
     pub(crate) header: LasHeader,
-    /// Units of the file's own coordinates.
+    /// Units of the coordinates in the file.
     units: Units,
-    /// How to decompress, where they are compressed.
+    /// How to decompress the records; `None` where they are not compressed.
     pub(crate) laz: Option<Laz>,
 }
 
 impl Records {
-    /// Opens a file and checks what it says of itself.
+    /// Opens a file and checks its header.
     pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Self> {
         let map = map(path)?;
         let header = LasHeader::read(&map)?;
@@ -49,9 +49,9 @@ impl Records {
         Ok(Self { map, header, units, laz })
     }
 
-    /// At most `n` records from `first` on; `(place of the first one, records)`. Where records are
-    /// compressed, the run starts at the piece that holds `first`; where they are one stream,
-    /// at the start of the file.
+    /// At most `n` records from place `first` on, with the place of the first record returned.
+    /// Where records are compressed, the run starts at the beginning of the piece that holds
+    /// `first`, or at the beginning of the file where they are one stream.
     pub(crate) fn run(&self, first: u64, n: usize) -> Result<(u64, Cow<'_, [u8]>)> {
         let n = n.min(usize::try_from(self.header.n_points.saturating_sub(first)).unwrap_or(n));
         let Some(laz) = &self.laz else {
@@ -73,14 +73,14 @@ impl Records {
         Ok((start, Cow::Owned(records)))
     }
 
-    /// Where [`Records::run`] would start.
+    /// The place at which [`Records::run`] would start.
     pub(crate) fn start(&self, first: u64) -> u64 {
         let Some(laz) = &self.laz else { return first };
         laz.pieces.get(laz.piece_of(first)).map_or(0, |p| p.first)
     }
 
-    /// Runs of records that can be read by themselves, of so many points where they are not
-    /// compressed, and all that lies between them; none where they are one stream.
+    /// Extents that cover the file: runs of records that can be read independently, of `n` points
+    /// where they are not compressed, and the bytes between them. `None` where they are one stream.
     fn extents(&self, n: usize) -> Option<Box<dyn Iterator<Item = Extent> + Send + '_>> {
         let (header, n_bytes) = (&self.header, self.map.len() as u64);
         let Some(laz) = &self.laz else {
@@ -95,8 +95,8 @@ impl Records {
         (!is_stream).then(|| Box::new(Extent::cover(laz.pieces.iter().cloned(), n_bytes)) as _)
     }
 
-    /// Records of an uncompressed file. In range, since the count was checked against the file's
-    /// length.
+    /// Records of an uncompressed file. They are in range, since the count was checked against the
+    /// length of the file.
     fn mapped(&self, first: u64, n: usize) -> &[u8] {
         let from = self.header.points_at + first as usize * self.header.record_len;
         &self.map[from..from + n * self.header.record_len]
@@ -109,16 +109,16 @@ pub(crate) struct Las {
     decoder: Decoder,
     masks: Vec<MaskSeed>,
     scans: Vec<ScanSeed>,
-    /// First and last place at which each scan was seen.
+    /// First and last place at which points of each scan were seen.
     extents: Vec<(u64, u64)>,
-    /// Whether a look at the file found all points inside the stated bounds: then a piece that is
-    /// not is damaged.
+    /// Whether all points of a sample lie inside the stated bounds; then a piece with points
+    /// outside is damaged.
     bounds_hold: bool,
     strip_points: usize,
 }
 
 impl Las {
-    /// Opens a LAS or LAZ file, with the scanners that are known for it.
+    /// Opens a LAS or LAZ file with the scanners that are known for it.
     pub(crate) fn open(path: &Path, scanners: &[LasScanner], settings: &Settings) -> Result<Self> {
         let records = Records::open(path, settings)?;
         let found = las_scans::find(path, &records, scanners, settings)?;
@@ -167,9 +167,10 @@ impl Reader for Las {
     }
 
     fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
-        /// Long enough to span several lines of most scanners, and spread over the scan.
+        /// Positions of the runs of a sample, relative to the length of the scan: each run spans
+        /// several lines of most scanners.
         const RUNS: [f64; 3] = [0.45, 0.1, 0.8];
-        /// More places to look at where other scans' points lie between.
+        /// Number of further positions that are tried where points of other scans lie between.
         const MORE: usize = 16;
         let (first, last) = self.extents[scan];
         let span = last + 1 - first.min(last + 1);
@@ -198,7 +199,7 @@ impl Reader for Las {
     }
 
     fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
-        /// Records that are read at once: a piece of most compressed files.
+        /// Number of records that are read at once: a piece of most compressed files.
         const RUN: u64 = 50_000;
         let (first, last) = self.extents[scan];
         let span = (last + 1).saturating_sub(first);
@@ -277,15 +278,15 @@ impl Reader for Las {
 }
 
 impl Las {
-    /// The strips of a run of records, of which the first has the place `first`.
+    /// The strips of a run of records; `first` is the place of the first record.
     fn strips_of(&self, records: &[u8], first: u64, want: Want) -> Vec<RawStrip> {
         let runs = records.chunks(self.strip_points * self.records.header.record_len);
         let places = (first..).step_by(self.strip_points);
         runs.zip(places).flat_map(|(run, first)| self.decoder.decode(run, first, want)).collect()
     }
 
-    /// A damaged compressed run decodes without complaint, into nonsense: tell by the stated
-    /// bounds, where these were found to be right.
+    /// Refuses a run with points outside the stated bounds, if these hold elsewhere: damaged
+    /// compressed data decodes to nonsense without an error.
     fn check_bounds(&self, records: &[u8], first: u64) -> Result<()> {
         let header = &self.records.header;
         let (Some(bounds), true) = (&header.bounds, self.bounds_hold) else {
@@ -312,14 +313,14 @@ impl Las {
 struct Streamed<'a> {
     las: &'a Las,
     want: Want,
-    /// Place of the first record that is not decompressed yet.
+    /// Place of the next record to decompress.
     place: u64,
     stream: Option<Stream<'a>>,
     has_failed: bool,
 }
 
 impl Streamed<'_> {
-    /// The next run; nothing at the end.
+    /// The strips of the next run; `None` at the end.
     fn run(&mut self) -> Result<Option<Vec<RawStrip>>> {
         let (las, first) = (self.las, self.place);
         let left = las.records.header.n_points - first;

@@ -1,4 +1,4 @@
-//! The bytes of a LAS or LAZ file in; its header out, checked against the length of the file.
+//! Reads the header of a LAS or LAZ file and checks it against the length of the file.
 
 use crate::las_record::Layout;
 use crate::units::{self, Declaration};
@@ -6,7 +6,7 @@ use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use std::io::Cursor;
 
-/// What the header and the variable length records say, checked.
+/// The checked content of the header and the variable length records.
 #[derive(Debug, Clone)]
 pub(crate) struct LasHeader {
     /// Minor version of LAS 1.x.
@@ -19,23 +19,23 @@ pub(crate) struct LasHeader {
     pub(crate) record_len: usize,
     /// Number of records.
     pub(crate) n_points: u64,
-    /// Of one count: in the unit of the file until it is brought to metres.
+    /// Length of one count of x, y and z, in the file's unit, or in metres after `in_metres`.
     pub(crate) scale: [f64; 3],
-    /// Added after scaling.
+    /// Added after scaling, in the same unit.
     pub(crate) offset: [f64; 3],
     /// Stated bounds, where they are finite and in order.
     pub(crate) bounds: Option<Aabb>,
-    /// Where points start, bytes from the start of the file.
+    /// Byte offset of the first point.
     pub(crate) points_at: usize,
-    /// Payload of the record of LASzip, where there is one.
+    /// Offset and length of the payload of the LASzip record, where there is one.
     pub(crate) laszip: Option<(usize, usize)>,
     /// Whether the file is a COPC (octree order).
     pub(crate) copc: bool,
-    /// Program that wrote it.
+    /// Name of the program that wrote the file.
     pub(crate) software: String,
-    /// What its records declare of its units, what counts first.
+    /// Declarations of units in its records, the decisive one first.
     pub(crate) declared: Vec<Declaration>,
-    /// What is odd, in words.
+    /// Messages about oddities.
     pub(crate) notes: Vec<String>,
 }
 
@@ -45,7 +45,7 @@ const VLR_HEADER: usize = 54;
 const COMPRESSED_BITS: u8 = 0b1100_0000;
 
 impl LasHeader {
-    /// Reads and checks.
+    /// Reads and checks the header.
     pub(crate) fn read(data: &[u8]) -> Result<Self> {
         let raw = las::raw::Header::read_from(Cursor::new(data)).map_err(|cause| {
             Error::bad_input("the header cannot be read").because(cause).at("header")
@@ -94,15 +94,15 @@ impl LasHeader {
         header.walk_records(&raw, data)?;
         header.n_points = header.count(&raw, data.len())?;
         if header.n_points > 0 && header.bounds.is_none() {
-            header.notes.push("the stated bounds make no sense and are not used".into());
+            header.notes.push("the stated bounds are not plausible and are not used".into());
         }
         Ok(header)
     }
 
-    /// The same in metres, where one unit of x, y and z has so many of them.
+    /// Converts the header to metres; `factors` are the metres per unit of x, y and z.
     ///
     /// # Errors
-    /// Numbers that are none any more.
+    /// If a number is not finite after the conversion.
     pub(crate) fn in_metres(mut self, factors: [f64; 3]) -> Result<Self> {
         for (axis, factor) in factors.into_iter().enumerate() {
             self.scale[axis] *= factor;
@@ -157,8 +157,7 @@ impl LasHeader {
         Ok(())
     }
 
-    /// Finds the records that matter among the variable length records; each is checked to lie
-    /// before the points.
+    /// Finds the relevant variable length records and checks that each ends before the points.
     fn walk_records(&mut self, raw: &las::raw::Header, data: &[u8]) -> Result<()> {
         let mut at = usize::from(raw.header_size);
         for i in 0..raw.number_of_variable_length_records {
@@ -197,14 +196,14 @@ impl LasHeader {
         Ok(())
     }
 
-    /// Number of points: the count that agrees with the bytes present, where a file states two that
-    /// differ.
+    /// Number of points. Where the file states two numbers that differ, the one that agrees with
+    /// the length of the file counts.
     fn count(&mut self, raw: &las::raw::Header, n_bytes: usize) -> Result<u64> {
         let old = u64::from(raw.number_of_point_records);
         let new = raw.large_file.map_or(old, |large| large.number_of_point_records);
         let room = (self.points_end(raw, n_bytes) - self.points_at) as u64;
-        // A compressed point takes at least something: the arithmetic coder spends a thousandth of
-        // a bit at best, so a count can only be checked against the chunk table; see `laz`.
+        // A compressed point may take as little as a thousandth of a bit, so a count can only be
+        // checked against the chunk table; see `laz`.
         let fits = |n: u64| {
             self.compressed || n.checked_mul(self.record_len as u64).is_some_and(|b| b <= room)
         };
@@ -217,14 +216,14 @@ impl LasHeader {
         }
         let there = room / self.record_len as u64;
         if fits(n) {
-            // A writer that was stopped before it could put the count right leaves less in the
-            // header than in the file.
+            // A writer that was stopped before it could correct the count leaves fewer points in
+            // the header than in the file.
             if !self.compressed && there > n {
                 return Err(Error::bad_input(format!(
                     "{there} points are in the file, stated are only \"{n}\""
                 ))
                 .at("header")
-                .hint("the header lies: export the file again, or put the count right"));
+                .hint("the header is wrong: export the file again, or correct the count"));
             }
             return Ok(n);
         }
@@ -233,8 +232,8 @@ impl LasHeader {
             .hint("the file is truncated; copy or export it again"))
     }
 
-    /// Where points end at the latest: before records that follow them, where the header says where
-    /// these start.
+    /// Byte offset at which the points end at the latest: the length of the file, or the beginning
+    /// of the records behind the points, where the header states it.
     fn points_end(&self, raw: &las::raw::Header, n_bytes: usize) -> usize {
         let extended = raw.evlr.filter(|e| e.number_of_evlrs > 0).map(|e| e.start_of_first_evlr);
         [raw.start_of_waveform_data_packet_record, extended]
@@ -253,7 +252,7 @@ fn stated_bounds(raw: &las::raw::Header) -> Option<Aabb> {
     sane.then(|| Aabb::of([min, max]))
 }
 
-/// Text of a field that is padded with zeros; other bytes than ASCII become `?`.
+/// Text of a field that is padded with zeros; non-ASCII bytes become `?`.
 fn text(field: &[u8]) -> String {
     field
         .iter()

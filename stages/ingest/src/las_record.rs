@@ -1,5 +1,5 @@
-//! Bytes of LAS point records in; strips out. The table of the eleven point formats, and the one
-//! loop that every LAS and LAZ point goes through.
+//! Decodes LAS point records to strips: the table of the eleven point formats, and the one loop
+//! through which all LAS and LAZ points pass.
 
 use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
@@ -8,12 +8,12 @@ use crate::reader::{RawStrip, Want};
 use contract::Attributes;
 use geometry::Pose;
 
-/// Where the fields of a point format lie, bytes from the start of the record.
+/// Offsets of the fields of a point format from the start of the record, bytes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Layout {
-    /// Shortest record.
+    /// Smallest length of a record, bytes.
     pub(crate) len: usize,
-    /// Formats 6 to 10: flags, class and source id lie elsewhere.
+    /// Whether it is one of formats 6 to 10, whose flags, class and source id lie elsewhere.
     pub(crate) modern: bool,
     /// GPS time.
     pub(crate) gps_time: Option<usize>,
@@ -21,7 +21,7 @@ pub(crate) struct Layout {
     pub(crate) color: Option<usize>,
 }
 
-/// LAS 1.4 R15, tables 7 to 17.
+/// The point formats 0 to 10 (LAS 1.4 R15, tables 7 to 17).
 const LAYOUTS: [Layout; 11] = [
     Layout { len: 20, modern: false, gps_time: None, color: None },
     Layout { len: 28, modern: false, gps_time: Some(20), color: None },
@@ -36,19 +36,19 @@ const LAYOUTS: [Layout; 11] = [
     Layout { len: 67, modern: true, gps_time: Some(22), color: Some(30) },
 ];
 
-/// Records that are decoded together: small enough for the first-level cache, long enough for
-/// vector loops.
+/// Number of records that are decoded together: few enough for the first-level cache, many enough
+/// for vector loops.
 const BLOCK: usize = 64;
-/// Intensity lies at the same place in all formats.
+/// Offset of the intensity, the same in all formats.
 const INTENSITY: usize = 12;
 
 impl Layout {
-    /// The layout of a point format.
+    /// The layout of a point format; `None` where the format is unknown.
     pub(crate) fn of(format: u8) -> Option<Self> {
         LAYOUTS.get(usize::from(format)).copied()
     }
 
-    /// Whether the file marks the point as not to be used.
+    /// Whether the file marks the point as withheld.
     #[inline]
     pub(crate) fn withheld(self, record: &[u8]) -> bool {
         if self.modern { record[15] & 0b100 != 0 } else { record[15] & 0b1000_0000 != 0 }
@@ -60,7 +60,7 @@ impl Layout {
         u16_at(record, if self.modern { 20 } else { 18 })
     }
 
-    /// Class.
+    /// Classification of the point.
     #[inline]
     fn classification(self, record: &[u8]) -> u8 {
         if self.modern { record[16] } else { record[15] & 0b1_1111 }
@@ -84,13 +84,13 @@ fn f64_at(record: &[u8], at: usize) -> f64 {
     f64::from_le_bytes(bytes)
 }
 
-/// The counts of a record.
+/// The integer coordinates (counts) of a record.
 #[inline]
 fn counts(record: &[u8]) -> [f64; 3] {
     [i32_at(record, 0), i32_at(record, 4), i32_at(record, 8)]
 }
 
-/// A strip whose first place is that of its first point; nothing where it has none.
+/// The strip with the place of its first point as first place; `None` where it has no point.
 fn trimmed(mut strip: RawStrip) -> Option<RawStrip> {
     let shift = *strip.place.first()?;
     if shift > 0 {
@@ -100,21 +100,21 @@ fn trimmed(mut strip: RawStrip) -> Option<RawStrip> {
     Some(strip)
 }
 
-/// A record in the scan frame, metres.
+/// Coordinates of a record in the scan frame, metres.
 #[inline]
 fn in_scan(record: &[u8], frame: &Frame) -> [f64; 3] {
     let (c, m, t) = (counts(record), &frame.m, &frame.t);
-    // One order of sums for all records: see `add_block`.
+    // `add_block` must sum in the same order, so that both give the same result to the bit.
     [0, 1, 2].map(|i| c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i])
 }
 
-/// From counts to the scan frame: `m · counts + t`.
+/// Conversion from counts to the scan frame: `m · counts + t`, metres.
 #[derive(Debug, Clone)]
 struct Frame {
     m: [[f64; 3]; 3],
     t: [f64; 3],
-    /// Points nearer to the scanner than this are beams without return, metres; 0 where no scanner
-    /// is known.
+    /// Distance from the scanner within which points are beams without return, metres; 0 where no
+    /// scanner is known.
     no_return: f64,
 }
 
@@ -126,7 +126,7 @@ impl Frame {
     }
 }
 
-/// Turns records into strips.
+/// Converts records to strips.
 #[derive(Debug)]
 pub(crate) struct Decoder {
     layout: Layout,
@@ -134,22 +134,22 @@ pub(crate) struct Decoder {
     scale: [f64; 3],
     offset: [f64; 3],
     frames: Vec<Frame>,
-    /// Scan of each source id; empty where all points are of scan 0.
+    /// Index of the scan of each source id; empty where all points belong to scan 0.
     scan_of_source: Vec<u16>,
     max_range: f64,
-    /// One a scan.
+    /// Counts of odd points, one entry a scan.
     oddities: Vec<Oddities>,
 }
 
 impl Decoder {
-    /// Whether records have colour.
+    /// Whether the records have colour.
     pub(crate) fn has_color(&self) -> bool {
         self.layout.color.is_some()
     }
 
-    /// For the scans of a file with these poses, and whether the scanner is there; `scan_of_source`
-    /// tells the scan of each source id (65,536 entries), or is empty where there is only one
-    /// scan.
+    /// A decoder for scans with these poses; each says whether its origin is the scanner.
+    /// `scan_of_source` gives the scan of each source id (65,536 entries), or is empty where there
+    /// is only one scan.
     pub(crate) fn new(
         header: &LasHeader,
         poses: &[(Pose, bool)],
@@ -164,8 +164,8 @@ impl Decoder {
                     nalgebra::Vector3::from(header.offset) - world_from_scan.translation.vector;
                 let t = turn * from;
                 let m = [0, 1, 2].map(|i| [0, 1, 2].map(|j| turn[(i, j)] * header.scale[j]));
-                // Coordinates are whole steps of the scale: one step off is where it was meant to
-                // be.
+                // Coordinates are whole steps of the scale, so a point within one step of the
+                // scanner is at the scanner.
                 let step = header.scale.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
                 let no_return = if *is_scanner { NO_RETURN.max(step) } else { 0.0 };
                 Frame { m, t: [t.x, t.y, t.z], no_return }
@@ -195,7 +195,7 @@ impl Decoder {
         self.layout
     }
 
-    /// Strips of consecutive records, one for each scan that has points among them, by their first
+    /// Strips of consecutive records, one for each scan that has points among them, sorted by first
     /// place. `first` is the place of the first record.
     pub(crate) fn decode(&self, records: &[u8], first: u64, want: Want) -> Vec<RawStrip> {
         let n = records.len() / self.record_len;
@@ -209,7 +209,7 @@ impl Decoder {
             let record = &records[i * self.record_len..];
             usize::from(self.scan_of_source[usize::from(self.layout.source_id(record))])
         };
-        // Points of one scan mostly lie together.
+        // Points of one scan usually follow one another.
         let mut from = 0;
         while from < n {
             let own = scan(from);
@@ -226,10 +226,10 @@ impl Decoder {
         strips
     }
 
-    /// Adds records of one scan, of which the first has the place `first`, to its strip.
+    /// Adds records of one scan to its strip; `first` is the place of the first record.
     fn add(&self, strip: &mut RawStrip, records: &[u8], first: u64) {
         let frame = &self.frames[strip.scan];
-        // The range of a strip is that of one block of records, far below 2³².
+        // A strip spans one block of records, so that the difference is far below 2³².
         let mut place = (first - strip.first_place) as u32;
         for block in records.chunks(BLOCK * self.record_len) {
             let n = block.len() / self.record_len;
@@ -253,8 +253,8 @@ impl Decoder {
         }
     }
 
-    /// The same for a whole block of records, in loops without branches; false, and nothing done,
-    /// where one of them is withheld or not to be believed.
+    /// Adds a whole block of records in loops without branches. Returns false, and adds nothing, if
+    /// any of them is withheld or out of range.
     fn add_block(&self, strip: &mut RawStrip, block: &[u8], frame: &Frame, place: u32) -> bool {
         let mut counts = [[0.0_f64; 3]; BLOCK];
         let mut withheld = false;
@@ -267,7 +267,8 @@ impl Decoder {
         let (mut near, mut at_scanner) = (true, false);
         for (c, p) in counts.iter().zip(&mut xyz) {
             for i in 0..3 {
-                // One order of sums for all scans: see `in_scan`.
+                // `in_scan` must sum in the same order, so that both give the same result to the
+                // bit.
                 let v = c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i];
                 near &= v.abs() <= self.max_range;
                 p[i] = v as f32;
@@ -300,7 +301,7 @@ impl Decoder {
         true
     }
 
-    /// A strip with room for `n` points.
+    /// An empty strip with capacity for `n` points.
     fn empty(&self, scan: usize, first_place: u64, n: usize, want: Want) -> RawStrip {
         let attributes = (want == Want::Everything).then(|| Attributes {
             world: Vec::with_capacity(n),
@@ -319,11 +320,11 @@ impl Decoder {
         }
     }
 
-    /// Scan frame, or nothing where the point is withheld or not to be believed.
+    /// Coordinates in the scan frame; `None` where the point is withheld or out of range.
     #[inline]
     fn local(&self, record: &[u8], frame: &Frame) -> Option<[f32; 3]> {
         let p = in_scan(record, frame);
-        // Written so that a NaN (from a scale near the end of f64) fails too.
+        // Written so that a NaN (from a scale near the end of f64) is refused, too.
         let near = p[0].abs() <= self.max_range
             && p[1].abs() <= self.max_range
             && p[2].abs() <= self.max_range;
@@ -331,12 +332,12 @@ impl Decoder {
         is_good.then(|| p.map(|v| v as f32))
     }
 
-    /// Whether a point that is not withheld lies at the scanner itself.
+    /// Whether the point is at the scanner itself and not withheld.
     fn is_no_return(&self, record: &[u8], frame: &Frame) -> bool {
         frame.is_no_return(in_scan(record, frame)) && !self.layout.withheld(record)
     }
 
-    /// What was odd in a scan when all was last read.
+    /// Counts of odd points of a scan from the last full read.
     pub(crate) fn oddities(&self, scan: usize) -> Option<&Oddities> {
         self.oddities.get(scan)
     }

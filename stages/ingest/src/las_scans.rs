@@ -1,5 +1,5 @@
-//! The records of a LAS or LAZ file and the scanners known for it in; its scans out: which source
-//! id belongs to which scanner, and where the origin lies when no scanner is known.
+//! Finds the scans of a LAS or LAZ file: which source id belongs to which known scanner, and where
+//! to put the origin where no scanner is known.
 
 use crate::frame::NO_RETURN;
 use crate::las::Records;
@@ -13,59 +13,61 @@ use geometry::{Aabb, Pose};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A scanner that stands for the points of a LAS or LAZ file, or for those of one source id in it.
+/// A known scanner of the points of a LAS or LAZ file, or of those with one source id.
 #[derive(Debug, Clone)]
 pub(crate) struct LasScanner {
-    /// Its points; `None` for the whole file.
+    /// Source id of its points; `None` for the whole file.
     pub(crate) source_id: Option<u16>,
-    /// Name for people.
+    /// Display name.
     pub(crate) name: Option<String>,
-    /// World from scan.
+    /// Pose `world_from_scan`, metres.
     pub(crate) pose: Pose,
-    /// Whether it may be of another file: then it is left out where none of its points are seen.
+    /// Whether it may belong to another file, so that it is left out if no point of it is seen
+    /// here.
     pub(crate) may_be_elsewhere: bool,
 }
 
 /// The scans of one file.
 pub(crate) struct Found {
     pub(crate) scans: Vec<ScanSeed>,
-    /// Scan of each source id, or empty where there is only one scan.
+    /// Index of the scan of each source id; empty where there is only one scan.
     pub(crate) scan_of_source: Vec<u16>,
-    /// First and last place at which each scan was seen.
+    /// First and last place at which points of each scan were seen.
     pub(crate) extents: Vec<(u64, u64)>,
-    /// Whether all points looked at lie inside the stated bounds.
+    /// Whether all sampled points lie inside the stated bounds.
     pub(crate) bounds_hold: bool,
 }
 
 impl Census {
-    /// Records of the whole file, of which `n` were seen.
+    /// Estimated number of records of the whole file, of which `n` were seen in the sample.
     fn likely(&self, n: u64, whole: (u64, u64)) -> u64 {
         let all = (whole.1 + 1 - whole.0) as f64;
         (n as f64 / self.n_looked.max(1) as f64 * all) as u64
     }
 }
 
-/// What is worse without scanner.
+/// Message for scans without scanner position.
 pub(crate) const NO_SCANNER: &str = "the scanner's position is not known: no free-space evidence, so postures are less \
      certain and wrong ones harder to refuse; give it with --scanners";
 
-/// Up to this many records, all source ids are looked at; beyond, only windows of them.
+/// Largest number of records of which all source ids are read; of larger files only windows are.
 const CENSUS_ALL: u64 = 20_000_000;
-/// Number of windows, and records in each.
+/// Number of windows.
 const CENSUS_WINDOWS: u64 = 512;
+/// Number of records in each window.
 const CENSUS_RECORDS: usize = 512;
-/// A scanner farther than this from the middle of its points is probably given in another frame,
+/// A scanner farther than this from the middle of its points was probably given in another frame,
 /// metres.
 const FAR_SCANNER: f64 = 2_000.0;
 
-/// What a look at the file shows.
+/// The source ids of a file, from all records or a sample of them.
 #[derive(Default)]
 struct Census {
-    /// First and last place of each source id, and how many records had it.
+    /// First place, last place and number of records of each source id.
     ids: BTreeMap<u16, (u64, u64, u64)>,
-    /// Records that were looked at.
+    /// Number of records that were read.
     n_looked: u64,
-    /// Whether every record was looked at.
+    /// Whether every record was read.
     complete: bool,
 }
 
@@ -134,7 +136,7 @@ fn by_source_id(
     stem: &str,
     seed: impl Fn(String, Option<u16>, Option<Pose>) -> ScanSeed,
 ) {
-    /// Stands for "no scanner" until the number of the scan for the rest is known.
+    /// Marks ids without scanner until the index of the scan for the rest is known.
     const NONE: u16 = u16::MAX;
     let mut scan_of_source = vec![NONE; 1 << 16];
     for scanner in scanners {
@@ -150,8 +152,8 @@ fn by_source_id(
         let mut scan = seed(name, Some(id), Some(scanner.pose));
         scan.likely_points = seen.map(|seen| census.likely(seen.2, whole));
         found.scans.push(scan);
-        // Windows may miss its first and last points; a look between those seen is enough for a
-        // sample.
+        // Windows may miss the first and last points of a scan; the places between those seen are
+        // enough for a sample.
         found.extents.push(seen.map_or(whole, |seen| (seen.0, seen.1)));
     }
     let rest = census.ids.keys().any(|id| scan_of_source[usize::from(*id)] == NONE);
@@ -164,8 +166,8 @@ fn by_source_id(
     found.scan_of_source = scan_of_source;
 }
 
-/// Checks where a scan stands: its scanner where that is known, else how far its points lie apart;
-/// notes what is worth it.
+/// Checks the place of a scan, by its scanner where that is known, else by the spread of its
+/// points, and notes what users should know.
 fn check_place(scan: &mut ScanSeed, look: &Look, settings: &Settings) -> Result<()> {
     if scan.scanner_known {
         let n = look.n_at(scan.world_from_scan.translation.vector);
@@ -212,28 +214,28 @@ fn check_distance(
     }
     if distance > FAR_SCANNER {
         scan.notes.push(format!(
-            "the scanner lies {distance:.0} m from the middle of the points: is its position in their frame?"
+            "the scanner lies {distance:.0} m from the middle of the points: check that its position is in their frame"
         ));
     }
     Ok(())
 }
 
-/// The stated bounds with some slack: writers round them, or leave a tenth of a unit out.
+/// The stated bounds with a margin, since writers round them by up to a tenth of a unit.
 pub(crate) fn grown(bounds: &Aabb, header: &LasHeader) -> Aabb {
     let size = bounds.size();
     let scale = header.scale.iter().fold(0.0_f64, |a, s| a.max(s.abs()));
     bounds.grown(0.01 * size[0].max(size[1]).max(size[2]) + 2.0 * scale)
 }
 
-/// What a few records say of the place of all.
+/// What a sample of records says of where all points lie.
 struct Look {
     /// World coordinates, metres.
     points: Vec<[f64; 3]>,
-    /// How many of them lie outside the stated bounds.
+    /// Number of these points outside the stated bounds.
     outside: usize,
-    /// Their median.
+    /// Median of these points, metres.
     middle: Option<[f64; 3]>,
-    /// Where to put the origin if no scanner is known: whole metres near the middle.
+    /// Origin to use where no scanner is known: whole metres near the median.
     origin: [f64; 3],
 }
 
@@ -242,7 +244,7 @@ impl Look {
         self.outside * 2 > self.points.len()
     }
 
-    /// How many points lie at a scanner itself.
+    /// Number of these points that lie at a scanner itself.
     fn n_at(&self, scanner: nalgebra::Vector3<f64>) -> usize {
         let is_at = |p: &&[f64; 3]| (0..3).all(|a| (p[a] - scanner[a]).abs() < NO_RETURN);
         self.points.iter().filter(is_at).count()
@@ -298,7 +300,7 @@ fn world(record: &[u8], header: &LasHeader) -> [f64; 3] {
     })
 }
 
-/// Looks at the source ids: of all records where there are few, else of windows.
+/// Reads the source ids of all records of a small file, else those of windows.
 fn census(records: &Records) -> Result<Census> {
     let header = &records.header;
     let layout = Layout::of(header.format).expect("the header was checked");
@@ -307,7 +309,7 @@ fn census(records: &Records) -> Result<Census> {
         let ids: Vec<u16> =
             run.chunks_exact(header.record_len).map(|r| layout.source_id(r)).collect();
         let mut place = first;
-        // A scan's points mostly stand one after the other.
+        // Points of one scan usually follow one another.
         for same in ids.chunk_by(|a, b| a == b) {
             let n = same.len() as u64;
             let id = census.ids.entry(same[0]).or_insert((place, place, 0));
@@ -317,7 +319,7 @@ fn census(records: &Records) -> Result<Census> {
         census.n_looked += place - first;
     };
     let stream = records.laz.as_ref().is_some_and(|l| l.pieces.is_empty());
-    // Compressed records cost forty times as much to look at.
+    // A compressed record takes forty times as long.
     let all = if header.compressed { CENSUS_ALL / 40 } else { CENSUS_ALL };
     if header.n_points <= all || stream {
         let n = usize::try_from(header.n_points.min(all)).expect("at most twenty million");

@@ -1,6 +1,5 @@
-//! The bytes of a LAZ file in; decompressed point records out, in file order. Every number that the
-//! decoder would believe (chunk table, layer sizes, counts) is checked against the bytes present
-//! before it sees them.
+//! Decompresses the point records of LAZ files, in file order. Every number that the decoder trusts
+//! (chunk table, layer sizes, counts) is first checked against the length of the file.
 
 use crate::las_header::LasHeader;
 use crate::reader::{Extent, Want};
@@ -11,13 +10,14 @@ use laz::{DecompressionSelection, LasZipDecompressor, LazItemRecordBuilder, LazI
 use std::io::Cursor;
 use std::ops::Range;
 
-/// No real piece is compressed more than this many times; a larger claim would only cost memory.
+/// Largest compression ratio of a piece; real ones stay below, and a larger claim would cost
+/// memory.
 const MAX_RATIO: u64 = 250;
-/// Records of a piece that are believed whatever its size: 50,000 equal points take next to
-/// nothing. Bytes.
+/// Size of a decompressed piece up to which any ratio is accepted, bytes: 50,000 equal points take
+/// next to no space.
 const SMALL_PIECE: u64 = 4 << 20;
 
-/// How the points of a LAZ file are to be decompressed.
+/// How the points of a LAZ file are decompressed.
 #[derive(Debug, Clone)]
 pub(crate) struct Laz {
     vlr: LazVlr,
@@ -25,8 +25,8 @@ pub(crate) struct Laz {
     points_at: usize,
     n_points: u64,
     layered: bool,
-    /// Independently compressed runs of points (LAZ calls them chunks); empty where the file is
-    /// one stream that can only be read from its start.
+    /// Independently compressed runs of points (LAZ calls them chunks); empty where the file is one
+    /// stream that can only be read from its start.
     pub(crate) pieces: Vec<Extent>,
 }
 
@@ -54,8 +54,8 @@ impl Laz {
         let table = laz.read_table(data).map_err(|e| e.at("chunk table"));
         let pieces = match table {
             Ok(table) => table,
-            // A stream without table can still be read from its start, unless pieces are of unknown
-            // size.
+            // A stream without table can still be read from its start, unless the size of its
+            // pieces is unknown.
             Err(_) if laz.readable_without_table(data) => return Ok(laz),
             Err(error) => return Err(error),
         };
@@ -70,7 +70,8 @@ impl Laz {
         Ok(laz)
     }
 
-    /// A writer that could not seek leaves −1 where the table's place should be, and no table.
+    /// Whether the file can be read without table: a writer that could not seek leaves −1 as the
+    /// offset of the table, and no table.
     fn readable_without_table(&self, data: &[u8]) -> bool {
         let place = data.get(self.points_at..self.points_at + 8);
         place == Some(&(-1_i64).to_le_bytes())
@@ -85,7 +86,7 @@ impl Laz {
             .get(table_at..table_at + 8)
             .ok_or_else(|| damaged("the chunk table lies outside the file"))?;
         let n = u64::from(u32::from_le_bytes([header[4], header[5], header[6], header[7]]));
-        // Each chunk starts with one uncompressed record, so that many fit at most.
+        // Each chunk starts with one uncompressed record, which bounds their number.
         let most = ((table_at - start) / self.record_len) as u64;
         if n > most {
             return Err(damaged(format!(
@@ -154,12 +155,12 @@ impl Laz {
             let at = usize::try_from(i64::from_le_bytes(bytes)).ok()?;
             (at >= self.points_at + ChunkTable::OFFSET_SIZE && at <= data.len() - 8).then_some(at)
         };
-        // A writer that could not go back leaves the place at the end of the file.
+        // A writer that could not seek back leaves the offset at the end of the file.
         let stated = at(self.points_at).or_else(|| at(data.len().checked_sub(8)?));
         stated.ok_or_else(|| damaged("the chunk table is missing or lies outside the file"))
     }
 
-    /// The number of the piece that holds the point at a place, or behind which it would come.
+    /// Index of the piece that holds a place, or after which the place would come.
     pub(crate) fn piece_of(&self, place: u64) -> usize {
         self.pieces.partition_point(|p| p.first + p.n_points <= place)
     }
@@ -170,7 +171,7 @@ impl Laz {
         self.decompress(part.of(data), &part, Want::Everything)
     }
 
-    /// Decompresses a piece from its bytes.
+    /// Decompresses a whole piece from its bytes.
     pub(crate) fn decompress(&self, bytes: &[u8], piece: &Extent, want: Want) -> Result<Vec<u8>> {
         let Extent { bytes: Range { start, .. }, first, n_points } = piece;
         let end = first + n_points;
@@ -186,8 +187,8 @@ impl Laz {
         Ok(records)
     }
 
-    /// Layered pieces say how long each layer is, and the decoder allocates what they say: check it
-    /// first.
+    /// Checks the layer sizes that a layered piece states, since the decoder allocates as much as
+    /// they say.
     fn check_layers(&self, bytes: &[u8], n_expected: u64) -> Result<()> {
         if !self.layered {
             return Ok(());
@@ -219,7 +220,7 @@ impl Laz {
         Ok(())
     }
 
-    /// A reader from the start of a file that is one stream.
+    /// A reader that starts at the beginning of a file that is one stream.
     pub(crate) fn stream<'a>(&self, data: &'a [u8]) -> Result<Stream<'a>> {
         let mut source = Cursor::new(data);
         source.set_position(self.points_at as u64);
@@ -244,7 +245,7 @@ impl Stream<'_> {
     }
 }
 
-/// Runs the decoder, whose panics on damaged files are caught here, at the boundary of the file.
+/// Runs the decoder and catches its panics, which damaged files cause.
 fn guarded<T, E>(doing: &str, run: impl FnOnce() -> std::result::Result<T, E>) -> Result<T>
 where
     E: std::error::Error + Send + Sync + 'static,
@@ -265,7 +266,7 @@ fn layers(item: LazItemType) -> usize {
     }
 }
 
-/// Fields that matter: the layered formats can leave the others compressed.
+/// The fields to decompress; layered formats allow the others to stay compressed.
 fn selection(want: Want) -> DecompressionSelection {
     match want {
         Want::Everything => DecompressionSelection::all(),
@@ -276,7 +277,7 @@ fn selection(want: Want) -> DecompressionSelection {
     }
 }
 
-/// The LASzip record: its items must be those of the point format, since the decoder trusts them.
+/// Reads the LASzip record. Its items must match the point format, since the decoder trusts them.
 fn read_vlr(payload: &[u8], header: &LasHeader) -> Result<(LazVlr, CompressorType)> {
     let mut payload = payload.to_vec();
     if payload.len() < 34 {
@@ -296,7 +297,7 @@ fn read_vlr(payload: &[u8], header: &LasHeader) -> Result<(LazVlr, CompressorTyp
         return Err(damaged(format!("{} bytes cannot hold \"{n_items}\" items", payload.len())));
     }
     if compressor == CompressorType::PointWise {
-        // LASzip 1 leaves the chunk size zero, which the decoder takes for chunks of varying size.
+        // LASzip 1 leaves the chunk size zero, which the decoder would take for varying sizes.
         payload[12..16].copy_from_slice(&50_000_u32.to_le_bytes());
     }
     let vlr = LazVlr::read_from(payload.as_slice()).map_err(|cause| {

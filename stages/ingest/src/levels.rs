@@ -1,18 +1,18 @@
-//! Intensities of a few points and their stated limits in; the span that is brought to 0..65535
-//! out: the stated one, or where many lie outside it, the one that they have.
+//! Chooses the range of intensities that is scaled to 0..65535: the stated one, or that of the
+//! values where many lie outside the stated one.
 
-/// Share of intensities outside the limits from which on the limits are wrong: fewer are single
+/// Share of intensities outside the limits from which on the limits are wrong; fewer are single
 /// bright spots.
 const WRONG: f64 = 0.01;
-/// Fewer values tell nothing.
+/// Number of values below which nothing is concluded.
 const MIN_VALUES: usize = 50;
-/// Share of the lowest and of the highest that is left out where a span is taken from the values
-/// and they lie far from all others: marks for "none".
+/// Share of the lowest and of the highest values that is ignored where a range is taken from the
+/// values and these lie far from all others: such values mean "none".
 const ODD: f64 = 0.001;
-/// How far that is, in spans of the others.
+/// What counts as far, in ranges of the other values.
 const FAR: f64 = 0.5;
 
-/// Which values become 0 and 65535.
+/// The values that become 0 and 65535.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Span {
     /// Value that becomes 0.
@@ -22,21 +22,20 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// 65535 over the span.
+    /// 65535 divided by the span.
     pub(crate) fn scale(self) -> f64 {
         65_535.0 / (self.max - self.min)
     }
 
-    /// Whether a value is cut. What is no number is not counted: it becomes 0.
+    /// Whether a value is outside and gets clamped. NaN is not counted: it becomes 0.
     #[inline]
     pub(crate) fn cuts(self, value: f64) -> bool {
-        // Writers round limits and values apart.
+        // Writers may round limits and values differently.
         let slack = 1e-4 * (self.max - self.min);
         value < self.min - slack || value > self.max + slack
     }
 
-    /// This span where the values keep to it, else the one that they have, and then what is said of
-    /// it.
+    /// This span where the values keep to it, else the span of the values with a message.
     pub(crate) fn suited(self, values: &[f64], is_stated: bool) -> (Self, Option<String>) {
         let n_outside = values.iter().filter(|v| self.cuts(**v)).count();
         if values.len() < MIN_VALUES || n_outside as f64 <= WRONG * values.len() as f64 {
@@ -88,7 +87,7 @@ mod tests {
         assert!(UNIT.cuts(40.0) && !UNIT.cuts(1.000_01) && !UNIT.cuts(f64::NAN));
         assert_eq!(UNIT.suited(&[], true), (UNIT, None));
         assert_eq!(UNIT.suited(&[7.0; 20], true), (UNIT, None));
-        // Marks for "none" widen nothing.
+        // Values that mean "none" do not widen the range.
         let mut counts: Vec<f64> = (0..10_000).map(|k| f64::from(k % 256)).collect();
         counts[7] = -1e9;
         assert_eq!(UNIT.suited(&counts, false).0, Span { min: 0.0, max: 255.0 });

@@ -1,5 +1,26 @@
-//! Files in, strips out: the only reader of point formats. Knows how files are read, and nothing of
-//! what is in them.
+//! Reads point files (E57, PTX, LAS, LAZ) as strips of points. No other crate knows these formats,
+//! and this crate knows nothing of what the points show.
+//!
+//! # Example
+//! ```
+//! use contract::{InputId, OneByOne};
+//! use ingest::{Settings, Want, open};
+//!
+//! // A PTX file of one column and two rows, whose scanner stands at (10, 20, 30).
+//! let pose = "10 20 30\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 20 30 1\n";
+//! let points = "1.0 2.0 3.0 0.5\n4.0 5.0 6.0 0.5\n";
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("scan.ptx");
+//! std::fs::write(&path, format!("1\n2\n{pose}{points}"))?;
+//!
+//! let sources = open(&[path], None, &Settings::default(), &OneByOne)?;
+//! let scanner = sources.scans[0].world_from_scan.translation.vector;
+//! assert_eq!((scanner.x, scanner.y, scanner.z), (10.0, 20.0, 30.0));
+//! for strip in sources.strips(InputId(0), Want::Coordinates)? {
+//!     assert_eq!(strip?.xyz, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]); // scan frame, metres
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![deny(unsafe_code)]
 
 mod bounds;

@@ -1,5 +1,5 @@
-//! A scan of an open file in; what a sample of its points tells out: its raster, where most of it
-//! lies, and whether its scanner can have stood where it is said to.
+//! What a sample of a scan's points tells: its raster, where most points lie, and whether the
+//! scanner can have stood at its stated position.
 
 use crate::position;
 use crate::raster::{self, Raster, Steps};
@@ -10,26 +10,26 @@ use crate::sources::File;
 use contract::{Result, Scan};
 use geometry::{Aabb, Pose};
 
-/// Said of a scan that a camera took.
+/// Note on a scan from a depth camera.
 const CAMERA: &str = "taken by a depth camera: its points err by half a percent of their range, alike over a hand's width";
-/// Said of a scan whose scanner is known and whose raster is not.
+/// Note on a scan whose scanner is known, but not its raster.
 const NO_RASTER: &str = "too few points to tell the raster: no free-space evidence from this scan";
 
-/// What a look at a scan tells.
+/// The result of sampling a scan.
 #[derive(Default)]
 pub(crate) struct Looked {
-    /// The raster, where the scanner is known and its points tell it.
+    /// The raster, where the scanner is known and the points suffice.
     pub(crate) raster: Option<Raster>,
-    /// What is odd about the raster, or worse for the lack of one.
+    /// Message about an odd or missing raster.
     pub(crate) note: Option<String>,
-    /// Where most of its points lie in the world, metres.
+    /// Bounds of most of its points in the world, metres.
     pub(crate) spread: Option<Aabb>,
-    /// Whether its scanner cannot have stood where it is said to.
+    /// Whether the scanner cannot have stood at its stated position.
     pub(crate) is_misplaced: bool,
 }
 
 impl File {
-    /// What a sample of a scan tells.
+    /// Samples a scan.
     pub(crate) fn look(&self, i: usize, scan: &Scan, settings: &Settings) -> Result<Looked> {
         if scan.stated_points == Some(0) {
             return Ok(Looked::default());
@@ -45,7 +45,7 @@ impl File {
         }
         let n_points = self.reader.scans()[i].likely_points.or(scan.stated_points);
         let raster = raster::estimate(&sample, n_points, settings);
-        // Rows and columns are regular about the scanner and nowhere else.
+        // Rows and columns that are regular in angle prove the scanner's position.
         if !raster.is_some_and(|raster| raster.steps == Steps::Native)
             && let Some(note) = self.misplaced(i)?
         {
@@ -60,7 +60,7 @@ impl File {
         Ok(Looked { raster, note, spread, is_misplaced: false })
     }
 
-    /// What is said of a scan whose scanner cannot have stood where it is said to.
+    /// The message for a scan whose scanner cannot have stood at its stated position.
     fn misplaced(&self, i: usize) -> Result<Option<String>> {
         let mut points = self.reader.spread(i, position::N_POINTS, position::N_READ)?;
         if let Some(new_from_file) = &self.moved[i] {
@@ -71,7 +71,7 @@ impl File {
     }
 }
 
-/// A place in the frame of a scan whose pose the user replaced.
+/// Converts a point of a scan whose pose the user replaced to its new scan frame, metres.
 pub(crate) fn moved(pose: &Pose, p: [f32; 3]) -> [f32; 3] {
     let q = pose * nalgebra::Point3::from(p.map(f64::from));
     [q.x as f32, q.y as f32, q.z as f32]

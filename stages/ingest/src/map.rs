@@ -1,9 +1,8 @@
-//! Path in, bytes out: the one place of the program that maps files into memory, inputs and the
-//! store alike.
+//! Maps files into memory, inputs and the tile store alike; nothing else in the program does.
 //!
-//! A file that is cut short, or a share that goes away, while it is mapped would end the program
-//! with a signal (SIGBUS). The signal is caught: the page that is missing is replaced by zeros, so
-//! that the reader comes to an end, and the map says that it is no longer whole.
+//! If a file is truncated or a network share vanishes while it is mapped, an access raises a signal
+//! (SIGBUS), which would end the program. The signal is caught: the missing page is replaced by
+//! zeros, so that the reader can finish, and [`Mapped::check`] then reports the loss.
 #![allow(unsafe_code)]
 
 use contract::{Error, Result};
@@ -12,47 +11,46 @@ use std::fs::File;
 use std::ops::Deref;
 use std::path::Path;
 
-/// A read-only map of a whole file. After its bytes were used, [`Mapped::check`] says whether they
-/// were there.
+/// A read-only map of a whole file. [`Mapped::check`] tells, after its bytes were used, whether
+/// they were all there.
 pub struct Mapped {
     map: Mmap,
-    /// The same file, to be read otherwise.
+    /// The same file, for reading without the map.
     file: File,
     watch: guard::Watch,
 }
 
-/// Maps a whole file, read only.
+/// Maps a whole file for reading.
 ///
 /// # Errors
-/// A file that cannot be opened or mapped; an empty one, since it cannot be mapped and holds
-/// nothing.
+/// If the file cannot be opened or mapped, or if it is empty.
 pub fn map(path: &Path) -> Result<Mapped> {
     let file = File::open(path)?;
     if file.metadata()?.len() == 0 {
         return Err(Error::bad_input("the file is empty"));
     }
-    // SAFETY: the map is only read. Inputs are never written by us; files of the store are renamed
-    // to their place whole and never written again. What remains is another process that shortens
-    // the file while it is read: `guard` takes care of that.
+    // SAFETY: the map is only read. This program never writes inputs, and renames files of the
+    // store to their place when they are complete. Another process may truncate the file while it
+    // is read: `guard` handles that.
     let map = unsafe { Mmap::map(&file)? };
     let watch = guard::Watch::over(&map);
     Ok(Mapped { map, file, watch })
 }
 
 impl Mapped {
-    /// The file that is mapped, whatever has its name by now.
+    /// The mapped file, even if another file has its name by now.
     #[must_use]
     pub fn file(&self) -> &File {
         &self.file
     }
 
-    /// Whether all that was read of it was there.
+    /// Checks that all bytes that were read were there.
     ///
     /// # Errors
-    /// The file was cut short, or could not be reached any more: what was read of it is of no use.
+    /// If the file was truncated or became unreachable, so that what was read is invalid.
     pub fn check(&self) -> Result<()> {
-        // Of the page in which a file ends now the rest reads as zeros without a signal: only its
-        // length tells.
+        // The rest of the page in which a truncated file ends reads as zeros without a signal, so
+        // the length is checked, too.
         let is_as_long = self.file.metadata().is_ok_and(|meta| meta.len() >= self.map.len() as u64);
         if self.watch.is_whole() && is_as_long {
             return Ok(());
@@ -61,8 +59,8 @@ impl Mapped {
             .hint("start again once it is whole"))
     }
 
-    /// Has the system read `n` bytes from `start` on, which will be asked for soon. Advice only:
-    /// errors are no harm.
+    /// Asks the operating system to read `n` bytes from `start` on ahead of their use. It is only
+    /// advice, so errors are ignored.
     pub fn will_need(&self, start: usize, n: usize) {
         #[cfg(unix)]
         let _ = self.map.advise_range(memmap2::Advice::WillNeed, start, n);
@@ -70,8 +68,8 @@ impl Mapped {
         let _ = (start, n);
     }
 
-    /// Gives its pages back to the system, which reads them again where they are asked for again.
-    /// Advice only.
+    /// Releases the map's pages; the operating system reads them again when they are used. It is
+    /// only advice, so errors are ignored.
     pub fn give_back(&self) {
         // SAFETY: the map is shared and read-only, so that a dropped page is read again from the
         // file with the same bytes; a page of zeros in the place of a missing one is private and
@@ -91,7 +89,7 @@ impl Deref for Mapped {
 
 #[cfg(not(unix))]
 mod guard {
-    /// Elsewhere a mapped file cannot be cut short.
+    /// Does nothing: on other systems a mapped file cannot be truncated.
     pub(super) struct Watch;
 
     impl Watch {
@@ -110,10 +108,11 @@ mod guard {
     use std::sync::Once;
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 
-    /// Most maps that are watched at the same time; one more is read unguarded.
+    /// Largest number of maps that are watched at a time; further maps are not watched.
     const MAX: usize = 1024;
 
-    /// Addresses of a map, and whether a page of it was missing. Free where it begins at 0.
+    /// Addresses of a map, and whether one of its pages was missing. The slot is free where it
+    /// begins at 0.
     struct Slot {
         begin: AtomicUsize,
         end: AtomicUsize,
@@ -127,10 +126,10 @@ mod guard {
             is_torn: AtomicBool::new(false),
         }
     }; MAX];
-    /// Size of the system's pages, bytes.
+    /// Page size of the operating system, bytes.
     static PAGE: AtomicUsize = AtomicUsize::new(4096);
 
-    /// Watches the addresses of a map while it lives.
+    /// Watches the addresses of a map as long as it lives.
     pub(super) struct Watch(Option<&'static Slot>);
 
     impl Watch {

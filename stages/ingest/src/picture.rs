@@ -1,33 +1,33 @@
-//! A sample of a scan's points in, as runs of neighbours in the order of the file; out comes
-//! whether a camera took them: its pixels lie at equal distances on a plane before it, a scanner's
-//! beams at equal angles.
+//! Tells from a sample of neighbouring points whether a depth camera took them: a camera's pixels
+//! are evenly spaced on a plane in front of it, a scanner's beams are evenly spaced in angle.
 
 use crate::raster::{Axis, wrap};
 use crate::reader::Sampled;
 use nalgebra::Vector3;
 
-/// Pairs of neighbours that are looked at: shares are known to a hundredth.
+/// Largest number of pairs of neighbours that are examined; it gives shares to one percent.
 const PAIRS: usize = 4_000;
-/// Fewer pairs tell nothing.
+/// Number of pairs below which nothing is concluded.
 const MIN_PAIRS: usize = 500;
-/// Length of the mean direction below which no single picture holds the points: they lie all round.
+/// Length of the mean unit direction below which the points lie all around, so that no single
+/// picture can hold them.
 const MIN_MEAN: f64 = 0.6;
-/// Steps this near the most frequent one are the same, logarithm: coordinates in tenths of a
-/// millimetre jitter by 4 %.
+/// Largest difference of a step from the most frequent one at which both are equal, as logarithm of
+/// the ratio: coordinates in tenths of a millimetre vary by 4 %.
 const SAME: f64 = 0.06;
-/// Steps within this of it are asked for, logarithm: longer ones skip pixels.
+/// Largest difference at which a step is counted at all, logarithm: longer steps skip pixels.
 const NEAR: f64 = 0.5;
-/// Width of the bins that the most frequent step is looked for in, logarithm.
+/// Width of the histogram bins for the most frequent step, logarithm.
 const BIN: f64 = 0.03;
-/// Share of equal steps that makes a raster; cameras have 0.99 on their plane and up to 0.42 in
-/// angles.
+/// Share of equal steps that makes a raster. Cameras have 0.99 on their plane and at most 0.42 in
+/// angle.
 const EVEN: f64 = 0.85;
-/// Share of equal angles from which on it is a scanner's.
+/// Share of equal angles from which on the points are a scanner's.
 const SCANNER: f64 = 0.7;
-/// How far the axis of a picture may lie from the mean direction, and the first step that it is
-/// looked for with; tangents.
+/// Search for the axis of a picture about the mean direction: number of steps to either side, and
+/// length of the first step, tangent.
 const AXIS: (i32, f64) = (5, 0.12);
-/// The last step of that: a degree off leaves steps equal to 2 %.
+/// Length of the last step, tangent: an axis wrong by a degree leaves steps equal to 2 %.
 const LAST_STEP: f64 = 0.01;
 
 /// Whether the points have the directions of a camera's pixels.
@@ -50,8 +50,8 @@ pub(crate) fn is_picture(sample: &[Sampled]) -> bool {
     !is_scanner && on_plane(&all, &pairs, &mean.normalize()) > EVEN
 }
 
-/// Largest share of equal steps on a plane before the eye, over the planes whose axes lie near a
-/// direction.
+/// Largest share of equal steps on a plane in front of the camera, over the planes whose axes lie
+/// near a direction.
 fn on_plane(all: &[Vector3<f64>], pairs: &[[usize; 2]], middle: &Vector3<f64>) -> f64 {
     let across = |of: &Vector3<f64>| {
         let x = of.cross(&Vector3::ith(of.iamin(), 1.0)).normalize();
@@ -86,7 +86,7 @@ fn on_plane(all: &[Vector3<f64>], pairs: &[[usize; 2]], middle: &Vector3<f64>) -
     most
 }
 
-/// Share of the steps that equal the most frequent one, of those that are about as long.
+/// Share of the steps that equal the most frequent one, among those of similar length.
 fn even(steps: impl Iterator<Item = f64>) -> f64 {
     let logs: Vec<f64> = steps.filter(|s| *s > 1e-7).map(f64::ln).collect();
     let mut bins = std::collections::BTreeMap::<i64, u32>::new();
@@ -105,13 +105,13 @@ fn even(steps: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
 
-    /// Points on a bumpy wall, row after row, in the directions that `at` gives.
+    /// Points on a bumpy wall, row by row, in the directions that `at` gives.
     fn sample(at: impl Fn(i32, i32) -> [f64; 3]) -> Vec<Sampled> {
         let rows = (-120..120).flat_map(|i| (-160..160).map(move |j| (i, j)));
         let point = |(i, j): (i32, i32)| {
             let range = 1.5 + 0.3 * f64::from(i * 7 + j * 3).sin();
             let d = Vector3::from(at(i, j)).normalize() * range;
-            // As a file with tenths of a millimetre has them.
+            // Rounded as in a file with tenths of a millimetre.
             Sampled { xyz: [d.x, d.y, d.z].map(|v| (v * 1e4).round() as f32 / 1e4), native: None }
         };
         // Pixels without depth are missing.
@@ -133,7 +133,7 @@ mod tests {
         };
         assert!(!is_picture(&sample(|i, j| beam(tan(j), tan(i)))));
         assert!(!is_picture(&sample(|i, j| beam(tan(i), tan(j)))));
-        // A scanner's window that looks up steeply, along its rows and along its columns.
+        // A window of a scanner that looks up steeply, along its rows and along its columns.
         assert!(!is_picture(&sample(|i, j| beam(tan(j), 0.7 + tan(i)))));
         assert!(!is_picture(&sample(|i, j| beam(tan(i), 0.7 + tan(j)))));
     }

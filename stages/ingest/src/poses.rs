@@ -1,18 +1,18 @@
-//! The scanners of `--scanners` in; those that are meant for a scan or a LAS file out, and which of
-//! them nobody asked for.
+//! Finds the entries of `--scanners` that belong to a scan or a LAS file, and those that belong to
+//! none.
 
 use crate::las_scans::LasScanner;
 use crate::scanners::{Scanner, Scanners};
 use geometry::Pose;
 use std::path::{Path, PathBuf};
 
-/// The scanners that the user gave, and which of them were of use.
+/// The scanners that the user gave, and which of them were used.
 pub(crate) struct Poses<'a> {
     entries: &'a [Scanner],
     used: Vec<bool>,
-    /// Names of the inputs without suffix.
+    /// File names of the inputs without suffix.
     stems: Vec<String>,
-    /// Whether there are several inputs, so that an entry may be meant for another one.
+    /// Whether there are several inputs, so that an entry may belong to another one.
     several: bool,
 }
 
@@ -32,8 +32,8 @@ impl<'a> Poses<'a> {
         Some(self.entries[at].world_from_scan)
     }
 
-    /// The scanners of a LAS or LAZ file: entries of its name; else those with a source id whose
-    /// name is not that of another input; else the only entry there is.
+    /// The scanners of a LAS or LAZ file: entries with its name; else those with a source id whose
+    /// name is not that of another input; else the only entry.
     pub(crate) fn of_las(&mut self, path: &Path) -> Vec<LasScanner> {
         let stem = stem(path);
         let named = |e: &Scanner| e.name.as_deref() == Some(stem.as_str());
@@ -54,7 +54,7 @@ impl<'a> Poses<'a> {
         for at in chosen {
             let entry = &self.entries[at];
             self.used[at] = true;
-            // An entry of this file's name goes before one that only shares the id.
+            // An entry with this file's name takes precedence over one that only shares the id.
             let twin = scanners.iter().position(|s| s.source_id == entry.point_source_id);
             let scanner = LasScanner {
                 source_id: entry.point_source_id,

@@ -1,56 +1,54 @@
-//! Points of a scan about its stated scanner in; out comes whether the scanner can have stood
-//! there.
+//! Tells from a scan's points whether the scanner can have stood at its stated position.
 //!
-//! Each beam of a scanner comes back once: in whatever direction it looks, there is one surface, as
-//! dense as the beams. Seen from anywhere else, one surface lies before another, and both are in
-//! view as densely as if nothing stood before them. Edges are no such places, since there both
-//! surfaces lie side by side; nor are fences, since their wires and what lies behind them share the
-//! beams.
+//! Each beam of a scanner returns once: in every direction from the scanner there is one surface,
+//! as dense as the beams. Seen from any other place, one surface lies in front of another, and both
+//! are visible at full density. At edges two surfaces lie side by side instead, and at fences the
+//! wires and what is behind them share the beams, so that neither is dense; those are not counted.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Points that are looked at, evenly spread over a scan.
+/// Number of points that are examined, evenly spread over a scan.
 pub(crate) const N_POINTS: usize = 300_000;
-/// Of larger scans, only so many points are read for that: a second of decoding.
+/// Largest number of points that are read for it: a second of decoding.
 pub(crate) const N_READ: u64 = 4_000_000;
-/// Fewer cells with points tell nothing.
+/// Number of filled cells below which nothing is concluded.
 const MIN_CELLS: usize = 200;
-/// Points of a cell as most points have it, at least.
+/// Smallest number of points in the cells that most points lie in.
 const IN_CELL: usize = 16;
-/// Points of a cell below which its two surfaces are not told.
+/// Number of points of a cell below which two surfaces cannot be told apart.
 const FEWEST: usize = 8;
-/// Points of a cell that are compared with one another, at most.
+/// Largest number of points of a cell that are compared with one another.
 const MOST: usize = 64;
-/// Cells along an edge of a cube's face, finest first: 0.2° to 11°.
+/// Numbers of cells along the edge of a cube face, finest first: cells of 0.2° to 11°.
 const EDGES: [usize; 7] = [512, 256, 128, 64, 32, 16, 8];
-/// Bands of elevation, 10° each, in which cells should be equally full.
+/// Number of bands of elevation, 10° each, in which cells should hold equally many points.
 const N_BANDS: usize = 18;
-/// A surface lies before another if their distance is larger than this, metres, and than this share
-/// of the nearer range: less may be one surface at a grazing angle.
+/// Distance above which two surfaces are different, metres, and as share of the nearer range;
+/// nearer points may lie on one surface at a grazing angle.
 const APART: (f64, f64) = (0.15, 0.08);
-/// Share of a cell's points that each of the two surfaces has at least.
+/// Smallest share of a cell's points on each of the two surfaces.
 const EITHER: f64 = 0.25;
-/// Share of the points whose nearest neighbour in direction lies on the other surface from which on
-/// both fill the cell; where two surfaces lie side by side only those at the border do.
+/// Share of points whose nearest neighbour in direction lies on the other surface, from which on
+/// both surfaces fill the cell. Where they lie side by side, only points at the border do.
 const MIXED: f64 = 0.25;
-/// How much fuller than most cells of its band a cell is in which two surfaces are seen, each as
-/// densely as it was scanned.
+/// Factor by which a cell with two surfaces at full density holds more points than most cells of
+/// its band.
 const FULLER: f64 = 1.35;
-/// Share of the cells with two surfaces in full from which on the position is wrong, and the least
-/// number of them. Of 66 simulated scans from where they were taken one had 0.0007, all others
-/// less; of 49 said to be taken 0.5 to 3 m off, 41 have more than this (benches/LEARNT.md, stated
-/// scanner positions). Real clouds of cameras had none.
+/// Share of cells with two full surfaces from which on the position is wrong, and the smallest
+/// number of such cells. Of 66 simulated scans at their true position one had 0.0007 and all others
+/// less; of 49 at positions wrong by 0.5 to 3 m, 41 have more than this (benches/LEARNT.md,
+/// stated scanner positions). Real clouds of depth cameras have none.
 const WRONG: (f64, usize) = (0.002, 4);
 
-/// Part of what is said of a scan whose stated position is not used.
+/// Beginning of the message for a scan whose stated position is not used.
 pub const MISPLACED: &str = "the stated scanner position cannot be right";
 
-/// What the directions show.
+/// The cells of directions from the stated position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Seen {
-    /// Cells that hold enough points to tell.
+    /// Number of cells with enough points.
     pub(crate) n_cells: usize,
-    /// Those in which two surfaces lie one before the other, both in full.
+    /// Number of those in which two surfaces lie one behind the other, both at full density.
     pub(crate) n_double: usize,
 }
 
@@ -62,7 +60,7 @@ impl Seen {
             && self.n_double as f64 >= WRONG.0 * self.n_cells as f64
     }
 
-    /// What is said of a scan whose scanner cannot have stood there.
+    /// The message for a scan whose scanner cannot have stood there.
     pub(crate) fn note(&self) -> String {
         format!(
             "{MISPLACED}, and is not used: from there one surface lies before another in {:.1} % of all directions, and both \
@@ -72,7 +70,7 @@ impl Seen {
     }
 }
 
-/// A point by direction and range.
+/// A point as direction and range.
 #[derive(Debug, Clone, Copy)]
 struct Beam {
     cell: u32,
@@ -80,7 +78,7 @@ struct Beam {
     range: f64,
 }
 
-/// Looks at points, scan frame, from its origin.
+/// Examines points (scan frame, metres) as seen from the origin.
 pub(crate) fn look(points: &[[f32; 3]]) -> Seen {
     let mut beams: Vec<Beam> = points.iter().filter_map(|p| beam(*p)).collect();
     for edge in EDGES {
@@ -110,8 +108,8 @@ fn same(a: &Beam, b: &Beam) -> bool {
     a.cell == b.cell
 }
 
-/// The cell of a direction on a cube whose faces have so many along an edge, all about equally
-/// wide.
+/// Index of the cell of a direction on a cube with `edge` cells along each edge of a face, all of
+/// about the same solid angle.
 fn cell(to: [f64; 3], edge: usize) -> u32 {
     let sizes = to.map(f64::abs);
     let axis = (0..3).fold(0, |most, i| if sizes[i] > sizes[most] { i } else { most });
@@ -123,7 +121,7 @@ fn cell(to: [f64; 3], edge: usize) -> u32 {
     ((face * edge + along(1)) * edge + along(2)) as u32
 }
 
-/// Length of the cell that the middle one of all points lies in.
+/// Number of points in the cell of the median point.
 fn typical(mut lengths: Vec<usize>) -> usize {
     lengths.sort_unstable();
     let half = lengths.iter().sum::<usize>() / 2;
@@ -135,20 +133,20 @@ fn typical(mut lengths: Vec<usize>) -> usize {
     middle.copied().unwrap_or(0)
 }
 
-/// The same of each band of elevation.
+/// The typical number of points of a cell for each band of elevation.
 fn usual(beams: &[Beam]) -> [usize; N_BANDS] {
     let mut lengths: [Vec<usize>; N_BANDS] = Default::default();
     beams.chunk_by(same).for_each(|cell| lengths[band(cell)].push(cell.len()));
     lengths.map(typical)
 }
 
-/// The band of a cell.
+/// Index of the elevation band of a cell.
 fn band(cell: &[Beam]) -> usize {
     let elevation = cell[0].to[2].clamp(-1.0, 1.0).asin();
     (((elevation / PI + 0.5) * N_BANDS as f64) as usize).min(N_BANDS - 1)
 }
 
-/// Whether two surfaces share all of a cell.
+/// Whether two surfaces share the whole cell.
 fn is_double(cell: &[Beam]) -> bool {
     let some: Vec<Beam> = cell.iter().step_by(cell.len().div_ceil(MOST)).copied().collect();
     let mut ranges: Vec<f64> = some.iter().map(|beam| beam.range).collect();
@@ -167,7 +165,7 @@ fn is_double(cell: &[Beam]) -> bool {
     n_mixed as f64 >= MIXED * some.len() as f64
 }
 
-/// The one whose direction is nearest to that of beam `i`.
+/// The beam whose direction is nearest to that of beam `i`.
 fn nearest(beams: &[Beam], i: usize) -> &Beam {
     let dot = |k: usize| (0..3).map(|a| beams[i].to[a] * beams[k].to[a]).sum::<f64>();
     let others = (0..beams.len()).filter(|k| *k != i);

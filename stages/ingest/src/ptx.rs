@@ -1,5 +1,6 @@
-//! PTX (gridded text) files in; scans and their points out. A block a scan: columns, rows, four
-//! lines of the scanner's pose, the same as a 4 × 4 matrix, then a line a pixel, column by column.
+//! Reads scans and points of PTX (gridded text) files. Each scan is a block: columns, rows, four
+//! lines with the scanner's position and axes, the same as a 4 × 4 matrix, then a line a pixel,
+//! column by column.
 
 mod blocks;
 mod look;
@@ -19,23 +20,23 @@ use std::path::{Path, PathBuf};
 /// One scan of the file.
 #[derive(Debug, Clone)]
 struct Block {
-    /// Pixels of a column.
+    /// Number of rows.
     n_rows: u64,
-    /// Lines of points.
+    /// Number of lines of points.
     n_lines: u64,
-    /// Numbers of a line.
+    /// Number of values of a line.
     n_columns: usize,
-    /// Lines that are not `0 0 0`.
+    /// Number of lines that are not `0 0 0`.
     n_valid: u64,
-    /// Byte where the points begin, and the number of the line before.
+    /// Byte offset of the points, and number of the line before.
     points_at: (u64, u64),
-    /// Metres of one unit of the file.
+    /// Metres per unit of the file.
     metres: f64,
-    /// From the file's coordinates, in metres, to the scan frame.
+    /// Conversion from the file's coordinates (metres) to the scan frame.
     frame: Frame,
-    /// Which intensities become 0 and 65535.
+    /// The intensities that become 0 and 65535.
     intensity: Span,
-    /// The step of the coordinates, metres, where it is coarse.
+    /// The step of the coordinates, metres; `None` where it is fine enough.
     step: Option<f64>,
 }
 
@@ -47,11 +48,11 @@ struct PtxFile {
     scans: Vec<ScanSeed>,
     blocks: Vec<Block>,
     units: Units,
-    /// One a scan.
+    /// Counts of odd points, one entry a scan.
     oddities: Vec<Oddities>,
 }
 
-/// Opens a PTX file. All lines are counted: only so can the scans after the first be found.
+/// Opens a PTX file. All lines are counted, since only so the scans after the first can be found.
 pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> {
     let mut file = PtxFile {
         path: path.to_path_buf(),

@@ -1,5 +1,5 @@
-//! A sample of a scan's points in; the angular raster that suits it out: from native rows and
-//! columns where they are regular, else from the directions of the points. Never finer than about
+//! Estimates the angular raster of a scan from a sample of its points: from native rows and columns
+//! where these are regular, else from the directions of the points. It is never finer than about
 //! one point a pixel.
 
 use crate::picture::is_picture;
@@ -11,7 +11,7 @@ use contract::Lattice;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Where the steps of a lattice come from.
+/// Source of the steps of a lattice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Steps {
     /// Native rows and columns: they map to pixels one to one.
@@ -24,16 +24,16 @@ pub(crate) enum Steps {
     None,
 }
 
-/// A lattice, and where its steps come from.
+/// A lattice and the source of its steps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Raster {
     pub(crate) lattice: Lattice,
     pub(crate) steps: Steps,
 }
 
-/// Fewer points than this tell nothing about a raster.
+/// Number of points below which no raster is estimated.
 const MIN_POINTS: usize = 64;
-/// Native rows and columns worse than this are not used at all, pixels RMS.
+/// Residual of native rows and columns above which they are not used at all, pixels RMS.
 const MAX_IRREGULAR: f64 = 2.5;
 
 /// The raster of a scan from a sample of it, as runs of neighbours in the order of the file;
@@ -63,7 +63,7 @@ pub(crate) fn estimate(
     with(&grid, Steps::Directions)
 }
 
-/// Steps and one pixel's middle, about one axis; radians.
+/// Steps about one axis and the middle of one pixel, radians.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Grid {
     pub(crate) axis: Axis,
@@ -85,7 +85,7 @@ fn lattice(grid: &Grid, settings: &Settings) -> Lattice {
     lattice
 }
 
-/// Which axis of the scan frame the scanner spins about.
+/// The axis of the scan frame about which the scanner spins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Axis {
     X,
@@ -94,10 +94,10 @@ pub(crate) enum Axis {
 }
 
 impl Axis {
-    /// The usual one first: it is preferred where several fit.
+    /// All axes, the usual one first: it is preferred where several fit.
     pub(crate) const ALL: [Self; 3] = [Self::Z, Self::Y, Self::X];
 
-    /// Turns this axis into z.
+    /// The rotation `lattice_from_scan` that turns this axis into z.
     pub(crate) fn lattice_from_scan(self) -> UnitQuaternion<f64> {
         match self {
             Self::Z => UnitQuaternion::identity(),
@@ -118,12 +118,12 @@ impl Axis {
     }
 }
 
-/// An angle in [−π, π).
+/// An angle wrapped to [−π, π).
 pub(crate) fn wrap(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 
-/// The middle one, or the upper of two.
+/// The median; of an even number of values the upper of the middle two.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)

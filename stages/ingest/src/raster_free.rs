@@ -1,29 +1,29 @@
-//! Points without native rows and columns in, in the order of the file; the raster that their
-//! directions suggest out. Points in scan order tell both steps; depth images and shuffled points
-//! tell the density only.
+//! Estimates a raster from the directions of points without native rows and columns. Points in the
+//! order of measurement give both steps; depth images and shuffled points give the density only.
 
 use crate::raster::{Axis, Grid, median, wrap};
 use crate::reader::Sampled;
 use std::f64::consts::TAU;
 
-/// Neighbours in the file that are farther apart than this many spacings of the sample are not
-/// neighbours on the scanner: the points are shuffled.
+/// Distance between points that follow one another in the file, in spacings of the sample, above
+/// which the points count as shuffled.
 const SHUFFLED: f64 = 4.0;
-/// Steps between neighbours this far off the line's direction count as along it, share of the step.
+/// Largest deviation of a step from the direction of a line at which it runs along it, share of the
+/// step.
 const ALONG: f64 = 0.35;
-/// Share of steps along the line that makes a line. Chance gives 0.23.
+/// Share of steps along the line from which on there are lines; random order gives 0.23.
 const LINES: f64 = 0.6;
-/// Lines about another axis than z must be this much straighter to be believed.
+/// Lines about another axis than z must have at most this part of the bend of those about z.
 const STRAIGHTER: f64 = 0.6;
-/// Lines this straight about z are believed at once: step across the line, share of the step along
-/// it.
+/// Bend of lines about z (step across the line as share of the step along it) below which they are
+/// accepted without trying other axes.
 const STRAIGHT: f64 = 1e-4;
-/// Directions steeper than this are left out where azimuth matters, radians (75°).
+/// Elevation above which directions are ignored where azimuth matters, radians (75°).
 const STEEP: f64 = 1.3;
-/// Angles between points that are the same direction twice (several returns of one beam), radians.
+/// Angle below which two points have the same direction (several returns of one beam), radians.
 const SAME: f64 = 1e-6;
 
-/// Fits; `None` only where directions do not spread at all.
+/// Fits a raster; `None` only where all points have the same direction.
 pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<Grid> {
     let about_z: Vec<[f64; 2]> = sample.iter().map(|s| Axis::Z.angles(s.xyz)).collect();
     let spacing = spacing(&about_z)?;
@@ -47,7 +47,7 @@ pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<Grid> {
     Some(best.grid(along))
 }
 
-/// The same step both ways.
+/// A raster with the same step in both directions.
 fn square(angles: &[[f64; 2]], step: f64) -> Grid {
     let [azimuth, elevation] = angles[angles.len() / 2];
     Grid { axis: Axis::Z, row_step: step, col_step: step, elevation, azimuth }
@@ -59,11 +59,11 @@ fn consecutive(sample: &[Sampled]) -> Vec<f64> {
     sample.windows(2).map(|w| (unit(&w[1]) - unit(&w[0])).norm()).collect()
 }
 
-/// How points follow one another about one axis.
+/// How consecutive points follow one another, seen about one axis.
 struct Lines {
     axis: Axis,
     angles: Vec<[f64; 2]>,
-    /// Whether elevation runs along a line (else azimuth does).
+    /// Whether elevation changes along a line, and not azimuth.
     upright: bool,
     /// Share of steps that run along a line.
     share: f64,
@@ -91,7 +91,7 @@ impl Lines {
         Self { axis, angles, upright, share, bend: bends[usize::from(!upright)] }
     }
 
-    /// Steps along and across the lines, and the phase where it is sharp.
+    /// Steps along and across the lines, and the phase where it is well determined.
     fn grid(&self, guess: f64) -> Grid {
         let (u, v) = if self.upright { (1, 0) } else { (0, 1) };
         let flat: Vec<[f64; 2]> =
@@ -104,7 +104,7 @@ impl Lines {
             .collect();
         let mut along = mode(&steps, SAME, 4.0 * guess / 0.2).unwrap_or(guess);
         let mut across = across(angles, u, v, along).unwrap_or(along);
-        // About one point a pixel, whatever the order of the points suggests.
+        // Not finer than about one point a pixel, whatever the order of the points suggests.
         if let Some(spacing) = spacing(angles) {
             let ratio = along * across / (spacing * spacing);
             if !(0.5..=2.5).contains(&ratio) {
@@ -122,10 +122,10 @@ impl Lines {
     }
 }
 
-/// Spacing of lines along `v`, from points that lie beside one another along `u`; `None` where the
-/// sample holds too few lines.
+/// Spacing of lines along coordinate `v`, from points that are neighbours along `u`; `None` where
+/// the sample holds too few lines.
 fn across(angles: &[[f64; 2]], u: usize, v: usize, along: f64) -> Option<f64> {
-    /// Lines farther apart than this many steps along the line are not neighbours.
+    /// Distance above which lines are not neighbours, in steps along the line.
     const FAR: f64 = 12.0;
     let mut cells: Vec<(i64, f64)> =
         angles.iter().map(|a| ((a[u] / along).floor() as i64, a[v])).collect();
@@ -136,15 +136,15 @@ fn across(angles: &[[f64; 2]], u: usize, v: usize, along: f64) -> Option<f64> {
         .map(|w| w[1].1 - w[0].1)
         .filter(|gap| *gap < FAR * along)
         .collect();
-    // Points of one line that share a cell differ by jitter only, which must not pass for the
+    // Points of one line that share a cell differ only by jitter, which must not be taken for the
     // spacing.
     (gaps.len() * 10 > angles.len()).then(|| mode(&gaps, 0.15 * along, FAR * along)).flatten()
 }
 
-/// The most frequent value in a range, on a scale of ratios: the median of the values about the
-/// fullest bin.
+/// The most frequent value in a range: the median of the values about the fullest bin of a
+/// logarithmic histogram.
 fn mode(values: &[f64], min: f64, max: f64) -> Option<f64> {
-    /// Ratio of neighbouring bins' limits.
+    /// Ratio of the limits of neighbouring bins.
     const RATIO: f64 = 1.06;
     let n_bins = ((max / min).ln() / RATIO.ln()).ceil().max(1.0) as usize;
     let mut bins = vec![0_u32; n_bins + 2];
@@ -159,12 +159,12 @@ fn mode(values: &[f64], min: f64, max: f64) -> Option<f64> {
     median(&mut near)
 }
 
-/// Spacing of points if they lay on a square raster of azimuth and elevation: from the number of
-/// points in cells, as small as the sample allows. `None` where all points lie in one direction.
+/// Spacing of the points if they lay on a square raster of azimuth and elevation, from the number
+/// of points in the smallest suitable cells. `None` where all points have the same direction.
 fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
-    /// Points in a cell that make its count certain to a fifth.
+    /// Number of points in a cell from which on its count is certain to 20 %.
     const ENOUGH: usize = 30;
-    /// Points in a cell below which the edges of lines are counted, not their spacing.
+    /// Number of points in a cell below which edges of lines are counted instead of their spacing.
     const FEW: usize = 8;
     let mut found = None;
     let mut edge = 16.0_f64.to_radians();
@@ -181,8 +181,7 @@ fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
         if counts.is_empty() {
             break;
         }
-        // The upper quartile of the points' cells: cells at the rim of the sample are only partly
-        // full.
+        // The upper quartile over points: cells at the rim of the sample are only partly filled.
         let at = counts.len() * 3 / 4;
         let count = *counts.select_nth_unstable(at).1;
         if count < FEW || (found.is_some() && count < ENOUGH) {
@@ -194,9 +193,9 @@ fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
     found
 }
 
-/// Lengths of the mean phasor at frequencies that follow one another at equal distances: each
-/// value's phasor is turned on by the same angle every time, without a sine or cosine (thousands of
-/// turns leave a part in 10¹²).
+/// Lengths of the mean phasor at equally spaced frequencies. Each value's phasor is rotated by the
+/// same angle at every step, without a sine or cosine (thousands of rotations leave an error of
+/// 10⁻¹²).
 struct Sweep {
     now: [Vec<f64>; 2],
     turn: [Vec<f64>; 2],
@@ -212,7 +211,7 @@ impl Sweep {
         Self { now: phasors(first), turn: phasors(apart) }
     }
 
-    /// The length at the next frequency.
+    /// The length of the mean phasor at the next frequency.
     fn next(&mut self) -> f64 {
         let ([re, im], [cos, sin]) = (&mut self.now, &self.turn);
         let length = f64::hypot(re.iter().sum(), im.iter().sum()) / re.len() as f64;
@@ -223,15 +222,14 @@ impl Sweep {
     }
 }
 
-/// The step near `step` that fits the angles best, and the middle of a pixel near their middle.
-/// Where they are not regular enough for a phase, the step stays and any phase will do.
+/// The step near `step` that fits the angles best, and the middle of a pixel near their median.
+/// Where the angles are too irregular for a phase, the step is kept and the phase is arbitrary.
 fn sharpen(angles: &[[f64; 2]], axis: usize, step: f64) -> (f64, f64) {
-    /// Points that are looked at: enough for a hundredth of a pixel.
+    /// Number of points that are used: enough for a hundredth of a pixel.
     const POINTS: usize = 4_000;
-    /// How far from the guess the step may lie.
+    /// Largest relative difference of the step from the guess.
     const REACH: f64 = 0.03;
-    /// Sharpness (length of the mean phasor) from which pixels hold one point each: jitter of 0.17
-    /// pixels.
+    /// Length of the mean phasor from which on pixels hold one point each: a jitter of 0.17 pixels.
     const SHARP: f64 = 0.55;
     let every = angles.len().div_ceil(POINTS);
     let values: Vec<f64> = angles.iter().step_by(every).map(|a| a[axis]).collect();

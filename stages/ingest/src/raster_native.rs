@@ -1,6 +1,5 @@
-//! Points with native rows and columns in; the regular raster that fits them best out, with how
-//! well it does. Rows are elevation and columns azimuth, about one of three axes, either way round,
-//! with or without a jump at ±π.
+//! Fits a regular raster to points with native rows and columns. Rows are elevation and columns are
+//! azimuth about one of three axes, in either direction, with or without a jump at ±π.
 
 use crate::raster::{Axis, Grid, median, wrap};
 use crate::reader::Sampled;
@@ -10,19 +9,19 @@ use geometry::robust::tukey;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Native {
     pub(crate) grid: Grid,
-    /// Residual of the worse of rows and columns, pixels RMS, the worst 2 % left out.
+    /// Residual of rows or columns, whichever is larger, pixels RMS without the worst 2 %.
     pub(crate) rms: f64,
 }
 
-/// Fewer rows or columns than this cannot be told from chance.
+/// Number of rows or columns below which regularity may be chance.
 const MIN_LINES: usize = 3;
-/// Azimuths of points steeper than this are left out: there a small error turns them far. Radians
-/// (75°).
+/// Elevation above which azimuths are ignored, radians (75°): there a small error changes the
+/// azimuth much.
 const STEEP: f64 = 1.3;
-/// Share of the largest residuals that is left out: mixed pixels and stray returns.
+/// Share of the largest residuals that is ignored: mixed pixels and stray returns.
 const LEFT_OUT: f64 = 0.02;
 
-/// Fits; `None` where the sample has no native rows and columns, or too few of them.
+/// Fits a raster; `None` where the sample has no native rows and columns, or too few of them.
 pub(crate) fn fit(sample: &[Sampled]) -> Option<Native> {
     let native: Vec<([f32; 3], [u32; 2])> =
         sample.iter().filter_map(|s| Some((s.xyz, s.native?))).collect();
@@ -34,7 +33,7 @@ pub(crate) fn fit(sample: &[Sampled]) -> Option<Native> {
         let Some(fitted) = fit_axis(&native, axis) else {
             continue;
         };
-        // A tenth of a pixel better is needed to leave the usual axis.
+        // Another axis than the usual one must be better by a tenth of a pixel.
         if best.is_none_or(|b| fitted.rms + 0.1 < b.rms) {
             best = Some(fitted);
         }
@@ -67,7 +66,7 @@ fn fit_axis(native: &[([f32; 3], [u32; 2])], axis: Axis) -> Option<Native> {
     Some(Native { grid, rms })
 }
 
-/// `angle + slope · (index − at)`, radians, modulo a turn.
+/// The line `angle + slope · (index − at)`, radians, modulo a turn.
 #[derive(Debug, Clone, Copy)]
 struct Line {
     slope: f64,
@@ -76,12 +75,12 @@ struct Line {
 }
 
 impl Line {
-    /// Fits to (index, angle), sorted by index.
+    /// Fits a line to (index, angle), sorted by index.
     fn fit(points: &[(u32, f64)]) -> Option<Self> {
         let mut lines: Vec<(f64, f64)> = points
             .chunk_by(|a, b| a.0 == b.0)
             .map(|same| {
-                // About the first one, so that a jump at ±π inside the line does no harm.
+                // Relative to the first angle, so that a jump at ±π within the line has no effect.
                 let mut angles: Vec<f64> = same.iter().map(|p| wrap(p.1 - same[0].1)).collect();
                 (f64::from(same[0].0), same[0].1 + median(&mut angles).unwrap_or(0.0))
             })
@@ -104,8 +103,8 @@ impl Line {
         (line.slope.is_finite() && line.slope.abs() > 1e-7).then_some(line)
     }
 
-    /// Reweighted least squares, about the middle index, which becomes the phase: the rounding of
-    /// the step to a whole number of columns then does least harm.
+    /// Reweighted least squares about the middle index, which becomes the phase: there the rounding
+    /// of the step to a whole number of columns has the least effect.
     fn least_squares(lines: &[(f64, f64)], slope: f64) -> Option<Self> {
         let at = ((lines[0].0 + lines[lines.len() - 1].0) / 2.0).round();
         let mut offsets: Vec<f64> = lines.iter().map(|l| l.1 - slope * (l.0 - at)).collect();
@@ -131,7 +130,7 @@ impl Line {
         Some(line)
     }
 
-    /// Pixels, the worst left out.
+    /// Residual in pixels RMS, without the worst ones.
     fn rms(&self, points: &[(u32, f64)]) -> f64 {
         let mut sizes: Vec<f64> = points
             .iter()

@@ -17,7 +17,7 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Mean 0, standard deviation 1, near enough.
+    /// A value of approximately normal distribution with mean 0 and standard deviation 1.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.next()).sum::<f64>() - 6.0
     }
@@ -106,8 +106,8 @@ fn native_pixels_map_one_to_one() {
             near(raster.lattice.row_step, 0.11, 1e-3) && near(raster.lattice.col_step, 0.09, 1e-3)
         );
         assert!(alone(&points, &raster.lattice) > 0.999);
-        // The same native column is the same column of the lattice, also across the jump at 180
-        // degrees.
+        // Points of one native column lie in one column of the lattice, also across the jump at
+        // 180°.
         let cols: Vec<u32> = points
             .iter()
             .map(|p| {

@@ -1,5 +1,5 @@
-//! What every format gives: its masks and scans, a sample of each scan, and its points as strips in
-//! file order.
+//! The trait of a format's reader: masks and scans, a sample of each scan, and all points as strips
+//! in file order.
 
 use crate::map::Mapped;
 use crate::oddities::Oddities;
@@ -8,49 +8,48 @@ use contract::{Attributes, Error, Format, Kind, Result};
 use geometry::{Aabb, Pose};
 use std::ops::Range;
 
-/// How much of each point is wanted.
+/// Which attributes of the points are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Want {
     /// Coordinates and places only.
     Coordinates,
-    /// Every attribute as well.
+    /// All attributes.
     Everything,
 }
 
-/// A mask of one file, before it has a number over all inputs.
+/// A mask of one file, before it gets its index over all inputs.
 #[derive(Debug, Clone)]
 pub(crate) struct MaskSeed {
-    /// Name for people.
+    /// Display name.
     pub(crate) name: String,
-    /// Valid points, where known without reading them.
+    /// Number of valid points, where known without reading them.
     pub(crate) n_points: Option<u64>,
-    /// Points that the file states, those that are not valid with them; of no use but to guess how
-    /// much there is.
+    /// Number of points that the file states, including invalid ones; only for estimates.
     pub(crate) n_stated: Option<u64>,
 }
 
-/// A scan of one file, before it has a number over all inputs and a lattice.
+/// A scan of one file, before it gets its index over all inputs and its lattice.
 #[derive(Debug, Clone)]
 pub(crate) struct ScanSeed {
-    /// Name for people.
+    /// Display name.
     pub(crate) name: String,
-    /// Which mask of this file labels it.
+    /// Index of the mask of this file that labels it.
     pub(crate) mask: usize,
-    /// LAS point source id, where scans are told apart by it.
+    /// Point source id of LAS, where scans are told apart by it.
     pub(crate) source_id: Option<u16>,
-    /// Pose; a translation near the points where the scanner is not known.
+    /// Pose of the scan frame, metres; a translation near the points where the scanner is unknown.
     pub(crate) world_from_scan: Pose,
-    /// Whether the scan frame's origin is the scanner.
+    /// Whether the origin of the scan frame is the scanner.
     pub(crate) scanner_known: bool,
-    /// Stated bounds in the world.
+    /// Stated bounds in the world, metres.
     pub(crate) stated_bounds: Option<Aabb>,
     /// Stated number of valid points.
     pub(crate) stated_points: Option<u64>,
-    /// About how many it has, where a look at the file told.
+    /// Estimated number of points, where a sample of the file gives one.
     pub(crate) likely_points: Option<u64>,
-    /// What is missing and what is worse for it.
+    /// Messages about what is missing and which results suffer from it.
     pub(crate) notes: Vec<String>,
-    /// The step that its coordinates come in, metres, where it is coarse.
+    /// The step of the coordinates, metres; `None` where it is fine enough.
     pub(crate) step: Option<f64>,
 }
 
@@ -59,35 +58,35 @@ pub(crate) struct ScanSeed {
 pub(crate) struct Sampled {
     /// Scan frame, metres.
     pub(crate) xyz: [f32; 3],
-    /// Native row and column.
+    /// Native row and column, where the file has them.
     pub(crate) native: Option<[u32; 2]>,
 }
 
-/// A strip with this file's own numbers for scan and mask. It holds no point only at the end of a
-/// mask whose length is not known beforehand and whose last points were dropped: `first_place` is
-/// then the length of the mask.
+/// A strip with indices of scan and mask within its file. It is empty only at the end of a mask
+/// whose length is not known beforehand and whose last points were dropped; `first_place` is then
+/// the length of the mask.
 #[derive(Debug, Clone)]
 pub(crate) struct RawStrip {
     /// Index of the scan in this file.
     pub(crate) scan: usize,
     /// Place in the mask of the first point.
     pub(crate) first_place: u64,
-    /// Places less `first_place`, ascending.
+    /// Places of the points less `first_place`, ascending.
     pub(crate) place: Vec<u32>,
     /// Scan frame, metres.
     pub(crate) xyz: Vec<[f32; 3]>,
-    /// Where asked for.
+    /// Attributes, if they were requested.
     pub(crate) attributes: Option<Attributes>,
 }
 
-/// Strips of one file, in its order.
+/// Iterator over the strips of one file, in file order.
 pub(crate) type RawStrips<'a> = Box<dyn Iterator<Item = Result<RawStrip>> + Send + 'a>;
 
-/// Consecutive bytes of a file that are points by themselves, so that any thread may read them; or
-/// that hold none. Extents cover a file from its first byte to its last.
+/// A range of bytes of a file whose points can be decoded independently, or that holds no points.
+/// The extents of a file cover it from its first byte to its last.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Extent {
-    /// Where its bytes lie in the file.
+    /// Byte offsets in the file.
     pub bytes: Range<u64>,
     /// Place of its first point.
     pub(crate) first: u64,
@@ -95,17 +94,17 @@ pub struct Extent {
     pub n_points: u64,
 }
 
-/// Bytes without points that are read at once, at most.
+/// Largest length of an extent without points, bytes.
 const GAP: usize = 1 << 20;
 
 impl Extent {
-    /// Its bytes in those of the file.
+    /// The bytes of the extent within those of the file.
     pub(crate) fn of<'a>(&self, file: &'a [u8]) -> &'a [u8] {
         &file[self.bytes.start as usize..self.bytes.end as usize]
     }
 
-    /// Extents with points, and what lies before, between and behind them in a file of so many
-    /// bytes.
+    /// Extends extents with points to cover a whole file of `n_bytes` bytes, by extents without
+    /// points before, between and after them.
     pub(crate) fn cover(
         points: impl Iterator<Item = Self>,
         n_bytes: u64,
@@ -122,64 +121,63 @@ impl Extent {
     }
 }
 
-/// How a file is read, in its order.
+/// How a file is read, in file order.
 pub(crate) enum Reading<'a> {
-    /// From its beginning on.
+    /// From its beginning to its end.
     Straight(RawStrips<'a>),
-    /// By extents, each of which is decoded by itself.
+    /// By extents that are decoded independently.
     ByExtent(Box<dyn Iterator<Item = Extent> + Send + 'a>),
 }
 
-/// An open file: headers read and checked, points not yet.
+/// An open file whose headers are read and checked.
 pub(crate) trait Reader: Send + Sync {
-    /// What it is.
+    /// The format of the file.
     fn format(&self) -> Format;
-    /// Its masks.
+    /// The masks of the file.
     fn masks(&self) -> &[MaskSeed];
-    /// Its scans.
+    /// The scans of the file.
     fn scans(&self) -> &[ScanSeed];
-    /// Up to `n` valid points of a scan, as runs of neighbours in file order spread over the scan.
+    /// Up to `n` valid points of a scan, as runs of neighbours in file order, spread over the scan.
     fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>>;
-    /// Up to `n` valid points of a scan, scan frame, metres, evenly spread over it; of a scan of
-    /// more than `most` points over so many.
+    /// Up to `n` valid points of a scan (scan frame, metres), evenly spread over it, or over its
+    /// first `most` points if it has more.
     fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>>;
-    /// All valid points in file order. Ends with an error, never with a silent end, where the file
-    /// is broken.
+    /// All valid points in file order. A broken file gives an error and never a silent end.
     fn read(&self, want: Want) -> Result<Reading<'_>>;
     /// The points of an extent, from its bytes.
     fn decode(&self, extent: &Extent, _bytes: &[u8], _want: Want) -> Result<Vec<RawStrip>> {
         let what = format!("bytes {:?} were given to a format without extents", extent.bytes);
         Err(Error::new(Kind::Bug, what))
     }
-    /// Its bytes, where it is mapped.
+    /// The memory map of the file, where it is mapped.
     fn mapped(&self) -> Option<&Mapped> {
         None
     }
-    /// Units of its coordinates as they stand in the file; what it gives is in metres.
+    /// Units of the coordinates in the file; the reader itself returns metres.
     fn units(&self) -> &Units;
-    /// The coordinates of one scan from its first point on, where a scan can be read by itself.
+    /// The coordinates of one scan, for formats in which a scan can be read alone.
     fn read_scan(&self, _scan: usize) -> Option<RawStrips<'_>> {
         None
     }
-    /// Whether points have colour.
+    /// Whether the points have colour.
     fn has_color(&self) -> bool;
-    /// Scale and offset of its coordinates, metres, where they are whole multiples of a step (LAS).
+    /// Scale and offset of the coordinates, metres, where they are multiples of a step (LAS).
     fn quantum(&self) -> Option<([f64; 3], [f64; 3])> {
         None
     }
-    /// What was odd about the points of a scan when all was last read, where that is counted.
+    /// Counts of odd points of a scan from the last full read, where they are counted.
     fn oddities(&self, _scan: usize) -> Option<&Oddities> {
         None
     }
-    /// Whether all that was read so far was really there: a mapped file may have been cut short.
+    /// Checks that all data read so far was there: a mapped file may have been truncated.
     fn check(&self) -> Result<()> {
         self.mapped().map_or(Ok(()), Mapped::check)
     }
-    /// What the file says of itself, as `(name, value)` pairs for `inspect`.
+    /// Facts that the file states, as (name, value), for `inspect`.
     fn facts(&self) -> Vec<(String, String)>;
 }
 
-/// The strips of a file on this thread, whichever way it is read.
+/// The strips of a file, decoded on this thread whichever way the file is read.
 pub(crate) fn strips(reader: &dyn Reader, want: Want) -> Result<RawStrips<'_>> {
     let extents = match reader.read(want)? {
         Reading::Straight(strips) => return Ok(strips),
@@ -192,7 +190,7 @@ pub(crate) fn strips(reader: &dyn Reader, want: Want) -> Result<RawStrips<'_>> {
             Err(error) => vec![Err(error)],
         }
     };
-    // An error is the end.
+    // The iterator ends after the first error.
     let mut has_failed = false;
     let until = move |strip: &Result<RawStrip>| {
         let goes_on = !has_failed;

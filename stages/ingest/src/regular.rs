@@ -1,14 +1,14 @@
-//! The path of a small text in, its text out: only of a regular file, and never more than a limit.
+//! Reads small text files: regular files only, and never more than a limit.
 
 use contract::{Error, Kind, Result};
 use std::io::Read as _;
 use std::path::Path;
 
-/// Refuses a path that leads to no regular file: a pipe or device may have no end, and may wait for
-/// ever for somebody to write.
+/// Refuses a path that is no regular file: reading a pipe or device may have no end, or wait for
+/// ever for a writer.
 ///
 /// # Errors
-/// Nothing is there, or a folder, pipe, socket or device; with the path.
+/// If the path does not exist or is a folder, pipe, socket or device; the error names it.
 pub fn regular(path: &Path) -> Result<()> {
     let meta = std::fs::metadata(path);
     let is_missing = |e: &std::io::Error| {
@@ -27,16 +27,16 @@ pub fn regular(path: &Path) -> Result<()> {
     }
 }
 
-/// The text of a regular file of at most `limit` bytes; `setting` names what sets the limit.
+/// The text of a regular file of at most `limit` bytes; `setting` names the setting of that limit.
 ///
 /// # Errors
-/// No regular file, a longer one, or one that is no UTF-8; with the path.
+/// If the file is not regular, is longer, or is not UTF-8; the error names its path.
 pub fn read_text(path: &Path, limit: u64, setting: &str) -> Result<String> {
     regular(path)?;
     let failed = |e| Error::from(e).at(path.display());
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(failed)?;
-    // Not as long as its folder says, but as it is: some files have no end.
+    // The stated length is not trusted, since some files have no end.
     file.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > limit {
         return Err(Error::new(Kind::OverBudget, format!("it is longer than {limit} bytes"))

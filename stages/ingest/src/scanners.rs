@@ -1,4 +1,4 @@
-//! The file of `--scanners` in (TOML or JSON); scanner poses out, world from scan, each checked.
+//! Reads and checks the scanner poses (`world_from_scan`) of a `--scanners` file in TOML or JSON.
 
 use crate::regular::read_text;
 use crate::settings::Settings;
@@ -9,24 +9,24 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Most entries of a file: LAS tells no more sources apart.
+/// Largest number of entries of a file: LAS can tell no more sources apart.
 const MAX_SCANNERS: usize = 1 << 16;
 
-/// A scanner whose pose the user knows.
+/// A scanner whose pose the user gives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scanner {
-    /// LAS point source id of its points.
+    /// Point source id of its points in a LAS file.
     pub point_source_id: Option<u16>,
-    /// Name of its scan, or of its file without suffix.
+    /// Name of its scan, or name of its file without suffix.
     pub name: Option<String>,
-    /// World from scan, metres.
+    /// Pose of the scanner in the world, metres.
     pub world_from_scan: Pose,
 }
 
-/// The poses of scanners, for formats that carry none.
+/// Scanner poses from the user, for formats that carry none.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Scanners {
-    /// In the order of the file.
+    /// The entries, in the order of the file.
     pub entries: Vec<Scanner>,
 }
 
@@ -49,13 +49,14 @@ impl Scanners {
     /// Reads a file: JSON if it starts with `{`, else TOML.
     ///
     /// # Errors
-    /// What cannot be read, is unknown, not finite, or stated twice is refused, with its place.
+    /// If the file cannot be read, or if an entry has an unknown key, a value that is not finite,
+    /// or the same name and id as another; the error names the place.
     pub fn read(path: &Path, settings: &Settings) -> Result<Self> {
         let text = read_text(path, settings.max_scanners_bytes, "ingest.max_scanners_bytes")?;
         Self::parse(&text).map_err(|e| e.at(path.display()))
     }
 
-    /// Reads the text of such a file.
+    /// Reads the text of a `--scanners` file.
     ///
     /// # Errors
     /// As [`Scanners::read`].

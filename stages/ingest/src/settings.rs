@@ -1,54 +1,54 @@
-//! What can be tuned in reading; defaults in, no file knows another number.
+//! The settings of this crate with their defaults; no other file has tunable numbers.
 
-/// Tunables of this room.
+/// Settings of reading point files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Points of a strip. 65,536: a message through a channel costs nothing at that size, and a
-    /// strip (1 MB) fits the second-level cache.
+    /// Number of points of a strip. At the default of 65,536 the cost of passing it through a
+    /// channel is negligible, and a strip (1 MB) fits the second-level cache.
     pub strip_points: usize,
-    /// Largest XML section of an E57 file that is read, bytes. Real ones stay below 1 MB even with
-    /// thousands of images.
+    /// Largest XML section of an E57 file, bytes. Real ones stay below 1 MB even with thousands of
+    /// images.
     pub max_xml_bytes: u64,
-    /// Most elements, attributes and texts of that section: its reader keeps about 80 bytes of
-    /// each.
+    /// Largest number of elements, attributes and texts of that section; the XML reader keeps about
+    /// 80 bytes of each.
     pub max_xml_nodes: u64,
-    /// Most attributes of one element of it: real ones have below ten, and its reader compares
-    /// each with all others.
+    /// Largest number of attributes of one element of that section. Real ones have below ten, and
+    /// the XML reader compares each with all others.
     pub max_xml_attributes: u64,
-    /// Largest `--scanners` file, bytes: 100,000 scanners fit.
+    /// Largest `--scanners` file, bytes; 100,000 scanners fit into the default.
     pub max_scanners_bytes: u64,
-    /// Largest configuration, review, scene, path or list of readings, bytes: texts that people or
-    /// small programs write.
+    /// Largest configuration, review, scene or path file or list of readings, bytes: texts that
+    /// people or small programs write.
     pub max_text_bytes: u64,
-    /// Points of a scan that the lattice is estimated from: angles to a hundredth of a pixel need
-    /// no more.
+    /// Number of points from which the lattice of a scan is estimated; it suffices for angles to a
+    /// hundredth of a pixel.
     pub sample_points: usize,
-    /// Largest memory for one LAZ chunk once decompressed, bytes. Chunks have 50,000 points (2 MB)
-    /// in practice; a file in one piece is decompressed point by point and does not count.
+    /// Largest memory for one decompressed LAZ chunk, bytes. Chunks usually have 50,000 points
+    /// (2 MB); a file in one piece is decompressed gradually and not limited by this.
     pub max_laz_chunk_bytes: u64,
-    /// Coordinates farther than this from the scanner, or from the middle of points without one,
-    /// are not measured but broken, metres: such points are dropped and counted. No
-    /// terrestrial scanner reaches 10 km; files without scanner may span a region, hence a
-    /// hundred: as far as coordinates in steps of 0.1 mm reach (214 km).
+    /// Largest distance of a point from its scanner, or from the middle of the points where no
+    /// scanner is known, metres; points farther away are dropped and counted. No terrestrial
+    /// scanner reaches 10 km, but a file without scanner may span a region, so that the default is
+    /// 100 km: coordinates in steps of 0.1 mm reach to 214 km.
     pub max_range: f64,
-    /// Residual of native rows and columns from a regular lattice that is accepted, pixels RMS.
-    /// Above it, native pixels cannot map one to one anyway.
+    /// Largest residual of native rows and columns from a regular lattice, pixels RMS; above it
+    /// native pixels cannot map to lattice pixels one to one.
     pub max_native_rms: f64,
-    /// Finest lattice step, radians (0.005°: below the best terrestrial scanners, 0.0018°, only in
-    /// name: their beam is wider).
+    /// Finest lattice step, radians. The default is 0.005°: the best terrestrial scanners offer
+    /// 0.0018°, but their beam is wider than that.
     pub min_step: f64,
-    /// Coarsest lattice step, radians (2°).
+    /// Coarsest lattice step, radians; the default is 2°.
     pub max_step: f64,
-    /// Units of coordinates: `declared` for what each file declares, else one such as `mm`,
-    /// `us-ft/m` (heights apart), or `hall.las=ft,mm` (one file's own).
+    /// Units of coordinates: `declared` for what each file declares, else a unit such as `mm`,
+    /// `us-ft/m` (another unit for heights), or `hall.las=ft,mm` (another unit for one file).
     pub units: String,
 }
 
 impl Settings {
-    /// Sees that what is set can be.
+    /// Checks that the settings are valid.
     ///
     /// # Errors
-    /// Units that are none.
+    /// If `units` names no known unit.
     pub fn check(&self) -> contract::Result<()> {
         crate::units::Choice::read(&self.units).map(drop)
     }

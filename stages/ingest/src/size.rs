@@ -1,33 +1,33 @@
-//! A sample of each scan in; how far its points spread, and whether that can be a plant in the
-//! units that they are read in, out.
+//! Estimates from samples how far the points of each scan spread, and checks whether that can be a
+//! plant in the units that are assumed.
 
 use crate::sources::{File, Sources};
 use crate::units::{Origin, Unit, Units};
 use contract::{Error, Input, Result, quote};
 use geometry::{Aabb, Point, Pose};
 
-/// Points of a scan that are looked at where nothing else needs a sample.
+/// Number of points of a scan that are sampled where nothing else needs a sample.
 pub(crate) const N_LOOKED: usize = 4096;
-/// Fewer points spread over nothing in particular.
+/// Number of points below which nothing is concluded.
 const LEAST_POINTS: usize = 100;
-/// Share of the points on either side that count for nothing: strays, and what is seen through
+/// Share of the points on either side that is ignored: stray points, and what is seen through
 /// gates.
 const TAIL: f64 = 0.05;
-/// No scan of a plant spreads farther, metres: halls measure hundreds of metres, scanners reach as
-/// far.
+/// Largest plausible spread of a scan of a plant, metres: halls measure hundreds of metres, as far
+/// as scanners reach.
 const LARGEST: [f64; 3] = [2_000.0, 2_000.0, 200.0];
-/// No scan spreads over less, metres: the smallest arms are ten times as large.
+/// Smallest plausible spread of a scan, metres: the smallest arms are ten times as large.
 const SMALLEST: f64 = 0.02;
-/// Scans of one plant lie no farther from one another, metres.
+/// Largest distance between scans of one plant, metres.
 const FARTHEST: f64 = 1.0e5;
-/// A cloud that is smaller than this share of the smallest robot's reach cannot hold it.
+/// A cloud smaller than this share of the smallest robot's reach cannot hold the robot.
 const SHARE_OF_REACH: f64 = 0.2;
-/// A robot cell in its right unit: least and most of its larger side, and of its height, metres.
+/// Plausible sizes of a robot cell, metres: least and most of its larger side, and of its height.
 const CELL: [[f64; 2]; 2] = [[1.5, 500.0], [0.8, 100.0]];
-/// Units that are tried on a cloud of the wrong size, the most common ones first.
+/// Units that are tried on a cloud of implausible size, the most common ones first.
 const TRIED: [(&str, f64); 4] = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("km", 1e3)];
 
-/// Where most points of a scan lie in the world, metres; nothing of too few points.
+/// World bounds of most points of a scan, metres; `None` where there are too few points.
 pub(crate) fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose) -> Option<Aabb> {
     let world = xyz.map(|p| world_from_scan * Point::from(p.map(f64::from)));
     let world: Vec<Point> = world.collect();
@@ -46,12 +46,12 @@ pub(crate) fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose
 }
 
 impl Sources {
-    /// Refuses inputs that cannot be of a plant in the units that they are read in: where nobody
-    /// gave a unit or declared one, clouds of kilometres; where somebody did, clouds of
-    /// millimetres, too.
+    /// Refuses inputs that cannot show a plant in the units that are assumed: without a given or
+    /// declared unit clouds of kilometres, and also clouds of millimetres where a unit was given or
+    /// declared.
     ///
     /// # Errors
-    /// The first such input, with what its points would measure and how to give the right unit.
+    /// For the first such input, with the size of its points and how to give the right unit.
     pub fn check_sizes(&self) -> Result<()> {
         self.check_frames()?;
         self.opened().iter().zip(&self.files).try_for_each(|(input, file)| {
@@ -70,15 +70,15 @@ impl Sources {
         })
     }
 
-    /// Where most points of the opened inputs lie in the world, metres, as far as samples tell;
-    /// empty where they do not.
+    /// World bounds of most points of the opened inputs, metres, as far as samples tell; empty
+    /// where they do not.
     #[must_use]
     pub fn spread(&self) -> Aabb {
         let all = self.files.iter().flat_map(|file| file.spreads.iter().flatten());
         all.fold(Aabb::EMPTY, |all, own| all.union(own))
     }
 
-    /// Refuses scans that lie as far from one another as frames do, and plants do not.
+    /// Refuses scans so far apart that they must be in different frames.
     fn check_frames(&self) -> Result<()> {
         let place = |file: &File, i: usize| {
             let scan = &self.scans[file.first_scan as usize + i];
@@ -107,7 +107,7 @@ impl Sources {
     /// Refuses inputs that are all too small to hold the smallest robot of a library.
     ///
     /// # Errors
-    /// The largest of them, with what its points measure.
+    /// For the largest of them, with the size of its points.
     pub fn check_reach(&self, smallest: &str, reach: f64) -> Result<()> {
         let all = self.opened().iter().zip(&self.files);
         let sizes = all.filter_map(|(input, file)| Some((input, file, file.largest()?)));
@@ -122,7 +122,7 @@ impl Sources {
         }
     }
 
-    /// What is worth a word where files declare their units.
+    /// Adds warnings about implausible sizes of files that declare their units.
     pub(crate) fn warn_of_sizes(&mut self) {
         let inputs = self.opened().iter().zip(&self.files);
         let said = inputs.flat_map(|(input, file)| {
@@ -145,12 +145,12 @@ impl Sources {
 }
 
 impl File {
-    /// How far the points of each scan spread, metres.
+    /// Spread of the points of each scan along x, y and z, metres.
     fn sizes(&self) -> impl Iterator<Item = [f64; 3]> {
         self.spreads.iter().flatten().map(Aabb::size)
     }
 
-    /// The largest of its scans.
+    /// The largest spread of its scans, metres.
     fn largest(&self) -> Option<[f64; 3]> {
         self.sizes().max_by(|a, b| diagonal(a).total_cmp(&diagonal(b)))
     }
@@ -181,7 +181,7 @@ fn wrong(input: &Input, units: &Units, size: &[f64; 3], why: &str) -> Error {
     Error::bad_input(what).at(input.path.display()).hint(hint)
 }
 
-/// The unit in which a cloud is as large as robot cells are, and how large it is then, metres.
+/// The unit in which a cloud has the size of a robot cell, and its size then, metres.
 fn likely(units: &Units, size: &[f64; 3]) -> Option<(&'static str, [f64; 3])> {
     let factors = units.factors();
     let of_file: [f64; 3] = std::array::from_fn(|axis| size[axis] / factors[axis]);
@@ -233,7 +233,7 @@ mod tests {
             ([40_000.0, 20_000.0, 8_000.0], Some("mm")),
             ([0.008, 0.007, 0.003], Some("km")),
             ([1e9, 1e9, 1e9], None),
-            // A landscape from the air, in feet as it happens: no cell in any unit.
+            // An aerial survey, which has the size of a cell in no unit.
             ([3_000.0, 4_000.0, 70.0], None),
         ] {
             assert_eq!(likely(&in_metres, &size).map(|(unit, _)| unit), unit, "{size:?}");

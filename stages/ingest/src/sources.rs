@@ -1,5 +1,5 @@
-//! Paths in; open inputs out, numbered over all of them: inputs, masks, scans with their lattices,
-//! and the strips of each input on request.
+//! Opens inputs and numbers inputs, masks and scans over all of them; gives scans with their
+//! lattices, and the strips of each input on request.
 
 use crate::format::detect;
 use crate::las::Las;
@@ -17,44 +17,44 @@ use contract::{
 use geometry::{Aabb, Pose};
 use std::path::{Path, PathBuf};
 
-/// Strips of one input, in its order.
+/// Iterator over the strips of one input, in file order.
 pub type Strips<'a> = Box<dyn Iterator<Item = Result<Strip>> + Send + 'a>;
 
-/// What an input is read by.
+/// A part of an input.
 #[derive(Debug)]
 pub enum Piece {
-    /// Points, of a format that is read from its beginning on.
+    /// Points, of a format that is read from beginning to end.
     Strip(Strip),
-    /// Bytes that whoever reads them hands to [`Sources::decode`].
+    /// A range of bytes, which the reader of the bytes passes to [`Sources::decode`].
     Extent(Extent),
 }
 
-/// Pieces of one input, in its order.
+/// Iterator over the pieces of one input, in file order.
 pub type Pieces<'a> = Box<dyn Iterator<Item = Result<Piece>> + Send + 'a>;
 
-/// Open inputs: headers read and checked, points not yet.
+/// Open inputs, with headers read and checked and no points read yet.
 pub struct Sources {
-    /// In the order of the command line.
+    /// Inputs, in the order of the command line.
     pub inputs: Vec<Input>,
-    /// In the order of the inputs.
+    /// Masks, in the order of the inputs.
     pub masks: Vec<Mask>,
-    /// In the order of the inputs.
+    /// Scans, in the order of the inputs.
     pub scans: Vec<Scan>,
-    /// What is odd about inputs and scanners, in words.
+    /// Warnings about inputs and scanners.
     pub warnings: Vec<String>,
     pub(crate) files: Vec<File>,
     n_before: [usize; 2],
 }
 
-/// Inputs of an earlier run, which are known but not open: those that are opened now are numbered
-/// after them.
+/// Inputs, masks and scans of an earlier run, which are known but not open. Inputs that are opened
+/// now are numbered after them.
 #[derive(Debug, Clone, Default)]
 pub struct Before {
-    /// In their order.
+    /// Inputs, in their order.
     pub inputs: Vec<Input>,
-    /// In the order of the inputs.
+    /// Masks, in the order of the inputs.
     pub masks: Vec<Mask>,
-    /// In the order of the inputs.
+    /// Scans, in the order of the inputs.
     pub scans: Vec<Scan>,
 }
 
@@ -63,21 +63,21 @@ pub(crate) struct File {
     pub(crate) reader: Box<dyn Reader>,
     pub(crate) first_scan: u32,
     first_mask: u32,
-    /// For each scan whose pose the user replaced: its new scan frame from that of the file.
+    /// For each scan whose pose the user replaced, the pose `new_scan_from_file_scan`.
     pub(crate) moved: Vec<Option<Pose>>,
     /// For each scan: whether its scanner's position is known.
     pub(crate) known: Vec<bool>,
-    /// For each scan: where the steps of its lattice come from.
+    /// For each scan the source of its lattice's steps.
     pub(crate) steps: Vec<Steps>,
-    /// For each scan: where most of its points lie in the world, metres, where that could be told.
+    /// For each scan the world bounds of most of its points, metres, where known.
     pub(crate) spreads: Vec<Option<Aabb>>,
 }
 
-/// Opens inputs: finds out what each is, reads and checks its header, and makes the lattices of
-/// scans whose scanner is known from a sample of their points.
+/// Opens inputs: detects their formats, reads and checks their headers, and estimates the lattices
+/// of scans with known scanner from a sample of their points.
 ///
 /// # Errors
-/// The first input, in their order, that is broken or not read at all; the place starts with its
+/// For the first input, in their order, that is broken or unsupported; the place begins with its
 /// path.
 pub fn open(
     paths: &[PathBuf],
@@ -88,7 +88,7 @@ pub fn open(
     open_after(Before::default(), paths, scanners, settings, fan)
 }
 
-/// The same, numbered after inputs of an earlier run.
+/// Opens inputs as [`open`] does, numbered after the inputs of an earlier run.
 ///
 /// # Errors
 /// As [`open`].
@@ -123,12 +123,12 @@ pub fn open_after(
 }
 
 impl Sources {
-    /// The points of an input, in its order, read on the thread that asks; with everything that the
-    /// file says of them, or coordinates only.
+    /// The points of an input in file order, read on the calling thread, with all attributes or
+    /// coordinates only.
     ///
     /// # Errors
-    /// An input that does not exist. Errors of the iterator name file and place; it ends after the
-    /// first.
+    /// If there is no such input. Errors of the iterator name file and place; it ends after the
+    /// first one.
     pub fn strips(&self, input: InputId, want: Want) -> Result<Strips<'_>> {
         let (file, path) = self.open(input)?;
         let strips = reader::strips(&*file.reader, want).map_err(|e| e.at(path.display()))?;
@@ -137,7 +137,7 @@ impl Sources {
         })))
     }
 
-    /// The same in pieces that many threads may read and decode.
+    /// The points of an input in file order, in pieces that several threads may read and decode.
     ///
     /// # Errors
     /// As [`Sources::strips`].
@@ -155,7 +155,7 @@ impl Sources {
     /// The points of an extent of an input, from its bytes.
     ///
     /// # Errors
-    /// What is wrong with them, with file and place.
+    /// If the bytes are damaged; the error names file and place.
     pub fn decode(
         &self,
         input: InputId,
@@ -168,7 +168,8 @@ impl Sources {
         Ok(strips.into_iter().map(|raw| file.number(raw)).collect())
     }
 
-    /// The file of an input, whatever has its name by now, where its pieces are extents.
+    /// The open file of an input whose pieces are extents, even if another file has its name by
+    /// now.
     #[must_use]
     pub fn file(&self, input: InputId) -> Option<&std::fs::File> {
         let (file, _) = self.open(input).ok()?;
@@ -184,7 +185,7 @@ impl Sources {
         known.ok_or_else(|| Error::new(Kind::Bug, format!("there is no input \"{at}\"")))
     }
 
-    /// Units of an opened input's own coordinates; all that is read of it is in metres.
+    /// Units of an opened input's coordinates in the file; all points are returned in metres.
     #[must_use]
     pub fn units(&self, input: InputId) -> Option<&Units> {
         self.open(input).ok().map(|(file, _)| file.reader.units())
@@ -202,11 +203,11 @@ impl Sources {
         &self.masks[self.n_before[1]..]
     }
 
-    /// Scale and offset, metres, of the LAS input with the finest steps; nothing where an input of
+    /// Scale and offset (metres) of the LAS input with the finest steps; `None` where an input of
     /// another format is finer.
     #[must_use]
     pub fn las_quantum(&self) -> Option<([f64; 3], [f64; 3])> {
-        /// Steps of formats that have none of their own, metres.
+        /// Step that is assumed for formats without a scale, metres.
         const OTHERS: f64 = 1e-4;
         let coarsest = |(scale, _): &([f64; 3], _)| scale.iter().fold(0.0, |a, s| s.abs().max(a));
         let all = self.files.iter().map(|file| file.reader.quantum());
@@ -221,8 +222,8 @@ impl Sources {
         self.files.iter().any(|file| file.reader.has_color())
     }
 
-    /// Points that an opened input states, those that are not valid with them; `None` where it
-    /// states none.
+    /// Number of points that an opened input states, including invalid ones; `None` where it states
+    /// none.
     #[must_use]
     pub fn n_stated(&self, input: InputId) -> Option<u64> {
         let first = self.inputs.len() - self.files.len();
@@ -230,7 +231,7 @@ impl Sources {
         file.reader.masks().iter().map(|mask| mask.n_stated).sum()
     }
 
-    /// What was odd about the points of the open inputs when all was last read of them, in words.
+    /// Messages about odd points of the open inputs, from the last full read.
     #[must_use]
     pub fn oddities(&self) -> Vec<String> {
         let of = |file: &File| -> Vec<String> {
@@ -243,10 +244,10 @@ impl Sources {
         self.files.iter().flat_map(of).collect()
     }
 
-    /// Refuses inputs whose coordinates are too coarse for any robot to be told.
+    /// Refuses inputs whose coordinates are too coarse to recognise a robot.
     ///
     /// # Errors
-    /// The first such input, by path and scan.
+    /// For the first such input, with path and scan.
     pub fn check_steps(&self) -> Result<()> {
         for (file, input) in self.files.iter().zip(self.opened()) {
             for scan in file.reader.scans() {
@@ -260,7 +261,7 @@ impl Sources {
     }
 
     fn add(&mut self, path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<()> {
-        // Its own place is put before it by who adds it.
+        // The caller adds the path to the error.
         if let Err(e) = regular(path) {
             return Err(e.without_place());
         }
@@ -293,8 +294,8 @@ impl Sources {
         Ok(())
     }
 
-    /// Looks at a sample of each scan for the raster that it was taken in, and whether its scanner
-    /// can have stood where it is said to.
+    /// Samples each scan to estimate its raster and to check whether the scanner can have stood at
+    /// its stated position.
     fn find_lattices(&mut self, settings: &Settings, fan: &dyn Fan) -> Result<()> {
         let n_scans = |file: &File| file.reader.scans().len();
         let all = (self.files.iter().enumerate())
@@ -322,7 +323,7 @@ impl Sources {
         Ok(())
     }
 
-    /// A scan of a file, without its lattice.
+    /// A scan of a file, still without lattice.
     fn scan(&self, input: InputId, file: &mut File, i: usize, poses: &mut Poses<'_>) -> Scan {
         let seed = &file.reader.scans()[i];
         let mut scan = Scan {
@@ -368,8 +369,8 @@ impl Weigh for Piece {
 }
 
 impl File {
-    /// What came of reading, if the file was whole all along: one that was cut short reads as zeros
-    /// from there, and that it was goes before what its reader makes of them.
+    /// The result of a read, unless the mapped file was truncated meanwhile: missing bytes read as
+    /// zeros, so the truncation is reported in place of the error that they cause.
     fn whole<T>(&self, read: Result<T>) -> Result<T> {
         self.reader.check().and(read)
     }

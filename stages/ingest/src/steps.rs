@@ -1,24 +1,23 @@
-//! A few points of a file in; the step that their coordinates come in, where it is coarse enough to
-//! matter, out.
+//! Finds the step of a file's coordinates, where it is coarse enough to matter.
 //!
-//! Single precision holds 24 bits: a northing of 5,600,000 m comes in steps of half a metre,
-//! whatever the file says of itself.
+//! Single precision has 24 bits: a northing of 5,600,000 m is stored in steps of half a metre,
+//! whatever precision the file claims.
 
 use contract::{Error, Result};
 
-/// Steps from here on are worth a word, metres: the noise of a common scanner, beside which finer
-/// ones vanish.
+/// Step from which on it is reported, metres: the noise of a common scanner, compared with which
+/// finer steps are negligible.
 const COARSE: f64 = 0.003;
-/// Steps from here on are refused, metres: points are then off by as much as the links of a small
-/// arm are thick, so that no posture is told from another.
+/// Step from which on a file is refused, metres: points are then wrong by the thickness of the
+/// links of a small arm, so that no posture can be determined.
 const USELESS: f64 = 0.1;
-/// Fewer points tell nothing: what few points have in common may be chance.
+/// Number of points below which nothing is concluded, since a common step may be chance.
 const MIN_POINTS: usize = 200;
-/// Fewer differences tell nothing: a cloud without noise has but few heights.
+/// Number of differences below which nothing is concluded: a cloud without noise has few heights.
 const MIN_GAPS: usize = 12;
-/// What is left of a difference beside whole steps by rounding, metres.
+/// Largest deviation of a difference from whole steps that is rounding, metres.
 const LEFT: f64 = 1e-4;
-/// Values nearer than this are one: rounding of map coordinates in double precision, metres.
+/// Largest difference of equal values, metres: the rounding of map coordinates in double precision.
 const SAME: f64 = 1e-7;
 
 /// The coarsest step of the three coordinates, metres; `None` where none is coarse.
@@ -29,11 +28,11 @@ pub(crate) fn coarse(points: &[[f64; 3]]) -> Option<f64> {
     (0..3).filter_map(|axis| step(points.iter().map(|p| p[axis]).collect())).reduce(f64::max)
 }
 
-/// The step that all values are whole multiples apart by, where it is a coarse one.
+/// The coarse step of which all differences of the values are multiples, if there is one.
 fn step(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let gaps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > SAME).collect();
-    // Euclid's algorithm; what has no step soon has none that is coarse.
+    // Euclid's algorithm; without a common step the divisor soon falls below any coarse one.
     let divides = |step: f64, gap: &f64| {
         let (mut a, mut b) = (*gap, step);
         while b > LEFT {
@@ -47,7 +46,7 @@ fn step(mut values: Vec<f64>) -> Option<f64> {
     is_told.then(|| gaps.iter().try_fold(least, divides)).flatten()
 }
 
-/// What is worse for a step, in words.
+/// The message about a coarse step.
 pub(crate) fn note(step: f64) -> String {
     format!(
         "coordinates come in steps of {}: surfaces and robots are not found better than that; export them in double \
@@ -56,23 +55,23 @@ pub(crate) fn note(step: f64) -> String {
     )
 }
 
-/// Refuses a step in which no robot can be told.
+/// Refuses a step that is too coarse to recognise a robot.
 ///
 /// # Errors
-/// Says the step and what to do.
+/// Names the step and what to do.
 pub(crate) fn refuse(step: f64) -> Result<()> {
     if step < USELESS {
         return Ok(());
     }
     let what = format!(
-        "coordinates come in steps of {}: no robot can be told in such points",
+        "coordinates come in steps of {}: no robot can be recognised in such points",
         length(step)
     );
     Err(Error::bad_input(what)
         .hint("export the scan in double precision, or about an origin near the plant"))
 }
 
-/// A length in the unit that suits it.
+/// A length in millimetres or metres, for people.
 fn length(metres: f64) -> String {
     if metres < 0.1 { format!("{:.1} mm", metres * 1e3) } else { format!("{metres:.2} m") }
 }
@@ -81,7 +80,7 @@ fn length(metres: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Points of a bumpy room about a place, as a file with such coordinates has them.
+    /// Points of a bumpy room about a place, stored as `stored` says.
     fn points(about: [f64; 3], stored: impl Fn(f64) -> f64) -> Vec<[f64; 3]> {
         let point = |k: u32| {
             let k = f64::from(k);
@@ -97,11 +96,11 @@ mod tests {
         assert_eq!(coarse(&map), Some(0.5));
         let words = refuse(0.5).expect_err("useless").to_string();
         assert!(words.contains("steps of 0.50 m"), "{words}");
-        // Few values, so that no two of them are neighbours.
+        // Few values, so that none of them are neighbours.
         let sparse: Vec<_> =
             map.iter().map(|p| [p[0], p[1] * 7.0 - 6.0 * 5_653_120.0, 0.0]).collect();
         assert_eq!(coarse(&sparse), Some(3.5));
-        // A local origin of 70 km: 7.8 mm, which is said and borne.
+        // A local origin 70 km away: steps of 7.8 mm, which are reported and accepted.
         let near = points([70_000.0, 1_000.0, 0.0], single);
         let step = coarse(&near).expect("it is coarse");
         assert!((step - 0.007_812_5).abs() < 1e-9 && refuse(step).is_ok(), "{step}");
@@ -115,7 +114,7 @@ mod tests {
         assert_eq!(coarse(&points(map, |v| (v * 1e3).round() / 1e3)), None);
         assert_eq!(coarse(&points([0.0; 3], |v| f64::from(v as f32))), None);
         assert_eq!(coarse(&points(map, |v| (v * 4.0).round() / 4.0)[..20]), None);
-        // All on one plane: that axis says nothing.
+        // All points on one plane: its axis has no step.
         let flat: Vec<_> = points([0.0; 3], |v| v).iter().map(|p| [p[0], p[1], 2.0]).collect();
         assert_eq!(coarse(&flat), None);
         // A few levels.

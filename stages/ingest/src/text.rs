@@ -1,16 +1,16 @@
-//! Text files of points in, lines and numbers out. Knows no format.
+//! Reads lines and numbers from text files of points, independent of the format.
 
 use contract::{Error, Result, quote};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Longest line that is read, bytes: seven numbers of 17 digits need 200.
+/// Longest line, bytes; seven numbers of 17 digits need 200.
 const MAX_LINE: u64 = 4096;
-/// Bytes read at once.
+/// Number of bytes that are read at once.
 const BUFFER: usize = 1 << 20;
 
-/// Lines of a file with their numbers; blank ones are left out.
+/// Reads a file line by line; blank lines are skipped.
 pub(crate) struct Lines {
     reader: BufReader<File>,
     line: Vec<u8>,
@@ -21,7 +21,7 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    /// At byte `from` of a file, which begins line `number + 1`.
+    /// Starts at byte `from` of a file, where line `number + 1` begins.
     pub(crate) fn open(path: &Path, from: u64, number: u64) -> Result<Self> {
         let mut file = File::open(path)?;
         file.seek(SeekFrom::Start(from))?;
@@ -33,7 +33,7 @@ impl Lines {
         })
     }
 
-    /// Reads the next line that is not blank; false at the end of the file.
+    /// Reads the next line that is not blank; returns false at the end of the file.
     pub(crate) fn advance(&mut self) -> Result<bool> {
         loop {
             self.line.clear();
@@ -56,7 +56,7 @@ impl Lines {
         }
     }
 
-    /// The current line, without white space at its end.
+    /// The current line without trailing white space.
     pub(crate) fn line(&self) -> &[u8] {
         &self.line
     }
@@ -71,12 +71,12 @@ impl Lines {
         self.end
     }
 
-    /// Broken input at the current line.
+    /// An error about the current line.
     pub(crate) fn error(&self, what: impl Into<String>) -> Error {
         Error::bad_input(what).at(format!("line {}", self.number))
     }
 
-    /// All numbers of the current line; an error where there are not `N`.
+    /// The numbers of the current line; an error if there are not exactly `N`.
     pub(crate) fn exactly<const N: usize>(&self) -> Result<[f64; N]> {
         let mut out = [0.0; N];
         match numbers(&self.line, &mut out) {
@@ -87,8 +87,8 @@ impl Lines {
     }
 }
 
-/// Parses the numbers of a line into `out` and returns how many there are: those beyond its length
-/// are counted only. The error is the word that is no number.
+/// Parses the numbers of a line into `out` and returns how many there are; those beyond the length
+/// of `out` are only counted. The error is the word that is no number.
 pub(crate) fn numbers(line: &[u8], out: &mut [f64]) -> std::result::Result<usize, String> {
     let mut n = 0;
     let mut rest = line;
@@ -118,14 +118,14 @@ pub(crate) fn numbers(line: &[u8], out: &mut [f64]) -> std::result::Result<usize
     }
 }
 
-/// A word as it may stand in a message: short, and printable.
+/// A word for a message: shortened and printable.
 fn shown(word: &[u8]) -> String {
     quote::shown(&String::from_utf8_lossy(&word[..word.len().min(40)])).into_owned()
 }
 
-/// The number that a line begins with, and its length; only the common case, exact: at most 15
-/// digits with an optional point, so that both the digits and the power of ten are exact in `f64`
-/// and one division rounds once.
+/// The number at the beginning of a line and its length in bytes. Handles the common case only, but
+/// exactly: with at most 15 digits and an optional point both the digits and the power of ten are
+/// exact in `f64`, so that the one division rounds once.
 #[inline]
 fn plain(line: &[u8]) -> Option<(f64, usize)> {
     const POWERS: [f64; 16] =
@@ -157,7 +157,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A word of a line: numbers as programs write them, and things that are nearly numbers.
+    /// A word of a line: a number as programs write it, or something that is nearly a number.
     fn word() -> impl Strategy<Value = String> {
         prop_oneof![
             any::<f64>().prop_map(|v| v.to_string()),

@@ -1,13 +1,13 @@
-//! Every LAS and LAZ file of public test suites: read in full, with the count and bounds that laspy
-//! 2.7 gives, or refused by name. The files are not part of the repository; without them these
-//! tests say that they were skipped.
+//! Every LAS and LAZ file of public test suites is read in full, with the count and bounds that
+//! laspy 2.7 gives, or refused by name. The files are not part of the repository; without them
+//! these tests report that they were skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::OneByOne;
 use ingest::{Settings, Sources, Want, open};
 use std::path::{Path, PathBuf};
 
-/// File, records, withheld records, least and largest coordinates.
+/// File, number of records, number of withheld records, smallest and largest coordinates.
 type Row = (&'static str, u64, u64, [f64; 3], [f64; 3]);
 
 #[rustfmt::skip]
@@ -85,8 +85,8 @@ const VALID: &[Row] = &[
     ("tbx__scale_offset_laz.laz", 5, 0, [0.0, 0.0, 0.0], [2.0, 3.0, 4.0]),
 ];
 
-/// Written by LASzip 1.2 as one stream; laspy cannot read it. Its uncompressed twin has 1065
-/// points.
+/// A file of one stream, written by LASzip 1.2, which laspy cannot read. Its uncompressed twin has
+/// 1065 points.
 const OLD_STREAM: Row = (
     "pdal__simple-laszip-compressor-version-1.2r0.laz",
     1065,
@@ -95,8 +95,8 @@ const OLD_STREAM: Row = (
     [638_982.55, 853_535.43, 586.38],
 );
 
-/// Files whose points lie farther from one another than any scanner reaches, all of them: nothing
-/// would be left.
+/// Files in which all points lie farther apart than any scanner reaches, so that none would be
+/// left.
 const ABSURD: [&str; 6] = [
     "lgl__pdrf10-1.4.las",
     "lgl__pdrf10-1.4.laz",
@@ -106,7 +106,7 @@ const ABSURD: [&str; 6] = [
     "lgl__pdrf8-1.4.laz",
 ];
 
-/// File, and words of the refusal.
+/// Files that are refused, and words of the error.
 const BROKEN: &[(&str, &str)] = &[
     ("lz__broken_compressor.laz", "compressor type \"16\""),
     ("lz__broken_type.laz", "compression is not known"),
@@ -162,7 +162,7 @@ fn read(sources: &Sources) -> contract::Result<Read> {
 #[test]
 fn valid_files_are_read_in_full() {
     let Some(folder) = folder() else { return };
-    // As numbers, whatever unit they are of: `las_units.rs` is about units.
+    // Plain numbers, whatever their unit: units are tested in `las_units.rs`.
     let settings = Settings { units: "m".into(), ..Settings::default() };
     for (name, n, withheld, min, max) in VALID.iter().chain([&OLD_STREAM]) {
         if ABSURD.contains(name) {
@@ -211,8 +211,8 @@ fn broken_files_are_refused_by_name() {
     }
 }
 
-/// Reads all of a damaged copy: an error or an answer, but no panic, and no memory beyond what the
-/// file can hold.
+/// Reads a damaged copy completely. Whether it ends with an error or a result does not matter, but
+/// it must not panic or use more memory than the file can hold.
 fn survives(path: &Path) -> bool {
     match open(&[path.to_owned()], None, &Settings::default(), &OneByOne) {
         Err(_) => false,
@@ -227,7 +227,7 @@ fn damage_is_an_error_or_harmless() {
     let Some(folder) = folder() else { return };
     let place = tempfile::tempdir().unwrap();
     let damaged = place.path().join("damaged");
-    // The decoder of LAZ panics on some damage, which is caught; keep its messages out of the
+    // The LAZ decoder panics on some damage, which is caught; its messages must not appear in the
     // output.
     std::panic::set_hook(Box::new(|_| {}));
     let mut bad = None;
@@ -243,7 +243,8 @@ fn damage_is_an_error_or_harmless() {
     ] {
         let good = std::fs::read(folder.join(name)).unwrap();
         let step = (good.len() / 24).max(1);
-        // A decoder for layered points takes milliseconds to set up, and this file has many pieces.
+        // Setting up the decoder of layered points takes milliseconds, and this file has many
+        // pieces.
         let dense = if name.contains("copc") { 61 } else { 7 };
         for at in (0..good.len().min(500)).step_by(dense).chain((0..good.len()).step_by(step)) {
             let mut flipped = good.clone();

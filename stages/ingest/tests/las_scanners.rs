@@ -1,5 +1,5 @@
-//! LAS files made here: how scanners apply to them, what is dropped, and what lies in the header
-//! costs.
+//! LAS files written by the tests: how scanners apply to them, which points are dropped, and what
+//! happens if the header is wrong.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::OneByOne;
@@ -44,7 +44,7 @@ fn las(points: &[([i32; 3], u16, bool)], extra: usize) -> Vec<u8> {
     bytes
 }
 
-/// Points of three scanners in turns; every tenth is withheld.
+/// Points of three scanners in turn; every tenth is withheld.
 fn mixed() -> Vec<([i32; 3], u16, bool)> {
     (0..5000_i32)
         .map(|i| ([i % 97 * 100, i % 89 * 100, i % 7 * 100], (i % 3) as u16, i % 10 == 0))
@@ -61,7 +61,7 @@ fn scanners(text: &str) -> Scanners {
     Scanners::parse(text).unwrap()
 }
 
-/// Points of each scan; checks world coordinates and that each place comes once.
+/// Number of points of each scan; checks world coordinates and that each place occurs once.
 fn counts(sources: &Sources) -> Vec<usize> {
     let mut counts = vec![0; sources.scans.len()];
     for input in &sources.inputs {
@@ -193,7 +193,7 @@ fn entries_find_their_file_or_are_reported() {
 fn lies_of_a_header_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let good = las(&mixed(), 0);
-    // Offset into the header, bytes to put there, words of the refusal.
+    // Offset into the header, bytes to write there, words of the error.
     let cases: &[(usize, &[u8], &str)] = &[
         (107, &u32::MAX.to_le_bytes(), "only 5000 points"),
         (105, &20_u16.to_le_bytes(), "records of point format 3 need 34"),

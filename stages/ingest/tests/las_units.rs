@@ -1,6 +1,6 @@
-//! What units the LAS and LAZ files of public test suites declare, in all their ways: read from WKT
-//! 1 and 2, GeoTIFF keys and numbers of systems. The files are not part of the repository; without
-//! them this test says that it was skipped.
+//! The units that the LAS and LAZ files of public test suites declare, by WKT 1 and 2, GeoTIFF keys
+//! and codes of systems. The files are not part of the repository; without them this test reports
+//! that it was skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::{Kind, OneByOne};
@@ -10,12 +10,12 @@ use std::path::Path;
 const FOOT: f64 = 0.3048;
 const US_FOOT: f64 = 1200.0 / 3937.0;
 
-/// File; metres of one unit of x and y, and of z, where it declares them.
+/// File, and metres per unit of x and y, and of z, where it declares them.
 #[rustfmt::skip]
 const DECLARED: &[(&str, [f64; 2])] = &[
-    // The number of the system alone says it: California zone 5.
+    // Only the code of the system tells the unit: California zone 5.
     ("ll__certainty3d-color-utm-feet-navd88.las", [US_FOOT, US_FOOT]),
-    // Heights are called feet and said to be metres of one: as x and y.
+    // The unit of heights is named foot with the length of a metre; that of x and y counts.
     ("lpy__1_4_w_evlr.las", [US_FOOT, US_FOOT]),
     ("lpy__1_4_w_evlr.laz", [US_FOOT, US_FOOT]),
     ("lpy__test1_4.las", [US_FOOT, US_FOOT]),
@@ -23,7 +23,7 @@ const DECLARED: &[(&str, [f64; 2])] = &[
     ("lpy__file_with_both_wkt_and_geotiff_vlrs.las", [US_FOOT, US_FOOT]),
     ("lpy__fullwave.laz", [1.0, 1.0]),
     ("lpy__plane.laz", [1.0, 1.0]),
-    // Metres across, feet up.
+    // Metres for x and y, feet for heights.
     ("lpy__simple.copc.laz", [1.0, US_FOOT]),
     ("lrs__32-1-472-150-76.laz", [1.0, 1.0]),
     ("lrs__autzen.laz", [FOOT, FOOT]),
@@ -32,7 +32,7 @@ const DECLARED: &[(&str, [f64; 2])] = &[
     ("pdal__lots_of_vlr.las", [US_FOOT, US_FOOT]),
 ];
 
-/// Files that declare nothing, or nothing that is a unit.
+/// Files that declare no unit.
 const ASSUMED: [&str; 4] = [
     "lpy__simple1_3.las",
     "lz__5points_14.las",

@@ -1,5 +1,5 @@
-//! Real scans: the lattices that their points suggest, with scanners from a file of poses. The
-//! scans are not part of the repository; without them these tests say that they were skipped.
+//! The lattices of real scans, from their points and scanners from a file of poses. The scans are
+//! not part of the repository; without them these tests report that they were skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::{Lattice, OneByOne};
@@ -15,7 +15,7 @@ fn folder(name: &str) -> Option<PathBuf> {
     Some(folder)
 }
 
-/// Share of the points that have a pixel for themselves, and points a filled pixel.
+/// Share of the points that are alone in their pixel, and number of points in a filled pixel.
 fn filling(sources: &Sources, scan: usize) -> (f64, f64) {
     let lattice: Lattice = sources.scans[scan].lattice.expect("the scanner is known");
     let mut pixels = Vec::new();
@@ -84,7 +84,7 @@ fn a_tilting_laser_without_rows_is_rebuilt() {
         "room: {:?} alone {alone:.3} points a pixel {filled:.3}",
         degrees(&sources.scans[0].lattice.unwrap())
     );
-    // Each point stands twice in this file.
+    // Each point occurs twice in this file.
     assert!((1.9..2.3).contains(&filled), "{filled}");
     let sources =
         open(&[folder.join("lgl__indoor.laz")], None, &Settings::default(), &OneByOne).unwrap();

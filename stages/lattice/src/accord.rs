@@ -1,29 +1,29 @@
-//! The views of a region in; out comes where they contradict each other: missing returns where
-//! others measured matter, which prove nothing, and matter where others saw free space, which
-//! moved.
+//! Finds where the views of a region contradict each other: missing returns where another scan
+//! measured a surface prove no free space, and a surface in what another scan saw as free has
+//! moved between the scans.
 
 use contract::{Fan, View};
 use geometry::Eye;
 use geometry::depth::{LANES, lanes};
 use geometry::narrow::floor_i32;
 
-/// Share of the matter measured by other scans that a scanner must have missed for its missing
-/// returns to mean nothing.
+/// Share of the surfaces measured by other scans that a scanner must have missed for none of its
+/// missing returns to count.
 const BLIND: f32 = 0.5;
-/// Half-width (cells) of the window about such matter in which missing returns mean nothing.
+/// Half-width of the window about such a surface in which missing returns do not count, cells.
 const DOUBT_WINDOW: i32 = 3;
-/// Points of each scan that are asked, at most, and of all of them: more scans show the same things
-/// again.
+/// Largest number of points of a scan that are tested; more show the same surfaces again.
 const N_ASKED: usize = 100_000;
+/// Largest number of points of all scans together that are tested.
 const N_ASKED_OF_ALL: usize = 600_000;
 
-/// Every how many of a scan's points are asked.
+/// Distance between the points of a scan that are tested.
 fn step(view: &View, n_views: usize) -> usize {
     (view.points.len() / (N_ASKED_OF_ALL / n_views).clamp(1, N_ASKED)).max(1)
 }
 
-/// Lets the views of a region check each other's missing returns: where one scan measured matter,
-/// the silence of another is no free space (a scanner behind a near post, black or shiny surfaces).
+/// Compares the views of a region: where one scan measured a surface, a missing return of another
+/// is no evidence of free space (a scanner behind a near post, black or shiny surfaces).
 pub fn agree(views: &mut [View], fan: &dyn Fan) {
     let n = views.len();
     let asked = |view: &View| view.points.iter().step_by(step(view, n)).copied().collect();
@@ -37,18 +37,19 @@ pub fn agree(views: &mut [View], fan: &dyn Fan) {
     fan.fan(views.iter_mut().enumerate().collect(), doubt);
 }
 
-/// Beams that went on so far beyond a point of another scan saw free space there, metres.
+/// Distance that a beam must pass a point of another scan to prove that place free, metres.
 const BEYOND: f32 = 0.10;
-/// Footprint in which they are asked, metres.
+/// Width of the depth image cells in which beams are looked up, metres.
 const FOOTPRINT: f32 = 0.03;
-/// Points that one thread asks at a time.
+/// Number of points that one thread tests at a time.
 const N_AT_A_TIME: usize = 8192;
-/// Edge of the cells that contradictions are counted in, metres, and points that make one.
+/// Edge of the cells in which contradictions are counted, metres.
 const CELL: f32 = 0.05;
+/// Number of contradicting points from which on a cell counts.
 const MIN_IN_CELL: usize = 3;
 
-/// What was here for one scan and gone for another: middles of cells of 5 cm, local frame. Edges
-/// and wires make a few, what moved makes many.
+/// Centres of 5 cm cells (local frame, metres) in which one scan measured a surface and another saw
+/// free space. Edges and wires give a few such cells, a thing that moved gives many.
 #[must_use]
 pub fn disagreement(views: &[View], fan: &dyn Fan) -> Vec<[f32; 3]> {
     let eyes: Vec<Eye<'_>> = views.iter().map(|v| Eye::new(&v.images)).collect();

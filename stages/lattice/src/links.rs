@@ -1,28 +1,29 @@
-//! A raster in, its links out: which neighbouring pixels see one surface, and which pixels see none
-//! (veils).
+//! Links neighbouring pixels of a raster that see one surface, and finds pixels that see none
+//! (veil points).
 
 use crate::Settings;
 use crate::raster::{NONE, Raster};
 
-/// Towards lower columns.
+/// Direction towards lower columns.
 pub(crate) const LEFT: usize = 0;
-/// Towards higher columns.
+/// Direction towards higher columns.
 pub(crate) const RIGHT: usize = 1;
-/// Towards lower rows.
+/// Direction towards lower rows.
 pub(crate) const DOWN: usize = 2;
-/// Towards higher rows.
+/// Direction towards higher rows.
 pub(crate) const UP: usize = 3;
-/// The neighbour is there, but sees another surface.
+/// Flag of a link to a neighbour that exists, but sees another surface.
 pub(crate) const BROKEN: u8 = 0x80;
-/// How far a neighbour is searched, pixels: rebuilt rasters leave gaps of up to two.
+/// Largest distance to a neighbour, pixels: rebuilt rasters have gaps of up to two.
 const REACH: usize = 3;
-/// Share of a step in range that may be missing in the next step of one grazing surface: directions
-/// are not exactly regular. At an edge before a flat background the whole step is missing.
+/// Share of a step in range that may be missing in the next step of one surface at a grazing angle,
+/// since directions are not exactly regular. At an edge in front of a flat background the whole
+/// step is missing.
 const UNEVEN: f32 = 0.4;
-/// Cells of a piece of surface below which it may be a veil.
+/// Number of cells of a piece of surface below which it may be a veil.
 const MIN_PIECE: usize = 4;
 
-/// Index of the neighbour of `at` in `direction`, `by` pixels away; must lie inside.
+/// Index of the pixel `by` pixels away from `at` in `direction`; it must lie inside the raster.
 #[inline]
 pub(crate) fn step(side: usize, at: usize, direction: usize, by: usize) -> usize {
     match direction {
@@ -33,21 +34,21 @@ pub(crate) fn step(side: usize, at: usize, direction: usize, by: usize) -> usize
     }
 }
 
-/// The neighbour of `at` on the same surface in `direction`, if any.
+/// The neighbour of `at` in `direction` that is linked as the same surface, if any.
 #[inline]
 pub(crate) fn linked(raster: &Raster, at: usize, direction: usize) -> Option<usize> {
     let link = raster.links[at][direction];
     (link != 0 && link & BROKEN == 0).then(|| step(raster.side, at, direction, usize::from(link)))
 }
 
-/// Limits for links of one raster.
+/// Limits for the links of one raster.
 struct Rule {
     incidence: f32,
     grazing: f32,
 }
 
-/// Links each pixel with its next neighbours along row and column: 0 for none, the distance in
-/// pixels for one on the same surface, the same with [`BROKEN`] for one on another surface.
+/// Links each pixel with its next neighbours along row and column. A link is 0 where there is none,
+/// else the distance to the neighbour in pixels, with [`BROKEN`] where it sees another surface.
 pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
     let (side, n_pixels) = (raster.side, raster.n_pixels());
     raster.links.clear();
@@ -72,7 +73,7 @@ pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
     }
 }
 
-/// Links `at` forwards; `room` is the number of pixels behind and before it inside the tile.
+/// Links `at` forwards; `room` is the number of pixels behind and in front of it inside the tile.
 #[inline]
 fn link_one(
     raster: &mut Raster,
@@ -92,7 +93,7 @@ fn link_one(
         let difference = (range - there).abs();
         let sigma = raster.noise.sigma(mean);
         let across = mean * angle * by as f32;
-        // A surface seen at this incidence cannot step more than that (METHOD.md §2).
+        // A surface seen at most at this incidence cannot step more than that (METHOD.md §2).
         let mut joined = difference <= across * rule.incidence + 4.243 * sigma;
         if !joined && difference <= across * rule.grazing && room.0 >= by && room.1 >= 2 * by {
             let before = raster.xyzr[step(side, at, back, by)][3];
@@ -111,8 +112,8 @@ fn link_one(
     }
 }
 
-/// Whether four neighbouring ranges lie on one plane seen at a grazing angle: the inverse range of
-/// a plane is straight along a line of the raster.
+/// Whether four neighbouring ranges lie on one plane seen at a grazing angle: along a line of the
+/// raster the inverse range of a plane is linear.
 #[inline]
 fn continues(ranges: [f32; 4], difference: f32, sigma: f32) -> bool {
     let [a, b, c, d] = ranges;
@@ -124,12 +125,12 @@ fn continues(ranges: [f32; 4], difference: f32, sigma: f32) -> bool {
     (va + vc - 2.0 * vb).abs() * b * b <= limit && (vb + vd - 2.0 * vc).abs() * c * c <= limit
 }
 
-/// Lists the veils of `raster`: pixels whose opposite neighbours along a row or a column both see
-/// another surface, one nearer and one farther, and small torn pieces between a near and a far
-/// surface.
+/// Finds the veil points of `raster`: pixels whose opposite neighbours along a row or column both
+/// see another surface, one nearer and one farther, and small separate pieces between a near and a
+/// far surface.
 ///
-/// A pixel nearer than both neighbours is a wire, one farther than both a slit: real matter, never
-/// a veil.
+/// A pixel nearer than both neighbours is a wire, and one farther than both is a slit; these are
+/// real surfaces and never veils.
 pub(crate) fn veils(raster: &mut Raster) {
     let mut out = std::mem::take(&mut raster.veils);
     out.clear();
@@ -149,7 +150,7 @@ pub(crate) fn veils(raster: &mut Raster) {
     raster.veils = out;
 }
 
-/// Whether the neighbours to both sides see other surfaces, one nearer and one farther.
+/// Whether the neighbours on both sides see other surfaces, one nearer and one farther.
 #[inline]
 fn between(raster: &Raster, at: usize, back: usize, forth: usize) -> bool {
     let (b, f) = (raster.links[at][back], raster.links[at][forth]);
@@ -184,7 +185,7 @@ fn is_small(raster: &Raster, at: usize) -> bool {
     true
 }
 
-/// Whether broken links lead from `at` to something nearer and to something farther.
+/// Whether broken links of `at` lead to something nearer and to something farther.
 fn near_and_far(raster: &Raster, at: usize) -> bool {
     let (side, range) = (raster.side, raster.xyzr[at][3]);
     let (mut near, mut far) = (false, false);

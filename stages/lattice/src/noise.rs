@@ -1,26 +1,26 @@
-//! Ranges of a raster in, range noise out: what the scanner promises, or more where the tile itself
-//! shows more.
+//! Estimates the range noise of a raster: that of the scanner's data sheet, or more where the tile
+//! itself shows more.
 
 use crate::Settings;
 
-/// Bins of range, an octave each: noise of depth cameras grows with the square of the range.
+/// Number of bins of range, an octave each: the noise of depth cameras grows with range squared.
 const N_BINS: usize = 16;
-/// Exponent bits of 2⁻⁴ m, where the first bin begins.
+/// Exponent bits of 2⁻⁴ m, at which the first bin begins.
 const FIRST_EXPONENT: u32 = 127 - 4;
-/// Fewest samples of a bin that speak for themselves.
+/// Smallest number of samples of a bin that gives its own estimate.
 const MIN_SAMPLES: usize = 48;
-/// Quantile of |second difference| that is taken: low, since edges and clutter only enlarge the
-/// rest.
+/// Quantile of the absolute second differences that is used: a low one, since edges and clutter
+/// enlarge the upper ones.
 const QUANTILE: f64 = 0.3;
-/// That quantile of |x| for a normal distribution of unit deviation.
+/// The same quantile of |x| for a normal distribution with standard deviation 1.
 const QUANTILE_OF_NORMAL: f32 = 0.3853;
 
-/// Standard deviation of ranges as a function of range.
+/// Standard deviation of measured ranges as a function of range.
 #[derive(Debug, Default)]
 pub(crate) struct Noise {
     base: f32,
     growth: f32,
-    /// Times more than expected, for each octave of range.
+    /// Ratio of measured to expected noise for each octave of range.
     factor: [f32; N_BINS],
     samples: Vec<Vec<f32>>,
 }
@@ -38,8 +38,8 @@ impl Noise {
     }
 
     /// Measures the noise from second differences of the inverse range along rows and along
-    /// columns: a plane has next to none, at any incidence. The larger of both counts, since
-    /// some scanners err by the line.
+    /// columns, which nearly vanish on a plane at any incidence. The larger of both counts, since
+    /// some scanners have errors that are common to a line.
     pub(crate) fn measure(&mut self, xyzr: &[[f32; 4]], side: usize, settings: &Settings) {
         self.base = settings.noise as f32;
         self.growth = settings.noise_growth as f32;
@@ -48,8 +48,8 @@ impl Noise {
         let limit = settings.noise_limit as f32;
         let mut factors = [None; N_BINS];
         for along in [1, side] {
-            // Where the raster is finer than the data, direct neighbours are missing: look one
-            // further.
+            // Where the raster is finer than the data, direct neighbours are missing, and the
+            // second next are used.
             for step in [1, 2] {
                 self.samples.iter_mut().for_each(Vec::clear);
                 self.sample(xyzr, side, step, along);
@@ -67,7 +67,7 @@ impl Noise {
             }
         }
         for b in 0..N_BINS {
-            // A bin without enough samples takes the word of the nearest one that has.
+            // A bin without enough samples takes the estimate of the nearest bin that has one.
             let nearest = (0..N_BINS)
                 .filter(|&o| factors[o].is_some())
                 .min_by_key(|&o| (o.abs_diff(b), o))
@@ -76,10 +76,10 @@ impl Noise {
         }
     }
 
-    /// Gathers second differences over neighbours `step` pixels apart, `along` rows (1) or columns
-    /// (one row).
+    /// Collects second differences over neighbours `step` pixels apart, along rows (`along` = 1) or
+    /// columns (`along` = length of a row).
     fn sample(&mut self, xyzr: &[[f32; 4]], side: usize, step: usize, along: usize) {
-        // Every sixth pixel: thousands of samples a tile, at a small share of the work.
+        // Every sixth pixel gives thousands of samples a tile at a small share of the work.
         let by = step * along;
         let (rows, cols) = if along == 1 { (0, step) } else { (step, 0) };
         for row in (rows..side - rows).step_by(3) {

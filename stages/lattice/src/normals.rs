@@ -1,5 +1,5 @@
-//! A linked raster in, normals out: cross products of differences between window means, O(1) a
-//! pixel for any window by summed-area tables.
+//! Normals of a linked raster: cross products of differences between window means, computed in
+//! constant time a pixel for any window by summed-area tables.
 
 use crate::Settings;
 use crate::links::{BROKEN, linked};
@@ -7,31 +7,31 @@ use crate::raster::Raster;
 use crate::{Scratch, voxels};
 use contract::{Scan, Tile};
 
-/// Ten units a millimetre: window sums are exact integers modulo 2³², and a window never holds 200
-/// km.
+/// Integer units per metre, a tenth of a millimetre each. Window sums are exact modulo 2³², and no
+/// window spans 200 km.
 const UNIT: f32 = 1e4;
-/// [`BROKEN`] in any of the four links of a pixel.
+/// Mask of [`BROKEN`] in any of the four links of a pixel.
 const ANY_BROKEN: u32 = u32::from_ne_bytes([BROKEN; 4]);
-/// Reach from which normals of neighbours may be shared: their windows are nearly the same …
+/// Reach from which on neighbours may share a normal, pixels: their windows are nearly the same.
 const SHARED_REACH: u8 = 2;
-/// … and largest turn between those at either end of four pixels, cosine of 2°: a pipe of 50 mm
-/// radius turns more.
+/// Cosine of the largest angle between the normals at the ends of four pixels that share one (2°);
+/// a pipe of 50 mm radius turns more.
 const SHARED_COSINE: f32 = 0.999_39;
-/// Longest reach that is told apart, pixels.
+/// Largest reach that is measured, pixels.
 const MOST_REACH: u8 = 127;
 
-/// Normals of one tile and the windows they come from; buffers are reused.
+/// Normals of one tile and the windows that they come from; buffers are reused.
 #[derive(Debug, Default)]
 pub(crate) struct Normals {
     /// Unit normal towards the scanner, scan frame; zero where there is none.
     pub(crate) normal: Vec<[f32; 3]>,
     /// Expected error of a normal, radians; 0 where there is no normal.
     pub(crate) error: Vec<f32>,
-    /// Half windows along columns and rows, pixels.
+    /// Half-widths of the windows along columns and rows, pixels.
     pub(crate) half: Vec<u8>,
-    /// Steps to the next border of a surface.
+    /// Distance of each pixel to the next border of a surface, pixels.
     reach: Vec<u8>,
-    /// Sums over all pixels below and left: x, y, z, n.
+    /// Sums over all pixels below and left of each pixel: x, y, z and number of points.
     table: Vec<[i32; 4]>,
 }
 
@@ -55,8 +55,8 @@ impl Normals {
         self.borrow_at_borders(raster);
     }
 
-    /// The normals of a pixel and of those right, above and right above it. Where the first and the
-    /// last agree, the surface is flat, and the two between have the first's.
+    /// The normals of a pixel and of its right, upper and upper right neighbour. Where those of the
+    /// first and the last agree, the surface is flat, and the two between share that of the first.
     #[inline]
     fn compute_four(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
         let first = row * raster.side + col;
@@ -153,8 +153,9 @@ impl Normals {
         }
     }
 
-    /// Mean of the points of a window about `centre` ([`UNIT`]s), from the table's entries at its
-    /// corners: low left, low right, high left, high right. `None` where it is empty.
+    /// Mean of the points of a window relative to `centre` (units of [`UNIT`]), from the table's
+    /// entries at its corners: low left, low right, high left, high right. `None` where the window
+    /// is empty.
     #[inline]
     fn mean(corners: [[i32; 4]; 4], centre: [i32; 3]) -> Option<[f32; 3]> {
         let [a, b, c, d] = corners;
@@ -179,13 +180,12 @@ impl Normals {
         let most = settings.max_window_pixels.max(1) as f32;
         let pixels =
             |step: f32, most: f32| ((window / step + 0.5).min(most) as usize).clamp(1, reach);
-        // Columns draw together towards the poles: there a window of the same width holds more of
-        // them.
+        // Columns converge towards the poles, where a window of the same width holds more of them.
         let squeeze = raster.row_step / raster.col_step[row].min(raster.row_step);
         let (h, v) = (pixels(raster.col_step[row], most * squeeze), pixels(raster.row_step, most));
         let (r0, r1) = (row.saturating_sub(v), (row + v + 1).min(side));
         let (c0, c1) = (col.saturating_sub(h), (col + h + 1).min(side));
-        // The halves share the middle line, so that neither is empty at the tile's border.
+        // Both halves include the middle line, so that neither is empty at the tile's border.
         let t = |r: usize, c: usize| self.table[r * wide + c];
         let [low0, low1, high0, high1] = [t(r0, c0), t(r0, c1), t(r1, c0), t(r1, c1)];
         let centre = [x, y, z].map(|v| (v * UNIT) as i32);
@@ -208,14 +208,14 @@ impl Normals {
         let towards = n[0] * x + n[1] * y + n[2] * z;
         let scale = if towards > 0.0 { -1.0 } else { 1.0 } / length2.sqrt();
         self.normal[at] = n.map(|v| v * scale);
-        // Two half windows of h·(2v+1) points, about h steps apart; the narrower direction rules.
+        // Two half windows of h·(2v+1) points, about h steps apart; the narrower direction counts.
         let spacing = range * (raster.col_step[row] * h as f32).min(raster.row_step * v as f32);
         let n_half = (h.min(v) * (2 * h.max(v) + 1)) as f32;
         self.error[at] = sigma * (2.0 / n_half).sqrt() / spacing.max(1e-6);
         self.half[at] = h.min(v) as u8;
     }
 
-    /// Border pixels take the normal of a linked neighbour whose tangent plane they lie on.
+    /// Gives border pixels the normal of a linked neighbour whose tangent plane they lie on.
     fn borrow_at_borders(&mut self, raster: &Raster) {
         for at in 0..raster.n_pixels() {
             if !raster.holds(at) || self.reach[at] > 0 {
@@ -228,7 +228,7 @@ impl Normals {
                 let Some(other) = linked(raster, at, direction) else {
                     continue;
                 };
-                // Neighbours at the border themselves have nothing of their own to lend.
+                // Neighbours that are at the border themselves have no normal to share.
                 let other = match self.reach[other] {
                     0 => linked(raster, other, direction).filter(|&o| self.reach[o] > 0),
                     _ => Some(other),
@@ -251,10 +251,10 @@ impl Normals {
     }
 }
 
-/// Unit normals of a tile's points, in the order of its points, in the scan frame (as its
-/// coordinates are), towards the scanner. Where the scanner is unknown, the sign is such that the
-/// largest component of the normal is positive, so horizontal surfaces point up as long as the scan
-/// frame does. `None` for veils and where no surface was found.
+/// Unit normals of a tile's points towards the scanner, in the scan frame and the order of the
+/// points. Where the scanner is unknown, the largest component of a normal is positive, so that
+/// horizontal surfaces point up if the scan frame's z does. `None` for veil points and where no
+/// surface was found.
 #[must_use]
 pub fn normals(tile: &Tile, scan: &Scan, settings: &Settings) -> Vec<Option<[f32; 3]>> {
     let mut scratch = Scratch::default();
@@ -273,7 +273,7 @@ pub fn normals(tile: &Tile, scan: &Scan, settings: &Settings) -> Vec<Option<[f32
             if !raster.holds(at) || normals.error[at] == 0.0 {
                 return None;
             }
-            // A second return of the pixel only shares the normal if it lies on the same tangent
+            // A second return of the pixel shares the normal only if it lies on the same tangent
             // plane.
             let (n, q) = (normals.normal[at], raster.xyzr[at]);
             let off = n[0] * (p[0] - q[0]) + n[1] * (p[1] - q[1]) + n[2] * (p[2] - q[2]);

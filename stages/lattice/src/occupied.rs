@@ -1,16 +1,16 @@
-//! Points in, occupied voxels of the world out, each once, with the number of points in it.
+//! Counts points by voxel of the world.
 
 use crate::patch::{WorldRows, apply};
 use contract::Occupancy;
 use geometry::narrow::floor_i32;
 
-/// Slots of the direct-mapped table before the list; power of two.
+/// Number of slots of the direct-mapped cache in front of the list; a power of two.
 const SLOTS: usize = 1 << 12;
-/// Bits of one coordinate in a key: ±52 km about the first point at 5 cm.
+/// Number of bits of one coordinate in a key: ±52 km about the first point at voxels of 5 cm.
 const BITS: u32 = 21;
-/// Middle of the coordinate's range.
+/// Middle of a coordinate's range.
 const MIDDLE: i64 = 1 << (BITS - 1);
-/// A slot that holds nothing.
+/// Key of an empty slot.
 const EMPTY: u64 = u64::MAX;
 
 /// Counts points by voxel; buffers are reused.
@@ -21,7 +21,7 @@ pub(crate) struct Counter {
 }
 
 impl Counter {
-    /// Counts points.
+    /// Adds points.
     pub(crate) fn count(
         &mut self,
         xyz: &[[f32; 3]],
@@ -71,7 +71,7 @@ impl Counter {
     }
 }
 
-/// One number that sorts by (z, y, x); saturates at the ends of its range.
+/// A key that sorts by (z, y, x); coordinates saturate at the ends of their range.
 #[inline]
 fn pack(voxel: [i32; 3], origin: [i32; 3]) -> u64 {
     let part = |i: usize| {
@@ -108,8 +108,8 @@ mod tests {
         }
         let expected: Vec<([i32; 3], u32)> =
             expected.into_iter().map(|(k, n)| ([k[2], k[1], k[0]], n)).collect();
-        // x·(1/edge) and x/edge may round differently at a voxel's border: allow for very few of
-        // them.
+        // x·(1/edge) and x/edge may round differently at the border of a voxel, so that very few
+        // differences are allowed.
         let same = got
             .voxels
             .iter()

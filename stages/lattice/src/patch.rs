@@ -1,4 +1,4 @@
-//! Regions of a raster in, patches in the world frame out, largest first.
+//! Converts the regions of a raster to patches in the world frame, largest first.
 
 use crate::Settings;
 use crate::raster::Raster;
@@ -6,12 +6,12 @@ use crate::regions::{Grown, Regions};
 use contract::{PlanePatch, Scan, ScanId};
 use geometry::{Aabb, Moments, Plane, Pose, Vector};
 
-/// Edge of a ground cell, metres: as `PlanePatch::ground` says.
+/// Edge of a ground cell, metres; must be that of `PlanePatch::ground`.
 pub(crate) const GROUND: f64 = 0.25;
-/// Least cosine of incidence for areas: flatter, the area of a pixel is mostly noise.
+/// Smallest cosine of incidence in areas: below, the area of a pixel is mostly noise.
 const MIN_COSINE: f32 = 0.01;
 
-/// Patches of all regions that are large enough.
+/// The patches of all regions that are large enough.
 pub(crate) fn patches(
     raster: &Raster,
     regions: &Regions,
@@ -27,7 +27,7 @@ pub(crate) fn patches(
     out
 }
 
-/// Sorts by area, equal ones by their place.
+/// Sorts patches by area, and those of equal area by their place.
 pub(crate) fn largest_first(patches: &mut [PlanePatch]) {
     patches.sort_by(|a, b| {
         let place = |p: &PlanePatch| p.bounds.min;
@@ -84,7 +84,7 @@ fn patch(
     })
 }
 
-/// A patch from sums alone, where there is no raster.
+/// A patch from moments alone, where there is no raster.
 pub(crate) fn from_sums(scan: ScanId, moments: Moments, plane: Plane, rms: f64) -> PlanePatch {
     PlanePatch { scan, plane, moments, rms, bounds: Aabb::EMPTY, area: 0.0, ground: Vec::new() }
 }
@@ -94,7 +94,7 @@ pub(crate) fn is_level(plane: &Plane, settings: &Settings) -> bool {
     plane.normal.z.abs() >= settings.level_tilt.cos()
 }
 
-/// Area from the solid angle of each pixel, its range and incidence, m².
+/// Area of a region from the solid angle, range and incidence of its pixels, m².
 fn area(raster: &Raster, members: &[u16], grown: &Grown) -> f64 {
     let mut area = 0.0_f64;
     for &at in members {
@@ -107,7 +107,7 @@ fn area(raster: &Raster, members: &[u16], grown: &Grown) -> f64 {
     area
 }
 
-/// The same sums in the world frame.
+/// Converts moments from the scan frame to the world frame.
 pub(crate) fn in_world(scan: &Moments, world_from_scan: &Pose) -> Moments {
     let turn = world_from_scan.rotation.to_rotation_matrix();
     let m = turn.matrix();
@@ -119,7 +119,7 @@ pub(crate) fn in_world(scan: &Moments, world_from_scan: &Pose) -> Moments {
     }
 }
 
-/// A pose as three rows of four f64, for inner loops.
+/// A pose as three rows of four `f64`, for inner loops.
 pub(crate) type WorldRows = [[f64; 4]; 3];
 
 /// `world_from_scan` as rows.
@@ -128,14 +128,14 @@ pub(crate) fn world_rows(world_from_scan: &Pose) -> WorldRows {
     std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]))
 }
 
-/// Takes a point of the scan frame to the world.
+/// Converts a point of the scan frame to the world, metres.
 #[inline]
 pub(crate) fn apply(m: &WorldRows, p: [f32; 3]) -> [f64; 3] {
     let [x, y, z] = p.map(f64::from);
     std::array::from_fn(|r| m[r][0] * x + m[r][1] * y + m[r][2] * z + m[r][3])
 }
 
-/// Gathers ground cells: runs of points in one cell are summed before they are sorted.
+/// Collects ground cells; runs of points in one cell are summed before they are sorted.
 #[derive(Debug, Default)]
 pub(crate) struct Ground {
     runs: Vec<([i32; 2], u32, f64)>,
@@ -159,9 +159,9 @@ impl Ground {
         }
     }
 
-    /// Sorted by cell, each cell once.
+    /// The cells, sorted, without duplicates.
     pub(crate) fn finish(mut self) -> Vec<([i32; 2], u32, f64)> {
-        // Stable, so that sums are always added in the same order.
+        // A stable sort, so that sums are always added in the same order.
         self.runs.sort_by_key(|run| run.0);
         self.runs.dedup_by(|later, kept| {
             let same = later.0 == kept.0;

@@ -1,47 +1,47 @@
-//! A tile in, a dense raster out: nearest return of each pixel, its range, its links to neighbours,
-//! its veils.
+//! A tile as a dense raster: for each pixel the nearest return, its range, its links to neighbours,
+//! and whether it is a veil.
 
 use crate::Settings;
 use crate::links;
 use crate::noise::Noise;
 use contract::{Lattice, TILE_SIDE, Tile};
 
-/// Most that is skipped of a dense tile: every fourth row and column is read, a sixteenth of the
-/// pixels.
+/// Largest level of subsampling of a dense tile: every fourth row and column is read, a sixteenth
+/// of the pixels.
 const MAX_SKIP: u32 = 2;
-/// A pixel without a return.
+/// Marks a pixel without a return.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// The dense raster of one tile; buffers are reused from tile to tile.
 #[derive(Debug, Default)]
 pub(crate) struct Raster {
-    /// Pixels along a side.
+    /// Number of pixels along a side.
     pub(crate) side: usize,
-    /// Of a dense tile only each 2^skip-th row and column is read.
+    /// Level of subsampling: each 2^skip-th row and column is read.
     pub(crate) skip: u32,
     /// Index of the nearest return in the tile's points, [`NONE`] where the pixel is empty or a
     /// veil.
     pub(crate) point: Vec<u32>,
-    /// Scan frame and range, metres; range 0 where the pixel is empty.
+    /// Coordinates in the scan frame and range, metres; range 0 where the pixel is empty.
     pub(crate) xyzr: Vec<[f32; 4]>,
     /// Links to the left, right, lower and upper neighbour, see [`links`].
     pub(crate) links: Vec<[u8; 4]>,
-    /// Empty pixels that a link leads across.
+    /// Whether a link leads across an empty pixel.
     pub(crate) bridged: Vec<bool>,
-    /// Noise of this tile.
+    /// Range noise of this tile.
     pub(crate) noise: Noise,
     /// Angle between rows, radians.
     pub(crate) row_step: f32,
     /// Angle between columns on the sphere, radians, for each row of the tile.
     pub(crate) col_step: Vec<f32>,
-    /// Veils, in ascending order of their pixel.
+    /// Pixels of veils, ascending.
     pub(crate) veils: Vec<u16>,
 }
 
 impl Raster {
-    /// Fills the raster with the nearest returns of `tile`, links them, and takes the veils out.
-    /// 2^`skip` rows and columns of the lattice become one: the first of their pixels that has
-    /// a return stands for them.
+    /// Fills the raster with the nearest returns of `tile`, links them, and removes the veils. Each
+    /// 2^`skip` rows and columns of the lattice become one; the first of their pixels with a return
+    /// represents them.
     pub(crate) fn fill(&mut self, tile: &Tile, lattice: &Lattice, skip: u32, settings: &Settings) {
         self.skip = skip;
         self.side = TILE_SIDE as usize >> skip;
@@ -52,13 +52,13 @@ impl Raster {
         self.xyzr.resize(n_pixels, [0.0; 4]);
         for (i, (pixel, p)) in tile.pixel.iter().zip(&tile.xyz).enumerate() {
             let at = self.pixel(*pixel);
-            // Points are sorted by pixel: another one holds this cell already.
+            // Points are sorted by pixel, so this cell may hold another one already.
             let old = self.point[at];
             if old != NONE && tile.pixel[old as usize] != *pixel {
                 continue;
             }
             let range = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
-            // A return at the scanner itself has no direction: it is no surface.
+            // A return at the scanner itself has no direction and is no surface.
             if range > 1e-3 && (old == NONE || range < self.xyzr[at][3]) {
                 self.point[at] = i as u32;
                 self.xyzr[at] = [p[0], p[1], p[2], range];
@@ -82,21 +82,21 @@ impl Raster {
         self.side * self.side
     }
 
-    /// Points of the tile that each one here stands for.
+    /// Number of points of the tile that each point of the raster represents.
     pub(crate) fn weight(&self) -> u32 {
         1 << (2 * self.skip)
     }
 
-    /// Where a pixel of the tile lies in the raster.
+    /// Index in the raster of a pixel of the tile.
     #[inline]
     fn pixel(&self, pixel: u16) -> usize {
         let (row, col) = (usize::from(pixel) >> 8, usize::from(pixel) & 255);
         (row >> self.skip) * self.side + (col >> self.skip)
     }
 
-    /// How much of a tile may be skipped whose points are no farther than `range`: as much as
-    /// leaves them no farther from each other than `spacing`, metres. A scan ten times as dense
-    /// tells no more of floors and clusters, but takes ten times as long.
+    /// Largest level of subsampling that leaves points up to `range` metres away no farther than
+    /// `spacing` metres from each other. A scan ten times as dense adds nothing to floors and
+    /// clusters, but takes ten times as long.
     pub(crate) fn skip(range: f32, lattice: &Lattice, spacing: f64) -> u32 {
         let across = f64::from(range) * lattice.row_step.max(lattice.col_step);
         let is_dense = |skip: &u32| across > 0.0 && across * f64::from(1 << skip) <= spacing;
@@ -114,15 +114,16 @@ impl Raster {
         self.veils = veils;
     }
 
-    /// Whether pixel `at` holds a return that is no veil.
+    /// Whether pixel `at` holds a return that is not a veil.
     #[inline]
     pub(crate) fn holds(&self, at: usize) -> bool {
         self.point[at] != NONE
     }
 }
 
-/// Which points of `tile` are veils (mixed pixels between a near edge and what lies behind), in the
-/// order of the tile's points. All `false` where the scan has no lattice: then nobody can tell.
+/// For each point of `tile` whether it is a veil point (a mixed pixel between a near edge and the
+/// surface behind it). All are `false` where the scan has no lattice, since veils cannot be found
+/// then.
 #[must_use]
 pub fn veils(tile: &Tile, scan: &contract::Scan, settings: &Settings) -> Vec<bool> {
     let mut out = vec![false; tile.len()];
@@ -136,10 +137,9 @@ pub fn veils(tile: &Tile, scan: &contract::Scan, settings: &Settings) -> Vec<boo
 }
 
 impl Raster {
-    /// Sets the flag of each veil point of the tile that filled this raster, of which it skipped
-    /// nothing.
+    /// Sets the flag of each veil point of the tile that filled this raster without subsampling.
     pub(crate) fn flag_veils(&self, tile: &Tile, flags: &mut [bool]) {
-        // Points and veils are both sorted by pixel; of several returns in a pixel only the nearest
+        // Points and veils are both sorted by pixel. Of several returns in a pixel only the nearest
         // was judged.
         let mut at = 0;
         for &pixel in &self.veils {

@@ -1,4 +1,4 @@
-//! Normals of a raster in, planar regions out: grown from the flattest seeds over linked pixels.
+//! Planar regions of a raster with normals, grown over linked pixels from the flattest seeds.
 
 use crate::Settings;
 use crate::links::linked;
@@ -7,25 +7,28 @@ use crate::raster::Raster;
 use geometry::{Moments, Vector};
 use nalgebra::Matrix3;
 
-/// No region has taken the pixel.
+/// Owner of a pixel that belongs to no region.
 pub(crate) const FREE: u16 = 0;
-/// Tried as part of a region that came to nothing: no seed any more, but others may take it.
+/// Owner of a pixel of a rejected region: it is no seed any more, but other regions may take it.
 const TRIED: u16 = 1;
-/// The region that grows at the moment.
+/// Owner of the pixels of the region that is growing.
 const GROWING: u16 = 2;
 /// Number of the first accepted region.
 pub(crate) const FIRST: u16 = 3;
-/// Pixels between seeds: a patch of the least area at any useful density holds several.
+/// Distance between seeds, pixels: a patch of the smallest area at any useful density holds
+/// several.
 const SEED_STEP: usize = 3;
-/// Angles between neighbouring normals up to which seeds are tried, flattest class first, radians.
+/// Largest angles between neighbouring normals of the classes of seeds, radians; the flattest class
+/// is tried first.
 const SEED_CLASSES: [f32; 4] = [0.026, 0.06, 0.12, 0.24];
-/// Points of the first refit.
+/// Number of points at the first refit.
 const FIRST_REFIT: usize = 12;
-/// Spread along a plane, in units of the spread across it, from which points know the plane's
-/// direction better than the seed's window does: close to the scanner, neighbours are nearer than
-/// their noise.
+/// Spread along a plane, in units of the spread across it, from which on points determine the
+/// plane's direction better than the seed's window does. Close to the scanner, neighbours are
+/// nearer to each other than their noise.
 const MIN_SLENDERNESS: f64 = 6.0;
-/// Angle that a pixel near a crease may show, as its window looks around the corner; cosine of 60°.
+/// Cosine of the largest angle of the normal of a pixel near a crease (60°), whose window looks
+/// around the corner.
 const CREASE: f32 = 0.5;
 
 /// One accepted region.
@@ -35,23 +38,23 @@ pub(crate) struct Grown {
     pub(crate) normal: [f32; 3],
     /// Range of its members in [`Regions::members`].
     pub(crate) members: std::ops::Range<usize>,
-    /// Sums of its points, scan frame.
+    /// Moments of its points, scan frame.
     pub(crate) moments: Moments,
 }
 
 /// All regions of one tile; buffers are reused.
 #[derive(Debug, Default)]
 pub(crate) struct Regions {
-    /// Region of each pixel, [`FREE`] or [`TRIED`] below [`FIRST`].
+    /// Region of each pixel; [`FREE`] and [`TRIED`] are below [`FIRST`].
     pub(crate) owner: Vec<u16>,
     /// Pixels of all regions, one region after the other.
     pub(crate) members: Vec<u16>,
-    /// In order of acceptance.
+    /// Accepted regions, in order of acceptance.
     pub(crate) grown: Vec<Grown>,
     seeds: [Vec<u16>; SEED_CLASSES.len()],
 }
 
-/// What the growth of one region goes by.
+/// The plane and the limits by which one region grows.
 struct Growth {
     n: [f32; 3],
     d: f32,
@@ -84,14 +87,14 @@ impl Growth {
             return;
         };
         let n = fit.plane.normal.map(|v| v as f32);
-        // Towards the scanner, as all normals are: the scanner is the origin.
+        // Normals point towards the scanner, which is the origin.
         let sign = if fit.plane.offset > 0.0 { -1.0 } else { 1.0 };
         self.n = [n.x * sign, n.y * sign, n.z * sign];
         self.d = fit.plane.offset as f32 * sign;
     }
 }
 
-/// Sums of points about a near origin, cheaper than [`Moments`] by symmetry.
+/// Moments of points about a near origin; they use symmetry and are cheaper than [`Moments`].
 struct Sums {
     origin: [f32; 3],
     s: [f64; 10],
@@ -226,8 +229,8 @@ impl Regions {
         sums.add(raster.xyzr[at]);
     }
 
-    /// Refits a grown region, lets go what does not lie on it, adds its border, and keeps it if it
-    /// is large enough.
+    /// Refits a grown region, releases pixels that do not lie on it, adds its border, and keeps it
+    /// if it is large enough.
     fn settle(
         &mut self,
         first: usize,
@@ -290,8 +293,8 @@ impl Regions {
         self.members.truncate(first);
     }
 
-    /// Takes pixels around the region that lie on its plane, though their normals look around a
-    /// crease or are missing, as far as windows reach.
+    /// Takes pixels around the region that lie on its plane, as far as windows reach, although
+    /// their normals are missing or look around a crease.
     fn absorb(&mut self, first: usize, growth: &Growth, raster: &Raster, normals: &Normals) {
         let mut from = first;
         let most = self.members[first..]

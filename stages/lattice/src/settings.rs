@@ -1,57 +1,57 @@
-//! What can be tuned when a tile is read as surfaces: plain numbers, each with its unit and reason.
+//! The settings of the lattice stage, each with its unit and reason.
 
 /// Settings of the lattice stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Range noise at the scanner, metres: a common terrestrial scanner on matt surfaces.
+    /// Range noise close to the scanner, metres: a common terrestrial scanner on matt surfaces.
     pub noise: f64,
     /// Growth of the range noise with range, metres a metre.
     pub noise_growth: f64,
-    /// Noise of a beam's direction, radians: 19 seconds of arc, as data sheets say.
+    /// Noise of a beam's direction, radians: 19 seconds of arc, as in data sheets.
     pub angular_noise: f64,
-    /// How many times more noise than expected is believed where the tile shows it (depth
+    /// Largest factor by which the measured noise of a tile may exceed the expected noise (depth
     /// cameras).
     pub noise_limit: f64,
-    /// Incidence up to which neighbours are one surface whatever lies around them, radians: 80°.
+    /// Incidence up to which neighbours always belong to one surface, radians: 80°.
     pub max_incidence: f64,
-    /// Incidence up to which neighbours are one surface if the next ones continue it, radians:
-    /// 88°.
+    /// Incidence up to which neighbours belong to one surface if the next pixels continue it,
+    /// radians: 88°.
     pub max_grazing: f64,
-    /// Half the window of a normal, metres: several steps of the raster at working range, less
-    /// than a pipe.
+    /// Half-width of the window of a normal, metres: several steps of the raster at working range,
+    /// less than a pipe.
     pub window: f64,
-    /// Largest half window, pixels: keeps near surfaces cheap and local.
+    /// Largest half-width of that window, pixels, which keeps near surfaces cheap and local.
     pub max_window_pixels: u32,
-    /// Least angle between normals of one plane that is tolerated, radians: 6°.
+    /// Angle between normals of one plane that is always tolerated, radians: 6°.
     pub normal_tolerance: f64,
-    /// Largest angle between normals of one plane that is tolerated, radians, where normals are
-    /// noisy: 14°.
+    /// Largest angle between normals of one plane that is tolerated where normals are noisy,
+    /// radians: 14°.
     pub max_normal_tolerance: f64,
-    /// What a flat surface may deviate beside noise, metres.
+    /// Deviation of a flat surface beside noise, metres.
     pub flatness: f64,
-    /// Fewest points of a patch: enough for three parameters and their errors.
+    /// Smallest number of points of a patch: enough for three parameters and their errors.
     pub min_patch_points: usize,
-    /// Least area of a horizontal patch, m²: a piece of the ring around a robot's foot.
+    /// Smallest area of a horizontal patch, m²: a piece of the ring around a robot's foot.
     pub min_level_area: f64,
-    /// Least width of a horizontal patch, metres.
+    /// Smallest width of a horizontal patch, metres.
     pub min_level_width: f64,
-    /// Least area of any other patch, m².
+    /// Smallest area of any other patch, m².
     pub min_patch_area: f64,
-    /// Least width of any other patch, metres: wider than the flat strip on a pipe of 50 mm
+    /// Smallest width of any other patch, metres: wider than the flat strip on a pipe of 50 mm
     /// radius.
     pub min_patch_width: f64,
     /// Tilt up to which a patch counts as nearly horizontal, radians: 8°, more than a floor may
     /// have.
     pub level_tilt: f64,
-    /// Distance of neighbouring points that suffices for floors, planes and occupied space,
-    /// metres: of scans that are denser, rows and columns are skipped there. A cable has more;
-    /// scans of five million points have it at six metres.
+    /// Distance of neighbouring points that suffices for floors, planes and occupied space, metres;
+    /// rows and columns of denser scans are skipped there. A cable is
+    /// thicker than the default of 10 mm; scans of five million points have that at six metres.
     pub spacing: f64,
-    /// Edge of an occupancy voxel, metres: finer than the gap between a robot and its fence.
+    /// Edge of a voxel of the occupied space, metres: finer than the gap between robot and fence.
     pub voxel: f64,
-    /// Edge of the voxels that stand in for a lattice where the scanner is unknown, metres.
+    /// Edge of the voxels that replace the lattice where the scanner is unknown, metres.
     pub surface_voxel: f64,
-    /// Noise of a surface where the scanner is unknown, metres: registered scans of several
+    /// Noise of a surface where the scanner is unknown, metres: registered scans from several
     /// positions.
     pub surface_noise: f64,
 }

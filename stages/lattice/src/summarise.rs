@@ -1,4 +1,4 @@
-//! A tile in, its summary out: patches, occupied space, counts.
+//! The step that reduces a tile to its summary: patches, occupied space and counts.
 
 use crate::Settings;
 use crate::normals::Normals;
@@ -9,7 +9,7 @@ use crate::regions::Regions;
 use crate::voxels::{self, Surface};
 use contract::{Error, Kind, Map, Occupancy, Result, Scan, ScanId, Tile, TileSummary};
 
-/// Makes the summary of each tile.
+/// The step that makes the summary of each tile.
 #[derive(Debug, Clone)]
 pub struct Summarise {
     scans: Vec<Scan>,
@@ -18,7 +18,7 @@ pub struct Summarise {
 }
 
 impl Summarise {
-    /// For tiles of these scans; a tile's `at.scan` is the scan's `id`.
+    /// A step for the tiles of these scans; `at.scan` of a tile must be the `id` of one of them.
     #[must_use]
     pub fn new(scans: &[Scan], settings: &Settings) -> Self {
         let mut scans = scans.to_vec();
@@ -26,8 +26,8 @@ impl Summarise {
         Self { scans, settings: *settings, with_planes: true }
     }
 
-    /// How much of a tile of a scan may be left out (see [`Tile::skip`]) whose points are mostly no
-    /// farther than `range` from the scanner, metres; nothing where that is not known (0).
+    /// Level of subsampling (see [`Tile::skip`]) that suffices for a tile of a scan whose points
+    /// are mostly no farther than `range` metres from the scanner; 0 where `range` is unknown (0).
     #[must_use]
     pub fn skip(&self, scan: ScanId, range: f32) -> u32 {
         let at = self.scans.binary_search_by_key(&scan, |scan| scan.id);
@@ -35,7 +35,7 @@ impl Summarise {
         lattice.map_or(0, |lattice| Raster::skip(range, &lattice, self.settings.spacing))
     }
 
-    /// The same without patches, which are most of the work: for where the planes are known.
+    /// The step without patches, which are most of the work, for where the planes are known.
     #[must_use]
     pub fn without_planes(self) -> Self {
         Self { with_planes: false, ..self }
@@ -90,7 +90,7 @@ impl Map for Summarise {
 }
 
 impl Summarise {
-    /// Space that is occupied by what is no veil; in dense tiles, by what was read of them.
+    /// Space that is occupied by points other than veils, at the tile's level of subsampling.
     fn occupancy(&self, tile: &Tile, rows: &WorldRows, scratch: &mut Scratch) -> Occupancy {
         let (raster, solid) = (&scratch.raster, &mut scratch.solid);
         solid.clear();

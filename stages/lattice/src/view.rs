@@ -1,21 +1,20 @@
-//! Tiles of one scan in; out comes the scan's view of a region: depth images towards it, and its
-//! points inside.
+//! Builds a scan's view of a region from its tiles: depth images towards the region, and the points
+//! inside.
 
 use contract::{Lattice, MAX_SKIP, Pixel, Region, Scan, TILE_SIDE, Tile, TileAt, TilePoints, View};
 use geometry::depth::{Empty, LANES, Lanes, Rows, lanes, rows, transform, transform_lanes};
 use geometry::{DepthImage, Faces, Point, Pose, Vector};
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 
-/// What is tuned.
+/// Settings of the views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewSettings {
-    /// Width of a depth image's cell in beams: below about 1.3 a regular scan leaves holes.
+    /// Width of a depth image's cell in beams; below about 1.3 a regular scan leaves holes.
     pub beams_per_cell: f64,
-    /// Smallest cell at the region's near side, metres: finer shows nothing that the search can
-    /// use.
+    /// Smallest cell at the near side of the region, metres; the search has no use for finer ones.
     pub min_cell: f64,
-    /// Half-width (cells) of the window that must be empty around a cell before it counts as "no
-    /// return".
+    /// Half-width of the window about a cell that must be empty before the cell counts as "no
+    /// return", cells.
     pub empty_window: i32,
 }
 
@@ -25,16 +24,16 @@ impl Default for ViewSettings {
     }
 }
 
-/// Widest half tangent of a single image: beyond, a pinhole stretches too much, and the faces of a
-/// cube serve.
+/// Largest half tangent of a single image; beyond, a pinhole distorts too much, and the faces of a
+/// cube are used.
 const MAX_HALF_TANGENT: f64 = 1.6;
 
 /// Rows and columns of a lattice that a scan covers: `[first row, last row, first column, last
 /// column]`.
 pub type Extent = [u32; 4];
 
-/// Gathers one scan's view of a region, tile by tile; in the order of the tiles, so that it is the
-/// same each time.
+/// Collects one scan's view of a region tile by tile, always in the order of the tiles, so that the
+/// result is reproducible.
 #[derive(Debug)]
 pub struct ViewBuilder {
     view: View,
@@ -43,22 +42,22 @@ pub struct ViewBuilder {
     lattice: Option<Lattice>,
     extent: Option<Extent>,
     bounds: geometry::Aabb,
-    /// Cones from the scanner that together hold the region; none without scanner.
+    /// Cones from the scanner that together hold the region; `None` where the scanner is unknown.
     cones: Option<Vec<Cone>>,
     empty_window: i32,
-    /// Of dense scans, one of each square of so many pixels (see [`Tile::skip`]) is enough to fill
-    /// the cells of the images and to be kept as points.
+    /// Level of subsampling (see [`Tile::skip`]) that suffices to fill the cells of the images and
+    /// for the points that are kept.
     skip: u32,
-    /// The same of the points alone; no points without it.
+    /// Level of subsampling of the points that are kept; `None` if no points are kept.
     kept: Option<u32>,
-    /// Places in the mask of the view's points, where no lattice tells which of them are
-    /// neighbours.
+    /// Places in the mask of the view's points, by which they are ordered where no lattice tells
+    /// which are neighbours.
     places: Vec<u64>,
 }
 
 impl ViewBuilder {
-    /// An empty view of `region` from `scan`; `extent` is what the scan covers of its lattice, if
-    /// known. Each 2^`thin`-th row and column of its points is kept; none of them without it.
+    /// An empty view of `region` from `scan`. `extent` is the part of the lattice that the scan
+    /// covers, if known. Each 2^`thin`-th row and column of the points is kept, or none for `None`.
     #[must_use]
     pub fn new(
         scan: &Scan,
@@ -76,7 +75,7 @@ impl ViewBuilder {
         let images = scanner.map_or_else(Vec::new, |s| cameras(&s, region, focal));
         let faces = Faces::new(&images);
         let thin = thin.map(|thin| if scan.lattice.is_some() { thin.min(MAX_SKIP) } else { 0 });
-        // What is kept of the points has to be read, even where that is more than fills the images.
+        // Points that are kept must be read, even where the images would need fewer.
         let skip = lattice_skip(scan, focal).min(thin.unwrap_or(MAX_SKIP));
         let cones = scanner.map(|s| cones(&s, region, &local_from_scan));
         let (id, mask, points) = (scan.id, scan.mask, Vec::new());
@@ -97,8 +96,8 @@ impl ViewBuilder {
         }
     }
 
-    /// Whether the tile can hold anything that this view needs: for a scan with beams, everything
-    /// in the cone of the region, before and behind it.
+    /// Whether a tile can hold anything that this view needs. For a scan with beams that is all in
+    /// the cone of the region, also in front of it and behind it.
     #[must_use]
     pub fn wants(&self, at: TileAt) -> bool {
         if at.scan != self.view.scan {
@@ -117,7 +116,7 @@ impl ViewBuilder {
             .into_iter()
             .map(|(dr, dc)| corner(dr, dc).angle(&middle))
             .fold(0.0, f64::max);
-        // A tile near the pole bulges beyond its corners; its half height covers that.
+        // A tile near the pole extends beyond its corners; its half height covers that.
         let radius = radius.max(f64::from(TILE_SIDE) * 0.5 * lattice.row_step);
         cones.iter().any(|cone| middle.angle(&cone.axis) <= radius + cone.angle)
     }
@@ -133,13 +132,13 @@ impl ViewBuilder {
             && y + side >= self.bounds.min[1]
     }
 
-    /// How much of each tile may be left out.
+    /// Level of subsampling at which tiles may be read.
     #[must_use]
     pub fn skip(&self) -> u32 {
         self.skip
     }
 
-    /// Adds points of a tile, as the store has them by level.
+    /// Adds points of a tile, one level of subsampling as it is stored.
     pub fn add(&mut self, tile: &TilePoints<'_>) {
         let local_from_scan = rows(&self.local_from_scan);
         let cameras: Vec<_> = self
@@ -159,7 +158,7 @@ impl ViewBuilder {
         }
     }
 
-    /// Keeps those of a few points that are in the region.
+    /// Keeps those of a few points that lie in the region.
     fn keep(&mut self, local: &Lanes, places: &[u32], first_place: u64) {
         for (i, place) in places.iter().enumerate() {
             let p = [local[0][i], local[1][i], local[2][i]];
@@ -172,7 +171,7 @@ impl ViewBuilder {
         }
     }
 
-    /// Marks a few points, given in the frames of the scan and of the region, in the images.
+    /// Adds a few points, given in the scan frame and in the local frame, to the images.
     fn splat(&mut self, n: usize, (scan, local): (&Lanes, &Lanes), cameras: &[Rows]) {
         if let Some(at) = self.faces.of_all(local) {
             let camera = transform_lanes(&cameras[at], scan);
@@ -187,7 +186,7 @@ impl ViewBuilder {
         }
     }
 
-    /// The view, with its empty cells judged.
+    /// Finishes the view and decides what empty cells mean.
     #[must_use]
     pub fn finish(mut self) -> View {
         if self.lattice.is_none() {
@@ -213,24 +212,23 @@ impl ViewBuilder {
     }
 }
 
-/// What a scanner sees of a piece of space.
+/// The directions from a scanner to a piece of space.
 #[derive(Debug)]
 struct Cone {
     /// Unit direction, scan frame.
     axis: Vector,
-    /// Half of its opening, radians.
+    /// Half of its opening angle, radians.
     angle: f64,
 }
 
-/// Pieces of a region on each axis, each with its cone: seen from close by, one cone around all of
-/// it would be the whole sphere, and all tiles of the scan would have to be read.
+/// Number of pieces of a region along each axis, each with its cone. From close by, one cone around
+/// the region would be the whole sphere, and all tiles of the scan would have to be read.
 const PIECES: usize = 4;
-/// Room around each piece, metres: what a depth image shows beside the region must be there as
-/// well.
+/// Margin around each piece, metres: a depth image shows some space beside the region, too.
 const BESIDE: f64 = 0.15;
 
-/// Cones around the pieces of a region; one that is the whole sphere where the scanner stands in or
-/// at a piece.
+/// Cones around the pieces of a region; the whole sphere for a piece that holds or touches the
+/// scanner.
 fn cones(scanner: &Point, region: &Region, local_from_scan: &Pose) -> Vec<Cone> {
     let (min, size) = (region.bounds.min, region.bounds.size());
     let half = Vector::from(size) * (0.5 / PIECES as f64);
@@ -251,11 +249,11 @@ fn cones(scanner: &Point, region: &Region, local_from_scan: &Pose) -> Vec<Cone> 
     all.unwrap_or_else(|| vec![Cone { axis: Vector::z(), angle: std::f64::consts::PI }])
 }
 
-/// Nothing of a robot is nearer to a scanner, metres, as a rule: from a scanner within a region its
-/// cells are as fine as from so far. At a third of that a robot at 5 m was seen in cells of 5 cm.
+/// Distance that is assumed at least between scanner and robot, metres: cells are not made finer
+/// for a scanner within a region. At a third of that a robot at 5 m was seen in cells of 5 cm.
 const NEAREST: f64 = 1.0;
 
-/// Cells of an image in one unit of its plane, as fine as beams and settings allow.
+/// Number of cells per unit of tangent of an image, as many as beams and settings allow.
 fn focal(scanner: &Point, region: &Region, beam_step: f64, settings: &ViewSettings) -> f64 {
     let outside = |i: usize| {
         let (min, max) = (region.bounds.min[i], region.bounds.max[i]);
@@ -265,17 +263,17 @@ fn focal(scanner: &Point, region: &Region, beam_step: f64, settings: &ViewSettin
     (1.0 / (settings.beams_per_cell * beam_step.max(1e-5))).min(near / settings.min_cell)
 }
 
-/// Fewest beams across a cell that leave no holes in the image of a regular scan.
+/// Smallest number of beams across a cell that leaves no holes in the image of a regular scan.
 const LEAST_BEAMS: f64 = 1.3;
 
-/// How much of a scan may be skipped where its beams are far denser than cells.
+/// Level of subsampling of a scan whose beams are far denser than cells.
 fn lattice_skip(scan: &Scan, focal: f64) -> u32 {
     let Some(lattice) = &scan.lattice else { return 0 };
     let beams = 1.0 / (focal.max(1e-6) * lattice.row_step.max(lattice.col_step));
     (0..=MAX_SKIP).rfind(|s| beams >= LEAST_BEAMS * f64::from(1 << s)).unwrap_or(0)
 }
 
-/// The images that together cover the region: one towards its middle, or the faces of a cube.
+/// The images that together cover the region: one towards its centre, or the faces of a cube.
 fn cameras(scanner: &Point, region: &Region, focal: f64) -> Vec<DepthImage> {
     let to = region.bounds.center() - scanner;
     if to.norm() > 1e-6 {
@@ -295,7 +293,7 @@ fn cameras(scanner: &Point, region: &Region, focal: f64) -> Vec<DepthImage> {
     axes.iter()
         .flat_map(|a| [*a, -a])
         .filter(|a| {
-            // A face does not see a box that is all on the far side of one side of its pyramid.
+            // A face does not see a box that lies entirely outside of one side of its pyramid.
             let camera_from_local = look_at(scanner, a);
             let seen = corners.map(|c| camera_from_local * c);
             let on = |is_in: fn(&Point) -> bool| seen.iter().any(is_in);
@@ -309,7 +307,7 @@ fn cameras(scanner: &Point, region: &Region, focal: f64) -> Vec<DepthImage> {
         .collect()
 }
 
-/// Camera frame at the scanner with +z along `to`.
+/// The pose `camera_from_local` of a camera at the scanner that looks with +z along `to`.
 fn look_at(scanner: &Point, to: &Vector) -> Pose {
     let up = if to.normalize().z.abs() > 0.95 { Vector::x() } else { Vector::z() };
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::look_at_lh(to, &up));

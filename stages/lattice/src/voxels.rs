@@ -1,30 +1,31 @@
-//! Points of a scan without known scanner in, planar patches and normals out: local planes by voxel
-//! moments, since there is no lattice. Nothing here can tell a veil, nor which side of a surface
-//! was seen.
+//! Planar patches and normals of a scan without known scanner: local planes from the moments of
+//! voxels, since there is no lattice. Neither veils nor the side from which a surface was seen can
+//! be told.
 
 use crate::Settings;
 use crate::patch::{Ground, apply, from_sums, in_world, is_level, largest_first, world_rows};
 use contract::{PlanePatch, Scan, Tile};
 use geometry::{Aabb, Moments, Plane, Vector};
 
-/// Fewest points of a voxel with a plane of its own.
+/// Smallest number of points of a voxel with a plane of its own.
 const MIN_POINTS: f64 = 6.0;
-/// Bits of one coordinate in a key; a tile is 128 voxels wide, any height of a building fits.
+/// Number of bits of one coordinate in a key; a tile is 128 voxels wide, and any height of a
+/// building fits.
 const BITS: u32 = 21;
 /// Middle of a coordinate's range.
 const MIDDLE: i64 = 1 << (BITS - 1);
-/// The voxel has no plane of its own.
+/// Owner of a voxel without a plane of its own.
 const FLAT_NOT: u32 = u32::MAX;
-/// No region has taken the voxel.
+/// Owner of a voxel that belongs to no region.
 const FREE: u32 = u32::MAX - 1;
 
 /// Voxels of one tile; buffers are reused.
 #[derive(Debug, Default)]
 pub(crate) struct Surface {
     points: Vec<(u64, u32)>,
-    /// Sorted by key.
+    /// Voxels, sorted by key.
     cells: Vec<Cell>,
-    /// Voxel of each point.
+    /// Index of the voxel of each point.
     of_point: Vec<u32>,
 }
 
@@ -32,13 +33,13 @@ pub(crate) struct Surface {
 struct Cell {
     key: u64,
     moments: Moments,
-    /// Scan frame; largest component of the normal positive.
+    /// Plane in the scan frame; the largest component of its normal is positive.
     plane: Option<Plane>,
     region: u32,
     bounds: [[f32; 3]; 2],
 }
 
-/// The side of a plane that stands for both: largest component of the normal positive.
+/// The plane with the sign for which the largest component of its normal is positive.
 fn upright(plane: Plane) -> Plane {
     let n = plane.normal;
     if n[n.iamax()] < 0.0 { plane.flipped() } else { plane }
@@ -113,7 +114,7 @@ impl Surface {
         }
     }
 
-    /// Grows a region from cell `seed`; its members in `members`.
+    /// Grows a region from cell `seed` and stores its cells in `members`.
     fn grow(&mut self, seed: usize, number: u32, members: &mut Vec<usize>, settings: &Settings) {
         let Some(mut plane) = self.cells[seed].plane else {
             return;
@@ -205,7 +206,7 @@ impl Surface {
     }
 }
 
-/// Planar patches of a tile of ground, largest first.
+/// Planar patches of a ground tile, largest first.
 pub(crate) fn patches(
     tile: &Tile,
     scan: &Scan,
@@ -215,7 +216,7 @@ pub(crate) fn patches(
     surface.fill(tile, settings);
     let mut seeds: Vec<usize> =
         (0..surface.cells.len()).filter(|&i| surface.cells[i].plane.is_some()).collect();
-    // Most points first: their planes are the best known.
+    // Voxels with most points first, since their planes are known best.
     seeds.sort_by(|&a, &b| surface.cells[b].moments.n.total_cmp(&surface.cells[a].moments.n));
     let (mut out, mut members) = (Vec::new(), Vec::new());
     for (number, &seed) in seeds.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! The lattice stage on a synthetic room: floor, pipes, veils, rings, and the same answer with used
-//! buffers.
+//! The lattice stage on a synthetic room: floor, pipes, veils and rings are found, and reused
+//! buffers do not change the result.
 
 mod caster;
 
@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 /// Step of the raster, radians: 7.5 mm at 3 m.
 const STEP: f64 = 0.0025;
 
-/// Made once for all tests.
+/// The tiles of the room, made once for all tests.
 static TILES: LazyLock<(Scan, Vec<Truth>)> = LazyLock::new(|| {
     let scan = scan([0.3, 0.2, 1.6], 0.4, STEP);
     let tiles = room(0.008).tiles(&scan);
@@ -61,7 +61,7 @@ fn normals_of_floor_and_walls_are_within_degrees() {
     assert!((none as f64) < 0.01 * n as f64, "{none} of {n}");
 }
 
-/// A tile as the store gives it: of a dense one a part.
+/// A tile as the store gives it: a dense one is subsampled.
 fn given(stage: &Summarise, tile: &Tile) -> Tile {
     let range = |p: &[f32; 3]| p.iter().map(|v| v * v).sum::<f32>().sqrt();
     let mut ranges: Vec<f32> = tile.xyz.iter().map(range).collect();
@@ -80,7 +80,7 @@ fn summaries(scan: &Scan, tiles: &[Truth]) -> Vec<TileSummary> {
 fn floor_cells_lie_on_horizontal_patches() {
     let (scan, tiles) = &*TILES;
     let got = summaries(scan, tiles);
-    // Points of the floor that lie on an upward patch of their tile, by distance.
+    // Number of floor points on an upward patch of their tile, by distance.
     let (mut on, mut all, mut edge_off) = (0, 0, 0);
     for (t, summary) in tiles.iter().zip(&got) {
         let up: Vec<_> = summary.patches.iter().filter(|p| p.plane.normal.z > 0.99).collect();
@@ -155,7 +155,7 @@ fn used_buffers_and_far_worlds_change_nothing() {
         }
         let sum = |s: &TileSummary| s.occupancy.voxels.iter().map(|v| u64::from(v.1)).sum::<u64>();
         assert_eq!(sum(a), sum(&b));
-        // Of dense tiles a part is read; it stands for all of them.
+        // Dense tiles are subsampled, and the sample represents the whole tile.
         let all = (sum(a) + a.n_veils) as f64 / a.n_points as f64;
         assert!((0.97..1.04).contains(&all), "{all}");
     }

@@ -1,5 +1,5 @@
-//! The bodies of a description in, the meshes of its links out; what cannot be read is a finding,
-//! not an end.
+//! Reads the meshes of a model's links. A mesh that cannot be read becomes a finding, so that all
+//! problems of a library are reported at once.
 
 use crate::finding::Findings;
 use crate::load::Settings;
@@ -12,22 +12,22 @@ use crate::urdf::{Body, Shape};
 use geometry::Aabb;
 use std::sync::Arc;
 
-/// A link larger than this is drawn in millimetres, metres.
+/// Largest plausible size of a link, metres; a larger one was probably drawn in millimetres.
 const LARGEST_LINK: f64 = 30.0;
-/// Size from which on a link is refused, metres: no beam of a gantry is so long; a hand's width in
-/// millimetres is.
+/// Size from which on a link is refused, metres. No beam of a gantry is as long, but a part of 0.1
+/// m that was drawn in millimetres is.
 const FAR_TOO_LARGE: f64 = 100.0;
-/// Size below which it is, metres: a millimetre in millimetres is as large.
+/// Size below which a link is refused, metres: a part of 1 mm that was scaled to metres twice.
 const FAR_TOO_SMALL: f64 = 1e-5;
 
-/// Where meshes lie, and how large they may be.
+/// Reads meshes from the folders of a model within limits on their size.
 pub(crate) struct Bodies<'a> {
     pub(crate) roots: &'a Roots,
     pub(crate) settings: &'a Settings,
 }
 
 impl Bodies<'_> {
-    /// Reads the meshes of all links.
+    /// Reads the meshes of all links into the tree.
     pub(crate) fn read(&self, tree: &mut Tree, file: &str, findings: &mut Findings) {
         let mut any = false;
         let shown = shown(tree);
@@ -44,23 +44,24 @@ impl Bodies<'_> {
                     self.body(mesh, body, &place, findings);
                 }
                 if !mesh.triangles.is_empty() {
-                    let what = "has no visual; its collision mesh stands in and may be a hull";
+                    let what =
+                        "has no visual; its collision mesh is used instead and may be a hull";
                     findings.warn(&place, what, "add a visual");
                 }
             }
             if mesh.triangles.is_empty() && !(raw.visuals.is_empty() && collisions.is_empty()) {
-                findings.warn(&place, "has no surface", "mend its visual");
+                findings.warn(&place, "has no surface", "correct its visual");
             }
             any |= !mesh.triangles.is_empty();
             link.bounds = Aabb::of(mesh.vertices.iter().map(|p| p.map(f64::from)));
             let size = link.bounds.size().into_iter().fold(0.0, f64::max);
-            let in_millimetres = "if it is drawn in millimetres add scale=\"0.001 0.001 0.001\"";
+            let in_millimetres = "if it is drawn in millimetres, add scale=\"0.001 0.001 0.001\"";
             if size > FAR_TOO_LARGE {
                 let what = format!("is far larger than any robot's link, metres \"{size:.1}\"");
                 findings.fail(&place, what, in_millimetres);
             } else if !mesh.triangles.is_empty() && size < FAR_TOO_SMALL {
                 let what = format!("is too small for any scanner, metres \"{size:e}\"");
-                findings.fail(&place, what, "mend the scale of its mesh");
+                findings.fail(&place, what, "correct the scale of its mesh");
             } else if size > LARGEST_LINK {
                 let what = format!("is larger than any robot's link, metres \"{size:.1}\"");
                 findings.warn(&place, what, in_millimetres);
@@ -92,7 +93,7 @@ impl Bodies<'_> {
             _ => {
                 findings.warn(
                     place,
-                    "has a body without extent, which is passed over",
+                    "has a body without extent, which is ignored",
                     "give sizes above zero",
                 );
                 return;
@@ -102,7 +103,7 @@ impl Bodies<'_> {
         if n_broken > 0 {
             findings.warn(
                 place,
-                format!("triangles with corners that are no numbers were left out \"{n_broken}\""),
+                format!("triangles with non-finite corners were left out \"{n_broken}\""),
                 "",
             );
         }
@@ -115,7 +116,7 @@ impl Bodies<'_> {
                 findings.warn(
                     place,
                     format!("{what} \"{written}\""),
-                    "put the mesh there, or mend its path",
+                    "put the mesh there, or correct its path",
                 );
                 return None;
             }
@@ -125,8 +126,8 @@ impl Bodies<'_> {
             let name = file_name(&found.path);
             findings.warn(
                 &place,
-                format!("is there in another case only \"{name}\""),
-                "mend the path",
+                format!("is there with other upper and lower case \"{name}\""),
+                "correct the path",
             );
         }
         let extension =
@@ -141,15 +142,16 @@ impl Bodies<'_> {
                 Some(soup)
             }
             Err(what) => {
-                findings.warn(&place, what, "mend or replace the mesh");
+                findings.warn(&place, what, "repair or replace the mesh");
                 None
             }
         }
     }
 }
 
-/// Which links are rigid with one that has a visual: their own collision bodies are capsules about
-/// that, drawn for checks of collisions, and no surface that a scan could show.
+/// For each link, whether it is rigidly connected to a link that has a visual. The collision bodies
+/// of such a link are capsules around that visual, drawn for collision checks, and no surface that
+/// a scan could show.
 fn shown(tree: &Tree) -> Vec<bool> {
     let mut leader: Vec<usize> = (0..tree.links.len()).collect();
     for l in 0..leader.len() {

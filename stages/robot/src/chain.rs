@@ -1,12 +1,12 @@
-//! The main chain, and what each link is part of.
+//! Finds the main chain of a model and the role of each link.
 
 use crate::finding::Findings;
 use crate::model::{Motion, Role};
 use crate::sheet::Sheet;
 use crate::tree::Tree;
 
-/// Joints from link `root` (included above it: nothing) to link `tip`, or `None` if `tip` does not
-/// hang on `root`.
+/// Indices of the joints from link `root` down to link `tip`, or `None` if `tip` is not below
+/// `root`.
 pub(crate) fn path(tree: &Tree, root: usize, tip: usize) -> Option<Vec<usize>> {
     let mut joints = Vec::new();
     let mut at = tip;
@@ -19,8 +19,8 @@ pub(crate) fn path(tree: &Tree, root: usize, tip: usize) -> Option<Vec<usize>> {
     Some(joints)
 }
 
-/// Joints of the main chain: as the sheet says, else the chain with most free joints, then the
-/// longest, then the first.
+/// Joints of the main chain: the one that `robot.toml` names, else the chain with most free joints,
+/// among equals the longest, then the first.
 pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) -> Vec<usize> {
     let mut find = |name: &Option<String>| {
         let name = name.as_ref()?;
@@ -29,7 +29,7 @@ pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) ->
             findings.fail(
                 "robot.toml: main_chain",
                 format!("no such link \"{name}\""),
-                "mend the name",
+                "correct the name",
             );
         }
         at
@@ -59,7 +59,7 @@ pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) ->
     best.2
 }
 
-/// Sets the role of each link.
+/// Sets the role of each link: main chain, sub chain or effector.
 pub(crate) fn set_roles(
     tree: &mut Tree,
     main_chain: &[usize],
@@ -77,11 +77,11 @@ pub(crate) fn set_roles(
             None => findings.fail(
                 "robot.toml: effector",
                 format!("no such link \"{name}\""),
-                "mend the name",
+                "correct the name",
             ),
         }
     }
-    // Links come after their parents, so that each inherits what its parent is.
+    // Links come after their parents, so each inherits the role of its parent.
     let mut beyond = vec![false; tree.links.len()];
     let mut tool = vec![false; tree.links.len()];
     let mut followed = vec![false; tree.links.len()];

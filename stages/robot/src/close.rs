@@ -1,4 +1,4 @@
-//! Sub chains as `robot.toml` has them and a tree in; closed loops in order of solution out.
+//! Builds the closed loops of a model from the sub chains of `robot.toml`, in order of solution.
 
 use crate::finding::Findings;
 use crate::kinematics::Placing;
@@ -8,12 +8,12 @@ use crate::sheet::{LoopWord, SubChain};
 use contract::words::count;
 use geometry::Vector;
 
-/// Values of each free joint at which a loop is tried.
+/// Number of values of each free joint at which a loop is tested.
 const N_TRIES: u32 = 9;
-/// A gap that is worth a warning, metres: less than a scanner sees.
+/// Smallest gap of a loop that is reported, metres: less than a scanner resolves.
 const SEEN_GAP: f64 = 1e-4;
 
-/// Finds the loops of all sub chains and gives them to the model.
+/// Builds the loops of all sub chains and adds them to the model.
 pub(crate) fn close(
     model: &mut Model,
     sub_chains: &[SubChain],
@@ -69,7 +69,7 @@ fn pins(
                 findings.fail(
                     place,
                     format!("a closure names no link \"{name}\""),
-                    "mend the name",
+                    "correct the name",
                 );
             }
             at
@@ -89,14 +89,14 @@ fn pins(
     Some(pins)
 }
 
-/// Passive joints that one side of a pin hangs on and the other does not.
+/// Passive joints that lie above one end of a pin, but not above the other.
 fn between(model: &Model, passive: &[usize], pin: &Closure) -> Vec<usize> {
     (passive.iter().copied())
         .filter(|&j| model.hangs_on(pin.link_a, j) != model.hangs_on(pin.link_b, j))
         .collect()
 }
 
-/// Parts that share no passive joint.
+/// Groups the pins into loops that share no passive joint.
 fn split(
     model: &Model,
     passive: &[usize],
@@ -143,7 +143,7 @@ fn split(
     Some(parts)
 }
 
-/// Sets the form of a loop, and turns its pin so that side a is that of the first passive joint.
+/// Chooses the form of a loop and orders its pin so that side a is that of the first passive joint.
 fn shape(
     model: &Model,
     closed_loop: &mut ClosedLoop,
@@ -190,7 +190,7 @@ fn shape(
     Some(())
 }
 
-/// The closed form of a loop with one pin.
+/// The closed form that solves a loop with one pin, or the general form.
 fn single(model: &Model, passive: &[usize], pin: &Closure) -> Form {
     let placing = Placing::open(model, &vec![0.0; model.free.len()]);
     let turns = |j: usize| placing.turns(j);
@@ -215,7 +215,7 @@ fn single(model: &Model, passive: &[usize], pin: &Closure) -> Form {
     }
 }
 
-/// Loops with those first on which others hang.
+/// Sorts the loops so that those on which others depend come first.
 fn ordered(
     model: &Model,
     loops: Vec<ClosedLoop>,
@@ -233,7 +233,7 @@ fn ordered(
             !(0..waiting.len()).any(|other| other != at && needs(&waiting[at], &waiting[other]))
         });
         let Some(at) = ready else {
-            let what = "loops hang on one another in a circle";
+            let what = "loops depend on one another in a circle";
             findings.fail("robot.toml: sub_chain", what, "write their closures into one sub_chain");
             return None;
         };
@@ -271,7 +271,8 @@ fn set_modes(model: &mut Model, findings: &mut Findings) {
     }
 }
 
-/// Moves each free joint over its range, the others at home, and says where loops do not close.
+/// Moves each free joint over its range, with the others at home, and reports where loops do not
+/// close.
 fn try_range(model: &Model, findings: &mut Findings) {
     let mut worst = vec![0.0_f64; model.loops.len()];
     let mut beyond = vec![false; model.joints.len()];
@@ -286,7 +287,8 @@ fn try_range(model: &Model, findings: &mut Findings) {
             }
             for &joint in model.loops.iter().flat_map(|l| &l.passive) {
                 let value = placing.values[joint];
-                // A driver's own limits are often rounded: one hundredth is no news.
+                // The limits of the driving joint are often rounded: an excess of 1 % is not
+                // reported.
                 let outside =
                     |[lower, upper]: [f64; 2]| value < lower - 0.01 || value > upper + 0.01;
                 beyond[joint] |= model.joints[joint].limits.is_some_and(outside);

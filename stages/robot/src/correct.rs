@@ -1,5 +1,5 @@
-//! The text of a URDF and where joints are against it in; the text with those joints' origins moved
-//! out, all else as it was written, but for the declared encoding: what comes out is UTF-8.
+//! Rewrites the text of a URDF with some joint origins moved. All other text stays as it was,
+//! except for the declared encoding: the result is UTF-8.
 
 use crate::encoding;
 use crate::load::Settings;
@@ -9,10 +9,11 @@ use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use roxmltree::{Document, Node};
 
-/// Moves the origins of the named joints: each by a pose in the joint's own frame.
+/// Moves the origins of the named joints, each by a pose in the joint's own frame
+/// (`model_joint_from_joint`, metres), and returns the new text.
 ///
 /// # Errors
-/// Not a URDF, or a joint that it has not.
+/// If the text is no URDF, or if it has no joint of that name.
 pub fn correct(text: &str, moves: &[(String, Pose)]) -> Result<String> {
     let text = encoding::declare_utf8(text);
     contract::check_xml(text.as_bytes(), &Settings::default().xml()).map_err(Error::bad_input)?;
@@ -57,8 +58,8 @@ pub fn correct(text: &str, moves: &[(String, Pose)]) -> Result<String> {
     Ok(out)
 }
 
-/// An `<origin>` as it is written; what is no number counts as zero, as for the reader of models.
-/// `turns` says whether a quaternion counts.
+/// The pose of an `<origin>`; a word that is no number counts as zero, as when a model is loaded.
+/// `turns` says whether `quat_xyzw` is supported in this file.
 fn pose(origin: &Node<'_, '_>, turns: bool) -> Pose {
     let vector = |name: &str| {
         let mut numbers = origin
@@ -93,8 +94,8 @@ mod tests {
 
     #[test]
     fn a_quaternion_is_moved_as_the_reader_reads_it() {
-        // A quarter turn about z, so that a move along x goes along y; version 1.0 passes the
-        // quaternion over.
+        // The quaternion is a quarter turn about z, so that a move along x goes along y. In URDF
+        // 1.0 it is ignored.
         let text = |version: &str| {
             format!(
                 "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?><robot{version}><joint name=\"a\">\

@@ -1,19 +1,19 @@
-//! An arm and a tool in; the arm that carries the tool out.
+//! Mounts a tool on an arm: two models become one model.
 
 use crate::model::{Joint, JointKind, Link, Model, Motion, Role};
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::f64::consts::PI;
 
-/// Frames that tools are bolted to, by convention (ROS-Industrial, REP 199), best first.
+/// Names of frames that tools are bolted to (ROS-Industrial, REP 199), in order of preference.
 const FLANGES: [&str; 3] = ["tool0", "flange", "tool"];
-/// Frames that differ by less are one, metres and radians.
+/// Frames that differ by less are the same, metres and radians.
 const SAME_FRAME: f64 = 1e-3;
 
 impl Model {
-    /// Links that a tool may be bolted to: frames that hang rigidly on the last link that moves,
-    /// those of the usual names first, then the tip of the main chain and others without a
-    /// body, and that link itself; those that stand alike once.
+    /// Indices of the links that a tool may be bolted to, without those at the same pose: frames
+    /// that are rigidly connected to the last link that moves, those with the usual names first,
+    /// then the tip of the main chain and other frames without a body, and last that link itself.
     #[must_use]
     pub fn flanges(&self) -> Vec<usize> {
         let moves = |j: &&usize| self.joints[**j].kind != JointKind::Fixed;
@@ -46,9 +46,10 @@ impl Model {
         out
     }
 
-    /// How a tool stands on this link before it is turned: its z along the axis of the robot's last
-    /// joint, away from the body that carries the link, whichever way the link's own frame
-    /// looks; and whether that joint turns the same way about z (1) or the other (−1).
+    /// The rotation `link_from_tool` with which a tool is mounted on this link before it is rotated
+    /// about its own z: the tool's z runs along the axis of the robot's last joint, away from the
+    /// body that carries the link, whichever way the link's own frame looks. Also returns whether
+    /// the last joint turns the same way about that z (1) or the other (−1).
     #[must_use]
     pub fn mount(&self, flange: usize) -> (UnitQuaternion<f64>, f64) {
         let poses = self.poses(&self.home());
@@ -71,12 +72,12 @@ impl Model {
         (turn, way)
     }
 
-    /// This robot with a tool's root link on one of its links, as [`Self::mount`] has it and turned
-    /// by `mount` about its own z, radians. A joint of the tool whose name the robot has
-    /// already gets the tool's before it; its joints come after the robot's own.
+    /// This robot with a tool's root link on the link `flange`, oriented by [`Self::mount`] and
+    /// then rotated by `mount` radians about its own z. The tool's joints follow the robot's own;
+    /// where the robot has a joint of the same name, the tool's name is put in front.
     ///
     /// # Panics
-    /// If there is no such link.
+    /// If the robot has no link `flange`.
     #[must_use]
     pub fn with_tool(&self, tool: &Self, flange: usize, mount: f64) -> Self {
         assert!(flange < self.links.len(), "a tool hangs on a link of its robot");
@@ -97,7 +98,7 @@ impl Model {
                 if is_taken { format!("{}/{}", tool.name, joint.name) } else { joint.name.clone() };
             Joint { name, parent, child, motion, ..joint.clone() }
         };
-        // Its own joint first: parents before children.
+        // The mounting joint comes first, since parents go before children.
         out.joints.push(Joint {
             name: format!("{}_mount", tool.name),
             kind: JointKind::Fixed,

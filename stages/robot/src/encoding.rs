@@ -1,16 +1,16 @@
-//! Bytes of an XML file in, its text out, by byte order mark or declared encoding: UTF-8, UTF-16,
-//! ASCII and ISO-8859-1. Any other encoding is refused by its name, since a wrong guess changes the
-//! names of links and of files.
+//! Decodes the bytes of an XML file by its byte order mark or its declared encoding: UTF-8, UTF-16,
+//! ASCII or ISO-8859-1. Any other encoding is refused by name, since a wrong guess would change the
+//! names of links and files.
 
 use std::borrow::Cow;
 
-/// The declaration stands at the beginning of a file; a longer one than this is none, bytes.
+/// Number of bytes at the beginning of a file in which the XML declaration must end.
 const DECLARATION: usize = 256;
 
-/// The text of an XML file without its byte order mark, or why its bytes are no text.
+/// The text of an XML file without its byte order mark, or why its bytes cannot be decoded.
 pub(crate) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
     match bytes {
-        // A mark, or else the first character, which is `<` in every XML file.
+        // A byte order mark, or else the first character, which is `<` in every XML file.
         [0xFF, 0xFE, rest @ ..] => utf16(rest, u16::from_le_bytes),
         [0xFE, 0xFF, rest @ ..] => utf16(rest, u16::from_be_bytes),
         [b'<', 0, second, 0, ..] if *second != 0 => utf16(bytes, u16::from_le_bytes),
@@ -20,8 +20,8 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
     }
 }
 
-/// UTF-16 that is declared and not there reads as the UTF-8 that it is: the declaration itself was
-/// found as such.
+/// Decodes text without a mark by its declaration. If that names UTF-16, the text is UTF-8 all the
+/// same, since the declaration could be read as such.
 fn by_declaration(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
     let Some(name) = declared(bytes) else {
         return utf8(bytes);
@@ -38,13 +38,13 @@ fn by_declaration(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
     }
 }
 
-/// What the XML declaration names as encoding.
+/// The name of the encoding in the XML declaration, if there is one.
 pub(crate) fn declared(bytes: &[u8]) -> Option<&str> {
     let name = encoding(bytes)?;
     std::str::from_utf8(&bytes[name]).ok()
 }
 
-/// Where the name of the encoding stands in the XML declaration.
+/// The position of that name in the file.
 fn encoding(bytes: &[u8]) -> Option<std::ops::Range<usize>> {
     let head = &bytes[..bytes.len().min(DECLARATION)];
     let end = head.windows(2).position(|w| w == b"?>")?;
@@ -68,7 +68,7 @@ fn encoding(bytes: &[u8]) -> Option<std::ops::Range<usize>> {
     Some(from..from + n)
 }
 
-/// The same text with UTF-8 as its declared encoding, for text that is written as UTF-8.
+/// The text with UTF-8 as its declared encoding, for writing it as UTF-8.
 pub(crate) fn declare_utf8(text: &str) -> Cow<'_, str> {
     match encoding(text.as_bytes()) {
         Some(name) if !text[name.clone()].eq_ignore_ascii_case("utf-8") => {

@@ -1,4 +1,4 @@
-//! Findings: what is wrong with a library or worth knowing, for people.
+//! Findings: messages to the user about problems of a robot library.
 
 use contract::{Error, Kind};
 use serde::{Deserialize, Serialize};
@@ -7,34 +7,34 @@ use std::fmt::Display;
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Severity {
-    /// Worth knowing.
+    /// Information; nothing needs to be done.
     Note,
-    /// The model loads, but not as its author meant it.
+    /// The model loads, but probably not as its author meant it.
     Warning,
     /// The model cannot be loaded.
     Error,
 }
 
-/// Something to say about a model.
+/// One message about a model.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Finding {
     /// Name of the model; empty for the library itself.
     pub model: String,
     /// How bad it is.
     pub severity: Severity,
-    /// What was found, a half sentence.
+    /// The problem, as a half sentence.
     pub what: String,
-    /// File and element.
+    /// File and element that it concerns.
     pub place: String,
-    /// The way out; empty where nothing need be done.
+    /// What the user can do about it; empty where nothing needs to be done.
     pub way_out: String,
 }
 
-/// Most findings of a model of each severity: whoever mends a library reads no more, and a file of
-/// a few megabytes can be wrong in a hundred thousand places.
+/// Largest number of findings of each severity for one model: a file of a few megabytes can have a
+/// hundred thousand problems, and nobody reads as many.
 const MAX_FINDINGS: usize = 100;
 
-/// Findings of one model while it is read.
+/// Collects the findings of one model while it is loaded.
 #[derive(Debug, Default)]
 pub(crate) struct Findings {
     model: String,
@@ -55,9 +55,11 @@ impl Findings {
             Finding {
                 model: self.model.clone(),
                 severity,
-                what: format!("there are more than these {MAX_FINDINGS}, which are not listed"),
+                what: format!(
+                    "there are more than these {MAX_FINDINGS}; the others are not listed"
+                ),
                 place: String::new(),
-                way_out: "mend those that are listed first".to_owned(),
+                way_out: "correct those that are listed first".to_owned(),
             }
         };
         if !self.list.contains(&finding) {
@@ -81,7 +83,7 @@ impl Findings {
         self.list.iter().any(|f| f.severity == Severity::Error)
     }
 
-    /// The first finding that keeps the model from loading, as an error.
+    /// The first finding that prevents the model from loading, as an error.
     pub(crate) fn first_error(&self) -> Error {
         match self.list.iter().find(|f| f.severity == Severity::Error) {
             Some(f) => {

@@ -1,10 +1,10 @@
-//! Points in; the convex body around them out.
+//! The convex hull of points.
 
 use crate::model::Mesh;
 use parry3d::transformation::try_convex_hull;
 
-/// The convex hull of some points, metres, its triangles counter-clockwise from outside; `None`
-/// where they lie in a plane or are too few.
+/// The convex hull of points (metres), with triangles counter-clockwise as seen from outside;
+/// `None` for fewer than four points, or where they lie in a plane.
 #[must_use]
 pub fn hull(points: &[[f32; 3]]) -> Option<Mesh> {
     let points: Vec<_> = points.iter().map(|p| glamx::Vec3::from_array(*p)).collect();
@@ -16,12 +16,12 @@ pub fn hull(points: &[[f32; 3]]) -> Option<Mesh> {
             a.dot(b.cross(c)) / 6.0
         })
         .sum();
-    // What is flat has two sides and nothing between them.
+    // A flat hull has two sides and no volume.
     (volume > FLAT)
         .then(|| Mesh { vertices: vertices.iter().map(|v| v.to_array()).collect(), triangles })
 }
 
-/// Smaller bodies are none, m³: a cube of 1 mm.
+/// Smallest volume of a body, m³: that of a cube of 1 mm.
 const FLAT: f32 = 1e-9;
 
 #[cfg(test)]

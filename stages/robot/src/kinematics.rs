@@ -1,4 +1,5 @@
-//! A posture in; poses of all links out, and how they move with each free joint.
+//! Forward kinematics: the poses of all links at a posture, and their derivatives by the free
+//! joints.
 
 use crate::loops::ClosedLoop;
 use crate::model::{Joint, JointKind, Kinematics, Model, Motion};
@@ -6,12 +7,13 @@ use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::f64::consts::PI;
 
-/// Fewer free joints in the main chain than this make a gripper or gun, not a robot: the smallest
-/// palletisers have four.
+/// A model with fewer free joints in its main chain is a gripper or a gun and no robot; the
+/// smallest palletisers have four.
 const MIN_ROBOT_JOINTS: usize = 3;
 
 impl Joint {
-    /// Pose of the child link in the parent link's frame at a value of the joint.
+    /// The pose `parent_from_child` of the links that the joint connects, at a value of the joint
+    /// (radians or metres).
     #[must_use]
     pub fn parent_from_child(&self, value: f64) -> Pose {
         match self.kind {
@@ -27,7 +29,7 @@ impl Joint {
     }
 }
 
-/// A model with the values of its joints, some of them perhaps not yet set.
+/// A model with the values of its joints; those of passive joints may not be solved yet.
 pub(crate) struct Placing<'a> {
     pub(crate) model: &'a Model,
     pub(crate) posture: Vec<f64>,
@@ -35,7 +37,7 @@ pub(crate) struct Placing<'a> {
 }
 
 impl<'a> Placing<'a> {
-    /// Sets free and mimic joints; loops are open.
+    /// Sets free and mimic joints and leaves the loops open.
     pub(crate) fn open(model: &'a Model, posture: &[f64]) -> Self {
         let mut placing =
             Self { model, posture: posture.to_vec(), values: vec![0.0; model.joints.len()] };
@@ -55,7 +57,7 @@ impl<'a> Placing<'a> {
         }
     }
 
-    /// All values, loops closed as far as they close.
+    /// Sets all joints; loops are closed as far as possible.
     pub(crate) fn closed(model: &'a Model, posture: &[f64]) -> Self {
         let mut placing = Self::open(model, posture);
         for closed_loop in &model.loops {
@@ -64,7 +66,7 @@ impl<'a> Placing<'a> {
         placing
     }
 
-    /// Another posture, with all loops solved that come before `until`.
+    /// Changes to another posture and solves all loops that come before `until`.
     pub(crate) fn move_to(&mut self, posture: Vec<f64>, until: &ClosedLoop) {
         self.posture = posture;
         self.set_followers();
@@ -73,7 +75,7 @@ impl<'a> Placing<'a> {
         }
     }
 
-    /// Base from link.
+    /// The pose `base_from_link` of a link.
     fn pose(&self, link: usize) -> Pose {
         let mut pose = Pose::identity();
         let mut at = link;
@@ -85,19 +87,19 @@ impl<'a> Placing<'a> {
         pose
     }
 
-    /// A point of a link, base frame.
+    /// Converts a point from a link's frame to the base frame.
     pub(crate) fn point(&self, link: usize, point: &Point) -> Point {
         self.pose(link) * point
     }
 
-    /// Origin and direction of a joint's axis, base frame.
+    /// Origin and direction of a joint's axis in the base frame.
     pub(crate) fn axis(&self, joint: usize) -> (Point, Vector) {
         let j = &self.model.joints[joint];
         let base_from_joint = self.pose(j.parent) * j.parent_from_joint;
         (base_from_joint.translation.vector.into(), base_from_joint * j.axis.into_inner())
     }
 
-    /// The link that carries a joint, and the joint's origin in its frame.
+    /// The link that carries a joint, and the joint's origin in the frame of that link.
     pub(crate) fn carrier(&self, joint: usize) -> (usize, Point) {
         let j = &self.model.joints[joint];
         (j.parent, j.parent_from_joint.translation.vector.into())
@@ -107,7 +109,7 @@ impl<'a> Placing<'a> {
         matches!(self.model.joints[joint].kind, JointKind::Revolute | JointKind::Continuous)
     }
 
-    /// Velocity of the point `p` (base frame) of a link for a unit rate of one joint.
+    /// Velocity of the point `p` (base frame) of a link at unit rate of one joint.
     pub(crate) fn moves(&self, joint: usize, link: usize, p: &Point) -> Vector {
         if !self.model.hangs_on(link, joint) {
             return Vector::zeros();
@@ -120,7 +122,7 @@ impl<'a> Placing<'a> {
         }
     }
 
-    /// Velocity of the point `p` (base frame) of a link for these rates of all joints.
+    /// Velocity of the point `p` (base frame) of a link at these rates of all joints.
     pub(crate) fn velocity(&self, link: usize, p: &Point, rates: &[f64]) -> Vector {
         let mut velocity = Vector::zeros();
         let mut at = link;
@@ -147,7 +149,7 @@ impl<'a> Placing<'a> {
         poses
     }
 
-    /// Rate of each joint for a unit rate of one free joint.
+    /// The rate of each joint at unit rate of one free joint.
     fn rates(&self, free: usize) -> Vec<f64> {
         let mut rates: Vec<f64> = (self.model.joints.iter())
             .map(|joint| match joint.motion {
@@ -167,8 +169,9 @@ impl<'a> Placing<'a> {
 }
 
 impl Model {
-    /// No part of the robot gets farther from the base's origin, metres: sum of the distances from
-    /// joint to joint along the longest way, and the size of what hangs at its end.
+    /// Upper bound of the distance of any part of the robot from the base's origin, metres: the sum
+    /// of the distances from joint to joint along the longest chain, plus the size of the last
+    /// link.
     #[must_use]
     pub fn reach(&self) -> f64 {
         let mut longest = 0.0_f64;
@@ -180,8 +183,8 @@ impl Model {
         longest
     }
 
-    /// How far each link's origin gets from that of the base at most, metres: the distances from
-    /// joint to joint, and strokes.
+    /// For each link the largest distance that its origin can have from the base's, metres: the sum
+    /// of the distances from joint to joint, with the strokes of prismatic joints.
     #[must_use]
     pub fn ways(&self) -> Vec<f64> {
         let mut ways = vec![0.0_f64; self.links.len()];
@@ -199,7 +202,7 @@ impl Model {
         ways
     }
 
-    /// For each link: whether a joint that moves lies between it and the base.
+    /// For each link, whether a joint that moves lies between it and the base.
     #[must_use]
     pub fn moving(&self) -> Vec<bool> {
         let mut moving = vec![false; self.links.len()];
@@ -210,26 +213,26 @@ impl Model {
         moving
     }
 
-    /// Number of free joints: the length of a posture.
+    /// Number of free joints, which is the length of a posture.
     #[must_use]
     pub fn n_free(&self) -> usize {
         self.free.len()
     }
 
-    /// Pose of each link, base from link, at a posture.
+    /// The pose `base_from_link` of each link at a posture (radians or metres a free joint).
     ///
     /// # Panics
-    /// If `posture` has not one value for each free joint.
+    /// If the length of `posture` is not the number of free joints.
     #[must_use]
     pub fn poses(&self, posture: &[f64]) -> Vec<Pose> {
         assert_eq!(posture.len(), self.free.len(), "a posture has one value for each free joint");
         Placing::closed(self, posture).poses()
     }
 
-    /// Poses and twists of all links at a posture.
+    /// Poses and twists of all links at a posture (radians or metres a free joint).
     ///
     /// # Panics
-    /// If `posture` has not one value for each free joint.
+    /// If the length of `posture` is not the number of free joints.
     #[must_use]
     pub fn kinematics(&self, posture: &[f64]) -> Kinematics {
         assert_eq!(posture.len(), self.free.len(), "a posture has one value for each free joint");
@@ -256,14 +259,14 @@ impl Model {
         Kinematics { base_from_link, twists }
     }
 
-    /// Value of each joint at a posture, in the order of `joints`: radians or metres; fixed joints
-    /// zero.
+    /// Value of each joint at a posture, in the order of `joints`, radians or metres; zero for
+    /// fixed joints.
     #[must_use]
     pub fn joint_values(&self, posture: &[f64]) -> Vec<f64> {
         Placing::closed(self, posture).values
     }
 
-    /// The largest opening of the closed loops at a posture, metres; zero for a robot without
+    /// The largest gap that the closed loops have at a posture, metres; zero for a robot without
     /// loops.
     #[must_use]
     pub fn loop_gap(&self, posture: &[f64]) -> f64 {
@@ -271,7 +274,7 @@ impl Model {
         self.loops.iter().map(|l| l.gap(&placing)).fold(0.0, f64::max)
     }
 
-    /// Zero, moved inside the limits.
+    /// The home posture: zero for each free joint, clamped to its limits.
     #[must_use]
     pub fn home(&self) -> Vec<f64> {
         (0..self.free.len())
@@ -286,14 +289,15 @@ impl Model {
         self.joints[self.free[free]].limits.unwrap_or([-PI, PI])
     }
 
-    /// A gripper or gun rather than a robot: fewer than three free joints in the main chain.
+    /// Whether the model is a gripper or a gun: it has fewer than three free joints in its main
+    /// chain.
     #[must_use]
     pub fn is_tool(&self) -> bool {
         let free = |j: &&usize| matches!(self.joints[**j].motion, Motion::Free(_));
         self.main_chain.iter().filter(free).count() < MIN_ROBOT_JOINTS
     }
 
-    /// Index of the link of that name.
+    /// Index of the link with this name.
     #[must_use]
     pub fn link(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|l| l.name == name)
@@ -313,7 +317,7 @@ impl Model {
     }
 }
 
-/// Twist `[v, w]` in the base frame for a unit rate.
+/// Twist `[v, w]` of a joint's child in the base frame at unit rate.
 fn unit_twist(joint: &Joint, base_from_joint: &Pose) -> [f64; 6] {
     let axis = base_from_joint * joint.axis.into_inner();
     match joint.kind {

@@ -1,4 +1,4 @@
-//! A folder of models in; models and findings out.
+//! Loads a library: a folder with one folder for each robot or tool.
 
 use crate::finding::{Finding, Findings, Severity};
 use crate::load::{Settings, load, urdfs};
@@ -7,21 +7,21 @@ use contract::words::count;
 use contract::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// All models that a run may find.
+/// All models that a run may find in the scans.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Library {
-    /// Sorted by name.
+    /// The models, sorted by name.
     pub models: Vec<Model>,
-    /// What is wrong or worth knowing, in order of the models' names.
+    /// Problems and information, in the order of the models' names.
     pub findings: Vec<Finding>,
 }
 
 impl Library {
-    /// Loads all models of a library; those that cannot be loaded are left out and explained in
+    /// Loads all models of a library. A model that cannot be loaded is left out and explained in
     /// `findings`.
     ///
     /// # Errors
-    /// If the folder cannot be read, or no model is left.
+    /// If the folder cannot be read, or if no model can be loaded.
     pub fn load(dir: &Path, settings: &Settings) -> Result<Self> {
         let (folders, mut library) = Self::open(dir)?;
         for folder in &folders {
@@ -30,8 +30,7 @@ impl Library {
         library.checked(dir)
     }
 
-    /// Everything wrong with a library, and what is worth knowing; a library that cannot be opened
-    /// is one finding.
+    /// All findings about a library. A library that cannot be opened gives a single finding.
     #[must_use]
     pub fn lint(dir: &Path, settings: &Settings) -> Vec<Finding> {
         let settings = &Settings { clouds: false, ..*settings };
@@ -53,9 +52,9 @@ impl Library {
         library.findings
     }
 
-    /// The folders that hold models, sorted by name, and a library without models that says what
-    /// was passed over: for loading in parallel with [`Library::load_folder`], [`Library::add`]
-    /// and [`Library::checked`].
+    /// The model folders of a library, sorted by name, and a library without models that already
+    /// has the findings about ignored folders. It is the first step of loading models in parallel,
+    /// with [`Library::load_folder`], [`Library::add`] and [`Library::checked`].
     ///
     /// # Errors
     /// If the folder cannot be read.
@@ -81,12 +80,12 @@ impl Library {
         folders.retain(|folder| {
             let name = name(folder);
             if name.starts_with(['_', '.']) {
-                passed.note(folder.display(), "is passed over for its name", "");
+                passed.note(folder.display(), "is ignored because of its name", "");
                 return false;
             }
             let holds = folder.join("robot.toml").is_file() || !urdfs(folder).is_empty();
             if !holds {
-                passed.note(folder.display(), "is passed over, it has no robot.urdf", "");
+                passed.note(folder.display(), "is ignored, since it has no robot.urdf", "");
             }
             holds
         });
@@ -109,16 +108,16 @@ impl Library {
         (model, findings.list)
     }
 
-    /// Adds a model; in the order of the folders, whatever order they were loaded in.
+    /// Adds a loaded model. The models must be added in the order of their folders.
     pub fn add(&mut self, (model, findings): (Option<Model>, Vec<Finding>)) {
         self.models.extend(model);
         self.findings.extend(findings);
     }
 
-    /// The library, if it holds a model.
+    /// Returns the library if it holds at least one model.
     ///
     /// # Errors
-    /// If it holds none: with the reasons.
+    /// If it holds none, with the reasons.
     pub fn checked(self, dir: &Path) -> Result<Self> {
         if !self.models.is_empty() {
             return Ok(self);
@@ -139,7 +138,7 @@ impl Library {
             .hint("`stillpoint robots lint` explains all of them"))
     }
 
-    /// Index of the model of that name.
+    /// Index of the model with this name.
     #[must_use]
     pub fn model(&self, name: &str) -> Option<usize> {
         self.models.iter().position(|m| m.name == name)

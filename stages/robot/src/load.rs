@@ -1,4 +1,4 @@
-//! A model's folder in, a model out: its URDF and `robot.toml`, sub chains, meshes, CAD clouds.
+//! Loads a model from its folder: URDF, `robot.toml`, sub chains, meshes and CAD clouds.
 
 use crate::bodies::Bodies;
 use crate::finding::{Finding, Findings};
@@ -14,32 +14,33 @@ use contract::{Error, Fan, OneByOne, Result, XmlLimits};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// What to load, and how finely.
+/// What is loaded, how finely it is sampled, and the limits on files.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Make CAD clouds. Without them loading takes a tenth of the time: for linting and
-    /// simulation.
+    /// Whether to make CAD clouds. Without them loading takes a tenth of the time, which is enough
+    /// for linting and simulation.
     pub clouds: bool,
-    /// Distance between neighbouring samples, metres. 5 mm: the spacing of a scan at 10 m.
+    /// Distance between neighbouring samples, metres. The default of 5 mm is the spacing of the
+    /// points of a scan at 10 m.
     pub spacing: f64,
-    /// Most samples of a link; a larger link gets a wider spacing. 60 k: one cubic metre's surface
-    /// at 10 mm.
+    /// Largest number of samples of a link; a larger link gets a wider spacing. The default of
+    /// 60,000 covers the surface of a cubic metre at 10 mm.
     pub max_samples: usize,
-    /// Largest mesh file that is read, bytes. 256 MiB: ten times the largest robot met, all links
-    /// together.
+    /// Largest mesh file, bytes. The default of 256 MiB is ten times the meshes of the largest
+    /// known robot together.
     pub max_mesh_bytes: u64,
-    /// What a COLLADA file may come to in memory and work, times its size and a megabyte more: a
-    /// file names the same geometry again and again, and nodes that do. Real ones come to four
-    /// times their size.
+    /// Largest memory and work for a COLLADA file, as a multiple of its size plus one MiB. A file
+    /// can instantiate the same geometry again and again, and nest such nodes; real files come to
+    /// four times their size.
     pub max_mesh_growth: u64,
-    /// Largest URDF and `robot.toml` that is read, bytes: text about a few dozen links. Real ones
-    /// stay below 1 MiB.
+    /// Largest URDF or `robot.toml`, bytes. Real files describe a few dozen links in less than
+    /// 1 MiB.
     pub max_urdf_bytes: u64,
-    /// Most elements, attributes and texts of a URDF or COLLADA file: their reader keeps about 80
-    /// bytes of each.
+    /// Largest number of elements, attributes and texts of a URDF or COLLADA file; the XML reader
+    /// keeps about 80 bytes of each.
     pub max_xml_nodes: u64,
-    /// Most attributes of one element of them: real ones have below ten, and their reader compares
-    /// each with all others.
+    /// Largest number of attributes of one XML element. Real files have below ten, and the reader
+    /// compares each with all others.
     pub max_xml_attributes: u64,
 }
 
@@ -59,7 +60,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Meshes and kinematics only.
+    /// Settings that load meshes and kinematics, but make no CAD clouds.
     #[must_use]
     pub fn without_clouds() -> Self {
         Self { clouds: false, ..Self::default() }
@@ -75,10 +76,10 @@ impl Settings {
 }
 
 impl Model {
-    /// Loads one model from its folder; beside it what is worth knowing.
+    /// Loads one model from its folder and returns it with its findings.
     ///
     /// # Errors
-    /// The first finding that keeps it from loading.
+    /// The first finding that prevents the model from loading.
     pub fn load(folder: &Path, settings: &Settings) -> Result<(Self, Vec<Finding>)> {
         let name = folder
             .file_name()
@@ -90,10 +91,11 @@ impl Model {
         }
     }
 
-    /// Loads one model from a URDF file alone; a `robot.toml` beside it is not read.
+    /// Loads one model from a URDF file and returns it with its findings; a `robot.toml` in the
+    /// same folder is not read.
     ///
     /// # Errors
-    /// The first finding that keeps it from loading.
+    /// The first finding that prevents the model from loading.
     pub fn load_urdf(path: &Path, name: &str, settings: &Settings) -> Result<(Self, Vec<Finding>)> {
         let mut findings = Findings::new(name);
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -105,7 +107,7 @@ impl Model {
         }
     }
 
-    /// Makes the CAD clouds of all links, of a model that was loaded without them.
+    /// Makes the CAD clouds of all links of a model that was loaded without them.
     pub fn sample(&mut self, settings: &Settings, fan: &dyn Fan) {
         let links = self.links.iter().collect();
         let sample =
@@ -117,7 +119,7 @@ impl Model {
     }
 }
 
-/// Loads the model of a folder.
+/// Loads the model of a folder and collects its findings.
 pub(crate) fn load(
     folder: &Path,
     name: &str,
@@ -146,10 +148,10 @@ pub(crate) fn load(
     Loader { name, roots, settings }.load(&path, &sheet, findings)
 }
 
-/// The URDF file that a model's folder is loaded from.
+/// The path of the URDF file from which a model's folder is loaded.
 ///
 /// # Errors
-/// What keeps the model from loading: a `robot.toml` that cannot be read, or no such file.
+/// If `robot.toml` cannot be read, or if there is no URDF file.
 pub fn urdf_of(folder: &Path) -> Result<PathBuf> {
     let mut findings = Findings::new(&file_name(folder));
     let roots = Roots::new(folder, None).map_err(|e| Error::from(e).at(folder.display()))?;
@@ -161,7 +163,7 @@ pub fn urdf_of(folder: &Path) -> Result<PathBuf> {
     find().ok_or_else(|| findings.first_error())
 }
 
-/// The one that `robot.toml` names, else `robot.urdf` or the only one.
+/// The URDF that `robot.toml` names, else `robot.urdf`, else the only URDF of the folder.
 fn urdf_in(
     folder: &Path,
     sheet: &Sheet,
@@ -175,7 +177,7 @@ fn urdf_in(
     match roots.find(written) {
         Ok(found) => Some(found.path),
         Err(what) => {
-            findings.fail("robot.toml: urdf", format!("{what} \"{written}\""), "mend the name");
+            findings.fail("robot.toml: urdf", format!("{what} \"{written}\""), "correct the name");
             None
         }
     }
@@ -202,13 +204,14 @@ fn read_sheet(
     }
 }
 
-/// A file of the model, unless it is a link that leads out of its folder and the library's.
+/// The path of a file of the model, unless it is a link that leads out of the model's and the
+/// library's folder.
 fn inside(path: &Path, roots: &Roots, findings: &mut Findings) -> Option<PathBuf> {
     let found = roots.inside(path);
     found.map_err(|what| findings.fail(file_name(path), what, "put the file itself there")).ok()
 }
 
-/// `robot.urdf`, or the only URDF there is.
+/// `robot.urdf`, or else the only URDF of the folder.
 pub(crate) fn find_urdf(folder: &Path, findings: &mut Findings) -> Option<PathBuf> {
     let path = folder.join("robot.urdf");
     if path.is_file() {
@@ -240,7 +243,7 @@ pub(crate) fn find_urdf(folder: &Path, findings: &mut Findings) -> Option<PathBu
     }
 }
 
-/// URDF files of a folder, sorted.
+/// The URDF files of a folder, sorted by name.
 pub(crate) fn urdfs(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return Vec::new();
@@ -295,7 +298,8 @@ impl Loader<'_> {
         Some(model)
     }
 
-    /// Adds the links and joints of a sub chain's own URDF; gives the names of its moving joints.
+    /// Adds the links and joints of a sub chain's own URDF and returns the names of its moving
+    /// joints.
     fn join(
         &self,
         description: &mut Description,
@@ -315,8 +319,8 @@ impl Loader<'_> {
         Some(moving)
     }
 
-    /// The new links and joints of a sub chain's URDF, its root renamed to the link of the main
-    /// URDF that it is.
+    /// The new links and joints of a sub chain's URDF. Its root link is replaced by the link of the
+    /// main URDF that it stands for.
     fn sub_urdf(
         &self,
         main: &Description,
@@ -326,7 +330,7 @@ impl Loader<'_> {
     ) -> Option<Description> {
         let place = close::place(sub_chain);
         let found = self.roots.find(written).map_err(|what| {
-            findings.fail(&place, format!("{what} \"{written}\""), "mend the name");
+            findings.fail(&place, format!("{what} \"{written}\""), "correct the name");
         });
         let most = self.settings.max_urdf_bytes;
         let text = read_xml(&found.ok()?.path, most, written, findings)?;

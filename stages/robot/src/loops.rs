@@ -1,5 +1,6 @@
-//! Closed loops: values of the other joints in, values of the passive joints out; planar four-bars,
-//! cylinders and bars in closed form, anything else by Newton's method from the zero posture.
+//! Solves closed loops: computes the values of the passive joints from those of all others. Planar
+//! four-bar linkages, cylinders and bars have closed forms; any other loop is solved by Newton's
+//! method, starting from the zero posture.
 
 use crate::kinematics::Placing;
 use crate::model::Model;
@@ -7,44 +8,45 @@ use geometry::{Point, Vector};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Steps from the zero posture for loops without a closed form: small enough to stay in the
-/// assembly mode.
+/// Number of steps from the zero posture for a loop without a closed form: small enough steps to
+/// stay in the assembly mode.
 const N_STEPS: u32 = 8;
-/// Newton steps each; three are enough from a neighbouring posture.
+/// Largest number of Newton iterations for each step; three are enough from a neighbouring posture.
 const N_NEWTON: u32 = 12;
-/// Below this the loop is closed, metres; rounding is 1e-15.
+/// Gap below which a loop counts as closed, metres; rounding errors are about 1e-15.
 pub(crate) const CLOSED: f64 = 1e-9;
 
-/// A loop that the tree leaves open.
+/// A kinematic loop that the tree of the URDF leaves open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClosedLoop {
-    /// As `robot.toml` calls it.
+    /// Name of the sub chain in `robot.toml`.
     pub name: String,
-    /// Indices of the joints that it sets, in tree order.
+    /// Indices of the passive joints that the loop sets, in tree order.
     pub passive: Vec<usize>,
-    /// Pins that hold it together.
+    /// The pins that close the loop.
     pub closures: Vec<Closure>,
-    /// How it is solved.
+    /// How the loop is solved.
     pub form: Form,
 }
 
-/// A pin: two points of two links that coincide, seen along the axes of the loop.
+/// A pin: points of two links that coincide when seen along the axes of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Closure {
     /// Index of the link on the side of the first passive joint.
     pub link_a: usize,
-    /// The pin in its frame, metres.
+    /// The pin in the frame of link a, metres.
     pub point_a: Point,
     /// Index of the other link.
     pub link_b: usize,
-    /// The pin in its frame, metres.
+    /// The pin in the frame of link b, metres.
     pub point_b: Point,
 }
 
-/// How a loop is solved. `mode` is +1 or −1: which of two solutions, that of the zero posture.
+/// How a loop is solved. `mode` is +1 or −1 and selects one of the two solutions: that of the zero
+/// posture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Form {
-    /// Two revolute joints one after the other, then the pin.
+    /// Two revolute joints in a row, then the pin.
     RrrSerial {
         /// Which of two solutions.
         mode: f64,
@@ -54,36 +56,36 @@ pub enum Form {
         /// Which of two solutions.
         mode: f64,
     },
-    /// A revolute joint that carries a prismatic one, then the pin.
+    /// A revolute joint, a prismatic joint that it carries, then the pin.
     Rpr {
         /// Which of two solutions.
         mode: f64,
     },
-    /// A bar that points at the pin.
+    /// One revolute joint with a bar that points at the pin.
     Rr,
-    /// By Newton's method.
+    /// Any other loop, solved by Newton's method.
     General,
 }
 
-/// The part of `v` across the unit vector `n`.
+/// The component of `v` perpendicular to the unit vector `n`.
 fn across(v: Vector, n: &Vector) -> Vector {
     v - n * n.dot(&v)
 }
 
-/// Angle about the unit vector `n` that turns `from` to `to`, both seen along `n`.
+/// Angle about the unit vector `n` from `from` to `to`, both projected along `n`, radians.
 fn turn(from: &Vector, to: &Vector, n: &Vector) -> f64 {
     let (from, to) = (across(*from, n), across(*to, n));
     n.dot(&from.cross(&to)).atan2(from.dot(&to))
 }
 
-/// `v`, seen along `n`, turned about it, of unit length.
+/// `v` projected along `n`, rotated about `n` by `angle` radians, and normalised.
 fn turned(v: &Vector, n: &Vector, angle: f64) -> Vector {
     let v = across(*v, n);
     (v * angle.cos() + n.cross(&v) * angle.sin()).try_normalize(1e-15).unwrap_or_else(Vector::zeros)
 }
 
 impl ClosedLoop {
-    /// Sets the values of the passive joints; all others that it hangs on are set.
+    /// Sets the passive joints; all other joints that the loop depends on must be set already.
     pub(crate) fn solve(&self, placing: &mut Placing) {
         let pin = self.closures[0];
         for &joint in &self.passive {
@@ -112,7 +114,7 @@ impl ClosedLoop {
         let along = across(placing.axis(slide).1, &axis);
         let start = across(placing.point(pin.link_a, &pin.point_a) - origin, &axis);
         let target = across(placing.point(pin.link_b, &pin.point_b) - origin, &axis);
-        // |start + s·along| = |target|
+        // Solve |start + s·along| = |target| for s.
         let (a, b) = (along.norm_squared(), start.dot(&along));
         if a < 1e-12 {
             return;
@@ -166,7 +168,7 @@ impl ClosedLoop {
                 let Ok(down) = svd.solve(&residual, 1e-9) else {
                     break;
                 };
-                // A step of half a radian is as far as the linear picture holds.
+                // The linearisation holds for steps of at most about half a radian.
                 x -= &down * (0.5 / down.amax()).min(1.0);
             }
         }
@@ -175,8 +177,8 @@ impl ClosedLoop {
         }
     }
 
-    /// Gap of the pins and its derivatives by the passive joints, seen along the axis of the first
-    /// revolute one; in space where all slide.
+    /// Gap of the pins and its derivatives by the passive joints, in the plane across the axis of
+    /// the first revolute one, or in space where all passive joints slide.
     fn equations(&self, placing: &Placing) -> (DVector<f64>, DMatrix<f64>) {
         let rows = self.directions(placing);
         let n = rows.len();
@@ -197,7 +199,7 @@ impl ClosedLoop {
         (residual, jacobian)
     }
 
-    /// Directions in which the pins must meet: two across the axes of a planar loop, else three.
+    /// Directions along which the pins must meet: two across the axes of a planar loop, else three.
     fn directions(&self, placing: &Placing) -> Vec<Vector> {
         let mut axes =
             (self.passive.iter()).filter(|&&j| placing.turns(j)).map(|&j| placing.axis(j).1);
@@ -211,7 +213,7 @@ impl ClosedLoop {
         }
     }
 
-    /// How far the pins are apart, metres, seen along the axes.
+    /// Distance of the points of the pins, seen along the axes, metres.
     pub(crate) fn gap(&self, placing: &Placing) -> f64 {
         let rows = self.directions(placing);
         let apart = |pin: &Closure| {
@@ -222,14 +224,14 @@ impl ClosedLoop {
         self.closures.iter().map(apart).fold(0.0, f64::max)
     }
 
-    /// Rates of the passive joints for a unit rate of free joint `free`, from the rates of all
-    /// others (those of the passive ones are zero).
+    /// Rates of the passive joints at unit rate of free joint `free`, from the rates of all other
+    /// joints (in which those of the passive ones are zero).
     pub(crate) fn rates(&self, placing: &Placing, rates: &[f64]) -> Vec<f64> {
         let pin = &self.closures[0];
         let open = self.form != Form::General && self.gap(placing) > CLOSED;
         match self.form {
             Form::Rr => vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b))],
-            // Out of reach all is in line and only points at the other end.
+            // Out of reach the bars lie in line and only point at the other end.
             Form::RrrSerial { .. } | Form::Rpr { .. } if open => {
                 vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b)), 0.0]
             }
@@ -244,7 +246,7 @@ impl ClosedLoop {
         }
     }
 
-    /// ∂q_p/∂q = −(∂φ/∂q_p)⁻¹ ∂φ/∂q.
+    /// Rates by the implicit function theorem, ∂q_p/∂q = −(∂φ/∂q_p)⁻¹ ∂φ/∂q.
     fn implicit_rates(&self, placing: &Placing, rates: &[f64]) -> Vec<f64> {
         let rows = self.directions(placing);
         let (_, jacobian) = self.equations(placing);
@@ -264,7 +266,8 @@ impl ClosedLoop {
         }
     }
 
-    /// Rate of the passive revolute joint `which` that keeps pointing at a point of a link.
+    /// Rate of the passive revolute joint `which` with which it keeps pointing at a point of a
+    /// link.
     fn aim_rate(
         &self,
         placing: &Placing,
@@ -280,14 +283,14 @@ impl ClosedLoop {
         if d.norm_squared() < 1e-18 {
             return 0.0;
         }
-        // Seen from the carrier: the target's own way less that of the carrier at the same place.
+        // Relative to the carrier: the target's velocity less the carrier's at the same place.
         let moves = placing.velocity(target.0, &target_at, rates)
             - placing.velocity(carrier, &target_at, rates);
         axis.dot(&d.cross(&moves)) / d.norm_squared()
     }
 
-    /// The mode of the zero posture, where the passive joints are zero; `None` where the loop is
-    /// stretched there and both solutions are one.
+    /// The mode of the zero posture, at which the passive joints are zero; `None` where the loop is
+    /// stretched out there, so that both solutions coincide.
     pub(crate) fn mode_at_zero(&self, placing: &Placing) -> Option<f64> {
         let pin = &self.closures[0];
         let (origin, axis) = placing.axis(self.passive[0]);
@@ -312,8 +315,8 @@ impl ClosedLoop {
     }
 }
 
-/// Direction from one end of a two-bar chain to its elbow; `d` is the way to the other end, `near`
-/// and `far` are the lengths of the bars. Out of reach: in line.
+/// Direction from one end of a two-bar chain to its elbow. `d` is the vector to the other end,
+/// `near` and `far` are the lengths of the bars. Out of reach the bars lie in line.
 fn toward_elbow(d: &Vector, near: f64, far: f64, axis: &Vector, mode: f64) -> Vector {
     let d = across(*d, axis);
     let length = d.norm();
@@ -322,7 +325,7 @@ fn toward_elbow(d: &Vector, near: f64, far: f64, axis: &Vector, mode: f64) -> Ve
 }
 
 impl Model {
-    /// This robot with some of its loops on the other of their two solutions.
+    /// This robot with the loops of these indices on the other of their two solutions.
     #[must_use]
     pub fn with_other_branches(&self, loops: &[usize]) -> Self {
         let mut out = self.clone();
@@ -337,8 +340,8 @@ impl Model {
         out
     }
 
-    /// Whether a loop could stand on the other of its two solutions at a posture: it closes there,
-    /// its joints stay within their limits, and it is another solution.
+    /// Whether loop `at` could stand on the other of its two solutions at a posture: the loop
+    /// closes there, its joints stay within their limits, and the solution differs from the first.
     #[must_use]
     pub fn has_other_branch(&self, at: usize, posture: &[f64]) -> bool {
         if matches!(self.loops[at].form, Form::Rr | Form::General) {
@@ -348,7 +351,7 @@ impl Model {
         let (own, values) = (self.joint_values(posture), other.joint_values(posture));
         let passive = || self.loops[at].passive.iter().copied();
         let inside = |j: usize| {
-            // A cylinder that is turned inside out is no cylinder, limits or not.
+            // A cylinder cannot have a negative length, whether its limits say so or not.
             let limits = self.joints[j].limits;
             limits.map_or_else(
                 || Placing::open(self, posture).turns(j),
@@ -360,7 +363,7 @@ impl Model {
     }
 }
 
-/// Limits of passive joints are often rounded, radians or metres.
+/// Tolerance on the limits of passive joints, which are often rounded, radians or metres.
 const LIMIT_PLAY: f64 = 0.02;
-/// Values that differ by less are one solution, radians or metres.
+/// Joint values that differ by less belong to the same solution, radians or metres.
 const OTHER_BRANCH: f64 = 0.02;

@@ -1,4 +1,4 @@
-//! The model of a robot: a tree of links and joints with their meshes, and which joints are free.
+//! The model of a robot: a tree of links and joints with meshes, free joints and closed loops.
 
 use crate::loops::ClosedLoop;
 use geometry::{Aabb, Point, Pose, Vector};
@@ -6,158 +6,159 @@ use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Triangles of a link in the link's frame, metres; all visuals of the link together.
+/// Triangles of a link in the link's frame, metres, with all visuals of the link together.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
-    /// Corners.
+    /// Vertices, metres.
     pub vertices: Vec<[f32; 3]>,
-    /// Indices of corners, counter-clockwise from outside where the file is right about it.
+    /// Indices of three vertices each, counter-clockwise as seen from outside, if the file is
+    /// right.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Samples on the outer surface of a link, in the link's frame.
+/// Samples of the outer surface of a link, in the link's frame.
 ///
 /// # Law
-/// Any prefix is spread evenly over the surface, so that `points[..300]` is the coarse cloud and
-/// all of it the fine.
+/// Any prefix is spread evenly over the surface, so that `points[..300]` is a coarse cloud of the
+/// whole link.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct CadCloud {
-    /// Positions, metres.
+    /// Positions of the samples, metres.
     pub points: Vec<[f32; 3]>,
-    /// Unit normals, outward.
+    /// Outward unit normals.
     pub normals: Vec<[f32; 3]>,
     /// Mean distance between neighbouring samples, metres.
     pub spacing: f32,
-    /// Outer surface that the samples stand for, m².
+    /// Area of the outer surface that the samples stand for, m².
     pub area: f32,
 }
 
-/// What a link is part of.
+/// The part of a robot that a link belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
-    /// Sets the posture.
+    /// The main chain, whose joints set the posture.
     Main,
-    /// Follows the main chain through a closed loop.
+    /// A sub chain, which follows the main chain through a closed loop.
     Sub,
-    /// Belongs to the tool.
+    /// The effector, that is the tool.
     Effector,
 }
 
 /// A rigid body of the robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Link {
-    /// As in the URDF.
+    /// Name in the URDF.
     pub name: String,
-    /// What it is part of.
+    /// The part of the robot that it belongs to.
     pub role: Role,
-    /// The joint that carries it; `None` for the root.
+    /// Index of the joint that carries it; `None` for the root.
     pub parent_joint: Option<usize>,
-    /// Its surface; empty for frames without a body. Shared by copies of the model, as are its
+    /// Its surface; empty for a frame without a body. Copies of the model share the mesh and the
     /// samples.
     pub mesh: Arc<Mesh>,
-    /// Samples of its outer surface; empty where the mesh is.
+    /// Samples of its outer surface; empty if the mesh is.
     pub cad: Arc<CadCloud>,
     /// Bounds of the mesh in the link's frame, metres.
     pub bounds: Aabb,
 }
 
-/// How a joint moves.
+/// The type of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum JointKind {
-    /// Turns between limits, radians.
+    /// Rotates between limits, radians.
     Revolute,
-    /// Turns without limits, radians.
+    /// Rotates without limits, radians.
     Continuous,
-    /// Slides, metres.
+    /// Translates between limits, metres.
     Prismatic,
     /// Does not move.
     Fixed,
 }
 
-/// What sets a joint's value.
+/// What determines a joint's value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Motion {
-    /// Its own entry in the posture.
+    /// The entry of the posture with this index.
     Free(usize),
-    /// `multiplier · posture[free] + offset` (URDF `<mimic>`; chains of mimics are already
-    /// resolved).
+    /// Another joint: the value is `multiplier · posture[free] + offset` (URDF `<mimic>`, with
+    /// chains of mimics resolved).
     Mimic {
-        /// Entry in the posture that it follows.
+        /// Index of the entry of the posture that it follows.
         free: usize,
-        /// Factor.
+        /// Factor of that entry.
         multiplier: f64,
-        /// Added, in the joint's own unit.
+        /// Added to the product, in the joint's own unit.
         offset: f64,
     },
     /// The closed loop with this index.
     Loop(usize),
-    /// Nothing.
+    /// Nothing; the joint is fixed.
     Fixed,
 }
 
 /// A joint of the tree.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
-    /// As in the URDF.
+    /// Name in the URDF.
     pub name: String,
-    /// How it moves.
+    /// Its type.
     pub kind: JointKind,
     /// Index of the link that carries it.
     pub parent: usize,
     /// Index of the link that it carries.
     pub child: usize,
-    /// URDF `<origin>`.
+    /// Pose of the joint in the parent link's frame at value zero (URDF `<origin>`), metres.
     pub parent_from_joint: Pose,
-    /// Axis in the joint's frame.
+    /// Axis in the joint's frame, unit length.
     pub axis: Unit<Vector>,
     /// Lower and upper limit, radians or metres; `None` for continuous and fixed joints.
     pub limits: Option<[f64; 2]>,
-    /// What sets its value.
+    /// What determines its value.
     pub motion: Motion,
 }
 
-/// A turn that leaves a link's surface as it is.
+/// A rotation that maps a link's surface onto itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Symmetry {
     /// Index of the link.
     pub link: usize,
-    /// Axis of the turn, link frame.
+    /// Axis of the rotation in the link's frame, unit length.
     pub axis: Unit<Vector>,
-    /// A point on the axis, link frame, metres.
+    /// A point on the axis in the link's frame, metres.
     pub through: Point,
-    /// Unchanged by a turn of 2π/order; 0: by any turn.
+    /// The surface is unchanged by a rotation of 2π/order; 0 means by any rotation.
     pub order: u32,
 }
 
-/// A robot: links and joints in tree order (parents before children, `links[0]` is the root).
+/// A robot: links and joints in tree order (parents before children; `links[0]` is the root).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// Name of its folder in the library.
     pub name: String,
-    /// Bodies and frames.
+    /// The links: bodies, and frames without a body.
     pub links: Vec<Link>,
-    /// Joints; `joints[i].child` is carried by it and by no other.
+    /// The joints; each link but the root is the child of exactly one.
     pub joints: Vec<Joint>,
-    /// Indices of the free joints, in tree order: the posture has one value for each.
+    /// Indices of the free joints, in tree order; a posture has one value for each.
     pub free: Vec<usize>,
-    /// Closed loops, in the order in which they are solved.
+    /// The closed loops, in the order in which they are solved.
     pub loops: Vec<ClosedLoop>,
-    /// Joints of the main chain, from the root to its tip.
+    /// Indices of the joints of the main chain, from the root to the tip.
     pub main_chain: Vec<usize>,
-    /// Symmetries that `robot.toml` names.
+    /// Symmetries of links, from `robot.toml`.
     pub symmetries: Vec<Symmetry>,
-    /// How far each link's mesh may be from the real surface, metres: index of the link and value,
-    /// where `robot.toml` says so.
+    /// Standard deviation of a link's real surface from its mesh, metres: index of the link and
+    /// value, where `robot.toml` gives one.
     pub mesh_sigmas: Vec<(usize, f64)>,
 }
 
-/// Where everything is at one posture.
+/// Poses and derivatives of all links at one posture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kinematics {
-    /// Pose of each link, base (root link) from link.
+    /// The pose `base_from_link` of each link; the base is the root link. Metres.
     pub base_from_link: Vec<Pose>,
-    /// For each link, for each free joint: the twist of the link in the base frame for a unit rate
-    /// of that joint: `[v, w]`, so that a point `p` (base frame, fixed to the link) moves with
-    /// `v + w × p`. Exact: mimic and loop joints on the way are in it.
+    /// For each link and each free joint the twist `[v, w]` of the link in the base frame at unit
+    /// rate of the joint: a point `p` (base frame) fixed to the link moves with `v + w × p`. The
+    /// motion of mimic joints and closed loops is included.
     pub twists: Vec<Vec<[f64; 6]>>,
 }

@@ -1,4 +1,4 @@
-//! What `robot.toml` names, applied: passive joints, symmetries, notes on single links.
+//! Applies what `robot.toml` says of passive joints, symmetries and single links.
 
 use crate::close;
 use crate::finding::Findings;
@@ -8,8 +8,8 @@ use crate::urdf::Description;
 use geometry::Vector;
 use nalgebra::Unit;
 
-/// The joints that the loops of a sub chain set: those named, else the `moving` ones of its own
-/// URDF.
+/// Indices of the joints that the loops of a sub chain set: those that `robot.toml` names, else the
+/// `moving` joints of the sub chain's own URDF.
 pub(crate) fn named_passive(
     description: &Description,
     sub_chain: &SubChain,
@@ -35,7 +35,7 @@ pub(crate) fn named_passive(
             findings.fail(
                 &place,
                 format!("a passive joint is not there or is fixed \"{name}\""),
-                "mend the name",
+                "correct the name",
             );
             return None;
         }
@@ -43,12 +43,12 @@ pub(crate) fn named_passive(
     Some(named)
 }
 
-/// Takes over what the sheet says of single links.
+/// Applies what `robot.toml` says of single links.
 pub(crate) fn note_links(model: &mut Model, sheet: &Sheet, findings: &mut Findings) {
     for note in &sheet.link {
         let place = format!("robot.toml: link {}", note.name);
         let Some(link) = model.link(&note.name) else {
-            findings.fail(&place, "no such link", "mend the name");
+            findings.fail(&place, "no such link", "correct the name");
             continue;
         };
         if let Some(turn) = &note.symmetry {
@@ -85,6 +85,6 @@ pub(crate) fn note_links(model: &mut Model, sheet: &Sheet, findings: &mut Findin
     }
     let n_moving = model.joints.iter().filter(|j| j.kind != JointKind::Fixed).count();
     if model.free.is_empty() && n_moving == 0 {
-        findings.warn("", "no joint moves: this is a thing, not a robot", "");
+        findings.warn("", "no joint moves: this is a static object, not a robot", "");
     }
 }

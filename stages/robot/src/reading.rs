@@ -1,4 +1,4 @@
-//! A path in, the bytes of a regular file out, never more than its limit.
+//! Reads regular files up to a limit on their size.
 
 use crate::encoding;
 use crate::finding::Findings;
@@ -12,14 +12,14 @@ pub(crate) fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
-/// Reads a regular file of at most `limit` bytes, which the setting of this room with this name
-/// sets.
+/// Reads a regular file of at most `limit` bytes; `setting` is the name of the setting of that
+/// limit, for the message.
 pub(crate) fn read_bytes(
     path: &Path,
     limit: u64,
     setting: &str,
 ) -> std::result::Result<Vec<u8>, String> {
-    // A pipe waits for ever for somebody to write, and devices may have no end.
+    // Reading a pipe would wait for ever for a writer, and a device may have no end.
     if path.metadata().is_ok_and(|meta| !meta.is_file()) {
         return Err("is no regular file, and nothing else is read".to_owned());
     }
@@ -49,7 +49,7 @@ pub(crate) fn read_text(
 ) -> Option<String> {
     let text = read_bytes(path, limit, "max_urdf_bytes")
         .and_then(|bytes| String::from_utf8(bytes).map_err(|e| format!("is not UTF-8 ({e})")));
-    text.map_err(|what| findings.fail(place, what, "mend or replace the file")).ok()
+    text.map_err(|what| findings.fail(place, what, "repair or replace the file")).ok()
 }
 
 /// Reads an XML file of at most `limit` bytes in the encoding that it declares.
@@ -61,14 +61,14 @@ pub(crate) fn read_xml(
 ) -> Option<String> {
     read_bytes(path, limit, "max_urdf_bytes")
         .and_then(|bytes| encoding::decode(&bytes).map(Cow::into_owned))
-        .map_err(|what| findings.fail(place, what, "mend or replace the file"))
+        .map_err(|what| findings.fail(place, what, "repair or replace the file"))
         .ok()
 }
 
 /// The text of a URDF file in the encoding that it declares, without its byte order mark.
 ///
 /// # Errors
-/// A file that cannot be read, is larger than any URDF, or is in an encoding that is not read.
+/// If the file cannot be read, exceeds the limit for a URDF, or has an unsupported encoding.
 pub fn urdf_text(path: &Path) -> Result<String> {
     read_bytes(path, Settings::default().max_urdf_bytes, "max_urdf_bytes")
         .and_then(|bytes| encoding::decode(&bytes).map(Cow::into_owned))

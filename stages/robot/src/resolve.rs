@@ -1,21 +1,22 @@
-//! A mesh path as a URDF has it in, a file inside the declared roots out. Never a process, never
-//! the network, never a file outside the model's or the library's folder, links on disk included.
+//! Finds the file that a mesh path of a URDF names. It never opens a file outside of the model's
+//! and the library's folder, follows no symbolic link out of them, and starts no process or network
+//! access.
 
 use std::path::{Component, Path, PathBuf};
 
-/// Where files may lie.
+/// The folders in which files may lie.
 #[derive(Debug, Clone)]
 pub(crate) struct Roots {
-    /// Folder of the model, and that of the library if the model is in one; canonical.
+    /// Canonical paths of the model's folder and, if the model is in one, the library's.
     model: PathBuf,
     library: Option<PathBuf>,
 }
 
-/// A file found.
+/// A file that was found.
 #[derive(Debug)]
 pub(crate) struct Found {
     pub(crate) path: PathBuf,
-    /// The name on disk differs in case from the one written.
+    /// Whether the file's name differs in case from the path in the URDF.
     pub(crate) other_case: bool,
 }
 
@@ -27,8 +28,8 @@ impl Roots {
         })
     }
 
-    /// Whether the model's folder lies in the library's, and is no link that leads out of it; else
-    /// what is wrong, in words.
+    /// Checks that the model's folder is not a link that leads out of the library's folder; the
+    /// error says so in words.
     pub(crate) fn check(&self) -> Result<(), String> {
         match &self.library {
             Some(library) if !self.model.starts_with(library) => {
@@ -38,8 +39,8 @@ impl Roots {
         }
     }
 
-    /// The path, if what it leads to lies in the model's or the library's folder; else what is
-    /// wrong, in words.
+    /// The canonical path of a file that lies in the model's or the library's folder, else an error
+    /// in words.
     pub(crate) fn inside(&self, path: &Path) -> Result<PathBuf, String> {
         match path.canonicalize() {
             Ok(found) if self.holds(&found) => Ok(path.to_path_buf()),
@@ -50,7 +51,7 @@ impl Roots {
         }
     }
 
-    /// The file that `written` means, or what is wrong with it in words.
+    /// The file that the path `written` means, or an error in words.
     pub(crate) fn find(&self, written: &str) -> Result<Found, String> {
         let candidates = self.candidates(written)?;
         let mut outside = false;
@@ -84,7 +85,7 @@ impl Roots {
             || self.library.as_ref().is_some_and(|root| path.starts_with(root))
     }
 
-    /// Folders and relative paths to try, in order.
+    /// Roots and relative paths to try, in order.
     fn candidates(&self, written: &str) -> Result<Vec<(PathBuf, PathBuf)>, String> {
         let slashed = written.trim().replace('\\', "/");
         let mut out = Vec::new();
@@ -121,9 +122,9 @@ impl Roots {
     }
 }
 
-/// `root/rest` with each part matched in any case; the first in order of name where several do.
+/// `root/rest` with each part matched regardless of case; the first by name if several match.
 fn any_case(root: &Path, rest: &Path) -> Option<PathBuf> {
-    // An absolute path is taken as written: the rest of the disk is not searched.
+    // An absolute path is taken as it is; the rest of the disk is not searched for it.
     root.parent()?;
     let mut at = root.to_path_buf();
     for part in rest.components() {

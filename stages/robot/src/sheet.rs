@@ -1,5 +1,5 @@
-//! `robot.toml` in: what a URDF cannot say (main chain, loops, tool, symmetries). README.md
-//! documents it.
+//! The content of `robot.toml`: what a URDF cannot express (main chain, loops, tool, symmetries).
+//! Its format is documented in README.md.
 
 use serde::Deserialize;
 

@@ -1,5 +1,5 @@
-//! Links and joints as written in, a checked tree out: one root, unique names, parents before
-//! children, and what moves each joint.
+//! Checks the links and joints of a description and orders them as a tree: one root, unique names,
+//! parents before children. Also determines what sets each joint.
 
 use crate::finding::Findings;
 use crate::model::{Joint, JointKind, Link, Motion, Role};
@@ -8,10 +8,10 @@ use geometry::{Aabb, Vector};
 use nalgebra::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Links of one model; a humanoid with hands has a few hundred.
+/// Largest number of links of a model; a humanoid with hands has a few hundred.
 const MAX_LINKS: usize = 5_000;
 
-/// A tree in order.
+/// Links and joints in tree order.
 #[derive(Debug, Default)]
 pub(crate) struct Tree {
     pub(crate) links: Vec<Link>,
@@ -20,7 +20,8 @@ pub(crate) struct Tree {
     pub(crate) free: Vec<usize>,
 }
 
-/// Checks and orders a description. `passive` joints are set by loops, by name → index of the loop.
+/// Checks and orders a description. `passive` maps the names of joints that loops set to the index
+/// of the loop.
 pub(crate) fn build(
     description: &Description,
     passive: &BTreeMap<String, usize>,
@@ -57,7 +58,7 @@ pub(crate) fn build(
     let mut tree = Tree::default();
     tree.grow(description, &children, by_name[root.name.as_str()]);
     if tree.links.len() != description.links.len() {
-        findings.fail(file, "joints run in a circle", "describe the loop in robot.toml");
+        findings.fail(file, "joints form a circle", "describe the loop in robot.toml");
         return None;
     }
     tree.set_motions(description, passive, file, findings)?;
@@ -120,7 +121,7 @@ fn check_joints(
                 findings.fail(
                     &place,
                     format!("its {end} is no link \"{name}\""),
-                    "add the link, or mend the name",
+                    "add the link, or correct the name",
                 );
             }
         }
@@ -138,7 +139,7 @@ fn check_joints(
     }
 }
 
-/// `follows` says whether another joint or a loop sets it.
+/// Checks the limits of a joint; `follows` says whether another joint or a loop sets its value.
 fn check_limits(joint: &RawJoint, follows: bool, place: &str, findings: &mut Findings) {
     use urdf_rs::JointType as T;
     if !matches!(joint.kind, T::Revolute | T::Prismatic) {
@@ -173,7 +174,7 @@ fn check_limits(joint: &RawJoint, follows: bool, place: &str, findings: &mut Fin
 }
 
 impl Tree {
-    /// Depth first in the order of the file, so that a serial chain stays together.
+    /// Adds links depth first in the order of the file, so that a serial chain stays together.
     fn grow(
         &mut self,
         description: &Description,
@@ -277,8 +278,8 @@ fn plain_joint(raw: &RawJoint, parent: usize, child: usize) -> Joint {
     }
 }
 
-/// Follows a chain of mimics to the free joint at its end: its entry, and the product of factors
-/// and offsets.
+/// Follows a chain of mimics to the free joint at its end. Returns the index of that joint's entry
+/// in the posture, and the combined factor and offset.
 fn follow(
     joint: &RawJoint,
     raw: &BTreeMap<&str, &RawJoint>,

@@ -1,6 +1,6 @@
-//! URDF text in, links and joints as written out. Cleans the text first (numbers, doubles, what we
-//! do not use), since the parser skips words that are no numbers, stops at a second material, and
-//! recurses as deep as the file says.
+//! Reads the links and joints of a URDF. The text is first reduced to what is used and checked,
+//! since the URDF parser ignores words that are no numbers, stops at a second material, and
+//! recurses as deep as the file is nested.
 
 use crate::finding::Findings;
 use contract::words::count;
@@ -10,10 +10,10 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use roxmltree::{Document, Node};
 use std::fmt::Write as _;
 
-/// Below this length the numbers of a quaternion are rounding, and no direction.
+/// Norm below which a quaternion is only rounding error and defines no orientation.
 const SHORTEST_QUATERNION: f64 = 1e-6;
 
-/// Links and joints as one file has them, unchecked against one another.
+/// Links and joints of one file, not yet checked against one another.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Description {
     pub(crate) links: Vec<RawLink>,
@@ -50,13 +50,13 @@ pub(crate) struct RawJoint {
     pub(crate) child: String,
     pub(crate) parent_from_joint: Pose,
     pub(crate) axis: [f64; 3],
-    /// As written; `None` where the element is missing.
+    /// Lower and upper limit; `None` where the element is missing.
     pub(crate) limits: Option<[f64; 2]>,
-    /// Joint, multiplier, offset.
+    /// Name of the followed joint, multiplier, offset.
     pub(crate) mimic: Option<(String, f64, f64)>,
 }
 
-/// Reads a description; what is wrong goes to `findings`.
+/// Reads a description; problems are added to `findings`.
 pub(crate) fn read(
     text: &str,
     file: &str,
@@ -64,13 +64,13 @@ pub(crate) fn read(
     findings: &mut Findings,
 ) -> Option<Description> {
     if let Err(what) = check_xml(text.as_bytes(), limits) {
-        findings.fail(file, what, "mend the file");
+        findings.fail(file, what, "repair the file");
         return None;
     }
     let document = match Document::parse(text) {
         Ok(document) => document,
         Err(error) => {
-            findings.fail(file, format!("not well-formed XML ({error})"), "mend the file");
+            findings.fail(file, format!("not well-formed XML ({error})"), "repair the file");
             return None;
         }
     };
@@ -94,7 +94,7 @@ pub(crate) fn read(
     match urdf_rs::read_from_string(&clean) {
         Ok(robot) => Some(describe(&robot, &document)),
         Err(error) => {
-            findings.fail(file, format!("not a URDF ({error})"), "mend the file");
+            findings.fail(file, format!("not a URDF ({error})"), "repair the file");
             None
         }
     }
@@ -109,14 +109,14 @@ fn is_xacro(root: Node) -> bool {
     })
 }
 
-/// Whether `quat_xyzw` counts: from URDF 1.1 on; a file without a version is 1.0.
+/// Whether `quat_xyzw` is supported: it is from URDF 1.1 on, and a file without a version is 1.0.
 pub(crate) fn has_quaternions(root: Node) -> bool {
     let mut parts = root.attribute("version").unwrap_or("1.0").trim().split('.');
     let mut next = || parts.next().and_then(|p| p.parse::<u32>().ok()).unwrap_or(0);
     (next(), next()) >= (1, 1)
 }
 
-/// The unit quaternion of `quat_xyzw`; `None` where its four numbers name no direction.
+/// The unit quaternion of `quat_xyzw`; `None` where it is not four finite numbers of nonzero norm.
 pub(crate) fn turn(quat_xyzw: &str) -> Option<UnitQuaternion<f64>> {
     let numbers: Vec<f64> =
         quat_xyzw.split_whitespace().map(str::parse).collect::<Result<_, _>>().ok()?;
@@ -126,14 +126,14 @@ pub(crate) fn turn(quat_xyzw: &str) -> Option<UnitQuaternion<f64>> {
     UnitQuaternion::try_new(Quaternion::new(w, x, y, z), SHORTEST_QUATERNION)
 }
 
-/// Writes the part of a URDF that we use, and only that.
+/// Copies the part of a URDF that is used to a new text.
 struct Cleaner<'a> {
     file: &'a str,
     findings: &'a mut Findings,
-    /// Whether `quat_xyzw` counts in this file.
+    /// Whether `quat_xyzw` is supported in this file.
     turns: bool,
-    /// Where lines of the file end: a file may be wrong in thousands of places, and each is to be
-    /// named.
+    /// Byte offsets of the line ends: a file may have thousands of problems, and each message needs
+    /// a line number.
     ends: Vec<usize>,
 }
 
@@ -141,7 +141,7 @@ fn line_ends(text: &str) -> Vec<usize> {
     text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at).collect()
 }
 
-/// How many numbers an attribute holds.
+/// The number of values that an attribute must hold.
 fn numbers_of(attribute: &str) -> Option<usize> {
     match attribute {
         "xyz" | "rpy" | "scale" | "size" => Some(3),
@@ -190,7 +190,7 @@ impl Cleaner<'_> {
         let Some(geometry) = self.only(node, "geometry") else {
             self.findings.warn(
                 self.place(node),
-                "has no geometry and is passed over",
+                "has no geometry and is ignored",
                 "remove it or complete it",
             );
             return true;
@@ -198,7 +198,7 @@ impl Cleaner<'_> {
         let Some(shape) = geometry.children().find(Node::is_element) else {
             self.findings.warn(
                 self.place(node),
-                "has an empty geometry and is passed over",
+                "has an empty geometry and is ignored",
                 "remove it or complete it",
             );
             return true;
@@ -209,7 +209,7 @@ impl Cleaner<'_> {
             "cylinder" | "capsule" => (&["radius", "length"], &[]),
             "sphere" => (&["radius"], &[]),
             other => {
-                let what = format!("a shape that is not known is passed over \"{other}\"");
+                let what = format!("a shape that is not known is ignored \"{other}\"");
                 self.findings.warn(
                     self.place(node),
                     what,
@@ -256,7 +256,7 @@ impl Cleaner<'_> {
         ];
         for (tag, needs, may) in parts {
             match self.only(node, tag) {
-                // An axis on a fixed joint says nothing; some files write nonsense there.
+                // The axis of a fixed joint has no meaning, and some files contain invalid ones.
                 Some(_) if kind == "fixed" && matches!(tag, "axis" | "limit" | "mimic") => {}
                 Some(part) => right &= self.open(part, needs, may, out, false),
                 None if matches!(tag, "parent" | "child") => {
@@ -274,29 +274,29 @@ impl Cleaner<'_> {
         right
     }
 
-    /// Writes an origin, its quaternion only where it counts, and then of unit length.
+    /// Copies an origin; its quaternion is normalised, and left out where it is not supported.
     fn origin(&mut self, node: Node, out: &mut String) -> bool {
         let Some(written) = node.attribute("quat_xyzw") else {
             return self.open(node, &[], &["xyz", "rpy"], out, false);
         };
         let place = self.place(node);
         if !self.turns {
-            let what = "quat_xyzw counts from URDF version 1.1 on, and is passed over here";
+            let what = "quat_xyzw is supported from URDF version 1.1 on, and is ignored here";
             let way_out = "write rpy instead, or add version=\"1.1\" to <robot>";
             self.findings.warn(place, what, way_out);
             return self.open(node, &[], &["xyz", "rpy"], out, false);
         }
         if node.has_attribute("rpy") {
-            let what = "has both rpy and quat_xyzw, which may name two directions";
+            let what = "has both rpy and quat_xyzw, which may contradict each other";
             self.findings.fail(place, what, "keep rpy");
             return false;
         }
         let Some(turn) = turn(written) else {
-            let what = format!("quat_xyzw is no direction \"{}\"", shortened(written));
+            let what = format!("quat_xyzw is no orientation \"{}\"", shortened(written));
             self.findings.fail(place, what, "write four finite numbers, not all zero: x y z w");
             return false;
         };
-        let what = "quat_xyzw is obeyed here, but passed over by most other readers of URDF";
+        let what = "quat_xyzw is applied here, but ignored by most other readers of URDF";
         self.findings.note(place, what, "write rpy, which all of them read");
         let right = node.attribute("xyz").is_none_or(|xyz| self.numbers(node, "xyz", xyz, 3));
         out.push_str("<origin");
@@ -309,7 +309,7 @@ impl Cleaner<'_> {
         right
     }
 
-    /// The child of that name; a second one is passed over with a warning.
+    /// The child element with that name; a second one is ignored with a warning.
     fn only<'n, 'i>(&mut self, node: Node<'n, 'i>, tag: &str) -> Option<Node<'n, 'i>> {
         let mut found = node.children().filter(|n| n.tag_name().name() == tag);
         let first = found.next();
@@ -323,7 +323,7 @@ impl Cleaner<'_> {
         first
     }
 
-    /// Writes an element with the attributes named, after checking their numbers.
+    /// Starts an element with the named attributes after checking their numbers.
     fn open(
         &mut self,
         node: Node,
@@ -349,7 +349,7 @@ impl Cleaner<'_> {
             attribute(out, name, value);
         }
         if node.tag_name().name() == "limit" {
-            // The parser wants a velocity; we do not use it.
+            // The parser requires a velocity, which is not used here.
             attribute(out, "velocity", "0");
         }
         out.push_str(if has_children { ">" } else { "/>" });
@@ -414,7 +414,7 @@ fn body(geometry: &urdf_rs::Geometry, origin: &urdf_rs::Pose) -> Body {
 }
 
 fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
-    // The parser cannot tell a missing limit from one of zero.
+    // The parser cannot tell a missing limit from a limit of zero.
     let limited: Vec<bool> = (document.root_element().children())
         .filter(|n| n.tag_name().name() == "joint")
         .map(|n| n.children().any(|c| c.tag_name().name() == "limit"))

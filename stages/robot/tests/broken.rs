@@ -67,7 +67,11 @@ fn capsules_about_a_link_that_has_a_visual_are_no_surface() {
         let capsule = &model.links[model.link("capsule").unwrap()];
         assert_eq!(!capsule.mesh.triangles.is_empty(), stands_in, "{kind}");
         assert_eq!(!capsule.bounds.is_empty(), stands_in, "{kind}");
-        assert_eq!(findings.iter().any(|f| f.what.contains("stands in")), stands_in, "{kind}");
+        assert_eq!(
+            findings.iter().any(|f| f.what.contains("is used instead")),
+            stands_in,
+            "{kind}"
+        );
     }
 }
 
@@ -147,7 +151,7 @@ fn empty_and_wrong_libraries_are_explained() {
     let error = Library::load(&folder.library(), &settings).unwrap_err().to_string();
     assert!(error.contains("model") && error.contains("no links"), "{error}");
     assert!(Model::load(&folder.path(), &settings).is_err());
-    // One wrong model does not keep the others out.
+    // A broken model does not prevent the others from loading.
     let folder =
         Folder::new().with("robot.urdf", "<robot/>").with("../good/any.urdf", robot(&arm(3)));
     let library = Library::load(&folder.library(), &settings).unwrap();
@@ -239,7 +243,7 @@ fn paths_stay_inside() {
     }
     let folder = at("package://other/m.stl").with("../other/m.stl", &good);
     assert_eq!(folder.lint(), Vec::<String>::new());
-    says(&at("Meshes/M.STL").with("meshes/m.stl", &good), "in another case");
+    says(&at("Meshes/M.STL").with("meshes/m.stl", &good), "other upper and lower case");
     says(&at("m.stl"), "missing");
     says(&at("../../outside.stl").with("../../outside.stl", &good), "leads out");
     says(&at("http://host/m.stl"), "network");
@@ -277,12 +281,12 @@ fn links_that_lead_out_are_refused_by_name_and_others_are_followed() {
         std::fs::remove_file(&link).unwrap();
         symlink("../shared/inside", &link).unwrap();
         assert!(Model::load(&folder.path(), &Settings::without_clouds()).is_ok(), "{name}");
-        // One that leads nowhere is no file that is missing.
+        // A link to a missing file is not reported as a missing file.
         std::fs::remove_file(&link).unwrap();
         symlink("../nowhere", &link).unwrap();
         assert!(Model::load(&folder.path(), &Settings::without_clouds()).is_err(), "{name}");
     }
-    // The folder of a model is no other.
+    // A link in place of a model's folder is refused, too.
     let folder = Folder::new().with("robot.urdf", &urdf).with("../../far/robot.urdf", &urdf);
     symlink("../far", folder.library().join("far")).unwrap();
     says(&folder, "far: is a link that leads out");

@@ -1,4 +1,4 @@
-//! CAD clouds: even prefixes, outward normals, hidden faces gone.
+//! CAD clouds have evenly spread prefixes and outward normals, and leave out hidden faces.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
@@ -45,7 +45,7 @@ fn normals_point_outward_and_inner_parts_are_gone() {
 fn every_prefix_is_even() {
     let cloud = body(SPHERE);
     for n in [100, 300, 1000, 4000] {
-        // Distance from each of many places to the next sample of the prefix, and between samples.
+        // Distances from many places to the nearest sample of the prefix, and between samples.
         let spacing = (f64::from(cloud.area) / n as f64).sqrt();
         let near = |p: &[f32; 3], skip: usize| {
             (cloud.points[..n].iter().enumerate().filter(|(k, _)| *k != skip))

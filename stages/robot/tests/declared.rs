@@ -1,4 +1,4 @@
-//! URDFs and meshes that declare what readers differ in: encodings, quaternions, units.
+//! URDFs and meshes that declare encodings, quaternions or units, which readers treat differently.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
@@ -6,7 +6,7 @@ mod common;
 use ::robot::Severity;
 use common::{Folder, LIMIT, link, meshed, says};
 
-/// A box with a turned joint: as text, its name and mesh file with a letter beyond ASCII.
+/// A robot with a box and a rotated joint, whose link and mesh file have a non-ASCII letter.
 fn turned(declared: &str, version: &str, origin: &str) -> String {
     format!(
         "<?xml version='1.0'{declared}?><robot name='r'{version}>{}<link name='gr\u{fc}n'><visual>\
@@ -34,7 +34,7 @@ fn a_urdf_is_read_in_the_encoding_that_it_declares() {
 
 #[test]
 fn a_quaternion_counts_from_version_1_1_on_and_lint_says_who_reads_it() {
-    // A quarter turn about x; not of unit length, as people write it.
+    // A quarter turn about x, not of unit length, as people write it.
     let quat = "quat_xyzw='2 0 0 2'";
     let turn = |version: &str, origin: &str| {
         let (model, findings) =
@@ -61,9 +61,9 @@ fn a_quaternion_counts_from_version_1_1_on_and_lint_says_who_reads_it() {
     assert!((roll - 0.5).abs() < 1e-12 && said.is_empty(), "{roll} {said:?}");
     for (origin, words) in [
         ("rpy='0 0 0' quat_xyzw='0 0 0 1'", "both rpy and quat_xyzw"),
-        ("quat_xyzw='0 0 0 0'", "no direction"),
-        ("quat_xyzw='0 0 1'", "no direction"),
-        ("quat_xyzw='0 nan 0 1'", "no direction"),
+        ("quat_xyzw='0 0 0 0'", "no orientation"),
+        ("quat_xyzw='0 0 1'", "no orientation"),
+        ("quat_xyzw='0 nan 0 1'", "no orientation"),
     ] {
         says(&Folder::new().with("robot.urdf", turned("", " version='1.1'", origin)), words);
     }

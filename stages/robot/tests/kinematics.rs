@@ -1,4 +1,4 @@
-//! Kinematics against yourdfpy, twists against differences, tools on flanges.
+//! Kinematics against yourdfpy, twists against finite differences, and tools on flanges.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
@@ -11,7 +11,7 @@ use common::{Dice, Folder, arm, check_twists, free, joint, link, robot};
 /// URDF. Made once: three postures a model, uniform within the limits.
 const POSES: &str = include_str!("common/yourdfpy.jsonl");
 
-/// One of them: radians or metres by joint; the upper three rows of the matrix.
+/// One reference pose: joint values in radians or metres, and the upper three rows of the matrix.
 #[derive(serde::Deserialize)]
 struct Placed {
     model: String,

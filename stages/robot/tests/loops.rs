@@ -1,4 +1,4 @@
-//! Loops against their descriptions, over the whole range and out of reach.
+//! Closed loops of real models over their whole range and out of reach.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
@@ -85,8 +85,8 @@ fn parallelograms_follow_their_mimic_and_fingers_nearly() {
         assert!((value(&model, &q, "joint_lever_a") - q3).abs() < 1e-9);
         assert!((value(&model, &q, "joint_lever_b") + q3).abs() < 1e-9);
         let mut q = dice.posture(&m900);
-        // Beyond −π/2 the bars have passed through one line and the other solution is as good; the
-        // real machine's coupled limits end before.
+        // Beyond −π/2 the bars have passed through one line and both solutions are valid; the
+        // coupled limits of the real machine end before.
         let q3 = &mut q[free(&m900, "joint_3")];
         *q3 = q3.max(-1.5);
         let q3 = *q3;
@@ -113,7 +113,7 @@ fn newton_agrees_with_the_closed_forms() {
         for _ in 0..10 {
             let q = dice.posture(&exact);
             for (a, b) in exact.joint_values(&q).iter().zip(newton.joint_values(&q)) {
-                // A turn more or less is the same pose.
+                // Whole turns apart is the same pose.
                 let apart = (a - b).abs() % std::f64::consts::TAU;
                 assert!(apart.min(std::f64::consts::TAU - apart) < 1e-8, "{name} {q:?} {a} {b}");
             }
@@ -173,7 +173,7 @@ fn loops_on_loops_keep_the_plate_level() {
         assert!(pose.rotation.angle() < 1e-9, "{a} {b} {}", pose.rotation.angle());
         assert!(model.loop_gap(&[a, b, 0.1]) < 1e-9);
     }
-    // Random postures may stretch the bars, where the derivative has no bound: stay inside.
+    // At random postures the bars may be stretched out, where the derivative is unbounded.
     let mut model = model;
     for joint in &mut model.joints {
         joint.limits = joint.limits.map(|_| [-0.6, 0.6]);
@@ -209,7 +209,7 @@ fn a_bar_points_at_its_pin_and_says_how_far_it_misses() {
 
 #[test]
 fn out_of_reach_takes_the_nearest_pose() {
-    // Bars of 0.5 m each must span from the foot to a point that goes further than 1 m away.
+    // Bars of 0.5 m each must span from the base to a point that moves farther than 1 m away.
     let bars = link("l0")
         + &link("a")
         + &link("b")

@@ -1,4 +1,4 @@
-//! Real robots and real hazards load as their makers meant them.
+//! Real robots, and meshes with known difficulties, load with the expected content.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
@@ -17,8 +17,8 @@ fn every_shared_robot_loads() {
         "{:#?}",
         library.findings
     );
-    // As in the table of the collection: name, free joints, triangles (it leaves out the gripper's
-    // two boxes).
+    // From the table of the collection: name, free joints, triangles (without the two boxes of the
+    // gripper).
     let expected = [
         ("abb_irb2400_12_155", 6, 9254),
         ("abb_irb4600_20_250", 6, 36572),
@@ -73,7 +73,7 @@ fn arms_of_depth_camera_scans_load() {
     );
 }
 
-/// File, triangles, bounds: from the README beside the files.
+/// File, number of triangles and bounds, from the README beside the files.
 const HAZARDS: &[(&str, usize, [f64; 3], [f64; 3])] = &[
     ("kr210l150_link_6.dae", 11712, [0.0, -0.0990, -0.0986], [0.0375, 0.0988, 0.0991]),
     ("kr150_r3100_2_link_6.dae", 2280, [1.9199, -0.0710, 2.0390], [1.9650, 0.0710, 2.1810]),

@@ -1,4 +1,4 @@
-//! Robots as they stand: fits and models in; posed links with their fields, gates and boxes out.
+//! Fitted robots prepared for labelling: posed links with distance fields, gates and bounds.
 
 use crate::Settings;
 use crate::field::{FIELD_REACH, Field};
@@ -9,45 +9,44 @@ use robot::{Kinematics, Model};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Samples of a link by which its uncertainty is judged: a share of the surface is enough for one
-/// figure a link.
+/// Number of samples of a link from which its uncertainty is computed.
 const N_SPREAD: usize = 64;
-/// A joint that the points do not determine is believed to this, radians or metres: its link was
-/// placed by search.
+/// Standard deviation that is assumed for a joint that the points do not determine, radians or
+/// metres: its link was placed by the search.
 const OPEN_SIGMA: f64 = 0.01;
 
-/// One link as it stands.
+/// One link of a fitted robot.
 pub(crate) struct Link {
-    /// Index into the model's links.
+    /// Index of the link in the model.
     pub(crate) index: u16,
     pub(crate) world_from_link: Pose,
     pub(crate) field: Arc<Field>,
     /// Bounds of the mesh in the link's frame, metres.
     pub(crate) bounds: Aabb,
-    /// How far around its bounds points are looked at, metres.
+    /// Distance around its bounds up to which points are examined, metres.
     pub(crate) reach: f64,
-    /// Distance at which a point still belongs to it, metres.
+    /// Gate: largest distance of a point that belongs to the link, metres.
     pub(crate) gate: f32,
-    /// Of the link that the robot stands on: the plane of its underside in the link's frame, unit
-    /// normal and offset.
+    /// For the link that the robot stands on, the plane of its underside in the link's frame: unit
+    /// normal and offset (metres).
     foot: Option<([f32; 3], f32)>,
 }
 
 impl Link {
-    /// How far a point (link frame) is above what the robot stands on, metres; `None` for links
-    /// that do not stand.
+    /// Height of a point (link frame) above the underside of the robot, metres; `None` for links on
+    /// which the robot does not stand.
     pub(crate) fn above_foot(&self, p: [f32; 3]) -> Option<f32> {
         self.foot.map(|(n, offset)| n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - offset)
     }
 }
 
-/// One robot as it stands.
+/// One fitted robot.
 pub(crate) struct Body {
-    /// Index into the fits.
+    /// Index of its fit.
     pub(crate) robot: u16,
-    /// Scans in which it stands so; empty: in all.
+    /// Scans in which it stands so; empty if it does in all.
     stands_in: Vec<ScanId>,
-    /// World bounds of everything that is looked at, metres.
+    /// World bounds of all points that are examined, metres.
     pub(crate) region: Aabb,
     pub(crate) links: Vec<Link>,
 }
@@ -59,7 +58,7 @@ impl Body {
     }
 }
 
-/// The fits that are used for labels; fields are shared between fits of one model.
+/// The fits that give labels; fits of one model share their distance fields.
 pub(crate) fn bodies(
     fits: &[Fit],
     models: &[Model],
@@ -70,7 +69,7 @@ pub(crate) fn bodies(
         std::iter::once(fit).chain(&fit.stays).map(move |fit| (robot, fit))
     });
     let used = all.filter_map(|(robot, fit)| {
-        // Labels hold a robot as i16.
+        // Labels store the index of a robot as i16.
         let (robot, model) = (i16::try_from(robot).ok()?, models.get(fit.model)?);
         let is_used = fit.gives_labels() && fit.joints.len() == model.free.len();
         is_used.then_some((robot.unsigned_abs(), fit, model))
@@ -86,7 +85,7 @@ pub(crate) fn bodies(
     used.iter().filter_map(body).collect()
 }
 
-/// For each model in use: the fields of its links that have a surface.
+/// For each model in use, the distance fields of its links that have a surface.
 fn fields(used: &[(u16, &Fit, &Model)], fan: &dyn Fan) -> BTreeMap<usize, Vec<Option<Arc<Field>>>> {
     let models: BTreeMap<usize, &Model> = used.iter().map(|(_, fit, m)| (fit.model, *m)).collect();
     let links = models.iter().flat_map(|(at, model)| model.links.iter().map(move |l| (*at, l)));
@@ -117,7 +116,7 @@ fn posed(
         let stated = model.mesh_sigmas.iter().find(|entry| entry.0 == index).map(|entry| entry.1);
         let mesh = stated.unwrap_or(settings.sigma_cad);
         let sigma = (settings.sigma_range.powi(2) + mesh * mesh + spread * spread).sqrt();
-        // The first link with a body stands; what carries it on turns and slides is no foot.
+        // The robot stands on its first link with a body, unless joints move that link.
         let stands = out.is_empty() && twists[index].iter().flatten().all(|v| *v == 0.0);
         out.push(Link {
             index: at,
@@ -132,7 +131,7 @@ fn posed(
     out
 }
 
-/// The plane under a link, square to the axis of the base, in the link's frame.
+/// The plane below a link, perpendicular to the axis of the base, in the link's frame.
 fn foot(link: &robot::Link, base_from_link: &Pose) -> ([f32; 3], f32) {
     let up = (base_from_link.rotation.inverse() * Vector::z()).cast::<f32>();
     let heights = link
@@ -144,12 +143,13 @@ fn foot(link: &robot::Link, base_from_link: &Pose) -> ([f32; 3], f32) {
     (up.into(), heights.fold(f32::INFINITY, f32::min))
 }
 
-/// Which links have no other link with a body beyond them: there the tool and the workpiece are.
+/// For each link, whether no other link with a body comes after it, so that it may carry a tool or
+/// a workpiece.
 fn hands(model: &Model) -> Vec<bool> {
     let mut hands: Vec<bool> = model.links.iter().map(|link| !link.cad.points.is_empty()).collect();
     for joint in model.joints.iter().rev() {
         let mut beyond = Some(joint.child);
-        // A body anywhere below takes the part of hand away from all that carry it.
+        // A body further along the chain excludes all links that carry it.
         if !model.links[joint.child].cad.points.is_empty() {
             while let Some(carrier) = beyond.and_then(|link| model.links[link].parent_joint) {
                 let parent = model.joints[carrier].parent;
@@ -158,14 +158,14 @@ fn hands(model: &Model) -> Vec<bool> {
             }
         }
     }
-    // A lone base is no hand: nothing is carried by what does not move.
+    // The root never counts, since what does not move carries nothing.
     if let Some(root) = hands.first_mut() {
         *root = false;
     }
     hands
 }
 
-/// RMS over the link's samples of their uncertainty across the surface, metres.
+/// RMS over the samples of a link of their standard deviation across the surface, metres.
 fn spread(
     fit: &Fit,
     field: &Field,
@@ -178,7 +178,7 @@ fn spread(
     for (p, normal) in field.samples(step) {
         let p = base_from_link * Point::from(p.map(f64::from));
         let normal = base_from_link * Vector::from(normal.map(f64::from));
-        // The base moves about its own origin along world axes.
+        // The base rotates about its own origin, in world axes.
         let (arm, across) =
             (fit.world_from_base.rotation * p.coords, fit.world_from_base.rotation * normal);
         let turn = arm.cross(&across);
@@ -194,8 +194,8 @@ fn spread(
     if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
 }
 
-/// Covariance of base and joints; of the standard deviations alone where the fit gives no whole one
-/// or a joint is open: that errs on the wide side, and the gate's upper limit holds it.
+/// Covariance of base and joints. If the fit has no full one or a joint is undetermined, it is made
+/// of the standard deviations, which overestimates; the upper limit of the gate bounds that.
 fn covariance(fit: &Fit) -> DMatrix<f64> {
     let n = 6 + fit.joints.len();
     let is_whole = fit.covariance.len() == n * n && fit.covariance.iter().all(|v| v.is_finite());
@@ -209,7 +209,7 @@ fn covariance(fit: &Fit) -> DMatrix<f64> {
 }
 
 impl Link {
-    /// World bounds of what is looked at, metres.
+    /// World bounds of the points that are examined, metres.
     pub(crate) fn region(&self) -> Aabb {
         let corners = self.bounds.grown(self.reach.max(f64::from(FIELD_REACH))).corners();
         Aabb::of(corners.map(|c| {
@@ -219,7 +219,7 @@ impl Link {
     }
 }
 
-/// Distance of a point from a box in its own frame, metres; zero inside.
+/// Distance of a point from a box in the box's frame, metres; zero inside.
 #[inline]
 pub(crate) fn box_distance(min: [f32; 3], max: [f32; 3], p: [f32; 3]) -> f32 {
     let mut square = 0.0;

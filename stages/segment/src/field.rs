@@ -1,26 +1,25 @@
-//! A link's CAD cloud as a grid: a place in the link's frame in, distance to the nearest surface
-//! and its normal out.
+//! The CAD cloud of a link as a grid that gives the distance and the normal of the nearest surface
+//! for a place in the link's frame.
 
 use geometry::NearestField;
 use robot::CadCloud;
 use std::ops::Range;
 
-/// Smallest edge of a cell, metres: with samples every 5 mm a cell holds about sixteen.
+/// Smallest edge of a cell, metres; with samples every 5 mm a cell holds about sixteen.
 const MIN_EDGE: f32 = 0.02;
-/// How far around the link the grid reaches, metres: beyond it a point is simply far.
+/// Distance around the link up to which the grid reaches, metres; farther points are simply far.
 pub(crate) const FIELD_REACH: f32 = 0.16;
-/// Most cells of a grid; a larger link gets larger cells.
+/// Largest number of cells of a grid; a larger link gets larger cells.
 const MAX_CELLS: f32 = 2.0e6;
 
-/// Rows of cells about a place, the nearest first: most samples of the others need not be looked
-/// at.
+/// Offsets of rows of cells about a place, the nearest first, so that most samples of the others
+/// need not be examined.
 const ROWS: [(isize, isize); 9] =
     [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
-/// What distances to cells may be off, metres: they are a few metres long at most, and reckoned to
-/// seven digits.
+/// Rounding error of distances to cells, metres: single precision, for a few metres.
 const ROUNDED: f32 = 1e-5;
 
-/// Samples sorted into cells, and for each cell how far it is from the surface.
+/// Samples sorted into cells, with an approximate nearest sample for each cell.
 pub(crate) struct Field {
     min: [f32; 3],
     size: [usize; 3],
@@ -29,16 +28,16 @@ pub(crate) struct Field {
     starts: Vec<u32>,
     points: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
-    /// About which sample is the nearest.
+    /// Approximate nearest sample of each cell.
     nearest: NearestField,
-    /// Distance along the surface to the next sample that still counts as none, metres.
+    /// Distance along the surface to the nearest sample that is ignored, metres.
     tangent: f32,
 }
 
 /// The nearest place on a surface.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Near {
-    /// Metres; across the surface where the point lies over it.
+    /// Distance, metres; measured across the surface where the point lies above it.
     pub(crate) distance: f32,
     /// Outward unit normal there, link frame.
     pub(crate) normal: [f32; 3],
@@ -96,21 +95,21 @@ impl Field {
         }
     }
 
-    /// The nearest place on the surface, where it is within a cell's edge; else `Err` of the rough
-    /// distance, metres, infinite beyond reach.
+    /// The nearest place on the surface, if it is within a cell's edge; else an approximate
+    /// distance as `Err`, metres, infinite beyond reach.
     pub(crate) fn near(&self, p: [f32; 3]) -> Result<Near, f32> {
         let Some(sample) = self.nearest.nearest(p) else { return Err(f32::INFINITY) };
         let rough = square(minus(p, self.points[sample])).sqrt();
-        // The middle of a cell is at most 0.87 edges from `p`: a sample within one edge of that is
-        // 1.87 from the middle, so the middle's own is no farther from it, nor 2.74 from
-        // `p`.
+        // The centre of a cell is at most 0.87 edges from `p`. If a sample is within one edge of
+        // `p`, it is within 1.87 of the centre, so that the centre's nearest sample is within 1.87
+        // of the centre and 2.74 of `p`.
         if rough > 2.75 * self.edge {
             return Err(rough);
         }
         let (cell, mut best) = (self.cell(p), (f32::INFINITY, 0));
         let gaps = self.gaps(p, cell);
-        // A sample so far off is no nearer across the surface than that without the tangent's
-        // length.
+        // A sample this far off cannot be nearer across the surface, even if the part along the
+        // surface is ignored.
         let is_beyond = |square: f32, best: f32| {
             let reach = square.sqrt() - self.tangent - ROUNDED;
             reach > 0.0 && reach * reach > best
@@ -121,7 +120,8 @@ impl Field {
             if y >= self.size[1] || z >= self.size[2] || is_beyond(aside, best.0) {
                 continue;
             }
-            // Cells along x are neighbours in memory: up to three of them are one run of samples.
+            // Cells along x are adjacent in memory, so that up to three of them are one run of
+            // samples.
             let row = (z * self.size[1] + y) * self.size[0];
             let is_left = cell[0] > 0 && !is_beyond(aside + gaps[0][0], best.0);
             let is_right = cell[0] + 1 < self.size[0] && !is_beyond(aside + gaps[0][1], best.0);
@@ -137,8 +137,8 @@ impl Field {
         }
     }
 
-    /// The nearest of a run of samples, where one is nearer than `best`: squared distance and
-    /// sample.
+    /// The nearest of a run of samples, if one is nearer than `best`: squared distance (m²) and
+    /// index.
     fn nearest_of(&self, p: [f32; 3], run: Range<usize>, mut best: (f32, usize)) -> (f32, usize) {
         let samples = self.points[run.clone()].iter().zip(&self.normals[run.clone()]);
         for (i, (point, n)) in run.zip(samples) {
@@ -157,8 +157,8 @@ impl Field {
         best
     }
 
-    /// On each axis, squared distances to the neighbours of the cell that a place lies in, the
-    /// lower first, square metres.
+    /// Along each axis, squared distances (m²) to the lower and upper neighbour of the cell that
+    /// holds a place.
     fn gaps(&self, p: [f32; 3], cell: [usize; 3]) -> [[f32; 2]; 3] {
         std::array::from_fn(|i| {
             let low = self.min[i] + cell[i] as f32 * self.edge;
@@ -185,8 +185,7 @@ impl Field {
     }
 }
 
-/// Of the squared distances to both neighbours, that to the one on this side; none to the cell
-/// itself.
+/// The squared distance to the neighbour on this side; 0 for the cell itself.
 fn gap(gaps: [f32; 2], side: isize) -> f32 {
     match side {
         0 => 0.0,
@@ -234,7 +233,7 @@ mod tests {
 
     #[test]
     fn no_sample_that_is_passed_over_is_nearer() {
-        // A ball: every direction, and thin enough samples that tangents matter.
+        // A ball has normals in all directions, with samples so sparse that tangents matter.
         let points: Vec<[f32; 3]> = (0..4000)
             .map(|i| {
                 let (z, turn) = (1.0 - (i as f32 + 0.5) / 2000.0, i as f32 * 2.399_963);

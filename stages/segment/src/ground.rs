@@ -1,20 +1,19 @@
-//! The floor as dense rasters: a place in, height above the floor and the default label out, in
-//! constant time.
+//! The floor as dense rasters: gives the height above the floor and the default label of any place
+//! in constant time.
 
 use crate::Settings;
 use contract::{Floor, FloorLevel, Label};
 use geometry::narrow::{floor_i32, local_f32};
 
-/// Largest dense raster, cells: 4 km² at 0.5 m. A level with stray cells farther apart is looked up
-/// by search.
+/// Largest number of cells of a dense raster: 4 km² at 0.5 m. The heights of a level with stray
+/// cells farther apart are looked up by search.
 const MAX_CELLS: i64 = 1 << 24;
-/// Half thickness of a floor in multiples of what its points scatter: one point in 30,000 lies
-/// beyond …
+/// Half-thickness of a floor in standard deviations of its points: one point in 30,000 lies beyond.
 const SCATTERS: f64 = 4.0;
-/// … and at least so much, metres: dust and paint.
+/// Smallest half-thickness of a floor, metres: dust and paint.
 const MIN_BAND: f64 = 0.005;
 
-/// The floor, prepared for a look-up at every point of the plant.
+/// The floor, prepared for a look-up at every point of a plant.
 #[derive(Debug, Clone)]
 pub struct Ground {
     levels: Vec<Level>,
@@ -24,7 +23,7 @@ pub struct Ground {
 #[derive(Debug, Clone)]
 struct Level {
     heights: Heights,
-    /// Half thickness above its heights, metres.
+    /// Half-thickness of the floor above its heights, metres.
     band: f64,
 }
 
@@ -34,22 +33,23 @@ enum Heights {
     Sparse(FloorLevel),
 }
 
-/// Heights at cell middles; cells without one but near known ones hold the mean plane, others NaN.
+/// Heights at the centres of cells. Cells without a height next to known ones have that of the mean
+/// plane, others are NaN.
 #[derive(Debug, Clone)]
 struct Raster {
-    /// Cells a metre.
+    /// Number of cells per metre.
     per_metre: f64,
     min: [i32; 2],
     width: usize,
     heights: Vec<f32>,
-    /// Subtracted from heights, metres, so that f32 is exact far above sea level.
+    /// Subtracted from heights, metres, so that `f32` is precise far above sea level.
     base: f64,
     /// Lowest and highest height, metres.
     span: [f64; 2],
 }
 
 impl Ground {
-    /// The floor as found, with the bands of `settings`.
+    /// The floor as found, with the thickness that `settings` give.
     #[must_use]
     pub fn new(floor: &Floor, settings: &Settings) -> Self {
         let levels = floor.levels.iter().filter(|level| !level.heights.is_empty());
@@ -65,8 +65,8 @@ impl Ground {
         }
     }
 
-    /// Height above the floor level that lies nearest below (or at most `floor_depth` above) a
-    /// place in the world, metres; `None` where no level is near.
+    /// Height of a place (world, metres) above the nearest floor level below it, metres; a level up
+    /// to `floor_depth` above counts as below. `None` where no level is near.
     #[inline]
     #[must_use]
     pub fn height_above(&self, world: [f64; 3]) -> Option<f64> {
@@ -83,7 +83,7 @@ impl Ground {
         best
     }
 
-    /// Whether a place in the world lies on the floor: on any of its levels.
+    /// Whether a place (world, metres) lies on the floor, on any of its levels.
     #[inline]
     #[must_use]
     pub fn is_floor(&self, world: [f64; 3]) -> bool {
@@ -91,7 +91,7 @@ impl Ground {
             floor.is_some_and(|h| (-self.depth..=band).contains(&(world[2] - h)))
         };
         self.levels.iter().any(|level| match &level.heights {
-            // Most points of a plant are far above the floor, or under the ceiling.
+            // Most points of a plant are far above the floor or below the ceiling.
             Heights::Dense(raster) => {
                 world[2] - level.band <= raster.span[1]
                     && world[2] + self.depth >= raster.span[0]
@@ -101,7 +101,7 @@ impl Ground {
         })
     }
 
-    /// The label that a point has by its place alone: floor or fixed.
+    /// The label of a point by its place alone: floor or fixed.
     #[inline]
     #[must_use]
     pub fn label(&self, world: [f64; 3]) -> Label {
@@ -113,7 +113,7 @@ impl Raster {
     /// The dense form of a level; `None` where it would be too large.
     fn new(level: &FloorLevel) -> Option<Self> {
         let cells = || level.heights.iter().map(|entry| entry.0);
-        // Two cells of margin: that far the mean plane stands in, as `FloorLevel::height` says.
+        // A margin of two cells, up to which `FloorLevel::height` uses the mean plane.
         let low = |axis: usize| Some(i64::from(cells().map(|c| c[axis]).min()?) - 2);
         let high = |axis: usize| Some(i64::from(cells().map(|c| c[axis]).max()?) + 2);
         let (width, depth) = (high(0)? - low(0)? + 1, high(1)? - low(1)? + 1);
@@ -144,15 +144,15 @@ impl Raster {
         Some(Self { per_metre: 1.0 / level.cell, min, width, heights, base, span })
     }
 
-    /// Bilinear height between cell middles, metres; where not all four are known, of those that
-    /// are.
+    /// Height by bilinear interpolation between the centres of cells, metres; where not all four
+    /// are known, from those that are.
     #[inline]
     fn height(&self, x: f64, y: f64) -> Option<f64> {
         let (u, v) = (x * self.per_metre - 0.5, y * self.per_metre - 0.5);
         let (i, j) = (floor_i32(u), floor_i32(v));
         let (fu, fv) = (u - f64::from(i), v - f64::from(j));
         let (i, j) = (i64::from(i) - i64::from(self.min[0]), i64::from(j) - i64::from(self.min[1]));
-        // Wholly within the raster, as nearly all points are.
+        // The common case: all four cells lie within the raster.
         if i >= 0 && j >= 0 && i + 1 < self.width as i64 {
             let at = j as usize * self.width + i as usize;
             if let (Some([a, b]), Some([c, d])) =
@@ -167,14 +167,14 @@ impl Raster {
         self.known_height((i, j), (fu, fv))
     }
 
-    /// Two neighbours of a row.
+    /// Heights of two neighbours in a row, if both are known.
     #[inline]
     fn pair(&self, at: usize) -> Option<[f64; 2]> {
         let pair = self.heights.get(at..at.checked_add(2)?)?;
         Some([f64::from(pair[0]), f64::from(pair[1])])
     }
 
-    /// The same at the rim of what is known.
+    /// The height at the border of the known cells.
     #[cold]
     fn known_height(&self, (i, j): (i64, i64), (fu, fv): (f64, f64)) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);

@@ -1,6 +1,31 @@
-//! A tile and the fits in, labels of its points near robots out; beside it, the label that a point
-//! has by its place alone. Knows nothing of other tiles: what hangs on a robot is told by `attach`
-//! from the voxels left here.
+//! Labels the points of one tile that are near fitted robots, and gives the default label of all
+//! other points. The crate never looks at other tiles: `attach` decides what belongs to a robot,
+//! from the voxels that remain here.
+//!
+//! # Example
+//! ```
+//! use contract::{Fit, Floor, FloorLevel, OneByOne, PointKind, Scan};
+//! use geometry::{Plane, Pose, Vector};
+//!
+//! // A floor of 10 m × 10 m at height 0.
+//! let cells = (-20..20).flat_map(|i| (-20..20).map(move |j| ([i, j], 0.0)));
+//! let level = FloorLevel {
+//!     plane: Plane { normal: Vector::z(), offset: 0.0 },
+//!     waviness: 0.0, scatter: 0.002, area: 100.0, cell: 0.25, heights: cells.collect(),
+//! };
+//! let floor = Floor { levels: vec![level], planes: vec![] };
+//! let settings = segment::Settings::default();
+//!
+//! // Away from robots the place of a point decides.
+//! let ground = segment::Ground::new(&floor, &settings);
+//! assert_eq!(ground.label([1.0, 2.0, 0.003]).kind, PointKind::Floor);
+//! assert_eq!(ground.label([1.0, 2.0, 0.5]).kind, PointKind::Fixed);
+//!
+//! // Near robots the step labels the points, tile by tile; without fits it has no region.
+//! let (fits, scans): (Vec<Fit>, Vec<Scan>) = (vec![], vec![]);
+//! let step = segment::Segment::new(&fits, &[], &floor, &scans, settings, &OneByOne);
+//! assert!(step.regions().is_empty());
+//! ```
 #![forbid(unsafe_code)]
 
 mod body;
@@ -12,29 +37,31 @@ mod step;
 pub use ground::Ground;
 pub use step::{Scratch, Segment};
 
-/// What may be tuned.
+/// Settings of the segmentation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Standard deviation of a range, metres: 2 mm is a phase scanner on dark steel (METHOD.md
+    /// Standard deviation of a range, metres; 2 mm for a phase scanner on dark steel (METHOD.md
     /// §3).
     pub sigma_range: f64,
-    /// Standard deviation of a mesh from the real casting, metres.
+    /// Standard deviation of the real casting from its mesh, metres.
     pub sigma_cad: f64,
-    /// Smallest distance from a link at which a point still belongs to it, metres.
+    /// Lower limit of the gate, the distance from a link up to which a point belongs to it, metres.
     pub min_gate: f64,
-    /// Largest such distance, metres: beyond it a hose may lie on the link.
+    /// Upper limit of the gate, metres; beyond it a hose may lie on the link.
     pub max_gate: f64,
-    /// Largest half thickness of the floor above its height map, metres: else four times what its
-    /// points scatter.
+    /// Upper limit of the floor's half-thickness above its height map, metres; below the limit it
+    /// is four standard deviations of the floor's points.
     pub floor_band: f64,
-    /// How far below the floor a point still counts as floor, metres (mixed pixels, reflections).
+    /// Depth below the floor down to which a point counts as floor, metres (mixed pixels,
+    /// reflections).
     pub floor_depth: f64,
-    /// Below this height above the floor a point is floor unless it lies on the side of a link,
-    /// and above the plane that a robot stands on it is no part of the foot, metres.
+    /// Height above the floor below which a point is floor unless it lies on the side of a link,
+    /// and height above the underside of a robot below which a point is no part of its foot,
+    /// metres.
     pub foot_band: f64,
-    /// How far around a link points are looked at, metres.
+    /// Distance around a link up to which points are examined, metres.
     pub reach: f64,
-    /// The same at the end of a chain, metres: half a car side carried by a gripper.
+    /// The same at the end of a chain, metres: half of a car's side carried by a gripper.
     pub hand_reach: f64,
 }
 

@@ -1,24 +1,23 @@
-//! The pixels of one tile as neighbours: points in; connectedness, veils and normals out.
+//! The pixels of one tile: which neighbours are connected, which points are veils, and normals.
 
 use contract::{Lattice, TILE_SIDE, Tile};
 
 const SIDE: i32 = TILE_SIDE as i32;
 const EMPTY: u32 = u32::MAX;
-/// Tangent of the steepest incidence at which neighbours still belong to one surface: 80°
-/// (METHOD.md §2).
+/// Tangent of the steepest incidence at which neighbours belong to one surface: 80° (METHOD.md §2).
 const MAX_SLOPE: f32 = 5.67;
-/// Half the width over which a normal is taken, metres: 2 mm of noise then tilts it by about 5°.
+/// Half-width over which a normal is computed, metres: 2 mm of noise tilt it by about 5°.
 const NORMAL_SPAN: f32 = 0.015;
 
-/// Point of each pixel of a tile, with ranges.
+/// The point of each pixel of a tile, and the ranges of the points.
 #[derive(Debug, Default)]
 pub(crate) struct Raster {
-    /// First point of each pixel, or `EMPTY`.
+    /// Index of the first point of each pixel, or `EMPTY`.
     first: Vec<u32>,
     ranges: Vec<f32>,
     /// Angle between neighbouring pixels, radians.
     step: f32,
-    /// Step in range that noise alone may cause, metres.
+    /// Largest step in range that noise alone causes, metres.
     noise: f32,
 }
 
@@ -39,7 +38,7 @@ impl Raster {
         self.noise = (3.0 * std::f64::consts::SQRT_2 * sigma_range) as f32;
     }
 
-    /// The point in the pixel `by` away from that of point `i`, inside the tile.
+    /// Index of the point in the pixel at offset `by` from that of point `i`, inside the tile.
     #[inline]
     pub(crate) fn beside(&self, tile: &Tile, i: usize, by: [i32; 2]) -> Option<usize> {
         let pixel = i32::from(tile.pixel[i]);
@@ -59,22 +58,22 @@ impl Raster {
         (ra - rb).abs() <= limit
     }
 
-    /// Whether a point hangs between an edge and what lies behind it: along a row or column it is
-    /// cut off on both sides.
+    /// Whether a point hangs between an edge and the surface behind it: along a row or column it is
+    /// disconnected on both sides.
     pub(crate) fn is_veil(&self, tile: &Tile, i: usize) -> bool {
         let cut = |by: [i32; 2]| self.beside(tile, i, by).map(|other| !self.connected(i, other, 1));
         [[0, 1], [1, 0]].into_iter().any(|by| {
             match (cut(by), cut([-by[0], -by[1]])) {
                 (Some(a), Some(b)) => a && b,
-                // Nothing came back on the other side: half a veil is one.
+                // No return on the other side: a single disconnected side is enough.
                 (Some(a), None) | (None, Some(a)) => a,
                 (None, None) => false,
             }
         })
     }
 
-    /// Unit normal at a point from its neighbours on both sides, scan frame, sign arbitrary; `None`
-    /// near edges.
+    /// Unit normal at a point from its neighbours on both sides, scan frame, with arbitrary sign;
+    /// `None` near edges.
     pub(crate) fn normal(&self, tile: &Tile, i: usize) -> Option<[f32; 3]> {
         let pixels =
             ((NORMAL_SPAN / (self.ranges[i] * self.step).max(1e-6)).round() as i32).clamp(1, 12);

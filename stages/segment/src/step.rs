@@ -1,4 +1,4 @@
-//! The step itself: one tile in, its labels near robots and its residual voxels out.
+//! The segmentation step: labels of one tile's points near robots, and its residual voxels.
 
 use crate::body::{Body, bodies, box_distance};
 use crate::field::FIELD_REACH;
@@ -13,62 +13,62 @@ use geometry::narrow::floor_i32;
 use geometry::{Aabb, Point, Pose};
 use robot::{Model, Role};
 
-/// Points that are asked together which links are near: neighbours along a row of the tile.
+/// Number of neighbouring points for which the links nearby are determined together.
 const BLOCK: usize = 32;
-/// A surface turned by more than this (cosine of 70°) from the link's is something else …
+/// Smallest cosine between the normals of a point and of a link (70°) for the point to lie on it.
 const MIN_AGREEMENT: f32 = 0.35;
-/// … unless it lies closer than this, metres: at edges normals are smeared.
+/// Distance from a link below which the normal does not matter, metres: at edges normals are wrong.
 const NEAR_ENOUGH: f32 = 0.003;
-/// A region ends here: points this near its border, metres, may go on outside.
+/// Distance from the border of a region within which a body may continue outside, metres.
 const BORDER: f32 = 0.03;
-/// Below this height, metres, what is not floor stands on it.
+/// Height above the floor below which a voxel stands on the floor, metres.
 const GROUNDED: f64 = 0.06;
-/// Of the eight neighbours, how many on a link pull a doubtful point onto it.
+/// Number of the eight neighbours on a link that assigns a doubtful point to the link.
 const PULL: usize = 4;
 
 /// Labels the points of tiles near fitted robots.
 pub struct Segment {
     bodies: Vec<Body>,
-    /// For each fit, for each link: whether it belongs to the tool.
+    /// For each fit and link, whether the link belongs to the tool.
     effectors: Vec<Vec<bool>>,
     ground: Ground,
     scans: Vec<Scan>,
     settings: Settings,
 }
 
-/// Memory reused from tile to tile.
+/// Memory that is reused from tile to tile.
 #[derive(Debug, Default)]
 pub struct Scratch {
     raster: Raster,
     found: Vec<Found>,
 }
 
-/// What one point is before its neighbours are asked.
+/// The class of a point before its neighbours are considered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Found {
-    /// Away from robots, or floor.
+    /// Away from robots, or on the floor.
     Default,
     /// Within the gate of a link.
     Link(Touch),
-    /// Between one gate and two.
+    /// Between one and two gates from a link.
     Doubt(Touch),
-    /// Near a robot, but none of its links.
+    /// Near a robot, but on none of its links.
     Residual(Touch),
-    /// Hangs between a link's edge and what lies behind.
+    /// A mixed pixel between a link's edge and the surface behind it.
     Veil,
 }
 
-/// The nearest link.
+/// The nearest link of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Touch {
     link: LinkAt,
-    /// Metres; infinite beyond the field.
+    /// Distance from its surface, metres; infinite beyond the field.
     distance: f32,
     at_border: bool,
     grounded: bool,
 }
 
-/// A link as one tile sees it.
+/// A link in the scan frame of one tile.
 #[derive(Clone, Copy)]
 struct Seen<'a> {
     at: LinkAt,
@@ -78,14 +78,14 @@ struct Seen<'a> {
     max: [f32; 3],
 }
 
-/// The links about a point.
+/// The links near a point.
 struct About<'a> {
-    /// How far it is within the reach of a link, at most, metres.
+    /// Largest depth of the point within the reach of a link, metres.
     inset: f32,
-    /// Where fields tell: so many gates away, from which link, its distance, metres, and its
-    /// surface's normal.
+    /// The best link by its field: distance in gates, link, distance in metres, and normal of the
+    /// surface.
     best: Option<(f32, &'a Seen<'a>, f32, [f32; 3])>,
-    /// The nearest by field, else by box: both distances, metres.
+    /// The nearest link by field, else by bounding box: both distances (metres) and the link.
     rough: (f32, f32, Option<&'a Seen<'a>>),
 }
 
@@ -94,8 +94,8 @@ fn effectors(model: Option<&Model>) -> Vec<bool> {
 }
 
 impl Segment {
-    /// Labels for these fits (the robots of the result, in its order; refused ones give none).
-    /// `scans` in the order of their numbers.
+    /// A step for these fits (the robots of the result, in its order; refused ones give no labels).
+    /// `scans` must be sorted by id.
     #[must_use]
     pub fn new(
         fits: &[Fit],
@@ -114,13 +114,13 @@ impl Segment {
         }
     }
 
-    /// World bounds of each robot's region, metres: only tiles that touch one need to be segmented.
+    /// World bounds of each robot's region, metres. Only tiles that touch one need to be segmented.
     #[must_use]
     pub fn regions(&self) -> Vec<Aabb> {
         self.bodies.iter().map(|body| body.region).collect()
     }
 
-    /// A tool's link is part of an effector, not of the robot.
+    /// Labels the links of tools as attachments: they belong to an effector, not to the robot.
     fn name_tools(&self, tile: &mut TileLabels) {
         let labels = tile.labels.iter_mut().map(|run| &mut run.what);
         for label in labels.filter(|label| label.kind == PointKind::Link) {
@@ -132,7 +132,7 @@ impl Segment {
         }
     }
 
-    /// The links whose surroundings a tile may touch.
+    /// The links whose surroundings overlap a tile.
     fn seen<'a>(&'a self, tile: &Tile, world_from_scan: &Pose) -> Vec<Seen<'a>> {
         let mut out = Vec::new();
         let here = |body: &&Body| body.is_in(tile.at.scan) && body.region.touches(&tile.bounds);
@@ -150,7 +150,7 @@ impl Segment {
         out
     }
 
-    /// What point `i` is by itself.
+    /// The class of point `i` without its neighbours.
     fn judge(
         &self,
         seen: &[Seen],
@@ -172,7 +172,7 @@ impl Segment {
         let is_floor = self.ground.is_floor(world);
         if let Some((gates, s, distance, surface)) = best.filter(|b| b.0 <= 2.0) {
             let found = touch(s.at, distance);
-            // A stand's top goes on beside the foot, within its gate.
+            // The top of a stand continues beside the foot, within its gate.
             let above = s.link.above_foot(transform(&s.link_from_scan, p));
             if above.is_some_and(|above| f64::from(above) <= self.settings.foot_band) {
                 return Found::Default;
@@ -205,10 +205,10 @@ impl Segment {
         rise.abs() < 0.5 && distance <= 0.5 * s.link.gate
     }
 
-    /// Doubtful points and veils, by what their neighbours are.
+    /// Decides doubtful points and veils by their neighbours.
     fn settle(&self, tile: &Tile, raster: Option<&Raster>, found: &mut [Found]) {
         let Some(raster) = raster else {
-            // Without neighbours a doubt stays one; `attach` sees it by its voxel.
+            // Without a raster doubtful points stay residual; `attach` decides by their voxels.
             for f in found.iter_mut() {
                 if let Found::Doubt(touch) = *f {
                     *f = Found::Residual(touch);
@@ -296,8 +296,7 @@ impl Map for Segment {
     }
 }
 
-/// Links that a point of a block may be near; those beyond the reach of all of them have no say in
-/// it.
+/// The links that any point of a block may be near.
 fn near<'a>(seen: &[Seen<'a>], points: &[[f32; 3]]) -> Vec<Seen<'a>> {
     let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for p in points {
@@ -309,14 +308,14 @@ fn near<'a>(seen: &[Seen<'a>], points: &[[f32; 3]]) -> Vec<Seen<'a>> {
     let middle: [f32; 3] = std::array::from_fn(|i| 0.5 * (min[i] + max[i]));
     let radius = (0..3).map(|i| (0.5 * (max[i] - min[i])).powi(2)).sum::<f32>().sqrt();
     let reach = seen.iter().map(|s| s.link.reach as f32).fold(0.0, f32::max).max(FIELD_REACH);
-    // A millimetre for what transforms round.
+    // A millimetre for the rounding of transforms.
     let far = reach + radius + 1e-3;
     let is_near =
         |s: &&Seen| box_distance(s.min, s.max, transform(&s.link_from_scan, middle)) <= far;
     seen.iter().filter(is_near).copied().collect()
 }
 
-/// What the fields and boxes of links say of a point.
+/// The links near a point, by their fields and bounding boxes.
 #[inline]
 fn about<'a>(seen: &'a [Seen<'a>], p: [f32; 3]) -> About<'a> {
     let mut out =
@@ -335,7 +334,7 @@ fn about<'a>(seen: &'a [Seen<'a>], p: [f32; 3]) -> About<'a> {
             }
             Err(distance) => distance,
         };
-        // Far from every field the box decides which link is the nearest.
+        // Far from every field the bounding box decides which link is nearest.
         if (distance, outside) < (out.rough.0, out.rough.1) || out.rough.2.is_none() {
             out.rough = (distance, outside, Some(s));
         }
@@ -343,7 +342,7 @@ fn about<'a>(seen: &'a [Seen<'a>], p: [f32; 3]) -> About<'a> {
     out
 }
 
-/// Turns what was found into lists sorted by place and by voxel.
+/// Collects the classes of all points as lists sorted by place and by voxel.
 fn gather(tile: &Tile, world_from_scan: &Pose, found: &[Found], mut out: TileLabels) -> TileLabels {
     for (i, found) in found.iter().enumerate() {
         let place = tile.first_place + u64::from(tile.place[i]);

@@ -1,5 +1,5 @@
-//! A box robot on a floor beside a wall, seen by one scanner with noise and mixed pixels: labels
-//! against truth.
+//! A robot made of boxes on a floor beside a wall, seen by one scanner with noise and mixed pixels:
+//! labels are compared with the truth.
 
 use crate::{Ground, Scratch, Segment, Settings};
 use contract::{
@@ -11,7 +11,7 @@ use robot::{CadCloud, Joint, JointKind, Link, Model, Motion, Role};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A box, in the frame of a link: half sizes about its middle, metres.
+/// A box in its own frame, given by its half sizes, metres.
 struct Brick {
     world_from_box: Pose,
     half: [f64; 3],
@@ -33,7 +33,7 @@ impl Brick {
     }
 }
 
-/// SplitMix64: a number in 0..1.
+/// A SplitMix64 number in 0..1.
 fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let mut z = *state;
@@ -160,7 +160,7 @@ fn scan(world_from_scan: Pose) -> Scan {
 /// A tile with the truth of its points; `None` for mixed pixels.
 type Shot = (Tile, Vec<Option<Label>>);
 
-/// Points by tile, with truth.
+/// Casts the rays of a scan; returns the points by tile, with truth.
 fn shoot(bricks: &[Brick], scan: &Scan) -> Vec<Shot> {
     let lattice = scan.lattice.expect("has one");
     let origin = scan.world_from_scan * Point::origin();
@@ -220,7 +220,7 @@ fn shoot(bricks: &[Brick], scan: &Scan) -> Vec<Shot> {
     tiles.into_values().collect()
 }
 
-/// Labels place by place.
+/// The labels, place by place.
 fn single(runs: &[PlaceRun<Label>]) -> impl Iterator<Item = (u64, Label)> {
     runs.iter().flat_map(|run| (run.first..run.end()).map(|place| (place, run.what)))
 }
@@ -382,7 +382,7 @@ fn points_of_a_real_robot_go_to_their_links() {
             let shift = Vector::from(n.map(f64::from)) * 0.002 * normal(&mut rng);
             let base = pose * (Point::from(p.map(f64::from)) + shift);
             let p = world_from_base * base;
-            // The foot's lowest samples lie on the floor, and belong to it.
+            // The lowest samples of the foot lie on the floor, and count as floor.
             if p.z > 0.02 && is_apart(link, base) {
                 tile.place.push(truth.len() as u32);
                 tile.pixel.push(0);

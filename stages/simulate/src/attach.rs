@@ -1,16 +1,16 @@
-//! What hangs on robots: hoses, tools and carried parts in; their bodies out.
+//! Bodies of what robots carry: hoses, tools and parts.
 
 use crate::scene::{Hose, Tool, ToolShape};
 use crate::solid::{Solid, bolts, cuboid, disc, lathe, tube};
 use geometry::{Point, Vector};
 
-/// Pieces of one hanging arc.
+/// Number of straight pieces of one hanging arc.
 const ARC_PIECES: usize = 24;
-/// Sides of a hose.
+/// Number of sides of a hose's cross-section.
 const HOSE_SIDES: usize = 14;
 
-/// A hose through points of the world: parabolas between them, hanging down by `sag` of each
-/// distance.
+/// A hose through points of the world (metres): parabolas between them that hang down by `sag` of
+/// each distance.
 pub(crate) fn hose(hose: &Hose, held: &[Point]) -> Solid {
     let mut path = vec![held[0]];
     for pair in held.windows(2) {
@@ -21,7 +21,7 @@ pub(crate) fn hose(hose: &Hose, held: &[Point]) -> Solid {
             path.push(a + (b - a) * t - Vector::z() * (4.0 * depth * t * (1.0 - t)));
         }
     }
-    // Where two arcs meet the hose bends, it does not fold.
+    // Smoothing makes the hose bend where two arcs meet, instead of folding.
     for _ in 0..6 {
         for i in 1..path.len() - 1 {
             path[i] = Point::from(

@@ -1,4 +1,5 @@
-//! Triangles in; the first one that a beam meets, with its range in double precision, out.
+//! Casts beams at triangles: the first triangle that a beam meets, with its range in double
+//! precision.
 
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
@@ -9,23 +10,23 @@ use obvhs::triangle::Triangle;
 
 type Vector = geometry::Vector;
 
-/// How far a triangle reaches beyond its edges, as a share of its size: about 60 roundings of
-/// single precision.
+/// How far a triangle is extended beyond its edges, as share of its size: about 60 rounding errors
+/// of single precision.
 const HAIR: f32 = 4e-6;
 
-/// Where a beam ends.
+/// The end of a beam.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hit {
     /// Distance from the origin of the beam, metres.
     pub(crate) range: f64,
-    /// Triangle, in the order of [`Beams`].
+    /// Index of the triangle, in the order of [`Beams`].
     pub(crate) triangle: u32,
     /// Index of its surface.
     pub(crate) surface: u32,
 }
 
-/// Triangles in a tree of boxes, two to a node: measured as fast as eight to a node, and built in
-/// half the time.
+/// Triangles in a binary bounding volume hierarchy. It measures as fast as one with eight children
+/// a node, and is built in half the time.
 pub(crate) struct Beams {
     tree: Bvh2,
     triangles: Vec<RtTriangle>,
@@ -33,18 +34,18 @@ pub(crate) struct Beams {
 }
 
 impl Beams {
-    /// Sorts the triangles into a tree.
+    /// Builds the hierarchy.
     pub(crate) fn new(triangles: &[[Vec3A; 3]], surface_of: &[u32]) -> Self {
         let plain: Vec<Triangle> =
             triangles.iter().map(|t| Triangle { v0: t[0], v1: t[1], v2: t[2] }).collect();
         if plain.is_empty() {
             return Self { tree: Bvh2::default(), triangles: Vec::new(), surface_of: Vec::new() };
         }
-        // Long thin triangles (fence wires, walls) are split into several boxes: they would fill
-        // the tree with air.
+        // Long thin triangles (fence wires, walls) are split into several boxes, which would be
+        // mostly empty otherwise.
         let settings = BvhBuildParams { pre_split: true, ..BvhBuildParams::medium_build() };
         let tree = build_bvh2_from_tris(&plain, settings, &mut std::time::Duration::default());
-        // In the order of the leaves: no second look-up while a beam is followed.
+        // Triangles are stored in the order of the leaves, which saves a look-up for each.
         let order = &tree.primitive_indices;
         let triangles = order.iter().map(|&i| RtTriangle::from(&plain[i as usize])).collect();
         let surface_of = order.iter().map(|&i| surface_of[i as usize]).collect();
@@ -66,22 +67,22 @@ impl Beams {
         }
         let triangle = hit.primitive_id;
         let single = f64::from(hit.t);
-        // Single precision finds the triangle; its plane gives the range. A grazing beam may leave
-        // the plane's answer worthless, and then the single-precision one stands.
+        // Single precision finds the triangle, and its plane gives the range. At grazing incidence
+        // the plane may give no useful range; then the single-precision one is used.
         let range = self.plane_range(triangle, origin, direction);
         let range = if (range - single).abs() < 1e-3 { range } else { single };
         Some(Hit { range, triangle, surface: self.surface_of[triangle as usize] })
     }
 
-    /// Range at which a beam meets the plane of a triangle, metres; infinite or negative where it
-    /// does not.
+    /// Range at which a beam meets the plane of a triangle, metres; infinite or negative if it does
+    /// not.
     #[inline]
     pub(crate) fn plane_range(&self, triangle: u32, origin: &Vector, direction: &Vector) -> f64 {
         let (corner, normal) = self.plane(triangle);
         normal.dot(&(corner - origin)) / normal.dot(direction)
     }
 
-    /// |cosine| between a beam and a triangle's normal.
+    /// Absolute cosine of the angle between a beam and a triangle's normal.
     pub(crate) fn cosine(&self, triangle: u32, direction: &Vector) -> f64 {
         let (_, normal) = self.plane(triangle);
         normal.dot(direction).abs() / normal.norm().max(1e-300)
@@ -95,9 +96,9 @@ impl Beams {
     }
 }
 
-/// Range at which a ray meets a triangle, infinite where it does not (Möller–Trumbore). Triangles
-/// are grown by a hair: beams of a regular raster fall exactly on edges that two triangles share,
-/// and single precision loses some of them.
+/// Range at which a ray meets a triangle, infinite if it does not (Möller–Trumbore). Triangles are
+/// extended slightly: beams of a regular raster fall exactly on edges between two triangles, and
+/// single precision would miss some of them.
 #[inline(always)]
 fn meet(t: &RtTriangle, ray: &Ray) -> f32 {
     let c = t.v0 - ray.origin;

@@ -1,18 +1,17 @@
-//! A scene in; the first thing that is wrong with it out. Limits keep a typing error from taking
-//! all memory.
+//! Checks a scene and refuses the first error. Limits keep a typing error from exhausting memory.
 
 use crate::scene::{Scanner, Scene};
 use contract::{Error, Result};
 use std::collections::BTreeSet;
 
-/// Largest coordinate inside a scene, metres: beyond it single precision triangles are coarser than
-/// 0.1 mm.
+/// Largest coordinate inside a scene, metres; beyond it, triangles in single precision are coarser
+/// than 0.1 mm.
 const MAX_COORDINATE: f64 = 1000.0;
-/// Largest difference between true and stated poses, metres: stated ones may be those of a map.
+/// Largest difference between true and stated poses, metres; stated ones may be map coordinates.
 const MAX_STATED: f64 = 1e8;
-/// Most beams of one scanner: 65 536 rows and columns.
+/// Largest number of rows or columns of one scanner.
 const MAX_SIDE: u32 = 1 << 16;
-/// Longest fence, metres: each metre has 60 wires.
+/// Longest fence, metres; each metre has 60 wires.
 const MAX_FENCE: f64 = 500.0;
 
 fn finite(what: &str, place: &str, values: &[f64], low: f64, high: f64) -> Result<()> {
@@ -25,7 +24,7 @@ fn finite(what: &str, place: &str, values: &[f64], low: f64, high: f64) -> Resul
     }
 }
 
-/// Refuses numbers that mean nothing and names that nobody has.
+/// Refuses numbers out of range and references to names that do not exist.
 ///
 /// # Errors
 /// `BadInput` at the first thing that is wrong.

@@ -1,22 +1,21 @@
-//! The forms in which beams leave the simulator: a scan's frame, and its columns as a structure of
-//! arrays.
+//! The output of the simulator: a scan's frame, and its columns of beams as a structure of arrays.
 
 use crate::scene::Raster;
 use contract::Label;
 use geometry::{Pose, Vector, direction};
 
-/// What a file says about a scan before its points.
+/// The properties of a scan that files state before its points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanFrame {
     /// Name of the scan.
     pub name: String,
-    /// Pose that files state: scene origin and registration error included.
+    /// Pose of the scan that files state, with scene origin and registration error, metres.
     pub world_from_scan: Pose,
-    /// True pose, scene origin included.
+    /// True pose of the scan, with scene origin, metres.
     pub true_world_from_scan: Pose,
     /// Directions of rows and columns in the scan frame.
     pub raster: Raster,
-    /// Number of rows, from the lowest elevation up.
+    /// Number of rows, counted from the lowest elevation.
     pub n_rows: u32,
     /// Number of columns, counter-clockwise.
     pub n_cols: u32,
@@ -26,26 +25,26 @@ pub struct ScanFrame {
 /// `i % n_rows` of column `first_col + i / n_rows`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SimColumns {
-    /// First column.
+    /// Index of the first column.
     pub first_col: u32,
-    /// Rows of each column.
+    /// Number of rows of each column.
     pub n_rows: u32,
-    /// Whether the beam came back.
+    /// Whether the beam returned.
     pub hit: Vec<bool>,
-    /// Measured range, metres; 0 where it did not come back.
+    /// Measured range, metres; 0 for a beam without return.
     pub range: Vec<f64>,
-    /// Measured point in the scan frame (range along the stated direction), metres; zero where it
-    /// did not come back.
+    /// Measured point in the scan frame (the range along the stated direction), metres; zero for a
+    /// beam without return.
     pub xyz: Vec<[f64; 3]>,
     /// Strength of the return, 0..1.
     pub intensity: Vec<f32>,
-    /// What the point belongs to; uncertain where the beam did not come back.
+    /// True label of the point; uncertain for a beam without return.
     pub label: Vec<Label>,
-    /// Index of the thing it belongs to in [`crate::Truth::objects`]; 0 where the beam did not
-    /// come back.
+    /// Index of the object that it belongs to in [`crate::Truth::objects`]; 0 for a beam without
+    /// return.
     pub object: Vec<u16>,
-    /// Whether the range is a mean over surfaces more than 3 cm apart: the point may hang in the
-    /// air, and its label is that of the nearest part.
+    /// Whether the range is a mean over surfaces more than 3 cm apart. The point may then lie
+    /// between surfaces; its label is that of the nearest part.
     pub mixed: Vec<bool>,
 }
 
@@ -56,7 +55,7 @@ impl SimColumns {
         self.hit.len()
     }
 
-    /// Holds no beam.
+    /// Whether there are no beams.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.hit.is_empty()
@@ -69,7 +68,7 @@ impl SimColumns {
         ((i % n) as u32, self.first_col + (i / n) as u32)
     }
 
-    /// Number of beams that came back.
+    /// Number of beams that returned.
     #[must_use]
     pub fn n_points(&self) -> usize {
         self.hit.iter().filter(|h| **h).count()
@@ -111,13 +110,13 @@ impl SimColumns {
 /// A whole scan in memory.
 #[derive(Debug, Clone)]
 pub struct SimScan {
-    /// What a file says about it.
+    /// The properties that files state.
     pub frame: ScanFrame,
     /// All its beams.
     pub columns: SimColumns,
 }
 
-/// One beam's answer.
+/// The result of one beam.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Return {
     pub(crate) range: f64,
@@ -128,7 +127,7 @@ pub(crate) struct Return {
 }
 
 impl ScanFrame {
-    /// Stated direction of a pixel's middle in the scan frame.
+    /// Stated direction through the middle of a pixel, unit length, scan frame.
     #[must_use]
     pub fn direction(&self, row: u32, col: u32) -> [f64; 3] {
         direction::unit(self.raster.azimuth(col), self.raster.elevation(row))

@@ -1,4 +1,4 @@
-//! A seed and robot models in; scenes to show and to measure the product with out.
+//! Scenes for the demo and for measurements.
 
 use crate::demo_robots::{ARM, PALLETISER, WELDER};
 use crate::random::Random;
@@ -13,14 +13,14 @@ use robot::Model;
 /// Angle between the beams of the demo's scanners, degrees: 7.7 mm at 4 m, 3 million beams a
 /// scanner.
 const DEMO_STEP_DEG: f64 = 0.11;
-/// Middle in the flange's frame and size of the carton, metres.
+/// Centre in the flange's frame and size of the carton, metres.
 const CARTON: ([f64; 3], [f64; 3]) = ([0.0, 0.0, -0.33], [0.5, 0.35, 0.25]);
 
-/// The cell of the demo: hall, three demo robots in drawn postures with hoses, tool and carried
-/// box, furniture, four scanners. `models` must hold the demo robots.
+/// The cell of the demo: a hall with three demo robots in random postures with hoses, a tool and a
+/// carried box, furniture, and four scanners. `models` must include the demo robots.
 ///
 /// # Errors
-/// `BadInput` where a demo robot is missing.
+/// `BadInput` if a demo robot is missing.
 pub fn demo_scene(seed: u64, models: &[Model]) -> Result<Scene> {
     let mut scene = Scene {
         seed,
@@ -71,9 +71,9 @@ pub fn demo_scene(seed: u64, models: &[Model]) -> Result<Scene> {
     Ok(scene)
 }
 
-/// The protocol of the method's source: one robot on a floor, six scanners on a circle of 5 m at
-/// 1.6 m height, 2 mm noise. `posture` has one value for each free joint; `n_beams` is that of each
-/// scanner.
+/// The test protocol of the paper behind the fitting method: one robot on a floor, six scanners on
+/// a circle of 5 m at a height of 1.6 m, 2 mm noise. `posture` has one value for each free joint
+/// (radians or metres); `n_beams` is the number of beams of each scanner.
 #[must_use]
 pub fn paper_scene(seed: u64, model: &Model, posture: &[f64], n_beams: u64) -> Scene {
     let joints = model.free.iter().zip(posture);
@@ -113,7 +113,7 @@ fn demo_spots() -> [Spot<'static>; 3] {
             stand: 0.0,
             side: 1.0,
             shape: StandShape::Plinth,
-            // Its plugs look towards the controller, which its supply comes from.
+            // Its plugs face the controller, from which its supply comes.
             yaw_deg: [25.0, 105.0],
             load: None,
             min: [-5.6, -1.3],

@@ -1,4 +1,4 @@
-//! Descriptions of hall furniture in; bodies standing on the ground out.
+//! Bodies of the hall: building, ground, columns, fences and furniture.
 
 use crate::scene::{
     Column, Fence, Filling, Floor, Furniture, Hall, Scene, Section, Stand, StandShape,
@@ -6,11 +6,11 @@ use crate::scene::{
 use crate::solid::{Solid, bolts, cuboid, disc, lathe, prism, tube};
 use geometry::Point;
 
-/// Thickness of walls and ceiling, metres: outside faces are never seen.
+/// Thickness of walls and ceiling, metres; their outside is never seen.
 const WALL: f64 = 0.2;
-/// How far the facets of the ground may be from its waves, metres: a tenth of a scanner's noise.
+/// Largest distance of the ground's facets from its waves, metres: a tenth of a scanner's noise.
 const FACET: f64 = 0.0002;
-/// Most cells along one side of the ground: 2 million triangles.
+/// Largest number of cells along one side of the ground: 2 million triangles.
 const MAX_CELLS: f64 = 1000.0;
 /// Thickness of a fence wire, metres.
 const WIRE: f64 = 0.004;
@@ -30,7 +30,7 @@ pub(crate) fn building(hall: &Hall, lowest: f64) -> Solid {
     let [x, y, z] = [0.5 * hall.size[0], 0.5 * hall.size[1], hall.size[2]];
     let mut out = Solid::default();
     if hall.walls {
-        // Below the lowest ground, so that no beam slips out under a wall.
+        // The walls reach below the lowest ground, so that no beam passes under them.
         let low = lowest - 0.5;
         out.add(&slab([-x - WALL, -y - WALL, low], [x + WALL, -y, z], 0.0));
         out.add(&slab([-x - WALL, y, low], [x + WALL, y + WALL, z], 0.0));
@@ -43,15 +43,15 @@ pub(crate) fn building(hall: &Hall, lowest: f64) -> Solid {
     out
 }
 
-/// Side of a ground cell, metres: as wide as the waves allow.
+/// Edge of a ground cell, metres: as wide as [`FACET`] allows.
 fn ground_cell(floor: &Floor) -> f64 {
-    // A chord of length c is c²·curvature/8 from its arc; the shorter of the two waves counts.
+    // A chord of length c is c²·curvature/8 away from its arc; the shorter of the two waves counts.
     let curvature =
         floor.wave_amplitude * (1.37 * std::f64::consts::TAU / floor.wave_length).powi(2);
     (8.0 * FACET / curvature.max(1e-9)).sqrt().clamp(0.1, 2.0 * MAX_CELLS)
 }
 
-/// A surface over a rectangle, `height` above each place.
+/// A surface over a rectangle with the given height at each place.
 fn sheet(cell: f64, min: [f64; 2], max: [f64; 2], height: impl Fn(f64, f64) -> f64) -> Solid {
     let cells = [0, 1].map(|i| ((max[i] - min[i]) / cell).ceil().clamp(1.0, MAX_CELLS) as usize);
     let mut out = Solid::default();
@@ -73,7 +73,7 @@ fn sheet(cell: f64, min: [f64; 2], max: [f64; 2], height: impl Fn(f64, f64) -> f
     out
 }
 
-/// The ground and its raised levels (floor), and the steps' faces (fixed).
+/// The ground with its raised levels (first), and the faces of their steps (second).
 pub(crate) fn ground(scene: &Scene) -> (Solid, Solid) {
     let mut faces = Solid::default();
     let Some(floor) = &scene.floor else {
@@ -121,7 +121,7 @@ fn step_face(
     out
 }
 
-/// A column on ground height `z`.
+/// A column that stands on ground of height `z`.
 pub(crate) fn column(column: &Column, z: f64) -> Solid {
     let (r, h) = (column.radius, column.height);
     let shaft = match column.section {
@@ -141,8 +141,7 @@ pub(crate) fn column(column: &Column, z: f64) -> Solid {
     Solid::of([shaft, foot]).at([column.xy[0], column.xy[1], z])
 }
 
-/// A fence over the ground: posts and panels (first), and what is in the panels where that is wire
-/// (second).
+/// A fence over the ground: posts and panels (first), and the wires of its panels (second).
 pub(crate) fn fence(fence: &Fence, ground: impl Fn(f64, f64) -> f64) -> (Solid, Solid) {
     let (dx, dy) = (fence.to[0] - fence.from[0], fence.to[1] - fence.from[1]);
     let length = dx.hypot(dy);
@@ -161,7 +160,7 @@ pub(crate) fn fence(fence: &Fence, ground: impl Fn(f64, f64) -> f64) -> (Solid, 
         if k == fields {
             break;
         }
-        // Panels start 0.15 m above the ground, as guard rules allow.
+        // Panels start 0.15 m above the ground, as rules for guards allow.
         let (low, high) = (z + 0.15, z + fence.height);
         let (left, right) = (s + 0.04, s + width - 0.04);
         match fence.filling {
@@ -222,7 +221,7 @@ pub(crate) fn conveyor(f: &Furniture, z: f64) -> Solid {
             h - 0.02,
         ]));
     }
-    // The drive hangs below one end, so that the ends differ.
+    // The drive hangs below one end, so that the two ends differ.
     out.add(&disc(0.08, -0.15, 0.15, 0.01, 24).along_y().at([0.5 * l - 0.5, 0.05, h - 0.25]));
     out.turned([0.0, 0.0, f.yaw_deg]).at([f.xy[0], f.xy[1], z])
 }

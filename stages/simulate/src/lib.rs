@@ -1,7 +1,31 @@
-//! A scene and robot models in; what a terrestrial laser scanner would see, with the truth, out.
+//! A virtual terrestrial laser scanner: scans a scene with robot models and gives points with
+//! truth.
 //!
-//! Robots of our own ([`demo_robots`]) and scenes of our own ([`demo_scene()`]) come with it, so
-//! that the whole way can be shown and measured on a bare machine.
+//! Demo robots ([`demo_robots`]) and scenes ([`demo_scene()`]) are included, so that the whole
+//! program can be shown and measured without other files.
+//!
+//! # Example
+//! ```
+//! use simulate::{Scene, Simulator};
+//!
+//! // A scanner 1.5 m above a flat floor, without noise.
+//! let scene = Scene::from_toml(r#"
+//!     [floor]
+//!     size = [20, 20]
+//!     [[scanner]]
+//!     name = "one"
+//!     position = [0, 0, 1.5]
+//!     noise = 0.0
+//!     noise_per_metre = 0.0
+//!     jitter = 0.0
+//!     raster = { elevation_deg = [-60, -30], step_deg = 1.0 }
+//! "#)?;
+//! let scan = Simulator::new(&scene, &[])?.scan(0);
+//! let columns = &scan.columns;
+//! let first = columns.hit.iter().position(|hit| *hit).expect("beams hit the floor");
+//! assert!((columns.xyz[first][2] + 1.5).abs() < 1e-3); // scan frame, metres
+//! # Ok::<(), contract::Error>(())
+//! ```
 #![forbid(unsafe_code)]
 
 mod attach;

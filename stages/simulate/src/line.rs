@@ -1,8 +1,8 @@
-//! A seed and robot models in; a line of equal cells as it was scanned, and one of its cells as it
-//! was scanned again, out.
+//! Scenes of a line of equal cells: one of the whole line, and one of a single cell that is scanned
+//! again later.
 //!
-//! Robots take one of two postures and pallets one of two places, then and now: the cell that was
-//! scanned again may look more like its neighbour did than like itself.
+//! In both scenes each robot has one of two postures and each pallet one of two places, so that the
+//! cell that is scanned again may resemble its earlier neighbour more than itself.
 
 use crate::random::Random;
 use crate::scene::{
@@ -12,16 +12,16 @@ use crate::spot::{Spot, scanner};
 use contract::{Error, Result};
 use robot::Model;
 
-/// What a line is drawn from.
+/// Parameters of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Seed of everything.
+    /// Seed of all random choices.
     pub seed: u64,
-    /// Cells.
+    /// Number of cells.
     pub n_cells: usize,
     /// Angle between beams, degrees.
     pub step_deg: f64,
-    /// What stands at the ends of the line.
+    /// The surroundings of the ends of the line.
     pub ends: Ends,
 }
 
@@ -30,27 +30,28 @@ pub struct Line {
 pub enum Ends {
     /// Walls close to the first and the last cell.
     Walls,
-    /// Walls along the line only, which go on.
+    /// Walls along the line only, which extend far beyond it.
     Long,
-    /// Nothing but the floor.
+    /// Only the floor.
     Open,
 }
 
-/// Width of a cell across the line, metres, and how far apart the middles of two are.
+/// Depth of a cell across the line, metres.
 const DEPTH: f64 = 4.4;
+/// Distances between the centres of two cells, metres: least and most.
 const PITCH: [f64; 2] = [4.0, 5.5];
 /// Aisle on either side, metres.
 const AISLE: f64 = 2.2;
-/// How far walls and floor go on beyond a long line, metres.
+/// How far walls and floor extend beyond a long line, metres.
 const BEYOND: f64 = 45.0;
-/// Standard deviations of the new scans' registration: metres, degrees.
+/// Standard deviations of the new scans' registration errors: metres, degrees.
 const OFF: [f64; 2] = [0.003, 0.01];
 const PALLET: [f64; 3] = [1.2, 0.8, 0.7];
 
-/// The two sessions of a line, and which of its cells was scanned again.
+/// The two scenes of a line, and the index of the cell that is scanned again.
 ///
 /// # Errors
-/// `BadInput` where the library holds no robot that fits in a cell.
+/// `BadInput` if no robot of the library fits into a cell.
 pub fn line(wanted: &Line, models: &[Model]) -> Result<([Scene; 2], usize)> {
     let mut random = Random::keyed(&[wanted.seed, 0x11E]);
     let robots: Vec<&Model> = models.iter().filter(|m| !m.is_tool()).collect();
@@ -76,7 +77,7 @@ pub fn line(wanted: &Line, models: &[Model]) -> Result<([Scene; 2], usize)> {
         min: [middle(k) - room, -0.5 * DEPTH],
         max: [middle(k) + room, 0.5 * DEPTH],
     };
-    // Two postures that all robots take.
+    // The two postures that all robots take.
     let mut bare = then.clone();
     let postures = [(); 2].map(|()| spot(0).place(&mut bare, model, &mut random));
     let [home, other] = postures;
@@ -125,7 +126,7 @@ fn shell(wanted: &Line, length: f64, random: &mut Random) -> Scene {
     }
 }
 
-/// The same in each cell.
+/// Adds the furniture that is the same in each cell.
 fn furnish(
     scene: &mut Scene,
     n_cells: usize,
@@ -162,7 +163,7 @@ fn furnish(
     }
 }
 
-/// Puts the pallet of a cell to one of two places.
+/// Puts the pallet of a cell in one of its two places.
 fn put_pallet(scene: &mut Scene, [x, y]: [f64; 2], place: usize, pitch: f64) {
     let side = if place == 0 { -1.0 } else { 1.0 };
     scene.boxes.push(Cuboid {
@@ -174,7 +175,7 @@ fn put_pallet(scene: &mut Scene, [x, y]: [f64; 2], place: usize, pitch: f64) {
     });
 }
 
-/// One scanner before each cell and one behind each second one.
+/// Adds one scanner in front of each cell and one behind every second cell.
 fn scanners(
     scene: &mut Scene,
     wanted: &Line,
@@ -188,7 +189,7 @@ fn scanners(
     }
 }
 
-/// Two scanners at the cell that is scanned again, registered to each other as well as rescans are.
+/// Adds two scanners at the cell that is scanned again, with the registration errors of rescans.
 fn new_scanners(scene: &mut Scene, wanted: &Line, [x, pitch]: [f64; 2], random: &mut Random) {
     scene.scanners.clear();
     for (k, side) in [-1.0, 1.0].into_iter().enumerate() {

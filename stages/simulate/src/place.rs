@@ -1,46 +1,47 @@
-//! Robots of a scene as its file has them: where they stand, how, and with which tool.
+//! Robots of a scene, as in a scene file: base pose, posture and tool.
 
 use crate::scene::pose;
 use geometry::Pose;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A robot and how it stands.
+/// A robot with its base pose and posture.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RobotPlace {
-    /// Its name in the scene.
+    /// Name in the scene.
     pub name: String,
-    /// Its folder in the library.
+    /// Name of its folder in the library.
     pub model: String,
-    /// Origin of the root link in the world, metres.
+    /// Position of the root link in the world, metres.
     pub xyz: [f64; 3],
     /// Roll, pitch, yaw of the root link, degrees.
     #[serde(default)]
     pub rpy_deg: [f64; 3],
-    /// Value of each free joint by name, radians or metres; the model's home value where left out.
+    /// Value of each free joint by name, radians or metres; the model's home value where it is
+    /// absent.
     #[serde(default)]
     pub posture: BTreeMap<String, f64>,
     /// A tool that no URDF describes.
     #[serde(default)]
     pub tool: Option<Tool>,
-    /// How it stands while other scanners look: it moved between two stations.
+    /// Its other postures, if it moved between two scanner positions.
     #[serde(default, rename = "later")]
     pub later: Vec<Later>,
 }
 
-/// How a robot stands while some scanners look.
+/// The posture of a robot in the scans of some scanners.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Later {
-    /// Names of those scanners.
+    /// Names of the scanners.
     pub scanners: Vec<String>,
     /// Value of each free joint by name, as for the robot.
     pub posture: BTreeMap<String, f64>,
 }
 
 impl RobotPlace {
-    /// World from root link, without the scene's origin.
+    /// Pose of the root link in the world without the scene's origin, metres.
     #[must_use]
     pub fn world_from_base(&self) -> Pose {
         pose(self.xyz, self.rpy_deg)
@@ -51,22 +52,22 @@ impl RobotPlace {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tool {
-    /// The link that carries it.
+    /// Name of the link that carries it.
     pub link: String,
-    /// What it looks like.
+    /// Its form.
     pub shape: ToolShape,
-    /// Place in the link's frame; the tool points along +z of the turned frame, metres.
+    /// Position in the link's frame, metres; the tool points along +z of its own frame.
     #[serde(default)]
     pub xyz: [f64; 3],
     /// Roll, pitch, yaw in the link's frame, degrees.
     #[serde(default)]
     pub rpy_deg: [f64; 3],
-    /// Its length, metres.
+    /// Length, metres.
     #[serde(default = "tool_length")]
     pub length: f64,
 }
 
-/// What a tool looks like.
+/// The form of a tool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ToolShape {

@@ -1,6 +1,6 @@
-//! A seed, robot models and what is wanted in; a cell, a line or a hall without robots, crowded as
-//! real ones are, out: robots of mixed models on floor and stands with hoses, tools and carried
-//! parts, between fences, conveyors, machines, posts and people.
+//! Random scenes of plants, as crowded as real ones: a cell, a line, or a hall without robots.
+//! Robots of mixed models stand on floor and stands with hoses, tools and carried parts, between
+//! fences, conveyors, machines, posts and people.
 
 use crate::hand::{part_in, tool_on};
 use crate::random::Random;
@@ -13,16 +13,16 @@ use contract::{Error, Result};
 use geometry::Point;
 use robot::{Model, Role};
 
-/// What a plant scene is drawn from.
+/// Parameters of a plant scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plant {
-    /// Seed of everything.
+    /// Seed of all random choices.
     pub seed: u64,
-    /// Robots; none: only what a hall is full of.
+    /// Number of robots; with 0 the hall has furniture only.
     pub n_robots: usize,
-    /// Rows of robots, a conveyor between each two.
+    /// Number of rows of robots; between two rows runs a conveyor.
     pub n_rows: usize,
-    /// Scanners.
+    /// Number of scanners.
     pub n_scanners: usize,
     /// Angle between beams, degrees.
     pub step_deg: f64,
@@ -32,29 +32,30 @@ pub struct Plant {
     pub moves: bool,
 }
 
-/// Room around a robot: share of its reach on each side of its base …
+/// Space around a robot on each side of its base, as share of its reach.
 const ROOM: f64 = 0.95;
-/// … but at least so much, metres.
+/// Smallest such space, metres.
 const MIN_ROOM: f64 = 0.9;
-/// Width of the aisles around a row, and of the conveyor's way between two, metres.
+/// Width of the aisles around a row, metres.
 const AISLE: f64 = 1.8;
+/// Width of the conveyor's way between two rows, metres.
 const WAY: f64 = 1.4;
-/// Elevations of a scanner, degrees.
+/// Range of elevations of a scanner, degrees.
 const DOME: [f64; 2] = [-60.0, 70.0];
-/// Samples of a link for its reach.
+/// Number of samples of a link from which its reach is computed.
 const N_SAMPLES: usize = 40;
 
-/// A robot's room.
+/// The space of one robot.
 struct Room<'a> {
     model: &'a Model,
     min: [f64; 2],
     max: [f64; 2],
 }
 
-/// Draws a scene.
+/// Draws a random scene.
 ///
 /// # Errors
-/// `BadInput` where the library holds no robot or a room is too narrow for one.
+/// `BadInput` if the library holds no robot, or if a room is too narrow for its robot.
 pub fn plant(wanted: &Plant, models: &[Model]) -> Result<Scene> {
     let robots: Vec<&Model> = models.iter().filter(|m| !m.is_tool()).collect();
     if robots.is_empty() && wanted.n_robots > 0 {
@@ -91,7 +92,7 @@ pub fn plant(wanted: &Plant, models: &[Model]) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Rooms in rows, and the size of the hall around them.
+/// Rooms in rows, and the size of the hall around them, metres.
 fn rooms<'a>(
     wanted: &Plant,
     robots: &[&'a Model],
@@ -125,7 +126,7 @@ fn rooms<'a>(
     (out, size)
 }
 
-/// How far a robot may get from the upright through its base, metres: over a few postures.
+/// Largest horizontal distance of a robot's parts from its base over a few postures, metres.
 fn reach(model: &Model) -> f64 {
     let mut random = Random::keyed(&[7]);
     let mut all: Vec<f64> = (0..24)
@@ -151,7 +152,7 @@ fn reach(model: &Model) -> f64 {
     all[all.len() * 3 / 4]
 }
 
-/// Everything that stands still.
+/// Adds everything that stands still.
 fn furnish(
     scene: &mut Scene,
     wanted: &Plant,
@@ -220,7 +221,7 @@ fn crate_at(scene: &mut Scene, name: &str, [x, y]: [f64; 2], size: [f64; 3], ran
     });
 }
 
-/// Posts, cranes, machines and people in the aisles (everywhere in a hall without robots).
+/// Adds posts, cranes, machines and people in the aisles, or everywhere in a hall without robots.
 fn stuff(scene: &mut Scene, size: [f64; 2], n: usize, random: &mut Random) {
     for k in 0..n {
         let along = random.unit() < 0.5;
@@ -273,7 +274,7 @@ fn stuff(scene: &mut Scene, size: [f64; 2], n: usize, random: &mut Random) {
     }
 }
 
-/// Somebody who stood still.
+/// Adds a person who stands still.
 fn person(scene: &mut Scene, name: &str, [x, y]: [f64; 2], random: &mut Random) {
     let ground = scene.ground(x, y);
     let yaw = random.between(0.0, 360.0);
@@ -292,7 +293,7 @@ fn person(scene: &mut Scene, name: &str, [x, y]: [f64; 2], random: &mut Random) 
     }
 }
 
-/// A robot in its room, with what hangs on it.
+/// Adds a robot in its room, with what it carries.
 fn stand(
     scene: &mut Scene,
     room: &Room<'_>,
@@ -321,7 +322,7 @@ fn stand(
         let again = spot.place(scene, room.model, random)?;
         place.later.push(Later { scanners: Vec::new(), posture: again.posture });
     }
-    // A robot that brings its own tool carries no other on it.
+    // A robot with a tool in its model gets no other tool.
     let is_armed = room.model.links.iter().any(|link| link.role == Role::Effector);
     let hand = room.model.flanges().first().copied().filter(|_| !is_armed);
     if let Some(hand) = hand.filter(|_| random.unit() < 0.7) {
@@ -340,7 +341,7 @@ fn stand(
     Ok(())
 }
 
-/// Farthest corner of the first link with a body from the upright through the base, metres.
+/// Largest horizontal distance of a corner of the first link with a body from the base, metres.
 fn foot_radius(model: &Model) -> f64 {
     let poses = model.poses(&model.home());
     let standing = model.links.iter().zip(&poses).find(|(l, _)| !l.mesh.vertices.is_empty());
@@ -360,7 +361,7 @@ fn lowest(model: &Model) -> f64 {
     })
 }
 
-/// Cables from body to body, their ends on the surfaces.
+/// Adds cables from link to link, with their ends on the surfaces.
 fn hoses(scene: &mut Scene, model: &Model, name: &str, random: &mut Random) {
     let bodies: Vec<usize> = model
         .main_chain
@@ -390,7 +391,7 @@ fn hoses(scene: &mut Scene, model: &Model, name: &str, random: &mut Random) {
     }
 }
 
-/// Scanners in the aisles and between rooms, each somewhere else.
+/// Adds scanners in the aisles and between rooms, each in a different place.
 fn scanners(
     scene: &mut Scene,
     wanted: &Plant,
@@ -401,7 +402,7 @@ fn scanners(
     let inner = [0.5 * size[0] - 0.5 * AISLE, 0.5 * size[1] - 0.5 * AISLE];
     let around = 4.0 * (inner[0] + inner[1]);
     for k in 0..wanted.n_scanners {
-        // Once around the hall, evenly; every third in the middle of it, where there is room.
+        // Evenly around the hall, with every third in its middle where there is space.
         let mut at = (k as f64 + random.between(0.2, 0.8)) / wanted.n_scanners as f64 * around;
         let mut xy = [-inner[0], -inner[1]];
         for (axis, way) in [(0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0)] {

@@ -1,4 +1,4 @@
-//! A seed, robot models and numbers in; a hall of plots with robots, for runs of any size, out.
+//! Scenes of halls of any size: square plots with one robot each.
 
 use crate::random::Random;
 use crate::scene::{
@@ -10,14 +10,13 @@ use robot::Model;
 
 /// Side of the square that each robot of a hall has, metres.
 const PLOT: f64 = 6.0;
-/// Most beams of one scanner of a hall: what a real one makes in some minutes.
+/// Largest number of beams of one scanner: what a real one measures in some minutes.
 const MAX_BEAMS: u64 = 20_000_000;
 
 /// A hall of `n_robots` robots of the library on plots of 6 m, with scanners for about `n_points`
 /// points.
 ///
-/// # Errors
-/// `BadInput` where the library holds no robot, or one too large for its plot.
+/// `BadInput` if the library holds no robot, or one that is too large for its plot.
 pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Result<Scene> {
     let robots: Vec<&Model> = models.iter().filter(|m| !m.is_tool()).collect();
     if robots.is_empty() {
@@ -50,7 +49,7 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
     let n_spots = (cols + 1) * (rows + 1);
     let stride = spread(n_spots);
     for k in 0..n_scanners as usize {
-        // Scanners stand where plots meet; robots keep away from there.
+        // Scanners stand where plots meet, which robots keep clear of.
         let spot = (k * stride) % n_spots;
         let [x, y] = corner(spot % (cols + 1), spot / (cols + 1));
         let (x, y) =
@@ -62,8 +61,8 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
     Ok(scene)
 }
 
-/// A stride that visits all of `n` places, near and far in turn: the one without common factor that
-/// is nearest to the golden section.
+/// A stride that visits all of `n` places, near and far in turn: the number coprime to `n` that is
+/// nearest to the golden section.
 fn spread(n: usize) -> usize {
     let coprime = |k: &usize| {
         let (mut a, mut b) = (n, *k);
@@ -127,7 +126,7 @@ fn plot(
     };
     let place = match spot.place(scene, model, random) {
         Ok(place) => place,
-        // The largest robots do not fit a plot in every posture: their home posture must do.
+        // The largest robots fit into a plot in few postures, so that the home posture is used.
         Err(_) => spot.stand_only(scene, random),
     };
     scene.robots.push(place);

@@ -1,5 +1,4 @@
-//! A model and a place in; random postures that do not go through the floor or the robot itself
-//! out.
+//! Random postures of a model that do not pass through the floor or the robot itself.
 
 use crate::random::Random;
 use contract::{Error, Result};
@@ -7,20 +6,20 @@ use geometry::{Point, Pose};
 use robot::{Mesh, Model};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Distance of the samples that stand for a link, metres: thinner parts than this may pass through
-/// one another.
+/// Distance between the samples of a link, metres; thinner parts may pass through one another.
 const SPACING: f64 = 0.03;
-/// Samples of two links nearer than this touch, metres: most crossing surfaces have such a pair.
+/// Distance between samples of two links at which they touch, metres; most crossing surfaces have
+/// such a pair.
 const TOUCH: f64 = 0.02;
-/// Most samples of a link.
+/// Largest number of samples of a link.
 const MAX_SAMPLES: usize = 4000;
-/// Tries before giving up: the worst real robot on a floor needs about 20.
+/// Number of attempts; the most difficult real robot on a floor needs about 20.
 const MAX_TRIES: usize = 2000;
 
-/// Draws postures of one model.
+/// Draws random postures of one model.
 pub struct Postures<'a> {
     model: &'a Model,
-    /// Samples of each link, link frame.
+    /// Samples of each link, link frame, metres.
     samples: Vec<Vec<Point>>,
     /// Pairs of links (smaller index first) that touch by design.
     joined: BTreeSet<(usize, usize)>,
@@ -40,19 +39,19 @@ impl<'a> Postures<'a> {
         out
     }
 
-    /// Says that a link carries a body (in the link's frame) that must not touch anything either.
+    /// Adds a body (frame of the link) that a link carries and that must not touch anything either.
     #[must_use]
     pub fn carrying(mut self, link: usize, body: &Mesh) -> Self {
-        // The body is part of its link: what may touch the link may touch it.
+        // The body counts as part of its link: what may touch the link may touch it.
         self.samples[link].extend(sample(body));
         self
     }
 
-    /// A posture, uniform within the limits, in which every sample of every link but the root is
-    /// `allowed` (a point in the world) and no two links touch that do not do so by design.
+    /// Draws a posture, uniform within the limits. `allowed` must hold for every sample (world,
+    /// metres) of every link but the root, and no two links may touch that do not by design.
     ///
     /// # Errors
-    /// `BadInput` where thousands of postures were none: the place is too narrow for the model.
+    /// `BadInput` after thousands of attempts: the place is too narrow for the model.
     pub fn draw(
         &self,
         random: &mut Random,
@@ -88,13 +87,13 @@ impl<'a> Postures<'a> {
             .collect()
     }
 
-    /// The first `at_most` pairs of links that touch and are not joined.
+    /// The first `at_most` pairs of links that touch and do not by design.
     fn touching(&self, placed: &[Vec<Point>], at_most: usize) -> BTreeSet<(usize, usize)> {
         let cell = |p: &Point| [p.x, p.y, p.z].map(|v| (v / TOUCH).floor() as i32);
         let mut grid: BTreeMap<[i32; 3], Vec<(usize, Point)>> = BTreeMap::new();
         let mut out = BTreeSet::new();
         for (link, points) in placed.iter().enumerate() {
-            // Against earlier links first, so that a link does not meet itself.
+            // Compared with earlier links only, so that a link is not compared with itself.
             for p in points {
                 let [x, y, z] = cell(p);
                 for i in 0..27 {
@@ -118,7 +117,7 @@ impl<'a> Postures<'a> {
     }
 }
 
-/// Points spread over a mesh, about [`SPACING`] apart, the same for the same mesh.
+/// Points spread over a mesh, about [`SPACING`] apart, identical for identical meshes.
 fn sample(mesh: &Mesh) -> Vec<Point> {
     let corner = |i: u32| Point::from(mesh.vertices[i as usize].map(f64::from));
     let area = |t: &[u32; 3]| {

@@ -1,8 +1,8 @@
-//! Seeds and counters in, reproducible random numbers out. Knows no scenes.
+//! Reproducible random numbers from seeds and counters.
 
 use std::f64::consts::TAU;
 
-/// SplitMix64: the state is a counter, so a generator can be started anywhere from a hash.
+/// The SplitMix64 generator. Its state is a counter, so that it can start at any hash.
 #[derive(Debug, Clone)]
 pub struct Random {
     state: u64,
@@ -18,7 +18,7 @@ fn mix(mut z: u64) -> u64 {
 }
 
 impl Random {
-    /// A generator whose sequence depends on all of `keys`, in their order, and on nothing else.
+    /// A generator whose sequence depends only on the `keys` and their order.
     #[must_use]
     pub fn keyed(keys: &[u64]) -> Self {
         let state = keys.iter().fold(0, |state, key| mix(state ^ key.wrapping_add(GOLDEN)));
@@ -36,12 +36,12 @@ impl Random {
         (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
     }
 
-    /// Uniform between `low` and `high`.
+    /// A number uniform between `low` and `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform index below `n`; 0 where `n` is 0.
+    /// A uniform index below `n`; 0 if `n` is 0.
     pub fn below(&mut self, n: usize) -> usize {
         ((self.unit() * n as f64) as usize).min(n.saturating_sub(1))
     }

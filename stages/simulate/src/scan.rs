@@ -1,5 +1,4 @@
-//! A scanner and what stands around it in; beams with range, truth and flags, column by column,
-//! out.
+//! Scans a scene from one scanner: beams with range, truth and flags, column by column.
 
 use crate::beams::{Beams, Hit};
 use crate::columns::{Return, ScanFrame, SimColumns};
@@ -12,26 +11,26 @@ use nalgebra::Matrix3;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Beams whose parts differ by more than this are said to be mixed, metres.
+/// Difference between the parts of a beam above which it counts as mixed, metres.
 const MIXED_SPREAD: f64 = 0.03;
-/// A neighbour farther than this from the plane of a beam's triangle shows an edge, metres.
+/// Distance of a neighbouring hit from the plane of a beam's triangle that shows an edge, metres.
 const EDGE: f64 = 0.004;
-/// Ring of the outer sub-beams as a share of the beam's radius: halves the beam's area.
+/// Radius of the ring of outer sub-beams, as share of the beam's radius; it halves the beam's area.
 const RING: f64 = 0.707;
 /// Range at which half of the light is lost, metres.
 const HALF_LIGHT: f64 = 25.0;
-/// Below this reflectance a surface counts as black.
+/// Reflectance below which a surface counts as black.
 const BLACK: f32 = 0.15;
 
-/// A scanner with all that does not change from beam to beam.
+/// A scanner with everything that is the same for all beams.
 pub(crate) struct Station {
     pub(crate) frame: ScanFrame,
     scanner: Scanner,
-    /// Where it stands within the scene, metres.
+    /// Position within the scene, metres.
     origin: Vector,
-    /// How it is turned within the scene.
+    /// Rotation from the scan frame to the scene.
     scene_from_scan: Matrix3<f64>,
-    /// Keys of the beams' random numbers.
+    /// Keys of the random numbers of its beams.
     keys: [u64; 2],
     /// Sine and cosine of each row's elevation.
     rows: Vec<[f64; 2]>,
@@ -72,7 +71,7 @@ impl Station {
         })
     }
 
-    /// Beams of the columns `cols`; see [`crate::Simulator::columns`].
+    /// Beams of the columns `cols`, see [`crate::Simulator::columns`].
     pub(crate) fn columns(
         &self,
         beams: &Beams,
@@ -82,7 +81,7 @@ impl Station {
         let n_rows = self.rows.len();
         let cols = cols.start.min(self.frame.n_cols)..cols.end.min(self.frame.n_cols);
         let mut out = SimColumns::with_capacity(cols.start, self.frame.n_rows, cols.len() * n_rows);
-        // Three columns at a time: an edge is seen by comparing a beam with its four neighbours.
+        // Three columns at a time: an edge is found by comparing a beam with its four neighbours.
         let look = self.scanner.mixed.is_some();
         let mut before =
             if look { self.cast_column(beams, self.left_of(cols.start)) } else { Vec::new() };
@@ -131,7 +130,7 @@ impl Station {
         Random::keyed(&[self.keys[0], self.keys[1], row as u64, u64::from(col), purpose])
     }
 
-    /// Thin beams along the middle of each pixel of a column; empty for no column.
+    /// Thin beams through the middle of each pixel of a column; empty for no column.
     fn cast_column(&self, beams: &Beams, col: Option<u32>) -> Vec<Beam> {
         let Some(col) = col else { return Vec::new() };
         let origin = self.origin;
@@ -195,7 +194,7 @@ impl Station {
         })
     }
 
-    /// Whether a neighbour sees something that the plane under this beam does not explain.
+    /// Whether a neighbour's hit is not explained by the plane under this beam.
     fn is_edge(
         &self,
         beams: &Beams,
@@ -219,9 +218,9 @@ impl Station {
             })
     }
 
-    /// What a wide beam measures: its thin parts are grouped by range, the strongest group wins
-    /// (the nearest of equals), and its mean is the range. Returns the part nearest to that
-    /// mean, the mean, and whether it is mixed.
+    /// The range that a wide beam measures. Its thin parts are grouped by range, the group with
+    /// most parts wins (the nearest at equal numbers), and its mean is the range. Returns the part
+    /// nearest to that mean, the mean (metres), and whether the beam is mixed.
     fn mix(
         &self,
         beams: &Beams,
@@ -255,7 +254,7 @@ impl Station {
                 from = to;
             }
         }
-        // A beam of which more than half comes back from nowhere is too weak to be noticed.
+        // A beam of which more than half has no return is too weak to be detected.
         if 2 * best.len() < (ring + 1) as usize && beam.hit.is_none() {
             return None;
         }
@@ -275,7 +274,8 @@ struct Beam {
     hit: Option<Hit>,
 }
 
-/// Two unit vectors across a unit vector, the first one level where that is possible.
+/// Two unit vectors perpendicular to a unit vector and to each other; the first is level if
+/// possible.
 fn across(along: &Vector) -> (Vector, Vector) {
     let u = Vector::z().cross(along).try_normalize(1e-6).unwrap_or_else(Vector::x);
     (u, along.cross(&u))

@@ -1,5 +1,4 @@
-//! What a scanner is: its place, raster, range and errors. Numbers in a scene file in; directions
-//! of beams out.
+//! The description of a scanner in a scene file: position, raster, range and errors.
 
 use crate::random::Random;
 use contract::{Error, Result};
@@ -13,32 +12,32 @@ use serde::{Deserialize, Serialize};
 pub struct Scanner {
     /// Name of the scan.
     pub name: String,
-    /// Where it stands, metres.
+    /// Position, metres.
     pub position: [f64; 3],
-    /// Roll, pitch, yaw, degrees; passed over where a quaternion is given.
+    /// Roll, pitch, yaw, degrees; ignored if a quaternion is given.
     pub rpy_deg: [f64; 3],
-    /// World from scan.
+    /// Rotation `world_from_scan`, unit quaternion.
     pub quaternion_wxyz: Option<[f64; 4]>,
     /// The angular raster.
     pub raster: Raster,
-    /// Nearest range that is measured, metres.
+    /// Smallest range that is measured, metres.
     pub min_range: f64,
-    /// Farthest range that is measured, metres.
+    /// Largest range that is measured, metres.
     pub max_range: f64,
-    /// Standard deviation of a range, metres.
+    /// Standard deviation of a range at the scanner, metres.
     pub noise: f64,
-    /// Grows the standard deviation with range, metres a metre.
+    /// Growth of that standard deviation with range, metres a metre.
     pub noise_per_metre: f64,
     /// Standard deviation of the true direction about the stated one, on each axis, radians.
     pub jitter: f64,
-    /// Added to every range, metres.
+    /// Systematic error that is added to every range, metres.
     pub range_bias: f64,
-    /// Share of beams that come back to nobody, 0..1.
+    /// Share of beams that are lost at random, 0..1.
     pub dropouts: f64,
-    /// Share of beams lost on a black surface that is seen edge-on, 0..1; less when seen straight,
-    /// none on bright ones.
+    /// Share of beams that are lost on a black surface at grazing incidence, 0..1; fewer are lost
+    /// at normal incidence, and none on bright surfaces.
     pub dark_dropouts: f64,
-    /// Beams have a width: what they measure at edges. None: infinitely thin beams.
+    /// Width of beams, which matters at edges; `None` for infinitely thin beams.
     pub mixed: Option<Mixed>,
     /// Error of the stated pose.
     pub registration: Registration,
@@ -66,7 +65,7 @@ impl Default for Scanner {
     }
 }
 
-/// Directions of beams: rows of elevation upwards, columns of azimuth counter-clockwise.
+/// Directions of beams: rows by elevation, upwards; columns by azimuth, counter-clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Raster {
@@ -74,9 +73,9 @@ pub struct Raster {
     pub elevation_deg: [f64; 2],
     /// First azimuth and, exclusive, the last one, degrees.
     pub azimuth_deg: [f64; 2],
-    /// Angle between neighbours, degrees; passed over where `n_beams` is given.
+    /// Angle between neighbouring beams, degrees; ignored if `n_beams` is given.
     pub step_deg: f64,
-    /// About how many beams are wanted: sets the step.
+    /// Approximate number of beams, from which the step is computed.
     pub n_beams: Option<u64>,
 }
 
@@ -92,7 +91,8 @@ impl Default for Raster {
 }
 
 impl Raster {
-    /// Angle between neighbours, degrees: a whole number of columns fills the azimuth range.
+    /// Angle between neighbouring beams, degrees; a whole number of columns fills the azimuth
+    /// range.
     #[must_use]
     pub fn step(&self) -> f64 {
         let width = self.azimuth_deg[1] - self.azimuth_deg[0];
@@ -107,7 +107,7 @@ impl Raster {
     /// Number of rows.
     #[must_use]
     pub fn n_rows(&self) -> u32 {
-        // A hair above, so that a range that holds a whole number of steps keeps its last row.
+        // A small margin, so that a range of a whole number of steps keeps its last row.
         (((self.elevation_deg[1] - self.elevation_deg[0]) / self.step() + 1e-6).floor() as u32) + 1
     }
 
@@ -130,19 +130,18 @@ impl Raster {
     }
 }
 
-/// A beam's width and how its parts are joined.
+/// The width of a beam, and how its parts are combined.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mixed {
-    /// Thin beams that stand for one wide beam: its middle and the rest on a ring; cast only where
-    /// a neighbouring beam sees something else.
+    /// Number of thin beams that represent a wide one: its middle, and others on a ring. They are
+    /// cast only where a neighbouring beam sees something else.
     pub sub_beams: u32,
-    /// Radius of the beam where it leaves, metres.
+    /// Radius of the beam at the scanner, metres.
     pub radius: f64,
-    /// Growth of the radius, metres a metre.
+    /// Growth of the radius with range, metres a metre.
     pub divergence: f64,
-    /// Parts nearer to one another than this are averaged into one range, farther ones compete,
-    /// metres.
+    /// Largest difference in range of parts that are averaged, metres; parts farther apart compete.
     pub depth: f64,
 }
 
@@ -152,7 +151,7 @@ impl Default for Mixed {
     }
 }
 
-/// What the stated pose of a scan differs by from its true one.
+/// Difference of the stated pose of a scan from its true one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Registration {
@@ -163,8 +162,7 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// That of a scan with this true pose, and this stated one: another frame of the world, for
-    /// example.
+    /// The difference between a true and a stated pose, for example of another world frame.
     #[must_use]
     pub fn between(world_from_scan: &Pose, stated: &Pose) -> Self {
         let error = world_from_scan.inverse() * stated;
@@ -175,8 +173,8 @@ impl Registration {
         }
     }
 
-    /// One that is drawn: standard deviations of the shift on each axis, metres, and of the turn
-    /// about each, degrees.
+    /// A random difference with these standard deviations: of the shift on each axis, metres, and
+    /// of the rotation about each axis, degrees.
     #[must_use]
     pub fn drawn([shift, turn]: [f64; 2], random: &mut Random) -> Self {
         let mut three = |sigma: f64| [(); 3].map(|()| sigma * random.normals()[0]);
@@ -185,16 +183,16 @@ impl Registration {
 }
 
 impl Scanner {
-    /// World from scan as it really is, without the scene's origin.
+    /// True pose `world_from_scan` without the scene's origin, metres.
     ///
     /// # Errors
-    /// `BadInput` for a quaternion that is not of about unit length.
+    /// `BadInput` if the quaternion is not of unit length to 1 %.
     pub fn world_from_scan(&self) -> Result<Pose> {
         let turn = match self.quaternion_wxyz {
             None => return Ok(crate::scene::pose(self.position, self.rpy_deg)),
             Some([w, x, y, z]) => Quaternion::new(w, x, y, z),
         };
-        // 1 % off is more than any rounding of a file, less than a mistake.
+        // 1 % is more than rounding in a file, and less than a mistake.
         if (turn.norm() - 1.0).abs() < 0.01 {
             let at = Translation3::from(Vector::from(self.position));
             Ok(Pose::from_parts(at, UnitQuaternion::from_quaternion(turn)))
@@ -204,7 +202,7 @@ impl Scanner {
         }
     }
 
-    /// World from scan as the files will state it, without the scene's origin.
+    /// Pose `world_from_scan` that files state, without the scene's origin, metres.
     ///
     /// # Errors
     /// As [`Scanner::world_from_scan`].

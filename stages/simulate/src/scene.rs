@@ -1,5 +1,5 @@
-//! A scene file in (TOML); a checked description of hall, robots and scanners out. Opens no files:
-//! models are named.
+//! The description of a scene, read from TOML and checked: hall, robots and scanners. No other
+//! files are opened; robot models are given by name.
 
 use contract::{Error, Result};
 use geometry::{Pose, Vector};
@@ -9,22 +9,21 @@ use serde::{Deserialize, Serialize};
 pub use crate::place::{Later, RobotPlace, Tool, ToolShape};
 pub use crate::scanner::{Mixed, Raster, Registration, Scanner};
 
-/// Everything that the virtual scanner needs. Metres, degrees where a name says so, world frame z
-/// up.
+/// A scene. Lengths are in metres, angles in degrees where a name ends in `_deg`; z of the world
+/// frame points up.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// Seed of all noise.
+    /// Seed of all random errors.
     #[serde(default)]
     pub seed: u64,
-    /// Added to every coordinate that leaves the simulator in the world frame (large map
-    /// coordinates), metres.
+    /// Added to all world coordinates of the output (for large map coordinates), metres.
     #[serde(default)]
     pub origin: [f64; 3],
-    /// The building; none: nothing but the floor below and the sky above.
+    /// The building; without it there are only floor and sky.
     #[serde(default)]
     pub hall: Option<Hall>,
-    /// The ground; none: no ground.
+    /// The ground; without it there is none.
     #[serde(default)]
     pub floor: Option<Floor>,
     /// Boxes.
@@ -42,24 +41,24 @@ pub struct Scene {
     /// Work benches.
     #[serde(default, rename = "bench")]
     pub benches: Vec<Furniture>,
-    /// Stands and pedestals that a robot may be bolted to.
+    /// Stands and pedestals for robots.
     #[serde(default, rename = "stand")]
     pub stands: Vec<Stand>,
-    /// Tubes and hoses, fixed or hung on robots.
+    /// Hoses, fixed or attached to robots.
     #[serde(default, rename = "hose")]
     pub hoses: Vec<Hose>,
     /// Boxes carried by robots.
     #[serde(default, rename = "carried")]
     pub carried: Vec<Carried>,
-    /// Robots; their order is that of the truth.
+    /// Robots, in the order of the truth.
     #[serde(default, rename = "robot")]
     pub robots: Vec<RobotPlace>,
-    /// Scanners; their order is that of the scans.
+    /// Scanners, in the order of the scans.
     #[serde(default, rename = "scanner")]
     pub scanners: Vec<Scanner>,
 }
 
-/// The building, its middle at the world's origin.
+/// The building, centred at the world's origin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hall {
@@ -73,17 +72,17 @@ pub struct Hall {
     pub ceiling: bool,
 }
 
-/// The ground: z = tilt + waves, over the hall's area or `size`.
+/// The ground: tilt plus waves, over the area of the hall or of `size`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Floor {
-    /// Length and width, metres; the hall's where left out, 20 × 20 without a hall.
+    /// Length and width, metres; by default those of the hall, or 20 × 20 without a hall.
     #[serde(default)]
     pub size: Option<[f64; 2]>,
     /// Slope along x and y, degrees.
     #[serde(default)]
     pub tilt_deg: [f64; 2],
-    /// Height of the waves above their mean, metres.
+    /// Amplitude of the waves, metres.
     #[serde(default)]
     pub wave_amplitude: f64,
     /// Length of the waves, metres.
@@ -106,21 +105,21 @@ pub struct Level {
     pub height: f64,
 }
 
-/// A box, resting anywhere.
+/// A box in any position.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cuboid {
-    /// For people.
+    /// Display name.
     #[serde(default)]
     pub name: String,
-    /// Middle, metres.
+    /// Centre, metres.
     pub xyz: [f64; 3],
-    /// Full size, metres.
+    /// Edge lengths, metres.
     pub size: [f64; 3],
     /// Roll, pitch, yaw, degrees.
     #[serde(default)]
     pub rpy_deg: [f64; 3],
-    /// How much light it sends back, 0..1.
+    /// Share of light that it reflects, 0..1.
     #[serde(default = "grey")]
     pub reflectance: f64,
 }
@@ -129,16 +128,16 @@ pub struct Cuboid {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
-    /// For people.
+    /// Display name.
     #[serde(default)]
     pub name: String,
-    /// Place on the ground, metres.
+    /// Position on the ground, metres.
     pub xy: [f64; 2],
-    /// Half its width, metres.
+    /// Half of its width, metres.
     pub radius: f64,
     /// Height above the ground, metres.
     pub height: f64,
-    /// Round, or an I-beam.
+    /// Cross-section.
     #[serde(default)]
     pub section: Section,
 }
@@ -158,7 +157,7 @@ pub enum Section {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fence {
-    /// For people.
+    /// Display name.
     #[serde(default)]
     pub name: String,
     /// One end, metres.
@@ -168,12 +167,12 @@ pub struct Fence {
     /// Height above the ground, metres.
     #[serde(default = "fence_height")]
     pub height: f64,
-    /// What is between the posts.
+    /// Filling between the posts.
     #[serde(default)]
     pub filling: Filling,
 }
 
-/// What is between the posts of a fence.
+/// The filling between the posts of a fence.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Filling {
@@ -188,12 +187,12 @@ pub enum Filling {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Furniture {
-    /// For people.
+    /// Display name.
     #[serde(default)]
     pub name: String,
-    /// Place of its middle on the ground, metres.
+    /// Position of its centre on the ground, metres.
     pub xy: [f64; 2],
-    /// Turn about z, degrees.
+    /// Rotation about z, degrees.
     #[serde(default)]
     pub yaw_deg: f64,
     /// Length, width, height, metres.
@@ -204,24 +203,24 @@ pub struct Furniture {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stand {
-    /// For people.
+    /// Display name.
     #[serde(default)]
     pub name: String,
-    /// Place of its middle on the ground, metres.
+    /// Position of its centre on the ground, metres.
     pub xy: [f64; 2],
-    /// Turn about z, degrees.
+    /// Rotation about z, degrees.
     #[serde(default)]
     pub yaw_deg: f64,
-    /// Height of its top in the world (not above the ground: the top is level), metres.
+    /// Height of its level top in the world (not above the ground), metres.
     pub top: f64,
     /// Side of its top plate, metres.
     pub side: f64,
-    /// What it looks like.
+    /// Its form.
     #[serde(default)]
     pub shape: StandShape,
 }
 
-/// What a stand looks like.
+/// The form of a stand.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StandShape {
@@ -234,33 +233,33 @@ pub enum StandShape {
     Plinth,
 }
 
-/// A point that moves with a robot's link, or stands in the world.
+/// A point that is fixed to a robot's link or to the world.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Anchor {
-    /// Name of the robot; none: the world.
+    /// Name of the robot; the world without it.
     #[serde(default)]
     pub robot: Option<String>,
-    /// Name of its link; none: its root.
+    /// Name of the link; the robot's root without it.
     #[serde(default)]
     pub link: Option<String>,
-    /// In the link's frame, or in the world, metres.
+    /// Position in the frame of the link or the world, metres.
     pub xyz: [f64; 3],
 }
 
-/// A hose that hangs from anchor to anchor. It belongs to the first robot of which it is fixed to a
-/// link other than the root; without one it stands still and is fixed.
+/// A hose that hangs from anchor to anchor. It is attached to the first robot that holds it by a
+/// link other than the root; if there is none, it counts as fixed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hose {
-    /// For people.
+    /// Display name.
     #[serde(default)]
     pub name: String,
-    /// Where it is held, at least two.
+    /// The points that hold it, at least two.
     pub anchors: Vec<Anchor>,
-    /// Half its thickness, metres.
+    /// Half of its thickness, metres.
     pub radius: f64,
-    /// Depth of each hanging arc as a share of the distance between its ends.
+    /// Depth of each hanging arc, as share of the distance between its ends.
     #[serde(default = "sag")]
     pub sag: f64,
 }
@@ -269,24 +268,24 @@ pub struct Hose {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Carried {
-    /// For people.
+    /// Display name.
     #[serde(default)]
     pub name: String,
     /// Name of the robot.
     pub robot: String,
     /// Name of the link that holds it.
     pub link: String,
-    /// Middle in the link's frame, metres.
+    /// Centre in the link's frame, metres.
     pub xyz: [f64; 3],
     /// Roll, pitch, yaw in the link's frame, degrees.
     #[serde(default)]
     pub rpy_deg: [f64; 3],
-    /// Full size, metres.
+    /// Edge lengths, metres.
     pub size: [f64; 3],
 }
 
 impl Scene {
-    /// The scene as one scanner sees it: robots as they stand then.
+    /// The scene during the scan of one scanner, with robots in their postures of that time.
     pub(crate) fn as_seen_by(&self, scanner: &str) -> Self {
         let mut out = self.clone();
         for robot in &mut out.robots {
@@ -301,10 +300,10 @@ impl Scene {
 }
 
 impl Scene {
-    /// Reads a scene file's text.
+    /// Reads a scene from the text of a scene file.
     ///
     /// # Errors
-    /// `BadInput` where the text is no scene: unknown names, missing values, numbers out of range.
+    /// `BadInput` for unknown keys, missing values and numbers out of range.
     pub fn from_toml(text: &str) -> Result<Self> {
         let scene: Self = toml::from_str(text).map_err(|e| {
             Error::bad_input("scene cannot be read")
@@ -315,16 +314,16 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The scene as text that [`Scene::from_toml`] reads back.
+    /// The scene as text of a scene file, which [`Scene::from_toml`] reads.
     ///
     /// # Errors
-    /// `Bug` where the scene cannot be written.
+    /// `Bug` if the scene cannot be serialised.
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string(self)
             .map_err(|e| Error::new(contract::Kind::Bug, "scene cannot be written").because(e))
     }
 
-    /// Height of the ground at a place, metres, without the scene's origin; 0 without a floor.
+    /// Height of the ground at (x, y), metres, without the scene's origin; 0 without a floor.
     #[must_use]
     pub fn ground(&self, x: f64, y: f64) -> f64 {
         let Some(floor) = &self.floor else { return 0.0 };
@@ -342,20 +341,20 @@ impl Scene {
 }
 
 impl Floor {
-    /// Height of the lowest level at a place, metres: tilt and two crossing waves.
+    /// Height of the ground below raised levels at (x, y), metres: tilt and two crossing waves.
     #[must_use]
     pub fn base_height(&self, x: f64, y: f64) -> f64 {
         let tilt = self.tilt_deg.map(|a| a.to_radians().tan());
         let k = std::f64::consts::TAU / self.wave_length;
-        // The second wave is shorter and turned, so that the pattern does not repeat along the
-        // axes.
+        // The second wave is shorter and rotated, so that the pattern does not repeat along an
+        // axis.
         let waves = 0.6 * (k * x).sin() * (k * y + 0.7).cos()
             + 0.4 * (1.37 * k * (0.8 * x - 0.6 * y)).sin();
         tilt[0] * x + tilt[1] * y + self.wave_amplitude * waves
     }
 }
 
-/// A pose from a position (metres) and roll, pitch, yaw about fixed x, y, z (degrees).
+/// A pose from a position (metres) and roll, pitch, yaw about the fixed axes x, y, z (degrees).
 #[must_use]
 pub fn pose(xyz: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
     let [r, p, y] = rpy_deg.map(f64::to_radians);

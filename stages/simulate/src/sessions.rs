@@ -1,5 +1,5 @@
-//! A plant as it was scanned, and one cell of it as it was scanned again weeks later, in two
-//! scenes: a robot moved, a pallet was pushed, a barrel was taken away.
+//! Two scenes of a plant: the whole plant, and one of its cells scanned again weeks later. In
+//! between a robot moved, a pallet was pushed, and a barrel was removed.
 
 use crate::plant::{Plant, plant};
 use crate::random::Random;
@@ -8,27 +8,29 @@ use crate::spot::scanner;
 use contract::{Error, Result};
 use robot::Model;
 
-/// Size of the pallet with its load, and of the barrel (radius, height), metres.
+/// Size of the loaded pallet, metres.
 const PALLET: [f64; 3] = [1.2, 0.8, 0.7];
+/// Radius and height of the barrel, metres.
 const BARREL: [f64; 2] = [0.29, 0.88];
-/// Room that both keep to other things, metres.
+/// Free space around both, metres.
 const FREE: f64 = 0.8;
-/// How far the new scanners stand from the robot's base, at most, and from the walls, metres.
+/// Largest distance of the new scanners from the robot's base, metres.
 const NEAR: f64 = 3.6;
+/// Smallest distance of the new scanners from the walls, metres.
 const WALL: f64 = 0.8;
-/// Standard deviations of the new scans' registration: metres, degrees.
+/// Standard deviations of the new scans' registration errors: metres, degrees.
 const OFF: [f64; 2] = [0.003, 0.01];
-/// Room about a new scanner, metres: a tripod's feet, and a person beside it.
+/// Free space around a new scanner, metres: the tripod's feet, and a person beside it.
 const TRIPOD: f64 = 0.6;
-/// Half of what a robot's foot takes up, metres.
+/// Half-width of the space that a robot's foot takes, metres.
 const ROBOT: f64 = 0.9;
-/// Places that are tried.
+/// Number of places that are tried.
 const TRIES: usize = 2000;
 
-/// The two sessions of a plant, drawn as [`plant`] draws it; its first robot is the one that moves.
+/// The two scenes of a plant drawn as by [`plant`]; its first robot is the one that moves.
 ///
 /// # Errors
-/// As [`plant`]; `BadInput` where the hall has no room for the pallet.
+/// As [`plant`]; also `BadInput` if the hall has no space for the pallet.
 pub fn sessions(wanted: &Plant, models: &[Model]) -> Result<[Scene; 2]> {
     let mut then = plant(&Plant { moves: true, ..wanted.clone() }, models)?;
     let mut random = Random::keyed(&[wanted.seed, 0x5E5]);
@@ -70,7 +72,7 @@ fn put_pallet(scene: &mut Scene, [x, y]: [f64; 2], yaw: f64) {
     });
 }
 
-/// Two scanners, on two sides of the robot, registered as well as rescans are.
+/// Adds two scanners on two sides of the robot, with the registration errors of rescans.
 fn new_scanners(
     scene: &Scene,
     at: [f64; 2],
@@ -103,7 +105,7 @@ fn new_scanners(
     Ok(places.into_iter().enumerate().map(one).collect())
 }
 
-/// A place on the floor near the robot's aisles that nothing stands on.
+/// A free place on the floor near the robot.
 fn free(
     scene: &Scene,
     (at, size): ([f64; 2], [f64; 3]),
@@ -129,7 +131,7 @@ fn free(
     Err(no_room("what is to be moved"))
 }
 
-/// What stands in a scene: middle and half of its greatest extent on the floor, metres.
+/// Centre and half of the largest horizontal extent of each object of a scene, metres.
 fn things(scene: &Scene) -> impl Iterator<Item = ([f64; 2], f64)> + '_ {
     let boxes = scene.boxes.iter();
     let boxes = boxes.map(|b| ([b.xyz[0], b.xyz[1]], 0.5 * b.size[0].hypot(b.size[1])));
@@ -140,7 +142,7 @@ fn is_near(p: [f64; 2], (xy, half): ([f64; 2], f64), room: f64) -> bool {
     (p[0] - xy[0]).hypot(p[1] - xy[1]) < room + half
 }
 
-/// Whether a tripod has room at a place.
+/// Whether a place has space for a tripod.
 fn is_free(scene: &Scene, xy: [f64; 2]) -> bool {
     let robots = scene.robots.iter().map(|r| ([r.xyz[0], r.xyz[1]], ROBOT));
     let furniture = scene.benches.iter().chain(&scene.conveyors).map(|f| {

@@ -1,5 +1,5 @@
-//! A scene and robot models in; the triangles of each body, with what moves it, and whether one
-//! place sees another, out: the truth that paths of robots are judged by.
+//! The triangles of each body of a scene with the link that moves it, and visibility between
+//! places: the truth against which checks of robot paths are judged.
 
 use crate::beams::Beams;
 use crate::scene::Scene;
@@ -8,37 +8,37 @@ use contract::{PointKind, Result};
 use geometry::Point;
 use robot::Model;
 
-/// A place that a beam ends this little before is where the beam ends, metres: rounding of single
-/// precision in a hall.
+/// Distance before the end of a beam within which a place counts as its end, metres: the rounding
+/// of single precision in a hall.
 const AT: f64 = 1e-3;
 
 /// A body of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
-    /// Kind and name of the thing that it belongs to.
+    /// Kind and name of the object that it belongs to.
     pub name: String,
-    /// Index of the robot that it is part of, or hangs on.
+    /// Index of the robot that it is part of or attached to.
     pub robot: Option<usize>,
-    /// Index of the link that it moves with as one body; nothing for hoses, which bend.
+    /// Index of the link with which it moves rigidly; `None` for hoses, which bend.
     pub link: Option<usize>,
-    /// Triangles as all stands in the scene, world without the scene's origin, metres.
+    /// Triangles in the world without the scene's origin, metres.
     pub triangles: Vec<[[f32; 3]; 3]>,
 }
 
 /// All bodies of a scene.
 pub struct Shapes {
-    /// Those with triangles.
+    /// The bodies that have triangles.
     pub all: Vec<Shape>,
     beams: Beams,
 }
 
 impl Shapes {
-    /// Of a scene with its robots in their first postures; `models` are the models that its robots
-    /// name.
+    /// The bodies of a scene with its robots in their first postures; `models` must include the
+    /// models of these robots.
     ///
     /// # Errors
-    /// `BadInput` where the scene names a model, link or joint that does not exist, or a number
-    /// means nothing.
+    /// `BadInput` if the scene names a model, link or joint that does not exist, or has a number
+    /// out of range.
     pub fn of(scene: &Scene, models: &[Model]) -> Result<Self> {
         crate::check::check(scene)?;
         let world = World::new(scene, models)?;
@@ -47,7 +47,7 @@ impl Shapes {
             name: world.objects.get(usize::from(surface.object)).cloned().unwrap_or_default(),
             robot: index(surface.label.robot),
             link: match surface.label.kind {
-                // Effectors of the model are links, too.
+                // Effectors in the model are links, too.
                 PointKind::Link | PointKind::Attachment if surface.label.link >= 0 => {
                     index(surface.label.link)
                 }
@@ -63,7 +63,7 @@ impl Shapes {
         Ok(Self { all, beams: Beams::new(&world.triangles, &world.surface_of) })
     }
 
-    /// Whether nothing of the scene lies between two places, world without the scene's origin.
+    /// Whether no body lies between two places (world without the scene's origin, metres).
     #[must_use]
     pub fn sees(&self, from: &Point, to: &Point) -> bool {
         let way = to - from;
@@ -72,8 +72,8 @@ impl Shapes {
         self.beams.cast(&from.coords, &along, (length - AT).max(0.0)).is_none()
     }
 
-    /// Whether a beam from a place through another one ends on something, no farther than so from
-    /// where it begins, metres.
+    /// Whether a beam from a place through another one hits something within `within` metres of its
+    /// origin.
     #[must_use]
     pub fn ends(&self, from: &Point, through: &Point, within: f64) -> bool {
         let along = (through - from).try_normalize(AT);

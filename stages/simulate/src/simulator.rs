@@ -1,4 +1,4 @@
-//! A scene and robot models in; scans with truth out.
+//! The simulator: scans with truth from a scene and robot models.
 
 use crate::beams::Beams;
 use crate::columns::{ScanFrame, SimColumns, SimScan};
@@ -13,16 +13,16 @@ use std::ops::Range;
 
 /// A scene ready to be scanned.
 pub struct Simulator {
-    /// One for each set of postures that some scanner saw.
+    /// The scene in each set of postures that any scanner saw.
     states: Vec<State>,
     stations: Vec<Station>,
-    /// For each station, what it saw.
+    /// Index of the state of each station.
     state_of: Vec<usize>,
     robots: Vec<TrueRobot>,
     objects: Vec<String>,
 }
 
-/// The scene while nothing moved.
+/// The scene in one set of postures.
 struct State {
     beams: Beams,
     surfaces: Vec<Surface>,
@@ -30,11 +30,11 @@ struct State {
 }
 
 impl Simulator {
-    /// Builds everything that stands in the scene; `models` are the models that its robots name.
+    /// Builds all bodies of a scene; `models` must include the models of its robots.
     ///
     /// # Errors
-    /// `BadInput` where the scene names a model, link or joint that does not exist, or a number
-    /// means nothing.
+    /// `BadInput` if the scene names a model, link or joint that does not exist, or has a number
+    /// out of range.
     pub fn new(scene: &Scene, models: &[Model]) -> Result<Self> {
         crate::check::check(scene)?;
         let (mut seen, mut states, mut state_of) = (Vec::new(), Vec::new(), Vec::new());
@@ -70,7 +70,7 @@ impl Simulator {
         self.states.first().map_or(0, |s| s.n_triangles)
     }
 
-    /// What a file says about a scan before its points.
+    /// The properties of a scan that files state.
     ///
     /// # Panics
     /// If the scene has no scanner with this index.
@@ -82,9 +82,9 @@ impl Simulator {
     /// Beams of some columns of one scan.
     ///
     /// # Law
-    /// A function of scene, scanner and column only: however the columns are split and in whatever
-    /// order they are asked for, the beams are the same. Each call casts one more column on
-    /// either side, so ask for 16 or more.
+    /// The beams depend only on scene, scanner and column: they are the same however the columns
+    /// are split and in whatever order they are requested. Each call casts one more column on
+    /// either side, so that 16 or more should be requested at a time.
     ///
     /// # Panics
     /// If the scene has no scanner with this index.
@@ -105,7 +105,8 @@ impl Simulator {
         SimScan { frame, columns }
     }
 
-    /// The truth; the numbers of points of its scans are 0 until the caller has counted them.
+    /// The truth of the scene; the numbers of points of its scans are 0 until the caller counts
+    /// them.
     #[must_use]
     pub fn truth(&self) -> Truth {
         let scans = self.stations.iter().map(|s| TrueScan {

@@ -1,5 +1,4 @@
-//! A place for a robot in a scene that is being made; the robot with a stand and a drawn posture
-//! out.
+//! Places a robot in a scene that is being built, with a stand and a random posture.
 
 use crate::posture::Postures;
 use crate::random::Random;
@@ -9,7 +8,7 @@ use contract::Result;
 use geometry::Point;
 use robot::Model;
 
-/// A link may be this far below the floor, metres.
+/// Depth below the floor that is allowed for a link, metres.
 const FLOOR_SLACK: f64 = 0.005;
 
 /// A scanner with the errors of a good real one.
@@ -27,26 +26,26 @@ pub(crate) fn scanner(name: String, position: [f64; 3], raster: Raster) -> Scann
     }
 }
 
-/// Where a robot goes and how much room it has.
+/// The place of a robot and the space that it has.
 pub(crate) struct Spot<'a> {
     pub(crate) name: String,
     pub(crate) model: &'a str,
     pub(crate) xy: [f64; 2],
-    /// Height of its stand, metres; 0: on the floor.
+    /// Height of its stand, metres; 0 for a robot on the floor.
     pub(crate) stand: f64,
     pub(crate) side: f64,
     pub(crate) shape: StandShape,
-    /// Range of its turn, degrees.
+    /// Range of its yaw, degrees.
     pub(crate) yaw_deg: [f64; 2],
-    /// Middle and size of a box that its `tool0` carries, metres.
+    /// Centre and size of a box that its `tool0` carries, metres.
     pub(crate) load: Option<([f64; 3], [f64; 3])>,
-    /// Corners of its room, metres.
+    /// Lowest and highest corner of its space, metres.
     pub(crate) min: [f64; 2],
     pub(crate) max: [f64; 2],
 }
 
 impl Spot<'_> {
-    /// Puts up the stand, turns the robot and draws its posture.
+    /// Adds the stand, turns the robot and draws its posture.
     pub(crate) fn place(
         &self,
         scene: &mut Scene,
@@ -63,8 +62,8 @@ impl Spot<'_> {
         let mut postures = Postures::new(model);
         if let Some((xyz, size)) = self.load {
             let link = model.links.iter().position(|l| l.name == "tool0");
-            // From the flange down to the bottom of the box, so that the tool between them is part
-            // of it.
+            // The body reaches from the flange to the bottom of the box, which includes the tool
+            // between.
             let (top, bottom) = (-0.04, xyz[2] - 0.5 * size[2]);
             let body = cuboid([size[0], size[1], top - bottom], 0.0).at([
                 xyz[0],
@@ -79,7 +78,7 @@ impl Spot<'_> {
         Ok(place)
     }
 
-    /// Puts up the stand (once) and turns the robot; its posture is the model's home.
+    /// Adds the stand (once) and turns the robot; its posture is the model's home.
     pub(crate) fn stand_only(&self, scene: &mut Scene, random: &mut Random) -> RobotPlace {
         let [x, y] = self.xy;
         let ground = scene.ground(x, y);
@@ -103,8 +102,8 @@ impl Spot<'_> {
     }
 }
 
-/// Boxes that arms must stay out of: furniture, and stands (a robot's own one up to just below its
-/// top).
+/// Boxes that arms must not enter: furniture and stands, a robot's own stand up to just below its
+/// top.
 fn keep_out(scene: &Scene, own: &str) -> Vec<([f64; 3], [f64; 3])> {
     let around = |xy: [f64; 2], half: [f64; 2], low: f64, high: f64| {
         ([xy[0] - half[0], xy[1] - half[1], low], [xy[0] + half[0], xy[1] + half[1], high])

@@ -1,11 +1,11 @@
-//! What really stands in a scene, to compare results with; written as JSON beside the scans.
+//! The truth of a scene for comparison with results, written as JSON beside the scans.
 
 use contract::{Error, Kind, Result};
 use geometry::Pose;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Name and version of the form.
+/// Name and version of the schema.
 pub const SCHEMA: &str = "stillpoint.truth/1";
 
 /// Truth of a scene: robots and scans. The label of each point is given beside the points.
@@ -13,65 +13,65 @@ pub const SCHEMA: &str = "stillpoint.truth/1";
 pub struct Truth {
     /// [`SCHEMA`].
     pub schema: String,
-    /// In the order of the scene: labels count them.
+    /// The robots in the order of the scene; labels hold their indices.
     pub robots: Vec<TrueRobot>,
-    /// In the order of the scene.
+    /// The scans in the order of the scene.
     pub scans: Vec<TrueScan>,
-    /// What stands in the scene, by name: `labels/N.object.npy` counts them.
+    /// Names of the objects of the scene; `labels/N.object.npy` holds their indices.
     #[serde(default)]
     pub objects: Vec<String>,
 }
 
-/// A robot as it stands.
+/// The true state of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrueRobot {
-    /// Its name in the scene.
+    /// Name in the scene.
     pub name: String,
-    /// Its folder in the library.
+    /// Name of its folder in the library.
     pub model: String,
-    /// Root link of its tree.
+    /// Name of the root link.
     pub base_link: String,
-    /// World from root link.
+    /// Pose of the root link in the world.
     pub base_pose: TruePose,
     /// Value of each free joint, radians or metres.
     pub joints: BTreeMap<String, f64>,
-    /// Names of its links, in the order that labels count.
+    /// Names of its links; labels hold their indices.
     pub links: Vec<String>,
-    /// How it stood for other scans, where it moved in between.
+    /// Its postures in other scans, if it moved in between.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub later: Vec<LaterPosture>,
 }
 
-/// How a robot stood for some of the scans.
+/// The posture of a robot in some of the scans.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LaterPosture {
-    /// Names of those scans.
+    /// Names of the scans.
     pub scans: Vec<String>,
     /// Value of each free joint, radians or metres.
     pub joints: BTreeMap<String, f64>,
 }
 
-/// A scan as it was made.
+/// The true state of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrueScan {
-    /// Its name.
+    /// Name of the scan.
     pub name: String,
-    /// World from scan as it really was.
+    /// True pose of the scan in the world.
     pub pose: TruePose,
-    /// World from scan as the files state it.
+    /// Pose of the scan that files state.
     pub stated_pose: TruePose,
     /// Number of beams.
     pub n_beams: u64,
-    /// Number of beams that came back; 0 until counted.
+    /// Number of beams that returned; 0 until counted.
     pub n_points: u64,
 }
 
 /// A pose as numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TruePose {
-    /// Metres.
+    /// Position, metres.
     pub xyz: [f64; 3],
-    /// Unit quaternion, real part first and not negative.
+    /// Rotation as a unit quaternion whose real part is not negative.
     pub quat_wxyz: [f64; 4],
 }
 
@@ -90,7 +90,7 @@ impl Truth {
     /// The truth as JSON text.
     ///
     /// # Errors
-    /// `Bug` where it cannot be written.
+    /// `Bug` if it cannot be serialised.
     pub fn to_json(&self) -> Result<String> {
         serde_json::to_string_pretty(self)
             .map_err(|e| Error::new(Kind::Bug, "truth cannot be written").because(e))
@@ -99,7 +99,7 @@ impl Truth {
     /// Reads what [`Truth::to_json`] wrote.
     ///
     /// # Errors
-    /// `BadInput` where the text is no truth.
+    /// `BadInput` if the text is no truth.
     pub fn from_json(text: &str) -> Result<Self> {
         serde_json::from_str(text).map_err(|e| Error::bad_input("truth cannot be read").because(e))
     }

@@ -1,4 +1,4 @@
-//! A scene and robot models in; triangles with their labels, ready for beams, out.
+//! The triangles of a scene with their labels, ready for ray casting.
 
 use crate::scene::{Anchor, RobotPlace, Scene, pose};
 use crate::solid::{Solid, cuboid};
@@ -8,29 +8,30 @@ use geometry::{Point, Pose};
 use glam::Vec3A;
 use robot::{Mesh, Model, Role};
 
-/// What all triangles of one body share.
+/// The properties that all triangles of one body share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Surface {
-    /// What a point on it belongs to.
+    /// Label of points on it.
     pub(crate) label: Label,
-    /// Index of the thing in [`World::objects`].
+    /// Index of its object in [`World::objects`].
     pub(crate) object: u16,
-    /// How much light it sends back, 0..1.
+    /// Share of light that it reflects, 0..1.
     pub(crate) reflectance: f32,
-    /// Thinner than the distance of beams: a beam may touch it where its neighbours do not.
+    /// Whether it is thinner than the distance of beams, so that a beam may touch it where its
+    /// neighbours do not.
     pub(crate) is_thin: bool,
-    /// Index of the link that holds an attachment rigidly; −1 for all else, hoses too.
+    /// Index of the link that holds an attachment rigidly; −1 for all others, and for hoses.
     pub(crate) holder: i16,
 }
 
-/// A robot of the scene with everything placed.
+/// A robot of the scene with the poses of its links.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedRobot {
-    /// Index into the models given.
+    /// Index of its model.
     pub(crate) model: usize,
-    /// One value for each free joint.
+    /// Value of each free joint, radians or metres.
     pub(crate) posture: Vec<f64>,
-    /// World (without the scene's origin) from link.
+    /// Pose of each link in the world without the scene's origin, metres.
     pub(crate) world_from_link: Vec<Pose>,
 }
 
@@ -40,16 +41,16 @@ pub(crate) struct World {
     pub(crate) triangles: Vec<[Vec3A; 3]>,
     pub(crate) surface_of: Vec<u32>,
     pub(crate) surfaces: Vec<Surface>,
-    /// Names of the things of the scene.
+    /// Names of the objects of the scene.
     pub(crate) objects: Vec<String>,
     pub(crate) robots: Vec<PlacedRobot>,
 }
 
-/// Painted steel and concrete.
+/// Reflectance of painted steel and concrete.
 const GREY: f32 = 0.5;
-/// Black rubber.
+/// Reflectance of black rubber.
 const BLACK: f32 = 0.06;
-/// Robot paint.
+/// Reflectance of robot paint.
 const PAINT: f32 = 0.7;
 
 impl World {
@@ -64,11 +65,11 @@ impl World {
         Ok(out)
     }
 
-    /// A new thing: what is added from now on is part of it.
+    /// Begins an object: all bodies that are added afterwards belong to it.
     fn object(&mut self, kind: &str, name: &str) -> u16 {
         let words = [kind, name].into_iter().filter(|w| !w.is_empty());
         self.objects.push(words.collect::<Vec<_>>().join(" "));
-        // A scene of more things counts the rest as one.
+        // Objects beyond the largest index share it.
         u16::try_from(self.objects.len() - 1).unwrap_or(u16::MAX)
     }
 
@@ -82,7 +83,7 @@ impl World {
         for t in triangles {
             let corners = t.map(|i| vertices[i as usize]);
             let triangle = corners.map(|p| Vec3A::new(p.x as f32, p.y as f32, p.z as f32));
-            // Triangles without area have no plane to meet.
+            // Triangles without area have no plane.
             if (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).length_squared() > 0.0 {
                 self.triangles.push(triangle);
                 self.surface_of.push(at);
@@ -179,7 +180,7 @@ impl World {
                 .map(|a| self.anchor(scene, models, a))
                 .collect::<Result<Vec<_>>>();
             let held = held.map_err(|e| e.at(format!("hose \"{}\"", hose.name)))?;
-            // A hose that is held by the foot only stands still.
+            // A hose that is held only by the robot's root does not move.
             let moves = |a: &&Anchor| {
                 a.link.as_ref().is_some_and(|link| !self.is_root(scene, models, a, link))
             };
@@ -200,7 +201,7 @@ impl World {
         Ok(())
     }
 
-    /// Index of a link of a robot of the scene, by its name.
+    /// Index of the link of a robot of the scene that holds something, by its name.
     fn holder(&self, models: &[Model], robot: usize, link: &str) -> Result<i16> {
         let links = &models[self.robots[robot].model].links;
         index_i16(links.iter().position(|l| l.name == link).unwrap_or(0))

@@ -1,4 +1,4 @@
-//! The demo robots as the robot room reads them.
+//! The demo robots load without findings, and their loops close.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod library;

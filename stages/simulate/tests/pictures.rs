@@ -1,5 +1,5 @@
-//! Pictures of the demo robots and of the demo scene for people: run with `--ignored`, look into
-//! the folder that it names.
+//! Draws the demo robots and the demo scene for people: run with `--ignored`, and look into the
+//! folder that is printed.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod library;

@@ -1,4 +1,4 @@
-//! Scenes whose answer can be worked out by hand, and what the simulator makes of them.
+//! Simulated scans of scenes whose result can be computed by hand.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -79,7 +79,7 @@ fn range_to_a_column_is_that_of_a_cylinder() {
         let along = 3.0 * x - (0.3_f64.powi(2) - across.powi(2)).max(0.0).sqrt();
         let height = 1.6 + along * d[2] / flat;
         if across < 0.25 && x > 0.0 && (0.2..2.9).contains(&height) {
-            // 48 facets: 0.64 mm inside the cylinder at most, more along an oblique beam.
+            // 48 facets are up to 0.64 mm inside the cylinder, and more along an oblique beam.
             assert!(columns.hit[i] && (columns.range[i] - along / flat).abs() < 0.002, "{i}");
             n += 1;
         }
@@ -226,7 +226,8 @@ fn wide_beams_hang_in_the_air_at_edges_and_nowhere_else() {
         let edge = (0.5 * x / 2.95 - y.abs()).abs().min((0.5 * x / 2.95 - z.abs()).abs());
         assert!(edge < 0.003, "{edge}");
     }
-    // Twice as deep as the parts may lie apart: the stronger part wins, nothing hangs in the air.
+    // At twice the depth over which parts are averaged, the stronger part wins and no point lies
+    // between the surfaces.
     scene.boxes[1].xyz[0] = 4.5;
     let split = scan(&scene);
     assert!((0..split.len()).filter(|&i| split.hit[i]).all(|i| !split.mixed[i]));

@@ -1,4 +1,4 @@
-//! How fast beams are cast, for `benches/README.md`: run with `--release -- --ignored --nocapture`.
+//! Speed of ray casting, for `benches/README.md`: run with `--release -- --ignored --nocapture`.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod library;
@@ -6,7 +6,7 @@ mod library;
 use simulate::Simulator;
 use simulate::scene::Scanner;
 
-/// Time that this thread has had a processor, seconds: other programs do not count. Linux only.
+/// CPU time of this thread, seconds, which does not count other programs. Linux only.
 fn cpu_seconds() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
     text.split_whitespace().next().unwrap().parse::<f64>().unwrap() * 1e-9

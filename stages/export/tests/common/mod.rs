@@ -1,5 +1,4 @@
-//! Points made by number in; tiles and clouds of them in a folder, and what is read of such files,
-//! out.
+//! Synthetic points by index, tiles and clouds of them in a folder, and readers of such files.
 #![allow(dead_code, reason = "each test file uses some of it")]
 #![allow(unreachable_pub, reason = "of tests only")]
 
@@ -58,7 +57,7 @@ pub fn clouds(
     let mut clouds = Clouds::create(out, &las, &settings).expect("create");
     let mut tiles = Tiles::create(out, &las, &settings).expect("create").expect("asked");
     let pack = Pack::of_clouds(&las, &settings);
-    // Strips of a length that divides nothing.
+    // The length of a strip divides no other number here.
     let all: Vec<usize> = (0..n).collect();
     for strip in all.chunks(1013) {
         let world: Vec<_> = strip.iter().map(|&i| world(i)).collect();
@@ -87,7 +86,7 @@ pub fn read(path: &Path) -> (las::Header, Vec<las::Point>) {
     (reader.header().clone(), points)
 }
 
-/// Says nothing, and never stops.
+/// A progress receiver that reports nothing and never cancels.
 struct Quiet;
 
 impl CopcSteps for Quiet {
@@ -98,7 +97,7 @@ impl CopcSteps for Quiet {
     }
 }
 
-/// Writes one COPC file of the tiles; whether there were any.
+/// Writes one COPC file of the tiles; returns whether there were any.
 pub fn copc(out: &Path, n_threads: usize) -> bool {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
     let write = || {

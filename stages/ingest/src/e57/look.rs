@@ -1,5 +1,5 @@
-//! The first records of a scan in; what they say of it out: where its points lie, whether beams
-//! without return are among them, how coarse its coordinates are, and what its intensities span.
+//! Looks at the first records of a scan: where its points lie, whether beams without return are
+//! among them, the step of its coordinates, and the range of its intensities.
 
 use super::pages::Pages;
 use super::points::{Points, Wanted};
@@ -9,22 +9,22 @@ use crate::frame::NO_RETURN;
 use contract::Result;
 use std::path::Path;
 
-/// Records that are looked at: a hundredth of a second.
+/// Number of records that are looked at, which takes a hundredth of a second.
 const N_RECORDS: usize = 65_536;
-/// Records that are decoded at once.
+/// Number of records that are decoded at once.
 const BLOCK: usize = 4096;
-/// Points that the scanner's reach is judged by.
+/// Number of points by which it is judged whether the origin can be the scanner.
 const N_JUDGED: usize = 64;
 
-/// What a look at a scan shows; valid points only.
+/// What the first records of a scan show; valid points only.
 #[derive(Debug, Default)]
 pub(super) struct Look {
-    /// Points that are no returns at the origin, file's frame.
+    /// Points other than beams without return at the origin, file frame, metres.
     pub(super) points: Vec<[f64; 3]>,
-    /// How many lie at the file's origin, and how many were looked at.
+    /// Number of points at the file's origin, and number of points looked at.
     pub(super) n_at_origin: usize,
     pub(super) n_looked: usize,
-    /// As the file has them.
+    /// Intensities as stored in the file.
     pub(super) intensities: Vec<f64>,
 }
 
@@ -63,12 +63,12 @@ impl Look {
         self.intensities.extend(intensity);
     }
 
-    /// Points that the scanner's reach is judged by: the first ones.
+    /// The first points, by which it is judged whether the origin can be the scanner.
     pub(super) fn first(&self) -> &[[f64; 3]] {
         &self.points[..self.points.len().min(N_JUDGED)]
     }
 
-    /// The step of the coordinates, metres, where it is coarse.
+    /// The step of the coordinates, metres; `None` where it is fine enough.
     pub(super) fn step(&self) -> Option<f64> {
         crate::steps::coarse(&self.points)
     }

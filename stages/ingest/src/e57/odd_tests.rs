@@ -9,7 +9,7 @@ use ::e57::{
     Quaternion, RawValues, Record, RecordDataType, RecordName, RecordValue, Transform, Translation,
 };
 
-/// Single-precision points and an intensity of 0 to 4095, no states.
+/// A scan of single-precision points with an intensity of 0 to 4095 and no invalid flags.
 fn singles(points: impl Iterator<Item = [f32; 3]>) -> Own {
     let prototype = vec![
         Record::CARTESIAN_X_F32,
@@ -19,14 +19,14 @@ fn singles(points: impl Iterator<Item = [f32; 3]>) -> Own {
     ];
     let values = |(n, p): (usize, [f32; 3])| -> RawValues {
         let xyz = p.map(RecordValue::Single);
-        // As `write` states limits of 0 to 2000: one in five hundred lies outside.
+        // `write` states limits of 0 to 2000, so one value in five hundred lies outside.
         let level = if n % 500 == 17 { 4000 } else { n as i64 % 2000 };
         xyz.into_iter().chain([RecordValue::Integer(level)]).collect()
     };
     Own { prototype, points: points.enumerate().map(values).collect(), transform: None }
 }
 
-/// A bumpy wall; three of four beams come back from nothing.
+/// A bumpy wall; three of four beams have no return.
 fn with_no_returns(n: usize) -> impl Iterator<Item = [f32; 3]> {
     (0..n).map(|k| {
         let t = k as f32;
@@ -42,8 +42,8 @@ fn posed() -> Option<Transform> {
 #[test]
 fn returns_at_the_scanner_are_no_returns_and_keep_their_places() {
     let known = Own { transform: posed(), ..singles(with_no_returns(8000)) };
-    // Without a pose or rows and columns no scanner is known; the origin is no point of the room
-    // even so.
+    // Without pose, rows and columns the scanner is unknown; the origin is no point of the room
+    // all the same.
     let unknown = singles(with_no_returns(8000));
     let file = write("origin.e57", vec![known, unknown], |xml| xml);
     let reader = open(&file.0, &settings()).expect("valid");
@@ -80,7 +80,7 @@ fn what_is_dropped_and_cut_is_counted() {
         |xml| xml,
     );
     let reader = open(&file.0, &settings()).expect("valid");
-    // Twice: each time is counted by itself.
+    // The file is read twice; the counts must not add up.
     for _ in 0..2 {
         crate::reader::strips(&*reader, Want::Everything)
             .expect("opens")
@@ -99,7 +99,7 @@ fn what_is_dropped_and_cut_is_counted() {
 #[test]
 fn steps_of_single_precision_at_map_offsets_are_said() {
     let far = with_no_returns(8000).map(|p| [412_300.0 + p[0], 5_653_120.0 + 300.0 * p[1], p[2]]);
-    // The same points off their raster, as noise has them.
+    // The same points with noise, so that they lie on no raster.
     let rough = |v: f32| v + 0.01 * (977.0 * v).sin();
     let fine = with_no_returns(8000).map(|p| if p == [0.0; 3] { p } else { p.map(rough) });
     let file = write("steps.e57", vec![singles(far), singles(fine)], |xml| xml);

@@ -1,4 +1,4 @@
-//! E57 files of our own, whole and broken.
+//! E57 files written by the tests, whole and damaged.
 
 use super::tests::{read, settings};
 use super::*;
@@ -8,7 +8,7 @@ use ::e57::{
     RecordValue, Transform, Translation,
 };
 
-/// Fields and points of a scan of our own.
+/// Fields and points of a scan to write.
 pub(super) struct Own {
     pub(super) prototype: Vec<Record>,
     pub(super) points: Vec<RawValues>,
@@ -19,8 +19,8 @@ pub(super) fn record(name: RecordName, data_type: RecordDataType) -> Record {
     Record { name, data_type }
 }
 
-/// Structured, scaled integers of 21 bits, doubles and singles mixed, states, intensity, colour,
-/// odd widths.
+/// A structured scan with scaled integers of 21 bits, doubles and singles mixed, invalid flags,
+/// intensity, colour and odd bit widths.
 fn own(n_points: usize) -> Own {
     let scaled =
         RecordDataType::ScaledInteger { min: -1_000_000, max: 1_000_000, scale: 1e-4, offset: 0.5 };
@@ -60,7 +60,7 @@ fn own(n_points: usize) -> Own {
     Own { prototype, points, transform: Some(transform) }
 }
 
-/// Writes scans of our own with the crate.
+/// Writes scans with the crate `e57`; `mend` may change the XML description.
 pub(super) fn write(name: &str, scans: Vec<Own>, mend: impl Fn(String) -> String) -> Scratch {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut bytes, "file").expect("plain");
@@ -100,8 +100,8 @@ fn own_file_comes_back_with_gaps_and_attributes() {
             assert_eq!(scans[0].xyz[at], [x as f32, y as f32, z as f32]);
             let want = [100.0 - y, 200.0 + x, 300.0 + z];
             assert!((0..3).all(|i| (scans[0].attributes.world[at][i] - want[i]).abs() < 1e-9));
-            // Half of them lie outside the limits that the file states, which are not believed
-            // then.
+            // Half of them lie outside the limits that the file states, so that the limits are
+            // ignored.
             let level = ((n % 4096) as f64 / 4095.0 * 65_535.0).round() as u16;
             assert_eq!(scans[0].attributes.intensity[at], level);
             assert_eq!(scans[0].attributes.color[at][..2], [(n % 256) as u16 * 257, 65_535]);
@@ -121,8 +121,8 @@ fn own_file_comes_back_with_gaps_and_attributes() {
 #[test]
 fn bounds_of_a_turned_scan_are_those_of_its_points() {
     let mut turned = own(4000);
-    // A diagonal line, turned by 45°: the corners of its box lie far off it. It begins 35 mm from
-    // the scanner, where points are no beams without return.
+    // A diagonal line turned by 45°, far from the corners of its box. It begins 35 mm from the
+    // scanner, where points do not count as beams without return.
     for (n, point) in turned.points.iter_mut().enumerate() {
         let along = n.max(20) as f64 * 1e-3;
         point[0] = RecordValue::ScaledInteger((along * 1e4) as i64 - 5000);
@@ -201,7 +201,11 @@ fn poses_and_fields_that_make_no_sense_are_refused() {
         ("<cartesianZ", "<sphericalZ", "tag"),
         ("scale=\"0.0001\"", "scale=\"0\"", "scale"),
         ("fileOffset=\"48\"", "fileOffset=\"4800000\"", "offset"),
-        ("type=\"Integer\" minimum=\"0\" maximum=\"999\"", "type=\"String\"", "not read"),
+        (
+            "type=\"Integer\" minimum=\"0\" maximum=\"999\"",
+            "type=\"String\"",
+            "unsupported content",
+        ),
     ];
     for (n, (from, to, words)) in cases.into_iter().enumerate() {
         let error = mended(&format!("mended-{n}.e57"), from, to)
@@ -231,7 +235,7 @@ fn a_bomb_of_constants_is_refused() {
     assert!(error.to_string().contains("cannot hold"), "{error}");
 }
 
-/// Sets the checksums of all pages right, so that breaks reach what lies behind them.
+/// Makes the checksums of all pages valid, so that damage reaches the code behind them.
 fn seal(bytes: &mut [u8]) {
     for page in bytes.chunks_exact_mut(1024) {
         let sum = crc32c::crc32c(&page[..1020]).to_be_bytes();

@@ -1,34 +1,34 @@
-//! Pages of one scan's section in, columns of numbers out, record by record in step over all
-//! fields. Knows that counts may lie: what the packets hold must be what the scan announces.
+//! Reads columns of numbers from one scan's section, with all fields kept at the same record.
+//! Counts in the file are not trusted: the packets must hold as many records as the scan announces.
 
 use super::pages::Pages;
 use super::stream::Stream;
 use contract::{Error, Kind, Result};
 use e57::Record;
 
-/// Bytes of the header of a section.
+/// Length of a section header, bytes.
 const SECTION_HEADER: u64 = 32;
-/// Kind, flags, length and number of fields of a packet of points, bytes.
+/// Length of a data packet's header, bytes: kind, flags, length and number of fields.
 const PACKET_HEADER: usize = 6;
-/// Largest run-ahead of one field before another, bytes. Writers fill packets of 64 KiB with all
-/// fields in step.
+/// Largest number of bytes that one field may be ahead of another. Writers fill packets of 64 KiB
+/// with all fields at the same record.
 const MAX_AHEAD: usize = 16 << 20;
-/// Records that may take no bits at all: a scan whose every field is constant has a handful of
-/// points.
+/// Largest number of records that take no bits at all: a scan whose fields are all constant has a
+/// handful of points.
 const MAX_CONSTANT: u64 = 65_536;
 
-/// The packets of one scan, and what of them was not decoded yet.
+/// The packets of one scan and the data that is not decoded yet.
 pub(super) struct Packets {
     pages: Pages,
-    /// Place of the next packet, without checksums.
+    /// Logical offset (without checksums) of the next packet.
     at: u64,
-    /// End of the section, without checksums.
+    /// Logical offset of the end of the section.
     end: u64,
-    /// One a field, in the order of the prototype.
+    /// One stream for each field, in the order of the prototype.
     streams: Vec<Stream>,
-    /// Records not handed out yet.
+    /// Number of records that were not returned yet.
     n_left: u64,
-    /// Records announced.
+    /// Number of records that the scan announces.
     n_records: u64,
 }
 
@@ -51,7 +51,7 @@ impl Packets {
             })
             .collect::<Result<Vec<_>>>()?;
         if n_records == 0 {
-            // Nothing to read; writers leave any offset here.
+            // Without records there is nothing to read, and writers leave any offset here.
             let packets = Self { pages, at: 0, end: 0, streams, n_left: 0, n_records };
             return packets.check_empty(file_offset);
         }
@@ -82,17 +82,18 @@ impl Packets {
         Ok(packets)
     }
 
-    /// Refuses points under an announced count of none; what is no section of points says nothing.
+    /// Refuses a scan that announces no points but has some; a section that is no section of points
+    /// is accepted.
     fn check_empty(mut self, file_offset: u64) -> Result<Self> {
         if self.has_bytes(file_offset).unwrap_or(false) {
             return Err(Error::bad_input("no points are announced, but there are some")
                 .at(format!("byte {file_offset}"))
-                .hint("its header lies: export the file anew"));
+                .hint("its header is wrong: export the file again"));
         }
         Ok(self)
     }
 
-    /// Whether the first packet of a section holds anything of a field.
+    /// Whether the first packet of a section holds data of any field.
     fn has_bytes(&mut self, file_offset: u64) -> Option<bool> {
         let start = self.pages.logical(file_offset).ok()?;
         let header = self.pages.read(start, SECTION_HEADER as usize).ok()?;
@@ -107,7 +108,7 @@ impl Packets {
         Some(n_fields == self.streams.len() && lengths.iter().any(|b| *b > 0))
     }
 
-    /// Refuses a count that the section's bytes cannot hold, before anything is sized by it.
+    /// Refuses a count of records that the section cannot hold, before it is used as a size.
     fn check_count(&self) -> Result<()> {
         let bits: u128 = self.streams.iter().map(|s| u128::from(s.bits())).sum();
         let held = u128::from(self.end - self.at) * 8;
@@ -118,13 +119,13 @@ impl Packets {
                 self.end - self.at,
                 self.n_records
             ))
-            .hint("the file is truncated or its header lies: export it anew"));
+            .hint("the file is truncated or its header is wrong: export it again"));
         }
         Ok(())
     }
 
-    /// Number of records that can be decoded now, at least one and at most `most`; none at the end,
-    /// which is checked to be where it was announced.
+    /// Number of records that can be decoded now, 1 to `most`; 0 at the end, after checking that
+    /// all announced records were read.
     pub(super) fn ready(&mut self, most: usize) -> Result<usize> {
         if self.n_left == 0 {
             return self.check_end().map(|()| 0);
@@ -140,22 +141,22 @@ impl Packets {
                     self.n_records - self.n_left,
                     self.n_records
                 ))
-                .hint("the file is truncated or its header lies: export it anew"));
+                .hint("the file is truncated or its header is wrong: export it again"));
             }
         }
     }
 
-    /// Numbers of field `field` of the next `n` records, `n` as [`Self::ready`] says.
+    /// The values of field `field` of the next `n` records, with `n` from [`Self::ready`].
     pub(super) fn numbers(&mut self, field: usize, n: usize, out: &mut Vec<f64>) {
         self.streams[field].numbers(n, out);
     }
 
-    /// As [`Self::numbers`], whole numbers.
+    /// The values of a field as integers, see [`Self::numbers`].
     pub(super) fn integers(&mut self, field: usize, n: usize, out: &mut Vec<i64>) {
         self.streams[field].integers(n, out);
     }
 
-    /// Goes on by `n` records; fields where `read` is false were not decoded and are left out.
+    /// Moves on by `n` records; fields for which `read` is false were not decoded and are skipped.
     pub(super) fn advance(&mut self, n: usize, read: &[bool]) {
         for (stream, read) in self.streams.iter_mut().zip(read) {
             if !read {
@@ -165,7 +166,7 @@ impl Packets {
         self.n_left -= n as u64;
     }
 
-    /// Appends the next data packet to the streams; false at the end of the section.
+    /// Appends the next data packet to the streams; returns false at the end of the section.
     fn feed(&mut self) -> Result<bool> {
         while self.at < self.end {
             let at = self.at;
@@ -197,22 +198,22 @@ impl Packets {
         Ok(false)
     }
 
-    /// Refuses fields that run away from one another: memory must not grow with the file.
+    /// Refuses fields that are too far ahead of others, so that memory does not grow with the file.
     fn check_ahead(&self) -> Result<()> {
         if self.streams.iter().any(|s| s.weight_bytes() > MAX_AHEAD) {
             return Err(Error::new(
                 Kind::Unsupported,
                 format!(
-                    "one field lies farther from the others than is read, bytes \"{MAX_AHEAD}\""
+                    "one field is farther ahead of the others than is supported, bytes \"{MAX_AHEAD}\""
                 ),
             )
             .at(format!("page {}", Pages::page(self.at)))
-            .hint("export the file anew"));
+            .hint("export the file again"));
         }
         Ok(())
     }
 
-    /// Refuses points beyond the announced ones.
+    /// Refuses records beyond the announced ones.
     fn check_end(&mut self) -> Result<()> {
         let spent = loop {
             if !self.streams.iter().all(Stream::is_spent) {
@@ -230,11 +231,11 @@ impl Packets {
             self.n_records
         ))
         .at(format!("page {}", Pages::page(self.at.saturating_sub(1))))
-        .hint("the header lies: export the file anew"))
+        .hint("the header is wrong: export the file again"))
     }
 }
 
-/// Hands the parts of a data packet to the streams.
+/// Distributes the parts of a data packet to the streams.
 fn split(packet: &[u8], streams: &mut [Stream]) -> Result<()> {
     let n_streams = packet.get(4..6).map_or(0, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
     if n_streams != streams.len() {

@@ -1,33 +1,33 @@
-//! Places in an E57 file in, bytes out: pages of 1024 bytes, of which the last four are a checksum
-//! of the rest. Every checksum on the way is checked. Knows no packets and no points.
+//! Reads bytes of an E57 file, which consists of pages of 1024 bytes whose last four are a checksum
+//! of the others. Each page that is read is checked.
 
 use contract::{Error, Result};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Bytes of a page; the only size that the standard's reference library writes or reads.
+/// Length of a page, bytes; the standard's reference library supports no other.
 pub(super) const PAGE: u64 = 1024;
-/// Bytes of a page before its checksum.
+/// Length of a page without its checksum, bytes.
 const PAYLOAD: u64 = PAGE - 4;
-/// Pages read at once: 256 KiB keeps a disk busy and the second-level cache warm, and holds any
-/// packet (64 KiB).
+/// Number of pages that are read at once: 256 KiB keep a disk busy, fit the second-level cache and
+/// hold any packet (64 KiB).
 const WINDOW: u64 = 256;
 
-/// An open file, seen without its checksums.
+/// An open file, addressed by logical offsets, which do not count checksums.
 pub(super) struct Pages {
     file: File,
     n_pages: u64,
-    /// First page of the window.
+    /// Number of the first page of the window.
     first: u64,
-    /// Pages of the window as they are on disk.
+    /// Pages of the window as stored in the file.
     raw: Vec<u8>,
-    /// Payloads of those pages of the window that were checked.
+    /// Payloads of the pages of the window that have been checked.
     checked: Vec<u8>,
 }
 
 impl Pages {
-    /// Opens a file; reads nothing.
+    /// Opens a file without reading it.
     pub(super) fn open(path: &Path) -> Result<Self> {
         let file = File::open(path)?;
         let n_bytes = file.metadata()?.len();
@@ -43,17 +43,17 @@ impl Pages {
         Ok(Self { file, n_pages: n_bytes / PAGE, first: 0, raw: Vec::new(), checked: Vec::new() })
     }
 
-    /// Bytes of the file without checksums.
+    /// Length of the file without checksums, bytes.
     pub(super) fn len(&self) -> u64 {
         self.n_pages * PAYLOAD
     }
 
-    /// Bytes of the file.
+    /// Length of the file, bytes.
     pub(super) fn len_on_disk(&self) -> u64 {
         self.n_pages * PAGE
     }
 
-    /// Place without checksums of a place on disk.
+    /// Converts an offset in the file to a logical one (without checksums).
     pub(super) fn logical(&self, physical: u64) -> Result<u64> {
         if physical >= self.len_on_disk() || physical % PAGE >= PAYLOAD {
             return Err(Error::bad_input(format!(
@@ -63,12 +63,12 @@ impl Pages {
         Ok(physical / PAGE * PAYLOAD + physical % PAGE)
     }
 
-    /// The page that holds a place.
+    /// Number of the page that holds a logical offset.
     pub(super) fn page(at: u64) -> u64 {
         at / PAYLOAD
     }
 
-    /// Bytes `at..at + len`, places without checksums; at most 64 KiB.
+    /// The bytes from logical offset `at` on; at most 64 KiB.
     pub(super) fn read(&mut self, at: u64, len: usize) -> Result<&[u8]> {
         let end = at.checked_add(len as u64).filter(|end| *end <= self.len());
         let Some(end) = end else {
@@ -101,18 +101,18 @@ impl Pages {
         Ok(())
     }
 
-    /// Checks the pages of the window before page `until`: only those that are needed, so that
-    /// damage elsewhere in the file (a picture, another scan) is not mistaken for damage here.
+    /// Checks the pages of the window before page `until`. Only pages that are needed are checked,
+    /// so that damage elsewhere in the file (a picture, another scan) causes no error here.
     fn check(&mut self, until: u64) -> Result<()> {
         let done = self.checked.len() as u64 / PAYLOAD;
         for n in done..until - self.first {
             let page = &self.raw[(n * PAGE) as usize..((n + 1) * PAGE) as usize];
             let (payload, stated) = page.split_at(PAYLOAD as usize);
-            // The standard says little-endian, all files have it big-endian.
+            // The standard says little-endian; in all files the checksum is big-endian.
             if crc32c::crc32c(payload).to_be_bytes() != stated {
                 return Err(Error::bad_input("page is damaged, its checksum does not match")
                     .at(format!("page {}", self.first + n))
-                    .hint("copy the file again, or export it anew"));
+                    .hint("copy or export the file again"));
             }
             self.checked.extend_from_slice(payload);
         }

@@ -1,4 +1,4 @@
-//! Packets of one scan in, blocks of points in the file's frame out.
+//! Decodes blocks of points, in the file's frame, from the packets of one scan.
 
 use super::packets::Packets;
 use super::pages::Pages;
@@ -8,15 +8,15 @@ use contract::Result;
 /// Which fields are decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wanted {
-    /// Coordinates and whether they are valid.
+    /// Coordinates and invalid flags.
     Coordinates,
-    /// Rows and columns too.
+    /// Also rows and columns.
     Native,
-    /// Intensity and colour too.
+    /// Also intensity and colour.
     Attributes,
 }
 
-/// The points of one scan, a block of records at a time.
+/// Reads the points of one scan, one block of records at a time.
 pub(super) struct Points {
     packets: Packets,
     coordinates: Option<Coordinates>,
@@ -24,21 +24,21 @@ pub(super) struct Points {
     native: Option<[usize; 2]>,
     intensity: Option<Channel>,
     color: Option<[Channel; 3]>,
-    /// Metres of one unit of the file.
+    /// Metres per unit of the file.
     metres: f64,
-    /// One a field: whether it is decoded.
+    /// For each field whether it is decoded.
     read: Vec<bool>,
-    /// Columns of the block.
+    /// The coordinate columns of the block.
     axes: [Vec<f64>; 3],
     states: Vec<i64>,
     rows_cols: [Vec<i64>; 2],
     levels: [Vec<u16>; 4],
-    /// Intensities of the block as the file has them, then, in turn, colours.
+    /// Intensities of the block as stored in the file, and a buffer for the colours.
     raw: [Vec<f64>; 2],
 }
 
 impl Points {
-    /// At the first point of a scan.
+    /// Starts at the first point of a scan.
     pub(super) fn open(scan: &E57Scan, pages: Pages, wanted: Wanted) -> Result<Self> {
         let native = scan.native.filter(|_| wanted == Wanted::Native);
         let intensity = scan.intensity.filter(|_| wanted == Wanted::Attributes);
@@ -77,7 +77,7 @@ impl Points {
         })
     }
 
-    /// Decodes the next records, at most `most`; their number, zero only at the checked end.
+    /// Decodes at most `most` further records and returns their number; 0 only at the checked end.
     pub(super) fn next_block(&mut self, most: usize) -> Result<usize> {
         let n = self.packets.ready(most)?;
         if n == 0 {
@@ -110,14 +110,14 @@ impl Points {
             self.packets.numbers(channel.field, n, raw);
             let (min, scale) = (channel.span.min, channel.span.scale());
             levels.clear();
-            // `as` cuts at both ends, and no number becomes 0.
+            // `as` saturates at both ends and turns NaN into 0.
             levels.extend(raw.iter().map(|v| ((v - min) * scale).round() as u16));
         }
         self.packets.advance(n, &self.read);
         Ok(n)
     }
 
-    /// Brings the first `n` columns of the block to metres: angles stay what they are.
+    /// Scales the first `n` columns of the block to metres; angles are not scaled.
     fn scale_to_metres(&mut self, n: usize) {
         if self.metres != 1.0 {
             let values = self.axes[..n].iter_mut().flatten();
@@ -125,7 +125,7 @@ impl Points {
         }
     }
 
-    /// Range, azimuth, elevation of the block to x, y, z.
+    /// Converts range, azimuth and elevation of the block to x, y, z.
     fn convert_spherical(&mut self) {
         let [xs, ys, zs] = &mut self.axes;
         for ((x, y), z) in xs.iter_mut().zip(ys).zip(zs) {
@@ -144,7 +144,7 @@ impl Points {
         self.state.is_none()
     }
 
-    /// Whether the file takes point `i` of the block for valid.
+    /// Whether the file marks point `i` of the block as valid.
     #[inline]
     pub(super) fn is_valid(&self, i: usize) -> bool {
         self.state.is_none() || self.states[i] == 0
@@ -163,23 +163,23 @@ impl Points {
         Some([u32::try_from(rows[i]).ok()?, u32::try_from(cols[i]).ok()?])
     }
 
-    /// Intensities of the block; empty where the file has none.
+    /// Intensities of the block, 0..65535; empty where the file has none.
     pub(super) fn intensity(&self) -> &[u16] {
         &self.levels[0]
     }
 
-    /// Intensity of point `i` of the block as the file has it.
+    /// Intensity of point `i` of the block as stored in the file.
     pub(super) fn raw_intensity(&self, i: usize) -> Option<f64> {
         self.raw[0].get(i).copied()
     }
 
-    /// Whether the intensity of point `i` of the block lies outside its limits.
+    /// Whether the intensity of point `i` lies outside the span and was clamped.
     pub(super) fn is_cut(&self, i: usize) -> bool {
         let own = self.intensity.zip(self.raw_intensity(i));
         own.is_some_and(|(channel, value)| channel.span.cuts(value))
     }
 
-    /// Colours of point `i` of the block, where the file has them.
+    /// Colour of point `i` of the block, where the file has one.
     pub(super) fn color(&self, i: usize) -> Option<[u16; 3]> {
         self.color?;
         Some([self.levels[1][i], self.levels[2][i], self.levels[3][i]])

@@ -1,4 +1,5 @@
-//! The description of one scan in an E57 file in; which fields hold what, and the scan's seed, out.
+//! Interprets the description of one scan of an E57 file: the meaning of its fields, pose and
+//! frame.
 
 use super::look::Look;
 use crate::Settings;
@@ -12,10 +13,10 @@ use geometry::{Aabb, Point, Pose};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
-/// Share of the points looked at that lie at the origin of a file whose scanner is not known, from
-/// which on they are beams without return: a single one may have been measured.
+/// Share of points at the origin from which on they are taken for beams without return, in a scan
+/// whose scanner is unknown: a single point there may have been measured.
 const NO_RETURNS: f64 = 0.005;
-/// Scans of fewer points are a writer's examples, and the origin may be one of their points.
+/// A scan of fewer points is an example of a writer, in which the origin may be a real point.
 const FEW: usize = 64;
 
 /// Which fields hold the coordinates.
@@ -27,27 +28,27 @@ pub(super) enum Coordinates {
     Spherical([usize; 3]),
 }
 
-/// A field whose values are brought to 0..65535.
+/// A field whose values are scaled to 0..65535.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Channel {
     /// Index of the field.
     pub(super) field: usize,
-    /// Which values become 0 and 65535.
+    /// The values that become 0 and 65535.
     pub(super) span: Span,
 }
 
 /// One scan of the file.
 #[derive(Debug, Clone)]
 pub(super) struct E57Scan {
-    /// Place of its points on disk.
+    /// Offset of its points in the file.
     pub(super) file_offset: u64,
-    /// Announced records.
+    /// Number of records that it announces.
     pub(super) n_records: u64,
     /// Fields of a record.
     pub(super) prototype: Vec<Record>,
-    /// `None` for a scan without points that names no coordinates.
+    /// The coordinate fields; `None` for a scan without points that names none.
     pub(super) coordinates: Option<Coordinates>,
-    /// Field that flags coordinates as invalid.
+    /// The field that flags coordinates as invalid.
     pub(super) state: Option<usize>,
     /// Fields of row and column.
     pub(super) native: Option<[usize; 2]>,
@@ -55,14 +56,14 @@ pub(super) struct E57Scan {
     pub(super) intensity: Option<Channel>,
     /// Fields of the colour.
     pub(super) color: Option<[Channel; 3]>,
-    /// Metres of one unit of the file.
+    /// Metres per unit of the file.
     pub(super) metres: f64,
-    /// From the file's coordinates, in metres, to the scan frame.
+    /// Conversion from the file's coordinates (metres) to the scan frame.
     pub(super) frame: Frame,
 }
 
 impl E57Scan {
-    /// Reads the description, and a few points to judge whether the origin can be the scanner.
+    /// Reads the description, and some points to judge whether the origin can be the scanner.
     pub(super) fn new(
         path: &Path,
         cloud: &PointCloud,
@@ -119,7 +120,7 @@ impl E57Scan {
         MaskSeed { name: name.into(), n_points: self.n_valid(), n_stated }
     }
 
-    /// Number of points that the file does not flag as invalid, where that is known without reading
+    /// Number of points that the file does not flag as invalid, where it is known without reading
     /// them.
     fn n_valid(&self) -> Option<u64> {
         match self.state.map(|field| &self.prototype[field].data_type) {
@@ -128,7 +129,7 @@ impl E57Scan {
         }
     }
 
-    /// Finds the fields.
+    /// Finds the fields by their names.
     fn fields(cloud: &PointCloud) -> Result<Self> {
         let find = |name: RecordName| cloud.prototype.iter().position(|r| r.name == name);
         let three = |names: [RecordName; 3]| -> Option<[usize; 3]> {
@@ -175,7 +176,7 @@ impl E57Scan {
         })
     }
 
-    /// Finds intensity and colour and what their values span; whether the file states that of the
+    /// Finds intensity, colour and their spans; returns whether the file states that of the
     /// intensity.
     fn channels(&mut self, cloud: &PointCloud) -> bool {
         let channel = |name: RecordName, limits: Option<[&Option<RecordValue>; 2]>| {
@@ -205,7 +206,7 @@ impl E57Scan {
         intensity.is_some_and(|(_, is_stated)| is_stated)
     }
 
-    /// Takes the span that the intensities have where most of them do not keep to their limits.
+    /// Replaces the span of the intensity by that of its values where most lie outside the limits.
     fn suit_intensity(&mut self, look: &Look, is_stated: bool, notes: &mut Vec<String>) {
         let Some(channel) = &mut self.intensity else { return };
         let (span, note) = channel.span.suited(&look.intensities, is_stated);
@@ -219,8 +220,8 @@ impl E57Scan {
         }
     }
 
-    /// The scan frame: the file's own where its origin can be the scanner, else one about the
-    /// points.
+    /// Chooses the scan frame: the file's own where its origin can be the scanner, else one with an
+    /// origin near the points.
     fn judge(
         &self,
         cloud: &PointCloud,
@@ -270,7 +271,7 @@ impl E57Scan {
     }
 }
 
-/// World from the file's frame of a scan, metres; identity where the file states none.
+/// The pose `world_from_file` of a scan, metres; identity where the file states none.
 fn pose(cloud: &PointCloud, metres: f64) -> Result<Pose> {
     let Some(t) = &cloud.transform else { return Ok(Pose::identity()) };
     let translation = Vector3::new(t.translation.x, t.translation.y, t.translation.z) * metres;
@@ -284,22 +285,22 @@ fn pose(cloud: &PointCloud, metres: f64) -> Result<Pose> {
     Ok(Pose::from_parts(Translation3::from(translation), rotation))
 }
 
-/// Stated bounds in the file's frame, metres, where they are sane.
+/// Stated bounds in the file frame, metres, where they are plausible.
 fn bounds(cloud: &PointCloud, metres: f64) -> Option<Aabb> {
     let b = cloud.get_cartesian_bounds()?;
     let [min, max] = [[b.x_min?, b.y_min?, b.z_min?], [b.x_max?, b.y_max?, b.z_max?]];
     let bounds = Aabb { min: min.map(|v| v * metres), max: max.map(|v| v * metres) };
-    // Writers that do not know them write the largest number there is.
+    // Writers that do not know the bounds write the largest number there is.
     let sane = bounds.min.iter().chain(&bounds.max).all(|v| v.abs() < 1e9);
     (sane && !bounds.is_empty()).then_some(bounds)
 }
 
-/// Whether these are limits of something.
+/// Whether two values are finite limits in ascending order.
 fn is_span(span: &[f64; 2]) -> bool {
     span.iter().all(|v| v.is_finite()) && span[1] > span[0]
 }
 
-/// What a field can hold, where its type says it.
+/// The values that a field can hold, where its type bounds them.
 fn type_span(data_type: &RecordDataType) -> Option<[f64; 2]> {
     match *data_type {
         RecordDataType::Single { min, max } => Some([f64::from(min?), f64::from(max?)]),

@@ -1,10 +1,10 @@
-//! Bytes of one field of the points in, numbers out: floats and bit-packed integers that run on
-//! from packet to packet.
+//! Decodes the bytes of one field: floats and bit-packed integers that continue from packet to
+//! packet.
 
 use contract::{Error, Result};
 use e57::RecordDataType;
 
-/// Bytes after the end that a load of sixteen may touch.
+/// Number of bytes after the end that a load of 16 bytes may touch.
 const PADDING: usize = 16;
 
 /// How a value is stored.
@@ -12,11 +12,11 @@ const PADDING: usize = 16;
 enum Coding {
     Single,
     Double,
-    /// `stored + min`, in so many bits.
+    /// `stored + min`, bit-packed.
     Integer {
         min: i64,
     },
-    /// `(stored + min) · scale + offset`.
+    /// `(stored + min) · scale + offset`, bit-packed.
     Scaled {
         min: i64,
         scale: f64,
@@ -24,19 +24,19 @@ enum Coding {
     },
 }
 
-/// One field of the points.
+/// The undecoded bytes of one field.
 #[derive(Debug, Clone)]
 pub(super) struct Stream {
     coding: Coding,
-    /// Bits of a value; none where all are equal.
+    /// Number of bits of a value; 0 where all values are equal.
     bits: u64,
-    /// Whether its values are wanted; where not, only their number is kept.
+    /// Whether the values are needed; if not, only their number is kept.
     wanted: bool,
-    /// What was not decoded yet, with some that was.
+    /// Bytes that are not decoded yet, after some that are.
     bytes: Vec<u8>,
-    /// Bits held, decoded ones included.
+    /// Number of bits held, including decoded ones.
     n_bits: u64,
-    /// Bits decoded.
+    /// Number of bits decoded.
     at: u64,
 }
 
@@ -61,17 +61,17 @@ impl Stream {
         Ok(Self { coding, bits, wanted, bytes: Vec::new(), n_bits: 0, at: 0 })
     }
 
-    /// Bits of a value.
+    /// Number of bits of a value.
     pub(super) fn bits(&self) -> u64 {
         self.bits
     }
 
-    /// Whole values held; `None` where values take no bits, and any number is held.
+    /// Number of whole values held; `None` where a value takes no bits, so that there is no limit.
     pub(super) fn available(&self) -> Option<u64> {
         (self.n_bits - self.at).checked_div(self.bits)
     }
 
-    /// Bytes kept.
+    /// Memory of the stream, bytes.
     pub(super) fn weight_bytes(&self) -> usize {
         self.bytes.len()
     }
@@ -87,8 +87,8 @@ impl Stream {
         self.n_bits = self.n_bits - whole * 8 + bytes.len() as u64 * 8;
     }
 
-    /// Whether only the padding that ends a stream is left: integers are written in words of up to
-    /// 64 bits.
+    /// Whether at most the padding at the end of a stream is left: integers are written in words of
+    /// up to 64 bits.
     pub(super) fn is_spent(&self) -> bool {
         let left = self.n_bits - self.at;
         match self.coding {
@@ -97,17 +97,17 @@ impl Stream {
         }
     }
 
-    /// Leaves out `n` values, which must be available.
+    /// Skips `n` values, which must be available.
     pub(super) fn skip(&mut self, n: usize) {
         self.at += n as u64 * self.bits;
     }
 
-    /// The next `n` values, which must be available, in place of what `out` held.
+    /// Decodes the next `n` values, which must be available, replacing the content of `out`.
     pub(super) fn numbers(&mut self, n: usize, out: &mut Vec<f64>) {
         out.clear();
         let from = self.at / 8;
         match self.coding {
-            // Floats begin on whole bytes: nothing shorter comes in.
+            // Floats begin on whole bytes, since all values of the stream have whole bytes.
             Coding::Single => {
                 let bytes = &self.bytes[from as usize..][..n * 4];
                 out.extend(
@@ -126,7 +126,8 @@ impl Stream {
         self.skip(n);
     }
 
-    /// The next `n` values as whole numbers (floats are cut), in place of what `out` held.
+    /// Decodes the next `n` values as integers (floats are truncated), replacing the content of
+    /// `out`.
     pub(super) fn integers(&mut self, n: usize, out: &mut Vec<i64>) {
         out.clear();
         match self.coding {
@@ -142,7 +143,7 @@ impl Stream {
         }
     }
 
-    /// Appends what `each` makes of the next `n` stored values.
+    /// Appends the results of `each` for the next `n` stored values.
     #[inline]
     fn unpack<T>(&mut self, n: usize, out: &mut Vec<T>, each: impl Fn(u64) -> T) {
         if self.bits == 0 {
@@ -172,7 +173,7 @@ impl Stream {
     }
 }
 
-/// Bits that hold `max − min`.
+/// Number of bits needed for `max − min`.
 fn integer_bits(min: i64, max: i64) -> u64 {
     u64::from(64 - max.wrapping_sub(min).cast_unsigned().leading_zeros())
 }

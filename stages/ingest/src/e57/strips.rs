@@ -1,4 +1,4 @@
-//! Blocks of points of all scans of an E57 file in, strips in its order out.
+//! Strips of an E57 file in file order, from the blocks of points of all its scans.
 
 use super::E57File;
 use super::pages::Pages;
@@ -10,34 +10,35 @@ use crate::reader::{RawStrip, Sampled, Want};
 use contract::{Attributes, Result};
 use geometry::Point;
 
-/// Records decoded at once: their columns (3 × 8 bytes each) stay in the second-level cache.
+/// Number of records decoded at once: their columns (3 × 8 bytes each) stay in the second-level
+/// cache.
 const BLOCK: usize = 8192;
-/// Records of a scan that a sample is spread over: a tenth of a second of decoding.
+/// Number of records over which a sample is spread: a tenth of a second of decoding.
 const N_SAMPLED_FROM: u64 = 4_000_000;
-/// Runs of a sample.
+/// Number of runs of neighbouring points in a sample.
 const N_RUNS: u64 = 4;
 
-/// Most places that a strip spans, so that they fit 32 bits; only reached where thousands of
-/// millions of points in a row are broken.
+/// Largest number of places that a strip spans, so that they fit 32 bits. It is only reached where
+/// billions of consecutive points are dropped.
 const MAX_SPAN: u64 = 1 << 31;
 
-/// Strips of one file.
+/// Iterator over the strips of one file.
 pub(super) struct Strips<'a> {
     file: &'a E57File,
     want: Want,
-    /// Scan being read, the one to end before, and the points of the first once open.
+    /// Index of the current scan, index at which to stop, and the open points of the current scan.
     scan: usize,
     until: usize,
     points: Option<Points>,
     /// Place in the mask of the next valid point.
     place: u64,
-    /// Place after the last point that was not dropped.
+    /// Place in the mask after the last point that was not dropped.
     named: u64,
     done: bool,
 }
 
 impl<'a> Strips<'a> {
-    /// At the first point of the file.
+    /// Starts at the first point of the file.
     pub(super) fn new(file: &'a E57File, want: Want) -> Self {
         if want == Want::Everything {
             file.oddities.iter().for_each(Oddities::clear);
@@ -46,7 +47,7 @@ impl<'a> Strips<'a> {
         Self { file, want, scan: 0, until, points: None, place: 0, named: 0, done: false }
     }
 
-    /// At the first point of a scan, of which coordinates are read and no other scan's.
+    /// Reads the coordinates of one scan only.
     pub(super) fn of_scan(file: &'a E57File, scan: usize) -> Self {
         Self { scan, until: scan + 1, ..Self::new(file, Want::Coordinates) }
     }
@@ -112,8 +113,8 @@ impl<'a> Strips<'a> {
             self.named = strip.first_place + u64::from(*last) + 1;
             return Ok(Some(strip));
         }
-        // At the end. Where nobody knows how long the mask is, and its last points were dropped, a
-        // strip without points says it.
+        // At the end: where the length of the mask is not known beforehand and its last points were
+        // dropped, a strip without points states the length.
         let told = self.file.masks[self.scan].n_points.is_some() || self.named == place;
         self.named = place;
         Ok((!told).then_some(RawStrip { first_place: place, ..strip }))
@@ -133,14 +134,14 @@ impl Iterator for Strips<'_> {
     }
 }
 
-/// A strip while it fills.
+/// A strip that is being filled.
 struct Filling<'a> {
     settings: &'a Settings,
     scan: &'a E57Scan,
     strip: RawStrip,
     /// Place in the mask of the next valid point.
     place: u64,
-    /// Points at the scanner itself, and intensities outside their limits.
+    /// Numbers of points at the scanner itself, and of intensities outside their limits.
     n_no_returns: u64,
     n_cut: u64,
 }
@@ -180,7 +181,7 @@ impl Filling<'_> {
         }
     }
 
-    /// Adds a block whose every point is good.
+    /// Adds a block in which every point is valid.
     fn add_plain(&mut self, points: &Points, shift: [f64; 3]) {
         let [x, y, z] = points.axes();
         let xyz = x.iter().zip(y).zip(z);
@@ -195,12 +196,12 @@ impl Filling<'_> {
         self.place += x.len() as u64;
     }
 
-    /// Places from the first point to the next.
+    /// Number of places from the first point to the next one.
     fn span(&self) -> u64 {
         if self.strip.place.is_empty() { 0 } else { self.place - self.strip.first_place }
     }
 
-    /// Adds the next place.
+    /// Appends the next place.
     fn push_place(&mut self) {
         if self.strip.place.is_empty() {
             self.strip.first_place = self.place;
@@ -208,7 +209,7 @@ impl Filling<'_> {
         self.strip.place.push((self.place - self.strip.first_place) as u32);
     }
 
-    /// Adds intensity, colour and world coordinates of point `i` of the block.
+    /// Appends intensity, colour and world coordinates of point `i` of the block.
     fn push_attributes(&mut self, points: &Points, i: usize, p: [f64; 3]) {
         let Some(attributes) = &mut self.strip.attributes else { return };
         attributes.world.push((self.scan.frame.world_from_scan * Point::from(p)).coords.into());
@@ -232,7 +233,8 @@ pub(super) fn sample(file: &E57File, scan: &E57Scan, n: usize) -> Result<Vec<Sam
         if n_block == 0 {
             break;
         }
-        // How many the runs begun so far may hold: run k begins at k/N_RUNS of the records.
+        // Number of points that the runs begun so far may hold: run k begins at k/N_RUNS of the
+        // records.
         let run = (seen * N_RUNS / spread + 1).min(N_RUNS) as usize;
         let most = n * run / N_RUNS as usize;
         for i in 0..n_block {
@@ -250,7 +252,8 @@ pub(super) fn sample(file: &E57File, scan: &E57Scan, n: usize) -> Result<Vec<Sam
     Ok(out)
 }
 
-/// Up to `n` valid points of a scan, evenly spread over its first `most` records.
+/// Up to `n` valid points of a scan (scan frame, metres), evenly spread over its first `most`
+/// records.
 pub(super) fn spread(file: &E57File, scan: &E57Scan, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
     let mut out = Vec::new();
     if scan.n_records == 0 || n == 0 {

@@ -1,4 +1,4 @@
-//! Real E57 files, against other readers.
+//! Real E57 files, compared with other readers.
 
 use super::*;
 use crate::check::{Read, read_all, shared};
@@ -41,7 +41,7 @@ const READ: &[(&str, &[(usize, Summary)])] = &[
     ("kurt_2scans_spherical.e57", &[(79_868, [[1.608407, 0.862601, 0.588169], [-0.0, -1.18613, -2.22064], [30.9913, 12.5529, 9.43721]]), (80_047, [[3.059066, 0.608406, 0.411208], [1.561801, -1.180405, -2.040884], [33.378866, 11.229214, 7.853923]])]),
 ];
 
-/// Files that are refused, and words of the reason.
+/// Files that are refused, and words of the error.
 const REFUSED: &[(&str, &str)] = &[
     ("cry__corrupt_crc.e57", "checksum"),
     ("e5p__empty.e57", "empty"),
@@ -60,7 +60,7 @@ pub(super) fn read(path: &Path, want: Want) -> Result<Vec<Read>> {
     read_all(&*open(path, &settings())?, want, &settings())
 }
 
-/// Every valid point in the world, as the crate reads it.
+/// World coordinates of all valid points, as the crate `e57` reads them.
 fn oracle(path: &Path) -> Vec<Vec<[f64; 3]>> {
     let mut reader = E57Reader::from_file(path).expect("valid");
     let clouds = reader.pointclouds();
@@ -108,7 +108,7 @@ fn compatibility_files_are_read_in_full_or_refused() {
     }
 }
 
-/// Compares with the figures of pye57 and point by point with the crate.
+/// Compares with the figures of pye57, and point by point with the crate `e57`.
 fn same_as_others(path: &Path, expected: &[(usize, Summary)]) {
     let reader = open(path, &settings()).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let scans = read_all(&*reader, Want::Coordinates, &settings())
@@ -130,13 +130,13 @@ fn same_as_others(path: &Path, expected: &[(usize, Summary)]) {
             continue;
         }
         if summary[2][0] > 1e9 {
-            // Coordinates of 10¹⁵ m: each point keeps its place, those far from the others are
-            // dropped.
+            // Coordinates of 10¹⁵ m: points far from the others are dropped, and the rest keep
+            // their places.
             assert!(scan.place.len() < *n_points, "{place}");
             continue;
         }
         assert_eq!(scan.place, (0..*n_points as u64).collect::<Vec<_>>(), "{place}");
-        // f32 about the scanner: 4 µm at 60 m.
+        // Single precision about the scanner: 4 µm at 60 m.
         let off =
             |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
         let near = |a: &Summary, b: &Summary| (0..3).all(|k| off(&a[k], &b[k]) < 2e-5);

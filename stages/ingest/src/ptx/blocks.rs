@@ -1,5 +1,4 @@
-//! A PTX file in; its blocks out: where each begins, its pose, how many lines hold a point. No
-//! point is kept.
+//! Finds the blocks of a PTX file: their offsets, poses and numbers of points. No point is kept.
 
 use super::Block;
 use super::look::Look;
@@ -11,15 +10,16 @@ use geometry::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
-/// Fewest bytes of a line of points: three digits, two spaces, an end (the last may lack it).
+/// Smallest length of a line of points, bytes: three digits, two spaces and a line end, which the
+/// last line may lack.
 const MIN_LINE: u64 = 6;
-/// How far a matrix may be from a rotation: files carry 4 to 6 digits.
+/// Largest deviation of a matrix from a rotation; files carry 4 to 6 digits.
 const RIGID: f64 = 1e-3;
-/// How far the stated scanner position may be from the matrix, metres, before it is mentioned.
+/// Difference between stated scanner position and matrix that is reported, metres.
 const SAME_POSITION: f64 = 1e-3;
 
-/// All blocks of the file, in its order, with what is missing in each; one unit of it has so many
-/// metres.
+/// All blocks of the file, in file order, each with messages about what is missing; `metres` is the
+/// length of the file's unit.
 pub(super) fn find(path: &Path, metres: f64) -> Result<Vec<(Block, Vec<String>)>> {
     let n_bytes = std::fs::metadata(path)?.len();
     let mut lines = Lines::open(path, 0, 0)?;
@@ -33,7 +33,7 @@ pub(super) fn find(path: &Path, metres: f64) -> Result<Vec<(Block, Vec<String>)>
     Ok(out)
 }
 
-/// One block, from the line with its columns to its last point.
+/// Reads one block, from the line with its columns to its last point.
 fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<String>)> {
     let mut notes = Vec::new();
     let n_cols = count(lines).map_err(|e| {
@@ -52,7 +52,7 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
             .error(format!(
                 "file is too short for the announced columns and rows, \"{n_cols} x {n_rows}\""
             ))
-            .hint("the file is truncated or its header lies: export it anew"));
+            .hint("the file is truncated or its header is wrong: export it again"));
     };
     let pose = pose(lines, metres, &mut notes)?;
     let points_at = (lines.end(), lines.number());
@@ -62,7 +62,7 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
         if !lines.advance()? {
             return Err(lines
                 .error(format!("scan ends after {n} of its announced points, \"{n_lines}\""))
-                .hint("the file is truncated or its header lies: export it anew"));
+                .hint("the file is truncated or its header is wrong: export it again"));
         }
         if n == 0 {
             n_columns = columns(lines)?;
@@ -86,7 +86,8 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
     ))
 }
 
-/// The scan frame: the file's own where its origin can be the scanner, else one about the points.
+/// Chooses the scan frame: the file's own where its origin can be the scanner, else one with an
+/// origin near the points.
 fn judge(pose: Pose, look: &Look, notes: &mut Vec<String>) -> Frame {
     if frame::within_reach(look.first()) {
         if look.n_at_origin > 0 {
@@ -102,7 +103,7 @@ fn judge(pose: Pose, look: &Look, notes: &mut Vec<String>) -> Frame {
     Frame::about(pose, frame::near(None, look.first()))
 }
 
-/// Goes to the next line of a header.
+/// Moves to the next line of a header.
 fn next(lines: &mut Lines) -> Result<()> {
     if lines.advance()? {
         return Ok(());
@@ -112,7 +113,7 @@ fn next(lines: &mut Lines) -> Result<()> {
         .hint("the file is truncated: copy it again"))
 }
 
-/// A line with one count.
+/// The count on the current line.
 fn count(lines: &Lines) -> Result<u64> {
     let [value] = lines.exactly()?;
     if value < 0.0 || value.fract() != 0.0 || value > 1e12 {
@@ -121,8 +122,8 @@ fn count(lines: &Lines) -> Result<u64> {
     Ok(value as u64)
 }
 
-/// Scanner position, axes and matrix, brought to metres. Only the matrix counts; that the position
-/// differs is mentioned.
+/// Reads scanner position, axes and matrix and converts them to metres. The matrix counts; a
+/// position that differs from it is mentioned.
 fn pose(lines: &mut Lines, metres: f64, notes: &mut Vec<String>) -> Result<Pose> {
     next(lines)?;
     let position = Vector3::from(lines.exactly::<3>()?) * metres;
@@ -148,8 +149,8 @@ fn pose(lines: &mut Lines, metres: f64, notes: &mut Vec<String>) -> Result<Pose>
     Ok(pose)
 }
 
-/// World from the file's frame. PTX multiplies row vectors from the left: the first three rows are
-/// the axes of the scanner in the world, the last its position.
+/// The pose `world_from_file`. PTX multiplies row vectors from the left: the first three rows are
+/// the axes of the scanner in the world, the last is its position.
 fn rigid(rows: [[f64; 4]; 4]) -> Result<Pose> {
     let axes = Matrix3::from_fn(|i, j| rows[j][i]);
     let position = Vector3::new(rows[3][0], rows[3][1], rows[3][2]);
@@ -158,7 +159,7 @@ fn rigid(rows: [[f64; 4]; 4]) -> Result<Pose> {
         return Err(Error::bad_input("matrix of the pose holds what is no number").hint(way_out));
     }
     let last = [rows[0][3], rows[1][3], rows[2][3], rows[3][3] - 1.0];
-    // What is no number is not near anything.
+    // Written so that NaN is refused.
     if !last.iter().all(|v| v.abs() <= RIGID) {
         return Err(
             Error::bad_input("last column of the pose's matrix is not \"0 0 0 1\"").hint(way_out)
@@ -190,7 +191,7 @@ fn rigid(rows: [[f64; 4]; 4]) -> Result<Pose> {
     Ok(Pose::from_parts(Translation3::from(position), rotation))
 }
 
-/// How many numbers a line of points has in this block.
+/// Number of values on each line of points of this block.
 fn columns(lines: &Lines) -> Result<usize> {
     match numbers(lines.line(), &mut [0.0; 7]) {
         Ok(n @ (3 | 4 | 6 | 7)) => Ok(n),
@@ -203,7 +204,7 @@ fn columns(lines: &Lines) -> Result<usize> {
     }
 }
 
-/// Whether a line is that of a beam without return, `0 0 0 …`: the file's way to flag it.
+/// Whether a line is `0 0 0 …`, which in PTX marks a beam without return.
 pub(super) fn is_no_return(line: &[u8]) -> bool {
     let mut n_zeros = 0;
     let mut within = false;
@@ -222,7 +223,7 @@ pub(super) fn is_no_return(line: &[u8]) -> bool {
                 }
             }
             b' ' | b'\t' => {}
-            // `0e0` is a zero too, but no program writes it: it is then a point at the scanner.
+            // `0e0` is zero, too, but no program writes it, so it counts as a point at the scanner.
             _ => return false,
         }
     }

@@ -1,43 +1,43 @@
-//! Some lines of a block in; what they say of all out: where its points lie, whether beams without
-//! return are among them, how coarse its coordinates are, and what its intensities span.
+//! Looks at some lines of a block: where its points lie, whether beams without return are among
+//! them, the step of its coordinates, and the range of its intensities.
 
 use crate::frame::NO_RETURN;
 use crate::levels::Span;
 use crate::text::numbers;
 
-/// First points of a block, by which the scanner's reach is judged.
+/// Number of first points by which it is judged whether the origin can be the scanner.
 const N_JUDGED: usize = 64;
-/// About so many lines of a block are looked at besides, evenly spread.
+/// Approximate number of further lines that are looked at, evenly spread.
 const N_LOOKED: u64 = 4096;
 
-/// What those lines show.
+/// What the sampled lines of a block show.
 #[derive(Debug)]
 pub(super) struct Look {
-    /// Every so manieth line with a point is looked at.
+    /// Distance between the lines with a point that are looked at.
     every: u64,
-    /// Metres of one unit of the file.
+    /// Metres per unit of the file.
     metres: f64,
-    /// Coordinates of points that are no returns at the scanner, file's frame, metres.
+    /// Points other than beams without return at the scanner, file frame, metres.
     pub(super) points: Vec<[f64; 3]>,
-    /// How many of those are of the block's beginning.
+    /// Number of those at the beginning of the block.
     n_first: usize,
-    /// How many lie at the scanner, and how many were looked at.
+    /// Number of points at the scanner, and number of points looked at.
     pub(super) n_at_origin: usize,
     pub(super) n_looked: usize,
-    /// As the file has them.
+    /// Intensities as stored in the file.
     intensities: Vec<f64>,
 }
 
 impl Look {
-    /// At a block of so many lines, in a unit of so many metres.
+    /// Starts to look at a block of `n_lines` lines; `metres` is the length of the file's unit.
     pub(super) fn new(n_lines: u64, metres: f64) -> Self {
         let every = n_lines.div_ceil(N_LOOKED).max(1);
         let (points, intensities) = (Vec::new(), Vec::new());
         Self { every, metres, points, n_first: 0, n_at_origin: 0, n_looked: 0, intensities }
     }
 
-    /// Takes a line with a point, the `n`th of them, of so many numbers; what is no number is
-    /// refused when points are read, here it is only left out.
+    /// Takes the `n`th line with a point, which holds `n_columns` values. A word that is no number
+    /// is refused when points are read; here its line is only skipped.
     pub(super) fn add(&mut self, n: u64, line: &[u8], n_columns: usize) {
         let is_first = self.points.len() < N_JUDGED;
         if !is_first && !n.is_multiple_of(self.every) {
@@ -61,18 +61,18 @@ impl Look {
         }
     }
 
-    /// Points that the scanner's reach is judged by: the first ones.
+    /// The first points, by which it is judged whether the origin can be the scanner.
     pub(super) fn first(&self) -> &[[f64; 3]] {
         &self.points[..self.n_first]
     }
 
-    /// The step of the coordinates, metres, where it is coarse.
+    /// The step of the coordinates, metres; `None` where it is fine enough.
     pub(super) fn step(&self) -> Option<f64> {
         crate::steps::coarse(&self.points)
     }
 
-    /// Which intensities become 0 and 65535, and what is odd about that: the format has them from 0
-    /// to 1.
+    /// The intensities that become 0 and 65535, and a message where they are not from 0 to 1, as
+    /// the format says.
     pub(super) fn intensity(&self) -> (Span, Option<String>) {
         Span { min: 0.0, max: 1.0 }.suited(&self.intensities, false)
     }

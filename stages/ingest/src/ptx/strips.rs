@@ -1,4 +1,4 @@
-//! Lines of all blocks of a PTX file in, strips in its order out.
+//! Strips of a PTX file in file order, from the lines of all its blocks.
 
 use super::{Block, PtxFile, blocks};
 use crate::oddities::Oddities;
@@ -7,32 +7,32 @@ use crate::text::{Lines, numbers};
 use contract::{Attributes, Result};
 use geometry::Point;
 
-/// Lines of a scan that a sample is spread over: half a second of parsing.
+/// Number of lines over which a sample is spread: half a second of parsing.
 const N_SAMPLED_FROM: u64 = 2_000_000;
-/// Runs of a sample.
+/// Number of runs of neighbouring points in a sample.
 const N_RUNS: u64 = 4;
-/// Most places that a strip spans, so that they fit 32 bits.
+/// Largest number of places that a strip spans, so that they fit 32 bits.
 const MAX_SPAN: u64 = 1 << 31;
 
-/// Points of one block, a line at a time.
+/// Reads the points of one block, a line at a time.
 struct Points<'a> {
     block: &'a Block,
     lines: Lines,
-    /// Lines read.
+    /// Number of lines read.
     n_read: u64,
-    /// Numbers of the current line.
+    /// Values of the current line.
     values: [f64; 7],
 }
 
 impl<'a> Points<'a> {
-    /// Before the first point of a block.
+    /// Starts before the first point of a block.
     fn open(file: &PtxFile, block: &'a Block) -> Result<Self> {
         let (byte, line) = block.points_at;
         Ok(Self { block, lines: Lines::open(&file.path, byte, line)?, n_read: 0, values: [0.0; 7] })
     }
 
-    /// Goes to the next line that the file does not flag as a beam without return; false after the
-    /// block's last. Only the first `n_wanted` numbers are parsed.
+    /// Moves to the next line that is not marked as a beam without return; returns false after the
+    /// last line of the block. Only the first `n_wanted` values are parsed.
     fn advance(&mut self, n_wanted: usize) -> Result<bool> {
         while self.n_read < self.block.n_lines {
             if !self.lines.advance()? {
@@ -58,7 +58,7 @@ impl<'a> Points<'a> {
         Ok(false)
     }
 
-    /// The current point in the scan frame, metres; `None` where it is broken, or lies at the
+    /// The current point in the scan frame, metres; `None` where it is out of range or lies at the
     /// scanner itself.
     fn xyz(&self, max_range: f64) -> Option<[f64; 3]> {
         let p = self.in_scan();
@@ -66,7 +66,7 @@ impl<'a> Points<'a> {
         is_good.then_some(p)
     }
 
-    /// The current point in the scan frame, whatever it is.
+    /// The current point in the scan frame, metres, without checks.
     fn in_scan(&self) -> [f64; 3] {
         let metres = |i: usize| self.values[i] * self.block.metres;
         self.block.frame.scan_from_file([metres(0), metres(1), metres(2)])
@@ -77,7 +77,7 @@ impl<'a> Points<'a> {
         matches!(self.block.n_columns, 4 | 7) && self.block.intensity.cuts(self.values[3])
     }
 
-    /// Column-major: row and column of the current point.
+    /// Row and column of the current point; lines run column by column.
     fn native(&self) -> Option<[u32; 2]> {
         let at = self.n_read - 1;
         let rows = self.block.n_rows;
@@ -85,11 +85,11 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Strips of one file.
+/// Iterator over the strips of one file.
 pub(super) struct Strips<'a> {
     file: &'a PtxFile,
     want: Want,
-    /// Scan being read, and its points once open.
+    /// Index of the current scan, and its points once they are open.
     scan: usize,
     points: Option<Points<'a>>,
     /// Place in the mask of the next valid point.
@@ -98,7 +98,7 @@ pub(super) struct Strips<'a> {
 }
 
 impl<'a> Strips<'a> {
-    /// At the first point of the file.
+    /// Starts at the first point of the file.
     pub(super) fn new(file: &'a PtxFile, want: Want) -> Self {
         if want == Want::Everything {
             file.oddities.iter().for_each(Oddities::clear);
@@ -174,10 +174,10 @@ impl Iterator for Strips<'_> {
     }
 }
 
-/// Adds what the current line says of its point beside the coordinates.
+/// Appends the attributes of the point on the current line.
 fn push(attributes: &mut Attributes, points: &Points<'_>, p: [f64; 3]) {
     attributes.world.push((points.block.frame.world_from_scan * Point::from(p)).coords.into());
-    // `as` cuts at both ends, and no number becomes 0. Colour is 0..255.
+    // `as` saturates at both ends and turns NaN into 0. Colour is 0..255.
     if let 4 | 7 = points.block.n_columns {
         let span = points.block.intensity;
         attributes.intensity.push(((points.values[3] - span.min) * span.scale()).round() as u16);
@@ -196,7 +196,8 @@ pub(super) fn sample(file: &PtxFile, scan: usize, n: usize) -> Result<Vec<Sample
     let spread = block.n_lines.clamp(1, N_SAMPLED_FROM);
     let mut points = Points::open(file, block)?;
     while out.len() < n && points.advance(3)? {
-        // How many the runs begun so far may hold: run k begins at k/N_RUNS of the lines.
+        // Number of points that the runs begun so far may hold: run k begins at k/N_RUNS of the
+        // lines.
         let run = ((points.n_read - 1) * N_RUNS / spread + 1).min(N_RUNS) as usize;
         if out.len() < n * run / N_RUNS as usize
             && let Some(p) = points.xyz(file.settings.max_range)
@@ -207,7 +208,8 @@ pub(super) fn sample(file: &PtxFile, scan: usize, n: usize) -> Result<Vec<Sample
     Ok(out)
 }
 
-/// Up to `n` valid points of a scan, evenly spread over its first `most` lines.
+/// Up to `n` valid points of a scan (scan frame, metres), evenly spread over its first `most`
+/// lines.
 pub(super) fn spread(file: &PtxFile, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
     let mut out = Vec::new();
     let block = &file.blocks[scan];

@@ -1,4 +1,4 @@
-//! Real and broken PTX files, and files of our own.
+//! Real PTX files compared with other readers, and files written by the tests, whole and damaged.
 
 use super::*;
 use crate::check::{Dice, Read, Scratch, read_all, shared};
@@ -11,7 +11,7 @@ type Summary = [[f64; 3]; 3];
 /// Valid points of a scan, numbers of a line, world coordinates.
 type Expected = (usize, usize, Summary);
 
-/// As NumPy computes them from the text, for each scan.
+/// Results for each scan as NumPy computes them from the text.
 #[rustfmt::skip]
 const READ: &[(&str, &[Expected])] = &[
     ("ptx-pts/pdal__1.2-with-color.ptx", &[(1065, 7, [[637_296.735_183, 851_249.538_488, 434.09784], [635_619.85, 848_899.7, 406.59], [638_982.55, 853_535.43, 586.38]])]),

@@ -1,32 +1,32 @@
-//! The word of a person in, `mm` or `hall.las=us-ft`; the units that a file is to be read in out.
+//! Parses the units that a user gives with `--units`, such as `mm` or `hall.las=us-ft`.
 
 use super::{Unit, known};
 use contract::{Error, Kind, Result};
 use std::path::Path;
 
-/// Said where a person leaves units to the files.
+/// The value with which a user leaves units to the files.
 pub(crate) const DECLARED: &str = "declared";
-/// Said beside words that are no units.
+/// Advice in messages about unknown units.
 const HINT: &str =
     "units are m, cm, mm, km, in, ft and us-ft; a file's own as NAME=mm, heights apart as us-ft/m";
 
 /// Units of x and y, and of z.
 pub(crate) type Pair = [Unit; 2];
 
-/// The units that a person gave.
+/// The units that a user gave.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Choice {
-    /// For all files that have none of their own.
+    /// Units of all files that have none of their own.
     all: Option<Pair>,
-    /// Names of files, with theirs.
+    /// File names with their own units.
     own: Vec<(String, Pair)>,
 }
 
 impl Choice {
-    /// Reads words that commas part.
+    /// Parses a comma-separated list.
     ///
     /// # Errors
-    /// A word that is no unit, or a second one for the same files.
+    /// If a word is no unit, or if a file gets two units.
     pub(crate) fn read(text: &str) -> Result<Self> {
         let mut choice = Self::default();
         let usage = |what: String| Error::new(Kind::Usage, what).at("units");
@@ -53,14 +53,14 @@ impl Choice {
         Ok(choice)
     }
 
-    /// The units given for a file: its own, by its path, name, or name without suffix; else those
-    /// for all.
+    /// The units given for a file: its own, by path, name, or name without suffix; else those for
+    /// all files.
     pub(crate) fn of(&self, path: &Path) -> Option<&Pair> {
         let own = self.own.iter().find(|(name, _)| is_named(path, name)).map(|(_, pair)| pair);
         own.or(self.all.as_ref())
     }
 
-    /// Names that are of none of these files.
+    /// The first name that matches none of these files.
     pub(crate) fn unknown<'a>(&'a self, paths: &'a [std::path::PathBuf]) -> Option<&'a str> {
         let is_of_none = |name: &&str| !paths.iter().any(|path| is_named(path, name));
         self.own.iter().map(|(name, _)| name.as_str()).find(is_of_none)

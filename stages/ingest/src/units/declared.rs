@@ -1,59 +1,58 @@
-//! What a file says of its coordinates' units, before anybody judges it.
+//! What a file declares about the units of its coordinates, before it is interpreted.
 
 use super::{Unit, known};
 
-/// What kind of numbers coordinates are.
+/// The kind of a coordinate system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum System {
-    /// Nothing says it.
+    /// Not declared.
     #[default]
     Unknown,
-    /// Lengths along axes of which the third points up.
+    /// Lengths along axes of which the third points upwards.
     Lengths,
-    /// Longitude and latitude.
+    /// Longitude and latitude, degrees.
     Degrees,
-    /// Lengths from the middle of the earth: no axis points up.
+    /// Lengths from the centre of the earth, so that no axis points upwards.
     EarthCentred,
 }
 
-/// A unit as a file states it: by name, by its metres, or both.
+/// A unit as a file states it: by name, by its length in metres, or both.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Stated {
     pub(crate) name: Option<String>,
     pub(crate) metres: Option<f64>,
 }
 
-/// What one record of a file declares.
+/// The declaration of one record of a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Declaration {
     pub(crate) system: System,
-    /// Of x and y.
+    /// Unit of x and y.
     pub(crate) horizontal: Option<Stated>,
-    /// Of z.
+    /// Unit of z.
     pub(crate) vertical: Option<Stated>,
-    /// Which record says it.
+    /// Name of the record.
     pub(crate) by: &'static str,
-    /// What is odd about it, in words.
+    /// Messages about oddities.
     pub(crate) remarks: Vec<String>,
 }
 
-/// What a stated unit comes to.
+/// The interpretation of a stated unit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Sense {
-    /// A unit.
+    /// A known unit.
     Unit(Unit),
-    /// Its name and its number of metres are of different units: that of the name, and that of the
-    /// number.
+    /// Name and length contradict each other: the unit of the name, and that of the length.
     Either(Unit, Unit),
-    /// Nobody knows what it is.
+    /// An unknown unit, by its name.
     Nothing(String),
 }
 
-/// Units whose lengths differ by less are the same but for rounding, or the two kinds of foot
+/// Largest relative difference of two units that are the same: rounding, and the two kinds of foot
 /// (2e-6).
 const SAME: f64 = 1e-3;
 
-/// Characters of a unit's name that are kept: nobody's unit has more.
+/// Largest number of characters of a unit's name that are kept.
 const LONGEST_NAME: usize = 60;
 
 impl Declaration {
@@ -69,16 +68,16 @@ impl From<Unit> for Stated {
 }
 
 impl Stated {
-    /// What unit it is.
+    /// Interprets the statement.
     pub(crate) fn sense(&self) -> Sense {
         let name = self.name.as_deref().unwrap_or_default().trim();
         let cut: String = name.chars().take(LONGEST_NAME).collect();
         let metres = self.metres.filter(|v| v.is_finite() && *v > 0.0);
         match (known::by_name(name), metres) {
             (Some(named), Some(metres)) if is_same(named.metres, metres) => {
-                // The number tells the two kinds of foot apart where the name does not. Files round
-                // that of the survey foot, which a map's coordinates are too large
-                // for.
+                // Where the name leaves it open, the length tells the two kinds of foot apart.
+                // Files round the survey foot, and map coordinates are so large that the exact
+                // value must be used.
                 let is_survey = (metres / known::US_FOOT - 1.0).abs() < 1e-9;
                 Sense::Unit(if is_survey {
                     Unit::new("US survey foot", known::US_FOOT)
@@ -96,7 +95,7 @@ impl Stated {
     }
 }
 
-/// Whether two units are one, in metres.
+/// Whether two units, in metres, are the same.
 pub(crate) fn is_same(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() < SAME
 }

@@ -1,4 +1,4 @@
-//! GeoTIFF keys of a LAS file in; in what units its coordinates are out.
+//! Reads the units of coordinates from the GeoTIFF keys of a LAS file.
 
 use super::declared::{Declaration, Stated, System};
 use super::known;
@@ -11,18 +11,18 @@ const UNIT: u16 = 3076;
 const UNIT_METRES: u16 = 3077;
 const VERTICAL: u16 = 4096;
 const VERTICAL_UNIT: u16 = 4099;
-/// A key's value lies in the record of doubles.
+/// Location that says that a key's value is in the record of doubles.
 const IN_DOUBLES: u16 = 34_736;
-/// "The writer defines it elsewhere."
+/// Value that says that the unit or system is defined elsewhere.
 const USER_DEFINED: u16 = 32_767;
 
-/// The directory of keys and the doubles that it points into.
+/// The directory of keys and the doubles that it refers to.
 struct Keys<'a> {
     directory: &'a [u8],
     doubles: &'a [u8],
 }
 
-/// What the keys declare; nothing where they say nothing of units.
+/// The declaration of the keys; `None` where they say nothing of units.
 pub(crate) fn read(directory: &[u8], doubles: &[u8]) -> Option<Declaration> {
     let keys = Keys { directory, doubles };
     let mut found = Declaration::new("GeoTIFF keys");
@@ -48,7 +48,7 @@ pub(crate) fn read(directory: &[u8], doubles: &[u8]) -> Option<Declaration> {
                 Some(unit.into())
             }
             None => {
-                found.remarks.push(format!("the GeoTIFF keys name a unit that is none: {code}"));
+                found.remarks.push(format!("the GeoTIFF keys name an unknown unit: {code}"));
                 None
             }
         },
@@ -63,7 +63,7 @@ pub(crate) fn read(directory: &[u8], doubles: &[u8]) -> Option<Declaration> {
     (found.system != System::Unknown || found.vertical.is_some()).then_some(found)
 }
 
-/// Said where the key of the unit and the system are not of one mind; the key counts, as with other
+/// The message where the key of the unit and the system differ; the key counts, as in other
 /// readers.
 fn contradiction(name: &str, metres: f64, system: Option<super::Unit>) -> Option<String> {
     let system = system.filter(|unit| !super::declared::is_same(unit.metres, metres))?;
@@ -74,7 +74,7 @@ fn contradiction(name: &str, metres: f64, system: Option<super::Unit>) -> Option
 }
 
 impl Keys<'_> {
-    /// Key, where its value lies, how many it has, value or place.
+    /// An entry of the directory: key, location of its value, number of values, value or offset.
     fn entry(&self, key: u16) -> Option<[u16; 4]> {
         let words =
             |chunk: &[u8]| [0, 2, 4, 6].map(|at| u16::from_le_bytes([chunk[at], chunk[at + 1]]));
@@ -87,7 +87,7 @@ impl Keys<'_> {
         self.entry(key).filter(|entry| entry[1] == 0).map(|entry| entry[3])
     }
 
-    /// The number of a system in the EPSG registry.
+    /// A key's code in the EPSG registry.
     fn code(&self, key: u16) -> Option<u32> {
         self.short(key).filter(|code| (1024..USER_DEFINED).contains(code)).map(u32::from)
     }
@@ -133,7 +133,7 @@ mod tests {
             (vec![key(1024, 1), key(3072, 2994), key(3076, 9002)], Some(0.3048), None),
             (vec![key(1024, 1), key(3072, 26915), key(3076, 9001)], Some(1.0), None),
             (vec![key(3076, 9001), key(4096, 6360)], Some(1.0), Some(known::US_FOOT)),
-            // A number of a system where that of a unit belongs.
+            // The number of a system in place of that of a unit.
             (vec![key(1024, 1), key(3076, 32632), key(4099, 9001)], None, Some(1.0)),
             // The unit counts where the system is in another.
             (vec![key(1024, 1), key(3072, 2229), key(3076, 9001)], Some(1.0), None),

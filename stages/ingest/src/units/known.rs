@@ -1,20 +1,20 @@
-//! The name or number of a unit of length in; how many metres it is out. Units by number, and
-//! systems that are not in metres, come from the EPSG registry (`epsg.txt`).
+//! The length in metres of units by name or EPSG code. Units by code, and systems that are not in
+//! metres, come from the EPSG registry (`epsg.txt`).
 
 use super::Unit;
 
-/// The part of the EPSG registry that matters here; its first lines say how it was made.
+/// The relevant part of the EPSG registry; its first lines say how it was made.
 const EPSG: &str = include_str!("epsg.txt");
-/// The metre by its number in the EPSG registry.
+/// The EPSG code of the metre.
 const METRE: u32 = 9001;
 /// Metres of a US survey foot: 1200/3937 by definition.
 pub(super) const US_FOOT: f64 = 1200.0 / 3937.0;
 
-/// Spellings of one unit, lower case without anything but letters and digits; its name for people;
-/// metres.
+/// Spellings of one unit in lower case with letters and digits only; its display name; its length
+/// in metres.
 type Spelled = (&'static [&'static str], &'static str, f64);
 
-/// Spellings in files and on the command line; those of the EPSG registry come after them.
+/// Spellings in files and on the command line; the names of the EPSG registry come after them.
 const SPELLED: [Spelled; 9] = [
     (&["m", "metre", "metres", "meter", "meters"], "metre", 1.0),
     (&["mm", "millimetre", "millimetres", "millimeter", "millimeters"], "millimetre", 1e-3),
@@ -31,7 +31,7 @@ const SPELLED: [Spelled; 9] = [
     (&["yd", "yard", "yards"], "yard", 0.9144),
 ];
 
-/// The unit of a name, as files and people spell it.
+/// The unit with a name, as files or people spell it.
 pub(super) fn by_name(name: &str) -> Option<Unit> {
     let plain = plain(name);
     let spelled = SPELLED.iter().find(|(spellings, ..)| spellings.contains(&plain.as_str()));
@@ -39,14 +39,14 @@ pub(super) fn by_name(name: &str) -> Option<Unit> {
     spelled.map(|(_, name, metres)| Unit::new(*name, *metres)).or_else(of_list)
 }
 
-/// The unit of a number in the EPSG registry.
+/// The unit with a code of the EPSG registry.
 pub(super) fn by_code(code: u32) -> Option<Unit> {
-    // The registry's decimals of the survey foot end too early for a map's coordinates.
+    // The registry gives the survey foot with too few decimals for map coordinates.
     let exact = |unit: Unit| by_name(&unit.name).unwrap_or(unit);
     units().find(|(known, _)| *known == code).map(|(_, unit)| exact(unit))
 }
 
-/// The unit of a system of the EPSG registry, `projected` or `vertical`: the metre where the list
+/// The unit of a system of the EPSG registry, `projected` or `vertical`; the metre where the list
 /// names no other.
 pub(super) fn of_system(kind: &str, code: u32) -> Option<Unit> {
     let holds = |range: &str| {
@@ -62,7 +62,7 @@ pub(super) fn of_system(kind: &str, code: u32) -> Option<Unit> {
     by_code(named.unwrap_or(METRE))
 }
 
-/// Units of the registry with their numbers.
+/// The units of the registry with their codes.
 fn units() -> impl Iterator<Item = (u32, Unit)> {
     EPSG.lines().filter_map(|line| line.strip_prefix("unit ")).filter_map(|line| {
         let mut words = line.splitn(3, ' ');

@@ -1,20 +1,21 @@
-//! The variable length records of a LAS file in; what they declare of its coordinates' units out.
+//! Collects what the variable length records of a LAS file declare about the units.
 
 use super::declared::{Declaration, System};
 use super::{geokeys, projjson, wkt};
 use las::raw;
 
-/// Bit of the global encoding that says that the WKT record counts, not the GeoTIFF keys.
+/// Bit of the global encoding that says that the WKT record counts and not the GeoTIFF keys.
 const WKT_COUNTS: u16 = 1 << 4;
-/// Lengths of the headers of a variable length record and of an extended one, bytes.
+/// Length of the header of a variable length record, bytes.
 const HEADER: usize = 54;
+/// Length of the header of an extended variable length record, bytes.
 const EXTENDED: usize = 60;
-/// Longest record that is looked at, bytes: texts of reference systems have a few thousand.
+/// Longest record that is read, bytes: texts of reference systems have a few thousand.
 const MAX_BYTES: usize = 1 << 20;
-/// Records that are looked at: writers put a handful of them.
+/// Largest number of records that are read; writers use a handful.
 const MAX_RECORDS: usize = 4096;
 
-/// What a file declares in its several ways, what counts first.
+/// All declarations of a file, the decisive one first.
 pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
     let records = records(raw, data);
     let find = |users: &[&str], id: u16| {
@@ -31,7 +32,7 @@ pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
     let last = if raw.global_encoding & WKT_COUNTS != 0 { [text, keys] } else { [keys, text] };
     let mut all: Vec<Declaration> =
         [of_wkt(4224), json].into_iter().chain(last).flatten().collect();
-    // Stable: those that say what coordinates are, before those that speak of heights alone.
+    // A stable sort: declarations of a coordinate system go before those of heights only.
     all.sort_by_key(|declaration| declaration.system == System::Unknown);
     all
 }
@@ -42,7 +43,7 @@ struct Record<'a> {
     payload: &'a [u8],
 }
 
-/// Records before the points, then those behind them, as far as they lie within the file.
+/// The records before the points, then those after them, as far as they lie within the file.
 fn records<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<Record<'a>> {
     let mut out = Vec::new();
     let first = (usize::from(raw.header_size), raw.number_of_variable_length_records as usize);

@@ -1,5 +1,5 @@
-//! What a file declares of its coordinates' units, what its format prescribes and what a person
-//! says in; how many metres they are out.
+//! Determines the units of a file's coordinates from what the user gives, what the file declares
+//! and what its format prescribes, in this order.
 
 mod choice;
 mod declared;
@@ -25,44 +25,44 @@ use std::fmt;
 /// A unit of length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unit {
-    /// Name for people.
+    /// Display name.
     pub name: String,
-    /// Metres of one.
+    /// Length of one unit, metres.
     pub metres: f64,
 }
 
-/// Where the units of an input come from.
+/// Source of the units of an input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Origin {
-    /// A person gave them.
+    /// The user gave them.
     Given,
     /// The file declares them.
     Declared,
     /// The format prescribes them.
     Format,
-    /// Nothing says anything: metres are assumed.
+    /// Nothing declares a unit; metres are assumed.
     Assumed,
 }
 
-/// Units that an input's coordinates are read in; what is read of it is in metres.
+/// The units of an input's coordinates in the file; points are returned in metres.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Units {
-    /// Of x and y.
+    /// Unit of x and y.
     pub horizontal: Unit,
-    /// Of z.
+    /// Unit of z.
     pub vertical: Unit,
-    /// Where they come from.
+    /// Source of the units.
     pub origin: Origin,
-    /// Which record declares them, where one does.
+    /// Name of the record that declares them, if one does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub by: Option<&'static str>,
-    /// What is odd about what the file says, in words.
+    /// Messages about oddities in the declaration.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
 }
 
-/// How coordinates whose units are not known can be read all the same.
+/// Advice for files whose units cannot be determined.
 const WAY_OUT: &str = "give the unit with --units, for example --units m";
 
 impl Unit {
@@ -70,18 +70,18 @@ impl Unit {
         Self { name: name.into(), metres }
     }
 
-    /// Whether it has about so many metres.
+    /// Whether the unit is about `metres` long.
     pub(crate) fn is_about(&self, metres: f64) -> bool {
         is_same(self.metres, metres)
     }
 }
 
 impl Units {
-    /// Of a file whose records declare this, what counts first; `choice` is what a person gives for
-    /// it.
+    /// The units of a file with these declarations, the decisive one first; `choice` is what the
+    /// user gave for the file.
     ///
     /// # Errors
-    /// Coordinates that are no lengths, or of which nobody can tell what they are.
+    /// If the coordinates are no lengths, or if their unit cannot be determined.
     pub(crate) fn of(declared: &[Declaration], choice: Option<&[Unit; 2]>) -> Result<Self> {
         if let Some([horizontal, vertical]) = choice {
             return Ok(Self::plain(horizontal.clone(), vertical.clone(), Origin::Given));
@@ -97,7 +97,7 @@ impl Units {
             }
             Some(Sense::Nothing(name)) => {
                 let name = quote::shown(&name);
-                remarks.push(format!("its {} names a unit that nobody knows: '{name}'", first.by));
+                remarks.push(format!("its {} names a unit that is not known: '{name}'", first.by));
                 None
             }
             None => None,
@@ -121,7 +121,7 @@ impl Units {
         })
     }
 
-    /// Of a file of scans with poses whose format prescribes metres.
+    /// The units of a file of scans with poses, whose format prescribes metres.
     ///
     /// # Errors
     /// As [`Units::of_nothing`].
@@ -129,10 +129,10 @@ impl Units {
         Self::of_scans(choice, Origin::Format)
     }
 
-    /// Of a file of scans with poses that says nothing, and whose format does not either.
+    /// The units of a file of scans with poses, where neither file nor format states a unit.
     ///
     /// # Errors
-    /// Heights in a unit of their own: scans are turned, so that none of their axes is the height.
+    /// If heights are given a unit of their own: scans are rotated, so that no axis is the height.
     pub(crate) fn of_nothing(choice: Option<&[Unit; 2]>) -> Result<Self> {
         Self::of_scans(choice, Origin::Assumed)
     }
@@ -163,13 +163,13 @@ impl Units {
         Self { horizontal, vertical, origin, by: None, remarks: Vec::new() }
     }
 
-    /// Metres of one unit of x, y and z.
+    /// Metres per unit of x, y and z.
     #[must_use]
     pub fn factors(&self) -> [f64; 3] {
         [self.horizontal.metres, self.horizontal.metres, self.vertical.metres]
     }
 
-    /// Whether coordinates are in metres as they stand in the file.
+    /// Whether the coordinates in the file are in metres already.
     #[must_use]
     pub fn is_metres(&self) -> bool {
         self.factors() == [1.0; 3]
@@ -189,8 +189,8 @@ fn refuse_angles(system: System) -> Result<()> {
     Err(Error::new(Kind::Unsupported, what))
 }
 
-/// The unit of heights. Where its name and its number contradict each other, the one that x and y
-/// have as well.
+/// The unit of heights. Where its name and its length contradict each other, the one that x and y
+/// also have counts.
 fn heights(
     stated: Option<(Sense, &'static str)>,
     horizontal: Option<&Unit>,
@@ -209,7 +209,7 @@ fn heights(
         Some((Sense::Unit(unit), _)) => Some(unit),
         Some((Sense::Nothing(name), by)) => {
             let name = quote::shown(&name);
-            remarks.push(format!("its {by} names a unit of heights that nobody knows: '{name}'"));
+            remarks.push(format!("its {by} names a unit of heights that is not known: '{name}'"));
             None
         }
         Some((Sense::Either(name, number), by)) => {
@@ -230,7 +230,7 @@ fn contradiction(name: &Unit, number: &Unit) -> Error {
     Error::bad_input(format!("{what}, \"{}, {}\"", name.name, number.metres))
 }
 
-/// Said where a record that does not count declares another unit.
+/// The message where a record that does not count declares another unit.
 fn disagreement(declared: &[Declaration], horizontal: Option<&Unit>) -> Option<String> {
     let own = horizontal?;
     let other = declared.iter().skip(1).find_map(|d| match d.horizontal.as_ref()?.sense() {

@@ -1,10 +1,10 @@
-//! PROJJSON in; in what units its coordinates are out.
+//! Reads the units of coordinates from PROJJSON.
 
 use super::declared::{Declaration, Stated, System};
 use super::known;
 use serde_json::Value;
 
-/// What a text declares; nothing where it is none.
+/// The declaration of a text; `None` where it is no PROJJSON.
 pub(crate) fn read(bytes: &[u8]) -> Option<Declaration> {
     let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
     let crs: Value = serde_json::from_slice(&bytes[..end]).ok()?;
@@ -13,7 +13,7 @@ pub(crate) fn read(bytes: &[u8]) -> Option<Declaration> {
     (found.system != System::Unknown || found.vertical.is_some()).then_some(found)
 }
 
-/// A system, or the parts of a compound one.
+/// Reads a system, or the parts of a compound one.
 fn look(crs: &Value, found: &mut Declaration) {
     match crs["type"].as_str().unwrap_or_default() {
         "CompoundCRS" => {
@@ -40,7 +40,7 @@ fn look(crs: &Value, found: &mut Declaration) {
     }
 }
 
-/// The unit of an axis: a name that PROJ knows, or an object with its metres.
+/// The unit of an axis: a name that PROJ knows, or an object with its length in metres.
 fn unit(crs: &Value, axis: usize) -> Option<Stated> {
     let unit = &crs["coordinate_system"]["axis"].get(axis)?["unit"];
     match unit {

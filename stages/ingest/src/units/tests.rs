@@ -1,9 +1,9 @@
-//! What files declare, in one way or in two that differ, comes to the units that are right.
+//! Declarations of files, alone or contradicting each other, give the right units.
 #![allow(clippy::unwrap_used)] // tests may panic
 
 use super::*;
 
-/// As real files have it: one of its name, one of its number of metres.
+/// A unit as in real files, given by name and by length.
 const NEW_MEXICO: &str = r#"PROJCS["NAD83(HARN) / New Mexico Central (ftUS)",GEOGCS["NAD83(HARN)",
     UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],
     UNIT["US survey foot",0.3048006096012192],AXIS["X",EAST],AXIS["Y",NORTH],

@@ -1,14 +1,14 @@
-//! Well-known text (WKT 1, WKT 2, and ESRI's) in; in what units its coordinates are out.
+//! Reads the units of coordinates from well-known text (WKT 1, WKT 2, and ESRI's dialect).
 
 use super::declared::{Declaration, Stated, System};
 use super::known;
 
-/// Longest text that is read, bytes: real ones have a few thousand.
+/// Longest text that is read, bytes; real ones have a few thousand.
 const MAX_BYTES: usize = 1 << 20;
-/// Deepest nesting: real texts have about ten levels.
+/// Deepest nesting that is read; real texts have about ten levels.
 const MAX_DEPTH: usize = 40;
 
-/// What horizontal systems are called whose coordinates are lengths.
+/// Keywords of horizontal systems whose coordinates are lengths.
 const PROJECTED: [&str; 9] = [
     "PROJCS",
     "PROJCRS",
@@ -20,27 +20,27 @@ const PROJECTED: [&str; 9] = [
     "BASEENGCRS",
     "BASEPROJCRS",
 ];
-/// Systems in degrees, unless they say that they are Cartesian.
+/// Keywords of systems in degrees, unless these say that they are Cartesian.
 const GEODETIC: [&str; 6] =
     ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS", "GEOCCS"];
 const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
 
-/// A keyword with what stands in its brackets.
+/// A keyword with the content of its brackets.
 #[derive(Debug, Default)]
 struct Node {
     keyword: String,
-    /// Words and numbers, as text.
+    /// Words and numbers in the brackets, as text.
     values: Vec<String>,
     children: Vec<Node>,
 }
 
-/// What a text declares; nothing where it is none.
+/// The declaration of a text; `None` where it is no WKT.
 pub(crate) fn read(bytes: &[u8]) -> Option<Declaration> {
     let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
     let text = String::from_utf8_lossy(&bytes[..end.min(MAX_BYTES)]);
     let mut reader = Reader { rest: text.trim() };
     let mut top = Node::default();
-    // ESRI writes a vertical system behind the horizontal one.
+    // ESRI writes the vertical system after the horizontal one.
     while let Some(node) = reader.node(0) {
         top.children.push(node);
         reader.skip(',');
@@ -50,20 +50,20 @@ pub(crate) fn read(bytes: &[u8]) -> Option<Declaration> {
     (found.system != System::Unknown || found.vertical.is_some()).then_some(found)
 }
 
-/// Takes the first horizontal and the first vertical system of a tree.
+/// Reads the first horizontal and the first vertical system of a tree.
 fn look(node: &Node, found: &mut Declaration) {
     for child in &node.children {
         let word = child.keyword.as_str();
         if PROJECTED.contains(&word) {
             horizontal(child, found);
-            // Some writers put the vertical system into the projected one.
+            // Some writers nest the vertical system in the projected one.
             child.children.iter().for_each(|inner| vertical(inner, found));
         } else if GEODETIC.contains(&word) {
             geodetic(child, found);
         } else if VERTICAL.contains(&word) {
             vertical(child, found);
         } else if word != "TARGETCRS" && word != "ABRIDGEDTRANSFORMATION" {
-            // A compound, a bound one, and whatever else wraps them.
+            // A compound or bound system, or anything else that contains them.
             look(child, found);
         }
     }
@@ -76,7 +76,7 @@ fn horizontal(node: &Node, found: &mut Declaration) {
     found.system = System::Lengths;
     let of_registry = || node.code().and_then(|code| known::of_system("projected", code));
     found.horizontal = node.unit(0).or_else(|| of_registry().map(Stated::from));
-    // A projected system of three axes has its heights among them.
+    // A projected system with three axes includes the heights.
     if node.axes().count() > 2 {
         found.vertical = node.unit(2);
     }
@@ -106,7 +106,7 @@ impl Node {
         self.children.iter().filter(|child| child.keyword == "AXIS")
     }
 
-    /// The unit of its axis with this number: that of the axis, else that of all.
+    /// The unit of axis number `axis`, else the unit of the whole system.
     fn unit(&self, axis: usize) -> Option<Stated> {
         let is_unit = |child: &&Node| ["UNIT", "LENGTHUNIT"].contains(&child.keyword.as_str());
         let own = |node: &Node| node.children.iter().find(is_unit).map(Node::stated);
@@ -118,7 +118,7 @@ impl Node {
         Stated { name: self.values.first().cloned(), metres }
     }
 
-    /// Its number in the EPSG registry.
+    /// The code in the EPSG registry.
     fn code(&self) -> Option<u32> {
         let is_id = |child: &&Node| ["ID", "AUTHORITY"].contains(&child.keyword.as_str());
         let id = self.children.iter().find(is_id)?;
@@ -127,14 +127,13 @@ impl Node {
     }
 }
 
-/// Reads a text from its beginning on.
+/// Parser of a text.
 struct Reader<'a> {
     rest: &'a str,
 }
 
 impl<'a> Reader<'a> {
-    /// The keyword and its brackets that the text begins with; a text that ends early gives what
-    /// there is.
+    /// The keyword and brackets at the beginning of the text; a truncated text gives what it holds.
     fn node(&mut self, depth: usize) -> Option<Node> {
         let keyword = self.word();
         if keyword.is_empty() || !(self.skip('[') || self.skip('(')) || depth > MAX_DEPTH {
@@ -168,7 +167,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Text in quotes; a quote in it is doubled.
+    /// A quoted text; quotes in it are doubled.
     fn quoted(&mut self) -> String {
         let mut out = String::new();
         self.rest = &self.rest[1..];
@@ -188,7 +187,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Up to the next bracket, comma or white space.
+    /// The text up to the next bracket, comma or white space.
     fn word(&mut self) -> &'a str {
         self.rest = self.rest.trim_start();
         let ends = |c: char| "[](),\"".contains(c) || c.is_whitespace();
@@ -286,7 +285,7 @@ mod tests {
         {
             assert!(super::read(text.as_bytes()).is_none(), "{}", &text[..text.len().min(20)]);
         }
-        // Cut short, it says what it says.
+        // A truncated text gives what it holds.
         let cut = super::read(br#"PROJCS["a",UNIT["foot",0.3048"#).expect("WKT");
         assert_eq!(cut.horizontal.and_then(|u| u.metres), Some(0.3048));
     }

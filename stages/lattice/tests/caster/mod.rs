@@ -1,4 +1,4 @@
-//! A scene in, tiles with truth out: a small analytic ray caster with range noise and mixed pixels.
+//! A small analytic ray caster with range noise and mixed pixels, which gives tiles with truth.
 #![allow(dead_code, missing_docs, unreachable_pub)]
 
 use contract::{InputId, Lattice, MaskId, Pixel, Scan, ScanId, TILE_SIDE, Tile, TileAt};
@@ -76,14 +76,15 @@ impl Random {
 
 pub const NOTHING: usize = usize::MAX;
 
-/// What each point of a tile truly is.
+/// A tile with the truth of each of its points.
 pub struct Truth {
     pub tile: Tile,
     /// Index of the shape, in the order of the tile's points.
     pub shape: Vec<usize>,
-    /// The point lies between surfaces, farther from both than neighbours on one surface may be.
+    /// Whether the point lies between surfaces, farther from both than neighbours on one surface
+    /// are.
     pub veil: Vec<bool>,
-    /// The beam hit more than one surface.
+    /// Whether the beam hit more than one surface.
     pub mixed: Vec<bool>,
 }
 

@@ -1,6 +1,5 @@
-//! A link's mesh and a place on it in; out: which side of the surface the world is on, if any.
-//! Vendors' meshes hold motors and bolts that no scanner sees, and faces that are turned the wrong
-//! way.
+//! Finds which side of a link's surface faces the outside, if any. Vendors' meshes contain motors
+//! and bolts that no scanner sees, and triangles with reversed orientation.
 
 use super::Sample;
 use crate::model::Mesh;
@@ -8,28 +7,28 @@ use nalgebra::Vector3;
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
 
-/// Rays over a hemisphere.
+/// Number of rays over a hemisphere.
 const N_RAYS: usize = 24;
-/// Rays between two looks at whether the case is clear: each such set is spread over the hemisphere
-/// as the whole is.
+/// Number of rays between two tests of whether the case is clear; each such subset is spread over
+/// the hemisphere like the whole set.
 const N_FIRST: usize = 4;
-/// Escaping rays that make a place visible: a single one may slip through a crack between badly
-/// joined triangles.
+/// Number of escaping rays that make a place visible. A single ray may slip through a crack between
+/// badly joined triangles.
 const N_ESCAPES: usize = 2;
-/// Start of a ray above the surface, metres: above rounding, below any real gap.
+/// Distance of a ray's origin from the surface, metres: above rounding, below any real gap.
 const LIFT: f32 = 1e-4;
 
-/// The side of a triangle, by the order of its corners.
+/// A side of a triangle, by the order of its corners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
     Front,
     Back,
 }
 
-/// A mesh that rays can be cast at.
+/// A mesh with a bounding volume hierarchy for ray casting.
 pub(super) struct Shell {
     bvh: Bvh,
-    /// First corner and two edges.
+    /// For each triangle its first corner and two edges, metres.
     triangles: Vec<[Vector3<f32>; 3]>,
     rays: [Vector3<f32>; N_RAYS],
 }
@@ -55,7 +54,8 @@ impl Shell {
         }
     }
 
-    /// The side from which more rays escape, if enough do from either; clear cases end early.
+    /// The side from which more rays escape, if enough escape on either; stops early where the case
+    /// is clear.
     pub(super) fn side(&self, sample: &Sample, blockers: &mut Blockers) -> Option<Side> {
         let (mut front, mut back) = (0, 0);
         let [ahead, behind] = &mut blockers.0;
@@ -68,7 +68,7 @@ impl Shell {
                 back += usize::from(self.escapes(sample.at, -sample.normal, ray, blocker));
             }
             for n in round..round + N_FIRST {
-                // Rays that escape take longest: no more of them than tell.
+                // Rays that escape take longest, so no more are cast than are needed.
                 if back == 0 && front >= N_ESCAPES {
                     return Some(Side::Front);
                 }
@@ -85,8 +85,8 @@ impl Shell {
         }
     }
 
-    /// Whether a ray of the hemisphere about `normal` leaves the mesh for good. What stopped the
-    /// same ray at the place before, which is mostly beside this one, is tried first.
+    /// Whether a ray of the hemisphere about `normal` leaves the mesh. The triangle that stopped
+    /// the same ray at the previous place is tested first, since that place is usually a neighbour.
     fn escapes(
         &self,
         at: Vector3<f32>,
@@ -103,7 +103,7 @@ impl Shell {
         if self.triangles.get(*blocker as usize).is_some_and(is_hit) {
             return false;
         }
-        // A direction along an axis would divide by zero.
+        // A component of zero would divide by zero.
         let inverse = direction.map(|v| if v.abs() < 1e-12 { 1e12 } else { 1.0 / v });
         let mut escapes = true;
         self.bvh.traverse(|node: &BvhNode| {
@@ -122,7 +122,7 @@ impl Shell {
     }
 }
 
-/// The triangle that each ray to either side was last stopped by.
+/// For each ray on either side, the triangle that stopped it last.
 pub(super) struct Blockers([[u32; N_RAYS]; 2]);
 
 impl Blockers {
@@ -131,8 +131,8 @@ impl Blockers {
     }
 }
 
-/// Whether more rays would not change the answer, or only for a place that hardly any beam can
-/// reach.
+/// Whether more rays could not change the answer, or could only do so for a place that hardly any
+/// beam reaches.
 fn is_clear(n_cast: usize, front: usize, back: usize) -> bool {
     let one_sided = front.max(back) >= N_ESCAPES && front.min(back) == 0;
     let hidden = n_cast >= N_RAYS / 2 && front + back == 0;
@@ -143,7 +143,7 @@ fn crosses(node: &BvhNode, origin: &Vector3<f32>, inverse: &Vector3<f32>) -> boo
     let (low, high) = (node.mins(), node.maxs());
     let (low, high) = ([low.x, low.y, low.z], [high.x, high.y, high.z]);
     let (mut enter, mut leave) = (0.0_f32, f32::INFINITY);
-    // Nothing here is NaN, which `f32::min` would look for.
+    // No value here is NaN, so the slower `f32::min`, which handles NaN, is not needed.
     let (least, most) =
         (|a: f32, b: f32| if a < b { a } else { b }, |a: f32, b: f32| if a > b { a } else { b });
     for k in 0..3 {
@@ -151,11 +151,11 @@ fn crosses(node: &BvhNode, origin: &Vector3<f32>, inverse: &Vector3<f32>) -> boo
         enter = most(enter, least(a, b));
         leave = least(leave, most(a, b));
     }
-    // A flat box must not vanish by rounding.
+    // The margin keeps a flat box from vanishing by rounding.
     enter <= leave * 1.000_001 + 1e-7
 }
 
-/// Möller and Trumbore, both sides.
+/// Whether a ray hits a triangle from either side (Möller and Trumbore).
 fn hits([a, e, f]: &[Vector3<f32>; 3], origin: &Vector3<f32>, direction: &Vector3<f32>) -> bool {
     let p = direction.cross(f);
     let det = e.dot(&p);
@@ -173,11 +173,11 @@ fn hits([a, e, f]: &[Vector3<f32>; 3], origin: &Vector3<f32>, direction: &Vector
     v >= -1e-5 && u + v <= 1.000_01 && f.dot(&q) * inverse > 0.0
 }
 
-/// Directions over the half space of +z, away from grazing, in an order whose first part is spread
-/// too.
+/// Directions over the hemisphere about +z without grazing ones, in an order in which each first
+/// part is spread evenly, too.
 fn hemisphere() -> [Vector3<f32>; N_RAYS] {
     std::array::from_fn(|k| {
-        // Every sixth of a spiral first, then the rest.
+        // Every sixth direction of a spiral first, then the others.
         let n_rounds = N_RAYS / N_FIRST;
         let at = (k % N_FIRST) * n_rounds + k / N_FIRST;
         let z = 1.0 - 0.92 * (at as f64 + 0.5) / N_RAYS as f64;

@@ -1,5 +1,5 @@
-//! A link's mesh in; samples of its outer surface with outward normals out, in an order whose
-//! prefixes are even.
+//! Samples the outer surface of a link's mesh, with outward normals, in an order in which each
+//! prefix is spread evenly.
 
 mod exterior;
 mod spread;
@@ -8,24 +8,24 @@ use crate::model::{CadCloud, Mesh};
 use exterior::{Blockers, Shell, Side};
 use nalgebra::Vector3;
 
-/// Candidates for each sample that is kept: with fewer the spread gets holes, with more it only
-/// costs time.
+/// Number of candidates for each sample that is kept: with fewer the samples leave holes, with more
+/// only the time grows.
 const N_CANDIDATES: f64 = 2.5;
-/// Edge of the cells whose candidates are judged together, metres: parts smaller than this hide
-/// nothing that a scanner resolves.
+/// Edge of the cells whose candidates are judged together, metres; smaller parts hide nothing that
+/// a scanner resolves.
 const JUDGED_CELL: f32 = 0.015;
-/// Depth of such a cell along the normal, metres: the two sides of a sheet of metal are judged
-/// apart.
+/// Depth of such a cell along the normal, metres, so that the two sides of sheet metal are judged
+/// separately.
 const JUDGED_DEPTH: f32 = 0.004;
 
-/// A place on the surface.
+/// A place on the surface, with its normal.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     at: Vector3<f32>,
     normal: Vector3<f32>,
 }
 
-/// SplitMix64: small, even, and the same on every machine.
+/// The SplitMix64 generator: small, uniform, and identical on every machine.
 #[derive(Debug, Clone, Copy)]
 struct Random(u64);
 
@@ -38,24 +38,25 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1).
+    /// A number in [0, 1).
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// In [0, n).
+    /// An integer in [0, n).
     fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.next()) * n as u128) >> 64) as usize
     }
 }
 
-/// A link gets so many samples at least, as far as the least spacing allows: bolts and edges of a
-/// small wrist are what tells its pose, and a sample beside an edge has the wrong normal.
+/// Smallest number of samples of a link, as far as [`MIN_SPACING`] allows. The pose of a small
+/// wrist is determined by its bolts and edges, and a sample beside an edge has the wrong normal.
 const MIN_SAMPLES: f64 = 12_000.0;
-/// Least spacing, metres: finer than the noise of any scanner.
+/// Smallest distance between samples, metres: finer than the noise of any scanner.
 const MIN_SPACING: f64 = 0.002;
 
-/// Samples a mesh at about `spacing` metres, a small one more finely, with at most `max_samples`.
+/// Samples a mesh at about `spacing` metres, a small mesh more finely, with at most `max_samples`
+/// samples.
 pub(crate) fn sample(mesh: &Mesh, spacing: f64, max_samples: usize) -> CadCloud {
     let areas: Vec<f64> = mesh.triangles.iter().map(|t| area(mesh, t)).collect();
     let whole: f64 = areas.iter().sum();
@@ -90,8 +91,8 @@ fn area(mesh: &Mesh, triangle: &[u32; 3]) -> f64 {
     0.5 * (b - a).cross(&(c - a)).norm()
 }
 
-/// About `n` places, each standing for the same area: one in each step of the summed area,
-/// low-discrepancy within large triangles.
+/// About `n` places that stand for equal areas: one in each step of the cumulative area, with a
+/// low-discrepancy sequence within large triangles.
 fn candidates(
     mesh: &Mesh,
     areas: &[f64],
@@ -112,7 +113,7 @@ fn candidates(
         let Some(normal) = (b - a).cast::<f64>().cross(&(c - a).cast()).try_normalize(0.0) else {
             continue;
         };
-        // The R2 sequence (plastic number) from a random start.
+        // The R2 sequence (powers of the plastic number) from a random start.
         let (mut u, mut v) = (random.unit(), random.unit());
         while next < sum {
             let (s, t) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
@@ -128,19 +129,19 @@ fn candidates(
     out
 }
 
-/// Which candidates are judged together: their cell, the way they face, and their depth along it.
+/// The group of candidates that are judged together: orientation, cell, and depth along the normal.
 fn key(sample: &Sample) -> (u8, [i32; 4]) {
     let n = sample.normal;
     let axis = n.iamax();
     let facing = (2 * axis + usize::from(n[axis] < 0.0)) as u8;
     let cell = sample.at.map(|v| (v / JUDGED_CELL).floor());
-    // From the middle of the cell, where a small turn of the normal matters little.
+    // Measured from the centre of the cell, where a small rotation of the normal matters little.
     let depth = n.dot(&(sample.at - cell.map(|v| (v + 0.5) * JUDGED_CELL)));
     let [x, y, z] = [0, 1, 2].map(|k| cell[k] as i32);
     (facing, [x, y, z, (depth / JUDGED_DEPTH).round() as i32])
 }
 
-/// The candidates on the outer surface, their normals turned outward.
+/// The candidates on the outer surface, with their normals turned outward.
 fn outer(mesh: &Mesh, candidates: Vec<Sample>) -> Vec<Sample> {
     let shell = Shell::new(mesh);
     let mut order: Vec<(_, u32)> = candidates.iter().map(key).zip(0..).collect();

@@ -1,16 +1,16 @@
-//! Candidates in; a subset out whose members keep their distance, in an order in which every prefix
-//! does so too: darts thrown with a radius that shrinks.
+//! Selects samples from candidates so that every prefix of the result keeps its distances, too
+//! (Poisson-disk sampling by dart throwing with a shrinking radius).
 
 use super::{Random, Sample};
 
-/// Radius of a dart in terms of the spacing: with this one there are as many
-/// samples as squares of the spacing.
+/// Radius of a dart relative to the spacing; with this value there are as many samples as squares
+/// of the spacing fit into the area.
 const RADIUS: f64 = 0.68;
-/// The first radius leaves room for about this many samples.
+/// Approximate number of samples for which the first radius leaves room.
 const N_COARSEST: f64 = 12.0;
-/// Each radius is this part of the one before: half the area.
+/// Factor from each radius to the next, which halves the area of a dart.
 const SHRINK: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Darts thrown for each sample that fits at a radius.
+/// Number of darts thrown for each sample that fits at a radius.
 const N_DARTS: f64 = 6.0;
 
 pub(super) fn spread(
@@ -37,7 +37,7 @@ pub(super) fn spread(
     }
 }
 
-/// Moves those of the first `n_darts` that keep their distance from `waiting` to `out`.
+/// Moves those of the first `n_darts` candidates that keep their distance from `waiting` to `out`.
 fn throw(out: &mut Vec<Sample>, waiting: &mut Vec<Sample>, n_darts: usize, radius: f32) {
     let mut grid = Grid::new(radius, out.len() + waiting.len().min(n_darts));
     for sample in out.iter() {
@@ -55,11 +55,11 @@ fn throw(out: &mut Vec<Sample>, waiting: &mut Vec<Sample>, n_darts: usize, radiu
     });
 }
 
-/// Samples by cell, chained through a table; two cells in one slot cost time, not truth.
+/// Samples by cell in a hash table with chaining. A collision of two cells costs time only.
 struct Grid {
     radius: f32,
     first: Vec<u32>,
-    /// Each with the next one of its slot.
+    /// Each sample with the index of the next one in its slot.
     samples: Vec<(Sample, u32)>,
 }
 
@@ -71,7 +71,7 @@ impl Grid {
         Self { radius, first: vec![NONE; n_slots], samples: Vec::with_capacity(n) }
     }
 
-    /// Cells are two radii wide, so that a ball of one radius touches two along each axis.
+    /// Cells are two radii wide, so that a ball of one radius touches two of them along each axis.
     fn cell(&self, sample: &Sample, shift: f32) -> [i32; 3] {
         [0, 1, 2].map(|k| (sample.at[k] / (2.0 * self.radius) + shift).floor() as i32)
     }
@@ -90,11 +90,11 @@ impl Grid {
         self.samples.push((*sample, std::mem::replace(&mut self.first[slot], at)));
     }
 
-    /// A sample that faces the same half of the world is nearer than the radius. The other side of
-    /// a sheet is another surface.
+    /// Whether a sample that faces into the same half space is nearer than the radius. The other
+    /// side of a sheet counts as another surface.
     fn is_taken(&self, sample: &Sample) -> bool {
         let (low, own) = (self.cell(sample, -0.5), self.cell(sample, 0.0));
-        // Its own cell first: most that are taken are so by one of that.
+        // The sample's own cell is tested first, since most conflicts are found there.
         let own = (0..3).map(|k| (own[k] - low[k]) << k).sum::<i32>();
         let limit = self.radius * self.radius;
         for n in 0..8 {

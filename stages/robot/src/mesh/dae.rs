@@ -1,5 +1,6 @@
-//! COLLADA text in, triangles out in the scene's frame, metres: node transforms and `<unit>`
-//! applied, `<up_axis>` not, as the viewers do for which robot makers draw their meshes.
+//! Reads triangles from a COLLADA file, in the scene's frame and metres. Node transforms and
+//! `<unit>` are applied; `<up_axis>` is ignored, as by the viewers for which robot vendors draw
+//! their meshes.
 
 use super::Soup;
 use crate::load::Settings;
@@ -8,15 +9,15 @@ use nalgebra::{Matrix4, Rotation3, Unit, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
 
-/// Nodes in one another; real files have below ten.
+/// Largest depth of nested nodes; real files have below ten.
 const MAX_DEPTH: usize = 64;
-/// Nodes walked in all, since an instance may hold instances.
+/// Largest number of nodes that are visited, since instances may contain instances.
 const MAX_VISITS: usize = 100_000;
-/// A unit that differs from the metre by less is a rounded metre: a millionth of a robot is below
-/// any scanner.
+/// A unit that differs by less from the metre is a rounded metre: a millionth of a robot's size is
+/// below the resolution of any scanner.
 const SAME_UNIT: f64 = 1e-6;
-/// What a file of any size may come to, times the growth that is allowed, bytes: small ones draw
-/// one bolt a hundred times.
+/// Added to the file's size before it is multiplied by the allowed growth, bytes: small files may
+/// draw one bolt a hundred times.
 const SMALL: u64 = 1 << 20;
 
 pub(super) fn read(text: &str, settings: &Settings) -> Result<Soup, String> {
@@ -43,7 +44,7 @@ pub(super) fn read(text: &str, settings: &Settings) -> Result<Soup, String> {
     let mut soup = scene.soup;
     if (unit - 1.0).abs() > SAME_UNIT {
         soup.note(&format!(
-            "its unit of {unit} m is applied here; most other readers of URDF pass it over and see \
+            "its unit of {unit} m is applied here; most other readers of URDF ignore it and see \
              the mesh {} times as large",
             rounded(unit.recip())
         ));
@@ -54,7 +55,7 @@ pub(super) fn read(text: &str, settings: &Settings) -> Result<Soup, String> {
     Ok(soup)
 }
 
-/// Six digits of a ratio, so that 1/0.0254 is 39.3701.
+/// A ratio rounded to six digits, so that 1/0.0254 is 39.3701.
 fn rounded(ratio: f64) -> f64 {
     let digit = 10_f64.powf(5.0 - ratio.log10().floor());
     (ratio * digit).round() / digit
@@ -65,8 +66,8 @@ struct Scene<'a, 'i> {
     unit: f64,
     soup: Soup,
     n_visits: usize,
-    /// What instances may still come to, bytes that are read or kept: geometries that are named
-    /// again and again make much of little.
+    /// Bytes that may still be read or kept. It bounds files that instantiate a geometry again and
+    /// again.
     left: u64,
 }
 
@@ -119,7 +120,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(Self { by_id, unit, soup: Soup::default(), n_visits: 0, left })
     }
 
-    /// Counts bytes that are read once more, or kept.
+    /// Counts bytes that are read again or kept, and refuses the file when the allowance is spent.
     fn spend(&mut self, n: usize) -> Result<(), String> {
         self.left = self.left.checked_sub(n as u64).ok_or(
             "it comes to far more than its size by what is named again and again; if it is right, raise --set \
@@ -128,15 +129,15 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    /// The element of that id in a mesh, else anywhere: real files give the same ids to each
-    /// geometry.
+    /// The element with this id within a mesh, else anywhere in the file: real files use the same
+    /// ids in each geometry.
     fn within(&self, mesh: Node<'a, 'i>, id: &str) -> Option<Node<'a, 'i>> {
         mesh.children()
             .find(|n| n.attribute("id") == Some(id))
             .or_else(|| self.by_id.get(id).copied())
     }
 
-    /// Nodes of the scene that the file shows; else of its first.
+    /// The nodes of the scene that the file instantiates, else those of its first scene.
     fn roots(&self, root: Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
         let shown = element(root, "scene")
             .and_then(|s| element(s, "instance_visual_scene"))
@@ -175,15 +176,13 @@ impl<'a, 'i> Scene<'a, 'i> {
                 "node" => self.node(part, scene_from_node, depth + 1)?,
                 "instance_node" => match target() {
                     Some(other) => self.node(other, scene_from_node, depth + 1)?,
-                    None => self.soup.note("an instance of a node outside the file is passed over"),
+                    None => self.soup.note("an instance of a node outside the file is ignored"),
                 },
                 "instance_geometry" => match target() {
                     Some(geometry) => self.geometry(geometry, &scene_from_node)?,
-                    None => {
-                        self.soup.note("an instance of a geometry outside the file is passed over")
-                    }
+                    None => self.soup.note("an instance of a geometry outside the file is ignored"),
                 },
-                "instance_controller" => self.soup.note("a skinned geometry is passed over"),
+                "instance_controller" => self.soup.note("a skinned geometry is ignored"),
                 _ => {}
             }
         }
@@ -196,10 +195,10 @@ impl<'a, 'i> Scene<'a, 'i> {
         scene_from_node: &Matrix4<f64>,
     ) -> Result<(), String> {
         let Some(mesh) = element(geometry, "mesh") else {
-            self.soup.note("a geometry that is no mesh is passed over");
+            self.soup.note("a geometry that is no mesh is ignored");
             return Ok(());
         };
-        // A mirror turns triangles inside out: turn them back.
+        // A mirroring transform reverses the orientation of triangles, which is undone here.
         let mirrored = scene_from_node.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
         let mut placed: Vec<(&str, usize, usize)> = Vec::new();
         for part in mesh.children().filter(Node::is_element) {
@@ -208,12 +207,12 @@ impl<'a, 'i> Scene<'a, 'i> {
             match tag {
                 "triangles" | "polylist" | "polygons" | "tristrips" | "trifans" => {}
                 "lines" | "linestrips" => {
-                    self.soup.note("lines are passed over");
+                    self.soup.note("lines are ignored");
                     continue;
                 }
                 _ => continue,
             }
-            // Each of its sources is looked for among all children.
+            // Each of its sources is looked for among all children, so all of them count.
             self.spend(mesh.children().count() + part.children().count() + placed.len())?;
             let Some(layout) = self.layout(mesh, part)? else {
                 continue;
@@ -238,7 +237,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    /// Where the index of a corner's position stands among the indices of one corner.
+    /// The position of the vertex index among the indices of one corner.
     fn layout(&self, mesh: Node<'a, 'i>, part: Node<'a, 'i>) -> Result<Option<Layout<'a>>, String> {
         let mut stride = 0;
         let mut position = None;
@@ -275,7 +274,8 @@ impl<'a, 'i> Scene<'a, 'i> {
         }
     }
 
-    /// Adds the positions of a source in the scene's frame: index of the first, and how many.
+    /// Adds the positions of a source in the scene's frame and returns the index of the first one
+    /// and their number.
     fn positions(
         &mut self,
         mesh: Node<'a, 'i>,
@@ -315,7 +315,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok((first, self.soup.vertices.len() - first))
     }
 
-    /// The indices that an element lists.
+    /// The indices in the text of an element.
     fn indices(&mut self, list: Node<'a, 'i>) -> Result<Vec<usize>, String> {
         let text = all_text(list);
         self.spend(text.len())?;
@@ -332,7 +332,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         let tag = part.tag_name().name();
         let vcount = element(part, "vcount").filter(|_| tag == "polylist");
         let mut sizes = vcount.map(|list| self.indices(list)).transpose()?.map(Vec::into_iter);
-        // A polygon with holes keeps its outline in <ph><p>.
+        // A polygon with holes has its outline in <ph><p>.
         let lists = part.children().flat_map(|c| match c.tag_name().name() {
             "p" => Some(c),
             "ph" => element(c, "p"),
@@ -386,12 +386,12 @@ struct Layout<'a> {
     stride: usize,
 }
 
-/// The text of an element; comments cut it into pieces.
+/// The whole text of an element, which comments may split into several pieces.
 fn all_text(node: Node) -> String {
     node.children().filter(Node::is_text).filter_map(|n| n.text()).collect::<Vec<_>>().join(" ")
 }
 
-/// The step of a transform element; `None` for any other.
+/// The matrix of a transform element; `None` for any other element.
 fn transform(part: Node) -> Result<Option<Matrix4<f64>>, String> {
     let tag = part.tag_name().name();
     let n = match tag {

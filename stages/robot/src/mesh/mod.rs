@@ -1,5 +1,5 @@
-//! A mesh file in, triangles out. Broken files are named, never trusted: a count in a file
-//! allocates nothing.
+//! Reads triangles from a mesh file. A broken file is refused by name, and no memory is allocated
+//! on the strength of a count in a header.
 
 mod dae;
 mod obj;
@@ -12,20 +12,20 @@ use crate::model::Mesh;
 use geometry::{Pose, Vector, narrow::local_f32};
 use std::collections::HashMap;
 
-/// Triangles of one file; the largest robots met have 480 k in all.
+/// Largest number of triangles of one file; the largest known robots have 480,000 in all.
 pub(crate) const MAX_TRIANGLES: usize = 4_000_000;
 
-/// Triangles as a file has them, metres by the file's own unit.
+/// The triangles of a file, in metres by the file's own unit.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub(crate) struct Soup {
     pub(crate) vertices: Vec<[f64; 3]>,
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// What a person may want to know about the file.
+    /// Remarks about the file for the user.
     pub(crate) notes: Vec<String>,
 }
 
 impl Soup {
-    /// A corner's index, or what is wrong.
+    /// Adds a vertex and returns its index, or why it cannot be added.
     fn add_vertex(&mut self, p: [f64; 3]) -> Result<u32, String> {
         let at = u32::try_from(self.vertices.len()).map_err(|_| "too many vertices".to_owned())?;
         self.vertices.push(p);
@@ -47,7 +47,7 @@ impl Soup {
     }
 }
 
-/// Reads a mesh file by its name's ending and its bytes.
+/// Reads a mesh file in the format that its file name extension tells.
 pub(crate) fn read(bytes: &[u8], extension: &str, settings: &Settings) -> Result<Soup, String> {
     let soup = match extension.to_lowercase().as_str() {
         "stl" => stl::read(bytes),
@@ -64,8 +64,9 @@ fn text(bytes: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(bytes).map_err(|e| format!("not UTF-8 from byte {}", e.valid_up_to()))
 }
 
-/// Adds a soup to a link's mesh: scaled, placed, equal corners joined, triangles without area left
-/// out. Gives the number of triangles left out because a corner is no finite number.
+/// Adds the triangles of a file to a link's mesh: scaled and placed, with equal vertices joined and
+/// triangles without area left out. Returns the number of triangles that were left out because a
+/// vertex is not finite.
 pub(crate) fn append(
     mesh: &mut Mesh,
     soup: &Soup,
@@ -76,7 +77,7 @@ pub(crate) fn append(
     let place = |p: [f64; 3]| {
         let p = link_from_body
             * geometry::Point::from([p[0] * scale[0], p[1] * scale[1], p[2] * scale[2]]);
-        // Adding zero makes −0 into 0, so that both are one corner.
+        // Adding zero turns −0 into 0, so that both become the same vertex.
         [p.x, p.y, p.z].map(|v| local_f32(v) + 0.0)
     };
     let mut index = |mesh: &mut Mesh, p: [f32; 3]| {

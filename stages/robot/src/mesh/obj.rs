@@ -1,4 +1,4 @@
-//! OBJ text in, triangles out. Materials, groups, normals, lines and curves are passed over.
+//! Reads triangles from an OBJ file. Materials, groups, normals, lines and curves are ignored.
 
 use super::Soup;
 

@@ -1,12 +1,13 @@
-//! Boxes, cylinders, capsules and spheres in, triangles out, outward; and polygons into triangles.
+//! Triangulates boxes, cylinders, capsules and spheres, oriented outward, and splits polygons.
 
 use super::Soup;
 use std::f64::consts::{PI, TAU};
 
-/// Sides of a round body: 3 % off the true radius would be 13; 48 gives 0.2 %.
+/// Sides of a round body: 13 would deviate by 3 % from the true radius, 48 deviate by 0.2 %.
 const N_SIDES: u32 = 48;
 
-/// Triangles of a polygon, for convex polygons exact, for others as every viewer does it.
+/// Adds the triangles of a polygon as a fan, which is exact for convex polygons and what viewers do
+/// with others.
 pub(super) fn fan(soup: &mut Soup, corners: &[u32]) -> Result<(), String> {
     for k in 2..corners.len() {
         soup.add_triangle([corners[0], corners[k - 1], corners[k]])?;
@@ -14,7 +15,7 @@ pub(super) fn fan(soup: &mut Soup, corners: &[u32]) -> Result<(), String> {
     Ok(())
 }
 
-/// A box about the origin, edges in metres.
+/// A box centred at the origin, edges in metres.
 pub(crate) fn cuboid(size: [f64; 3]) -> Soup {
     let mut soup = Soup::default();
     for n in 0..8_u32 {
@@ -29,8 +30,8 @@ pub(crate) fn cuboid(size: [f64; 3]) -> Soup {
     soup
 }
 
-/// A body of revolution about z from its profile (radius, height), bottom to top; it should start
-/// and end at radius 0.
+/// A body of revolution about z from its profile of (radius, height), metres, from bottom to top.
+/// The profile should start and end at radius 0.
 fn lathe(profile: &[(f64, f64)]) -> Soup {
     let mut soup = Soup::default();
     for &(radius, z) in profile {
@@ -50,18 +51,18 @@ fn lathe(profile: &[(f64, f64)]) -> Soup {
     soup
 }
 
-/// A cylinder about z, middle at the origin.
+/// A cylinder about z, centred at the origin, metres.
 pub(crate) fn cylinder(radius: f64, length: f64) -> Soup {
     let half = 0.5 * length;
     lathe(&[(0.0, -half), (radius, -half), (radius, half), (0.0, half)])
 }
 
-/// A sphere about the origin.
+/// A sphere centred at the origin, metres.
 pub(crate) fn sphere(radius: f64) -> Soup {
     capsule(radius, 0.0)
 }
 
-/// A cylinder about z of this length with half spheres on its ends.
+/// A cylinder about z of this length with hemispheres on its ends, metres.
 pub(crate) fn capsule(radius: f64, length: f64) -> Soup {
     let n = N_SIDES / 2;
     let mut profile = Vec::new();

@@ -1,4 +1,4 @@
-//! STL bytes in, triangles out: binary, binary that opens with "solid", ASCII.
+//! Reads triangles from an STL file: ASCII, binary, or binary with a header that begins "solid".
 
 use super::Soup;
 
@@ -22,7 +22,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, String> {
         (Some(n), Some(expected)) if expected < bytes.len() => {
             let mut soup = binary(&bytes[..expected])?;
             if n > 0 {
-                soup.note("bytes after the last triangle are passed over");
+                soup.note("bytes after the last triangle are ignored");
             }
             Ok(soup)
         }

@@ -75,7 +75,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// A small generator for postures.
+/// A small generator of random postures.
 pub struct Dice(u64);
 
 impl Dice {
@@ -137,12 +137,12 @@ pub fn robot(inner: &str) -> String {
     format!("<?xml version='1.0'?><robot name='r'>{inner}</robot>")
 }
 
-/// The number of a free joint.
+/// Index of a free joint in a posture.
 pub fn free(model: &Model, joint: &str) -> usize {
     model.free.iter().position(|&j| model.joints[j].name == joint).unwrap()
 }
 
-/// Twists against central differences of poses, at random postures.
+/// Compares twists with central differences of poses at random postures.
 pub fn check_twists(model: &Model, seed: u64) {
     let mut dice = Dice::new(seed);
     let step = 1e-6;
@@ -190,7 +190,7 @@ pub fn body(path: &str) -> String {
         + &joint("j", "revolute", "a", "b", "0 0 1", LIMIT)
 }
 
-/// Asks for a finding with these words.
+/// Asserts that linting reports a finding with these words.
 pub fn says(folder: &Folder, words: &str) {
     let found = folder.lint();
     assert!(found.iter().any(|f| f.contains(words)), "expected \"{words}\" in {found:#?}");

@@ -58,7 +58,7 @@ pub const RRR: &[(&str, &str)] = &[
         ]"),
 ];
 
-/// A model of the shared ones with this sheet beside it.
+/// Loads a shared model with this `robot.toml`.
 pub fn looped(name: &str, sheet: &str) -> Option<Model> {
     let (model, findings) = Folder::of(name)?.with("robot.toml", sheet).load();
     for f in findings {

@@ -1,4 +1,4 @@
-//! Nothing in; the small six-axis robot out: a bench-top arm, 1.1 m reach, upper arm on one side.
+//! The small six-axis demo robot: a bench-top arm of 1.1 m reach with its upper arm on one side.
 
 use super::castings::{boom, cheek, foot, hub, motor, pipe, rib, tool_plate, trunk};
 use super::design::{Design, Hinge, Part};
@@ -85,7 +85,7 @@ fn shoulder() -> Solid {
         cheek(&[([x, z], 0.086), ([0.0, 0.09], 0.07)], [-0.075, 0.005], 0.008),
         hub([x, z], 0.088, [-0.085, 0.012]),
         motor(0.05, 0.12).along_y().turned([0.0, 0.0, 180.0]).at([x, -0.08, z]),
-        // Axis 1 motor stands behind, beside the arm.
+        // The motor of axis 1 stands behind, beside the arm.
         motor(0.043, 0.15).at([-0.075, -0.045, 0.02]),
     ])
 }
@@ -182,7 +182,7 @@ fn wrist() -> Solid {
     ])
 }
 
-/// A camera on a bracket: the turn of axis 6 must show.
+/// A camera on a bracket, which makes the rotation of axis 6 visible.
 fn sensor() -> Solid {
     Solid::of([
         cuboid([0.012, 0.10, 0.03], 0.002).at([0.012, -0.05, -0.012]),

@@ -1,14 +1,14 @@
-//! Sizes in; the pieces that robot links are cast and bolted from out. x forward, y left, z up;
-//! joints about y.
+//! The pieces that links of demo robots are made of. x is forward, y left, z up; joints turn about
+//! y.
 
 use crate::solid::{Ring, Solid, bolts, cuboid, disc, lathe, loft, prism, rounded, tube};
 use geometry::Point;
 use std::f64::consts::TAU;
 
-/// Sides of a hub.
+/// Number of sides of a hub.
 const HUB_SIDES: usize = 44;
 
-/// Convex outline around circles (middle, radius), counter-clockwise.
+/// Convex outline around circles (centre, radius), counter-clockwise, metres.
 pub(super) fn hull(circles: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     for (centre, radius) in circles {
@@ -24,7 +24,7 @@ pub(super) fn hull(circles: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
     let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {
         let mut out: Vec<[f64; 2]> = Vec::new();
         for p in points {
-            // Corners that are nearly straight are left out: they only make slivers.
+            // Corners that are nearly straight are left out, since they only give slivers.
             while out.len() >= 2 && turn(out[out.len() - 2], out[out.len() - 1], p) <= 1e-7 {
                 out.pop();
             }
@@ -38,12 +38,12 @@ pub(super) fn hull(circles: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
     out
 }
 
-/// An outline in the plane of x and z, from `y[0]` to `y[1]`.
+/// An outline in the xz plane, extruded from `y[0]` to `y[1]`.
 pub(super) fn side_prism(outline: &[[f64; 2]], y: [f64; 2], chamfer: f64) -> Solid {
     prism(outline, -y[1], -y[0], chamfer).turned([90.0, 0.0, 0.0])
 }
 
-/// A cheek around circles in the plane of x and z, from `y[0]` to `y[1]`.
+/// A plate around circles in the xz plane, from `y[0]` to `y[1]`.
 pub(super) fn cheek(circles: &[([f64; 2], f64)], y: [f64; 2], chamfer: f64) -> Solid {
     side_prism(&hull(circles), y, chamfer)
 }
@@ -64,15 +64,15 @@ pub(super) fn hub(at: [f64; 2], radius: f64, y: [f64; 2]) -> Solid {
     let size = (0.14 * radius).min(0.022);
     let ring = bolts(8, 0.88 * radius, y[1], size);
     let other = bolts(8, 0.88 * radius, -y[0], size).turned([180.0, 0.0, 0.0]);
-    // The lathe's axis laid along +y: (x, y, z) goes to (x, z, −y), so that a hub is drawn upright
-    // with z = y.
+    // The axis of the lathe is laid along +y: (x, y, z) becomes (x, z, −y), so that a hub is drawn
+    // upright with z = y.
     Solid::of([lathe(&body, HUB_SIDES), ring, other]).along_y().at([at[0], 0.0, at[1]])
 }
 
-/// A section of a boom: x, middle (y, z), size (y, z), radius of its corners; metres.
+/// A section of a boom: x, centre (y, z), size (y, z), radius of its corners; metres.
 pub(super) type Section = (f64, [f64; 2], [f64; 2], f64);
 
-/// A hollow-looking casting along x through sections.
+/// A casting along x through sections.
 pub(super) fn boom(sections: &[Section]) -> Solid {
     let rings: Vec<Ring> = sections
         .iter()
@@ -81,7 +81,7 @@ pub(super) fn boom(sections: &[Section]) -> Solid {
     loft(&rings).along_x()
 }
 
-/// A casting along z through sections (z, middle (x, y), size (x, y), radius of its corners).
+/// A casting along z through sections: z, centre (x, y), size (x, y), radius of its corners.
 pub(super) fn trunk(sections: &[Section]) -> Solid {
     let rings: Vec<Ring> =
         sections.iter().map(|&(z, c, s, r)| rounded([c[0], c[1], z], s, r, 8)).collect();
@@ -152,8 +152,8 @@ pub(super) fn bar(from: [f64; 2], to: [f64; 2], y: f64, radius: f64) -> Solid {
     ])
 }
 
-/// A tool plate on the plane x = 0, facing +x: disc, bolt ring, dowel and a plug on one side, so
-/// that its turn shows.
+/// A tool plate on the plane x = 0, facing +x: disc, bolt ring, dowel, and a plug on one side that
+/// makes its rotation visible.
 pub(super) fn tool_plate(radius: f64, thick: f64) -> Solid {
     let upright = Solid::of([
         disc(0.8 * radius, 0.0, 0.5 * thick, 0.0, 48),
@@ -186,7 +186,7 @@ pub(super) fn pipe(corners: &[[f64; 3]], radius: f64) -> Solid {
     let mut path: Vec<Point> = Vec::new();
     for (i, pair) in corners.windows(2).enumerate() {
         let (a, b) = (Point::from(pair[0]), Point::from(pair[1]));
-        // Two points near each corner make a bend of it.
+        // Two points near each corner round it off.
         if i == 0 {
             path.push(a);
         }

@@ -1,15 +1,15 @@
-//! A robot as drawn (bodies, joints, loops) in; the files of its library folder out.
+//! Writes a robot design (bodies, joints, loops) as the files of its library folder.
 
 use crate::solid::Solid;
 use std::fmt::Write;
 
-/// A link and its body.
+/// A link with its body.
 pub(super) struct Part {
     pub(super) name: &'static str,
     pub(super) body: Option<Solid>,
 }
 
-/// A joint as URDF has it; `limits` none: fixed.
+/// A joint as in a URDF; a joint without `limits` is fixed.
 #[derive(Clone)]
 pub(super) struct Hinge {
     pub(super) name: &'static str,
@@ -81,14 +81,14 @@ impl Hinge {
 
 /// A sub chain with a URDF of its own.
 pub(super) struct SubChain {
-    /// Its file is `sub_<name>.urdf`.
+    /// Name of the sub chain; its file is `sub_<name>.urdf`.
     pub(super) name: &'static str,
     pub(super) kind: &'static str,
-    /// Link of the main URDF that it hangs on.
+    /// Link of the main URDF to which it is attached.
     pub(super) root: &'static str,
     pub(super) parts: Vec<Part>,
     pub(super) hinges: Vec<Hinge>,
-    /// (link, point, link, point) of the pin that the tree leaves open.
+    /// Link, point, link and point (metres) of the pin that closes the loop.
     pub(super) pin: (&'static str, [f64; 3], &'static str, [f64; 3]),
 }
 
@@ -102,11 +102,11 @@ pub(super) struct Design {
     pub(super) effector: Option<&'static str>,
 }
 
-/// A path below the library's folder and what the file holds.
+/// A path relative to the library's folder, and the content of the file.
 pub type File = (String, Vec<u8>);
 
 impl Design {
-    /// All files of its folder.
+    /// All files of the robot's folder.
     pub(super) fn files(&self) -> Vec<File> {
         let mut out = Vec::new();
         let mut put =

@@ -1,4 +1,4 @@
-//! Nothing in; the spot welder's gun and its sliding electrode out.
+//! The spot welder's gun with its sliding electrode.
 
 use super::castings::{cheek, pipe, rib};
 use crate::solid::{Solid, cuboid, disc, lathe};

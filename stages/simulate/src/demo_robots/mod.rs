@@ -1,5 +1,5 @@
-//! Nothing in; a library of three robots of our own, drawn by code, out: the files of
-//! `<model>/robot.urdf`, meshes, sub chains and `robot.toml`. Writes nothing itself.
+//! A library of three demo robots that are drawn by code: the files of `<model>/robot.urdf`,
+//! meshes, sub chains and `robot.toml`. The caller writes them to disk.
 
 mod arm;
 mod castings;
@@ -19,8 +19,8 @@ pub const WELDER: &str = "demo_welder_2600";
 /// Name of the four-axis palletiser, 2.0 m reach, whose bars (RR) keep the wrist level.
 pub const PALLETISER: &str = "demo_palletiser_2000";
 
-/// All files of the library, paths relative to its folder with `/` between parts; by robot, then
-/// file.
+/// All files of the library, sorted by robot, then file. Paths are relative to its folder, with `/`
+/// between parts.
 #[must_use]
 pub fn files() -> Vec<File> {
     [arm::design(), palletiser::design(), welder::design()]
@@ -29,9 +29,9 @@ pub fn files() -> Vec<File> {
         .collect()
 }
 
-/// One joint axis and another: about y (pitch), about x (roll), about z (yaw).
+/// Axes of joints: roll about x, pitch about y, yaw about z.
 const X: [f64; 3] = [1.0, 0.0, 0.0];
 const Y: [f64; 3] = [0.0, 1.0, 0.0];
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
-/// Limits of a joint that turns all round, short of a second way to the same pose, radians.
+/// Limits of a joint that turns almost a full turn, so that no pose is reached twice, radians.
 const FULL_TURN: [f64; 2] = [-3.1, 3.1];

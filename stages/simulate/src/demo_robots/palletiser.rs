@@ -1,5 +1,5 @@
-//! Nothing in; the palletiser out: four axes, and bars (RR) that keep elbow plate and wrist level
-//! and drive the forearm from the carousel.
+//! The palletiser: four axes, bars (RR) that keep elbow plate and wrist level, and a rod that
+//! drives the forearm from the carousel.
 
 use super::castings::{bar, boom, cheek, foot, hub, motor, pipe, rib, trunk};
 use super::design::{Design, Hinge, Part, SubChain};
@@ -24,7 +24,7 @@ const LEVER: f64 = 0.30;
 const LEVER_Y: f64 = 0.20;
 /// Plane of the drive rod, metres.
 const ROD_Y: f64 = 0.265;
-/// Limits of joints that bars hold, radians.
+/// Limits of joints that bars set, radians.
 const FREE: [f64; 2] = [-3.2, 3.2];
 
 pub(super) fn design() -> Design {
@@ -49,7 +49,7 @@ pub(super) fn design() -> Design {
     }
 }
 
-/// The joints; those of plates and lever follow the arm's.
+/// The joints; those of plates and lever follow those of the arm.
 fn hinges() -> Vec<Hinge> {
     let turn = Hinge::turn;
     vec![
@@ -67,7 +67,7 @@ fn hinges() -> Vec<Hinge> {
     ]
 }
 
-/// The bars, each a chain of its own that a pin closes.
+/// The bars, each a sub chain that a pin closes.
 fn bars() -> Vec<SubChain> {
     let bar_chain = |name, root, link: &'static str, joint, at, body, pin| SubChain {
         name,
@@ -226,7 +226,7 @@ fn wrist_plate() -> Solid {
     ])
 }
 
-/// A flange below its joint with a plate that is longer to one side, so that the turn shows.
+/// A flange with a plate that is longer on one side, which makes its rotation visible.
 fn flange() -> Solid {
     Solid::of([
         disc(0.06, -0.03, 0.0, 0.004, 44),

@@ -1,6 +1,5 @@
-//! Nothing in; the large spot welder out: six turning axes, a gas-spring balancer (RPR), a
-//! parallelogram that drives the forearm (RRR), and a gun whose electrode slides as the seventh
-//! joint.
+//! The large spot welder: six revolute axes, a gas-spring balancer (RPR), a parallelogram that
+//! drives the forearm (RRR), and a gun whose sliding electrode is the seventh joint.
 
 use super::castings::{boom, cheek, foot, hub, motor, pipe, rib, tool_plate, trunk};
 use super::design::{Design, Hinge, Part};
@@ -103,7 +102,8 @@ fn carousel() -> Solid {
         side([0.165, 0.20]),
         hub([x, z], 0.16, [-0.25, -0.155]),
         motor(0.10, 0.30).along_y().turned([0.0, 0.0, 180.0]).at([x, -0.25, z]),
-        // Axis 1 motor stands behind on the left; the balancer's bracket behind on the right.
+        // The motor of axis 1 stands behind on the left, the balancer's bracket behind on the
+        // right.
         motor(0.105, 0.36).turned([0.0, 0.0, 150.0]).at([-0.18, 0.16, 0.14]),
         cheek(
             &[([CYLINDER_PIN[0], CYLINDER_PIN[2]], 0.055), ([-0.16, 0.09], 0.07)],

@@ -1,4 +1,4 @@
-//! Nothing in; the sub chains of the spot welder out: balancer (RPR) and parallelogram (RRR).
+//! The sub chains of the spot welder: balancer (RPR) and parallelogram (RRR).
 
 use super::castings::{bar, cheek, hub};
 use super::design::{Hinge, Part, SubChain};

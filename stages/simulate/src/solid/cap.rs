@@ -1,19 +1,19 @@
-//! Plane polygons in: insets and triangulations out.
+//! Insets and triangulations of plane polygons.
 
 /// Twice the signed area of triangle `abc`: positive counter-clockwise.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Triangles of a simple polygon given counter-clockwise, by cutting ears; n − 2 of them.
+/// The n − 2 triangles of a simple polygon (counter-clockwise), by ear clipping.
 pub(super) fn ears(polygon: &[[f64; 2]]) -> Vec<[u32; 3]> {
     let mut left: Vec<u32> = (0..polygon.len() as u32).collect();
     let mut out = Vec::with_capacity(polygon.len().saturating_sub(2));
     let at = |i: u32| polygon[i as usize];
     while left.len() > 3 {
         let n = left.len();
-        // The fattest ear keeps slivers away; a polygon that has none (touches itself) is cut at
-        // its first corner.
+        // The fattest ear is cut, which avoids slivers. A polygon without an ear (one that touches
+        // itself) is cut at its first corner.
         let best = (0..n)
             .filter_map(|k| {
                 let (a, b, c) = (left[(k + n - 1) % n], left[k], left[(k + 1) % n]);
@@ -37,7 +37,7 @@ pub(super) fn ears(polygon: &[[f64; 2]]) -> Vec<[u32; 3]> {
     out
 }
 
-/// The polygon (counter-clockwise) moved inwards by `inset`, corner by corner along the mitre.
+/// The polygon (counter-clockwise) moved inwards by `inset`, each corner along its mitre.
 pub(super) fn inset(polygon: &[[f64; 2]], inset: f64) -> Vec<[f64; 2]> {
     let n = polygon.len();
     (0..n)

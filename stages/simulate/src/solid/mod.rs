@@ -1,5 +1,4 @@
-//! Outlines, rings and paths in; closed triangle bodies out. What the hall and the demo robots are
-//! made of.
+//! Closed triangle bodies from outlines, rings and paths, of which hall and demo robots are made.
 
 mod cap;
 mod shapes;
@@ -10,18 +9,17 @@ use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Mesh;
 
-/// A closed body of triangles, counter-clockwise from outside, metres. Pieces of one body may
-/// overlap.
+/// A closed triangle body, counter-clockwise as seen from outside, metres. Its pieces may overlap.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Solid {
-    /// Corners.
+    /// Vertices, metres.
     pub vertices: Vec<Point>,
-    /// Indices of corners.
+    /// Indices of three vertices each.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl Solid {
-    /// All bodies as one.
+    /// Several bodies as one.
     #[must_use]
     pub fn of(parts: impl IntoIterator<Item = Solid>) -> Self {
         let mut out = Self::default();
@@ -38,7 +36,7 @@ impl Solid {
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
     }
 
-    /// The body moved by `pose`.
+    /// The body transformed by `pose`.
     #[must_use]
     pub fn posed(mut self, pose: &Pose) -> Self {
         for vertex in &mut self.vertices {
@@ -47,7 +45,7 @@ impl Solid {
         self
     }
 
-    /// Moved by a displacement, metres.
+    /// The body moved by a displacement, metres.
     #[must_use]
     pub fn at(self, xyz: [f64; 3]) -> Self {
         self.posed(&Pose::from_parts(
@@ -56,7 +54,7 @@ impl Solid {
         ))
     }
 
-    /// Turned about the origin: roll, pitch, yaw about fixed x, y, z, degrees.
+    /// The body rotated about the origin: roll, pitch, yaw about the fixed axes x, y, z, degrees.
     #[must_use]
     pub fn turned(self, rpy_deg: [f64; 3]) -> Self {
         let [r, p, y] = rpy_deg.map(f64::to_radians);
@@ -66,13 +64,14 @@ impl Solid {
         ))
     }
 
-    /// The z axis laid along +x (x goes to −z): bodies are drawn standing, then laid down.
+    /// The body with its z axis laid along +x (x becomes −z): bodies are drawn upright, then laid
+    /// down.
     #[must_use]
     pub fn along_x(self) -> Self {
         self.turned([0.0, 90.0, 0.0])
     }
 
-    /// The z axis laid along +y (y goes to −z).
+    /// The body with its z axis laid along +y (y becomes −z).
     #[must_use]
     pub fn along_y(self) -> Self {
         self.turned([-90.0, 0.0, 0.0])
@@ -105,7 +104,8 @@ mod tests {
     use super::*;
     use std::collections::BTreeMap;
 
-    /// Every edge is used once in each direction: the body has no hole and no doubled face.
+    /// Whether every edge is used once in each direction, so that there is no hole and no doubled
+    /// face.
     fn is_closed(solid: &Solid) -> bool {
         let mut edges: BTreeMap<(u32, u32), i32> = BTreeMap::new();
         for t in &solid.triangles {

@@ -1,14 +1,14 @@
-//! Outlines in, simple closed bodies out: prism, lathe, loft, tube and what is made of them.
+//! Simple closed bodies from outlines: prism, lathe, loft, tube, and bodies made of them.
 
 use super::{Solid, cap};
 use geometry::{Point, Vector};
 use std::f64::consts::TAU;
 
-/// A closed ring of corners, counter-clockwise seen from its outer end (the side the loft goes to).
+/// A closed ring of vertices, counter-clockwise as seen from the end of the loft.
 pub type Ring = Vec<Point>;
 
-/// A body between rings of equal length, closed at both ends (ends must be star-shaped about their
-/// middle).
+/// A body between rings of equal length, closed at both ends, which must be star-shaped about their
+/// centres.
 #[must_use]
 pub fn loft(rings: &[Ring]) -> Solid {
     let n = rings.first().map_or(0, Vec::len);
@@ -35,8 +35,8 @@ pub fn loft(rings: &[Ring]) -> Solid {
     out
 }
 
-/// A rectangle with rounded corners in a plane z = constant: middle, full size in x and y, corner
-/// radius, and the number of steps of each corner.
+/// A rectangle with rounded corners in a plane z = constant, with centre, size in x and y, corner
+/// radius (metres), and number of steps of each corner.
 #[must_use]
 pub fn rounded(centre: [f64; 3], size: [f64; 2], radius: f64, steps: usize) -> Ring {
     let radius = radius.min(0.499 * size[0]).min(0.499 * size[1]);
@@ -77,7 +77,7 @@ pub fn prism(outline: &[[f64; 2]], z0: f64, z1: f64, chamfer: f64) -> Solid {
     };
     let n = outline.len();
     let mut out = loft(&rings);
-    // The caps of a loft are fans; an outline may be hollow, so its own ears take their place.
+    // A loft closes its ends with fans; an outline may be concave, so that ears replace them.
     out.triangles.truncate(2 * n * (rings.len() - 1));
     out.vertices.truncate(n * rings.len());
     let last = (n * (rings.len() - 1)) as u32;
@@ -151,7 +151,7 @@ pub fn bolts(count: usize, radius: f64, z: f64, size: f64) -> Solid {
 }
 
 /// A round tube of `n` sides along a path of at least two points, with flat ends. The cross-section
-/// is carried along without twist.
+/// does not twist along the path.
 #[must_use]
 pub fn tube(path: &[Point], radius: f64, n: usize) -> Solid {
     let direction = |i: usize| -> Vector {

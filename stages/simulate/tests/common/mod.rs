@@ -1,4 +1,4 @@
-//! A robot of two boxes, made by hand.
+//! A robot of two boxes that is built without files.
 
 use geometry::{Aabb, Pose, Vector};
 use nalgebra::Unit;

@@ -1,4 +1,4 @@
-//! The library of demo robots, written to a folder and read back by the robot room.
+//! The library of demo robots, written to a folder and loaded again.
 
 use robot::{Library, Settings};
 use simulate::demo_robots;
