@@ -2,14 +2,16 @@
 //! out.
 
 use crate::Level;
-use crate::obstacles::{Bin, HALF_CELL, Obstacle, Obstacles, Replaced, What};
-use crate::path::STEP;
+use crate::obstacle::{HALF_CELL, Obstacle, What};
+use crate::obstacles::{Bin, Obstacles, Replaced};
 use crate::shape::{Gap, Shape};
 use contract::Fan;
 use geometry::{Aabb, Point, Pose};
 use robot::{Link, Model};
 use std::collections::BTreeMap;
 
+/// No point of the robot moves farther from one posture that is looked at to the next, metres.
+pub const STEP: f64 = 0.01;
 /// Points that hang on the links of a robot, by link, in its frame, metres.
 pub type Hung = BTreeMap<usize, Vec<[f32; 3]>>;
 

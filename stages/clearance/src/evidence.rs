@@ -6,7 +6,7 @@
 //! that has neither, in space that beams went through, is evidence of nothing. What was told by
 //! beams that grazed the edge of a robot is evidence only where others tell of a surface.
 
-use crate::obstacles::{HALF_CELL, Obstacle, What, distance};
+use crate::obstacle::{HALF_CELL, Obstacle, What, distance};
 use contract::{Space, SpaceKind};
 use geometry::{Point, Pose};
 use rustc_hash::FxHashMap;

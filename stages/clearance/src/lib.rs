@@ -7,15 +7,17 @@
 
 mod body;
 mod evidence;
+mod obstacle;
 mod obstacles;
 mod path;
 mod shadow;
 mod shape;
 
-pub use body::{Body, Hung, reach};
+pub use body::{Body, Hung, STEP, reach};
 pub use evidence::hanging;
-pub use obstacles::{CELL, Cells, FARTHEST, Known, Obstacles, What};
-pub use path::{Contact, Contacts, Leg, Looked, STEP, Walk, leg};
+pub use obstacle::{CELL, What};
+pub use obstacles::{Cells, FARTHEST, Known, Obstacles};
+pub use path::{Contact, Contacts, Leg, Looked, Walk, leg};
 pub use shadow::{Eye, Shadow};
 
 /// How a part of a robot stands to an obstacle; what is worse is greater.

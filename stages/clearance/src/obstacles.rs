@@ -2,6 +2,7 @@
 //! frame of its base, metres.
 
 use crate::evidence::evident;
+use crate::obstacle::{CELL, HALF_CELL, HALF_DIAGONAL, Obstacle, What, distance};
 use crate::shadow::{Eye, Front};
 use contract::{Space, SpaceKind};
 use geometry::{Aabb, Point, Pose, Vector};
@@ -10,46 +11,12 @@ use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Edge of the cells in which all points are one obstacle, metres: finer than planners' margins,
-/// and the floor of a cell in such cells fits into memory.
-pub const CELL: f64 = 0.004;
-/// Half the diagonal of a cube of edge 1.
-const HALF_DIAGONAL: f64 = 0.8661;
-/// Radius of a ball that holds a cell, metres.
-pub(crate) const HALF_CELL: f32 = (HALF_DIAGONAL * CELL) as f32;
 /// Edge of a bin, metres: about as many cells of a surface as bins about a robot.
 const BIN: f64 = 0.16;
 /// Bits of a cell's place on each axis.
 const BITS: u32 = 20;
 /// Farthest from a base that points are told apart, metres: 2 km.
 pub const FARTHEST: f64 = 0.5 * CELL * (1_u32 << BITS) as f64;
-
-/// What an obstacle is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum What {
-    /// Points that stand still.
-    Fixed,
-    /// Points of the floor.
-    Floor,
-    /// Points of which nobody knows.
-    Uncertain,
-    /// Those of them beside where the robot stood when it was scanned: most are its own.
-    Beside,
-    /// Points and surface of the robot with this number.
-    Robot(i16),
-    /// Space that no beam went through.
-    Unseen,
-}
-
-/// A ball.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Obstacle {
-    pub(crate) at: [f32; 3],
-    pub(crate) radius: f32,
-    pub(crate) what: What,
-    /// All beams that tell it grazed the edge of a robot (see [`crate::Shadow`]).
-    pub(crate) is_grazed: bool,
-}
 
 /// Obstacles beside each other.
 #[derive(Debug, Clone)]
@@ -357,9 +324,4 @@ fn unseen(space: &Space, base_from_world: &Pose) -> impl Iterator<Item = Obstacl
             is_grazed: false,
         }
     })
-}
-
-#[inline]
-pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f32>().sqrt()
 }

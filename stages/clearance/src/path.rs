@@ -2,13 +2,12 @@
 //! where on the way which part is near to what, out.
 
 use crate::Level;
-use crate::body::{Body, Near, Touch};
-use crate::obstacles::{Obstacles, What};
+use crate::body::{Body, Near, STEP, Touch};
+use crate::obstacle::What;
+use crate::obstacles::Obstacles;
 use geometry::Point;
 use std::collections::BTreeMap;
 
-/// No point of the robot moves farther from one posture that is looked at to the next, metres.
-pub const STEP: f64 = 0.01;
 /// A first guess of steps: so far do joints go in one, radians or metres. Arcs differ from their
 /// chords by less than 0.2 % then.
 const TURN: f64 = 0.1;

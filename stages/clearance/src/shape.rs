@@ -1,7 +1,7 @@
 //! The surface of a link, or points that hang on it, in; how far a place is from it, out. All in
 //! the frame of the link, metres.
 
-use crate::obstacles::{HALF_CELL, distance};
+use crate::obstacle::{HALF_CELL, distance};
 use contract::{Space, SpaceGrid, SpaceKind};
 use geometry::{Aabb, NearestField};
 use glamx::Vec3;

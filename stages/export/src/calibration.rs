@@ -1,7 +1,7 @@
 //! What a calibration found in; its part of `result.json` out, and back.
 
+use crate::finite::finite;
 use crate::places::Places;
-use crate::result::finite;
 use contract::{Calibration, Fit, JointFrame};
 use serde::{Deserialize, Serialize};
 

@@ -15,6 +15,7 @@ mod clouds;
 mod copc;
 mod e57;
 mod evidence_picture;
+mod finite;
 mod junit;
 mod las;
 mod mask;

@@ -1,6 +1,7 @@
 //! `result.json`: what was found, how sure that is, and from what; schema `stillpoint.result/1`,
 //! which grows by adding fields. Numbers that are not finite are written as null.
 
+use crate::finite::finite;
 use crate::calibration::CalibrationEntry;
 use crate::mask::MaskFiles;
 use crate::places::Places;
@@ -418,9 +419,4 @@ impl ScanLabels {
 /// Something of each joint of a fit, by name.
 fn each<T>(fit: &Fit, of: impl Fn(&JointFit) -> T) -> Vec<(String, T)> {
     fit.joints.iter().map(|joint| (joint.name.clone(), of(joint))).collect()
-}
-
-/// The number, if it is one.
-pub(crate) fn finite(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
 }

@@ -1,7 +1,7 @@
 //! One resolution of a depth image: hits in; each cell's nearest and farthest, what its neighbours
 //! say, and the next coarser level, out.
 
-use crate::depth::{LANES, Lanes};
+use crate::lanes::{LANES, Lanes};
 
 /// A raster of nearest and farthest ranges at one resolution.
 #[derive(Debug, Clone)]

@@ -1,6 +1,7 @@
 //! E57 (ASTM E2807) files in; scans and their points out. The description is parsed by the crate
 //! `e57`, points are decoded here.
 
+mod describe;
 mod look;
 mod packets;
 mod pages;

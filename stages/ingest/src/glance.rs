@@ -2,7 +2,8 @@
 //! guess what stands in a plant without reading all of it.
 
 use crate::reader::{Extent, RawStrip, RawStrips, Reading, Want};
-use crate::sources::{File, Sources};
+use crate::file::File;
+use crate::sources::Sources;
 use contract::{Fan, InputId, Result};
 use geometry::Point;
 

@@ -1,6 +1,6 @@
 //! The bytes of a LAS or LAZ file in; its header out, checked against the length of the file.
 
-use crate::las_record::Layout;
+use crate::las_layout::Layout;
 use crate::units::{self, Declaration};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;

@@ -1,76 +1,19 @@
-//! Bytes of LAS point records in; strips out. The table of the eleven point formats, and the one
-//! loop that every LAS and LAZ point goes through.
+//! Bytes of LAS point records in; strips out: the one loop that every LAS and LAZ point goes
+//! through.
 
 use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
+use crate::las_layout::{Layout, u16_at};
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, Want};
 use contract::Attributes;
 use geometry::Pose;
-
-/// Where the fields of a point format lie, bytes from the start of the record.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Layout {
-    /// Shortest record.
-    pub(crate) len: usize,
-    /// Formats 6 to 10: flags, class and source id lie elsewhere.
-    pub(crate) modern: bool,
-    /// GPS time.
-    pub(crate) gps_time: Option<usize>,
-    /// Red, green, blue.
-    pub(crate) color: Option<usize>,
-}
-
-/// LAS 1.4 R15, tables 7 to 17.
-const LAYOUTS: [Layout; 11] = [
-    Layout { len: 20, modern: false, gps_time: None, color: None },
-    Layout { len: 28, modern: false, gps_time: Some(20), color: None },
-    Layout { len: 26, modern: false, gps_time: None, color: Some(20) },
-    Layout { len: 34, modern: false, gps_time: Some(20), color: Some(28) },
-    Layout { len: 57, modern: false, gps_time: Some(20), color: None },
-    Layout { len: 63, modern: false, gps_time: Some(20), color: Some(28) },
-    Layout { len: 30, modern: true, gps_time: Some(22), color: None },
-    Layout { len: 36, modern: true, gps_time: Some(22), color: Some(30) },
-    Layout { len: 38, modern: true, gps_time: Some(22), color: Some(30) },
-    Layout { len: 59, modern: true, gps_time: Some(22), color: None },
-    Layout { len: 67, modern: true, gps_time: Some(22), color: Some(30) },
-];
 
 /// Records that are decoded together: small enough for the first-level cache, long enough for
 /// vector loops.
 const BLOCK: usize = 64;
 /// Intensity lies at the same place in all formats.
 const INTENSITY: usize = 12;
-
-impl Layout {
-    /// The layout of a point format.
-    pub(crate) fn of(format: u8) -> Option<Self> {
-        LAYOUTS.get(usize::from(format)).copied()
-    }
-
-    /// Whether the file marks the point as not to be used.
-    #[inline]
-    pub(crate) fn withheld(self, record: &[u8]) -> bool {
-        if self.modern { record[15] & 0b100 != 0 } else { record[15] & 0b1000_0000 != 0 }
-    }
-
-    /// Point source id.
-    #[inline]
-    pub(crate) fn source_id(self, record: &[u8]) -> u16 {
-        u16_at(record, if self.modern { 20 } else { 18 })
-    }
-
-    /// Class.
-    #[inline]
-    fn classification(self, record: &[u8]) -> u8 {
-        if self.modern { record[16] } else { record[15] & 0b1_1111 }
-    }
-}
-
-#[inline]
-fn u16_at(record: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes([record[at], record[at + 1]])
-}
 
 #[inline]
 fn i32_at(record: &[u8], at: usize) -> f64 {

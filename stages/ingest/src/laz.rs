@@ -303,7 +303,7 @@ fn read_vlr(payload: &[u8], header: &LasHeader) -> Result<(LazVlr, CompressorTyp
         Error::new(Kind::Unsupported, "the compression is not known").because(cause)
     })?;
     let extra =
-        header.record_len - crate::las_record::Layout::of(header.format).map_or(0, |l| l.len);
+        header.record_len - crate::las_layout::Layout::of(header.format).map_or(0, |l| l.len);
     let expected =
         LazItemRecordBuilder::default_for_point_format_id(header.format, extra as u16)
             .map_err(|cause| damaged("the compression does not fit the points").because(cause))?;

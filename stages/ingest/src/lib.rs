@@ -2,17 +2,21 @@
 //! what is in them.
 #![deny(unsafe_code)]
 
+mod angular_grid;
 mod bounds;
 #[cfg(test)]
 mod check;
 mod e57;
+mod file;
 mod format;
 mod frame;
 mod glance;
 mod inspect;
 mod las;
 mod las_header;
+mod las_layout;
 mod las_record;
+mod las_runs;
 mod las_scans;
 mod laz;
 mod levels;

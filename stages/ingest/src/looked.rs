@@ -1,19 +1,25 @@
 //! A scan of an open file in; what a sample of its points tells out: its raster, where most of it
 //! lies, and whether its scanner can have stood where it is said to.
 
+use crate::file::{File, moved};
 use crate::position;
 use crate::raster::{self, Raster, Steps};
 use crate::reader::Sampled;
 use crate::settings::Settings;
-use crate::size::{self, N_LOOKED};
-use crate::sources::File;
 use contract::{Result, Scan};
-use geometry::{Aabb, Pose};
+use geometry::{Aabb, Point, Pose};
 
 /// Said of a scan that a camera took.
 const CAMERA: &str = "taken by a depth camera: its points err by half a percent of their range, alike over a hand's width";
 /// Said of a scan whose scanner is known and whose raster is not.
 const NO_RASTER: &str = "too few points to tell the raster: no free-space evidence from this scan";
+/// Points of a scan that are looked at where nothing else needs a sample.
+const N_LOOKED: usize = 4096;
+/// Fewer points spread over nothing in particular.
+const LEAST_POINTS: usize = 100;
+/// Share of the points on either side that count for nothing: strays, and what is seen through
+/// gates.
+const TAIL: f64 = 0.05;
 
 /// What a look at a scan tells.
 #[derive(Default)]
@@ -39,7 +45,7 @@ impl File {
         if let Some(new_from_file) = &self.moved[i] {
             sample.iter_mut().for_each(|s| s.xyz = moved(new_from_file, s.xyz));
         }
-        let spread = size::spread(sample.iter().map(|s| s.xyz), &scan.world_from_scan);
+        let spread = spread(sample.iter().map(|s| s.xyz), &scan.world_from_scan);
         if !self.known[i] {
             return Ok(Looked { spread, ..Looked::default() });
         }
@@ -71,8 +77,20 @@ impl File {
     }
 }
 
-/// A place in the frame of a scan whose pose the user replaced.
-pub(crate) fn moved(pose: &Pose, p: [f32; 3]) -> [f32; 3] {
-    let q = pose * nalgebra::Point3::from(p.map(f64::from));
-    [q.x as f32, q.y as f32, q.z as f32]
+/// Where most points of a scan lie in the world, metres; nothing of too few points.
+fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose) -> Option<Aabb> {
+    let world = xyz.map(|p| world_from_scan * Point::from(p.map(f64::from)));
+    let world: Vec<Point> = world.collect();
+    if world.len() < LEAST_POINTS {
+        return None;
+    }
+    let last = (world.len() - 1) as f64;
+    let (low, high) = ((last * TAIL) as usize, (last * (1.0 - TAIL)) as usize);
+    let mut out = Aabb::EMPTY;
+    for axis in 0..3 {
+        let mut along: Vec<f64> = world.iter().map(|p| p[axis]).collect();
+        along.sort_unstable_by(f64::total_cmp);
+        (out.min[axis], out.max[axis]) = (along[low], along[high]);
+    }
+    Some(out)
 }

@@ -2,7 +2,7 @@
 //! whether a camera took them: its pixels lie at equal distances on a plane before it, a scanner's
 //! beams at equal angles.
 
-use crate::raster::{Axis, wrap};
+use crate::angular_grid::{Axis, wrap};
 use crate::reader::Sampled;
 use nalgebra::Vector3;
 

@@ -2,14 +2,13 @@
 //! columns where they are regular, else from the directions of the points. Never finer than about
 //! one point a pixel.
 
+use crate::angular_grid::{AngularGrid, wrap};
 use crate::picture::is_picture;
 use crate::raster_free;
 use crate::raster_native;
 use crate::reader::Sampled;
 use crate::settings::Settings;
 use contract::Lattice;
-use nalgebra::{UnitQuaternion, Vector3};
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Where the steps of a lattice come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +48,7 @@ pub(crate) fn estimate(
         return None;
     }
     let is_camera = is_picture(&sample);
-    let with = |grid: &Grid, steps| {
+    let with = |grid: &AngularGrid, steps| {
         let lattice = Lattice { is_camera, ..lattice(grid, settings) };
         Some(Raster { lattice, steps })
     };
@@ -63,17 +62,7 @@ pub(crate) fn estimate(
     with(&grid, Steps::Directions)
 }
 
-/// Steps and one pixel's middle, about one axis; radians.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Grid {
-    pub(crate) axis: Axis,
-    pub(crate) row_step: f64,
-    pub(crate) col_step: f64,
-    pub(crate) elevation: f64,
-    pub(crate) azimuth: f64,
-}
-
-fn lattice(grid: &Grid, settings: &Settings) -> Lattice {
+fn lattice(grid: &AngularGrid, settings: &Settings) -> Lattice {
     let clamp = |step: f64| step.abs().clamp(settings.min_step, settings.max_step);
     let mut lattice = Lattice::new(
         clamp(grid.row_step),
@@ -83,50 +72,6 @@ fn lattice(grid: &Grid, settings: &Settings) -> Lattice {
     );
     lattice.lattice_from_scan = grid.axis.lattice_from_scan();
     lattice
-}
-
-/// Which axis of the scan frame the scanner spins about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Axis {
-    X,
-    Y,
-    Z,
-}
-
-impl Axis {
-    /// The usual one first: it is preferred where several fit.
-    pub(crate) const ALL: [Self; 3] = [Self::Z, Self::Y, Self::X];
-
-    /// Turns this axis into z.
-    pub(crate) fn lattice_from_scan(self) -> UnitQuaternion<f64> {
-        match self {
-            Self::Z => UnitQuaternion::identity(),
-            Self::Y => UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2),
-            Self::X => UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -FRAC_PI_2),
-        }
-    }
-
-    /// Azimuth and elevation about this axis, radians.
-    pub(crate) fn angles(self, p: [f32; 3]) -> [f64; 2] {
-        let [x, y, z] = p.map(f64::from);
-        let [x, y, z] = match self {
-            Self::Z => [x, y, z],
-            Self::Y => [x, -z, y],
-            Self::X => [-z, y, x],
-        };
-        [y.atan2(x), z.atan2(x.hypot(y))]
-    }
-}
-
-/// An angle in [−π, π).
-pub(crate) fn wrap(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(TAU) - PI
-}
-
-/// The middle one, or the upper of two.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! directions suggest out. Points in scan order tell both steps; depth images and shuffled points
 //! tell the density only.
 
-use crate::raster::{Axis, Grid, median, wrap};
+use crate::angular_grid::{AngularGrid, Axis, median, wrap};
 use crate::reader::Sampled;
 use std::f64::consts::TAU;
 
@@ -24,7 +24,7 @@ const STEEP: f64 = 1.3;
 const SAME: f64 = 1e-6;
 
 /// Fits; `None` only where directions do not spread at all.
-pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<Grid> {
+pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<AngularGrid> {
     let about_z: Vec<[f64; 2]> = sample.iter().map(|s| Axis::Z.angles(s.xyz)).collect();
     let spacing = spacing(&about_z)?;
     let steps = consecutive(sample);
@@ -48,9 +48,9 @@ pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<Grid> {
 }
 
 /// The same step both ways.
-fn square(angles: &[[f64; 2]], step: f64) -> Grid {
+fn square(angles: &[[f64; 2]], step: f64) -> AngularGrid {
     let [azimuth, elevation] = angles[angles.len() / 2];
-    Grid { axis: Axis::Z, row_step: step, col_step: step, elevation, azimuth }
+    AngularGrid { axis: Axis::Z, row_step: step, col_step: step, elevation, azimuth }
 }
 
 /// Angles between points that follow one another, radians.
@@ -92,7 +92,7 @@ impl Lines {
     }
 
     /// Steps along and across the lines, and the phase where it is sharp.
-    fn grid(&self, guess: f64) -> Grid {
+    fn grid(&self, guess: f64) -> AngularGrid {
         let (u, v) = if self.upright { (1, 0) } else { (0, 1) };
         let flat: Vec<[f64; 2]> =
             self.angles.iter().copied().filter(|a| a[1].abs() < STEEP).collect();
@@ -118,7 +118,7 @@ impl Lines {
         } else {
             (across, across_phase, along, along_phase)
         };
-        Grid { axis: self.axis, row_step, col_step, elevation, azimuth }
+        AngularGrid { axis: self.axis, row_step, col_step, elevation, azimuth }
     }
 }
 

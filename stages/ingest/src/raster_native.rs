@@ -2,14 +2,14 @@
 //! well it does. Rows are elevation and columns azimuth, about one of three axes, either way round,
 //! with or without a jump at ±π.
 
-use crate::raster::{Axis, Grid, median, wrap};
+use crate::angular_grid::{AngularGrid, Axis, median, wrap};
 use crate::reader::Sampled;
 use geometry::robust::tukey;
 
 /// A raster fitted to native rows and columns.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Native {
-    pub(crate) grid: Grid,
+    pub(crate) grid: AngularGrid,
     /// Residual of the worse of rows and columns, pixels RMS, the worst 2 % left out.
     pub(crate) rms: f64,
 }
@@ -57,7 +57,7 @@ fn fit_axis(native: &[([f32; 3], [u32; 2])], axis: Axis) -> Option<Native> {
     let row = Line::fit(&rows)?;
     let col = Line::fit(&cols)?;
     let rms = row.rms(&rows).max(col.rms(&cols));
-    let grid = Grid {
+    let grid = AngularGrid {
         axis,
         row_step: row.slope.abs(),
         col_step: col.slope.abs(),

@@ -1,18 +1,12 @@
 //! A sample of each scan in; how far its points spread, and whether that can be a plant in the
 //! units that they are read in, out.
 
-use crate::sources::{File, Sources};
+use crate::file::File;
+use crate::sources::Sources;
 use crate::units::{Origin, Unit, Units};
 use contract::{Error, Input, Result, quote};
 use geometry::{Aabb, Point, Pose};
 
-/// Points of a scan that are looked at where nothing else needs a sample.
-pub(crate) const N_LOOKED: usize = 4096;
-/// Fewer points spread over nothing in particular.
-const LEAST_POINTS: usize = 100;
-/// Share of the points on either side that count for nothing: strays, and what is seen through
-/// gates.
-const TAIL: f64 = 0.05;
 /// No scan of a plant spreads farther, metres: halls measure hundreds of metres, scanners reach as
 /// far.
 const LARGEST: [f64; 3] = [2_000.0, 2_000.0, 200.0];
@@ -26,24 +20,6 @@ const SHARE_OF_REACH: f64 = 0.2;
 const CELL: [[f64; 2]; 2] = [[1.5, 500.0], [0.8, 100.0]];
 /// Units that are tried on a cloud of the wrong size, the most common ones first.
 const TRIED: [(&str, f64); 4] = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("km", 1e3)];
-
-/// Where most points of a scan lie in the world, metres; nothing of too few points.
-pub(crate) fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose) -> Option<Aabb> {
-    let world = xyz.map(|p| world_from_scan * Point::from(p.map(f64::from)));
-    let world: Vec<Point> = world.collect();
-    if world.len() < LEAST_POINTS {
-        return None;
-    }
-    let last = (world.len() - 1) as f64;
-    let (low, high) = ((last * TAIL) as usize, (last * (1.0 - TAIL)) as usize);
-    let mut out = Aabb::EMPTY;
-    for axis in 0..3 {
-        let mut along: Vec<f64> = world.iter().map(|p| p[axis]).collect();
-        along.sort_unstable_by(f64::total_cmp);
-        (out.min[axis], out.max[axis]) = (along[low], along[high]);
-    }
-    Some(out)
-}
 
 impl Sources {
     /// Refuses inputs that cannot be of a plant in the units that they are read in: where nobody

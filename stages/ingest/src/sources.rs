@@ -1,9 +1,9 @@
 //! Paths in; open inputs out, numbered over all of them: inputs, masks, scans with their lattices,
 //! and the strips of each input on request.
 
+use crate::file::File;
 use crate::format::detect;
 use crate::las::Las;
-use crate::looked::moved;
 use crate::poses::Poses;
 use crate::raster::Steps;
 use crate::reader::{self, Extent, RawStrip, Reader, Reading, ScanSeed, Want};
@@ -56,21 +56,6 @@ pub struct Before {
     pub masks: Vec<Mask>,
     /// In the order of the inputs.
     pub scans: Vec<Scan>,
-}
-
-/// One open file.
-pub(crate) struct File {
-    pub(crate) reader: Box<dyn Reader>,
-    pub(crate) first_scan: u32,
-    first_mask: u32,
-    /// For each scan whose pose the user replaced: its new scan frame from that of the file.
-    pub(crate) moved: Vec<Option<Pose>>,
-    /// For each scan: whether its scanner's position is known.
-    pub(crate) known: Vec<bool>,
-    /// For each scan: where the steps of its lattice come from.
-    pub(crate) steps: Vec<Steps>,
-    /// For each scan: where most of its points lie in the world, metres, where that could be told.
-    pub(crate) spreads: Vec<Option<Aabb>>,
 }
 
 /// Opens inputs: finds out what each is, reads and checks its header, and makes the lattices of
@@ -363,29 +348,6 @@ impl Weigh for Piece {
         match self {
             Self::Strip(strip) => strip.n_points(),
             Self::Extent(extent) => extent.n_points,
-        }
-    }
-}
-
-impl File {
-    /// What came of reading, if the file was whole all along: one that was cut short reads as zeros
-    /// from there, and that it was goes before what its reader makes of them.
-    fn whole<T>(&self, read: Result<T>) -> Result<T> {
-        self.reader.check().and(read)
-    }
-
-    pub(crate) fn number(&self, mut raw: RawStrip) -> Strip {
-        let seed: &ScanSeed = &self.reader.scans()[raw.scan];
-        if let Some(new_from_file) = &self.moved[raw.scan] {
-            raw.xyz.iter_mut().for_each(|p| *p = moved(new_from_file, *p));
-        }
-        Strip {
-            scan: ScanId(self.first_scan + raw.scan as u32),
-            mask: MaskId(self.first_mask + seed.mask as u32),
-            first_place: raw.first_place,
-            place: raw.place,
-            xyz: raw.xyz,
-            attributes: raw.attributes,
         }
     }
 }

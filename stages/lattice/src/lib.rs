@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod accord;
+mod fill;
 mod links;
 mod noise;
 mod normals;
@@ -12,12 +13,13 @@ mod raster;
 mod regions;
 mod settings;
 mod summarise;
+mod tile_normals;
 mod view;
 mod voxels;
 
 pub use accord::{agree, disagreement};
-pub use normals::normals;
-pub use raster::veils;
+pub use fill::veils;
 pub use settings::Settings;
 pub use summarise::{Scratch, Summarise};
+pub use tile_normals::normals;
 pub use view::{Extent, ViewBuilder, ViewSettings};

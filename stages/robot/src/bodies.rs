@@ -2,7 +2,7 @@
 //! not an end.
 
 use crate::finding::Findings;
-use crate::load::Settings;
+use crate::settings::Settings;
 use crate::mesh;
 use crate::model::JointKind;
 use crate::reading::{file_name, read_bytes};

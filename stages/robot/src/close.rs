@@ -2,7 +2,7 @@
 
 use crate::finding::Findings;
 use crate::kinematics::Placing;
-use crate::loops::{ClosedLoop, Closure, Form};
+use crate::closed_loop::{ClosedLoop, Closure, Form};
 use crate::model::{JointKind, Model, Motion};
 use crate::sheet::{LoopWord, SubChain};
 use contract::words::count;

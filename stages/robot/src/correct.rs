@@ -2,7 +2,7 @@
 //! out, all else as it was written, but for the declared encoding: what comes out is UTF-8.
 
 use crate::encoding;
-use crate::load::Settings;
+use crate::settings::Settings;
 use crate::urdf::{self, has_quaternions};
 use contract::{Error, Result};
 use geometry::{Pose, Vector};

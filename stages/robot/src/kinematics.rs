@@ -1,6 +1,6 @@
 //! A posture in; poses of all links out, and how they move with each free joint.
 
-use crate::loops::ClosedLoop;
+use crate::closed_loop::ClosedLoop;
 use crate::model::{Joint, JointKind, Kinematics, Model, Motion};
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};

@@ -1,7 +1,8 @@
 //! A folder of models in; models and findings out.
 
 use crate::finding::{Finding, Findings, Severity};
-use crate::load::{Settings, load, urdfs};
+use crate::load::{load, urdfs};
+use crate::settings::Settings;
 use crate::model::Model;
 use contract::words::count;
 use contract::{Error, Result};

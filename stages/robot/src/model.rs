@@ -1,6 +1,6 @@
 //! The model of a robot: a tree of links and joints with their meshes, and which joints are free.
 
-use crate::loops::ClosedLoop;
+use crate::closed_loop::ClosedLoop;
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! A scene in; the first thing that is wrong with it out. Limits keep a typing error from taking
-//! all memory.
+//! The text of a scene in; the scene, or the first thing that is wrong with it, out. Limits keep a
+//! typing error from taking all memory.
 
 use crate::scene::{Scanner, Scene};
 use contract::{Error, Result};
@@ -25,11 +25,27 @@ fn finite(what: &str, place: &str, values: &[f64], low: f64, high: f64) -> Resul
     }
 }
 
+impl Scene {
+    /// Reads a scene file's text.
+    ///
+    /// # Errors
+    /// `BadInput` where the text is no scene: unknown names, missing values, numbers out of range.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        let scene: Self = toml::from_str(text).map_err(|e| {
+            Error::bad_input("scene cannot be read")
+                .because(e)
+                .hint("the words of a scene are in stages/simulate/README.md")
+        })?;
+        check(&scene)?;
+        Ok(scene)
+    }
+}
+
 /// Refuses numbers that mean nothing and names that nobody has.
 ///
 /// # Errors
 /// `BadInput` at the first thing that is wrong.
-pub(crate) fn check(scene: &Scene) -> Result<()> {
+fn check(scene: &Scene) -> Result<()> {
     hall(scene)?;
     bodies(scene)?;
     robots(scene)?;

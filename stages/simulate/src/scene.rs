@@ -301,20 +301,6 @@ impl Scene {
 }
 
 impl Scene {
-    /// Reads a scene file's text.
-    ///
-    /// # Errors
-    /// `BadInput` where the text is no scene: unknown names, missing values, numbers out of range.
-    pub fn from_toml(text: &str) -> Result<Self> {
-        let scene: Self = toml::from_str(text).map_err(|e| {
-            Error::bad_input("scene cannot be read")
-                .because(e)
-                .hint("the words of a scene are in stages/simulate/README.md")
-        })?;
-        crate::check::check(&scene)?;
-        Ok(scene)
-    }
-
     /// The scene as text that [`Scene::from_toml`] reads back.
     ///
     /// # Errors

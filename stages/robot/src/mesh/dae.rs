@@ -2,7 +2,7 @@
 //! applied, `<up_axis>` not, as the viewers do for which robot makers draw their meshes.
 
 use super::Soup;
-use crate::load::Settings;
+use crate::settings::Settings;
 use contract::check_xml;
 use nalgebra::{Matrix4, Rotation3, Unit, Vector3};
 use roxmltree::{Document, Node};

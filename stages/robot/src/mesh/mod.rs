@@ -7,7 +7,7 @@ pub(crate) mod primitive;
 mod stl;
 
 use crate::encoding;
-use crate::load::Settings;
+use crate::settings::Settings;
 use crate::model::Mesh;
 use geometry::{Pose, Vector, narrow::local_f32};
 use std::collections::HashMap;

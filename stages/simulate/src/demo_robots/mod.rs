@@ -7,6 +7,7 @@ mod design;
 mod gun;
 mod palletiser;
 mod welder;
+mod welder_dimensions;
 mod welder_loops;
 
 pub use design::File;

@@ -2,7 +2,7 @@
 
 use super::castings::{bar, cheek, hub};
 use super::design::{Hinge, Part, SubChain};
-use super::welder::{CYLINDER_PIN, LEVER, ROD_PIN, SHOULDER, UPPER};
+use super::welder_dimensions::{CYLINDER_PIN, LEVER, ROD_PIN, SHOULDER, UPPER};
 use super::{X, Y};
 use crate::solid::{Solid, cuboid, disc, lathe};
 
