@@ -1,8 +1,8 @@
 //! `result.json`: what was found, how sure that is, and from what; schema `stillpoint.result/1`,
 //! which grows by adding fields. Numbers that are not finite are written as null.
 
-use crate::finite::finite;
 use crate::calibration::CalibrationEntry;
+use crate::finite::finite;
 use crate::mask::MaskFiles;
 use crate::places::Places;
 use crate::review::ReviewEntry;

@@ -1,8 +1,8 @@
 //! An open input in; some of its points, spread over it as well as its format lets, out: enough to
 //! guess what stands in a plant without reading all of it.
 
-use crate::reader::{Extent, RawStrip, RawStrips, Reading, Want};
 use crate::file::File;
+use crate::reader::{Extent, RawStrip, RawStrips, Reading, Want};
 use crate::sources::Sources;
 use contract::{Fan, InputId, Result};
 use geometry::Point;

@@ -2,9 +2,9 @@
 //! id belongs to which scanner, and where the origin lies when no scanner is known.
 
 use crate::frame::NO_RETURN;
-use crate::las_runs::Records;
 use crate::las_header::LasHeader;
 use crate::las_layout::Layout;
+use crate::las_runs::Records;
 use crate::oddities::no_returns_note;
 use crate::reader::ScanSeed;
 use crate::settings::Settings;

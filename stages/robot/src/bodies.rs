@@ -2,11 +2,11 @@
 //! not an end.
 
 use crate::finding::Findings;
-use crate::settings::Settings;
 use crate::mesh;
 use crate::model::JointKind;
 use crate::reading::{file_name, read_bytes};
 use crate::resolve::Roots;
+use crate::settings::Settings;
 use crate::tree::Tree;
 use crate::urdf::{Body, Shape};
 use geometry::Aabb;

@@ -1,8 +1,8 @@
 //! Sub chains as `robot.toml` has them and a tree in; closed loops in order of solution out.
 
+use crate::closed_loop::{ClosedLoop, Closure, Form};
 use crate::finding::Findings;
 use crate::kinematics::Placing;
-use crate::closed_loop::{ClosedLoop, Closure, Form};
 use crate::model::{JointKind, Model, Motion};
 use crate::sheet::{LoopWord, SubChain};
 use contract::words::count;

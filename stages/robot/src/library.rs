@@ -2,8 +2,8 @@
 
 use crate::finding::{Finding, Findings, Severity};
 use crate::load::{load, urdfs};
-use crate::settings::Settings;
 use crate::model::Model;
+use crate::settings::Settings;
 use contract::words::count;
 use contract::{Error, Result};
 use std::path::{Path, PathBuf};
