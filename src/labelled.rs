@@ -6,7 +6,7 @@ use crate::spaces::{Grids, Spot};
 use contract::{Label, Map, MaskId, PlaceRun, PointKind, Result, Scan, Strip, Weigh};
 use export::{LabelColumns, Pack, Packed, PlanPicture, PointColumns};
 use geometry::{Aabb, Point, Pose};
-use segment::Ground;
+use segment::FloorHeights;
 use std::ops::Range;
 
 /// Points whose bounds are looked at together: neighbours of a scan are near each other.

@@ -12,12 +12,12 @@ use attach::Hanging;
 use contract::{Cluster, Fit, Floor, Input, InputId, Result, Space};
 use export::{
     Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Spool,
-    Tiles, Written, write_space,
+    Tiles, WrittenFiles, write_space,
 };
 use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
 use robot::Model;
-use segment::Ground;
+use segment::FloorHeights;
 use std::path::Path;
 
 use crate::bodies::Bodies;
@@ -65,7 +65,7 @@ pub(crate) struct Scope {
 
 /// What was written.
 pub(crate) struct Done {
-    pub(crate) clouds: Written,
+    pub(crate) clouds: WrittenFiles,
     /// For each mask: entries, points that were dropped, and points that are said to move.
     pub(crate) masks: Vec<MaskCount>,
     /// Pictures, relative to the output folder.
@@ -202,7 +202,7 @@ impl<'a> Labelling<'a> {
         };
         let (((masks, mut digests), (moving, fixed)), (tiles, open, pictures)) =
             engine.handing("clouds", apart, along)?;
-        let clouds = Written { tiles, robots: moving, fixed };
+        let clouds = WrittenFiles { tiles, robots: moving, fixed };
         digests.extend(clouds.sums().cloned());
         let said = vec![None; self.fits.len()];
         let done = Done { clouds, masks, pictures, spaces: said, digests, las };

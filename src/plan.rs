@@ -23,7 +23,7 @@ use crate::tools;
 use crate::units;
 use contract::{Cluster, Fit, Floor, Input, Region, Result, Scan, Space};
 use export::{COPC, ReviewEntry};
-use ingest::{Scanners, Sources};
+use ingest::{KnownScanners, Sources};
 use robot::{Library, Model};
 use std::path::PathBuf;
 
@@ -134,7 +134,7 @@ impl Run<'_> {
         let most = settings.ingest.max_text_bytes;
         let read = |path: &PathBuf| Review::read(path, &library.models, most);
         let review = job.review.as_ref().map(read).transpose()?.unwrap_or_default();
-        let read = |path| Scanners::read(path, &job.means.settings.ingest);
+        let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
         let scanners = job.scanners.as_deref().map(read).transpose()?;
         let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
         let sources = engine.pool()?.install(open)?;

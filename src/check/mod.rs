@@ -15,7 +15,7 @@ use crate::library;
 use crate::rescan::{State, models_of};
 use crate::reuse::Vouched;
 use crate::trajectory::Trajectory;
-use clearance::{Body, Contact, Contacts, FARTHEST, Obstacles, Walk};
+use clearance::{Contact, Contacts, FARTHEST, Obstacles, RobotBody, Walk};
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::ResultFile;
 use geometry::{Point, Pose};
@@ -115,7 +115,7 @@ pub fn check(request: &Request, means: &Means, engine: &Engine) -> Result<Report
 pub(crate) struct Place<'a> {
     request: &'a Request,
     robot: &'a Robot<'a>,
-    body: Body<'a>,
+    body: RobotBody<'a>,
     obstacles: Obstacles,
     /// Ids of all robots, by their numbers.
     ids: Vec<String>,
@@ -208,7 +208,7 @@ fn surrounded<'a>(
     (around, others, models): (&Surroundings<'_>, &[(usize, &Fit)], &[Model]),
     request: &Request,
     engine: &Engine,
-) -> Result<(Body<'a>, Obstacles)> {
+) -> Result<(RobotBody<'a>, Obstacles)> {
     let margin = request.margin;
     let mut far = clearance::reach(robot.model) + margin + HUNG;
     loop {
@@ -218,7 +218,7 @@ fn surrounded<'a>(
         }
         let (hung, obstacles) = around.gather(robot, (others, models), far, engine)?;
         let sizes = (margin, obstacles.largest());
-        let body = engine.pool()?.install(|| Body::new(robot.model, hung, sizes, &AllThreads));
+        let body = engine.pool()?.install(|| RobotBody::new(robot.model, hung, sizes, &AllThreads));
         let needed = body.farthest() + margin + BETWEEN;
         if needed <= far {
             return Ok((body, obstacles));

@@ -4,7 +4,7 @@
 use super::{Doubt, Outcome, Report, Request};
 use crate::reuse::Manifest;
 use crate::trajectory::Trajectory;
-use clearance::{Contact, Leg, Level, What};
+use clearance::{Contact, ContactLevel, Leg, What};
 use contract::{Error, Fit, JointFit, Result, Verdict};
 use export::{RobotEntry, mesh_files};
 use robot::{JointKind, Model};
@@ -157,21 +157,21 @@ impl Robot<'_> {
         let mut doubts = if warnings.is_empty() { Vec::new() } else { vec![Doubt::Posture] };
         let is_beside = |c: &Contact| c.what == What::Beside || c.is_doubtful;
         let stands = |c: &&Contact| !c.as_found && !is_beside(c);
-        let is = |level: Level| contacts.iter().filter(stands).any(|c| c.level >= level);
+        let is = |level: ContactLevel| contacts.iter().filter(stands).any(|c| c.level >= level);
         let has = |is: &dyn Fn(&Contact) -> bool| contacts.iter().any(is);
         // What was as near where it stood is no news: it stood there.
         if has(&Contact::is_unseen) {
             doubts.push(Doubt::Unseen);
         }
-        if has(&|c| is_beside(c) && c.level > Level::Unseen && !c.as_found) {
+        if has(&|c| is_beside(c) && c.level > ContactLevel::Unseen && !c.as_found) {
             doubts.push(Doubt::Beside);
         }
-        if has(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c)) {
+        if has(&|c| c.as_found && c.level > ContactLevel::Unseen && !is_beside(c)) {
             doubts.push(Doubt::AsFound);
         }
-        let outcome = if is(Level::Hit) || !impossible.is_empty() {
+        let outcome = if is(ContactLevel::Hit) || !impossible.is_empty() {
             Outcome::Blocked
-        } else if is(Level::Near) {
+        } else if is(ContactLevel::Near) {
             Outcome::Near
         } else if doubts.is_empty() {
             Outcome::Free

@@ -5,7 +5,7 @@ use super::say::Say;
 use crate::engine::AllThreads;
 use crate::exit;
 use contract::Result;
-use ingest::Scanners;
+use ingest::KnownScanners;
 
 pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;

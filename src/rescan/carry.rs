@@ -7,7 +7,7 @@ use crate::engine::{AllThreads, Engine, Task};
 use crate::store::Store;
 use contract::{Error, Result, Scan, words};
 use export::CarriedEntry;
-use frame::{Answer, Gathered, Panorama, Place, Refusal, Session};
+use frame::{Answer, FramePlace, Gathered, Panorama, Refusal, SessionSurfaces};
 use geometry::{Aabb, Point, Pose, Vector};
 use ingest::Sources;
 use nalgebra::{Translation3, UnitQuaternion};
@@ -110,7 +110,11 @@ impl Sessions<'_> {
 
     /// The word of a person that the frame is the plant's: believed unless surfaces and beams
     /// contradict it.
-    fn as_stated(&self, answer: Answer, both: (&Session, &Session)) -> Result<Carried> {
+    fn as_stated(
+        &self,
+        answer: Answer,
+        both: (&SessionSurfaces, &SessionSurfaces),
+    ) -> Result<Carried> {
         let warning = "too few surfaces of the new scans lie on the plant's to confirm the frame that --frame states";
         match answer {
             Answer::Holds(_) => Ok(Carried::default()),
@@ -125,7 +129,11 @@ impl Sessions<'_> {
         }
     }
 
-    fn rough(&self, rough: [f64; 4], both: (&Session, &Session)) -> Result<Carried> {
+    fn rough(
+        &self,
+        rough: [f64; 4],
+        both: (&SessionSurfaces, &SessionSurfaces),
+    ) -> Result<Carried> {
         let plant_from_new = self.posed(rough);
         match frame::from_rough(both.0, both.1, &local(&plant_from_new, both.0, both.1)) {
             Ok(place) => Ok(carried(&place, "given", both)),
@@ -167,7 +175,7 @@ impl Sessions<'_> {
         first.map_or_else(String::new, |input| input.path.display().to_string())
     }
 
-    fn new_session(&self) -> Result<Session> {
+    fn new_session(&self) -> Result<SessionSurfaces> {
         let origin = self.first().map(f64::round);
         let all = (0..self.new.entries().len()).collect();
         let gather = Gather { store: self.new, origin, superseded: None, bounds: None };
@@ -175,7 +183,7 @@ impl Sessions<'_> {
     }
 
     /// The earlier session, whole or as far as it lies within some bounds.
-    fn old_session(&self, bounds: Option<&Aabb>) -> Result<Session> {
+    fn old_session(&self, bounds: Option<&Aabb>) -> Result<SessionSurfaces> {
         let store = self.past.store;
         let tiles = match bounds {
             Some(bounds) => store.touching(bounds),
@@ -190,7 +198,7 @@ impl Sessions<'_> {
         gather.session((self.past.scans, tiles), (&self.stood, n_asked), self.engine)
     }
 
-    fn refused(&self, refusal: &Refusal, both: (&Session, &Session)) -> Error {
+    fn refused(&self, refusal: &Refusal, both: (&SessionSurfaces, &SessionSurfaces)) -> Error {
         let way_out = "if they are of this plant, say about where the first new scanner stands in it and how far the new frame is turned (--frame X,Y,Z,YAW, metres and degrees; --frame same where the frame is the plant's), give scans that are registered to the plant, or scan more of what surrounds the cell";
         let error = match refusal {
             Refusal::Nothing(None) => Error::bad_input(
@@ -218,7 +226,7 @@ impl Sessions<'_> {
         error.at(self.input()).hint(way_out)
     }
 
-    fn contradicted(&self, place: &Place) -> Error {
+    fn contradicted(&self, place: &FramePlace) -> Error {
         let what = format!("the frame that --frame states is contradicted: {}", in_words(place));
         Error::bad_input(what).at(self.input()).hint(
             "give the place of the first new scanner in the plant to 0.3 m and 2°, or leave --frame out",
@@ -226,7 +234,7 @@ impl Sessions<'_> {
     }
 
     /// A place as the flag that states it.
-    fn flag(&self, place: &Place, (old, new): (&Session, &Session)) -> String {
+    fn flag(&self, place: &FramePlace, (old, new): (&SessionSurfaces, &SessionSurfaces)) -> String {
         let pose = world(&place.laid.old_from_new, old, new);
         let at = pose * Point::from(self.first());
         let yaw = pose.rotation.euler_angles().2.to_degrees();
@@ -236,12 +244,12 @@ impl Sessions<'_> {
 }
 
 /// Whether beams went through more than what agrees.
-fn is_contradicted(place: &Place) -> bool {
+fn is_contradicted(place: &FramePlace) -> bool {
     place.evidence.n_against() > place.evidence.n_same()
 }
 
 /// What speaks for and against a place.
-fn in_words(place: &Place) -> String {
+fn in_words(place: &FramePlace) -> String {
     let e = &place.evidence;
     format!(
         "{:.1} m² of upright surfaces agree, and beams went through {:.1} m² of them",
@@ -251,17 +259,21 @@ fn in_words(place: &Place) -> String {
 }
 
 /// Poses between worlds as poses between origins of sessions, and back.
-fn local(plant_from_new: &Pose, old: &Session, new: &Session) -> Pose {
+fn local(plant_from_new: &Pose, old: &SessionSurfaces, new: &SessionSurfaces) -> Pose {
     Translation3::from(-old.surfels.origin)
         * plant_from_new
         * Translation3::from(new.surfels.origin)
 }
 
-fn world(old_from_new: &Pose, old: &Session, new: &Session) -> Pose {
+fn world(old_from_new: &Pose, old: &SessionSurfaces, new: &SessionSurfaces) -> Pose {
     Translation3::from(old.surfels.origin) * old_from_new * Translation3::from(-new.surfels.origin)
 }
 
-fn carried(place: &Place, by: &str, (old, new): (&Session, &Session)) -> Carried {
+fn carried(
+    place: &FramePlace,
+    by: &str,
+    (old, new): (&SessionSurfaces, &SessionSurfaces),
+) -> Carried {
     let pose = world(&place.laid.old_from_new, old, new);
     let e = &place.evidence;
     let entry = CarriedEntry {
@@ -296,7 +308,7 @@ impl Gather<'_> {
         (scans, tiles): (&[Scan], Vec<usize>),
         (robots, n_asked): (&[Aabb], usize),
         engine: &Engine,
-    ) -> Result<Session> {
+    ) -> Result<SessionSurfaces> {
         let entries = self.store.entries();
         // Of each scan: its tiles here, and how many points these have.
         let mut own: Vec<(&Scan, Vec<usize>, u64)> =
@@ -326,7 +338,7 @@ impl Gather<'_> {
                 eyes.extend(eye);
             }
         }
-        Ok(Session { surfels: all.surfels(robots), eyes })
+        Ok(SessionSurfaces { surfels: all.surfels(robots), eyes })
     }
 
     /// One scan: its surfaces, and how far its beams went if that is asked for.

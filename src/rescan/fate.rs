@@ -2,8 +2,8 @@
 //! or all of them go, out: where one or the other is so, the records of those points need not be
 //! asked for one by one again.
 
-use change::Tally;
-use freespace::Sight;
+use change::SessionOccupancy;
+use freespace::Visibility;
 use geometry::Aabb;
 use std::sync::atomic::{AtomicU8, Ordering};
 

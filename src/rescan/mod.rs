@@ -36,7 +36,7 @@ use crate::units;
 use base::Base;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
 use geometry::{Aabb, Pose};
-use ingest::{Scanners, Sources};
+use ingest::{KnownScanners, Sources};
 use past::Past;
 use robot::Library;
 use session::{Robots, Session};
@@ -172,7 +172,7 @@ impl Rescan<'_> {
         let &Rescan { base, job, engine, .. } = self;
         let settings = &job.means.settings;
         let library = library::load(&job.robots, &settings.robot, Some(shelved), engine)?;
-        let read = |path| Scanners::read(path, &job.means.settings.ingest);
+        let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
         let scanners = job.scanners.as_deref().map(read).transpose()?;
         let before = base.state.before();
         let open = || {

@@ -10,7 +10,7 @@ use crate::search::Search;
 use crate::spaces::{region, standing};
 use change::Thing;
 use contract::{Fit, Region, Result, Verdict};
-use freespace::Watch;
+use freespace::VisibilityQuery;
 use geometry::Aabb;
 use robot::Model;
 

@@ -6,12 +6,12 @@ use crate::engine::Engine;
 use crate::near::Near;
 use crate::report::tiles;
 use crate::store::Store;
-use change::{Tally, Tallying};
+use change::{OccupancyBuilder, SessionOccupancy};
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
-use freespace::{Sight, Watch};
+use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point};
 use register::{Planes, Registration};
-use segment::Ground;
+use segment::FloorHeights;
 
 /// Points of a scan that are laid on the plant's surfaces, about.
 const N_LAID: u64 = 100_000;
@@ -47,19 +47,19 @@ pub(crate) struct Present<'a> {
     pub(crate) ground: &'a Ground,
     pub(crate) cell: Aabb,
     /// What stood there: the earlier scans are asked only where nothing of it is near.
-    pub(crate) then: &'a Tally,
+    pub(crate) then: &'a SessionOccupancy,
     /// Earlier scans.
-    pub(crate) watch: &'a Watch<'a>,
+    pub(crate) watch: &'a VisibilityQuery<'a>,
     /// The new ones.
-    pub(crate) own: &'a Watch<'a>,
+    pub(crate) own: &'a VisibilityQuery<'a>,
 }
 
 /// What one tile adds.
-pub(crate) struct Tallied(Tally);
+pub(crate) struct Tallied(SessionOccupancy);
 
 impl Present<'_> {
-    pub(crate) fn tally(&self, store: &Store, engine: &Engine) -> Result<Tally> {
-        let mut all = Tally::default();
+    pub(crate) fn tally(&self, store: &Store, engine: &Engine) -> Result<SessionOccupancy> {
+        let mut all = SessionOccupancy::default();
         let source = store.picks_once(store.touching(&self.cell), 0);
         let reads = store.reads();
         engine.pass(tiles("compare", store), source, |f| {
@@ -79,7 +79,7 @@ impl Map for Present<'_> {
 
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Tallied> {
         let scan = &self.scans[tile.at.scan.0 as usize];
-        let mut out = Tallying::default();
+        let mut out = OccupancyBuilder::default();
         let (in_world, mut near) = (World::from(scan), self.near.of(scan.mask));
         // Neighbours are mostly in one voxel, and ask once whether something stood there.
         let (mut last, mut stood) = (None, false);
@@ -92,11 +92,11 @@ impl Map for Present<'_> {
             let label: Label = known.unwrap_or_else(|| self.ground.label(world));
             match label.kind {
                 PointKind::Fixed => {
-                    let cell = Tally::cell(world);
+                    let cell = SessionOccupancy::cell(world);
                     if last != Some(cell) {
                         (last, stood) = (Some(cell), self.then.has_some(&cell));
                     }
-                    let sight = if stood { Sight::Onto } else { self.watch.look(world) };
+                    let sight = if stood { Visibility::Onto } else { self.watch.look(world) };
                     out.add(world, area(scan, world), seen(sight, self.own, world));
                 }
                 PointKind::Link | PointKind::Attachment => out.add_robot(world),

@@ -7,7 +7,7 @@ use crate::spaces::{poses, reach};
 use crate::tools::dress_in;
 use contract::{Error, Fit, Region, Result, Verdict};
 use fit::Scene;
-use freespace::{Sight, Watch};
+use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::{Library, Model};
 
@@ -120,7 +120,11 @@ const FAR_REACH: f64 = 4.0;
 pub(crate) fn look(
     before: &Fit,
     models: &[Model],
-    (search, [watch, other_session], regions): (&Search<'_, '_>, [&Watch<'_>; 2], &[Region]),
+    (search, [watch, other_session], regions): (
+        &Search<'_, '_>,
+        [&VisibilityQuery<'_>; 2],
+        &[Region],
+    ),
 ) -> Result<(Now, Option<Model>)> {
     let model = &models[before.model];
     let said = said(before, model, watch);
@@ -195,7 +199,7 @@ fn knows(fit: &Fit, other: &Fit) -> bool {
 fn anew(
     before: &Fit,
     models: &[Model],
-    (search, other_session, near): (&Search<'_, '_>, &Watch<'_>, &Region),
+    (search, other_session, near): (&Search<'_, '_>, &VisibilityQuery<'_>, &Region),
 ) -> Result<Option<(Fit, Option<Model>)>> {
     let world_from_base = &before.world_from_base;
     let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
@@ -250,7 +254,7 @@ fn home(fit: &Fit, model: &Model, regions: &[Region]) -> Region {
     own.copied().unwrap_or_else(|| reach(fit, model))
 }
 
-fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> Said {
+fn said(fit: &Fit, model: &Model, watch: &VisibilityQuery<'_>) -> Said {
     let (mut n, mut judged, mut through) = (0_usize, 0_usize, 0_usize);
     let mut foot = None;
     for (link, pose) in model.links.iter().zip(poses(fit, model)) {
@@ -259,8 +263,8 @@ fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> Said {
         for p in link.cad.points.iter().step_by(step) {
             n += 1;
             let sight = watch.look((pose * Point::from(p.map(f64::from))).into());
-            own += usize::from(sight >= Sight::Through);
-            gone += usize::from(sight == Sight::Through);
+            own += usize::from(sight >= Visibility::Through);
+            gone += usize::from(sight == Visibility::Through);
         }
         (judged, through) = (judged + own, through + gone);
         if own > 0 && foot.is_none() {

@@ -224,8 +224,8 @@ impl Said<'_, '_> {
     fn draw(&self, changes: &[RobotChange]) -> export::Canvas {
         let things = self.found.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
             name: format!("T{} {}", k + 1, word(thing.change)),
-            gone: change::Tally::middles(&thing.gone),
-            filled: change::Tally::middles(&thing.filled),
+            gone: change::SessionOccupancy::middles(&thing.gone),
+            filled: change::SessionOccupancy::middles(&thing.filled),
             at: thing.now.or(thing.then).map(|b| b.center().into()).unwrap_or_default(),
         });
         let robots = self.found.robots.compared().into_iter().map(|i| {
@@ -240,7 +240,7 @@ impl Said<'_, '_> {
         let unseen: Vec<_> = unseen.copied().collect();
         draw_changes(
             &self.found.session.past.cell,
-            [&self.found.labels.now.solid(), &change::Tally::middles(&unseen)],
+            [&self.found.labels.now.solid(), &change::SessionOccupancy::middles(&unseen)],
             &things.collect::<Vec<_>>(),
             &robots.collect::<Vec<_>>(),
         )

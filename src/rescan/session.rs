@@ -14,11 +14,11 @@ use crate::search::{Search, Shelf};
 use crate::spaces::{reach, region, standing};
 use crate::store::Store;
 use crate::surfaces::{Gather, Ground, Surfaces};
-use change::{Tally, Thing, Unseen, things};
+use change::{SessionOccupancy, Thing, Unseen, things};
 use contract::{
     Cluster, Error, Fit, Floor, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View,
 };
-use freespace::Watch;
+use freespace::VisibilityQuery;
 use geometry::{Aabb, Pose};
 use ingest::Sources;
 use lattice::ViewSettings;
@@ -92,7 +92,7 @@ pub(crate) struct Labels {
     /// What stood in the cell and was not looked at.
     pub(crate) unseen: Vec<Unseen>,
     /// What stands in the cell now.
-    pub(crate) now: Tally,
+    pub(crate) now: SessionOccupancy,
 }
 
 /// Bounds of the cell that is meant.
@@ -416,5 +416,5 @@ fn asked(past: &Past<'_>, n_scans: usize) -> Ground {
             }))
         });
     }
-    Ground { surfaces: floor::Ground::default(), extents }
+    Ground { surfaces: floor::FloorFindings::default(), extents }
 }

@@ -87,7 +87,7 @@ impl EvidenceGrid {
             {
                 let place = |lane: usize| [middle(0, first + lane), middle(1, j), middle(2, k)];
                 let local = lanes(&std::array::from_fn::<_, LANES, _>(place));
-                let mut known = Gathered::default();
+                let mut known = GatheredBeams::default();
                 evidence.eyes().iter().for_each(|eye| known.add(&eye.look_lanes(&local, edge)));
                 let packed = known.packed();
                 layer.extend_from_slice(&packed[..LANES.min(n[0] - first)]);
@@ -123,19 +123,19 @@ impl EvidenceGrid {
 
 /// What the scans say about places beside each other, being gathered.
 #[derive(Debug, Clone, Copy)]
-struct Gathered {
+struct GatheredBeams {
     ahead: [f32; LANES],
     off: [f32; LANES],
     is_silent: [bool; LANES],
 }
 
-impl Default for Gathered {
+impl Default for GatheredBeams {
     fn default() -> Self {
         Self { ahead: [0.0; LANES], off: [f32::INFINITY; LANES], is_silent: [false; LANES] }
     }
 }
 
-impl Gathered {
+impl GatheredBeams {
     #[inline]
     fn add(&mut self, looks: &Looks) {
         for i in 0..LANES {

@@ -13,7 +13,7 @@ use crate::trial::{BaseTrial, LAG, SampleScore, Samples, Thinning, best};
 const CLIMB: usize = 3;
 
 /// Where a climb starts.
-struct Start<'a> {
+struct ClimbStart<'a> {
     trial: &'a BaseTrial,
     /// Likely poses of the first link, frame of the root; none where it is not asked.
     root_from_firsts: &'a [Pose],
@@ -63,7 +63,7 @@ impl BaseSearch<'_> {
         let around = |trial: BaseTrial| -> Vec<BaseTrial> {
             let firsts = self.likely_firsts(&planes[trial.plane], &trial, tolerance);
             let mut near =
-                self.climb(planes, &Start { trial: &trial, root_from_firsts: &firsts }, level);
+                self.climb(planes, &ClimbStart { trial: &trial, root_from_firsts: &firsts }, level);
             for t in &mut near {
                 t.said =
                     self.joined(self.look(planes, t, self.settings.n_fine, tolerance), t.first);
@@ -81,7 +81,12 @@ impl BaseSearch<'_> {
     /// The neighbours of the best pose that steps to ever better ones lead to, those that may be as
     /// good: the coarse level may have taken what stands beside a place for it. What hides a
     /// foot may look like one: the first link, at its likely poses on the root, has a say.
-    fn climb(&self, planes: &[Plane], start: &Start<'_>, level: &SearchLevel) -> Vec<BaseTrial> {
+    fn climb(
+        &self,
+        planes: &[Plane],
+        start: &ClimbStart<'_>,
+        level: &SearchLevel,
+    ) -> Vec<BaseTrial> {
         // Those about one pose are mostly about the next, too.
         let mut known: HashMap<ClimbSteps, Option<BaseTrial>> = HashMap::new();
         let mut about = |middle: ClimbSteps| -> Vec<(ClimbSteps, BaseTrial)> {
@@ -116,7 +121,7 @@ impl BaseSearch<'_> {
     fn moved_by(
         &self,
         planes: &[Plane],
-        start: &Start<'_>,
+        start: &ClimbStart<'_>,
         level: &SearchLevel,
         [height, i, j, k]: ClimbSteps,
     ) -> Option<BaseTrial> {

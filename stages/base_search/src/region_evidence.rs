@@ -11,7 +11,7 @@ use crate::trial::{SampleScore, Samples};
 
 /// The points of a small cube.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Spot {
+pub(crate) struct PointCube {
     /// Their mean, local, metres.
     pub(crate) at: [f32; 3],
     pub(crate) n_points: u32,
@@ -28,9 +28,9 @@ pub struct RegionEvidence<'a> {
     /// What each scan sees by itself, where they are to be asked one by one; else empty.
     pub(crate) each: Vec<Evidence<'a>>,
     /// Where there are points.
-    all_spots: Vec<Spot>,
+    all_spots: Vec<PointCube>,
     /// Those of them that a base may stand among.
-    spots: Vec<Spot>,
+    spots: Vec<PointCube>,
 }
 
 impl<'a> RegionEvidence<'a> {
@@ -64,7 +64,7 @@ impl<'a> RegionEvidence<'a> {
     /// there are higher than `height` above the region's lowest, metres.
     pub fn pass_over(&mut self, boxes: &[Aabb], height: f64) -> usize {
         let origin = self.region.origin;
-        let is_free = |spot: &&Spot| {
+        let is_free = |spot: &&PointCube| {
             let world = origin + Vector::from(spot.at.map(f64::from));
             !boxes.iter().any(|b| b.contains(world.into()))
         };
@@ -75,7 +75,7 @@ impl<'a> RegionEvidence<'a> {
     }
 
     /// Where there are points that a base may stand among.
-    pub(crate) fn spots(&self) -> &[Spot] {
+    pub(crate) fn spots(&self) -> &[PointCube] {
         &self.spots
     }
 
@@ -145,7 +145,7 @@ struct CubeSum {
 }
 
 /// The points of all views, cube by cube.
-fn spots(views: &[View], fan: &dyn Fan) -> Vec<Spot> {
+fn spots(views: &[View], fan: &dyn Fan) -> Vec<PointCube> {
     // Beams beside each other mostly end in one cube: there are far fewer runs of points than
     // points.
     let of_view = |view: &View| {
@@ -165,7 +165,7 @@ fn spots(views: &[View], fan: &dyn Fan) -> Vec<Spot> {
     // View by view they are in order: the stable sort merges them.
     all.sort_by_key(|own| own.cube);
     let mean = |own: &CubeSum| own.sum.map(|v| (v / f64::from(own.n_points)) as f32);
-    joined(all).iter().map(|own| Spot { at: mean(own), n_points: own.n_points }).collect()
+    joined(all).iter().map(|own| PointCube { at: mean(own), n_points: own.n_points }).collect()
 }
 
 /// One sum for each cube, of sums in the order of the cubes.

@@ -1,10 +1,10 @@
 //! A robot and what hangs on it in; at one posture, which of its parts are near to which obstacles,
 //! out.
 
-use crate::Level;
+use crate::ContactLevel;
 use crate::obstacle::{HALF_CELL, Obstacle, What};
 use crate::obstacles::{Bin, Obstacles, Replaced};
-use crate::shape::{Gap, Shape};
+use crate::shape::{Gap, PartShape};
 use contract::Fan;
 use geometry::{Aabb, Point, Pose};
 use robot::{Link, Model};
@@ -34,53 +34,59 @@ const CREVICE: f32 = 0.025;
 const JOINED: f32 = 0.04;
 
 /// A link's surface, or what hangs on it.
-pub(crate) struct Part {
+pub(crate) struct BodyPart {
     pub(crate) link: usize,
     pub(crate) hangs: bool,
     /// Uncertain points beside the link: nobody knows whether they hang on it.
     pub(crate) is_doubtful: bool,
     bounds: Aabb,
-    shape: Shape,
+    shape: PartShape,
 }
 
 /// All that moves with the joints of a robot.
-pub struct Body<'a> {
+pub struct RobotBody<'a> {
     pub(crate) model: &'a Model,
-    pub(crate) parts: Vec<Part>,
+    pub(crate) parts: Vec<BodyPart>,
     /// Surfaces of links that no joint moves: what lies on them is the robot's, too.
-    still: Vec<Part>,
+    still: Vec<BodyPart>,
     margin: f32,
     /// Of points that hang on it nobody asks from farther away, metres.
     within: f32,
 }
 
-impl Part {
+impl BodyPart {
     fn hung(link: usize, points: Vec<[f32; 3]>, within: f32) -> Self {
         let bounds = Aabb::of(points.iter().map(|p| p.map(f64::from)));
-        Self { link, hangs: true, is_doubtful: false, bounds, shape: Shape::hung(points, within) }
+        Self {
+            link,
+            hangs: true,
+            is_doubtful: false,
+            bounds,
+            shape: PartShape::hung(points, within),
+        }
     }
 }
 
 /// A part near to an obstacle.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Touch {
+pub(crate) struct PartTouch {
     pub(crate) part: usize,
     pub(crate) obstacle: usize,
-    pub(crate) level: Level,
+    pub(crate) level: ContactLevel,
     /// At least so far, metres.
     pub(crate) gap: f32,
 }
 
 /// All that is near at one posture.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Near {
+pub(crate) struct PostureNear {
     /// By part, then obstacle.
-    pub(crate) touches: Vec<Touch>,
+    pub(crate) touches: Vec<PartTouch>,
     /// Parts that reach into space of which nothing is known.
     pub(crate) outside: Vec<usize>,
 }
 
-impl<'a> Body<'a> {
+impl<'a> RobotBody<'a> {
     /// The parts of a model that its joints move, and what hangs on them; `margin` is what is near,
     /// `largest` the radius of the largest obstacle, metres.
     #[must_use]
@@ -91,16 +97,16 @@ impl<'a> Body<'a> {
         let all: Vec<usize> = (0..model.links.len()).collect();
         let surfaces = fan.fan(all, |link| {
             let (mesh, bounds) = (&model.links[link].mesh, model.links[link].bounds);
-            let shape = Shape::surface(mesh, &bounds, least)?;
-            Some(Part { link, hangs: false, is_doubtful: false, bounds, shape })
+            let shape = PartShape::surface(mesh, &bounds, least)?;
+            Some(BodyPart { link, hangs: false, is_doubtful: false, bounds, shape })
         });
-        let (mut parts, still): (Vec<Part>, Vec<Part>) =
+        let (mut parts, still): (Vec<BodyPart>, Vec<BodyPart>) =
             surfaces.into_iter().flatten().partition(|part| moves[part.link]);
         let within = margin.max(BESIDE) + BETWEEN + largest as f32;
         for (link, points) in
             hung.into_iter().filter(|(link, points)| moves[*link] && !points.is_empty())
         {
-            parts.push(Part::hung(link, points, within));
+            parts.push(BodyPart::hung(link, points, within));
         }
         Self { model, parts, still, margin, within }
     }
@@ -109,7 +115,7 @@ impl<'a> Body<'a> {
     #[must_use]
     pub fn farthest(&self) -> f64 {
         let ways = self.model.ways();
-        let far = |p: &Part| farthest(&p.bounds) + ways[p.link];
+        let far = |p: &BodyPart| farthest(&p.bounds) + ways[p.link];
         self.parts.iter().map(far).fold(0.0, f64::max)
     }
 
@@ -124,7 +130,7 @@ impl<'a> Body<'a> {
     /// hang on the part that is nearest and move with it.
     pub fn stand(&mut self, found: &[f64], around: &mut Obstacles) {
         let mut near: Vec<Option<(f32, usize)>> = vec![None; around.all.len()];
-        for Touch { part, obstacle, gap, .. } in self.within(BESIDE, found, around).touches {
+        for PartTouch { part, obstacle, gap, .. } in self.within(BESIDE, found, around).touches {
             let least = near[obstacle].get_or_insert((gap, part));
             if gap < least.0 {
                 *least = (gap, part);
@@ -133,7 +139,7 @@ impl<'a> Body<'a> {
         let poses = self.model.poses(found);
         let from_base = |link: usize| Flat::of(&poses[link].inverse());
         let surfaces = self.parts.iter().filter(|part| !part.hangs).chain(&self.still);
-        let surfaces: Vec<(&Part, Flat)> =
+        let surfaces: Vec<(&BodyPart, Flat)> =
             surfaces.map(|part| (part, from_base(part.link))).collect();
         let is_own = |at: [f32; 3], within: f32| {
             surfaces.iter().any(|(part, link_from_base)| {
@@ -163,19 +169,19 @@ impl<'a> Body<'a> {
             _ => Replaced::Kept,
         });
         for (link, points) in doubtful {
-            let part = Part::hung(link, points, self.within);
-            self.parts.push(Part { is_doubtful: true, ..part });
+            let part = BodyPart::hung(link, points, self.within);
+            self.parts.push(BodyPart { is_doubtful: true, ..part });
         }
     }
 
     /// All that is nearer than the margin at a posture.
-    pub(crate) fn near(&self, posture: &[f64], around: &Obstacles) -> Near {
+    pub(crate) fn near(&self, posture: &[f64], around: &Obstacles) -> PostureNear {
         self.within(self.margin, posture, around)
     }
 
-    fn within(&self, margin: f32, posture: &[f64], around: &Obstacles) -> Near {
+    fn within(&self, margin: f32, posture: &[f64], around: &Obstacles) -> PostureNear {
         let poses = self.model.poses(posture);
-        let mut out = Near::default();
+        let mut out = PostureNear::default();
         for (at, part) in self.parts.iter().enumerate() {
             let base_from_link = &poses[part.link];
             let grown = part.bounds.grown(f64::from(margin + BETWEEN));
@@ -193,10 +199,10 @@ impl<'a> Body<'a> {
 
     fn bin(
         &self,
-        (at, part): (usize, &Part),
+        (at, part): (usize, &BodyPart),
         (bin, (margin, link_from_base)): (&Bin, (f32, &Flat)),
         around: &Obstacles,
-        touches: &mut Vec<Touch>,
+        touches: &mut Vec<PartTouch>,
     ) {
         let middle = link_from_base.of_point(bin.middle);
         let within = bin.radius + margin + BETWEEN;
@@ -230,13 +236,13 @@ impl<'a> Body<'a> {
                 Gap::Inside => touches.push(inside(at, obstacle, o)),
                 Gap::At(gap) => {
                     let touch = touch((at, obstacle), (o, margin), gap);
-                    let is_so = |touch: &Touch| {
+                    let is_so = |touch: &PartTouch| {
                         around.split.parts(o).is_none_or(|mut parts| {
                             parts.any(|o| {
                                 let p = link_from_base.of_point(o.at);
                                 part.shape.gap(p, o.radius + margin + BETWEEN) != Gap::Far
                             })
-                        }) || touch.level != Level::Unseen
+                        }) || touch.level != ContactLevel::Unseen
                     };
                     touches.extend(touch.filter(is_so));
                 }
@@ -249,21 +255,21 @@ fn touch(
     (part, obstacle): (usize, usize),
     (o, margin): (&Obstacle, f32),
     gap: f32,
-) -> Option<Touch> {
+) -> Option<PartTouch> {
     // Between two postures it may be half a step nearer.
     let gap = gap - o.radius - BETWEEN;
     let level = match o.what {
         _ if gap > margin => return None,
-        What::Unseen => Level::Unseen,
-        _ if gap <= 0.0 => Level::Hit,
-        _ => Level::Near,
+        What::Unseen => ContactLevel::Unseen,
+        _ if gap <= 0.0 => ContactLevel::Hit,
+        _ => ContactLevel::Near,
     };
-    Some(Touch { part, obstacle, level, gap: gap.max(0.0) })
+    Some(PartTouch { part, obstacle, level, gap: gap.max(0.0) })
 }
 
-fn inside(part: usize, obstacle: usize, o: &Obstacle) -> Touch {
-    let level = if o.what == What::Unseen { Level::Unseen } else { Level::Inside };
-    Touch { part, obstacle, level, gap: 0.0 }
+fn inside(part: usize, obstacle: usize, o: &Obstacle) -> PartTouch {
+    let level = if o.what == What::Unseen { ContactLevel::Unseen } else { ContactLevel::Inside };
+    PartTouch { part, obstacle, level, gap: 0.0 }
 }
 
 /// No link of a robot gets farther from its base's origin, metres.

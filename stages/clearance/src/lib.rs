@@ -13,20 +13,20 @@ mod path;
 mod shadow;
 mod shape;
 
-pub use body::{Body, Hung, STEP, reach};
+pub use body::{Hung, RobotBody, STEP, reach};
 pub use evidence::hanging;
 pub use obstacle::{CELL, What};
-pub use obstacles::{Cells, FARTHEST, Known, Obstacles};
-pub use path::{Contact, Contacts, Leg, Looked, Walk, leg};
-pub use shadow::{Eye, Shadow};
+pub use obstacles::{Cells, FARTHEST, KnownBounds, Obstacles};
+pub use path::{Contact, Contacts, Leg, PieceContacts, Walk, leg};
+pub use shadow::{ScannerAt, Shadow};
 
 /// How a part of a robot stands to an obstacle; what is worse is greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
+pub enum ContactLevel {
     /// In space that no beam went through.
     Unseen,
     /// Nearer than the margin.
-    Near,
+    PostureNear,
     /// It touches the surface of the part.
     Hit,
     /// It lies inside of the part.

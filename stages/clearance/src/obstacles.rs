@@ -3,7 +3,7 @@
 
 use crate::evidence::evident;
 use crate::obstacle::{CELL, HALF_CELL, HALF_DIAGONAL, Obstacle, What, distance};
-use crate::shadow::{Eye, Front};
+use crate::shadow::{Front, ScannerAt};
 use contract::{Space, SpaceKind};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
@@ -41,7 +41,7 @@ pub struct Cells {
 
 /// Where beams went, in the frame of the world.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct KnownBounds {
     /// World from base.
     pub world_from_base: Pose,
     /// Bounds of the space of which anything is known; empty where nothing is.
@@ -61,7 +61,7 @@ pub(crate) enum Replaced {
 pub struct Obstacles {
     pub(crate) all: Vec<Obstacle>,
     pub(crate) bins: Vec<Bin>,
-    pub(crate) known: Known,
+    pub(crate) known: KnownBounds,
     /// Farthest from the base on each axis that points were gathered, metres.
     far: f64,
     pub(crate) split: Split,
@@ -80,7 +80,7 @@ impl Cells {
     /// None, of points no farther from the base than so on each axis, metres; and the scanners of
     /// which it is known where they stood, by the `point_source_id` of their points.
     #[must_use]
-    pub fn within(far: f64, eyes: &BTreeMap<u16, Eye>) -> Self {
+    pub fn within(far: f64, eyes: &BTreeMap<u16, ScannerAt>) -> Self {
         let fronts = eyes.iter().map(|(source, eye)| (*source, Front::new(eye))).collect();
         Self { far, cells: Vec::new(), fronts }
     }
@@ -157,7 +157,7 @@ impl Obstacles {
     pub fn new(
         cells: &Cells,
         others: &[(i16, &Model, Vec<Pose>)],
-        (space, known): (Option<&Space>, Known),
+        (space, known): (Option<&Space>, KnownBounds),
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles();
         let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, |at| thin[at]);

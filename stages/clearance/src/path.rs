@@ -1,8 +1,8 @@
 //! Postures of a path in; postures so close to each other that nothing is missed between them, and
 //! where on the way which part is near to what, out.
 
-use crate::Level;
-use crate::body::{Body, Near, STEP, Touch};
+use crate::ContactLevel;
+use crate::body::{PartTouch, PostureNear, RobotBody, STEP};
 use crate::obstacle::What;
 use crate::obstacles::Obstacles;
 use geometry::Point;
@@ -38,7 +38,7 @@ pub struct Contact {
     /// To what.
     pub what: What,
     /// How near at worst.
-    pub level: Level,
+    pub level: ContactLevel,
     /// It is not nearer than where it was found; to obstacles that it was as near to.
     pub as_found: bool,
     /// Where that begins first and ends last.
@@ -63,16 +63,16 @@ impl Contact {
     /// beyond all that is known nobody can tell.
     #[must_use]
     pub fn is_unseen(&self) -> bool {
-        self.level == Level::Unseen && (!self.as_found || self.at.is_none())
+        self.level == ContactLevel::Unseen && (!self.as_found || self.at.is_none())
     }
 }
 
 /// Which part, to what, and whether only as it was found.
-type Key = (usize, What, bool);
+type ContactKey = (usize, What, bool);
 
 /// A path that is looked at piece by piece.
 pub struct Walk<'a> {
-    body: &'a Body<'a>,
+    body: &'a RobotBody<'a>,
     around: &'a Obstacles,
     path: &'a [Vec<f64>],
     legs: &'a [Leg],
@@ -82,14 +82,14 @@ pub struct Walk<'a> {
 }
 
 /// What is near at the postures of a piece, and how far closed loops stay open there, metres.
-pub struct Looked(Vec<(f64, Told, f64)>);
+pub struct PieceContacts(Vec<(f64, PostureContacts, f64)>);
 
 impl<'a> Walk<'a> {
     /// Along the waypoints (at least one), with a leg from each to the next; `found` is the posture
     /// that the robot was scanned in.
     #[must_use]
     pub fn new(
-        (body, around): (&'a Body<'a>, &'a Obstacles),
+        (body, around): (&'a RobotBody<'a>, &'a Obstacles),
         (path, legs): (&'a [Vec<f64>], &'a [Leg]),
         found: &[f64],
     ) -> Self {
@@ -114,7 +114,7 @@ impl<'a> Walk<'a> {
 
     /// Looks at a piece; none of them asks for another.
     #[must_use]
-    pub fn look(&self, piece: usize) -> Looked {
+    pub fn look(&self, piece: usize) -> PieceContacts {
         let own = piece * PIECE..((piece + 1) * PIECE).min(self.n_postures());
         let look = |at: usize| {
             let leg = self.first.partition_point(|first| *first <= at) - 1;
@@ -128,11 +128,11 @@ impl<'a> Walk<'a> {
             let open = self.body.model.loop_gap(&posture);
             (leg as f64 + share, told(&near, (&self.found, self.around)), open)
         };
-        Looked(own.map(look).collect())
+        PieceContacts(own.map(look).collect())
     }
 
     /// Adds what was near in the next piece.
-    pub fn add(&self, looked: Looked, to: &mut Contacts) {
+    pub fn add(&self, looked: PieceContacts, to: &mut Contacts) {
         for (place, told, open) in looked.0 {
             to.add((self.body, self.around), place, told);
             if open > to.open.1 {
@@ -144,7 +144,7 @@ impl<'a> Walk<'a> {
 
 /// How many postures lie between a waypoint and the next.
 #[must_use]
-pub fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
+pub fn leg(body: &RobotBody<'_>, from: &[f64], to: &[f64]) -> Leg {
     let turn = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
     let mut n_steps = ((turn / TURN).ceil() as usize).clamp(1, MAX_STEPS);
     loop {
@@ -163,7 +163,7 @@ pub fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
 
 /// The longest way of any point of the robot from one of the postures to the next, metres: that of
 /// a corner of its bounds.
-fn longest(body: &Body<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
+fn longest(body: &RobotBody<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
     let corners = |step: usize| -> Vec<Point> {
         let poses = body.model.poses(&between(from, to, step as f64 / n_steps as f64));
         let own =
@@ -195,17 +195,17 @@ const ROUNDING: f32 = 2e-3;
 
 /// How near parts were to obstacles where the robot was found.
 struct AsFound {
-    touches: BTreeMap<(usize, usize), (Level, f32)>,
+    touches: BTreeMap<(usize, usize), (ContactLevel, f32)>,
     outside: Vec<usize>,
 }
 
 impl AsFound {
-    fn of(near: Near) -> Self {
-        let touch = |t: &Touch| ((t.part, t.obstacle), (t.level, t.gap));
+    fn of(near: PostureNear) -> Self {
+        let touch = |t: &PartTouch| ((t.part, t.obstacle), (t.level, t.gap));
         Self { touches: near.touches.iter().map(touch).collect(), outside: near.outside }
     }
 
-    fn is(&self, touch: &Touch) -> bool {
+    fn is(&self, touch: &PartTouch) -> bool {
         let before = self.touches.get(&(touch.part, touch.obstacle));
         before.is_some_and(|(level, gap)| *level >= touch.level && touch.gap >= gap - ROUNDING)
     }
@@ -213,10 +213,10 @@ impl AsFound {
 
 /// What is near at one posture, the worst of each kind: how near, at least so far, which obstacle,
 /// how many.
-type Told = BTreeMap<Key, (Level, f32, Option<usize>, usize)>;
+type PostureContacts = BTreeMap<ContactKey, (ContactLevel, f32, Option<usize>, usize)>;
 
-fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
-    let mut out = Told::new();
+fn told(near: &PostureNear, (found, around): (&AsFound, &Obstacles)) -> PostureContacts {
+    let mut out = PostureContacts::new();
     for touch in &near.touches {
         let key = (touch.part, around.all[touch.obstacle].what, found.is(touch));
         let worst = out.entry(key).or_insert((touch.level, touch.gap, Some(touch.obstacle), 0));
@@ -227,7 +227,7 @@ fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
     }
     for &part in &near.outside {
         let key = (part, What::Unseen, found.outside.contains(&part));
-        out.entry(key).or_insert((Level::Unseen, 0.0, None, 0));
+        out.entry(key).or_insert((ContactLevel::Unseen, 0.0, None, 0));
     }
     out
 }
@@ -235,13 +235,18 @@ fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
 /// All postures at which the same part is near to the same thing are one contact.
 #[derive(Debug, Clone, Default)]
 pub struct Contacts {
-    all: BTreeMap<Key, Contact>,
+    all: BTreeMap<ContactKey, Contact>,
     /// Where closed loops stay open most, and how far, metres.
     open: (f64, f64),
 }
 
 impl Contacts {
-    fn add(&mut self, (body, around): (&Body<'_>, &Obstacles), place: f64, told: Told) {
+    fn add(
+        &mut self,
+        (body, around): (&RobotBody<'_>, &Obstacles),
+        place: f64,
+        told: PostureContacts,
+    ) {
         for (key, (level, gap, obstacle, n)) in told {
             let part = &body.parts[key.0];
             let now = Contact {
@@ -290,7 +295,7 @@ impl Contacts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Cells, Known};
+    use crate::{Cells, KnownBounds};
     use contract::OneByOne;
     use geometry::{Aabb, Pose};
     use robot::{Model, Settings};
@@ -306,7 +311,7 @@ mod tests {
         Model::load_urdf(&path, "arm", &Settings::default()).expect("loads").0
     }
 
-    fn legs(body: &Body<'_>, path: &[Vec<f64>]) -> Vec<Leg> {
+    fn legs(body: &RobotBody<'_>, path: &[Vec<f64>]) -> Vec<Leg> {
         path.windows(2).map(|pair| leg(body, &pair[0], &pair[1])).collect()
     }
 
@@ -319,12 +324,12 @@ mod tests {
     fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let mut body = Body::new(&model, BTreeMap::new(), (margin, 0.0), &OneByOne);
+        let mut body = RobotBody::new(&model, BTreeMap::new(), (margin, 0.0), &OneByOne);
         let mut cells = Cells::within(crate::reach(&model) + margin + 0.1, &BTreeMap::new());
         points.iter().for_each(|(p, what)| cells.add(*p, *what, (false, 0)));
         cells.settle();
         let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
-        let known = Known { world_from_base: Pose::identity(), bounds };
+        let known = KnownBounds { world_from_base: Pose::identity(), bounds };
         let mut around = Obstacles::new(&cells, &[], (None, known));
         body.stand(&[found], &mut around);
         let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
@@ -340,7 +345,7 @@ mod tests {
             (0..100).map(|k| ([0.0, 0.9, 0.002 * f64::from(k) - 0.1], What::Fixed)).collect();
         let found = walk(&post, &[0.0, std::f64::consts::PI], 0.0, 0.02);
         let [hit] = &found[..] else { panic!("one contact: {found:?}") };
-        assert!(!hit.as_found && hit.level >= Level::Hit && hit.gap == 0.0, "{hit:?}");
+        assert!(!hit.as_found && hit.level >= ContactLevel::Hit && hit.gap == 0.0, "{hit:?}");
         // The beam's side is 5 cm off its middle: 3.2° before, and as much behind; the margin and
         // half a step more.
         let share = (0.05_f64 / 0.9).asin() / std::f64::consts::PI;
@@ -351,7 +356,7 @@ mod tests {
         let beyond = |off: f64| vec![([0.0, 1.0 + off, 0.0], What::Fixed)];
         assert!(walk(&beyond(0.04), &[0.0, 3.0], 0.0, 0.02).is_empty());
         let near = walk(&beyond(0.015), &[0.0, 3.0], 0.0, 0.02);
-        assert!(near.len() == 1 && near[0].level == Level::Near, "{near:?}");
+        assert!(near.len() == 1 && near[0].level == ContactLevel::Near, "{near:?}");
         assert!(near[0].gap <= 0.015 && near[0].gap > 0.002, "{near:?}");
     }
 
@@ -361,14 +366,14 @@ mod tests {
         let points = [([1.01, 0.0, 0.0], What::Uncertain), ([0.0, 0.8, 0.0], What::Fixed)];
         let found = walk(&points, &[0.0, 1.6], 0.0, 0.02);
         let levels: Vec<_> =
-            found.iter().map(|c| (c.what, c.level >= Level::Hit, c.as_found)).collect();
+            found.iter().map(|c| (c.what, c.level >= ContactLevel::Hit, c.as_found)).collect();
         assert_eq!(levels, [(What::Fixed, true, false), (What::Beside, false, true)]);
         // The same point is none of its own where it was found elsewhere.
         assert!(walk(&points[..1], &[0.0, 1.6], 1.6, 0.02).iter().all(|c| !c.as_found));
         // It was near where it was found, and is inside on the way.
         let points = [([0.9, 0.06, 0.0], What::Fixed)];
         let found = walk(&points, &[0.0, 0.1], 0.0, 0.02);
-        assert!(found.iter().any(|c| c.level >= Level::Hit && !c.as_found), "{found:?}");
+        assert!(found.iter().any(|c| c.level >= ContactLevel::Hit && !c.as_found), "{found:?}");
     }
 
     #[test]
@@ -376,7 +381,7 @@ mod tests {
         // Beside the beam, 15 mm off its side; it is pushed into by 10 mm and no more.
         let points = [([0.5, 0.065, 0.0], What::Fixed)];
         let found = walk(&points, &[0.0, 0.05], 0.0, 0.02);
-        assert!(found.iter().any(|c| c.level == Level::Inside && !c.as_found), "{found:?}");
+        assert!(found.iter().any(|c| c.level == ContactLevel::Inside && !c.as_found), "{found:?}");
     }
 
     #[test]
@@ -388,7 +393,7 @@ mod tests {
             (0..40).map(|k| (at(k), What::Fixed)).collect()
         };
         assert_eq!(walk(&patch(0.003), &[0.0, 0.3], 0.0, 0.02), []);
-        let hit = |c: &Contact| c.level >= Level::Hit && !c.as_found;
+        let hit = |c: &Contact| c.level >= ContactLevel::Hit && !c.as_found;
         assert!(walk(&patch(0.03), &[0.0, 0.3], 0.0, 0.02).iter().any(hit));
     }
 
@@ -401,7 +406,7 @@ mod tests {
         let found = walk(&points, &[0.0, 3.0], 0.0, 0.02);
         let fixed: Vec<_> = found.iter().filter(|c| c.what == What::Fixed).collect();
         assert!(
-            fixed.len() == 1 && fixed[0].is_doubtful && fixed[0].level == Level::Hit,
+            fixed.len() == 1 && fixed[0].is_doubtful && fixed[0].level == ContactLevel::Hit,
             "{found:?}"
         );
         let away = found.iter().filter(|c| c.what == What::Beside && !c.as_found);
@@ -412,7 +417,7 @@ mod tests {
     fn whole_turns_are_no_rest() {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let body = Body::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
+        let body = RobotBody::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
         let turns = MAX_STEPS as f64 * std::f64::consts::TAU;
         assert!(leg(&body, &[0.0], &[turns]).jumps && leg(&body, &[0.0], &[1e308]).jumps);
     }
@@ -420,16 +425,16 @@ mod tests {
     #[test]
     fn what_lies_inside_of_a_link_from_the_beginning_is_hit() {
         let found = walk(&[([0.5, 0.0, 0.0], What::Uncertain)], &[0.0], 1.0, 0.005);
-        assert!(found.len() == 1 && found[0].level == Level::Inside, "{found:?}");
+        assert!(found.len() == 1 && found[0].level == ContactLevel::Inside, "{found:?}");
     }
 
     #[test]
     fn space_of_which_nothing_is_known_is_not_free() {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let body = Body::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
+        let body = RobotBody::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
         let bounds = Aabb { min: [-9.0, -0.2, -9.0], max: [9.0, 9.0, 9.0] };
-        let known = Known { world_from_base: Pose::identity(), bounds };
+        let known = KnownBounds { world_from_base: Pose::identity(), bounds };
         let around = Obstacles::new(
             &Cells::within(crate::reach(&model) + 0.2, &BTreeMap::new()),
             &[],

@@ -25,7 +25,7 @@ const MAX_NAMESPACES: u64 = 256;
 /// # Errors
 /// More than the limits allow, in words, with the line and the setting that lifts it.
 pub fn check_xml(bytes: &[u8], limits: &XmlLimits) -> Result<(), String> {
-    let mut count = Count { bytes, limits, at: 0, n_nodes: 0, n_namespaces: 0, depth: 0 };
+    let mut count = XmlCount { bytes, limits, at: 0, n_nodes: 0, n_namespaces: 0, depth: 0 };
     while let Some(n) = bytes[count.at..].iter().position(|b| *b == b'<') {
         // Text before it, white space included.
         count.nodes(u64::from(n > 0))?;
@@ -52,7 +52,7 @@ pub fn check_xml(bytes: &[u8], limits: &XmlLimits) -> Result<(), String> {
     Ok(())
 }
 
-struct Count<'a> {
+struct XmlCount<'a> {
     bytes: &'a [u8],
     limits: &'a XmlLimits,
     at: usize,
@@ -61,7 +61,7 @@ struct Count<'a> {
     depth: u64,
 }
 
-impl Count<'_> {
+impl XmlCount<'_> {
     /// Goes on behind the next `end`, which begins `from` bytes on at the earliest; to the end
     /// where there is none.
     fn skip(&mut self, from: usize, end: &[u8]) {

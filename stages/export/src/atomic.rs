@@ -1,7 +1,7 @@
 //! Files that exist whole or not at all: bytes in; a temporary name until the end, then a sync and
 //! a rename.
 
-use crate::block::{self, Block};
+use crate::block::{self, AlignedBlock};
 use contract::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
@@ -20,7 +20,7 @@ pub struct AtomicFile {
     file: Option<File>,
     part: PathBuf,
     path: PathBuf,
-    waiting: Block,
+    waiting: AlignedBlock,
     /// Whether the file is written past the cache; `None` before the first piece, that of a small
     /// file is its last.
     direct: Option<bool>,
@@ -42,7 +42,7 @@ impl AtomicFile {
             .truncate(true)
             .open(&part)
             .map_err(|e| Error::of_file("file cannot be made", &part, e))?;
-        let (file, waiting) = (Some(file), Block::default());
+        let (file, waiting) = (Some(file), AlignedBlock::default());
         Ok(Self { file, part, path, waiting, direct: None })
     }
 

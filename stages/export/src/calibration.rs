@@ -1,7 +1,7 @@
 //! What a calibration found in; its part of `result.json` out, and back.
 
 use crate::finite::finite;
-use crate::places::Places;
+use crate::places::NamedMap;
 use contract::{Calibration, Fit, JointFrame};
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ pub struct CalibrationEntry {
     pub prior: [f64; 2],
     /// RMS distance of each link's points from its surface, metres: as in the model, and
     /// corrected.
-    pub link_rms: Places<[Option<f64>; 2]>,
+    pub link_rms: NamedMap<[Option<f64>; 2]>,
 }
 
 /// Where a joint is against its model, in the joint's own frame.
@@ -45,7 +45,7 @@ impl CalibrationEntry {
         Self {
             joints: found.frames.iter().map(FrameEntry::from).collect(),
             prior: found.prior,
-            link_rms: Places(names.zip(rms).collect()),
+            link_rms: NamedMap(names.zip(rms).collect()),
         }
     }
 

@@ -23,11 +23,11 @@ pub struct PlanPicture {
     per_metre: f64,
     width: usize,
     height: usize,
-    cells: Vec<Cell>,
+    cells: Vec<PlanCell>,
 }
 
 #[derive(Debug, Default)]
-struct Cell {
+struct PlanCell {
     n_floor: AtomicU32,
     n_fixed: AtomicU32,
     n_uncertain: AtomicU32,
@@ -52,7 +52,7 @@ impl PlanPicture {
             per_metre: 1.0 / cell,
             width,
             height,
-            cells: (0..width * height).map(|_| Cell::default()).collect(),
+            cells: (0..width * height).map(|_| PlanCell::default()).collect(),
         }
     }
 
@@ -158,7 +158,7 @@ impl PlanPicture {
     /// Points in a well filled cell: the 98th percentile of those that hold any standing point.
     fn full(&self) -> f64 {
         let mut counts: Vec<u32> =
-            self.cells.iter().map(Cell::n_standing).filter(|n| *n > 0).collect();
+            self.cells.iter().map(PlanCell::n_standing).filter(|n| *n > 0).collect();
         if counts.is_empty() {
             return 1.0;
         }
@@ -178,7 +178,7 @@ const FLOOR: Rgb = [232, 234, 230];
 const FIXED: Rgb = [120, 126, 134];
 const UNCERTAIN: Rgb = [236, 190, 60];
 
-impl Cell {
+impl PlanCell {
     fn n_standing(&self) -> u32 {
         self.n_fixed.load(Relaxed).saturating_add(self.n_uncertain.load(Relaxed))
     }

@@ -4,7 +4,7 @@
 use crate::calibration::CalibrationEntry;
 use crate::finite::finite;
 use crate::mask::MaskFiles;
-use crate::places::Places;
+use crate::places::NamedMap;
 use crate::review::ReviewEntry;
 use crate::session::RescanEntry;
 use crate::space::SpaceEntry;
@@ -25,7 +25,7 @@ pub struct ResultFile {
     /// Robots; their places here are the numbers in the masks.
     pub robots: Vec<RobotEntry>,
     /// Where the masks are.
-    pub labels: Labels,
+    pub labels: LabelFiles,
     /// What was read.
     pub inputs: Vec<InputEntry>,
     /// What was done.
@@ -54,28 +54,28 @@ pub struct RobotEntry {
     /// Its standard deviation.
     pub base_sigma: BaseSigma,
     /// Value of each joint, radians or metres, in the order of the model.
-    pub joints: Places<f64>,
+    pub joints: NamedMap<f64>,
     /// Joints whose values are metres; those of the others are radians.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub slides: Vec<String>,
     /// Standard deviation of each joint, same unit; that of any angle, π/√3, where the points say
     /// nothing of it.
-    pub sigma: Places<f64>,
+    pub sigma: NamedMap<f64>,
     /// Values of the joints that follow those, by a rule of the model or as a closed loop needs
     /// it, same units.
     #[serde(default)]
-    pub passive: Places<f64>,
+    pub passive: NamedMap<f64>,
     /// Whether the points determine each joint.
     #[serde(default)]
-    pub determined: Places<bool>,
+    pub determined: NamedMap<bool>,
     /// The same in three words: `determined`, `coarse` or `undetermined`.
     #[serde(default)]
-    pub certainty: Places<Certainty>,
+    pub certainty: NamedMap<Certainty>,
     /// Names of the links; their places here are the numbers in the masks.
     pub links: Vec<String>,
     /// World from each link.
     #[serde(default)]
-    pub link_poses: Places<BasePose>,
+    pub link_poses: NamedMap<BasePose>,
     /// `trusted`, `doubtful` or `refused`.
     pub verdict: String,
     /// Share explained less share contradicted.
@@ -96,7 +96,7 @@ pub struct RobotEntry {
     /// Other values within the limits, whole turns away, at which the robot stands the same, by
     /// joint.
     #[serde(default)]
-    pub equivalents: Places<Vec<f64>>,
+    pub equivalents: NamedMap<Vec<f64>>,
     /// The tool of the library that it carries; its joints and links follow the robot's own.
     #[serde(default)]
     pub tool: Option<ToolEntry>,
@@ -218,7 +218,7 @@ pub struct ToolEntry {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EqualEntry {
     /// Value of each joint, radians or metres.
-    pub joints: Places<f64>,
+    pub joints: NamedMap<f64>,
     /// As in [`RunnerUpEntry`].
     pub margin: Option<f64>,
 }
@@ -238,7 +238,7 @@ pub struct ShiftEntry {
 
 /// Where the masks are.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Labels {
+pub struct LabelFiles {
     /// The legend.
     pub table: String,
     /// One for each mask.
@@ -323,13 +323,13 @@ impl RobotEntry {
             base_link: links.first().cloned().unwrap_or_default(),
             base_pose: (&fit.world_from_base).into(),
             base_sigma: BaseSigma { xyz: [0, 1, 2].map(sigma), rotation: [3, 4, 5].map(sigma) },
-            joints: Places(each(fit, |j| j.value)),
-            sigma: Places(each(fit, |j| j.sigma)),
-            determined: Places(each(fit, |j| j.is_determined())),
-            certainty: Places(each(fit, |j| j.certainty)),
-            passive: Places::default(),
+            joints: NamedMap(each(fit, |j| j.value)),
+            sigma: NamedMap(each(fit, |j| j.sigma)),
+            determined: NamedMap(each(fit, |j| j.is_determined())),
+            certainty: NamedMap(each(fit, |j| j.certainty)),
+            passive: NamedMap::default(),
             links: links.to_vec(),
-            link_poses: Places::default(),
+            link_poses: NamedMap::default(),
             verdict: fit.verdict.word().into(),
             score: finite(fit.score),
             rms: finite(fit.rms),
@@ -341,7 +341,7 @@ impl RobotEntry {
                 margin: finite(r.margin),
             }),
             equals: fit.equals.iter().map(|e| EqualEntry::new(fit, e)).collect(),
-            equivalents: Places(
+            equivalents: NamedMap(
                 fit.joints
                     .iter()
                     .filter(|j| !j.equivalents.is_empty())
@@ -376,7 +376,7 @@ impl EqualEntry {
     fn new(fit: &Fit, equal: &contract::Equal) -> Self {
         let names = fit.joints.iter().map(|j| j.name.clone());
         Self {
-            joints: Places(names.zip(equal.posture.iter().copied()).collect()),
+            joints: NamedMap(names.zip(equal.posture.iter().copied()).collect()),
             margin: finite(equal.margin),
         }
     }
@@ -401,7 +401,7 @@ impl From<&contract::LinkEvidence> for LinkEntry {
     }
 }
 
-impl Labels {
+impl LabelFiles {
     /// Name of the legend.
     pub const TABLE: &'static str = "labels/table.json";
 }

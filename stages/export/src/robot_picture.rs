@@ -22,10 +22,10 @@ pub struct RobotPicture {
     robot: i16,
     bounds: Aabb,
     links: Vec<String>,
-    views: Vec<View>,
+    views: Vec<PictureView>,
 }
 
-struct View {
+struct PictureView {
     name: &'static str,
     /// Right and down in pixels, away from the eye in metres.
     view_from_world: Rows,
@@ -71,7 +71,7 @@ impl RobotPicture {
             ("oblique", 40.0, 30.0),
         ];
         let views = fan.fan(views.into(), |(name, turn, tilt): (_, f64, f64)| {
-            let mut view = View::new(name, turn, tilt, &shown);
+            let mut view = PictureView::new(name, turn, tilt, &shown);
             view.outline(model, world_from_link);
             view
         });
@@ -140,7 +140,7 @@ impl RobotPicture {
     }
 }
 
-impl View {
+impl PictureView {
     /// A view from the front (+x), turned by `turn` degrees about z and tilted by `tilt` degrees
     /// from above.
     fn new(name: &'static str, turn: f64, tilt: f64, bounds: &Aabb) -> Self {
@@ -257,7 +257,7 @@ impl View {
     }
 }
 
-impl View {
+impl PictureView {
     /// Red where points lie before the surface, blue where behind, white where on it.
     fn draw_residuals(&self) -> Canvas {
         let mut canvas = Canvas::new(SIDE, SIDE);

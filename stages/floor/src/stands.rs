@@ -2,7 +2,7 @@
 //! something to stand on.
 
 use crate::Settings;
-use crate::levels::{Level, Scanners, scanner, seen_through};
+use crate::levels::{PieceLevel, ScannerPlaces, scanner, seen_through};
 use crate::pieces::upward;
 use crate::union::Union;
 use contract::{FloorLevel, InstallationPlane, PlanePatch, ScanId};
@@ -17,8 +17,8 @@ const TILT_ERROR: f64 = 0.0175;
 /// Joins patches that face up into planes; the largest ones, largest first.
 pub(crate) fn stands(
     patches: &[PlanePatch],
-    floor: (&[Level], &[FloorLevel]),
-    scanners: &Scanners,
+    floor: (&[PieceLevel], &[FloorLevel]),
+    scanners: &ScannerPlaces,
     settings: &Settings,
 ) -> Vec<InstallationPlane> {
     let mut chosen: Vec<&PlanePatch> = patches
@@ -68,8 +68,8 @@ fn is_floor(patch: &PlanePatch, levels: &[FloorLevel], settings: &Settings) -> b
 /// Whether a patch was seen through a floor level: a mirror image.
 fn is_ghost(
     patch: &PlanePatch,
-    levels: &[Level],
-    scanners: &Scanners,
+    levels: &[PieceLevel],
+    scanners: &ScannerPlaces,
     settings: &Settings,
 ) -> bool {
     scanner(scanners, patch.scan).is_some_and(|from| {

@@ -1,8 +1,8 @@
 //! Judged poses in; the one that is clear, or what keeps each from being so, out.
 
-use crate::judge::{Evidence, Judged, judge};
+use crate::judge::{Judged, PoseEvidence, judge};
 use crate::refine::{Chosen, Laid, NEAR, WIDE, apart};
-use crate::{Session, search};
+use crate::{SessionSurfaces, search};
 use contract::Fan;
 use geometry::{Pose, Vector};
 
@@ -39,11 +39,11 @@ const MAX_TOLD: usize = 4;
 
 /// A pose of the new session in the earlier one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct FramePlace {
     /// The pose, each session about its own origin, and how well it is determined.
     pub laid: Laid,
     /// What speaks for and against it.
-    pub evidence: Evidence,
+    pub evidence: PoseEvidence,
     /// By how many surfels more the next best other place is contradicted; `None` where there is
     /// no other.
     pub margin: Option<i64>,
@@ -53,27 +53,27 @@ pub struct Place {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Answer {
     /// It holds.
-    Holds(Place),
+    Holds(FramePlace),
     /// It nearly holds: so far off, clearly.
-    Near(Place),
+    Near(FramePlace),
     /// It is contradicted, or too little speaks for it.
-    Not(Option<Place>),
+    Not(Option<FramePlace>),
 }
 
 /// Why no pose is taken.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Refusal {
     /// Nothing of the new session lies well on the earlier one; the best of what was tried.
-    Nothing(Option<Box<Place>>),
+    Nothing(Option<Box<FramePlace>>),
     /// Several places fit, the best first: what tells them apart is less than what may have been
     /// moved.
-    Several(Vec<Place>),
+    Several(Vec<FramePlace>),
 }
 
 /// Whether new scans lie where they are stated to, `stated` being the earlier session's world from
 /// theirs.
 #[must_use]
-pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
+pub fn at_stated(old: &SessionSurfaces, new: &SessionSurfaces, stated: &Pose) -> Answer {
     let chosen = Chosen::of(&new.surfels);
     let Some(laid) = chosen.lay(&old.surfels, stated, &NEAR) else { return Answer::Not(None) };
     let place = plain(&judge(old, new, laid));
@@ -94,7 +94,11 @@ pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
 ///
 /// # Errors
 /// The pose as far as it could be refined, where they do not.
-pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, Option<Box<Place>>> {
+pub fn from_rough(
+    old: &SessionSurfaces,
+    new: &SessionSurfaces,
+    rough: &Pose,
+) -> Result<FramePlace, Option<Box<FramePlace>>> {
     let laid = Chosen::of(&new.surfels).lay(&old.surfels, rough, &WIDE).ok_or(None)?;
     let place = plain(&judge(old, new, laid));
     if is_borne_out(&place) { Ok(place) } else { Err(Some(Box::new(place))) }
@@ -105,7 +109,12 @@ pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, O
 ///
 /// # Errors
 /// No pose is clear.
-pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Result<Place, Refusal> {
+pub fn find(
+    old: &SessionSurfaces,
+    new: &SessionSurfaces,
+    stated: &Pose,
+    fan: &dyn Fan,
+) -> Result<FramePlace, Refusal> {
     let chosen = Chosen::of(&new.surfels);
     let mut poses = search::poses(&old.surfels, &new.surfels, fan);
     poses.push(*stated);
@@ -133,7 +142,7 @@ pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Resul
 
 /// Whether a pose is the stated one, as near as the registration of each scan can tell.
 #[must_use]
-pub fn is_stated(place: &Place, stated: &Pose, new: &Session) -> bool {
+pub fn is_stated(place: &FramePlace, stated: &Pose, new: &SessionSurfaces) -> bool {
     let off = apart(&place.laid.old_from_new, stated, &middle(new));
     off.0 <= STATED.0 && off.1 <= STATED.1
 }
@@ -154,7 +163,7 @@ fn places(judged: Vec<Judged>, at: &Vector) -> Vec<Judged> {
 }
 
 /// The first of some places, if it is clear.
-fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal> {
+fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<FramePlace, Refusal> {
     let Some((best, others)) = places.split_first() else { return Err(Refusal::Nothing(None)) };
     let mut place = plain(best);
     let off = apart(&place.laid.old_from_new, stated, at);
@@ -169,7 +178,7 @@ fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal
     place.margin = serious.iter().map(margin).min();
     // That the files state it speaks for a pose as much as what stands there.
     let least = if is_stated { 0 } else { MIN_MARGIN.max((MARGIN_SHARE * n_same) as i64) };
-    let rivals: Vec<Place> =
+    let rivals: Vec<FramePlace> =
         serious.iter().filter(|o| margin(o) < least).map(|o| plain(o)).take(MAX_TOLD - 1).collect();
     if rivals.is_empty() {
         return Ok(place);
@@ -177,23 +186,23 @@ fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal
     Err(Refusal::Several([vec![place], rivals].concat()))
 }
 
-fn plain(judged: &Judged) -> Place {
-    Place { laid: judged.laid, evidence: judged.evidence, margin: None }
+fn plain(judged: &Judged) -> FramePlace {
+    FramePlace { laid: judged.laid, evidence: judged.evidence, margin: None }
 }
 
-fn is_good(place: &Place, min_share: f64) -> bool {
+fn is_good(place: &FramePlace, min_share: f64) -> bool {
     place.evidence.n_same() >= MIN_SAME
         && place.laid.hold >= MIN_HOLD
         && place.evidence.share() >= min_share
 }
 
 /// Whether enough speaks for a pose that somebody states.
-fn is_borne_out(place: &Place) -> bool {
+fn is_borne_out(place: &FramePlace) -> bool {
     place.evidence.n_same() >= MIN_SAME_STATED && place.evidence.share() >= MIN_SHARE_STATED
 }
 
 /// Where poses of a new session are compared.
-fn middle(new: &Session) -> Vector {
+fn middle(new: &SessionSurfaces) -> Vector {
     let n = new.surfels.all.len().max(1) as f64;
     new.surfels.all.iter().map(|s| s.at).sum::<Vector>() / n
 }

@@ -24,15 +24,15 @@ mod surfels;
 #[cfg(test)]
 mod tests;
 
-pub use decide::{Answer, Place, Refusal, at_stated, find, from_rough, is_stated};
-pub use judge::Evidence;
+pub use decide::{Answer, FramePlace, Refusal, at_stated, find, from_rough, is_stated};
+pub use judge::PoseEvidence;
 pub use panorama::Panorama;
 pub use refine::Laid;
 pub use surfels::{Gathered, Surfel, Surfels};
 
 /// What one session knows: its surfaces, and how far its beams went.
 #[derive(Debug, Clone, Default)]
-pub struct Session {
+pub struct SessionSurfaces {
     /// Its surfaces, about an origin of its own.
     pub surfels: Surfels,
     /// Its scanners, about the same origin.

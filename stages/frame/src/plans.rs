@@ -59,7 +59,7 @@ pub(crate) struct Plans {
 }
 
 /// Layers of one session on a raster.
-struct Drawn(Vec<Vec<f32>>);
+struct SessionPlan(Vec<Vec<f32>>);
 
 impl Plans {
     /// Draws an earlier session for new ones; `main` is the direction that most of its walls face,
@@ -119,7 +119,7 @@ impl Plans {
         surfels: impl Iterator<Item = &'s Surfel>,
         (pose, corner): (&Pose, [f64; 2]),
         most: f32,
-    ) -> Drawn {
+    ) -> SessionPlan {
         let [nx, ny] = self.n;
         let mut layers = vec![vec![0.0_f32; nx * ny]; N_LAYERS];
         for surfel in surfels {
@@ -149,12 +149,12 @@ impl Plans {
             layer.iter_mut().for_each(|v| *v = v.min(most));
         }
         // Floor is bare where nothing stands on it, nor beside.
-        let drawn = Drawn(layers);
+        let drawn = SessionPlan(layers);
         let stands: Vec<f32> = (0..nx * ny).map(|i| drawn.stands(i)).collect();
         let beside = widened(&stands, self.n);
         let mut layers = drawn.0;
         layers[BARE].iter_mut().zip(&beside).for_each(|(v, s)| *v *= f32::from(*s == 0.0));
-        Drawn(layers)
+        SessionPlan(layers)
     }
 
     /// Highest peaks of a score over all shifts.
@@ -192,7 +192,7 @@ impl Plans {
     }
 }
 
-impl Drawn {
+impl SessionPlan {
     /// How much stands in a cell.
     fn stands(&self, i: usize) -> f32 {
         self.0[..BARE].iter().map(|layer| layer[i]).sum::<f32>().min(MAX_HIGH)

@@ -97,8 +97,8 @@ impl Chosen {
         Some(Laid { old_from_new: pose, sigma, about, hold, n_pairs: sums.n, rms })
     }
 
-    fn sums(&self, old: &Surfels, pose: &Pose, gate: f64) -> Option<Sums> {
-        let mut out = Sums::default();
+    fn sums(&self, old: &Surfels, pose: &Pose, gate: f64) -> Option<RefineSums> {
+        let mut out = RefineSums::default();
         let about = (pose * nalgebra::Point3::from(self.middle)).coords;
         for surfel in &self.surfels {
             let at = (pose * nalgebra::Point3::from(surfel.at)).coords;
@@ -123,7 +123,7 @@ impl Chosen {
 }
 
 #[derive(Default)]
-struct Sums {
+struct RefineSums {
     normal: Matrix4<f64>,
     right: Vector4<f64>,
     in_plan: Matrix2<f64>,

@@ -1,7 +1,7 @@
 //! Rooms of planes with things in them, seen by scanners that see all of them from where they
 //! stand.
 
-use crate::{Answer, Gathered, Panorama, Refusal, Session, at_stated, find, from_rough};
+use crate::{Answer, Gathered, Panorama, Refusal, SessionSurfaces, at_stated, find, from_rough};
 use contract::OneByOne;
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -40,12 +40,12 @@ impl World {
     }
 
     /// What scanners at these places see, in the frame that `stated` brings the world into.
-    fn session(&self, scanners: &[[f64; 3]], stated: &Pose) -> Session {
+    fn session(&self, scanners: &[[f64; 3]], stated: &Pose) -> SessionSurfaces {
         self.seen(scanners, stated, true)
     }
 
     /// The same, with the places of the scanners or without.
-    fn seen(&self, scanners: &[[f64; 3]], stated: &Pose, is_known: bool) -> Session {
+    fn seen(&self, scanners: &[[f64; 3]], stated: &Pose, is_known: bool) -> SessionSurfaces {
         let origin = (stated * nalgebra::Point3::from(scanners[0])).coords.map(f64::round);
         let mut gathered = Gathered::about(origin);
         let mut eyes = Vec::new();
@@ -70,7 +70,7 @@ impl World {
             }
             eyes.extend(is_known.then(|| eye.finish()));
         }
-        Session { surfels: gathered.surfels(&[]), eyes }
+        SessionSurfaces { surfels: gathered.surfels(&[]), eyes }
     }
 }
 
@@ -80,7 +80,7 @@ fn frame(shift: [f64; 3], yaw_deg: f64) -> Pose {
 }
 
 /// The earlier session's world from the new one, each about its own origin, as it truly is.
-fn truth(old: &Session, new: &Session, stated: &Pose) -> Pose {
+fn truth(old: &SessionSurfaces, new: &SessionSurfaces, stated: &Pose) -> Pose {
     Translation3::from(-old.surfels.origin)
         * stated.inverse()
         * Translation3::from(new.surfels.origin)

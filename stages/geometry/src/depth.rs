@@ -7,7 +7,7 @@
 
 use crate::Pose;
 pub use crate::lanes::{LANES, Lanes, lanes};
-use crate::level::Level;
+use crate::level::DepthLevel;
 
 /// What a cell without a hit means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub struct DepthImage {
     pub(crate) scanner: crate::Point,
     /// Cells of level 0 per unit tangent.
     focal: f32,
-    levels: Vec<Level>,
+    levels: Vec<DepthLevel>,
 }
 
 /// `a_from_b` as three rows of four f32, for inner loops.
@@ -74,7 +74,7 @@ impl DepthImage {
     pub fn new(camera_from_local: Pose, half_tangent: f64, focal: f64) -> Self {
         let side = ((2.0 * half_tangent * focal).ceil().clamp(1.0, 8192.0)) as usize;
         let cells = vec![[f32::NAN; 3]; side * side];
-        let level = Level { width: side, height: side, cells };
+        let level = DepthLevel { width: side, height: side, cells };
         let rows = rows(&camera_from_local);
         // To a micrometre, so that images of one scanner agree.
         let scanner = camera_from_local.inverse() * crate::Point::origin();
@@ -146,7 +146,7 @@ impl DepthImage {
             let next = self.levels[self.levels.len() - 1].halved();
             self.levels.push(next);
         }
-        self.levels.iter_mut().for_each(Level::look_around);
+        self.levels.iter_mut().for_each(DepthLevel::look_around);
     }
 
     /// Takes back "no return" where others measured matter in that direction (local frame): beams

@@ -3,13 +3,13 @@
 //! facet serves point-to-plane.
 
 use crate::Aabb;
-use crate::spread::{Grid, N_LANES, spread};
+use crate::spread::{N_LANES, VoxelGrid, spread};
 
 /// A voxel grid about a surface: each voxel within reach holds the index of the sample nearest to
 /// its middle.
 #[derive(Debug, Clone, Default)]
 pub struct NearestField {
-    grid: Grid,
+    grid: VoxelGrid,
     /// Bricks on each axis, see [`BRICK`].
     bricks: [usize; 3],
     /// Index of the nearest sample + 1; 0 beyond reach. Brick after brick, x fastest.
@@ -52,7 +52,7 @@ impl NearestField {
         let size = bounds.size().map(|s| (s / f64::from(edge)).ceil() as usize + 1);
         let bricks = size.map(|n| n.div_ceil(1 << BRICK));
         let origin = bounds.min.map(|v| v as f32);
-        let grid = Grid { origin, edge, inverse_edge: 1.0 / edge, size };
+        let grid = VoxelGrid { origin, edge, inverse_edge: 1.0 / edge, size };
         let cells = vec![0; bricks.iter().product::<usize>() << (3 * BRICK)];
         let mut field = Self { grid, bricks, cells };
         // What is beyond reach is not told, so memory of bricks there is never touched.

@@ -5,7 +5,7 @@ use crate::lanes::{LANES, Lanes};
 
 /// A raster of nearest and farthest ranges at one resolution.
 #[derive(Debug, Clone)]
-pub(crate) struct Level {
+pub(crate) struct DepthLevel {
     pub(crate) width: usize,
     pub(crate) height: usize,
     /// `[near, far, around]` in metres; NaN unknown, +∞ no return. Row-major. `around` is the
@@ -14,7 +14,7 @@ pub(crate) struct Level {
     pub(crate) cells: Vec<[f32; 3]>,
 }
 
-impl Level {
+impl DepthLevel {
     /// The cell of a hit given in the camera frame, and its range, metres; `None` outside of the
     /// raster.
     #[inline]

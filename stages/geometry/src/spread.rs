@@ -12,7 +12,7 @@ pub(crate) const N_LANES: usize = 8;
 
 /// Where voxels lie.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Grid {
+pub(crate) struct VoxelGrid {
     /// Where the first voxel begins, metres.
     pub(crate) origin: [f32; 3],
     /// Of a voxel, metres.
@@ -23,7 +23,7 @@ pub(crate) struct Grid {
     pub(crate) size: [usize; 3],
 }
 
-impl Grid {
+impl VoxelGrid {
     /// The middles of `n` voxels along `axis`, metres.
     fn middles(&self, axis: usize, n: usize) -> Vec<f32> {
         (0..n).map(|place| self.origin[axis] + (place as f32 + 0.5) * self.edge).collect()
@@ -58,18 +58,18 @@ fn numbers(eight: &Eight) -> [u32; N_LANES] {
 }
 
 /// Voxels of one plane.
-struct Plane {
+struct VoxelPlane {
     eights: Vec<Eight>,
     /// Whether any of eight voxels has a sample.
     is_told: Vec<bool>,
 }
 
-impl Plane {
+impl VoxelPlane {
     fn new(n: usize) -> Self {
         Self { eights: vec![NONE; n], is_told: vec![false; n] }
     }
 
-    fn line(&self, y: usize, n_eights: usize) -> Told<'_> {
+    fn line(&self, y: usize, n_eights: usize) -> PlaneRow<'_> {
         let row = y * n_eights..(y + 1) * n_eights;
         (&self.eights[row.clone()], &self.is_told[row])
     }
@@ -81,10 +81,10 @@ impl Plane {
 }
 
 /// A row of a plane: its eights, and which of them have a sample.
-type Told<'a> = (&'a [Eight], &'a [bool]);
+type PlaneRow<'a> = (&'a [Eight], &'a [bool]);
 
 /// A row whose samples are at least so far away from another row, m².
-struct Line<'a> {
+struct VoxelRow<'a> {
     beyond2: f32,
     eights: &'a [Eight],
     is_told: &'a [bool],
@@ -101,7 +101,7 @@ struct Seed {
 /// What is on its way: see [`spread`].
 struct Spread<'a> {
     points: &'a [[f32; 3]],
-    grid: Grid,
+    grid: VoxelGrid,
     /// Squared reach, m².
     limit: f32,
     /// Planes or rows on either side that can hold a sample within reach.
@@ -117,7 +117,7 @@ struct Spread<'a> {
 /// of a row are told too.
 pub(crate) fn spread(
     points: &[[f32; 3]],
-    grid: Grid,
+    grid: VoxelGrid,
     reach: f32,
     mut take: impl FnMut([u32; 3], &[u32; N_LANES]),
 ) {
@@ -131,8 +131,8 @@ pub(crate) fn spread(
     let seeds = it.seeds();
     let n_planes = 2 * n_rings + 1;
     let n = n_y * it.n_eights;
-    let mut rows = Plane::new(n);
-    let mut planes: Vec<Plane> = (0..n_planes).map(|_| Plane::new(n)).collect();
+    let mut rows = VoxelPlane::new(n);
+    let mut planes: Vec<VoxelPlane> = (0..n_planes).map(|_| VoxelPlane::new(n)).collect();
     let mut from = 0;
     for z in 0..n_z + n_rings {
         let plane = &mut planes[z % n_planes];
@@ -168,7 +168,7 @@ impl Spread<'_> {
     }
 
     /// The nearest of a row's own samples, for each row of the plane.
-    fn along_rows(&self, seeds: &[Seed], z: usize, rows: &mut Plane) {
+    fn along_rows(&self, seeds: &[Seed], z: usize, rows: &mut VoxelPlane) {
         let n_y = self.grid.size[1];
         let mut best = vec![FAR; self.n_eights];
         for seeds in seeds.chunk_by(|a, b| a.row == b.row) {
@@ -198,7 +198,7 @@ impl Spread<'_> {
     }
 
     /// Of the rows' nearest samples, the nearest of the plane.
-    fn across_rows(&self, rows: &Plane, z: usize, plane: &mut Plane) {
+    fn across_rows(&self, rows: &VoxelPlane, z: usize, plane: &mut VoxelPlane) {
         let mut lines = Vec::new();
         for y in 0..self.grid.size[1] {
             self.outwards(&mut lines, y, self.grid.size[1], |y| rows.line(y, self.n_eights));
@@ -214,7 +214,7 @@ impl Spread<'_> {
     /// Of the planes' nearest samples, the nearest of all.
     fn across_planes(
         &self,
-        planes: &[Plane],
+        planes: &[VoxelPlane],
         z: usize,
         take: &mut impl FnMut([u32; 3], &[u32; N_LANES]),
     ) {
@@ -233,10 +233,10 @@ impl Spread<'_> {
     /// The lines at `place`, then those on either side of it among `n`, ring by ring.
     fn outwards<'b>(
         &self,
-        lines: &mut Vec<Line<'b>>,
+        lines: &mut Vec<VoxelRow<'b>>,
         place: usize,
         n: usize,
-        line: impl Fn(usize) -> Told<'b>,
+        line: impl Fn(usize) -> PlaneRow<'b>,
     ) {
         lines.clear();
         for ring in 0..=self.n_rings {
@@ -245,7 +245,7 @@ impl Spread<'_> {
             for at in sides.into_iter().flatten().filter(|at| *at < n) {
                 let (eights, is_told) = line(at);
                 if is_told.contains(&true) {
-                    lines.push(Line { beyond2: beyond * beyond, eights, is_told });
+                    lines.push(VoxelRow { beyond2: beyond * beyond, eights, is_told });
                 }
             }
         }
@@ -261,7 +261,7 @@ impl Spread<'_> {
 
     /// The nearest samples to eight voxels of those that lines know; `None` where no voxel has any.
     #[inline]
-    fn nearest(&self, lines: &[Line], place: [usize; 3]) -> Option<Eight> {
+    fn nearest(&self, lines: &[VoxelRow], place: [usize; 3]) -> Option<Eight> {
         let middles = self.middles_of(place);
         let (mut best, mut kept, mut is_told) = (f32x8::splat(self.limit), NONE, false);
         for line in lines {

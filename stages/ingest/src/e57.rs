@@ -12,7 +12,7 @@ mod strips;
 
 use crate::Settings;
 use crate::oddities::Oddities;
-use crate::reader::{MaskSeed, RawStrips, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::reader::{FileReading, MaskSeed, RawStrips, Reader, SampledPoint, ScanSeed, Want};
 use crate::units::{self, Choice, Units};
 use ::e57::E57Reader;
 use contract::{Error, Format, Kind, Result, XmlLimits, check_xml};
@@ -85,7 +85,7 @@ impl Reader for E57File {
         &self.scans
     }
 
-    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>> {
         strips::sample(self, &self.files[scan], n)
             .map_err(|e| e.at(format!("scan \"{}\"", self.scans[scan].name)))
     }
@@ -95,8 +95,8 @@ impl Reader for E57File {
             .map_err(|e| e.at(format!("scan \"{}\"", self.scans[scan].name)))
     }
 
-    fn read(&self, want: Want) -> Result<Reading<'_>> {
-        Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
+    fn read(&self, want: Want) -> Result<FileReading<'_>> {
+        Ok(FileReading::Straight(Box::new(strips::Strips::new(self, want))))
     }
 
     fn units(&self) -> &Units {

@@ -1,13 +1,13 @@
 //! One open input: its reader, what is known of its scans, and the numbers that its masks and scans
 //! have among those of all inputs.
 
-use crate::raster::Steps;
+use crate::raster::StepSource;
 use crate::reader::{RawStrip, Reader, ScanSeed};
 use contract::{MaskId, Result, ScanId, Strip};
 use geometry::{Aabb, Pose};
 
 /// One open file.
-pub(crate) struct File {
+pub(crate) struct OpenFile {
     pub(crate) reader: Box<dyn Reader>,
     pub(crate) first_scan: u32,
     pub(crate) first_mask: u32,
@@ -16,12 +16,12 @@ pub(crate) struct File {
     /// For each scan: whether its scanner's position is known.
     pub(crate) known: Vec<bool>,
     /// For each scan: where the steps of its lattice come from.
-    pub(crate) steps: Vec<Steps>,
+    pub(crate) steps: Vec<StepSource>,
     /// For each scan: where most of its points lie in the world, metres, where that could be told.
     pub(crate) spreads: Vec<Option<Aabb>>,
 }
 
-impl File {
+impl OpenFile {
     /// What came of reading, if the file was whole all along: one that was cut short reads as zeros
     /// from there, and that it was goes before what its reader makes of them.
     pub(crate) fn whole<T>(&self, read: Result<T>) -> Result<T> {

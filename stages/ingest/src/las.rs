@@ -3,12 +3,14 @@
 //! a point.
 
 use crate::las_record::Decoder;
-use crate::las_runs::{Records, at_once};
+use crate::las_runs::{LasRecords, at_once};
 use crate::las_scans::{self, LasScanner};
 use crate::laz::Stream;
 use crate::map::Mapped;
 use crate::oddities::Oddities;
-use crate::reader::{Extent, MaskSeed, RawStrip, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::reader::{
+    Extent, FileReading, MaskSeed, RawStrip, Reader, SampledPoint, ScanSeed, Want,
+};
 use crate::settings::Settings;
 use crate::units::Units;
 use contract::{Error, Format, Result};
@@ -16,7 +18,7 @@ use std::path::Path;
 
 /// An open LAS or LAZ file.
 pub(crate) struct Las {
-    records: Records,
+    records: LasRecords,
     decoder: Decoder,
     masks: Vec<MaskSeed>,
     scans: Vec<ScanSeed>,
@@ -31,7 +33,7 @@ pub(crate) struct Las {
 impl Las {
     /// Opens a LAS or LAZ file, with the scanners that are known for it.
     pub(crate) fn open(path: &Path, scanners: &[LasScanner], settings: &Settings) -> Result<Self> {
-        let records = Records::open(path, settings)?;
+        let records = LasRecords::open(path, settings)?;
         let found = las_scans::find(path, &records, scanners, settings)?;
         let pose = |s: &ScanSeed| (s.world_from_scan, s.scanner_known);
         let poses: Vec<_> = found.scans.iter().map(pose).collect();
@@ -77,7 +79,7 @@ impl Reader for Las {
         &self.scans
     }
 
-    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>> {
         /// Long enough to span several lines of most scanners, and spread over the scan.
         const RUNS: [f64; 3] = [0.45, 0.1, 0.8];
         /// More places to look at where other scans' points lie between.
@@ -91,7 +93,7 @@ impl Reader for Las {
             RUNS.into_iter().chain(more).collect()
         };
         let length = if starts.len() == 1 { n } else { n / RUNS.len() };
-        let mut sample: Vec<Sampled> = Vec::new();
+        let mut sample: Vec<SampledPoint> = Vec::new();
         for (i, share) in starts.into_iter().enumerate() {
             if sample.len() >= n || (i >= RUNS.len() && sample.len() > n / 2) {
                 break;
@@ -100,7 +102,9 @@ impl Reader for Las {
             let (place, records) = self.records.run(from, length)?;
             for strip in self.decoder.decode(&records, place, Want::Coordinates) {
                 if strip.scan == scan {
-                    sample.extend(strip.xyz.into_iter().map(|xyz| Sampled { xyz, native: None }));
+                    sample.extend(
+                        strip.xyz.into_iter().map(|xyz| SampledPoint { xyz, native: None }),
+                    );
                 }
             }
         }
@@ -132,15 +136,16 @@ impl Reader for Las {
         self.decoder.oddities(scan)
     }
 
-    fn read(&self, want: Want) -> Result<Reading<'_>> {
+    fn read(&self, want: Want) -> Result<FileReading<'_>> {
         if want == Want::Everything {
             (0..self.scans.len()).filter_map(|i| self.oddities(i)).for_each(Oddities::clear);
         }
         let streamed = || {
-            let records = Streamed { las: self, want, place: 0, stream: None, has_failed: false };
-            Reading::Straight(Box::new(records.flatten()))
+            let records =
+                StreamedStrips { las: self, want, place: 0, stream: None, has_failed: false };
+            FileReading::Straight(Box::new(records.flatten()))
         };
-        Ok(self.records.extents(self.strip_points).map_or_else(streamed, Reading::ByExtent))
+        Ok(self.records.extents(self.strip_points).map_or_else(streamed, FileReading::ByExtent))
     }
 
     fn decode(&self, extent: &Extent, bytes: &[u8], want: Want) -> Result<Vec<RawStrip>> {
@@ -220,7 +225,7 @@ impl Las {
 }
 
 /// The strips of a file whose compressed records are one stream, run by run.
-struct Streamed<'a> {
+struct StreamedStrips<'a> {
     las: &'a Las,
     want: Want,
     /// Place of the first record that is not decompressed yet.
@@ -229,7 +234,7 @@ struct Streamed<'a> {
     has_failed: bool,
 }
 
-impl Streamed<'_> {
+impl StreamedStrips<'_> {
     /// The next run; nothing at the end.
     fn run(&mut self) -> Result<Option<Vec<RawStrip>>> {
         let (las, first) = (self.las, self.place);
@@ -248,7 +253,7 @@ impl Streamed<'_> {
     }
 }
 
-impl Iterator for Streamed<'_> {
+impl Iterator for StreamedStrips<'_> {
     type Item = Vec<Result<RawStrip>>;
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -2,7 +2,7 @@
 
 /// Where the fields of a point format lie, bytes from the start of the record.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Layout {
+pub(crate) struct RecordLayout {
     /// Shortest record.
     pub(crate) len: usize,
     /// Formats 6 to 10: flags, class and source id lie elsewhere.
@@ -14,21 +14,21 @@ pub(crate) struct Layout {
 }
 
 /// LAS 1.4 R15, tables 7 to 17.
-const LAYOUTS: [Layout; 11] = [
-    Layout { len: 20, modern: false, gps_time: None, color: None },
-    Layout { len: 28, modern: false, gps_time: Some(20), color: None },
-    Layout { len: 26, modern: false, gps_time: None, color: Some(20) },
-    Layout { len: 34, modern: false, gps_time: Some(20), color: Some(28) },
-    Layout { len: 57, modern: false, gps_time: Some(20), color: None },
-    Layout { len: 63, modern: false, gps_time: Some(20), color: Some(28) },
-    Layout { len: 30, modern: true, gps_time: Some(22), color: None },
-    Layout { len: 36, modern: true, gps_time: Some(22), color: Some(30) },
-    Layout { len: 38, modern: true, gps_time: Some(22), color: Some(30) },
-    Layout { len: 59, modern: true, gps_time: Some(22), color: None },
-    Layout { len: 67, modern: true, gps_time: Some(22), color: Some(30) },
+const LAYOUTS: [RecordLayout; 11] = [
+    RecordLayout { len: 20, modern: false, gps_time: None, color: None },
+    RecordLayout { len: 28, modern: false, gps_time: Some(20), color: None },
+    RecordLayout { len: 26, modern: false, gps_time: None, color: Some(20) },
+    RecordLayout { len: 34, modern: false, gps_time: Some(20), color: Some(28) },
+    RecordLayout { len: 57, modern: false, gps_time: Some(20), color: None },
+    RecordLayout { len: 63, modern: false, gps_time: Some(20), color: Some(28) },
+    RecordLayout { len: 30, modern: true, gps_time: Some(22), color: None },
+    RecordLayout { len: 36, modern: true, gps_time: Some(22), color: Some(30) },
+    RecordLayout { len: 38, modern: true, gps_time: Some(22), color: Some(30) },
+    RecordLayout { len: 59, modern: true, gps_time: Some(22), color: None },
+    RecordLayout { len: 67, modern: true, gps_time: Some(22), color: Some(30) },
 ];
 
-impl Layout {
+impl RecordLayout {
     /// The layout of a point format.
     pub(crate) fn of(format: u8) -> Option<Self> {
         LAYOUTS.get(usize::from(format)).copied()

@@ -3,7 +3,7 @@
 
 use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
-use crate::las_layout::{Layout, u16_at};
+use crate::las_layout::{RecordLayout, u16_at};
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, Want};
 use contract::Attributes;
@@ -45,7 +45,7 @@ fn trimmed(mut strip: RawStrip) -> Option<RawStrip> {
 
 /// A record in the scan frame, metres.
 #[inline]
-fn in_scan(record: &[u8], frame: &Frame) -> [f64; 3] {
+fn in_scan(record: &[u8], frame: &CountFrame) -> [f64; 3] {
     let (c, m, t) = (counts(record), &frame.m, &frame.t);
     // One order of sums for all records: see `add_block`.
     [0, 1, 2].map(|i| c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i])
@@ -53,7 +53,7 @@ fn in_scan(record: &[u8], frame: &Frame) -> [f64; 3] {
 
 /// From counts to the scan frame: `m · counts + t`.
 #[derive(Debug, Clone)]
-struct Frame {
+struct CountFrame {
     m: [[f64; 3]; 3],
     t: [f64; 3],
     /// Points nearer to the scanner than this are beams without return, metres; 0 where no scanner
@@ -61,7 +61,7 @@ struct Frame {
     no_return: f64,
 }
 
-impl Frame {
+impl CountFrame {
     /// Whether a place in the scan frame is at the scanner itself.
     #[inline]
     fn is_no_return(&self, p: [f64; 3]) -> bool {
@@ -72,11 +72,11 @@ impl Frame {
 /// Turns records into strips.
 #[derive(Debug)]
 pub(crate) struct Decoder {
-    layout: Layout,
+    layout: RecordLayout,
     record_len: usize,
     scale: [f64; 3],
     offset: [f64; 3],
-    frames: Vec<Frame>,
+    frames: Vec<CountFrame>,
     /// Scan of each source id; empty where all points are of scan 0.
     scan_of_source: Vec<u16>,
     max_range: f64,
@@ -99,7 +99,7 @@ impl Decoder {
         scan_of_source: Vec<u16>,
         max_range: f64,
     ) -> Self {
-        let frames: Vec<Frame> = poses
+        let frames: Vec<CountFrame> = poses
             .iter()
             .map(|(world_from_scan, is_scanner)| {
                 let turn = world_from_scan.rotation.inverse().to_rotation_matrix();
@@ -111,7 +111,7 @@ impl Decoder {
                 // be.
                 let step = header.scale.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
                 let no_return = if *is_scanner { NO_RETURN.max(step) } else { 0.0 };
-                Frame { m, t: [t.x, t.y, t.z], no_return }
+                CountFrame { m, t: [t.x, t.y, t.z], no_return }
             })
             .collect();
         Self {
@@ -134,7 +134,7 @@ impl Decoder {
     }
 
     /// Layout of the records.
-    pub(crate) fn layout(&self) -> Layout {
+    pub(crate) fn layout(&self) -> RecordLayout {
         self.layout
     }
 
@@ -198,7 +198,13 @@ impl Decoder {
 
     /// The same for a whole block of records, in loops without branches; false, and nothing done,
     /// where one of them is withheld or not to be believed.
-    fn add_block(&self, strip: &mut RawStrip, block: &[u8], frame: &Frame, place: u32) -> bool {
+    fn add_block(
+        &self,
+        strip: &mut RawStrip,
+        block: &[u8],
+        frame: &CountFrame,
+        place: u32,
+    ) -> bool {
         let mut counts = [[0.0_f64; 3]; BLOCK];
         let mut withheld = false;
         for (record, count) in block.chunks_exact(self.record_len).zip(&mut counts) {
@@ -264,7 +270,7 @@ impl Decoder {
 
     /// Scan frame, or nothing where the point is withheld or not to be believed.
     #[inline]
-    fn local(&self, record: &[u8], frame: &Frame) -> Option<[f32; 3]> {
+    fn local(&self, record: &[u8], frame: &CountFrame) -> Option<[f32; 3]> {
         let p = in_scan(record, frame);
         // Written so that a NaN (from a scale near the end of f64) fails too.
         let near = p[0].abs() <= self.max_range
@@ -275,7 +281,7 @@ impl Decoder {
     }
 
     /// Whether a point that is not withheld lies at the scanner itself.
-    fn is_no_return(&self, record: &[u8], frame: &Frame) -> bool {
+    fn is_no_return(&self, record: &[u8], frame: &CountFrame) -> bool {
         frame.is_no_return(in_scan(record, frame)) && !self.layout.withheld(record)
     }
 

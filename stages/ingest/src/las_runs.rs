@@ -23,7 +23,7 @@ pub(crate) fn at_once(record_len: usize) -> usize {
 }
 
 /// The records of a file, whichever way they are stored.
-pub(crate) struct Records {
+pub(crate) struct LasRecords {
     pub(crate) map: Mapped,
     /// Header, checked, in metres.
     pub(crate) header: LasHeader,
@@ -33,7 +33,7 @@ pub(crate) struct Records {
     pub(crate) laz: Option<Laz>,
 }
 
-impl Records {
+impl LasRecords {
     /// Opens a file and checks what it says of itself.
     pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Self> {
         let map = map(path)?;
@@ -69,7 +69,7 @@ impl Records {
         Ok((start, Cow::Owned(records)))
     }
 
-    /// Where [`Records::run`] would start.
+    /// Where [`LasRecords::run`] would start.
     pub(crate) fn start(&self, first: u64) -> u64 {
         let Some(laz) = &self.laz else { return first };
         laz.pieces.get(laz.piece_of(first)).map_or(0, |p| p.first)

@@ -3,8 +3,8 @@
 
 use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
-use crate::las_layout::Layout;
-use crate::las_runs::Records;
+use crate::las_layout::RecordLayout;
+use crate::las_runs::LasRecords;
 use crate::oddities::no_returns_note;
 use crate::reader::ScanSeed;
 use crate::settings::Settings;
@@ -27,7 +27,7 @@ pub(crate) struct LasScanner {
 }
 
 /// The scans of one file.
-pub(crate) struct Found {
+pub(crate) struct FoundScans {
     pub(crate) scans: Vec<ScanSeed>,
     /// Scan of each source id, or empty where there is only one scan.
     pub(crate) scan_of_source: Vec<u16>,
@@ -72,10 +72,10 @@ struct Census {
 /// Finds the scans of a file.
 pub(crate) fn find(
     path: &Path,
-    records: &Records,
+    records: &LasRecords,
     scanners: &[LasScanner],
     settings: &Settings,
-) -> Result<Found> {
+) -> Result<FoundScans> {
     let header = &records.header;
     let look = look(records)?;
     let whole = (0, header.n_points.saturating_sub(1));
@@ -102,7 +102,7 @@ pub(crate) fn find(
         notes: notes.clone(),
         step,
     };
-    let mut found = Found {
+    let mut found = FoundScans {
         scans: Vec::new(),
         scan_of_source: Vec::new(),
         extents: Vec::new(),
@@ -127,7 +127,7 @@ pub(crate) fn find(
 }
 
 fn by_source_id(
-    found: &mut Found,
+    found: &mut FoundScans,
     scanners: &[LasScanner],
     census: &Census,
     whole: (u64, u64),
@@ -166,7 +166,7 @@ fn by_source_id(
 
 /// Checks where a scan stands: its scanner where that is known, else how far its points lie apart;
 /// notes what is worth it.
-fn check_place(scan: &mut ScanSeed, look: &Look, settings: &Settings) -> Result<()> {
+fn check_place(scan: &mut ScanSeed, look: &LasLook, settings: &Settings) -> Result<()> {
     if scan.scanner_known {
         let n = look.n_at(scan.world_from_scan.translation.vector);
         if n > 0 {
@@ -226,7 +226,7 @@ pub(crate) fn grown(bounds: &Aabb, header: &LasHeader) -> Aabb {
 }
 
 /// What a few records say of the place of all.
-struct Look {
+struct LasLook {
     /// World coordinates, metres.
     points: Vec<[f64; 3]>,
     /// How many of them lie outside the stated bounds.
@@ -237,7 +237,7 @@ struct Look {
     origin: [f64; 3],
 }
 
-impl Look {
+impl LasLook {
     fn bounds_wrong(&self) -> bool {
         self.outside * 2 > self.points.len()
     }
@@ -254,7 +254,7 @@ impl Look {
     }
 }
 
-fn look(records: &Records) -> Result<Look> {
+fn look(records: &LasRecords) -> Result<LasLook> {
     const WINDOWS: u64 = 8;
     const IN_WINDOW: usize = 256;
     let header = &records.header;
@@ -280,7 +280,7 @@ fn look(records: &Records) -> Result<Look> {
             values[values.len() / 2]
         })
     });
-    let mut look = Look { points, outside, middle, origin: [0.0; 3] };
+    let mut look = LasLook { points, outside, middle, origin: [0.0; 3] };
     let stated = header.bounds.filter(|_| !look.bounds_wrong()).map(|b| {
         let center = b.center();
         [center.x, center.y, center.z]
@@ -299,9 +299,9 @@ fn world(record: &[u8], header: &LasHeader) -> [f64; 3] {
 }
 
 /// Looks at the source ids: of all records where there are few, else of windows.
-fn census(records: &Records) -> Result<Census> {
+fn census(records: &LasRecords) -> Result<Census> {
     let header = &records.header;
-    let layout = Layout::of(header.format).expect("the header was checked");
+    let layout = RecordLayout::of(header.format).expect("the header was checked");
     let mut census = Census::default();
     let mut add = |first: u64, run: &[u8]| {
         let ids: Vec<u16> =

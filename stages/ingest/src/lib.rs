@@ -40,15 +40,15 @@ mod steps;
 mod text;
 mod units;
 
-pub use glance::{Glance, Sample};
+pub use glance::{Glance, GlanceSample};
 pub use inspect::{
-    BoundsText, Description, Fact, LatticeText, PoseText, ScanDescription, describe,
+    BoundsText, Fact, InputDescription, LatticeText, PoseText, ScanDescription, describe,
 };
 pub use map::{Mapped, map};
 pub use position::MISPLACED;
 pub use reader::{Extent, Want};
 pub use regular::{read_text, regular};
-pub use scanners::{Scanner, Scanners};
+pub use scanners::{KnownScanner, KnownScanners};
 pub use settings::Settings;
-pub use sources::{Before, Piece, Pieces, Sources, Strips, open, open_after};
-pub use units::{Origin, Unit, Units};
+pub use sources::{Before, InputPiece, InputPieces, Sources, Strips, open, open_after};
+pub use units::{LengthUnit, Origin, Units};

@@ -1,10 +1,10 @@
 //! A scan of an open file in; what a sample of its points tells out: its raster, where most of it
 //! lies, and whether its scanner can have stood where it is said to.
 
-use crate::file::{File, moved};
+use crate::file::{OpenFile, moved};
 use crate::position;
-use crate::raster::{self, Raster, Steps};
-use crate::reader::Sampled;
+use crate::raster::{self, ScanRaster, StepSource};
+use crate::reader::SampledPoint;
 use crate::settings::Settings;
 use contract::{Result, Scan};
 use geometry::{Aabb, Point, Pose};
@@ -23,9 +23,9 @@ const TAIL: f64 = 0.05;
 
 /// What a look at a scan tells.
 #[derive(Default)]
-pub(crate) struct Looked {
+pub(crate) struct ScanLook {
     /// The raster, where the scanner is known and its points tell it.
-    pub(crate) raster: Option<Raster>,
+    pub(crate) raster: Option<ScanRaster>,
     /// What is odd about the raster, or worse for the lack of one.
     pub(crate) note: Option<String>,
     /// Where most of its points lie in the world, metres.
@@ -34,36 +34,36 @@ pub(crate) struct Looked {
     pub(crate) is_misplaced: bool,
 }
 
-impl File {
+impl OpenFile {
     /// What a sample of a scan tells.
-    pub(crate) fn look(&self, i: usize, scan: &Scan, settings: &Settings) -> Result<Looked> {
+    pub(crate) fn look(&self, i: usize, scan: &Scan, settings: &Settings) -> Result<ScanLook> {
         if scan.stated_points == Some(0) {
-            return Ok(Looked::default());
+            return Ok(ScanLook::default());
         }
         let n = if self.known[i] { settings.sample_points } else { N_LOOKED };
-        let mut sample: Vec<Sampled> = self.reader.sample(i, n)?;
+        let mut sample: Vec<SampledPoint> = self.reader.sample(i, n)?;
         if let Some(new_from_file) = &self.moved[i] {
             sample.iter_mut().for_each(|s| s.xyz = moved(new_from_file, s.xyz));
         }
         let spread = spread(sample.iter().map(|s| s.xyz), &scan.world_from_scan);
         if !self.known[i] {
-            return Ok(Looked { spread, ..Looked::default() });
+            return Ok(ScanLook { spread, ..ScanLook::default() });
         }
         let n_points = self.reader.scans()[i].likely_points.or(scan.stated_points);
         let raster = raster::estimate(&sample, n_points, settings);
         // Rows and columns are regular about the scanner and nowhere else.
-        if !raster.is_some_and(|raster| raster.steps == Steps::Native)
+        if !raster.is_some_and(|raster| raster.steps == StepSource::Native)
             && let Some(note) = self.misplaced(i)?
         {
             let note = Some(note);
-            return Ok(Looked { raster: None, note, spread, is_misplaced: true });
+            return Ok(ScanLook { raster: None, note, spread, is_misplaced: true });
         }
         let note = match &raster {
             None if !sample.is_empty() => Some(NO_RASTER.into()),
             Some(raster) if raster.lattice.is_camera => Some(CAMERA.into()),
             _ => None,
         };
-        Ok(Looked { raster, note, spread, is_misplaced: false })
+        Ok(ScanLook { raster, note, spread, is_misplaced: false })
     }
 
     /// What is said of a scan whose scanner cannot have stood where it is said to.

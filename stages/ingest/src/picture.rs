@@ -3,7 +3,7 @@
 //! beams at equal angles.
 
 use crate::angular_grid::{Axis, wrap};
-use crate::reader::Sampled;
+use crate::reader::SampledPoint;
 use nalgebra::Vector3;
 
 /// Pairs of neighbours that are looked at: shares are known to a hundredth.
@@ -31,8 +31,8 @@ const AXIS: (i32, f64) = (5, 0.12);
 const LAST_STEP: f64 = 0.01;
 
 /// Whether the points have the directions of a camera's pixels.
-pub(crate) fn is_picture(sample: &[Sampled]) -> bool {
-    let unit = |s: &Sampled| Vector3::from(s.xyz.map(f64::from)).normalize();
+pub(crate) fn is_picture(sample: &[SampledPoint]) -> bool {
+    let unit = |s: &SampledPoint| Vector3::from(s.xyz.map(f64::from)).normalize();
     let all: Vec<Vector3<f64>> = sample.iter().map(unit).collect();
     let mean = all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64;
     let every = all.len().div_ceil(PAIRS).max(1);
@@ -106,13 +106,16 @@ mod tests {
     use super::*;
 
     /// Points on a bumpy wall, row after row, in the directions that `at` gives.
-    fn sample(at: impl Fn(i32, i32) -> [f64; 3]) -> Vec<Sampled> {
+    fn sample(at: impl Fn(i32, i32) -> [f64; 3]) -> Vec<SampledPoint> {
         let rows = (-120..120).flat_map(|i| (-160..160).map(move |j| (i, j)));
         let point = |(i, j): (i32, i32)| {
             let range = 1.5 + 0.3 * f64::from(i * 7 + j * 3).sin();
             let d = Vector3::from(at(i, j)).normalize() * range;
             // As a file with tenths of a millimetre has them.
-            Sampled { xyz: [d.x, d.y, d.z].map(|v| (v * 1e4).round() as f32 / 1e4), native: None }
+            SampledPoint {
+                xyz: [d.x, d.y, d.z].map(|v| (v * 1e4).round() as f32 / 1e4),
+                native: None,
+            }
         };
         // Pixels without depth are missing.
         rows.filter(|(i, j)| (i * 31 + j * 17) % 7 != 0).map(point).collect()

@@ -8,17 +8,17 @@ mod strips;
 mod tests;
 
 use crate::Settings;
-use crate::frame::Frame;
+use crate::frame::FileFrame;
 use crate::levels::Span;
 use crate::oddities::Oddities;
-use crate::reader::{MaskSeed, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::reader::{FileReading, MaskSeed, Reader, SampledPoint, ScanSeed, Want};
 use crate::units::{Choice, Units};
 use contract::{Format, Result};
 use std::path::{Path, PathBuf};
 
 /// One scan of the file.
 #[derive(Debug, Clone)]
-struct Block {
+struct PtxScan {
     /// Pixels of a column.
     n_rows: u64,
     /// Lines of points.
@@ -32,7 +32,7 @@ struct Block {
     /// Metres of one unit of the file.
     metres: f64,
     /// From the file's coordinates, in metres, to the scan frame.
-    frame: Frame,
+    frame: FileFrame,
     /// Which intensities become 0 and 65535.
     intensity: Span,
     /// The step of the coordinates, metres, where it is coarse.
@@ -45,7 +45,7 @@ struct PtxFile {
     settings: Settings,
     masks: Vec<MaskSeed>,
     scans: Vec<ScanSeed>,
-    blocks: Vec<Block>,
+    blocks: Vec<PtxScan>,
     units: Units,
     /// One a scan.
     oddities: Vec<Oddities>,
@@ -97,7 +97,7 @@ impl Reader for PtxFile {
         &self.scans
     }
 
-    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>> {
         strips::sample(self, scan, n)
     }
 
@@ -105,8 +105,8 @@ impl Reader for PtxFile {
         strips::spread(self, scan, n, most)
     }
 
-    fn read(&self, want: Want) -> Result<Reading<'_>> {
-        Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
+    fn read(&self, want: Want) -> Result<FileReading<'_>> {
+        Ok(FileReading::Straight(Box::new(strips::Strips::new(self, want))))
     }
 
     fn units(&self) -> &Units {

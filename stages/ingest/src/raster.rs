@@ -6,13 +6,13 @@ use crate::angular_grid::{AngularGrid, wrap};
 use crate::picture::is_picture;
 use crate::raster_free;
 use crate::raster_native;
-use crate::reader::Sampled;
+use crate::reader::SampledPoint;
 use crate::settings::Settings;
 use contract::Lattice;
 
 /// Where the steps of a lattice come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Steps {
+pub(crate) enum StepSource {
     /// Native rows and columns: they map to pixels one to one.
     Native,
     /// Native rows and columns, but they are not regular: a pixel may hold two returns or none.
@@ -25,9 +25,9 @@ pub(crate) enum Steps {
 
 /// A lattice, and where its steps come from.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Raster {
+pub(crate) struct ScanRaster {
     pub(crate) lattice: Lattice,
-    pub(crate) steps: Steps,
+    pub(crate) steps: StepSource,
 }
 
 /// Fewer points than this tell nothing about a raster.
@@ -38,11 +38,11 @@ const MAX_IRREGULAR: f64 = 2.5;
 /// The raster of a scan from a sample of it, as runs of neighbours in the order of the file;
 /// `n_total` is the number of points of the scan. `None` where there are too few points to tell.
 pub(crate) fn estimate(
-    sample: &[Sampled],
+    sample: &[SampledPoint],
     n_total: Option<u64>,
     settings: &Settings,
-) -> Option<Raster> {
-    let sample: Vec<Sampled> =
+) -> Option<ScanRaster> {
+    let sample: Vec<SampledPoint> =
         sample.iter().copied().filter(|s| s.xyz.iter().any(|v| *v != 0.0)).collect();
     if sample.len() < MIN_POINTS {
         return None;
@@ -50,16 +50,16 @@ pub(crate) fn estimate(
     let is_camera = is_picture(&sample);
     let with = |grid: &AngularGrid, steps| {
         let lattice = Lattice { is_camera, ..lattice(grid, settings) };
-        Some(Raster { lattice, steps })
+        Some(ScanRaster { lattice, steps })
     };
     let native = raster_native::fit(&sample);
     if let Some(native) = native.filter(|n| n.rms < MAX_IRREGULAR) {
         let regular = native.rms < settings.max_native_rms;
-        let steps = if regular { Steps::Native } else { Steps::Irregular };
+        let steps = if regular { StepSource::Native } else { StepSource::Irregular };
         return with(&native.grid, steps);
     }
     let grid = raster_free::fit(&sample, n_total)?;
-    with(&grid, Steps::Directions)
+    with(&grid, StepSource::Directions)
 }
 
 fn lattice(grid: &AngularGrid, settings: &Settings) -> Lattice {

@@ -3,7 +3,7 @@
 //! tell the density only.
 
 use crate::angular_grid::{AngularGrid, Axis, median, wrap};
-use crate::reader::Sampled;
+use crate::reader::SampledPoint;
 use std::f64::consts::TAU;
 
 /// Neighbours in the file that are farther apart than this many spacings of the sample are not
@@ -24,7 +24,7 @@ const STEEP: f64 = 1.3;
 const SAME: f64 = 1e-6;
 
 /// Fits; `None` only where directions do not spread at all.
-pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<AngularGrid> {
+pub(crate) fn fit(sample: &[SampledPoint], n_total: Option<u64>) -> Option<AngularGrid> {
     let about_z: Vec<[f64; 2]> = sample.iter().map(|s| Axis::Z.angles(s.xyz)).collect();
     let spacing = spacing(&about_z)?;
     let steps = consecutive(sample);
@@ -34,7 +34,7 @@ pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<AngularGri
         let share = n_total.map_or(1.0, |n| (sample.len() as f64 / n as f64).min(1.0));
         return Some(square(&about_z, spacing * share.sqrt()));
     };
-    let lines = Axis::ALL.map(|axis| Lines::find(sample, &steps, along, axis));
+    let lines = Axis::ALL.map(|axis| ScanLines::find(sample, &steps, along, axis));
     let mut best = &lines[0];
     for other in &lines[1..] {
         if best.bend > STRAIGHT && other.bend < STRAIGHTER * best.bend {
@@ -54,13 +54,13 @@ fn square(angles: &[[f64; 2]], step: f64) -> AngularGrid {
 }
 
 /// Angles between points that follow one another, radians.
-fn consecutive(sample: &[Sampled]) -> Vec<f64> {
-    let unit = |s: &Sampled| nalgebra::Vector3::from(s.xyz.map(f64::from)).normalize();
+fn consecutive(sample: &[SampledPoint]) -> Vec<f64> {
+    let unit = |s: &SampledPoint| nalgebra::Vector3::from(s.xyz.map(f64::from)).normalize();
     sample.windows(2).map(|w| (unit(&w[1]) - unit(&w[0])).norm()).collect()
 }
 
 /// How points follow one another about one axis.
-struct Lines {
+struct ScanLines {
     axis: Axis,
     angles: Vec<[f64; 2]>,
     /// Whether elevation runs along a line (else azimuth does).
@@ -71,8 +71,8 @@ struct Lines {
     bend: f64,
 }
 
-impl Lines {
-    fn find(sample: &[Sampled], steps: &[f64], along: f64, axis: Axis) -> Self {
+impl ScanLines {
+    fn find(sample: &[SampledPoint], steps: &[f64], along: f64, axis: Axis) -> Self {
         let angles: Vec<[f64; 2]> = sample.iter().map(|s| axis.angles(s.xyz)).collect();
         let (mut up, mut round) = (Vec::new(), Vec::new());
         for (i, step) in steps.iter().enumerate() {
@@ -197,12 +197,12 @@ fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
 /// Lengths of the mean phasor at frequencies that follow one another at equal distances: each
 /// value's phasor is turned on by the same angle every time, without a sine or cosine (thousands of
 /// turns leave a part in 10¹²).
-struct Sweep {
+struct PhasorSweep {
     now: [Vec<f64>; 2],
     turn: [Vec<f64>; 2],
 }
 
-impl Sweep {
+impl PhasorSweep {
     fn new(values: &[f64], low: f64, first: f64, apart: f64) -> Self {
         let phasors = |f: f64| {
             let turn = |v: &f64| TAU * f * (v - low);
@@ -241,7 +241,7 @@ fn sharpen(angles: &[[f64; 2]], axis: usize, step: f64) -> (f64, f64) {
     let apart = 0.2 / (high - low).max(step);
     let n = ((REACH / step) / apart).ceil().min(4_000.0) as i32;
     let sharpest = |about: f64, apart: f64, n: i32| -> (f64, f64) {
-        let mut sweep = Sweep::new(&values, low, about - f64::from(n) * apart, apart);
+        let mut sweep = PhasorSweep::new(&values, low, about - f64::from(n) * apart, apart);
         let mut best = (0.0, about);
         for i in -n..=n {
             let length = sweep.next();

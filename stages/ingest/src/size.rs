@@ -1,9 +1,9 @@
 //! A sample of each scan in; how far its points spread, and whether that can be a plant in the
 //! units that they are read in, out.
 
-use crate::file::File;
+use crate::file::OpenFile;
 use crate::sources::Sources;
-use crate::units::{Origin, Unit, Units};
+use crate::units::{LengthUnit, Origin, Units};
 use contract::{Error, Input, Result, quote};
 use geometry::{Aabb, Point, Pose};
 
@@ -56,11 +56,11 @@ impl Sources {
 
     /// Refuses scans that lie as far from one another as frames do, and plants do not.
     fn check_frames(&self) -> Result<()> {
-        let place = |file: &File, i: usize| {
+        let place = |file: &OpenFile, i: usize| {
             let scan = &self.scans[file.first_scan as usize + i];
             (scan.world_from_scan.translation.vector, &self.inputs[scan.input.0 as usize].path)
         };
-        let has_points = |file: &File, i: &usize| file.spreads[*i].is_some();
+        let has_points = |file: &OpenFile, i: &usize| file.spreads[*i].is_some();
         let all = self.files.iter().flat_map(|file| {
             let scans = (0..file.spreads.len()).filter(move |i| has_points(file, i));
             scans.map(move |i| place(file, i))
@@ -120,7 +120,7 @@ impl Sources {
     }
 }
 
-impl File {
+impl OpenFile {
     /// How far the points of each scan spread, metres.
     fn sizes(&self) -> impl Iterator<Item = [f64; 3]> {
         self.spreads.iter().flatten().map(Aabb::size)
@@ -161,7 +161,7 @@ fn wrong(input: &Input, units: &Units, size: &[f64; 3], why: &str) -> Error {
 fn likely(units: &Units, size: &[f64; 3]) -> Option<(&'static str, [f64; 3])> {
     let factors = units.factors();
     let of_file: [f64; 3] = std::array::from_fn(|axis| size[axis] / factors[axis]);
-    let is_other = |metres: f64| !Unit::new("", metres).is_about(units.horizontal.metres);
+    let is_other = |metres: f64| !LengthUnit::new("", metres).is_about(units.horizontal.metres);
     TRIED.into_iter().filter(|(_, metres)| is_other(*metres)).find_map(|(unit, metres)| {
         let size = of_file.map(|side| side * metres);
         let within = |v: f64, [least, most]: [f64; 2]| v >= least && v <= most;
@@ -214,7 +214,7 @@ mod tests {
         ] {
             assert_eq!(likely(&in_metres, &size).map(|(unit, _)| unit), unit, "{size:?}");
         }
-        let mm = Unit::new("millimetre", 1e-3);
+        let mm = LengthUnit::new("millimetre", 1e-3);
         let given = Units::of_nothing(Some(&[mm.clone(), mm])).expect("given");
         assert_eq!(likely(&given, &[0.008, 0.007, 0.003]).map(|(unit, _)| unit), Some("m"));
     }

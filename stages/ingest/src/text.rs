@@ -11,7 +11,7 @@ const MAX_LINE: u64 = 4096;
 const BUFFER: usize = 1 << 20;
 
 /// Lines of a file with their numbers; blank ones are left out.
-pub(crate) struct Lines {
+pub(crate) struct TextLines {
     reader: BufReader<File>,
     line: Vec<u8>,
     /// Number of the current line, from 1.
@@ -20,7 +20,7 @@ pub(crate) struct Lines {
     end: u64,
 }
 
-impl Lines {
+impl TextLines {
     /// At byte `from` of a file, which begins line `number + 1`.
     pub(crate) fn open(path: &Path, from: u64, number: u64) -> Result<Self> {
         let mut file = File::open(path)?;

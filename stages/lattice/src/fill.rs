@@ -2,10 +2,10 @@
 
 use crate::Settings;
 use crate::links;
-use crate::raster::{NONE, Raster};
+use crate::raster::{NONE, TileRaster};
 use contract::{Lattice, TILE_SIDE, Tile};
 
-impl Raster {
+impl TileRaster {
     /// Fills the raster with the nearest returns of `tile`, links them, and takes the veils out.
     /// 2^`skip` rows and columns of the lattice become one: the first of their pixels that has
     /// a return stands for them.
@@ -64,7 +64,7 @@ pub fn veils(tile: &Tile, scan: &contract::Scan, settings: &Settings) -> Vec<boo
     let Some(lattice) = &scan.lattice else {
         return out;
     };
-    let mut raster = Raster::default();
+    let mut raster = TileRaster::default();
     raster.fill(tile, lattice, 0, settings);
     raster.flag_veils(tile, &mut out);
     out

@@ -20,6 +20,6 @@ mod voxels;
 pub use accord::{agree, disagreement};
 pub use fill::veils;
 pub use settings::Settings;
-pub use summarise::{Scratch, Summarise};
+pub use summarise::{LatticeScratch, Summarise};
 pub use tile_normals::normals;
-pub use view::{Extent, ViewBuilder, ViewSettings};
+pub use view::{LatticeExtent, ViewBuilder, ViewSettings};

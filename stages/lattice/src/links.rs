@@ -2,7 +2,7 @@
 //! (veils).
 
 use crate::Settings;
-use crate::raster::{NONE, Raster};
+use crate::raster::{NONE, TileRaster};
 
 /// Towards lower columns.
 pub(crate) const LEFT: usize = 0;
@@ -35,7 +35,7 @@ pub(crate) fn step(side: usize, at: usize, direction: usize, by: usize) -> usize
 
 /// The neighbour of `at` on the same surface in `direction`, if any.
 #[inline]
-pub(crate) fn linked(raster: &Raster, at: usize, direction: usize) -> Option<usize> {
+pub(crate) fn linked(raster: &TileRaster, at: usize, direction: usize) -> Option<usize> {
     let link = raster.links[at][direction];
     (link != 0 && link & BROKEN == 0).then(|| step(raster.side, at, direction, usize::from(link)))
 }
@@ -48,7 +48,7 @@ struct Rule {
 
 /// Links each pixel with its next neighbours along row and column: 0 for none, the distance in
 /// pixels for one on the same surface, the same with [`BROKEN`] for one on another surface.
-pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
+pub(crate) fn link(raster: &mut TileRaster, settings: &Settings) {
     let (side, n_pixels) = (raster.side, raster.n_pixels());
     raster.links.clear();
     raster.links.resize(n_pixels, [0; 4]);
@@ -75,7 +75,7 @@ pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
 /// Links `at` forwards; `room` is the number of pixels behind and before it inside the tile.
 #[inline]
 fn link_one(
-    raster: &mut Raster,
+    raster: &mut TileRaster,
     rule: &Rule,
     (at, forth, back): (usize, usize, usize),
     angle: f32,
@@ -130,7 +130,7 @@ fn continues(ranges: [f32; 4], difference: f32, sigma: f32) -> bool {
 ///
 /// A pixel nearer than both neighbours is a wire, one farther than both a slit: real matter, never
 /// a veil.
-pub(crate) fn veils(raster: &mut Raster) {
+pub(crate) fn veils(raster: &mut TileRaster) {
     let mut out = std::mem::take(&mut raster.veils);
     out.clear();
     for at in 0..raster.n_pixels() {
@@ -151,7 +151,7 @@ pub(crate) fn veils(raster: &mut Raster) {
 
 /// Whether the neighbours to both sides see other surfaces, one nearer and one farther.
 #[inline]
-fn between(raster: &Raster, at: usize, back: usize, forth: usize) -> bool {
+fn between(raster: &TileRaster, at: usize, back: usize, forth: usize) -> bool {
     let (b, f) = (raster.links[at][back], raster.links[at][forth]);
     if b & BROKEN == 0 || f & BROKEN == 0 {
         return false;
@@ -163,7 +163,7 @@ fn between(raster: &Raster, at: usize, back: usize, forth: usize) -> bool {
 }
 
 /// Whether the linked piece around `at` has fewer than [`MIN_PIECE`] pixels.
-fn is_small(raster: &Raster, at: usize) -> bool {
+fn is_small(raster: &TileRaster, at: usize) -> bool {
     let mut piece = [at; MIN_PIECE];
     let (mut n, mut next) = (1, 0);
     while next < n {
@@ -185,7 +185,7 @@ fn is_small(raster: &Raster, at: usize) -> bool {
 }
 
 /// Whether broken links lead from `at` to something nearer and to something farther.
-fn near_and_far(raster: &Raster, at: usize) -> bool {
+fn near_and_far(raster: &TileRaster, at: usize) -> bool {
     let (side, range) = (raster.side, raster.xyzr[at][3]);
     let (mut near, mut far) = (false, false);
     for direction in 0..4 {

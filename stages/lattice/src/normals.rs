@@ -3,7 +3,7 @@
 
 use crate::Settings;
 use crate::links::{BROKEN, linked};
-use crate::raster::Raster;
+use crate::raster::TileRaster;
 
 /// Ten units a millimetre: window sums are exact integers modulo 2³², and a window never holds 200
 /// km.
@@ -35,7 +35,7 @@ pub(crate) struct Normals {
 
 impl Normals {
     /// Computes the normals of `raster`.
-    pub(crate) fn fill(&mut self, raster: &Raster, settings: &Settings) {
+    pub(crate) fn fill(&mut self, raster: &TileRaster, settings: &Settings) {
         self.measure_reach(raster);
         self.sum(raster);
         let (side, n_pixels) = (raster.side, raster.n_pixels());
@@ -56,7 +56,7 @@ impl Normals {
     /// The normals of a pixel and of those right, above and right above it. Where the first and the
     /// last agree, the surface is flat, and the two between have the first's.
     #[inline]
-    fn compute_four(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
+    fn compute_four(&mut self, raster: &TileRaster, row: usize, col: usize, settings: &Settings) {
         let first = row * raster.side + col;
         let four = [(0, 0), (1, 1), (0, 1), (1, 0)];
         let mut is_flat = raster.holds(first) && self.reach[first] >= SHARED_REACH;
@@ -78,7 +78,7 @@ impl Normals {
     }
 
     /// Chessboard distance of each pixel to the next broken link or unbridged gap.
-    fn measure_reach(&mut self, raster: &Raster) {
+    fn measure_reach(&mut self, raster: &TileRaster) {
         let side = raster.side;
         self.reach.clear();
         self.reach.extend((0..raster.n_pixels()).map(|at| {
@@ -130,7 +130,7 @@ impl Normals {
         }
     }
 
-    fn sum(&mut self, raster: &Raster) {
+    fn sum(&mut self, raster: &TileRaster) {
         let (side, wide) = (raster.side, raster.side + 1);
         self.table.clear();
         self.table.resize(wide * wide, [0; 4]);
@@ -167,7 +167,7 @@ impl Normals {
     }
 
     #[inline]
-    fn compute(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
+    fn compute(&mut self, raster: &TileRaster, row: usize, col: usize, settings: &Settings) {
         let (side, wide) = (raster.side, raster.side + 1);
         let at = row * side + col;
         let [x, y, z, range] = raster.xyzr[at];
@@ -214,7 +214,7 @@ impl Normals {
     }
 
     /// Border pixels take the normal of a linked neighbour whose tangent plane they lie on.
-    fn borrow_at_borders(&mut self, raster: &Raster) {
+    fn borrow_at_borders(&mut self, raster: &TileRaster) {
         for at in 0..raster.n_pixels() {
             if !raster.holds(at) || self.reach[at] > 0 {
                 continue;

@@ -1,7 +1,7 @@
 //! A tile in, a dense raster out: nearest return of each pixel, its range, its links to neighbours,
 //! its veils.
 
-use crate::noise::Noise;
+use crate::noise::RangeNoise;
 use contract::{Lattice, TILE_SIDE, Tile};
 
 /// Most that is skipped of a dense tile: every fourth row and column is read, a sixteenth of the
@@ -12,7 +12,7 @@ pub(crate) const NONE: u32 = u32::MAX;
 
 /// The dense raster of one tile; buffers are reused from tile to tile.
 #[derive(Debug, Default)]
-pub(crate) struct Raster {
+pub(crate) struct TileRaster {
     /// Pixels along a side.
     pub(crate) side: usize,
     /// Of a dense tile only each 2^skip-th row and column is read.
@@ -27,7 +27,7 @@ pub(crate) struct Raster {
     /// Empty pixels that a link leads across.
     pub(crate) bridged: Vec<bool>,
     /// Noise of this tile.
-    pub(crate) noise: Noise,
+    pub(crate) noise: RangeNoise,
     /// Angle between rows, radians.
     pub(crate) row_step: f32,
     /// Angle between columns on the sphere, radians, for each row of the tile.
@@ -36,7 +36,7 @@ pub(crate) struct Raster {
     pub(crate) veils: Vec<u16>,
 }
 
-impl Raster {
+impl TileRaster {
     /// Number of pixels.
     pub(crate) fn n_pixels(&self) -> usize {
         self.side * self.side
@@ -70,7 +70,7 @@ impl Raster {
     }
 }
 
-impl Raster {
+impl TileRaster {
     /// Sets the flag of each veil point of the tile that filled this raster, of which it skipped
     /// nothing.
     pub(crate) fn flag_veils(&self, tile: &Tile, flags: &mut [bool]) {

@@ -1,7 +1,7 @@
 //! A tile in; the normal of each of its points out: from its raster where the scanner is known, else
 //! from voxels.
 
-use crate::{Scratch, Settings, voxels};
+use crate::{LatticeScratch, Settings, voxels};
 use contract::{Scan, Tile};
 
 /// Unit normals of a tile's points, in the order of its points, in the scan frame (as its
@@ -10,7 +10,7 @@ use contract::{Scan, Tile};
 /// frame does. `None` for veils and where no surface was found.
 #[must_use]
 pub fn normals(tile: &Tile, scan: &Scan, settings: &Settings) -> Vec<Option<[f32; 3]>> {
-    let mut scratch = Scratch::default();
+    let mut scratch = LatticeScratch::default();
     let Some(lattice) = &scan.lattice else {
         return voxels::normals(tile, &mut scratch.surface, settings);
     };

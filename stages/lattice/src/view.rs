@@ -31,7 +31,7 @@ const MAX_HALF_TANGENT: f64 = 1.6;
 
 /// Rows and columns of a lattice that a scan covers: `[first row, last row, first column, last
 /// column]`.
-pub type Extent = [u32; 4];
+pub type LatticeExtent = [u32; 4];
 
 /// Gathers one scan's view of a region, tile by tile; in the order of the tiles, so that it is the
 /// same each time.
@@ -41,7 +41,7 @@ pub struct ViewBuilder {
     faces: Faces,
     local_from_scan: Pose,
     lattice: Option<Lattice>,
-    extent: Option<Extent>,
+    extent: Option<LatticeExtent>,
     bounds: geometry::Aabb,
     /// Cones from the scanner that together hold the region; none without scanner.
     cones: Option<Vec<Cone>>,
@@ -63,7 +63,7 @@ impl ViewBuilder {
     pub fn new(
         scan: &Scan,
         region: &Region,
-        extent: Option<Extent>,
+        extent: Option<LatticeExtent>,
         thin: Option<u32>,
         settings: &ViewSettings,
     ) -> Self {

@@ -3,7 +3,7 @@
 //! was seen.
 
 use crate::Settings;
-use crate::patch::{Ground, apply, from_sums, in_world, is_level, largest_first, world_rows};
+use crate::patch::{GroundCells, apply, from_sums, in_world, is_level, largest_first, world_rows};
 use contract::{PlanePatch, Scan, Tile};
 use geometry::{Aabb, Moments, Plane, Vector};
 
@@ -20,16 +20,16 @@ const FREE: u32 = u32::MAX - 1;
 
 /// Voxels of one tile; buffers are reused.
 #[derive(Debug, Default)]
-pub(crate) struct Surface {
+pub(crate) struct VoxelSurface {
     points: Vec<(u64, u32)>,
     /// Sorted by key.
-    cells: Vec<Cell>,
+    cells: Vec<VoxelCell>,
     /// Voxel of each point.
     of_point: Vec<u32>,
 }
 
 #[derive(Debug)]
-struct Cell {
+struct VoxelCell {
     key: u64,
     moments: Moments,
     /// Scan frame; largest component of the normal positive.
@@ -53,7 +53,7 @@ fn unpack(key: u64) -> [i64; 3] {
     std::array::from_fn(|i| (key >> (BITS * i as u32) & ((1 << BITS) - 1)) as i64 - MIDDLE)
 }
 
-impl Surface {
+impl VoxelSurface {
     fn fill(&mut self, tile: &Tile, settings: &Settings) {
         let edge = settings.surface_voxel;
         self.points.clear();
@@ -69,7 +69,7 @@ impl Surface {
             if self.cells.last().is_none_or(|c| c.key != key) {
                 let origin = Vector::from(p.map(f64::from));
                 let moments = Moments::new(origin);
-                self.cells.push(Cell {
+                self.cells.push(VoxelCell {
                     key,
                     moments,
                     plane: None,
@@ -184,7 +184,7 @@ impl Surface {
         }
         let rows = world_rows(&scan.world_from_scan);
         let mut patch = from_sums(scan.id, moments, plane, fit.rms);
-        let mut ground = Ground::default();
+        let mut ground = GroundCells::default();
         for &i in members {
             let cell = &self.cells[i];
             let box_of = |k: usize| {
@@ -209,7 +209,7 @@ impl Surface {
 pub(crate) fn patches(
     tile: &Tile,
     scan: &Scan,
-    surface: &mut Surface,
+    surface: &mut VoxelSurface,
     settings: &Settings,
 ) -> Vec<PlanePatch> {
     surface.fill(tile, settings);
@@ -231,7 +231,7 @@ pub(crate) fn patches(
 /// Normals of a tile's points by their voxels, scan frame, largest component positive.
 pub(crate) fn normals(
     tile: &Tile,
-    surface: &mut Surface,
+    surface: &mut VoxelSurface,
     settings: &Settings,
 ) -> Vec<Option<[f32; 3]>> {
     surface.fill(tile, settings);

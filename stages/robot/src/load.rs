@@ -1,6 +1,6 @@
 //! A model's folder in, a model out: its URDF and `robot.toml`, sub chains, meshes, CAD clouds.
 
-use crate::bodies::Bodies;
+use crate::bodies::MeshFiles;
 use crate::finding::{Finding, Findings};
 use crate::model::{Link, Model};
 use crate::notes::{named_passive, note_links};
@@ -8,8 +8,8 @@ use crate::reading::{file_name, read_text, read_xml};
 use crate::resolve::Roots;
 use crate::settings::Settings;
 use crate::sheet::{Sheet, SubChain};
-use crate::tree::Tree;
-use crate::urdf::Description;
+use crate::tree::LinkTree;
+use crate::urdf::UrdfDescription;
 use crate::{chain, close, cloud, tree, urdf};
 use contract::{Error, Fan, OneByOne, Result};
 use std::collections::{BTreeMap, BTreeSet};
@@ -222,9 +222,9 @@ impl Loader<'_> {
         let main_chain = chain::main_chain(&tree, sheet, findings);
         chain::set_roles(&mut tree, &main_chain, sheet, findings);
         let mut model = Model { name: self.name.to_owned(), main_chain, ..Model::default() };
-        let bodies = Bodies { roots: &self.roots, settings: self.settings };
+        let bodies = MeshFiles { roots: &self.roots, settings: self.settings };
         bodies.read(&mut tree, &file, findings);
-        Tree { links: model.links, joints: model.joints, free: model.free, .. } = tree;
+        LinkTree { links: model.links, joints: model.joints, free: model.free, .. } = tree;
         close::close(&mut model, &sheet.sub_chain, findings)?;
         note_links(&mut model, sheet, findings);
         if findings.failed() {
@@ -239,7 +239,7 @@ impl Loader<'_> {
     /// Adds the links and joints of a sub chain's own URDF; gives the names of its moving joints.
     fn join(
         &self,
-        description: &mut Description,
+        description: &mut UrdfDescription,
         sub_chain: &SubChain,
         findings: &mut Findings,
     ) -> Option<Vec<String>> {
@@ -260,11 +260,11 @@ impl Loader<'_> {
     /// URDF that it is.
     fn sub_urdf(
         &self,
-        main: &Description,
+        main: &UrdfDescription,
         sub_chain: &SubChain,
         written: &str,
         findings: &mut Findings,
-    ) -> Option<Description> {
+    ) -> Option<UrdfDescription> {
         let place = close::place(sub_chain);
         let found = self.roots.find(written).map_err(|what| {
             findings.fail(&place, format!("{what} \"{written}\""), "mend the name");

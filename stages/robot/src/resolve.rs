@@ -13,7 +13,7 @@ pub(crate) struct Roots {
 
 /// A file found.
 #[derive(Debug)]
-pub(crate) struct Found {
+pub(crate) struct FoundFile {
     pub(crate) path: PathBuf,
     /// The name on disk differs in case from the one written.
     pub(crate) other_case: bool,
@@ -51,7 +51,7 @@ impl Roots {
     }
 
     /// The file that `written` means, or what is wrong with it in words.
-    pub(crate) fn find(&self, written: &str) -> Result<Found, String> {
+    pub(crate) fn find(&self, written: &str) -> Result<FoundFile, String> {
         let candidates = self.candidates(written)?;
         let mut outside = false;
         for other_case in [false, true] {
@@ -67,7 +67,7 @@ impl Roots {
                     continue;
                 }
                 if self.holds(&path) {
-                    return Ok(Found { path, other_case });
+                    return Ok(FoundFile { path, other_case });
                 }
                 outside = true;
             }

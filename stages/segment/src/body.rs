@@ -1,7 +1,7 @@
 //! Robots as they stand: fits and models in; posed links with their fields, gates and boxes out.
 
 use crate::Settings;
-use crate::field::{FIELD_REACH, Field};
+use crate::field::{DistanceField, FIELD_REACH};
 use contract::{Fan, Fit, ScanId, Verdict};
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::{DMatrix, DVector};
@@ -17,11 +17,11 @@ const N_SPREAD: usize = 64;
 const OPEN_SIGMA: f64 = 0.01;
 
 /// One link as it stands.
-pub(crate) struct Link {
+pub(crate) struct StandingLink {
     /// Index into the model's links.
     pub(crate) index: u16,
     pub(crate) world_from_link: Pose,
-    pub(crate) field: Arc<Field>,
+    pub(crate) field: Arc<DistanceField>,
     /// Bounds of the mesh in the link's frame, metres.
     pub(crate) bounds: Aabb,
     /// How far around its bounds points are looked at, metres.
@@ -33,7 +33,7 @@ pub(crate) struct Link {
     foot: Option<([f32; 3], f32)>,
 }
 
-impl Link {
+impl StandingLink {
     /// How far a point (link frame) is above what the robot stands on, metres; `None` for links
     /// that do not stand.
     pub(crate) fn above_foot(&self, p: [f32; 3]) -> Option<f32> {
@@ -42,17 +42,17 @@ impl Link {
 }
 
 /// One robot as it stands.
-pub(crate) struct Body {
+pub(crate) struct StandingRobot {
     /// Index into the fits.
     pub(crate) robot: u16,
     /// Scans in which it stands so; empty: in all.
     stands_in: Vec<ScanId>,
     /// World bounds of everything that is looked at, metres.
     pub(crate) region: Aabb,
-    pub(crate) links: Vec<Link>,
+    pub(crate) links: Vec<StandingLink>,
 }
 
-impl Body {
+impl StandingRobot {
     /// Whether it stands so in a scan.
     pub(crate) fn is_in(&self, scan: ScanId) -> bool {
         self.stands_in.is_empty() || self.stands_in.contains(&scan)
@@ -65,7 +65,7 @@ pub(crate) fn bodies(
     models: &[Model],
     settings: &Settings,
     fan: &dyn Fan,
-) -> Vec<Body> {
+) -> Vec<StandingRobot> {
     let all = fits.iter().enumerate().flat_map(|(robot, fit)| {
         std::iter::once(fit).chain(&fit.stays).map(move |fit| (robot, fit))
     });
@@ -81,17 +81,21 @@ pub(crate) fn bodies(
         let links = posed(fit, model, &fields[&fit.model], settings);
         let region = links.iter().fold(Aabb::EMPTY, |all, link| all.union(&link.region()));
         let stands_in = fit.stands_in.clone();
-        (!region.is_empty()).then_some(Body { robot: *robot, stands_in, region, links })
+        (!region.is_empty()).then_some(StandingRobot { robot: *robot, stands_in, region, links })
     };
     used.iter().filter_map(body).collect()
 }
 
 /// For each model in use: the fields of its links that have a surface.
-fn fields(used: &[(u16, &Fit, &Model)], fan: &dyn Fan) -> BTreeMap<usize, Vec<Option<Arc<Field>>>> {
+fn fields(
+    used: &[(u16, &Fit, &Model)],
+    fan: &dyn Fan,
+) -> BTreeMap<usize, Vec<Option<Arc<DistanceField>>>> {
     let models: BTreeMap<usize, &Model> = used.iter().map(|(_, fit, m)| (fit.model, *m)).collect();
     let links = models.iter().flat_map(|(at, model)| model.links.iter().map(move |l| (*at, l)));
-    let made = |(at, link): (usize, &robot::Link)| (at, Field::new(&link.cad).map(Arc::new));
-    let mut out: BTreeMap<usize, Vec<Option<Arc<Field>>>> = BTreeMap::new();
+    let made =
+        |(at, link): (usize, &robot::Link)| (at, DistanceField::new(&link.cad).map(Arc::new));
+    let mut out: BTreeMap<usize, Vec<Option<Arc<DistanceField>>>> = BTreeMap::new();
     for (at, field) in fan.fan(links.collect(), made) {
         out.entry(at).or_default().push(field);
     }
@@ -101,9 +105,9 @@ fn fields(used: &[(u16, &Fit, &Model)], fan: &dyn Fan) -> BTreeMap<usize, Vec<Op
 fn posed(
     fit: &Fit,
     model: &Model,
-    fields: &[Option<Arc<Field>>],
+    fields: &[Option<Arc<DistanceField>>],
     settings: &Settings,
-) -> Vec<Link> {
+) -> Vec<StandingLink> {
     let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
     let Kinematics { base_from_link, twists } = model.kinematics(&posture);
     let covariance = covariance(fit);
@@ -119,7 +123,7 @@ fn posed(
         let sigma = (settings.sigma_range.powi(2) + mesh * mesh + spread * spread).sqrt();
         // The first link with a body stands; what carries it on turns and slides is no foot.
         let stands = out.is_empty() && twists[index].iter().flatten().all(|v| *v == 0.0);
-        out.push(Link {
+        out.push(StandingLink {
             index: at,
             world_from_link: fit.world_from_base * base_from_link[index],
             field: Arc::clone(field),
@@ -168,7 +172,7 @@ fn hands(model: &Model) -> Vec<bool> {
 /// RMS over the link's samples of their uncertainty across the surface, metres.
 fn spread(
     fit: &Fit,
-    field: &Field,
+    field: &DistanceField,
     base_from_link: &Pose,
     twists: &[[f64; 6]],
     covariance: &DMatrix<f64>,
@@ -208,7 +212,7 @@ fn covariance(fit: &Fit) -> DMatrix<f64> {
     DMatrix::from_diagonal(&DVector::from_iterator(n, variances))
 }
 
-impl Link {
+impl StandingLink {
     /// World bounds of what is looked at, metres.
     pub(crate) fn region(&self) -> Aabb {
         let corners = self.bounds.grown(self.reach.max(f64::from(FIELD_REACH))).corners();

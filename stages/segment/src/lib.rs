@@ -9,8 +9,8 @@ mod ground;
 mod raster;
 mod step;
 
-pub use ground::Ground;
-pub use step::{Scratch, Segment};
+pub use ground::FloorHeights;
+pub use step::{Segment, SegmentScratch};
 
 /// What may be tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]

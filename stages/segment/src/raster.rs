@@ -12,7 +12,7 @@ const NORMAL_SPAN: f32 = 0.015;
 
 /// Point of each pixel of a tile, with ranges.
 #[derive(Debug, Default)]
-pub(crate) struct Raster {
+pub(crate) struct PixelRaster {
     /// First point of each pixel, or `EMPTY`.
     first: Vec<u32>,
     ranges: Vec<f32>,
@@ -22,7 +22,7 @@ pub(crate) struct Raster {
     noise: f32,
 }
 
-impl Raster {
+impl PixelRaster {
     /// Fills the raster of a tile; memory is reused.
     pub(crate) fn fill(&mut self, tile: &Tile, lattice: &Lattice, sigma_range: f64) {
         self.first.clear();

@@ -7,7 +7,7 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-type Vector = geometry::Vector;
+use geometry::Vector;
 
 /// How far a triangle reaches beyond its edges, as a share of its size: about 60 roundings of
 /// single precision.
@@ -15,7 +15,7 @@ const HAIR: f32 = 4e-6;
 
 /// Where a beam ends.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Hit {
+pub(crate) struct BeamHit {
     /// Distance from the origin of the beam, metres.
     pub(crate) range: f64,
     /// Triangle, in the order of [`Beams`].
@@ -53,7 +53,12 @@ impl Beams {
 
     /// The nearest triangle along `direction` (unit length) not farther than `max_range`.
     #[inline]
-    pub(crate) fn cast(&self, origin: &Vector, direction: &Vector, max_range: f64) -> Option<Hit> {
+    pub(crate) fn cast(
+        &self,
+        origin: &Vector,
+        direction: &Vector,
+        max_range: f64,
+    ) -> Option<BeamHit> {
         if self.triangles.is_empty() {
             return None;
         }
@@ -70,7 +75,7 @@ impl Beams {
         // the plane's answer worthless, and then the single-precision one stands.
         let range = self.plane_range(triangle, origin, direction);
         let range = if (range - single).abs() < 1e-3 { range } else { single };
-        Some(Hit { range, triangle, surface: self.surface_of[triangle as usize] })
+        Some(BeamHit { range, triangle, surface: self.surface_of[triangle as usize] })
     }
 
     /// Range at which a beam meets the plane of a triangle, metres; infinite or negative where it

@@ -1,7 +1,7 @@
 //! The forms in which beams leave the simulator: a scan's frame, and its columns as a structure of
 //! arrays.
 
-use crate::scene::Raster;
+use crate::scene::BeamRaster;
 use contract::Label;
 use geometry::{Pose, Vector, direction};
 
@@ -15,7 +15,7 @@ pub struct ScanFrame {
     /// True pose, scene origin included.
     pub true_world_from_scan: Pose,
     /// Directions of rows and columns in the scan frame.
-    pub raster: Raster,
+    pub raster: BeamRaster,
     /// Number of rows, from the lowest elevation up.
     pub n_rows: u32,
     /// Number of columns, counter-clockwise.

@@ -5,10 +5,10 @@
 use crate::hand::{part_in, tool_on};
 use crate::random::Random;
 use crate::scene::{
-    Anchor, Column, Cuboid, Fence, Filling, Floor, Furniture, Hall, Hose, Later, Raster, Scene,
-    Section, StandShape, ToolShape,
+    Anchor, BeamRaster, Building, Column, Cuboid, Fence, FenceFilling, Furniture, Hose, Later,
+    Scene, SceneFloor, Section, StandShape, ToolShape,
 };
-use crate::spot::{Spot, scanner};
+use crate::spot::{RobotSpot, scanner};
 use contract::{Error, Result};
 use geometry::Point;
 use robot::{Model, Role};
@@ -64,12 +64,12 @@ pub fn plant(wanted: &Plant, models: &[Model]) -> Result<Scene> {
     let (rooms, size) = rooms(wanted, &robots, &mut random);
     let mut scene = Scene {
         seed: wanted.seed,
-        hall: Some(Hall {
+        hall: Some(Building {
             size: [size[0], size[1], random.between(5.0, 8.0)],
             walls: true,
             ceiling: random.unit() < 0.7,
         }),
-        floor: Some(Floor {
+        floor: Some(SceneFloor {
             size: None,
             tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
             wave_amplitude: 0.003,
@@ -206,7 +206,7 @@ fn furnish(
 }
 
 fn fence(name: String, (from, to): ([f64; 2], [f64; 2]), random: &mut Random) -> Fence {
-    let filling = if random.unit() < 0.75 { Filling::Wires } else { Filling::Panel };
+    let filling = if random.unit() < 0.75 { FenceFilling::Wires } else { FenceFilling::Panel };
     Fence { name, from, to, height: random.between(1.4, 2.2), filling }
 }
 
@@ -303,7 +303,7 @@ fn stand(
     let name = format!("R{}", k + 1);
     let stand = if random.unit() < 0.4 { random.between(0.15, 0.6) } else { 0.0 };
     let grow = if wanted.is_tight { 0.0 } else { 0.08 };
-    let spot = Spot {
+    let spot = RobotSpot {
         name: name.clone(),
         model: &room.model.name,
         xy: [0.5 * (room.min[0] + room.max[0]), 0.5 * (room.min[1] + room.max[1])],
@@ -412,7 +412,8 @@ fn scanners(
         if k % 3 == 2 && rooms.len() > 3 {
             xy[1] = 0.0;
         }
-        let raster = Raster { elevation_deg: DOME, step_deg: wanted.step_deg, ..Raster::default() };
+        let raster =
+            BeamRaster { elevation_deg: DOME, step_deg: wanted.step_deg, ..BeamRaster::default() };
         let z = scene.ground(xy[0], xy[1]) + random.between(1.5, 2.3);
         let mut one = scanner(format!("scan_{}", k + 1), [xy[0], xy[1], z], raster);
         one.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];

@@ -20,7 +20,7 @@ pub struct Scanner {
     /// World from scan.
     pub quaternion_wxyz: Option<[f64; 4]>,
     /// The angular raster.
-    pub raster: Raster,
+    pub raster: BeamRaster,
     /// Nearest range that is measured, metres.
     pub min_range: f64,
     /// Farthest range that is measured, metres.
@@ -41,7 +41,7 @@ pub struct Scanner {
     /// Beams have a width: what they measure at edges. None: infinitely thin beams.
     pub mixed: Option<Mixed>,
     /// Error of the stated pose.
-    pub registration: Registration,
+    pub registration: RegistrationError,
 }
 
 impl Default for Scanner {
@@ -51,7 +51,7 @@ impl Default for Scanner {
             position: [0.0, 0.0, 1.6],
             rpy_deg: [0.0; 3],
             quaternion_wxyz: None,
-            raster: Raster::default(),
+            raster: BeamRaster::default(),
             min_range: 0.3,
             max_range: 80.0,
             noise: 0.002,
@@ -61,7 +61,7 @@ impl Default for Scanner {
             dropouts: 0.0,
             dark_dropouts: 0.0,
             mixed: None,
-            registration: Registration::default(),
+            registration: RegistrationError::default(),
         }
     }
 }
@@ -69,7 +69,7 @@ impl Default for Scanner {
 /// Directions of beams: rows of elevation upwards, columns of azimuth counter-clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Raster {
+pub struct BeamRaster {
     /// Lowest and highest elevation, degrees.
     pub elevation_deg: [f64; 2],
     /// First azimuth and, exclusive, the last one, degrees.
@@ -80,7 +80,7 @@ pub struct Raster {
     pub n_beams: Option<u64>,
 }
 
-impl Default for Raster {
+impl Default for BeamRaster {
     fn default() -> Self {
         Self {
             elevation_deg: [-60.0, 90.0],
@@ -91,7 +91,7 @@ impl Default for Raster {
     }
 }
 
-impl Raster {
+impl BeamRaster {
     /// Angle between neighbours, degrees: a whole number of columns fills the azimuth range.
     #[must_use]
     pub fn step(&self) -> f64 {
@@ -155,14 +155,14 @@ impl Default for Mixed {
 /// What the stated pose of a scan differs by from its true one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Registration {
+pub struct RegistrationError {
     /// Shift in the scan frame, metres.
     pub xyz: [f64; 3],
     /// Roll, pitch, yaw, degrees.
     pub rpy_deg: [f64; 3],
 }
 
-impl Registration {
+impl RegistrationError {
     /// That of a scan with this true pose, and this stated one: another frame of the world, for
     /// example.
     #[must_use]

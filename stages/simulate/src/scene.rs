@@ -7,7 +7,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 pub use crate::place::{Later, RobotPlace, Tool, ToolShape};
-pub use crate::scanner::{Mixed, Raster, Registration, Scanner};
+pub use crate::scanner::{BeamRaster, Mixed, RegistrationError, Scanner};
 
 /// Everything that the virtual scanner needs. Metres, degrees where a name says so, world frame z
 /// up.
@@ -23,10 +23,10 @@ pub struct Scene {
     pub origin: [f64; 3],
     /// The building; none: nothing but the floor below and the sky above.
     #[serde(default)]
-    pub hall: Option<Hall>,
+    pub hall: Option<Building>,
     /// The ground; none: no ground.
     #[serde(default)]
-    pub floor: Option<Floor>,
+    pub floor: Option<SceneFloor>,
     /// Boxes.
     #[serde(default, rename = "box")]
     pub boxes: Vec<Cuboid>,
@@ -44,13 +44,13 @@ pub struct Scene {
     pub benches: Vec<Furniture>,
     /// Stands and pedestals that a robot may be bolted to.
     #[serde(default, rename = "stand")]
-    pub stands: Vec<Stand>,
+    pub stands: Vec<SceneStand>,
     /// Tubes and hoses, fixed or hung on robots.
     #[serde(default, rename = "hose")]
     pub hoses: Vec<Hose>,
     /// Boxes carried by robots.
     #[serde(default, rename = "carried")]
-    pub carried: Vec<Carried>,
+    pub carried: Vec<CarriedBox>,
     /// Robots; their order is that of the truth.
     #[serde(default, rename = "robot")]
     pub robots: Vec<RobotPlace>,
@@ -62,7 +62,7 @@ pub struct Scene {
 /// The building, its middle at the world's origin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Hall {
+pub struct Building {
     /// Length, width, height, metres.
     pub size: [f64; 3],
     /// Whether it has walls.
@@ -76,7 +76,7 @@ pub struct Hall {
 /// The ground: z = tilt + waves, over the hall's area or `size`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Floor {
+pub struct SceneFloor {
     /// Length and width, metres; the hall's where left out, 20 × 20 without a hall.
     #[serde(default)]
     pub size: Option<[f64; 2]>,
@@ -91,13 +91,13 @@ pub struct Floor {
     pub wave_length: f64,
     /// Raised rectangles of floor.
     #[serde(default, rename = "level")]
-    pub levels: Vec<Level>,
+    pub levels: Vec<RaisedFloor>,
 }
 
 /// A raised rectangle of floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Level {
+pub struct RaisedFloor {
     /// Smallest corner, metres.
     pub min: [f64; 2],
     /// Largest corner, metres.
@@ -170,13 +170,13 @@ pub struct Fence {
     pub height: f64,
     /// What is between the posts.
     #[serde(default)]
-    pub filling: Filling,
+    pub filling: FenceFilling,
 }
 
 /// What is between the posts of a fence.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Filling {
+pub enum FenceFilling {
     /// Welded wires of 4 mm, 50 mm apart.
     #[default]
     Wires,
@@ -203,7 +203,7 @@ pub struct Furniture {
 /// A stand on the ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Stand {
+pub struct SceneStand {
     /// For people.
     #[serde(default)]
     pub name: String,
@@ -268,7 +268,7 @@ pub struct Hose {
 /// A box held by a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Carried {
+pub struct CarriedBox {
     /// For people.
     #[serde(default)]
     pub name: String,
@@ -314,7 +314,8 @@ impl Scene {
     #[must_use]
     pub fn ground(&self, x: f64, y: f64) -> f64 {
         let Some(floor) = &self.floor else { return 0.0 };
-        let inside = |l: &&Level| x >= l.min[0] && x <= l.max[0] && y >= l.min[1] && y <= l.max[1];
+        let inside =
+            |l: &&RaisedFloor| x >= l.min[0] && x <= l.max[0] && y >= l.min[1] && y <= l.max[1];
         let raised = floor.levels.iter().filter(inside).map(|l| l.height).fold(0.0, f64::max);
         raised + floor.base_height(x, y)
     }
@@ -327,7 +328,7 @@ impl Scene {
     }
 }
 
-impl Floor {
+impl SceneFloor {
     /// Height of the lowest level at a place, metres: tilt and two crossing waves.
     #[must_use]
     pub fn base_height(&self, x: f64, y: f64) -> f64 {

@@ -3,7 +3,7 @@
 
 use crate::plant::{Plant, plant};
 use crate::random::Random;
-use crate::scene::{Column, Cuboid, Raster, Registration, Scene, Section};
+use crate::scene::{BeamRaster, Column, Cuboid, RegistrationError, Scene, Section};
 use crate::spot::scanner;
 use contract::{Error, Result};
 use robot::Model;
@@ -93,11 +93,11 @@ fn new_scanners(
     };
     let places = [side(0, random)?, side(1, random)?];
     let one = |(k, xy): (usize, [f64; 2])| {
-        let raster = Raster { elevation_deg: [-60.0, 70.0], step_deg, ..Raster::default() };
+        let raster = BeamRaster { elevation_deg: [-60.0, 70.0], step_deg, ..BeamRaster::default() };
         let z = scene.ground(xy[0], xy[1]) + random.between(1.6, 2.2);
         let mut out = scanner(format!("again_{}", k + 1), [xy[0], xy[1], z], raster);
         out.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];
-        out.registration = Registration::drawn(OFF, random);
+        out.registration = RegistrationError::drawn(OFF, random);
         out
     };
     Ok(places.into_iter().enumerate().map(one).collect())

@@ -1,7 +1,7 @@
 //! Text that people write in; what was read of it is within its bounds, out.
 
 use crate::{file, refused};
-use ingest::Scanners;
+use ingest::KnownScanners;
 use simulate::Scene;
 
 /// `--scanners`, TOML or JSON.

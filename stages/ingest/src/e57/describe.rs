@@ -1,10 +1,10 @@
 //! The description of one scan in an E57 file and its first records in; the scan, and its seed with
 //! all that is odd about it, out.
 
-use super::look::Look;
+use super::look::E57Look;
 use super::scan::{Coordinates, E57Scan};
 use crate::Settings;
-use crate::frame::{self, Frame};
+use crate::frame::{self, FileFrame};
 use crate::oddities::no_returns_note;
 use crate::reader::ScanSeed;
 use contract::{Error, Kind, Result};
@@ -38,7 +38,7 @@ impl E57Scan {
         }
         let is_stated = scan.channels(cloud);
         let bounds = bounds(cloud, metres);
-        let look = Look::at(&scan, path, settings)?;
+        let look = E57Look::at(&scan, path, settings)?;
         scan.suit_intensity(&look, is_stated, &mut notes);
         scan.frame = scan.judge(cloud, pose, bounds.as_ref(), &look, &mut notes);
         let (step, n_valid) = (look.step(), scan.n_valid());
@@ -72,7 +72,7 @@ impl E57Scan {
     }
 
     /// Takes the span that the intensities have where most of them do not keep to their limits.
-    fn suit_intensity(&mut self, look: &Look, is_stated: bool, notes: &mut Vec<String>) {
+    fn suit_intensity(&mut self, look: &E57Look, is_stated: bool, notes: &mut Vec<String>) {
         let Some(channel) = &mut self.intensity else { return };
         let (span, note) = channel.span.suited(&look.intensities, is_stated);
         channel.span = span;
@@ -92,9 +92,9 @@ impl E57Scan {
         cloud: &PointCloud,
         pose: Pose,
         bounds: Option<&Aabb>,
-        look: &Look,
+        look: &E57Look,
         notes: &mut Vec<String>,
-    ) -> Frame {
+    ) -> FileFrame {
         let first = look.first();
         let spherical = matches!(self.coordinates, Some(Coordinates::Spherical(_)));
         let claimed =
@@ -108,7 +108,7 @@ impl E57Scan {
                         .into(),
                 );
             }
-            let frame = Frame::of_scanner(pose);
+            let frame = FileFrame::of_scanner(pose);
             if look.n_looked < FEW {
                 return frame.with_origin();
             }
@@ -127,7 +127,7 @@ impl E57Scan {
             }
             .into(),
         );
-        let frame = Frame::about(pose, frame::near(bounds, first));
+        let frame = FileFrame::about(pose, frame::near(bounds, first));
         if (look.n_at_origin as f64) < NO_RETURNS * look.n_looked as f64 || look.n_at_origin < 2 {
             return frame;
         }

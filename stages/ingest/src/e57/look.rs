@@ -2,7 +2,7 @@
 //! without return are among them, how coarse its coordinates are, and what its intensities span.
 
 use super::pages::Pages;
-use super::points::{Points, Wanted};
+use super::points::{E57Points, WantedFields};
 use super::scan::E57Scan;
 use crate::Settings;
 use crate::frame::NO_RETURN;
@@ -18,7 +18,7 @@ const N_JUDGED: usize = 64;
 
 /// What a look at a scan shows; valid points only.
 #[derive(Debug, Default)]
-pub(super) struct Look {
+pub(super) struct E57Look {
     /// Points that are no returns at the origin, file's frame.
     pub(super) points: Vec<[f64; 3]>,
     /// How many lie at the file's origin, and how many were looked at.
@@ -28,14 +28,14 @@ pub(super) struct Look {
     pub(super) intensities: Vec<f64>,
 }
 
-impl Look {
+impl E57Look {
     /// Looks at the first records of a scan.
     pub(super) fn at(scan: &E57Scan, path: &Path, settings: &Settings) -> Result<Self> {
         let mut look = Self::default();
         if scan.n_records == 0 {
             return Ok(look);
         }
-        let mut points = Points::open(scan, Pages::open(path)?, Wanted::Attributes)?;
+        let mut points = E57Points::open(scan, Pages::open(path)?, WantedFields::Attributes)?;
         let mut n_seen = 0;
         while n_seen < N_RECORDS {
             let n = points.next_block(settings.strip_points.min(BLOCK))?;

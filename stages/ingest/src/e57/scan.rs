@@ -1,6 +1,6 @@
 //! The description of one scan in an E57 file in; which fields hold what, out.
 
-use crate::frame::Frame;
+use crate::frame::FileFrame;
 use crate::levels::Span;
 use crate::reader::MaskSeed;
 use contract::{Error, Result};
@@ -47,7 +47,7 @@ pub(super) struct E57Scan {
     /// Metres of one unit of the file.
     pub(super) metres: f64,
     /// From the file's coordinates, in metres, to the scan frame.
-    pub(super) frame: Frame,
+    pub(super) frame: FileFrame,
 }
 
 impl E57Scan {
@@ -109,7 +109,7 @@ impl E57Scan {
             intensity: None,
             color: None,
             metres: 1.0,
-            frame: Frame::of_scanner(Pose::identity()),
+            frame: FileFrame::of_scanner(Pose::identity()),
         })
     }
 

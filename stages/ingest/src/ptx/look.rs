@@ -12,7 +12,7 @@ const N_LOOKED: u64 = 4096;
 
 /// What those lines show.
 #[derive(Debug)]
-pub(super) struct Look {
+pub(super) struct PtxLook {
     /// Every so manieth line with a point is looked at.
     every: u64,
     /// Metres of one unit of the file.
@@ -28,7 +28,7 @@ pub(super) struct Look {
     intensities: Vec<f64>,
 }
 
-impl Look {
+impl PtxLook {
     /// At a block of so many lines, in a unit of so many metres.
     pub(super) fn new(n_lines: u64, metres: f64) -> Self {
         let every = n_lines.div_ceil(N_LOOKED).max(1);

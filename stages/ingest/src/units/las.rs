@@ -18,7 +18,7 @@ const MAX_RECORDS: usize = 4096;
 pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
     let records = records(raw, data);
     let find = |users: &[&str], id: u16| {
-        let is_it = |r: &&Record<'_>| r.id == id && users.contains(&r.user.as_str());
+        let is_it = |r: &&VlrRecord<'_>| r.id == id && users.contains(&r.user.as_str());
         records.iter().find(is_it).map(|r| r.payload)
     };
     const PROJECTION: &[&str] = &["LASF_Projection", "liblas"];
@@ -36,14 +36,14 @@ pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
     all
 }
 
-struct Record<'a> {
+struct VlrRecord<'a> {
     user: String,
     id: u16,
     payload: &'a [u8],
 }
 
 /// Records before the points, then those behind them, as far as they lie within the file.
-fn records<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<Record<'a>> {
+fn records<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<VlrRecord<'a>> {
     let mut out = Vec::new();
     let first = (usize::from(raw.header_size), raw.number_of_variable_length_records as usize);
     walk(data, first, HEADER, &mut out);
@@ -58,7 +58,7 @@ fn walk<'a>(
     data: &'a [u8],
     (mut at, n): (usize, usize),
     n_header: usize,
-    out: &mut Vec<Record<'a>>,
+    out: &mut Vec<VlrRecord<'a>>,
 ) {
     for _ in 0..n.min(MAX_RECORDS) {
         let Some(header) = at.checked_add(n_header).and_then(|end| data.get(at..end)) else {
@@ -77,7 +77,7 @@ fn walk<'a>(
             return;
         };
         let user = user.collect::<String>().trim_end().to_owned();
-        out.push(Record { user, id, payload: &data[start..end.min(start + MAX_BYTES)] });
+        out.push(VlrRecord { user, id, payload: &data[start..end.min(start + MAX_BYTES)] });
         at = end;
     }
 }

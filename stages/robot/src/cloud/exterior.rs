@@ -2,7 +2,7 @@
 //! Vendors' meshes hold motors and bolts that no scanner sees, and faces that are turned the wrong
 //! way.
 
-use super::Sample;
+use super::SurfaceSample;
 use crate::model::Mesh;
 use nalgebra::Vector3;
 use parry3d::bounding_volume::Aabb;
@@ -56,7 +56,7 @@ impl Shell {
     }
 
     /// The side from which more rays escape, if enough do from either; clear cases end early.
-    pub(super) fn side(&self, sample: &Sample, blockers: &mut Blockers) -> Option<Side> {
+    pub(super) fn side(&self, sample: &SurfaceSample, blockers: &mut Blockers) -> Option<Side> {
         let (mut front, mut back) = (0, 0);
         let [ahead, behind] = &mut blockers.0;
         for round in (0..N_RAYS).step_by(N_FIRST) {

@@ -3,7 +3,7 @@
 //! joint.
 
 use super::castings::{boom, cheek, foot, hub, motor, pipe, rib, tool_plate, trunk};
-use super::design::{Design, Hinge, Part};
+use super::design::{Design, DesignPart, Hinge};
 use super::gun::{electrode, gun};
 use super::welder_dimensions::{CYLINDER_PIN, LEVER, ROD_PIN, SHOULDER, UPPER};
 use super::welder_loops::{balancer, parallelogram};
@@ -20,7 +20,7 @@ const FORE: f64 = 0.88;
 const WRIST: f64 = 0.20;
 
 pub(super) fn design() -> Design {
-    let part = |name, body| Part { name, body: Some(body) };
+    let part = |name, body| DesignPart { name, body: Some(body) };
     Design {
         name: WELDER,
         parts: vec![
@@ -33,7 +33,7 @@ pub(super) fn design() -> Design {
             part("link_6", tool_plate(0.10, 0.05)),
             part("gun_body", gun()),
             part("electrode", electrode()),
-            Part { name: "tool0", body: None },
+            DesignPart { name: "tool0", body: None },
         ],
         hinges: vec![
             Hinge::turn("joint_1", "base_link", "link_1", [0.0, 0.0, NECK], Z, FULL_TURN),
