@@ -183,7 +183,7 @@ impl Place<'_> {
         let pairs: Vec<&[Vec<f64>]> = postures.windows(2).collect();
         let lay = |pair: &[Vec<f64>]| Ok(clearance::leg(body, &pair[0], &pair[1]));
         let legs = engine.fan_out(Task::new("path"), pairs, lay)?;
-        let walk = Walk::new((body, obstacles), (&postures, &legs), &robot.found());
+        let walk = Walk::new(body, obstacles, &postures, &legs, &robot.found());
         let contacts = contacts(&walk, engine)?;
         let impossible = robot.impossible(&postures, (&legs, contacts.open()), request.degrees);
         let contacts = contacts.all();
@@ -217,8 +217,9 @@ fn surrounded<'a>(
             return Err(Error::new(Kind::Unsupported, what).hint("mend the limits of its slides"));
         }
         let (hung, obstacles) = around.gather(robot, (others, models), far, engine)?;
-        let sizes = (margin, obstacles.largest());
-        let body = engine.pool()?.install(|| RobotBody::new(robot.model, hung, sizes, &AllThreads));
+        let largest = obstacles.largest();
+        let new = || RobotBody::new(robot.model, hung, margin, largest, &AllThreads);
+        let body = engine.pool()?.install(new);
         let needed = body.farthest() + margin + BETWEEN;
         if needed <= far {
             return Ok((body, obstacles));

@@ -86,7 +86,7 @@ impl Surroundings<'_> {
         let space: Option<Space> = robot.entry.space.as_ref().map(read).transpose()?;
         let bounds = space.as_ref().map_or(Aabb::EMPTY, |space| space.grid().bounds());
         let known = KnownBounds { world_from_base: robot.fit.world_from_base, bounds };
-        Ok((hung, Obstacles::new(&cells, &others, (space.as_ref(), known))))
+        Ok((hung, Obstacles::new(&cells, &others, space.as_ref(), known)))
     }
 
     /// Cells of all points that may stand in the way, and points that hang on the robot.
@@ -219,7 +219,7 @@ impl Surroundings<'_> {
             PointKind::Floor => What::Floor,
             _ => What::Uncertain,
         };
-        into.cells.add(p.coords.into(), what, (is_grazed, point.source_id));
+        into.cells.add(p.coords.into(), what, is_grazed, point.source_id);
         into.n_waiting += 1;
         Ok(())
     }

@@ -90,7 +90,7 @@ impl<'a> RobotBody<'a> {
     /// The parts of a model that its joints move, and what hangs on them; `margin` is what is near,
     /// `largest` the radius of the largest obstacle, metres.
     #[must_use]
-    pub fn new(model: &'a Model, hung: Hung, (margin, largest): (f64, f64), fan: &dyn Fan) -> Self {
+    pub fn new(model: &'a Model, hung: Hung, margin: f64, largest: f64, fan: &dyn Fan) -> Self {
         let margin = margin as f32;
         let least = margin + BETWEEN + HALF_CELL;
         let moves = model.moving();
@@ -190,8 +190,8 @@ impl<'a> RobotBody<'a> {
             }
             let link_from_base = Flat::of(&base_from_link.inverse());
             for bin in &around.bins {
-                let asked = (margin, &link_from_base);
-                self.bin((at, part), (bin, asked), around, &mut out.touches);
+                let asked = PartQuery { at, margin, link_from_base: &link_from_base };
+                self.bin(&asked, bin, around, &mut out.touches);
             }
         }
         out
@@ -199,11 +199,13 @@ impl<'a> RobotBody<'a> {
 
     fn bin(
         &self,
-        (at, part): (usize, &BodyPart),
-        (bin, (margin, link_from_base)): (&Bin, (f32, &Flat)),
+        asked: &PartQuery<'_>,
+        bin: &Bin,
         around: &Obstacles,
         touches: &mut Vec<PartTouch>,
     ) {
+        let &PartQuery { at, margin, link_from_base } = asked;
+        let part = &self.parts[at];
         let middle = link_from_base.of_point(bin.middle);
         let within = bin.radius + margin + BETWEEN;
         if !is_near(&part.bounds, middle, within) {
@@ -235,7 +237,7 @@ impl<'a> RobotBody<'a> {
                 Gap::Far => {}
                 Gap::Inside => touches.push(inside(at, obstacle, o)),
                 Gap::At(gap) => {
-                    let touch = touch((at, obstacle), (o, margin), gap);
+                    let touch = touch(at, obstacle, o, margin, gap);
                     let is_so = |touch: &PartTouch| {
                         around.split.parts(o).is_none_or(|mut parts| {
                             parts.any(|o| {
@@ -251,11 +253,7 @@ impl<'a> RobotBody<'a> {
     }
 }
 
-fn touch(
-    (part, obstacle): (usize, usize),
-    (o, margin): (&Obstacle, f32),
-    gap: f32,
-) -> Option<PartTouch> {
+fn touch(part: usize, obstacle: usize, o: &Obstacle, margin: f32, gap: f32) -> Option<PartTouch> {
     // Between two postures it may be half a step nearer.
     let gap = gap - o.radius - BETWEEN;
     let level = match o.what {
@@ -293,6 +291,15 @@ fn is_near(bounds: &Aabb, p: [f32; 3], within: f32) -> bool {
         (bounds.min[i] - v).max(v - bounds.max[i]).max(0.0)
     };
     (0..3).map(|i| outside(i).powi(2)).sum::<f64>() <= f64::from(within).powi(2)
+}
+
+/// A part that is asked what is near to it.
+struct PartQuery<'a> {
+    /// Index of the part.
+    at: usize,
+    /// What counts as near, metres.
+    margin: f32,
+    link_from_base: &'a Flat,
 }
 
 /// A pose for many points.

@@ -93,7 +93,7 @@ impl Cells {
     }
 
     /// Adds a point that is no farther, frame of the base; its beam grazed the edge of a robot.
-    pub fn add(&mut self, p: [f64; 3], what: What, (is_grazed, source): (bool, u16)) {
+    pub fn add(&mut self, p: [f64; 3], what: What, is_grazed: bool, source: u16) {
         let most = f64::from((1_u32 << BITS) - 1);
         let place = |i: usize| ((p[i] + self.far) / CELL).clamp(0.0, most) as u64;
         self.cells.push((
@@ -157,7 +157,8 @@ impl Obstacles {
     pub fn new(
         cells: &Cells,
         others: &[(i16, &Model, Vec<Pose>)],
-        (space, known): (Option<&Space>, KnownBounds),
+        space: Option<&Space>,
+        known: KnownBounds,
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles();
         let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, |at| thin[at]);

@@ -89,8 +89,10 @@ impl<'a> Walk<'a> {
     /// that the robot was scanned in.
     #[must_use]
     pub fn new(
-        (body, around): (&'a RobotBody<'a>, &'a Obstacles),
-        (path, legs): (&'a [Vec<f64>], &'a [Leg]),
+        body: &'a RobotBody<'a>,
+        around: &'a Obstacles,
+        path: &'a [Vec<f64>],
+        legs: &'a [Leg],
         found: &[f64],
     ) -> Self {
         let mut first = vec![0];
@@ -126,7 +128,7 @@ impl<'a> Walk<'a> {
             let posture = between(from, self.path.get(leg + 1).unwrap_or(from), share);
             let near = self.body.near(&posture, self.around);
             let open = self.body.model.loop_gap(&posture);
-            (leg as f64 + share, told(&near, (&self.found, self.around)), open)
+            (leg as f64 + share, told(&near, &self.found, self.around), open)
         };
         PieceContacts(own.map(look).collect())
     }
@@ -134,7 +136,7 @@ impl<'a> Walk<'a> {
     /// Adds what was near in the next piece.
     pub fn add(&self, looked: PieceContacts, to: &mut Contacts) {
         for (place, told, open) in looked.0 {
-            to.add((self.body, self.around), place, told);
+            to.add(self.body, self.around, place, told);
             if open > to.open.1 {
                 to.open = (place, open);
             }
@@ -215,7 +217,7 @@ impl AsFound {
 /// how many.
 type PostureContacts = BTreeMap<ContactKey, (ContactLevel, f32, Option<usize>, usize)>;
 
-fn told(near: &PostureNear, (found, around): (&AsFound, &Obstacles)) -> PostureContacts {
+fn told(near: &PostureNear, found: &AsFound, around: &Obstacles) -> PostureContacts {
     let mut out = PostureContacts::new();
     for touch in &near.touches {
         let key = (touch.part, around.all[touch.obstacle].what, found.is(touch));
@@ -241,12 +243,7 @@ pub struct Contacts {
 }
 
 impl Contacts {
-    fn add(
-        &mut self,
-        (body, around): (&RobotBody<'_>, &Obstacles),
-        place: f64,
-        told: PostureContacts,
-    ) {
+    fn add(&mut self, body: &RobotBody<'_>, around: &Obstacles, place: f64, told: PostureContacts) {
         for (key, (level, gap, obstacle, n)) in told {
             let part = &body.parts[key.0];
             let now = Contact {
@@ -324,17 +321,17 @@ mod tests {
     fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let mut body = RobotBody::new(&model, BTreeMap::new(), (margin, 0.0), &OneByOne);
+        let mut body = RobotBody::new(&model, BTreeMap::new(), margin, 0.0, &OneByOne);
         let mut cells = Cells::within(crate::reach(&model) + margin + 0.1, &BTreeMap::new());
-        points.iter().for_each(|(p, what)| cells.add(*p, *what, (false, 0)));
+        points.iter().for_each(|(p, what)| cells.add(*p, *what, false, 0));
         cells.settle();
         let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
         let known = KnownBounds { world_from_base: Pose::identity(), bounds };
-        let mut around = Obstacles::new(&cells, &[], (None, known));
+        let mut around = Obstacles::new(&cells, &[], None, known);
         body.stand(&[found], &mut around);
         let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
         let legs = legs(&body, &path);
-        let walk = Walk::new((&body, &around), (&path, &legs), &[found]);
+        let walk = Walk::new(&body, &around, &path, &legs, &[found]);
         contacts(&walk)
     }
 
@@ -417,7 +414,7 @@ mod tests {
     fn whole_turns_are_no_rest() {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let body = RobotBody::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
+        let body = RobotBody::new(&model, BTreeMap::new(), 0.02, 0.0, &OneByOne);
         let turns = MAX_STEPS as f64 * std::f64::consts::TAU;
         assert!(leg(&body, &[0.0], &[turns]).jumps && leg(&body, &[0.0], &[1e308]).jumps);
     }
@@ -432,17 +429,18 @@ mod tests {
     fn space_of_which_nothing_is_known_is_not_free() {
         let dir = tempfile::tempdir().expect("a folder");
         let model = arm(dir.path());
-        let body = RobotBody::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
+        let body = RobotBody::new(&model, BTreeMap::new(), 0.02, 0.0, &OneByOne);
         let bounds = Aabb { min: [-9.0, -0.2, -9.0], max: [9.0, 9.0, 9.0] };
         let known = KnownBounds { world_from_base: Pose::identity(), bounds };
         let around = Obstacles::new(
             &Cells::within(crate::reach(&model) + 0.2, &BTreeMap::new()),
             &[],
-            (None, known),
+            None,
+            known,
         );
         let path = [vec![0.0], vec![-1.0]];
         let legs = legs(&body, &path);
-        let walk = Walk::new((&body, &around), (&path, &legs), &[0.0]);
+        let walk = Walk::new(&body, &around, &path, &legs, &[0.0]);
         let found = contacts(&walk);
         assert!(found.len() == 1 && found[0].what == What::Unseen && found[0].at.is_none());
         assert!(found[0].from > 0.0 && found[0].to == 1.0, "{found:?}");

@@ -21,7 +21,8 @@ const POINT: usize = 9;
 pub(crate) fn check(
     file: &mut (impl Read + Seek),
     at: u64,
-    (laz, las): (&LazVlr, &LasSettings),
+    laz: &LazVlr,
+    las: &LasSettings,
     n_points: u64,
 ) -> io::Result<Result<(), String>> {
     if n_points == 0 {

@@ -64,15 +64,15 @@ impl PlanPicture {
         for (p, label) in world.iter().zip(labels) {
             let now = (self.at([p[0], p[1]]), *label);
             if now != last {
-                self.count(last, n);
+                self.count(last.0, last.1, n);
                 (last, n) = (now, 0);
             }
             n += 1;
         }
-        self.count(last, n);
+        self.count(last.0, last.1, n);
     }
 
-    fn count(&self, (at, label): (Option<usize>, Label), n: u32) {
+    fn count(&self, at: Option<usize>, label: Label, n: u32) {
         let Some(at) = at else { return };
         let cell = &self.cells[at];
         let count = match label.kind {

@@ -182,8 +182,8 @@ impl<'a> RefillTile<'a> {
                 compare(path, stated, read)?;
             }
             let laz = crate::las::laz_vlr(las);
-            let (at, of) = (expected as u64, (&laz, las));
-            let fits = chunks::check(&mut file, at, of, left).map_err(failed)?;
+            let at = expected as u64;
+            let fits = chunks::check(&mut file, at, &laz, las, left).map_err(failed)?;
             fits.map_err(|what| foreign().because(what))?;
             file.seek(SeekFrom::Start(at)).map_err(failed)?;
             let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;

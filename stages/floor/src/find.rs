@@ -171,7 +171,7 @@ fn search(
         .filter(|(i, p)| wanted(p) && ceilings.binary_search(i).is_err())
         .map(|(_, p)| p.clone())
         .collect();
-    let mut planes = stands(&may_carry, (&found, &levels), scanners, settings);
+    let mut planes = stands(&may_carry, &found, &levels, scanners, settings);
     planes.extend(found.iter().map(|level| InstallationPlane {
         plane: level.plane,
         bounds: Aabb::of(level.nodes.iter().map(|n| n.place().into())),

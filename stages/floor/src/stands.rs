@@ -17,13 +17,14 @@ const TILT_ERROR: f64 = 0.0175;
 /// Joins patches that face up into planes; the largest ones, largest first.
 pub(crate) fn stands(
     patches: &[PlanePatch],
-    floor: (&[PieceLevel], &[FloorLevel]),
+    found: &[PieceLevel],
+    levels: &[FloorLevel],
     scanners: &ScannerPlaces,
     settings: &Settings,
 ) -> Vec<InstallationPlane> {
     let mut chosen: Vec<&PlanePatch> = patches
         .iter()
-        .filter(|p| !is_floor(p, floor.1, settings) && !is_ghost(p, floor.0, scanners, settings))
+        .filter(|p| !is_floor(p, levels, settings) && !is_ghost(p, found, scanners, settings))
         .collect();
     chosen.sort_by(|a, b| a.bounds.min[0].total_cmp(&b.bounds.min[0]));
     let mut union = Union::new(chosen.len());

@@ -3,7 +3,7 @@
 //! out: a floor lies on itself wherever it is laid.
 
 use crate::refine::Laid;
-use crate::surfels::{Surfel, Surfels};
+use crate::surfels::Surfel;
 use crate::{Panorama, SessionSurfaces};
 use geometry::{Pose, Vector};
 use nalgebra::Point3;
@@ -91,7 +91,7 @@ pub(crate) fn judge(old: &SessionSurfaces, new: &SessionSurfaces, laid: Laid) ->
         if s.is_level() {
             return SurfelState::Unknown;
         }
-        match state(s, &pose, (&old.surfels, &old.eyes)) {
+        match state(s, &pose, old) {
             // Without beams, what stands where a floor or anything else was seen and it was not was
             // not there.
             SurfelState::Unknown if old.eyes.is_empty() && is_covered(s) => SurfelState::Through,
@@ -105,7 +105,7 @@ pub(crate) fn judge(old: &SessionSurfaces, new: &SessionSurfaces, laid: Laid) ->
         if s.is_level() || !scanners.iter().any(is_near) {
             return SurfelState::Unknown;
         }
-        match state(s, &back, (&new.surfels, &new.eyes)) {
+        match state(s, &back, new) {
             SurfelState::Same if s.may_move => SurfelState::SameRobot,
             SurfelState::Through if s.may_move => SurfelState::Unknown,
             state => state,
@@ -145,7 +145,8 @@ impl Judged {
 
 /// What a session has where a surfel of the other one lies; `pose` brings that one's world into its
 /// own.
-fn state(surfel: &Surfel, pose: &Pose, (surfels, eyes): (&Surfels, &[Panorama])) -> SurfelState {
+fn state(surfel: &Surfel, pose: &Pose, other_session: &SessionSurfaces) -> SurfelState {
+    let SessionSurfaces { surfels, eyes } = other_session;
     let at = (pose * Point3::from(surfel.at)).coords;
     let normal = pose.rotation * surfel.normal;
     let is_same = |other: &&Surfel| {

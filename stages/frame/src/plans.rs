@@ -78,7 +78,7 @@ impl Plans {
         let fft = Fourier::of(n);
         let corner = min.map(|v| v - edge);
         let mut plans = Self { edge, n, corner, reach, main, layers: Vec::new(), fft };
-        let drawn = plans.draw(old.all.iter(), (&Pose::identity(), corner), THERE);
+        let drawn = plans.draw(old.all.iter(), &Pose::identity(), corner, THERE);
         let widened =
             drawn.0.iter().enumerate().map(|(layer, raster)| {
                 if layer == BARE { raster.clone() } else { widened(raster, n) }
@@ -96,7 +96,7 @@ impl Plans {
         let pose = Pose::from_parts(nalgebra::Translation3::identity(), turn);
         let corner = [-self.reach - self.edge; 2];
         let near = new.all.iter().filter(|s| s.at.xy().norm() <= self.reach);
-        let drawn = self.draw(near, (&pose, corner), MAX_HIGH);
+        let drawn = self.draw(near, &pose, corner, MAX_HIGH);
         let stands: Vec<f32> = (0..self.n[0] * self.n[1]).map(|i| drawn.stands(i)).collect();
         let mut sum = vec![Complex32::default(); stands.len()];
         let mut add = |old: &[Complex32], new: &[f32], weight: f32| {
@@ -117,7 +117,8 @@ impl Plans {
     fn draw<'s>(
         &self,
         surfels: impl Iterator<Item = &'s Surfel>,
-        (pose, corner): (&Pose, [f64; 2]),
+        pose: &Pose,
+        corner: [f64; 2],
         most: f32,
     ) -> SessionPlan {
         let [nx, ny] = self.n;

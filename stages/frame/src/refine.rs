@@ -103,7 +103,7 @@ impl Chosen {
         for surfel in &self.surfels {
             let at = (pose * nalgebra::Point3::from(surfel.at)).coords;
             let normal = pose.rotation * surfel.normal;
-            let Some(on) = nearest(old, &at, (&normal, surfel.is_signed), gate) else { continue };
+            let Some(on) = nearest(old, &at, &normal, surfel.is_signed, gate) else { continue };
             let plane = &old.all[on];
             let distance = plane.normal.dot(&(at - plane.at));
             let u = distance / gate;
@@ -136,7 +136,8 @@ struct RefineSums {
 fn nearest(
     old: &Surfels,
     at: &Vector,
-    (normal, is_signed): (&Vector, bool),
+    normal: &Vector,
+    is_signed: bool,
     gate: f64,
 ) -> Option<usize> {
     let n_steps = (gate / STEP).ceil() as i32;

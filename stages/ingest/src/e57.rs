@@ -60,7 +60,7 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
             Some(name) if !name.is_empty() => name.to_string(),
             _ => format!("scan {}", n + 1),
         };
-        let (scan, mut seed) = E57Scan::new(path, cloud, (&name, metres), settings)
+        let (scan, mut seed) = E57Scan::new(path, cloud, &name, metres, settings)
             .map_err(|e| e.at(format!("scan \"{name}\"")))?;
         seed.mask = n;
         file.facts.push((format!("scan {} fields", n + 1), fields(cloud)));

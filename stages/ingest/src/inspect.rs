@@ -109,12 +109,13 @@ pub struct BoundsText {
 pub fn describe(sources: &Sources, fan: &dyn Fan) -> Vec<InputDescription> {
     let read = bounds::read(sources, fan);
     let inputs = sources.inputs.iter().enumerate();
-    inputs.map(|(i, input)| description(sources, (i, input), &read)).collect()
+    inputs.map(|(i, input)| description(sources, i, input, &read)).collect()
 }
 
 fn description(
     sources: &Sources,
-    (at, input): (usize, &Input),
+    at: usize,
+    input: &Input,
     read: &BTreeMap<u32, Aabb>,
 ) -> InputDescription {
     let file = &sources.files[at];

@@ -65,24 +65,32 @@ pub(crate) fn link(raster: &mut TileRaster, settings: &Settings) {
                 continue;
             }
             let angle = raster.col_step[row];
-            link_one(raster, &rule, (at, RIGHT, LEFT), angle, (col, side - 1 - col));
+            let row_way = Way { forth: RIGHT, back: LEFT, behind: col, before: side - 1 - col };
+            link_one(raster, &rule, at, row_way, angle);
             let angle = raster.row_step;
-            link_one(raster, &rule, (at, UP, DOWN), angle, (row, side - 1 - row));
+            let column_way = Way { forth: UP, back: DOWN, behind: row, before: side - 1 - row };
+            link_one(raster, &rule, at, column_way, angle);
         }
     }
 }
 
-/// Links `at` forwards; `room` is the number of pixels behind and before it inside the tile.
+/// The way along which a pixel is linked.
+#[derive(Clone, Copy)]
+struct Way {
+    /// Direction forwards, and the one back.
+    forth: usize,
+    back: usize,
+    /// Number of pixels inside the tile behind the pixel, and before it.
+    behind: usize,
+    before: usize,
+}
+
+/// Links `at` forwards; `angle` lies between neighbours, radians.
 #[inline]
-fn link_one(
-    raster: &mut TileRaster,
-    rule: &Rule,
-    (at, forth, back): (usize, usize, usize),
-    angle: f32,
-    room: (usize, usize),
-) {
+fn link_one(raster: &mut TileRaster, rule: &Rule, at: usize, way: Way, angle: f32) {
+    let Way { forth, back, .. } = way;
     let (side, range) = (raster.side, raster.xyzr[at][3]);
-    for by in 1..=REACH.min(room.1) {
+    for by in 1..=REACH.min(way.before) {
         let other = step(side, at, forth, by);
         let there = raster.xyzr[other][3];
         if there == 0.0 {
@@ -94,7 +102,11 @@ fn link_one(
         let across = mean * angle * by as f32;
         // A surface seen at this incidence cannot step more than that (METHOD.md §2).
         let mut joined = difference <= across * rule.incidence + 4.243 * sigma;
-        if !joined && difference <= across * rule.grazing && room.0 >= by && room.1 >= 2 * by {
+        if !joined
+            && difference <= across * rule.grazing
+            && way.behind >= by
+            && way.before >= 2 * by
+        {
             let before = raster.xyzr[step(side, at, back, by)][3];
             let after = raster.xyzr[step(side, other, forth, by)][3];
             joined = continues([before, range, there, after], difference, sigma);

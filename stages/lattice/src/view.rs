@@ -152,7 +152,7 @@ impl ViewBuilder {
         for (some, places) in tile.xyz.chunks(LANES).zip(tile.place.chunks(LANES)) {
             let scan = lanes(some);
             let local = transform_lanes(&local_from_scan, &scan);
-            self.splat(some.len(), (&scan, &local), &cameras);
+            self.splat(some.len(), &scan, &local, &cameras);
             if is_kept {
                 self.keep(&local, places, tile.first_place);
             }
@@ -173,7 +173,7 @@ impl ViewBuilder {
     }
 
     /// Marks a few points, given in the frames of the scan and of the region, in the images.
-    fn splat(&mut self, n: usize, (scan, local): (&Lanes, &Lanes), cameras: &[Rows]) {
+    fn splat(&mut self, n: usize, scan: &Lanes, local: &Lanes, cameras: &[Rows]) {
         if let Some(at) = self.faces.of_all(local) {
             let camera = transform_lanes(&cameras[at], scan);
             self.view.images[at].splat_lanes(&camera, n);

@@ -26,7 +26,8 @@ impl Library {
     pub fn load(dir: &Path, settings: &Settings) -> Result<Self> {
         let (folders, mut library) = Self::open(dir)?;
         for folder in &folders {
-            library.add(Self::load_folder(dir, folder, settings));
+            let (model, findings) = Self::load_folder(dir, folder, settings);
+            library.add(model, findings);
         }
         library.checked(dir)
     }
@@ -46,7 +47,8 @@ impl Library {
             Err(error) => return fail(&error),
         };
         for folder in &folders {
-            library.add(Self::load_folder(dir, folder, settings));
+            let (model, findings) = Self::load_folder(dir, folder, settings);
+            library.add(model, findings);
         }
         if folders.is_empty() {
             library.findings.extend(fail(&empty(dir)));
@@ -111,7 +113,7 @@ impl Library {
     }
 
     /// Adds a model; in the order of the folders, whatever order they were loaded in.
-    pub fn add(&mut self, (model, findings): (Option<Model>, Vec<Finding>)) {
+    pub fn add(&mut self, model: Option<Model>, findings: Vec<Finding>) {
         self.models.extend(model);
         self.findings.extend(findings);
     }

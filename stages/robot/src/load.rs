@@ -82,7 +82,7 @@ pub(crate) fn load(
         findings.fail(folder.display(), what, "put the model's folder itself into the library");
         return None;
     }
-    let sheet = read_sheet(folder, (&roots, settings), findings)?;
+    let sheet = read_sheet(folder, &roots, settings, findings)?;
     let path = urdf_in(folder, &sheet, &roots, findings)?;
     Loader { name, roots, settings }.load(&path, &sheet, findings)
 }
@@ -96,7 +96,7 @@ pub fn urdf_of(folder: &Path) -> Result<PathBuf> {
     let roots = Roots::new(folder, None).map_err(|e| Error::from(e).at(folder.display()))?;
     let settings = Settings::default();
     let mut find = || {
-        let sheet = read_sheet(folder, (&roots, &settings), &mut findings)?;
+        let sheet = read_sheet(folder, &roots, &settings, &mut findings)?;
         urdf_in(folder, &sheet, &roots, &mut findings)
     };
     find().ok_or_else(|| findings.first_error())
@@ -124,7 +124,8 @@ fn urdf_in(
 
 fn read_sheet(
     folder: &Path,
-    (roots, settings): (&Roots, &Settings),
+    roots: &Roots,
+    settings: &Settings,
     findings: &mut Findings,
 ) -> Option<Sheet> {
     let path = folder.join("robot.toml");

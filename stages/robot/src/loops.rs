@@ -178,16 +178,16 @@ impl ClosedLoop {
         let pin = &self.closures[0];
         let open = self.form != Form::General && self.gap(placing) > CLOSED;
         match self.form {
-            Form::Rr => vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b))],
+            Form::Rr => vec![self.aim_rate(placing, rates, 0, pin.link_b, &pin.point_b)],
             // Out of reach all is in line and only points at the other end.
             Form::RrrSerial { .. } | Form::Rpr { .. } if open => {
-                vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b)), 0.0]
+                vec![self.aim_rate(placing, rates, 0, pin.link_b, &pin.point_b), 0.0]
             }
             Form::RrrBranched { .. } if open => {
                 let ends = [self.passive[1], self.passive[0]].map(|j| placing.carrier(j));
                 vec![
-                    self.aim_rate(placing, rates, 0, (ends[0].0, &ends[0].1)),
-                    self.aim_rate(placing, rates, 1, (ends[1].0, &ends[1].1)),
+                    self.aim_rate(placing, rates, 0, ends[0].0, &ends[0].1),
+                    self.aim_rate(placing, rates, 1, ends[1].0, &ends[1].1),
                 ]
             }
             _ => self.implicit_rates(placing, rates),
@@ -220,18 +220,19 @@ impl ClosedLoop {
         placing: &Placing,
         rates: &[f64],
         which: usize,
-        target: (usize, &Point),
+        link: usize,
+        point: &Point,
     ) -> f64 {
         let j = self.passive[which];
         let (origin, axis) = placing.axis(j);
         let (carrier, _) = placing.carrier(j);
-        let target_at = placing.point(target.0, target.1);
+        let target_at = placing.point(link, point);
         let d = across(target_at - origin, &axis);
         if d.norm_squared() < 1e-18 {
             return 0.0;
         }
         // Seen from the carrier: the target's own way less that of the carrier at the same place.
-        let moves = placing.velocity(target.0, &target_at, rates)
+        let moves = placing.velocity(link, &target_at, rates)
             - placing.velocity(carrier, &target_at, rates);
         axis.dot(&d.cross(&moves)) / d.norm_squared()
     }

@@ -92,7 +92,7 @@ pub(crate) fn ground(scene: &Scene) -> (Solid, Solid) {
             ([b[0], b[1]], [a[0], b[1]]),
             ([a[0], b[1]], [a[0], a[1]]),
         ] {
-            faces.add(&step_face(cell, (p, q), level.height, |x, y| floor.base_height(x, y)));
+            faces.add(&step_face(cell, p, q, level.height, |x, y| floor.base_height(x, y)));
         }
     }
     (out, faces)
@@ -101,7 +101,8 @@ pub(crate) fn ground(scene: &Scene) -> (Solid, Solid) {
 /// The upright face of a step from `p` to `q`.
 fn step_face(
     cell: f64,
-    (p, q): ([f64; 2], [f64; 2]),
+    p: [f64; 2],
+    q: [f64; 2],
     height: f64,
     base: impl Fn(f64, f64) -> f64,
 ) -> Solid {

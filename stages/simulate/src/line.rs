@@ -63,7 +63,7 @@ pub fn line(wanted: &ProductionLine, models: &[Model]) -> Result<([Scene; 2], us
     let length = pitch * wanted.n_cells as f64;
     let mut then = shell(wanted, length, &mut random);
     let middle = |k: usize| (k as f64 + 0.5) * pitch - 0.5 * length;
-    furnish(&mut then, wanted.n_cells, (pitch, &middle), &mut random);
+    furnish(&mut then, wanted.n_cells, pitch, &middle, &mut random);
     let room = 0.5 * pitch - 0.15;
     let spot = |k: usize| RobotSpot {
         name: format!("R{}", k + 1),
@@ -101,7 +101,7 @@ pub fn line(wanted: &ProductionLine, models: &[Model]) -> Result<([Scene; 2], us
             put_pallet(scene, [middle(k), 0.0], *pallet, pitch);
         }
     }
-    scanners(&mut then, wanted, (pitch, &middle), &mut random);
+    scanners(&mut then, wanted, pitch, &middle, &mut random);
     new_scanners(&mut now, wanted, [middle(again), pitch], &mut random);
     Ok(([then, now], again))
 }
@@ -130,7 +130,8 @@ fn shell(wanted: &ProductionLine, length: f64, random: &mut Random) -> Scene {
 fn furnish(
     scene: &mut Scene,
     n_cells: usize,
-    (pitch, middle): (f64, &impl Fn(usize) -> f64),
+    pitch: f64,
+    middle: &impl Fn(usize) -> f64,
     random: &mut Random,
 ) {
     let height = random.between(1.6, 2.2);
@@ -179,7 +180,8 @@ fn put_pallet(scene: &mut Scene, [x, y]: [f64; 2], place: usize, pitch: f64) {
 fn scanners(
     scene: &mut Scene,
     wanted: &ProductionLine,
-    (pitch, middle): (f64, &impl Fn(usize) -> f64),
+    pitch: f64,
+    middle: &impl Fn(usize) -> f64,
     random: &mut Random,
 ) {
     for k in 0..wanted.n_cells {

@@ -80,7 +80,7 @@ pub fn plant(wanted: &Plant, models: &[Model]) -> Result<Scene> {
     };
     furnish(&mut scene, wanted, &rooms, size, &mut random);
     for (k, room) in rooms.iter().enumerate() {
-        stand(&mut scene, room, (k, wanted.moves && k == 0), wanted, &mut random)?;
+        stand(&mut scene, room, k, wanted.moves && k == 0, wanted, &mut random)?;
     }
     scanners(&mut scene, wanted, &rooms, size, &mut random);
     if let (true, Some(robot)) = (wanted.moves, scene.robots.first_mut()) {
@@ -167,7 +167,8 @@ fn furnish(
             let x = room.max[0] - 0.03;
             scene.fences.push(fence(
                 format!("between {k}"),
-                ([x, room.min[1]], [x, room.max[1]]),
+                [x, room.min[1]],
+                [x, room.max[1]],
                 random,
             ));
         }
@@ -175,7 +176,8 @@ fn furnish(
             let y = if random.unit() < 0.5 { room.min[1] } else { room.max[1] };
             scene.fences.push(fence(
                 format!("along {k}"),
-                ([room.min[0], y], [room.max[0], y]),
+                [room.min[0], y],
+                [room.max[0], y],
                 random,
             ));
         }
@@ -205,7 +207,7 @@ fn furnish(
     stuff(scene, size, if rooms.is_empty() { 14 } else { 5 }, random);
 }
 
-fn fence(name: String, (from, to): ([f64; 2], [f64; 2]), random: &mut Random) -> Fence {
+fn fence(name: String, from: [f64; 2], to: [f64; 2], random: &mut Random) -> Fence {
     let filling = if random.unit() < 0.75 { FenceFilling::Wires } else { FenceFilling::Panel };
     Fence { name, from, to, height: random.between(1.4, 2.2), filling }
 }
@@ -296,7 +298,8 @@ fn person(scene: &mut Scene, name: &str, [x, y]: [f64; 2], random: &mut Random) 
 fn stand(
     scene: &mut Scene,
     room: &Room<'_>,
-    (k, later): (usize, bool),
+    k: usize,
+    later: bool,
     wanted: &Plant,
     random: &mut Random,
 ) -> Result<()> {

@@ -40,9 +40,9 @@ pub fn sessions(wanted: &Plant, models: &[Model]) -> Result<[Scene; 2]> {
     let size = then.hall.as_ref().map_or([20.0; 3], |hall| hall.size);
     let new = new_scanners(&then, at, size, wanted.step_deg, &mut random)?;
     let mut taken: Vec<[f64; 2]> = new.iter().map(|s| [s.position[0], s.position[1]]).collect();
-    let pallet = free(&then, (at, size), &mut taken, &mut random)?;
-    let pushed = free(&then, (at, size), &mut taken, &mut random)?;
-    let barrel = free(&then, (at, size), &mut taken, &mut random)?;
+    let pallet = free(&then, at, size, &mut taken, &mut random)?;
+    let pushed = free(&then, at, size, &mut taken, &mut random)?;
+    let barrel = free(&then, at, size, &mut taken, &mut random)?;
     let mut now = then.clone();
     put_pallet(&mut then, pallet, random.between(-15.0, 15.0));
     put_pallet(&mut now, pushed, random.between(-15.0, 15.0));
@@ -106,7 +106,8 @@ fn new_scanners(
 /// A place on the floor near the robot's aisles that nothing stands on.
 fn free(
     scene: &Scene,
-    (at, size): ([f64; 2], [f64; 3]),
+    at: [f64; 2],
+    size: [f64; 3],
     taken: &mut Vec<[f64; 2]>,
     random: &mut Random,
 ) -> Result<[f64; 2]> {

@@ -24,7 +24,8 @@ impl E57Scan {
     pub(super) fn new(
         path: &Path,
         cloud: &PointCloud,
-        (name, metres): (&str, f64),
+        name: &str,
+        metres: f64,
         settings: &Settings,
     ) -> Result<(Self, ScanSeed)> {
         let mut notes = Vec::new();

@@ -45,18 +45,19 @@ struct VlrRecord<'a> {
 /// Records before the points, then those behind them, as far as they lie within the file.
 fn records<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<VlrRecord<'a>> {
     let mut out = Vec::new();
-    let first = (usize::from(raw.header_size), raw.number_of_variable_length_records as usize);
-    walk(data, first, HEADER, &mut out);
+    let n = raw.number_of_variable_length_records as usize;
+    walk(data, usize::from(raw.header_size), n, HEADER, &mut out);
     if let Some(extended) = &raw.evlr {
         let start = usize::try_from(extended.start_of_first_evlr).unwrap_or(usize::MAX);
-        walk(data, (start, extended.number_of_evlrs as usize), EXTENDED, &mut out);
+        walk(data, start, extended.number_of_evlrs as usize, EXTENDED, &mut out);
     }
     out
 }
 
 fn walk<'a>(
     data: &'a [u8],
-    (mut at, n): (usize, usize),
+    mut at: usize,
+    n: usize,
     n_header: usize,
     out: &mut Vec<VlrRecord<'a>>,
 ) {
