@@ -15,7 +15,7 @@ use crate::library;
 use crate::rescan::{State, models_of};
 use crate::reuse::Vouched;
 use crate::trajectory::Trajectory;
-use clearance::{Contact, Contacts, FARTHEST, Obstacles, RobotBody, Walk};
+use clearance::{Contact, Contacts, FARTHEST, Obstacles, PathWalk, RobotBody};
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::ResultFile;
 use geometry::{Point, Pose};
@@ -183,7 +183,7 @@ impl Place<'_> {
         let pairs: Vec<&[Vec<f64>]> = postures.windows(2).collect();
         let lay = |pair: &[Vec<f64>]| Ok(clearance::leg(body, &pair[0], &pair[1]));
         let legs = engine.fan_out(Task::new("path"), pairs, lay)?;
-        let walk = Walk::new(body, obstacles, &postures, &legs, &robot.found());
+        let walk = PathWalk::new(body, obstacles, &postures, &legs, &robot.found());
         let contacts = contacts(&walk, engine)?;
         let impossible = robot.impossible(&postures, (&legs, contacts.open()), request.degrees);
         let contacts = contacts.all();
@@ -239,7 +239,7 @@ const HUNG: f64 = 0.5;
 const WAITING: usize = 1 << 12;
 
 /// Looks along the path.
-fn contacts(walk: &Walk<'_>, engine: &Engine) -> Result<Contacts> {
+fn contacts(walk: &PathWalk<'_>, engine: &Engine) -> Result<Contacts> {
     let mut all = Contacts::default();
     for from in (0..walk.n_pieces()).step_by(WAITING) {
         let some = (from..(from + WAITING).min(walk.n_pieces())).collect();

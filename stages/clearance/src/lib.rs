@@ -17,7 +17,7 @@ pub use body::{Hung, RobotBody, STEP, reach};
 pub use evidence::hanging;
 pub use obstacle::{CELL, What};
 pub use obstacles::{Cells, FARTHEST, KnownBounds, Obstacles};
-pub use path::{Contact, Contacts, Leg, PieceContacts, Walk, leg};
+pub use path::{Contact, Contacts, Leg, PathWalk, PieceContacts, leg};
 pub use shadow::{ScannerAt, Shadow};
 
 /// How a part of a robot stands to an obstacle; what is worse is greater.

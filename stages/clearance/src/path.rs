@@ -71,7 +71,7 @@ impl Contact {
 type ContactKey = (usize, What, bool);
 
 /// A path that is looked at piece by piece.
-pub struct Walk<'a> {
+pub struct PathWalk<'a> {
     body: &'a RobotBody<'a>,
     around: &'a Obstacles,
     path: &'a [Vec<f64>],
@@ -84,7 +84,7 @@ pub struct Walk<'a> {
 /// What is near at the postures of a piece, and how far closed loops stay open there, metres.
 pub struct PieceContacts(Vec<(f64, PostureContacts, f64)>);
 
-impl<'a> Walk<'a> {
+impl<'a> PathWalk<'a> {
     /// Along the waypoints (at least one), with a leg from each to the next; `found` is the posture
     /// that the robot was scanned in.
     #[must_use]
@@ -312,7 +312,7 @@ mod tests {
         path.windows(2).map(|pair| leg(body, &pair[0], &pair[1])).collect()
     }
 
-    fn contacts(walk: &Walk<'_>) -> Vec<Contact> {
+    fn contacts(walk: &PathWalk<'_>) -> Vec<Contact> {
         let mut all = Contacts::default();
         (0..walk.n_pieces()).for_each(|piece| walk.add(walk.look(piece), &mut all));
         all.all()
@@ -331,7 +331,7 @@ mod tests {
         body.stand(&[found], &mut around);
         let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
         let legs = legs(&body, &path);
-        let walk = Walk::new(&body, &around, &path, &legs, &[found]);
+        let walk = PathWalk::new(&body, &around, &path, &legs, &[found]);
         contacts(&walk)
     }
 
@@ -440,7 +440,7 @@ mod tests {
         );
         let path = [vec![0.0], vec![-1.0]];
         let legs = legs(&body, &path);
-        let walk = Walk::new(&body, &around, &path, &legs, &[0.0]);
+        let walk = PathWalk::new(&body, &around, &path, &legs, &[0.0]);
         let found = contacts(&walk);
         assert!(found.len() == 1 && found[0].what == What::Unseen && found[0].at.is_none());
         assert!(found[0].from > 0.0 && found[0].to == 1.0, "{found:?}");
