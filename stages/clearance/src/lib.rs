@@ -26,7 +26,7 @@ pub enum ContactLevel {
     /// In space that no beam went through.
     Unseen,
     /// Nearer than the margin.
-    PostureNear,
+    Near,
     /// It touches the surface of the part.
     Hit,
     /// It lies inside of the part.
