@@ -19,7 +19,7 @@ const DRAWN: u64 = 4;
 pub(crate) struct LabelStrip<'a> {
     /// Labels of points near robots: for each mask, by place.
     pub(crate) near: &'a [Vec<PlaceRun<Label>>],
-    pub(crate) ground: &'a Ground,
+    pub(crate) ground: &'a FloorHeights,
     pub(crate) scans: &'a [Scan],
     /// Voxels of the robots' spaces.
     pub(crate) grids: &'a Grids,

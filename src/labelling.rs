@@ -38,7 +38,7 @@ pub(crate) struct Labelling<'a> {
     models: &'a [Model],
     sources: &'a Sources,
     floor: &'a Floor,
-    ground: Ground,
+    ground: FloorHeights,
     settings: segment::Settings,
     attach: attach::Settings,
     /// World bounds of each scan's points, metres.
@@ -136,7 +136,7 @@ impl<'a> Labelling<'a> {
         (store, floor, clusters): (&Store, &'a Floor, &[Cluster]),
         settings: &Settings,
     ) -> Self {
-        let ground = Ground::new(floor, &settings.segment);
+        let ground = FloorHeights::new(floor, &settings.segment);
         let mut bounds = vec![Aabb::EMPTY; sources.scans.len()];
         for entry in store.entries() {
             let scan = &mut bounds[entry.at.scan.0 as usize];
@@ -149,7 +149,7 @@ impl<'a> Labelling<'a> {
     }
 
     /// The floor, for the label of a point that is near no robot.
-    pub(crate) fn ground(&self) -> &Ground {
+    pub(crate) fn ground(&self) -> &FloorHeights {
         &self.ground
     }
 

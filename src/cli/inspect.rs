@@ -11,7 +11,7 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
     let means = common.means()?;
     present(&flags.inputs)?;
     let scanners =
-        common.scanners(&means).map(|path| Scanners::read(&path, &means.settings.ingest));
+        common.scanners(&means).map(|path| KnownScanners::read(&path, &means.settings.ingest));
     let sources = ingest::open(
         &flags.inputs,
         scanners.transpose()?.as_ref(),

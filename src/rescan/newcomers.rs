@@ -115,7 +115,7 @@ impl Session<'_> {
             &self.old_ground,
             self.settings,
         );
-        let watch = Watch::new(&self.cell, &self.old_views);
+        let watch = VisibilityQuery::new(&self.cell, &self.old_views);
         let (then, own) = look(now, models, (&search, [&watch, &self.watch()], &[]))?;
         Ok(match then {
             Now::Found(fit) | Now::Anew(fit, _) => Some((*fit, own)),

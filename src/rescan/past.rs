@@ -81,9 +81,9 @@ impl<'a> Past<'a> {
     }
 
     /// The surfaces of what stood there.
-    pub(crate) fn surfaces(&self, engine: &Engine) -> Result<Surfaces> {
+    pub(crate) fn surfaces(&self, engine: &Engine) -> Result<SurfaceVoxels> {
         let (skip, step) = sampled((self.n_points() / N_SAMPLED).max(SAMPLE));
-        let (mut all, sample) = (Surfaces::default(), Sample { past: self, step });
+        let (mut all, sample) = (SurfaceVoxels::default(), Sample { past: self, step });
         let source = self.store.picks_once(self.tiles.clone(), skip);
         let reads = self.store.reads();
         engine.pass(self.task("register"), source, |f| {
@@ -223,7 +223,7 @@ struct Sample<'a> {
     step: usize,
 }
 
-struct Sampled(Surfaces);
+struct Sampled(SurfaceVoxels);
 
 impl Map for Sample<'_> {
     type In = Tile;
@@ -233,7 +233,7 @@ impl Map for Sample<'_> {
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Sampled> {
         let (scan, mask) = self.past.scan(&tile);
         let old = &self.past.before[mask.0 as usize];
-        let mut out = Surfaces::default();
+        let mut out = SurfaceVoxels::default();
         let in_world = World::from(scan);
         for i in (0..tile.len()).step_by(self.step) {
             let world = in_world.of(tile.xyz[i]);

@@ -44,7 +44,7 @@ pub(crate) fn register(
 pub(crate) struct Present<'a> {
     pub(crate) scans: &'a [Scan],
     pub(crate) near: &'a Near,
-    pub(crate) ground: &'a Ground,
+    pub(crate) ground: &'a FloorHeights,
     pub(crate) cell: Aabb,
     /// What stood there: the earlier scans are asked only where nothing of it is near.
     pub(crate) then: &'a SessionOccupancy,

@@ -12,8 +12,8 @@ use change::Unseen;
 use contract::words::{count, fixed, triple};
 use contract::{Error, Kind, Result, quote};
 use export::{
-    CarriedEntry, ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile,
-    ScanLabels, draw_changes, write_table,
+    CarriedEntry, ChangedThing, LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
+    draw_changes, write_table,
 };
 use register::Registration;
 use serde_json::json;

@@ -221,8 +221,8 @@ impl<'a> Session<'a> {
     }
 
     /// What the new scans say of places.
-    pub(crate) fn watch(&self) -> Watch<'_> {
-        Watch::new(&self.cell, &self.new_views)
+    pub(crate) fn watch(&self) -> VisibilityQuery<'_> {
+        VisibilityQuery::new(&self.cell, &self.new_views)
     }
 
     /// The search in the new scans.
@@ -253,7 +253,7 @@ impl<'a> Session<'a> {
     ) -> Result<Robots> {
         let mut out = Robots::default();
         let (search, watch) = (self.search(), self.watch());
-        let old_watch = Watch::new(&self.cell, &self.old_views);
+        let old_watch = VisibilityQuery::new(&self.cell, &self.old_views);
         let regions = base_search::regions(&self.clusters, &self.settings.region);
         let here = here((fits, models), &self.past.cell);
         let looked = engine.fan_out(Task::new("fit").large(), here.clone(), |(i, _)| {
@@ -313,7 +313,7 @@ impl<'a> Session<'a> {
         let own = self.own_fits(fits, robots);
         let labelling = self.labelling(&own, models);
         let near = labelling.near_robots(self.store, engine)?;
-        let (watch, old_watch) = (self.watch(), Watch::new(&self.cell, &self.old_views));
+        let (watch, old_watch) = (self.watch(), VisibilityQuery::new(&self.cell, &self.old_views));
         let missed = self.missed((fits, models), robots, engine)?;
         let compared = self.past.look([&watch, &old_watch], missed.as_ref(), engine)?;
         let then = &compared.then;

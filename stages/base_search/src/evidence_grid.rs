@@ -2,9 +2,9 @@
 //! up once for all models and all base poses of a search instead of once for each sample.
 
 use contract::{Fan, Region};
-use geometry::Evidence;
 use geometry::depth::{LANES, Looks, lanes};
 use geometry::probe::NO_RETURN_WEIGHT;
+use geometry::{Evidence, Probe};
 use std::sync::OnceLock;
 
 use crate::score_grid::{SCORE_UNIT, ScoreGrid, UNJUDGED};

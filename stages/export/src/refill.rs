@@ -1,7 +1,7 @@
 //! A spatial tile of an earlier result in; its points that are not superseded out, behind the new
 //! ones of a tile that is being written. Records stay as they are, byte for byte.
 
-use crate::block::Straight;
+use crate::block::DirectReader;
 use crate::chunks;
 use crate::las::head;
 use crate::record::{CLASSES, LasSettings, RecordExtent};
@@ -150,7 +150,7 @@ struct RefillTile<'a> {
 }
 
 enum RefillRecords {
-    Plain(Straight),
+    Plain(DirectReader),
     Compressed(Box<LasZipDecompressor<'static, BufReader<File>>>),
 }
 
@@ -197,7 +197,9 @@ impl<'a> RefillTile<'a> {
                 let read = StatedTile { n_bytes: expected as u64, crc32c: crc32c::crc32c(&head) };
                 sum = Some((stated, read));
             }
-            RefillRecords::Plain(Straight::new(file.into_inner(), expected as u64).map_err(failed)?)
+            RefillRecords::Plain(
+                DirectReader::new(file.into_inner(), expected as u64).map_err(failed)?,
+            )
         };
         Ok(Self { path, records, record_len: las.record_len(), left, sum })
     }

@@ -96,7 +96,7 @@ impl Reader for E57File {
     }
 
     fn read(&self, want: Want) -> Result<FileReading<'_>> {
-        Ok(FileReading::Straight(Box::new(strips::Strips::new(self, want))))
+        Ok(FileReading::Straight(Box::new(strips::E57Strips::new(self, want))))
     }
 
     fn units(&self) -> &Units {
@@ -104,7 +104,7 @@ impl Reader for E57File {
     }
 
     fn read_scan(&self, scan: usize) -> Option<RawStrips<'_>> {
-        Some(Box::new(strips::Strips::of_scan(self, scan)))
+        Some(Box::new(strips::E57Strips::of_scan(self, scan)))
     }
 
     fn oddities(&self, scan: usize) -> Option<&Oddities> {

@@ -5,7 +5,7 @@
 use crate::las_record::Decoder;
 use crate::las_runs::{LasRecords, at_once};
 use crate::las_scans::{self, LasScanner};
-use crate::laz::Stream;
+use crate::laz::LazStream;
 use crate::map::Mapped;
 use crate::oddities::Oddities;
 use crate::reader::{
@@ -230,7 +230,7 @@ struct StreamedStrips<'a> {
     want: Want,
     /// Place of the first record that is not decompressed yet.
     place: u64,
-    stream: Option<Stream<'a>>,
+    stream: Option<LazStream<'a>>,
     has_failed: bool,
 }
 
@@ -267,19 +267,5 @@ impl Iterator for StreamedStrips<'_> {
                 Some(vec![Err(error)])
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_stream_is_decompressed_in_runs_of_bounded_bytes() {
-        for record_len in [20, 30, 67, 1000, usize::from(u16::MAX)] {
-            let n = at_once(record_len);
-            assert!(n >= 1 && n * record_len <= RUN_BYTES, "{n} records of {record_len} bytes");
-        }
-        assert!(at_once(67) > Settings::default().strip_points, "usual records: whole strips");
     }
 }

@@ -14,7 +14,7 @@ pub(crate) struct RecordLayout {
 }
 
 /// LAS 1.4 R15, tables 7 to 17.
-const LAYOUTS: [RecordLayout; 11] = [
+pub(crate) const LAYOUTS: [RecordLayout; 11] = [
     RecordLayout { len: 20, modern: false, gps_time: None, color: None },
     RecordLayout { len: 28, modern: false, gps_time: Some(20), color: None },
     RecordLayout { len: 26, modern: false, gps_time: None, color: Some(20) },

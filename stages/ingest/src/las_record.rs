@@ -3,7 +3,7 @@
 
 use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
-use crate::las_layout::{RecordLayout, u16_at};
+use crate::las_layout::{LAYOUTS, RecordLayout, u16_at};
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, Want};
 use contract::Attributes;

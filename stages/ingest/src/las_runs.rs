@@ -13,7 +13,7 @@ use std::path::Path;
 
 /// Largest run of records that is decompressed from a stream at once, bytes: of usual records, more
 /// than a strip.
-pub(crate) const RUN_BYTES: usize = 16 << 20;
+const RUN_BYTES: usize = 16 << 20;
 
 /// Records of this length that are decompressed from a stream at once. A stream does not say how
 /// many there really are, and a header may state records of 64 KiB, so that a strip of them would
@@ -96,5 +96,19 @@ impl LasRecords {
     fn mapped(&self, first: u64, n: usize) -> &[u8] {
         let from = self.header.points_at + first as usize * self.header.record_len;
         &self.map[from..from + n * self.header.record_len]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_is_decompressed_in_runs_of_bounded_bytes() {
+        for record_len in [20, 30, 67, 1000, usize::from(u16::MAX)] {
+            let n = at_once(record_len);
+            assert!(n >= 1 && n * record_len <= RUN_BYTES, "{n} records of {record_len} bytes");
+        }
+        assert!(at_once(67) > Settings::default().strip_points, "usual records: whole strips");
     }
 }

@@ -106,7 +106,7 @@ impl Reader for PtxFile {
     }
 
     fn read(&self, want: Want) -> Result<FileReading<'_>> {
-        Ok(FileReading::Straight(Box::new(strips::Strips::new(self, want))))
+        Ok(FileReading::Straight(Box::new(strips::PtxStrips::new(self, want))))
     }
 
     fn units(&self) -> &Units {

@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used)] // tests may panic
 
 use super::*;
+use crate::angular_grid::Axis;
 use geometry::direction::unit;
 use nalgebra::{Rotation3, Vector3};
+use std::f64::consts::FRAC_PI_2;
 
 /// SplitMix64 with a fixed seed.
 struct Random(u64);

@@ -5,7 +5,7 @@ use crate::file::OpenFile;
 use crate::sources::Sources;
 use crate::units::{LengthUnit, Origin, Units};
 use contract::{Error, Input, Result, quote};
-use geometry::{Aabb, Point, Pose};
+use geometry::Aabb;
 
 /// No scan of a plant spreads farther, metres: halls measure hundreds of metres, scanners reach as
 /// far.
@@ -185,20 +185,6 @@ fn words(size: &[f64; 3]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_spread_is_of_most_points_and_along_the_worlds_axes() {
-        let points = || (0..1000).map(|i| [i as f32 * 0.01, 0.0, 0.5]);
-        let stray = points().chain([[9e5, 9e5, -9e5]]);
-        let box_of = |points: &mut dyn Iterator<Item = [f32; 3]>, pose: &Pose| spread(points, pose);
-        let found = box_of(&mut stray.into_iter(), &Pose::identity()).expect("points");
-        assert!((found.size()[0] - 9.0).abs() < 0.05, "{found:?}");
-        assert_eq!((found.size()[1], found.min[2]), (0.0, 0.5));
-        let upright = Pose::rotation(geometry::Vector::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
-        let found = box_of(&mut points(), &upright).expect("points");
-        assert!((found.size()[2] - 9.0).abs() < 0.05 && found.size()[0] < 1e-6, "{found:?}");
-        assert_eq!(box_of(&mut points().take(99), &Pose::identity()), None);
-    }
 
     #[test]
     fn the_unit_that_makes_a_cell_is_named() {

@@ -6,7 +6,7 @@ use crate::format::detect;
 use crate::las::Las;
 use crate::poses::Poses;
 use crate::raster::StepSource;
-use crate::reader::{self, Extent, FileReading, RawStrip, Reader, ScanSeed, Want};
+use crate::reader::{self, Extent, FileReading, Reader, Want};
 use crate::regular::regular;
 use crate::scanners::KnownScanners;
 use crate::settings::Settings;
@@ -14,7 +14,6 @@ use crate::units::{Choice, Units};
 use contract::{
     Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
 };
-use geometry::{Aabb, Pose};
 use std::path::{Path, PathBuf};
 
 /// Strips of one input, in its order.

@@ -2,7 +2,7 @@
 //! its veils.
 
 use crate::noise::RangeNoise;
-use contract::{Lattice, TILE_SIDE, Tile};
+use contract::{Lattice, Tile};
 
 /// Most that is skipped of a dense tile: every fourth row and column is read, a sixteenth of the
 /// pixels.
@@ -49,7 +49,7 @@ impl TileRaster {
 
     /// Where a pixel of the tile lies in the raster.
     #[inline]
-    fn pixel(&self, pixel: u16) -> usize {
+    pub(crate) fn pixel(&self, pixel: u16) -> usize {
         let (row, col) = (usize::from(pixel) >> 8, usize::from(pixel) & 255);
         (row >> self.skip) * self.side + (col >> self.skip)
     }

@@ -49,7 +49,7 @@ enum PointState {
     /// Away from robots, or floor.
     Default,
     /// Within the gate of a link.
-    StandingLink(NearestLink),
+    Link(NearestLink),
     /// Between one gate and two.
     Doubt(NearestLink),
     /// Near a robot, but none of its links.

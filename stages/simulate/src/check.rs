@@ -45,7 +45,7 @@ impl Scene {
 ///
 /// # Errors
 /// `BadInput` at the first thing that is wrong.
-fn check(scene: &Scene) -> Result<()> {
+pub(crate) fn check(scene: &Scene) -> Result<()> {
     hall(scene)?;
     bodies(scene)?;
     robots(scene)?;

@@ -6,7 +6,7 @@ use simulate::Scene;
 
 /// `--scanners`, TOML or JSON.
 pub fn scanners(data: &[u8]) {
-    match Scanners::read(&file("scanners.toml", data), &ingest::Settings::default()) {
+    match KnownScanners::read(&file("scanners.toml", data), &ingest::Settings::default()) {
         Ok(scanners) => {
             for entry in &scanners.entries {
                 let pose = &entry.world_from_scan;

@@ -41,7 +41,7 @@ pub(crate) struct Declaration {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Sense {
     /// A unit.
-    LengthUnit(LengthUnit),
+    Unit(LengthUnit),
     /// Its name and its number of metres are of different units: that of the name, and that of the
     /// number.
     Either(LengthUnit, LengthUnit),
