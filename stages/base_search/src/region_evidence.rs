@@ -1,5 +1,5 @@
-//! The views of a region in; what searches of all models ask of it out: its evidence, a grid of that
-//! for coarse looks, and where there are points that a base may stand among.
+//! The views of a region in; what searches of all models ask of it out: its evidence, a grid of
+//! that for coarse looks, and where there are points that a base may stand among.
 
 use contract::{Fan, Region, View};
 use geometry::probe::HIDDEN_PRICE;

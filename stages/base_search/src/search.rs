@@ -36,8 +36,8 @@ const YAW_LAG: f64 = 0.35;
 const MAX_STRIDE: usize = 6;
 /// Tolerance of the coarse level in steps of its grid.
 const COARSE_REACH: f64 = 1.3;
-/// Share of the lowest score that a base must have after the coarse level: on coarse grids the right
-/// one scores a little more or less than in the end.
+/// Share of the lowest score that a base must have after the coarse level: on coarse grids the
+/// right one scores a little more or less than in the end.
 const MIN_SHARE_COARSE: f64 = 0.4;
 /// Share of the lowest score that a base must have after the middle level.
 const MIN_SHARE_MIDDLE: f64 = 0.6;

@@ -1,5 +1,5 @@
-//! What one obstacle is: a ball about a cell of points or a voxel of unseen space, and how far balls
-//! are from each other. All in the frame of the robot's base, metres.
+//! What one obstacle is: a ball about a cell of points or a voxel of unseen space, and how far
+//! balls are from each other. All in the frame of the robot's base, metres.
 
 /// Edge of the cells in which all points are one obstacle, metres: finer than planners' margins,
 /// and the floor of a cell in such cells fits into memory.
