@@ -21,7 +21,7 @@ use crate::result::report::Report;
 use crate::store::{Store, spatial_tiles};
 use contract::{Cluster, Fit, Input, Result, Space};
 use export::{COPC, ReviewEntry};
-use ingest::{Scanners, Sources};
+use ingest::{KnownScanners, Sources};
 use robot::Library;
 
 /// Does the main job.
@@ -138,7 +138,7 @@ impl Run<'_> {
         let &Run { job, settings, output, digests, engine } = self;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
         let review = Review::of(job, &library.models)?;
-        let read = |path| Scanners::read(path, &job.means.settings.ingest);
+        let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
         let scanners = job.scanners.as_deref().map(read).transpose()?;
         let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
         let sources = engine.pool()?.install(open)?;

@@ -4,7 +4,7 @@
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 use contract::{Kind, OneByOne};
-use ingest::{Scanners, Sources};
+use ingest::{KnownScanners, Sources};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -79,7 +79,7 @@ fn opened(scans: &Path, off: [f64; 3]) -> Sources {
             *value = toml::Value::Float(value.as_float().expect("a number") + off);
         }
     }
-    let scanners = Scanners::parse(&table.to_string()).expect("scanners");
+    let scanners = KnownScanners::parse(&table.to_string()).expect("scanners");
     let settings = ingest::Settings::default();
     ingest::open(&[scans.join("scans.las")], Some(&scanners), &settings, &OneByOne).expect("opens")
 }

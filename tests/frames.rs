@@ -49,7 +49,7 @@ impl Plant {
         for scanner in &mut mapped.scanners {
             let real = scanner.world_from_scan().expect("a pose");
             let stated = frame * scanner.stated_world_from_scan().expect("a pose");
-            scanner.registration = simulate::scene::Registration::between(&real, &stated);
+            scanner.registration = simulate::scene::RegistrationError::between(&real, &stated);
         }
         let third = simulate::Scene { seed: now.seed ^ 99, ..now.clone() };
         let scenes = [(&then, "then"), (&mapped, "mapped"), (&third, "third"), (&other, "other")];

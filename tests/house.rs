@@ -4,7 +4,7 @@
 #[path = "house/imports.rs"]
 mod imports;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -335,6 +335,41 @@ fn every_stage_is_in_the_table_of_stages() {
     let table = fs::read_to_string(root().join("stages/README.md")).unwrap_or_default();
     let missing = stages().into_iter().filter(|s| !table.contains(&format!("| {s} |")));
     report(&missing.map(|s| format!("stages/README.md does not name `{s}`")).collect::<Vec<_>>());
+}
+
+/// Names that types of several stages have on purpose: each stage has its settings, which are
+/// written with the stage's name. Generators of random numbers of two stages must not depend on
+/// each other, since the one decides samples and the other scenes.
+const SHARED_NAMES: [&str; 2] = ["Settings", "Random"];
+/// The stage whose types are not held to it yet.
+const NAMES_UNCHECKED: &str = "fit";
+
+/// The types that a text defines outside of functions, without those of its tests.
+fn types(code: &str) -> impl Iterator<Item = &str> {
+    const KINDS: [&str; 4] = ["struct ", "enum ", "trait ", "type "];
+    code.lines().filter(|line| !line.starts_with(' ')).filter_map(|line| {
+        let line = line.strip_prefix("pub").map_or(line, |rest| {
+            rest.strip_prefix("(crate)").or(rest.strip_prefix("(super)")).unwrap_or(rest)
+        });
+        let line = line.trim_start();
+        let name = KINDS.iter().find_map(|kind| line.strip_prefix(kind))?;
+        name.split(|c: char| !c.is_alphanumeric() && c != '_').next()
+    })
+}
+
+#[test]
+fn a_type_name_stands_once_in_the_stages() {
+    let mut homes: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (name, text) in rust_files("stages") {
+        if room(&name) == NAMES_UNCHECKED {
+            continue;
+        }
+        for of in types(&code(&name, &text)).filter(|of| !SHARED_NAMES.contains(of)) {
+            homes.entry(of.to_owned()).or_default().push(name.clone());
+        }
+    }
+    homes.retain(|_, files| files.len() > 1);
+    report(&homes.iter().map(|(of, files)| format!("`{of}`: {files:?}")).collect::<Vec<_>>());
 }
 
 /// Settings of a stage that nobody can set, by room and name: made by the program, not by people.

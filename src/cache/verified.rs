@@ -9,7 +9,7 @@ use super::file_digests::Algorithm;
 use super::manifest::{LIST, Manifest, OutputFile, RESULT};
 use crate::io::own_paths::without_links;
 use contract::{Error, Result};
-use export::{ResultFile, Stated};
+use export::{ResultFile, StatedTile};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -97,11 +97,11 @@ impl VerifiedFiles {
     ///
     /// # Errors
     /// A file that the list does not name, or that is not what was written.
-    pub(crate) fn stated(&self, name: &str) -> Result<(PathBuf, Option<Stated>)> {
+    pub(crate) fn stated(&self, name: &str) -> Result<(PathBuf, Option<StatedTile>)> {
         let (path, file, _) = self.listed(name)?;
         let digits = file.digest.strip_prefix(Algorithm::Crc32c.name());
         match digits.and_then(|digits| u32::from_str_radix(digits, 16).ok()) {
-            Some(crc32c) => Ok((path, Some(Stated { n_bytes: file.n_bytes, crc32c }))),
+            Some(crc32c) => Ok((path, Some(StatedTile { n_bytes: file.n_bytes, crc32c }))),
             None => Ok((self.compared(name)?, None)),
         }
     }

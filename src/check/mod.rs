@@ -16,10 +16,11 @@ pub use report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
 use crate::cache::VerifiedFiles;
 use crate::detect::library;
 use crate::detect::robots::RobotList;
+
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::{Job, Means};
 use crate::result::plant_state::PlantState;
-use clearance::{Body, Contacts, FARTHEST, Obstacles, Walk};
+use clearance::{Contacts, FARTHEST, Obstacles, PathWalk, RobotBody};
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::ResultFile;
 use robot::Model;
@@ -43,7 +44,7 @@ pub fn check(request: &CheckRequest, means: &Means, engine: &Engine) -> Result<P
 pub(crate) struct RobotSite<'a> {
     request: &'a CheckRequest,
     robot: &'a CheckedRobot<'a>,
-    body: Body<'a>,
+    body: RobotBody<'a>,
     obstacles: Obstacles,
     /// Ids of all robots, by their numbers.
     ids: Vec<String>,
@@ -111,7 +112,7 @@ impl RobotSite<'_> {
         let pairs: Vec<&[Vec<f64>]> = postures.windows(2).collect();
         let lay = |pair: &[Vec<f64>]| Ok(clearance::leg(body, &pair[0], &pair[1]));
         let legs = engine.fan_out(Task::new("path"), pairs, lay)?;
-        let walk = Walk::new((body, obstacles), (&postures, &legs), &robot.found());
+        let walk = PathWalk::new(body, obstacles, &postures, &legs, &robot.found());
         let contacts = contacts(&walk, engine)?;
         let impossible = robot.impossible(&postures, &legs, &contacts, request.degrees);
         let contacts = contacts.all();
@@ -138,7 +139,7 @@ fn surrounded<'a>(
     models: &[Model],
     request: &CheckRequest,
     engine: &Engine,
-) -> Result<(Body<'a>, Obstacles)> {
+) -> Result<(RobotBody<'a>, Obstacles)> {
     let margin = request.margin;
     let mut far = clearance::reach(robot.model) + margin + HUNG;
     loop {
@@ -147,8 +148,9 @@ fn surrounded<'a>(
             return Err(Error::new(Kind::Unsupported, what).hint("mend the limits of its slides"));
         }
         let (hung, obstacles) = around.gather(robot, others, models, far, engine)?;
-        let sizes = (margin, obstacles.largest());
-        let body = engine.pool()?.install(|| Body::new(robot.model, hung, sizes, &AllThreads));
+        let largest = obstacles.largest();
+        let new = || RobotBody::new(robot.model, hung, margin, largest, &AllThreads);
+        let body = engine.pool()?.install(new);
         let needed = body.farthest() + margin + BETWEEN;
         if needed <= far {
             return Ok((body, obstacles));
@@ -168,7 +170,7 @@ const HUNG: f64 = 0.5;
 const WAITING: usize = 1 << 12;
 
 /// Looks along the path.
-fn contacts(walk: &Walk<'_>, engine: &Engine) -> Result<Contacts> {
+fn contacts(walk: &PathWalk<'_>, engine: &Engine) -> Result<Contacts> {
     let mut all = Contacts::default();
     for from in (0..walk.n_pieces()).step_by(WAITING) {
         let some = (from..(from + WAITING).min(walk.n_pieces())).collect();

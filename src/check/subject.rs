@@ -4,7 +4,7 @@
 use super::report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
 use super::trajectory::Trajectory;
 use crate::cache::Manifest;
-use clearance::{Contact, Contacts, Leg, Level, What};
+use clearance::{Contact, ContactLevel, Contacts, Leg, What};
 use contract::{Error, Fit, JointFit, Result, Verdict};
 use export::{RobotEntry, mesh_files};
 use robot::{JointKind, Model};
@@ -159,21 +159,21 @@ impl CheckedRobot<'_> {
         let mut doubts = if warnings.is_empty() { Vec::new() } else { vec![PathDoubt::Posture] };
         let is_beside = |c: &Contact| c.what == What::Beside || c.is_doubtful;
         let stands = |c: &&Contact| !c.as_found && !is_beside(c);
-        let is = |level: Level| contacts.iter().filter(stands).any(|c| c.level >= level);
+        let is = |level: ContactLevel| contacts.iter().filter(stands).any(|c| c.level >= level);
         let has = |is: &dyn Fn(&Contact) -> bool| contacts.iter().any(is);
         // What was as near where it stood is no news: it stood there.
         if has(&Contact::is_unseen) {
             doubts.push(PathDoubt::Unseen);
         }
-        if has(&|c| is_beside(c) && c.level > Level::Unseen && !c.as_found) {
+        if has(&|c| is_beside(c) && c.level > ContactLevel::Unseen && !c.as_found) {
             doubts.push(PathDoubt::Beside);
         }
-        if has(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c)) {
+        if has(&|c| c.as_found && c.level > ContactLevel::Unseen && !is_beside(c)) {
             doubts.push(PathDoubt::AsFound);
         }
-        let outcome = if is(Level::Hit) || !impossible.is_empty() {
+        let outcome = if is(ContactLevel::Hit) || !impossible.is_empty() {
             PathOutcome::Blocked
-        } else if is(Level::Near) {
+        } else if is(ContactLevel::Near) {
             PathOutcome::Near
         } else if doubts.is_empty() {
             PathOutcome::Free

@@ -5,7 +5,7 @@ use crate::cache::{VerifiedFiles, tiles_of};
 use crate::engine::{Engine, Task};
 use crate::label::known_space::poses;
 use crate::result::plant_state::PlantState;
-use clearance::{CELL, Cells, Eye, Hung, Known, Obstacles, Shadow, What, hanging};
+use clearance::{CELL, Cells, Hung, KnownBounds, Obstacles, ScannerAt, Shadow, What, hanging};
 use contract::{Error, Fit, PointKind, Result, Scan, Space};
 use export::{OldPoint, ResultFile, SpaceEntry, read_tile};
 use geometry::{Aabb, Point, Pose};
@@ -40,7 +40,7 @@ struct Sorting<'a> {
     /// By LAS `point_source_id`: what robots hide from the scanners that its points may be of.
     shadows: BTreeMap<u16, Vec<&'a Shadow>>,
     /// By LAS `point_source_id`, where it is that of one scanner: that scanner.
-    eyes: BTreeMap<u16, Eye>,
+    eyes: BTreeMap<u16, ScannerAt>,
 }
 
 /// Points of a tile.
@@ -86,8 +86,8 @@ impl Surroundings<'_> {
         };
         let space: Option<Space> = robot.entry.space.as_ref().map(read).transpose()?;
         let bounds = space.as_ref().map_or(Aabb::EMPTY, |space| space.grid().bounds());
-        let known = Known { world_from_base: robot.fit.world_from_base, bounds };
-        Ok((hung, Obstacles::new(&cells, &others, (space.as_ref(), known))))
+        let known = KnownBounds { world_from_base: robot.fit.world_from_base, bounds };
+        Ok((hung, Obstacles::new(&cells, &others, space.as_ref(), known)))
     }
 
     /// Cells of all points that may stand in the way, and points that hang on the robot.
@@ -170,7 +170,7 @@ impl Surroundings<'_> {
     }
 
     /// The scanners that are known, where points tell of which they are.
-    fn eyes(&self, base_from_world: &Pose) -> BTreeMap<u16, Eye> {
+    fn eyes(&self, base_from_world: &Pose) -> BTreeMap<u16, ScannerAt> {
         let mut all: BTreeMap<u16, Vec<&Scan>> = BTreeMap::new();
         for (at, scan) in self.state.scans.iter().enumerate() {
             self.source_id(at).into_iter().for_each(|id| all.entry(id).or_default().push(scan));
@@ -179,7 +179,7 @@ impl Surroundings<'_> {
             let [scan] = scans[..] else { return None };
             let lattice = scan.lattice.as_ref()?;
             let at = base_from_world * Point::from(scan.world_from_scan.translation.vector);
-            Some((id, Eye { at, step: lattice.row_step.max(lattice.col_step) }))
+            Some((id, ScannerAt { at, step: lattice.row_step.max(lattice.col_step) }))
         };
         all.into_iter().filter_map(eye).collect()
     }
@@ -220,7 +220,7 @@ impl Surroundings<'_> {
             PointKind::Floor => What::Floor,
             _ => What::Uncertain,
         };
-        into.cells.add(p.coords.into(), what, (is_grazed, point.source_id));
+        into.cells.add(p.coords.into(), what, is_grazed, point.source_id);
         into.n_waiting += 1;
         Ok(())
     }

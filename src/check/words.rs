@@ -1,7 +1,7 @@
 //! What a path came to in; that for people and for programs out.
 
 use super::report::{PathDoubt, PathOutcome, PathReport};
-use clearance::{Contact, Level, STEP, What};
+use clearance::{Contact, ContactLevel, STEP, What};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -48,10 +48,10 @@ impl PathDoubt {
 
 fn level(contact: &Contact) -> &'static str {
     match contact.level {
-        Level::Unseen => "unseen",
-        Level::Near => "near",
-        Level::Hit => "hit",
-        Level::Inside => "inside",
+        ContactLevel::Unseen => "unseen",
+        ContactLevel::Near => "near",
+        ContactLevel::Hit => "hit",
+        ContactLevel::Inside => "inside",
     }
 }
 
@@ -103,11 +103,11 @@ impl PathReport {
         };
         let is_beside = |c: &Contact| c.what == What::Beside || c.is_doubtful;
         let anew = |c: &Contact| !c.as_found && !is_beside(c);
-        if let Some(c) = worst(&|c| anew(c) && c.level >= Level::Hit) {
+        if let Some(c) = worst(&|c| anew(c) && c.level >= ContactLevel::Hit) {
             let (part, what, place) = told(c);
             return format!("{part} hits something ({what}){place}.");
         }
-        if let Some(c) = worst(&|c| anew(c) && c.level == Level::Near) {
+        if let Some(c) = worst(&|c| anew(c) && c.level == ContactLevel::Near) {
             let ((part, what, place), gap) = (told(c), c.gap * 1e3);
             return format!(
                 "{part} may come as near as {gap:.0} mm to something ({what}){place}, and the margin is {margin:.0} mm."
@@ -122,7 +122,7 @@ impl PathReport {
             PathDoubt::Unseen => worst(&Contact::is_unseen),
             PathDoubt::Beside => worst(&|c| is_beside(c) && !c.as_found),
             PathDoubt::AsFound => {
-                worst(&|c| c.as_found && c.level > Level::Unseen && !is_beside(c))
+                worst(&|c| c.as_found && c.level > ContactLevel::Unseen && !is_beside(c))
             }
             PathDoubt::Posture => None,
         };
@@ -162,7 +162,7 @@ impl PathReport {
                 format!(", worst at {:.2} near ({x:.3}, {y:.3}, {z:.3})", contact.worst)
             });
             let gap = match contact.level {
-                Level::Near => format!(", {:.0} mm or more apart", contact.gap * 1e3),
+                ContactLevel::Near => format!(", {:.0} mm or more apart", contact.gap * 1e3),
                 _ => String::new(),
             };
             let _ = writeln!(

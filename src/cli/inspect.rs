@@ -5,13 +5,13 @@ use super::flags::{Common, InspectFlags, present};
 use super::say::Say;
 use crate::engine::AllThreads;
 use contract::Result;
-use ingest::Scanners;
+use ingest::KnownScanners;
 
 pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
     present(&flags.inputs)?;
     let scanners =
-        common.scanners(&means).map(|path| Scanners::read(&path, &means.settings.ingest));
+        common.scanners(&means).map(|path| KnownScanners::read(&path, &means.settings.ingest));
     let sources = ingest::open(
         &flags.inputs,
         scanners.transpose()?.as_ref(),

@@ -5,7 +5,7 @@ use crate::engine::Engine;
 use crate::job::Settings;
 use crate::store::{Store, TileEntry};
 use contract::{Fold, Map, Result, Scan, ScanId, TILE_SIDE, Tile, TileSummary, Weigh};
-use lattice::{Extent, Summarise};
+use lattice::{LatticeExtent, Summarise};
 use serde::{Deserialize, Serialize};
 
 /// The map: a tile's summary, and which rows and columns of its scan it covers.
@@ -14,7 +14,7 @@ struct Surfaces(Summarise);
 /// What one tile leaves behind.
 struct Surface {
     scan: ScanId,
-    extent: Option<Extent>,
+    extent: Option<LatticeExtent>,
     summary: TileSummary,
 }
 
@@ -28,9 +28,9 @@ struct GatherGround {
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Ground {
     /// Floor, planes and occupied space.
-    pub(crate) surfaces: floor::Ground,
+    pub(crate) surfaces: floor::FloorFindings,
     /// For each scan: the rows and columns of its lattice that it covers.
-    pub(crate) extents: Vec<Option<Extent>>,
+    pub(crate) extents: Vec<Option<LatticeExtent>>,
 }
 
 impl Ground {
@@ -99,7 +99,7 @@ impl GatherGround {
 impl Map for Surfaces {
     type In = Tile;
     type Out = Surface;
-    type Scratch = lattice::Scratch;
+    type Scratch = lattice::LatticeScratch;
 
     fn apply(&self, tile: Tile, scratch: &mut Self::Scratch) -> Result<Surface> {
         let scan = tile.at.scan;
@@ -110,7 +110,7 @@ impl Map for Surfaces {
 
 impl Fold for GatherGround {
     type In = Surface;
-    type Sum = (floor::Sum, Vec<Option<Extent>>);
+    type Sum = (floor::FloorSum, Vec<Option<LatticeExtent>>);
     type Out = Ground;
 
     fn empty(&self) -> Self::Sum {
@@ -136,7 +136,7 @@ impl Fold for GatherGround {
 }
 
 /// Rows and columns that a tile covers, in its lattice.
-fn extent(tile: &Tile) -> Option<Extent> {
+fn extent(tile: &Tile) -> Option<LatticeExtent> {
     // Sorted by pixel, so by row.
     let (first, last) = (tile.pixel.first()?, tile.pixel.last()?);
     let cols = tile.pixel.iter().map(|pixel| *pixel as u8);
@@ -147,11 +147,11 @@ fn extent(tile: &Tile) -> Option<Extent> {
     Some([row + low, row + high, col + left, col + right])
 }
 
-fn union(a: Extent, b: Extent) -> Extent {
+fn union(a: LatticeExtent, b: LatticeExtent) -> LatticeExtent {
     [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])]
 }
 
-fn join(a: Option<Extent>, b: Option<Extent>) -> Option<Extent> {
+fn join(a: Option<LatticeExtent>, b: Option<LatticeExtent>) -> Option<LatticeExtent> {
     match (a, b) {
         (Some(a), Some(b)) => Some(union(a, b)),
         (a, b) => a.or(b),

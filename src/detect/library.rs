@@ -62,8 +62,8 @@ pub(crate) fn load_those(
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         kept.map_or_else(load, |kept| kept.get_or_compute(&name, load))
     })?;
-    for model in loaded {
-        library.add(model);
+    for (model, findings) in loaded {
+        library.add(model, findings);
     }
     Ok(library)
 }

@@ -7,7 +7,7 @@ use crate::job::Settings;
 
 use contract::{Cluster, Floor, FloorLevel, Format, Input, Occupancy, Region, Result, Voxel};
 use geometry::Plane;
-use ingest::{Sample, Sources};
+use ingest::{GlanceSample, Sources};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -68,7 +68,7 @@ pub(super) fn look(
         let n = sources.n_stated(input.id).unwrap_or(0);
         let share = n as f64 / all.max(1) as f64;
         let most = DECODED.iter().find(|(format, _)| *format == input.format).map_or(0, |d| d.1);
-        let sample = Sample {
+        let sample = GlanceSample {
             n_decoded: (most as f64 * share) as u64,
             n_kept: (KEPT as f64 * share) as u64,
         };

@@ -12,7 +12,7 @@ use crate::job::{Job, Settings, memory_words, units};
 use crate::store::spatial_tiles;
 use contract::words::count;
 use contract::{Error, Input, Kind, Result};
-use ingest::{Scanners, Sources};
+use ingest::{KnownScanners, Sources};
 use rates::{COPC, INGEST, LOAD, REST, SPREAD};
 use serde::Serialize;
 use std::path::Path;
@@ -103,7 +103,7 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
 /// Opens what a job reads, and estimates it but for the search.
 fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<(Estimate, Sources)> {
     let n_models = library::count(&job.robots)?;
-    let read = |path| Scanners::read(path, &job.means.settings.ingest);
+    let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
     let scanners = job.scanners.as_deref().map(read).transpose()?;
     let sources =
         ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest, &AllThreads)?;

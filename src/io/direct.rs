@@ -1,7 +1,7 @@
 //! A file in, pieces of it out, past the system's cache where that is asked for and can be: what is
 //! read once, and is larger than any cache, would only push out of it what is read again.
 
-use export::block::{Block, PAGE, read_all, set_direct};
+use export::block::{AlignedBlock, PAGE, read_all, set_direct};
 use std::fs::File;
 use std::io::Result;
 use std::ops::{Deref, Range};
@@ -11,13 +11,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) struct DirectFile {
     file: File,
     /// Memory that no reader uses now: fresh memory costs as much as reading.
-    free: Mutex<Vec<Block>>,
+    free: Mutex<Vec<AlignedBlock>>,
 }
 
 /// Bytes of a file in memory that is lent.
 pub(crate) struct LentBytes<'a> {
     of: &'a DirectFile,
-    block: Block,
+    block: AlignedBlock,
     range: Range<usize>,
 }
 
@@ -44,7 +44,7 @@ impl DirectFile {
         Ok(LentBytes { of: self, block, range: before.min(read)..read.min(before + n) })
     }
 
-    fn free(&self) -> MutexGuard<'_, Vec<Block>> {
+    fn free(&self) -> MutexGuard<'_, Vec<AlignedBlock>> {
         self.free.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -5,7 +5,7 @@ use super::direct::{DirectFile, LentBytes};
 use super::hash_tree::{HashTree, Subtree};
 use crate::engine::{Amount, Engine, Task};
 use contract::{Error, Input, Kind, Map, Result, Strip, Weigh};
-use ingest::{Extent, Piece, Sources, Want};
+use ingest::{Extent, InputPiece, Sources, Want};
 
 /// Inputs that are larger than this in all are read past the system's cache, bytes: smaller ones it
 /// may still hold when they are read once more, and a disk or share may be slow.
@@ -99,17 +99,17 @@ enum Loaded<'a> {
 }
 
 impl<'a> Map for Load<'a> {
-    type In = Piece;
+    type In = InputPiece;
     type Out = Loaded<'a>;
     type Scratch = ();
 
-    fn apply(&self, piece: Piece, (): &mut ()) -> Result<Loaded<'a>> {
+    fn apply(&self, piece: InputPiece, (): &mut ()) -> Result<Loaded<'a>> {
         let is_asked = |extent: &Extent| extent.n_points > 0 || self.n_bytes.is_some();
         let (extent, file) = match (piece, self.file) {
-            (Piece::Strip(strip), _) => return Ok(Loaded::Strip(strip)),
-            (Piece::Extent(extent), _) if !is_asked(&extent) => return Ok(Loaded::Nothing),
-            (Piece::Extent(extent), Some(file)) => (extent, file),
-            (Piece::Extent(_), None) => {
+            (InputPiece::Strip(strip), _) => return Ok(Loaded::Strip(strip)),
+            (InputPiece::Extent(extent), _) if !is_asked(&extent) => return Ok(Loaded::Nothing),
+            (InputPiece::Extent(extent), Some(file)) => (extent, file),
+            (InputPiece::Extent(_), None) => {
                 return Err(Error::new(Kind::Bug, "there is no file to read a piece from"));
             }
         };

@@ -6,7 +6,7 @@ use super::known_space::{SpaceGrids, VoxelMark};
 use contract::{Label, Map, MaskId, PlaceRun, PointKind, Result, Scan, Strip, Weigh};
 use export::{LabelColumns, Pack, Packed, PlanPicture, PointColumns};
 use geometry::{Aabb, Point, Pose};
-use segment::Ground;
+use segment::FloorHeights;
 use std::ops::Range;
 
 /// Points whose bounds are looked at together: neighbours of a scan are near each other.
@@ -19,7 +19,7 @@ const DRAWN: u64 = 4;
 pub(crate) struct LabelStrip<'a> {
     /// Labels of points near robots: for each mask, by place.
     pub(crate) near: &'a [Vec<PlaceRun<Label>>],
-    pub(crate) ground: &'a Ground,
+    pub(crate) ground: &'a FloorHeights,
     pub(crate) scans: &'a [Scan],
     /// Voxels of the robots' spaces.
     pub(crate) grids: &'a SpaceGrids,

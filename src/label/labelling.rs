@@ -20,12 +20,12 @@ use attach::Hanging;
 use contract::{Cluster, Fit, Floor, Input, InputId, Result, Space};
 use export::{
     Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Spool,
-    Tiles, Written, write_space,
+    Tiles, WrittenFiles, write_space,
 };
 use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
 use robot::Model;
-use segment::Ground;
+use segment::FloorHeights;
 use std::path::Path;
 
 /// Records that wait for their tiles may take so many times what a channel does, where memory is
@@ -38,7 +38,7 @@ pub(crate) struct Labelling<'a> {
     models: &'a [Model],
     sources: &'a Sources,
     floor: &'a Floor,
-    ground: Ground,
+    ground: FloorHeights,
     settings: segment::Settings,
     attach: attach::Settings,
     /// World bounds of each scan's points, metres.
@@ -97,7 +97,7 @@ pub(crate) struct Scope {
 
 /// What was written.
 pub(crate) struct WrittenLabels {
-    pub(crate) clouds: Written,
+    pub(crate) clouds: WrittenFiles,
     /// For each mask: entries, points that were dropped, and points that are said to move.
     pub(crate) masks: Vec<MaskCount>,
     /// Pictures, relative to the output folder.
@@ -160,7 +160,7 @@ impl<'a> Labelling<'a> {
     ) -> Self {
         let FittedRobots { fits, models } = robots;
         let &ScansToLabel { sources, store, floor, clusters } = scans;
-        let ground = Ground::new(floor, &settings.segment);
+        let ground = FloorHeights::new(floor, &settings.segment);
         let mut bounds = vec![Aabb::EMPTY; sources.scans.len()];
         for entry in store.entries() {
             let scan = &mut bounds[entry.at.scan.0 as usize];
@@ -173,7 +173,7 @@ impl<'a> Labelling<'a> {
     }
 
     /// The floor, for the label of a point that is near no robot.
-    pub(crate) fn ground(&self) -> &Ground {
+    pub(crate) fn ground(&self) -> &FloorHeights {
         &self.ground
     }
 
@@ -231,7 +231,7 @@ impl<'a> Labelling<'a> {
         };
         let (((masks, mut digests), (moving, fixed)), (tiles, open, pictures)) =
             engine.pipe("clouds", apart, along)?;
-        let clouds = Written { tiles, robots: moving, fixed };
+        let clouds = WrittenFiles { tiles, robots: moving, fixed };
         digests.extend(clouds.sums().cloned());
         let said = vec![None; self.fits.len()];
         let done = WrittenLabels { clouds, masks, pictures, spaces: said, digests, las };

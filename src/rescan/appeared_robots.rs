@@ -12,7 +12,7 @@ use crate::label::labelling::{Labelling, ScansToLabel};
 use crate::label::near_robots::NearRobots;
 use change::Thing;
 use contract::{Fit, Region, Result, Verdict};
-use freespace::Watch;
+use freespace::VisibilityQuery;
 use geometry::Aabb;
 use robot::Model;
 
@@ -119,7 +119,7 @@ impl CellComparison<'_> {
             &self.old_ground,
             self.settings,
         );
-        let (watch, other) = (Watch::new(&self.cell, &self.old_views), self.watch());
+        let (watch, other) = (VisibilityQuery::new(&self.cell, &self.old_views), self.watch());
         let seen = Observed { search: &search, watch: &watch, other_session: &other, regions: &[] };
         let (then, own) = look(now, models, &seen)?;
         Ok(match then {

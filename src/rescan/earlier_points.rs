@@ -7,12 +7,12 @@ use super::voxel_fates::Fates;
 use crate::engine::{Engine, Task};
 use crate::label::near_robots::NearRobots;
 use crate::store::Store;
-use change::{Seen, Tally, Tallying};
+use change::{OccupancyBuilder, SessionEvidence, SessionOccupancy};
 use contract::{Label, MAX_SKIP, Map, MaskId, PointKind, Result, Scan, Tile, Weigh};
 use export::MaskReader;
-use freespace::{Sight, Watch};
+use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point};
-use register::Surfaces;
+use register::SurfaceVoxels;
 use std::collections::BTreeSet;
 
 /// One of so many points tells the surfaces, and of many points more are passed over, so that about
@@ -41,7 +41,7 @@ pub(crate) struct EarlierPoints<'a> {
 /// What the new scans say of the earlier points.
 pub(crate) struct Compared {
     /// What stood there, by voxel.
-    pub(crate) then: Tally,
+    pub(crate) then: SessionOccupancy,
     tiles: Vec<Looked>,
     /// What becomes of them.
     pub(crate) fates: Fates,
@@ -59,7 +59,7 @@ struct Looked {
     robots: Vec<(u64, i16)>,
     /// Voxels of robots that the earlier result missed.
     missed: BTreeSet<[i32; 3]>,
-    tally: Tally,
+    tally: SessionOccupancy,
 }
 
 impl<'a> EarlierPoints<'a> {
@@ -80,9 +80,9 @@ impl<'a> EarlierPoints<'a> {
     }
 
     /// The surfaces of what stood there.
-    pub(crate) fn surfaces(&self, engine: &Engine) -> Result<Surfaces> {
+    pub(crate) fn surfaces(&self, engine: &Engine) -> Result<SurfaceVoxels> {
         let (skip, step) = sampled((self.n_points() / N_SAMPLED).max(SAMPLE));
-        let (mut all, sample) = (Surfaces::default(), Sample { past: self, step });
+        let (mut all, sample) = (SurfaceVoxels::default(), Sample { past: self, step });
         let source = self.store.picks_once(self.tiles.clone(), skip);
         let reads = self.store.reads();
         engine.pass(self.task("register"), source, |f| {
@@ -97,11 +97,11 @@ impl<'a> EarlierPoints<'a> {
     /// Asks the new scans about every point, and the earlier ones where those saw nothing.
     pub(crate) fn look(
         &self,
-        [watch, own]: [&Watch<'_>; 2],
+        [watch, own]: [&VisibilityQuery<'_>; 2],
         missed: Option<&NearRobots>,
         engine: &Engine,
     ) -> Result<Compared> {
-        let (mut then, mut tiles) = (Tally::default(), Vec::new());
+        let (mut then, mut tiles) = (SessionOccupancy::default(), Vec::new());
         let fates = Fates::of(&self.cell);
         let anew: Vec<Places> = self.n_points.iter().map(|n| Places::of(*n)).collect();
         let look = Look { past: self, watch, own, missed, fates: &fates, anew: &anew };
@@ -222,7 +222,7 @@ struct Sample<'a> {
     step: usize,
 }
 
-struct Sampled(Surfaces);
+struct Sampled(SurfaceVoxels);
 
 impl Map for Sample<'_> {
     type In = Tile;
@@ -232,7 +232,7 @@ impl Map for Sample<'_> {
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Sampled> {
         let (scan, mask) = self.past.scan(&tile);
         let old = &self.past.before[mask.0 as usize];
-        let mut out = Surfaces::default();
+        let mut out = SurfaceVoxels::default();
         let in_world = World::from(scan);
         for i in (0..tile.len()).step_by(self.step) {
             let world = in_world.of(tile.xyz[i]);
@@ -252,15 +252,15 @@ struct Asked {
     places: Vec<u64>,
     worlds: Vec<[f64; 3]>,
     labels: Vec<Label>,
-    sights: Vec<Sight>,
+    sights: Vec<Visibility>,
 }
 
 /// The map that asks the new scans.
 struct Look<'a> {
     past: &'a EarlierPoints<'a>,
-    watch: &'a Watch<'a>,
+    watch: &'a VisibilityQuery<'a>,
     /// Of the earlier scans.
-    own: &'a Watch<'a>,
+    own: &'a VisibilityQuery<'a>,
     /// Labels of robots that the earlier result missed.
     missed: Option<&'a NearRobots>,
     fates: &'a Fates,
@@ -290,17 +290,17 @@ impl Map for Look<'_> {
         self.past.labels(mask, places, labels)?;
         self.watch.look_all(worlds, sights);
         let mut out = Looked { mask: mask.0, ..Looked::default() };
-        let mut tallying = Tallying::default();
+        let mut tallying = OccupancyBuilder::default();
         let mut anew = self.anew[mask.0 as usize].adding();
         let mut missed = self.missed.map(|near| near.of(mask));
         let points = places.iter().zip(&*worlds).zip(labels.iter().zip(&*sights));
         for ((&place, &world), (label, &sight)) in points {
-            let voxel = Tally::cell(world);
+            let voxel = SessionOccupancy::cell(world);
             self.fates.add(voxel, sight);
             match sight {
-                Sight::Onto => anew.add(place),
-                Sight::Through => out.through.push((place, voxel)),
-                Sight::Close | Sight::Hidden | Sight::Unseen => {}
+                Visibility::Onto => anew.add(place),
+                Visibility::Through => out.through.push((place, voxel)),
+                Visibility::Close | Visibility::Hidden | Visibility::Unseen => {}
             }
             let is_missed = missed.as_mut().and_then(|near| near.label(place));
             if is_missed.is_some_and(|label| label.moves()) {
@@ -326,18 +326,22 @@ impl Map for Look<'_> {
 
 /// What a session has at the place of another one's point, of which that one's own beams say
 /// whether it is of a mesh.
-pub(crate) fn seen(sight: Sight, own: &Watch<'_>, world: [f64; 3]) -> Seen {
+pub(crate) fn seen(
+    sight: Visibility,
+    own: &VisibilityQuery<'_>,
+    world: [f64; 3],
+) -> SessionEvidence {
     match sight {
-        Sight::Through => Seen::Nothing { is_pierced: own.is_pierced(world) },
-        Sight::Onto | Sight::Close => Seen::Something,
-        Sight::Hidden | Sight::Unseen => Seen::Not,
+        Visibility::Through => SessionEvidence::Nothing { is_pierced: own.is_pierced(world) },
+        Visibility::Onto | Visibility::Close => SessionEvidence::Something,
+        Visibility::Hidden | Visibility::Unseen => SessionEvidence::Not,
     }
 }
 
 /// Area across its beam that a point stands for, m²: that of its pixel, or of a voxel's share where
 /// no scanner is known.
 pub(crate) fn area(scan: &Scan, world: [f64; 3]) -> f64 {
-    let Some(lattice) = &scan.lattice else { return Tally::FACE };
+    let Some(lattice) = &scan.lattice else { return SessionOccupancy::FACE };
     let beam = Point::from(world) - Point::from(scan.world_from_scan.translation.vector);
     lattice.row_step * lattice.col_step * beam.norm_squared()
 }

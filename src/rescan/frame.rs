@@ -7,7 +7,7 @@ use crate::engine::{AllThreads, Engine, Task};
 use crate::store::Store;
 use contract::{Error, Result, Scan, words};
 use export::CarriedEntry;
-use frame::{Answer, Gathered, Panorama, Place, Refusal, Session};
+use frame::{Answer, FramePlace, Gathered, Panorama, Refusal, SessionSurfaces};
 use geometry::{Aabb, Point, Pose, Vector};
 use ingest::Sources;
 use nalgebra::{Translation3, UnitQuaternion};
@@ -73,8 +73,8 @@ pub(crate) fn carry(
 /// What both sessions saw.
 #[derive(Clone, Copy)]
 struct BothSessions<'s> {
-    old: &'s Session,
-    new: &'s Session,
+    old: &'s SessionSurfaces,
+    new: &'s SessionSurfaces,
 }
 
 /// All that the frame is found from.
@@ -180,7 +180,7 @@ impl FrameSearch<'_> {
         first.map_or_else(String::new, |input| input.path.display().to_string())
     }
 
-    fn new_session(&self) -> Result<Session> {
+    fn new_session(&self) -> Result<SessionSurfaces> {
         let origin = self.first().map(f64::round);
         let all = (0..self.new.entries().len()).collect();
         let gather = SessionReader { store: self.new, origin, superseded: None, bounds: None };
@@ -188,7 +188,7 @@ impl FrameSearch<'_> {
     }
 
     /// The earlier session, whole or as far as it lies within some bounds.
-    fn old_session(&self, bounds: Option<&Aabb>) -> Result<Session> {
+    fn old_session(&self, bounds: Option<&Aabb>) -> Result<SessionSurfaces> {
         let store = self.past.store;
         let tiles = match bounds {
             Some(bounds) => store.touching(bounds),
@@ -231,7 +231,7 @@ impl FrameSearch<'_> {
         error.at(self.input()).hint(way_out)
     }
 
-    fn contradicted(&self, place: &Place) -> Error {
+    fn contradicted(&self, place: &FramePlace) -> Error {
         let what = format!("the frame that --frame states is contradicted: {}", in_words(place));
         Error::bad_input(what).at(self.input()).hint(
             "give the place of the first new scanner in the plant to 0.3 m and 2°, or leave --frame out",
@@ -239,7 +239,7 @@ impl FrameSearch<'_> {
     }
 
     /// A place as the flag that states it.
-    fn flag(&self, place: &Place, both: BothSessions<'_>) -> String {
+    fn flag(&self, place: &FramePlace, both: BothSessions<'_>) -> String {
         let BothSessions { old, new } = both;
         let pose = world(&place.laid.old_from_new, old, new);
         let at = pose * Point::from(self.first());
@@ -250,12 +250,12 @@ impl FrameSearch<'_> {
 }
 
 /// Whether beams went through more than what agrees.
-fn is_contradicted(place: &Place) -> bool {
+fn is_contradicted(place: &FramePlace) -> bool {
     place.evidence.n_against() > place.evidence.n_same()
 }
 
 /// What speaks for and against a place.
-fn in_words(place: &Place) -> String {
+fn in_words(place: &FramePlace) -> String {
     let e = &place.evidence;
     format!(
         "{:.1} m² of upright surfaces agree, and beams went through {:.1} m² of them",
@@ -265,17 +265,17 @@ fn in_words(place: &Place) -> String {
 }
 
 /// Poses between worlds as poses between origins of sessions, and back.
-fn local(plant_from_new: &Pose, old: &Session, new: &Session) -> Pose {
+fn local(plant_from_new: &Pose, old: &SessionSurfaces, new: &SessionSurfaces) -> Pose {
     Translation3::from(-old.surfels.origin)
         * plant_from_new
         * Translation3::from(new.surfels.origin)
 }
 
-fn world(old_from_new: &Pose, old: &Session, new: &Session) -> Pose {
+fn world(old_from_new: &Pose, old: &SessionSurfaces, new: &SessionSurfaces) -> Pose {
     Translation3::from(old.surfels.origin) * old_from_new * Translation3::from(-new.surfels.origin)
 }
 
-fn carried(place: &Place, by: &str, both: BothSessions<'_>) -> CarriedSession {
+fn carried(place: &FramePlace, by: &str, both: BothSessions<'_>) -> CarriedSession {
     let BothSessions { old, new } = both;
     let pose = world(&place.laid.old_from_new, old, new);
     let e = &place.evidence;
@@ -313,7 +313,7 @@ impl SessionReader<'_> {
         robots: &[Aabb],
         n_asked: usize,
         engine: &Engine,
-    ) -> Result<Session> {
+    ) -> Result<SessionSurfaces> {
         let entries = self.store.entries();
         // Of each scan: its tiles here, and how many points these have.
         let mut own: Vec<(&Scan, Vec<usize>, u64)> =
@@ -343,7 +343,7 @@ impl SessionReader<'_> {
                 eyes.extend(eye);
             }
         }
-        Ok(Session { surfels: all.surfels(robots), eyes })
+        Ok(SessionSurfaces { surfels: all.surfels(robots), eyes })
     }
 
     /// One scan: its surfaces, and how far its beams went if that is asked for.

@@ -25,6 +25,7 @@ use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, WholeResult
 use crate::detect::library;
 use crate::detect::robots::RobotList;
 use crate::detect::search::PreparedLibrary;
+
 use crate::engine::{AllThreads, Engine};
 use crate::job::{Job, Outcome, units};
 use crate::result::plant_state::PlantState;
@@ -34,7 +35,7 @@ use earlier_points::EarlierPoints;
 use earlier_result::EarlierResult;
 use found::Found;
 use geometry::{Aabb, Pose};
-use ingest::{Scanners, Sources};
+use ingest::{KnownScanners, Sources};
 use robot::Library;
 use session::{BothScans, CellComparison, ComparedRobots};
 use std::path::PathBuf;
@@ -154,7 +155,7 @@ impl Rescan<'_> {
         let &Rescan { base, job, engine, .. } = self;
         let settings = &job.means.settings;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
-        let read = |path| Scanners::read(path, &job.means.settings.ingest);
+        let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
         let scanners = job.scanners.as_deref().map(read).transpose()?;
         let before = base.state.before();
         let open = || {

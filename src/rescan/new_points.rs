@@ -5,12 +5,12 @@ use super::earlier_points::{World, area, sampled, seen};
 use crate::engine::Engine;
 use crate::label::near_robots::NearRobots;
 use crate::store::Store;
-use change::{Tally, Tallying};
+use change::{OccupancyBuilder, SessionOccupancy};
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
-use freespace::{Sight, Watch};
+use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point};
 use register::{Planes, Registration};
-use segment::Ground;
+use segment::FloorHeights;
 
 /// Points of a scan that are laid on the plant's surfaces, about.
 const N_LAID: u64 = 100_000;
@@ -44,22 +44,22 @@ pub(crate) fn register(
 pub(crate) struct NewPoints<'a> {
     pub(crate) scans: &'a [Scan],
     pub(crate) near: &'a NearRobots,
-    pub(crate) ground: &'a Ground,
+    pub(crate) ground: &'a FloorHeights,
     pub(crate) cell: Aabb,
     /// What stood there: the earlier scans are asked only where nothing of it is near.
-    pub(crate) then: &'a Tally,
+    pub(crate) then: &'a SessionOccupancy,
     /// Earlier scans.
-    pub(crate) watch: &'a Watch<'a>,
+    pub(crate) watch: &'a VisibilityQuery<'a>,
     /// The new ones.
-    pub(crate) own: &'a Watch<'a>,
+    pub(crate) own: &'a VisibilityQuery<'a>,
 }
 
 /// What one tile adds.
-pub(crate) struct Tallied(Tally);
+pub(crate) struct Tallied(SessionOccupancy);
 
 impl NewPoints<'_> {
-    pub(crate) fn tally(&self, store: &Store, engine: &Engine) -> Result<Tally> {
-        let mut all = Tally::default();
+    pub(crate) fn tally(&self, store: &Store, engine: &Engine) -> Result<SessionOccupancy> {
+        let mut all = SessionOccupancy::default();
         let source = store.picks_once(store.touching(&self.cell), 0);
         let reads = store.reads();
         engine.pass(store.task("compare"), source, |f| {
@@ -79,7 +79,7 @@ impl Map for NewPoints<'_> {
 
     fn apply(&self, tile: Tile, (): &mut ()) -> Result<Tallied> {
         let scan = &self.scans[tile.at.scan.0 as usize];
-        let mut out = Tallying::default();
+        let mut out = OccupancyBuilder::default();
         let (in_world, mut near) = (World::from(scan), self.near.of(scan.mask));
         // Neighbours are mostly in one voxel, and ask once whether something stood there.
         let (mut last, mut stood) = (None, false);
@@ -92,11 +92,11 @@ impl Map for NewPoints<'_> {
             let label: Label = known.unwrap_or_else(|| self.ground.label(world));
             match label.kind {
                 PointKind::Fixed => {
-                    let cell = Tally::cell(world);
+                    let cell = SessionOccupancy::cell(world);
                     if last != Some(cell) {
                         (last, stood) = (Some(cell), self.then.has_some(&cell));
                     }
-                    let sight = if stood { Sight::Onto } else { self.watch.look(world) };
+                    let sight = if stood { Visibility::Onto } else { self.watch.look(world) };
                     out.add(world, area(scan, world), seen(sight, self.own, world));
                 }
                 PointKind::Link | PointKind::Attachment => out.add_robot(world),

@@ -4,7 +4,7 @@
 use crate::label::known_space::poses;
 use contract::{Fit, Verdict};
 use fit::Scene;
-use freespace::{Sight, Watch};
+use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
 
@@ -25,7 +25,7 @@ pub(crate) fn is_the_same(
     fit: &Fit,
     model: &Model,
     scene: &Scene<'_>,
-    other_session: &Watch<'_>,
+    other_session: &VisibilityQuery<'_>,
 ) -> bool {
     fit.verdict == Verdict::Trusted
         || fit::verdict::is_uncontradicted(fit, scene)
@@ -34,7 +34,12 @@ pub(crate) fn is_the_same(
 
 /// Share of what stands within a robot's reach, where the other session saw that nothing did, that
 /// is not its own.
-fn strange(fit: &Fit, model: &Model, scene: &Scene<'_>, other_session: &Watch<'_>) -> f64 {
+fn strange(
+    fit: &Fit,
+    model: &Model,
+    scene: &Scene<'_>,
+    other_session: &VisibilityQuery<'_>,
+) -> f64 {
     let base = Point::from(fit.world_from_base.translation.vector);
     let links: Vec<(Pose, Aabb)> = model
         .links
@@ -50,7 +55,7 @@ fn strange(fit: &Fit, model: &Model, scene: &Scene<'_>, other_session: &Watch<'_
     let step = near.len().div_ceil(ASKED).max(1);
     let (mut n, mut n_strange) = (0_usize, 0_usize);
     for at in near.iter().step_by(step).filter(|at| !is_foot(at)) {
-        if other_session.look((*at).into()) == Sight::Through {
+        if other_session.look((*at).into()) == Visibility::Through {
             n += 1;
             n_strange += usize::from(!is_own(at));
         }

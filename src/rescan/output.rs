@@ -14,10 +14,10 @@ use crate::label::known_space::{SpaceGrids, VoxelMark};
 use crate::label::label_strips::blocks;
 use crate::label::labelling::{LabelFolders, Labelling, Scope, Streamed};
 use crate::result::copc;
-use change::{Tally, ThingChange};
+use change::{SessionOccupancy, ThingChange};
 use contract::{MaskId, Result};
 use export::{COPC, FileSum, MaskFiles, NpyWriter, OldPoint, Spool};
-use freespace::{Sight, Watch};
+use freespace::{Visibility, VisibilityQuery};
 use geometry::Aabb;
 use register::Registration;
 use std::cell::RefCell;
@@ -144,7 +144,12 @@ impl Found<'_, '_> {
     }
 
     /// Which points of the earlier result are still part of the plant, as the new scans see it.
-    fn stay(&self, points: &[OldPoint], watch: &Watch<'_>, gone: &BTreeSet<[i32; 3]>) -> Vec<bool> {
+    fn stay(
+        &self,
+        points: &[OldPoint],
+        watch: &VisibilityQuery<'_>,
+        gone: &BTreeSet<[i32; 3]>,
+    ) -> Vec<bool> {
         let left = |p: &OldPoint| p.label.moves() && self.stands_otherwise(p.label.robot);
         let mut stays: Vec<bool> = points.iter().map(|p| !left(p)).collect();
         let (mut here, mut worlds, mut sights) = (Vec::new(), Vec::new(), Vec::new());
@@ -154,7 +159,7 @@ impl Found<'_, '_> {
             if !stays[i] || !self.session.past.cell.contains(point.world) {
                 continue;
             }
-            let voxel = Tally::cell(point.world);
+            let voxel = SessionOccupancy::cell(point.world);
             let fate = match last {
                 Some((at, fate)) if at == voxel => fate,
                 _ => self.labels.compared.fates.stays(voxel, || gone.contains(&voxel)),
@@ -171,9 +176,9 @@ impl Found<'_, '_> {
         watch.look_all(&worlds, &mut sights);
         for ((i, world), sight) in here.into_iter().zip(worlds).zip(sights) {
             stays[i] = match sight {
-                Sight::Onto => false,
-                Sight::Through => !gone.contains(&Tally::cell(world)),
-                Sight::Close | Sight::Hidden | Sight::Unseen => true,
+                Visibility::Onto => false,
+                Visibility::Through => !gone.contains(&SessionOccupancy::cell(world)),
+                Visibility::Close | Visibility::Hidden | Visibility::Unseen => true,
             };
         }
         stays

@@ -13,8 +13,8 @@ use change::Unseen;
 use contract::words::{count, fixed, triple};
 use contract::{Error, Kind, Result, quote};
 use export::{
-    CarriedEntry, ChangedThing, Labels as LabelFiles, RegistrationEntry, RescanEntry, ResultFile,
-    ScanLabels, draw_changes, write_table,
+    CarriedEntry, ChangedThing, LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
+    draw_changes, write_table,
 };
 use register::Registration;
 use serde_json::json;
@@ -225,8 +225,8 @@ impl RescanReport<'_, '_> {
     fn draw(&self, changes: &[RobotChange]) -> export::Canvas {
         let things = self.found.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
             name: format!("T{} {}", k + 1, word(thing.change)),
-            gone: change::Tally::middles(&thing.gone),
-            filled: change::Tally::middles(&thing.filled),
+            gone: change::SessionOccupancy::middles(&thing.gone),
+            filled: change::SessionOccupancy::middles(&thing.filled),
             at: thing.now.or(thing.then).map(|b| b.center().into()).unwrap_or_default(),
         });
         let robots = self.found.robots.compared().into_iter().map(|i| {
@@ -241,7 +241,7 @@ impl RescanReport<'_, '_> {
         let unseen: Vec<_> = unseen.copied().collect();
         draw_changes(
             &self.found.session.past.cell,
-            [&self.found.labels.now.solid(), &change::Tally::middles(&unseen)],
+            [&self.found.labels.now.solid(), &change::SessionOccupancy::middles(&unseen)],
             &things.collect::<Vec<_>>(),
             &robots.collect::<Vec<_>>(),
         )

@@ -8,7 +8,7 @@ use crate::label::known_space::{poses, reach};
 use contract::{Fit, Region, Result, Verdict};
 use fit::Scene;
 use fit::verdict::{self, VerdictEvent};
-use freespace::{Sight, Watch};
+use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
 
@@ -76,8 +76,8 @@ pub(crate) struct Observed<'s, 'a, 'm> {
     /// The search in the scans of this session.
     pub(crate) search: &'s Search<'a, 'm>,
     /// What these scans, and those of the other session, say of places.
-    pub(crate) watch: &'s Watch<'s>,
-    pub(crate) other_session: &'s Watch<'s>,
+    pub(crate) watch: &'s VisibilityQuery<'s>,
+    pub(crate) other_session: &'s VisibilityQuery<'s>,
     /// Regions of this session.
     pub(crate) regions: &'s [Region],
 }
@@ -166,7 +166,7 @@ fn anew(
     before: &Fit,
     models: &[Model],
     search: &Search<'_, '_>,
-    other_session: &Watch<'_>,
+    other_session: &VisibilityQuery<'_>,
     near: &Region,
 ) -> Result<Option<(Fit, Option<Model>)>> {
     let world_from_base = &before.world_from_base;
@@ -223,7 +223,7 @@ fn home(fit: &Fit, model: &Model, regions: &[Region]) -> Region {
     own.copied().unwrap_or_else(|| reach(fit, model))
 }
 
-fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> PostureEvidence {
+fn said(fit: &Fit, model: &Model, watch: &VisibilityQuery<'_>) -> PostureEvidence {
     let (mut n, mut judged, mut through) = (0_usize, 0_usize, 0_usize);
     let mut foot = None;
     for (link, pose) in model.links.iter().zip(poses(fit, model)) {
@@ -232,8 +232,8 @@ fn said(fit: &Fit, model: &Model, watch: &Watch<'_>) -> PostureEvidence {
         for p in link.cad.points.iter().step_by(step) {
             n += 1;
             let sight = watch.look((pose * Point::from(p.map(f64::from))).into());
-            own += usize::from(sight >= Sight::Through);
-            gone += usize::from(sight == Sight::Through);
+            own += usize::from(sight >= Visibility::Through);
+            gone += usize::from(sight == Visibility::Through);
         }
         (judged, through) = (judged + own, through + gone);
         if own > 0 && foot.is_none() {

@@ -1,6 +1,3 @@
-//! Earlier and new scans of a cell in; how its robots stand now, and what else is not where it was,
-//! out.
-
 use super::earlier_points::{Compared, EarlierPoints};
 use super::earlier_result::EarlierResult;
 use super::new_points;
@@ -15,12 +12,12 @@ use crate::label::known_space::{reach, region, standing};
 use crate::label::labelling::{Labelling, ScansToLabel};
 use crate::label::near_robots::NearRobots;
 use crate::store::Store;
-use change::{Tally, Thing, Unseen, things};
+use change::{SessionOccupancy, Thing, Unseen, things};
 use contract::{
     Cluster, Error, Fit, Floor, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View,
 };
 use fit::verdict::{self, VerdictEvent};
-use freespace::Watch;
+use freespace::VisibilityQuery;
 use geometry::{Aabb, Pose};
 use ingest::Sources;
 use lattice::ViewSettings;
@@ -117,7 +114,7 @@ pub(crate) struct CellLabels {
     /// What stood in the cell and was not looked at.
     pub(crate) unseen: Vec<Unseen>,
     /// What stands in the cell now.
-    pub(crate) now: Tally,
+    pub(crate) now: SessionOccupancy,
 }
 
 /// Bounds of the cell that is meant.
@@ -248,8 +245,8 @@ impl<'a> CellComparison<'a> {
     }
 
     /// What the new scans say of places.
-    pub(crate) fn watch(&self) -> Watch<'_> {
-        Watch::new(&self.cell, &self.new_views)
+    pub(crate) fn watch(&self) -> VisibilityQuery<'_> {
+        VisibilityQuery::new(&self.cell, &self.new_views)
     }
 
     /// The search in the new scans.
@@ -276,7 +273,7 @@ impl<'a> CellComparison<'a> {
     fn known_robots(&self, plant: &mut RobotList, engine: &Engine) -> Result<ComparedRobots> {
         let mut out = ComparedRobots::default();
         let (search, watch) = (self.search(), self.watch());
-        let old_watch = Watch::new(&self.cell, &self.old_views);
+        let old_watch = VisibilityQuery::new(&self.cell, &self.old_views);
         let regions = base_search::regions(&self.clusters, &self.settings.region);
         let here = here(plant.view(), &self.past.cell);
         let seen = Observed {
@@ -340,7 +337,7 @@ impl<'a> CellComparison<'a> {
         let own = self.own_fits(plant.fits, robots);
         let labelling = self.labelling(FittedRobots { fits: &own, ..plant });
         let near = labelling.near_robots(self.store, engine)?;
-        let (watch, old_watch) = (self.watch(), Watch::new(&self.cell, &self.old_views));
+        let (watch, old_watch) = (self.watch(), VisibilityQuery::new(&self.cell, &self.old_views));
         let missed = self.missed(plant, robots, engine)?;
         let compared = self.past.look([&watch, &old_watch], missed.as_ref(), engine)?;
         let then = &compared.then;
@@ -440,5 +437,5 @@ fn asked(past: &EarlierPoints<'_>, n_scans: usize) -> Ground {
             }))
         });
     }
-    Ground { surfaces: floor::Ground::default(), extents }
+    Ground { surfaces: floor::FloorFindings::default(), extents }
 }

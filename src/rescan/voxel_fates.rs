@@ -2,8 +2,8 @@
 //! or all of them go, out: where one or the other is so, the records of those points need not be
 //! asked for one by one again.
 
-use change::Tally;
-use freespace::Sight;
+use change::SessionOccupancy;
+use freespace::Visibility;
 use geometry::Aabb;
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -16,7 +16,7 @@ const STAYS: u8 = 1;
 const ONTO: u8 = 2;
 const THROUGH: u8 = 4;
 
-/// Fates of the old points by voxel ([`Tally::cell`]).
+/// Fates of the old points by voxel ([`SessionOccupancy::cell`]).
 pub(crate) struct Fates {
     first: [i32; 3],
     size: [usize; 3],
@@ -27,7 +27,7 @@ pub(crate) struct Fates {
 impl Fates {
     /// None known yet.
     pub(crate) fn of(cell: &Aabb) -> Self {
-        let (first, last) = (Tally::cell(cell.min), Tally::cell(cell.max));
+        let (first, last) = (SessionOccupancy::cell(cell.min), SessionOccupancy::cell(cell.max));
         let n = |i: usize| i64::from(last[i]) - i64::from(first[i]) + 1;
         let size = [0, 1, 2].map(|i| usize::try_from(n(i)).unwrap_or(0));
         let n = size.iter().try_fold(1_usize, |n, s| n.checked_mul(*s));
@@ -37,11 +37,11 @@ impl Fates {
 
     /// Says what the new scans have at an old point's place.
     #[inline]
-    pub(crate) fn add(&self, voxel: [i32; 3], sight: Sight) {
+    pub(crate) fn add(&self, voxel: [i32; 3], sight: Visibility) {
         let fate = match sight {
-            Sight::Onto => ONTO,
-            Sight::Through => THROUGH,
-            Sight::Close | Sight::Hidden | Sight::Unseen => STAYS,
+            Visibility::Onto => ONTO,
+            Visibility::Through => THROUGH,
+            Visibility::Close | Visibility::Hidden | Visibility::Unseen => STAYS,
         };
         if let Some(own) = self.at(voxel)
             && own.load(Ordering::Relaxed) & fate == 0
@@ -83,13 +83,13 @@ mod tests {
     fn only_voxels_of_one_fate_have_one() {
         let cell = Aabb { min: [-1.0, 2.0, 0.0], max: [3.0, 4.0, 2.5] };
         let fates = Fates::of(&cell);
-        let voxel = |k: i32| Tally::cell([-0.97 + 0.05 * f64::from(k), 3.1, 2.49]);
+        let voxel = |k: i32| SessionOccupancy::cell([-0.97 + 0.05 * f64::from(k), 3.1, 2.49]);
         for (k, sights) in [
-            (0, vec![Sight::Onto, Sight::Onto]),
-            (1, vec![Sight::Hidden, Sight::Unseen, Sight::Close]),
-            (2, vec![Sight::Onto, Sight::Hidden]),
-            (3, vec![Sight::Through]),
-            (4, vec![Sight::Through, Sight::Onto]),
+            (0, vec![Visibility::Onto, Visibility::Onto]),
+            (1, vec![Visibility::Hidden, Visibility::Unseen, Visibility::Close]),
+            (2, vec![Visibility::Onto, Visibility::Hidden]),
+            (3, vec![Visibility::Through]),
+            (4, vec![Visibility::Through, Visibility::Onto]),
         ] {
             sights.into_iter().for_each(|sight| fates.add(voxel(k), sight));
         }
@@ -97,7 +97,7 @@ mod tests {
         let both = [Some(false), Some(true), None];
         assert_eq!(said(true), [both, [Some(false), Some(false), None]].concat()[..]);
         assert_eq!(said(false), [both, [Some(true), None, None]].concat()[..]);
-        assert_eq!(fates.stays(Tally::cell([9.0, 3.0, 1.0]), || true), None);
-        assert_eq!(fates.stays(Tally::cell([-1.1, 3.0, 1.0]), || true), None);
+        assert_eq!(fates.stays(SessionOccupancy::cell([9.0, 3.0, 1.0]), || true), None);
+        assert_eq!(fates.stays(SessionOccupancy::cell([-1.1, 3.0, 1.0]), || true), None);
     }
 }

@@ -12,7 +12,7 @@ use crate::store::Store;
 use contract::words::{Unit, count, fixed, triple};
 use contract::{Fit, Format, Input, JointFit, Mask, Result, Scan, Verdict, quote};
 use export::{
-    InputEntry, Labels, Places, ResultFile, ReviewEntry, RobotEntry, SCHEMA, ScanLabels,
+    InputEntry, LabelFiles, NamedMap, ResultFile, ReviewEntry, RobotEntry, SCHEMA, ScanLabels,
     SpaceEntry, StageEntry, write_table,
 };
 use ingest::{MISPLACED, Sources};
@@ -51,8 +51,8 @@ impl Report<'_> {
         write_table(output.next(), &robots)?;
         let warnings = self.warnings();
         let masks = self.sources.masks.iter().zip(&self.written.masks);
-        let labels = Labels {
-            table: Labels::TABLE.into(),
+        let labels = LabelFiles {
+            table: LabelFiles::TABLE.into(),
             scans: masks.map(|(mask, count)| ScanLabels::new(mask, count.n_points)).collect(),
         };
         let result = ResultFile {
@@ -229,11 +229,11 @@ fn stand(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
     let joints = model.joints.iter().zip(model.joint_values(&posture));
     let passive =
         joints.filter(|(j, _)| matches!(j.motion, Motion::Mimic { .. } | Motion::Loop(_)));
-    entry.passive = Places(passive.map(|(j, value)| (j.name.clone(), value)).collect());
+    entry.passive = NamedMap(passive.map(|(j, value)| (j.name.clone(), value)).collect());
     let slides = model.joints.iter().filter(|j| j.kind == JointKind::Prismatic);
     entry.slides = slides.map(|j| j.name.clone()).collect();
     let links = model.links.iter().zip(poses(fit, model));
-    entry.link_poses = Places(links.map(|(l, pose)| (l.name.clone(), (&pose).into())).collect());
+    entry.link_poses = NamedMap(links.map(|(l, pose)| (l.name.clone(), (&pose).into())).collect());
     for (entry, stay) in entry.stays.iter_mut().zip(&fit.stays) {
         stand(entry, stay, models);
     }

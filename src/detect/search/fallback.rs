@@ -4,7 +4,7 @@
 use super::tried::TriedBases;
 use super::{GUESS_BREADTH, MAX_SUNK, SAME_BASE, Search, base, breadth};
 use crate::engine::AllThreads;
-use base_search::Sight;
+use base_search::RegionEvidence;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Verdict};
 use fit::{Scene, Sights};
 use geometry::{Aabb, Point};
@@ -49,7 +49,7 @@ impl Search<'_, '_> {
     pub(super) fn on_mounts(
         &self,
         scene: &Scene<'_>,
-        sight: &Sight<'_>,
+        sight: &RegionEvidence<'_>,
         is_wanted: &impl Fn(&Candidate) -> bool,
         tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
@@ -60,7 +60,7 @@ impl Search<'_, '_> {
     pub(super) fn hung_beside(
         &self,
         scene: &Scene<'_>,
-        sight: &mut Sight<'_>,
+        sight: &mut RegionEvidence<'_>,
         fits: &[Fit],
         tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
@@ -78,7 +78,7 @@ impl Search<'_, '_> {
     fn hung(
         &self,
         scene: &Scene<'_>,
-        sight: &Sight<'_>,
+        sight: &RegionEvidence<'_>,
         name: &str,
         is_wanted: &impl Fn(&Candidate) -> bool,
         tried: &mut TriedBases,
@@ -119,7 +119,7 @@ impl Search<'_, '_> {
     pub(super) fn left_over(
         &self,
         scene: &Scene<'_>,
-        sight: &mut Sight<'_>,
+        sight: &mut RegionEvidence<'_>,
         planes: &[InstallationPlane],
         fits: &[Fit],
         tried: &mut TriedBases,
@@ -136,7 +136,7 @@ impl Search<'_, '_> {
     pub(super) fn on_stands(
         &self,
         scene: &Scene<'_>,
-        sight: &mut Sight<'_>,
+        sight: &mut RegionEvidence<'_>,
         fits: &[Fit],
         is_wanted: &impl Fn(&Candidate) -> bool,
         tried: &mut TriedBases,
@@ -158,7 +158,7 @@ impl Search<'_, '_> {
     fn pass_over(
         &self,
         scene: &Scene<'_>,
-        sight: &mut Sight<'_>,
+        sight: &mut RegionEvidence<'_>,
         fits: &[Fit],
     ) -> Option<Vec<Point>> {
         // Without beams nothing contradicts a wrong base.
@@ -174,7 +174,12 @@ impl Search<'_, '_> {
 
     /// Robots that moved between scans: where no robot is trusted, but something stands like a
     /// robot's foot within whose reach things were here and gone (region's frame).
-    pub(super) fn moved(&self, fits: &[Fit], sight: Sight<'_>, sights: &Sights<'_>) -> Vec<Fit> {
+    pub(super) fn moved(
+        &self,
+        fits: &[Fit],
+        sight: RegionEvidence<'_>,
+        sights: &Sights<'_>,
+    ) -> Vec<Fit> {
         let gone = lattice::disagreement(sights.views, &AllThreads);
         if gone.len() < MIN_GONE {
             return Vec::new();

@@ -7,11 +7,12 @@ mod views;
 
 use super::ground::Ground;
 use crate::cache::Cache;
+
 use crate::engine::AllThreads;
 use crate::engine::progress::Pieces;
 use crate::job::Settings;
 use crate::store::Store;
-use base_search::{BaseSearch, Sight};
+use base_search::{BaseSearch, RegionEvidence};
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
 use fit::{Method, Prepared, Scene, Sights};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
@@ -174,7 +175,8 @@ impl<'a, 'm> Search<'a, 'm> {
             return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
         }
         let feet = about.map_or(*region, |(place, radius)| feet(region, &place, radius));
-        let mut sight = Sight::new(&feet, &views, (&scene.evidence, &scene.scouts), &AllThreads);
+        let mut sight =
+            RegionEvidence::new(&feet, &views, &scene.evidence, &scene.scouts, &AllThreads);
         let find = || self.candidates(&sight, &planes, 0.0, breadth(&planes));
         let mut candidates = self.piece(region, "candidates", find)?;
         candidates.retain(is_wanted);
@@ -201,15 +203,15 @@ impl<'a, 'm> Search<'a, 'm> {
     /// much; so many times the usual base poses are looked at.
     fn candidates(
         &self,
-        sight: &Sight<'_>,
+        sight: &RegionEvidence<'_>,
         planes: &[InstallationPlane],
         min_score: f64,
         breadth: usize,
     ) -> Vec<Candidate> {
         let guessed = planes.iter().all(InstallationPlane::is_guess);
         let search = |index: usize| {
-            let model = (index, &self.library.models[index]);
-            let search = BaseSearch::new(model, sight, &self.settings.base_search);
+            let model = &self.library.models[index];
+            let search = BaseSearch::new(index, model, sight, &self.settings.base_search);
             let search = search.map(|s| if guessed { s.on_guesses() } else { s });
             let search = search.map(|s| s.at_least(min_score).broad(breadth));
             let found = search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default();

@@ -5,7 +5,7 @@ use geometry::Vector;
 use nalgebra::{Rotation3, UnitQuaternion};
 use robot::Model;
 use simulate::random::Random;
-use simulate::scene::{Anchor, Carried, Hose, ToolShape};
+use simulate::scene::{Anchor, CarriedBox, Hose, ToolShape};
 use simulate::{Scene, part_in, tool_on};
 
 /// Hoses along an arm, at most (METHOD.md §19, T8 and T9).
@@ -67,7 +67,7 @@ pub(super) fn load(scene: &mut Scene, model: &Model, chance: f64, reach: f64, ra
 }
 
 /// A box of a size on top of a link, along its longest side, so far from its surface, metres.
-fn laid(model: &Model, link: usize, name: &str, gap: f64, size: [f64; 3]) -> Carried {
+fn laid(model: &Model, link: usize, name: &str, gap: f64, size: [f64; 3]) -> CarriedBox {
     let (at, away) = top(model, link);
     let extent = model.links[link].bounds.size();
     let longest = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
@@ -78,7 +78,7 @@ fn laid(model: &Model, link: usize, name: &str, gap: f64, size: [f64; 3]) -> Car
     let x = if along.norm() > 0.3 { along.normalize() } else { other.normalize() };
     let turn = Rotation3::from_basis_unchecked(&[x, away.cross(&x), away]);
     let (roll, pitch, yaw) = UnitQuaternion::from_rotation_matrix(&turn).euler_angles();
-    Carried {
+    CarriedBox {
         name: format!("{name} of R1"),
         robot: "R1".into(),
         link: model.links[link].name.clone(),

@@ -10,8 +10,8 @@ use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 use simulate::random::Random;
 use simulate::scene::{
-    Column, Cuboid, Fence, Filling, Floor, Furniture, Mixed, Raster, Registration, RobotPlace,
-    Scanner, Section, Stand, StandShape,
+    BeamRaster, Column, Cuboid, Fence, FenceFilling, Furniture, Mixed, RegistrationError,
+    RobotPlace, Scanner, SceneFloor, SceneStand, Section, StandShape,
 };
 use simulate::{Postures, Scene};
 use std::f64::consts::TAU;
@@ -130,7 +130,7 @@ pub(super) fn draw(case: &DrawnCase, model: &Model) -> Result<DrawnCell> {
     let world_from_base =
         world_from_plate.map_or(upright, |plate| plate * Pose::translation(0.0, 0.0, -foot));
     if stand > 0.0 && world_from_plate.is_none() {
-        scene.stands.push(Stand {
+        scene.stands.push(SceneStand {
             name: "stand".into(),
             xy,
             yaw_deg: yaw.to_degrees(),
@@ -169,7 +169,7 @@ pub(super) fn draw(case: &DrawnCase, model: &Model) -> Result<DrawnCell> {
 fn empty(seed: u64, random: &mut Random) -> Scene {
     Scene {
         seed,
-        floor: Some(Floor {
+        floor: Some(SceneFloor {
             size: Some([24.0, 24.0]),
             tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
             wave_amplitude: 0.002,
@@ -306,7 +306,7 @@ fn around(scene: &mut Scene, chance: f64, reach: f64, random: &mut Random) {
         // One straight fence in front, wires as real ones.
         let (a, r) = (random.between(0.0, TAU), reach + random.between(0.4, 0.8));
         let corner = |t: f64| [r * a.cos() - t * a.sin(), r * a.sin() + t * a.cos()];
-        let filling = if random.unit() < 0.8 { Filling::Wires } else { Filling::Panel };
+        let filling = if random.unit() < 0.8 { FenceFilling::Wires } else { FenceFilling::Panel };
         scene.fences.push(Fence {
             name: "fence".into(),
             from: corner(-2.0),
@@ -364,12 +364,12 @@ fn scanners(scene: &mut Scene, c: &Condition, reach: [f64; 2], random: &mut Rand
         let down = (z / near).atan().to_degrees().clamp(10.0, 60.0);
         let yaw = (a + std::f64::consts::PI).rem_euclid(TAU).to_degrees();
         let [shift, angle, bias] = c.registration;
-        let registration = Registration::drawn([shift, angle], random);
+        let registration = RegistrationError::drawn([shift, angle], random);
         scene.scanners.push(Scanner {
             name: format!("scan_{}", k + 1),
             position: [x, y, z],
             rpy_deg: [0.0, 0.0, yaw],
-            raster: Raster {
+            raster: BeamRaster {
                 elevation_deg: [-down, up],
                 azimuth_deg: [-half, half],
                 step_deg,

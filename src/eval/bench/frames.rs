@@ -18,8 +18,8 @@ use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use serde::Serialize;
 use simulate::random::Random;
-use simulate::scene::Registration;
-use simulate::{Ends, Line, Scene, line, sessions};
+use simulate::scene::RegistrationError;
+use simulate::{Ends, ProductionLine, Scene, line, sessions};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
@@ -88,7 +88,7 @@ fn case(row: &mut FrameRow, asked: &FrameCase<'_>, dir: &Path) -> Result<()> {
     let frame = drawn(row);
     for scanner in &mut now.scanners {
         let (real, stated) = (scanner.world_from_scan()?, scanner.stated_world_from_scan()?);
-        scanner.registration = Registration::between(&real, &(frame * stated));
+        scanner.registration = RegistrationError::between(&real, &(frame * stated));
     }
     let formats = Formats { las: false, labels: false, ..Formats::ALL };
     for (scene, name) in [(&then, "then"), (&now, "now")] {
@@ -129,7 +129,12 @@ fn scenes(
     if bench.suite == RescanSuite::Lines {
         let ends = [Ends::Open, Ends::Long, Ends::Walls][number % 3];
         row.ends = Some(format!("{ends:?}"));
-        let wanted = Line { seed: row.seed, n_cells: N_CELLS, step_deg: bench.size.step_deg, ends };
+        let wanted = ProductionLine {
+            seed: row.seed,
+            n_cells: N_CELLS,
+            step_deg: bench.size.step_deg,
+            ends,
+        };
         return Ok(line(&wanted, models)?.0);
     }
     sessions(&bench.size.plant(row.seed), models)

@@ -8,7 +8,7 @@ use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use robot::Model;
 use simulate::random::Random;
-use simulate::scene::{Cuboid, Fence, Filling, Furniture, RobotPlace};
+use simulate::scene::{Cuboid, Fence, FenceFilling, Furniture, RobotPlace};
 use simulate::{Postures, Scene};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -135,7 +135,7 @@ fn fences(scene: &mut Scene, robot: &Standing<'_>, random: &mut Random) {
             from: corner(k),
             to: corner(k + 1),
             height: random.between(1.8, 2.2),
-            filling: Filling::Wires,
+            filling: FenceFilling::Wires,
         });
     }
 }

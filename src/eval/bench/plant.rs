@@ -18,7 +18,7 @@ use export::atomic;
 use robot::Model;
 use serde::Serialize;
 use simulate::random::Random;
-use simulate::scene::{Registration, Scanner};
+use simulate::scene::{RegistrationError, Scanner};
 use simulate::{Plant, Scene};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -86,7 +86,7 @@ impl Drawing {
 fn shift(scanner: &mut Scanner, seed: u64, k: usize) {
     let mut random = Random::keyed(&[seed, k as u64, 0x5E]);
     let [shift, turn, bias] = condition::REGISTRATION;
-    scanner.registration = Registration::drawn([shift, turn], &mut random);
+    scanner.registration = RegistrationError::drawn([shift, turn], &mut random);
     scanner.range_bias = bias * random.normals()[0];
 }
 

@@ -15,7 +15,7 @@ pub struct Attach {
 /// Voxels gathered so far; sorted and joined now and then so that memory follows the plant, not the
 /// scans.
 #[derive(Debug, Default)]
-pub struct Sum {
+pub struct ResidualSum {
     voxels: Vec<ResidualVoxel>,
     /// Length after the last joining.
     joined: usize,
@@ -155,14 +155,14 @@ struct Ways {
 
 impl Fold for Attach {
     type In = Vec<ResidualVoxel>;
-    type Sum = Sum;
+    type Sum = ResidualSum;
     type Out = Attached;
 
-    fn empty(&self) -> Sum {
-        Sum::default()
+    fn empty(&self) -> ResidualSum {
+        ResidualSum::default()
     }
 
-    fn add(&self, sum: &mut Sum, voxels: Vec<ResidualVoxel>) -> Result<()> {
+    fn add(&self, sum: &mut ResidualSum, voxels: Vec<ResidualVoxel>) -> Result<()> {
         sum.voxels.extend(voxels);
         if sum.voxels.len() > 2 * sum.joined.max(MIN_JOINING) {
             sum.settle();
@@ -170,11 +170,11 @@ impl Fold for Attach {
         Ok(())
     }
 
-    fn join(&self, earlier: &mut Sum, later: Sum) -> Result<()> {
+    fn join(&self, earlier: &mut ResidualSum, later: ResidualSum) -> Result<()> {
         self.add(earlier, later.voxels)
     }
 
-    fn finish(&self, mut sum: Sum) -> Result<Attached> {
+    fn finish(&self, mut sum: ResidualSum) -> Result<Attached> {
         sum.settle();
         // Where a link fills a voxel, what is left in it is the link's roughness, and connects
         // nothing.
@@ -194,7 +194,7 @@ impl Fold for Attach {
     }
 }
 
-impl Sum {
+impl ResidualSum {
     /// Sorts, and joins what is in one voxel. Joining does not depend on order, so neither does the
     /// answer on when this happens.
     fn settle(&mut self) {

@@ -15,9 +15,11 @@ const MAX_HEIGHT: f64 = 3.6;
 /// Thickness below which a column is a wall, fence or panel, metres, one sigma: voxels of 5 cm make
 /// a plane 2 cm thick.
 const FLAT: f64 = 0.045;
-/// Share of a column's voxels that two upright planes may leave over where walls meet, and how many
-/// of them.
-const LEFT_OVER: (f64, f64) = (0.08, 60.0);
+/// Share of a column's voxels that two upright planes may leave over where walls meet.
+const MAX_SHARE_LEFT_OVER: f64 = 0.08;
+/// Most voxels of a column that two upright planes may leave over where walls meet, however large
+/// their share is.
+const MAX_LEFT_OVER: f64 = 60.0;
 /// Lowest corner of a room, metres: lower ones may be the body of a machine.
 const MIN_CORNER: f64 = 2.4;
 /// Pairs of voxels that are tried for a plane through them.
@@ -94,9 +96,8 @@ fn is_corner(voxels: &[Voxel], edge: f64) -> bool {
     }
     let mut left: Vec<Pile> = piles.into_values().collect();
     for _ in 0..2 {
-        let Some((p, normal)) = best_line(&left) else { return false };
-        let (on, off): (Vec<Pile>, Vec<Pile>) =
-            left.iter().partition(|pile| !is_off(pile, (p, normal)));
+        let Some(line) = best_line(&left) else { return false };
+        let (on, off): (Vec<Pile>, Vec<Pile>) = left.iter().partition(|pile| !is_off(pile, &line));
         let low = on.iter().map(|p| p.low).min().unwrap_or(0);
         let high = on.iter().map(|p| p.high).max().unwrap_or(0);
         if f64::from(high - low) * edge < MIN_CORNER {
@@ -105,29 +106,36 @@ fn is_corner(voxels: &[Voxel], edge: f64) -> bool {
         left = off;
     }
     let over: f64 = left.iter().map(|p| p.n).sum();
-    over <= (LEFT_OVER.0 * voxels.len() as f64).min(LEFT_OVER.1)
+    over <= (MAX_SHARE_LEFT_OVER * voxels.len() as f64).min(MAX_LEFT_OVER)
 }
 
-/// A line seen from above: a point on it and its unit normal.
-type Line = ([f64; 2], [f64; 2]);
+/// A line seen from above.
+#[derive(Debug, Clone, Copy)]
+struct GroundLine {
+    /// A point on it, metres.
+    point: [f64; 2],
+    /// Its unit normal.
+    normal: [f64; 2],
+}
 
-fn is_off(pile: &Pile, (p, normal): Line) -> bool {
+fn is_off(pile: &Pile, line: &GroundLine) -> bool {
+    let (p, normal) = (line.point, line.normal);
     let off = (pile.at[0] - p[0]) * normal[0] + (pile.at[1] - p[1]) * normal[1];
     off.abs() > 2.0 * FLAT
 }
 
 /// The line that the fewest voxels are off, through two of them.
-fn best_line(piles: &[Pile]) -> Option<Line> {
+fn best_line(piles: &[Pile]) -> Option<GroundLine> {
     // Pairs far apart in the order of the voxels are far apart in space.
     let n = piles.len();
     let pair = |k: usize| (piles[k * n / N_PAIRS].at, piles[(k * n / N_PAIRS + n / 2) % n].at);
     let lines = (0..if n > 0 { N_PAIRS } else { 0 }).map(pair).filter_map(|(a, b)| {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = dx.hypot(dy);
-        (length > 2.0 * FLAT).then(|| (a, [-dy / length, dx / length]))
+        (length > 2.0 * FLAT).then(|| GroundLine { point: a, normal: [-dy / length, dx / length] })
     });
-    let over = |line: &Line| -> f64 {
-        piles.iter().filter(|pile| is_off(pile, *line)).map(|pile| pile.n).sum()
+    let over = |line: &GroundLine| -> f64 {
+        piles.iter().filter(|pile| is_off(pile, line)).map(|pile| pile.n).sum()
     };
     lines.min_by(|a, b| over(a).total_cmp(&over(b)))
 }

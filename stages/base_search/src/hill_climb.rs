@@ -5,27 +5,38 @@ use contract::Fan;
 use geometry::{Plane, Pose};
 use std::collections::HashMap;
 
+use crate::problem::BaseSearch;
 use crate::regions::are_stacked;
-use crate::search::BaseSearch;
-use crate::trial::{Said, Trial, best, prefix};
+use crate::trial::{BaseTrial, LAG, SampleScore, Samples, Thinning, best};
 
 /// Steps that a pose may go beyond its neighbours while it gets better.
 const CLIMB: usize = 3;
-/// Mean score on a quarter of the samples by which a pose may lag behind the best and still be
-/// looked at closely.
-pub(crate) const LAG: f64 = 0.15;
 
-/// Steps from a pose that is refined: planes up, along x and y, yaw.
-type Steps = [isize; 4];
-
-/// Spacing of a level of the search: metres, radians, and planes where heights are guessed.
-pub(crate) struct Grid {
-    pub(crate) step: f64,
-    pub(crate) yaw: f64,
-    pub(crate) rise: isize,
+/// Where a climb starts.
+struct ClimbStart<'a> {
+    trial: &'a BaseTrial,
+    /// Likely poses of the first link, frame of the root; none where it is not asked.
+    root_from_firsts: &'a [Pose],
 }
 
-impl Grid {
+/// Steps from a pose that is refined: planes up, along x and y, yaw.
+type ClimbSteps = [isize; 4];
+
+/// A level of the search: the spacing of its grid, and how many of its poses are kept.
+pub(crate) struct SearchLevel {
+    /// Step along the plane, metres.
+    pub(crate) step: f64,
+    /// Step of the yaw, radians.
+    pub(crate) yaw: f64,
+    /// Planes from one height to the next, where heights are guessed.
+    pub(crate) rise: isize,
+    /// Base poses that go on to the next level.
+    pub(crate) keep: usize,
+    /// Most of them at one place.
+    pub(crate) quota: usize,
+}
+
+impl SearchLevel {
     /// How far from a surface a point may be that counts, metres.
     fn tolerance(&self) -> f32 {
         (self.step * 1.5).clamp(0.025, 0.08) as f32
@@ -38,24 +49,32 @@ impl BaseSearch<'_> {
     pub(crate) fn finer(
         &self,
         planes: &[Plane],
-        trials: &[Trial],
-        (grid, (keep, quota)): (Grid, (usize, usize)),
+        trials: &[BaseTrial],
+        level: &SearchLevel,
         fan: &dyn Fan,
-    ) -> Vec<Trial> {
-        let (tolerance, apart) = (grid.tolerance(), (grid.step * 0.6, grid.yaw * 0.6));
-        let around = |trial: Trial| -> Vec<Trial> {
+    ) -> Vec<BaseTrial> {
+        let tolerance = level.tolerance();
+        let kept = Thinning {
+            keep: level.keep,
+            quota: level.quota,
+            step: level.step * 0.6,
+            yaw_step: level.yaw * 0.6,
+        };
+        let around = |trial: BaseTrial| -> Vec<BaseTrial> {
             let firsts = self.likely_firsts(&planes[trial.plane], &trial, tolerance);
-            let mut near = self.climb(planes, (&trial, &firsts), &grid);
+            let mut near =
+                self.climb(planes, &ClimbStart { trial: &trial, root_from_firsts: &firsts }, level);
             for t in &mut near {
                 t.said =
                     self.joined(self.look(planes, t, self.settings.n_fine, tolerance), t.first);
             }
             near
         };
-        let mut out: Vec<Trial> = fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
-        best(&mut out, (2 * keep, 2 * quota), apart.0, apart.1);
+        let mut out: Vec<BaseTrial> =
+            fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
+        best(&mut out, Thinning { keep: 2 * kept.keep, quota: 2 * kept.quota, ..kept });
         let mut out = fan.fan(out, |t| self.with_first(&planes[t.plane], t, tolerance));
-        best(&mut out, (keep, quota), apart.0, apart.1);
+        best(&mut out, kept);
         out
     }
 
@@ -65,18 +84,18 @@ impl BaseSearch<'_> {
     fn climb(
         &self,
         planes: &[Plane],
-        (trial, firsts): (&Trial, &[Pose]),
-        grid: &Grid,
-    ) -> Vec<Trial> {
+        start: &ClimbStart<'_>,
+        level: &SearchLevel,
+    ) -> Vec<BaseTrial> {
         // Those about one pose are mostly about the next, too.
-        let mut known: HashMap<Steps, Option<Trial>> = HashMap::new();
-        let mut about = |middle: Steps| -> Vec<(Steps, Trial)> {
-            let levels = if self.is_guess { -1..2 } else { 0..1 };
-            let all = levels.flat_map(|level| (0..27).map(move |n| (level, n)));
-            let near = all.filter_map(|(level, n)| {
-                let by = [level, n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
+        let mut known: HashMap<ClimbSteps, Option<BaseTrial>> = HashMap::new();
+        let mut about = |middle: ClimbSteps| -> Vec<(ClimbSteps, BaseTrial)> {
+            let heights = if self.is_guess { -1..2 } else { 0..1 };
+            let all = heights.flat_map(|height| (0..27).map(move |n| (height, n)));
+            let near = all.filter_map(|(height, n)| {
+                let by = [height, n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
                 let steps = [0, 1, 2, 3].map(|i| middle[i] + by[i]);
-                let find = || self.moved_by(planes, (trial, firsts), (grid, steps));
+                let find = || self.moved_by(planes, start, level, steps);
                 known.entry(steps).or_insert_with(find).map(|trial| (steps, trial))
             });
             near.collect()
@@ -102,37 +121,47 @@ impl BaseSearch<'_> {
     fn moved_by(
         &self,
         planes: &[Plane],
-        (trial, firsts): (&Trial, &[Pose]),
-        (grid, [level, i, j, k]): (&Grid, Steps),
-    ) -> Option<Trial> {
-        let rise = level * grid.rise;
+        start: &ClimbStart<'_>,
+        level: &SearchLevel,
+        [height, i, j, k]: ClimbSteps,
+    ) -> Option<BaseTrial> {
+        let trial = start.trial;
+        let rise = height * level.rise;
         let plane = trial.plane.checked_add_signed(rise).filter(|p| *p < planes.len())?;
         if !are_stacked(&planes[trial.plane], &planes[plane], rise) {
             return None;
         }
-        let next = Trial {
+        let next = BaseTrial {
             plane,
-            x: trial.x + i as f64 * grid.step,
-            y: trial.y + j as f64 * grid.step,
-            yaw: trial.yaw + k as f64 * grid.yaw,
+            x: trial.x + i as f64 * level.step,
+            y: trial.y + j as f64 * level.step,
+            yaw: trial.yaw + k as f64 * level.yaw,
             ..*trial
         };
-        let own = self.look(planes, &next, self.settings.n_fine / 4, grid.tolerance());
-        if firsts.is_empty() {
-            return Some(Trial { said: own, ..next });
+        let own = self.look(planes, &next, self.settings.n_fine / 4, level.tolerance());
+        if start.root_from_firsts.is_empty() {
+            return Some(BaseTrial { said: own, ..next });
         }
-        let first = self.glance_at(&planes[plane], &next, firsts, grid.tolerance());
-        Some(Trial { said: self.joined(own, first), first, ..next })
+        let first =
+            self.glance_at(&planes[plane], &next, start.root_from_firsts, level.tolerance());
+        Some(BaseTrial { said: self.joined(own, first), first, ..next })
     }
 
     /// What some samples of the base say at a glance.
-    fn look(&self, planes: &[Plane], t: &Trial, n_samples: usize, tolerance: f32) -> Said {
+    fn look(
+        &self,
+        planes: &[Plane],
+        t: &BaseTrial,
+        n_samples: usize,
+        tolerance: f32,
+    ) -> SampleScore {
         let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
-        self.sight.glance(prefix(self.model, self.base, n_samples), &pose, tolerance)
+        let samples = Samples::first(self.model, self.base, n_samples);
+        self.region.glance(samples, &pose, tolerance)
     }
 }
 
 /// The trial that scores most, with where it is; of equals the last.
-fn highest(near: &[(Steps, Trial)]) -> Option<(Steps, Trial)> {
+fn highest(near: &[(ClimbSteps, BaseTrial)]) -> Option<(ClimbSteps, BaseTrial)> {
     near.iter().copied().max_by(|a, b| a.1.said.score.total_cmp(&b.1.said.score))
 }

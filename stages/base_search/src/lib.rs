@@ -8,12 +8,17 @@
 mod body_boxes;
 mod evidence_grid;
 mod first_link;
+mod first_link_score;
 mod hill_climb;
+mod problem;
+mod region_evidence;
 mod regions;
 mod score_grid;
 mod search;
+mod settings;
 mod trial;
 
-pub use evidence_grid::Sight;
+pub use problem::BaseSearch;
+pub use region_evidence::RegionEvidence;
 pub use regions::{RegionSettings, guessed_planes, raised_planes, regions, stand_planes};
-pub use search::{BaseSearch, Settings};
+pub use settings::Settings;

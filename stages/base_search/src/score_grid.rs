@@ -1,7 +1,7 @@
 //! A grid of scores and the samples of a body in; out comes the mean score of the samples at a
 //! pose, in whole numbers: one look-up and one addition a sample.
 
-use crate::trial::Said;
+use crate::trial::SampleScore;
 use geometry::Pose;
 use geometry::depth::{Rows, rows, transform};
 
@@ -16,7 +16,7 @@ pub(crate) const HIDDEN: f32 = UNJUDGED as f32 * -SCORE_UNIT;
 
 /// What each cell of a region scores at some tolerance.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Graded<'a> {
+pub(crate) struct ScoreGrid<'a> {
     /// Low corner of the first cell, local, metres.
     pub(crate) min: [f32; 3],
     /// Edge of a cell, metres.
@@ -30,14 +30,14 @@ pub(crate) struct Graded<'a> {
 /// Samples of a body in one attitude, as cells of the grid: the body is moved by whole cells.
 #[derive(Debug, Clone)]
 pub(crate) struct Stencil<'a> {
-    grid: Graded<'a>,
+    grid: ScoreGrid<'a>,
     places: Vec<i32>,
     /// Least and most cells of the samples along x, y, z.
     low: [i32; 3],
     high: [i32; 3],
 }
 
-impl<'a> Graded<'a> {
+impl<'a> ScoreGrid<'a> {
     /// The rows that lead from the body's frame into cells.
     fn cells_from(&self, local_from_body: &Pose) -> Rows {
         let mut m = rows(local_from_body);
@@ -50,7 +50,7 @@ impl<'a> Graded<'a> {
 
     /// What samples (frame of the body) say with the body at a pose; what lies outside of the grid
     /// is hidden.
-    pub(crate) fn ask(&self, points: &[[f32; 3]], local_from_body: &Pose) -> Said {
+    pub(crate) fn ask(&self, points: &[[f32; 3]], local_from_body: &Pose) -> SampleScore {
         let m = self.cells_from(local_from_body);
         let score = |p: &[f32; 3]| {
             let at = transform(&m, *p);
@@ -84,7 +84,7 @@ impl<'a> Graded<'a> {
 impl Stencil<'_> {
     /// What the first `n` samples say with the body moved by `shift` (local, metres), to the
     /// nearest cell; `None` where some of them would lie outside of the grid.
-    pub(crate) fn ask(&self, shift: [f32; 3], n: usize) -> Option<Said> {
+    pub(crate) fn ask(&self, shift: [f32; 3], n: usize) -> Option<SampleScore> {
         let grid = &self.grid;
         let by = shift.map(|v| (v / grid.edge).round() as i32);
         let is_inside =
@@ -97,13 +97,13 @@ impl Stencil<'_> {
     }
 }
 
-fn said(scores: impl Iterator<Item = i8>, n: usize) -> Said {
+fn said(scores: impl Iterator<Item = i8>, n: usize) -> SampleScore {
     let add = |(sum, n_seen): (i32, i32), score: i8| {
         (sum + i32::from(score), n_seen + i32::from(score != UNJUDGED))
     };
     let (sum, n_seen) = scores.fold((0, 0), add);
     let n = n.max(1) as f64;
-    Said { score: f64::from(sum) * f64::from(SCORE_UNIT) / n, seen: f64::from(n_seen) / n }
+    SampleScore { score: f64::from(sum) * f64::from(SCORE_UNIT) / n, seen: f64::from(n_seen) / n }
 }
 
 #[cfg(test)]
@@ -114,7 +114,7 @@ mod tests {
     fn a_moved_body_scores_as_where_it_was_moved_to_and_nothing_outside() {
         let n = [20, 17, 13];
         let scores: Vec<i8> = (0..20 * 17 * 13).map(|i| (i * 37 % 150 - 100) as i8).collect();
-        let grid = Graded { min: [-0.3, 0.1, -0.2], edge: 0.03, n, scores: &scores };
+        let grid = ScoreGrid { min: [-0.3, 0.1, -0.2], edge: 0.03, n, scores: &scores };
         let points = [[0.0, 0.02, 0.05], [0.07, -0.01, 0.1], [-0.05, 0.03, 0.0]];
         let at = |x: f64, y: f64, z: f64| Pose::translation(-0.1 + x, 0.2 + y, -0.1 + z);
         let stencil = grid.stencil(&points, &at(0.0, 0.0, 0.0));

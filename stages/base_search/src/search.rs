@@ -7,165 +7,46 @@
 //! it.
 
 use contract::{Candidate, Fan, InstallationPlane};
-use geometry::{Plane, Point, Pose, Vector};
+use geometry::{Plane, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
-use robot::Model;
 
-use crate::evidence_grid::Sight;
-use crate::first_link::First;
-use crate::hill_climb::Grid;
+use crate::hill_climb::SearchLevel;
+use crate::problem::BaseSearch;
 use crate::regions::{GUESS_STEP, are_stacked};
 use crate::score_grid::Stencil;
-use crate::trial::{QUOTA, Said, Trial, base_link, best, coarse_yaw, prefix};
-
-/// What is tuned.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Samples of the base link at the coarse level.
-    pub n_coarse: usize,
-    /// Samples of a link at finer levels.
-    pub n_fine: usize,
-    /// Base poses of the coarse level whose first link is looked at.
-    pub keep_feet: usize,
-    /// Base poses that survive the coarse level.
-    pub keep_coarse: usize,
-    /// Base poses that survive the middle level.
-    pub keep_middle: usize,
-    /// Places (bases farther apart than `place_radius`) that go on to the fit.
-    pub max_places: usize,
-    /// Base poses that go on to the fit for each place.
-    pub bases_per_place: usize,
-    /// Bases nearer than this are at the same place, metres.
-    pub place_radius: f64,
-    /// Lowest mean sample score of base and first link that is worth a fit.
-    pub min_score: f64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            n_coarse: 80,
-            n_fine: 160,
-            keep_feet: 800,
-            keep_coarse: 120,
-            keep_middle: 60,
-            max_places: 5,
-            bases_per_place: 12,
-            place_radius: 0.30,
-            min_score: 0.05,
-        }
-    }
-}
+use crate::trial::{BaseTrial, QUOTA, SampleScore, Samples, Thinning, best, coarse_yaw};
 
 /// Heights above a plane at which a foot is looked for, metres: not the plane itself, and no higher
 /// than shoulders stand.
 const FOOT_HEIGHTS: std::ops::Range<f64> = 0.03..1.2;
-/// A base may stand where, within this share of its radius, so many cells of the plane have so many
-/// points each.
+/// Share of a base's radius within which there must be points about a place where it may stand.
 const ABOUT: f64 = 0.8;
+/// Least filled cells of the plane within that radius.
 const MIN_CELLS: usize = 3;
+/// Least points of a filled cell.
 const MIN_IN_CELL: u32 = 3;
 /// Mean score on a quarter of the samples, at the best of every other yaw, below which a place is
-/// not looked at any further; and by how much yaws may lag behind that best.
+/// not looked at any further.
 const HOPELESS: f64 = -0.2;
+/// Mean score by which a yaw may lag behind the best one of its place and still be looked at with
+/// all samples.
 const YAW_LAG: f64 = 0.35;
 /// Of so many guessed heights one is looked at coarsely, at most: two up and down are tried then,
 /// and one more.
 const MAX_STRIDE: usize = 6;
 /// Tolerance of the coarse level in steps of its grid.
 const COARSE_REACH: f64 = 1.3;
-/// Share of the lowest score that a base must have after the coarse level, and after the next: on
-/// coarse grids the right one scores a little more or less than in the end.
-const SHORT: (f64, f64) = (0.4, 0.6);
+/// Share of the lowest score that a base must have after the coarse level: on coarse grids the
+/// right one scores a little more or less than in the end.
+const MIN_SHARE_COARSE: f64 = 0.4;
+/// Share of the lowest score that a base must have after the middle level.
+const MIN_SHARE_MIDDLE: f64 = 0.6;
 /// Ground that one robot and its furniture take, m².
 const CELL_AREA: f64 = 25.0;
 /// Most cells that a region is taken for: a square of 12 m holds so many.
 const MAX_CELLS: usize = 6;
 
-/// The search for one model's base in one region.
-#[derive(Debug)]
-pub struct BaseSearch<'a> {
-    pub(crate) model: &'a Model,
-    index: usize,
-    pub(crate) sight: &'a Sight<'a>,
-    pub(crate) settings: &'a Settings,
-    /// Farthest sample of the base from its upright axis, metres.
-    radius: f64,
-    /// Height of the base's lowest sample in the root's frame, metres.
-    foot: f64,
-    /// The link that stands on the plane, and its pose in the root's frame.
-    pub(crate) base: usize,
-    pub(crate) root_from_base: Pose,
-    /// The first link that moves and has a surface.
-    pub(crate) first: Option<First>,
-    /// Whether the planes are guesses, one close above the other.
-    pub(crate) is_guess: bool,
-    /// Lowest mean score of base and first link that counts.
-    min_score: f64,
-    /// So many times the usual number of base poses are kept at each level.
-    breadth: usize,
-}
-
-impl<'a> BaseSearch<'a> {
-    /// Prepares the search; `None` for a model without a base surface, or one that is only a tool.
-    #[must_use]
-    pub fn new(
-        (index, model): (usize, &'a Model),
-        sight: &'a Sight<'a>,
-        settings: &'a Settings,
-    ) -> Option<Self> {
-        let base = base_link(model)?;
-        if model.is_tool() {
-            return None;
-        }
-        let root_from_base = model.poses(&model.home())[base];
-        let rooted = model.links[base]
-            .cad
-            .points
-            .iter()
-            .map(|p| root_from_base * Point::from(p.map(f64::from)));
-        let (mut radius, mut foot) = (0.0_f64, f64::INFINITY);
-        for p in rooted {
-            radius = radius.max(p.x.hypot(p.y));
-            foot = foot.min(p.z);
-        }
-        let first = First::of(model);
-        let is_guess = false;
-        Some(Self {
-            model,
-            index,
-            sight,
-            settings,
-            radius,
-            foot,
-            base,
-            root_from_base,
-            first,
-            is_guess,
-            min_score: settings.min_score,
-            breadth: 1,
-        })
-    }
-
-    /// The same on planes that are guesses, one close above the other: a few of them tell where to
-    /// look at the others.
-    #[must_use]
-    pub fn on_guesses(self) -> Self {
-        Self { is_guess: true, ..self }
-    }
-
-    /// The same with so many times the base poses at each level.
-    #[must_use]
-    pub fn broad(self, breadth: usize) -> Self {
-        Self { breadth, ..self }
-    }
-
-    /// The same for bases that score so much at least.
-    #[must_use]
-    pub fn at_least(self, score: f64) -> Self {
-        Self { min_score: self.min_score.max(score), ..self }
-    }
-
+impl BaseSearch<'_> {
     /// The candidates: one for each place, best first.
     #[must_use]
     pub fn run(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> Vec<Candidate> {
@@ -177,51 +58,67 @@ impl<'a> BaseSearch<'a> {
         let step = self.coarse_step();
         let yaw_step = coarse_yaw();
         let cells = self.breadth * self.n_cells();
-        best(&mut trials, (self.settings.keep_feet * cells, QUOTA), step * 0.9, yaw_step * 0.9);
+        let thinning = Thinning {
+            keep: self.settings.keep_feet * cells,
+            quota: QUOTA,
+            step: step * 0.9,
+            yaw_step: yaw_step * 0.9,
+        };
+        best(&mut trials, thinning);
         // Half of a cell has the height of a foot: what stands on it tells sooner than a closer
         // look.
         let tolerance = self.coarse_tolerance();
         let mut trials = fan.fan(trials, |t| self.glance_at_first(&local[t.plane], t, tolerance));
-        best(&mut trials, (self.settings.keep_coarse * cells, QUOTA), step * 0.9, yaw_step * 0.9);
-        self.drop_hopeless(&mut trials, SHORT.0);
-        let keep = (self.settings.keep_middle * cells, QUOTA);
-        let grid = Grid { step: step / 2.0, yaw: yaw_step / 2.0, rise: 2 };
-        let mut trials = self.finer(&local, &trials, (grid, keep), fan);
-        self.drop_hopeless(&mut trials, SHORT.1);
+        best(&mut trials, Thinning { keep: self.settings.keep_coarse * cells, ..thinning });
+        self.drop_hopeless(&mut trials, MIN_SHARE_COARSE);
+        let middle = SearchLevel {
+            step: step / 2.0,
+            yaw: yaw_step / 2.0,
+            rise: 2,
+            keep: self.settings.keep_middle * cells,
+            quota: QUOTA,
+        };
+        let mut trials = self.finer(&local, &trials, &middle, fan);
+        self.drop_hopeless(&mut trials, MIN_SHARE_MIDDLE);
         let per_place = self.settings.bases_per_place;
-        let keep = (self.settings.max_places * cells * per_place, per_place);
-        let grid = Grid { step: step / 4.0, yaw: yaw_step / 5.0, rise: 1 };
-        let trials = self.finer(&local, &trials, (grid, keep), fan);
+        let fine = SearchLevel {
+            step: step / 4.0,
+            yaw: yaw_step / 5.0,
+            rise: 1,
+            keep: self.settings.max_places * cells * per_place,
+            quota: per_place,
+        };
+        let trials = self.finer(&local, &trials, &fine, fan);
         self.group(planes, &local, &trials)
     }
 
     /// Drops trials that score less than a share of what they need in the end.
-    fn drop_hopeless(&self, trials: &mut Vec<Trial>, share: f64) {
+    fn drop_hopeless(&self, trials: &mut Vec<BaseTrial>, share: f64) {
         trials.retain(|t| t.said.score >= share * self.min_score);
     }
 
     /// How many robot cells the region may hold, at least one: the more, the more places must go
     /// on.
     fn n_cells(&self) -> usize {
-        let size = self.sight.region.bounds.size();
+        let size = self.region.region.bounds.size();
         ((size[0] * size[1] / CELL_AREA).round() as usize).clamp(1, MAX_CELLS)
     }
 
     fn to_local(&self, plane: &Plane) -> Plane {
         Plane {
             normal: plane.normal,
-            offset: plane.offset - plane.normal.dot(&self.sight.region.origin.coords),
+            offset: plane.offset - plane.normal.dot(&self.region.region.origin.coords),
         }
     }
 
     /// Spacing of the coarse grid: small enough that the true place lies within the tolerance.
     fn coarse_step(&self) -> f64 {
-        self.sight.in_cells((self.radius * 0.35).clamp(0.04, 0.10))
+        self.region.in_cells((self.radius * 0.35).clamp(0.04, 0.10))
     }
 
     /// Tolerance of the coarse level, metres.
     fn coarse_tolerance(&self) -> f32 {
-        self.sight.of_grid((COARSE_REACH * self.coarse_step()) as f32)
+        self.region.of_grid((COARSE_REACH * self.coarse_step()) as f32)
     }
 
     /// Which planes are looked at coarsely: the lowest of a stack of guessed heights and every few
@@ -247,19 +144,19 @@ impl<'a> BaseSearch<'a> {
         plane: &InstallationPlane,
         local: &Plane,
         fan: &dyn Fan,
-    ) -> Vec<Trial> {
+    ) -> Vec<BaseTrial> {
         let (step, tolerance) = (self.coarse_step(), self.coarse_tolerance());
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
         let places = self.occupied(plane, local, step);
         let Some(start) = places.first().copied() else { return Vec::new() };
-        let cad = prefix(self.model, self.base, self.settings.n_coarse);
+        let samples = Samples::first(self.model, self.base, self.settings.n_coarse);
         let turned = |k: usize| {
             self.pose(local, start.0, start.1, k as f64 * coarse_yaw()) * self.root_from_base
         };
         let stencils: Option<Vec<Stencil<'_>>> =
-            (0..n).map(|k| self.sight.stencil(cad.0, &turned(k), tolerance)).collect();
+            (0..n).map(|k| self.region.stencil(samples.points, &turned(k), tolerance)).collect();
         let frame = local.frame();
-        let place = |(x, y): (f64, f64)| -> Vec<Trial> {
+        let place = |(x, y): (f64, f64)| -> Vec<BaseTrial> {
             let shift = frame * Vector::new(x - start.0, y - start.1, 0.0);
             let ask = |k: usize, n_samples: usize| {
                 let known = stencils.as_ref().map(|s| &s[k]);
@@ -267,7 +164,8 @@ impl<'a> BaseSearch<'a> {
                 known.unwrap_or_else(|| {
                     let mut pose = turned(k);
                     pose.translation.vector += shift;
-                    self.sight.glance(prefix(self.model, self.base, n_samples), &pose, tolerance)
+                    let samples = Samples::first(self.model, self.base, n_samples);
+                    self.region.glance(samples, &pose, tolerance)
                 })
             };
             // A few samples at every other yaw tell most places to be hopeless, and most yaws of
@@ -284,8 +182,8 @@ impl<'a> BaseSearch<'a> {
             let all = (0..n).filter(|k| is_open(*k)).filter_map(|k| {
                 let said = ask(k, self.settings.n_coarse);
                 let yaw = k as f64 * coarse_yaw();
-                let first = Said::default();
-                (said.score > 0.0).then_some(Trial { x, y, yaw, plane: at, said, first })
+                let first = SampleScore::default();
+                (said.score > 0.0).then_some(BaseTrial { x, y, yaw, plane: at, said, first })
             });
             all.collect()
         };
@@ -303,10 +201,10 @@ impl<'a> BaseSearch<'a> {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
         };
         let shifted = plane.bounds.corners().map(|c| {
-            let at = Vector::from(c) - self.sight.region.origin.coords;
+            let at = Vector::from(c) - self.region.region.origin.coords;
             [at.x, at.y, at.z]
         });
-        let reach = self.sight.region.bounds.corners();
+        let reach = self.region.region.bounds.corners();
         let grow = self.radius.max(0.1);
         let low: [f64; 2] =
             std::array::from_fn(|i| span(reach, i).0.max(span(shifted, i).0 - grow));
@@ -318,7 +216,7 @@ impl<'a> BaseSearch<'a> {
         let n: [usize; 2] =
             std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
         let mut count = vec![0_u32; n[0] * n[1]];
-        for spot in self.sight.spots() {
+        for spot in self.region.spots() {
             let q = to_plane * Vector::from(spot.at.map(f64::from));
             let height = q.z - local.offset;
             if !FOOT_HEIGHTS.contains(&height) {
@@ -355,36 +253,16 @@ impl<'a> BaseSearch<'a> {
         out
     }
 
-    pub(crate) fn score_base(
-        &self,
-        plane: &Plane,
-        trial: &Trial,
-        (tolerance, n): (f32, usize),
-    ) -> Said {
-        let cad = prefix(self.model, self.base, n);
-        let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
-        self.sight.said(&self.sight.evidence.probe(cad.0, cad.1, &pose, tolerance))
-    }
-
-    /// The base standing on the plane at a place (its own coordinates), turned by `yaw` about the
-    /// plane's normal.
-    pub(crate) fn pose(&self, plane: &Plane, x: f64, y: f64, yaw: f64) -> Pose {
-        let frame = plane.frame();
-        let foot = frame * Vector::new(x, y, plane.offset - self.foot);
-        let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), yaw);
-        Pose::from_parts(Translation3::from(foot), frame * turn)
-    }
-
     fn group(
         &self,
         planes: &[InstallationPlane],
         local: &[Plane],
-        trials: &[Trial],
+        trials: &[BaseTrial],
     ) -> Vec<Candidate> {
-        let mut places: Vec<Vec<Trial>> = Vec::new();
+        let mut places: Vec<Vec<BaseTrial>> = Vec::new();
         for trial in trials.iter().filter(|t| t.said.score >= self.min_score) {
             let radius = self.settings.place_radius;
-            let at = |t: &Trial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
+            let at = |t: &BaseTrial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
             let here = at(trial);
             let same = places.iter().position(|p| (at(&p[0]) - here).norm() < radius);
             match same {
@@ -401,10 +279,10 @@ impl<'a> BaseSearch<'a> {
         places.iter_mut().for_each(|p| p.sort_by(|a, b| b.said.score.total_cmp(&a.said.score)));
         places.retain_mut(|place| self.accept(local, place));
         let world_from_local = Pose::from_parts(
-            Translation3::from(self.sight.region.origin.coords),
+            Translation3::from(self.region.region.origin.coords),
             UnitQuaternion::identity(),
         );
-        let world = self.sight.region.world_bounds();
+        let world = self.region.region.world_bounds();
         places
             .iter()
             .map(|place| Candidate {

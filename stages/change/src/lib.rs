@@ -8,6 +8,6 @@ mod split;
 mod things;
 mod unobserved;
 
-pub use occupancy::{Seen, Tally, Tallying};
+pub use occupancy::{OccupancyBuilder, SessionEvidence, SessionOccupancy};
 pub use things::{Thing, ThingChange, ThingSettings, things};
 pub use unobserved::{Unseen, unseen};

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 /// A voxel of a world: `floor(p / edge)`.
-pub(crate) type Cell = [i32; 3];
+pub(crate) type OccupancyCell = [i32; 3];
 
 /// Edge of a voxel, metres.
 pub(crate) const EDGE: f64 = 0.05;
@@ -24,15 +24,15 @@ const MIN_SHARE: f64 = 0.6;
 /// Points of one session by voxel: how many, and at how many places of theirs the other session saw
 /// nothing. Nothing depends on the order of the voxels.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Tally {
-    cells: FxHashMap<Cell, Count>,
+pub struct SessionOccupancy {
+    cells: FxHashMap<OccupancyCell, CellCount>,
     /// Voxels with points of robots and what hangs on them.
-    robots: BTreeSet<Cell>,
+    robots: BTreeSet<OccupancyCell>,
 }
 
 /// What another session says of a point's place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Seen {
+pub enum SessionEvidence {
     /// None of its beams got there.
     Not,
     /// Some ended there, or so close that it may be the same.
@@ -46,7 +46,7 @@ pub enum Seen {
 
 /// What is in a voxel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Count {
+struct CellCount {
     n_points: u32,
     /// At whose places the other session saw nothing …
     n_empty: u32,
@@ -60,7 +60,7 @@ struct Count {
     most: (u32, f64),
 }
 
-impl Count {
+impl CellCount {
     fn join(&mut self, other: &Self) {
         self.n_points += other.n_points;
         self.n_empty += other.n_empty;
@@ -76,23 +76,23 @@ impl Count {
 /// Points of one scan that are still to be counted by voxel: neighbours in a scan mostly are in the
 /// same one, and cost no search for it.
 #[derive(Debug, Default)]
-pub struct Tallying {
-    cells: FxHashMap<Cell, Count>,
-    last: Option<(Cell, Count)>,
-    robots: Vec<Cell>,
+pub struct OccupancyBuilder {
+    cells: FxHashMap<OccupancyCell, CellCount>,
+    last: Option<(OccupancyCell, CellCount)>,
+    robots: Vec<OccupancyCell>,
 }
 
-impl Tallying {
+impl OccupancyBuilder {
     /// Adds a point that stands still, and for so much area across its beam, m²; and what the other
     /// session has at its place.
     #[inline]
-    pub fn add(&mut self, world: [f64; 3], area: f64, seen: Seen) {
-        let cell = Tally::cell(world);
-        let point = Count {
+    pub fn add(&mut self, world: [f64; 3], area: f64, seen: SessionEvidence) {
+        let cell = SessionOccupancy::cell(world);
+        let point = CellCount {
             n_points: 1,
-            n_empty: u32::from(matches!(seen, Seen::Nothing { .. })),
-            n_pierced: u32::from(seen == Seen::Nothing { is_pierced: true }),
-            n_unseen: u32::from(seen == Seen::Not),
+            n_empty: u32::from(matches!(seen, SessionEvidence::Nothing { .. })),
+            n_pierced: u32::from(seen == SessionEvidence::Nothing { is_pierced: true }),
+            n_unseen: u32::from(seen == SessionEvidence::Not),
             area,
             most: (0, 0.0),
         };
@@ -105,7 +105,7 @@ impl Tallying {
         }
     }
 
-    fn join(&mut self, run: Option<(Cell, Count)>) {
+    fn join(&mut self, run: Option<(OccupancyCell, CellCount)>) {
         if let Some((cell, count)) = run {
             self.cells.entry(cell).or_default().join(&count);
         }
@@ -114,7 +114,7 @@ impl Tallying {
     /// Adds a point of a robot or of what hangs on it.
     #[inline]
     pub fn add_robot(&mut self, world: [f64; 3]) {
-        let cell = Tally::cell(world);
+        let cell = SessionOccupancy::cell(world);
         if self.robots.last() != Some(&cell) {
             self.robots.push(cell);
         }
@@ -122,35 +122,35 @@ impl Tallying {
 
     /// All of them by voxel.
     #[must_use]
-    pub fn finish(mut self) -> Tally {
+    pub fn finish(mut self) -> SessionOccupancy {
         let last = self.last.take();
         self.join(last);
         self.cells.values_mut().for_each(|all| all.most = (all.n_points, all.area));
-        Tally { cells: self.cells, robots: self.robots.into_iter().collect() }
+        SessionOccupancy { cells: self.cells, robots: self.robots.into_iter().collect() }
     }
 }
 
-impl Tally {
+impl SessionOccupancy {
     /// Face of a voxel, m².
     pub const FACE: f64 = EDGE * EDGE;
 
     /// The voxel of a place.
     #[inline]
     #[must_use]
-    pub fn cell(world: [f64; 3]) -> Cell {
+    pub fn cell(world: [f64; 3]) -> OccupancyCell {
         let step = |v: f64| (v * PER_METRE).floor() as i32;
         [step(world[0]), step(world[1]), step(world[2])]
     }
 
     /// Middles of voxels, world, metres.
     #[must_use]
-    pub fn middles(cells: &[Cell]) -> Vec<[f64; 3]> {
+    pub fn middles(cells: &[OccupancyCell]) -> Vec<[f64; 3]> {
         cells.iter().map(|c| c.map(|i| (f64::from(i) + 0.5) * EDGE)).collect()
     }
 
     /// All voxels with points.
     #[cfg(test)]
-    pub(crate) fn cells(&self) -> impl Iterator<Item = &Cell> {
+    pub(crate) fn cells(&self) -> impl Iterator<Item = &OccupancyCell> {
         self.cells.keys()
     }
 
@@ -158,7 +158,7 @@ impl Tally {
     #[must_use]
     pub fn solid(&self) -> Vec<[f64; 3]> {
         let solid = self.cells.iter().filter(|(_, c)| c.n_points >= MIN_POINTS);
-        let mut solid: Vec<Cell> = solid.map(|(cell, _)| *cell).collect();
+        let mut solid: Vec<OccupancyCell> = solid.map(|(cell, _)| *cell).collect();
         solid.sort_unstable();
         Self::middles(&solid)
     }
@@ -171,75 +171,78 @@ impl Tally {
     }
 
     /// Whether a voxel within so many steps holds points of a robot.
-    pub(crate) fn has_robot_near(&self, cell: &Cell, reach: i32) -> bool {
+    pub(crate) fn has_robot_near(&self, cell: &OccupancyCell, reach: i32) -> bool {
         columns(cell, reach).any(|column| self.robots.range(column).next().is_some())
     }
 
     /// Whether a voxel or one beside it holds points: what the other session has there, it has here
     /// as well.
     #[must_use]
-    pub fn has_some(&self, cell: &Cell) -> bool {
+    pub fn has_some(&self, cell: &OccupancyCell) -> bool {
         self.cells.contains_key(cell) || around(cell, 1).any(|cell| self.cells.contains_key(&cell))
     }
 
-    pub(crate) fn is_solid(&self, cell: &Cell) -> bool {
+    pub(crate) fn is_solid(&self, cell: &OccupancyCell) -> bool {
         self.cells.get(cell).is_some_and(|c| c.n_points >= MIN_POINTS)
     }
 
     /// Points in some voxels.
-    pub(crate) fn n_points(&self, cells: &[Cell]) -> u64 {
+    pub(crate) fn n_points(&self, cells: &[OccupancyCell]) -> u64 {
         cells.iter().map(|c| u64::from(self.cells[c].n_points)).sum()
     }
 
     /// Voxels that hold points, in and beside which the other session has nothing: of a wire or an
     /// edge it has a point here and there.
-    pub(crate) fn changed(&self, other: &Self) -> BTreeSet<Cell> {
+    pub(crate) fn changed(&self, other: &Self) -> BTreeSet<OccupancyCell> {
         self.alone(other, |c| c.n_empty)
     }
 
     /// Solid voxels that no beam of the other session reached.
-    pub(crate) fn unseen(&self, other: &Self) -> BTreeSet<Cell> {
+    pub(crate) fn unseen(&self, other: &Self) -> BTreeSet<OccupancyCell> {
         let mut out = self.alone(other, |c| c.n_unseen);
         out.retain(|cell| self.is_solid(cell));
         out
     }
 
     /// Voxels of which so many points are enough, in and beside which the other session has none.
-    fn alone(&self, other: &Self, n: impl Fn(&Count) -> u32) -> BTreeSet<Cell> {
-        let is_enough = |c: &Count| f64::from(n(c)) >= MIN_SHARE * f64::from(c.n_points);
+    fn alone(&self, other: &Self, n: impl Fn(&CellCount) -> u32) -> BTreeSet<OccupancyCell> {
+        let is_enough = |c: &CellCount| f64::from(n(c)) >= MIN_SHARE * f64::from(c.n_points);
         let full = self.cells.iter().filter(|(_, c)| is_enough(c));
         full.map(|(cell, _)| *cell).filter(|cell| !other.has_some(cell)).collect()
     }
 
     /// Share of the faces of some voxels that their points stand for.
-    pub(crate) fn cover(&self, cells: &[Cell]) -> f64 {
+    pub(crate) fn cover(&self, cells: &[OccupancyCell]) -> f64 {
         let area: f64 = cells.iter().map(|c| self.cells[c].area).sum();
         area / (cells.len() as f64 * Self::FACE)
     }
 
     /// The same of the points of one scan, in each voxel of that which has most of them there.
-    pub(crate) fn cover_by_one(&self, cells: &[Cell]) -> f64 {
+    pub(crate) fn cover_by_one(&self, cells: &[OccupancyCell]) -> f64 {
         let area: f64 = cells.iter().map(|c| self.cells[c].most.1).sum();
         area / (cells.len() as f64 * Self::FACE)
     }
 
     /// Share of the points in some voxels at whose places another beam of their own session went
     /// on.
-    pub(crate) fn pierced(&self, cells: &[Cell]) -> f64 {
+    pub(crate) fn pierced(&self, cells: &[OccupancyCell]) -> f64 {
         let n: u64 = cells.iter().map(|c| u64::from(self.cells[c].n_pierced)).sum();
         n as f64 / self.n_points(cells) as f64
     }
 }
 
 /// All voxels within so many steps of one.
-pub(crate) fn around(cell: &Cell, reach: i32) -> impl Iterator<Item = Cell> {
+pub(crate) fn around(cell: &OccupancyCell, reach: i32) -> impl Iterator<Item = OccupancyCell> {
     let ([x, y, z], r) = (*cell, reach);
     (-r..=r)
         .flat_map(move |i| (-r..=r).flat_map(move |j| (-r..=r).map(move |k| [x + i, y + j, z + k])))
 }
 
 /// The same as runs along the last axis, along which voxels are in order.
-fn columns(cell: &Cell, reach: i32) -> impl Iterator<Item = RangeInclusive<Cell>> {
+fn columns(
+    cell: &OccupancyCell,
+    reach: i32,
+) -> impl Iterator<Item = RangeInclusive<OccupancyCell>> {
     let ([x, y, z], r) = (*cell, reach);
     let column = move |i, j| [x + i, y + j, z - r]..=[x + i, y + j, z + r];
     (-r..=r).flat_map(move |i| (-r..=r).map(move |j| column(i, j)))
@@ -248,11 +251,11 @@ fn columns(cell: &Cell, reach: i32) -> impl Iterator<Item = RangeInclusive<Cell>
 /// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is
 /// new and belongs to it.
 pub(crate) fn connected(
-    first: Cell,
+    first: OccupancyCell,
     reach: i32,
-    mut take: impl FnMut(&Cell) -> bool,
+    mut take: impl FnMut(&OccupancyCell) -> bool,
     at_most: usize,
-) -> Vec<Cell> {
+) -> Vec<OccupancyCell> {
     let mut out = vec![first];
     let mut next = 0;
     while next < out.len() && out.len() < at_most {
@@ -265,7 +268,7 @@ pub(crate) fn connected(
 }
 
 /// What some voxels fill, world, metres.
-pub(crate) fn bounds<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Aabb {
+pub(crate) fn bounds<'a>(cells: impl IntoIterator<Item = &'a OccupancyCell>) -> Aabb {
     let mut out = Aabb::EMPTY;
     for cell in cells {
         out.add(cell.map(|i| f64::from(i) * EDGE));

@@ -1,7 +1,7 @@
 //! Voxels of a change in; whether they are of something that beams do not go through, out: a fence
 //! of which another session misses a part has not gone.
 
-use crate::occupancy::{Cell, Tally};
+use crate::occupancy::{OccupancyCell, SessionOccupancy};
 use nalgebra::{Matrix3, Vector3};
 
 /// Share of a voxel's face that its points stand for, over all voxels of a change. Solid things
@@ -25,7 +25,7 @@ const UPRIGHT: f64 = 0.5;
 
 /// Of what shape some voxels are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shape {
+enum ChangeShape {
     /// As thin as a fence, and upright as one.
     Fence,
     /// As thin as that.
@@ -33,11 +33,11 @@ enum Shape {
     Body,
 }
 
-impl Tally {
+impl SessionOccupancy {
     /// Whether some voxels are of something that beams do not go through.
-    pub(crate) fn is_closed(&self, cells: &[Cell]) -> bool {
+    pub(crate) fn is_closed(&self, cells: &[OccupancyCell]) -> bool {
         let (cover, shape) = (self.cover(cells), shape(cells));
-        let most = if shape == Shape::Body && cover >= MIN_COVER {
+        let most = if shape == ChangeShape::Body && cover >= MIN_COVER {
             MAX_PIERCED
         } else {
             MAX_PIERCED_SHEET
@@ -47,14 +47,14 @@ impl Tally {
             && match shape {
                 // Enough scans together cover a mesh, and one that is near gives most of its
                 // points: each of them alone does not.
-                Shape::Fence => self.cover_by_one(cells) >= MIN_COVER,
-                Shape::Sheet => cover >= MIN_COVER,
-                Shape::Body => cover >= MIN_CLOSED,
+                ChangeShape::Fence => self.cover_by_one(cells) >= MIN_COVER,
+                ChangeShape::Sheet => cover >= MIN_COVER,
+                ChangeShape::Body => cover >= MIN_CLOSED,
             }
     }
 }
 
-fn shape(cells: &[Cell]) -> Shape {
+fn shape(cells: &[OccupancyCell]) -> ChangeShape {
     let places = || cells.iter().map(|c| Vector3::from(c.map(f64::from)));
     let n = cells.len() as f64;
     let middle = places().sum::<Vector3<f64>>() / n;
@@ -62,43 +62,43 @@ fn shape(cells: &[Cell]) -> Shape {
     let eigen = (spread.sum::<Matrix3<f64>>() / n).symmetric_eigen();
     let thinnest = eigen.eigenvalues.imin();
     match eigen.eigenvalues[thinnest].max(0.0).sqrt() {
-        SHEET.. => Shape::Body,
-        _ if eigen.eigenvectors[(2, thinnest)].abs() <= UPRIGHT => Shape::Fence,
-        _ => Shape::Sheet,
+        SHEET.. => ChangeShape::Body,
+        _ if eigen.eigenvectors[(2, thinnest)].abs() <= UPRIGHT => ChangeShape::Fence,
+        _ => ChangeShape::Sheet,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::occupancy::{Seen, Tallying};
+    use crate::occupancy::{OccupancyBuilder, SessionEvidence};
 
     /// Points 1 cm apart on a plane through a direction on the ground, 1.5 m by 1 m, leaning by a
     /// slope; what one stands for, m².
-    fn plane(along: f64, slope: f64, area: f64) -> Tally {
-        let mut out = Tallying::default();
+    fn plane(along: f64, slope: f64, area: f64) -> SessionOccupancy {
+        let mut out = OccupancyBuilder::default();
         for (i, j) in (0..150).flat_map(|i| (0..100).map(move |j| (i, j))) {
             let (s, z) = (0.01 * f64::from(i), 0.01 * f64::from(j));
             let (x, y) = (s * along.cos() - slope * z * along.sin(), s * along.sin());
             let at = [x, y + slope * z * along.cos(), z];
-            out.add(at, area, Seen::Nothing { is_pierced: false });
+            out.add(at, area, SessionEvidence::Nothing { is_pierced: false });
         }
         out.finish()
     }
 
-    fn cells(tally: &Tally) -> Vec<Cell> {
+    fn cells(tally: &SessionOccupancy) -> Vec<OccupancyCell> {
         tally.cells().copied().collect()
     }
 
     #[test]
     fn fences_are_known_however_they_stand() {
         for along in [0.0, 0.3, 0.8, 1.4] {
-            assert_eq!(shape(&cells(&plane(along, 0.0, 1e-4))), Shape::Fence, "{along}");
-            assert_eq!(shape(&cells(&plane(along, 4.0, 1e-4))), Shape::Sheet, "{along}");
+            assert_eq!(shape(&cells(&plane(along, 0.0, 1e-4))), ChangeShape::Fence, "{along}");
+            assert_eq!(shape(&cells(&plane(along, 4.0, 1e-4))), ChangeShape::Sheet, "{along}");
         }
         let mut corner = plane(0.0, 0.0, 1e-4);
         corner.join(plane(1.57, 0.0, 1e-4));
-        assert_eq!(shape(&cells(&corner)), Shape::Body);
+        assert_eq!(shape(&cells(&corner)), ChangeShape::Body);
     }
 
     #[test]

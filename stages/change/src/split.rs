@@ -1,7 +1,7 @@
 //! The voxels of a change and the size of a thing in; where such a thing and another one make up
 //! the change, standing side by side, the voxels of each out.
 
-use crate::occupancy::{Cell, EDGE, REACH, connected};
+use crate::occupancy::{EDGE, OccupancyCell, REACH, connected};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Tops so many voxels apart are not of one thing.
@@ -11,12 +11,12 @@ const FILLED: f64 = 0.5;
 
 /// Heights of the change over its ground, in voxels: the top of each column, and how many voxels it
 /// has.
-type Columns = BTreeMap<[i32; 2], (i32, usize)>;
+type ColumnTops = BTreeMap<[i32; 2], (i32, usize)>;
 
 /// Parts a change into a thing of that size (metres, standing on the lowest voxel) and the rest, of
 /// which the tops tell that it is something else; `None` where no place of the thing makes that of
 /// it.
-pub(crate) fn parted(cells: &[Cell], size: [f64; 3]) -> Option<[Vec<Cell>; 2]> {
+pub(crate) fn parted(cells: &[OccupancyCell], size: [f64; 3]) -> Option<[Vec<OccupancyCell>; 2]> {
     let steps = size.map(|s| ((s / EDGE).round() as i32).max(1));
     let low = cells.iter().map(|c| c[2]).min()?;
     let top = low + steps[2] - 1;
@@ -24,17 +24,17 @@ pub(crate) fn parted(cells: &[Cell], size: [f64; 3]) -> Option<[Vec<Cell>; 2]> {
     let placed = [[steps[0], steps[1]], [steps[1], steps[0]]].into_iter();
     let best = placed.filter_map(|sides| Some((sides, place(&columns, sides, top)?)));
     let (sides, (_, at)) = best.max_by_key(|(_, (n, _))| *n)?;
-    let (mut own, rest): (Vec<Cell>, Vec<Cell>) =
+    let (mut own, rest): (Vec<OccupancyCell>, Vec<OccupancyCell>) =
         cells.iter().copied().partition(|c| is_within([c[0], c[1]], at, sides));
     let (rest, slivers) = largest(rest.into_iter().collect());
     own.extend(slivers);
-    let off = |part: &[Cell]| Some((part.iter().map(|c| c[2]).max()? - top).abs());
+    let off = |part: &[OccupancyCell]| Some((part.iter().map(|c| c[2]).max()? - top).abs());
     (off(&own)? < STEP && off(&rest)? >= STEP).then_some([own, rest])
 }
 
 /// What is connected and largest, and all else: a thing that stands askew has corners beyond its
 /// place.
-fn largest(mut cells: BTreeSet<Cell>) -> (Vec<Cell>, Vec<Cell>) {
+fn largest(mut cells: BTreeSet<OccupancyCell>) -> (Vec<OccupancyCell>, Vec<OccupancyCell>) {
     let mut parts = Vec::new();
     while let Some(first) = cells.pop_first() {
         parts.push(connected(first, REACH, |c| cells.remove(c), usize::MAX));
@@ -43,8 +43,8 @@ fn largest(mut cells: BTreeSet<Cell>) -> (Vec<Cell>, Vec<Cell>) {
     (parts.pop().unwrap_or_default(), parts.concat())
 }
 
-fn columns(cells: &[Cell]) -> Columns {
-    let mut columns = Columns::new();
+fn columns(cells: &[OccupancyCell]) -> ColumnTops {
+    let mut columns = ColumnTops::new();
     for [x, y, z] in cells {
         let column = columns.entry([*x, *y]).or_insert((*z, 0));
         *column = (column.0.max(*z), column.1 + 1);
@@ -57,7 +57,7 @@ fn is_within(at: [i32; 2], low: [i32; 2], sides: [i32; 2]) -> bool {
 }
 
 /// The place at which a thing holds most voxels, none of them above its top, and how many.
-fn place(columns: &Columns, sides: [i32; 2], top: i32) -> Option<(usize, [i32; 2])> {
+fn place(columns: &ColumnTops, sides: [i32; 2], top: i32) -> Option<(usize, [i32; 2])> {
     let span = |i: usize| {
         let along = columns.keys().map(|c| c[i]);
         Some((along.clone().min()?, along.max()?))
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     /// Sides and top of a box, voxels.
-    fn shell(low: Cell, size: [i32; 3]) -> Vec<Cell> {
+    fn shell(low: OccupancyCell, size: [i32; 3]) -> Vec<OccupancyCell> {
         let mut out = Vec::new();
         for i in 0..size[0] {
             for j in 0..size[1] {

@@ -1,7 +1,7 @@
 //! Voxels of what stands still in two sessions, and what each session's beams say of the other's,
 //! in; what appeared, went and moved out.
 
-use crate::occupancy::{Cell, EDGE, REACH, Tally, bounds, connected};
+use crate::occupancy::{EDGE, OccupancyCell, REACH, SessionOccupancy, bounds, connected};
 use crate::split::parted;
 use contract::Fan;
 use geometry::Aabb;
@@ -80,15 +80,15 @@ pub struct Thing {
     /// Points in them.
     pub n_points: u64,
     /// Voxels that are empty now.
-    pub gone: Vec<Cell>,
+    pub gone: Vec<OccupancyCell>,
     /// Voxels that are filled now.
-    pub filled: Vec<Cell>,
+    pub filled: Vec<OccupancyCell>,
 }
 
 /// One connected change.
 #[derive(Debug, Clone)]
-struct Piece {
-    cells: Vec<Cell>,
+struct ChangePiece {
+    cells: Vec<OccupancyCell>,
     n_points: u64,
     bounds: Aabb,
     /// With rows of beams about it that graze the thing, and whatever else lies there.
@@ -98,7 +98,7 @@ struct Piece {
     whole: Option<Aabb>,
 }
 
-impl Piece {
+impl ChangePiece {
     /// Several as one; `None` of none.
     fn of<'p>(pieces: impl Iterator<Item = &'p Self>) -> Option<Self> {
         pieces.cloned().reduce(|mut all, more| {
@@ -116,14 +116,16 @@ impl Piece {
     }
 }
 
-impl Tally {
+impl SessionOccupancy {
     /// Connected changes that are large enough and no robot's.
-    fn pieces(&self, other: &Self, settings: &ThingSettings) -> Vec<Piece> {
+    fn pieces(&self, other: &Self, settings: &ThingSettings) -> Vec<ChangePiece> {
         let mut thin = self.changed(other);
-        let mut left: BTreeSet<Cell> = thin.iter().copied().filter(|c| self.is_solid(c)).collect();
+        let mut left: BTreeSet<OccupancyCell> =
+            thin.iter().copied().filter(|c| self.is_solid(c)).collect();
         let margin = (settings.robot_margin / EDGE).ceil() as i32;
-        let is_near =
-            |cell: &Cell| self.has_robot_near(cell, margin) || other.has_robot_near(cell, margin);
+        let is_near = |cell: &OccupancyCell| {
+            self.has_robot_near(cell, margin) || other.has_robot_near(cell, margin)
+        };
         let mut out = Vec::new();
         while let Some(first) = left.pop_first() {
             let cells = connected(first, REACH, |c| left.remove(c), usize::MAX);
@@ -139,10 +141,15 @@ impl Tally {
 
     /// Changes, those in two of which one is as the other session has it and stands beside
     /// something else.
-    fn apart(&self, pieces: &[Piece], others: &[Piece], settings: &ThingSettings) -> Vec<Piece> {
-        let two = |piece: &Piece| {
+    fn apart(
+        &self,
+        pieces: &[ChangePiece],
+        others: &[ChangePiece],
+        settings: &ThingSettings,
+    ) -> Vec<ChangePiece> {
+        let two = |piece: &ChangePiece| {
             let times = |other: &Aabb| ground(&piece.bounds) / ground(other);
-            let boxes = others.iter().flat_map(Piece::boxes);
+            let boxes = others.iter().flat_map(ChangePiece::boxes);
             let smaller = boxes.filter(|o| (WIDER[0]..WIDER[1]).contains(&times(o)));
             let parts = smaller.filter_map(|other| {
                 let parts = parted(&piece.cells, other.size())?;
@@ -155,10 +162,14 @@ impl Tally {
     }
 
     /// Changes of which few points are seen between them are one thing.
-    fn joined(&self, pieces: Vec<Vec<Cell>>, mut thin: BTreeSet<Cell>) -> Vec<Piece> {
+    fn joined(
+        &self,
+        pieces: Vec<Vec<OccupancyCell>>,
+        mut thin: BTreeSet<OccupancyCell>,
+    ) -> Vec<ChangePiece> {
         let mut out = Vec::new();
         thin.extend(pieces.iter().flatten());
-        let mut left: BTreeMap<Cell, Vec<Cell>> =
+        let mut left: BTreeMap<OccupancyCell, Vec<OccupancyCell>> =
             pieces.into_iter().map(|cells| (cells[0], cells)).collect();
         while let Some((first, mut cells)) = left.pop_first() {
             thin.remove(&first);
@@ -167,13 +178,13 @@ impl Tally {
                 cells.extend(left.remove(cell).into_iter().flatten());
             }
             cells.sort_unstable();
-            out.push(Piece { wide: bounds(&all), ..self.piece_of(cells) });
+            out.push(ChangePiece { wide: bounds(&all), ..self.piece_of(cells) });
         }
         out
     }
 
     /// Whether connected voxels are large and solid enough for a thing.
-    fn is_thing(&self, cells: &[Cell], settings: &ThingSettings) -> bool {
+    fn is_thing(&self, cells: &[OccupancyCell], settings: &ThingSettings) -> bool {
         let size = bounds(cells).size().iter().fold(0.0_f64, |a, b| a.max(*b));
         cells.len() >= settings.min_voxels
             && self.n_points(cells) >= u64::from(settings.min_points)
@@ -182,17 +193,17 @@ impl Tally {
     }
 
     /// One of two that stand side by side: what is about it is the other.
-    fn piece_of(&self, cells: Vec<Cell>) -> Piece {
+    fn piece_of(&self, cells: Vec<OccupancyCell>) -> ChangePiece {
         let bounds = bounds(&cells);
-        Piece { n_points: self.n_points(&cells), bounds, wide: bounds, whole: None, cells }
+        ChangePiece { n_points: self.n_points(&cells), bounds, wide: bounds, whole: None, cells }
     }
 
     /// Changes, those joined that are parts of one thing which stands apart from others.
-    fn wholes(&self, mut pieces: Vec<Piece>) -> Vec<Piece> {
+    fn wholes(&self, mut pieces: Vec<ChangePiece>) -> Vec<ChangePiece> {
         let mut out = Vec::new();
         while let Some(mut piece) = pieces.pop() {
             let all = self.standing(&piece.cells);
-            let is_part = |other: &Piece| other.cells.iter().any(|c| all.contains(c));
+            let is_part = |other: &ChangePiece| other.cells.iter().any(|c| all.contains(c));
             let parts = pieces.iter().filter(|p| is_part(p));
             let n = piece.cells.len() + parts.map(|p| p.cells.len()).sum::<usize>();
             if all.len() < MAX_WHOLE && n as f64 >= WHOLE * all.len() as f64 {
@@ -202,8 +213,11 @@ impl Tally {
                 }
                 piece.cells.sort_unstable();
                 let whole = bounds(&all).union(&piece.wide);
-                piece =
-                    Piece { wide: piece.wide, whole: Some(whole), ..self.piece_of(piece.cells) };
+                piece = ChangePiece {
+                    wide: piece.wide,
+                    whole: Some(whole),
+                    ..self.piece_of(piece.cells)
+                };
             }
             out.push(piece);
         }
@@ -211,8 +225,8 @@ impl Tally {
     }
 
     /// All that some voxels are connected with: [`MAX_WHOLE`] and more where that is much.
-    fn standing(&self, cells: &[Cell]) -> BTreeSet<Cell> {
-        let mut all: BTreeSet<Cell> = cells.iter().copied().collect();
+    fn standing(&self, cells: &[OccupancyCell]) -> BTreeSet<OccupancyCell> {
+        let mut all: BTreeSet<OccupancyCell> = cells.iter().copied().collect();
         for first in cells {
             if all.len() < MAX_WHOLE {
                 connected(*first, 1, |c| self.is_solid(c) && all.insert(*c), MAX_WHOLE);
@@ -225,8 +239,13 @@ impl Tally {
 /// What differs between two sessions: things that moved, then those that went, then those that
 /// appeared, each by size.
 #[must_use]
-pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings, fan: &dyn Fan) -> Vec<Thing> {
-    let by_size = |mut pieces: Vec<Piece>| {
+pub fn things(
+    then: &SessionOccupancy,
+    now: &SessionOccupancy,
+    settings: &ThingSettings,
+    fan: &dyn Fan,
+) -> Vec<Thing> {
+    let by_size = |mut pieces: Vec<ChangePiece>| {
         pieces.sort_by_key(|p| std::cmp::Reverse(p.cells.len()));
         pieces
     };
@@ -236,9 +255,9 @@ pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings, fan: &dyn Fan
     let filled = by_size(now.apart(&pieces[1], &pieces[0], settings));
     let mut moved = moved(&gone, &filled);
     complete(&mut moved, [&gone, &filled]);
-    let one = |pair: &Pair| {
+    let one = |pair: &MovedPair| {
         let [was, is] = [(&gone, &pair.parts[0]), (&filled, &pair.parts[1])]
-            .map(|(all, parts)| Piece::of(parts.iter().map(|i| &all[*i])));
+            .map(|(all, parts)| ChangePiece::of(parts.iter().map(|i| &all[*i])));
         let [then, now] = pair.boxes;
         Thing {
             then: Some(then),
@@ -257,14 +276,14 @@ pub fn things(then: &Tally, now: &Tally, settings: &ThingSettings, fan: &dyn Fan
 }
 
 /// A thing that stands elsewhere: changes that it is made of, then and now, and its bounds.
-struct Pair {
+struct MovedPair {
     parts: [Vec<usize>; 2],
     boxes: [Aabb; 2],
 }
 
 /// Adds to things of which one session saw pieces apart from each other what makes them as large as
 /// the other one saw them.
-fn complete(moved: &mut [Pair], pieces: [&[Piece]; 2]) {
+fn complete(moved: &mut [MovedPair], pieces: [&[ChangePiece]; 2]) {
     for at in 0..moved.len() {
         for side in 0..2 {
             for (i, piece) in pieces[side].iter().enumerate() {
@@ -301,7 +320,7 @@ fn is_end(piece: &Aabb, own: &Aabb, other: &Aabb) -> bool {
 
 /// Which of those that went stands elsewhere and the bounds there and here, the most alike first
 /// chosen: a barrel must not take a pallet's new place.
-fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<Pair> {
+fn moved(gone: &[ChangePiece], filled: &[ChangePiece]) -> Vec<MovedPair> {
     let pairs = (0..gone.len()).flat_map(|i| (0..filled.len()).map(move |j| (i, j)));
     let alike = pairs.filter_map(|(i, j)| {
         let (was, is) = (&gone[i], &filled[j]);
@@ -317,19 +336,19 @@ fn moved(gone: &[Piece], filled: &[Piece]) -> Vec<Pair> {
     });
     let mut alike: Vec<_> = alike.collect();
     alike.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut out: Vec<Pair> = Vec::new();
+    let mut out: Vec<MovedPair> = Vec::new();
     for (_, i, j, boxes) in alike {
         if out.iter().all(|pair| pair.parts[0] != [i] && pair.parts[1] != [j]) {
-            out.push(Pair { parts: [vec![i], vec![j]], boxes });
+            out.push(MovedPair { parts: [vec![i], vec![j]], boxes });
         }
     }
     out.sort_by_key(|pair| pair.parts[0][0]);
     out
 }
 
-fn thing(change: ThingChange, was: Option<&Piece>, is: Option<&Piece>) -> Thing {
+fn thing(change: ThingChange, was: Option<&ChangePiece>, is: Option<&ChangePiece>) -> Thing {
     let (then, now) = (was.map(|p| p.bounds), is.map(|p| p.bounds));
-    let cells = |p: Option<&Piece>| p.map(|p| p.cells.clone()).unwrap_or_default();
+    let cells = |p: Option<&ChangePiece>| p.map(|p| p.cells.clone()).unwrap_or_default();
     let (gone, filled) = (cells(was), cells(is));
     let main = is.or(was);
     let n_points = main.map_or(0, |p| p.n_points);

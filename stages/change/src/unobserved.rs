@@ -1,7 +1,7 @@
 //! Voxels of what stood still in a session in; those regions of it out that no beam of another
 //! session reached: of them nobody can say whether they changed.
 
-use crate::occupancy::{Cell, EDGE, REACH, Tally, bounds, connected};
+use crate::occupancy::{EDGE, OccupancyCell, REACH, SessionOccupancy, bounds, connected};
 use crate::things::ThingSettings;
 use geometry::Aabb;
 use std::collections::BTreeSet;
@@ -19,14 +19,18 @@ pub struct Unseen {
     /// Points that were seen in them.
     pub n_points: u64,
     /// Its voxels.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<OccupancyCell>,
 }
 
 /// What stood then and was not looked at since, by size; specks are left out as among
 /// [`crate::things()`].
 #[must_use]
-pub fn unseen(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Unseen> {
-    let mut left: BTreeSet<Cell> = then.unseen(now);
+pub fn unseen(
+    then: &SessionOccupancy,
+    now: &SessionOccupancy,
+    settings: &ThingSettings,
+) -> Vec<Unseen> {
+    let mut left: BTreeSet<OccupancyCell> = then.unseen(now);
     let mut out = Vec::new();
     while let Some(first) = left.pop_first() {
         let cells = connected(first, REACH, |c| left.remove(c), usize::MAX);
@@ -48,18 +52,18 @@ pub fn unseen(then: &Tally, now: &Tally, settings: &ThingSettings) -> Vec<Unseen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::occupancy::{Seen, Tallying};
+    use crate::occupancy::{OccupancyBuilder, SessionEvidence};
 
     #[test]
     fn a_cabinet_that_no_new_beam_reached_is_said_to_be_so() {
-        let (mut then, mut now) = (Tallying::default(), Tallying::default());
+        let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
         for (i, j) in (0..40).flat_map(|i| (0..90).map(move |j| (i, j))) {
             let (y, z) = (0.02 * f64::from(i), 0.02 * f64::from(j));
-            then.add([2.0, y, z], 4e-4, Seen::Not);
-            then.add([5.0, y, z], 4e-4, Seen::Something);
-            then.add([8.0, y, z], 4e-4, Seen::Not);
+            then.add([2.0, y, z], 4e-4, SessionEvidence::Not);
+            then.add([5.0, y, z], 4e-4, SessionEvidence::Something);
+            then.add([8.0, y, z], 4e-4, SessionEvidence::Not);
             // No new beam ended on these very places, but others did beside them.
-            now.add([8.02, y, z], 4e-4, Seen::Something);
+            now.add([8.02, y, z], 4e-4, SessionEvidence::Something);
         }
         let found = unseen(&then.finish(), &now.finish(), &ThingSettings::default());
         assert_eq!(found.len(), 1, "{found:?}");

@@ -1,14 +1,17 @@
 //! A robot with the points attached to it: which of its parts are near which obstacles in a
 //! posture.
 
-use crate::Level;
-use crate::obstacles::{Bin, HALF_CELL, Obstacle, Obstacles, Replaced, What};
-use crate::path::STEP;
-use crate::shape::{Gap, Shape};
+use crate::ContactLevel;
+use crate::obstacle::{HALF_CELL, Obstacle, What};
+use crate::obstacles::{Bin, Obstacles, Replaced};
+use crate::shape::{Gap, PartShape};
 use contract::Fan;
 use geometry::{Aabb, Point, Pose};
 use robot::{Link, Model};
 use std::collections::BTreeMap;
+
+/// No point of the robot moves farther from one posture that is looked at to the next, metres.
+pub const STEP: f64 = 0.01;
 
 /// Points attached to the links of a robot, by index of the link, link frame, metres.
 pub type Hung = BTreeMap<usize, Vec<[f32; 3]>>;
@@ -34,73 +37,79 @@ const CREVICE: f32 = 0.025;
 const JOINED: f32 = 0.04;
 
 /// The surface of a link, or the points attached to it.
-pub(crate) struct Part {
+pub(crate) struct BodyPart {
     pub(crate) link: usize,
     pub(crate) hangs: bool,
     /// Whether it consists of uncertain points beside the link, which may or may not be attached.
     pub(crate) is_doubtful: bool,
     bounds: Aabb,
-    shape: Shape,
+    shape: PartShape,
 }
 
 /// Everything that moves with the joints of a robot.
-pub struct Body<'a> {
+pub struct RobotBody<'a> {
     pub(crate) model: &'a Model,
-    pub(crate) parts: Vec<Part>,
+    pub(crate) parts: Vec<BodyPart>,
     /// Surfaces of links that no joint moves; points on them belong to the robot, too.
-    still: Vec<Part>,
+    still: Vec<BodyPart>,
     margin: f32,
     /// Largest distance at which attached points are looked up, metres.
     within: f32,
 }
 
-impl Part {
+impl BodyPart {
     fn hung(link: usize, points: Vec<[f32; 3]>, within: f32) -> Self {
         let bounds = Aabb::of(points.iter().map(|p| p.map(f64::from)));
-        Self { link, hangs: true, is_doubtful: false, bounds, shape: Shape::hung(points, within) }
+        Self {
+            link,
+            hangs: true,
+            is_doubtful: false,
+            bounds,
+            shape: PartShape::hung(points, within),
+        }
     }
 }
 
 /// A part that is near an obstacle.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Touch {
+pub(crate) struct PartTouch {
     pub(crate) part: usize,
     pub(crate) obstacle: usize,
-    pub(crate) level: Level,
+    pub(crate) level: ContactLevel,
     /// Lower bound of their distance, metres.
     pub(crate) gap: f32,
 }
 
 /// All parts that are near something in one posture.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Near {
+pub(crate) struct PostureNear {
     /// Sorted by part, then by obstacle.
-    pub(crate) touches: Vec<Touch>,
+    pub(crate) touches: Vec<PartTouch>,
     /// Parts that reach into space of which nothing is known.
     pub(crate) outside: Vec<usize>,
 }
 
-impl<'a> Body<'a> {
+impl<'a> RobotBody<'a> {
     /// The moving parts of a model with the attached points `hung`. `margin` is the distance below
     /// which an obstacle counts as near, and `largest` the radius of the largest obstacle, metres.
     #[must_use]
-    pub fn new(model: &'a Model, hung: Hung, (margin, largest): (f64, f64), fan: &dyn Fan) -> Self {
+    pub fn new(model: &'a Model, hung: Hung, margin: f64, largest: f64, fan: &dyn Fan) -> Self {
         let margin = margin as f32;
         let least = margin + BETWEEN + HALF_CELL;
         let moves = model.moving();
         let all: Vec<usize> = (0..model.links.len()).collect();
         let surfaces = fan.fan(all, |link| {
             let (mesh, bounds) = (&model.links[link].mesh, model.links[link].bounds);
-            let shape = Shape::surface(mesh, &bounds, least)?;
-            Some(Part { link, hangs: false, is_doubtful: false, bounds, shape })
+            let shape = PartShape::surface(mesh, &bounds, least)?;
+            Some(BodyPart { link, hangs: false, is_doubtful: false, bounds, shape })
         });
-        let (mut parts, still): (Vec<Part>, Vec<Part>) =
+        let (mut parts, still): (Vec<BodyPart>, Vec<BodyPart>) =
             surfaces.into_iter().flatten().partition(|part| moves[part.link]);
         let within = margin.max(BESIDE) + BETWEEN + largest as f32;
         for (link, points) in
             hung.into_iter().filter(|(link, points)| moves[*link] && !points.is_empty())
         {
-            parts.push(Part::hung(link, points, within));
+            parts.push(BodyPart::hung(link, points, within));
         }
         Self { model, parts, still, margin, within }
     }
@@ -109,7 +118,7 @@ impl<'a> Body<'a> {
     #[must_use]
     pub fn farthest(&self) -> f64 {
         let ways = self.model.ways();
-        let far = |p: &Part| farthest(&p.bounds) + ways[p.link];
+        let far = |p: &BodyPart| farthest(&p.bounds) + ways[p.link];
         self.parts.iter().map(far).fold(0.0, f64::max)
     }
 
@@ -124,7 +133,7 @@ impl<'a> Body<'a> {
     /// as points that may be attached to the nearest part and move with it.
     pub fn stand(&mut self, found: &[f64], around: &mut Obstacles) {
         let mut near: Vec<Option<(f32, usize)>> = vec![None; around.all.len()];
-        for Touch { part, obstacle, gap, .. } in self.within(BESIDE, found, around).touches {
+        for PartTouch { part, obstacle, gap, .. } in self.within(BESIDE, found, around).touches {
             let least = near[obstacle].get_or_insert((gap, part));
             if gap < least.0 {
                 *least = (gap, part);
@@ -133,7 +142,7 @@ impl<'a> Body<'a> {
         let poses = self.model.poses(found);
         let from_base = |link: usize| Flat::of(&poses[link].inverse());
         let surfaces = self.parts.iter().filter(|part| !part.hangs).chain(&self.still);
-        let surfaces: Vec<(&Part, Flat)> =
+        let surfaces: Vec<(&BodyPart, Flat)> =
             surfaces.map(|part| (part, from_base(part.link))).collect();
         let is_own = |at: [f32; 3], within: f32| {
             surfaces.iter().any(|(part, link_from_base)| {
@@ -163,19 +172,19 @@ impl<'a> Body<'a> {
             _ => Replaced::Kept,
         });
         for (link, points) in doubtful {
-            let part = Part::hung(link, points, self.within);
-            self.parts.push(Part { is_doubtful: true, ..part });
+            let part = BodyPart::hung(link, points, self.within);
+            self.parts.push(BodyPart { is_doubtful: true, ..part });
         }
     }
 
     /// Everything that is nearer than the margin in a posture.
-    pub(crate) fn near(&self, posture: &[f64], around: &Obstacles) -> Near {
+    pub(crate) fn near(&self, posture: &[f64], around: &Obstacles) -> PostureNear {
         self.within(self.margin, posture, around)
     }
 
-    fn within(&self, margin: f32, posture: &[f64], around: &Obstacles) -> Near {
+    fn within(&self, margin: f32, posture: &[f64], around: &Obstacles) -> PostureNear {
         let poses = self.model.poses(posture);
-        let mut out = Near::default();
+        let mut out = PostureNear::default();
         for (at, part) in self.parts.iter().enumerate() {
             let base_from_link = &poses[part.link];
             let grown = part.bounds.grown(f64::from(margin + BETWEEN));
@@ -184,8 +193,8 @@ impl<'a> Body<'a> {
             }
             let link_from_base = Flat::of(&base_from_link.inverse());
             for bin in &around.bins {
-                let asked = (margin, &link_from_base);
-                self.bin((at, part), (bin, asked), around, &mut out.touches);
+                let asked = PartQuery { at, margin, link_from_base: &link_from_base };
+                self.bin(&asked, bin, around, &mut out.touches);
             }
         }
         out
@@ -193,11 +202,13 @@ impl<'a> Body<'a> {
 
     fn bin(
         &self,
-        (at, part): (usize, &Part),
-        (bin, (margin, link_from_base)): (&Bin, (f32, &Flat)),
+        asked: &PartQuery<'_>,
+        bin: &Bin,
         around: &Obstacles,
-        touches: &mut Vec<Touch>,
+        touches: &mut Vec<PartTouch>,
     ) {
+        let &PartQuery { at, margin, link_from_base } = asked;
+        let part = &self.parts[at];
         let middle = link_from_base.of_point(bin.middle);
         let within = bin.radius + margin + BETWEEN;
         if !is_near(&part.bounds, middle, within) {
@@ -229,14 +240,14 @@ impl<'a> Body<'a> {
                 Gap::Far => {}
                 Gap::Inside => touches.push(inside(at, obstacle, o)),
                 Gap::At(gap) => {
-                    let touch = touch((at, obstacle), (o, margin), gap);
-                    let is_so = |touch: &Touch| {
+                    let touch = touch(at, obstacle, o, margin, gap);
+                    let is_so = |touch: &PartTouch| {
                         around.split.parts(o).is_none_or(|mut parts| {
                             parts.any(|o| {
                                 let p = link_from_base.of_point(o.at);
                                 part.shape.gap(p, o.radius + margin + BETWEEN) != Gap::Far
                             })
-                        }) || touch.level != Level::Unseen
+                        }) || touch.level != ContactLevel::Unseen
                     };
                     touches.extend(touch.filter(is_so));
                 }
@@ -245,25 +256,21 @@ impl<'a> Body<'a> {
     }
 }
 
-fn touch(
-    (part, obstacle): (usize, usize),
-    (o, margin): (&Obstacle, f32),
-    gap: f32,
-) -> Option<Touch> {
+fn touch(part: usize, obstacle: usize, o: &Obstacle, margin: f32, gap: f32) -> Option<PartTouch> {
     // Between two postures the obstacle may be nearer by half a step.
     let gap = gap - o.radius - BETWEEN;
     let level = match o.what {
         _ if gap > margin => return None,
-        What::Unseen => Level::Unseen,
-        _ if gap <= 0.0 => Level::Hit,
-        _ => Level::Near,
+        What::Unseen => ContactLevel::Unseen,
+        _ if gap <= 0.0 => ContactLevel::Hit,
+        _ => ContactLevel::Near,
     };
-    Some(Touch { part, obstacle, level, gap: gap.max(0.0) })
+    Some(PartTouch { part, obstacle, level, gap: gap.max(0.0) })
 }
 
-fn inside(part: usize, obstacle: usize, o: &Obstacle) -> Touch {
-    let level = if o.what == What::Unseen { Level::Unseen } else { Level::Inside };
-    Touch { part, obstacle, level, gap: 0.0 }
+fn inside(part: usize, obstacle: usize, o: &Obstacle) -> PartTouch {
+    let level = if o.what == What::Unseen { ContactLevel::Unseen } else { ContactLevel::Inside };
+    PartTouch { part, obstacle, level, gap: 0.0 }
 }
 
 /// Upper bound of the distance of all links from the base's origin in any posture, metres.
@@ -287,6 +294,15 @@ fn is_near(bounds: &Aabb, p: [f32; 3], within: f32) -> bool {
         (bounds.min[i] - v).max(v - bounds.max[i]).max(0.0)
     };
     (0..3).map(|i| outside(i).powi(2)).sum::<f64>() <= f64::from(within).powi(2)
+}
+
+/// A part that is asked what is near to it.
+struct PartQuery<'a> {
+    /// Index of the part.
+    at: usize,
+    /// What counts as near, metres.
+    margin: f32,
+    link_from_base: &'a Flat,
 }
 
 /// A pose in single precision, for many points.

@@ -6,7 +6,7 @@
 //! wire do. A point without either is dropped if it lies in space that beams passed through. Points
 //! of beams that grazed the edge of a robot count only as part of a surface.
 
-use crate::obstacles::{HALF_CELL, Obstacle, What, distance};
+use crate::obstacle::{HALF_CELL, Obstacle, What, distance};
 use contract::{Space, SpaceKind};
 use geometry::{Point, Pose};
 use rustc_hash::FxHashMap;

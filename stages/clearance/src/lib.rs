@@ -36,20 +36,22 @@
 
 mod body;
 mod evidence;
+mod obstacle;
 mod obstacles;
 mod path;
 mod shadow;
 mod shape;
 
-pub use body::{Body, Hung, reach};
+pub use body::{Hung, RobotBody, STEP, reach};
 pub use evidence::hanging;
-pub use obstacles::{CELL, Cells, FARTHEST, Known, Obstacles, What};
-pub use path::{Contact, Contacts, Leg, Looked, STEP, Walk, leg};
-pub use shadow::{Eye, Shadow};
+pub use obstacle::{CELL, What};
+pub use obstacles::{Cells, FARTHEST, KnownBounds, Obstacles};
+pub use path::{Contact, Contacts, Leg, PathWalk, PieceContacts, leg};
+pub use shadow::{ScannerAt, Shadow};
 
 /// How close a part of a robot is to an obstacle; a greater level is worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
+pub enum ContactLevel {
     /// The part reaches into space that no beam passed through.
     Unseen,
     /// The obstacle is nearer than the margin.

@@ -2,21 +2,14 @@
 //! coordinates are in the frame of the robot's base, metres.
 
 use crate::evidence::evident;
-use crate::shadow::{Eye, Front};
+use crate::obstacle::{CELL, HALF_CELL, HALF_DIAGONAL, Obstacle, What, distance};
+use crate::shadow::{Front, ScannerAt};
 use contract::{Space, SpaceKind};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 use std::ops::Range;
-
-/// Edge of the cells in which all points become one obstacle, metres: finer than the margins of
-/// planners, and coarse enough for the floor of a robot cell to fit into memory.
-pub const CELL: f64 = 0.004;
-/// Half the diagonal of a cube of edge 1.
-const HALF_DIAGONAL: f64 = 0.8661;
-/// Radius of a ball that contains a cell, metres.
-pub(crate) const HALF_CELL: f32 = (HALF_DIAGONAL * CELL) as f32;
 /// Edge of a bin, metres: a bin has about as many cells of a surface as there are bins about a
 /// robot.
 const BIN: f64 = 0.16;
@@ -24,33 +17,6 @@ const BIN: f64 = 0.16;
 const BITS: u32 = 20;
 /// Largest distance from a base at which points can be told apart, metres: 2 km.
 pub const FARTHEST: f64 = 0.5 * CELL * (1_u32 << BITS) as f64;
-
-/// The kind of an obstacle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum What {
-    /// Points that stand still.
-    Fixed,
-    /// Points of the floor.
-    Floor,
-    /// Uncertain points.
-    Uncertain,
-    /// Uncertain points beside the robot as it was scanned; most are its own.
-    Beside,
-    /// Points and surface of the robot with this index.
-    Robot(i16),
-    /// Space that no beam passed through.
-    Unseen,
-}
-
-/// An obstacle as a ball.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Obstacle {
-    pub(crate) at: [f32; 3],
-    pub(crate) radius: f32,
-    pub(crate) what: What,
-    /// Whether all beams that measured it grazed the edge of a robot (see [`crate::Shadow`]).
-    pub(crate) is_grazed: bool,
-}
 
 /// Neighbouring obstacles.
 #[derive(Debug, Clone)]
@@ -75,7 +41,7 @@ pub struct Cells {
 
 /// The part of space that beams passed through, in the world frame.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct KnownBounds {
     /// Pose of the robot's base in the world, metres.
     pub world_from_base: Pose,
     /// Bounds of the known space in the world, metres; empty where nothing is known.
@@ -95,7 +61,7 @@ pub(crate) enum Replaced {
 pub struct Obstacles {
     pub(crate) all: Vec<Obstacle>,
     pub(crate) bins: Vec<Bin>,
-    pub(crate) known: Known,
+    pub(crate) known: KnownBounds,
     /// Distance from the base along each axis up to which points were collected, metres.
     far: f64,
     pub(crate) split: Split,
@@ -114,7 +80,7 @@ impl Cells {
     /// Empty cells for points up to `far` metres from the base along each axis. `eyes` are the
     /// scanners with known position, by the `point_source_id` of their points.
     #[must_use]
-    pub fn within(far: f64, eyes: &BTreeMap<u16, Eye>) -> Self {
+    pub fn within(far: f64, eyes: &BTreeMap<u16, ScannerAt>) -> Self {
         let fronts = eyes.iter().map(|(source, eye)| (*source, Front::new(eye))).collect();
         Self { far, cells: Vec::new(), fronts }
     }
@@ -128,7 +94,7 @@ impl Cells {
 
     /// Adds a point (base frame, at most `far` away) with whether its beam grazed the edge of a
     /// robot, and the `point_source_id` of its scanner.
-    pub fn add(&mut self, p: [f64; 3], what: What, (is_grazed, source): (bool, u16)) {
+    pub fn add(&mut self, p: [f64; 3], what: What, is_grazed: bool, source: u16) {
         let most = f64::from((1_u32 << BITS) - 1);
         let place = |i: usize| ((p[i] + self.far) / CELL).clamp(0.0, most) as u64;
         self.cells.push((
@@ -192,7 +158,8 @@ impl Obstacles {
     pub fn new(
         cells: &Cells,
         others: &[(i16, &Model, Vec<Pose>)],
-        (space, known): (Option<&Space>, Known),
+        space: Option<&Space>,
+        known: KnownBounds,
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles();
         let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, |at| thin[at]);
@@ -359,9 +326,4 @@ fn unseen(space: &Space, base_from_world: &Pose) -> impl Iterator<Item = Obstacl
             is_grazed: false,
         }
     })
-}
-
-#[inline]
-pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f32>().sqrt()
 }

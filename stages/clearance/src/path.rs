@@ -1,14 +1,12 @@
 //! Walks along a path in postures so close that nothing is missed between them, and reports where
 //! on the path which part is near which obstacle.
 
-use crate::Level;
-use crate::body::{Body, Near, Touch};
-use crate::obstacles::{Obstacles, What};
+use crate::ContactLevel;
+use crate::body::{PartTouch, PostureNear, RobotBody, STEP};
+use crate::obstacle::What;
+use crate::obstacles::Obstacles;
 use geometry::Point;
 use std::collections::BTreeMap;
-
-/// Largest distance that any point of the robot moves between two examined postures, metres.
-pub const STEP: f64 = 0.01;
 /// Largest joint motion of a step in the first guess, radians or metres; arcs then differ from
 /// their chords by less than 0.2 %.
 const TURN: f64 = 0.1;
@@ -39,7 +37,7 @@ pub struct Contact {
     /// The kind of the obstacle.
     pub what: What,
     /// The worst level on the stretch.
-    pub level: Level,
+    pub level: ContactLevel,
     /// Whether the part was as near to these obstacles in the posture in which it was scanned.
     pub as_found: bool,
     /// Place on the path where the contact first begins.
@@ -63,16 +61,16 @@ impl Contact {
     /// known this cannot be told, and counts.
     #[must_use]
     pub fn is_unseen(&self) -> bool {
-        self.level == Level::Unseen && (!self.as_found || self.at.is_none())
+        self.level == ContactLevel::Unseen && (!self.as_found || self.at.is_none())
     }
 }
 
 /// Index of the part, kind of the obstacle, and whether it was as near when scanned.
-type Key = (usize, What, bool);
+type ContactKey = (usize, What, bool);
 
 /// A path that is examined piece by piece.
-pub struct Walk<'a> {
-    body: &'a Body<'a>,
+pub struct PathWalk<'a> {
+    body: &'a RobotBody<'a>,
     around: &'a Obstacles,
     path: &'a [Vec<f64>],
     legs: &'a [Leg],
@@ -82,15 +80,17 @@ pub struct Walk<'a> {
 }
 
 /// The contacts at the postures of a piece, and the gap of closed loops there, metres.
-pub struct Looked(Vec<(f64, Told, f64)>);
+pub struct PieceContacts(Vec<(f64, PostureContacts, f64)>);
 
-impl<'a> Walk<'a> {
+impl<'a> PathWalk<'a> {
     /// A walk along waypoints (at least one) with a leg from each to the next; `found` is the
     /// posture in which the robot was scanned.
     #[must_use]
     pub fn new(
-        (body, around): (&'a Body<'a>, &'a Obstacles),
-        (path, legs): (&'a [Vec<f64>], &'a [Leg]),
+        body: &'a RobotBody<'a>,
+        around: &'a Obstacles,
+        path: &'a [Vec<f64>],
+        legs: &'a [Leg],
         found: &[f64],
     ) -> Self {
         let mut first = vec![0];
@@ -114,7 +114,7 @@ impl<'a> Walk<'a> {
 
     /// Examines a piece, independently of all others.
     #[must_use]
-    pub fn look(&self, piece: usize) -> Looked {
+    pub fn look(&self, piece: usize) -> PieceContacts {
         let own = piece * PIECE..((piece + 1) * PIECE).min(self.n_postures());
         let look = |at: usize| {
             let leg = self.first.partition_point(|first| *first <= at) - 1;
@@ -126,15 +126,15 @@ impl<'a> Walk<'a> {
             let posture = between(from, self.path.get(leg + 1).unwrap_or(from), share);
             let near = self.body.near(&posture, self.around);
             let open = self.body.model.loop_gap(&posture);
-            (leg as f64 + share, told(&near, (&self.found, self.around)), open)
+            (leg as f64 + share, told(&near, &self.found, self.around), open)
         };
-        Looked(own.map(look).collect())
+        PieceContacts(own.map(look).collect())
     }
 
     /// Adds the contacts of the next piece.
-    pub fn add(&self, looked: Looked, to: &mut Contacts) {
+    pub fn add(&self, looked: PieceContacts, to: &mut Contacts) {
         for (place, told, open) in looked.0 {
-            to.add((self.body, self.around), place, told);
+            to.add(self.body, self.around, place, told);
             if open > to.open.1 {
                 to.open = (place, open);
             }
@@ -144,7 +144,7 @@ impl<'a> Walk<'a> {
 
 /// The leg between two waypoints: the number of postures to examine.
 #[must_use]
-pub fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
+pub fn leg(body: &RobotBody<'_>, from: &[f64], to: &[f64]) -> Leg {
     let turn = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
     let mut n_steps = ((turn / TURN).ceil() as usize).clamp(1, MAX_STEPS);
     loop {
@@ -163,7 +163,7 @@ pub fn leg(body: &Body<'_>, from: &[f64], to: &[f64]) -> Leg {
 
 /// Largest distance that any point of the robot moves from one posture to the next, metres, from
 /// the corners of its bounds.
-fn longest(body: &Body<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
+fn longest(body: &RobotBody<'_>, from: &[f64], to: &[f64], n_steps: usize) -> f64 {
     let corners = |step: usize| -> Vec<Point> {
         let poses = body.model.poses(&between(from, to, step as f64 / n_steps as f64));
         let own =
@@ -195,17 +195,17 @@ const ROUNDING: f32 = 2e-3;
 
 /// Distances of parts from obstacles in the posture in which the robot was scanned.
 struct AsFound {
-    touches: BTreeMap<(usize, usize), (Level, f32)>,
+    touches: BTreeMap<(usize, usize), (ContactLevel, f32)>,
     outside: Vec<usize>,
 }
 
 impl AsFound {
-    fn of(near: Near) -> Self {
-        let touch = |t: &Touch| ((t.part, t.obstacle), (t.level, t.gap));
+    fn of(near: PostureNear) -> Self {
+        let touch = |t: &PartTouch| ((t.part, t.obstacle), (t.level, t.gap));
         Self { touches: near.touches.iter().map(touch).collect(), outside: near.outside }
     }
 
-    fn is(&self, touch: &Touch) -> bool {
+    fn is(&self, touch: &PartTouch) -> bool {
         let before = self.touches.get(&(touch.part, touch.obstacle));
         before.is_some_and(|(level, gap)| *level >= touch.level && touch.gap >= gap - ROUNDING)
     }
@@ -213,10 +213,10 @@ impl AsFound {
 
 /// The worst contact of each kind in one posture: level, lower bound of the distance (metres),
 /// index of the obstacle, number of obstacles.
-type Told = BTreeMap<Key, (Level, f32, Option<usize>, usize)>;
+type PostureContacts = BTreeMap<ContactKey, (ContactLevel, f32, Option<usize>, usize)>;
 
-fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
-    let mut out = Told::new();
+fn told(near: &PostureNear, found: &AsFound, around: &Obstacles) -> PostureContacts {
+    let mut out = PostureContacts::new();
     for touch in &near.touches {
         let key = (touch.part, around.all[touch.obstacle].what, found.is(touch));
         let worst = out.entry(key).or_insert((touch.level, touch.gap, Some(touch.obstacle), 0));
@@ -227,7 +227,7 @@ fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
     }
     for &part in &near.outside {
         let key = (part, What::Unseen, found.outside.contains(&part));
-        out.entry(key).or_insert((Level::Unseen, 0.0, None, 0));
+        out.entry(key).or_insert((ContactLevel::Unseen, 0.0, None, 0));
     }
     out
 }
@@ -235,13 +235,13 @@ fn told(near: &Near, (found, around): (&AsFound, &Obstacles)) -> Told {
 /// Joins the contacts of all postures: one for each part and kind of obstacle.
 #[derive(Debug, Clone, Default)]
 pub struct Contacts {
-    all: BTreeMap<Key, Contact>,
+    all: BTreeMap<ContactKey, Contact>,
     /// Place on the path where closed loops are open most, and their gap, metres.
     open: (f64, f64),
 }
 
 impl Contacts {
-    fn add(&mut self, (body, around): (&Body<'_>, &Obstacles), place: f64, told: Told) {
+    fn add(&mut self, body: &RobotBody<'_>, around: &Obstacles, place: f64, told: PostureContacts) {
         for (key, (level, gap, obstacle, n)) in told {
             let part = &body.parts[key.0];
             let now = Contact {
@@ -288,158 +288,4 @@ impl Contacts {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Cells, Known};
-    use contract::OneByOne;
-    use geometry::{Aabb, Pose};
-    use robot::{Model, Settings};
-
-    /// An arm of one link, 1 m long and 0.1 m thick, that turns about z at its end.
-    fn arm(dir: &std::path::Path) -> Model {
-        let urdf = "<robot name='arm'><link name='foot'/><link name='beam'><visual><origin xyz='0.5 0 0'/>\
-            <geometry><box size='1 0.1 0.1'/></geometry></visual></link><joint name='turn' type='revolute'>\
-            <parent link='foot'/><child link='beam'/><axis xyz='0 0 1'/>\
-            <limit lower='-3.2' upper='3.2' effort='1' velocity='1'/></joint></robot>";
-        let path = dir.join("arm.urdf");
-        std::fs::write(&path, urdf).expect("is written");
-        Model::load_urdf(&path, "arm", &Settings::default()).expect("loads").0
-    }
-
-    fn legs(body: &Body<'_>, path: &[Vec<f64>]) -> Vec<Leg> {
-        path.windows(2).map(|pair| leg(body, &pair[0], &pair[1])).collect()
-    }
-
-    fn contacts(walk: &Walk<'_>) -> Vec<Contact> {
-        let mut all = Contacts::default();
-        (0..walk.n_pieces()).for_each(|piece| walk.add(walk.look(piece), &mut all));
-        all.all()
-    }
-
-    fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
-        let dir = tempfile::tempdir().expect("a folder");
-        let model = arm(dir.path());
-        let mut body = Body::new(&model, BTreeMap::new(), (margin, 0.0), &OneByOne);
-        let mut cells = Cells::within(crate::reach(&model) + margin + 0.1, &BTreeMap::new());
-        points.iter().for_each(|(p, what)| cells.add(*p, *what, (false, 0)));
-        cells.settle();
-        let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
-        let known = Known { world_from_base: Pose::identity(), bounds };
-        let mut around = Obstacles::new(&cells, &[], (None, known));
-        body.stand(&[found], &mut around);
-        let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
-        let legs = legs(&body, &path);
-        let walk = Walk::new((&body, &around), (&path, &legs), &[found]);
-        contacts(&walk)
-    }
-
-    #[test]
-    fn a_post_in_the_way_is_hit_where_it_stands() {
-        // Half a turn; a post stands at 90°, 0.9 m away.
-        let post: Vec<_> =
-            (0..100).map(|k| ([0.0, 0.9, 0.002 * f64::from(k) - 0.1], What::Fixed)).collect();
-        let found = walk(&post, &[0.0, std::f64::consts::PI], 0.0, 0.02);
-        let [hit] = &found[..] else { panic!("one contact: {found:?}") };
-        assert!(!hit.as_found && hit.level >= Level::Hit && hit.gap == 0.0, "{hit:?}");
-        // The beam's side is 5 cm from its axis, which is 3.2° on either side of the post, plus the
-        // margin and half a step.
-        let share = (0.05_f64 / 0.9).asin() / std::f64::consts::PI;
-        assert!(hit.from < 0.5 - share && hit.from > 0.5 - 1.8 * share, "{hit:?}");
-        assert!(hit.to > 0.5 + share && hit.to < 0.5 + 1.8 * share, "{hit:?}");
-        assert!((hit.at.expect("a point") - Point::new(0.0, 0.9, 0.0)).norm() < 0.12);
-        // Beyond its end nothing is hit, but within the margin it is near.
-        let beyond = |off: f64| vec![([0.0, 1.0 + off, 0.0], What::Fixed)];
-        assert!(walk(&beyond(0.04), &[0.0, 3.0], 0.0, 0.02).is_empty());
-        let near = walk(&beyond(0.015), &[0.0, 3.0], 0.0, 0.02);
-        assert!(near.len() == 1 && near[0].level == Level::Near, "{near:?}");
-        assert!(near[0].gap <= 0.015 && near[0].gap > 0.002, "{near:?}");
-    }
-
-    #[test]
-    fn what_it_touched_where_it_was_found_is_told_apart_until_it_comes_nearer() {
-        // A point at its end, 1 cm away as found, and a post that it turns into.
-        let points = [([1.01, 0.0, 0.0], What::Uncertain), ([0.0, 0.8, 0.0], What::Fixed)];
-        let found = walk(&points, &[0.0, 1.6], 0.0, 0.02);
-        let levels: Vec<_> =
-            found.iter().map(|c| (c.what, c.level >= Level::Hit, c.as_found)).collect();
-        assert_eq!(levels, [(What::Fixed, true, false), (What::Beside, false, true)]);
-        // If it was found elsewhere, the same point is not its own.
-        assert!(walk(&points[..1], &[0.0, 1.6], 1.6, 0.02).iter().all(|c| !c.as_found));
-        // A point that was near where it was found, and is inside on the path.
-        let points = [([0.9, 0.06, 0.0], What::Fixed)];
-        let found = walk(&points, &[0.0, 0.1], 0.0, 0.02);
-        assert!(found.iter().any(|c| c.level >= Level::Hit && !c.as_found), "{found:?}");
-    }
-
-    #[test]
-    fn what_was_near_outside_is_not_as_found_inside() {
-        // A point 15 mm beside the beam, into which the beam moves by 10 mm.
-        let points = [([0.5, 0.065, 0.0], What::Fixed)];
-        let found = walk(&points, &[0.0, 0.05], 0.0, 0.02);
-        assert!(found.iter().any(|c| c.level == Level::Inside && !c.as_found), "{found:?}");
-    }
-
-    #[test]
-    fn points_on_its_own_surface_are_no_obstacle() {
-        // A patch at a distance from the beam's side that a mask left to the fixed world.
-        let patch = |off: f64| -> Vec<_> {
-            let at =
-                |k: u32| [0.4 + 0.01 * f64::from(k % 10), 0.05 + off, 0.01 * f64::from(k / 10)];
-            (0..40).map(|k| (at(k), What::Fixed)).collect()
-        };
-        assert_eq!(walk(&patch(0.003), &[0.0, 0.3], 0.0, 0.02), []);
-        let hit = |c: &Contact| c.level >= Level::Hit && !c.as_found;
-        assert!(walk(&patch(0.03), &[0.0, 0.3], 0.0, 0.02).iter().any(hit));
-    }
-
-    #[test]
-    fn uncertain_points_beside_it_may_move_with_it() {
-        // Points above the beam's end, and a post that the beam passes below, but they do not.
-        let beside = (0..8).map(|k| ([0.9, 0.0, 0.07 + 0.01 * f64::from(k)], What::Uncertain));
-        let post = std::iter::once(([0.0, 0.9, 0.12], What::Fixed));
-        let points: Vec<_> = beside.chain(post).collect();
-        let found = walk(&points, &[0.0, 3.0], 0.0, 0.02);
-        let fixed: Vec<_> = found.iter().filter(|c| c.what == What::Fixed).collect();
-        assert!(
-            fixed.len() == 1 && fixed[0].is_doubtful && fixed[0].level == Level::Hit,
-            "{found:?}"
-        );
-        let away = found.iter().filter(|c| c.what == What::Beside && !c.as_found);
-        assert!(away.count() == 0, "it does not come nearer to them: {found:?}");
-    }
-
-    #[test]
-    fn whole_turns_are_no_rest() {
-        let dir = tempfile::tempdir().expect("a folder");
-        let model = arm(dir.path());
-        let body = Body::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
-        let turns = MAX_STEPS as f64 * std::f64::consts::TAU;
-        assert!(leg(&body, &[0.0], &[turns]).jumps && leg(&body, &[0.0], &[1e308]).jumps);
-    }
-
-    #[test]
-    fn what_lies_inside_of_a_link_from_the_beginning_is_hit() {
-        let found = walk(&[([0.5, 0.0, 0.0], What::Uncertain)], &[0.0], 1.0, 0.005);
-        assert!(found.len() == 1 && found[0].level == Level::Inside, "{found:?}");
-    }
-
-    #[test]
-    fn space_of_which_nothing_is_known_is_not_free() {
-        let dir = tempfile::tempdir().expect("a folder");
-        let model = arm(dir.path());
-        let body = Body::new(&model, BTreeMap::new(), (0.02, 0.0), &OneByOne);
-        let bounds = Aabb { min: [-9.0, -0.2, -9.0], max: [9.0, 9.0, 9.0] };
-        let known = Known { world_from_base: Pose::identity(), bounds };
-        let around = Obstacles::new(
-            &Cells::within(crate::reach(&model) + 0.2, &BTreeMap::new()),
-            &[],
-            (None, known),
-        );
-        let path = [vec![0.0], vec![-1.0]];
-        let legs = legs(&body, &path);
-        let walk = Walk::new((&body, &around), (&path, &legs), &[0.0]);
-        let found = contacts(&walk);
-        assert!(found.len() == 1 && found[0].what == What::Unseen && found[0].at.is_none());
-        assert!(found[0].from > 0.0 && found[0].to == 1.0, "{found:?}");
-    }
-}
+mod tests;

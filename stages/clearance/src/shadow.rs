@@ -96,7 +96,7 @@ impl Shadow {
 
 /// A scanner with a `point_source_id` of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Eye {
+pub struct ScannerAt {
     /// Position in the base frame, metres.
     pub at: Point,
     /// Angle between its beams, radians.
@@ -118,7 +118,7 @@ const BEAM: f64 = 1e-3;
 const BEFORE: f32 = 0.02;
 
 impl Front {
-    pub(crate) fn new(eye: &Eye) -> Self {
+    pub(crate) fn new(eye: &ScannerAt) -> Self {
         Self { eye: eye.at, width: eye.step.max(BEAM), near: FxHashMap::default() }
     }
 
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn what_beams_met_before_is_told_beside_it_and_no_farther() {
-        let mut front = Front::new(&Eye { at: Point::new(0.0, 0.0, 1.0), step: 0.003 });
+        let mut front = Front::new(&ScannerAt { at: Point::new(0.0, 0.0, 1.0), step: 0.003 });
         // A wire 2 m away.
         (0..100).for_each(|i| front.add(&Point::new(2.0, 0.0, 0.5 + 0.006 * f64::from(i))));
         for (p, is_behind) in [

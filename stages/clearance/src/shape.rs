@@ -1,7 +1,7 @@
 //! Distances from the surface of a link, or from points attached to it. All coordinates are in the
 //! frame of the link, metres.
 
-use crate::obstacles::{HALF_CELL, distance};
+use crate::obstacle::{HALF_CELL, distance};
 use contract::{Space, SpaceGrid, SpaceKind};
 use geometry::{Aabb, NearestField};
 use glamx::Vec3;
@@ -32,14 +32,14 @@ pub(crate) enum Gap {
 }
 
 /// A shape whose distance from obstacles is checked.
-pub(crate) enum Shape {
+pub(crate) enum PartShape {
     /// Triangles, and the voxels that they enclose.
     Surface(Box<TriMesh>, Space),
     /// Attached points, with an index of the nearest one.
     Hung(Vec<[f32; 3]>, NearestField),
 }
 
-impl Shape {
+impl PartShape {
     /// A shape for queries of at least `least` metres; `None` for a mesh without triangles.
     pub(crate) fn surface(mesh: &Mesh, bounds: &Aabb, least: f32) -> Option<Self> {
         let corners = mesh.vertices.iter().map(|v| Vec3::from_array(*v)).collect();
@@ -148,28 +148,28 @@ mod tests {
     #[test]
     fn a_place_is_far_at_the_surface_or_inside() {
         let (mesh, bounds) = cube();
-        let shape = Shape::surface(&mesh, &bounds, 0.03).expect("triangles");
+        let shape = PartShape::surface(&mesh, &bounds, 0.03).expect("triangles");
         assert_eq!(shape.gap([0.5, 0.0, 0.0], 0.1), Gap::Far);
         let Gap::At(gap) = shape.gap([0.25, 0.1, -0.1], 0.1) else { panic!("near") };
         assert!((gap - 0.05).abs() < 1e-6, "{gap}");
         assert_eq!(shape.gap([0.0; 3], 0.1), Gap::Inside);
         // The side is right whatever the limit of the query is.
         for (margin, k) in [0.0085, 0.02].into_iter().flat_map(|m| (1..20).map(move |k| (m, k))) {
-            let shape = Shape::surface(&mesh, &bounds, margin).expect("triangles");
+            let shape = PartShape::surface(&mesh, &bounds, margin).expect("triangles");
             let off = 0.01 * k as f32 - 0.0005;
             let gap = shape.gap([0.2 - off, 0.0137, -0.0049], margin);
             assert!(off < 0.007 || gap == Gap::Inside, "{margin} {off}: {gap:?}");
         }
         // A cube with a side missing encloses nothing.
         let open = Mesh { triangles: mesh.triangles[2..].to_vec(), ..mesh };
-        let shape = Shape::surface(&open, &bounds, 0.03).expect("triangles");
+        let shape = PartShape::surface(&open, &bounds, 0.03).expect("triangles");
         assert_eq!(shape.gap([0.0; 3], 0.1), Gap::Far);
     }
 
     #[test]
     fn points_that_hang_are_never_farther_than_they_are() {
         let points: Vec<[f32; 3]> = (0..200).map(|i| [0.003 * i as f32, 0.0, 0.0]).collect();
-        let shape = Shape::hung(points, 0.05);
+        let shape = PartShape::hung(points, 0.05);
         for k in 0..100 {
             let off = 0.0005 * k as f32;
             match shape.gap([0.2, off, 0.0], 0.05) {

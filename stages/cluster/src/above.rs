@@ -9,7 +9,7 @@ pub(crate) fn above(occupancy: &Occupancy, floor: &Floor, settings: &Settings) -
         return occupancy.voxels.clone();
     }
     let edge = occupancy.edge;
-    let mut patches: Vec<Patch> = floor.levels.iter().map(|_| Patch::default()).collect();
+    let mut patches: Vec<LevelPatch> = floor.levels.iter().map(|_| LevelPatch::default()).collect();
     occupancy
         .voxels
         .iter()
@@ -36,7 +36,7 @@ pub(crate) fn above(occupancy: &Occupancy, floor: &Floor, settings: &Settings) -
 
 /// Cached heights of one level by voxel column, so that each column is computed only once.
 #[derive(Debug, Default)]
-struct Patch {
+struct LevelPatch {
     /// Lowest voxel column of the cache.
     first: [i32; 2],
     size: [usize; 2],
@@ -48,7 +48,7 @@ struct Patch {
 /// Heights of larger levels are computed each time.
 const MOST: usize = 1 << 22;
 
-impl Patch {
+impl LevelPatch {
     fn height(&mut self, level: &FloorLevel, edge: f64, at: [i32; 2], xy: [f64; 2]) -> Option<f64> {
         if self.heights.is_empty() {
             self.open(level, edge);

@@ -4,13 +4,13 @@
 use crate::Counted;
 
 /// Consecutive voxels of one row, with small gaps bridged.
-struct Run {
+struct VoxelRun {
     first: i32,
     last: i32,
 }
 
 /// A row of voxels along x.
-struct Row {
+struct RowOfVoxels {
     z: i32,
     y: i32,
     runs: std::ops::Range<usize>,
@@ -46,18 +46,18 @@ pub(crate) fn connect(voxels: &[Counted], gap: i32) -> Vec<u32> {
         .collect()
 }
 
-fn cut(voxels: &[Counted], reach: i32) -> (Vec<Row>, Vec<Run>, Vec<u32>) {
-    let (mut rows, mut runs): (Vec<Row>, Vec<Run>) = (Vec::new(), Vec::new());
+fn cut(voxels: &[Counted], reach: i32) -> (Vec<RowOfVoxels>, Vec<VoxelRun>, Vec<u32>) {
+    let (mut rows, mut runs): (Vec<RowOfVoxels>, Vec<VoxelRun>) = (Vec::new(), Vec::new());
     let mut run_of = Vec::with_capacity(voxels.len());
     for &([x, y, z], _) in voxels {
         let same_row = rows.last().is_some_and(|r| r.z == z && r.y == y);
         if !same_row {
-            rows.push(Row { z, y, runs: runs.len()..runs.len() });
+            rows.push(RowOfVoxels { z, y, runs: runs.len()..runs.len() });
         }
         match runs.last_mut() {
             Some(run) if same_row && x.saturating_sub(run.last) <= reach => run.last = x,
             _ => {
-                runs.push(Run { first: x, last: x });
+                runs.push(VoxelRun { first: x, last: x });
                 if let Some(row) = rows.last_mut() {
                     row.runs.end = runs.len();
                 }
@@ -68,8 +68,14 @@ fn cut(voxels: &[Counted], reach: i32) -> (Vec<Row>, Vec<Run>, Vec<u32>) {
     (rows, runs, run_of)
 }
 
-/// Joins the runs of each row with those of the row at offset `(dz, dy)`.
-fn join_rows(rows: &[Row], runs: &[Run], (dz, dy): (i32, i32), reach: i32, parent: &mut [u32]) {
+/// Joins runs of each row with those of the row that lies `(dz, dy)` from it.
+fn join_rows(
+    rows: &[RowOfVoxels],
+    runs: &[VoxelRun],
+    (dz, dy): (i32, i32),
+    reach: i32,
+    parent: &mut [u32],
+) {
     // Both sequences of rows are sorted and walked through once.
     let mut other = 0;
     for row in rows {

@@ -34,10 +34,10 @@ pub type Result<T> = std::result::Result<T, Error>;
 ///
 /// Messages are half sentences: lower case, no full stop, the offending value in quotes, last.
 #[derive(Debug)]
-pub struct Error(Box<Inner>);
+pub struct Error(Box<ErrorInner>);
 
 #[derive(Debug)]
-struct Inner {
+struct ErrorInner {
     kind: Kind,
     what: String,
     place: Option<String>,
@@ -48,7 +48,13 @@ struct Inner {
 impl Error {
     /// Makes an error of this kind; `what` is a half sentence.
     pub fn new(kind: Kind, what: impl Into<String>) -> Self {
-        Self(Box::new(Inner { kind, what: what.into(), place: None, hint: None, source: None }))
+        Self(Box::new(ErrorInner {
+            kind,
+            what: what.into(),
+            place: None,
+            hint: None,
+            source: None,
+        }))
     }
 
     /// Makes an error of kind [`Kind::BadInput`].

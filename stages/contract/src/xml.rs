@@ -28,7 +28,7 @@ const MAX_NAMESPACES: u64 = 256;
 /// # Errors
 /// The limit that is exceeded, in words, with the line and the setting that raises it.
 pub fn check_xml(bytes: &[u8], limits: &XmlLimits) -> Result<(), String> {
-    let mut count = Count { bytes, limits, at: 0, n_nodes: 0, n_namespaces: 0, depth: 0 };
+    let mut count = XmlCount { bytes, limits, at: 0, n_nodes: 0, n_namespaces: 0, depth: 0 };
     while let Some(n) = bytes[count.at..].iter().position(|b| *b == b'<') {
         // The text before the tag counts as a node; white space is text, too.
         count.nodes(u64::from(n > 0))?;
@@ -55,7 +55,7 @@ pub fn check_xml(bytes: &[u8], limits: &XmlLimits) -> Result<(), String> {
     Ok(())
 }
 
-struct Count<'a> {
+struct XmlCount<'a> {
     bytes: &'a [u8],
     limits: &'a XmlLimits,
     at: usize,
@@ -64,7 +64,7 @@ struct Count<'a> {
     depth: u64,
 }
 
-impl Count<'_> {
+impl XmlCount<'_> {
     /// Moves behind the next `end` that begins at least `from` bytes further on, or to the end of
     /// the file if there is none.
     fn skip(&mut self, from: usize, end: &[u8]) {

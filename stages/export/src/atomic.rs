@@ -1,7 +1,7 @@
 //! Files that are either complete or absent: they are written under a temporary name, synced, and
 //! then renamed.
 
-use crate::block::{self, Block};
+use crate::block::{self, AlignedBlock};
 use contract::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
@@ -20,7 +20,7 @@ pub struct AtomicFile {
     file: Option<File>,
     part: PathBuf,
     path: PathBuf,
-    waiting: Block,
+    waiting: AlignedBlock,
     /// Whether writes bypass the page cache; `None` before the first full buffer, which small files
     /// never reach.
     direct: Option<bool>,
@@ -45,7 +45,7 @@ impl AtomicFile {
             .truncate(true)
             .open(&part)
             .map_err(|e| Error::of_file("file cannot be made", &part, e))?;
-        let (file, waiting) = (Some(file), Block::default());
+        let (file, waiting) = (Some(file), AlignedBlock::default());
         Ok(Self { file, part, path, waiting, direct: None })
     }
 

@@ -18,12 +18,12 @@ struct Page([u8; PAGE]);
 
 /// A buffer of aligned memory.
 #[derive(Default)]
-pub struct Block {
+pub struct AlignedBlock {
     pages: Vec<Page>,
     n_bytes: usize,
 }
 
-impl Block {
+impl AlignedBlock {
     /// The bytes that were filled in.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
@@ -131,20 +131,20 @@ pub fn read_all(
 const AT_ONCE: usize = 1 << 19;
 
 /// Reads a file sequentially, past the page cache where possible.
-pub(crate) struct Straight {
+pub(crate) struct DirectReader {
     file: File,
-    block: Block,
+    block: AlignedBlock,
     /// Number of bytes of the block that were returned.
     n_given: usize,
 }
 
-impl Straight {
+impl DirectReader {
     /// Starts at an offset of the file.
     pub(crate) fn new(mut file: File, start: u64) -> Result<Self> {
         let n_given = start as usize % PAGE;
         file.seek(SeekFrom::Start(start - n_given as u64))?;
         let _ = set_direct(&file, true);
-        let mut straight = Self { file, block: Block::default(), n_given: 0 };
+        let mut straight = Self { file, block: AlignedBlock::default(), n_given: 0 };
         straight.next()?;
         straight.n_given = n_given.min(straight.block.n_bytes);
         Ok(straight)
@@ -158,7 +158,7 @@ impl Straight {
     }
 }
 
-impl Read for Straight {
+impl Read for DirectReader {
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize> {
         if self.n_given == self.block.n_bytes {
             self.next()?;
@@ -185,7 +185,7 @@ mod tests {
         {
             let file = File::open(&path).expect("opens");
             let mut read = Vec::new();
-            let mut straight = Straight::new(file, start as u64).expect("begins");
+            let mut straight = DirectReader::new(file, start as u64).expect("begins");
             straight.read_to_end(&mut read).expect("reads");
             assert!(read == bytes[start.min(bytes.len())..], "from {start}");
         }
@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn blocks_hold_what_they_were_filled_with() {
         let bytes: Vec<u8> = (0..5 * PAGE).map(|i| (i % 251) as u8).collect();
-        let mut block = Block::default();
+        let mut block = AlignedBlock::default();
         let mut rest = &bytes[..];
         for n in [1, 10, PAGE, 0, 2 * PAGE, PAGE] {
             let (now, _) = rest.split_at(n);

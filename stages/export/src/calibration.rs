@@ -1,7 +1,7 @@
 //! The calibration of a robot's joints in `result.json`.
 
-use crate::places::Places;
-use crate::result::finite;
+use crate::finite::finite;
+use crate::places::NamedMap;
 use contract::{Calibration, Fit, JointFrame};
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ pub struct CalibrationEntry {
     pub prior: [f64; 2],
     /// For each link the RMS distance of its points from its surface, metres: with the model as it
     /// is, and calibrated.
-    pub link_rms: Places<[Option<f64>; 2]>,
+    pub link_rms: NamedMap<[Option<f64>; 2]>,
 }
 
 /// The frame of a joint relative to the model, in the joint's own frame.
@@ -45,7 +45,7 @@ impl CalibrationEntry {
         Self {
             joints: found.frames.iter().map(FrameEntry::from).collect(),
             prior: found.prior,
-            link_rms: Places(names.zip(rms).collect()),
+            link_rms: NamedMap(names.zip(rms).collect()),
         }
     }
 

@@ -21,7 +21,8 @@ const POINT: usize = 9;
 pub(crate) fn check(
     file: &mut (impl Read + Seek),
     at: u64,
-    (laz, las): (&LazVlr, &LasSettings),
+    laz: &LazVlr,
+    las: &LasSettings,
     n_points: u64,
 ) -> io::Result<Result<(), String>> {
     let record_len = las.record_len();

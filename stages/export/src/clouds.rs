@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The files that [`Tiles`](crate::Tiles) and [`Clouds`] wrote.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Written {
+pub struct WrittenFiles {
     /// The tiles, sorted by row, then column.
     pub tiles: Vec<LasSummary>,
     /// The cloud of links and attachments.
@@ -19,7 +19,7 @@ pub struct Written {
     pub fixed: Option<LasSummary>,
 }
 
-impl Written {
+impl WrittenFiles {
     /// Checksums of the files, where they are known.
     pub fn sums(&self) -> impl Iterator<Item = &FileSum> {
         let all = self.tiles.iter().chain([&self.robots]).chain(&self.fixed);

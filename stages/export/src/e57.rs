@@ -40,7 +40,7 @@ pub struct GridPoint {
 /// Writes an E57 file of several scans.
 pub struct E57Scans {
     writer: E57Writer<Shared>,
-    file: Arc<Mutex<Straight>>,
+    file: Arc<Mutex<SequentialFile>>,
     path: PathBuf,
     n_scans: usize,
 }
@@ -53,7 +53,7 @@ impl E57Scans {
     /// If the file cannot be created.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
-        let file = Arc::new(Mutex::new(Straight::new(AtomicFile::create(&path)?)));
+        let file = Arc::new(Mutex::new(SequentialFile::new(AtomicFile::create(&path)?)));
         let shared = Shared(Arc::clone(&file));
         let writer = E57Writer::new(
             shared,
@@ -174,7 +174,7 @@ fn guid(name: &str, number: u64) -> String {
 const GATHER: usize = 1 << 20;
 
 /// A file that is written almost sequentially: seeking is free, and writes are buffered.
-struct Straight {
+struct SequentialFile {
     file: AtomicFile,
     /// Position of the next byte.
     at: u64,
@@ -185,7 +185,7 @@ struct Straight {
     from: u64,
 }
 
-impl Straight {
+impl SequentialFile {
     fn new(file: AtomicFile) -> Self {
         Self { file, at: 0, end: 0, gathered: Vec::with_capacity(GATHER), from: 0 }
     }
@@ -201,10 +201,10 @@ impl Straight {
 }
 
 /// A shared handle to the file: the crate keeps its writer and does not return it.
-struct Shared(Arc<Mutex<Straight>>);
+struct Shared(Arc<Mutex<SequentialFile>>);
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Straight> {
+    fn lock(&self) -> MutexGuard<'_, SequentialFile> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -45,7 +45,7 @@ pub fn draw_evidence(title: &str, picture: &RobotPicture, fit: &Fit, model: &Mod
     for (i, joint) in fit.joints.iter().enumerate() {
         let own = model.joints.iter().find(|j| j.name == joint.name);
         if let Some(own) = own {
-            row(&mut canvas, top + LINE * (i as i64 + 1), (fit, i), own);
+            row(&mut canvas, top + LINE * (i as i64 + 1), fit, i, own);
         }
     }
     canvas.text(LINKS, top, 1, GREY, "link                seen  through  rms mm  points");
@@ -85,7 +85,7 @@ fn certainty_color(certainty: Certainty) -> Rgb {
 
 /// Draws one joint: a bar for its limits, the value with its standard deviation, and other values
 /// that fit as well.
-fn row(canvas: &mut Canvas, y: i64, (fit, at): (&Fit, usize), own: &Joint) {
+fn row(canvas: &mut Canvas, y: i64, fit: &Fit, at: usize, own: &Joint) {
     let joint = &fit.joints[at];
     let [low, high] = own.limits.unwrap_or(NO_LIMITS);
     let place = |value: f64| {

@@ -2,7 +2,7 @@
 
 use crate::atomic::AtomicFile;
 use crate::pack::{Pack, PointColumns};
-use crate::record::{Extent, LasSettings};
+use crate::record::{LasSettings, RecordExtent};
 use crate::summed::{FileSum, SummedFile};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
@@ -42,7 +42,7 @@ pub struct LasWriter {
     sink: Sink,
     settings: LasSettings,
     pack: Pack,
-    extent: Extent,
+    extent: RecordExtent,
     path: PathBuf,
     gathered: Vec<u8>,
 }
@@ -54,7 +54,7 @@ impl LasWriter {
     /// If the file cannot be created.
     pub fn create(path: impl Into<PathBuf>, settings: LasSettings) -> Result<Self> {
         let path = path.into();
-        let head = head(&settings, &Extent::default())?;
+        let head = head(&settings, &RecordExtent::default())?;
         let sink = if settings.compress {
             let mut file = BufWriter::with_capacity(GATHER, AtomicFile::create(&path)?);
             file.write_all(&head)
@@ -70,7 +70,7 @@ impl LasWriter {
             sink,
             settings,
             pack,
-            extent: Extent::default(),
+            extent: RecordExtent::default(),
             path,
             gathered: Vec::with_capacity(GATHER + 64),
         })
@@ -87,7 +87,7 @@ impl LasWriter {
     }
 
     /// Appends records that are encoded already.
-    pub(crate) fn push_records(&mut self, records: &[u8], extent: &Extent) -> Result<()> {
+    pub(crate) fn push_records(&mut self, records: &[u8], extent: &RecordExtent) -> Result<()> {
         self.extent.join(extent);
         self.gather(records)
     }
@@ -132,7 +132,7 @@ impl LasWriter {
 }
 
 /// Bounds of an extent, metres.
-pub(crate) fn bounds(settings: &LasSettings, extent: &Extent) -> Aabb {
+pub(crate) fn bounds(settings: &LasSettings, extent: &RecordExtent) -> Aabb {
     if extent.n == 0 {
         return Aabb::EMPTY;
     }
@@ -144,7 +144,7 @@ pub(crate) fn bounds(settings: &LasSettings, extent: &Extent) -> Aabb {
 
 /// Everything before the first point: header and variable length records. Its length does not
 /// depend on `extent`.
-pub(crate) fn head(settings: &LasSettings, extent: &Extent) -> Result<Vec<u8>> {
+pub(crate) fn head(settings: &LasSettings, extent: &RecordExtent) -> Result<Vec<u8>> {
     let records = records(settings)?;
     let mut tail = Vec::new();
     for record in &records {

@@ -32,6 +32,7 @@ mod clouds;
 mod copc;
 mod e57;
 mod evidence_picture;
+mod finite;
 mod junit;
 mod las;
 mod mask;
@@ -61,7 +62,7 @@ pub use atomic::AtomicFile;
 pub use calibration::{CalibrationEntry, FrameEntry};
 pub use canvas::{Canvas, Rgb, link_color, robot_color};
 pub use change_picture::{ChangedThing, draw_changes};
-pub use clouds::{Clouds, Written};
+pub use clouds::{Clouds, WrittenFiles};
 pub use copc::{COPC, CopcSteps, tiles, write_copc};
 pub use e57::{E57Scans, GridPoint, GridScan};
 pub use evidence_picture::draw_evidence;
@@ -70,14 +71,14 @@ pub use las::{LasSummary, LasWriter};
 pub use mask::{LabelColumns, MaskFiles, MaskRange, MaskReader, MaskWriter};
 pub use npy::{Element, NpyWriter, read_places};
 pub use pack::{Pack, Packed, PointColumns};
-pub use places::Places;
+pub use places::NamedMap;
 pub use plan_picture::PlanPicture;
 pub use ply::{PLY, write_ply};
 pub use posture::JointWords;
 pub use record::{LasSettings, Quantum, RawVlr, class_of};
-pub use refill::{OldPoint, Stated, read_tile};
+pub use refill::{OldPoint, StatedTile, read_tile};
 pub use result::{
-    BasePose, BaseSigma, InputEntry, Labels, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
+    BasePose, BaseSigma, InputEntry, LabelFiles, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
     SCHEMA, ScanLabels, StageEntry, TipPose, UnitsEntry,
 };
 pub use review::ReviewEntry;

@@ -15,35 +15,35 @@ const DEPTH: u32 = 16;
 pub(crate) const HALF: i64 = 1 << (DEPTH - 1);
 
 /// Whether a voxel is occupied; `None` where unknown.
-pub(crate) type Known = Option<bool>;
+pub(crate) type OctomapState = Option<bool>;
 
 /// A voxel grid: position of the first voxel in edges from the tree's origin, size, and content.
-pub(crate) struct Grid<'a> {
+pub(crate) struct OctomapGrid<'a> {
     pub(crate) first: [i64; 3],
     pub(crate) size: [usize; 3],
     /// Edge of a voxel, metres.
     pub(crate) edge: f64,
     /// State of the voxel with this index; z varies fastest, then y.
-    pub(crate) known: &'a dyn Fn(usize) -> Known,
+    pub(crate) known: &'a dyn Fn(usize) -> OctomapState,
 }
 
 /// The content of a cube of the tree.
-enum Node {
-    Leaf(Known),
+enum OctomapNode {
+    Leaf(OctomapState),
     /// An inner node: the bytes of the node and all below, and their number of nodes.
     Inner(Vec<u8>, u64),
 }
 
 /// Writes the tree of a grid.
-pub(crate) fn write(path: &Path, grid: &Grid<'_>) -> Result<()> {
+pub(crate) fn write(path: &Path, grid: &OctomapGrid<'_>) -> Result<()> {
     let fits =
         (0..3).all(|i| grid.first[i] >= -HALF && grid.first[i] + grid.size[i] as i64 <= HALF);
     if !fits {
         return Err(Error::new(Kind::Bug, "an octree does not reach so far").at(path.display()));
     }
     let (data, n_nodes) = match grid.node([-HALF; 3], DEPTH) {
-        Node::Inner(data, n) => (data, n),
-        Node::Leaf(_) => (vec![0, 0], 1),
+        OctomapNode::Inner(data, n) => (data, n),
+        OctomapNode::Leaf(_) => (vec![0, 0], 1),
     };
     let mut bytes = format!(
         "# Octomap OcTree binary file\nid OcTree\nsize {n_nodes}\nres {}\ndata\n",
@@ -54,24 +54,24 @@ pub(crate) fn write(path: &Path, grid: &Grid<'_>) -> Result<()> {
     atomic::write(path, &bytes)
 }
 
-impl Grid<'_> {
+impl OctomapGrid<'_> {
     /// The node of the cube with this corner, `2^level` voxels wide.
-    fn node(&self, corner: [i64; 3], level: u32) -> Node {
+    fn node(&self, corner: [i64; 3], level: u32) -> OctomapNode {
         let width = 1_i64 << level;
         let apart = |i: usize| {
             corner[i] + width <= self.first[i] || corner[i] >= self.first[i] + self.size[i] as i64
         };
         if (0..3).any(apart) {
-            return Node::Leaf(None);
+            return OctomapNode::Leaf(None);
         }
         if level == 0 {
             let at = (0..3).fold(0, |at, i| {
                 at * self.size[i] + usize::try_from(corner[i] - self.first[i]).unwrap_or(0)
             });
-            return Node::Leaf((self.known)(at));
+            return OctomapNode::Leaf((self.known)(at));
         }
         let half = width / 2;
-        let children: Vec<Node> = (0..8)
+        let children: Vec<OctomapNode> = (0..8)
             .map(|c| {
                 self.node(std::array::from_fn(|i| corner[i] + half * ((c >> i) & 1)), level - 1)
             })
@@ -80,29 +80,29 @@ impl Grid<'_> {
     }
 }
 
-fn joined(children: &[Node]) -> Node {
-    if let Node::Leaf(first) = children[0]
-        && children.iter().all(|c| matches!(c, Node::Leaf(known) if *known == first))
+fn joined(children: &[OctomapNode]) -> OctomapNode {
+    if let OctomapNode::Leaf(first) = children[0]
+        && children.iter().all(|c| matches!(c, OctomapNode::Leaf(known) if *known == first))
     {
-        return Node::Leaf(first);
+        return OctomapNode::Leaf(first);
     }
     let (mut bits, mut n) = (0_u16, 1);
     let mut below = Vec::new();
     for (c, child) in children.iter().enumerate() {
         let code = match child {
-            Node::Leaf(None) => 0b00,
-            Node::Leaf(Some(false)) => 0b01,
-            Node::Leaf(Some(true)) => 0b10,
-            Node::Inner(bytes, nodes) => {
+            OctomapNode::Leaf(None) => 0b00,
+            OctomapNode::Leaf(Some(false)) => 0b01,
+            OctomapNode::Leaf(Some(true)) => 0b10,
+            OctomapNode::Inner(bytes, nodes) => {
                 below.extend_from_slice(bytes);
                 n += nodes;
                 0b11
             }
         };
-        n += u64::from(matches!(child, Node::Leaf(Some(_))));
+        n += u64::from(matches!(child, OctomapNode::Leaf(Some(_))));
         bits |= code << (2 * c);
     }
     let mut bytes = bits.to_le_bytes().to_vec();
     bytes.append(&mut below);
-    Node::Inner(bytes, n)
+    OctomapNode::Inner(bytes, n)
 }

@@ -1,7 +1,7 @@
 //! Encodes labelled points as LAS records, in runs that belong to one spatial tile. Nothing is
 //! shared, so that several workers encode strips while one thread writes them.
 
-use crate::record::{Extent, LasSettings, Quantum, class_of, too_far};
+use crate::record::{LasSettings, Quantum, RecordExtent, class_of, too_far};
 use crate::settings::Settings;
 use contract::{Label, PointKind, Result};
 use geometry::narrow::floor_i32;
@@ -35,19 +35,19 @@ pub struct PointColumns<'a> {
 
 /// Consecutive records of one tile.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Run {
+pub(crate) struct TileRun {
     /// Row and column of the tile.
     pub(crate) tile: [i32; 2],
     /// Whether the points belong to links and attachments.
     pub(crate) moves: bool,
-    pub(crate) extent: Extent,
+    pub(crate) extent: RecordExtent,
 }
 
 /// The encoded records of a strip.
 #[derive(Debug, Clone, Default)]
 pub struct Packed {
     pub(crate) bytes: Vec<u8>,
-    pub(crate) runs: Vec<Run>,
+    pub(crate) runs: Vec<TileRun>,
 }
 
 impl Packed {
@@ -58,7 +58,7 @@ impl Packed {
     }
 
     /// The runs with their records of `record_len` bytes each.
-    pub(crate) fn runs(&self, record_len: usize) -> impl Iterator<Item = (&Run, &[u8])> {
+    pub(crate) fn runs(&self, record_len: usize) -> impl Iterator<Item = (&TileRun, &[u8])> {
         let mut rest = &*self.bytes;
         self.runs.iter().map(move |run| {
             let (own, later) = rest.split_at(run.extent.n as usize * record_len);
@@ -175,8 +175,8 @@ impl Pack {
         ([row, col], [side(col), side(col + 1), side(row), side(row + 1)])
     }
 
-    fn runs(&self, points: &PointColumns<'_>, steps: &[[i32; 3]]) -> Vec<Run> {
-        let mut runs: Vec<Run> = Vec::new();
+    fn runs(&self, points: &PointColumns<'_>, steps: &[[i32; 3]]) -> Vec<TileRun> {
+        let mut runs: Vec<TileRun> = Vec::new();
         // Most points lie in the same tile as the point before.
         let (mut tile, mut bounds) = ([0; 2], [f64::NAN; 4]);
         for ((p, label), step) in points.world.iter().zip(points.labels).zip(steps) {
@@ -188,9 +188,9 @@ impl Pack {
             match runs.last_mut() {
                 Some(run) if run.tile == tile && run.moves == moves => run.extent.add(*step),
                 _ => {
-                    let mut extent = Extent::default();
+                    let mut extent = RecordExtent::default();
                     extent.add(*step);
-                    runs.push(Run { tile, moves, extent });
+                    runs.push(TileRun { tile, moves, extent });
                 }
             }
         }
@@ -202,7 +202,8 @@ impl Packed {
     /// Joins the runs of each tile and keeps the order of points within it.
     fn joined(self, record_len: usize) -> Self {
         let mut start = 0;
-        let mut order: Vec<([i32; 2], bool, usize, Extent)> = Vec::with_capacity(self.runs.len());
+        let mut order: Vec<([i32; 2], bool, usize, RecordExtent)> =
+            Vec::with_capacity(self.runs.len());
         for run in &self.runs {
             order.push((run.tile, run.moves, start, run.extent));
             start += run.extent.n as usize * record_len;
@@ -214,7 +215,7 @@ impl Packed {
             out.bytes.extend_from_slice(&self.bytes[start..end]);
             match out.runs.last_mut() {
                 Some(run) if run.tile == tile && run.moves == moves => run.extent.join(&extent),
-                _ => out.runs.push(Run { tile, moves, extent }),
+                _ => out.runs.push(TileRun { tile, moves, extent }),
             }
         }
         out

@@ -7,15 +7,15 @@ use std::marker::PhantomData;
 
 /// A JSON object whose names keep their order.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Places<T>(pub Vec<(String, T)>);
+pub struct NamedMap<T>(pub Vec<(String, T)>);
 
-impl<T> Default for Places<T> {
+impl<T> Default for NamedMap<T> {
     fn default() -> Self {
         Self(Vec::new())
     }
 }
 
-impl<T: Serialize> Serialize for Places<T> {
+impl<T: Serialize> Serialize for NamedMap<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
         for (name, value) in &self.0 {
@@ -25,23 +25,23 @@ impl<T: Serialize> Serialize for Places<T> {
     }
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Places<T> {
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for NamedMap<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
         struct InOrder<T>(PhantomData<T>);
         impl<'de, T: Deserialize<'de>> Visitor<'de> for InOrder<T> {
-            type Value = Places<T>;
+            type Value = NamedMap<T>;
             fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
                 f.write_str("an object")
             }
             fn visit_map<A: MapAccess<'de>>(
                 self,
                 mut map: A,
-            ) -> std::result::Result<Places<T>, A::Error> {
+            ) -> std::result::Result<NamedMap<T>, A::Error> {
                 let mut out = Vec::new();
                 while let Some(entry) = map.next_entry()? {
                     out.push(entry);
                 }
-                Ok(Places(out))
+                Ok(NamedMap(out))
             }
         }
         deserializer.deserialize_map(InOrder(PhantomData))

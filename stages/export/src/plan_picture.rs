@@ -23,11 +23,11 @@ pub struct PlanPicture {
     per_metre: f64,
     width: usize,
     height: usize,
-    cells: Vec<Cell>,
+    cells: Vec<PlanCell>,
 }
 
 #[derive(Debug, Default)]
-struct Cell {
+struct PlanCell {
     n_floor: AtomicU32,
     n_fixed: AtomicU32,
     n_uncertain: AtomicU32,
@@ -52,7 +52,7 @@ impl PlanPicture {
             per_metre: 1.0 / cell,
             width,
             height,
-            cells: (0..width * height).map(|_| Cell::default()).collect(),
+            cells: (0..width * height).map(|_| PlanCell::default()).collect(),
         }
     }
 
@@ -64,15 +64,15 @@ impl PlanPicture {
         for (p, label) in world.iter().zip(labels) {
             let now = (self.at([p[0], p[1]]), *label);
             if now != last {
-                self.count(last, n);
+                self.count(last.0, last.1, n);
                 (last, n) = (now, 0);
             }
             n += 1;
         }
-        self.count(last, n);
+        self.count(last.0, last.1, n);
     }
 
-    fn count(&self, (at, label): (Option<usize>, Label), n: u32) {
+    fn count(&self, at: Option<usize>, label: Label, n: u32) {
         let Some(at) = at else { return };
         let cell = &self.cells[at];
         let count = match label.kind {
@@ -159,7 +159,7 @@ impl PlanPicture {
     /// points.
     fn full(&self) -> f64 {
         let mut counts: Vec<u32> =
-            self.cells.iter().map(Cell::n_standing).filter(|n| *n > 0).collect();
+            self.cells.iter().map(PlanCell::n_standing).filter(|n| *n > 0).collect();
         if counts.is_empty() {
             return 1.0;
         }
@@ -179,7 +179,7 @@ const FLOOR: Rgb = [232, 234, 230];
 const FIXED: Rgb = [120, 126, 134];
 const UNCERTAIN: Rgb = [236, 190, 60];
 
-impl Cell {
+impl PlanCell {
     fn n_standing(&self) -> u32 {
         self.n_fixed.load(Relaxed).saturating_add(self.n_uncertain.load(Relaxed))
     }

@@ -168,20 +168,20 @@ impl LasSettings {
 
 /// Count and bounds of points, as a header states them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Extent {
+pub(crate) struct RecordExtent {
     pub(crate) n: u64,
     /// Smallest coordinates, in steps.
     pub(crate) min: [i32; 3],
     pub(crate) max: [i32; 3],
 }
 
-impl Default for Extent {
+impl Default for RecordExtent {
     fn default() -> Self {
         Self { n: 0, min: [i32::MAX; 3], max: [i32::MIN; 3] }
     }
 }
 
-impl Extent {
+impl RecordExtent {
     #[inline]
     pub(crate) fn add(&mut self, steps: [i32; 3]) {
         self.n += 1;

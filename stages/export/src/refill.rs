@@ -1,10 +1,10 @@
 //! Copies the points of an earlier result's tile that are not superseded to a tile that is being
 //! written, behind its new points. Records are copied byte for byte.
 
-use crate::block::Straight;
+use crate::block::DirectReader;
 use crate::chunks;
 use crate::las::head;
-use crate::record::{CLASSES, Extent, LasSettings};
+use crate::record::{CLASSES, LasSettings, RecordExtent};
 use crate::spool::{Blocks, Spool};
 use contract::{Error, Label, PointKind, Result};
 use las::raw;
@@ -45,7 +45,7 @@ pub struct OldPoint {
 
 /// Length and checksum of a tile, as a list of files states them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stated {
+pub struct StatedTile {
     /// Length, bytes.
     pub n_bytes: u64,
     /// CRC-32C (Castagnoli) of all bytes.
@@ -63,19 +63,19 @@ impl Spool {
     pub fn take_from(
         &mut self,
         old: &Path,
-        stated: Option<Stated>,
+        stated: Option<StatedTile>,
         keep: impl Fn(&[OldPoint]) -> Vec<bool>,
     ) -> Result<()> {
         let las = self.las().clone();
         let (record_len, mut blocks) = (las.record_len(), Blocks::new(WAITING));
         let (mut bytes, mut points) = (Vec::new(), Vec::new());
-        let mut tile = Tile::open(old, &las, stated)?;
+        let mut tile = RefillTile::open(old, &las, stated)?;
         while let Some(records) = tile.piece(&mut bytes)? {
             points.clear();
             points.extend(records.chunks_exact(record_len).map(|record| point(record, &las)));
             for run in runs(&keep(&points)) {
                 let run = &records[run.start * record_len..run.end * record_len];
-                let mut extent = Extent::default();
+                let mut extent = RecordExtent::default();
                 run.chunks_exact(record_len).for_each(|record| extent.add(steps(record)));
                 self.push(run, &extent, &mut blocks)?;
             }
@@ -94,11 +94,11 @@ impl Spool {
 pub fn read_tile(
     path: &Path,
     las: &LasSettings,
-    stated: Option<Stated>,
+    stated: Option<StatedTile>,
     mut take: impl FnMut(&[OldPoint]) -> Result<()>,
 ) -> Result<()> {
     let (record_len, mut bytes, mut points) = (las.record_len(), Vec::new(), Vec::new());
-    let mut tile = Tile::open(path, las, stated)?;
+    let mut tile = RefillTile::open(path, las, stated)?;
     while let Some(records) = tile.piece(&mut bytes)? {
         points.clear();
         points.extend(records.chunks_exact(record_len).map(|record| point(record, las)));
@@ -139,25 +139,25 @@ fn point(record: &[u8], las: &LasSettings) -> OldPoint {
 }
 
 /// A tile that is read piece by piece.
-struct Tile<'a> {
+struct RefillTile<'a> {
     path: &'a Path,
-    records: Records,
+    records: RefillRecords,
     record_len: usize,
     left: u64,
     /// The stated sum and the sum of what was read, if a sum is stated and the file is read
     /// sequentially.
-    sum: Option<(Stated, Stated)>,
+    sum: Option<(StatedTile, StatedTile)>,
 }
 
-enum Records {
+enum RefillRecords {
     /// A tile of no points: its table of chunks is not looked at, whatever it states.
     None,
-    Plain(Straight),
+    Plain(DirectReader),
     Compressed(Box<LasZipDecompressor<'static, BufReader<File>>>),
 }
 
-impl<'a> Tile<'a> {
-    fn open(path: &'a Path, las: &LasSettings, stated: Option<Stated>) -> Result<Self> {
+impl<'a> RefillTile<'a> {
+    fn open(path: &'a Path, las: &LasSettings, stated: Option<StatedTile>) -> Result<Self> {
         let failed = |e| Error::of_read("tile cannot be read", path, e);
         let foreign = || {
             let what = "this is no tile of the earlier result: its records are others";
@@ -165,7 +165,7 @@ impl<'a> Tile<'a> {
         };
         let mut file = BufReader::new(File::open(path).map_err(failed)?);
         let header = raw::Header::read_from(&mut file).map_err(|e| foreign().because(e))?;
-        let expected = head(las, &Extent::default())?.len();
+        let expected = head(las, &RecordExtent::default())?.len();
         let scales = [header.x_scale_factor, header.y_scale_factor, header.z_scale_factor];
         let is_ours = header.offset_to_point_data as usize == expected
             && usize::from(header.point_data_record_length) == las.record_len()
@@ -185,29 +185,31 @@ impl<'a> Tile<'a> {
             if left == 0 {
                 return Ok(Self {
                     path,
-                    records: Records::None,
+                    records: RefillRecords::None,
                     record_len: las.record_len(),
                     left,
                     sum,
                 });
             }
             let laz = crate::las::laz_vlr(las);
-            let (at, of) = (expected as u64, (&laz, las));
-            let fits = chunks::check(&mut file, at, of, left).map_err(failed)?;
+            let at = expected as u64;
+            let fits = chunks::check(&mut file, at, &laz, las, left).map_err(failed)?;
             fits.map_err(|what| foreign().because(what))?;
             file.seek(SeekFrom::Start(at)).map_err(failed)?;
             let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;
-            Records::Compressed(Box::new(reader))
+            RefillRecords::Compressed(Box::new(reader))
         } else {
             if let Some(stated) = stated {
                 let mut head = vec![0; expected];
                 file.seek(SeekFrom::Start(0))
                     .and_then(|_| file.read_exact(&mut head))
                     .map_err(failed)?;
-                let read = Stated { n_bytes: expected as u64, crc32c: crc32c::crc32c(&head) };
+                let read = StatedTile { n_bytes: expected as u64, crc32c: crc32c::crc32c(&head) };
                 sum = Some((stated, read));
             }
-            Records::Plain(Straight::new(file.into_inner(), expected as u64).map_err(failed)?)
+            RefillRecords::Plain(
+                DirectReader::new(file.into_inner(), expected as u64).map_err(failed)?,
+            )
         };
         Ok(Self { path, records, record_len: las.record_len(), left, sum })
     }
@@ -223,9 +225,9 @@ impl<'a> Tile<'a> {
         }
         bytes.resize(n as usize * self.record_len, 0);
         let read = match &mut self.records {
-            Records::None => Ok(()),
-            Records::Plain(file) => file.read_exact(bytes),
-            Records::Compressed(reader) => reader.decompress_many(bytes),
+            RefillRecords::None => Ok(()),
+            RefillRecords::Plain(file) => file.read_exact(bytes),
+            RefillRecords::Compressed(reader) => reader.decompress_many(bytes),
         };
         read.map_err(|e| Error::of_read("tile cannot be read", self.path, e))?;
         if let Some((_, read)) = &mut self.sum {
@@ -238,8 +240,8 @@ impl<'a> Tile<'a> {
 }
 
 /// Length and checksum of a whole file.
-fn sum_of(file: &mut File) -> std::io::Result<Stated> {
-    let (mut bytes, mut sum) = (vec![0; SUMMED], Stated { n_bytes: 0, crc32c: 0 });
+fn sum_of(file: &mut File) -> std::io::Result<StatedTile> {
+    let (mut bytes, mut sum) = (vec![0; SUMMED], StatedTile { n_bytes: 0, crc32c: 0 });
     file.seek(SeekFrom::Start(0))?;
     loop {
         let n = file.read(&mut bytes)?;
@@ -252,7 +254,7 @@ fn sum_of(file: &mut File) -> std::io::Result<Stated> {
 }
 
 /// Refuses a tile whose length or checksum differs from the stated one.
-fn compare(path: &Path, stated: Stated, read: Stated) -> Result<()> {
+fn compare(path: &Path, stated: StatedTile, read: StatedTile) -> Result<()> {
     if stated == read {
         return Ok(());
     }

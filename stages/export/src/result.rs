@@ -2,8 +2,9 @@
 //! `stillpoint.result/1`, which grows by adding fields. Numbers that are not finite become null.
 
 use crate::calibration::CalibrationEntry;
+use crate::finite::finite;
 use crate::mask::MaskFiles;
-use crate::places::Places;
+use crate::places::NamedMap;
 use crate::review::ReviewEntry;
 use crate::session::RescanEntry;
 use crate::space::SpaceEntry;
@@ -24,7 +25,7 @@ pub struct ResultFile {
     /// The robots; their indices are those of the masks.
     pub robots: Vec<RobotEntry>,
     /// Paths of the masks.
-    pub labels: Labels,
+    pub labels: LabelFiles,
     /// The inputs that were read.
     pub inputs: Vec<InputEntry>,
     /// The stages that ran.
@@ -53,28 +54,28 @@ pub struct RobotEntry {
     /// Standard deviation of the base.
     pub base_sigma: BaseSigma,
     /// Value of each free joint, radians or metres, in the order of the model.
-    pub joints: Places<f64>,
+    pub joints: NamedMap<f64>,
     /// Names of the joints whose values are metres; those of all others are radians.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub slides: Vec<String>,
     /// Standard deviation of each free joint in the same unit; π/√3, that of a uniform angle, where
     /// the points say nothing of it.
-    pub sigma: Places<f64>,
+    pub sigma: NamedMap<f64>,
     /// Values of the joints that follow the free ones by a rule or in a closed loop, in the same
     /// units.
     #[serde(default)]
-    pub passive: Places<f64>,
+    pub passive: NamedMap<f64>,
     /// Whether the points determine each free joint.
     #[serde(default)]
-    pub determined: Places<bool>,
+    pub determined: NamedMap<bool>,
     /// How well they do: `determined`, `coarse` or `undetermined`.
     #[serde(default)]
-    pub certainty: Places<Certainty>,
+    pub certainty: NamedMap<Certainty>,
     /// Names of the links; their indices are those of the masks.
     pub links: Vec<String>,
     /// Pose of each link in the world.
     #[serde(default)]
-    pub link_poses: Places<BasePose>,
+    pub link_poses: NamedMap<BasePose>,
     /// `trusted`, `doubtful` or `refused`.
     pub verdict: String,
     /// Share of the surface that is explained less the share that is contradicted.
@@ -95,7 +96,7 @@ pub struct RobotEntry {
     /// For each joint other values within its limits, whole turns away, at which the robot stands
     /// the same.
     #[serde(default)]
-    pub equivalents: Places<Vec<f64>>,
+    pub equivalents: NamedMap<Vec<f64>>,
     /// The tool that it carries; the tool's joints and links follow the robot's own.
     #[serde(default)]
     pub tool: Option<ToolEntry>,
@@ -217,7 +218,7 @@ pub struct ToolEntry {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EqualEntry {
     /// Value of each joint, radians or metres.
-    pub joints: Places<f64>,
+    pub joints: NamedMap<f64>,
     /// How clearly the beams prefer the robot's posture, as in [`RunnerUpEntry`].
     pub margin: Option<f64>,
 }
@@ -237,7 +238,7 @@ pub struct ShiftEntry {
 
 /// Paths of the masks.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Labels {
+pub struct LabelFiles {
     /// Path of the legend.
     pub table: String,
     /// The files of each mask.
@@ -322,13 +323,13 @@ impl RobotEntry {
             base_link: links.first().cloned().unwrap_or_default(),
             base_pose: (&fit.world_from_base).into(),
             base_sigma: BaseSigma { xyz: [0, 1, 2].map(sigma), rotation: [3, 4, 5].map(sigma) },
-            joints: Places(each(fit, |j| j.value)),
-            sigma: Places(each(fit, |j| j.sigma)),
-            determined: Places(each(fit, |j| j.is_determined())),
-            certainty: Places(each(fit, |j| j.certainty)),
-            passive: Places::default(),
+            joints: NamedMap(each(fit, |j| j.value)),
+            sigma: NamedMap(each(fit, |j| j.sigma)),
+            determined: NamedMap(each(fit, |j| j.is_determined())),
+            certainty: NamedMap(each(fit, |j| j.certainty)),
+            passive: NamedMap::default(),
             links: links.to_vec(),
-            link_poses: Places::default(),
+            link_poses: NamedMap::default(),
             verdict: fit.verdict.word().into(),
             score: finite(fit.score),
             rms: finite(fit.rms),
@@ -340,7 +341,7 @@ impl RobotEntry {
                 margin: finite(r.margin),
             }),
             equals: fit.equals.iter().map(|e| EqualEntry::new(fit, e)).collect(),
-            equivalents: Places(
+            equivalents: NamedMap(
                 fit.joints
                     .iter()
                     .filter(|j| !j.equivalents.is_empty())
@@ -375,7 +376,7 @@ impl EqualEntry {
     fn new(fit: &Fit, equal: &contract::Equal) -> Self {
         let names = fit.joints.iter().map(|j| j.name.clone());
         Self {
-            joints: Places(names.zip(equal.posture.iter().copied()).collect()),
+            joints: NamedMap(names.zip(equal.posture.iter().copied()).collect()),
             margin: finite(equal.margin),
         }
     }
@@ -400,7 +401,7 @@ impl From<&contract::LinkEvidence> for LinkEntry {
     }
 }
 
-impl Labels {
+impl LabelFiles {
     /// Path of the legend.
     pub const TABLE: &'static str = "labels/table.json";
 }
@@ -418,9 +419,4 @@ impl ScanLabels {
 /// A property of each joint of a fit, by name.
 fn each<T>(fit: &Fit, of: impl Fn(&JointFit) -> T) -> Vec<(String, T)> {
     fit.joints.iter().map(|joint| (joint.name.clone(), of(joint))).collect()
-}
-
-/// The number, if it is finite.
-pub(crate) fn finite(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
 }

@@ -21,10 +21,10 @@ pub struct RobotPicture {
     robot: i16,
     bounds: Aabb,
     links: Vec<String>,
-    views: Vec<View>,
+    views: Vec<PictureView>,
 }
 
-struct View {
+struct PictureView {
     name: &'static str,
     /// Rows of the transform to pixels to the right, pixels down, and metres away from the viewer.
     view_from_world: Rows,
@@ -69,7 +69,7 @@ impl RobotPicture {
             ("oblique", 40.0, 30.0),
         ];
         let views = fan.fan(views.into(), |(name, turn, tilt): (_, f64, f64)| {
-            let mut view = View::new(name, turn, tilt, &shown);
+            let mut view = PictureView::new(name, turn, tilt, &shown);
             view.outline(model, world_from_link);
             view
         });
@@ -138,7 +138,7 @@ impl RobotPicture {
     }
 }
 
-impl View {
+impl PictureView {
     /// A view from the front (+x), turned by `turn` degrees about z and tilted by `tilt` degrees
     /// from above.
     fn new(name: &'static str, turn: f64, tilt: f64, bounds: &Aabb) -> Self {
@@ -255,7 +255,7 @@ impl View {
     }
 }
 
-impl View {
+impl PictureView {
     /// Draws points red in front of the surface, blue behind it, and white on it.
     fn draw_residuals(&self) -> Canvas {
         let mut canvas = Canvas::new(SIDE, SIDE);

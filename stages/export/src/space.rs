@@ -7,7 +7,7 @@
 //! ```
 
 use crate::npy::{self, NpyWriter};
-use crate::octomap::{self, Grid, HALF};
+use crate::octomap::{self, HALF, OctomapGrid};
 use contract::{Error, Result, Space, SpaceGrid, SpaceKind};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -92,7 +92,7 @@ pub fn write_space(out: &Path, id: &str, space: &Space) -> Result<SpaceEntry> {
     let tree = |known: &dyn Fn(usize) -> Option<bool>, file: &str| {
         octomap::write(
             &out.join(name(file)),
-            &Grid { first, size: grid.size, edge: grid.edge, known },
+            &OctomapGrid { first, size: grid.size, edge: grid.edge, known },
         )
     };
     let known = |at: usize| match voxels[at] {

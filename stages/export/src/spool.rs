@@ -2,9 +2,9 @@
 //! are appended.
 
 use crate::atomic::part_of;
-use crate::block::{self, Block};
+use crate::block::{self, AlignedBlock};
 use crate::las::{LasSummary, LasWriter, bounds, head};
-use crate::record::{Extent, LasSettings};
+use crate::record::{LasSettings, RecordExtent};
 use crate::summed::BodySum;
 use contract::{Error, Result};
 use std::fs::{File, OpenOptions};
@@ -19,7 +19,7 @@ const MIN_BLOCKS: usize = 4;
 
 /// The pool of blocks for waiting records.
 pub(crate) struct Blocks {
-    pub(crate) empty: Vec<Block>,
+    pub(crate) empty: Vec<AlignedBlock>,
     /// Number of blocks that may still be allocated.
     left: usize,
 }
@@ -30,11 +30,11 @@ impl Blocks {
     }
 
     /// An empty block; `None` where all are in use.
-    pub(crate) fn take(&mut self) -> Option<Block> {
+    pub(crate) fn take(&mut self) -> Option<AlignedBlock> {
         let known = self.empty.pop();
         if known.is_none() && self.left > 0 {
             self.left -= 1;
-            return Some(Block::default());
+            return Some(AlignedBlock::default());
         }
         known
     }
@@ -48,8 +48,8 @@ pub struct Spool {
     /// the end.
     part: PathBuf,
     /// Waiting records; all blocks but the last are full.
-    pub(crate) blocks: Vec<Block>,
-    pub(crate) extent: Extent,
+    pub(crate) blocks: Vec<AlignedBlock>,
+    pub(crate) extent: RecordExtent,
     body: BodySum,
     /// The part of the header that is not yet written.
     head: Vec<u8>,
@@ -66,8 +66,8 @@ impl Spool {
     /// If the settings give no valid header.
     pub fn create(path: PathBuf, las: &LasSettings) -> Result<Self> {
         let part = part_of(&path.with_extension("records"));
-        let head = if las.compress { Vec::new() } else { head(las, &Extent::default())? };
-        let (extent, body, n_head) = (Extent::default(), BodySum::default(), head.len());
+        let head = if las.compress { Vec::new() } else { head(las, &RecordExtent::default())? };
+        let (extent, body, n_head) = (RecordExtent::default(), BodySum::default(), head.len());
         let (las, blocks) = (las.clone(), Vec::new());
         let (is_begun, direct) = (false, true);
         Ok(Self { path, las, part, blocks, extent, body, head, n_head, is_begun, direct })
@@ -94,7 +94,7 @@ impl Spool {
     pub(crate) fn push(
         &mut self,
         mut records: &[u8],
-        extent: &Extent,
+        extent: &RecordExtent,
         blocks: &mut Blocks,
     ) -> Result<()> {
         self.extent.join(extent);
@@ -129,7 +129,7 @@ impl Spool {
     }
 
     /// Writes the first `n` waiting blocks to the file and returns them.
-    pub(crate) fn write(&mut self, n: usize) -> Result<Vec<Block>> {
+    pub(crate) fn write(&mut self, n: usize) -> Result<Vec<AlignedBlock>> {
         let first = &self.blocks[..n];
         self.direct &= first.iter().all(|block| block.bytes().len() == BLOCK_BYTES);
         let written = self.open().and_then(|mut file| {
@@ -140,7 +140,7 @@ impl Spool {
         });
         written.map_err(|e| Error::of_file("tile cannot be written", &self.part, e))?;
         self.is_begun = true;
-        let mut written: Vec<Block> = self.blocks.drain(..n).collect();
+        let mut written: Vec<AlignedBlock> = self.blocks.drain(..n).collect();
         for block in &mut written {
             let n_head = self.n_head.min(block.bytes().len());
             self.body.add(&block.bytes()[n_head..]);
@@ -203,7 +203,7 @@ impl Spool {
             let n = left.min(piece.len());
             file.read_exact(&mut piece[..n]).map_err(failed)?;
             writer.push_records(&piece[..n], &extent)?;
-            (left, extent) = (left - n, Extent::default());
+            (left, extent) = (left - n, RecordExtent::default());
         }
         writer.finish()
     }

@@ -5,7 +5,7 @@
 //! parallel.
 
 use crate::las::LasSummary;
-use crate::pack::{Packed, Run};
+use crate::pack::{Packed, TileRun};
 use crate::record::LasSettings;
 use crate::settings::Settings;
 use crate::spool::{Blocks, Spool};
@@ -48,7 +48,7 @@ impl Tiles {
         runs.try_for_each(|(run, records)| self.spool(run, records, fan))
     }
 
-    fn spool(&mut self, run: &Run, mut records: &[u8], fan: &dyn Fan) -> Result<()> {
+    fn spool(&mut self, run: &TileRun, mut records: &[u8], fan: &dyn Fan) -> Result<()> {
         let (at, las) = (run.tile, &self.las);
         let path = || self.out.join(format!("tiles/{}_{}.{}", at[1], at[0], las.ending()));
         let spool = match self.tiles.entry(at) {

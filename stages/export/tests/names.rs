@@ -2,7 +2,7 @@
 //! stay valid for their readers.
 
 use contract::{Fit, JointFit, Verdict, quote};
-use export::{Labels, ResultFile, RobotEntry, SCHEMA, write_junit, write_robot};
+use export::{LabelFiles, ResultFile, RobotEntry, SCHEMA, write_junit, write_robot};
 use robot::{Model, Settings};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -81,7 +81,7 @@ fn junit_of_a_result_with_odd_names_is_xml_that_says_them() {
         schema: SCHEMA.into(),
         version: "0".into(),
         robots: vec![RobotEntry::new(ODD, &fit(&model), &links, None)],
-        labels: Labels { table: "t".into(), scans: Vec::new() },
+        labels: LabelFiles { table: "t".into(), scans: Vec::new() },
         inputs: Vec::new(),
         stages: Vec::new(),
         warnings: Vec::new(),

@@ -134,7 +134,7 @@ fn sample(out: &Path) {
         schema: SCHEMA.into(),
         version: "0.1.0".into(),
         robots,
-        labels: Labels {
+        labels: LabelFiles {
             table: "labels/table.json".into(),
             scans: vec![ScanLabels::new(&mask, n_points)],
         },

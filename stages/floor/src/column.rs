@@ -1,11 +1,11 @@
 //! What occupied space lies above and below a surface, by ground cell.
 
-use crate::pieces::{GROUND, Node};
+use crate::pieces::{GROUND, GroundNode};
 use contract::Occupancy;
 
 /// Shares of a surface's cells with occupied space in bands below and above it, 0..1.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Around {
+pub(crate) struct SpaceAround {
     /// Anything lower than [`NEAR`] below the surface.
     pub(crate) below: f64,
     /// Anything between [`NEAR`] and [`TALL`] below the surface.
@@ -25,12 +25,12 @@ const MIN_POINTS: u32 = 3;
 
 /// Occupied voxels by ground cell, for look-ups under many surfaces.
 #[derive(Debug)]
-pub(crate) struct Columns {
+pub(crate) struct GroundColumns {
     /// Ground cell and height of the voxel's centre (metres), sorted.
     voxels: Vec<([i32; 2], f32)>,
 }
 
-impl Columns {
+impl GroundColumns {
     /// Sorts the voxels by ground cell.
     pub(crate) fn new(occupancy: &Occupancy) -> Self {
         let middle = |i: i32| (f64::from(i) + 0.5) * occupancy.edge;
@@ -49,7 +49,7 @@ impl Columns {
     }
 
     /// The occupied space around a surface.
-    pub(crate) fn around(&self, nodes: &[Node]) -> Around {
+    pub(crate) fn around(&self, nodes: &[GroundNode]) -> SpaceAround {
         let mut n = [0_u32; 4];
         for node in nodes {
             let from = self.voxels.partition_point(|v| v.0 < node.cell);
@@ -66,6 +66,6 @@ impl Columns {
             }
         }
         let share = |k: usize| f64::from(n[k]) / nodes.len().max(1) as f64;
-        Around { below: share(0), near_below: share(1), near_above: share(2), above: share(3) }
+        SpaceAround { below: share(0), near_below: share(1), near_above: share(2), above: share(3) }
     }
 }

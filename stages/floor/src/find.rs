@@ -1,7 +1,7 @@
 //! The step that reduces the summaries of all tiles to floor and occupied space.
 
 use crate::Settings;
-use crate::column::Columns;
+use crate::column::GroundColumns;
 use crate::levels::{describe, levels};
 use crate::mounts::MIN_PATCH;
 use crate::overlap::Overlaps;
@@ -23,7 +23,7 @@ pub struct Find {
 
 /// State that is kept while summaries come in.
 #[derive(Debug, Clone, Default)]
-pub struct Sum {
+pub struct FloorSum {
     n_points: u64,
     n_veils: u64,
     patches: Vec<PlanePatch>,
@@ -37,7 +37,7 @@ pub struct Sum {
 
 /// Floor, occupied space and other planar surfaces of a plant.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Ground {
+pub struct FloorFindings {
     /// Floor levels and installation planes.
     pub floor: Floor,
     /// Occupied space over all scans, floor and walls included.
@@ -66,7 +66,7 @@ impl Find {
     }
 }
 
-impl Sum {
+impl FloorSum {
     fn push(&mut self, occupancy: Occupancy) {
         if occupancy.voxels.is_empty() {
             return;
@@ -91,14 +91,14 @@ impl Sum {
 
 impl Fold for Find {
     type In = TileSummary;
-    type Sum = Sum;
-    type Out = Ground;
+    type Sum = FloorSum;
+    type Out = FloorFindings;
 
-    fn empty(&self) -> Sum {
-        Sum::default()
+    fn empty(&self) -> FloorSum {
+        FloorSum::default()
     }
 
-    fn add(&self, sum: &mut Sum, item: TileSummary) -> Result<()> {
+    fn add(&self, sum: &mut FloorSum, item: TileSummary) -> Result<()> {
         sum.n_points += item.n_points;
         sum.n_veils += item.n_veils;
         for patch in item.patches {
@@ -113,7 +113,7 @@ impl Fold for Find {
         Ok(())
     }
 
-    fn join(&self, earlier: &mut Sum, later: Sum) -> Result<()> {
+    fn join(&self, earlier: &mut FloorSum, later: FloorSum) -> Result<()> {
         earlier.n_points += later.n_points;
         earlier.n_veils += later.n_veils;
         earlier.patches.extend(later.patches);
@@ -125,15 +125,15 @@ impl Fold for Find {
         Ok(())
     }
 
-    fn finish(&self, mut sum: Sum) -> Result<Ground> {
+    fn finish(&self, mut sum: FloorSum) -> Result<FloorFindings> {
         while sum.occupancies.len() > 1 {
             sum.fuse();
         }
         let occupancy = sum.occupancies.pop().unwrap_or_default();
         let floor = search(&sum.patches, &occupancy, &self.scanners, &self.settings);
-        let Sum { sides, overlaps, n_points, n_veils, .. } = sum;
+        let FloorSum { sides, overlaps, n_points, n_veils, .. } = sum;
         let overlaps = overlaps.finish();
-        Ok(Ground { floor, occupancy, sides, overlaps, n_points, n_veils })
+        Ok(FloorFindings { floor, occupancy, sides, overlaps, n_points, n_veils })
     }
 }
 
@@ -161,7 +161,7 @@ fn search(
     settings: &Settings,
 ) -> Floor {
     let wanted = |p: &PlanePatch| faces_up(p, settings);
-    let columns = Columns::new(occupancy);
+    let columns = GroundColumns::new(occupancy);
     let pieces = pieces(patches, wanted, settings);
     let crate::levels::Levels { floor: found, ceilings } =
         levels(pieces, patches, &columns, scanners, settings);
@@ -172,7 +172,7 @@ fn search(
         .filter(|(i, p)| wanted(p) && ceilings.binary_search(i).is_err())
         .map(|(_, p)| p.clone())
         .collect();
-    let mut planes = stands(&may_carry, (&found, &levels), scanners, settings);
+    let mut planes = stands(&may_carry, &found, &levels, scanners, settings);
     planes.extend(found.iter().map(|level| InstallationPlane {
         plane: level.plane,
         bounds: Aabb::of(level.nodes.iter().map(|n| n.place().into())),

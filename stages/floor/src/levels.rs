@@ -1,8 +1,8 @@
 //! Finds floor levels among pieces of level surface: those that are large, low and seen from above.
 
 use crate::Settings;
-use crate::column::{Around, Columns};
-use crate::pieces::{GROUND, Node, Piece, fit, height};
+use crate::column::{GroundColumns, SpaceAround};
+use crate::pieces::{GROUND, GroundNode, LevelPiece, fit, height};
 use contract::{FloorLevel, PlanePatch, ScanId};
 use geometry::{Plane, Vector};
 
@@ -19,9 +19,9 @@ const NEAR_CELL: i32 = 1;
 
 /// Pieces of level surface at one height.
 #[derive(Debug, Clone)]
-pub(crate) struct Level {
+pub(crate) struct PieceLevel {
     /// Cells of all its pieces, sorted by cell.
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Vec<GroundNode>,
     /// Indices of its patches, ascending.
     pub(crate) patches: Vec<usize>,
     /// Mean plane; its normal points up.
@@ -33,15 +33,15 @@ pub(crate) struct Level {
 }
 
 /// Positions of the scanners (world, metres; `None` where unknown), sorted by scan.
-pub(crate) type Scanners = [(ScanId, Option<Vector>)];
+pub(crate) type ScannerPlaces = [(ScanId, Option<Vector>)];
 
 /// Position of a scanner in the world, metres, if known.
-pub(crate) fn scanner(scanners: &Scanners, id: ScanId) -> Option<Vector> {
+pub(crate) fn scanner(scanners: &ScannerPlaces, id: ScanId) -> Option<Vector> {
     scanners.binary_search_by_key(&id, |s| s.0).ok().and_then(|i| scanners[i].1)
 }
 
-impl Level {
-    fn new(piece: Piece) -> Option<Self> {
+impl PieceLevel {
+    fn new(piece: LevelPiece) -> Option<Self> {
         let (plane, waviness) = fit(&piece.nodes)?;
         let largest = piece.area();
         Some(Self { nodes: piece.nodes, patches: piece.patches, plane, waviness, largest })
@@ -53,7 +53,7 @@ impl Level {
     }
 
     /// Whether `piece` belongs to this level: heights agree within what its distance allows.
-    fn continues(&self, piece: &Piece, settings: &Settings) -> bool {
+    fn continues(&self, piece: &LevelPiece, settings: &Settings) -> bool {
         let mut off: Vec<f64> = piece
             .nodes
             .iter()
@@ -69,14 +69,15 @@ impl Level {
     }
 
     /// Horizontal gap between the bounds of both, metres.
-    fn distance(&self, piece: &Piece) -> f64 {
-        let bounds = |nodes: &[Node]| geometry::Aabb::of(nodes.iter().map(|n| n.place().into()));
+    fn distance(&self, piece: &LevelPiece) -> f64 {
+        let bounds =
+            |nodes: &[GroundNode]| geometry::Aabb::of(nodes.iter().map(|n| n.place().into()));
         let (a, b) = (bounds(&self.nodes), bounds(&piece.nodes));
         let gap = |i: usize| (a.min[i] - b.max[i]).max(b.min[i] - a.max[i]).max(0.0);
         gap(0).hypot(gap(1))
     }
 
-    fn join(&mut self, piece: Piece) {
+    fn join(&mut self, piece: LevelPiece) {
         // Small pieces hardly change the plane, so that a new fit for each is not worth its time.
         let refit = piece.nodes.len() * 20 >= self.nodes.len();
         self.nodes.extend(piece.nodes);
@@ -95,7 +96,7 @@ impl Level {
         &self,
         upper: &Self,
         patches: &[PlanePatch],
-        scanners: &Scanners,
+        scanners: &ScannerPlaces,
     ) -> f64 {
         let (mut through, mut all) = (0.0, 0.0);
         for patch in self.patches.iter().map(|&i| &patches[i]) {
@@ -120,10 +121,10 @@ impl Level {
 }
 
 /// Share of a patch's cells that the scanner at `from` saw through `upper`.
-pub(crate) fn seen_through(patch: &PlanePatch, from: Vector, upper: &Level) -> f64 {
+pub(crate) fn seen_through(patch: &PlanePatch, from: Vector, upper: &PieceLevel) -> f64 {
     let mut n = 0;
     for &(cell, count, sum) in &patch.ground {
-        let p = Node { cell, z: sum / f64::from(count.max(1)), n: count }.place();
+        let p = GroundNode { cell, z: sum / f64::from(count.max(1)), n: count }.place();
         let (above, below) = (upper.plane.distance(&from), upper.plane.distance(&p));
         if above > 0.0 && below < -0.1 {
             let t = above / (above - below);
@@ -138,7 +139,7 @@ pub(crate) fn seen_through(patch: &PlanePatch, from: Vector, upper: &Level) -> f
 #[derive(Debug, Default)]
 pub(crate) struct Levels {
     /// Floor levels, largest first.
-    pub(crate) floor: Vec<Level>,
+    pub(crate) floor: Vec<PieceLevel>,
     /// Indices of the patches of ceilings, ascending. Their scanners are unknown; nothing can stand
     /// on them.
     pub(crate) ceilings: Vec<usize>,
@@ -146,18 +147,18 @@ pub(crate) struct Levels {
 
 /// Groups pieces into levels and selects those that are floor.
 pub(crate) fn levels(
-    pieces: Vec<Piece>,
+    pieces: Vec<LevelPiece>,
     patches: &[PlanePatch],
-    columns: &Columns,
-    scanners: &Scanners,
+    columns: &GroundColumns,
+    scanners: &ScannerPlaces,
     settings: &Settings,
 ) -> Levels {
-    let mut groups: Vec<Level> = Vec::new();
+    let mut groups: Vec<PieceLevel> = Vec::new();
     for piece in pieces {
         match groups.iter_mut().find(|group| group.continues(&piece, settings)) {
             Some(group) => group.join(piece),
             // A piece of a single cell may join a level, but is too small to begin one.
-            None if piece.nodes.len() > 1 => groups.extend(Level::new(piece)),
+            None if piece.nodes.len() > 1 => groups.extend(PieceLevel::new(piece)),
             None => {}
         }
     }
@@ -189,9 +190,14 @@ pub(crate) fn levels(
     out
 }
 
-/// Whether a level was seen from below, judged by what lies around it. Where the scanner is known,
-/// the normals of the patches tell the side.
-fn is_ceiling(level: &Level, around: Around, patches: &[PlanePatch], scanners: &Scanners) -> bool {
+/// Whether a level was seen from below, by what lies around it; where the scanner is known, its
+/// side is.
+fn is_ceiling(
+    level: &PieceLevel,
+    around: SpaceAround,
+    patches: &[PlanePatch],
+    scanners: &ScannerPlaces,
+) -> bool {
     let known = weight(level, patches, |p| scanner(scanners, p.scan).is_some());
     if 2.0 * known >= weight(level, patches, |_| true) {
         return false;
@@ -201,12 +207,16 @@ fn is_ceiling(level: &Level, around: Around, patches: &[PlanePatch], scanners: &
     bare || around.near_above > COVERED
 }
 
-fn weight(level: &Level, patches: &[PlanePatch], wanted: impl Fn(&PlanePatch) -> bool) -> f64 {
+fn weight(level: &PieceLevel, patches: &[PlanePatch], wanted: impl Fn(&PlanePatch) -> bool) -> f64 {
     level.patches.iter().map(|&i| &patches[i]).filter(|p| wanted(p)).map(|p| p.moments.n).sum()
 }
 
-/// The level's mean plane and height map.
-pub(crate) fn describe(level: &Level, patches: &[PlanePatch], settings: &Settings) -> FloorLevel {
+/// The level as others see it: mean plane and height map.
+pub(crate) fn describe(
+    level: &PieceLevel,
+    patches: &[PlanePatch],
+    settings: &Settings,
+) -> FloorLevel {
     let cell = settings.height_cell;
     let mut offs: Vec<([i32; 2], f64)> = level
         .nodes
@@ -243,7 +253,7 @@ fn scatter<'a>(level: &FloorLevel, patches: impl Iterator<Item = &'a PlanePatch>
     let mut offs: Vec<(f64, u32)> = Vec::new();
     for patch in patches {
         for &(cell, n, sum) in &patch.ground {
-            let at = Node { cell, z: sum / f64::from(n.max(1)), n }.place();
+            let at = GroundNode { cell, z: sum / f64::from(n.max(1)), n }.place();
             let off = level.height(at.x, at.y).map(|height| at.z - height);
             offs.extend(off.map(|off| (off.hypot(patch.rms), n)));
         }

@@ -38,6 +38,6 @@ mod settings;
 mod stands;
 mod union;
 
-pub use find::{Find, Ground, Sum, find};
+pub use find::{Find, FloorFindings, FloorSum, find};
 pub use mounts::mounts;
 pub use settings::Settings;

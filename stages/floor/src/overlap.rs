@@ -18,15 +18,15 @@ const ALIKE: f64 = 0.999_66;
 const APART: f64 = 0.02;
 
 /// A cell, and the axis and side to which its surface faces (the axis nearest to the normal).
-type Key = ([i32; 3], u8);
+type SurfaceCell = ([i32; 3], u8);
 
 /// What each scan saw of each piece.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Overlaps(BTreeMap<Key, Vec<Seen>>);
+pub(crate) struct Overlaps(BTreeMap<SurfaceCell, Vec<ScanSurface>>);
 
 /// What one scan saw of one piece.
 #[derive(Debug, Clone)]
-struct Seen {
+struct ScanSurface {
     scan: ScanId,
     n: f64,
     /// Sums of places (metres) and of normals over its points.
@@ -40,7 +40,7 @@ impl Overlaps {
         let cell = [0, 1, 2].map(|i| floor_i32(middle[i] / EDGE));
         let axis = normal.iamax();
         let key = (cell, 2 * axis as u8 + u8::from(normal[axis] > 0.0));
-        let seen = Seen { scan: patch.scan, n, place: middle * n, normal: normal * n };
+        let seen = ScanSurface { scan: patch.scan, n, place: middle * n, normal: normal * n };
         self.seen(key, seen);
     }
 
@@ -48,7 +48,7 @@ impl Overlaps {
         later.0.into_iter().for_each(|(key, all)| all.into_iter().for_each(|s| self.seen(key, s)));
     }
 
-    fn seen(&mut self, key: Key, seen: Seen) {
+    fn seen(&mut self, key: SurfaceCell, seen: ScanSurface) {
         let all = self.0.entry(key).or_default();
         match all.iter_mut().find(|known| known.scan == seen.scan) {
             Some(known) => {
@@ -66,14 +66,14 @@ impl Overlaps {
     }
 }
 
-fn overlap(mut all: Vec<Seen>) -> Option<Overlap> {
+fn overlap(mut all: Vec<ScanSurface>) -> Option<Overlap> {
     all.retain(|seen| seen.n >= MIN_POINTS);
     if all.len() < 2 {
         return None;
     }
     let normal = all.iter().map(|seen| seen.normal.normalize()).sum::<Vector>().normalize();
     let middle = all.iter().map(|seen| seen.place / seen.n).sum::<Vector>() / all.len() as f64;
-    let is_it = |seen: &Seen| {
+    let is_it = |seen: &ScanSurface| {
         let off = normal.dot(&(seen.place / seen.n - middle));
         seen.normal.normalize().dot(&normal) > ALIKE && off.abs() < APART
     };

@@ -11,7 +11,7 @@ pub(crate) const GROUND: f64 = 0.25;
 
 /// Height of a surface in one ground cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Node {
+pub(crate) struct GroundNode {
     /// Ground cell.
     pub(crate) cell: [i32; 2],
     /// Mean height, metres.
@@ -20,7 +20,7 @@ pub(crate) struct Node {
     pub(crate) n: u32,
 }
 
-impl Node {
+impl GroundNode {
     /// Centre of the cell at the height of the surface, world, metres.
     pub(crate) fn place(&self) -> Vector {
         let [x, y] = self.cell.map(|i| (f64::from(i) + 0.5) * GROUND);
@@ -30,14 +30,14 @@ impl Node {
 
 /// A connected level surface.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Piece {
+pub(crate) struct LevelPiece {
     /// Its cells, sorted by cell, then height.
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Vec<GroundNode>,
     /// Indices of the patches that it is made of, ascending.
     pub(crate) patches: Vec<usize>,
 }
 
-impl Piece {
+impl LevelPiece {
     /// Area of its cells, m².
     pub(crate) fn area(&self) -> f64 {
         self.nodes.len() as f64 * GROUND * GROUND
@@ -57,7 +57,7 @@ pub(crate) fn pieces(
     patches: &[PlanePatch],
     wanted: impl Fn(&PlanePatch) -> bool,
     settings: &Settings,
-) -> Vec<Piece> {
+) -> Vec<LevelPiece> {
     let mut entries: Vec<Entry> = Vec::new();
     for (patch, p) in patches.iter().enumerate().filter(|(_, p)| wanted(p)) {
         entries.extend(
@@ -77,14 +77,14 @@ pub(crate) fn pieces(
 }
 
 /// Merges the entries of one cell whose heights differ by less than a step to one node.
-fn merge_heights(entries: &[Entry], settings: &Settings) -> (Vec<Node>, Vec<usize>) {
-    let mut nodes: Vec<Node> = Vec::new();
+fn merge_heights(entries: &[Entry], settings: &Settings) -> (Vec<GroundNode>, Vec<usize>) {
+    let mut nodes: Vec<GroundNode> = Vec::new();
     let mut node_of = Vec::with_capacity(entries.len());
     let mut sum = 0.0;
     for e in entries {
         let same = nodes.last().is_some_and(|n| n.cell == e.cell && e.z - n.z <= settings.max_step);
         if !same {
-            nodes.push(Node { cell: e.cell, z: e.z, n: 0 });
+            nodes.push(GroundNode { cell: e.cell, z: e.z, n: 0 });
             sum = 0.0;
         }
         if let Some(node) = nodes.last_mut() {
@@ -98,7 +98,7 @@ fn merge_heights(entries: &[Entry], settings: &Settings) -> (Vec<Node>, Vec<usiz
 }
 
 /// Joins nodes of neighbouring cells with little difference in height.
-fn join_cells(nodes: &[Node], union: &mut Union, settings: &Settings) {
+fn join_cells(nodes: &[GroundNode], union: &mut Union, settings: &Settings) {
     for (i, node) in nodes.iter().enumerate() {
         for [dx, dy] in [[0, 1], [1, -1], [1, 0], [1, 1]] {
             let cell = [node.cell[0].saturating_add(dx), node.cell[1].saturating_add(dy)];
@@ -127,14 +127,19 @@ fn join_patches(entries: &[Entry], node_of: &[usize], n_patches: usize, union: &
     }
 }
 
-fn collect(nodes: &[Node], entries: &[Entry], node_of: &[usize], union: &mut Union) -> Vec<Piece> {
+fn collect(
+    nodes: &[GroundNode],
+    entries: &[Entry],
+    node_of: &[usize],
+    union: &mut Union,
+) -> Vec<LevelPiece> {
     let mut number = vec![usize::MAX; nodes.len()];
-    let mut out: Vec<Piece> = Vec::new();
+    let mut out: Vec<LevelPiece> = Vec::new();
     for (i, node) in nodes.iter().enumerate() {
         let root = union.find(i);
         if number[root] == usize::MAX {
             number[root] = out.len();
-            out.push(Piece { nodes: Vec::new(), patches: Vec::new() });
+            out.push(LevelPiece { nodes: Vec::new(), patches: Vec::new() });
         }
         out[number[root]].nodes.push(*node);
     }
@@ -152,7 +157,7 @@ fn collect(nodes: &[Node], entries: &[Entry], node_of: &[usize], union: &mut Uni
 
 /// Mean plane of nodes, each cell with the same weight and the normal up, with the RMS of heights
 /// about it. Outliers are left out once. A single row of cells gives a horizontal plane.
-pub(crate) fn fit(nodes: &[Node]) -> Option<(Plane, f64)> {
+pub(crate) fn fit(nodes: &[GroundNode]) -> Option<(Plane, f64)> {
     let first = nodes.first()?.place();
     let mut moments = Moments::new(first);
     nodes.iter().for_each(|n| moments.add(&n.place()));
@@ -165,7 +170,7 @@ pub(crate) fn fit(nodes: &[Node]) -> Option<(Plane, f64)> {
     let mut kept = Moments::new(first);
     nodes
         .iter()
-        .map(Node::place)
+        .map(GroundNode::place)
         .filter(|p| plane.distance(p).abs() <= limit)
         .for_each(|p| kept.add(&p));
     if 2.0 * kept.n >= moments.n {

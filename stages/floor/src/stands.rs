@@ -2,7 +2,7 @@
 //! for a robot to stand on.
 
 use crate::Settings;
-use crate::levels::{Level, Scanners, scanner, seen_through};
+use crate::levels::{PieceLevel, ScannerPlaces, scanner, seen_through};
 use crate::pieces::upward;
 use crate::union::Union;
 use contract::{FloorLevel, InstallationPlane, PlanePatch, ScanId};
@@ -17,13 +17,14 @@ const TILT_ERROR: f64 = 0.0175;
 /// Joins patches that face up to planes and returns the largest ones, largest first.
 pub(crate) fn stands(
     patches: &[PlanePatch],
-    floor: (&[Level], &[FloorLevel]),
-    scanners: &Scanners,
+    found: &[PieceLevel],
+    levels: &[FloorLevel],
+    scanners: &ScannerPlaces,
     settings: &Settings,
 ) -> Vec<InstallationPlane> {
     let mut chosen: Vec<&PlanePatch> = patches
         .iter()
-        .filter(|p| !is_floor(p, floor.1, settings) && !is_ghost(p, floor.0, scanners, settings))
+        .filter(|p| !is_floor(p, levels, settings) && !is_ghost(p, found, scanners, settings))
         .collect();
     chosen.sort_by(|a, b| a.bounds.min[0].total_cmp(&b.bounds.min[0]));
     let mut union = Union::new(chosen.len());
@@ -68,8 +69,8 @@ fn is_floor(patch: &PlanePatch, levels: &[FloorLevel], settings: &Settings) -> b
 /// Whether a patch was seen through a floor level and is therefore a mirror image.
 fn is_ghost(
     patch: &PlanePatch,
-    levels: &[Level],
-    scanners: &Scanners,
+    levels: &[PieceLevel],
+    scanners: &ScannerPlaces,
     settings: &Settings,
 ) -> bool {
     scanner(scanners, patch.scan).is_some_and(|from| {

@@ -1,8 +1,8 @@
 //! Decides which judged pose of the new scans to take, or why none is clear enough.
 
-use crate::judge::{Evidence, Judged, judge};
+use crate::judge::{Judged, PoseEvidence, judge};
 use crate::refine::{Chosen, Laid, NEAR, WIDE, apart};
-use crate::{Session, search};
+use crate::{SessionSurfaces, search};
 use contract::Fan;
 use geometry::{Pose, Vector};
 
@@ -40,11 +40,11 @@ const MAX_TOLD: usize = 4;
 
 /// A pose of the new session in the earlier one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct FramePlace {
     /// The pose, each session about its own origin, with its uncertainty.
     pub laid: Laid,
     /// The evidence for and against it.
-    pub evidence: Evidence,
+    pub evidence: PoseEvidence,
     /// By how many more surfels the next best place is contradicted; `None` where there is no other
     /// place.
     pub margin: Option<i64>,
@@ -54,27 +54,27 @@ pub struct Place {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Answer {
     /// The stated pose is right.
-    Holds(Place),
+    Holds(FramePlace),
     /// The stated pose is nearly right; the place has the correction.
-    Near(Place),
+    Near(FramePlace),
     /// The stated pose is contradicted, or has too little evidence.
-    Not(Option<Place>),
+    Not(Option<FramePlace>),
 }
 
 /// Why no pose is taken.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Refusal {
     /// Nothing of the new session fits the earlier one well; the best pose that was tried.
-    Nothing(Option<Box<Place>>),
+    Nothing(Option<Box<FramePlace>>),
     /// Several places fit, the best first; they differ by no more evidence than objects that were
     /// moved could account for.
-    Several(Vec<Place>),
+    Several(Vec<FramePlace>),
 }
 
 /// Checks whether new scans lie where they are stated to; `stated` is the pose
 /// `old_world_from_new_world`.
 #[must_use]
-pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
+pub fn at_stated(old: &SessionSurfaces, new: &SessionSurfaces, stated: &Pose) -> Answer {
     let chosen = Chosen::of(&new.surfels);
     let Some(laid) = chosen.lay(&old.surfels, stated, &NEAR) else { return Answer::Not(None) };
     let place = plain(&judge(old, new, laid));
@@ -91,22 +91,31 @@ pub fn at_stated(old: &Session, new: &Session, stated: &Pose) -> Answer {
     }
 }
 
-/// Refines a rough pose that a user gives, and checks it against surfaces and beams.
+/// The pose near a rough one that a person gives, and whether surfaces and beams bear it out.
 ///
 /// # Errors
-/// If they contradict the pose or do not confirm it, with the pose as far as it could be refined.
-pub fn from_rough(old: &Session, new: &Session, rough: &Pose) -> Result<Place, Option<Box<Place>>> {
+/// The pose as far as it could be refined, where they do not.
+pub fn from_rough(
+    old: &SessionSurfaces,
+    new: &SessionSurfaces,
+    rough: &Pose,
+) -> Result<FramePlace, Option<Box<FramePlace>>> {
     let laid = Chosen::of(&new.surfels).lay(&old.surfels, rough, &WIDE).ok_or(None)?;
     let place = plain(&judge(old, new, laid));
     if is_borne_out(&place) { Ok(place) } else { Err(Some(Box::new(place))) }
 }
 
-/// Finds where the new session lies in the earlier one, over all shifts and yaws; `stated` is tried
-/// as one of the poses.
+/// Where the new session lies in the earlier one, searched over all shifts and yaws; `stated` is
+/// one of the poses that are asked for.
 ///
 /// # Errors
-/// If no pose is clear.
-pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Result<Place, Refusal> {
+/// No pose is clear.
+pub fn find(
+    old: &SessionSurfaces,
+    new: &SessionSurfaces,
+    stated: &Pose,
+    fan: &dyn Fan,
+) -> Result<FramePlace, Refusal> {
     let chosen = Chosen::of(&new.surfels);
     let mut poses = search::poses(&old.surfels, &new.surfels, fan);
     poses.push(*stated);
@@ -134,7 +143,7 @@ pub fn find(old: &Session, new: &Session, stated: &Pose, fan: &dyn Fan) -> Resul
 
 /// Whether a place is the stated pose, within what the registration of each scan corrects.
 #[must_use]
-pub fn is_stated(place: &Place, stated: &Pose, new: &Session) -> bool {
+pub fn is_stated(place: &FramePlace, stated: &Pose, new: &SessionSurfaces) -> bool {
     let off = apart(&place.laid.old_from_new, stated, &middle(new));
     off.0 <= STATED.0 && off.1 <= STATED.1
 }
@@ -155,7 +164,7 @@ fn places(judged: Vec<Judged>, at: &Vector) -> Vec<Judged> {
 }
 
 /// The best of these places, if it is clear.
-fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal> {
+fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<FramePlace, Refusal> {
     let Some((best, others)) = places.split_first() else { return Err(Refusal::Nothing(None)) };
     let mut place = plain(best);
     let off = apart(&place.laid.old_from_new, stated, at);
@@ -170,7 +179,7 @@ fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal
     place.margin = serious.iter().map(margin).min();
     // A pose that the files state needs no margin: the statement is evidence for it.
     let least = if is_stated { 0 } else { MIN_MARGIN.max((MARGIN_SHARE * n_same) as i64) };
-    let rivals: Vec<Place> =
+    let rivals: Vec<FramePlace> =
         serious.iter().filter(|o| margin(o) < least).map(|o| plain(o)).take(MAX_TOLD - 1).collect();
     if rivals.is_empty() {
         return Ok(place);
@@ -178,23 +187,23 @@ fn clear(places: &[Judged], stated: &Pose, at: &Vector) -> Result<Place, Refusal
     Err(Refusal::Several([vec![place], rivals].concat()))
 }
 
-fn plain(judged: &Judged) -> Place {
-    Place { laid: judged.laid, evidence: judged.evidence, margin: None }
+fn plain(judged: &Judged) -> FramePlace {
+    FramePlace { laid: judged.laid, evidence: judged.evidence, margin: None }
 }
 
-fn is_good(place: &Place, min_share: f64) -> bool {
+fn is_good(place: &FramePlace, min_share: f64) -> bool {
     place.evidence.n_same() >= MIN_SAME
         && place.laid.hold >= MIN_HOLD
         && place.evidence.share() >= min_share
 }
 
 /// Whether the evidence confirms a pose that a user states.
-fn is_borne_out(place: &Place) -> bool {
+fn is_borne_out(place: &FramePlace) -> bool {
     place.evidence.n_same() >= MIN_SAME_STATED && place.evidence.share() >= MIN_SHARE_STATED
 }
 
 /// The point of a new session at which poses are compared.
-fn middle(new: &Session) -> Vector {
+fn middle(new: &SessionSurfaces) -> Vector {
     let n = new.surfels.all.len().max(1) as f64;
     new.surfels.all.iter().map(|s| s.at).sum::<Vector>() / n
 }

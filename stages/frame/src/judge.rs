@@ -3,8 +3,8 @@
 //! fits on itself in any place.
 
 use crate::refine::Laid;
-use crate::surfels::{Surfel, Surfels};
-use crate::{Panorama, Session};
+use crate::surfels::Surfel;
+use crate::{Panorama, SessionSurfaces};
 use geometry::{Pose, Vector};
 use nalgebra::Point3;
 
@@ -21,7 +21,7 @@ const FARTHEST: f64 = 20.0;
 
 /// What the other session has at the place of a surfel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) enum State {
+pub(crate) enum SurfelState {
     /// Nothing is known, since no beam got there.
     #[default]
     Unknown,
@@ -35,7 +35,7 @@ pub(crate) enum State {
 
 /// Evidence for and against a pose, in non-level surfels (0.04 m² each).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Evidence {
+pub struct PoseEvidence {
     /// Number of new surfels on surfaces of the earlier session.
     pub n_on_old: usize,
     /// Number of new surfels where beams of the earlier session passed through.
@@ -51,12 +51,12 @@ pub struct Evidence {
 /// A pose with its evidence.
 pub(crate) struct Judged {
     pub(crate) laid: Laid,
-    pub(crate) evidence: Evidence,
-    new: Vec<State>,
-    old: Vec<State>,
+    pub(crate) evidence: PoseEvidence,
+    new: Vec<SurfelState>,
+    old: Vec<SurfelState>,
 }
 
-impl Evidence {
+impl PoseEvidence {
     /// Number of surfels that lie on surfaces of the other session.
     #[must_use]
     pub fn n_same(&self) -> usize {
@@ -83,18 +83,18 @@ impl Evidence {
 }
 
 /// Judges a pose by both sessions.
-pub(crate) fn judge(old: &Session, new: &Session, laid: Laid) -> Judged {
+pub(crate) fn judge(old: &SessionSurfaces, new: &SessionSurfaces, laid: Laid) -> Judged {
     let pose = laid.old_from_new;
     let back = pose.inverse();
     let is_covered = |s: &Surfel| old.surfels.covers(&(pose * Point3::from(s.at)).coords);
     let state_new = |s: &Surfel| {
         if s.is_level() {
-            return State::Unknown;
+            return SurfelState::Unknown;
         }
-        match state(s, &pose, (&old.surfels, &old.eyes)) {
+        match state(s, &pose, old) {
             // Without beams, an object where the other session saw a floor or anything else, but
             // not the object, was not there.
-            State::Unknown if old.eyes.is_empty() && is_covered(s) => State::Through,
+            SurfelState::Unknown if old.eyes.is_empty() && is_covered(s) => SurfelState::Through,
             state => state,
         }
     };
@@ -103,24 +103,26 @@ pub(crate) fn judge(old: &Session, new: &Session, laid: Laid) -> Judged {
         let at = (back * Point3::from(s.at)).coords;
         let is_near = |scanner: &Vector| (at - scanner).norm_squared() < FARTHEST * FARTHEST;
         if s.is_level() || !scanners.iter().any(is_near) {
-            return State::Unknown;
+            return SurfelState::Unknown;
         }
-        match state(s, &back, (&new.surfels, &new.eyes)) {
-            State::Same if s.may_move => State::SameRobot,
-            State::Through if s.may_move => State::Unknown,
+        match state(s, &back, new) {
+            SurfelState::Same if s.may_move => SurfelState::SameRobot,
+            SurfelState::Through if s.may_move => SurfelState::Unknown,
             state => state,
         }
     };
-    let new_states: Vec<State> = new.surfels.all.iter().map(state_new).collect();
-    let old_states: Vec<State> = old.surfels.all.iter().map(state_old).collect();
-    let n = |all: &[State], wanted: &[State]| all.iter().filter(|s| wanted.contains(s)).count();
-    let same = [State::Same, State::SameRobot];
-    let evidence = Evidence {
+    let new_states: Vec<SurfelState> = new.surfels.all.iter().map(state_new).collect();
+    let old_states: Vec<SurfelState> = old.surfels.all.iter().map(state_old).collect();
+    let n = |all: &[SurfelState], wanted: &[SurfelState]| {
+        all.iter().filter(|s| wanted.contains(s)).count()
+    };
+    let same = [SurfelState::Same, SurfelState::SameRobot];
+    let evidence = PoseEvidence {
         n_on_old: n(&new_states, &same),
-        n_where_old_saw_through: n(&new_states, &[State::Through]),
+        n_where_old_saw_through: n(&new_states, &[SurfelState::Through]),
         n_new: new.surfels.all.iter().filter(|s| !s.is_level()).count(),
         n_on_new: n(&old_states, &same),
-        n_where_new_saw_through: n(&old_states, &[State::Through]),
+        n_where_new_saw_through: n(&old_states, &[SurfelState::Through]),
     };
     Judged { laid, evidence, new: new_states, old: old_states }
 }
@@ -132,9 +134,9 @@ impl Judged {
     pub(crate) fn margin_over(&self, other: &Self) -> i64 {
         let sides = [(&self.new, &other.new), (&self.old, &other.old)];
         let all = sides.into_iter().flat_map(|(own, other)| own.iter().zip(other));
-        let more = |(own, other): (&State, &State)| match (own, other) {
-            (State::Same | State::Unknown, State::Through) => 1,
-            (State::Through, State::Same | State::Unknown) => -1,
+        let more = |(own, other): (&SurfelState, &SurfelState)| match (own, other) {
+            (SurfelState::Same | SurfelState::Unknown, SurfelState::Through) => 1,
+            (SurfelState::Through, SurfelState::Same | SurfelState::Unknown) => -1,
             _ => 0,
         };
         all.map(more).sum()
@@ -143,7 +145,8 @@ impl Judged {
 
 /// What a session has at the place of a surfel of the other one; `pose` converts from the other's
 /// world to its own.
-fn state(surfel: &Surfel, pose: &Pose, (surfels, eyes): (&Surfels, &[Panorama])) -> State {
+fn state(surfel: &Surfel, pose: &Pose, other_session: &SessionSurfaces) -> SurfelState {
+    let SessionSurfaces { surfels, eyes } = other_session;
     let at = (pose * Point3::from(surfel.at)).coords;
     let normal = pose.rotation * surfel.normal;
     let is_same = |other: &&Surfel| {
@@ -156,15 +159,15 @@ fn state(surfel: &Surfel, pose: &Pose, (surfels, eyes): (&Surfels, &[Panorama]))
             !other.is_level() && between.norm_squared() < NEAR * NEAR
         }
     };
-    let mut found = State::Unknown;
+    let mut found = SurfelState::Unknown;
     for other in surfels.about(&at).map(|i| &surfels.all[i]).filter(is_same) {
         if !other.may_move {
-            return State::Same;
+            return SurfelState::Same;
         }
-        found = State::SameRobot;
+        found = SurfelState::SameRobot;
     }
-    if found == State::Unknown && eyes.iter().any(|eye| eye.sees_through(&at)) {
-        return State::Through;
+    if found == SurfelState::Unknown && eyes.iter().any(|eye| eye.sees_through(&at)) {
+        return SurfelState::Through;
     }
     found
 }

@@ -46,15 +46,15 @@ mod surfels;
 #[cfg(test)]
 mod tests;
 
-pub use decide::{Answer, Place, Refusal, at_stated, find, from_rough, is_stated};
-pub use judge::Evidence;
+pub use decide::{Answer, FramePlace, Refusal, at_stated, find, from_rough, is_stated};
+pub use judge::PoseEvidence;
 pub use panorama::Panorama;
 pub use refine::Laid;
 pub use surfels::{Gathered, Surfel, Surfels};
 
 /// The surfaces of one session, and how far its beams went.
 #[derive(Debug, Clone, Default)]
-pub struct Session {
+pub struct SessionSurfaces {
     /// Surfaces, about an origin of the session's own.
     pub surfels: Surfels,
     /// Scanners, about the same origin.

@@ -62,7 +62,7 @@ pub(crate) struct Plans {
 }
 
 /// The layers of one session on a raster.
-struct Drawn(Vec<Vec<f32>>);
+struct SessionPlan(Vec<Vec<f32>>);
 
 impl Plans {
     /// Draws an earlier session for comparison with new ones; `main` is the direction that most of
@@ -81,7 +81,7 @@ impl Plans {
         let fft = Fourier::of(n);
         let corner = min.map(|v| v - edge);
         let mut plans = Self { edge, n, corner, reach, main, layers: Vec::new(), fft };
-        let drawn = plans.draw(old.all.iter(), (&Pose::identity(), corner), THERE);
+        let drawn = plans.draw(old.all.iter(), &Pose::identity(), corner, THERE);
         let widened =
             drawn.0.iter().enumerate().map(|(layer, raster)| {
                 if layer == BARE { raster.clone() } else { widened(raster, n) }
@@ -99,7 +99,7 @@ impl Plans {
         let pose = Pose::from_parts(nalgebra::Translation3::identity(), turn);
         let corner = [-self.reach - self.edge; 2];
         let near = new.all.iter().filter(|s| s.at.xy().norm() <= self.reach);
-        let drawn = self.draw(near, (&pose, corner), MAX_HIGH);
+        let drawn = self.draw(near, &pose, corner, MAX_HIGH);
         let stands: Vec<f32> = (0..self.n[0] * self.n[1]).map(|i| drawn.stands(i)).collect();
         let mut sum = vec![Complex32::default(); stands.len()];
         let mut add = |old: &[Complex32], new: &[f32], weight: f32| {
@@ -120,9 +120,10 @@ impl Plans {
     fn draw<'s>(
         &self,
         surfels: impl Iterator<Item = &'s Surfel>,
-        (pose, corner): (&Pose, [f64; 2]),
+        pose: &Pose,
+        corner: [f64; 2],
         most: f32,
-    ) -> Drawn {
+    ) -> SessionPlan {
         let [nx, ny] = self.n;
         let mut layers = vec![vec![0.0_f32; nx * ny]; N_LAYERS];
         for surfel in surfels {
@@ -152,12 +153,12 @@ impl Plans {
             layer.iter_mut().for_each(|v| *v = v.min(most));
         }
         // Floor is bare where no object stands on it or beside.
-        let drawn = Drawn(layers);
+        let drawn = SessionPlan(layers);
         let stands: Vec<f32> = (0..nx * ny).map(|i| drawn.stands(i)).collect();
         let beside = widened(&stands, self.n);
         let mut layers = drawn.0;
         layers[BARE].iter_mut().zip(&beside).for_each(|(v, s)| *v *= f32::from(*s == 0.0));
-        Drawn(layers)
+        SessionPlan(layers)
     }
 
     /// The highest peaks of a score over all shifts.
@@ -195,7 +196,7 @@ impl Plans {
     }
 }
 
-impl Drawn {
+impl SessionPlan {
     /// How many surfels of objects a cell has.
     fn stands(&self, i: usize) -> f32 {
         self.0[..BARE].iter().map(|layer| layer[i]).sum::<f32>().min(MAX_HIGH)

@@ -96,13 +96,13 @@ impl Chosen {
         Some(Laid { old_from_new: pose, sigma, about, hold, n_pairs: sums.n, rms })
     }
 
-    fn sums(&self, old: &Surfels, pose: &Pose, gate: f64) -> Option<Sums> {
-        let mut out = Sums::default();
+    fn sums(&self, old: &Surfels, pose: &Pose, gate: f64) -> Option<RefineSums> {
+        let mut out = RefineSums::default();
         let about = (pose * nalgebra::Point3::from(self.middle)).coords;
         for surfel in &self.surfels {
             let at = (pose * nalgebra::Point3::from(surfel.at)).coords;
             let normal = pose.rotation * surfel.normal;
-            let Some(on) = nearest(old, &at, (&normal, surfel.is_signed), gate) else { continue };
+            let Some(on) = nearest(old, &at, &normal, surfel.is_signed, gate) else { continue };
             let plane = &old.all[on];
             let distance = plane.normal.dot(&(at - plane.at));
             let u = distance / gate;
@@ -122,7 +122,7 @@ impl Chosen {
 }
 
 #[derive(Default)]
-struct Sums {
+struct RefineSums {
     normal: Matrix4<f64>,
     right: Vector4<f64>,
     in_plan: Matrix2<f64>,
@@ -135,7 +135,8 @@ struct Sums {
 fn nearest(
     old: &Surfels,
     at: &Vector,
-    (normal, is_signed): (&Vector, bool),
+    normal: &Vector,
+    is_signed: bool,
     gate: f64,
 ) -> Option<usize> {
     let n_steps = (gate / STEP).ceil() as i32;

@@ -32,11 +32,11 @@ pub(crate) const UPRIGHT: f64 = 0.21;
 #[derive(Debug, Clone)]
 pub struct Gathered {
     origin: Vector,
-    cells: FxHashMap<[i32; 3], Cell>,
+    cells: FxHashMap<[i32; 3], SurfelCell>,
 }
 
 #[derive(Debug, Clone)]
-struct Cell {
+struct SurfelCell {
     moments: Moments,
     /// Sum of the unit vectors from the points to their scanners; zero where scanners are unknown.
     towards: Vector,
@@ -78,7 +78,7 @@ impl Gathered {
     pub fn add(&mut self, world: [f64; 3], scanner: Option<&Vector>) {
         let world = Vector::from(world);
         let p = world - self.origin;
-        let cell = self.cells.entry(voxel(&p)).or_insert_with(|| Cell {
+        let cell = self.cells.entry(voxel(&p)).or_insert_with(|| SurfelCell {
             moments: Moments::new(middle(&voxel(&p))),
             towards: Vector::zeros(),
         });
@@ -123,7 +123,7 @@ impl Gathered {
     }
 }
 
-impl Cell {
+impl SurfelCell {
     fn surfel(&self) -> Option<Surfel> {
         if self.moments.n < MIN_ROUGH {
             return None;

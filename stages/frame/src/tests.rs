@@ -1,6 +1,6 @@
 //! Synthetic rooms with boxes in them; scanners see everything from where they stand.
 
-use crate::{Answer, Gathered, Panorama, Refusal, Session, at_stated, find, from_rough};
+use crate::{Answer, Gathered, Panorama, Refusal, SessionSurfaces, at_stated, find, from_rough};
 use contract::OneByOne;
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -39,12 +39,12 @@ impl World {
     }
 
     /// The session of scanners at these places; `stated` converts the world to the session's frame.
-    fn session(&self, scanners: &[[f64; 3]], stated: &Pose) -> Session {
+    fn session(&self, scanners: &[[f64; 3]], stated: &Pose) -> SessionSurfaces {
         self.seen(scanners, stated, true)
     }
 
     /// A session with known or unknown scanner positions.
-    fn seen(&self, scanners: &[[f64; 3]], stated: &Pose, is_known: bool) -> Session {
+    fn seen(&self, scanners: &[[f64; 3]], stated: &Pose, is_known: bool) -> SessionSurfaces {
         let origin = (stated * nalgebra::Point3::from(scanners[0])).coords.map(f64::round);
         let mut gathered = Gathered::about(origin);
         let mut eyes = Vec::new();
@@ -69,7 +69,7 @@ impl World {
             }
             eyes.extend(is_known.then(|| eye.finish()));
         }
-        Session { surfels: gathered.surfels(&[]), eyes }
+        SessionSurfaces { surfels: gathered.surfels(&[]), eyes }
     }
 }
 
@@ -79,7 +79,7 @@ fn frame(shift: [f64; 3], yaw_deg: f64) -> Pose {
 }
 
 /// The true pose of the new session's world in the earlier one, each about its own origin.
-fn truth(old: &Session, new: &Session, stated: &Pose) -> Pose {
+fn truth(old: &SessionSurfaces, new: &SessionSurfaces, stated: &Pose) -> Pose {
     Translation3::from(-old.surfels.origin)
         * stated.inverse()
         * Translation3::from(new.surfels.origin)

@@ -8,7 +8,7 @@ mod known_space;
 mod visibility;
 
 pub use known_space::{Passed, see, stand};
-pub use visibility::{Sight, Watch};
+pub use visibility::{Visibility, VisibilityQuery};
 
 /// Tunables of the grids of known space about robots.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -22,7 +22,7 @@ const FOOTPRINT: f32 = 0.012;
 /// What scans say of a place.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
-pub enum Sight {
+pub enum Visibility {
     /// No beam went there.
     #[default]
     Unseen = 0,
@@ -37,12 +37,12 @@ pub enum Sight {
 }
 
 /// Scans that are asked.
-pub struct Watch<'a> {
+pub struct VisibilityQuery<'a> {
     region: &'a Region,
     views: Vec<(&'a View, Eye<'a>)>,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> VisibilityQuery<'a> {
     /// Views of a region.
     #[must_use]
     pub fn new(region: &'a Region, views: &'a [View]) -> Self {
@@ -67,15 +67,15 @@ impl<'a> Watch<'a> {
 
     /// What the scans say of a place in the world: the strongest of what each of them says.
     #[must_use]
-    pub fn look(&self, world: [f64; 3]) -> Sight {
-        self.looks(world).map(|(_, look)| Sight::of(&look)).max().unwrap_or_default()
+    pub fn look(&self, world: [f64; 3]) -> Visibility {
+        self.looks(world).map(|(_, look)| Visibility::of(&look)).max().unwrap_or_default()
     }
 
     /// The same of many places, scan after scan: an image stays in the cache while neighbours are
     /// asked for.
-    pub fn look_all(&self, world: &[[f64; 3]], out: &mut Vec<Sight>) {
+    pub fn look_all(&self, world: &[[f64; 3]], out: &mut Vec<Visibility>) {
         out.clear();
-        out.resize(world.len(), Sight::Unseen);
+        out.resize(world.len(), Visibility::Unseen);
         // Places of which it is not known yet that something is there.
         let mut open: Vec<(u32, [f32; 3])> =
             (0..).zip(world).map(|(i, world)| (i, self.local(*world))).collect();
@@ -86,11 +86,11 @@ impl<'a> Watch<'a> {
                 let looks = eye.look_lanes(&lanes(&places[..some.len()]), FOOTPRINT);
                 for (k, (i, _)) in some.iter().enumerate() {
                     let best = &mut out[*i as usize];
-                    *best =
-                        (*best).max(looks.get(k).map_or(Sight::Unseen, |look| Sight::of(&look)));
+                    *best = (*best)
+                        .max(looks.get(k).map_or(Visibility::Unseen, |look| Visibility::of(&look)));
                 }
             }
-            open.retain(|(i, _)| out[*i as usize] != Sight::Onto);
+            open.retain(|(i, _)| out[*i as usize] != Visibility::Onto);
         }
     }
 
@@ -99,7 +99,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-impl Sight {
+impl Visibility {
     #[inline]
     fn of(look: &Look) -> Self {
         let is_on = |range: f32| (range - look.range).abs() <= ON;
@@ -142,12 +142,13 @@ mod tests {
     #[test]
     fn a_beam_that_ends_on_the_same_thing_a_little_farther_pierces_nothing() {
         let region = Region { origin: Point::origin(), bounds: Aabb::EMPTY };
-        let is_pierced =
-            |behind: f32, x: f64| Watch::new(&region, &[view(behind)]).is_pierced([x, 0.0, 3.0]);
+        let is_pierced = |behind: f32, x: f64| {
+            VisibilityQuery::new(&region, &[view(behind)]).is_pierced([x, 0.0, 3.0])
+        };
         assert!(is_pierced(0.8, 0.0));
         assert!(!is_pierced(0.8, 0.6));
         assert!(!is_pierced(0.1, 0.0));
         let far = View { beam_step: 0.01, ..view(0.8) };
-        assert!(!Watch::new(&region, &[far]).is_pierced([0.0, 0.0, 3.0]));
+        assert!(!VisibilityQuery::new(&region, &[far]).is_pierced([0.0, 0.0, 3.0]));
     }
 }

@@ -6,7 +6,8 @@
 //! that robot and background are not averaged at a silhouette.
 
 use crate::Pose;
-use crate::level::Level;
+pub use crate::lanes::{LANES, Lanes, lanes};
+use crate::level::DepthLevel;
 
 /// The meaning of a cell without a hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +27,7 @@ pub struct DepthImage {
     pub(crate) scanner: crate::Point,
     /// Cells of level 0 per unit of tangent.
     focal: f32,
-    levels: Vec<Level>,
+    levels: Vec<DepthLevel>,
 }
 
 /// A pose `a_from_b` as three rows of four `f32` (rotation and translation), for inner loops.
@@ -44,26 +45,6 @@ pub fn rows(pose: &Pose) -> Rows {
 #[must_use]
 pub fn transform(m: &Rows, p: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2] + m[r][3])
-}
-
-/// Number of places that are looked up together.
-pub const LANES: usize = 16;
-
-/// Coordinates of [`LANES`] places, axis by axis, so that arithmetic on all of them is done in
-/// vector registers.
-pub type Lanes = [[f32; LANES]; 3];
-
-/// Arranges 1 to [`LANES`] places as [`Lanes`]; the last place fills the lanes that are left over.
-#[inline]
-#[must_use]
-pub fn lanes(places: &[[f32; 3]]) -> Lanes {
-    // The compiler inlines this loop, but not `array::from_fn` with a closure.
-    let mut out = [[0.0; LANES]; 3];
-    for i in 0..LANES {
-        let place = places[i.min(places.len() - 1)];
-        (out[0][i], out[1][i], out[2][i]) = (place[0], place[1], place[2]);
-    }
-    out
 }
 
 /// Applies a pose to places; the result is the same as that of [`transform`] for each of them.
@@ -93,7 +74,7 @@ impl DepthImage {
     pub fn new(camera_from_local: Pose, half_tangent: f64, focal: f64) -> Self {
         let side = ((2.0 * half_tangent * focal).ceil().clamp(1.0, 8192.0)) as usize;
         let cells = vec![[f32::NAN; 3]; side * side];
-        let level = Level { width: side, height: side, cells };
+        let level = DepthLevel { width: side, height: side, cells };
         let rows = rows(&camera_from_local);
         // Rounded to a micrometre, so that all images of one scanner agree on its position.
         let scanner = camera_from_local.inverse() * crate::Point::origin();
@@ -165,7 +146,7 @@ impl DepthImage {
             let next = self.levels[self.levels.len() - 1].halved();
             self.levels.push(next);
         }
-        self.levels.iter_mut().for_each(Level::look_around);
+        self.levels.iter_mut().for_each(DepthLevel::look_around);
     }
 
     /// Withdraws "no return" where other scans measured a surface in that direction (`local`

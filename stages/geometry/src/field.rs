@@ -3,13 +3,13 @@
 //! from the sample's own facet.
 
 use crate::Aabb;
-use crate::spread::{Grid, N_LANES, spread};
+use crate::spread::{N_LANES, VoxelGrid, spread};
 
 /// A voxel grid about a surface. Each voxel within reach holds the index of the sample that is
 /// nearest to the voxel's centre.
 #[derive(Debug, Clone, Default)]
 pub struct NearestField {
-    grid: Grid,
+    grid: VoxelGrid,
     /// Number of bricks along each axis, see [`BRICK`].
     bricks: [usize; 3],
     /// Index of the nearest sample plus one, 0 beyond reach; brick after brick, x fastest.
@@ -52,7 +52,7 @@ impl NearestField {
         let size = bounds.size().map(|s| (s / f64::from(edge)).ceil() as usize + 1);
         let bricks = size.map(|n| n.div_ceil(1 << BRICK));
         let origin = bounds.min.map(|v| v as f32);
-        let grid = Grid { origin, edge, inverse_edge: 1.0 / edge, size };
+        let grid = VoxelGrid { origin, edge, inverse_edge: 1.0 / edge, size };
         let cells = vec![0; bricks.iter().product::<usize>() << (3 * BRICK)];
         let mut field = Self { grid, bricks, cells };
         // Voxels beyond reach are never written, so that their memory is never touched.

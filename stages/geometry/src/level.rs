@@ -1,11 +1,11 @@
 //! One resolution level of a depth image: the nearest and the farthest hit of each cell and its
 //! neighbours, and how the next coarser level is made.
 
-use crate::depth::{LANES, Lanes};
+use crate::lanes::{LANES, Lanes};
 
 /// A raster of nearest and farthest ranges at one resolution.
 #[derive(Debug, Clone)]
-pub(crate) struct Level {
+pub(crate) struct DepthLevel {
     pub(crate) width: usize,
     pub(crate) height: usize,
     /// `[near, far, around]` in metres, row-major; NaN where unknown, +∞ where no beam returned.
@@ -14,7 +14,7 @@ pub(crate) struct Level {
     pub(crate) cells: Vec<[f32; 3]>,
 }
 
-impl Level {
+impl DepthLevel {
     /// Index of the cell of a hit and its range, metres, from the hit in the camera frame; `None`
     /// outside of the raster.
     #[inline]

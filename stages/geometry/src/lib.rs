@@ -31,6 +31,7 @@ pub mod direction;
 pub mod evidence;
 pub mod faces;
 pub mod field;
+mod lanes;
 mod level;
 pub mod narrow;
 pub mod plane;

@@ -93,7 +93,7 @@ pub fn probe(
     let to_local = rows(local_from_body);
     let mut out = Probe { n: before.n + points.len() as u32, ..before };
     for (points, normals) in points.chunks(BLOCK).zip(normals.chunks(BLOCK)) {
-        let mut block = Block::new(&to_local, points, normals);
+        let mut block = SampleBlock::new(&to_local, points, normals);
         eyes.iter().for_each(|eye| block.ask(eye, tolerance));
         (0..points.len()).for_each(|i| out.count(block.through[i], block.on[i]));
     }
@@ -104,7 +104,7 @@ pub fn probe(
 const BLOCK: usize = 80;
 
 /// Samples in the local frame and what is known of them so far.
-struct Block {
+struct SampleBlock {
     n: usize,
     p: [[f32; BLOCK]; 3],
     normal: [[f32; BLOCK]; 3],
@@ -113,7 +113,7 @@ struct Block {
     on: [f32; BLOCK],
 }
 
-impl Block {
+impl SampleBlock {
     #[inline]
     fn new(to_local: &Rows, points: &[[f32; 3]], normals: &[[f32; 3]]) -> Self {
         let zero = [[0.0; BLOCK]; 3];

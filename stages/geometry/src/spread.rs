@@ -12,7 +12,7 @@ pub(crate) const N_LANES: usize = 8;
 
 /// Placement of the voxels.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Grid {
+pub(crate) struct VoxelGrid {
     /// Lowest corner of the first voxel, metres.
     pub(crate) origin: [f32; 3],
     /// Edge of a voxel, metres.
@@ -23,7 +23,7 @@ pub(crate) struct Grid {
     pub(crate) size: [usize; 3],
 }
 
-impl Grid {
+impl VoxelGrid {
     /// Centres of the first `n` voxels along `axis`, metres.
     fn middles(&self, axis: usize, n: usize) -> Vec<f32> {
         (0..n).map(|place| self.origin[axis] + (place as f32 + 0.5) * self.edge).collect()
@@ -58,18 +58,18 @@ fn numbers(eight: &Eight) -> [u32; N_LANES] {
 }
 
 /// The nearest samples of the voxels of one plane.
-struct Plane {
+struct VoxelPlane {
     eights: Vec<Eight>,
     /// For each group of eight voxels, whether any of them has a sample.
     is_told: Vec<bool>,
 }
 
-impl Plane {
+impl VoxelPlane {
     fn new(n: usize) -> Self {
         Self { eights: vec![NONE; n], is_told: vec![false; n] }
     }
 
-    fn line(&self, y: usize, n_eights: usize) -> Told<'_> {
+    fn line(&self, y: usize, n_eights: usize) -> PlaneRow<'_> {
         let row = y * n_eights..(y + 1) * n_eights;
         (&self.eights[row.clone()], &self.is_told[row])
     }
@@ -81,10 +81,10 @@ impl Plane {
 }
 
 /// One row of a plane: its groups of eight voxels, and which groups have a sample.
-type Told<'a> = (&'a [Eight], &'a [bool]);
+type PlaneRow<'a> = (&'a [Eight], &'a [bool]);
 
 /// A row with a lower bound of the squared distance of its samples from another row, m².
-struct Line<'a> {
+struct VoxelRow<'a> {
     beyond2: f32,
     eights: &'a [Eight],
     is_told: &'a [bool],
@@ -101,7 +101,7 @@ struct Seed {
 /// The inputs and constants of one run of [`spread`].
 struct Spread<'a> {
     points: &'a [[f32; 3]],
-    grid: Grid,
+    grid: VoxelGrid,
     /// Square of the reach, m².
     limit: f32,
     /// Number of planes or rows on either side that can hold a sample within reach.
@@ -118,7 +118,7 @@ struct Spread<'a> {
 /// with eight sample numbers plus one, 0 beyond reach. A group may extend past the end of its row.
 pub(crate) fn spread(
     points: &[[f32; 3]],
-    grid: Grid,
+    grid: VoxelGrid,
     reach: f32,
     mut take: impl FnMut([u32; 3], &[u32; N_LANES]),
 ) {
@@ -132,8 +132,8 @@ pub(crate) fn spread(
     let seeds = it.seeds();
     let n_planes = 2 * n_rings + 1;
     let n = n_y * it.n_eights;
-    let mut rows = Plane::new(n);
-    let mut planes: Vec<Plane> = (0..n_planes).map(|_| Plane::new(n)).collect();
+    let mut rows = VoxelPlane::new(n);
+    let mut planes: Vec<VoxelPlane> = (0..n_planes).map(|_| VoxelPlane::new(n)).collect();
     let mut from = 0;
     for z in 0..n_z + n_rings {
         let plane = &mut planes[z % n_planes];
@@ -169,7 +169,7 @@ impl Spread<'_> {
     }
 
     /// For each row of the plane, the nearest of the row's own samples.
-    fn along_rows(&self, seeds: &[Seed], z: usize, rows: &mut Plane) {
+    fn along_rows(&self, seeds: &[Seed], z: usize, rows: &mut VoxelPlane) {
         let n_y = self.grid.size[1];
         let mut best = vec![FAR; self.n_eights];
         for seeds in seeds.chunk_by(|a, b| a.row == b.row) {
@@ -199,7 +199,7 @@ impl Spread<'_> {
     }
 
     /// The nearest sample of the plane, from the nearest samples of its rows.
-    fn across_rows(&self, rows: &Plane, z: usize, plane: &mut Plane) {
+    fn across_rows(&self, rows: &VoxelPlane, z: usize, plane: &mut VoxelPlane) {
         let mut lines = Vec::new();
         for y in 0..self.grid.size[1] {
             self.outwards(&mut lines, y, self.grid.size[1], |y| rows.line(y, self.n_eights));
@@ -215,7 +215,7 @@ impl Spread<'_> {
     /// The nearest sample of all, from the nearest samples of the planes.
     fn across_planes(
         &self,
-        planes: &[Plane],
+        planes: &[VoxelPlane],
         z: usize,
         take: &mut impl FnMut([u32; 3], &[u32; N_LANES]),
     ) {
@@ -234,10 +234,10 @@ impl Spread<'_> {
     /// The line at `place` and then those on either side of it among `n`, by growing distance.
     fn outwards<'b>(
         &self,
-        lines: &mut Vec<Line<'b>>,
+        lines: &mut Vec<VoxelRow<'b>>,
         place: usize,
         n: usize,
-        line: impl Fn(usize) -> Told<'b>,
+        line: impl Fn(usize) -> PlaneRow<'b>,
     ) {
         lines.clear();
         for ring in 0..=self.n_rings {
@@ -246,7 +246,7 @@ impl Spread<'_> {
             for at in sides.into_iter().flatten().filter(|at| *at < n) {
                 let (eights, is_told) = line(at);
                 if is_told.contains(&true) {
-                    lines.push(Line { beyond2: beyond * beyond, eights, is_told });
+                    lines.push(VoxelRow { beyond2: beyond * beyond, eights, is_told });
                 }
             }
         }
@@ -263,7 +263,7 @@ impl Spread<'_> {
     /// The nearest samples to a group of eight voxels among the samples of these lines; `None`
     /// where none of the voxels has one.
     #[inline]
-    fn nearest(&self, lines: &[Line], place: [usize; 3]) -> Option<Eight> {
+    fn nearest(&self, lines: &[VoxelRow], place: [usize; 3]) -> Option<Eight> {
         let middles = self.middles_of(place);
         let (mut best, mut kept, mut is_told) = (f32x8::splat(self.limit), NONE, false);
         for line in lines {

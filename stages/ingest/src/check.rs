@@ -91,9 +91,9 @@ pub(crate) fn skipped(folder: &str) {
 }
 
 /// A file that is removed when the test ends.
-pub(crate) struct Scratch(pub(crate) PathBuf);
+pub(crate) struct ScratchFile(pub(crate) PathBuf);
 
-impl Scratch {
+impl ScratchFile {
     /// Creates a file with this name, which must be unique over all tests.
     pub(crate) fn new(name: &str, bytes: &[u8]) -> Self {
         let path =
@@ -103,7 +103,7 @@ impl Scratch {
     }
 }
 
-impl Drop for Scratch {
+impl Drop for ScratchFile {
     fn drop(&mut self) {
         let _gone = std::fs::remove_file(&self.0);
     }

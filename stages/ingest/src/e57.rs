@@ -1,6 +1,7 @@
 //! Reads scans and points of E57 files (ASTM E2807). The XML description is parsed by the crate
 //! `e57`; the points are decoded here.
 
+mod describe;
 mod look;
 mod packets;
 mod pages;
@@ -11,7 +12,7 @@ mod strips;
 
 use crate::Settings;
 use crate::oddities::Oddities;
-use crate::reader::{MaskSeed, RawStrips, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::reader::{FileReading, MaskSeed, RawStrips, Reader, SampledPoint, ScanSeed, Want};
 use crate::units::{self, Choice, Units};
 use ::e57::E57Reader;
 use contract::{Error, Format, Kind, Result, XmlLimits, check_xml};
@@ -59,7 +60,7 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
             Some(name) if !name.is_empty() => name.to_string(),
             _ => format!("scan {}", n + 1),
         };
-        let (scan, mut seed) = E57Scan::new(path, cloud, (&name, metres), settings)
+        let (scan, mut seed) = E57Scan::new(path, cloud, &name, metres, settings)
             .map_err(|e| e.at(format!("scan \"{name}\"")))?;
         seed.mask = n;
         file.facts.push((format!("scan {} fields", n + 1), fields(cloud)));
@@ -84,7 +85,7 @@ impl Reader for E57File {
         &self.scans
     }
 
-    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>> {
         strips::sample(self, &self.files[scan], n)
             .map_err(|e| e.at(format!("scan \"{}\"", self.scans[scan].name)))
     }
@@ -94,8 +95,8 @@ impl Reader for E57File {
             .map_err(|e| e.at(format!("scan \"{}\"", self.scans[scan].name)))
     }
 
-    fn read(&self, want: Want) -> Result<Reading<'_>> {
-        Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
+    fn read(&self, want: Want) -> Result<FileReading<'_>> {
+        Ok(FileReading::Straight(Box::new(strips::E57Strips::new(self, want))))
     }
 
     fn units(&self) -> &Units {
@@ -103,7 +104,7 @@ impl Reader for E57File {
     }
 
     fn read_scan(&self, scan: usize) -> Option<RawStrips<'_>> {
-        Some(Box::new(strips::Strips::of_scan(self, scan)))
+        Some(Box::new(strips::E57Strips::of_scan(self, scan)))
     }
 
     fn oddities(&self, scan: usize) -> Option<&Oddities> {

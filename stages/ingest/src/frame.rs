@@ -18,7 +18,7 @@ const NO_POINT: f64 = 1e-6;
 
 /// Conversion from a file's coordinates to those of the scan frame.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Frame {
+pub(crate) struct FileFrame {
     /// Rotation that is applied first; only where the scanner is unknown and the file states a
     /// rotation.
     rotation: Option<UnitQuaternion<f64>>,
@@ -33,7 +33,7 @@ pub(crate) struct Frame {
     no_return: ([f64; 3], f64),
 }
 
-impl Frame {
+impl FileFrame {
     /// The file's own frame, with the scanner at its origin.
     pub(crate) fn of_scanner(world_from_scan: Pose) -> Self {
         let no_return = ([0.0; 3], NO_RETURN);
@@ -141,22 +141,22 @@ mod tests {
             Pose::new(Vector3::new(400_000.0, 5_600_000.0, 100.0), Vector3::new(0.1, -0.2, 0.7));
         let p = [312.25, -41.5, 7.0];
         let world = pose * Point::from(p);
-        for frame in [Frame::of_scanner(pose), Frame::about(pose, [300.0, -40.0, 5.0])] {
+        for frame in [FileFrame::of_scanner(pose), FileFrame::about(pose, [300.0, -40.0, 5.0])] {
             let back = frame.world_from_scan * Point::from(frame.scan_from_file(p));
             assert!((back - world).norm() < 1e-8, "{back} {world}");
         }
-        let about = Frame::about(pose, [300.0, -40.0, 5.0]);
+        let about = FileFrame::about(pose, [300.0, -40.0, 5.0]);
         assert!(Vector3::from(about.scan_from_file(p)).norm() < 20.0);
         assert_eq!(about.world_from_scan.rotation, UnitQuaternion::identity());
     }
 
     #[test]
     fn the_origin_is_no_return_where_it_is_the_scanner_or_marks_one() {
-        let scanner = Frame::of_scanner(Pose::translation(1.0, 2.0, 3.0));
+        let scanner = FileFrame::of_scanner(Pose::translation(1.0, 2.0, 3.0));
         assert!(
             scanner.is_no_return([0.0, 0.0, -0.009]) && !scanner.is_no_return([0.0, 0.02, 0.0])
         );
-        let map = Frame::about(Pose::identity(), [400_000.0, 5_600_000.0, 80.0]);
+        let map = FileFrame::about(Pose::identity(), [400_000.0, 5_600_000.0, 80.0]);
         let origin = map.scan_from_file([0.0; 3]);
         assert!(!map.is_no_return(origin) && !map.is_no_return([0.0; 3]));
         let marked = map.without_origin();

@@ -1,14 +1,15 @@
-//! Takes a small sample of the points of an input, spread over it as well as its format allows,
-//! to estimate what is in a plant without reading all points.
+//! An open input in; some of its points, spread over it as well as its format lets, out: enough to
+//! guess what stands in a plant without reading all of it.
 
-use crate::reader::{Extent, RawStrip, RawStrips, Reading, Want};
-use crate::sources::{File, Sources};
+use crate::file::OpenFile;
+use crate::reader::{Extent, FileReading, RawStrip, RawStrips, Want};
+use crate::sources::Sources;
 use contract::{Fan, InputId, Result};
 use geometry::Point;
 
 /// Size of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sample {
+pub struct GlanceSample {
     /// Approximate largest number of points that are decoded.
     pub n_decoded: u64,
     /// Approximate largest number of points that are kept.
@@ -30,16 +31,16 @@ impl Sources {
     ///
     /// # Errors
     /// If the input is broken where it is read; the error names its path.
-    pub fn glance(&self, input: InputId, sample: Sample, fan: &dyn Fan) -> Result<Glance> {
+    pub fn glance(&self, input: InputId, sample: GlanceSample, fan: &dyn Fan) -> Result<Glance> {
         let (file, path) = self.open(input)?;
         self.glanced(file, sample, fan).map_err(|e| e.at(path.display()))
     }
 
-    fn glanced(&self, file: &File, sample: Sample, fan: &dyn Fan) -> Result<Glance> {
+    fn glanced(&self, file: &OpenFile, sample: GlanceSample, fan: &dyn Fan) -> Result<Glance> {
         let n_stated: u64 = file.reader.masks().iter().filter_map(|m| m.n_stated).sum();
         let every = sample.n_decoded.min(n_stated).div_ceil(sample.n_kept.max(1)).max(1);
         let found = match file.reader.read(Want::Coordinates)? {
-            Reading::ByExtent(extents) => {
+            FileReading::ByExtent(extents) => {
                 let all: Vec<Extent> = extents.filter(|e| e.n_points > 0).collect();
                 let n: u64 = all.iter().map(|e| e.n_points).sum();
                 let stride = n.div_ceil(sample.n_decoded.max(1)).max(1) as usize;
@@ -50,7 +51,7 @@ impl Sources {
                     self.thinned(file, strips.into_iter().map(Ok), u64::MAX, every)
                 })
             }
-            Reading::Straight(strips) => {
+            FileReading::Straight(strips) => {
                 let n_scans = file.reader.scans().len();
                 let share = sample.n_decoded / n_scans.max(1) as u64;
                 let scans: Option<Vec<RawStrips<'_>>> =
@@ -73,7 +74,7 @@ impl Sources {
     /// Keeps one of every few points of the strips, until enough are decoded.
     fn thinned(
         &self,
-        file: &File,
+        file: &OpenFile,
         strips: impl Iterator<Item = Result<RawStrip>>,
         most: u64,
         every: u64,

@@ -2,7 +2,7 @@
 //! JSON.
 
 use crate::bounds;
-use crate::raster::Steps;
+use crate::raster::StepSource;
 use crate::sources::Sources;
 use crate::units::Units;
 use contract::words::fixed;
@@ -14,7 +14,7 @@ use std::fmt;
 
 /// What one input holds.
 #[derive(Debug, Clone, Serialize)]
-pub struct Description {
+pub struct InputDescription {
     /// Path as given by the user.
     pub path: String,
     /// `E57`, `PTX`, `LAS` or `LAZ`.
@@ -106,17 +106,18 @@ pub struct BoundsText {
 /// Describes each input, in the order of the inputs. E57 files that are not large are read for the
 /// bounds of their points.
 #[must_use]
-pub fn describe(sources: &Sources, fan: &dyn Fan) -> Vec<Description> {
+pub fn describe(sources: &Sources, fan: &dyn Fan) -> Vec<InputDescription> {
     let read = bounds::read(sources, fan);
     let inputs = sources.inputs.iter().enumerate();
-    inputs.map(|(i, input)| description(sources, (i, input), &read)).collect()
+    inputs.map(|(i, input)| description(sources, i, input, &read)).collect()
 }
 
 fn description(
     sources: &Sources,
-    (at, input): (usize, &Input),
+    at: usize,
+    input: &Input,
     read: &BTreeMap<u32, Aabb>,
-) -> Description {
+) -> InputDescription {
     let file = &sources.files[at];
     let scans = sources
         .scans
@@ -124,7 +125,7 @@ fn description(
         .filter(|s| s.input == input.id)
         .zip(file.steps.iter().zip(&file.known));
     let masks = sources.masks.iter().filter(|m| m.input == input.id);
-    Description {
+    InputDescription {
         path: input.path.display().to_string(),
         format: word(input.format),
         n_bytes: input.n_bytes,
@@ -144,21 +145,21 @@ fn description(
 
 fn scan_description(
     scan: &Scan,
-    steps: Steps,
+    steps: StepSource,
     scanner_known: bool,
     bounds: Option<Aabb>,
 ) -> ScanDescription {
     let mut notes = scan.notes.clone();
     match steps {
-        Steps::Irregular => notes.push(
+        StepSource::Irregular => notes.push(
             "rows and columns are not regular in angle: a pixel of the lattice may hold two points or none".into(),
         ),
-        Steps::Directions => notes.push(
+        StepSource::Directions => notes.push(
             "no rows and columns: the lattice is rebuilt from directions, edges are a pixel less sharp, and beams \
              without return cannot be told from gaps"
                 .into(),
         ),
-        Steps::Native | Steps::None => {}
+        StepSource::Native | StepSource::None => {}
     }
     ScanDescription {
         name: scan.name.clone(),
@@ -166,7 +167,7 @@ fn scan_description(
         n_points: scan.stated_points,
         scanner_known,
         world_from_scan: pose_text(&scan.world_from_scan),
-        structured: steps == Steps::Native,
+        structured: steps == StepSource::Native,
         lattice: scan.lattice.as_ref().map(|lattice| LatticeText {
             row_step_deg: lattice.row_step.to_degrees(),
             col_step_deg: lattice.col_step.to_degrees(),
@@ -174,9 +175,9 @@ fn scan_description(
             n_cols: lattice.n_cols,
             axis: axis(lattice),
             from: match steps {
-                Steps::Native => "rows and columns",
-                Steps::Irregular => "irregular rows and columns",
-                Steps::Directions | Steps::None => "directions",
+                StepSource::Native => "rows and columns",
+                StepSource::Irregular => "irregular rows and columns",
+                StepSource::Directions | StepSource::None => "directions",
             },
         }),
         bounds: bounds.as_ref().map(bounds_text),
@@ -212,7 +213,7 @@ fn metres(v: &[f64; 3]) -> String {
     v.map(|v| fixed(v, 3)).join(" ")
 }
 
-impl fmt::Display for Description {
+impl fmt::Display for InputDescription {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", quote::shown(&self.path))?;
         writeln!(f, "  format: {}", self.format)?;

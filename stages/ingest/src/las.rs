@@ -1,111 +1,24 @@
-//! Reads LAS and LAZ files (versions 1.0 to 1.4, point formats 0 to 10) as scans and strips. Points
-//! are handled as runs of records, as they lie in the file or come from the decompressor, without
-//! an object for each point.
+//! LAS and LAZ files in (versions 1.0 to 1.4, point formats 0 to 10); scans and strips out. Points
+//! come as runs of records, as they lie in the file or from the decompressor; no object is made for
+//! a point.
 
-use crate::las_header::LasHeader;
 use crate::las_record::Decoder;
+use crate::las_runs::{LasRecords, at_once};
 use crate::las_scans::{self, LasScanner};
-use crate::laz::{Laz, Stream};
-use crate::map::{Mapped, map};
+use crate::laz::LazStream;
+use crate::map::Mapped;
 use crate::oddities::Oddities;
-use crate::reader::{Extent, MaskSeed, RawStrip, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::reader::{
+    Extent, FileReading, MaskSeed, RawStrip, Reader, SampledPoint, ScanSeed, Want,
+};
 use crate::settings::Settings;
-use crate::units::{Choice, Units};
+use crate::units::Units;
 use contract::{Error, Format, Result};
-use std::borrow::Cow;
 use std::path::Path;
-
-/// Largest number of bytes of records that are decompressed from a stream at once: of records of
-/// usual length more than a strip.
-const RUN_BYTES: usize = 16 << 20;
-
-/// Number of records of this length that are decompressed from a stream at once. A stream does not
-/// tell how many records there really are, and a header may state records of 64 KiB, so that a
-/// buffer for a strip of them could take gigabytes before the first record is read.
-fn at_once(record_len: usize) -> usize {
-    (RUN_BYTES / record_len.max(1)).max(1)
-}
-
-/// The records of a file, compressed or not.
-pub(crate) struct Records {
-    map: Mapped,
-    /// The checked header, in metres.
-    pub(crate) header: LasHeader,
-    /// Units of the coordinates in the file.
-    units: Units,
-    /// How to decompress the records; `None` where they are not compressed.
-    pub(crate) laz: Option<Laz>,
-}
-
-impl Records {
-    /// Opens a file and checks its header.
-    pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Self> {
-        let map = map(path)?;
-        let header = LasHeader::read(&map)?;
-        let choice = Choice::read(&settings.units)?;
-        let units = Units::of(&header.declared, choice.of(path))?;
-        let header = header.in_metres(units.factors())?;
-        let laz = if header.compressed { Some(Laz::read(&map, &header, settings)?) } else { None };
-        Ok(Self { map, header, units, laz })
-    }
-
-    /// At most `n` records from place `first` on, with the place of the first record returned.
-    /// Where records are compressed, the run starts at the beginning of the piece that holds
-    /// `first`, or at the beginning of the file where they are one stream.
-    pub(crate) fn run(&self, first: u64, n: usize) -> Result<(u64, Cow<'_, [u8]>)> {
-        let n = n.min(usize::try_from(self.header.n_points.saturating_sub(first)).unwrap_or(n));
-        let Some(laz) = &self.laz else {
-            return Ok((first, Cow::Borrowed(self.mapped(first, n))));
-        };
-        if laz.pieces.is_empty() {
-            let n = n.min(at_once(self.header.record_len));
-            return Ok((0, Cow::Owned(laz.stream(&self.map)?.next(n)?)));
-        }
-        let mut at = laz.piece_of(first);
-        let start = laz.pieces.get(at).map_or(first, |p| p.first);
-        let mut records = Vec::new();
-        let mut left = n;
-        while let Some(piece) = laz.pieces.get(at).filter(|_| left > 0) {
-            records.extend(laz.head(&self.map, piece, left)?);
-            left = left.saturating_sub(piece.n_points as usize);
-            at += 1;
-        }
-        Ok((start, Cow::Owned(records)))
-    }
-
-    /// The place at which [`Records::run`] would start.
-    pub(crate) fn start(&self, first: u64) -> u64 {
-        let Some(laz) = &self.laz else { return first };
-        laz.pieces.get(laz.piece_of(first)).map_or(0, |p| p.first)
-    }
-
-    /// Extents that cover the file: runs of records that can be read independently, of `n` points
-    /// where they are not compressed, and the bytes between them. `None` where they are one stream.
-    fn extents(&self, n: usize) -> Option<Box<dyn Iterator<Item = Extent> + Send + '_>> {
-        let (header, n_bytes) = (&self.header, self.map.len() as u64);
-        let Some(laz) = &self.laz else {
-            let at = |place: u64| header.points_at as u64 + place * header.record_len as u64;
-            let runs = (0..header.n_points).step_by(n).map(move |first| {
-                let n_points = (n as u64).min(header.n_points - first);
-                Extent { bytes: at(first)..at(first + n_points), first, n_points }
-            });
-            return Some(Box::new(Extent::cover(runs, n_bytes)));
-        };
-        let is_stream = laz.pieces.is_empty();
-        (!is_stream).then(|| Box::new(Extent::cover(laz.pieces.iter().cloned(), n_bytes)) as _)
-    }
-
-    /// Records of an uncompressed file. They are in range, since the count was checked against the
-    /// length of the file.
-    fn mapped(&self, first: u64, n: usize) -> &[u8] {
-        let from = self.header.points_at + first as usize * self.header.record_len;
-        &self.map[from..from + n * self.header.record_len]
-    }
-}
 
 /// An open LAS or LAZ file.
 pub(crate) struct Las {
-    records: Records,
+    records: LasRecords,
     decoder: Decoder,
     masks: Vec<MaskSeed>,
     scans: Vec<ScanSeed>,
@@ -120,7 +33,7 @@ pub(crate) struct Las {
 impl Las {
     /// Opens a LAS or LAZ file with the scanners that are known for it.
     pub(crate) fn open(path: &Path, scanners: &[LasScanner], settings: &Settings) -> Result<Self> {
-        let records = Records::open(path, settings)?;
+        let records = LasRecords::open(path, settings)?;
         let found = las_scans::find(path, &records, scanners, settings)?;
         let pose = |s: &ScanSeed| (s.world_from_scan, s.scanner_known);
         let poses: Vec<_> = found.scans.iter().map(pose).collect();
@@ -166,7 +79,7 @@ impl Reader for Las {
         &self.scans
     }
 
-    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>> {
         /// Positions of the runs of a sample, relative to the length of the scan: each run spans
         /// several lines of most scanners.
         const RUNS: [f64; 3] = [0.45, 0.1, 0.8];
@@ -181,7 +94,7 @@ impl Reader for Las {
             RUNS.into_iter().chain(more).collect()
         };
         let length = if starts.len() == 1 { n } else { n / RUNS.len() };
-        let mut sample: Vec<Sampled> = Vec::new();
+        let mut sample: Vec<SampledPoint> = Vec::new();
         for (i, share) in starts.into_iter().enumerate() {
             if sample.len() >= n || (i >= RUNS.len() && sample.len() > n / 2) {
                 break;
@@ -190,7 +103,9 @@ impl Reader for Las {
             let (place, records) = self.records.run(from, length)?;
             for strip in self.decoder.decode(&records, place, Want::Coordinates) {
                 if strip.scan == scan {
-                    sample.extend(strip.xyz.into_iter().map(|xyz| Sampled { xyz, native: None }));
+                    sample.extend(
+                        strip.xyz.into_iter().map(|xyz| SampledPoint { xyz, native: None }),
+                    );
                 }
             }
         }
@@ -222,15 +137,16 @@ impl Reader for Las {
         self.decoder.oddities(scan)
     }
 
-    fn read(&self, want: Want) -> Result<Reading<'_>> {
+    fn read(&self, want: Want) -> Result<FileReading<'_>> {
         if want == Want::Everything {
             (0..self.scans.len()).filter_map(|i| self.oddities(i)).for_each(Oddities::clear);
         }
         let streamed = || {
-            let records = Streamed { las: self, want, place: 0, stream: None, has_failed: false };
-            Reading::Straight(Box::new(records.flatten()))
+            let records =
+                StreamedStrips { las: self, want, place: 0, stream: None, has_failed: false };
+            FileReading::Straight(Box::new(records.flatten()))
         };
-        Ok(self.records.extents(self.strip_points).map_or_else(streamed, Reading::ByExtent))
+        Ok(self.records.extents(self.strip_points).map_or_else(streamed, FileReading::ByExtent))
     }
 
     fn decode(&self, extent: &Extent, bytes: &[u8], want: Want) -> Result<Vec<RawStrip>> {
@@ -310,16 +226,16 @@ impl Las {
 }
 
 /// The strips of a file whose compressed records are one stream, run by run.
-struct Streamed<'a> {
+struct StreamedStrips<'a> {
     las: &'a Las,
     want: Want,
     /// Place of the next record to decompress.
     place: u64,
-    stream: Option<Stream<'a>>,
+    stream: Option<LazStream<'a>>,
     has_failed: bool,
 }
 
-impl Streamed<'_> {
+impl StreamedStrips<'_> {
     /// The strips of the next run; `None` at the end.
     fn run(&mut self) -> Result<Option<Vec<RawStrip>>> {
         let (las, first) = (self.las, self.place);
@@ -338,7 +254,7 @@ impl Streamed<'_> {
     }
 }
 
-impl Iterator for Streamed<'_> {
+impl Iterator for StreamedStrips<'_> {
     type Item = Vec<Result<RawStrip>>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -352,19 +268,5 @@ impl Iterator for Streamed<'_> {
                 Some(vec![Err(error)])
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_stream_is_decompressed_in_runs_of_bounded_bytes() {
-        for record_len in [20, 30, 67, 1000, usize::from(u16::MAX)] {
-            let n = at_once(record_len);
-            assert!(n >= 1 && n * record_len <= RUN_BYTES, "{n} records of {record_len} bytes");
-        }
-        assert!(at_once(67) > Settings::default().strip_points, "usual records: whole strips");
     }
 }

@@ -1,6 +1,6 @@
 //! Reads the header of a LAS or LAZ file and checks it against the length of the file.
 
-use crate::las_record::Layout;
+use crate::las_layout::RecordLayout;
 use crate::units::{self, Declaration};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
@@ -60,7 +60,7 @@ impl LasHeader {
             .hint("versions 1.0 to 1.4 are read; convert it"));
         }
         let format = raw.point_data_record_format & !COMPRESSED_BITS;
-        let Some(layout) = Layout::of(format) else {
+        let Some(layout) = RecordLayout::of(format) else {
             return Err(Error::new(Kind::Unsupported, format!("point format \"{format}\""))
                 .at("header")
                 .hint("formats 0 to 10 are read; convert it"));

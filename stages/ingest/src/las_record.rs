@@ -3,74 +3,17 @@
 
 use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
+use crate::las_layout::{LAYOUTS, RecordLayout, u16_at};
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, Want};
 use contract::Attributes;
 use geometry::Pose;
-
-/// Offsets of the fields of a point format from the start of the record, bytes.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Layout {
-    /// Smallest length of a record, bytes.
-    pub(crate) len: usize,
-    /// Whether it is one of formats 6 to 10, whose flags, class and source id lie elsewhere.
-    pub(crate) modern: bool,
-    /// GPS time.
-    pub(crate) gps_time: Option<usize>,
-    /// Red, green, blue.
-    pub(crate) color: Option<usize>,
-}
-
-/// The point formats 0 to 10 (LAS 1.4 R15, tables 7 to 17).
-const LAYOUTS: [Layout; 11] = [
-    Layout { len: 20, modern: false, gps_time: None, color: None },
-    Layout { len: 28, modern: false, gps_time: Some(20), color: None },
-    Layout { len: 26, modern: false, gps_time: None, color: Some(20) },
-    Layout { len: 34, modern: false, gps_time: Some(20), color: Some(28) },
-    Layout { len: 57, modern: false, gps_time: Some(20), color: None },
-    Layout { len: 63, modern: false, gps_time: Some(20), color: Some(28) },
-    Layout { len: 30, modern: true, gps_time: Some(22), color: None },
-    Layout { len: 36, modern: true, gps_time: Some(22), color: Some(30) },
-    Layout { len: 38, modern: true, gps_time: Some(22), color: Some(30) },
-    Layout { len: 59, modern: true, gps_time: Some(22), color: None },
-    Layout { len: 67, modern: true, gps_time: Some(22), color: Some(30) },
-];
 
 /// Number of records that are decoded together: few enough for the first-level cache, many enough
 /// for vector loops.
 const BLOCK: usize = 64;
 /// Offset of the intensity, the same in all formats.
 const INTENSITY: usize = 12;
-
-impl Layout {
-    /// The layout of a point format; `None` where the format is unknown.
-    pub(crate) fn of(format: u8) -> Option<Self> {
-        LAYOUTS.get(usize::from(format)).copied()
-    }
-
-    /// Whether the file marks the point as withheld.
-    #[inline]
-    pub(crate) fn withheld(self, record: &[u8]) -> bool {
-        if self.modern { record[15] & 0b100 != 0 } else { record[15] & 0b1000_0000 != 0 }
-    }
-
-    /// Point source id.
-    #[inline]
-    pub(crate) fn source_id(self, record: &[u8]) -> u16 {
-        u16_at(record, if self.modern { 20 } else { 18 })
-    }
-
-    /// Classification of the point.
-    #[inline]
-    fn classification(self, record: &[u8]) -> u8 {
-        if self.modern { record[16] } else { record[15] & 0b1_1111 }
-    }
-}
-
-#[inline]
-fn u16_at(record: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes([record[at], record[at + 1]])
-}
 
 #[inline]
 fn i32_at(record: &[u8], at: usize) -> f64 {
@@ -102,7 +45,7 @@ fn trimmed(mut strip: RawStrip) -> Option<RawStrip> {
 
 /// Coordinates of a record in the scan frame, metres.
 #[inline]
-fn in_scan(record: &[u8], frame: &Frame) -> [f64; 3] {
+fn in_scan(record: &[u8], frame: &CountFrame) -> [f64; 3] {
     let (c, m, t) = (counts(record), &frame.m, &frame.t);
     // `add_block` must sum in the same order, so that both give the same result to the bit.
     [0, 1, 2].map(|i| c[0] * m[i][0] + c[1] * m[i][1] + c[2] * m[i][2] + t[i])
@@ -110,7 +53,7 @@ fn in_scan(record: &[u8], frame: &Frame) -> [f64; 3] {
 
 /// Conversion from counts to the scan frame: `m · counts + t`, metres.
 #[derive(Debug, Clone)]
-struct Frame {
+struct CountFrame {
     m: [[f64; 3]; 3],
     t: [f64; 3],
     /// Distance from the scanner within which points are beams without return, metres; 0 where no
@@ -118,7 +61,7 @@ struct Frame {
     no_return: f64,
 }
 
-impl Frame {
+impl CountFrame {
     /// Whether a place in the scan frame is at the scanner itself.
     #[inline]
     fn is_no_return(&self, p: [f64; 3]) -> bool {
@@ -129,11 +72,11 @@ impl Frame {
 /// Converts records to strips.
 #[derive(Debug)]
 pub(crate) struct Decoder {
-    layout: Layout,
+    layout: RecordLayout,
     record_len: usize,
     scale: [f64; 3],
     offset: [f64; 3],
-    frames: Vec<Frame>,
+    frames: Vec<CountFrame>,
     /// Index of the scan of each source id; empty where all points belong to scan 0.
     scan_of_source: Vec<u16>,
     max_range: f64,
@@ -156,7 +99,7 @@ impl Decoder {
         scan_of_source: Vec<u16>,
         max_range: f64,
     ) -> Self {
-        let frames: Vec<Frame> = poses
+        let frames: Vec<CountFrame> = poses
             .iter()
             .map(|(world_from_scan, is_scanner)| {
                 let turn = world_from_scan.rotation.inverse().to_rotation_matrix();
@@ -168,7 +111,7 @@ impl Decoder {
                 // scanner is at the scanner.
                 let step = header.scale.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
                 let no_return = if *is_scanner { NO_RETURN.max(step) } else { 0.0 };
-                Frame { m, t: [t.x, t.y, t.z], no_return }
+                CountFrame { m, t: [t.x, t.y, t.z], no_return }
             })
             .collect();
         Self {
@@ -191,7 +134,7 @@ impl Decoder {
     }
 
     /// Layout of the records.
-    pub(crate) fn layout(&self) -> Layout {
+    pub(crate) fn layout(&self) -> RecordLayout {
         self.layout
     }
 
@@ -253,9 +196,15 @@ impl Decoder {
         }
     }
 
-    /// Adds a whole block of records in loops without branches. Returns false, and adds nothing, if
-    /// any of them is withheld or out of range.
-    fn add_block(&self, strip: &mut RawStrip, block: &[u8], frame: &Frame, place: u32) -> bool {
+    /// The same for a whole block of records, in loops without branches; false, and nothing done,
+    /// where one of them is withheld or not to be believed.
+    fn add_block(
+        &self,
+        strip: &mut RawStrip,
+        block: &[u8],
+        frame: &CountFrame,
+        place: u32,
+    ) -> bool {
         let mut counts = [[0.0_f64; 3]; BLOCK];
         let mut withheld = false;
         for (record, count) in block.chunks_exact(self.record_len).zip(&mut counts) {
@@ -322,7 +271,7 @@ impl Decoder {
 
     /// Coordinates in the scan frame; `None` where the point is withheld or out of range.
     #[inline]
-    fn local(&self, record: &[u8], frame: &Frame) -> Option<[f32; 3]> {
+    fn local(&self, record: &[u8], frame: &CountFrame) -> Option<[f32; 3]> {
         let p = in_scan(record, frame);
         // Written so that a NaN (from a scale near the end of f64) is refused, too.
         let near = p[0].abs() <= self.max_range
@@ -333,7 +282,7 @@ impl Decoder {
     }
 
     /// Whether the point is at the scanner itself and not withheld.
-    fn is_no_return(&self, record: &[u8], frame: &Frame) -> bool {
+    fn is_no_return(&self, record: &[u8], frame: &CountFrame) -> bool {
         frame.is_no_return(in_scan(record, frame)) && !self.layout.withheld(record)
     }
 

@@ -2,9 +2,9 @@
 //! to put the origin where no scanner is known.
 
 use crate::frame::NO_RETURN;
-use crate::las::Records;
 use crate::las_header::LasHeader;
-use crate::las_record::Layout;
+use crate::las_layout::RecordLayout;
+use crate::las_runs::LasRecords;
 use crate::oddities::no_returns_note;
 use crate::reader::ScanSeed;
 use crate::settings::Settings;
@@ -28,7 +28,7 @@ pub(crate) struct LasScanner {
 }
 
 /// The scans of one file.
-pub(crate) struct Found {
+pub(crate) struct FoundScans {
     pub(crate) scans: Vec<ScanSeed>,
     /// Index of the scan of each source id; empty where there is only one scan.
     pub(crate) scan_of_source: Vec<u16>,
@@ -74,10 +74,10 @@ struct Census {
 /// Finds the scans of a file.
 pub(crate) fn find(
     path: &Path,
-    records: &Records,
+    records: &LasRecords,
     scanners: &[LasScanner],
     settings: &Settings,
-) -> Result<Found> {
+) -> Result<FoundScans> {
     let header = &records.header;
     let look = look(records)?;
     let whole = (0, header.n_points.saturating_sub(1));
@@ -104,7 +104,7 @@ pub(crate) fn find(
         notes: notes.clone(),
         step,
     };
-    let mut found = Found {
+    let mut found = FoundScans {
         scans: Vec::new(),
         scan_of_source: Vec::new(),
         extents: Vec::new(),
@@ -129,7 +129,7 @@ pub(crate) fn find(
 }
 
 fn by_source_id(
-    found: &mut Found,
+    found: &mut FoundScans,
     scanners: &[LasScanner],
     census: &Census,
     whole: (u64, u64),
@@ -168,7 +168,7 @@ fn by_source_id(
 
 /// Checks the place of a scan, by its scanner where that is known, else by the spread of its
 /// points, and notes what users should know.
-fn check_place(scan: &mut ScanSeed, look: &Look, settings: &Settings) -> Result<()> {
+fn check_place(scan: &mut ScanSeed, look: &LasLook, settings: &Settings) -> Result<()> {
     if scan.scanner_known {
         let n = look.n_at(scan.world_from_scan.translation.vector);
         if n > 0 {
@@ -228,7 +228,7 @@ pub(crate) fn grown(bounds: &Aabb, header: &LasHeader) -> Aabb {
 }
 
 /// What a sample of records says of where all points lie.
-struct Look {
+struct LasLook {
     /// World coordinates, metres.
     points: Vec<[f64; 3]>,
     /// Number of these points outside the stated bounds.
@@ -239,7 +239,7 @@ struct Look {
     origin: [f64; 3],
 }
 
-impl Look {
+impl LasLook {
     fn bounds_wrong(&self) -> bool {
         self.outside * 2 > self.points.len()
     }
@@ -256,7 +256,7 @@ impl Look {
     }
 }
 
-fn look(records: &Records) -> Result<Look> {
+fn look(records: &LasRecords) -> Result<LasLook> {
     const WINDOWS: u64 = 8;
     const IN_WINDOW: usize = 256;
     let header = &records.header;
@@ -282,7 +282,7 @@ fn look(records: &Records) -> Result<Look> {
             values[values.len() / 2]
         })
     });
-    let mut look = Look { points, outside, middle, origin: [0.0; 3] };
+    let mut look = LasLook { points, outside, middle, origin: [0.0; 3] };
     let stated = header.bounds.filter(|_| !look.bounds_wrong()).map(|b| {
         let center = b.center();
         [center.x, center.y, center.z]
@@ -301,9 +301,9 @@ fn world(record: &[u8], header: &LasHeader) -> [f64; 3] {
 }
 
 /// Reads the source ids of all records of a small file, else those of windows.
-fn census(records: &Records) -> Result<Census> {
+fn census(records: &LasRecords) -> Result<Census> {
     let header = &records.header;
-    let layout = Layout::of(header.format).expect("the header was checked");
+    let layout = RecordLayout::of(header.format).expect("the header was checked");
     let mut census = Census::default();
     let mut add = |first: u64, run: &[u8]| {
         let ids: Vec<u16> =

@@ -221,22 +221,22 @@ impl Laz {
     }
 
     /// A reader that starts at the beginning of a file that is one stream.
-    pub(crate) fn stream<'a>(&self, data: &'a [u8]) -> Result<Stream<'a>> {
+    pub(crate) fn stream<'a>(&self, data: &'a [u8]) -> Result<LazStream<'a>> {
         let mut source = Cursor::new(data);
         source.set_position(self.points_at as u64);
         let vlr = self.vlr.clone();
         let inner = guarded("starting the decoder", || LasZipDecompressor::new(source, vlr))?;
-        Ok(Stream { inner, record_len: self.record_len })
+        Ok(LazStream { inner, record_len: self.record_len })
     }
 }
 
 /// A LAZ file that can only be read from its start.
-pub(crate) struct Stream<'a> {
+pub(crate) struct LazStream<'a> {
     inner: LasZipDecompressor<'a, Cursor<&'a [u8]>>,
     record_len: usize,
 }
 
-impl Stream<'_> {
+impl LazStream<'_> {
     /// The next `n` records.
     pub(crate) fn next(&mut self, n: usize) -> Result<Vec<u8>> {
         let mut records = vec![0; n * self.record_len];
@@ -304,7 +304,7 @@ fn read_vlr(payload: &[u8], header: &LasHeader) -> Result<(LazVlr, CompressorTyp
         Error::new(Kind::Unsupported, "the compression is not known").because(cause)
     })?;
     let extra =
-        header.record_len - crate::las_record::Layout::of(header.format).map_or(0, |l| l.len);
+        header.record_len - crate::las_layout::RecordLayout::of(header.format).map_or(0, |l| l.len);
     let expected =
         LazItemRecordBuilder::default_for_point_format_id(header.format, extra as u16)
             .map_err(|cause| damaged("the compression does not fit the points").because(cause))?;

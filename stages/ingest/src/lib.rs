@@ -23,17 +23,21 @@
 //! ```
 #![deny(unsafe_code)]
 
+mod angular_grid;
 mod bounds;
 #[cfg(test)]
 mod check;
 mod e57;
+mod file;
 mod format;
 mod frame;
 mod glance;
 mod inspect;
 mod las;
 mod las_header;
+mod las_layout;
 mod las_record;
+mod las_runs;
 mod las_scans;
 mod laz;
 mod levels;
@@ -57,15 +61,15 @@ mod steps;
 mod text;
 mod units;
 
-pub use glance::{Glance, Sample};
+pub use glance::{Glance, GlanceSample};
 pub use inspect::{
-    BoundsText, Description, Fact, LatticeText, PoseText, ScanDescription, describe,
+    BoundsText, Fact, InputDescription, LatticeText, PoseText, ScanDescription, describe,
 };
 pub use map::{Mapped, map};
 pub use position::MISPLACED;
 pub use reader::{Extent, Want};
 pub use regular::{read_text, regular};
-pub use scanners::{Scanner, Scanners};
+pub use scanners::{KnownScanner, KnownScanners};
 pub use settings::Settings;
-pub use sources::{Before, Piece, Pieces, Sources, Strips, open, open_after};
-pub use units::{Origin, Unit, Units};
+pub use sources::{Before, InputPiece, InputPieces, Sources, Strips, open, open_after};
+pub use units::{LengthUnit, Origin, Units};

@@ -1,25 +1,32 @@
-//! What a sample of a scan's points tells: its raster, where most points lie, and whether the
-//! scanner can have stood at its stated position.
+//! A scan of an open file in; what a sample of its points tells out: its raster, where most of it
+//! lies, and whether its scanner can have stood where it is said to.
+
+use crate::file::{OpenFile, moved};
 
 use crate::position;
-use crate::raster::{self, Raster, Steps};
-use crate::reader::Sampled;
+use crate::raster::{self, ScanRaster, StepSource};
+use crate::reader::SampledPoint;
 use crate::settings::Settings;
-use crate::size::{self, N_LOOKED};
-use crate::sources::File;
 use contract::{Result, Scan};
-use geometry::{Aabb, Pose};
+use geometry::{Aabb, Point, Pose};
 
 /// Note on a scan from a depth camera.
 const CAMERA: &str = "taken by a depth camera: its points err by half a percent of their range, alike over a hand's width";
 /// Note on a scan whose scanner is known, but not its raster.
 const NO_RASTER: &str = "too few points to tell the raster: no free-space evidence from this scan";
+/// Points of a scan that are looked at where nothing else needs a sample.
+const N_LOOKED: usize = 4096;
+/// Fewer points spread over nothing in particular.
+const LEAST_POINTS: usize = 100;
+/// Share of the points on either side that count for nothing: strays, and what is seen through
+/// gates.
+const TAIL: f64 = 0.05;
 
 /// The result of sampling a scan.
 #[derive(Default)]
-pub(crate) struct Looked {
+pub(crate) struct ScanLook {
     /// The raster, where the scanner is known and the points suffice.
-    pub(crate) raster: Option<Raster>,
+    pub(crate) raster: Option<ScanRaster>,
     /// Message about an odd or missing raster.
     pub(crate) note: Option<String>,
     /// Bounds of most of its points in the world, metres.
@@ -28,36 +35,36 @@ pub(crate) struct Looked {
     pub(crate) is_misplaced: bool,
 }
 
-impl File {
+impl OpenFile {
     /// Samples a scan.
-    pub(crate) fn look(&self, i: usize, scan: &Scan, settings: &Settings) -> Result<Looked> {
+    pub(crate) fn look(&self, i: usize, scan: &Scan, settings: &Settings) -> Result<ScanLook> {
         if scan.stated_points == Some(0) {
-            return Ok(Looked::default());
+            return Ok(ScanLook::default());
         }
         let n = if self.known[i] { settings.sample_points } else { N_LOOKED };
-        let mut sample: Vec<Sampled> = self.reader.sample(i, n)?;
+        let mut sample: Vec<SampledPoint> = self.reader.sample(i, n)?;
         if let Some(new_from_file) = &self.moved[i] {
             sample.iter_mut().for_each(|s| s.xyz = moved(new_from_file, s.xyz));
         }
-        let spread = size::spread(sample.iter().map(|s| s.xyz), &scan.world_from_scan);
+        let spread = spread(sample.iter().map(|s| s.xyz), &scan.world_from_scan);
         if !self.known[i] {
-            return Ok(Looked { spread, ..Looked::default() });
+            return Ok(ScanLook { spread, ..ScanLook::default() });
         }
         let n_points = self.reader.scans()[i].likely_points.or(scan.stated_points);
         let raster = raster::estimate(&sample, n_points, settings);
         // Rows and columns that are regular in angle prove the scanner's position.
-        if !raster.is_some_and(|raster| raster.steps == Steps::Native)
+        if !raster.is_some_and(|raster| raster.steps == StepSource::Native)
             && let Some(note) = self.misplaced(i)?
         {
             let note = Some(note);
-            return Ok(Looked { raster: None, note, spread, is_misplaced: true });
+            return Ok(ScanLook { raster: None, note, spread, is_misplaced: true });
         }
         let note = match &raster {
             None if !sample.is_empty() => Some(NO_RASTER.into()),
             Some(raster) if raster.lattice.is_camera => Some(CAMERA.into()),
             _ => None,
         };
-        Ok(Looked { raster, note, spread, is_misplaced: false })
+        Ok(ScanLook { raster, note, spread, is_misplaced: false })
     }
 
     /// The message for a scan whose scanner cannot have stood at its stated position.
@@ -71,8 +78,39 @@ impl File {
     }
 }
 
-/// Converts a point of a scan whose pose the user replaced to its new scan frame, metres.
-pub(crate) fn moved(pose: &Pose, p: [f32; 3]) -> [f32; 3] {
-    let q = pose * nalgebra::Point3::from(p.map(f64::from));
-    [q.x as f32, q.y as f32, q.z as f32]
+/// Where most points of a scan lie in the world, metres; nothing of too few points.
+fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose) -> Option<Aabb> {
+    let world = xyz.map(|p| world_from_scan * Point::from(p.map(f64::from)));
+    let world: Vec<Point> = world.collect();
+    if world.len() < LEAST_POINTS {
+        return None;
+    }
+    let last = (world.len() - 1) as f64;
+    let (low, high) = ((last * TAIL) as usize, (last * (1.0 - TAIL)) as usize);
+    let mut out = Aabb::EMPTY;
+    for axis in 0..3 {
+        let mut along: Vec<f64> = world.iter().map(|p| p[axis]).collect();
+        along.sort_unstable_by(f64::total_cmp);
+        (out.min[axis], out.max[axis]) = (along[low], along[high]);
+    }
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_is_of_most_points_and_along_the_worlds_axes() {
+        let points = || (0..1000).map(|i| [i as f32 * 0.01, 0.0, 0.5]);
+        let stray = points().chain([[9e5, 9e5, -9e5]]);
+        let box_of = |points: &mut dyn Iterator<Item = [f32; 3]>, pose: &Pose| spread(points, pose);
+        let found = box_of(&mut stray.into_iter(), &Pose::identity()).expect("points");
+        assert!((found.size()[0] - 9.0).abs() < 0.05, "{found:?}");
+        assert_eq!((found.size()[1], found.min[2]), (0.0, 0.5));
+        let upright = Pose::rotation(geometry::Vector::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
+        let found = box_of(&mut points(), &upright).expect("points");
+        assert!((found.size()[2] - 9.0).abs() < 0.05 && found.size()[0] < 1e-6, "{found:?}");
+        assert_eq!(box_of(&mut points().take(99), &Pose::identity()), None);
+    }
 }

@@ -1,8 +1,8 @@
 //! Tells from a sample of neighbouring points whether a depth camera took them: a camera's pixels
 //! are evenly spaced on a plane in front of it, a scanner's beams are evenly spaced in angle.
 
-use crate::raster::{Axis, wrap};
-use crate::reader::Sampled;
+use crate::angular_grid::{Axis, wrap};
+use crate::reader::SampledPoint;
 use nalgebra::Vector3;
 
 /// Largest number of pairs of neighbours that are examined; it gives shares to one percent.
@@ -31,8 +31,8 @@ const AXIS: (i32, f64) = (5, 0.12);
 const LAST_STEP: f64 = 0.01;
 
 /// Whether the points have the directions of a camera's pixels.
-pub(crate) fn is_picture(sample: &[Sampled]) -> bool {
-    let unit = |s: &Sampled| Vector3::from(s.xyz.map(f64::from)).normalize();
+pub(crate) fn is_picture(sample: &[SampledPoint]) -> bool {
+    let unit = |s: &SampledPoint| Vector3::from(s.xyz.map(f64::from)).normalize();
     let all: Vec<Vector3<f64>> = sample.iter().map(unit).collect();
     let mean = all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64;
     let every = all.len().div_ceil(PAIRS).max(1);
@@ -106,13 +106,17 @@ mod tests {
     use super::*;
 
     /// Points on a bumpy wall, row by row, in the directions that `at` gives.
-    fn sample(at: impl Fn(i32, i32) -> [f64; 3]) -> Vec<Sampled> {
+    fn sample(at: impl Fn(i32, i32) -> [f64; 3]) -> Vec<SampledPoint> {
         let rows = (-120..120).flat_map(|i| (-160..160).map(move |j| (i, j)));
         let point = |(i, j): (i32, i32)| {
             let range = 1.5 + 0.3 * f64::from(i * 7 + j * 3).sin();
             let d = Vector3::from(at(i, j)).normalize() * range;
-            // Rounded as in a file with tenths of a millimetre.
-            Sampled { xyz: [d.x, d.y, d.z].map(|v| (v * 1e4).round() as f32 / 1e4), native: None }
+            // As a file with tenths of a millimetre has them.
+            SampledPoint {
+                // Rounded as in a file with tenths of a millimetre.
+                xyz: [d.x, d.y, d.z].map(|v| (v * 1e4).round() as f32 / 1e4),
+                native: None,
+            }
         };
         // Pixels without depth are missing.
         rows.filter(|(i, j)| (i * 31 + j * 17) % 7 != 0).map(point).collect()

@@ -2,13 +2,13 @@
 //! none.
 
 use crate::las_scans::LasScanner;
-use crate::scanners::{Scanner, Scanners};
+use crate::scanners::{KnownScanner, KnownScanners};
 use geometry::Pose;
 use std::path::{Path, PathBuf};
 
 /// The scanners that the user gave, and which of them were used.
 pub(crate) struct Poses<'a> {
-    entries: &'a [Scanner],
+    entries: &'a [KnownScanner],
     used: Vec<bool>,
     /// File names of the inputs without suffix.
     stems: Vec<String>,
@@ -17,7 +17,7 @@ pub(crate) struct Poses<'a> {
 }
 
 impl<'a> Poses<'a> {
-    pub(crate) fn new(scanners: &'a Scanners, paths: &[PathBuf]) -> Self {
+    pub(crate) fn new(scanners: &'a KnownScanners, paths: &[PathBuf]) -> Self {
         Self {
             entries: &scanners.entries,
             used: vec![false; scanners.entries.len()],
@@ -36,17 +36,20 @@ impl<'a> Poses<'a> {
     /// name is not that of another input; else the only entry.
     pub(crate) fn of_las(&mut self, path: &Path) -> Vec<LasScanner> {
         let stem = stem(path);
-        let named = |e: &Scanner| e.name.as_deref() == Some(stem.as_str());
-        let for_another = |e: &Scanner| e.name.as_ref().is_some_and(|n| self.stems.contains(n));
-        let by_id = |e: &Scanner| e.point_source_id.is_some() && !for_another(e);
-        let only =
-            |e: &Scanner| self.entries.len() == 1 && e.point_source_id.is_none() && !for_another(e);
-        let whole = |e: &Scanner| named(e) && e.point_source_id.is_none();
+        let named = |e: &KnownScanner| e.name.as_deref() == Some(stem.as_str());
+        let for_another =
+            |e: &KnownScanner| e.name.as_ref().is_some_and(|n| self.stems.contains(n));
+        let by_id = |e: &KnownScanner| e.point_source_id.is_some() && !for_another(e);
+        let only = |e: &KnownScanner| {
+            self.entries.len() == 1 && e.point_source_id.is_none() && !for_another(e)
+        };
+        let whole = |e: &KnownScanner| named(e) && e.point_source_id.is_none();
         let chosen: Vec<usize> = match self.entries.iter().position(whole) {
             Some(at) => vec![at],
             None => {
-                let fits =
-                    |e: &Scanner| (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e);
+                let fits = |e: &KnownScanner| {
+                    (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e)
+                };
                 (0..self.entries.len()).filter(|i| fits(&self.entries[*i])).collect()
             }
         };

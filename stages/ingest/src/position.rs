@@ -45,14 +45,14 @@ pub const MISPLACED: &str = "the stated scanner position cannot be right";
 
 /// The cells of directions from the stated position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Seen {
+pub(crate) struct SeenDirections {
     /// Number of cells with enough points.
     pub(crate) n_cells: usize,
     /// Number of those in which two surfaces lie one behind the other, both at full density.
     pub(crate) n_double: usize,
 }
 
-impl Seen {
+impl SeenDirections {
     /// Whether no scanner can have stood there.
     pub(crate) fn is_wrong(&self) -> bool {
         self.n_cells >= MIN_CELLS
@@ -72,24 +72,24 @@ impl Seen {
 
 /// A point as direction and range.
 #[derive(Debug, Clone, Copy)]
-struct Beam {
+struct RangedDirection {
     cell: u32,
     to: [f64; 3],
     range: f64,
 }
 
 /// Examines points (scan frame, metres) as seen from the origin.
-pub(crate) fn look(points: &[[f32; 3]]) -> Seen {
-    let mut beams: Vec<Beam> = points.iter().filter_map(|p| beam(*p)).collect();
+pub(crate) fn look(points: &[[f32; 3]]) -> SeenDirections {
+    let mut beams: Vec<RangedDirection> = points.iter().filter_map(|p| beam(*p)).collect();
     for edge in EDGES {
         beams.iter_mut().for_each(|beam| beam.cell = cell(beam.to, edge));
         beams.sort_by_key(|beam| beam.cell);
-        if typical(beams.chunk_by(same).map(<[Beam]>::len).collect()) >= IN_CELL {
+        if typical(beams.chunk_by(same).map(<[RangedDirection]>::len).collect()) >= IN_CELL {
             break;
         }
     }
     let usual = usual(&beams);
-    let mut seen = Seen { n_cells: 0, n_double: 0 };
+    let mut seen = SeenDirections { n_cells: 0, n_double: 0 };
     for cell in beams.chunk_by(same).filter(|cell| cell.len() >= FEWEST) {
         seen.n_cells += 1;
         let is_full = cell.len() as f64 > FULLER * usual[band(cell)] as f64;
@@ -98,13 +98,13 @@ pub(crate) fn look(points: &[[f32; 3]]) -> Seen {
     seen
 }
 
-fn beam(p: [f32; 3]) -> Option<Beam> {
+fn beam(p: [f32; 3]) -> Option<RangedDirection> {
     let p = p.map(f64::from);
     let range = p.iter().map(|v| v * v).sum::<f64>().sqrt();
-    (range > 0.0).then(|| Beam { cell: 0, to: p.map(|v| v / range), range })
+    (range > 0.0).then(|| RangedDirection { cell: 0, to: p.map(|v| v / range), range })
 }
 
-fn same(a: &Beam, b: &Beam) -> bool {
+fn same(a: &RangedDirection, b: &RangedDirection) -> bool {
     a.cell == b.cell
 }
 
@@ -134,21 +134,22 @@ fn typical(mut lengths: Vec<usize>) -> usize {
 }
 
 /// The typical number of points of a cell for each band of elevation.
-fn usual(beams: &[Beam]) -> [usize; N_BANDS] {
+fn usual(beams: &[RangedDirection]) -> [usize; N_BANDS] {
     let mut lengths: [Vec<usize>; N_BANDS] = Default::default();
     beams.chunk_by(same).for_each(|cell| lengths[band(cell)].push(cell.len()));
     lengths.map(typical)
 }
 
 /// Index of the elevation band of a cell.
-fn band(cell: &[Beam]) -> usize {
+fn band(cell: &[RangedDirection]) -> usize {
     let elevation = cell[0].to[2].clamp(-1.0, 1.0).asin();
     (((elevation / PI + 0.5) * N_BANDS as f64) as usize).min(N_BANDS - 1)
 }
 
 /// Whether two surfaces share the whole cell.
-fn is_double(cell: &[Beam]) -> bool {
-    let some: Vec<Beam> = cell.iter().step_by(cell.len().div_ceil(MOST)).copied().collect();
+fn is_double(cell: &[RangedDirection]) -> bool {
+    let some: Vec<RangedDirection> =
+        cell.iter().step_by(cell.len().div_ceil(MOST)).copied().collect();
     let mut ranges: Vec<f64> = some.iter().map(|beam| beam.range).collect();
     ranges.sort_by(f64::total_cmp);
     let ratio = |at: &usize| ranges[at + 1] / ranges[*at];
@@ -159,14 +160,14 @@ fn is_double(cell: &[Beam]) -> bool {
     if gap < APART.0.max(APART.1 * near) || !(EITHER..=1.0 - EITHER).contains(&share) {
         return false;
     }
-    let is_far = |beam: &Beam| beam.range > near + gap / 2.0;
+    let is_far = |beam: &RangedDirection| beam.range > near + gap / 2.0;
     let n_mixed =
         (0..some.len()).filter(|&i| is_far(&some[i]) != is_far(nearest(&some, i))).count();
     n_mixed as f64 >= MIXED * some.len() as f64
 }
 
 /// The beam whose direction is nearest to that of beam `i`.
-fn nearest(beams: &[Beam], i: usize) -> &Beam {
+fn nearest(beams: &[RangedDirection], i: usize) -> &RangedDirection {
     let dot = |k: usize| (0..3).map(|a| beams[i].to[a] * beams[k].to[a]).sum::<f64>();
     let others = (0..beams.len()).filter(|k| *k != i);
     let best = others.max_by(|a, b| dot(*a).total_cmp(&dot(*b)));

@@ -9,17 +9,17 @@ mod strips;
 mod tests;
 
 use crate::Settings;
-use crate::frame::Frame;
+use crate::frame::FileFrame;
 use crate::levels::Span;
 use crate::oddities::Oddities;
-use crate::reader::{MaskSeed, Reader, Reading, Sampled, ScanSeed, Want};
+use crate::reader::{FileReading, MaskSeed, Reader, SampledPoint, ScanSeed, Want};
 use crate::units::{Choice, Units};
 use contract::{Format, Result};
 use std::path::{Path, PathBuf};
 
 /// One scan of the file.
 #[derive(Debug, Clone)]
-struct Block {
+struct PtxScan {
     /// Number of rows.
     n_rows: u64,
     /// Number of lines of points.
@@ -33,7 +33,7 @@ struct Block {
     /// Metres per unit of the file.
     metres: f64,
     /// Conversion from the file's coordinates (metres) to the scan frame.
-    frame: Frame,
+    frame: FileFrame,
     /// The intensities that become 0 and 65535.
     intensity: Span,
     /// The step of the coordinates, metres; `None` where it is fine enough.
@@ -46,7 +46,7 @@ struct PtxFile {
     settings: Settings,
     masks: Vec<MaskSeed>,
     scans: Vec<ScanSeed>,
-    blocks: Vec<Block>,
+    blocks: Vec<PtxScan>,
     units: Units,
     /// Counts of odd points, one entry a scan.
     oddities: Vec<Oddities>,
@@ -98,7 +98,7 @@ impl Reader for PtxFile {
         &self.scans
     }
 
-    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>> {
         strips::sample(self, scan, n)
     }
 
@@ -106,8 +106,8 @@ impl Reader for PtxFile {
         strips::spread(self, scan, n, most)
     }
 
-    fn read(&self, want: Want) -> Result<Reading<'_>> {
-        Ok(Reading::Straight(Box::new(strips::Strips::new(self, want))))
+    fn read(&self, want: Want) -> Result<FileReading<'_>> {
+        Ok(FileReading::Straight(Box::new(strips::PtxStrips::new(self, want))))
     }
 
     fn units(&self) -> &Units {

@@ -1,8 +1,8 @@
 //! Estimates a raster from the directions of points without native rows and columns. Points in the
 //! order of measurement give both steps; depth images and shuffled points give the density only.
 
-use crate::raster::{Axis, Grid, median, wrap};
-use crate::reader::Sampled;
+use crate::angular_grid::{AngularGrid, Axis, median, wrap};
+use crate::reader::SampledPoint;
 use std::f64::consts::TAU;
 
 /// Distance between points that follow one another in the file, in spacings of the sample, above
@@ -24,7 +24,7 @@ const STEEP: f64 = 1.3;
 const SAME: f64 = 1e-6;
 
 /// Fits a raster; `None` only where all points have the same direction.
-pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<Grid> {
+pub(crate) fn fit(sample: &[SampledPoint], n_total: Option<u64>) -> Option<AngularGrid> {
     let about_z: Vec<[f64; 2]> = sample.iter().map(|s| Axis::Z.angles(s.xyz)).collect();
     let spacing = spacing(&about_z)?;
     let steps = consecutive(sample);
@@ -34,7 +34,7 @@ pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<Grid> {
         let share = n_total.map_or(1.0, |n| (sample.len() as f64 / n as f64).min(1.0));
         return Some(square(&about_z, spacing * share.sqrt()));
     };
-    let lines = Axis::ALL.map(|axis| Lines::find(sample, &steps, along, axis));
+    let lines = Axis::ALL.map(|axis| ScanLines::find(sample, &steps, along, axis));
     let mut best = &lines[0];
     for other in &lines[1..] {
         if best.bend > STRAIGHT && other.bend < STRAIGHTER * best.bend {
@@ -48,19 +48,19 @@ pub(crate) fn fit(sample: &[Sampled], n_total: Option<u64>) -> Option<Grid> {
 }
 
 /// A raster with the same step in both directions.
-fn square(angles: &[[f64; 2]], step: f64) -> Grid {
+fn square(angles: &[[f64; 2]], step: f64) -> AngularGrid {
     let [azimuth, elevation] = angles[angles.len() / 2];
-    Grid { axis: Axis::Z, row_step: step, col_step: step, elevation, azimuth }
+    AngularGrid { axis: Axis::Z, row_step: step, col_step: step, elevation, azimuth }
 }
 
 /// Angles between points that follow one another, radians.
-fn consecutive(sample: &[Sampled]) -> Vec<f64> {
-    let unit = |s: &Sampled| nalgebra::Vector3::from(s.xyz.map(f64::from)).normalize();
+fn consecutive(sample: &[SampledPoint]) -> Vec<f64> {
+    let unit = |s: &SampledPoint| nalgebra::Vector3::from(s.xyz.map(f64::from)).normalize();
     sample.windows(2).map(|w| (unit(&w[1]) - unit(&w[0])).norm()).collect()
 }
 
 /// How consecutive points follow one another, seen about one axis.
-struct Lines {
+struct ScanLines {
     axis: Axis,
     angles: Vec<[f64; 2]>,
     /// Whether elevation changes along a line, and not azimuth.
@@ -71,8 +71,8 @@ struct Lines {
     bend: f64,
 }
 
-impl Lines {
-    fn find(sample: &[Sampled], steps: &[f64], along: f64, axis: Axis) -> Self {
+impl ScanLines {
+    fn find(sample: &[SampledPoint], steps: &[f64], along: f64, axis: Axis) -> Self {
         let angles: Vec<[f64; 2]> = sample.iter().map(|s| axis.angles(s.xyz)).collect();
         let (mut up, mut round) = (Vec::new(), Vec::new());
         for (i, step) in steps.iter().enumerate() {
@@ -92,7 +92,7 @@ impl Lines {
     }
 
     /// Steps along and across the lines, and the phase where it is well determined.
-    fn grid(&self, guess: f64) -> Grid {
+    fn grid(&self, guess: f64) -> AngularGrid {
         let (u, v) = if self.upright { (1, 0) } else { (0, 1) };
         let flat: Vec<[f64; 2]> =
             self.angles.iter().copied().filter(|a| a[1].abs() < STEEP).collect();
@@ -118,7 +118,7 @@ impl Lines {
         } else {
             (across, across_phase, along, along_phase)
         };
-        Grid { axis: self.axis, row_step, col_step, elevation, azimuth }
+        AngularGrid { axis: self.axis, row_step, col_step, elevation, azimuth }
     }
 }
 
@@ -196,12 +196,12 @@ fn spacing(angles: &[[f64; 2]]) -> Option<f64> {
 /// Lengths of the mean phasor at equally spaced frequencies. Each value's phasor is rotated by the
 /// same angle at every step, without a sine or cosine (thousands of rotations leave an error of
 /// 10⁻¹²).
-struct Sweep {
+struct PhasorSweep {
     now: [Vec<f64>; 2],
     turn: [Vec<f64>; 2],
 }
 
-impl Sweep {
+impl PhasorSweep {
     fn new(values: &[f64], low: f64, first: f64, apart: f64) -> Self {
         let phasors = |f: f64| {
             let turn = |v: &f64| TAU * f * (v - low);
@@ -239,7 +239,7 @@ fn sharpen(angles: &[[f64; 2]], axis: usize, step: f64) -> (f64, f64) {
     let apart = 0.2 / (high - low).max(step);
     let n = ((REACH / step) / apart).ceil().min(4_000.0) as i32;
     let sharpest = |about: f64, apart: f64, n: i32| -> (f64, f64) {
-        let mut sweep = Sweep::new(&values, low, about - f64::from(n) * apart, apart);
+        let mut sweep = PhasorSweep::new(&values, low, about - f64::from(n) * apart, apart);
         let mut best = (0.0, about);
         for i in -n..=n {
             let length = sweep.next();

@@ -1,14 +1,14 @@
 //! Fits a regular raster to points with native rows and columns. Rows are elevation and columns are
 //! azimuth about one of three axes, in either direction, with or without a jump at ±π.
 
-use crate::raster::{Axis, Grid, median, wrap};
-use crate::reader::Sampled;
+use crate::angular_grid::{AngularGrid, Axis, median, wrap};
+use crate::reader::SampledPoint;
 use geometry::robust::tukey;
 
 /// A raster fitted to native rows and columns.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Native {
-    pub(crate) grid: Grid,
+    pub(crate) grid: AngularGrid,
     /// Residual of rows or columns, whichever is larger, pixels RMS without the worst 2 %.
     pub(crate) rms: f64,
 }
@@ -22,7 +22,7 @@ const STEEP: f64 = 1.3;
 const LEFT_OUT: f64 = 0.02;
 
 /// Fits a raster; `None` where the sample has no native rows and columns, or too few of them.
-pub(crate) fn fit(sample: &[Sampled]) -> Option<Native> {
+pub(crate) fn fit(sample: &[SampledPoint]) -> Option<Native> {
     let native: Vec<([f32; 3], [u32; 2])> =
         sample.iter().filter_map(|s| Some((s.xyz, s.native?))).collect();
     if native.len() * 2 < sample.len() {
@@ -53,10 +53,10 @@ fn fit_axis(native: &[([f32; 3], [u32; 2])], axis: Axis) -> Option<Native> {
     }
     rows.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     cols.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let row = Line::fit(&rows)?;
-    let col = Line::fit(&cols)?;
+    let row = AngleLine::fit(&rows)?;
+    let col = AngleLine::fit(&cols)?;
     let rms = row.rms(&rows).max(col.rms(&cols));
-    let grid = Grid {
+    let grid = AngularGrid {
         axis,
         row_step: row.slope.abs(),
         col_step: col.slope.abs(),
@@ -68,13 +68,13 @@ fn fit_axis(native: &[([f32; 3], [u32; 2])], axis: Axis) -> Option<Native> {
 
 /// The line `angle + slope · (index − at)`, radians, modulo a turn.
 #[derive(Debug, Clone, Copy)]
-struct Line {
+struct AngleLine {
     slope: f64,
     at: f64,
     angle: f64,
 }
 
-impl Line {
+impl AngleLine {
     /// Fits a line to (index, angle), sorted by index.
     fn fit(points: &[(u32, f64)]) -> Option<Self> {
         let mut lines: Vec<(f64, f64)> = points

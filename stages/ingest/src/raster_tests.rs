@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used)] // tests may panic
 
 use super::*;
+use crate::angular_grid::Axis;
 use geometry::direction::unit;
 use nalgebra::{Rotation3, Vector3};
+use std::f64::consts::FRAC_PI_2;
 
 /// SplitMix64 with a fixed seed.
 struct Random(u64);
@@ -47,7 +49,7 @@ const PLAIN: Synthetic = Synthetic {
 };
 
 impl Synthetic {
-    fn points(&self) -> Vec<Sampled> {
+    fn points(&self) -> Vec<SampledPoint> {
         let mut random = Random(7);
         let mut points = Vec::new();
         for col in 0..self.n_cols {
@@ -61,27 +63,29 @@ impl Synthetic {
                     .to_radians();
                 let range = 4.0 + 2.0 * (3.0 * a).sin() + e;
                 let d = unit(if self.clockwise { -a } else { a }, e);
-                points
-                    .push(Sampled { xyz: d.map(|v| (v * range) as f32), native: Some([row, col]) });
+                points.push(SampledPoint {
+                    xyz: d.map(|v| (v * range) as f32),
+                    native: Some([row, col]),
+                });
             }
         }
         points
     }
 }
 
-fn plain(points: &[Sampled]) -> Vec<Sampled> {
-    points.iter().map(|p| Sampled { native: None, ..*p }).collect()
+fn plain(points: &[SampledPoint]) -> Vec<SampledPoint> {
+    points.iter().map(|p| SampledPoint { native: None, ..*p }).collect()
 }
 
-fn turned(points: &[Sampled], turn: &Rotation3<f64>) -> Vec<Sampled> {
+fn turned(points: &[SampledPoint], turn: &Rotation3<f64>) -> Vec<SampledPoint> {
     let to = |p: [f32; 3]| {
         let q = turn * Vector3::from(p.map(f64::from));
         [q.x as f32, q.y as f32, q.z as f32]
     };
-    points.iter().map(|p| Sampled { xyz: to(p.xyz), native: p.native }).collect()
+    points.iter().map(|p| SampledPoint { xyz: to(p.xyz), native: p.native }).collect()
 }
 
-fn of(points: &[Sampled]) -> Raster {
+fn of(points: &[SampledPoint]) -> ScanRaster {
     estimate(points, Some(points.len() as u64), &Settings::default()).unwrap()
 }
 
@@ -90,7 +94,7 @@ fn near(value: f64, degrees: f64, share: f64) -> bool {
 }
 
 /// Share of points that are alone in their pixel.
-fn alone(points: &[Sampled], lattice: &Lattice) -> f64 {
+fn alone(points: &[SampledPoint], lattice: &Lattice) -> f64 {
     let mut pixels: Vec<_> = points.iter().map(|p| lattice.pixel(p.xyz).0).collect();
     pixels.sort_unstable();
     pixels.chunk_by(|a, b| a == b).filter(|c| c.len() == 1).count() as f64 / points.len() as f64
@@ -101,7 +105,7 @@ fn native_pixels_map_one_to_one() {
     for clockwise in [false, true] {
         let points = Synthetic { clockwise, jitter: 0.05, ..PLAIN }.points();
         let raster = of(&points);
-        assert_eq!(raster.steps, Steps::Native);
+        assert_eq!(raster.steps, StepSource::Native);
         assert!(
             near(raster.lattice.row_step, 0.11, 1e-3) && near(raster.lattice.col_step, 0.09, 1e-3)
         );
@@ -151,7 +155,7 @@ fn axis_of(axis: Axis) -> [f64; 3] {
 fn directions_alone_give_steps_and_phase() {
     let points = plain(&PLAIN.points());
     let raster = of(&points[..60_000]);
-    assert_eq!(raster.steps, Steps::Directions);
+    assert_eq!(raster.steps, StepSource::Directions);
     assert!(near(raster.lattice.row_step, 0.11, 2e-3), "{raster:?}");
     assert!(near(raster.lattice.col_step, 0.09, 2e-2), "{raster:?}");
     assert!(alone(&points[..60_000], &raster.lattice) > 0.98);
@@ -160,7 +164,7 @@ fn directions_alone_give_steps_and_phase() {
 #[test]
 fn rows_that_run_round_are_told_from_columns() {
     let mut points = plain(&PLAIN.points());
-    let elevation = |p: &Sampled| Axis::Z.angles(p.xyz)[1];
+    let elevation = |p: &SampledPoint| Axis::Z.angles(p.xyz)[1];
     points.sort_by(|a, b| {
         (elevation(a) / 0.11_f64.to_radians())
             .round()
@@ -200,7 +204,7 @@ fn shuffled_points_give_the_density() {
 fn irregular_rows_and_columns_still_give_steps() {
     let points = Synthetic { jitter: 0.8, ..PLAIN }.points();
     let raster = of(&points);
-    assert_eq!(raster.steps, Steps::Irregular);
+    assert_eq!(raster.steps, StepSource::Irregular);
     assert!(near(raster.lattice.row_step, 0.11, 0.01) && near(raster.lattice.col_step, 0.09, 0.01));
 }
 
@@ -208,12 +212,12 @@ fn irregular_rows_and_columns_still_give_steps() {
 fn nothing_and_nonsense_have_no_raster_or_any() {
     let settings = Settings::default();
     assert!(estimate(&[], Some(0), &settings).is_none());
-    let one = vec![Sampled { xyz: [1.0, 2.0, 3.0], native: None }; 1000];
+    let one = vec![SampledPoint { xyz: [1.0, 2.0, 3.0], native: None }; 1000];
     if let Some(raster) = estimate(&one, None, &settings) {
         assert!(raster.lattice.row_step >= settings.min_step);
     }
-    let zero = vec![Sampled { xyz: [0.0; 3], native: Some([0, 0]) }; 1000];
+    let zero = vec![SampledPoint { xyz: [0.0; 3], native: Some([0, 0]) }; 1000];
     assert!(estimate(&zero, None, &settings).is_none());
-    let up = vec![Sampled { xyz: [0.0, 0.0, 1.0], native: Some([3, 4]) }; 1000];
+    let up = vec![SampledPoint { xyz: [0.0, 0.0, 1.0], native: Some([3, 4]) }; 1000];
     let _ = estimate(&up, None, &settings);
 }

@@ -55,7 +55,7 @@ pub(crate) struct ScanSeed {
 
 /// A valid point of a sample, with its native row and column where the file has them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Sampled {
+pub(crate) struct SampledPoint {
     /// Scan frame, metres.
     pub(crate) xyz: [f32; 3],
     /// Native row and column, where the file has them.
@@ -122,7 +122,7 @@ impl Extent {
 }
 
 /// How a file is read, in file order.
-pub(crate) enum Reading<'a> {
+pub(crate) enum FileReading<'a> {
     /// From its beginning to its end.
     Straight(RawStrips<'a>),
     /// By extents that are decoded independently.
@@ -138,12 +138,12 @@ pub(crate) trait Reader: Send + Sync {
     /// The scans of the file.
     fn scans(&self) -> &[ScanSeed];
     /// Up to `n` valid points of a scan, as runs of neighbours in file order, spread over the scan.
-    fn sample(&self, scan: usize, n: usize) -> Result<Vec<Sampled>>;
+    fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>>;
     /// Up to `n` valid points of a scan (scan frame, metres), evenly spread over it, or over its
     /// first `most` points if it has more.
     fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>>;
     /// All valid points in file order. A broken file gives an error and never a silent end.
-    fn read(&self, want: Want) -> Result<Reading<'_>>;
+    fn read(&self, want: Want) -> Result<FileReading<'_>>;
     /// The points of an extent, from its bytes.
     fn decode(&self, extent: &Extent, _bytes: &[u8], _want: Want) -> Result<Vec<RawStrip>> {
         let what = format!("bytes {:?} were given to a format without extents", extent.bytes);
@@ -180,8 +180,8 @@ pub(crate) trait Reader: Send + Sync {
 /// The strips of a file, decoded on this thread whichever way the file is read.
 pub(crate) fn strips(reader: &dyn Reader, want: Want) -> Result<RawStrips<'_>> {
     let extents = match reader.read(want)? {
-        Reading::Straight(strips) => return Ok(strips),
-        Reading::ByExtent(extents) => extents,
+        FileReading::Straight(strips) => return Ok(strips),
+        FileReading::ByExtent(extents) => extents,
     };
     let decode = move |extent: Extent| {
         let bytes = reader.mapped().map_or(&[][..], |map| extent.of(map));

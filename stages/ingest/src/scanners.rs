@@ -14,7 +14,7 @@ const MAX_SCANNERS: usize = 1 << 16;
 
 /// A scanner whose pose the user gives.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scanner {
+pub struct KnownScanner {
     /// Point source id of its points in a LAS file.
     pub point_source_id: Option<u16>,
     /// Name of its scan, or name of its file without suffix.
@@ -25,9 +25,9 @@ pub struct Scanner {
 
 /// Scanner poses from the user, for formats that carry none.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Scanners {
+pub struct KnownScanners {
     /// The entries, in the order of the file.
-    pub entries: Vec<Scanner>,
+    pub entries: Vec<KnownScanner>,
 }
 
 #[derive(Deserialize)]
@@ -45,7 +45,7 @@ struct EntryText {
     quaternion_wxyz: Option<[f64; 4]>,
 }
 
-impl Scanners {
+impl KnownScanners {
     /// Reads a file: JSON if it starts with `{`, else TOML.
     ///
     /// # Errors
@@ -76,7 +76,7 @@ impl Scanners {
                 file.scanner.len()
             )));
         }
-        let mut entries: Vec<Scanner> = Vec::new();
+        let mut entries: Vec<KnownScanner> = Vec::new();
         let mut known = BTreeMap::new();
         for (i, entry) in file.scanner.into_iter().enumerate() {
             let entry = entry.check().map_err(|e| e.at(format!("scanner {}", i + 1)))?;
@@ -95,7 +95,7 @@ impl Scanners {
 }
 
 impl EntryText {
-    fn check(self) -> Result<Scanner> {
+    fn check(self) -> Result<KnownScanner> {
         if let Some(bad) = self.position.iter().find(|v| !v.is_finite()) {
             return Err(Error::bad_input(format!("position must be finite, not \"{bad}\"")));
         }
@@ -113,7 +113,7 @@ impl EntryText {
             }
         };
         let [x, y, z] = self.position;
-        Ok(Scanner {
+        Ok(KnownScanner {
             point_source_id: self.point_source_id,
             name: self.name,
             world_from_scan: Pose::from_parts(Translation3::new(x, y, z), turn),
@@ -132,7 +132,7 @@ mod tests {
                     quaternion_wxyz = [0.876, 0, 0, 0.482]\n[[scanner]]\nposition = [0, 0, 0.0]\n";
         let json = r#"{"scanner": [{"point_source_id": 1, "name": "a", "position": [4.9, 1, 1.5],
                        "quaternion_wxyz": [0.876, 0, 0, 0.482]}, {"position": [0, 0, 0]}]}"#;
-        let (a, b) = (Scanners::parse(toml).unwrap(), Scanners::parse(json).unwrap());
+        let (a, b) = (KnownScanners::parse(toml).unwrap(), KnownScanners::parse(json).unwrap());
         assert_eq!(a, b);
         assert_eq!(a.entries.len(), 2);
         assert!((a.entries[0].world_from_scan.rotation.norm() - 1.0).abs() < 1e-12);
@@ -142,8 +142,8 @@ mod tests {
     fn as_many_scanners_as_there_can_be_are_soon_read() {
         let entry = |i: usize| format!("[[scanner]]\nname = 's{i}'\nposition = [0, 0, 0]\n");
         let text = |n: usize| (0..n).map(entry).collect::<String>();
-        assert_eq!(Scanners::parse(&text(MAX_SCANNERS)).unwrap().entries.len(), MAX_SCANNERS);
-        let error = Scanners::parse(&text(MAX_SCANNERS + 1)).unwrap_err().to_string();
+        assert_eq!(KnownScanners::parse(&text(MAX_SCANNERS)).unwrap().entries.len(), MAX_SCANNERS);
+        let error = KnownScanners::parse(&text(MAX_SCANNERS + 1)).unwrap_err().to_string();
         assert!(error.contains("not \"65537\""), "{error}");
     }
 
@@ -159,7 +159,7 @@ mod tests {
             ("{", "JSON"),
             ("", "scanner"),
         ] {
-            let error = Scanners::parse(text).unwrap_err().to_string();
+            let error = KnownScanners::parse(text).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
         }
     }

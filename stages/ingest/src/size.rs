@@ -1,18 +1,11 @@
 //! Estimates from samples how far the points of each scan spread, and checks whether that can be a
 //! plant in the units that are assumed.
 
-use crate::sources::{File, Sources};
-use crate::units::{Origin, Unit, Units};
+use crate::file::OpenFile;
+use crate::sources::Sources;
+use crate::units::{LengthUnit, Origin, Units};
 use contract::{Error, Input, Result, quote};
-use geometry::{Aabb, Point, Pose};
-
-/// Number of points of a scan that are sampled where nothing else needs a sample.
-pub(crate) const N_LOOKED: usize = 4096;
-/// Number of points below which nothing is concluded.
-const LEAST_POINTS: usize = 100;
-/// Share of the points on either side that is ignored: stray points, and what is seen through
-/// gates.
-const TAIL: f64 = 0.05;
+use geometry::Aabb;
 /// Largest plausible spread of a scan of a plant, metres: halls measure hundreds of metres, as far
 /// as scanners reach.
 const LARGEST: [f64; 3] = [2_000.0, 2_000.0, 200.0];
@@ -26,24 +19,6 @@ const SHARE_OF_REACH: f64 = 0.2;
 const CELL: [[f64; 2]; 2] = [[1.5, 500.0], [0.8, 100.0]];
 /// Units that are tried on a cloud of implausible size, the most common ones first.
 const TRIED: [(&str, f64); 4] = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("km", 1e3)];
-
-/// World bounds of most points of a scan, metres; `None` where there are too few points.
-pub(crate) fn spread(xyz: impl Iterator<Item = [f32; 3]>, world_from_scan: &Pose) -> Option<Aabb> {
-    let world = xyz.map(|p| world_from_scan * Point::from(p.map(f64::from)));
-    let world: Vec<Point> = world.collect();
-    if world.len() < LEAST_POINTS {
-        return None;
-    }
-    let last = (world.len() - 1) as f64;
-    let (low, high) = ((last * TAIL) as usize, (last * (1.0 - TAIL)) as usize);
-    let mut out = Aabb::EMPTY;
-    for axis in 0..3 {
-        let mut along: Vec<f64> = world.iter().map(|p| p[axis]).collect();
-        along.sort_unstable_by(f64::total_cmp);
-        (out.min[axis], out.max[axis]) = (along[low], along[high]);
-    }
-    Some(out)
-}
 
 impl Sources {
     /// Refuses inputs that cannot show a plant in the units that are assumed: without a given or
@@ -80,11 +55,11 @@ impl Sources {
 
     /// Refuses scans so far apart that they must be in different frames.
     fn check_frames(&self) -> Result<()> {
-        let place = |file: &File, i: usize| {
+        let place = |file: &OpenFile, i: usize| {
             let scan = &self.scans[file.first_scan as usize + i];
             (scan.world_from_scan.translation.vector, &self.inputs[scan.input.0 as usize].path)
         };
-        let has_points = |file: &File, i: &usize| file.spreads[*i].is_some();
+        let has_points = |file: &OpenFile, i: &usize| file.spreads[*i].is_some();
         let all = self.files.iter().flat_map(|file| {
             let scans = (0..file.spreads.len()).filter(move |i| has_points(file, i));
             scans.map(move |i| place(file, i))
@@ -144,7 +119,7 @@ impl Sources {
     }
 }
 
-impl File {
+impl OpenFile {
     /// Spread of the points of each scan along x, y and z, metres.
     fn sizes(&self) -> impl Iterator<Item = [f64; 3]> {
         self.spreads.iter().flatten().map(Aabb::size)
@@ -185,7 +160,7 @@ fn wrong(input: &Input, units: &Units, size: &[f64; 3], why: &str) -> Error {
 fn likely(units: &Units, size: &[f64; 3]) -> Option<(&'static str, [f64; 3])> {
     let factors = units.factors();
     let of_file: [f64; 3] = std::array::from_fn(|axis| size[axis] / factors[axis]);
-    let is_other = |metres: f64| !Unit::new("", metres).is_about(units.horizontal.metres);
+    let is_other = |metres: f64| !LengthUnit::new("", metres).is_about(units.horizontal.metres);
     TRIED.into_iter().filter(|(_, metres)| is_other(*metres)).find_map(|(unit, metres)| {
         let size = of_file.map(|side| side * metres);
         let within = |v: f64, [least, most]: [f64; 2]| v >= least && v <= most;
@@ -211,20 +186,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spread_is_of_most_points_and_along_the_worlds_axes() {
-        let points = || (0..1000).map(|i| [i as f32 * 0.01, 0.0, 0.5]);
-        let stray = points().chain([[9e5, 9e5, -9e5]]);
-        let box_of = |points: &mut dyn Iterator<Item = [f32; 3]>, pose: &Pose| spread(points, pose);
-        let found = box_of(&mut stray.into_iter(), &Pose::identity()).expect("points");
-        assert!((found.size()[0] - 9.0).abs() < 0.05, "{found:?}");
-        assert_eq!((found.size()[1], found.min[2]), (0.0, 0.5));
-        let upright = Pose::rotation(geometry::Vector::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
-        let found = box_of(&mut points(), &upright).expect("points");
-        assert!((found.size()[2] - 9.0).abs() < 0.05 && found.size()[0] < 1e-6, "{found:?}");
-        assert_eq!(box_of(&mut points().take(99), &Pose::identity()), None);
-    }
-
-    #[test]
     fn the_unit_that_makes_a_cell_is_named() {
         let in_metres = Units::of_nothing(None).expect("metres");
         for (size, unit) in [
@@ -238,7 +199,7 @@ mod tests {
         ] {
             assert_eq!(likely(&in_metres, &size).map(|(unit, _)| unit), unit, "{size:?}");
         }
-        let mm = Unit::new("millimetre", 1e-3);
+        let mm = LengthUnit::new("millimetre", 1e-3);
         let given = Units::of_nothing(Some(&[mm.clone(), mm])).expect("given");
         assert_eq!(likely(&given, &[0.008, 0.007, 0.003]).map(|(unit, _)| unit), Some("m"));
     }

@@ -1,20 +1,20 @@
-//! Opens inputs and numbers inputs, masks and scans over all of them; gives scans with their
-//! lattices, and the strips of each input on request.
+//! Paths in; open inputs out, numbered over all of them: inputs, masks, scans with their lattices,
+//! and the strips of each input on request.
+
+use crate::file::OpenFile;
 
 use crate::format::detect;
 use crate::las::Las;
-use crate::looked::moved;
 use crate::poses::Poses;
-use crate::raster::Steps;
-use crate::reader::{self, Extent, RawStrip, Reader, Reading, ScanSeed, Want};
+use crate::raster::StepSource;
+use crate::reader::{self, Extent, FileReading, Reader, Want};
 use crate::regular::regular;
-use crate::scanners::Scanners;
+use crate::scanners::KnownScanners;
 use crate::settings::Settings;
 use crate::units::{Choice, Units};
 use contract::{
     Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
 };
-use geometry::{Aabb, Pose};
 use std::path::{Path, PathBuf};
 
 /// Iterator over the strips of one input, in file order.
@@ -22,7 +22,7 @@ pub type Strips<'a> = Box<dyn Iterator<Item = Result<Strip>> + Send + 'a>;
 
 /// A part of an input.
 #[derive(Debug)]
-pub enum Piece {
+pub enum InputPiece {
     /// Points, of a format that is read from beginning to end.
     Strip(Strip),
     /// A range of bytes, which the reader of the bytes passes to [`Sources::decode`].
@@ -30,7 +30,7 @@ pub enum Piece {
 }
 
 /// Iterator over the pieces of one input, in file order.
-pub type Pieces<'a> = Box<dyn Iterator<Item = Result<Piece>> + Send + 'a>;
+pub type InputPieces<'a> = Box<dyn Iterator<Item = Result<InputPiece>> + Send + 'a>;
 
 /// Open inputs, with headers read and checked and no points read yet.
 pub struct Sources {
@@ -42,7 +42,7 @@ pub struct Sources {
     pub scans: Vec<Scan>,
     /// Warnings about inputs and scanners.
     pub warnings: Vec<String>,
-    pub(crate) files: Vec<File>,
+    pub(crate) files: Vec<OpenFile>,
     n_before: [usize; 2],
 }
 
@@ -58,21 +58,6 @@ pub struct Before {
     pub scans: Vec<Scan>,
 }
 
-/// One open file.
-pub(crate) struct File {
-    pub(crate) reader: Box<dyn Reader>,
-    pub(crate) first_scan: u32,
-    first_mask: u32,
-    /// For each scan whose pose the user replaced, the pose `new_scan_from_file_scan`.
-    pub(crate) moved: Vec<Option<Pose>>,
-    /// For each scan: whether its scanner's position is known.
-    pub(crate) known: Vec<bool>,
-    /// For each scan the source of its lattice's steps.
-    pub(crate) steps: Vec<Steps>,
-    /// For each scan the world bounds of most of its points, metres, where known.
-    pub(crate) spreads: Vec<Option<Aabb>>,
-}
-
 /// Opens inputs: detects their formats, reads and checks their headers, and estimates the lattices
 /// of scans with known scanner from a sample of their points.
 ///
@@ -81,7 +66,7 @@ pub(crate) struct File {
 /// path.
 pub fn open(
     paths: &[PathBuf],
-    scanners: Option<&Scanners>,
+    scanners: Option<&KnownScanners>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Result<Sources> {
@@ -95,7 +80,7 @@ pub fn open(
 pub fn open_after(
     before: Before,
     paths: &[PathBuf],
-    scanners: Option<&Scanners>,
+    scanners: Option<&KnownScanners>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Result<Sources> {
@@ -108,7 +93,7 @@ pub fn open_after(
             Error::new(Kind::Usage, "no input was given").hint("name at least one scan file")
         );
     }
-    let none = Scanners::default();
+    let none = KnownScanners::default();
     let mut poses = Poses::new(scanners.unwrap_or(&none), paths);
     for path in paths {
         sources.add(path, &mut poses, settings).map_err(|e| e.at(path.display()))?;
@@ -141,12 +126,12 @@ impl Sources {
     ///
     /// # Errors
     /// As [`Sources::strips`].
-    pub fn pieces(&self, input: InputId, want: Want) -> Result<Pieces<'_>> {
+    pub fn pieces(&self, input: InputId, want: Want) -> Result<InputPieces<'_>> {
         let (file, path) = self.open(input)?;
         Ok(match file.reader.read(want).map_err(|e| e.at(path.display()))? {
-            Reading::ByExtent(extents) => Box::new(extents.map(Piece::Extent).map(Ok)),
-            Reading::Straight(strips) => Box::new(strips.map(move |strip| {
-                let strip = file.whole(strip).map(|raw| Piece::Strip(file.number(raw)));
+            FileReading::ByExtent(extents) => Box::new(extents.map(InputPiece::Extent).map(Ok)),
+            FileReading::Straight(strips) => Box::new(strips.map(move |strip| {
+                let strip = file.whole(strip).map(|raw| InputPiece::Strip(file.number(raw)));
                 strip.map_err(|e| e.at(path.display()))
             })),
         })
@@ -173,12 +158,12 @@ impl Sources {
     #[must_use]
     pub fn file(&self, input: InputId) -> Option<&std::fs::File> {
         let (file, _) = self.open(input).ok()?;
-        let by_extent = matches!(file.reader.read(Want::Coordinates), Ok(Reading::ByExtent(_)));
+        let by_extent = matches!(file.reader.read(Want::Coordinates), Ok(FileReading::ByExtent(_)));
         file.reader.mapped().filter(|_| by_extent).map(crate::map::Mapped::file)
     }
 
     /// An open input and its path.
-    pub(crate) fn open(&self, input: InputId) -> Result<(&File, &Path)> {
+    pub(crate) fn open(&self, input: InputId) -> Result<(&OpenFile, &Path)> {
         let at = input.0 as usize;
         let open = at.checked_sub(self.n_before[0]).and_then(|at| self.files.get(at));
         let known = open.zip(self.inputs.get(at)).map(|(file, known)| (file, &*known.path));
@@ -234,7 +219,7 @@ impl Sources {
     /// Messages about odd points of the open inputs, from the last full read.
     #[must_use]
     pub fn oddities(&self) -> Vec<String> {
-        let of = |file: &File| -> Vec<String> {
+        let of = |file: &OpenFile| -> Vec<String> {
             let scans = file.reader.scans().iter().enumerate();
             let said = scans.flat_map(|(i, scan)| {
                 file.reader.oddities(i).map(|odd| odd.said(&scan.name)).unwrap_or_default()
@@ -285,7 +270,7 @@ impl Sources {
         }
         let (moved, known, steps) = (Vec::new(), Vec::new(), Vec::new());
         let spreads = Vec::new();
-        let mut file = File { reader, first_scan, first_mask, moved, known, steps, spreads };
+        let mut file = OpenFile { reader, first_scan, first_mask, moved, known, steps, spreads };
         for i in 0..file.reader.scans().len() {
             let scan = self.scan(id, &mut file, i, poses);
             self.scans.push(scan);
@@ -297,11 +282,11 @@ impl Sources {
     /// Samples each scan to estimate its raster and to check whether the scanner can have stood at
     /// its stated position.
     fn find_lattices(&mut self, settings: &Settings, fan: &dyn Fan) -> Result<()> {
-        let n_scans = |file: &File| file.reader.scans().len();
+        let n_scans = |file: &OpenFile| file.reader.scans().len();
         let all = (self.files.iter().enumerate())
             .flat_map(|(f, file)| (0..n_scans(file)).map(move |i| (f, i)))
             .collect();
-        let scan_of = |file: &File, i: usize| file.first_scan as usize + i;
+        let scan_of = |file: &OpenFile, i: usize| file.first_scan as usize + i;
         let found = fan.fan(all, |(f, i): (usize, usize)| {
             let file = &self.files[f];
             let found = file.look(i, &self.scans[scan_of(file, i)], settings);
@@ -315,7 +300,7 @@ impl Sources {
                 let looked = found.next().transpose()?.unwrap_or_default();
                 self.scans[at].notes.extend(looked.note);
                 self.scans[at].lattice = looked.raster.as_ref().map(|r| r.lattice);
-                file.steps.push(looked.raster.map_or(Steps::None, |r| r.steps));
+                file.steps.push(looked.raster.map_or(StepSource::None, |r| r.steps));
                 file.spreads.push(looked.spread);
                 file.known[i] &= !looked.is_misplaced;
             }
@@ -324,7 +309,7 @@ impl Sources {
     }
 
     /// A scan of a file, still without lattice.
-    fn scan(&self, input: InputId, file: &mut File, i: usize, poses: &mut Poses<'_>) -> Scan {
+    fn scan(&self, input: InputId, file: &mut OpenFile, i: usize, poses: &mut Poses<'_>) -> Scan {
         let seed = &file.reader.scans()[i];
         let mut scan = Scan {
             id: ScanId(file.first_scan + i as u32),
@@ -352,7 +337,7 @@ impl Sources {
     }
 }
 
-impl Weigh for Piece {
+impl Weigh for InputPiece {
     fn weight_bytes(&self) -> usize {
         match self {
             Self::Strip(strip) => strip.weight_bytes(),
@@ -364,29 +349,6 @@ impl Weigh for Piece {
         match self {
             Self::Strip(strip) => strip.n_points(),
             Self::Extent(extent) => extent.n_points,
-        }
-    }
-}
-
-impl File {
-    /// The result of a read, unless the mapped file was truncated meanwhile: missing bytes read as
-    /// zeros, so the truncation is reported in place of the error that they cause.
-    fn whole<T>(&self, read: Result<T>) -> Result<T> {
-        self.reader.check().and(read)
-    }
-
-    pub(crate) fn number(&self, mut raw: RawStrip) -> Strip {
-        let seed: &ScanSeed = &self.reader.scans()[raw.scan];
-        if let Some(new_from_file) = &self.moved[raw.scan] {
-            raw.xyz.iter_mut().for_each(|p| *p = moved(new_from_file, *p));
-        }
-        Strip {
-            scan: ScanId(self.first_scan + raw.scan as u32),
-            mask: MaskId(self.first_mask + seed.mask as u32),
-            first_place: raw.first_place,
-            place: raw.place,
-            xyz: raw.xyz,
-            attributes: raw.attributes,
         }
     }
 }

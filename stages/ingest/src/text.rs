@@ -11,7 +11,7 @@ const MAX_LINE: u64 = 4096;
 const BUFFER: usize = 1 << 20;
 
 /// Reads a file line by line; blank lines are skipped.
-pub(crate) struct Lines {
+pub(crate) struct TextLines {
     reader: BufReader<File>,
     line: Vec<u8>,
     /// Number of the current line, from 1.
@@ -20,7 +20,7 @@ pub(crate) struct Lines {
     end: u64,
 }
 
-impl Lines {
+impl TextLines {
     /// Starts at byte `from` of a file, where line `number + 1` begins.
     pub(crate) fn open(path: &Path, from: u64, number: u64) -> Result<Self> {
         let mut file = File::open(path)?;

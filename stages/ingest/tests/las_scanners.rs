@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::OneByOne;
-use ingest::{Scanners, Settings, Sources, Want, open};
+use ingest::{KnownScanners, Settings, Sources, Want, open};
 use std::path::{Path, PathBuf};
 
 /// Point format 3 with `extra` bytes; each point is (x, y, z in millimetres, source id, withheld).
@@ -57,8 +57,8 @@ fn write(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-fn scanners(text: &str) -> Scanners {
-    Scanners::parse(text).unwrap()
+fn scanners(text: &str) -> KnownScanners {
+    KnownScanners::parse(text).unwrap()
 }
 
 /// Number of points of each scan; checks world coordinates and that each place occurs once.

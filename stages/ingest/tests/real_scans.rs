@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::{Lattice, OneByOne};
-use ingest::{Scanners, Settings, Sources, Want, describe, open};
+use ingest::{KnownScanners, Settings, Sources, Want, describe, open};
 use std::path::{Path, PathBuf};
 
 fn folder(name: &str) -> Option<PathBuf> {
@@ -50,7 +50,8 @@ fn depth_cameras_have_about_one_point_a_pixel() {
         let scene = std::fs::read_to_string(folder.join("scene.json")).unwrap();
         let scene: serde_json::Value = serde_json::from_str(&scene).unwrap();
         let position = &scene["scanner_position_world"];
-        let scanners = Scanners::parse(&format!("[[scanner]]\nposition = {position}")).unwrap();
+        let scanners =
+            KnownScanners::parse(&format!("[[scanner]]\nposition = {position}")).unwrap();
         let path = folder.join(scene["files"][0].as_str().unwrap());
         let sources = open(&[path], Some(&scanners), &Settings::default(), &OneByOne).unwrap();
         assert!(sources.warnings.is_empty());
@@ -71,7 +72,7 @@ fn a_tilting_laser_without_rows_is_rebuilt() {
     let Some(folder) = folder("indoor-las") else {
         return;
     };
-    let scanners = Scanners::parse("[[scanner]]\nposition = [0, 0, 0]").unwrap();
+    let scanners = KnownScanners::parse("[[scanner]]\nposition = [0, 0, 0]").unwrap();
     let sources = open(
         &[folder.join("pcl__room_scan1.laz")],
         Some(&scanners),

@@ -30,6 +30,7 @@
 #![forbid(unsafe_code)]
 
 mod accord;
+mod fill;
 mod links;
 mod noise;
 mod normals;
@@ -39,12 +40,13 @@ mod raster;
 mod regions;
 mod settings;
 mod summarise;
+mod tile_normals;
 mod view;
 mod voxels;
 
 pub use accord::{agree, disagreement};
-pub use normals::normals;
-pub use raster::veils;
+pub use fill::veils;
 pub use settings::Settings;
-pub use summarise::{Scratch, Summarise};
-pub use view::{Extent, ViewBuilder, ViewSettings};
+pub use summarise::{LatticeScratch, Summarise};
+pub use tile_normals::normals;
+pub use view::{LatticeExtent, ViewBuilder, ViewSettings};

@@ -2,7 +2,7 @@
 //! (veil points).
 
 use crate::Settings;
-use crate::raster::{NONE, Raster};
+use crate::raster::{NONE, TileRaster};
 
 /// Direction towards lower columns.
 pub(crate) const LEFT: usize = 0;
@@ -36,7 +36,7 @@ pub(crate) fn step(side: usize, at: usize, direction: usize, by: usize) -> usize
 
 /// The neighbour of `at` in `direction` that is linked as the same surface, if any.
 #[inline]
-pub(crate) fn linked(raster: &Raster, at: usize, direction: usize) -> Option<usize> {
+pub(crate) fn linked(raster: &TileRaster, at: usize, direction: usize) -> Option<usize> {
     let link = raster.links[at][direction];
     (link != 0 && link & BROKEN == 0).then(|| step(raster.side, at, direction, usize::from(link)))
 }
@@ -49,7 +49,7 @@ struct Rule {
 
 /// Links each pixel with its next neighbours along row and column. A link is 0 where there is none,
 /// else the distance to the neighbour in pixels, with [`BROKEN`] where it sees another surface.
-pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
+pub(crate) fn link(raster: &mut TileRaster, settings: &Settings) {
     let (side, n_pixels) = (raster.side, raster.n_pixels());
     raster.links.clear();
     raster.links.resize(n_pixels, [0; 4]);
@@ -66,24 +66,32 @@ pub(crate) fn link(raster: &mut Raster, settings: &Settings) {
                 continue;
             }
             let angle = raster.col_step[row];
-            link_one(raster, &rule, (at, RIGHT, LEFT), angle, (col, side - 1 - col));
+            let row_way = Way { forth: RIGHT, back: LEFT, behind: col, before: side - 1 - col };
+            link_one(raster, &rule, at, row_way, angle);
             let angle = raster.row_step;
-            link_one(raster, &rule, (at, UP, DOWN), angle, (row, side - 1 - row));
+            let column_way = Way { forth: UP, back: DOWN, behind: row, before: side - 1 - row };
+            link_one(raster, &rule, at, column_way, angle);
         }
     }
 }
 
+/// The way along which a pixel is linked.
+#[derive(Clone, Copy)]
+struct Way {
+    /// Direction forwards, and the one back.
+    forth: usize,
+    back: usize,
+    /// Number of pixels inside the tile behind the pixel, and before it.
+    behind: usize,
+    before: usize,
+}
+
 /// Links `at` forwards; `room` is the number of pixels behind and in front of it inside the tile.
 #[inline]
-fn link_one(
-    raster: &mut Raster,
-    rule: &Rule,
-    (at, forth, back): (usize, usize, usize),
-    angle: f32,
-    room: (usize, usize),
-) {
+fn link_one(raster: &mut TileRaster, rule: &Rule, at: usize, way: Way, angle: f32) {
+    let Way { forth, back, .. } = way;
     let (side, range) = (raster.side, raster.xyzr[at][3]);
-    for by in 1..=REACH.min(room.1) {
+    for by in 1..=REACH.min(way.before) {
         let other = step(side, at, forth, by);
         let there = raster.xyzr[other][3];
         if there == 0.0 {
@@ -95,7 +103,11 @@ fn link_one(
         let across = mean * angle * by as f32;
         // A surface seen at most at this incidence cannot step more than that (METHOD.md §2).
         let mut joined = difference <= across * rule.incidence + 4.243 * sigma;
-        if !joined && difference <= across * rule.grazing && room.0 >= by && room.1 >= 2 * by {
+        if !joined
+            && difference <= across * rule.grazing
+            && way.behind >= by
+            && way.before >= 2 * by
+        {
             let before = raster.xyzr[step(side, at, back, by)][3];
             let after = raster.xyzr[step(side, other, forth, by)][3];
             joined = continues([before, range, there, after], difference, sigma);
@@ -131,7 +143,7 @@ fn continues(ranges: [f32; 4], difference: f32, sigma: f32) -> bool {
 ///
 /// A pixel nearer than both neighbours is a wire, and one farther than both is a slit; these are
 /// real surfaces and never veils.
-pub(crate) fn veils(raster: &mut Raster) {
+pub(crate) fn veils(raster: &mut TileRaster) {
     let mut out = std::mem::take(&mut raster.veils);
     out.clear();
     for at in 0..raster.n_pixels() {
@@ -152,7 +164,7 @@ pub(crate) fn veils(raster: &mut Raster) {
 
 /// Whether the neighbours on both sides see other surfaces, one nearer and one farther.
 #[inline]
-fn between(raster: &Raster, at: usize, back: usize, forth: usize) -> bool {
+fn between(raster: &TileRaster, at: usize, back: usize, forth: usize) -> bool {
     let (b, f) = (raster.links[at][back], raster.links[at][forth]);
     if b & BROKEN == 0 || f & BROKEN == 0 {
         return false;
@@ -164,7 +176,7 @@ fn between(raster: &Raster, at: usize, back: usize, forth: usize) -> bool {
 }
 
 /// Whether the linked piece around `at` has fewer than [`MIN_PIECE`] pixels.
-fn is_small(raster: &Raster, at: usize) -> bool {
+fn is_small(raster: &TileRaster, at: usize) -> bool {
     let mut piece = [at; MIN_PIECE];
     let (mut n, mut next) = (1, 0);
     while next < n {
@@ -186,7 +198,7 @@ fn is_small(raster: &Raster, at: usize) -> bool {
 }
 
 /// Whether broken links of `at` lead to something nearer and to something farther.
-fn near_and_far(raster: &Raster, at: usize) -> bool {
+fn near_and_far(raster: &TileRaster, at: usize) -> bool {
     let (side, range) = (raster.side, raster.xyzr[at][3]);
     let (mut near, mut far) = (false, false);
     for direction in 0..4 {

@@ -17,7 +17,7 @@ const QUANTILE_OF_NORMAL: f32 = 0.3853;
 
 /// Standard deviation of measured ranges as a function of range.
 #[derive(Debug, Default)]
-pub(crate) struct Noise {
+pub(crate) struct RangeNoise {
     base: f32,
     growth: f32,
     /// Ratio of measured to expected noise for each octave of range.
@@ -30,7 +30,7 @@ fn bin(range: f32) -> usize {
     ((range.to_bits() >> 23).saturating_sub(FIRST_EXPONENT) as usize).min(N_BINS - 1)
 }
 
-impl Noise {
+impl RangeNoise {
     /// Standard deviation of a range, metres.
     #[inline]
     pub(crate) fn sigma(&self, range: f32) -> f32 {

@@ -3,9 +3,7 @@
 
 use crate::Settings;
 use crate::links::{BROKEN, linked};
-use crate::raster::Raster;
-use crate::{Scratch, voxels};
-use contract::{Scan, Tile};
+use crate::raster::TileRaster;
 
 /// Integer units per metre, a tenth of a millimetre each. Window sums are exact modulo 2³², and no
 /// window spans 200 km.
@@ -37,7 +35,7 @@ pub(crate) struct Normals {
 
 impl Normals {
     /// Computes the normals of `raster`.
-    pub(crate) fn fill(&mut self, raster: &Raster, settings: &Settings) {
+    pub(crate) fn fill(&mut self, raster: &TileRaster, settings: &Settings) {
         self.measure_reach(raster);
         self.sum(raster);
         let (side, n_pixels) = (raster.side, raster.n_pixels());
@@ -58,7 +56,7 @@ impl Normals {
     /// The normals of a pixel and of its right, upper and upper right neighbour. Where those of the
     /// first and the last agree, the surface is flat, and the two between share that of the first.
     #[inline]
-    fn compute_four(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
+    fn compute_four(&mut self, raster: &TileRaster, row: usize, col: usize, settings: &Settings) {
         let first = row * raster.side + col;
         let four = [(0, 0), (1, 1), (0, 1), (1, 0)];
         let mut is_flat = raster.holds(first) && self.reach[first] >= SHARED_REACH;
@@ -80,7 +78,7 @@ impl Normals {
     }
 
     /// Chessboard distance of each pixel to the next broken link or unbridged gap.
-    fn measure_reach(&mut self, raster: &Raster) {
+    fn measure_reach(&mut self, raster: &TileRaster) {
         let side = raster.side;
         self.reach.clear();
         self.reach.extend((0..raster.n_pixels()).map(|at| {
@@ -132,7 +130,7 @@ impl Normals {
         }
     }
 
-    fn sum(&mut self, raster: &Raster) {
+    fn sum(&mut self, raster: &TileRaster) {
         let (side, wide) = (raster.side, raster.side + 1);
         self.table.clear();
         self.table.resize(wide * wide, [0; 4]);
@@ -170,7 +168,7 @@ impl Normals {
     }
 
     #[inline]
-    fn compute(&mut self, raster: &Raster, row: usize, col: usize, settings: &Settings) {
+    fn compute(&mut self, raster: &TileRaster, row: usize, col: usize, settings: &Settings) {
         let (side, wide) = (raster.side, raster.side + 1);
         let at = row * side + col;
         let [x, y, z, range] = raster.xyzr[at];
@@ -216,7 +214,7 @@ impl Normals {
     }
 
     /// Gives border pixels the normal of a linked neighbour whose tangent plane they lie on.
-    fn borrow_at_borders(&mut self, raster: &Raster) {
+    fn borrow_at_borders(&mut self, raster: &TileRaster) {
         for at in 0..raster.n_pixels() {
             if !raster.holds(at) || self.reach[at] > 0 {
                 continue;
@@ -249,35 +247,4 @@ impl Normals {
             }
         }
     }
-}
-
-/// Unit normals of a tile's points towards the scanner, in the scan frame and the order of the
-/// points. Where the scanner is unknown, the largest component of a normal is positive, so that
-/// horizontal surfaces point up if the scan frame's z does. `None` for veil points and where no
-/// surface was found.
-#[must_use]
-pub fn normals(tile: &Tile, scan: &Scan, settings: &Settings) -> Vec<Option<[f32; 3]>> {
-    let mut scratch = Scratch::default();
-    let Some(lattice) = &scan.lattice else {
-        return voxels::normals(tile, &mut scratch.surface, settings);
-    };
-    scratch.raster.fill(tile, lattice, 0, settings);
-    scratch.normals.fill(&scratch.raster, settings);
-    let (raster, normals) = (&scratch.raster, &scratch.normals);
-    tile.pixel
-        .iter()
-        .zip(&tile.xyz)
-        .map(|(pixel, p)| {
-            // Nothing is skipped, so pixels of the tile are pixels of the raster.
-            let at = usize::from(*pixel);
-            if !raster.holds(at) || normals.error[at] == 0.0 {
-                return None;
-            }
-            // A second return of the pixel shares the normal only if it lies on the same tangent
-            // plane.
-            let (n, q) = (normals.normal[at], raster.xyzr[at]);
-            let off = n[0] * (p[0] - q[0]) + n[1] * (p[1] - q[1]) + n[2] * (p[2] - q[2]);
-            (off.abs() <= 3.0 * raster.noise.sigma(q[3]) + 1e-3).then_some(n)
-        })
-        .collect()
 }

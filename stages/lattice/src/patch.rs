@@ -1,7 +1,7 @@
 //! Converts the regions of a raster to patches in the world frame, largest first.
 
 use crate::Settings;
-use crate::raster::Raster;
+use crate::raster::TileRaster;
 use crate::regions::{Grown, Regions};
 use contract::{PlanePatch, Scan, ScanId};
 use geometry::{Aabb, Moments, Plane, Pose, Vector};
@@ -13,7 +13,7 @@ const MIN_COSINE: f32 = 0.01;
 
 /// The patches of all regions that are large enough.
 pub(crate) fn patches(
-    raster: &Raster,
+    raster: &TileRaster,
     regions: &Regions,
     scan: &Scan,
     settings: &Settings,
@@ -40,7 +40,7 @@ pub(crate) fn largest_first(patches: &mut [PlanePatch]) {
 }
 
 fn patch(
-    raster: &Raster,
+    raster: &TileRaster,
     regions: &Regions,
     grown: &Grown,
     scan: &Scan,
@@ -64,7 +64,7 @@ fn patch(
     let points = members.iter().map(|&at| raster.xyzr[usize::from(at)]);
     let rows = world_rows(&scan.world_from_scan);
     let mut bounds = Aabb::EMPTY;
-    let mut ground = Ground::default();
+    let mut ground = GroundCells::default();
     let weight = raster.weight();
     for p in points {
         let w = apply(&rows, [p[0], p[1], p[2]]);
@@ -95,7 +95,7 @@ pub(crate) fn is_level(plane: &Plane, settings: &Settings) -> bool {
 }
 
 /// Area of a region from the solid angle, range and incidence of its pixels, m².
-fn area(raster: &Raster, members: &[u16], grown: &Grown) -> f64 {
+fn area(raster: &TileRaster, members: &[u16], grown: &Grown) -> f64 {
     let mut area = 0.0_f64;
     for &at in members {
         let p = raster.xyzr[usize::from(at)];
@@ -137,11 +137,11 @@ pub(crate) fn apply(m: &WorldRows, p: [f32; 3]) -> [f64; 3] {
 
 /// Collects ground cells; runs of points in one cell are summed before they are sorted.
 #[derive(Debug, Default)]
-pub(crate) struct Ground {
+pub(crate) struct GroundCells {
     runs: Vec<([i32; 2], u32, f64)>,
 }
 
-impl Ground {
+impl GroundCells {
     /// Adds `n` points at a place in the world, metres.
     #[inline]
     pub(crate) fn add(&mut self, w: [f64; 3], n: u32) {

@@ -3,7 +3,7 @@
 use crate::Settings;
 use crate::links::linked;
 use crate::normals::Normals;
-use crate::raster::Raster;
+use crate::raster::TileRaster;
 use geometry::{Moments, Vector};
 use nalgebra::Matrix3;
 
@@ -66,7 +66,7 @@ struct Growth {
 impl Growth {
     /// Whether a point lies on the plane, within its noise along the normal.
     #[inline]
-    fn holds(&self, p: [f32; 4], raster: &Raster) -> bool {
+    fn holds(&self, p: [f32; 4], raster: &TileRaster) -> bool {
         let along = self.n[0] * p[0] + self.n[1] * p[1] + self.n[2] * p[2];
         let facing = along.abs() / p[3];
         let sigma = raster.noise.sigma(p[3]) * facing.max(0.2) + self.angular * p[3];
@@ -78,7 +78,7 @@ impl Growth {
         self.n[0] * n[0] + self.n[1] * n[1] + self.n[2] * n[2] >= cosine
     }
 
-    fn refit(&mut self, sums: &Sums) {
+    fn refit(&mut self, sums: &PointSums) {
         let moments = sums.moments();
         let known = moments.plane().filter(|fit| fit.spread[1] >= MIN_SLENDERNESS * fit.rms);
         let Some(fit) = known else {
@@ -95,12 +95,12 @@ impl Growth {
 }
 
 /// Moments of points about a near origin; they use symmetry and are cheaper than [`Moments`].
-struct Sums {
+struct PointSums {
     origin: [f32; 3],
     s: [f64; 10],
 }
 
-impl Sums {
+impl PointSums {
     fn new(p: [f32; 4]) -> Self {
         Self { origin: [p[0], p[1], p[2]], s: [0.0; 10] }
     }
@@ -127,7 +127,7 @@ impl Sums {
 
 impl Regions {
     /// Grows all regions of `raster`.
-    pub(crate) fn fill(&mut self, raster: &Raster, normals: &Normals, settings: &Settings) {
+    pub(crate) fn fill(&mut self, raster: &TileRaster, normals: &Normals, settings: &Settings) {
         self.owner.clear();
         self.owner.resize(raster.n_pixels(), FREE);
         self.members.clear();
@@ -144,7 +144,7 @@ impl Regions {
         }
     }
 
-    fn find_seeds(&mut self, raster: &Raster, normals: &Normals) {
+    fn find_seeds(&mut self, raster: &TileRaster, normals: &Normals) {
         self.seeds.iter_mut().for_each(Vec::clear);
         let limits = SEED_CLASSES.map(f32::cos);
         let side = raster.side;
@@ -184,7 +184,7 @@ impl Regions {
         }
     }
 
-    fn grow(&mut self, seed: usize, raster: &Raster, normals: &Normals, settings: &Settings) {
+    fn grow(&mut self, seed: usize, raster: &TileRaster, normals: &Normals, settings: &Settings) {
         let p = raster.xyzr[seed];
         let n = normals.normal[seed];
         let least = settings.normal_tolerance as f32;
@@ -197,7 +197,7 @@ impl Regions {
             flatness: settings.flatness as f32,
         };
         let first = self.members.len();
-        let mut sums = Sums::new(p);
+        let mut sums = PointSums::new(p);
         self.take(seed, &mut sums, raster);
         let (mut next, mut refit_at) = (first, FIRST_REFIT);
         while next < self.members.len() {
@@ -223,7 +223,7 @@ impl Regions {
         self.settle(first, growth, &sums, raster, normals, settings);
     }
 
-    fn take(&mut self, at: usize, sums: &mut Sums, raster: &Raster) {
+    fn take(&mut self, at: usize, sums: &mut PointSums, raster: &TileRaster) {
         self.owner[at] = GROWING;
         self.members.push(at as u16);
         sums.add(raster.xyzr[at]);
@@ -235,8 +235,8 @@ impl Regions {
         &mut self,
         first: usize,
         mut growth: Growth,
-        sums: &Sums,
-        raster: &Raster,
+        sums: &PointSums,
+        raster: &TileRaster,
         normals: &Normals,
         settings: &Settings,
     ) {
@@ -265,7 +265,7 @@ impl Regions {
         let Some(&seed) = self.members.get(first) else {
             return;
         };
-        let mut sums = Sums::new(raster.xyzr[usize::from(seed)]);
+        let mut sums = PointSums::new(raster.xyzr[usize::from(seed)]);
         for &at in &self.members[first..] {
             sums.add(raster.xyzr[usize::from(at)]);
         }
@@ -295,7 +295,7 @@ impl Regions {
 
     /// Takes pixels around the region that lie on its plane, as far as windows reach, although
     /// their normals are missing or look around a crease.
-    fn absorb(&mut self, first: usize, growth: &Growth, raster: &Raster, normals: &Normals) {
+    fn absorb(&mut self, first: usize, growth: &Growth, raster: &TileRaster, normals: &Normals) {
         let mut from = first;
         let most = self.members[first..]
             .iter()

@@ -4,9 +4,9 @@ use crate::Settings;
 use crate::normals::Normals;
 use crate::occupied::Counter;
 use crate::patch::{WorldRows, patches, world_rows};
-use crate::raster::{NONE, Raster};
+use crate::raster::{NONE, TileRaster};
 use crate::regions::Regions;
-use crate::voxels::{self, Surface};
+use crate::voxels::{self, VoxelSurface};
 use contract::{Error, Kind, Map, Occupancy, Result, Scan, ScanId, Tile, TileSummary};
 
 /// The step that makes the summary of each tile.
@@ -32,7 +32,7 @@ impl Summarise {
     pub fn skip(&self, scan: ScanId, range: f32) -> u32 {
         let at = self.scans.binary_search_by_key(&scan, |scan| scan.id);
         let lattice = at.ok().and_then(|at| self.scans[at].lattice);
-        lattice.map_or(0, |lattice| Raster::skip(range, &lattice, self.settings.spacing))
+        lattice.map_or(0, |lattice| TileRaster::skip(range, &lattice, self.settings.spacing))
     }
 
     /// The step without patches, which are most of the work, for where the planes are known.
@@ -44,12 +44,12 @@ impl Summarise {
 
 /// Buffers that one worker reuses from tile to tile (about 7 MB).
 #[derive(Debug, Default)]
-pub struct Scratch {
-    pub(crate) raster: Raster,
+pub struct LatticeScratch {
+    pub(crate) raster: TileRaster,
     pub(crate) normals: Normals,
     pub(crate) regions: Regions,
     pub(crate) counter: Counter,
-    pub(crate) surface: Surface,
+    pub(crate) surface: VoxelSurface,
     veils: Vec<bool>,
     solid: Vec<[f32; 3]>,
 }
@@ -57,9 +57,9 @@ pub struct Scratch {
 impl Map for Summarise {
     type In = Tile;
     type Out = TileSummary;
-    type Scratch = Scratch;
+    type Scratch = LatticeScratch;
 
-    fn apply(&self, tile: Tile, scratch: &mut Scratch) -> Result<TileSummary> {
+    fn apply(&self, tile: Tile, scratch: &mut LatticeScratch) -> Result<TileSummary> {
         let at = self.scans.binary_search_by_key(&tile.at.scan, |scan| scan.id).map_err(|_| {
             let what = format!("a tile of a scan that was not announced: '{}'", tile.at.scan.0);
             Error::new(Kind::Bug, what)
@@ -91,7 +91,7 @@ impl Map for Summarise {
 
 impl Summarise {
     /// Space that is occupied by points other than veils, at the tile's level of subsampling.
-    fn occupancy(&self, tile: &Tile, rows: &WorldRows, scratch: &mut Scratch) -> Occupancy {
+    fn occupancy(&self, tile: &Tile, rows: &WorldRows, scratch: &mut LatticeScratch) -> Occupancy {
         let (raster, solid) = (&scratch.raster, &mut scratch.solid);
         solid.clear();
         if raster.skip > 0 {

@@ -30,7 +30,7 @@ const MAX_HALF_TANGENT: f64 = 1.6;
 
 /// Rows and columns of a lattice that a scan covers: `[first row, last row, first column, last
 /// column]`.
-pub type Extent = [u32; 4];
+pub type LatticeExtent = [u32; 4];
 
 /// Collects one scan's view of a region tile by tile, always in the order of the tiles, so that the
 /// result is reproducible.
@@ -40,7 +40,7 @@ pub struct ViewBuilder {
     faces: Faces,
     local_from_scan: Pose,
     lattice: Option<Lattice>,
-    extent: Option<Extent>,
+    extent: Option<LatticeExtent>,
     bounds: geometry::Aabb,
     /// Cones from the scanner that together hold the region; `None` where the scanner is unknown.
     cones: Option<Vec<Cone>>,
@@ -62,7 +62,7 @@ impl ViewBuilder {
     pub fn new(
         scan: &Scan,
         region: &Region,
-        extent: Option<Extent>,
+        extent: Option<LatticeExtent>,
         thin: Option<u32>,
         settings: &ViewSettings,
     ) -> Self {
@@ -151,7 +151,7 @@ impl ViewBuilder {
         for (some, places) in tile.xyz.chunks(LANES).zip(tile.place.chunks(LANES)) {
             let scan = lanes(some);
             let local = transform_lanes(&local_from_scan, &scan);
-            self.splat(some.len(), (&scan, &local), &cameras);
+            self.splat(some.len(), &scan, &local, &cameras);
             if is_kept {
                 self.keep(&local, places, tile.first_place);
             }
@@ -172,7 +172,7 @@ impl ViewBuilder {
     }
 
     /// Adds a few points, given in the scan frame and in the local frame, to the images.
-    fn splat(&mut self, n: usize, (scan, local): (&Lanes, &Lanes), cameras: &[Rows]) {
+    fn splat(&mut self, n: usize, scan: &Lanes, local: &Lanes, cameras: &[Rows]) {
         if let Some(at) = self.faces.of_all(local) {
             let camera = transform_lanes(&cameras[at], scan);
             self.view.images[at].splat_lanes(&camera, n);

@@ -3,7 +3,7 @@
 //! be told.
 
 use crate::Settings;
-use crate::patch::{Ground, apply, from_sums, in_world, is_level, largest_first, world_rows};
+use crate::patch::{GroundCells, apply, from_sums, in_world, is_level, largest_first, world_rows};
 use contract::{PlanePatch, Scan, Tile};
 use geometry::{Aabb, Moments, Plane, Vector};
 
@@ -21,16 +21,16 @@ const FREE: u32 = u32::MAX - 1;
 
 /// Voxels of one tile; buffers are reused.
 #[derive(Debug, Default)]
-pub(crate) struct Surface {
+pub(crate) struct VoxelSurface {
     points: Vec<(u64, u32)>,
     /// Voxels, sorted by key.
-    cells: Vec<Cell>,
+    cells: Vec<VoxelCell>,
     /// Index of the voxel of each point.
     of_point: Vec<u32>,
 }
 
 #[derive(Debug)]
-struct Cell {
+struct VoxelCell {
     key: u64,
     moments: Moments,
     /// Plane in the scan frame; the largest component of its normal is positive.
@@ -54,7 +54,7 @@ fn unpack(key: u64) -> [i64; 3] {
     std::array::from_fn(|i| (key >> (BITS * i as u32) & ((1 << BITS) - 1)) as i64 - MIDDLE)
 }
 
-impl Surface {
+impl VoxelSurface {
     fn fill(&mut self, tile: &Tile, settings: &Settings) {
         let edge = settings.surface_voxel;
         self.points.clear();
@@ -70,7 +70,7 @@ impl Surface {
             if self.cells.last().is_none_or(|c| c.key != key) {
                 let origin = Vector::from(p.map(f64::from));
                 let moments = Moments::new(origin);
-                self.cells.push(Cell {
+                self.cells.push(VoxelCell {
                     key,
                     moments,
                     plane: None,
@@ -185,7 +185,7 @@ impl Surface {
         }
         let rows = world_rows(&scan.world_from_scan);
         let mut patch = from_sums(scan.id, moments, plane, fit.rms);
-        let mut ground = Ground::default();
+        let mut ground = GroundCells::default();
         for &i in members {
             let cell = &self.cells[i];
             let box_of = |k: usize| {
@@ -210,7 +210,7 @@ impl Surface {
 pub(crate) fn patches(
     tile: &Tile,
     scan: &Scan,
-    surface: &mut Surface,
+    surface: &mut VoxelSurface,
     settings: &Settings,
 ) -> Vec<PlanePatch> {
     surface.fill(tile, settings);
@@ -232,7 +232,7 @@ pub(crate) fn patches(
 /// Normals of a tile's points by their voxels, scan frame, largest component positive.
 pub(crate) fn normals(
     tile: &Tile,
-    surface: &mut Surface,
+    surface: &mut VoxelSurface,
     settings: &Settings,
 ) -> Vec<Option<[f32; 3]>> {
     surface.fill(tile, settings);

@@ -5,7 +5,7 @@ mod caster;
 
 use caster::{FLOOR, NOTHING, PIPE, ROOM, Truth, room, scan};
 use contract::{Map, Scan, Tile, TileSummary};
-use lattice::{Scratch, Settings, Summarise};
+use lattice::{LatticeScratch, Settings, Summarise};
 use std::sync::LazyLock;
 
 /// Step of the raster, radians: 7.5 mm at 3 m.
@@ -71,7 +71,7 @@ fn given(stage: &Summarise, tile: &Tile) -> Tile {
 
 fn summaries(scan: &Scan, tiles: &[Truth]) -> Vec<TileSummary> {
     let stage = Summarise::new(std::slice::from_ref(scan), &Settings::default());
-    let mut scratch = Scratch::default();
+    let mut scratch = LatticeScratch::default();
     let tiles = tiles.iter().map(|t| given(&stage, &t.tile));
     tiles.map(|tile| stage.apply(tile, &mut scratch).expect("a tile")).collect()
 }
@@ -142,7 +142,7 @@ fn used_buffers_and_far_worlds_change_nothing() {
     let stage = Summarise::new(std::slice::from_ref(&scan), &Settings::default());
     for (t, summary) in some.iter().zip(&used) {
         let tile = given(&stage, &t.tile);
-        let fresh = stage.apply(tile, &mut Scratch::default()).expect("a tile");
+        let fresh = stage.apply(tile, &mut LatticeScratch::default()).expect("a tile");
         assert!(fresh == *summary, "{:?}", t.tile.at);
     }
     scan.world_from_scan.translation.vector += geometry::Vector::new(4e5, 5e6, 100.0);
@@ -169,14 +169,14 @@ fn odd_tiles_do_no_harm() {
         *p = [[0.0; 3], [1e9, -1e9, 3.0], [1e-30; 3], *p][i % 4];
     });
     let stage = Summarise::new(std::slice::from_ref(scan), &Settings::default());
-    let got = stage.apply(tile.clone(), &mut Scratch::default()).expect("a tile");
+    let got = stage.apply(tile.clone(), &mut LatticeScratch::default()).expect("a tile");
     assert_eq!(got.n_points, tile.len() as u64);
     tile.xyz.clear();
     tile.pixel.clear();
     tile.place.clear();
-    let got = stage.apply(tile.clone(), &mut Scratch::default()).expect("an empty tile");
+    let got = stage.apply(tile.clone(), &mut LatticeScratch::default()).expect("an empty tile");
     assert!(got.patches.is_empty() && got.occupancy.voxels.is_empty());
     tile.at.scan = contract::ScanId(9);
-    assert!(stage.apply(tile, &mut Scratch::default()).is_err());
+    assert!(stage.apply(tile, &mut LatticeScratch::default()).is_err());
     assert_ne!(ROOM, NOTHING);
 }

@@ -41,7 +41,7 @@ const FROM_MEDIAN: f64 = 1.4826;
 
 /// Points of a plant by voxel. Nothing depends on the order of the voxels.
 #[derive(Debug, Clone, Default)]
-pub struct Surfaces {
+pub struct SurfaceVoxels {
     cells: FxHashMap<[i32; 3], Moments>,
 }
 
@@ -66,13 +66,13 @@ pub struct Registration {
 }
 
 /// What one voxel says: distance, normal and place of the new points in it.
-struct Told {
+struct VoxelResidual {
     distance: f64,
     normal: Vector,
     at: Vector,
 }
 
-impl Surfaces {
+impl SurfaceVoxels {
     /// Adds a point, world, metres.
     pub fn add(&mut self, p: [f64; 3]) {
         let cell = cell(&p);
@@ -145,11 +145,15 @@ fn total(pose: &Pose, about: &Point) -> Vector6<f64> {
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-fn told(planes: &FxHashMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -> Vec<Told> {
+fn told(
+    planes: &FxHashMap<[i32; 3], Plane>,
+    points: &[[f64; 3]],
+    pose: &Pose,
+) -> Vec<VoxelResidual> {
     // Neighbours among the points are mostly in one voxel, and ask once for its plane and its place
     // among the sums.
     let mut sums: FxHashMap<[i32; 3], usize> = FxHashMap::default();
-    let mut told: Vec<(usize, Told)> = Vec::new();
+    let mut told: Vec<(usize, VoxelResidual)> = Vec::new();
     let (mut last, mut known): (Option<[i32; 3]>, Option<(&Plane, usize)>) = (None, None);
     for p in points {
         let p = (pose * Point::from(*p)).coords;
@@ -159,7 +163,7 @@ fn told(planes: &FxHashMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -
             known = planes.get(&cell).map(|plane| {
                 let at = *sums.entry(cell).or_insert_with(|| {
                     let (normal, at) = (plane.normal, Vector::zeros());
-                    told.push((0, Told { distance: 0.0, normal, at }));
+                    told.push((0, VoxelResidual { distance: 0.0, normal, at }));
                     told.len() - 1
                 });
                 (plane, at)
@@ -175,7 +179,7 @@ fn told(planes: &FxHashMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -
         }
     }
     let many = told.into_iter().filter(|(n, _)| *n >= MIN_NEW);
-    let mean = |(n, sum): (usize, Told)| Told {
+    let mean = |(n, sum): (usize, VoxelResidual)| VoxelResidual {
         distance: sum.distance / n as f64,
         at: sum.at / n as f64,
         ..sum
@@ -184,7 +188,7 @@ fn told(planes: &FxHashMap<[i32; 3], Plane>, points: &[[f64; 3]], pose: &Pose) -
 }
 
 /// Robust standard deviation of what the voxels say, metres.
-fn scale(told: &[Told]) -> f64 {
+fn scale(told: &[VoxelResidual]) -> f64 {
     let mut all: Vec<f64> = told.iter().map(|t| t.distance.abs()).collect();
     let middle = all.len() / 2;
     let (_, median, _) = all.select_nth_unstable_by(middle, f64::total_cmp);
@@ -193,7 +197,7 @@ fn scale(told: &[Told]) -> f64 {
 
 /// The next step of shift and turn, and standard deviations.
 fn solve(
-    told: &[Told],
+    told: &[VoxelResidual],
     scale: f64,
     about: &Point,
     total: &Vector6<f64>,
@@ -242,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_scan_that_is_off_is_brought_back() {
-        let mut surfaces = Surfaces::default();
+        let mut surfaces = SurfaceVoxels::default();
         room(0.0).iter().for_each(|p| surfaces.add(*p));
         let about = Point::new(1.5, 1.5, 1.0);
         let off = motion(&Vector6::new(0.004, -0.006, 0.003, 0.0005, -0.0003, 0.001), &about);

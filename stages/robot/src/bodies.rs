@@ -2,13 +2,13 @@
 //! problems of a library are reported at once.
 
 use crate::finding::Findings;
-use crate::load::Settings;
 use crate::mesh;
 use crate::model::JointKind;
 use crate::reading::{file_name, read_bytes};
 use crate::resolve::Roots;
-use crate::tree::Tree;
-use crate::urdf::{Body, Shape};
+use crate::settings::Settings;
+use crate::tree::LinkTree;
+use crate::urdf::{UrdfBody, UrdfShape};
 use geometry::Aabb;
 use std::sync::Arc;
 
@@ -21,14 +21,14 @@ const FAR_TOO_LARGE: f64 = 100.0;
 const FAR_TOO_SMALL: f64 = 1e-5;
 
 /// Reads meshes from the folders of a model within limits on their size.
-pub(crate) struct Bodies<'a> {
+pub(crate) struct MeshFiles<'a> {
     pub(crate) roots: &'a Roots,
     pub(crate) settings: &'a Settings,
 }
 
-impl Bodies<'_> {
+impl MeshFiles<'_> {
     /// Reads the meshes of all links into the tree.
-    pub(crate) fn read(&self, tree: &mut Tree, file: &str, findings: &mut Findings) {
+    pub(crate) fn read(&self, tree: &mut LinkTree, file: &str, findings: &mut Findings) {
         let mut any = false;
         let shown = shown(tree);
         for ((link, raw), shown) in tree.links.iter_mut().zip(&tree.raw_links).zip(shown) {
@@ -72,19 +72,21 @@ impl Bodies<'_> {
         }
     }
 
-    fn body(&self, into: &mut crate::Mesh, body: &Body, place: &str, findings: &mut Findings) {
+    fn body(&self, into: &mut crate::Mesh, body: &UrdfBody, place: &str, findings: &mut Findings) {
         use mesh::primitive;
         let positive = |sizes: &[f64]| sizes.iter().all(|s| *s > 0.0);
         let (soup, scale) = match &body.shape {
-            Shape::Box(size) if positive(size) => (primitive::cuboid(*size), [1.0; 3]),
-            Shape::Cylinder { radius, length } if positive(&[*radius, *length]) => {
+            UrdfShape::Box(size) if positive(size) => (primitive::cuboid(*size), [1.0; 3]),
+            UrdfShape::Cylinder { radius, length } if positive(&[*radius, *length]) => {
                 (primitive::cylinder(*radius, *length), [1.0; 3])
             }
-            Shape::Capsule { radius, length } if positive(&[*radius, *length]) => {
+            UrdfShape::Capsule { radius, length } if positive(&[*radius, *length]) => {
                 (primitive::capsule(*radius, *length), [1.0; 3])
             }
-            Shape::Sphere(radius) if positive(&[*radius]) => (primitive::sphere(*radius), [1.0; 3]),
-            Shape::Mesh { path, scale } if scale.iter().all(|s| *s != 0.0) => {
+            UrdfShape::Sphere(radius) if positive(&[*radius]) => {
+                (primitive::sphere(*radius), [1.0; 3])
+            }
+            UrdfShape::Mesh { path, scale } if scale.iter().all(|s| *s != 0.0) => {
                 let Some(soup) = self.mesh(path, place, findings) else {
                     return;
                 };
@@ -152,7 +154,7 @@ impl Bodies<'_> {
 /// For each link, whether it is rigidly connected to a link that has a visual. The collision bodies
 /// of such a link are capsules around that visual, drawn for collision checks, and no surface that
 /// a scan could show.
-fn shown(tree: &Tree) -> Vec<bool> {
+fn shown(tree: &LinkTree) -> Vec<bool> {
     let mut leader: Vec<usize> = (0..tree.links.len()).collect();
     for l in 0..leader.len() {
         let joint = tree.links[l].parent_joint.map(|j| &tree.joints[j]);

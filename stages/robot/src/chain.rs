@@ -3,11 +3,11 @@
 use crate::finding::Findings;
 use crate::model::{Motion, Role};
 use crate::sheet::Sheet;
-use crate::tree::Tree;
+use crate::tree::LinkTree;
 
 /// Indices of the joints from link `root` down to link `tip`, or `None` if `tip` is not below
 /// `root`.
-pub(crate) fn path(tree: &Tree, root: usize, tip: usize) -> Option<Vec<usize>> {
+pub(crate) fn path(tree: &LinkTree, root: usize, tip: usize) -> Option<Vec<usize>> {
     let mut joints = Vec::new();
     let mut at = tip;
     while at != root {
@@ -21,7 +21,7 @@ pub(crate) fn path(tree: &Tree, root: usize, tip: usize) -> Option<Vec<usize>> {
 
 /// Joints of the main chain: the one that `robot.toml` names, else the chain with most free joints,
 /// among equals the longest, then the first.
-pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) -> Vec<usize> {
+pub(crate) fn main_chain(tree: &LinkTree, sheet: &Sheet, findings: &mut Findings) -> Vec<usize> {
     let mut find = |name: &Option<String>| {
         let name = name.as_ref()?;
         let at = tree.links.iter().position(|l| l.name == *name);
@@ -61,12 +61,12 @@ pub(crate) fn main_chain(tree: &Tree, sheet: &Sheet, findings: &mut Findings) ->
 
 /// Sets the role of each link: main chain, sub chain or effector.
 pub(crate) fn set_roles(
-    tree: &mut Tree,
+    tree: &mut LinkTree,
     main_chain: &[usize],
     sheet: &Sheet,
     findings: &mut Findings,
 ) {
-    let moving = |tree: &Tree, j: usize| tree.joints[j].motion != Motion::Fixed;
+    let moving = |tree: &LinkTree, j: usize| tree.joints[j].motion != Motion::Fixed;
     let last =
         main_chain.iter().rev().copied().find(|&j| moving(tree, j)).map(|j| tree.joints[j].child);
     let on_chain: Vec<usize> = main_chain.iter().map(|&j| tree.joints[j].child).collect();

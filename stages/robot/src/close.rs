@@ -1,8 +1,8 @@
 //! Builds the closed loops of a model from the sub chains of `robot.toml`, in order of solution.
 
+use crate::closed_loop::{ClosedLoop, Closure, Form};
 use crate::finding::Findings;
 use crate::kinematics::Placing;
-use crate::loops::{ClosedLoop, Closure, Form};
 use crate::model::{JointKind, Model, Motion};
 use crate::sheet::{LoopWord, SubChain};
 use contract::words::count;

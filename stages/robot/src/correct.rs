@@ -2,7 +2,7 @@
 //! except for the declared encoding: the result is UTF-8.
 
 use crate::encoding;
-use crate::load::Settings;
+use crate::settings::Settings;
 use crate::urdf::{self, has_quaternions};
 use contract::{Error, Result};
 use geometry::{Pose, Vector};

@@ -1,7 +1,7 @@
 //! Forward kinematics: the poses of all links at a posture, and their derivatives by the free
 //! joints.
 
-use crate::loops::ClosedLoop;
+use crate::closed_loop::ClosedLoop;
 use crate::model::{Joint, JointKind, Kinematics, Model, Motion};
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};

@@ -28,6 +28,7 @@
 mod bodies;
 mod chain;
 mod close;
+mod closed_loop;
 mod cloud;
 mod correct;
 mod dress;
@@ -43,17 +44,19 @@ mod model;
 mod notes;
 mod reading;
 mod resolve;
+mod settings;
 mod sheet;
 mod tree;
 mod urdf;
 
+pub use closed_loop::{ClosedLoop, Closure, Form};
 pub use correct::correct;
 pub use finding::{Finding, Severity};
 pub use hull::hull;
 pub use library::Library;
-pub use load::{Settings, urdf_of};
-pub use loops::{ClosedLoop, Closure, Form};
+pub use load::urdf_of;
 pub use model::{
     CadCloud, Joint, JointKind, Kinematics, Link, Mesh, Model, Motion, Role, Symmetry,
 };
 pub use reading::urdf_text;
+pub use settings::Settings;

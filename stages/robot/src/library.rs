@@ -1,8 +1,9 @@
 //! Loads a library: a folder with one folder for each robot or tool.
 
 use crate::finding::{Finding, Findings, Severity};
-use crate::load::{Settings, load, urdfs};
+use crate::load::{load, urdfs};
 use crate::model::Model;
+use crate::settings::Settings;
 use contract::words::count;
 use contract::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -25,7 +26,8 @@ impl Library {
     pub fn load(dir: &Path, settings: &Settings) -> Result<Self> {
         let (folders, mut library) = Self::open(dir)?;
         for folder in &folders {
-            library.add(Self::load_folder(dir, folder, settings));
+            let (model, findings) = Self::load_folder(dir, folder, settings);
+            library.add(model, findings);
         }
         library.checked(dir)
     }
@@ -44,7 +46,8 @@ impl Library {
             Err(error) => return fail(&error),
         };
         for folder in &folders {
-            library.add(Self::load_folder(dir, folder, settings));
+            let (model, findings) = Self::load_folder(dir, folder, settings);
+            library.add(model, findings);
         }
         if folders.is_empty() {
             library.findings.extend(fail(&empty(dir)));
@@ -109,7 +112,7 @@ impl Library {
     }
 
     /// Adds a loaded model. The models must be added in the order of their folders.
-    pub fn add(&mut self, (model, findings): (Option<Model>, Vec<Finding>)) {
+    pub fn add(&mut self, model: Option<Model>, findings: Vec<Finding>) {
         self.models.extend(model);
         self.findings.extend(findings);
     }

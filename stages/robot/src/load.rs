@@ -1,79 +1,19 @@
 //! Loads a model from its folder: URDF, `robot.toml`, sub chains, meshes and CAD clouds.
 
-use crate::bodies::Bodies;
+use crate::bodies::MeshFiles;
 use crate::finding::{Finding, Findings};
 use crate::model::{Link, Model};
 use crate::notes::{named_passive, note_links};
 use crate::reading::{file_name, read_text, read_xml};
 use crate::resolve::Roots;
+use crate::settings::Settings;
 use crate::sheet::{Sheet, SubChain};
-use crate::tree::Tree;
-use crate::urdf::Description;
+use crate::tree::LinkTree;
+use crate::urdf::UrdfDescription;
 use crate::{chain, close, cloud, tree, urdf};
-use contract::{Error, Fan, OneByOne, Result, XmlLimits};
+use contract::{Error, Fan, OneByOne, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-/// What is loaded, how finely it is sampled, and the limits on files.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Whether to make CAD clouds. Without them loading takes a tenth of the time, which is enough
-    /// for linting and simulation.
-    pub clouds: bool,
-    /// Distance between neighbouring samples, metres. The default of 5 mm is the spacing of the
-    /// points of a scan at 10 m.
-    pub spacing: f64,
-    /// Largest number of samples of a link; a larger link gets a wider spacing. The default of
-    /// 60,000 covers the surface of a cubic metre at 10 mm.
-    pub max_samples: usize,
-    /// Largest mesh file, bytes. The default of 256 MiB is ten times the meshes of the largest
-    /// known robot together.
-    pub max_mesh_bytes: u64,
-    /// Largest memory and work for a COLLADA file, as a multiple of its size plus one MiB. A file
-    /// can instantiate the same geometry again and again, and nest such nodes; real files come to
-    /// four times their size.
-    pub max_mesh_growth: u64,
-    /// Largest URDF or `robot.toml`, bytes. Real files describe a few dozen links in less than
-    /// 1 MiB.
-    pub max_urdf_bytes: u64,
-    /// Largest number of elements, attributes and texts of a URDF or COLLADA file; the XML reader
-    /// keeps about 80 bytes of each.
-    pub max_xml_nodes: u64,
-    /// Largest number of attributes of one XML element. Real files have below ten, and the reader
-    /// compares each with all others.
-    pub max_xml_attributes: u64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            clouds: true,
-            spacing: 0.005,
-            max_samples: 60_000,
-            max_mesh_bytes: 256 << 20,
-            max_mesh_growth: 32,
-            max_urdf_bytes: 4 << 20,
-            max_xml_nodes: 4_000_000,
-            max_xml_attributes: 256,
-        }
-    }
-}
-
-impl Settings {
-    /// Settings that load meshes and kinematics, but make no CAD clouds.
-    #[must_use]
-    pub fn without_clouds() -> Self {
-        Self { clouds: false, ..Self::default() }
-    }
-
-    pub(crate) fn xml(&self) -> XmlLimits {
-        XmlLimits {
-            max_nodes: self.max_xml_nodes,
-            max_attributes: self.max_xml_attributes,
-            room: "robot",
-        }
-    }
-}
 
 impl Model {
     /// Loads one model from its folder and returns it with its findings.
@@ -143,7 +83,7 @@ pub(crate) fn load(
         findings.fail(folder.display(), what, "put the model's folder itself into the library");
         return None;
     }
-    let sheet = read_sheet(folder, (&roots, settings), findings)?;
+    let sheet = read_sheet(folder, &roots, settings, findings)?;
     let path = urdf_in(folder, &sheet, &roots, findings)?;
     Loader { name, roots, settings }.load(&path, &sheet, findings)
 }
@@ -157,7 +97,7 @@ pub fn urdf_of(folder: &Path) -> Result<PathBuf> {
     let roots = Roots::new(folder, None).map_err(|e| Error::from(e).at(folder.display()))?;
     let settings = Settings::default();
     let mut find = || {
-        let sheet = read_sheet(folder, (&roots, &settings), &mut findings)?;
+        let sheet = read_sheet(folder, &roots, &settings, &mut findings)?;
         urdf_in(folder, &sheet, &roots, &mut findings)
     };
     find().ok_or_else(|| findings.first_error())
@@ -185,7 +125,8 @@ fn urdf_in(
 
 fn read_sheet(
     folder: &Path,
-    (roots, settings): (&Roots, &Settings),
+    roots: &Roots,
+    settings: &Settings,
     findings: &mut Findings,
 ) -> Option<Sheet> {
     let path = folder.join("robot.toml");
@@ -284,9 +225,9 @@ impl Loader<'_> {
         let main_chain = chain::main_chain(&tree, sheet, findings);
         chain::set_roles(&mut tree, &main_chain, sheet, findings);
         let mut model = Model { name: self.name.to_owned(), main_chain, ..Model::default() };
-        let bodies = Bodies { roots: &self.roots, settings: self.settings };
+        let bodies = MeshFiles { roots: &self.roots, settings: self.settings };
         bodies.read(&mut tree, &file, findings);
-        Tree { links: model.links, joints: model.joints, free: model.free, .. } = tree;
+        LinkTree { links: model.links, joints: model.joints, free: model.free, .. } = tree;
         close::close(&mut model, &sheet.sub_chain, findings)?;
         note_links(&mut model, sheet, findings);
         if findings.failed() {
@@ -302,7 +243,7 @@ impl Loader<'_> {
     /// joints.
     fn join(
         &self,
-        description: &mut Description,
+        description: &mut UrdfDescription,
         sub_chain: &SubChain,
         findings: &mut Findings,
     ) -> Option<Vec<String>> {
@@ -323,11 +264,11 @@ impl Loader<'_> {
     /// main URDF that it stands for.
     fn sub_urdf(
         &self,
-        main: &Description,
+        main: &UrdfDescription,
         sub_chain: &SubChain,
         written: &str,
         findings: &mut Findings,
-    ) -> Option<Description> {
+    ) -> Option<UrdfDescription> {
         let place = close::place(sub_chain);
         let found = self.roots.find(written).map_err(|what| {
             findings.fail(&place, format!("{what} \"{written}\""), "correct the name");

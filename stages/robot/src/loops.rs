@@ -1,12 +1,12 @@
-//! Solves closed loops: computes the values of the passive joints from those of all others. Planar
-//! four-bar linkages, cylinders and bars have closed forms; any other loop is solved by Newton's
-//! method, starting from the zero posture.
+//! Closed loops: values of the other joints in, values of the passive joints out; planar four-bars,
+//! cylinders and bars in closed form, anything else by Newton's method from the zero posture.
+
+use crate::closed_loop::{ClosedLoop, Closure, Form};
 
 use crate::kinematics::Placing;
 use crate::model::Model;
 use geometry::{Point, Vector};
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
 /// Number of steps from the zero posture for a loop without a closed form: small enough steps to
 /// stay in the assembly mode.
@@ -15,57 +15,6 @@ const N_STEPS: u32 = 8;
 const N_NEWTON: u32 = 12;
 /// Gap below which a loop counts as closed, metres; rounding errors are about 1e-15.
 pub(crate) const CLOSED: f64 = 1e-9;
-
-/// A kinematic loop that the tree of the URDF leaves open.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ClosedLoop {
-    /// Name of the sub chain in `robot.toml`.
-    pub name: String,
-    /// Indices of the passive joints that the loop sets, in tree order.
-    pub passive: Vec<usize>,
-    /// The pins that close the loop.
-    pub closures: Vec<Closure>,
-    /// How the loop is solved.
-    pub form: Form,
-}
-
-/// A pin: points of two links that coincide when seen along the axes of the loop.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Closure {
-    /// Index of the link on the side of the first passive joint.
-    pub link_a: usize,
-    /// The pin in the frame of link a, metres.
-    pub point_a: Point,
-    /// Index of the other link.
-    pub link_b: usize,
-    /// The pin in the frame of link b, metres.
-    pub point_b: Point,
-}
-
-/// How a loop is solved. `mode` is +1 or −1 and selects one of the two solutions: that of the zero
-/// posture.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Form {
-    /// Two revolute joints in a row, then the pin.
-    RrrSerial {
-        /// Which of two solutions.
-        mode: f64,
-    },
-    /// A revolute joint on each side of the pin.
-    RrrBranched {
-        /// Which of two solutions.
-        mode: f64,
-    },
-    /// A revolute joint, a prismatic joint that it carries, then the pin.
-    Rpr {
-        /// Which of two solutions.
-        mode: f64,
-    },
-    /// One revolute joint with a bar that points at the pin.
-    Rr,
-    /// Any other loop, solved by Newton's method.
-    General,
-}
 
 /// The component of `v` perpendicular to the unit vector `n`.
 fn across(v: Vector, n: &Vector) -> Vector {
@@ -230,16 +179,16 @@ impl ClosedLoop {
         let pin = &self.closures[0];
         let open = self.form != Form::General && self.gap(placing) > CLOSED;
         match self.form {
-            Form::Rr => vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b))],
+            Form::Rr => vec![self.aim_rate(placing, rates, 0, pin.link_b, &pin.point_b)],
             // Out of reach the bars lie in line and only point at the other end.
             Form::RrrSerial { .. } | Form::Rpr { .. } if open => {
-                vec![self.aim_rate(placing, rates, 0, (pin.link_b, &pin.point_b)), 0.0]
+                vec![self.aim_rate(placing, rates, 0, pin.link_b, &pin.point_b), 0.0]
             }
             Form::RrrBranched { .. } if open => {
                 let ends = [self.passive[1], self.passive[0]].map(|j| placing.carrier(j));
                 vec![
-                    self.aim_rate(placing, rates, 0, (ends[0].0, &ends[0].1)),
-                    self.aim_rate(placing, rates, 1, (ends[1].0, &ends[1].1)),
+                    self.aim_rate(placing, rates, 0, ends[0].0, &ends[0].1),
+                    self.aim_rate(placing, rates, 1, ends[1].0, &ends[1].1),
                 ]
             }
             _ => self.implicit_rates(placing, rates),
@@ -273,18 +222,19 @@ impl ClosedLoop {
         placing: &Placing,
         rates: &[f64],
         which: usize,
-        target: (usize, &Point),
+        link: usize,
+        point: &Point,
     ) -> f64 {
         let j = self.passive[which];
         let (origin, axis) = placing.axis(j);
         let (carrier, _) = placing.carrier(j);
-        let target_at = placing.point(target.0, target.1);
+        let target_at = placing.point(link, point);
         let d = across(target_at - origin, &axis);
         if d.norm_squared() < 1e-18 {
             return 0.0;
         }
         // Relative to the carrier: the target's velocity less the carrier's at the same place.
-        let moves = placing.velocity(target.0, &target_at, rates)
+        let moves = placing.velocity(link, &target_at, rates)
             - placing.velocity(carrier, &target_at, rates);
         axis.dot(&d.cross(&moves)) / d.norm_squared()
     }

@@ -1,6 +1,6 @@
 //! The model of a robot: a tree of links and joints with meshes, free joints and closed loops.
 
-use crate::loops::ClosedLoop;
+use crate::closed_loop::ClosedLoop;
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};

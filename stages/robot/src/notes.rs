@@ -4,14 +4,14 @@ use crate::close;
 use crate::finding::Findings;
 use crate::model::{JointKind, Model, Symmetry};
 use crate::sheet::{Sheet, SubChain};
-use crate::urdf::Description;
+use crate::urdf::UrdfDescription;
 use geometry::Vector;
 use nalgebra::Unit;
 
 /// Indices of the joints that the loops of a sub chain set: those that `robot.toml` names, else the
 /// `moving` joints of the sub chain's own URDF.
 pub(crate) fn named_passive(
-    description: &Description,
+    description: &UrdfDescription,
     sub_chain: &SubChain,
     moving: Vec<String>,
     findings: &mut Findings,

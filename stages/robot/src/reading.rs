@@ -2,7 +2,7 @@
 
 use crate::encoding;
 use crate::finding::Findings;
-use crate::load::Settings;
+use crate::settings::Settings;
 use contract::{Error, Result};
 use std::borrow::Cow;
 use std::io::Read as _;

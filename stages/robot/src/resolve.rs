@@ -14,7 +14,7 @@ pub(crate) struct Roots {
 
 /// A file that was found.
 #[derive(Debug)]
-pub(crate) struct Found {
+pub(crate) struct FoundFile {
     pub(crate) path: PathBuf,
     /// Whether the file's name differs in case from the path in the URDF.
     pub(crate) other_case: bool,
@@ -52,7 +52,7 @@ impl Roots {
     }
 
     /// The file that the path `written` means, or an error in words.
-    pub(crate) fn find(&self, written: &str) -> Result<Found, String> {
+    pub(crate) fn find(&self, written: &str) -> Result<FoundFile, String> {
         let candidates = self.candidates(written)?;
         let mut outside = false;
         for other_case in [false, true] {
@@ -68,7 +68,7 @@ impl Roots {
                     continue;
                 }
                 if self.holds(&path) {
-                    return Ok(Found { path, other_case });
+                    return Ok(FoundFile { path, other_case });
                 }
                 outside = true;
             }

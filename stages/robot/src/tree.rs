@@ -3,7 +3,7 @@
 
 use crate::finding::Findings;
 use crate::model::{Joint, JointKind, Link, Motion, Role};
-use crate::urdf::{Description, RawJoint, RawLink};
+use crate::urdf::{RawJoint, RawLink, UrdfDescription};
 use geometry::{Aabb, Vector};
 use nalgebra::Unit;
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +13,7 @@ const MAX_LINKS: usize = 5_000;
 
 /// Links and joints in tree order.
 #[derive(Debug, Default)]
-pub(crate) struct Tree {
+pub(crate) struct LinkTree {
     pub(crate) links: Vec<Link>,
     pub(crate) raw_links: Vec<RawLink>,
     pub(crate) joints: Vec<Joint>,
@@ -23,11 +23,11 @@ pub(crate) struct Tree {
 /// Checks and orders a description. `passive` maps the names of joints that loops set to the index
 /// of the loop.
 pub(crate) fn build(
-    description: &Description,
+    description: &UrdfDescription,
     passive: &BTreeMap<String, usize>,
     file: &str,
     findings: &mut Findings,
-) -> Option<Tree> {
+) -> Option<LinkTree> {
     let before = findings.list.len();
     let by_name = names(description, file, findings);
     check_joints(description, passive, &by_name, file, findings);
@@ -55,7 +55,7 @@ pub(crate) fn build(
         );
         return None;
     };
-    let mut tree = Tree::default();
+    let mut tree = LinkTree::default();
     tree.grow(description, &children, by_name[root.name.as_str()]);
     if tree.links.len() != description.links.len() {
         findings.fail(file, "joints form a circle", "describe the loop in robot.toml");
@@ -66,7 +66,7 @@ pub(crate) fn build(
 }
 
 fn names<'a>(
-    description: &'a Description,
+    description: &'a UrdfDescription,
     file: &str,
     findings: &mut Findings,
 ) -> BTreeMap<&'a str, usize> {
@@ -107,7 +107,7 @@ fn names<'a>(
 }
 
 fn check_joints(
-    description: &Description,
+    description: &UrdfDescription,
     passive: &BTreeMap<String, usize>,
     links: &BTreeMap<&str, usize>,
     file: &str,
@@ -173,11 +173,11 @@ fn check_limits(joint: &RawJoint, follows: bool, place: &str, findings: &mut Fin
     }
 }
 
-impl Tree {
+impl LinkTree {
     /// Adds links depth first in the order of the file, so that a serial chain stays together.
     fn grow(
         &mut self,
-        description: &Description,
+        description: &UrdfDescription,
         children: &BTreeMap<&str, Vec<usize>>,
         root: usize,
     ) {
@@ -209,7 +209,7 @@ impl Tree {
 
     fn set_motions(
         &mut self,
-        description: &Description,
+        description: &UrdfDescription,
         passive: &BTreeMap<String, usize>,
         file: &str,
         findings: &mut Findings,

@@ -15,7 +15,7 @@ const SHORTEST_QUATERNION: f64 = 1e-6;
 
 /// Links and joints of one file, not yet checked against one another.
 #[derive(Debug, Default, Clone)]
-pub(crate) struct Description {
+pub(crate) struct UrdfDescription {
     pub(crate) links: Vec<RawLink>,
     pub(crate) joints: Vec<RawJoint>,
 }
@@ -23,18 +23,18 @@ pub(crate) struct Description {
 #[derive(Debug, Clone)]
 pub(crate) struct RawLink {
     pub(crate) name: String,
-    pub(crate) visuals: Vec<Body>,
-    pub(crate) collisions: Vec<Body>,
+    pub(crate) visuals: Vec<UrdfBody>,
+    pub(crate) collisions: Vec<UrdfBody>,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct Body {
+pub(crate) struct UrdfBody {
     pub(crate) link_from_body: Pose,
-    pub(crate) shape: Shape,
+    pub(crate) shape: UrdfShape,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) enum Shape {
+pub(crate) enum UrdfShape {
     Box([f64; 3]),
     Cylinder { radius: f64, length: f64 },
     Capsule { radius: f64, length: f64 },
@@ -62,7 +62,7 @@ pub(crate) fn read(
     file: &str,
     limits: &XmlLimits,
     findings: &mut Findings,
-) -> Option<Description> {
+) -> Option<UrdfDescription> {
     if let Err(what) = check_xml(text.as_bytes(), limits) {
         findings.fail(file, what, "repair the file");
         return None;
@@ -399,21 +399,21 @@ fn pose(origin: &urdf_rs::Pose) -> Pose {
     )
 }
 
-fn body(geometry: &urdf_rs::Geometry, origin: &urdf_rs::Pose) -> Body {
+fn body(geometry: &urdf_rs::Geometry, origin: &urdf_rs::Pose) -> UrdfBody {
     use urdf_rs::Geometry as G;
     let shape = match geometry {
-        G::Box { size } => Shape::Box(**size),
-        G::Cylinder { radius, length } => Shape::Cylinder { radius: *radius, length: *length },
-        G::Capsule { radius, length } => Shape::Capsule { radius: *radius, length: *length },
-        G::Sphere { radius } => Shape::Sphere(*radius),
+        G::Box { size } => UrdfShape::Box(**size),
+        G::Cylinder { radius, length } => UrdfShape::Cylinder { radius: *radius, length: *length },
+        G::Capsule { radius, length } => UrdfShape::Capsule { radius: *radius, length: *length },
+        G::Sphere { radius } => UrdfShape::Sphere(*radius),
         G::Mesh { filename, scale } => {
-            Shape::Mesh { path: filename.clone(), scale: scale.map_or([1.0; 3], |s| *s) }
+            UrdfShape::Mesh { path: filename.clone(), scale: scale.map_or([1.0; 3], |s| *s) }
         }
     };
-    Body { link_from_body: pose(origin), shape }
+    UrdfBody { link_from_body: pose(origin), shape }
 }
 
-fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
+fn describe(robot: &urdf_rs::Robot, document: &Document) -> UrdfDescription {
     // The parser cannot tell a missing limit from a limit of zero.
     let limited: Vec<bool> = (document.root_element().children())
         .filter(|n| n.tag_name().name() == "joint")
@@ -439,5 +439,5 @@ fn describe(robot: &urdf_rs::Robot, document: &Document) -> Description {
                 .map(|m| (m.joint.clone(), m.multiplier.unwrap_or(1.0), m.offset.unwrap_or(0.0))),
         })
         .collect();
-    Description { links, joints }
+    UrdfDescription { links, joints }
 }

@@ -1,7 +1,7 @@
 //! Fitted robots prepared for labelling: posed links with distance fields, gates and bounds.
 
 use crate::Settings;
-use crate::field::{FIELD_REACH, Field};
+use crate::field::{DistanceField, FIELD_REACH};
 use contract::{Fan, Fit, ScanId};
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::{DMatrix, DVector};
@@ -16,11 +16,11 @@ const N_SPREAD: usize = 64;
 const OPEN_SIGMA: f64 = 0.01;
 
 /// One link of a fitted robot.
-pub(crate) struct Link {
+pub(crate) struct StandingLink {
     /// Index of the link in the model.
     pub(crate) index: u16,
     pub(crate) world_from_link: Pose,
-    pub(crate) field: Arc<Field>,
+    pub(crate) field: Arc<DistanceField>,
     /// Bounds of the mesh in the link's frame, metres.
     pub(crate) bounds: Aabb,
     /// Distance around its bounds up to which points are examined, metres.
@@ -32,7 +32,7 @@ pub(crate) struct Link {
     foot: Option<([f32; 3], f32)>,
 }
 
-impl Link {
+impl StandingLink {
     /// Height of a point (link frame) above the underside of the robot, metres; `None` for links on
     /// which the robot does not stand.
     pub(crate) fn above_foot(&self, p: [f32; 3]) -> Option<f32> {
@@ -41,17 +41,17 @@ impl Link {
 }
 
 /// One fitted robot.
-pub(crate) struct Body {
+pub(crate) struct StandingRobot {
     /// Index of its fit.
     pub(crate) robot: u16,
     /// Scans in which it stands so; empty if it does in all.
     stands_in: Vec<ScanId>,
     /// World bounds of all points that are examined, metres.
     pub(crate) region: Aabb,
-    pub(crate) links: Vec<Link>,
+    pub(crate) links: Vec<StandingLink>,
 }
 
-impl Body {
+impl StandingRobot {
     /// Whether it stands so in a scan.
     pub(crate) fn is_in(&self, scan: ScanId) -> bool {
         self.stands_in.is_empty() || self.stands_in.contains(&scan)
@@ -64,7 +64,7 @@ pub(crate) fn bodies(
     models: &[Model],
     settings: &Settings,
     fan: &dyn Fan,
-) -> Vec<Body> {
+) -> Vec<StandingRobot> {
     let all = fits.iter().enumerate().flat_map(|(robot, fit)| {
         std::iter::once(fit).chain(&fit.stays).map(move |fit| (robot, fit))
     });
@@ -80,17 +80,21 @@ pub(crate) fn bodies(
         let links = posed(fit, model, &fields[&fit.model], settings);
         let region = links.iter().fold(Aabb::EMPTY, |all, link| all.union(&link.region()));
         let stands_in = fit.stands_in.clone();
-        (!region.is_empty()).then_some(Body { robot: *robot, stands_in, region, links })
+        (!region.is_empty()).then_some(StandingRobot { robot: *robot, stands_in, region, links })
     };
     used.iter().filter_map(body).collect()
 }
 
-/// For each model in use, the distance fields of its links that have a surface.
-fn fields(used: &[(u16, &Fit, &Model)], fan: &dyn Fan) -> BTreeMap<usize, Vec<Option<Arc<Field>>>> {
+/// For each model in use: the fields of its links that have a surface.
+fn fields(
+    used: &[(u16, &Fit, &Model)],
+    fan: &dyn Fan,
+) -> BTreeMap<usize, Vec<Option<Arc<DistanceField>>>> {
     let models: BTreeMap<usize, &Model> = used.iter().map(|(_, fit, m)| (fit.model, *m)).collect();
     let links = models.iter().flat_map(|(at, model)| model.links.iter().map(move |l| (*at, l)));
-    let made = |(at, link): (usize, &robot::Link)| (at, Field::new(&link.cad).map(Arc::new));
-    let mut out: BTreeMap<usize, Vec<Option<Arc<Field>>>> = BTreeMap::new();
+    let made =
+        |(at, link): (usize, &robot::Link)| (at, DistanceField::new(&link.cad).map(Arc::new));
+    let mut out: BTreeMap<usize, Vec<Option<Arc<DistanceField>>>> = BTreeMap::new();
     for (at, field) in fan.fan(links.collect(), made) {
         out.entry(at).or_default().push(field);
     }
@@ -100,9 +104,9 @@ fn fields(used: &[(u16, &Fit, &Model)], fan: &dyn Fan) -> BTreeMap<usize, Vec<Op
 fn posed(
     fit: &Fit,
     model: &Model,
-    fields: &[Option<Arc<Field>>],
+    fields: &[Option<Arc<DistanceField>>],
     settings: &Settings,
-) -> Vec<Link> {
+) -> Vec<StandingLink> {
     let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
     let Kinematics { base_from_link, twists } = model.kinematics(&posture);
     let covariance = covariance(fit);
@@ -118,7 +122,7 @@ fn posed(
         let sigma = (settings.sigma_range.powi(2) + mesh * mesh + spread * spread).sqrt();
         // The robot stands on its first link with a body, unless joints move that link.
         let stands = out.is_empty() && twists[index].iter().flatten().all(|v| *v == 0.0);
-        out.push(Link {
+        out.push(StandingLink {
             index: at,
             world_from_link: fit.world_from_base * base_from_link[index],
             field: Arc::clone(field),
@@ -168,7 +172,7 @@ fn hands(model: &Model) -> Vec<bool> {
 /// RMS over the samples of a link of their standard deviation across the surface, metres.
 fn spread(
     fit: &Fit,
-    field: &Field,
+    field: &DistanceField,
     base_from_link: &Pose,
     twists: &[[f64; 6]],
     covariance: &DMatrix<f64>,
@@ -208,7 +212,7 @@ fn covariance(fit: &Fit) -> DMatrix<f64> {
     DMatrix::from_diagonal(&DVector::from_iterator(n, variances))
 }
 
-impl Link {
+impl StandingLink {
     /// World bounds of the points that are examined, metres.
     pub(crate) fn region(&self) -> Aabb {
         let corners = self.bounds.grown(self.reach.max(f64::from(FIELD_REACH))).corners();

@@ -20,7 +20,7 @@ const ROWS: [(isize, isize); 9] =
 const ROUNDED: f32 = 1e-5;
 
 /// Samples sorted into cells, with an approximate nearest sample for each cell.
-pub(crate) struct Field {
+pub(crate) struct DistanceField {
     min: [f32; 3],
     size: [usize; 3],
     edge: f32,
@@ -36,14 +36,14 @@ pub(crate) struct Field {
 
 /// The nearest place on a surface.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Near {
+pub(crate) struct NearestPlace {
     /// Distance, metres; measured across the surface where the point lies above it.
     pub(crate) distance: f32,
     /// Outward unit normal there, link frame.
     pub(crate) normal: [f32; 3],
 }
 
-impl Field {
+impl DistanceField {
     /// The field of a CAD cloud; `None` for a link without a body.
     pub(crate) fn new(cad: &CadCloud) -> Option<Self> {
         let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
@@ -97,7 +97,7 @@ impl Field {
 
     /// The nearest place on the surface, if it is within a cell's edge; else an approximate
     /// distance as `Err`, metres, infinite beyond reach.
-    pub(crate) fn near(&self, p: [f32; 3]) -> Result<Near, f32> {
+    pub(crate) fn near(&self, p: [f32; 3]) -> Result<NearestPlace, f32> {
         let Some(sample) = self.nearest.nearest(p) else { return Err(f32::INFINITY) };
         let rough = square(minus(p, self.points[sample])).sqrt();
         // The centre of a cell is at most 0.87 edges from `p`. If a sample is within one edge of
@@ -131,7 +131,7 @@ impl Field {
             best = self.nearest_of(p, run, best);
         }
         if best.0.is_finite() {
-            Ok(Near { distance: best.0.sqrt(), normal: self.normals[best.1] })
+            Ok(NearestPlace { distance: best.0.sqrt(), normal: self.normals[best.1] })
         } else {
             Err(rough)
         }
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn distance_is_across_the_surface_and_grows_past_its_edge() {
-        let field = Field::new(&plate()).expect("has samples");
+        let field = DistanceField::new(&plate()).expect("has samples");
         let near = field.near([0.0512, 0.0833, 0.007]).expect("near");
         assert!((near.distance - 0.007).abs() < 1e-5);
         let beside = field.near([0.22, 0.0, 0.0]).expect("near");
@@ -228,7 +228,7 @@ mod tests {
         let rough = field.near([0.0, 0.0, 0.1]).expect_err("far");
         assert!((rough - 0.1).abs() < 0.03, "{rough}");
         assert_eq!(field.near([0.0, 0.0, 1.0]).expect_err("outside"), f32::INFINITY);
-        assert!(Field::new(&CadCloud::default()).is_none());
+        assert!(DistanceField::new(&CadCloud::default()).is_none());
     }
 
     #[test]
@@ -243,7 +243,7 @@ mod tests {
             .collect();
         let normals = points.iter().map(|p| p.map(|v| v / 0.1)).collect();
         let cad = CadCloud { points, normals, spacing: 0.006, area: 0.126 };
-        let field = Field::new(&cad).expect("has samples");
+        let field = DistanceField::new(&cad).expect("has samples");
         let mut n_near = 0;
         for i in 0..4000 {
             let (a, b, c) = (i % 16, i / 16 % 16, i / 256);

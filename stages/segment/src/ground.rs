@@ -15,13 +15,13 @@ const MIN_BAND: f64 = 0.005;
 
 /// The floor, prepared for a look-up at every point of a plant.
 #[derive(Debug, Clone)]
-pub struct Ground {
-    levels: Vec<Level>,
+pub struct FloorHeights {
+    levels: Vec<HeightLevel>,
     depth: f64,
 }
 
 #[derive(Debug, Clone)]
-struct Level {
+struct HeightLevel {
     heights: Heights,
     /// Half-thickness of the floor above its heights, metres.
     band: f64,
@@ -29,14 +29,14 @@ struct Level {
 
 #[derive(Debug, Clone)]
 enum Heights {
-    Dense(Raster),
+    Dense(HeightRaster),
     Sparse(FloorLevel),
 }
 
 /// Heights at the centres of cells. Cells without a height next to known ones have that of the mean
 /// plane, others are NaN.
 #[derive(Debug, Clone)]
-struct Raster {
+struct HeightRaster {
     /// Number of cells per metre.
     per_metre: f64,
     min: [i32; 2],
@@ -48,15 +48,15 @@ struct Raster {
     span: [f64; 2],
 }
 
-impl Ground {
+impl FloorHeights {
     /// The floor as found, with the thickness that `settings` give.
     #[must_use]
     pub fn new(floor: &Floor, settings: &Settings) -> Self {
         let levels = floor.levels.iter().filter(|level| !level.heights.is_empty());
         Self {
             levels: levels
-                .map(|level| Level {
-                    heights: Raster::new(level)
+                .map(|level| HeightLevel {
+                    heights: HeightRaster::new(level)
                         .map_or_else(|| Heights::Sparse(level.clone()), Heights::Dense),
                     band: (SCATTERS * level.scatter).max(MIN_BAND).min(settings.floor_band),
                 })
@@ -109,7 +109,7 @@ impl Ground {
     }
 }
 
-impl Raster {
+impl HeightRaster {
     /// The dense form of a level; `None` where it would be too large.
     fn new(level: &FloorLevel) -> Option<Self> {
         let cells = || level.heights.iter().map(|entry| entry.0);
@@ -225,7 +225,7 @@ mod tests {
         let (waviness, scatter, area) = (0.007, 0.003, 100.0);
         let level = FloorLevel { plane, waviness, scatter, area, cell, heights };
         let floor = Floor { levels: vec![level], planes: Vec::new() };
-        let ground = Ground::new(&floor, &Settings::default());
+        let ground = FloorHeights::new(&floor, &Settings::default());
         for (x, y) in [(0.1, 0.2), (-3.3, 4.1), (4.2, -4.4)] {
             let z = wave(x, y);
             assert_eq!(ground.label([x, y, z + 0.004]), Label::FLOOR);

@@ -34,8 +34,8 @@ mod ground;
 mod raster;
 mod step;
 
-pub use ground::Ground;
-pub use step::{Scratch, Segment};
+pub use ground::FloorHeights;
+pub use step::{Segment, SegmentScratch};
 
 /// Settings of the segmentation.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,7 @@ const NORMAL_SPAN: f32 = 0.015;
 
 /// The point of each pixel of a tile, and the ranges of the points.
 #[derive(Debug, Default)]
-pub(crate) struct Raster {
+pub(crate) struct PixelRaster {
     /// Index of the first point of each pixel, or `EMPTY`.
     first: Vec<u32>,
     ranges: Vec<f32>,
@@ -21,7 +21,7 @@ pub(crate) struct Raster {
     noise: f32,
 }
 
-impl Raster {
+impl PixelRaster {
     /// Fills the raster of a tile; memory is reused.
     pub(crate) fn fill(&mut self, tile: &Tile, lattice: &Lattice, sigma_range: f64) {
         self.first.clear();

@@ -1,9 +1,9 @@
 //! The segmentation step: labels of one tile's points near robots, and its residual voxels.
 
-use crate::body::{Body, bodies, box_distance};
+use crate::body::{StandingRobot, bodies, box_distance};
 use crate::field::FIELD_REACH;
-use crate::raster::Raster;
-use crate::{Ground, Settings};
+use crate::raster::PixelRaster;
+use crate::{FloorHeights, Settings};
 use contract::{
     Error, Fan, Fit, Floor, Kind, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE,
     ResidualVoxel, Result, Scan, Tile, TileLabels,
@@ -28,39 +28,39 @@ const PULL: usize = 4;
 
 /// Labels the points of tiles near fitted robots.
 pub struct Segment {
-    bodies: Vec<Body>,
+    bodies: Vec<StandingRobot>,
     /// For each fit and link, whether the link belongs to the tool.
     effectors: Vec<Vec<bool>>,
-    ground: Ground,
+    ground: FloorHeights,
     scans: Vec<Scan>,
     settings: Settings,
 }
 
 /// Memory that is reused from tile to tile.
 #[derive(Debug, Default)]
-pub struct Scratch {
-    raster: Raster,
-    found: Vec<Found>,
+pub struct SegmentScratch {
+    raster: PixelRaster,
+    found: Vec<PointState>,
 }
 
 /// The class of a point before its neighbours are considered.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Found {
+enum PointState {
     /// Away from robots, or on the floor.
     Default,
     /// Within the gate of a link.
-    Link(Touch),
+    Link(NearestLink),
     /// Between one and two gates from a link.
-    Doubt(Touch),
+    Doubt(NearestLink),
     /// Near a robot, but on none of its links.
-    Residual(Touch),
+    Residual(NearestLink),
     /// A mixed pixel between a link's edge and the surface behind it.
     Veil,
 }
 
 /// The nearest link of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Touch {
+struct NearestLink {
     link: LinkAt,
     /// Distance from its surface, metres; infinite beyond the field.
     distance: f32,
@@ -70,9 +70,9 @@ struct Touch {
 
 /// A link in the scan frame of one tile.
 #[derive(Clone, Copy)]
-struct Seen<'a> {
+struct LinkInTile<'a> {
     at: LinkAt,
-    link: &'a crate::body::Link,
+    link: &'a crate::body::StandingLink,
     link_from_scan: Rows,
     min: [f32; 3],
     max: [f32; 3],
@@ -84,9 +84,9 @@ struct About<'a> {
     inset: f32,
     /// The best link by its field: distance in gates, link, distance in metres, and normal of the
     /// surface.
-    best: Option<(f32, &'a Seen<'a>, f32, [f32; 3])>,
+    best: Option<(f32, &'a LinkInTile<'a>, f32, [f32; 3])>,
     /// The nearest link by field, else by bounding box: both distances (metres) and the link.
-    rough: (f32, f32, Option<&'a Seen<'a>>),
+    rough: (f32, f32, Option<&'a LinkInTile<'a>>),
 }
 
 fn effectors(model: Option<&Model>) -> Vec<bool> {
@@ -108,7 +108,7 @@ impl Segment {
         Self {
             bodies: bodies(fits, models, &settings, fan),
             effectors: fits.iter().map(|fit| effectors(models.get(fit.model))).collect(),
-            ground: Ground::new(floor, &settings),
+            ground: FloorHeights::new(floor, &settings),
             scans: scans.to_vec(),
             settings,
         }
@@ -133,12 +133,13 @@ impl Segment {
     }
 
     /// The links whose surroundings overlap a tile.
-    fn seen<'a>(&'a self, tile: &Tile, world_from_scan: &Pose) -> Vec<Seen<'a>> {
+    fn seen<'a>(&'a self, tile: &Tile, world_from_scan: &Pose) -> Vec<LinkInTile<'a>> {
         let mut out = Vec::new();
-        let here = |body: &&Body| body.is_in(tile.at.scan) && body.region.touches(&tile.bounds);
+        let here =
+            |body: &&StandingRobot| body.is_in(tile.at.scan) && body.region.touches(&tile.bounds);
         for body in self.bodies.iter().filter(here) {
             for link in body.links.iter().filter(|link| link.region().touches(&tile.bounds)) {
-                out.push(Seen {
+                out.push(LinkInTile {
                     at: LinkAt { robot: body.robot, link: link.index },
                     link,
                     link_from_scan: rows(&(link.world_from_link.inverse() * world_from_scan)),
@@ -153,17 +154,17 @@ impl Segment {
     /// The class of point `i` without its neighbours.
     fn judge(
         &self,
-        seen: &[Seen],
+        seen: &[LinkInTile],
         p: [f32; 3],
         world: [f64; 3],
         normal: impl Fn() -> Option<[f32; 3]>,
-    ) -> Found {
+    ) -> PointState {
         let About { inset, best, rough } = about(seen, p);
         let Some(nearest) = rough.2.filter(|_| inset > 0.0) else {
-            return Found::Default;
+            return PointState::Default;
         };
         let height = self.ground.height_above(world);
-        let touch = |at: LinkAt, distance: f32| Touch {
+        let touch = |at: LinkAt, distance: f32| NearestLink {
             link: at,
             distance,
             at_border: inset < BORDER,
@@ -175,12 +176,12 @@ impl Segment {
             // The top of a stand continues beside the foot, within its gate.
             let above = s.link.above_foot(transform(&s.link_from_scan, p));
             if above.is_some_and(|above| f64::from(above) <= self.settings.foot_band) {
-                return Found::Default;
+                return PointState::Default;
             }
             if height.is_some_and(|h| h <= self.settings.foot_band)
                 && !self.on_side(s, surface, distance)
             {
-                return Found::Default;
+                return PointState::Default;
             }
             let agrees = distance <= NEAR_ENOUGH
                 || normal().is_none_or(|n| {
@@ -189,29 +190,33 @@ impl Segment {
                         >= MIN_AGREEMENT
                 });
             if gates <= 1.0 && agrees {
-                return Found::Link(found);
+                return PointState::Link(found);
             }
             if !is_floor && agrees {
-                return Found::Doubt(found);
+                return PointState::Doubt(found);
             }
         }
-        if is_floor { Found::Default } else { Found::Residual(touch(nearest.at, rough.0)) }
+        if is_floor {
+            PointState::Default
+        } else {
+            PointState::Residual(touch(nearest.at, rough.0))
+        }
     }
 
     /// Whether a point close to the floor lies on the upright side of a link, well inside its gate.
-    fn on_side(&self, s: &Seen, surface: [f32; 3], distance: f32) -> bool {
+    fn on_side(&self, s: &LinkInTile, surface: [f32; 3], distance: f32) -> bool {
         let up = s.link.world_from_link.rotation.inverse() * geometry::Vector::z();
         let rise = surface[0] * up.x as f32 + surface[1] * up.y as f32 + surface[2] * up.z as f32;
         rise.abs() < 0.5 && distance <= 0.5 * s.link.gate
     }
 
     /// Decides doubtful points and veils by their neighbours.
-    fn settle(&self, tile: &Tile, raster: Option<&Raster>, found: &mut [Found]) {
+    fn settle(&self, tile: &Tile, raster: Option<&PixelRaster>, found: &mut [PointState]) {
         let Some(raster) = raster else {
             // Without a raster doubtful points stay residual; `attach` decides by their voxels.
             for f in found.iter_mut() {
-                if let Found::Doubt(touch) = *f {
-                    *f = Found::Residual(touch);
+                if let PointState::Doubt(touch) = *f {
+                    *f = PointState::Residual(touch);
                 }
             }
             return;
@@ -219,8 +224,8 @@ impl Segment {
         let first = found.to_vec();
         for i in 0..first.len() {
             let (touch, is_doubt) = match first[i] {
-                Found::Doubt(touch) => (touch, true),
-                Found::Residual(touch) => (touch, false),
+                PointState::Doubt(touch) => (touch, true),
+                PointState::Residual(touch) => (touch, false),
                 _ => continue,
             };
             let (mut n_joined, mut n_link) = (0, 0);
@@ -228,7 +233,7 @@ impl Segment {
                 let Some(other) = raster.beside(tile, i, by) else {
                     continue;
                 };
-                if let Found::Link(at) = first[other] {
+                if let PointState::Link(at) = first[other] {
                     n_link += 1;
                     let inner = by[0].abs() <= 1 && by[1].abs() <= 1;
                     n_joined += usize::from(
@@ -237,9 +242,9 @@ impl Segment {
                 }
             }
             found[i] = match (is_doubt, n_link > 0 && raster.is_veil(tile, i)) {
-                (true, false) if n_joined >= PULL => Found::Link(touch),
-                (_, true) => Found::Veil,
-                _ => Found::Residual(touch),
+                (true, false) if n_joined >= PULL => PointState::Link(touch),
+                (_, true) => PointState::Veil,
+                _ => PointState::Residual(touch),
             };
         }
     }
@@ -248,9 +253,9 @@ impl Segment {
 impl Map for Segment {
     type In = Tile;
     type Out = TileLabels;
-    type Scratch = Scratch;
+    type Scratch = SegmentScratch;
 
-    fn apply(&self, tile: Tile, scratch: &mut Scratch) -> Result<TileLabels> {
+    fn apply(&self, tile: Tile, scratch: &mut SegmentScratch) -> Result<TileLabels> {
         let Some(scan) = self.scans.get(tile.at.scan.0 as usize) else {
             return Err(Error::new(Kind::Bug, format!("a tile of no scan: {:?}", tile.at)));
         };
@@ -275,7 +280,7 @@ impl Map for Segment {
         for (block, points) in tile.xyz.chunks(BLOCK).enumerate() {
             let near = near(&seen, points);
             if near.is_empty() {
-                scratch.found.resize(scratch.found.len() + points.len(), Found::Default);
+                scratch.found.resize(scratch.found.len() + points.len(), PointState::Default);
                 continue;
             }
             for (i, p) in points.iter().enumerate() {
@@ -284,7 +289,7 @@ impl Map for Segment {
                 let found = if regions.iter().any(|region| region.contains(world)) {
                     self.judge(&near, *p, world, || raster.and_then(|r| r.normal(&tile, at)))
                 } else {
-                    Found::Default
+                    PointState::Default
                 };
                 scratch.found.push(found);
             }
@@ -297,7 +302,7 @@ impl Map for Segment {
 }
 
 /// The links that any point of a block may be near.
-fn near<'a>(seen: &[Seen<'a>], points: &[[f32; 3]]) -> Vec<Seen<'a>> {
+fn near<'a>(seen: &[LinkInTile<'a>], points: &[[f32; 3]]) -> Vec<LinkInTile<'a>> {
     let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for p in points {
         for i in 0..3 {
@@ -311,13 +316,13 @@ fn near<'a>(seen: &[Seen<'a>], points: &[[f32; 3]]) -> Vec<Seen<'a>> {
     // A millimetre for the rounding of transforms.
     let far = reach + radius + 1e-3;
     let is_near =
-        |s: &&Seen| box_distance(s.min, s.max, transform(&s.link_from_scan, middle)) <= far;
+        |s: &&LinkInTile| box_distance(s.min, s.max, transform(&s.link_from_scan, middle)) <= far;
     seen.iter().filter(is_near).copied().collect()
 }
 
 /// The links near a point, by their fields and bounding boxes.
 #[inline]
-fn about<'a>(seen: &'a [Seen<'a>], p: [f32; 3]) -> About<'a> {
+fn about<'a>(seen: &'a [LinkInTile<'a>], p: [f32; 3]) -> About<'a> {
     let mut out =
         About { inset: f32::NEG_INFINITY, best: None, rough: (f32::INFINITY, f32::INFINITY, None) };
     for s in seen {
@@ -342,18 +347,23 @@ fn about<'a>(seen: &'a [Seen<'a>], p: [f32; 3]) -> About<'a> {
     out
 }
 
-/// Collects the classes of all points as lists sorted by place and by voxel.
-fn gather(tile: &Tile, world_from_scan: &Pose, found: &[Found], mut out: TileLabels) -> TileLabels {
+/// Turns what was found into lists sorted by place and by voxel.
+fn gather(
+    tile: &Tile,
+    world_from_scan: &Pose,
+    found: &[PointState],
+    mut out: TileLabels,
+) -> TileLabels {
     for (i, found) in found.iter().enumerate() {
         let place = tile.first_place + u64::from(tile.place[i]);
         let (touch, on_link) = match *found {
-            Found::Link(touch) => (touch, true),
-            Found::Residual(touch) | Found::Doubt(touch) => (touch, false),
-            Found::Veil => {
+            PointState::Link(touch) => (touch, true),
+            PointState::Residual(touch) | PointState::Doubt(touch) => (touch, false),
+            PointState::Veil => {
                 out.labels.push(PlaceRun::one(place, Label::UNCERTAIN));
                 continue;
             }
-            Found::Default => continue,
+            PointState::Default => continue,
         };
         let voxel = world(world_from_scan, tile.xyz[i]).map(|v| floor_i32(v / RESIDUAL_EDGE));
         if on_link {

@@ -1,7 +1,7 @@
 //! A robot made of boxes on a floor beside a wall, seen by one scanner with noise and mixed pixels:
 //! labels are compared with the truth.
 
-use crate::{Ground, Scratch, Segment, Settings};
+use crate::{FloorHeights, Segment, SegmentScratch, Settings};
 use contract::{
     Fit, Floor, FloorLevel, InputId, JointFit, Label, Lattice, Map, MaskId, OneByOne, Pixel,
     PlaceRun, PointKind, Scan, ScanId, Tile, TileAt, Verdict,
@@ -247,8 +247,8 @@ fn links_are_found_and_nothing_fixed_is_lost() {
     let tiles = shoot(&bricks, &scan);
     let fits = [fit(world_from_base, q)];
     let segment = segment(&fits, &scan);
-    let ground = Ground::new(&floor(), &Settings::default());
-    let mut scratch = Scratch::default();
+    let ground = FloorHeights::new(&floor(), &Settings::default());
+    let mut scratch = SegmentScratch::default();
     let (mut hit, mut missed, mut invented, mut n_fixed) = ([0_u32; 2], [0_u32; 2], [0_u32; 2], 0);
     let (mut n_veils, mut veils_on_link, mut floor_right, mut n_floor) = (0, 0, 0, 0);
     for (tile, truth) in tiles {
@@ -310,7 +310,7 @@ fn the_top_of_a_stand_goes_on_beside_the_foot() {
     let scan = scan(at(3.0, 1.6, 1.9) * Pose::rotation(Vector::z() * 3.6));
     let fits = [fit(world_from_base, 0.0)];
     let segment = segment(&fits, &scan);
-    let mut scratch = Scratch::default();
+    let mut scratch = SegmentScratch::default();
     let (mut n_stand, mut n_lost, mut n_base, mut n_found) = (0_u32, 0_u32, 0_u32, 0_u32);
     for (tile, truth) in shoot(&bricks, &scan) {
         let out = segment.apply(tile.clone(), &mut scratch).expect("maps");
@@ -354,7 +354,7 @@ fn points_of_a_real_robot_go_to_their_links() {
         .collect();
     let poses = model.poses(&posture);
     let fields: Vec<_> =
-        model.links.iter().map(|link| crate::field::Field::new(&link.cad)).collect();
+        model.links.iter().map(|link| crate::field::DistanceField::new(&link.cad)).collect();
     // Faces pressed together inside a joint belong to either link, and no scanner sees them.
     let is_apart = |link: usize, base: Point| {
         let others = fields.iter().zip(&poses).enumerate().filter(|(other, _)| *other != link);
@@ -396,7 +396,7 @@ fn points_of_a_real_robot_go_to_their_links() {
     let started = std::time::Instant::now();
     let segment = Segment::new(&[fit], &[model], &floor(), &[scan], Settings::default(), &OneByOne);
     let built = started.elapsed();
-    let out = segment.apply(tile, &mut Scratch::default()).expect("maps");
+    let out = segment.apply(tile, &mut SegmentScratch::default()).expect("maps");
     let labels: Vec<(u64, Label)> = single(&out.labels).collect();
     let right = labels.iter().filter(|(place, label)| label.link == truth[*place as usize]).count();
     let taken = started.elapsed() - built;

@@ -8,7 +8,7 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-type Vector = geometry::Vector;
+use geometry::Vector;
 
 /// How far a triangle is extended beyond its edges, as share of its size: about 60 rounding errors
 /// of single precision.
@@ -16,7 +16,7 @@ const HAIR: f32 = 4e-6;
 
 /// The end of a beam.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Hit {
+pub(crate) struct BeamHit {
     /// Distance from the origin of the beam, metres.
     pub(crate) range: f64,
     /// Index of the triangle, in the order of [`Beams`].
@@ -54,7 +54,12 @@ impl Beams {
 
     /// The nearest triangle along `direction` (unit length) not farther than `max_range`.
     #[inline]
-    pub(crate) fn cast(&self, origin: &Vector, direction: &Vector, max_range: f64) -> Option<Hit> {
+    pub(crate) fn cast(
+        &self,
+        origin: &Vector,
+        direction: &Vector,
+        max_range: f64,
+    ) -> Option<BeamHit> {
         if self.triangles.is_empty() {
             return None;
         }
@@ -71,7 +76,7 @@ impl Beams {
         // the plane may give no useful range; then the single-precision one is used.
         let range = self.plane_range(triangle, origin, direction);
         let range = if (range - single).abs() < 1e-3 { range } else { single };
-        Some(Hit { range, triangle, surface: self.surface_of[triangle as usize] })
+        Some(BeamHit { range, triangle, surface: self.surface_of[triangle as usize] })
     }
 
     /// Range at which a beam meets the plane of a triangle, metres; infinite or negative if it does

@@ -24,6 +24,22 @@ fn finite(what: &str, place: &str, values: &[f64], low: f64, high: f64) -> Resul
     }
 }
 
+impl Scene {
+    /// Reads a scene file's text.
+    ///
+    /// # Errors
+    /// `BadInput` where the text is no scene: unknown names, missing values, numbers out of range.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        let scene: Self = toml::from_str(text).map_err(|e| {
+            Error::bad_input("scene cannot be read")
+                .because(e)
+                .hint("the words of a scene are in stages/simulate/README.md")
+        })?;
+        check(&scene)?;
+        Ok(scene)
+    }
+}
+
 /// Refuses numbers out of range and references to names that do not exist.
 ///
 /// # Errors

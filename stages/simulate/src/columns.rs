@@ -1,6 +1,6 @@
 //! The output of the simulator: a scan's frame, and its columns of beams as a structure of arrays.
 
-use crate::scene::Raster;
+use crate::scene::BeamRaster;
 use contract::Label;
 use geometry::{Pose, Vector, direction};
 
@@ -14,7 +14,7 @@ pub struct ScanFrame {
     /// True pose of the scan, with scene origin, metres.
     pub true_world_from_scan: Pose,
     /// Directions of rows and columns in the scan frame.
-    pub raster: Raster,
+    pub raster: BeamRaster,
     /// Number of rows, counted from the lowest elevation.
     pub n_rows: u32,
     /// Number of columns, counter-clockwise.

@@ -3,10 +3,10 @@
 use crate::demo_robots::{ARM, PALLETISER, WELDER};
 use crate::random::Random;
 use crate::scene::{
-    Anchor, Carried, Column, Cuboid, Fence, Filling, Floor, Furniture, Hall, Hose, Raster,
-    RobotPlace, Scanner, Scene, Section, StandShape, Tool, ToolShape,
+    Anchor, BeamRaster, Building, CarriedBox, Column, Cuboid, Fence, FenceFilling, Furniture, Hose,
+    RobotPlace, Scanner, Scene, SceneFloor, Section, StandShape, Tool, ToolShape,
 };
-use crate::spot::{Spot, scanner};
+use crate::spot::{RobotSpot, scanner};
 use contract::{Error, Result};
 use robot::Model;
 
@@ -24,8 +24,8 @@ const CARTON: ([f64; 3], [f64; 3]) = ([0.0, 0.0, -0.33], [0.5, 0.35, 0.25]);
 pub fn demo_scene(seed: u64, models: &[Model]) -> Result<Scene> {
     let mut scene = Scene {
         seed,
-        hall: Some(Hall { size: [12.0, 10.0, 5.0], walls: true, ceiling: true }),
-        floor: Some(Floor {
+        hall: Some(Building { size: [12.0, 10.0, 5.0], walls: true, ceiling: true }),
+        floor: Some(SceneFloor {
             size: None,
             tilt_deg: [0.12, -0.08],
             wave_amplitude: 0.003,
@@ -48,7 +48,7 @@ pub fn demo_scene(seed: u64, models: &[Model]) -> Result<Scene> {
         rpy_deg: [180.0, 0.0, 0.0],
         length: 0.2,
     });
-    scene.carried.push(Carried {
+    scene.carried.push(CarriedBox {
         name: "carton".into(),
         robot: "R2".into(),
         link: "tool0".into(),
@@ -61,8 +61,11 @@ pub fn demo_scene(seed: u64, models: &[Model]) -> Result<Scene> {
         .into_iter()
         .enumerate()
     {
-        let raster =
-            Raster { elevation_deg: [-60.0, 45.0], step_deg: DEMO_STEP_DEG, ..Raster::default() };
+        let raster = BeamRaster {
+            elevation_deg: [-60.0, 45.0],
+            step_deg: DEMO_STEP_DEG,
+            ..BeamRaster::default()
+        };
         let mut scanner =
             scanner(format!("scan_{}", i + 1), [x, y, z + scene.ground(x, y)], raster);
         scanner.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];
@@ -85,13 +88,13 @@ pub fn paper_scene(seed: u64, model: &Model, posture: &[f64], n_beams: u64) -> S
     };
     let scanners = (0..6).map(|k| {
         let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / 6.0).sin_cos();
-        let raster = Raster { n_beams: Some(n_beams), ..Raster::default() };
+        let raster = BeamRaster { n_beams: Some(n_beams), ..BeamRaster::default() };
         let thin = scanner(format!("scan_{}", k + 1), [5.0 * cos, 5.0 * sin, 1.6], raster);
         Scanner { mixed: None, dropouts: 0.0, dark_dropouts: 0.0, ..thin }
     });
     Scene {
         seed,
-        floor: Some(Floor {
+        floor: Some(SceneFloor {
             size: Some([20.0, 20.0]),
             tilt_deg: [0.0; 2],
             wave_amplitude: 0.0,
@@ -104,9 +107,9 @@ pub fn paper_scene(seed: u64, model: &Model, posture: &[f64], n_beams: u64) -> S
     }
 }
 
-fn demo_spots() -> [Spot<'static>; 3] {
+fn demo_spots() -> [RobotSpot<'static>; 3] {
     [
-        Spot {
+        RobotSpot {
             name: "R1".into(),
             model: WELDER,
             xy: [-2.8, 1.6],
@@ -119,7 +122,7 @@ fn demo_spots() -> [Spot<'static>; 3] {
             min: [-5.6, -1.3],
             max: [-0.1, 4.7],
         },
-        Spot {
+        RobotSpot {
             name: "R2".into(),
             model: PALLETISER,
             xy: [3.0, -1.9],
@@ -131,7 +134,7 @@ fn demo_spots() -> [Spot<'static>; 3] {
             min: [0.3, -4.6],
             max: [5.6, 0.6],
         },
-        Spot {
+        RobotSpot {
             name: "R3".into(),
             model: ARM,
             xy: [3.2, 3.2],
@@ -153,9 +156,9 @@ fn furnish(scene: &mut Scene) {
     scene.benches.push(furniture("bench", [5.35, 3.2], 90.0, [1.6, 0.7, 0.9]));
     let fence =
         |name: &str, from, to, filling| Fence { name: name.into(), from, to, height: 2.0, filling };
-    scene.fences.push(fence("east", [0.1, 0.6], [0.1, 4.8], Filling::Wires));
-    scene.fences.push(fence("south", [-5.8, -1.6], [-2.8, -1.6], Filling::Wires));
-    scene.fences.push(fence("panel", [5.75, -1.0], [5.75, 0.2], Filling::Panel));
+    scene.fences.push(fence("east", [0.1, 0.6], [0.1, 4.8], FenceFilling::Wires));
+    scene.fences.push(fence("south", [-5.8, -1.6], [-2.8, -1.6], FenceFilling::Wires));
+    scene.fences.push(fence("panel", [5.75, -1.0], [5.75, 0.2], FenceFilling::Panel));
     let column =
         |xy, radius, section| Column { name: String::new(), xy, radius, height: 5.0, section };
     scene.columns.push(column([-5.6, -4.6], 0.2, Section::IBeam));

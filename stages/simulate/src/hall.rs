@@ -1,7 +1,8 @@
 //! Bodies of the hall: building, ground, columns, fences and furniture.
 
 use crate::scene::{
-    Column, Fence, Filling, Floor, Furniture, Hall, Scene, Section, Stand, StandShape,
+    Building, Column, Fence, FenceFilling, Furniture, Scene, SceneFloor, SceneStand, Section,
+    StandShape,
 };
 use crate::solid::{Solid, bolts, cuboid, disc, lathe, prism, tube};
 use geometry::Point;
@@ -26,7 +27,7 @@ fn slab(min: [f64; 3], max: [f64; 3], chamfer: f64) -> Solid {
 }
 
 /// Walls and ceiling.
-pub(crate) fn building(hall: &Hall, lowest: f64) -> Solid {
+pub(crate) fn building(hall: &Building, lowest: f64) -> Solid {
     let [x, y, z] = [0.5 * hall.size[0], 0.5 * hall.size[1], hall.size[2]];
     let mut out = Solid::default();
     if hall.walls {
@@ -44,7 +45,7 @@ pub(crate) fn building(hall: &Hall, lowest: f64) -> Solid {
 }
 
 /// Edge of a ground cell, metres: as wide as [`FACET`] allows.
-fn ground_cell(floor: &Floor) -> f64 {
+fn ground_cell(floor: &SceneFloor) -> f64 {
     // A chord of length c is c²·curvature/8 away from its arc; the shorter of the two waves counts.
     let curvature =
         floor.wave_amplitude * (1.37 * std::f64::consts::TAU / floor.wave_length).powi(2);
@@ -91,7 +92,7 @@ pub(crate) fn ground(scene: &Scene) -> (Solid, Solid) {
             ([b[0], b[1]], [a[0], b[1]]),
             ([a[0], b[1]], [a[0], a[1]]),
         ] {
-            faces.add(&step_face(cell, (p, q), level.height, |x, y| floor.base_height(x, y)));
+            faces.add(&step_face(cell, p, q, level.height, |x, y| floor.base_height(x, y)));
         }
     }
     (out, faces)
@@ -100,7 +101,8 @@ pub(crate) fn ground(scene: &Scene) -> (Solid, Solid) {
 /// The upright face of a step from `p` to `q`.
 fn step_face(
     cell: f64,
-    (p, q): ([f64; 2], [f64; 2]),
+    p: [f64; 2],
+    q: [f64; 2],
     height: f64,
     base: impl Fn(f64, f64) -> f64,
 ) -> Solid {
@@ -164,8 +166,8 @@ pub(crate) fn fence(fence: &Fence, ground: impl Fn(f64, f64) -> f64) -> (Solid, 
         let (low, high) = (z + 0.15, z + fence.height);
         let (left, right) = (s + 0.04, s + width - 0.04);
         match fence.filling {
-            Filling::Panel => posts.add(&slab([left, -0.002, low], [right, 0.002, high], 0.0)),
-            Filling::Wires => wires.add(&wire_mesh([left, right], [low, high])),
+            FenceFilling::Panel => posts.add(&slab([left, -0.002, low], [right, 0.002, high], 0.0)),
+            FenceFilling::Wires => wires.add(&wire_mesh([left, right], [low, high])),
         }
     }
     let yaw = dy.atan2(dx).to_degrees();
@@ -254,7 +256,7 @@ pub(crate) fn bench(f: &Furniture, z: f64) -> Solid {
 }
 
 /// A stand from ground height `z` to its top.
-pub(crate) fn stand(stand: &Stand, z: f64) -> Solid {
+pub(crate) fn stand(stand: &SceneStand, z: f64) -> Solid {
     let h = (stand.top - z).max(0.01);
     let s = stand.side;
     let plate = |side: f64, low: f64, high: f64| {

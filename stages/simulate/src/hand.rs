@@ -1,6 +1,6 @@
 //! Tools on a robot's flange, and parts that a tool holds.
 
-use crate::scene::{Carried, Tool, ToolShape, pose};
+use crate::scene::{CarriedBox, Tool, ToolShape, pose};
 use geometry::Point;
 use robot::Model;
 
@@ -13,9 +13,9 @@ pub fn tool_on(model: &Model, flange: usize, shape: ToolShape, length: f64) -> T
 
 /// A part of this size (metres) at the end of a robot's tool.
 #[must_use]
-pub fn part_in(tool: &Tool, robot: &str, size: [f64; 3]) -> Carried {
+pub fn part_in(tool: &Tool, robot: &str, size: [f64; 3]) -> CarriedBox {
     let middle = pose([0.0; 3], tool.rpy_deg) * Point::new(0.0, 0.0, tool.length + 0.5 * size[2]);
-    Carried {
+    CarriedBox {
         name: format!("part of {robot}"),
         robot: robot.to_owned(),
         link: tool.link.clone(),

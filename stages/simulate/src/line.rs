@@ -6,15 +6,16 @@
 
 use crate::random::Random;
 use crate::scene::{
-    Cuboid, Fence, Filling, Floor, Furniture, Hall, Raster, Registration, Scene, StandShape,
+    BeamRaster, Building, Cuboid, Fence, FenceFilling, Furniture, RegistrationError, Scene,
+    SceneFloor, StandShape,
 };
-use crate::spot::{Spot, scanner};
+use crate::spot::{RobotSpot, scanner};
 use contract::{Error, Result};
 use robot::Model;
 
 /// Parameters of a line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Line {
+pub struct ProductionLine {
     /// Seed of all random choices.
     pub seed: u64,
     /// Number of cells.
@@ -52,7 +53,7 @@ const PALLET: [f64; 3] = [1.2, 0.8, 0.7];
 ///
 /// # Errors
 /// `BadInput` if no robot of the library fits into a cell.
-pub fn line(wanted: &Line, models: &[Model]) -> Result<([Scene; 2], usize)> {
+pub fn line(wanted: &ProductionLine, models: &[Model]) -> Result<([Scene; 2], usize)> {
     let mut random = Random::keyed(&[wanted.seed, 0x11E]);
     let robots: Vec<&Model> = models.iter().filter(|m| !m.is_tool()).collect();
     if robots.is_empty() {
@@ -63,9 +64,9 @@ pub fn line(wanted: &Line, models: &[Model]) -> Result<([Scene; 2], usize)> {
     let length = pitch * wanted.n_cells as f64;
     let mut then = shell(wanted, length, &mut random);
     let middle = |k: usize| (k as f64 + 0.5) * pitch - 0.5 * length;
-    furnish(&mut then, wanted.n_cells, (pitch, &middle), &mut random);
+    furnish(&mut then, wanted.n_cells, pitch, &middle, &mut random);
     let room = 0.5 * pitch - 0.15;
-    let spot = |k: usize| Spot {
+    let spot = |k: usize| RobotSpot {
         name: format!("R{}", k + 1),
         model: &model.name,
         xy: [middle(k), 0.0],
@@ -101,21 +102,21 @@ pub fn line(wanted: &Line, models: &[Model]) -> Result<([Scene; 2], usize)> {
             put_pallet(scene, [middle(k), 0.0], *pallet, pitch);
         }
     }
-    scanners(&mut then, wanted, (pitch, &middle), &mut random);
+    scanners(&mut then, wanted, pitch, &middle, &mut random);
     new_scanners(&mut now, wanted, [middle(again), pitch], &mut random);
     Ok(([then, now], again))
 }
 
 /// Building and floor.
-fn shell(wanted: &Line, length: f64, random: &mut Random) -> Scene {
+fn shell(wanted: &ProductionLine, length: f64, random: &mut Random) -> Scene {
     let beyond = if wanted.ends == Ends::Walls { AISLE } else { BEYOND };
     let size = [length + 2.0 * beyond, DEPTH + 2.0 * AISLE];
     let height = random.between(4.5, 6.0);
-    let hall = Hall { size: [size[0], size[1], height], walls: true, ceiling: true };
+    let hall = Building { size: [size[0], size[1], height], walls: true, ceiling: true };
     Scene {
         seed: wanted.seed,
         hall: (wanted.ends != Ends::Open).then_some(hall),
-        floor: Some(Floor {
+        floor: Some(SceneFloor {
             size: Some(size),
             tilt_deg: [0.0; 2],
             wave_amplitude: 0.001,
@@ -130,7 +131,8 @@ fn shell(wanted: &Line, length: f64, random: &mut Random) -> Scene {
 fn furnish(
     scene: &mut Scene,
     n_cells: usize,
-    (pitch, middle): (f64, &impl Fn(usize) -> f64),
+    pitch: f64,
+    middle: &impl Fn(usize) -> f64,
     random: &mut Random,
 ) {
     let height = random.between(1.6, 2.2);
@@ -142,7 +144,7 @@ fn furnish(
             from: [x, -0.5 * DEPTH],
             to: [x, 0.5 * DEPTH],
             height,
-            filling: Filling::Panel,
+            filling: FenceFilling::Panel,
         });
     }
     for k in 0..n_cells {
@@ -178,8 +180,9 @@ fn put_pallet(scene: &mut Scene, [x, y]: [f64; 2], place: usize, pitch: f64) {
 /// Adds one scanner in front of each cell and one behind every second cell.
 fn scanners(
     scene: &mut Scene,
-    wanted: &Line,
-    (pitch, middle): (f64, &impl Fn(usize) -> f64),
+    wanted: &ProductionLine,
+    pitch: f64,
+    middle: &impl Fn(usize) -> f64,
     random: &mut Random,
 ) {
     for k in 0..wanted.n_cells {
@@ -189,21 +192,35 @@ fn scanners(
     }
 }
 
-/// Adds two scanners at the cell that is scanned again, with the registration errors of rescans.
-fn new_scanners(scene: &mut Scene, wanted: &Line, [x, pitch]: [f64; 2], random: &mut Random) {
+/// Two scanners at the cell that is scanned again, registered to each other as well as rescans are.
+fn new_scanners(
+    scene: &mut Scene,
+    wanted: &ProductionLine,
+    [x, pitch]: [f64; 2],
+    random: &mut Random,
+) {
     scene.scanners.clear();
     for (k, side) in [-1.0, 1.0].into_iter().enumerate() {
         let x = x + random.between(-0.3, 0.3) * pitch;
         one(scene, format!("again_{}", k + 1), [x, side * 0.5 * (DEPTH + AISLE)], wanted, random);
     }
-    let registration = |_: &crate::scene::Scanner| Registration::drawn(OFF, random);
-    let all: Vec<Registration> = scene.scanners.iter().map(registration).collect();
+    let registration = |_: &crate::scene::Scanner| RegistrationError::drawn(OFF, random);
+    let all: Vec<RegistrationError> = scene.scanners.iter().map(registration).collect();
     scene.scanners.iter_mut().zip(all).for_each(|(s, r)| s.registration = r);
 }
 
-fn one(scene: &mut Scene, name: String, xy: [f64; 2], wanted: &Line, random: &mut Random) {
-    let raster =
-        Raster { elevation_deg: [-60.0, 70.0], step_deg: wanted.step_deg, ..Raster::default() };
+fn one(
+    scene: &mut Scene,
+    name: String,
+    xy: [f64; 2],
+    wanted: &ProductionLine,
+    random: &mut Random,
+) {
+    let raster = BeamRaster {
+        elevation_deg: [-60.0, 70.0],
+        step_deg: wanted.step_deg,
+        ..BeamRaster::default()
+    };
     let mut one = scanner(name, [xy[0], xy[1], random.between(1.6, 2.2)], raster);
     one.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];
     scene.scanners.push(one);

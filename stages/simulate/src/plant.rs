@@ -5,10 +5,10 @@
 use crate::hand::{part_in, tool_on};
 use crate::random::Random;
 use crate::scene::{
-    Anchor, Column, Cuboid, Fence, Filling, Floor, Furniture, Hall, Hose, Later, Raster, Scene,
-    Section, StandShape, ToolShape,
+    Anchor, BeamRaster, Building, Column, Cuboid, Fence, FenceFilling, Furniture, Hose, Later,
+    Scene, SceneFloor, Section, StandShape, ToolShape,
 };
-use crate::spot::{Spot, scanner};
+use crate::spot::{RobotSpot, scanner};
 use contract::{Error, Result};
 use geometry::Point;
 use robot::{Model, Role};
@@ -65,12 +65,12 @@ pub fn plant(wanted: &Plant, models: &[Model]) -> Result<Scene> {
     let (rooms, size) = rooms(wanted, &robots, &mut random);
     let mut scene = Scene {
         seed: wanted.seed,
-        hall: Some(Hall {
+        hall: Some(Building {
             size: [size[0], size[1], random.between(5.0, 8.0)],
             walls: true,
             ceiling: random.unit() < 0.7,
         }),
-        floor: Some(Floor {
+        floor: Some(SceneFloor {
             size: None,
             tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
             wave_amplitude: 0.003,
@@ -81,7 +81,7 @@ pub fn plant(wanted: &Plant, models: &[Model]) -> Result<Scene> {
     };
     furnish(&mut scene, wanted, &rooms, size, &mut random);
     for (k, room) in rooms.iter().enumerate() {
-        stand(&mut scene, room, (k, wanted.moves && k == 0), wanted, &mut random)?;
+        stand(&mut scene, room, k, wanted.moves && k == 0, wanted, &mut random)?;
     }
     scanners(&mut scene, wanted, &rooms, size, &mut random);
     if let (true, Some(robot)) = (wanted.moves, scene.robots.first_mut()) {
@@ -168,7 +168,8 @@ fn furnish(
             let x = room.max[0] - 0.03;
             scene.fences.push(fence(
                 format!("between {k}"),
-                ([x, room.min[1]], [x, room.max[1]]),
+                [x, room.min[1]],
+                [x, room.max[1]],
                 random,
             ));
         }
@@ -176,7 +177,8 @@ fn furnish(
             let y = if random.unit() < 0.5 { room.min[1] } else { room.max[1] };
             scene.fences.push(fence(
                 format!("along {k}"),
-                ([room.min[0], y], [room.max[0], y]),
+                [room.min[0], y],
+                [room.max[0], y],
                 random,
             ));
         }
@@ -206,8 +208,8 @@ fn furnish(
     stuff(scene, size, if rooms.is_empty() { 14 } else { 5 }, random);
 }
 
-fn fence(name: String, (from, to): ([f64; 2], [f64; 2]), random: &mut Random) -> Fence {
-    let filling = if random.unit() < 0.75 { Filling::Wires } else { Filling::Panel };
+fn fence(name: String, from: [f64; 2], to: [f64; 2], random: &mut Random) -> Fence {
+    let filling = if random.unit() < 0.75 { FenceFilling::Wires } else { FenceFilling::Panel };
     Fence { name, from, to, height: random.between(1.4, 2.2), filling }
 }
 
@@ -297,14 +299,15 @@ fn person(scene: &mut Scene, name: &str, [x, y]: [f64; 2], random: &mut Random) 
 fn stand(
     scene: &mut Scene,
     room: &Room<'_>,
-    (k, later): (usize, bool),
+    k: usize,
+    later: bool,
     wanted: &Plant,
     random: &mut Random,
 ) -> Result<()> {
     let name = format!("R{}", k + 1);
     let stand = if random.unit() < 0.4 { random.between(0.15, 0.6) } else { 0.0 };
     let grow = if wanted.is_tight { 0.0 } else { 0.08 };
-    let spot = Spot {
+    let spot = RobotSpot {
         name: name.clone(),
         model: &room.model.name,
         xy: [0.5 * (room.min[0] + room.max[0]), 0.5 * (room.min[1] + room.max[1])],
@@ -413,7 +416,8 @@ fn scanners(
         if k % 3 == 2 && rooms.len() > 3 {
             xy[1] = 0.0;
         }
-        let raster = Raster { elevation_deg: DOME, step_deg: wanted.step_deg, ..Raster::default() };
+        let raster =
+            BeamRaster { elevation_deg: DOME, step_deg: wanted.step_deg, ..BeamRaster::default() };
         let z = scene.ground(xy[0], xy[1]) + random.between(1.5, 2.3);
         let mut one = scanner(format!("scan_{}", k + 1), [xy[0], xy[1], z], raster);
         one.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];

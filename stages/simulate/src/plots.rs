@@ -2,9 +2,10 @@
 
 use crate::random::Random;
 use crate::scene::{
-    Column, Cuboid, Fence, Filling, Floor, Hall, Raster, Scene, Section, StandShape,
+    BeamRaster, Building, Column, Cuboid, Fence, FenceFilling, Scene, SceneFloor, Section,
+    StandShape,
 };
-use crate::spot::{Spot, scanner};
+use crate::spot::{RobotSpot, scanner};
 use contract::{Error, Result};
 use robot::Model;
 
@@ -28,8 +29,8 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
     let size = [PLOT * cols as f64 + 2.0, PLOT * rows as f64 + 2.0, 7.0];
     let mut scene = Scene {
         seed,
-        hall: Some(Hall { size, walls: true, ceiling: true }),
-        floor: Some(Floor {
+        hall: Some(Building { size, walls: true, ceiling: true }),
+        floor: Some(SceneFloor {
             size: None,
             tilt_deg: [0.05, 0.03],
             wave_amplitude: 0.004,
@@ -54,7 +55,8 @@ pub fn hall(seed: u64, models: &[Model], n_robots: usize, n_points: u64) -> Resu
         let [x, y] = corner(spot % (cols + 1), spot / (cols + 1));
         let (x, y) =
             (x.clamp(0.6 - 0.5 * size[0], 0.5 * size[0] - 0.6), y + random.between(-0.2, 0.2));
-        let raster = Raster { n_beams: Some(n_points.div_ceil(n_scanners)), ..Raster::default() };
+        let raster =
+            BeamRaster { n_beams: Some(n_points.div_ceil(n_scanners)), ..BeamRaster::default() };
         let at = [x, y, scene.ground(x, y) + random.between(1.5, 2.2)];
         scene.scanners.push(scanner(format!("scan_{}", k + 1), at, raster));
     }
@@ -109,10 +111,10 @@ fn plot(
             from: [from[0] + 1.0, y],
             to: [from[0] + PLOT - 1.0, y],
             height: 2.0,
-            filling: Filling::Wires,
+            filling: FenceFilling::Wires,
         });
     }
-    let spot = Spot {
+    let spot = RobotSpot {
         name: format!("R{}", n + 1),
         model: &model.name,
         xy: middle,

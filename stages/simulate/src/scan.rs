@@ -1,10 +1,10 @@
 //! Scans a scene from one scanner: beams with range, truth and flags, column by column.
 
-use crate::beams::{Beams, Hit};
+use crate::beams::{BeamHit, Beams};
 use crate::columns::{Return, ScanFrame, SimColumns};
 use crate::random::Random;
 use crate::scene::{Mixed, Scanner};
-use crate::world::Surface;
+use crate::world::BodySurface;
 use contract::Result;
 use geometry::{Pose, Vector};
 use nalgebra::Matrix3;
@@ -75,7 +75,7 @@ impl Station {
     pub(crate) fn columns(
         &self,
         beams: &Beams,
-        surfaces: &[Surface],
+        surfaces: &[BodySurface],
         cols: Range<u32>,
     ) -> SimColumns {
         let n_rows = self.rows.len();
@@ -131,7 +131,7 @@ impl Station {
     }
 
     /// Thin beams through the middle of each pixel of a column; empty for no column.
-    fn cast_column(&self, beams: &Beams, col: Option<u32>) -> Vec<Beam> {
+    fn cast_column(&self, beams: &Beams, col: Option<u32>) -> Vec<SceneBeam> {
         let Some(col) = col else { return Vec::new() };
         let origin = self.origin;
         (0..self.rows.len())
@@ -142,7 +142,7 @@ impl Station {
                     let (u, v) = across(&along);
                     along = (along + (u * a + v * b) * self.scanner.jitter).normalize();
                 }
-                Beam { along, hit: beams.cast(&origin, &along, self.scanner.max_range) }
+                SceneBeam { along, hit: beams.cast(&origin, &along, self.scanner.max_range) }
             })
             .collect()
     }
@@ -150,10 +150,10 @@ impl Station {
     fn measure(
         &self,
         beams: &Beams,
-        surfaces: &[Surface],
+        surfaces: &[BodySurface],
         (row, col): (usize, u32),
-        beam: &Beam,
-        neighbours: [Option<&Beam>; 4],
+        beam: &SceneBeam,
+        neighbours: [Option<&SceneBeam>; 4],
     ) -> Option<Return> {
         let (hit, range, is_mixed) = match &self.scanner.mixed {
             Some(mixed) if self.is_edge(beams, surfaces, beam, neighbours) => {
@@ -198,12 +198,12 @@ impl Station {
     fn is_edge(
         &self,
         beams: &Beams,
-        surfaces: &[Surface],
-        beam: &Beam,
-        neighbours: [Option<&Beam>; 4],
+        surfaces: &[BodySurface],
+        beam: &SceneBeam,
+        neighbours: [Option<&SceneBeam>; 4],
     ) -> bool {
         let origin = self.origin;
-        let thin = |b: &Beam| b.hit.is_some_and(|h| surfaces[h.surface as usize].is_thin);
+        let thin = |b: &SceneBeam| b.hit.is_some_and(|h| surfaces[h.surface as usize].is_thin);
         thin(beam)
             || neighbours.into_iter().flatten().any(|other| match (&beam.hit, &other.hit) {
                 (None, None) => false,
@@ -226,18 +226,18 @@ impl Station {
         beams: &Beams,
         mixed: &Mixed,
         (row, col): (usize, u32),
-        beam: &Beam,
-        neighbours: [Option<&Beam>; 4],
-    ) -> Option<(Hit, f64, bool)> {
+        beam: &SceneBeam,
+        neighbours: [Option<&SceneBeam>; 4],
+    ) -> Option<(BeamHit, f64, bool)> {
         let origin = self.origin;
-        let seen = |b: &Beam| b.hit.map(|h| h.range);
+        let seen = |b: &SceneBeam| b.hit.map(|h| h.range);
         let near = seen(beam)
             .or_else(|| neighbours.into_iter().flatten().filter_map(seen).min_by(f64::total_cmp))?;
         let radius = (mixed.radius + mixed.divergence * near) * RING / near.max(0.1);
         let (u, v) = across(&beam.along);
         let phase = self.random(row, col, 2).unit();
         let ring = mixed.sub_beams.saturating_sub(1);
-        let mut parts: Vec<Hit> = beam.hit.into_iter().collect();
+        let mut parts: Vec<BeamHit> = beam.hit.into_iter().collect();
         for k in 0..ring {
             let (sin, cos) = (TAU * (f64::from(k) + phase) / f64::from(ring)).sin_cos();
             let along = (beam.along + (u * cos + v * sin) * radius).normalize();
@@ -269,9 +269,9 @@ impl Station {
 }
 
 /// A thin beam in the scene.
-struct Beam {
+struct SceneBeam {
     along: Vector,
-    hit: Option<Hit>,
+    hit: Option<BeamHit>,
 }
 
 /// Two unit vectors perpendicular to a unit vector and to each other; the first is level if

@@ -19,7 +19,7 @@ pub struct Scanner {
     /// Rotation `world_from_scan`, unit quaternion.
     pub quaternion_wxyz: Option<[f64; 4]>,
     /// The angular raster.
-    pub raster: Raster,
+    pub raster: BeamRaster,
     /// Smallest range that is measured, metres.
     pub min_range: f64,
     /// Largest range that is measured, metres.
@@ -40,7 +40,7 @@ pub struct Scanner {
     /// Width of beams, which matters at edges; `None` for infinitely thin beams.
     pub mixed: Option<Mixed>,
     /// Error of the stated pose.
-    pub registration: Registration,
+    pub registration: RegistrationError,
 }
 
 impl Default for Scanner {
@@ -50,7 +50,7 @@ impl Default for Scanner {
             position: [0.0, 0.0, 1.6],
             rpy_deg: [0.0; 3],
             quaternion_wxyz: None,
-            raster: Raster::default(),
+            raster: BeamRaster::default(),
             min_range: 0.3,
             max_range: 80.0,
             noise: 0.002,
@@ -60,7 +60,7 @@ impl Default for Scanner {
             dropouts: 0.0,
             dark_dropouts: 0.0,
             mixed: None,
-            registration: Registration::default(),
+            registration: RegistrationError::default(),
         }
     }
 }
@@ -68,7 +68,7 @@ impl Default for Scanner {
 /// Directions of beams: rows by elevation, upwards; columns by azimuth, counter-clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Raster {
+pub struct BeamRaster {
     /// Lowest and highest elevation, degrees.
     pub elevation_deg: [f64; 2],
     /// First azimuth and, exclusive, the last one, degrees.
@@ -79,7 +79,7 @@ pub struct Raster {
     pub n_beams: Option<u64>,
 }
 
-impl Default for Raster {
+impl Default for BeamRaster {
     fn default() -> Self {
         Self {
             elevation_deg: [-60.0, 90.0],
@@ -90,7 +90,7 @@ impl Default for Raster {
     }
 }
 
-impl Raster {
+impl BeamRaster {
     /// Angle between neighbouring beams, degrees; a whole number of columns fills the azimuth
     /// range.
     #[must_use]
@@ -154,14 +154,14 @@ impl Default for Mixed {
 /// Difference of the stated pose of a scan from its true one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Registration {
+pub struct RegistrationError {
     /// Shift in the scan frame, metres.
     pub xyz: [f64; 3],
     /// Roll, pitch, yaw, degrees.
     pub rpy_deg: [f64; 3],
 }
 
-impl Registration {
+impl RegistrationError {
     /// The difference between a true and a stated pose, for example of another world frame.
     #[must_use]
     pub fn between(world_from_scan: &Pose, stated: &Pose) -> Self {

@@ -7,7 +7,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 pub use crate::place::{Later, RobotPlace, Tool, ToolShape};
-pub use crate::scanner::{Mixed, Raster, Registration, Scanner};
+pub use crate::scanner::{BeamRaster, Mixed, RegistrationError, Scanner};
 
 /// A scene. Lengths are in metres, angles in degrees where a name ends in `_deg`; z of the world
 /// frame points up.
@@ -22,10 +22,10 @@ pub struct Scene {
     pub origin: [f64; 3],
     /// The building; without it there are only floor and sky.
     #[serde(default)]
-    pub hall: Option<Hall>,
+    pub hall: Option<Building>,
     /// The ground; without it there is none.
     #[serde(default)]
-    pub floor: Option<Floor>,
+    pub floor: Option<SceneFloor>,
     /// Boxes.
     #[serde(default, rename = "box")]
     pub boxes: Vec<Cuboid>,
@@ -43,13 +43,13 @@ pub struct Scene {
     pub benches: Vec<Furniture>,
     /// Stands and pedestals for robots.
     #[serde(default, rename = "stand")]
-    pub stands: Vec<Stand>,
+    pub stands: Vec<SceneStand>,
     /// Hoses, fixed or attached to robots.
     #[serde(default, rename = "hose")]
     pub hoses: Vec<Hose>,
     /// Boxes carried by robots.
     #[serde(default, rename = "carried")]
-    pub carried: Vec<Carried>,
+    pub carried: Vec<CarriedBox>,
     /// Robots, in the order of the truth.
     #[serde(default, rename = "robot")]
     pub robots: Vec<RobotPlace>,
@@ -61,7 +61,7 @@ pub struct Scene {
 /// The building, centred at the world's origin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Hall {
+pub struct Building {
     /// Length, width, height, metres.
     pub size: [f64; 3],
     /// Whether it has walls.
@@ -75,7 +75,7 @@ pub struct Hall {
 /// The ground: tilt plus waves, over the area of the hall or of `size`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Floor {
+pub struct SceneFloor {
     /// Length and width, metres; by default those of the hall, or 20 × 20 without a hall.
     #[serde(default)]
     pub size: Option<[f64; 2]>,
@@ -90,13 +90,13 @@ pub struct Floor {
     pub wave_length: f64,
     /// Raised rectangles of floor.
     #[serde(default, rename = "level")]
-    pub levels: Vec<Level>,
+    pub levels: Vec<RaisedFloor>,
 }
 
 /// A raised rectangle of floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Level {
+pub struct RaisedFloor {
     /// Smallest corner, metres.
     pub min: [f64; 2],
     /// Largest corner, metres.
@@ -169,13 +169,13 @@ pub struct Fence {
     pub height: f64,
     /// Filling between the posts.
     #[serde(default)]
-    pub filling: Filling,
+    pub filling: FenceFilling,
 }
 
 /// The filling between the posts of a fence.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Filling {
+pub enum FenceFilling {
     /// Welded wires of 4 mm, 50 mm apart.
     #[default]
     Wires,
@@ -202,7 +202,7 @@ pub struct Furniture {
 /// A stand on the ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Stand {
+pub struct SceneStand {
     /// Display name.
     #[serde(default)]
     pub name: String,
@@ -267,7 +267,7 @@ pub struct Hose {
 /// A box held by a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Carried {
+pub struct CarriedBox {
     /// Display name.
     #[serde(default)]
     pub name: String,
@@ -300,20 +300,6 @@ impl Scene {
 }
 
 impl Scene {
-    /// Reads a scene from the text of a scene file.
-    ///
-    /// # Errors
-    /// `BadInput` for unknown keys, missing values and numbers out of range.
-    pub fn from_toml(text: &str) -> Result<Self> {
-        let scene: Self = toml::from_str(text).map_err(|e| {
-            Error::bad_input("scene cannot be read")
-                .because(e)
-                .hint("the words of a scene are in stages/simulate/README.md")
-        })?;
-        crate::check::check(&scene)?;
-        Ok(scene)
-    }
-
     /// The scene as text of a scene file, which [`Scene::from_toml`] reads.
     ///
     /// # Errors
@@ -327,7 +313,8 @@ impl Scene {
     #[must_use]
     pub fn ground(&self, x: f64, y: f64) -> f64 {
         let Some(floor) = &self.floor else { return 0.0 };
-        let inside = |l: &&Level| x >= l.min[0] && x <= l.max[0] && y >= l.min[1] && y <= l.max[1];
+        let inside =
+            |l: &&RaisedFloor| x >= l.min[0] && x <= l.max[0] && y >= l.min[1] && y <= l.max[1];
         let raised = floor.levels.iter().filter(inside).map(|l| l.height).fold(0.0, f64::max);
         raised + floor.base_height(x, y)
     }
@@ -340,7 +327,7 @@ impl Scene {
     }
 }
 
-impl Floor {
+impl SceneFloor {
     /// Height of the ground below raised levels at (x, y), metres: tilt and two crossing waves.
     #[must_use]
     pub fn base_height(&self, x: f64, y: f64) -> f64 {

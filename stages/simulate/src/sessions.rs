@@ -3,7 +3,7 @@
 
 use crate::plant::{Plant, plant};
 use crate::random::Random;
-use crate::scene::{Column, Cuboid, Raster, Registration, Scene, Section};
+use crate::scene::{BeamRaster, Column, Cuboid, RegistrationError, Scene, Section};
 use crate::spot::scanner;
 use contract::{Error, Result};
 use robot::Model;
@@ -42,9 +42,9 @@ pub fn sessions(wanted: &Plant, models: &[Model]) -> Result<[Scene; 2]> {
     let size = then.hall.as_ref().map_or([20.0; 3], |hall| hall.size);
     let new = new_scanners(&then, at, size, wanted.step_deg, &mut random)?;
     let mut taken: Vec<[f64; 2]> = new.iter().map(|s| [s.position[0], s.position[1]]).collect();
-    let pallet = free(&then, (at, size), &mut taken, &mut random)?;
-    let pushed = free(&then, (at, size), &mut taken, &mut random)?;
-    let barrel = free(&then, (at, size), &mut taken, &mut random)?;
+    let pallet = free(&then, at, size, &mut taken, &mut random)?;
+    let pushed = free(&then, at, size, &mut taken, &mut random)?;
+    let barrel = free(&then, at, size, &mut taken, &mut random)?;
     let mut now = then.clone();
     put_pallet(&mut then, pallet, random.between(-15.0, 15.0));
     put_pallet(&mut now, pushed, random.between(-15.0, 15.0));
@@ -95,11 +95,11 @@ fn new_scanners(
     };
     let places = [side(0, random)?, side(1, random)?];
     let one = |(k, xy): (usize, [f64; 2])| {
-        let raster = Raster { elevation_deg: [-60.0, 70.0], step_deg, ..Raster::default() };
+        let raster = BeamRaster { elevation_deg: [-60.0, 70.0], step_deg, ..BeamRaster::default() };
         let z = scene.ground(xy[0], xy[1]) + random.between(1.6, 2.2);
         let mut out = scanner(format!("again_{}", k + 1), [xy[0], xy[1], z], raster);
         out.rpy_deg = [0.0, 0.0, random.between(-180.0, 180.0)];
-        out.registration = Registration::drawn(OFF, random);
+        out.registration = RegistrationError::drawn(OFF, random);
         out
     };
     Ok(places.into_iter().enumerate().map(one).collect())
@@ -108,7 +108,8 @@ fn new_scanners(
 /// A free place on the floor near the robot.
 fn free(
     scene: &Scene,
-    (at, size): ([f64; 2], [f64; 3]),
+    at: [f64; 2],
+    size: [f64; 3],
     taken: &mut Vec<[f64; 2]>,
     random: &mut Random,
 ) -> Result<[f64; 2]> {

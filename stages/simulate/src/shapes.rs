@@ -3,7 +3,7 @@
 
 use crate::beams::Beams;
 use crate::scene::Scene;
-use crate::world::{Surface, World};
+use crate::world::{BodySurface, SceneTriangles};
 use contract::{PointKind, Result};
 use geometry::Point;
 use robot::Model;
@@ -14,7 +14,7 @@ const AT: f64 = 1e-3;
 
 /// A body of a scene.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shape {
+pub struct BodyShape {
     /// Kind and name of the object that it belongs to.
     pub name: String,
     /// Index of the robot that it is part of or attached to.
@@ -28,7 +28,7 @@ pub struct Shape {
 /// All bodies of a scene.
 pub struct Shapes {
     /// The bodies that have triangles.
-    pub all: Vec<Shape>,
+    pub all: Vec<BodyShape>,
     beams: Beams,
 }
 
@@ -41,9 +41,9 @@ impl Shapes {
     /// out of range.
     pub fn of(scene: &Scene, models: &[Model]) -> Result<Self> {
         crate::check::check(scene)?;
-        let world = World::new(scene, models)?;
+        let world = SceneTriangles::new(scene, models)?;
         let index = |i: i16| usize::try_from(i).ok();
-        let shape = |surface: &Surface| Shape {
+        let shape = |surface: &BodySurface| BodyShape {
             name: world.objects.get(usize::from(surface.object)).cloned().unwrap_or_default(),
             robot: index(surface.label.robot),
             link: match surface.label.kind {
@@ -55,7 +55,7 @@ impl Shapes {
             },
             triangles: Vec::new(),
         };
-        let mut all: Vec<Shape> = world.surfaces.iter().map(shape).collect();
+        let mut all: Vec<BodyShape> = world.surfaces.iter().map(shape).collect();
         for (triangle, surface) in world.triangles.iter().zip(&world.surface_of) {
             all[*surface as usize].triangles.push(triangle.map(|corner| corner.to_array()));
         }

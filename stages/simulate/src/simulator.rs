@@ -5,7 +5,7 @@ use crate::columns::{ScanFrame, SimColumns, SimScan};
 use crate::scan::Station;
 use crate::scene::{RobotPlace, Scene};
 use crate::truth::{LaterPosture, SCHEMA, TrueRobot, TrueScan, Truth};
-use crate::world::{Surface, World, posture_of};
+use crate::world::{BodySurface, SceneTriangles, posture_of};
 use contract::Result;
 use geometry::{Pose, Vector};
 use robot::Model;
@@ -14,7 +14,7 @@ use std::ops::Range;
 /// A scene ready to be scanned.
 pub struct Simulator {
     /// The scene in each set of postures that any scanner saw.
-    states: Vec<State>,
+    states: Vec<StillScene>,
     stations: Vec<Station>,
     /// Index of the state of each station.
     state_of: Vec<usize>,
@@ -23,9 +23,9 @@ pub struct Simulator {
 }
 
 /// The scene in one set of postures.
-struct State {
+struct StillScene {
     beams: Beams,
-    surfaces: Vec<Surface>,
+    surfaces: Vec<BodySurface>,
     n_triangles: usize,
 }
 
@@ -43,11 +43,11 @@ impl Simulator {
             let known = seen.iter().position(|s| *s == then.robots);
             state_of.push(known.unwrap_or(seen.len()));
             if known.is_none() {
-                states.push(State::new(World::new(&then, models)?));
+                states.push(StillScene::new(SceneTriangles::new(&then, models)?));
                 seen.push(then.robots);
             }
         }
-        let world = World::new(scene, models)?;
+        let world = SceneTriangles::new(scene, models)?;
         let robots = true_robots(scene, models, &world)?;
         let stations = scene
             .scanners
@@ -125,8 +125,8 @@ impl Simulator {
     }
 }
 
-impl State {
-    fn new(world: World) -> Self {
+impl StillScene {
+    fn new(world: SceneTriangles) -> Self {
         Self {
             beams: Beams::new(&world.triangles, &world.surface_of),
             surfaces: world.surfaces,
@@ -135,7 +135,7 @@ impl State {
     }
 }
 
-fn true_robots(scene: &Scene, models: &[Model], world: &World) -> Result<Vec<TrueRobot>> {
+fn true_robots(scene: &Scene, models: &[Model], world: &SceneTriangles) -> Result<Vec<TrueRobot>> {
     scene
         .robots
         .iter()

@@ -2,7 +2,7 @@
 
 use crate::posture::Postures;
 use crate::random::Random;
-use crate::scene::{Mixed, Raster, RobotPlace, Scanner, Scene, Stand, StandShape};
+use crate::scene::{BeamRaster, Mixed, RobotPlace, Scanner, Scene, SceneStand, StandShape};
 use crate::solid::cuboid;
 use contract::Result;
 use geometry::Point;
@@ -12,7 +12,7 @@ use robot::Model;
 const FLOOR_SLACK: f64 = 0.005;
 
 /// A scanner with the errors of a good real one.
-pub(crate) fn scanner(name: String, position: [f64; 3], raster: Raster) -> Scanner {
+pub(crate) fn scanner(name: String, position: [f64; 3], raster: BeamRaster) -> Scanner {
     Scanner {
         name,
         position,
@@ -27,7 +27,7 @@ pub(crate) fn scanner(name: String, position: [f64; 3], raster: Raster) -> Scann
 }
 
 /// The place of a robot and the space that it has.
-pub(crate) struct Spot<'a> {
+pub(crate) struct RobotSpot<'a> {
     pub(crate) name: String,
     pub(crate) model: &'a str,
     pub(crate) xy: [f64; 2],
@@ -44,7 +44,7 @@ pub(crate) struct Spot<'a> {
     pub(crate) max: [f64; 2],
 }
 
-impl Spot<'_> {
+impl RobotSpot<'_> {
     /// Adds the stand, turns the robot and draws its posture.
     pub(crate) fn place(
         &self,
@@ -83,7 +83,7 @@ impl Spot<'_> {
         let [x, y] = self.xy;
         let ground = scene.ground(x, y);
         if self.stand > 0.0 && !scene.stands.iter().any(|s| s.name == self.name) {
-            scene.stands.push(Stand {
+            scene.stands.push(SceneStand {
                 name: self.name.clone(),
                 xy: self.xy,
                 yaw_deg: 0.0,

@@ -10,7 +10,7 @@ use robot::{Mesh, Model, Role};
 
 /// The properties that all triangles of one body share.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Surface {
+pub(crate) struct BodySurface {
     /// Label of points on it.
     pub(crate) label: Label,
     /// Index of its object in [`World::objects`].
@@ -37,10 +37,10 @@ pub(crate) struct PlacedRobot {
 
 /// Triangles in scene coordinates, each with the index of its surface.
 #[derive(Debug, Default)]
-pub(crate) struct World {
+pub(crate) struct SceneTriangles {
     pub(crate) triangles: Vec<[Vec3A; 3]>,
     pub(crate) surface_of: Vec<u32>,
-    pub(crate) surfaces: Vec<Surface>,
+    pub(crate) surfaces: Vec<BodySurface>,
     /// Names of the objects of the scene.
     pub(crate) objects: Vec<String>,
     pub(crate) robots: Vec<PlacedRobot>,
@@ -53,7 +53,7 @@ const BLACK: f32 = 0.06;
 /// Reflectance of robot paint.
 const PAINT: f32 = 0.7;
 
-impl World {
+impl SceneTriangles {
     pub(crate) fn new(scene: &Scene, models: &[Model]) -> Result<Self> {
         let mut out = Self::default();
         out.add_hall(scene);
@@ -73,11 +73,11 @@ impl World {
         u16::try_from(self.objects.len() - 1).unwrap_or(u16::MAX)
     }
 
-    fn add(&mut self, surface: Surface, solid: &Solid) {
+    fn add(&mut self, surface: BodySurface, solid: &Solid) {
         self.add_mesh(surface, &solid.vertices, &solid.triangles);
     }
 
-    fn add_mesh(&mut self, surface: Surface, vertices: &[Point], triangles: &[[u32; 3]]) {
+    fn add_mesh(&mut self, surface: BodySurface, vertices: &[Point], triangles: &[[u32; 3]]) {
         let at = self.surfaces.len() as u32;
         self.surfaces.push(surface);
         for t in triangles {
@@ -93,44 +93,49 @@ impl World {
 
     fn add_hall(&mut self, scene: &Scene) {
         let object = self.object("floor", "");
-        let fixed =
-            Surface { label: Label::FIXED, object, reflectance: GREY, is_thin: false, holder: -1 };
+        let fixed = BodySurface {
+            label: Label::FIXED,
+            object,
+            reflectance: GREY,
+            is_thin: false,
+            holder: -1,
+        };
         let (ground, faces) = hall::ground(scene);
         let lowest = ground.vertices.iter().map(|p| p.z).fold(0.0, f64::min);
-        self.add(Surface { label: Label::FLOOR, ..fixed }, &ground);
+        self.add(BodySurface { label: Label::FLOOR, ..fixed }, &ground);
         self.add(fixed, &faces);
         if let Some(building) = &scene.hall {
             let object = self.object("building", "");
-            let surface = Surface { object, reflectance: 0.8, ..fixed };
+            let surface = BodySurface { object, reflectance: 0.8, ..fixed };
             self.add(surface, &hall::building(building, lowest));
         }
         for b in &scene.boxes {
             let object = self.object("box", &b.name);
-            let surface = Surface { object, reflectance: b.reflectance as f32, ..fixed };
+            let surface = BodySurface { object, reflectance: b.reflectance as f32, ..fixed };
             self.add(surface, &cuboid(b.size, 0.002).posed(&pose(b.xyz, b.rpy_deg)));
         }
         let z = |xy: [f64; 2]| scene.ground(xy[0], xy[1]);
         for c in &scene.columns {
             let object = self.object("column", &c.name);
-            self.add(Surface { object, ..fixed }, &hall::column(c, z(c.xy)));
+            self.add(BodySurface { object, ..fixed }, &hall::column(c, z(c.xy)));
         }
         for f in &scene.fences {
             let (posts, wires) = hall::fence(f, |x, y| scene.ground(x, y));
             let object = self.object("fence", &f.name);
-            self.add(Surface { object, ..fixed }, &posts);
-            self.add(Surface { object, is_thin: true, ..fixed }, &wires);
+            self.add(BodySurface { object, ..fixed }, &posts);
+            self.add(BodySurface { object, is_thin: true, ..fixed }, &wires);
         }
         for f in &scene.conveyors {
             let object = self.object("conveyor", &f.name);
-            self.add(Surface { object, ..fixed }, &hall::conveyor(f, z(f.xy)));
+            self.add(BodySurface { object, ..fixed }, &hall::conveyor(f, z(f.xy)));
         }
         for f in &scene.benches {
             let object = self.object("bench", &f.name);
-            self.add(Surface { object, ..fixed }, &hall::bench(f, z(f.xy)));
+            self.add(BodySurface { object, ..fixed }, &hall::bench(f, z(f.xy)));
         }
         for s in &scene.stands {
             let object = self.object("stand", &s.name);
-            self.add(Surface { object, ..fixed }, &hall::stand(s, z(s.xy)));
+            self.add(BodySurface { object, ..fixed }, &hall::stand(s, z(s.xy)));
         }
     }
 
@@ -148,7 +153,8 @@ impl World {
                 if part.role == Role::Effector { PointKind::Attachment } else { PointKind::Link };
             let label = Label { kind, robot: index_i16(index)?, link: index_i16(link)? };
             let vertices = place_mesh(&part.mesh, &poses[link]);
-            let surface = Surface { label, object, reflectance: PAINT, is_thin: false, holder: -1 };
+            let surface =
+                BodySurface { label, object, reflectance: PAINT, is_thin: false, holder: -1 };
             self.add_mesh(surface, &vertices, &part.mesh.triangles);
         }
         self.robots.push(PlacedRobot { model: at, posture, world_from_link: poses });
@@ -162,7 +168,7 @@ impl World {
                 let body = attach::tool(tool).posed(&(link * pose(tool.xyz, tool.rpy_deg)));
                 let object = self.object("tool of", &place.name);
                 let holder = self.holder(models, index, &tool.link)?;
-                self.add(Surface { holder, ..attachment(index, object, GREY)? }, &body);
+                self.add(BodySurface { holder, ..attachment(index, object, GREY)? }, &body);
             }
         }
         for part in &scene.carried {
@@ -171,7 +177,7 @@ impl World {
             let body = cuboid(part.size, 0.002).posed(&(link * pose(part.xyz, part.rpy_deg)));
             let object = self.object("carried", &part.name);
             let holder = self.holder(models, index, &part.link)?;
-            self.add(Surface { holder, ..attachment(index, object, GREY)? }, &body);
+            self.add(BodySurface { holder, ..attachment(index, object, GREY)? }, &body);
         }
         for hose in &scene.hoses {
             let held = hose
@@ -188,7 +194,7 @@ impl World {
             let object = self.object("hose", &hose.name);
             let surface = match owner {
                 Some(name) => attachment(robot_index(scene, name)?, object, BLACK)?,
-                None => Surface {
+                None => BodySurface {
                     label: Label::FIXED,
                     object,
                     reflectance: BLACK,
@@ -242,9 +248,9 @@ impl World {
     }
 }
 
-fn attachment(robot: usize, object: u16, reflectance: f32) -> Result<Surface> {
+fn attachment(robot: usize, object: u16, reflectance: f32) -> Result<BodySurface> {
     let label = Label { kind: PointKind::Attachment, robot: index_i16(robot)?, link: -1 };
-    Ok(Surface { label, object, reflectance, is_thin: false, holder: -1 })
+    Ok(BodySurface { label, object, reflectance, is_thin: false, holder: -1 })
 }
 
 fn index_i16(index: usize) -> Result<i16> {

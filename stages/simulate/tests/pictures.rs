@@ -5,7 +5,7 @@
 mod library;
 
 use robot::Model;
-use simulate::scene::{Floor, Raster, RobotPlace, Scanner, Scene};
+use simulate::scene::{BeamRaster, RobotPlace, Scanner, Scene, SceneFloor};
 use simulate::{SimColumns, Simulator};
 use std::path::Path;
 
@@ -47,7 +47,7 @@ fn picture(simulator: &Simulator, scanner: usize, path: &Path) {
 fn looking(name: &str, from: [f64; 3], at: [f64; 3], half_deg: f64) -> Scanner {
     let d = [0, 1, 2].map(|i| at[i] - from[i]);
     let elevation = d[2].atan2(d[0].hypot(d[1])).to_degrees();
-    let raster = Raster {
+    let raster = BeamRaster {
         elevation_deg: [elevation - half_deg, elevation + half_deg],
         azimuth_deg: [-half_deg, half_deg],
         step_deg: half_deg / 300.0,
@@ -83,7 +83,7 @@ fn views(model: &Model, posture: &[f64], tag: &str, folder: &Path) {
     };
     let at = [middle.x, middle.y, middle.z];
     let scene = Scene {
-        floor: Some(Floor {
+        floor: Some(SceneFloor {
             size: Some([8.0, 8.0]),
             tilt_deg: [0.0; 2],
             wave_amplitude: 0.0,

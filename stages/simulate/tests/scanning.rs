@@ -5,12 +5,13 @@ mod common;
 
 use contract::{Label, PointKind};
 use simulate::scene::{
-    Anchor, Column, Cuboid, Floor, Hall, Hose, Mixed, Raster, RobotPlace, Scanner, Scene,
+    Anchor, BeamRaster, Building, Column, Cuboid, Hose, Mixed, RobotPlace, Scanner, Scene,
+    SceneFloor,
 };
 use simulate::{SimColumns, Simulator};
 
-fn flat(size: f64) -> Option<Floor> {
-    Some(Floor {
+fn flat(size: f64) -> Option<SceneFloor> {
+    Some(SceneFloor {
         size: Some([size, size]),
         tilt_deg: [0.0; 2],
         wave_amplitude: 0.0,
@@ -20,7 +21,7 @@ fn flat(size: f64) -> Option<Floor> {
 }
 
 fn exact(step_deg: f64) -> Scanner {
-    let raster = Raster { step_deg, ..Raster::default() };
+    let raster = BeamRaster { step_deg, ..BeamRaster::default() };
     Scanner { name: "s".into(), raster, noise: 0.0, ..Scanner::default() }
 }
 
@@ -113,8 +114,8 @@ fn busy() -> Scene {
     };
     Scene {
         seed: 5,
-        hall: Some(Hall { size: [8.0, 8.0, 4.0], walls: true, ceiling: true }),
-        floor: Some(Floor {
+        hall: Some(Building { size: [8.0, 8.0, 4.0], walls: true, ceiling: true }),
+        floor: Some(SceneFloor {
             size: None,
             tilt_deg: [0.2, -0.1],
             wave_amplitude: 0.004,

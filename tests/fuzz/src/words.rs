@@ -1,12 +1,12 @@
 //! Text that people write in; what was read of it is within its bounds, out.
 
 use crate::{file, refused};
-use ingest::Scanners;
+use ingest::KnownScanners;
 use simulate::Scene;
 
 /// `--scanners`, TOML or JSON.
 pub fn scanners(data: &[u8]) {
-    match Scanners::read(&file("scanners.toml", data), &ingest::Settings::default()) {
+    match KnownScanners::read(&file("scanners.toml", data), &ingest::Settings::default()) {
         Ok(scanners) => {
             for entry in &scanners.entries {
                 let pose = &entry.world_from_scan;

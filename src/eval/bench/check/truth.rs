@@ -10,7 +10,7 @@ use parry3d::partitioning::BvhNode;
 use parry3d::query;
 use parry3d::shape::{TriMesh, Triangle};
 use robot::Model;
-use simulate::{Scene, Shape, Shapes};
+use simulate::{BodyShape, Scene, Shapes};
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
@@ -94,7 +94,7 @@ impl<'a> Truth<'a> {
         let world_from_base = scene.robots[robot].world_from_base();
         let poses = placed(model, &world_from_base, posture);
         let moves = model.moving();
-        let is_own = |s: &&Shape| s.robot == Some(robot);
+        let is_own = |s: &&BodyShape| s.robot == Some(robot);
         let own = shapes.all.iter().filter(is_own).filter_map(|s| Some((s.link?, s)));
         let parts = own.clone().filter(|(link, _)| moves[*link]);
         let parts: Vec<MeshPart> =
@@ -271,7 +271,7 @@ impl MeshPart {
         kept - ways.fold(0.0, f64::max)
     }
 
-    fn of(link: usize, shape: &Shape, world_from_link: &Pose) -> Option<Self> {
+    fn of(link: usize, shape: &BodyShape, world_from_link: &Pose) -> Option<Self> {
         let link_from_world = world_from_link.inverse();
         let inner = |p: &[f32; 3]| {
             (link_from_world * Point::from(p.map(f64::from))).coords.map(|v| v as f32)
@@ -297,7 +297,7 @@ impl MeshPart {
 }
 
 /// What bodies fill: their surfaces, and what these enclose.
-fn filled<'s>(shapes: impl Iterator<Item = &'s Shape>) -> (SpaceGrid, Vec<bool>) {
+fn filled<'s>(shapes: impl Iterator<Item = &'s BodyShape>) -> (SpaceGrid, Vec<bool>) {
     let mut all = Vec::new();
     for t in shapes.flat_map(|s| &s.triangles) {
         places(&t.map(Vec3::from_array), OWN_SAMPLE, |p| all.push(p));

@@ -1,15 +1,15 @@
 //! Voxels of drawn things in; which of them moved, went and came, out.
 
 use super::*;
-use crate::occupancy::{Seen, Tallying};
+use crate::occupancy::{OccupancyBuilder, SessionEvidence};
 use contract::OneByOne;
 
-fn found(then: Tallying, now: Tallying) -> Vec<Thing> {
+fn found(then: OccupancyBuilder, now: OccupancyBuilder) -> Vec<Thing> {
     things(&then.finish(), &now.finish(), &ThingSettings::default(), &OneByOne)
 }
 
 /// A box's surface, five points a voxel.
-fn solid(tally: &mut Tallying, min: [f64; 3], size: [f64; 3], is_empty: bool) {
+fn solid(tally: &mut OccupancyBuilder, min: [f64; 3], size: [f64; 3], is_empty: bool) {
     let n = size.map(|s| (s / 0.02) as i32);
     for i in 0..=n[0] {
         for j in 0..=n[1] {
@@ -18,8 +18,8 @@ fn solid(tally: &mut Tallying, min: [f64; 3], size: [f64; 3], is_empty: bool) {
                 if rim {
                     let at = [i, j, k].map(|v| 0.02 * f64::from(v));
                     let p = [min[0] + at[0], min[1] + at[1], min[2] + at[2]];
-                    let nothing = Seen::Nothing { is_pierced: false };
-                    tally.add(p, 4e-4, if is_empty { nothing } else { Seen::Something });
+                    let nothing = SessionEvidence::Nothing { is_pierced: false };
+                    tally.add(p, 4e-4, if is_empty { nothing } else { SessionEvidence::Something });
                 }
             }
         }
@@ -28,7 +28,7 @@ fn solid(tally: &mut Tallying, min: [f64; 3], size: [f64; 3], is_empty: bool) {
 
 #[test]
 fn a_pallet_moves_a_barrel_goes_and_a_crate_comes() {
-    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     // A cabinet stays; the other session saw surfaces there.
     solid(&mut then, [5.0, 5.0, 0.02], [0.8, 0.6, 1.8], false);
     solid(&mut now, [5.0, 5.0, 0.02], [0.8, 0.6, 1.8], false);
@@ -47,7 +47,7 @@ fn a_pallet_moves_a_barrel_goes_and_a_crate_comes() {
 
 #[test]
 fn a_thing_pushed_by_less_than_its_length_moved_as_a_whole() {
-    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     // Where it stands in both sessions nothing was seen empty.
     let parts = [(&mut then, 1.0, 0.4, 1.4, 0.8), (&mut now, 2.2, 0.4, 1.4, 0.8)];
     for (tally, own, own_length, shared, shared_length) in parts {
@@ -63,7 +63,7 @@ fn a_thing_pushed_by_less_than_its_length_moved_as_a_whole() {
 
 #[test]
 fn a_thing_of_which_beams_graze_the_top_is_one() {
-    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.2, 1.0, 0.7], true);
     // Two sides are seen in part, and rows of the top, 14 cm apart.
     solid(&mut now, [5.0, 1.0, 0.02], [0.1, 0.4, 0.7], true);
@@ -71,7 +71,7 @@ fn a_thing_of_which_beams_graze_the_top_is_one() {
     for row in 1..=8 {
         for i in 0..10 {
             let (x, y) = (5.01 + 0.14 * f64::from(row), 1.05 + 0.1 * f64::from(i));
-            now.add([x, y, 0.71], 4e-4, Seen::Nothing { is_pierced: false });
+            now.add([x, y, 0.71], 4e-4, SessionEvidence::Nothing { is_pierced: false });
         }
     }
     let found = found(then, now);
@@ -81,7 +81,7 @@ fn a_thing_of_which_beams_graze_the_top_is_one() {
 
 #[test]
 fn one_side_of_a_thing_is_enough_to_know_it_by_and_a_barrel_is_none() {
-    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.0, 0.66], true);
     solid(&mut then, [1.0, 6.0, 0.02], [0.9, 0.9, 0.86], true);
     // Its long side, and a strip of its top.
@@ -94,11 +94,11 @@ fn one_side_of_a_thing_is_enough_to_know_it_by_and_a_barrel_is_none() {
 
 #[test]
 fn wires_that_a_nearer_scanner_sees_are_no_change() {
-    let (then, mut now) = (Tallying::default(), Tallying::default());
+    let (then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     for (scan, wire) in (0..4).flat_map(|scan| (0..12).map(move |wire| (scan, wire))) {
         for i in 0..400 {
             let at = [0.0025 * f64::from(i), 1.0, 0.05 * f64::from(wire) + 0.02];
-            now.add(at, 3.7e-5, Seen::Nothing { is_pierced: scan > 0 });
+            now.add(at, 3.7e-5, SessionEvidence::Nothing { is_pierced: scan > 0 });
         }
     }
     assert!(found(then, now).is_empty());
@@ -106,7 +106,7 @@ fn wires_that_a_nearer_scanner_sees_are_no_change() {
 
 #[test]
 fn what_is_near_a_robot_is_the_robots() {
-    let (mut then, now) = (Tallying::default(), Tallying::default());
+    let (mut then, now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.5], [0.2, 0.2, 0.2], true);
     for i in 0..60 {
         then.add_robot([1.25, 1.0 + 0.005 * f64::from(i), 0.6]);
@@ -121,7 +121,7 @@ fn what_is_near_a_robot_is_the_robots() {
 
 #[test]
 fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
-    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.2, 0.8, 0.7], true);
     solid(&mut then, [1.0, 6.0, 0.02], [0.6, 0.6, 0.5], true);
     solid(&mut now, [5.0, 1.0, 0.62], [1.2, 0.8, 0.1], true);
@@ -135,7 +135,7 @@ fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
 
 #[test]
 fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
-    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.3, 0.9, 0.73], true);
     // Rows of beams graze its top: one end is seen whole, of the other an edge. Something else came
     // beside it.
@@ -152,7 +152,7 @@ fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
 
 #[test]
 fn an_end_beside_a_thing_that_was_turned_is_its_own() {
-    let (mut then, mut now) = (Tallying::default(), Tallying::default());
+    let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.4, 0.73], true);
     // Turned, it has narrower bounds; a post hides a strip of it. A lower thing beside it is
     // another one.
@@ -167,19 +167,19 @@ fn an_end_beside_a_thing_that_was_turned_is_its_own() {
 }
 
 /// A sheet that stands upright, of which so many of ten points are pierced.
-fn sheet(tally: &mut Tallying, n_pierced: i32) {
+fn sheet(tally: &mut OccupancyBuilder, n_pierced: i32) {
     for (i, j) in (0..40).flat_map(|i| (0..20).map(move |j| (i, j))) {
         let is_pierced = (i + j) % 10 < n_pierced;
         let at = [1.01, 1.0 + 0.02 * f64::from(i), 1.0 + 0.02 * f64::from(j)];
-        tally.add(at, 4e-4, Seen::Nothing { is_pierced });
+        tally.add(at, 4e-4, SessionEvidence::Nothing { is_pierced });
     }
 }
 
 #[test]
 fn a_sheet_that_beams_go_through_is_of_a_fence() {
     for (n_pierced, n_things) in [(0, 1), (1, 0)] {
-        let mut then = Tallying::default();
+        let mut then = OccupancyBuilder::default();
         sheet(&mut then, n_pierced);
-        assert_eq!(found(then, Tallying::default()).len(), n_things, "{n_pierced} of 10");
+        assert_eq!(found(then, OccupancyBuilder::default()).len(), n_things, "{n_pierced} of 10");
     }
 }

@@ -48,7 +48,7 @@ pub fn clouds(
     n: usize,
     [compress, with_color]: [bool; 2],
     waiting_bytes: usize,
-) -> Written {
+) -> WrittenFiles {
     let around =
         Aabb { min: [399_985.0, 4_999_988.0, 100.0], max: [400_015.0, 5_000_012.0, 103.0] };
     let las = LasSettings { with_color, ..LasSettings::new(Quantum::around(&around)) };
@@ -77,7 +77,7 @@ pub fn clouds(
     }
     let tiles = tiles.finish(&contract::OneByOne).expect("finish");
     let (robots, fixed) = clouds.finish().expect("finish");
-    Written { tiles, robots, fixed }
+    WrittenFiles { tiles, robots, fixed }
 }
 
 pub fn read(path: &Path) -> (las::Header, Vec<las::Point>) {

@@ -2,7 +2,7 @@
 //! among them, the step of its coordinates, and the range of its intensities.
 
 use super::pages::Pages;
-use super::points::{Points, Wanted};
+use super::points::{E57Points, WantedFields};
 use super::scan::E57Scan;
 use crate::Settings;
 use crate::frame::NO_RETURN;
@@ -18,7 +18,7 @@ const N_JUDGED: usize = 64;
 
 /// What the first records of a scan show; valid points only.
 #[derive(Debug, Default)]
-pub(super) struct Look {
+pub(super) struct E57Look {
     /// Points other than beams without return at the origin, file frame, metres.
     pub(super) points: Vec<[f64; 3]>,
     /// Number of points at the file's origin, and number of points looked at.
@@ -28,14 +28,14 @@ pub(super) struct Look {
     pub(super) intensities: Vec<f64>,
 }
 
-impl Look {
+impl E57Look {
     /// Looks at the first records of a scan.
     pub(super) fn at(scan: &E57Scan, path: &Path, settings: &Settings) -> Result<Self> {
         let mut look = Self::default();
         if scan.n_records == 0 {
             return Ok(look);
         }
-        let mut points = Points::open(scan, Pages::open(path)?, Wanted::Attributes)?;
+        let mut points = E57Points::open(scan, Pages::open(path)?, WantedFields::Attributes)?;
         let mut n_seen = 0;
         while n_seen < N_RECORDS {
             let n = points.next_block(settings.strip_points.min(BLOCK))?;

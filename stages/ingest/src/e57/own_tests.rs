@@ -2,7 +2,7 @@
 
 use super::tests::{read, settings};
 use super::*;
-use crate::check::{Dice, Scratch, shared};
+use crate::check::{Dice, ScratchFile, shared};
 use ::e57::{
     E57Writer, IntensityLimits, Quaternion, RawValues, Record, RecordDataType, RecordName,
     RecordValue, Transform, Translation,
@@ -61,7 +61,7 @@ fn own(n_points: usize) -> Own {
 }
 
 /// Writes scans with the crate `e57`; `mend` may change the XML description.
-pub(super) fn write(name: &str, scans: Vec<Own>, mend: impl Fn(String) -> String) -> Scratch {
+pub(super) fn write(name: &str, scans: Vec<Own>, mend: impl Fn(String) -> String) -> ScratchFile {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut bytes, "file").expect("plain");
     for (n, own) in scans.into_iter().enumerate() {
@@ -78,7 +78,7 @@ pub(super) fn write(name: &str, scans: Vec<Own>, mend: impl Fn(String) -> String
     }
     writer.finalize_customized_xml(|xml| Ok(mend(xml))).expect("plain");
     drop(writer);
-    Scratch::new(name, bytes.get_ref())
+    ScratchFile::new(name, bytes.get_ref())
 }
 
 #[test]
@@ -253,7 +253,7 @@ fn broken_bytes_are_found_and_never_fatal() {
         let mut broken = bytes.clone();
         let at = dice.below(broken.len());
         broken[at] ^= 1 << dice.below(8);
-        let file = Scratch::new("flip.e57", &broken);
+        let file = ScratchFile::new("flip.e57", &broken);
         // With its checksum wrong, a page that is needed is refused; padding is not needed.
         if let Ok(scans) = read(&file.0, Want::Everything) {
             assert_eq!(format!("{scans:?}"), whole, "byte {at}");
@@ -261,12 +261,12 @@ fn broken_bytes_are_found_and_never_fatal() {
         drop(file);
         if round % 2 == 0 {
             seal(&mut broken);
-            let file = Scratch::new("sealed.e57", &broken);
+            let file = ScratchFile::new("sealed.e57", &broken);
             let _either = read(&file.0, Want::Everything);
         }
     }
     for len in (0..bytes.len()).step_by(509).chain((0..bytes.len()).step_by(1024)) {
-        let file = Scratch::new("cut.e57", &bytes[..len]);
+        let file = ScratchFile::new("cut.e57", &bytes[..len]);
         assert!(read(&file.0, Want::Coordinates).is_err(), "{len}");
     }
 }
@@ -289,7 +289,7 @@ fn real_files_broken_behind_their_checksums_are_never_fatal() {
                 broken[at] ^= 1 << dice.below(8);
             }
             seal(&mut broken);
-            let file = Scratch::new("real.e57", &broken);
+            let file = ScratchFile::new("real.e57", &broken);
             let _either = read(&file.0, Want::Everything);
         }
     }

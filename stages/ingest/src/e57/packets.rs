@@ -2,7 +2,7 @@
 //! Counts in the file are not trusted: the packets must hold as many records as the scan announces.
 
 use super::pages::Pages;
-use super::stream::Stream;
+use super::stream::FieldStream;
 use contract::{Error, Kind, Result};
 use e57::Record;
 
@@ -25,7 +25,7 @@ pub(super) struct Packets {
     /// Logical offset of the end of the section.
     end: u64,
     /// One stream for each field, in the order of the prototype.
-    streams: Vec<Stream>,
+    streams: Vec<FieldStream>,
     /// Number of records that were not returned yet.
     n_left: u64,
     /// Number of records that the scan announces.
@@ -46,7 +46,7 @@ impl Packets {
             .iter()
             .zip(wanted)
             .map(|(record, wanted)| {
-                Stream::new(&record.data_type, *wanted)
+                FieldStream::new(&record.data_type, *wanted)
                     .map_err(|e| e.at(format!("field {:?}", record.name)))
             })
             .collect::<Result<Vec<_>>>()?;
@@ -131,7 +131,8 @@ impl Packets {
             return self.check_end().map(|()| 0);
         }
         loop {
-            let held = self.streams.iter().filter_map(Stream::available).min().unwrap_or(u64::MAX);
+            let held =
+                self.streams.iter().filter_map(FieldStream::available).min().unwrap_or(u64::MAX);
             if held > 0 {
                 return Ok(held.min(self.n_left).min(most as u64) as usize);
             }
@@ -216,7 +217,7 @@ impl Packets {
     /// Refuses records beyond the announced ones.
     fn check_end(&mut self) -> Result<()> {
         let spent = loop {
-            if !self.streams.iter().all(Stream::is_spent) {
+            if !self.streams.iter().all(FieldStream::is_spent) {
                 break false;
             }
             if !self.feed()? {
@@ -236,7 +237,7 @@ impl Packets {
 }
 
 /// Distributes the parts of a data packet to the streams.
-fn split(packet: &[u8], streams: &mut [Stream]) -> Result<()> {
+fn split(packet: &[u8], streams: &mut [FieldStream]) -> Result<()> {
     let n_streams = packet.get(4..6).map_or(0, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
     if n_streams != streams.len() {
         return Err(Error::bad_input(format!(

@@ -7,7 +7,7 @@ use contract::Result;
 
 /// Which fields are decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wanted {
+pub(super) enum WantedFields {
     /// Coordinates and invalid flags.
     Coordinates,
     /// Also rows and columns.
@@ -17,7 +17,7 @@ pub(super) enum Wanted {
 }
 
 /// Reads the points of one scan, one block of records at a time.
-pub(super) struct Points {
+pub(super) struct E57Points {
     packets: Packets,
     coordinates: Option<Coordinates>,
     state: Option<usize>,
@@ -37,12 +37,12 @@ pub(super) struct Points {
     raw: [Vec<f64>; 2],
 }
 
-impl Points {
+impl E57Points {
     /// Starts at the first point of a scan.
-    pub(super) fn open(scan: &E57Scan, pages: Pages, wanted: Wanted) -> Result<Self> {
-        let native = scan.native.filter(|_| wanted == Wanted::Native);
-        let intensity = scan.intensity.filter(|_| wanted == Wanted::Attributes);
-        let color = scan.color.filter(|_| wanted == Wanted::Attributes);
+    pub(super) fn open(scan: &E57Scan, pages: Pages, wanted: WantedFields) -> Result<Self> {
+        let native = scan.native.filter(|_| wanted == WantedFields::Native);
+        let intensity = scan.intensity.filter(|_| wanted == WantedFields::Attributes);
+        let color = scan.color.filter(|_| wanted == WantedFields::Attributes);
         let mut read = vec![false; scan.prototype.len()];
         let axes = match scan.coordinates {
             None => None,

@@ -26,7 +26,7 @@ enum Coding {
 
 /// The undecoded bytes of one field.
 #[derive(Debug, Clone)]
-pub(super) struct Stream {
+pub(super) struct FieldStream {
     coding: Coding,
     /// Number of bits of a value; 0 where all values are equal.
     bits: u64,
@@ -40,7 +40,7 @@ pub(super) struct Stream {
     at: u64,
 }
 
-impl Stream {
+impl FieldStream {
     /// An empty stream.
     pub(super) fn new(data_type: &RecordDataType, wanted: bool) -> Result<Self> {
         let (coding, bits) = match *data_type {
@@ -204,7 +204,7 @@ mod tests {
             let min = if bits == 64 { i64::MIN } else { -5 };
             let max = min.wrapping_add(mask.cast_signed());
             let mut stream =
-                Stream::new(&RecordDataType::Integer { min, max }, true).expect("plain");
+                FieldStream::new(&RecordDataType::Integer { min, max }, true).expect("plain");
             assert_eq!(stream.bits(), u64::from(bits));
             let mut got = Vec::new();
             let mut part = Vec::new();
@@ -224,11 +224,11 @@ mod tests {
     #[test]
     fn constants_take_no_bits() {
         let data_type = RecordDataType::ScaledInteger { min: 7, max: 7, scale: 0.5, offset: 1.0 };
-        let mut stream = Stream::new(&data_type, true).expect("plain");
+        let mut stream = FieldStream::new(&data_type, true).expect("plain");
         let mut out = Vec::new();
         stream.numbers(3, &mut out);
         assert_eq!((stream.available(), out), (None, vec![4.5; 3]));
         let broken = RecordDataType::ScaledInteger { min: 0, max: 7, scale: f64::NAN, offset: 1.0 };
-        assert!(Stream::new(&broken, true).is_err());
+        assert!(FieldStream::new(&broken, true).is_err());
     }
 }

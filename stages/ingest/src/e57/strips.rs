@@ -2,11 +2,11 @@
 
 use super::E57File;
 use super::pages::Pages;
-use super::points::{Points, Wanted};
+use super::points::{E57Points, WantedFields};
 use super::scan::E57Scan;
 use crate::Settings;
 use crate::oddities::Oddities;
-use crate::reader::{RawStrip, Sampled, Want};
+use crate::reader::{RawStrip, SampledPoint, Want};
 use contract::{Attributes, Result};
 use geometry::Point;
 
@@ -23,13 +23,13 @@ const N_RUNS: u64 = 4;
 const MAX_SPAN: u64 = 1 << 31;
 
 /// Iterator over the strips of one file.
-pub(super) struct Strips<'a> {
+pub(super) struct E57Strips<'a> {
     file: &'a E57File,
     want: Want,
     /// Index of the current scan, index at which to stop, and the open points of the current scan.
     scan: usize,
     until: usize,
-    points: Option<Points>,
+    points: Option<E57Points>,
     /// Place in the mask of the next valid point.
     place: u64,
     /// Place in the mask after the last point that was not dropped.
@@ -37,7 +37,7 @@ pub(super) struct Strips<'a> {
     done: bool,
 }
 
-impl<'a> Strips<'a> {
+impl<'a> E57Strips<'a> {
     /// Starts at the first point of the file.
     pub(super) fn new(file: &'a E57File, want: Want) -> Self {
         if want == Want::Everything {
@@ -73,14 +73,14 @@ impl<'a> Strips<'a> {
             Some(points) => points,
             none => {
                 let wanted = match self.want {
-                    Want::Coordinates => Wanted::Coordinates,
-                    Want::Everything => Wanted::Attributes,
+                    Want::Coordinates => WantedFields::Coordinates,
+                    Want::Everything => WantedFields::Attributes,
                 };
-                none.insert(Points::open(scan, Pages::open(&self.file.path)?, wanted)?)
+                none.insert(E57Points::open(scan, Pages::open(&self.file.path)?, wanted)?)
             }
         };
         let settings = &self.file.settings;
-        let mut strip = Filling {
+        let mut strip = FillingStrip {
             settings,
             scan,
             strip: RawStrip {
@@ -102,7 +102,7 @@ impl<'a> Strips<'a> {
             }
             strip.add(points, n);
         }
-        let Filling { strip, place, n_no_returns, n_cut, .. } = strip;
+        let FillingStrip { strip, place, n_no_returns, n_cut, .. } = strip;
         self.place = place;
         if self.want == Want::Everything {
             let oddities = &self.file.oddities[self.scan];
@@ -121,7 +121,7 @@ impl<'a> Strips<'a> {
     }
 }
 
-impl Iterator for Strips<'_> {
+impl Iterator for E57Strips<'_> {
     type Item = Result<RawStrip>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -135,7 +135,7 @@ impl Iterator for Strips<'_> {
 }
 
 /// A strip that is being filled.
-struct Filling<'a> {
+struct FillingStrip<'a> {
     settings: &'a Settings,
     scan: &'a E57Scan,
     strip: RawStrip,
@@ -146,9 +146,9 @@ struct Filling<'a> {
     n_cut: u64,
 }
 
-impl Filling<'_> {
+impl FillingStrip<'_> {
     /// Adds a block of `n` records.
-    fn add(&mut self, points: &Points, n: usize) {
+    fn add(&mut self, points: &E57Points, n: usize) {
         let far = self.settings.max_range;
         if points.all_valid()
             && self.strip.attributes.is_none()
@@ -182,7 +182,7 @@ impl Filling<'_> {
     }
 
     /// Adds a block in which every point is valid.
-    fn add_plain(&mut self, points: &Points, shift: [f64; 3]) {
+    fn add_plain(&mut self, points: &E57Points, shift: [f64; 3]) {
         let [x, y, z] = points.axes();
         let xyz = x.iter().zip(y).zip(z);
         self.strip.xyz.extend(xyz.map(|((x, y), z)| {
@@ -210,7 +210,7 @@ impl Filling<'_> {
     }
 
     /// Appends intensity, colour and world coordinates of point `i` of the block.
-    fn push_attributes(&mut self, points: &Points, i: usize, p: [f64; 3]) {
+    fn push_attributes(&mut self, points: &E57Points, i: usize, p: [f64; 3]) {
         let Some(attributes) = &mut self.strip.attributes else { return };
         attributes.world.push((self.scan.frame.world_from_scan * Point::from(p)).coords.into());
         attributes.intensity.extend(points.intensity().get(i));
@@ -220,12 +220,12 @@ impl Filling<'_> {
 }
 
 /// Up to `n` valid points of a scan in a few runs.
-pub(super) fn sample(file: &E57File, scan: &E57Scan, n: usize) -> Result<Vec<Sampled>> {
+pub(super) fn sample(file: &E57File, scan: &E57Scan, n: usize) -> Result<Vec<SampledPoint>> {
     let mut out = Vec::new();
     if scan.n_records == 0 || n == 0 {
         return Ok(out);
     }
-    let mut points = Points::open(scan, Pages::open(&file.path)?, Wanted::Native)?;
+    let mut points = E57Points::open(scan, Pages::open(&file.path)?, WantedFields::Native)?;
     let spread = scan.n_records.min(N_SAMPLED_FROM);
     let mut seen = 0;
     while out.len() < n {
@@ -244,7 +244,7 @@ pub(super) fn sample(file: &E57File, scan: &E57Scan, n: usize) -> Result<Vec<Sam
                 && !scan.frame.is_no_return(p)
                 && p.iter().all(|v| v.abs() <= file.settings.max_range)
             {
-                out.push(Sampled { xyz: p.map(|v| v as f32), native: points.native(i) });
+                out.push(SampledPoint { xyz: p.map(|v| v as f32), native: points.native(i) });
             }
         }
         seen += n_block as u64;
@@ -259,7 +259,7 @@ pub(super) fn spread(file: &E57File, scan: &E57Scan, n: usize, most: u64) -> Res
     if scan.n_records == 0 || n == 0 {
         return Ok(out);
     }
-    let mut points = Points::open(scan, Pages::open(&file.path)?, Wanted::Coordinates)?;
+    let mut points = E57Points::open(scan, Pages::open(&file.path)?, WantedFields::Coordinates)?;
     let every = scan.n_records.min(most).div_ceil(n as u64);
     let mut seen = 0;
     while seen < most {

@@ -1,10 +1,10 @@
 //! Finds the blocks of a PTX file: their offsets, poses and numbers of points. No point is kept.
 
-use super::Block;
-use super::look::Look;
-use crate::frame::{self, Frame};
+use super::PtxScan;
+use super::look::PtxLook;
+use crate::frame::{self, FileFrame};
 use crate::oddities::no_returns_note;
-use crate::text::{Lines, numbers};
+use crate::text::{TextLines, numbers};
 use contract::{Error, Result};
 use geometry::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -20,9 +20,9 @@ const SAME_POSITION: f64 = 1e-3;
 
 /// All blocks of the file, in file order, each with messages about what is missing; `metres` is the
 /// length of the file's unit.
-pub(super) fn find(path: &Path, metres: f64) -> Result<Vec<(Block, Vec<String>)>> {
+pub(super) fn find(path: &Path, metres: f64) -> Result<Vec<(PtxScan, Vec<String>)>> {
     let n_bytes = std::fs::metadata(path)?.len();
-    let mut lines = Lines::open(path, 0, 0)?;
+    let mut lines = TextLines::open(path, 0, 0)?;
     let mut out = Vec::new();
     while lines.advance()? {
         out.push(block(&mut lines, n_bytes, metres)?);
@@ -34,7 +34,7 @@ pub(super) fn find(path: &Path, metres: f64) -> Result<Vec<(Block, Vec<String>)>
 }
 
 /// Reads one block, from the line with its columns to its last point.
-fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<String>)> {
+fn block(lines: &mut TextLines, n_bytes: u64, metres: f64) -> Result<(PtxScan, Vec<String>)> {
     let mut notes = Vec::new();
     let n_cols = count(lines).map_err(|e| {
         if lines.number() == 1 {
@@ -57,7 +57,7 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
     let pose = pose(lines, metres, &mut notes)?;
     let points_at = (lines.end(), lines.number());
     let (mut n_valid, mut n_columns) = (0, 0);
-    let mut look = Look::new(n_lines, metres);
+    let mut look = PtxLook::new(n_lines, metres);
     for n in 0..n_lines {
         if !lines.advance()? {
             return Err(lines
@@ -81,30 +81,30 @@ fn block(lines: &mut Lines, n_bytes: u64, metres: f64) -> Result<(Block, Vec<Str
     let step = look.step();
     notes.extend(note.into_iter().chain(step.map(crate::steps::note)));
     Ok((
-        Block { n_rows, n_lines, n_columns, n_valid, points_at, metres, frame, intensity, step },
+        PtxScan { n_rows, n_lines, n_columns, n_valid, points_at, metres, frame, intensity, step },
         notes,
     ))
 }
 
 /// Chooses the scan frame: the file's own where its origin can be the scanner, else one with an
 /// origin near the points.
-fn judge(pose: Pose, look: &Look, notes: &mut Vec<String>) -> Frame {
+fn judge(pose: Pose, look: &PtxLook, notes: &mut Vec<String>) -> FileFrame {
     if frame::within_reach(look.first()) {
         if look.n_at_origin > 0 {
             notes.push(no_returns_note(look.n_at_origin, look.n_looked));
         }
-        return Frame::of_scanner(pose);
+        return FileFrame::of_scanner(pose);
     }
     notes.push(
         "points lie farther from the scan's origin than any scanner reaches: the scanner is not known, so there \
          is no free-space evidence"
             .into(),
     );
-    Frame::about(pose, frame::near(None, look.first()))
+    FileFrame::about(pose, frame::near(None, look.first()))
 }
 
 /// Moves to the next line of a header.
-fn next(lines: &mut Lines) -> Result<()> {
+fn next(lines: &mut TextLines) -> Result<()> {
     if lines.advance()? {
         return Ok(());
     }
@@ -114,7 +114,7 @@ fn next(lines: &mut Lines) -> Result<()> {
 }
 
 /// The count on the current line.
-fn count(lines: &Lines) -> Result<u64> {
+fn count(lines: &TextLines) -> Result<u64> {
     let [value] = lines.exactly()?;
     if value < 0.0 || value.fract() != 0.0 || value > 1e12 {
         return Err(lines.error(format!("number of columns or rows is no count, \"{value}\"")));
@@ -124,7 +124,7 @@ fn count(lines: &Lines) -> Result<u64> {
 
 /// Reads scanner position, axes and matrix and converts them to metres. The matrix counts; a
 /// position that differs from it is mentioned.
-fn pose(lines: &mut Lines, metres: f64, notes: &mut Vec<String>) -> Result<Pose> {
+fn pose(lines: &mut TextLines, metres: f64, notes: &mut Vec<String>) -> Result<Pose> {
     next(lines)?;
     let position = Vector3::from(lines.exactly::<3>()?) * metres;
     for _axis in 0..3 {
@@ -192,7 +192,7 @@ fn rigid(rows: [[f64; 4]; 4]) -> Result<Pose> {
 }
 
 /// Number of values on each line of points of this block.
-fn columns(lines: &Lines) -> Result<usize> {
+fn columns(lines: &TextLines) -> Result<usize> {
     match numbers(lines.line(), &mut [0.0; 7]) {
         Ok(n @ (3 | 4 | 6 | 7)) => Ok(n),
         Ok(n) => {

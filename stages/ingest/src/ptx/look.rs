@@ -12,7 +12,7 @@ const N_LOOKED: u64 = 4096;
 
 /// What the sampled lines of a block show.
 #[derive(Debug)]
-pub(super) struct Look {
+pub(super) struct PtxLook {
     /// Distance between the lines with a point that are looked at.
     every: u64,
     /// Metres per unit of the file.
@@ -28,7 +28,7 @@ pub(super) struct Look {
     intensities: Vec<f64>,
 }
 
-impl Look {
+impl PtxLook {
     /// Starts to look at a block of `n_lines` lines; `metres` is the length of the file's unit.
     pub(super) fn new(n_lines: u64, metres: f64) -> Self {
         let every = n_lines.div_ceil(N_LOOKED).max(1);

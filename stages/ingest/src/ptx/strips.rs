@@ -1,9 +1,9 @@
 //! Strips of a PTX file in file order, from the lines of all its blocks.
 
-use super::{Block, PtxFile, blocks};
+use super::{PtxFile, PtxScan, blocks};
 use crate::oddities::Oddities;
-use crate::reader::{RawStrip, Sampled, Want};
-use crate::text::{Lines, numbers};
+use crate::reader::{RawStrip, SampledPoint, Want};
+use crate::text::{TextLines, numbers};
 use contract::{Attributes, Result};
 use geometry::Point;
 
@@ -15,20 +15,25 @@ const N_RUNS: u64 = 4;
 const MAX_SPAN: u64 = 1 << 31;
 
 /// Reads the points of one block, a line at a time.
-struct Points<'a> {
-    block: &'a Block,
-    lines: Lines,
+struct PtxPoints<'a> {
+    block: &'a PtxScan,
+    lines: TextLines,
     /// Number of lines read.
     n_read: u64,
     /// Values of the current line.
     values: [f64; 7],
 }
 
-impl<'a> Points<'a> {
+impl<'a> PtxPoints<'a> {
     /// Starts before the first point of a block.
-    fn open(file: &PtxFile, block: &'a Block) -> Result<Self> {
+    fn open(file: &PtxFile, block: &'a PtxScan) -> Result<Self> {
         let (byte, line) = block.points_at;
-        Ok(Self { block, lines: Lines::open(&file.path, byte, line)?, n_read: 0, values: [0.0; 7] })
+        Ok(Self {
+            block,
+            lines: TextLines::open(&file.path, byte, line)?,
+            n_read: 0,
+            values: [0.0; 7],
+        })
     }
 
     /// Moves to the next line that is not marked as a beam without return; returns false after the
@@ -86,18 +91,18 @@ impl<'a> Points<'a> {
 }
 
 /// Iterator over the strips of one file.
-pub(super) struct Strips<'a> {
+pub(super) struct PtxStrips<'a> {
     file: &'a PtxFile,
     want: Want,
     /// Index of the current scan, and its points once they are open.
     scan: usize,
-    points: Option<Points<'a>>,
+    points: Option<PtxPoints<'a>>,
     /// Place in the mask of the next valid point.
     place: u64,
     done: bool,
 }
 
-impl<'a> Strips<'a> {
+impl<'a> PtxStrips<'a> {
     /// Starts at the first point of the file.
     pub(super) fn new(file: &'a PtxFile, want: Want) -> Self {
         if want == Want::Everything {
@@ -119,10 +124,10 @@ impl<'a> Strips<'a> {
     }
 
     /// The next strip of this block; `None` at its end.
-    fn read_block(&mut self, block: &'a Block) -> Result<Option<RawStrip>> {
+    fn read_block(&mut self, block: &'a PtxScan) -> Result<Option<RawStrip>> {
         let points = match &mut self.points {
             Some(points) => points,
-            none => none.insert(Points::open(self.file, block)?),
+            none => none.insert(PtxPoints::open(self.file, block)?),
         };
         let settings = &self.file.settings;
         let mut strip = RawStrip {
@@ -161,7 +166,7 @@ impl<'a> Strips<'a> {
     }
 }
 
-impl Iterator for Strips<'_> {
+impl Iterator for PtxStrips<'_> {
     type Item = Result<RawStrip>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -175,7 +180,7 @@ impl Iterator for Strips<'_> {
 }
 
 /// Appends the attributes of the point on the current line.
-fn push(attributes: &mut Attributes, points: &Points<'_>, p: [f64; 3]) {
+fn push(attributes: &mut Attributes, points: &PtxPoints<'_>, p: [f64; 3]) {
     attributes.world.push((points.block.frame.world_from_scan * Point::from(p)).coords.into());
     // `as` saturates at both ends and turns NaN into 0. Colour is 0..255.
     if let 4 | 7 = points.block.n_columns {
@@ -190,11 +195,11 @@ fn push(attributes: &mut Attributes, points: &Points<'_>, p: [f64; 3]) {
 }
 
 /// Up to `n` valid points of a scan in a few runs.
-pub(super) fn sample(file: &PtxFile, scan: usize, n: usize) -> Result<Vec<Sampled>> {
+pub(super) fn sample(file: &PtxFile, scan: usize, n: usize) -> Result<Vec<SampledPoint>> {
     let mut out = Vec::new();
     let block = &file.blocks[scan];
     let spread = block.n_lines.clamp(1, N_SAMPLED_FROM);
-    let mut points = Points::open(file, block)?;
+    let mut points = PtxPoints::open(file, block)?;
     while out.len() < n && points.advance(3)? {
         // Number of points that the runs begun so far may hold: run k begins at k/N_RUNS of the
         // lines.
@@ -202,7 +207,7 @@ pub(super) fn sample(file: &PtxFile, scan: usize, n: usize) -> Result<Vec<Sample
         if out.len() < n * run / N_RUNS as usize
             && let Some(p) = points.xyz(file.settings.max_range)
         {
-            out.push(Sampled { xyz: p.map(|v| v as f32), native: points.native() });
+            out.push(SampledPoint { xyz: p.map(|v| v as f32), native: points.native() });
         }
     }
     Ok(out)
@@ -214,7 +219,7 @@ pub(super) fn spread(file: &PtxFile, scan: usize, n: usize, most: u64) -> Result
     let mut out = Vec::new();
     let block = &file.blocks[scan];
     let every = block.n_valid.min(most).div_ceil(n.max(1) as u64).max(1);
-    let mut points = Points::open(file, block)?;
+    let mut points = PtxPoints::open(file, block)?;
     let mut at = 0_u64;
     while points.n_read < most && points.advance(3)? {
         if at.is_multiple_of(every)

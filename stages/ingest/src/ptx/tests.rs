@@ -1,7 +1,7 @@
 //! Real PTX files compared with other readers, and files written by the tests, whole and damaged.
 
 use super::*;
-use crate::check::{Dice, Read, Scratch, read_all, shared};
+use crate::check::{Dice, Read, ScratchFile, read_all, shared};
 use contract::Kind;
 use std::path::Path;
 
@@ -102,7 +102,7 @@ fn own_file_comes_back() {
     let first = "1 2 3 0.5\n0 0 0 0.5\nnan 2 3 0.25\n0.0 -0.00 0 1\n  4\t5 6 1.5  \n-0.5 0 0 0\n";
     let second = "1 0 0 255 128 0\r\n0 0 0 0 0 0\r\n";
     let text = format!("\n{}\n\n{}", block(2, 3, first), block(1, 2, second).replace('\n', "\r\n"));
-    let file = Scratch::new("own.ptx", text.as_bytes());
+    let file = ScratchFile::new("own.ptx", text.as_bytes());
     let scans = read(&file.0, Want::Everything).expect("valid");
     assert_eq!(scans[0].place, [0, 2, 3]);
     assert_eq!(scans[0].xyz, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [-0.5, 0.0, 0.0]]);
@@ -129,7 +129,7 @@ fn points_at_the_scanner_and_intensities_of_another_scale_are_said() {
         ),
     };
     let text = block(20, 50, &(0..1000).map(line).collect::<String>());
-    let file = Scratch::new("odd.ptx", text.as_bytes());
+    let file = ScratchFile::new("odd.ptx", text.as_bytes());
     let reader = open(&file.0, &settings()).expect("valid");
     let notes = &reader.scans()[0].notes;
     assert!(
@@ -174,7 +174,7 @@ fn broken_files_are_refused_with_their_line() {
         (block(1, 1, &"1".repeat(9000)), "longer than"),
     ];
     for (n, (text, words)) in cases.iter().enumerate() {
-        let file = Scratch::new(&format!("broken-{n}.ptx"), text.as_bytes());
+        let file = ScratchFile::new(&format!("broken-{n}.ptx"), text.as_bytes());
         let error =
             read(&file.0, Want::Coordinates).err().unwrap_or_else(|| panic!("{words}: was taken"));
         assert!(
@@ -192,11 +192,11 @@ fn broken_bytes_are_never_fatal() {
         let mut broken = text.clone();
         let at = dice.below(broken.len());
         broken[at] ^= 1 << dice.below(8);
-        let file = Scratch::new("flip.ptx", &broken);
+        let file = ScratchFile::new("flip.ptx", &broken);
         let _either = read(&file.0, Want::Everything);
     }
     for len in (0..text.len() - 14).step_by(37) {
-        let file = Scratch::new("cut.ptx", &text[..len]);
+        let file = ScratchFile::new("cut.ptx", &text[..len]);
         assert!(read(&file.0, Want::Coordinates).is_err(), "{len}");
     }
 }

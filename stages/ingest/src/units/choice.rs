@@ -1,6 +1,6 @@
 //! Parses the units that a user gives with `--units`, such as `mm` or `hall.las=us-ft`.
 
-use super::{Unit, known};
+use super::{LengthUnit, known};
 use contract::{Error, Kind, Result};
 use std::path::Path;
 
@@ -11,15 +11,15 @@ const HINT: &str =
     "units are m, cm, mm, km, in, ft and us-ft; a file's own as NAME=mm, heights apart as us-ft/m";
 
 /// Units of x and y, and of z.
-pub(crate) type Pair = [Unit; 2];
+pub(crate) type UnitPair = [LengthUnit; 2];
 
 /// The units that a user gave.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Choice {
     /// Units of all files that have none of their own.
-    all: Option<Pair>,
+    all: Option<UnitPair>,
     /// File names with their own units.
-    own: Vec<(String, Pair)>,
+    own: Vec<(String, UnitPair)>,
 }
 
 impl Choice {
@@ -55,7 +55,7 @@ impl Choice {
 
     /// The units given for a file: its own, by path, name, or name without suffix; else those for
     /// all files.
-    pub(crate) fn of(&self, path: &Path) -> Option<&Pair> {
+    pub(crate) fn of(&self, path: &Path) -> Option<&UnitPair> {
         let own = self.own.iter().find(|(name, _)| is_named(path, name)).map(|(_, pair)| pair);
         own.or(self.all.as_ref())
     }
@@ -72,7 +72,7 @@ fn is_named(path: &Path, name: &str) -> bool {
     path == Path::new(name) || is(path.file_name()) || is(path.file_stem())
 }
 
-fn pair(word: &str) -> Option<Pair> {
+fn pair(word: &str) -> Option<UnitPair> {
     let (horizontal, vertical) = word.split_once('/').unwrap_or((word, word));
     Some([known::by_name(horizontal)?, known::by_name(vertical)?])
 }

@@ -1,6 +1,6 @@
 //! What a file declares about the units of its coordinates, before it is interpreted.
 
-use super::{Unit, known};
+use super::{LengthUnit, known};
 
 /// The kind of a coordinate system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -18,7 +18,7 @@ pub(crate) enum System {
 
 /// A unit as a file states it: by name, by its length in metres, or both.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Stated {
+pub(crate) struct StatedUnit {
     pub(crate) name: Option<String>,
     pub(crate) metres: Option<f64>,
 }
@@ -28,9 +28,9 @@ pub(crate) struct Stated {
 pub(crate) struct Declaration {
     pub(crate) system: System,
     /// Unit of x and y.
-    pub(crate) horizontal: Option<Stated>,
+    pub(crate) horizontal: Option<StatedUnit>,
     /// Unit of z.
-    pub(crate) vertical: Option<Stated>,
+    pub(crate) vertical: Option<StatedUnit>,
     /// Name of the record.
     pub(crate) by: &'static str,
     /// Messages about oddities.
@@ -41,9 +41,9 @@ pub(crate) struct Declaration {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Sense {
     /// A known unit.
-    Unit(Unit),
+    Unit(LengthUnit),
     /// Name and length contradict each other: the unit of the name, and that of the length.
-    Either(Unit, Unit),
+    Either(LengthUnit, LengthUnit),
     /// An unknown unit, by its name.
     Nothing(String),
 }
@@ -61,13 +61,13 @@ impl Declaration {
     }
 }
 
-impl From<Unit> for Stated {
-    fn from(unit: Unit) -> Self {
+impl From<LengthUnit> for StatedUnit {
+    fn from(unit: LengthUnit) -> Self {
         Self { name: Some(unit.name), metres: Some(unit.metres) }
     }
 }
 
-impl Stated {
+impl StatedUnit {
     /// Interprets the statement.
     pub(crate) fn sense(&self) -> Sense {
         let name = self.name.as_deref().unwrap_or_default().trim();
@@ -80,16 +80,17 @@ impl Stated {
                 // value must be used.
                 let is_survey = (metres / known::US_FOOT - 1.0).abs() < 1e-9;
                 Sense::Unit(if is_survey {
-                    Unit::new("US survey foot", known::US_FOOT)
+                    LengthUnit::new("US survey foot", known::US_FOOT)
                 } else {
-                    Unit::new(named.name, metres)
+                    LengthUnit::new(named.name, metres)
                 })
             }
-            (Some(named), Some(metres)) => Sense::Either(named, Unit::new("unit", metres)),
+            (Some(named), Some(metres)) => Sense::Either(named, LengthUnit::new("unit", metres)),
             (Some(named), None) => Sense::Unit(named),
-            (None, Some(metres)) => {
-                Sense::Unit(Unit::new(if cut.is_empty() { "unit".into() } else { cut }, metres))
-            }
+            (None, Some(metres)) => Sense::Unit(LengthUnit::new(
+                if cut.is_empty() { "unit".into() } else { cut },
+                metres,
+            )),
             (None, None) => Sense::Nothing(cut),
         }
     }

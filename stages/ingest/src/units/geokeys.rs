@@ -1,6 +1,6 @@
 //! Reads the units of coordinates from the GeoTIFF keys of a LAS file.
 
-use super::declared::{Declaration, Stated, System};
+use super::declared::{Declaration, StatedUnit, System};
 use super::known;
 
 const MODEL: u16 = 1024;
@@ -40,7 +40,7 @@ pub(crate) fn read(directory: &[u8], doubles: &[u8]) -> Option<Declaration> {
     found.horizontal = match keys.short(UNIT) {
         Some(USER_DEFINED) => {
             let metres = keys.double(UNIT_METRES);
-            metres.map(|metres| Stated { name: None, metres: Some(metres) })
+            metres.map(|metres| StatedUnit { name: None, metres: Some(metres) })
         }
         Some(code) => match known::by_code(code.into()) {
             Some(unit) => {
@@ -55,17 +55,17 @@ pub(crate) fn read(directory: &[u8], doubles: &[u8]) -> Option<Declaration> {
         None => None,
     };
     if found.horizontal.is_none() {
-        found.horizontal = of_system().map(Stated::from);
+        found.horizontal = of_system().map(StatedUnit::from);
     }
     let of_unit = keys.short(VERTICAL_UNIT).and_then(|code| known::by_code(code.into()));
     let vertical = || keys.code(VERTICAL).and_then(|code| known::of_system("vertical", code));
-    found.vertical = of_unit.or_else(vertical).map(Stated::from);
+    found.vertical = of_unit.or_else(vertical).map(StatedUnit::from);
     (found.system != System::Unknown || found.vertical.is_some()).then_some(found)
 }
 
 /// The message where the key of the unit and the system differ; the key counts, as in other
 /// readers.
-fn contradiction(name: &str, metres: f64, system: Option<super::Unit>) -> Option<String> {
+fn contradiction(name: &str, metres: f64, system: Option<super::LengthUnit>) -> Option<String> {
     let system = system.filter(|unit| !super::declared::is_same(unit.metres, metres))?;
     Some(format!(
         "the GeoTIFF keys name a system in {} and the unit {name}: the unit counts",
@@ -113,7 +113,7 @@ mod tests {
         read(&directory, &doubles)
     }
 
-    fn metres(stated: Option<Stated>) -> Option<f64> {
+    fn metres(stated: Option<StatedUnit>) -> Option<f64> {
         match stated?.sense() {
             Sense::Unit(unit) => Some(unit.metres),
             _ => None,

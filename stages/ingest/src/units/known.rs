@@ -1,7 +1,7 @@
 //! The length in metres of units by name or EPSG code. Units by code, and systems that are not in
 //! metres, come from the EPSG registry (`epsg.txt`).
 
-use super::Unit;
+use super::LengthUnit;
 
 /// The relevant part of the EPSG registry; its first lines say how it was made.
 const EPSG: &str = include_str!("epsg.txt");
@@ -32,23 +32,23 @@ const SPELLED: [Spelled; 9] = [
 ];
 
 /// The unit with a name, as files or people spell it.
-pub(super) fn by_name(name: &str) -> Option<Unit> {
+pub(super) fn by_name(name: &str) -> Option<LengthUnit> {
     let plain = plain(name);
     let spelled = SPELLED.iter().find(|(spellings, ..)| spellings.contains(&plain.as_str()));
     let of_list = || units().find(|(_, unit)| self::plain(&unit.name) == plain).map(|(_, u)| u);
-    spelled.map(|(_, name, metres)| Unit::new(*name, *metres)).or_else(of_list)
+    spelled.map(|(_, name, metres)| LengthUnit::new(*name, *metres)).or_else(of_list)
 }
 
 /// The unit with a code of the EPSG registry.
-pub(super) fn by_code(code: u32) -> Option<Unit> {
+pub(super) fn by_code(code: u32) -> Option<LengthUnit> {
     // The registry gives the survey foot with too few decimals for map coordinates.
-    let exact = |unit: Unit| by_name(&unit.name).unwrap_or(unit);
+    let exact = |unit: LengthUnit| by_name(&unit.name).unwrap_or(unit);
     units().find(|(known, _)| *known == code).map(|(_, unit)| exact(unit))
 }
 
 /// The unit of a system of the EPSG registry, `projected` or `vertical`; the metre where the list
 /// names no other.
-pub(super) fn of_system(kind: &str, code: u32) -> Option<Unit> {
+pub(super) fn of_system(kind: &str, code: u32) -> Option<LengthUnit> {
     let holds = |range: &str| {
         let (first, last) = range.split_once('-').unwrap_or((range, range));
         let number = |word: &str| word.parse::<u32>().ok();
@@ -63,11 +63,11 @@ pub(super) fn of_system(kind: &str, code: u32) -> Option<Unit> {
 }
 
 /// The units of the registry with their codes.
-fn units() -> impl Iterator<Item = (u32, Unit)> {
+fn units() -> impl Iterator<Item = (u32, LengthUnit)> {
     EPSG.lines().filter_map(|line| line.strip_prefix("unit ")).filter_map(|line| {
         let mut words = line.splitn(3, ' ');
         let (code, metres) = (words.next()?.parse().ok()?, words.next()?.parse().ok()?);
-        Some((code, Unit::new(words.next()?, metres)))
+        Some((code, LengthUnit::new(words.next()?, metres)))
     })
 }
 

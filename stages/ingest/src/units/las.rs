@@ -19,7 +19,7 @@ const MAX_RECORDS: usize = 4096;
 pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
     let records = records(raw, data);
     let find = |users: &[&str], id: u16| {
-        let is_it = |r: &&Record<'_>| r.id == id && users.contains(&r.user.as_str());
+        let is_it = |r: &&VlrRecord<'_>| r.id == id && users.contains(&r.user.as_str());
         records.iter().find(is_it).map(|r| r.payload)
     };
     const PROJECTION: &[&str] = &["LASF_Projection", "liblas"];
@@ -37,29 +37,30 @@ pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
     all
 }
 
-struct Record<'a> {
+struct VlrRecord<'a> {
     user: String,
     id: u16,
     payload: &'a [u8],
 }
 
 /// The records before the points, then those after them, as far as they lie within the file.
-fn records<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<Record<'a>> {
+fn records<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<VlrRecord<'a>> {
     let mut out = Vec::new();
-    let first = (usize::from(raw.header_size), raw.number_of_variable_length_records as usize);
-    walk(data, first, HEADER, &mut out);
+    let n = raw.number_of_variable_length_records as usize;
+    walk(data, usize::from(raw.header_size), n, HEADER, &mut out);
     if let Some(extended) = &raw.evlr {
         let start = usize::try_from(extended.start_of_first_evlr).unwrap_or(usize::MAX);
-        walk(data, (start, extended.number_of_evlrs as usize), EXTENDED, &mut out);
+        walk(data, start, extended.number_of_evlrs as usize, EXTENDED, &mut out);
     }
     out
 }
 
 fn walk<'a>(
     data: &'a [u8],
-    (mut at, n): (usize, usize),
+    mut at: usize,
+    n: usize,
     n_header: usize,
-    out: &mut Vec<Record<'a>>,
+    out: &mut Vec<VlrRecord<'a>>,
 ) {
     for _ in 0..n.min(MAX_RECORDS) {
         let Some(header) = at.checked_add(n_header).and_then(|end| data.get(at..end)) else {
@@ -78,7 +79,7 @@ fn walk<'a>(
             return;
         };
         let user = user.collect::<String>().trim_end().to_owned();
-        out.push(Record { user, id, payload: &data[start..end.min(start + MAX_BYTES)] });
+        out.push(VlrRecord { user, id, payload: &data[start..end.min(start + MAX_BYTES)] });
         at = end;
     }
 }

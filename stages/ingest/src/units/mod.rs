@@ -18,13 +18,13 @@ pub(crate) use las::read as of_las;
 pub(crate) use wkt::read as of_wkt;
 
 use contract::{Error, Kind, Result, quote};
-use declared::{Sense, Stated, System, is_same};
+use declared::{Sense, StatedUnit, System, is_same};
 use serde::Serialize;
 use std::fmt;
 
 /// A unit of length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Unit {
+pub struct LengthUnit {
     /// Display name.
     pub name: String,
     /// Length of one unit, metres.
@@ -49,9 +49,9 @@ pub enum Origin {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Units {
     /// Unit of x and y.
-    pub horizontal: Unit,
+    pub horizontal: LengthUnit,
     /// Unit of z.
-    pub vertical: Unit,
+    pub vertical: LengthUnit,
     /// Source of the units.
     pub origin: Origin,
     /// Name of the record that declares them, if one does.
@@ -65,7 +65,7 @@ pub struct Units {
 /// Advice for files whose units cannot be determined.
 const WAY_OUT: &str = "give the unit with --units, for example --units m";
 
-impl Unit {
+impl LengthUnit {
     pub(crate) fn new(name: impl Into<String>, metres: f64) -> Self {
         Self { name: name.into(), metres }
     }
@@ -82,7 +82,7 @@ impl Units {
     ///
     /// # Errors
     /// If the coordinates are no lengths, or if their unit cannot be determined.
-    pub(crate) fn of(declared: &[Declaration], choice: Option<&[Unit; 2]>) -> Result<Self> {
+    pub(crate) fn of(declared: &[Declaration], choice: Option<&[LengthUnit; 2]>) -> Result<Self> {
         if let Some([horizontal, vertical]) = choice {
             return Ok(Self::plain(horizontal.clone(), vertical.clone(), Origin::Given));
         }
@@ -90,7 +90,7 @@ impl Units {
         let place = |e: Error| e.at(first.by).hint(WAY_OUT);
         refuse_angles(first.system).map_err(place)?;
         let mut remarks = first.remarks.clone();
-        let horizontal = match first.horizontal.as_ref().map(Stated::sense) {
+        let horizontal = match first.horizontal.as_ref().map(StatedUnit::sense) {
             Some(Sense::Unit(unit)) => Some(unit),
             Some(Sense::Either(name, number)) => {
                 return Err(place(contradiction(&name, &number)));
@@ -125,7 +125,7 @@ impl Units {
     ///
     /// # Errors
     /// As [`Units::of_nothing`].
-    pub(crate) fn of_format(choice: Option<&[Unit; 2]>) -> Result<Self> {
+    pub(crate) fn of_format(choice: Option<&[LengthUnit; 2]>) -> Result<Self> {
         Self::of_scans(choice, Origin::Format)
     }
 
@@ -133,11 +133,11 @@ impl Units {
     ///
     /// # Errors
     /// If heights are given a unit of their own: scans are rotated, so that no axis is the height.
-    pub(crate) fn of_nothing(choice: Option<&[Unit; 2]>) -> Result<Self> {
+    pub(crate) fn of_nothing(choice: Option<&[LengthUnit; 2]>) -> Result<Self> {
         Self::of_scans(choice, Origin::Assumed)
     }
 
-    fn of_scans(choice: Option<&[Unit; 2]>, origin: Origin) -> Result<Self> {
+    fn of_scans(choice: Option<&[LengthUnit; 2]>, origin: Origin) -> Result<Self> {
         match choice {
             None => Ok(Self { origin, ..Self::assumed() }),
             Some([all, heights]) if all == heights => {
@@ -155,11 +155,11 @@ impl Units {
     }
 
     fn assumed() -> Self {
-        let metre = || Unit::new("metre", 1.0);
+        let metre = || LengthUnit::new("metre", 1.0);
         Self::plain(metre(), metre(), Origin::Assumed)
     }
 
-    fn plain(horizontal: Unit, vertical: Unit, origin: Origin) -> Self {
+    fn plain(horizontal: LengthUnit, vertical: LengthUnit, origin: Origin) -> Self {
         Self { horizontal, vertical, origin, by: None, remarks: Vec::new() }
     }
 
@@ -193,9 +193,9 @@ fn refuse_angles(system: System) -> Result<()> {
 /// also have counts.
 fn heights(
     stated: Option<(Sense, &'static str)>,
-    horizontal: Option<&Unit>,
+    horizontal: Option<&LengthUnit>,
     remarks: &mut Vec<String>,
-) -> Result<Option<Unit>> {
+) -> Result<Option<LengthUnit>> {
     Ok(match stated {
         None => {
             if let Some(unit) = horizontal.filter(|unit| !is_same(unit.metres, 1.0)) {
@@ -213,7 +213,8 @@ fn heights(
             None
         }
         Some((Sense::Either(name, number), by)) => {
-            let is_it = |unit: &&Unit| horizontal.is_some_and(|h| is_same(h.metres, unit.metres));
+            let is_it =
+                |unit: &&LengthUnit| horizontal.is_some_and(|h| is_same(h.metres, unit.metres));
             let unit = [&name, &number].into_iter().find(is_it);
             let unit = unit.ok_or_else(|| contradiction(&name, &number))?;
             remarks.push(format!(
@@ -225,13 +226,13 @@ fn heights(
     })
 }
 
-fn contradiction(name: &Unit, number: &Unit) -> Error {
+fn contradiction(name: &LengthUnit, number: &LengthUnit) -> Error {
     let what = "the unit contradicts itself: its name and its number of metres differ";
     Error::bad_input(format!("{what}, \"{}, {}\"", name.name, number.metres))
 }
 
 /// The message where a record that does not count declares another unit.
-fn disagreement(declared: &[Declaration], horizontal: Option<&Unit>) -> Option<String> {
+fn disagreement(declared: &[Declaration], horizontal: Option<&LengthUnit>) -> Option<String> {
     let own = horizontal?;
     let other = declared.iter().skip(1).find_map(|d| match d.horizontal.as_ref()?.sense() {
         Sense::Unit(unit) if !is_same(unit.metres, own.metres) => Some((unit, d.by)),
@@ -241,7 +242,7 @@ fn disagreement(declared: &[Declaration], horizontal: Option<&Unit>) -> Option<S
     Some(format!("its {by} declares another unit, which does not count: {unit}"))
 }
 
-impl fmt::Display for Unit {
+impl fmt::Display for LengthUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.name.as_str() {
             "metre" if is_same(self.metres, 1.0) => write!(f, "metre"),

@@ -1,6 +1,6 @@
 //! Reads the units of coordinates from PROJJSON.
 
-use super::declared::{Declaration, Stated, System};
+use super::declared::{Declaration, StatedUnit, System};
 use super::known;
 use serde_json::Value;
 
@@ -41,11 +41,11 @@ fn look(crs: &Value, found: &mut Declaration) {
 }
 
 /// The unit of an axis: a name that PROJ knows, or an object with its length in metres.
-fn unit(crs: &Value, axis: usize) -> Option<Stated> {
+fn unit(crs: &Value, axis: usize) -> Option<StatedUnit> {
     let unit = &crs["coordinate_system"]["axis"].get(axis)?["unit"];
     match unit {
-        Value::String(name) => Some(Stated { name: Some(name.clone()), metres: None }),
-        Value::Object(unit) => Some(Stated {
+        Value::String(name) => Some(StatedUnit { name: Some(name.clone()), metres: None }),
+        Value::Object(unit) => Some(StatedUnit {
             name: unit.get("name").and_then(Value::as_str).map(str::to_owned),
             metres: unit.get("conversion_factor").and_then(Value::as_f64),
         }),
@@ -53,10 +53,10 @@ fn unit(crs: &Value, axis: usize) -> Option<Stated> {
     }
 }
 
-fn of_registry(crs: &Value, kind: &str) -> Option<Stated> {
+fn of_registry(crs: &Value, kind: &str) -> Option<StatedUnit> {
     let id = &crs["id"];
     let code = if id["authority"] == "EPSG" { id["code"].as_u64() } else { None };
-    known::of_system(kind, u32::try_from(code?).ok()?).map(Stated::from)
+    known::of_system(kind, u32::try_from(code?).ok()?).map(StatedUnit::from)
 }
 
 #[cfg(test)]

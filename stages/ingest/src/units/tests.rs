@@ -23,7 +23,7 @@ fn nothing_declared_is_metres_assumed() {
 
 #[test]
 fn what_a_person_says_goes_before_all() {
-    let foot = Unit::new("foot", 0.3048);
+    let foot = LengthUnit::new("foot", 0.3048);
     let degrees = of_wkt(br#"GEOGCS["WGS 84"]"#).unwrap();
     let units = Units::of(&[degrees], Some(&[foot.clone(), foot])).unwrap();
     assert_eq!((units.origin, units.factors()), (Origin::Given, [0.3048; 3]));

@@ -1,6 +1,6 @@
 //! Reads the units of coordinates from well-known text (WKT 1, WKT 2, and ESRI's dialect).
 
-use super::declared::{Declaration, Stated, System};
+use super::declared::{Declaration, StatedUnit, System};
 use super::known;
 
 /// Longest text that is read, bytes; real ones have a few thousand.
@@ -27,19 +27,19 @@ const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
 
 /// A keyword with the content of its brackets.
 #[derive(Debug, Default)]
-struct Node {
+struct WktNode {
     keyword: String,
     /// Words and numbers in the brackets, as text.
     values: Vec<String>,
-    children: Vec<Node>,
+    children: Vec<WktNode>,
 }
 
 /// The declaration of a text; `None` where it is no WKT.
 pub(crate) fn read(bytes: &[u8]) -> Option<Declaration> {
     let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
     let text = String::from_utf8_lossy(&bytes[..end.min(MAX_BYTES)]);
-    let mut reader = Reader { rest: text.trim() };
-    let mut top = Node::default();
+    let mut reader = WktReader { rest: text.trim() };
+    let mut top = WktNode::default();
     // ESRI writes the vertical system after the horizontal one.
     while let Some(node) = reader.node(0) {
         top.children.push(node);
@@ -51,7 +51,7 @@ pub(crate) fn read(bytes: &[u8]) -> Option<Declaration> {
 }
 
 /// Reads the first horizontal and the first vertical system of a tree.
-fn look(node: &Node, found: &mut Declaration) {
+fn look(node: &WktNode, found: &mut Declaration) {
     for child in &node.children {
         let word = child.keyword.as_str();
         if PROJECTED.contains(&word) {
@@ -69,58 +69,58 @@ fn look(node: &Node, found: &mut Declaration) {
     }
 }
 
-fn horizontal(node: &Node, found: &mut Declaration) {
+fn horizontal(node: &WktNode, found: &mut Declaration) {
     if found.system != System::Unknown {
         return;
     }
     found.system = System::Lengths;
     let of_registry = || node.code().and_then(|code| known::of_system("projected", code));
-    found.horizontal = node.unit(0).or_else(|| of_registry().map(Stated::from));
+    found.horizontal = node.unit(0).or_else(|| of_registry().map(StatedUnit::from));
     // A projected system with three axes includes the heights.
     if node.axes().count() > 2 {
         found.vertical = node.unit(2);
     }
 }
 
-fn geodetic(node: &Node, found: &mut Declaration) {
+fn geodetic(node: &WktNode, found: &mut Declaration) {
     if found.system != System::Unknown {
         return;
     }
-    let cartesian = |child: &Node| {
+    let cartesian = |child: &WktNode| {
         child.keyword == "CS" && child.values.iter().any(|v| v.eq_ignore_ascii_case("cartesian"))
     };
     let is_cartesian = node.keyword == "GEOCCS" || node.children.iter().any(cartesian);
     found.system = if is_cartesian { System::EarthCentred } else { System::Degrees };
 }
 
-fn vertical(node: &Node, found: &mut Declaration) {
+fn vertical(node: &WktNode, found: &mut Declaration) {
     if !VERTICAL.contains(&node.keyword.as_str()) || found.vertical.is_some() {
         return;
     }
     let of_registry = || node.code().and_then(|code| known::of_system("vertical", code));
-    found.vertical = node.unit(0).or_else(|| of_registry().map(Stated::from));
+    found.vertical = node.unit(0).or_else(|| of_registry().map(StatedUnit::from));
 }
 
-impl Node {
-    fn axes(&self) -> impl Iterator<Item = &Node> {
+impl WktNode {
+    fn axes(&self) -> impl Iterator<Item = &WktNode> {
         self.children.iter().filter(|child| child.keyword == "AXIS")
     }
 
     /// The unit of axis number `axis`, else the unit of the whole system.
-    fn unit(&self, axis: usize) -> Option<Stated> {
-        let is_unit = |child: &&Node| ["UNIT", "LENGTHUNIT"].contains(&child.keyword.as_str());
-        let own = |node: &Node| node.children.iter().find(is_unit).map(Node::stated);
+    fn unit(&self, axis: usize) -> Option<StatedUnit> {
+        let is_unit = |child: &&WktNode| ["UNIT", "LENGTHUNIT"].contains(&child.keyword.as_str());
+        let own = |node: &WktNode| node.children.iter().find(is_unit).map(WktNode::stated);
         self.axes().nth(axis).and_then(own).or_else(|| own(self))
     }
 
-    fn stated(&self) -> Stated {
+    fn stated(&self) -> StatedUnit {
         let metres = self.values.get(1).and_then(|text| text.parse().ok());
-        Stated { name: self.values.first().cloned(), metres }
+        StatedUnit { name: self.values.first().cloned(), metres }
     }
 
     /// The code in the EPSG registry.
     fn code(&self) -> Option<u32> {
-        let is_id = |child: &&Node| ["ID", "AUTHORITY"].contains(&child.keyword.as_str());
+        let is_id = |child: &&WktNode| ["ID", "AUTHORITY"].contains(&child.keyword.as_str());
         let id = self.children.iter().find(is_id)?;
         let is_epsg = id.values.first()?.eq_ignore_ascii_case("EPSG");
         is_epsg.then(|| id.values.get(1)?.parse().ok())?
@@ -128,18 +128,18 @@ impl Node {
 }
 
 /// Parser of a text.
-struct Reader<'a> {
+struct WktReader<'a> {
     rest: &'a str,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> WktReader<'a> {
     /// The keyword and brackets at the beginning of the text; a truncated text gives what it holds.
-    fn node(&mut self, depth: usize) -> Option<Node> {
+    fn node(&mut self, depth: usize) -> Option<WktNode> {
         let keyword = self.word();
         if keyword.is_empty() || !(self.skip('[') || self.skip('(')) || depth > MAX_DEPTH {
             return None;
         }
-        let mut node = Node { keyword: keyword.to_ascii_uppercase(), ..Node::default() };
+        let mut node = WktNode { keyword: keyword.to_ascii_uppercase(), ..WktNode::default() };
         loop {
             self.rest = self.rest.trim_start();
             if self.skip(']') || self.skip(')') || self.rest.is_empty() {
@@ -213,7 +213,8 @@ mod tests {
     /// System, horizontal and vertical unit as stated.
     fn read_text(text: &str) -> (System, Option<Named>, Option<Named>) {
         let found = super::read(text.as_bytes()).expect("WKT");
-        let pair = |s: Stated| (s.name.unwrap_or_default(), s.metres.expect("a number of metres"));
+        let pair =
+            |s: StatedUnit| (s.name.unwrap_or_default(), s.metres.expect("a number of metres"));
         (found.system, found.horizontal.map(pair), found.vertical.map(pair))
     }
 

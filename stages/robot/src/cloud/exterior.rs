@@ -1,7 +1,7 @@
 //! Finds which side of a link's surface faces the outside, if any. Vendors' meshes contain motors
 //! and bolts that no scanner sees, and triangles with reversed orientation.
 
-use super::Sample;
+use super::SurfaceSample;
 use crate::model::Mesh;
 use nalgebra::Vector3;
 use parry3d::bounding_volume::Aabb;
@@ -56,7 +56,7 @@ impl Shell {
 
     /// The side from which more rays escape, if enough escape on either; stops early where the case
     /// is clear.
-    pub(super) fn side(&self, sample: &Sample, blockers: &mut Blockers) -> Option<Side> {
+    pub(super) fn side(&self, sample: &SurfaceSample, blockers: &mut Blockers) -> Option<Side> {
         let (mut front, mut back) = (0, 0);
         let [ahead, behind] = &mut blockers.0;
         for round in (0..N_RAYS).step_by(N_FIRST) {

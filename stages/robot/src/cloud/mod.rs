@@ -20,7 +20,7 @@ const JUDGED_DEPTH: f32 = 0.004;
 
 /// A place on the surface, with its normal.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
+struct SurfaceSample {
     at: Vector3<f32>,
     normal: Vector3<f32>,
 }
@@ -99,7 +99,7 @@ fn candidates(
     whole: f64,
     n: usize,
     random: &mut Random,
-) -> Vec<Sample> {
+) -> Vec<SurfaceSample> {
     let step = whole / n as f64;
     let mut out = Vec::with_capacity(n + 1);
     let mut next = step * random.unit();
@@ -117,7 +117,7 @@ fn candidates(
         let (mut u, mut v) = (random.unit(), random.unit());
         while next < sum {
             let (s, t) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-            out.push(Sample {
+            out.push(SurfaceSample {
                 at: a + (b - a) * s as f32 + (c - a) * t as f32,
                 normal: normal.cast(),
             });
@@ -130,7 +130,7 @@ fn candidates(
 }
 
 /// The group of candidates that are judged together: orientation, cell, and depth along the normal.
-fn key(sample: &Sample) -> (u8, [i32; 4]) {
+fn key(sample: &SurfaceSample) -> (u8, [i32; 4]) {
     let n = sample.normal;
     let axis = n.iamax();
     let facing = (2 * axis + usize::from(n[axis] < 0.0)) as u8;
@@ -142,7 +142,7 @@ fn key(sample: &Sample) -> (u8, [i32; 4]) {
 }
 
 /// The candidates on the outer surface, with their normals turned outward.
-fn outer(mesh: &Mesh, candidates: Vec<Sample>) -> Vec<Sample> {
+fn outer(mesh: &Mesh, candidates: Vec<SurfaceSample>) -> Vec<SurfaceSample> {
     let shell = Shell::new(mesh);
     let mut order: Vec<(_, u32)> = candidates.iter().map(key).zip(0..).collect();
     order.sort_unstable();
@@ -165,7 +165,7 @@ fn outer(mesh: &Mesh, candidates: Vec<Sample>) -> Vec<Sample> {
     (candidates.into_iter().zip(sides))
         .filter_map(|(sample, side)| match side? {
             Side::Front => Some(sample),
-            Side::Back => Some(Sample { at: sample.at, normal: -sample.normal }),
+            Side::Back => Some(SurfaceSample { at: sample.at, normal: -sample.normal }),
         })
         .collect()
 }

@@ -1,7 +1,7 @@
 //! Selects samples from candidates so that every prefix of the result keeps its distances, too
 //! (Poisson-disk sampling by dart throwing with a shrinking radius).
 
-use super::{Random, Sample};
+use super::{Random, SurfaceSample};
 
 /// Radius of a dart relative to the spacing; with this value there are as many samples as squares
 /// of the spacing fit into the area.
@@ -14,16 +14,16 @@ const SHRINK: f64 = std::f64::consts::FRAC_1_SQRT_2;
 const N_DARTS: f64 = 6.0;
 
 pub(super) fn spread(
-    candidates: Vec<Sample>,
+    candidates: Vec<SurfaceSample>,
     area: f64,
     spacing: f64,
     random: &mut Random,
-) -> Vec<Sample> {
+) -> Vec<SurfaceSample> {
     let mut waiting = candidates;
     for at in (1..waiting.len()).rev() {
         waiting.swap(at, random.below(at + 1));
     }
-    let mut out: Vec<Sample> = Vec::new();
+    let mut out: Vec<SurfaceSample> = Vec::new();
     let last = RADIUS * spacing;
     let mut radius = (RADIUS * (area / N_COARSEST).sqrt()).max(last);
     loop {
@@ -37,9 +37,14 @@ pub(super) fn spread(
     }
 }
 
-/// Moves those of the first `n_darts` candidates that keep their distance from `waiting` to `out`.
-fn throw(out: &mut Vec<Sample>, waiting: &mut Vec<Sample>, n_darts: usize, radius: f32) {
-    let mut grid = Grid::new(radius, out.len() + waiting.len().min(n_darts));
+/// Moves those of the first `n_darts` that keep their distance from `waiting` to `out`.
+fn throw(
+    out: &mut Vec<SurfaceSample>,
+    waiting: &mut Vec<SurfaceSample>,
+    n_darts: usize,
+    radius: f32,
+) {
+    let mut grid = SampleGrid::new(radius, out.len() + waiting.len().min(n_darts));
     for sample in out.iter() {
         grid.add(sample);
     }
@@ -56,23 +61,23 @@ fn throw(out: &mut Vec<Sample>, waiting: &mut Vec<Sample>, n_darts: usize, radiu
 }
 
 /// Samples by cell in a hash table with chaining. A collision of two cells costs time only.
-struct Grid {
+struct SampleGrid {
     radius: f32,
     first: Vec<u32>,
     /// Each sample with the index of the next one in its slot.
-    samples: Vec<(Sample, u32)>,
+    samples: Vec<(SurfaceSample, u32)>,
 }
 
 const NONE: u32 = u32::MAX;
 
-impl Grid {
+impl SampleGrid {
     fn new(radius: f32, n: usize) -> Self {
         let n_slots = (2 * n).next_power_of_two().max(64);
         Self { radius, first: vec![NONE; n_slots], samples: Vec::with_capacity(n) }
     }
 
     /// Cells are two radii wide, so that a ball of one radius touches two of them along each axis.
-    fn cell(&self, sample: &Sample, shift: f32) -> [i32; 3] {
+    fn cell(&self, sample: &SurfaceSample, shift: f32) -> [i32; 3] {
         [0, 1, 2].map(|k| (sample.at[k] / (2.0 * self.radius) + shift).floor() as i32)
     }
 
@@ -84,7 +89,7 @@ impl Grid {
         ((h ^ (h >> 29)) as usize) & (self.first.len() - 1)
     }
 
-    fn add(&mut self, sample: &Sample) {
+    fn add(&mut self, sample: &SurfaceSample) {
         let slot = self.slot(self.cell(sample, 0.0));
         let at = self.samples.len() as u32;
         self.samples.push((*sample, std::mem::replace(&mut self.first[slot], at)));
@@ -92,7 +97,7 @@ impl Grid {
 
     /// Whether a sample that faces into the same half space is nearer than the radius. The other
     /// side of a sheet counts as another surface.
-    fn is_taken(&self, sample: &Sample) -> bool {
+    fn is_taken(&self, sample: &SurfaceSample) -> bool {
         let (low, own) = (self.cell(sample, -0.5), self.cell(sample, 0.0));
         // The sample's own cell is tested first, since most conflicts are found there.
         let own = (0..3).map(|k| (own[k] - low[k]) << k).sum::<i32>();

@@ -3,7 +3,7 @@
 //! their meshes.
 
 use super::Soup;
-use crate::load::Settings;
+use crate::settings::Settings;
 use contract::check_xml;
 use nalgebra::{Matrix4, Rotation3, Unit, Vector3};
 use roxmltree::{Document, Node};
@@ -28,7 +28,7 @@ pub(super) fn read(text: &str, settings: &Settings) -> Result<Soup, String> {
         return Err(format!("not a COLLADA file, opens with \"{}\"", root.tag_name().name()));
     }
     let mut scene =
-        Scene::new(root, (text.len() as u64 + SMALL).saturating_mul(settings.max_mesh_growth))?;
+        DaeScene::new(root, (text.len() as u64 + SMALL).saturating_mul(settings.max_mesh_growth))?;
     let roots = scene.roots(root);
     for node in &roots {
         scene.node(*node, Matrix4::identity(), 0)?;
@@ -61,7 +61,7 @@ fn rounded(ratio: f64) -> f64 {
     (ratio * digit).round() / digit
 }
 
-struct Scene<'a, 'i> {
+struct DaeScene<'a, 'i> {
     by_id: HashMap<&'a str, Node<'a, 'i>>,
     unit: f64,
     soup: Soup,
@@ -97,7 +97,7 @@ fn index_list(text: &str) -> Result<Vec<usize>, String> {
         .collect()
 }
 
-impl<'a, 'i> Scene<'a, 'i> {
+impl<'a, 'i> DaeScene<'a, 'i> {
     fn new(root: Node<'a, 'i>, left: u64) -> Result<Self, String> {
         let mut by_id = HashMap::new();
         for node in root.descendants() {
@@ -237,8 +237,12 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    /// The position of the vertex index among the indices of one corner.
-    fn layout(&self, mesh: Node<'a, 'i>, part: Node<'a, 'i>) -> Result<Option<Layout<'a>>, String> {
+    /// Where the index of a corner's position stands among the indices of one corner.
+    fn layout(
+        &self,
+        mesh: Node<'a, 'i>,
+        part: Node<'a, 'i>,
+    ) -> Result<Option<DaeLayout<'a>>, String> {
         let mut stride = 0;
         let mut position = None;
         for input in part.children().filter(|n| n.tag_name().name() == "input") {
@@ -266,7 +270,7 @@ impl<'a, 'i> Scene<'a, 'i> {
             }
         }
         match position {
-            Some((source, offset)) => Ok(Some(Layout { source, offset, stride })),
+            Some((source, offset)) => Ok(Some(DaeLayout { source, offset, stride })),
             None if part.children().any(|n| n.tag_name().name() == "p") => {
                 Err("triangles name no positions".to_owned())
             }
@@ -325,7 +329,7 @@ impl<'a, 'i> Scene<'a, 'i> {
     fn faces(
         &mut self,
         part: Node<'a, 'i>,
-        layout: &Layout,
+        layout: &DaeLayout,
         first: usize,
         n: usize,
     ) -> Result<(), String> {
@@ -380,7 +384,7 @@ impl<'a, 'i> Scene<'a, 'i> {
     }
 }
 
-struct Layout<'a> {
+struct DaeLayout<'a> {
     source: &'a str,
     offset: usize,
     stride: usize,

@@ -7,8 +7,8 @@ pub(crate) mod primitive;
 mod stl;
 
 use crate::encoding;
-use crate::load::Settings;
 use crate::model::Mesh;
+use crate::settings::Settings;
 use geometry::{Pose, Vector, narrow::local_f32};
 use std::collections::HashMap;
 

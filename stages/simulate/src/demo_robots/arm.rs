@@ -1,7 +1,7 @@
 //! The small six-axis demo robot: a bench-top arm of 1.1 m reach with its upper arm on one side.
 
 use super::castings::{boom, cheek, foot, hub, motor, pipe, rib, tool_plate, trunk};
-use super::design::{Design, Hinge, Part};
+use super::design::{Design, DesignPart, Hinge};
 use super::{ARM, FULL_TURN, X, Y, Z};
 use crate::solid::{Solid, bolts, cuboid, disc};
 
@@ -19,7 +19,7 @@ const FORE: f64 = 0.37;
 const WRIST: f64 = 0.075;
 
 pub(super) fn design() -> Design {
-    let part = |name, body| Part { name, body: Some(body) };
+    let part = |name, body| DesignPart { name, body: Some(body) };
     Design {
         name: ARM,
         parts: vec![
@@ -30,7 +30,7 @@ pub(super) fn design() -> Design {
             part("link_4", forearm()),
             part("link_5", wrist()),
             part("link_6", Solid::of([tool_plate(0.036, 0.022), sensor()])),
-            Part { name: "tool0", body: None },
+            DesignPart { name: "tool0", body: None },
         ],
         hinges: vec![
             Hinge::turn("joint_1", "base_link", "link_1", [0.0, 0.0, NECK], Z, [-2.96, 2.96]),

@@ -70,10 +70,10 @@ pub(super) fn hub(at: [f64; 2], radius: f64, y: [f64; 2]) -> Solid {
 }
 
 /// A section of a boom: x, centre (y, z), size (y, z), radius of its corners; metres.
-pub(super) type Section = (f64, [f64; 2], [f64; 2], f64);
+pub(super) type BoomSection = (f64, [f64; 2], [f64; 2], f64);
 
 /// A casting along x through sections.
-pub(super) fn boom(sections: &[Section]) -> Solid {
+pub(super) fn boom(sections: &[BoomSection]) -> Solid {
     let rings: Vec<Ring> = sections
         .iter()
         .map(|&(x, c, s, r)| rounded([-c[1], c[0], x], [s[1], s[0]], r, 8))
@@ -82,7 +82,7 @@ pub(super) fn boom(sections: &[Section]) -> Solid {
 }
 
 /// A casting along z through sections: z, centre (x, y), size (x, y), radius of its corners.
-pub(super) fn trunk(sections: &[Section]) -> Solid {
+pub(super) fn trunk(sections: &[BoomSection]) -> Solid {
     let rings: Vec<Ring> =
         sections.iter().map(|&(z, c, s, r)| rounded([c[0], c[1], z], s, r, 8)).collect();
     loft(&rings)

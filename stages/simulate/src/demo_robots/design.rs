@@ -4,7 +4,7 @@ use crate::solid::Solid;
 use std::fmt::Write;
 
 /// A link with its body.
-pub(super) struct Part {
+pub(super) struct DesignPart {
     pub(super) name: &'static str,
     pub(super) body: Option<Solid>,
 }
@@ -80,13 +80,13 @@ impl Hinge {
 }
 
 /// A sub chain with a URDF of its own.
-pub(super) struct SubChain {
+pub(super) struct DesignSubChain {
     /// Name of the sub chain; its file is `sub_<name>.urdf`.
     pub(super) name: &'static str,
     pub(super) kind: &'static str,
     /// Link of the main URDF to which it is attached.
     pub(super) root: &'static str,
-    pub(super) parts: Vec<Part>,
+    pub(super) parts: Vec<DesignPart>,
     pub(super) hinges: Vec<Hinge>,
     /// Link, point, link and point (metres) of the pin that closes the loop.
     pub(super) pin: (&'static str, [f64; 3], &'static str, [f64; 3]),
@@ -95,19 +95,19 @@ pub(super) struct SubChain {
 /// A whole robot.
 pub(super) struct Design {
     pub(super) name: &'static str,
-    pub(super) parts: Vec<Part>,
+    pub(super) parts: Vec<DesignPart>,
     pub(super) hinges: Vec<Hinge>,
     pub(super) tip: &'static str,
-    pub(super) sub_chains: Vec<SubChain>,
+    pub(super) sub_chains: Vec<DesignSubChain>,
     pub(super) effector: Option<&'static str>,
 }
 
 /// A path relative to the library's folder, and the content of the file.
-pub type File = (String, Vec<u8>);
+pub type LibraryFile = (String, Vec<u8>);
 
 impl Design {
     /// All files of the robot's folder.
-    pub(super) fn files(&self) -> Vec<File> {
+    pub(super) fn files(&self) -> Vec<LibraryFile> {
         let mut out = Vec::new();
         let mut put =
             |path: &str, bytes: Vec<u8>| out.push((format!("{}/{path}", self.name), bytes));
@@ -156,7 +156,7 @@ fn mesh_path(part: &str) -> String {
     format!("meshes/{part}.stl")
 }
 
-fn urdf(name: &str, root: Option<&str>, parts: &[Part], hinges: &[Hinge]) -> String {
+fn urdf(name: &str, root: Option<&str>, parts: &[DesignPart], hinges: &[Hinge]) -> String {
     let mut t = format!("<?xml version=\"1.0\"?>\n<robot name=\"{name}\">\n");
     if let Some(root) = root {
         let _ = writeln!(t, "  <link name=\"{root}\"/>");

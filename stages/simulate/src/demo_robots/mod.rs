@@ -7,9 +7,10 @@ mod design;
 mod gun;
 mod palletiser;
 mod welder;
+mod welder_dimensions;
 mod welder_loops;
 
-pub use design::File;
+pub use design::LibraryFile;
 
 /// Name of the small six-axis robot, 1.1 m reach.
 pub const ARM: &str = "demo_arm_1100";
@@ -22,7 +23,7 @@ pub const PALLETISER: &str = "demo_palletiser_2000";
 /// All files of the library, sorted by robot, then file. Paths are relative to its folder, with `/`
 /// between parts.
 #[must_use]
-pub fn files() -> Vec<File> {
+pub fn files() -> Vec<LibraryFile> {
     [arm::design(), palletiser::design(), welder::design()]
         .iter()
         .flat_map(design::Design::files)

@@ -2,7 +2,7 @@
 //! drives the forearm from the carousel.
 
 use super::castings::{bar, boom, cheek, foot, hub, motor, pipe, rib, trunk};
-use super::design::{Design, Hinge, Part, SubChain};
+use super::design::{Design, DesignPart, DesignSubChain, Hinge};
 use super::{FULL_TURN, PALLETISER, Y, Z};
 use crate::solid::{Solid, bolts, cuboid, disc, lathe};
 
@@ -28,7 +28,7 @@ const ROD_Y: f64 = 0.265;
 const FREE: [f64; 2] = [-3.2, 3.2];
 
 pub(super) fn design() -> Design {
-    let part = |name, body| Part { name, body: Some(body) };
+    let part = |name, body| DesignPart { name, body: Some(body) };
     Design {
         name: PALLETISER,
         parts: vec![
@@ -40,7 +40,7 @@ pub(super) fn design() -> Design {
             part("wrist_plate", wrist_plate()),
             part("link_4", flange()),
             part("lever", lever()),
-            Part { name: "tool0", body: None },
+            DesignPart { name: "tool0", body: None },
         ],
         hinges: hinges(),
         tip: "tool0",
@@ -68,12 +68,12 @@ fn hinges() -> Vec<Hinge> {
 }
 
 /// The bars, each a sub chain that a pin closes.
-fn bars() -> Vec<SubChain> {
-    let bar_chain = |name, root, link: &'static str, joint, at, body, pin| SubChain {
+fn bars() -> Vec<DesignSubChain> {
+    let bar_chain = |name, root, link: &'static str, joint, at, body, pin| DesignSubChain {
         name,
         kind: "RR",
         root,
-        parts: vec![Part { name: link, body: Some(body) }],
+        parts: vec![DesignPart { name: link, body: Some(body) }],
         hinges: vec![Hinge::turn(joint, root, link, at, Y, FREE)],
         pin,
     };

@@ -2,33 +2,24 @@
 //! drives the forearm (RRR), and a gun whose sliding electrode is the seventh joint.
 
 use super::castings::{boom, cheek, foot, hub, motor, pipe, rib, tool_plate, trunk};
-use super::design::{Design, Hinge, Part};
+use super::design::{Design, DesignPart, Hinge};
 use super::gun::{electrode, gun};
+use super::welder_dimensions::{CYLINDER_PIN, LEVER, ROD_PIN, SHOULDER, UPPER};
 use super::welder_loops::{balancer, parallelogram};
 use super::{FULL_TURN, WELDER, X, Y, Z};
 use crate::solid::{Solid, bolts, cuboid, disc};
 
 /// Height of joint 1 above the foot, metres.
 const NECK: f64 = 0.36;
-/// Joint 2 from joint 1, metres.
-pub(super) const SHOULDER: [f64; 3] = [0.33, 0.0, 0.34];
-/// Length of the upper arm, metres.
-pub(super) const UPPER: f64 = 1.075;
 /// Joint 4 from joint 3, metres.
 const ELBOW: [f64; 3] = [0.34, 0.0, 0.23];
 /// Length of the forearm, metres.
 const FORE: f64 = 0.88;
 /// Joint 6 from joint 5, metres.
 const WRIST: f64 = 0.20;
-/// Pin of the balancer's cylinder on link_1, metres.
-pub(super) const CYLINDER_PIN: [f64; 3] = [-0.36, -0.30, 0.10];
-/// Pin of the balancer's rod on link_2, metres.
-pub(super) const ROD_PIN: [f64; 3] = [-0.18, -0.30, 0.12];
-/// Length of the lever and of link_3's rear arm, metres.
-pub(super) const LEVER: f64 = 0.36;
 
 pub(super) fn design() -> Design {
-    let part = |name, body| Part { name, body: Some(body) };
+    let part = |name, body| DesignPart { name, body: Some(body) };
     Design {
         name: WELDER,
         parts: vec![
@@ -41,7 +32,7 @@ pub(super) fn design() -> Design {
             part("link_6", tool_plate(0.10, 0.05)),
             part("gun_body", gun()),
             part("electrode", electrode()),
-            Part { name: "tool0", body: None },
+            DesignPart { name: "tool0", body: None },
         ],
         hinges: vec![
             Hinge::turn("joint_1", "base_link", "link_1", [0.0, 0.0, NECK], Z, FULL_TURN),

@@ -1,8 +1,8 @@
 //! The sub chains of the spot welder: balancer (RPR) and parallelogram (RRR).
 
 use super::castings::{bar, cheek, hub};
-use super::design::{Hinge, Part, SubChain};
-use super::welder::{CYLINDER_PIN, LEVER, ROD_PIN, SHOULDER, UPPER};
+use super::design::{DesignPart, DesignSubChain, Hinge};
+use super::welder_dimensions::{CYLINDER_PIN, LEVER, ROD_PIN, SHOULDER, UPPER};
 use super::{X, Y};
 use crate::solid::{Solid, cuboid, disc, lathe};
 
@@ -11,7 +11,7 @@ const LEVER_Y: f64 = 0.24;
 /// Plane of the parallelogram's rod, metres.
 const ROD_Y: f64 = 0.315;
 
-pub(super) fn balancer() -> SubChain {
+pub(super) fn balancer() -> DesignSubChain {
     let pin = [0, 1, 2].map(|i| SHOULDER[i] + ROD_PIN[i] - CYLINDER_PIN[i]);
     let length = pin[0].hypot(pin[2]);
     // The cylinder's x axis points at the rod's pin in the zero posture.
@@ -57,20 +57,20 @@ pub(super) fn balancer() -> SubChain {
             [-1.0, 1.0],
         )
     };
-    SubChain {
+    DesignSubChain {
         name: "balancer",
         kind: "RPR",
         root: "link_1",
         parts: vec![
-            Part { name: "balancer_cylinder", body: Some(cylinder) },
-            Part { name: "balancer_rod", body: Some(rod) },
+            DesignPart { name: "balancer_cylinder", body: Some(cylinder) },
+            DesignPart { name: "balancer_rod", body: Some(rod) },
         ],
         hinges: vec![to_cylinder, to_rod.slide()],
         pin: ("balancer_rod", [0.0; 3], "link_2", ROD_PIN),
     }
 }
 
-pub(super) fn parallelogram() -> SubChain {
+pub(super) fn parallelogram() -> DesignSubChain {
     let lever = Solid::of([
         hub([0.0, 0.0], 0.14, [-0.035, 0.035]),
         cheek(&[([0.0, 0.0], 0.11), ([-LEVER, 0.0], 0.055)], [-0.03, 0.03], 0.008),
@@ -78,13 +78,13 @@ pub(super) fn parallelogram() -> SubChain {
     ]);
     let dy = ROD_Y - LEVER_Y;
     let rod = bar([0.0, 0.0], [0.0, UPPER], 0.0, 0.034);
-    SubChain {
+    DesignSubChain {
         name: "parallelogram",
         kind: "RRR",
         root: "link_2",
         parts: vec![
-            Part { name: "lever", body: Some(lever) },
-            Part { name: "rod", body: Some(rod) },
+            DesignPart { name: "lever", body: Some(lever) },
+            DesignPart { name: "rod", body: Some(rod) },
         ],
         hinges: vec![
             Hinge::turn("joint_lever", "link_2", "lever", [0.0, LEVER_Y, 0.0], Y, [-1.6, 1.6]),

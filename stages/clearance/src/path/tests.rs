@@ -1,0 +1,155 @@
+//! Paths of an arm past drawn points; what is near on the way.
+
+use super::*;
+use crate::{Cells, KnownBounds};
+use contract::OneByOne;
+use geometry::{Aabb, Pose};
+use robot::{Model, Settings};
+
+/// An arm of one link, 1 m long and 0.1 m thick, that turns about z at its end.
+fn arm(dir: &std::path::Path) -> Model {
+    let urdf = "<robot name='arm'><link name='foot'/><link name='beam'><visual><origin xyz='0.5 0 0'/>\
+        <geometry><box size='1 0.1 0.1'/></geometry></visual></link><joint name='turn' type='revolute'>\
+        <parent link='foot'/><child link='beam'/><axis xyz='0 0 1'/>\
+        <limit lower='-3.2' upper='3.2' effort='1' velocity='1'/></joint></robot>";
+    let path = dir.join("arm.urdf");
+    std::fs::write(&path, urdf).expect("is written");
+    Model::load_urdf(&path, "arm", &Settings::default()).expect("loads").0
+}
+
+fn legs(body: &RobotBody<'_>, path: &[Vec<f64>]) -> Vec<Leg> {
+    path.windows(2).map(|pair| leg(body, &pair[0], &pair[1])).collect()
+}
+
+fn contacts(walk: &PathWalk<'_>) -> Vec<Contact> {
+    let mut all = Contacts::default();
+    (0..walk.n_pieces()).for_each(|piece| walk.add(walk.look(piece), &mut all));
+    all.all()
+}
+
+fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
+    let dir = tempfile::tempdir().expect("a folder");
+    let model = arm(dir.path());
+    let mut body = RobotBody::new(&model, BTreeMap::new(), margin, 0.0, &OneByOne);
+    let mut cells = Cells::within(crate::reach(&model) + margin + 0.1, &BTreeMap::new());
+    points.iter().for_each(|(p, what)| cells.add(*p, *what, false, 0));
+    cells.settle();
+    let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
+    let known = KnownBounds { world_from_base: Pose::identity(), bounds };
+    let mut around = Obstacles::new(&cells, &[], None, known);
+    body.stand(&[found], &mut around);
+    let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
+    let legs = legs(&body, &path);
+    let walk = PathWalk::new(&body, &around, &path, &legs, &[found]);
+    contacts(&walk)
+}
+
+#[test]
+fn a_post_in_the_way_is_hit_where_it_stands() {
+    // Half a turn; the post stands 90° on, 0.9 m away.
+    let post: Vec<_> =
+        (0..100).map(|k| ([0.0, 0.9, 0.002 * f64::from(k) - 0.1], What::Fixed)).collect();
+    let found = walk(&post, &[0.0, std::f64::consts::PI], 0.0, 0.02);
+    let [hit] = &found[..] else { panic!("one contact: {found:?}") };
+    assert!(!hit.as_found && hit.level >= ContactLevel::Hit && hit.gap == 0.0, "{hit:?}");
+    // The beam's side is 5 cm off its middle: 3.2° before, and as much behind; the margin and
+    // half a step more.
+    let share = (0.05_f64 / 0.9).asin() / std::f64::consts::PI;
+    assert!(hit.from < 0.5 - share && hit.from > 0.5 - 1.8 * share, "{hit:?}");
+    assert!(hit.to > 0.5 + share && hit.to < 0.5 + 1.8 * share, "{hit:?}");
+    assert!((hit.at.expect("a point") - Point::new(0.0, 0.9, 0.0)).norm() < 0.12);
+    // Beyond its end nothing is hit; within the margin it is near.
+    let beyond = |off: f64| vec![([0.0, 1.0 + off, 0.0], What::Fixed)];
+    assert!(walk(&beyond(0.04), &[0.0, 3.0], 0.0, 0.02).is_empty());
+    let near = walk(&beyond(0.015), &[0.0, 3.0], 0.0, 0.02);
+    assert!(near.len() == 1 && near[0].level == ContactLevel::Near, "{near:?}");
+    assert!(near[0].gap <= 0.015 && near[0].gap > 0.002, "{near:?}");
+}
+
+#[test]
+fn what_it_touched_where_it_was_found_is_told_apart_until_it_comes_nearer() {
+    // At its end, 1 cm away, as found; and a post that it turns into.
+    let points = [([1.01, 0.0, 0.0], What::Uncertain), ([0.0, 0.8, 0.0], What::Fixed)];
+    let found = walk(&points, &[0.0, 1.6], 0.0, 0.02);
+    let levels: Vec<_> =
+        found.iter().map(|c| (c.what, c.level >= ContactLevel::Hit, c.as_found)).collect();
+    assert_eq!(levels, [(What::Fixed, true, false), (What::Beside, false, true)]);
+    // The same point is none of its own where it was found elsewhere.
+    assert!(walk(&points[..1], &[0.0, 1.6], 1.6, 0.02).iter().all(|c| !c.as_found));
+    // It was near where it was found, and is inside on the way.
+    let points = [([0.9, 0.06, 0.0], What::Fixed)];
+    let found = walk(&points, &[0.0, 0.1], 0.0, 0.02);
+    assert!(found.iter().any(|c| c.level >= ContactLevel::Hit && !c.as_found), "{found:?}");
+}
+
+#[test]
+fn what_was_near_outside_is_not_as_found_inside() {
+    // Beside the beam, 15 mm off its side; it is pushed into by 10 mm and no more.
+    let points = [([0.5, 0.065, 0.0], What::Fixed)];
+    let found = walk(&points, &[0.0, 0.05], 0.0, 0.02);
+    assert!(found.iter().any(|c| c.level == ContactLevel::Inside && !c.as_found), "{found:?}");
+}
+
+#[test]
+fn points_on_its_own_surface_are_no_obstacle() {
+    // A patch that a mask left to the fixed world, so far off the beam's side.
+    let patch = |off: f64| -> Vec<_> {
+        let at = |k: u32| [0.4 + 0.01 * f64::from(k % 10), 0.05 + off, 0.01 * f64::from(k / 10)];
+        (0..40).map(|k| (at(k), What::Fixed)).collect()
+    };
+    assert_eq!(walk(&patch(0.003), &[0.0, 0.3], 0.0, 0.02), []);
+    let hit = |c: &Contact| c.level >= ContactLevel::Hit && !c.as_found;
+    assert!(walk(&patch(0.03), &[0.0, 0.3], 0.0, 0.02).iter().any(hit));
+}
+
+#[test]
+fn uncertain_points_beside_it_may_move_with_it() {
+    // Above the beam's end; and a post that the beam passes below, but not they.
+    let beside = (0..8).map(|k| ([0.9, 0.0, 0.07 + 0.01 * f64::from(k)], What::Uncertain));
+    let post = std::iter::once(([0.0, 0.9, 0.12], What::Fixed));
+    let points: Vec<_> = beside.chain(post).collect();
+    let found = walk(&points, &[0.0, 3.0], 0.0, 0.02);
+    let fixed: Vec<_> = found.iter().filter(|c| c.what == What::Fixed).collect();
+    assert!(
+        fixed.len() == 1 && fixed[0].is_doubtful && fixed[0].level == ContactLevel::Hit,
+        "{found:?}"
+    );
+    let away = found.iter().filter(|c| c.what == What::Beside && !c.as_found);
+    assert!(away.count() == 0, "it does not come nearer to them: {found:?}");
+}
+
+#[test]
+fn whole_turns_are_no_rest() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let model = arm(dir.path());
+    let body = RobotBody::new(&model, BTreeMap::new(), 0.02, 0.0, &OneByOne);
+    let turns = MAX_STEPS as f64 * std::f64::consts::TAU;
+    assert!(leg(&body, &[0.0], &[turns]).jumps && leg(&body, &[0.0], &[1e308]).jumps);
+}
+
+#[test]
+fn what_lies_inside_of_a_link_from_the_beginning_is_hit() {
+    let found = walk(&[([0.5, 0.0, 0.0], What::Uncertain)], &[0.0], 1.0, 0.005);
+    assert!(found.len() == 1 && found[0].level == ContactLevel::Inside, "{found:?}");
+}
+
+#[test]
+fn space_of_which_nothing_is_known_is_not_free() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let model = arm(dir.path());
+    let body = RobotBody::new(&model, BTreeMap::new(), 0.02, 0.0, &OneByOne);
+    let bounds = Aabb { min: [-9.0, -0.2, -9.0], max: [9.0, 9.0, 9.0] };
+    let known = KnownBounds { world_from_base: Pose::identity(), bounds };
+    let around = Obstacles::new(
+        &Cells::within(crate::reach(&model) + 0.2, &BTreeMap::new()),
+        &[],
+        None,
+        known,
+    );
+    let path = [vec![0.0], vec![-1.0]];
+    let legs = legs(&body, &path);
+    let walk = PathWalk::new(&body, &around, &path, &legs, &[0.0]);
+    let found = contacts(&walk);
+    assert!(found.len() == 1 && found[0].what == What::Unseen && found[0].at.is_none());
+    assert!(found[0].from > 0.0 && found[0].to == 1.0, "{found:?}");
+}
