@@ -26,8 +26,8 @@ use geometry::Aabb;
 /// Settings of the cluster stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Number of empty voxels that a cluster may bridge. The default of 1 allows for the holes that
-    /// thin and distant parts have at 5 cm.
+    /// Number of empty voxels that a cluster may bridge. The default of 1 allows for the holes
+    /// that thin and distant parts have at 5 cm.
     pub gap: i32,
     /// Smallest height of a voxel's bottom above the floor, metres; the default is three times the
     /// noise of a common scanner.

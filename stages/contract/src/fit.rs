@@ -81,8 +81,8 @@ pub struct RunnerUp {
     pub score: f64,
     /// Whether it is the same model in another posture.
     pub same_model: bool,
-    /// How clearly the beams prefer the fit to this explanation, judged on the surface of the links
-    /// that stand differently: about 0 where neither is better.
+    /// How clearly the beams prefer the fit to this explanation, judged on the surface of the
+    /// links that stand differently: about 0 where neither is better.
     pub margin: f64,
 }
 
@@ -150,8 +150,8 @@ pub struct JointFrame {
     pub slides: bool,
     /// Shift of the joint's origin, joint frame of the model, metres.
     pub shift: [f64; 3],
-    /// Rotation vector of the joint's frame, joint frame of the model, radians. Its component along
-    /// the axis is zero, since the joint's own value takes that part.
+    /// Rotation vector of the joint's frame, joint frame of the model, radians. Its component
+    /// along the axis is zero, since the joint's own value takes that part.
     pub turn: [f64; 3],
     /// Standard deviations of `shift` (metres) and `turn` (radians), axis by axis.
     pub sigma: [f64; 6],

@@ -27,8 +27,8 @@ pub struct ResidualVoxel {
     pub n_link: u32,
     /// The link nearest to any of its points.
     pub nearest: LinkAt,
-    /// Distance of the nearest point from that link's surface, metres; infinite beyond the reach of
-    /// the link's distance field.
+    /// Distance of the nearest point from that link's surface, metres; infinite beyond the reach
+    /// of the link's distance field.
     /// reach.
     pub distance: f32,
     /// Whether it lies at the border of the region, so that its body may continue outside.

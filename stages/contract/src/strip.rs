@@ -12,8 +12,8 @@ pub struct Strip {
     pub mask: MaskId,
     /// Smallest place in the mask of the points of this strip.
     pub first_place: u64,
-    /// Place in the mask of each point, less `first_place`; ascending. Points with coordinates that
-    /// are not finite are dropped and leave a gap.
+    /// Place in the mask of each point, less `first_place`; ascending. Points with coordinates
+    /// that are not finite are dropped and leave a gap.
     pub place: Vec<u32>,
     /// Coordinates in the scan frame, metres.
     pub xyz: Vec<[f32; 3]>,

@@ -17,10 +17,12 @@ pub struct PlanePatch {
     pub rms: f64,
     /// Bounds of the points in the world, metres.
     pub bounds: Aabb,
-    /// Area that the points cover, m²: from solid angle, range and incidence, not from the outline.
+    /// Area that the points cover, m²: from solid angle, range and incidence, not from the
+    /// outline.
     pub area: f64,
-    /// Ground cells that the points touch, sorted: index (floor(x/0.25 m), floor(y/0.25 m)), number
-    /// of points, and sum of their z (metres). Empty where the patch is not nearly horizontal.
+    /// Ground cells that the points touch, sorted: index (floor(x/0.25 m), floor(y/0.25 m)),
+    /// number of points, and sum of their z (metres). Empty where the patch is not nearly
+    /// horizontal.
     pub ground: Vec<([i32; 2], u32, f64)>,
 }
 

@@ -21,8 +21,8 @@ pub struct AtomicFile {
     part: PathBuf,
     path: PathBuf,
     waiting: AlignedBlock,
-    /// Whether writes bypass the page cache; `None` before the first full buffer, which small files
-    /// never reach.
+    /// Whether writes bypass the page cache; `None` before the first full buffer, which small
+    /// files never reach.
     direct: Option<bool>,
 }
 

@@ -58,8 +58,8 @@ pub struct RobotEntry {
     /// Names of the joints whose values are metres; those of all others are radians.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub slides: Vec<String>,
-    /// Standard deviation of each free joint in the same unit; π/√3, that of a uniform angle, where
-    /// the points say nothing of it.
+    /// Standard deviation of each free joint in the same unit; π/√3, that of a uniform angle,
+    /// where the points say nothing of it.
     pub sigma: NamedMap<f64>,
     /// Values of the joints that follow the free ones by a rule or in a closed loop, in the same
     /// units.

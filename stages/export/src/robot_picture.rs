@@ -32,8 +32,8 @@ struct PictureView {
     origin: Point,
     points: Vec<(f32, Rgb)>,
     outline: Vec<bool>,
-    /// For each pixel the depth of the posture's surface and the cosine of its angle to the viewer,
-    /// and the distance of the nearest point from it.
+    /// For each pixel the depth of the posture's surface and the cosine of its angle to the
+    /// viewer, and the distance of the nearest point from it.
     surface: Vec<(f32, f32)>,
     residuals: Vec<(f32, f32)>,
 }

@@ -140,8 +140,8 @@ pub(crate) fn seen_through(patch: &PlanePatch, from: Vector, upper: &PieceLevel)
 pub(crate) struct Levels {
     /// Floor levels, largest first.
     pub(crate) floor: Vec<PieceLevel>,
-    /// Indices of the patches of ceilings, ascending. Their scanners are unknown; nothing can stand
-    /// on them.
+    /// Indices of the patches of ceilings, ascending. Their scanners are unknown; nothing can
+    /// stand on them.
     pub(crate) ceilings: Vec<usize>,
 }
 

@@ -45,8 +45,8 @@ pub struct FramePlace {
     pub laid: Laid,
     /// The evidence for and against it.
     pub evidence: PoseEvidence,
-    /// By how many more surfels the next best place is contradicted; `None` where there is no other
-    /// place.
+    /// By how many more surfels the next best place is contradicted; `None` where there is no
+    /// other place.
     pub margin: Option<i64>,
 }
 

@@ -42,7 +42,8 @@ pub struct PoseEvidence {
     pub n_where_old_saw_through: usize,
     /// Number of all new surfels.
     pub n_new: usize,
-    /// Number of surfels of the earlier session, near the new scanners, on surfaces of the new one.
+    /// Number of surfels of the earlier session, near the new scanners, on surfaces of the new
+    /// one.
     pub n_on_new: usize,
     /// Number of surfels of the earlier session where new beams passed through.
     pub n_where_new_saw_through: usize,

@@ -66,7 +66,8 @@ pub struct Faces {
     /// the images are not the faces of a cube.
     by_side: Option<[Vec<usize>; 6]>,
     /// If the largest coordinate of a place (scanner as origin) is at least this multiple of the
-    /// next one, the place lies on one face only; rasters extend up to half a cell beyond the edge.
+    /// next one, the place lies on one face only; rasters extend up to half a cell beyond the
+    /// edge.
     apart: f32,
 }
 

@@ -61,8 +61,8 @@ pub struct ScanDescription {
     /// Bounds of the points in the world, metres, where they are stated in the world or were
     /// computed from the points.
     pub bounds: Option<BoundsText>,
-    /// Stated bounds in the world, metres. Those that an E57 file states in the scan frame hold all
-    /// points, but may be wider than they are.
+    /// Stated bounds in the world, metres. Those that an E57 file states in the scan frame hold
+    /// all points, but may be wider than they are.
     pub stated_bounds: Option<BoundsText>,
     /// Messages about what is missing and which results suffer from it.
     pub notes: Vec<String>,

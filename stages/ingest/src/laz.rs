@@ -25,8 +25,8 @@ pub(crate) struct Laz {
     points_at: usize,
     n_points: u64,
     layered: bool,
-    /// Independently compressed runs of points (LAZ calls them chunks); empty where the file is one
-    /// stream that can only be read from its start.
+    /// Independently compressed runs of points (LAZ calls them chunks); empty where the file is
+    /// one stream that can only be read from its start.
     pub(crate) pieces: Vec<Extent>,
 }
 

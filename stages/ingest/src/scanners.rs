@@ -59,7 +59,7 @@ impl KnownScanners {
     /// Reads the text of a `--scanners` file.
     ///
     /// # Errors
-    /// As [`Scanners::read`].
+    /// As [`KnownScanners::read`].
     pub fn parse(text: &str) -> Result<Self> {
         const HINT: &str =
             "an entry has position, and may have name, point_source_id and quaternion_wxyz";

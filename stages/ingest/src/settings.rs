@@ -9,8 +9,8 @@ pub struct Settings {
     /// Largest XML section of an E57 file, bytes. Real ones stay below 1 MB even with thousands of
     /// images.
     pub max_xml_bytes: u64,
-    /// Largest number of elements, attributes and texts of that section; the XML reader keeps about
-    /// 80 bytes of each.
+    /// Largest number of elements, attributes and texts of that section; the XML reader keeps
+    /// about 80 bytes of each.
     pub max_xml_nodes: u64,
     /// Largest number of attributes of one element of that section. Real ones have below ten, and
     /// the XML reader compares each with all others.

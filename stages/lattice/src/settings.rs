@@ -43,8 +43,8 @@ pub struct Settings {
     /// Tilt up to which a patch counts as nearly horizontal, radians: 8°, more than a floor may
     /// have.
     pub level_tilt: f64,
-    /// Distance of neighbouring points that suffices for floors, planes and occupied space, metres;
-    /// rows and columns of denser scans are skipped there. A cable is
+    /// Distance of neighbouring points that suffices for floors, planes and occupied space,
+    /// metres; rows and columns of denser scans are skipped there. A cable is
     /// thicker than the default of 10 mm; scans of five million points have that at six metres.
     pub spacing: f64,
     /// Edge of a voxel of the occupied space, metres: finer than the gap between robot and fence.

@@ -132,8 +132,8 @@ struct Cleaner<'a> {
     findings: &'a mut Findings,
     /// Whether `quat_xyzw` is supported in this file.
     turns: bool,
-    /// Byte offsets of the line ends: a file may have thousands of problems, and each message needs
-    /// a line number.
+    /// Byte offsets of the line ends: a file may have thousands of problems, and each message
+    /// needs a line number.
     ends: Vec<usize>,
 }
 

@@ -45,7 +45,8 @@ pub struct Settings {
     pub sigma_range: f64,
     /// Standard deviation of the real casting from its mesh, metres.
     pub sigma_cad: f64,
-    /// Lower limit of the gate, the distance from a link up to which a point belongs to it, metres.
+    /// Lower limit of the gate, the distance from a link up to which a point belongs to it,
+    /// metres.
     pub min_gate: f64,
     /// Upper limit of the gate, metres; beyond it a hose may lie on the link.
     pub max_gate: f64,

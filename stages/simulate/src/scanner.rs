@@ -141,7 +141,8 @@ pub struct Mixed {
     pub radius: f64,
     /// Growth of the radius with range, metres a metre.
     pub divergence: f64,
-    /// Largest difference in range of parts that are averaged, metres; parts farther apart compete.
+    /// Largest difference in range of parts that are averaged, metres; parts farther apart
+    /// compete.
     pub depth: f64,
 }
 

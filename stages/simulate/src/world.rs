@@ -13,7 +13,7 @@ use robot::{Mesh, Model, Role};
 pub(crate) struct BodySurface {
     /// Label of points on it.
     pub(crate) label: Label,
-    /// Index of its object in [`World::objects`].
+    /// Index of its object in [`SceneTriangles::objects`].
     pub(crate) object: u16,
     /// Share of light that it reflects, 0..1.
     pub(crate) reflectance: f32,

@@ -67,9 +67,9 @@ pub(crate) struct ModeLimits {
     pub(crate) equal: f64,
     /// Margin up to which another value of the last joint is listed.
     pub(crate) nearly_equal: f64,
-    /// Margin up to which another value of a slide that closes a tool leaves it open: what the tool
-    /// holds looks like it where little of it is seen. Electrodes in plain view led by 0.6 and
-    /// more, those in a part by 0.17 to 0.6 where they were right, by 0.18 where not.
+    /// Margin up to which another value of a slide that closes a tool leaves it open: what the
+    /// tool holds looks like it where little of it is seen. Electrodes in plain view led by
+    /// 0.6 and more, those in a part by 0.17 to 0.6 where they were right, by 0.18 where not.
     pub(crate) slide_equal: f64,
     /// Squares that a value may have beyond the best one's and be as good.
     pub(crate) as_good: AsGood,
@@ -117,9 +117,9 @@ pub(crate) struct ProfileStep {
 
 /// Modes of a leaf joint.
 pub(crate) struct LeafLimits {
-    /// Another local minimum is as good if its excess over the best value is below so many standard
-    /// deviations of an excess by chance: of flanges that bolts make look alike the right one was
-    /// worse by up to 1.8; what is not alike by 3 and more.
+    /// Another local minimum is as good if its excess over the best value is below so many
+    /// standard deviations of an excess by chance: of flanges that bolts make look alike the
+    /// right one was worse by up to 1.8; what is not alike by 3 and more.
     pub(crate) clearly_worse_sigmas: f64,
 }
 
@@ -131,8 +131,8 @@ pub(crate) struct BendLimits {
     pub(crate) short: f64,
     /// Most values.
     pub(crate) n_values: usize,
-    /// Distance of the values of a slide, metres. They are compared as they are: a refinement would
-    /// be drawn to what the tool holds.
+    /// Distance of the values of a slide, metres. They are compared as they are: a refinement
+    /// would be drawn to what the tool holds.
     pub(crate) slide_step: f64,
     /// Most values of a slide.
     pub(crate) max_slides: f64,
@@ -202,8 +202,8 @@ pub(crate) struct FootLimits {
 pub(crate) struct MarginalLimits {
     /// Joints with more points on what they move are held by so many that the parabola is right.
     pub(crate) max_points: usize,
-    /// Values on either side of a joint's own at which the points are asked, one standard deviation
-    /// apart.
+    /// Values on either side of a joint's own at which the points are asked, one standard
+    /// deviation apart.
     pub(crate) n_beside: i32,
     /// Joints that are stated to be known so well are asked, radians: from 0.03° on it may be more
     /// than it should, up to 0.4°; beyond that it is wide enough, and six of it are another
@@ -263,8 +263,8 @@ pub(crate) struct RivalLimits {
     /// Slides that differ by more stand otherwise, metres.
     pub(crate) slid: f64,
     /// What beams have against the best, where points speak for it, or points where beams do,
-    /// counts so many times: a wrist that was 7° off was better by 0.19 for the beams, and worse by
-    /// 0.03 for the points.
+    /// counts so many times: a wrist that was 7° off was better by 0.19 for the beams, and worse
+    /// by 0.03 for the points.
     pub(crate) against: f64,
 }
 

@@ -37,8 +37,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) settings: &'a Settings,
     /// What is known of the base beforehand.
     pub(crate) prior: Option<Prior>,
-    /// Points of the scene within the robot's reach, thinned to one a grid cell and view: enough to
-    /// choose by. Indices into the scene's points, ascending.
+    /// Points of the scene within the robot's reach, thinned to one a grid cell and view: enough
+    /// to choose by. Indices into the scene's points, ascending.
     pub(crate) thin: &'a [u32],
     /// All points of the scene within the robot's reach: for adjustments.
     pub(crate) all: &'a [u32],
