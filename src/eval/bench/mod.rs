@@ -22,6 +22,7 @@ mod plot;
 pub mod rescan;
 mod score;
 mod shape;
+mod sheet;
 mod special;
 mod table;
 pub mod throughput;
@@ -102,7 +103,7 @@ pub fn accuracy(bench: &Bench, means: &Means, engine: &Engine) -> Result<String>
     let table = table::table(&rows) + &special::tables(&rows);
     if let Some(dir) = &bench.out {
         atomic::write(&dir.join("accuracy.md"), table.as_bytes())?;
-        atomic::write(&dir.join("accuracy.csv"), table::csv(&rows).as_bytes())?;
+        atomic::write(&dir.join("accuracy.csv"), table::csv(&rows)?.as_bytes())?;
         atomic::write(&dir.join("accuracy.json"), json(&rows)?.as_bytes())?;
         atomic::write(&dir.join("errors.svg"), plot::errors(&rows).as_bytes())?;
         atomic::write(&dir.join("reliability.svg"), plot::reliability(&rows).as_bytes())?;

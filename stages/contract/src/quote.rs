@@ -14,6 +14,7 @@
 //! | a string of YAML | [`yaml`] | in double quotes, odd characters become `\u…` or `\U…` |
 //! | text and attributes of XML | [`xml`] | references for what XML can hold; what it cannot becomes `\u{…}` |
 //! | a cell of CSV | [`csv`] | in double quotes; no spreadsheet takes it for a formula |
+//! | a cell that a CSV writer quotes | [`cell`] | the same without the quotes |
 //! | a part of a file's name | [`file_name`] | letters and digits of ASCII; all else becomes `_` |
 
 use std::borrow::Cow;
@@ -114,16 +115,22 @@ pub fn xml(text: &str) -> Cow<'_, str> {
     })
 }
 
-/// A cell of CSV, in double quotes. One that a spreadsheet would take for a formula begins with an
-/// apostrophe, which spreadsheets take for "this is text"; a number stays a number.
+/// The text of a cell of CSV, for a writer that puts quotes about it where needed. One that a
+/// spreadsheet would take for a formula begins with an apostrophe, which spreadsheets take for
+/// "this is text"; a number stays a number.
 #[must_use]
-pub fn csv(text: &str) -> String {
-    let shown = shown(text);
+pub fn cell(text: &str) -> String {
     let is_formula = text
         .starts_with(['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'])
         && text.parse::<f64>().is_err();
     let mark = if is_formula { "'" } else { "" };
-    format!("\"{mark}{}\"", shown.replace('"', "\"\""))
+    format!("{mark}{}", shown(text))
+}
+
+/// A cell of CSV, in double quotes; see [`cell`].
+#[must_use]
+pub fn csv(text: &str) -> String {
+    format!("\"{}\"", cell(text).replace('"', "\"\""))
 }
 
 /// A part of a file's name that every file system knows.

@@ -1,7 +1,8 @@
 //! Candidates in; a subset out whose members keep their distance, in an order in which every prefix
 //! does so too: darts thrown with a radius that shrinks.
 
-use super::{Random, Sample};
+use super::{Sample, below};
+use rand_xoshiro::SplitMix64;
 
 /// Radius of a dart in terms of the spacing: with this one there are as many
 /// samples as squares of the spacing.
@@ -17,11 +18,11 @@ pub(super) fn spread(
     candidates: Vec<Sample>,
     area: f64,
     spacing: f64,
-    random: &mut Random,
+    random: &mut SplitMix64,
 ) -> Vec<Sample> {
     let mut waiting = candidates;
     for at in (1..waiting.len()).rev() {
-        waiting.swap(at, random.below(at + 1));
+        waiting.swap(at, below(random, at + 1));
     }
     let mut out: Vec<Sample> = Vec::new();
     let last = RADIUS * spacing;
