@@ -66,7 +66,7 @@ pub fn accuracy(bench: &AccuracyBench, means: &Means, engine: &Engine) -> Result
     let table = table::table(&rows) + &other_tables::tables(&rows);
     if let Some(dir) = &bench.drawn.out {
         atomic::write(&dir.join("accuracy.md"), table.as_bytes())?;
-        atomic::write(&dir.join("accuracy.csv"), table::csv(&rows).as_bytes())?;
+        atomic::write(&dir.join("accuracy.csv"), table::csv(&rows)?.as_bytes())?;
         atomic::write(&dir.join("accuracy.json"), json(&rows)?.as_bytes())?;
         atomic::write(&dir.join("errors.svg"), plot::errors(&rows).as_bytes())?;
         atomic::write(&dir.join("reliability.svg"), plot::reliability(&rows).as_bytes())?;

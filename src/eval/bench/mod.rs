@@ -22,6 +22,7 @@ pub mod request;
 pub mod rescan;
 mod score;
 mod shape;
+mod sheet;
 mod table;
 pub mod throughput;
 mod time_plot;

@@ -2,7 +2,8 @@
 
 use super::labels::{LabelScores, share_of};
 use super::score::AccuracyRow;
-use contract::quote;
+use super::sheet;
+use contract::{Result, quote};
 use std::fmt::Write as _;
 
 /// One line a suite: what was found, how exact it is, whether standard deviations and verdicts
@@ -115,30 +116,42 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 /// One line a joint.
-pub(super) fn csv(rows: &[AccuracyRow]) -> String {
-    let mut out = String::from(
-        "suite,model,seed,scanners,robot_points,found,verdict,right,joint,truth,error,sigma,determined\n",
-    );
-    for row in rows {
-        let found = quote::csv(row.found.as_deref().unwrap_or(""));
-        for j in &row.joints {
-            let _ = writeln!(
-                out,
-                "{},{},{},{},{},{found},{},{},{},{},{},{},{}",
-                row.suite,
-                quote::csv(&row.model),
-                row.seed,
-                row.n_scanners,
-                row.n_robot_points,
-                row.verdict,
-                row.right,
-                quote::csv(&j.name),
-                j.truth,
-                j.error,
-                j.sigma,
-                j.determined
-            );
-        }
-    }
-    out
+///
+/// # Errors
+/// `Bug` where a line cannot be written.
+pub(super) fn csv(rows: &[AccuracyRow]) -> Result<String> {
+    let columns = [
+        "suite",
+        "model",
+        "seed",
+        "scanners",
+        "robot_points",
+        "found",
+        "verdict",
+        "right",
+        "joint",
+        "truth",
+        "error",
+        "sigma",
+        "determined",
+    ];
+    let joints = rows.iter().flat_map(|row| row.joints.iter().map(move |joint| (row, joint)));
+    let cells = joints.map(|(row, joint)| {
+        [
+            row.suite.clone(),
+            quote::cell(&row.model),
+            row.seed.to_string(),
+            row.n_scanners.to_string(),
+            row.n_robot_points.to_string(),
+            quote::cell(row.found.as_deref().unwrap_or("")),
+            row.verdict.clone(),
+            row.right.to_string(),
+            quote::cell(&joint.name),
+            joint.truth.to_string(),
+            joint.error.to_string(),
+            joint.sigma.to_string(),
+            joint.determined.to_string(),
+        ]
+    });
+    sheet::csv(columns, cells)
 }

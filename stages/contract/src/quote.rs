@@ -116,13 +116,18 @@ pub fn xml(text: &str) -> Cow<'_, str> {
 /// Writes a cell of CSV, in double quotes. Text that a spreadsheet would evaluate as a formula gets
 /// an apostrophe in front, which marks it as text; a number stays a number.
 #[must_use]
-pub fn csv(text: &str) -> String {
-    let shown = shown(text);
+pub fn cell(text: &str) -> String {
     let is_formula = text
         .starts_with(['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'])
         && text.parse::<f64>().is_err();
     let mark = if is_formula { "'" } else { "" };
-    format!("\"{mark}{}\"", shown.replace('"', "\"\""))
+    format!("{mark}{}", shown(text))
+}
+
+/// A cell of CSV, in double quotes; see [`cell`].
+#[must_use]
+pub fn csv(text: &str) -> String {
+    format!("\"{}\"", cell(text).replace('"', "\"\""))
 }
 
 /// Turns a name into a part of a file name that is valid on every file system.

@@ -1,9 +1,10 @@
 //! A picture in memory, drawn with pixels, discs and text, and written as PNG.
 
 use crate::atomic;
+use crate::font::{self, TextSize};
 use contract::{Error, Kind, Result};
-use font8x8::UnicodeFonts;
 use std::path::Path;
+use tiny_skia::{FillRule, Paint, PathBuilder, Pixmap, PremultipliedColorU8, Transform};
 
 /// A colour: red, green and blue, 0..255.
 pub type Rgb = [u8; 3];
@@ -37,92 +38,114 @@ pub fn link_color(link: usize) -> Rgb {
     COLORS[link % COLORS.len()]
 }
 
+/// Most pixels along a side: ten times what any picture here has.
+const MAX_SIDE: usize = 30_000;
+
 /// A picture.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Canvas {
-    width: usize,
-    height: usize,
-    pixels: Vec<Rgb>,
+    /// All of it opaque.
+    pixels: Pixmap,
 }
 
 impl Canvas {
     /// A white picture, size in pixels.
     #[must_use]
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, height, pixels: vec![WHITE; width * height] }
+        let [width, height] = [width, height].map(|n| n.clamp(1, MAX_SIDE) as u32);
+        let mut pixels = Pixmap::new(width, height).expect("both sides are in bounds");
+        pixels.fill(tiny_skia::Color::WHITE);
+        Self { pixels }
     }
 
     /// Width, pixels.
     #[must_use]
     pub fn width(&self) -> usize {
-        self.width
+        self.pixels.width() as usize
     }
 
     /// Height, pixels.
     #[must_use]
     pub fn height(&self) -> usize {
-        self.height
+        self.pixels.height() as usize
     }
 
     /// Colours a pixel; pixels outside the picture are ignored.
     pub fn set(&mut self, x: i64, y: i64, color: Rgb) {
-        if x >= 0 && y >= 0 && (x as usize) < self.width && (y as usize) < self.height {
-            self.pixels[y as usize * self.width + x as usize] = color;
+        if let Some(pixel) = self.pixel(x, y) {
+            *pixel = opaque(color);
         }
+    }
+
+    /// A pixel; `None` outside the paper.
+    fn pixel(&mut self, x: i64, y: i64) -> Option<&mut PremultipliedColorU8> {
+        let (width, height) = (self.width(), self.height());
+        let inside = x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height;
+        inside.then(|| &mut self.pixels.pixels_mut()[y as usize * width + x as usize])
     }
 
     /// Fills a rectangle.
     pub fn fill(&mut self, x: i64, y: i64, width: i64, height: i64, color: Rgb) {
-        for v in y.max(0)..(y + height).min(self.height as i64) {
-            for u in x.max(0)..(x + width).min(self.width as i64) {
-                self.set(u, v, color);
-            }
+        let across = x.max(0)..(x + width).min(self.width() as i64);
+        if across.is_empty() {
+            return;
+        }
+        let (n, color) = (self.width(), opaque(color));
+        for v in y.max(0)..(y + height).min(self.height() as i64) {
+            let row = v as usize * n;
+            let row = row + across.start as usize..row + across.end as usize;
+            self.pixels.pixels_mut()[row].fill(color);
         }
     }
 
-    /// Fills a disc.
+    /// Fills a disc about the middle of a pixel; `radius` in pixels.
     pub fn disc(&mut self, x: i64, y: i64, radius: i64, color: Rgb) {
-        for v in -radius..=radius {
-            for u in -radius..=radius {
-                if u * u + v * v <= radius * radius {
-                    self.set(x + u, y + v, color);
+        let middle = [x, y].map(|v| v as f32 + 0.5);
+        let Some(circle) = PathBuilder::from_circle(middle[0], middle[1], radius as f32 + 0.5)
+        else {
+            return;
+        };
+        let mut paint = Paint::default();
+        paint.set_color_rgba8(color[0], color[1], color[2], 255);
+        self.pixels.fill_path(&circle, &paint, FillRule::Winding, Transform::identity(), None);
+    }
+
+    /// Writes words on a white ground, with the left upper corner of the first capital letter at
+    /// (`x`, `y`).
+    pub fn text(&mut self, x: i64, y: i64, size: TextSize, color: Rgb, words: &str) {
+        let (width, capitals) = (Self::text_width(size, words), size.capitals().ceil() as i64);
+        let below = capitals / 3;
+        self.fill(x - 1, y - 1, width + 2, capitals + below + 2, WHITE);
+        for outline in font::outlines(size, words, x as f32, (y + capitals) as f32) {
+            let corner = outline.px_bounds().min;
+            outline.draw(|u, v, share| {
+                let at = [corner.x as i64 + i64::from(u), corner.y as i64 + i64::from(v)];
+                if let Some(pixel) = self.pixel(at[0], at[1]) {
+                    let ground = [pixel.red(), pixel.green(), pixel.blue()];
+                    *pixel = opaque(blend(ground, color, share.into()));
                 }
-            }
+            });
         }
     }
 
     /// Writes text, `size` times 8 pixels high, on a white background. Characters that the font
     /// lacks become question marks.
-    pub fn text(&mut self, x: i64, y: i64, size: i64, color: Rgb, words: &str) {
-        let n = words.chars().count() as i64;
-        self.fill(x - size, y - size, n * 8 * size + 2 * size, 10 * size, WHITE);
-        for (i, letter) in words.chars().enumerate() {
-            let glyph = [&font8x8::BASIC_FONTS.get(letter), &font8x8::LATIN_FONTS.get(letter)]
-                .into_iter()
-                .find_map(|g| *g)
-                .or_else(|| font8x8::BASIC_FONTS.get('?'))
-                .unwrap_or_default();
-            for (v, row) in glyph.iter().enumerate() {
-                for u in (0..8).filter(|u| row >> u & 1 == 1) {
-                    self.fill(
-                        x + (i as i64 * 8 + u) * size,
-                        y + v as i64 * size,
-                        size,
-                        size,
-                        color,
-                    );
-                }
-            }
-        }
+    pub(crate) fn text_to(&mut self, x: i64, y: i64, size: TextSize, color: Rgb, words: &str) {
+        self.text(x - Self::text_width(size, words), y, size, color, words);
+    }
+
+    /// How wide words are, pixels.
+    #[must_use]
+    pub fn text_width(size: TextSize, words: &str) -> i64 {
+        font::width(size, words).ceil() as i64
     }
 
     /// Copies another picture onto this one.
     pub fn paste(&mut self, x: i64, y: i64, other: &Self) {
-        for v in 0..other.height {
-            for u in 0..other.width {
-                self.set(x + u as i64, y + v as i64, other.pixels[v * other.width + u]);
-            }
-        }
+        let paint = tiny_skia::PixmapPaint::default();
+        let at = [x, y].map(|v| v.clamp(-(MAX_SIDE as i64), MAX_SIDE as i64) as i32);
+        let from = other.pixels.as_ref();
+        self.pixels.draw_pixmap(at[0], at[1], from, &paint, Transform::identity(), None);
     }
 
     /// Writes a PNG file.
@@ -133,17 +156,24 @@ impl Canvas {
         let failed = |e: png::EncodingError| {
             Error::new(Kind::Bug, "picture does not encode").because(e).at(path.display())
         };
+        let [width, height] = [self.pixels.width(), self.pixels.height()];
+        let colors = |p: &PremultipliedColorU8| [p.red(), p.green(), p.blue()];
+        let rgb: Vec<Rgb> = self.pixels.pixels().iter().map(colors).collect();
         let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         // A rescan draws a dozen pictures while tiles need the same threads.
         encoder.set_compression(png::Compression::Fast);
         let mut writer = encoder.write_header().map_err(failed)?;
-        writer.write_image_data(self.pixels.as_flattened()).map_err(failed)?;
+        writer.write_image_data(rgb.as_flattened()).map_err(failed)?;
         writer.finish().map_err(failed)?;
         atomic::write(path, &bytes)
     }
+}
+
+fn opaque([red, green, blue]: Rgb) -> PremultipliedColorU8 {
+    PremultipliedColorU8::from_rgba(red, green, blue, 255).expect("an opaque colour is one")
 }
 
 /// A mixture of two colours; at a `share` of 0 it is the first.
@@ -152,4 +182,46 @@ pub(crate) fn blend(a: Rgb, b: Rgb, share: f64) -> Rgb {
         (f64::from(a[i]) + (f64::from(b[i]) - f64::from(a[i])) * share.clamp(0.0, 1.0)).round()
             as u8
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(canvas: &Canvas, x: usize, y: usize) -> Rgb {
+        let p = canvas.pixels.pixels()[y * canvas.width() + x];
+        [p.red(), p.green(), p.blue()]
+    }
+
+    #[test]
+    fn shapes_beyond_the_paper_are_cut_off() {
+        let mut canvas = Canvas::new(20, 10);
+        canvas.fill(-5, -5, 8, 7, INK);
+        canvas.fill(30, 2, 8, 7, INK);
+        canvas.set(-1, 3, INK);
+        canvas.text(-10, 8, TextSize::Body, INK, "beyond the paper");
+        canvas.disc(19, 9, 3, [200, 0, 60]);
+        assert_eq!([at(&canvas, 2, 1), at(&canvas, 3, 1)], [INK, WHITE]);
+        assert_eq!(at(&canvas, 19, 9), [200, 0, 60]);
+        let mut other = Canvas::new(0, 0);
+        assert_eq!((other.width(), other.height()), (1, 1));
+        other.paste(0, 0, &canvas);
+        assert_eq!(at(&other, 0, 0), INK);
+    }
+
+    #[test]
+    fn words_have_smooth_edges_on_white() {
+        let mut canvas = Canvas::new(80, 20);
+        canvas.fill(0, 0, 80, 20, [0, 0, 255]);
+        canvas.text(4, 4, TextSize::Body, [0, 0, 0], "Aa 8");
+        let end = 4 + Canvas::text_width(TextSize::Body, "Aa 8") as usize;
+        let letters: Vec<Rgb> = (4..14)
+            .flat_map(|y| (4..end).map(move |x| (x, y)))
+            .map(|(x, y)| at(&canvas, x, y))
+            .collect();
+        assert!(letters.iter().all(|c| c[0] == c[2]), "black on white, no blue left");
+        assert!(
+            letters.iter().any(|c| c[0] < 30) && letters.iter().any(|c| (60..200).contains(&c[0]))
+        );
+    }
 }

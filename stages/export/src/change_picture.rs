@@ -2,6 +2,7 @@
 //! what appeared.
 
 use crate::canvas::{Canvas, INK, Rgb, blend};
+use crate::font::TextSize::Body;
 use geometry::Aabb;
 
 /// Longer side of the view from above, pixels.
@@ -65,17 +66,17 @@ pub fn draw_changes(
     }
     for thing in things {
         let [(x, y), _] = place(&thing.at);
-        canvas.text(x + 6, y - 4, 1, INK, &thing.name);
+        canvas.text(x + 6, y - 4, Body, INK, &thing.name);
     }
     for (name, at) in robots {
         let [(x, y), _] = place(&[at[0], at[1], cell.min[2]]);
         canvas.disc(x, y, 5, [0, 114, 178]);
-        canvas.text(x + 8, y - 4, 1, [0, 60, 110], name);
+        canvas.text(x + 8, y - 4, Body, [0, 60, 110], name);
     }
     canvas.text(
         MARGIN,
         8,
-        1,
+        Body,
         INK,
         "grey: stands   yellow: not seen again   orange: was there   green: is there now",
     );

@@ -2,6 +2,10 @@
 //! fitted surface, each joint within its limits, the evidence for each link, verdict and runner-up.
 
 use crate::canvas::{Canvas, INK, Rgb};
+use crate::font::{
+    self,
+    TextSize::{Body, Title},
+};
 use crate::robot_picture::{FULL, RobotPicture, residual_color};
 use contract::words::Unit;
 use contract::{Certainty, Fit, Verdict};
@@ -16,10 +20,13 @@ const LINE: i64 = 16;
 const BAR: (i64, i64) = (190, 300);
 /// Left end of the table of links, pixels.
 const LINKS: i64 = 700;
+/// Columns of that table: head, and right end, pixels.
+const COLUMNS: [(&str, i64); 4] =
+    [("seen", 900), ("seen through", 990), ("rms mm", 1055), ("points", 1115)];
 /// Range that is drawn for a joint without limits, radians: a turn to each side.
 const NO_LIMITS: [f64; 2] = [-std::f64::consts::TAU, std::f64::consts::TAU];
 /// Number of characters of a line across the page.
-const LINE_CHARS: usize = 136;
+const INDENT: i64 = 24;
 const GREY: Rgb = [150, 154, 162];
 const PALE: Rgb = [226, 229, 234];
 const RED: Rgb = [196, 30, 40];
@@ -34,37 +41,48 @@ pub fn draw_evidence(title: &str, picture: &RobotPicture, fit: &Fit, model: &Mod
     let top = 36 + SIDE + 40;
     let height = top + LINE * (n_rows + 3 + words.len() as i64) + 10;
     let mut canvas = Canvas::new(WIDTH as usize, height as usize);
-    canvas.text(8, 10, 2, verdict_color(fit.label_verdict()), title);
+    canvas.text(8, 10, Title, verdict_color(fit.label_verdict()), title);
     for (i, view) in picture.residuals().iter().enumerate() {
         canvas.paste(i as i64 * (SIDE + 6), 36, view);
     }
     scale(&mut canvas, 36 + SIDE + 6);
-    canvas.text(8, top, 1, GREY, "joint");
-    canvas.text(BAR.0, top, 1, GREY, "lower limit .. upper limit");
-    canvas.text(BAR.0 + BAR.1 + 12, top, 1, GREY, "value, std. dev.");
+    canvas.text(8, top, Body, GREY, "joint");
+    canvas.text(BAR.0, top, Body, GREY, "lower limit .. upper limit");
+    canvas.text(BAR.0 + BAR.1 + 12, top, Body, GREY, "value, std. dev.");
     for (i, joint) in fit.joints.iter().enumerate() {
         let own = model.joints.iter().find(|j| j.name == joint.name);
         if let Some(own) = own {
             row(&mut canvas, top + LINE * (i as i64 + 1), fit, i, own);
         }
     }
-    canvas.text(LINKS, top, 1, GREY, "link                seen  through  rms mm  points");
-    for (i, link) in fit.links.iter().enumerate() {
-        let name: String = link.name.chars().take(18).collect();
-        let line = format!(
-            "{name:<18} {:>4.0} % {:>5.1} % {:>7.1} {:>8}",
-            100.0 * link.seen,
-            100.0 * link.violated,
-            1e3 * link.rms,
-            link.n_points
-        );
-        let color = if link.violated > 0.1 { RED } else { INK };
-        canvas.text(LINKS, top + LINE * (i as i64 + 1), 1, color, &line);
-    }
-    for (i, line) in words.iter().enumerate() {
-        canvas.text(8, top + LINE * (n_rows + 2 + i as i64), 1, INK, line);
+    links(&mut canvas, top, fit);
+    for (i, (indent, line)) in words.iter().enumerate() {
+        canvas.text(8 + indent, top + LINE * (n_rows + 2 + i as i64), Body, INK, line);
     }
     canvas
+}
+
+/// The table of links: what the scans say of each.
+fn links(canvas: &mut Canvas, top: i64, fit: &Fit) {
+    canvas.text(LINKS, top, Body, GREY, "link");
+    for (head, right) in COLUMNS {
+        canvas.text_to(right, top, Body, GREY, head);
+    }
+    let room = (COLUMNS[0].1 - LINKS - 50) as f32;
+    for (i, link) in fit.links.iter().enumerate() {
+        let y = top + LINE * (i as i64 + 1);
+        let color = if link.violated > 0.1 { RED } else { INK };
+        canvas.text(LINKS, y, Body, color, &font::shortened(Body, &link.name, room));
+        let cells = [
+            format!("{:.0} %", 100.0 * link.seen),
+            format!("{:.1} %", 100.0 * link.violated),
+            format!("{:.1}", 1e3 * link.rms),
+            link.n_points.to_string(),
+        ];
+        for (cell, (_, right)) in cells.iter().zip(COLUMNS) {
+            canvas.text_to(right, y, Body, color, cell);
+        }
+    }
 }
 
 fn verdict_color(verdict: Verdict) -> Rgb {
@@ -92,8 +110,8 @@ fn row(canvas: &mut Canvas, y: i64, fit: &Fit, at: usize, own: &Joint) {
         let share = ((value - low) / (high - low).max(1e-9)).clamp(0.0, 1.0);
         BAR.0 + (share * BAR.1 as f64).round() as i64
     };
-    let name: String = joint.name.chars().take(21).collect();
-    canvas.text(8, y, 1, INK, &name);
+    let name = font::shortened(Body, &joint.name, (BAR.0 - 20) as f32);
+    canvas.text(8, y, Body, INK, &name);
     canvas.fill(BAR.0, y + 3, BAR.1, 3, PALE);
     for equal in &fit.equals {
         canvas.fill(place(equal.posture[at]), y, 2, 9, GREY);
@@ -104,7 +122,7 @@ fn row(canvas: &mut Canvas, y: i64, fit: &Fit, at: usize, own: &Joint) {
     canvas.fill(place(joint.value) - 1, y - 1, 3, 11, color);
     let unit = Unit::of(own.kind == JointKind::Prismatic);
     let words = unit.say_both(joint.value, joint.sigma) + joint.certainty.note();
-    canvas.text(BAR.0 + BAR.1 + 12, y, 1, color, &words);
+    canvas.text(BAR.0 + BAR.1 + 12, y, Body, color, &words);
 }
 
 /// Draws the legend of the residual colours.
@@ -115,12 +133,12 @@ fn scale(canvas: &mut Canvas, y: i64) {
         canvas.fill(60 + 12 * i, y, 12, 10, residual_color(off));
     }
     let full = format!("{:.0} mm", FULL * 1e3);
-    canvas.text(8, y + 1, 1, GREY, &format!("-{full}"));
-    canvas.text(60 + 12 * n + 6, y + 1, 1, GREY, &format!("+{full} before the surface"));
+    canvas.text(8, y, Body, GREY, &format!("-{full}"));
+    canvas.text(60 + 12 * n + 6, y, Body, GREY, &format!("+{full} before the surface"));
 }
 
 /// Verdict, reasons and runner-up, wrapped to the width of the page.
-fn words(fit: &Fit) -> Vec<String> {
+fn words(fit: &Fit) -> Vec<(i64, String)> {
     let mut all = vec![format!(
         "{}: score {:.3}, rms {:.2} mm",
         fit.label_verdict().word(),
@@ -138,18 +156,18 @@ fn words(fit: &Fit) -> Vec<String> {
     all.iter().flat_map(|text| wrapped(text)).collect()
 }
 
-fn wrapped(text: &str) -> Vec<String> {
-    let mut lines = vec![String::new()];
+/// A sentence in lines that are as wide as the page at most.
+fn wrapped(text: &str) -> Vec<(i64, String)> {
+    let mut lines = vec![(0, String::new())];
     for word in text.split_whitespace() {
         let last = lines.len() - 1;
-        let fits = lines[last].chars().count() + word.chars().count() < LINE_CHARS;
-        if fits || lines[last].is_empty() {
-            if !lines[last].is_empty() {
-                lines[last].push(' ');
-            }
-            lines[last].push_str(word);
+        let (indent, line) = &mut lines[last];
+        let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
+        let fits = *indent + Canvas::text_width(Body, &longer) <= WIDTH - 16;
+        if fits || line.is_empty() {
+            *line = longer;
         } else {
-            lines.push(format!("    {word}"));
+            lines.push((INDENT, word.to_owned()));
         }
     }
     lines

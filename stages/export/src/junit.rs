@@ -13,74 +13,65 @@ use crate::atomic;
 use crate::posture::JointWords;
 use crate::result::{ResultFile, RobotEntry};
 use contract::words::triple;
-use contract::{Certainty, Result, Verdict, quote};
-use std::fmt::Write as _;
+use contract::{Certainty, Error, Kind, Result, Verdict, quote};
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use std::path::Path;
-
-/// The result of a test case.
-enum Outcome {
-    Passes,
-    /// It fails, with the type of the failure and a message.
-    Fails(String, String),
-    /// It is skipped, with a message.
-    Skipped(String),
-}
-
-/// One test case.
-struct Case {
-    class: String,
-    name: String,
-    outcome: Outcome,
-    /// Further lines of output.
-    output: Vec<String>,
-}
 
 /// Writes the file; `is_partial` says that the run left out inputs, models or regions that failed.
 ///
 /// # Errors
 /// If the file cannot be written.
 pub fn write_junit(path: &Path, result: &ResultFile, is_partial: bool) -> Result<()> {
-    atomic::write(path, junit(result, is_partial).as_bytes())
+    atomic::write(path, junit(result, is_partial)?.as_bytes())
 }
 
-fn junit(result: &ResultFile, is_partial: bool) -> String {
-    let mut cases = Vec::new();
+fn junit(result: &ResultFile, is_partial: bool) -> Result<String> {
+    let mut suite = TestSuite::new("stillpoint");
     if is_partial {
-        cases.push(left_out(result));
+        suite.add_test_case(left_out(result));
     }
     for robot in &result.robots {
-        of_robot(&mut cases, robot);
+        of_robot(&mut suite, robot);
     }
-    let count = |is: fn(&Outcome) -> bool| cases.iter().filter(|c| is(&c.outcome)).count();
-    let counts = format!(
-        "tests=\"{}\" failures=\"{}\" skipped=\"{}\"",
-        cases.len(),
-        count(|o| matches!(o, Outcome::Fails(..))),
-        count(|o| matches!(o, Outcome::Skipped(_)))
-    );
-    let mut text = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {counts}>\n<testsuite name=\"stillpoint\" {counts}>\n"
-    );
-    cases.iter().for_each(|case| case.write(&mut text));
     if !result.warnings.is_empty() {
-        let _ = writeln!(text, "  <system-err>{}</system-err>", lines(&result.warnings));
+        suite.set_system_err(lines(&result.warnings));
     }
-    text + "</testsuite>\n</testsuites>\n"
+    let mut report = Report::unnamed();
+    report.add_test_suite(suite);
+    let bug = |e| Error::new(Kind::Bug, "the JUnit report does not encode").because(e);
+    report.to_string().map_err(bug)
 }
 
-/// The test case of a run that left something out.
-fn left_out(result: &ResultFile) -> Case {
-    let why = format!("inputs, models or regions were left out: {}", result.warnings.join("; "));
-    Case {
-        class: "stillpoint".into(),
-        name: "everything was looked at".into(),
-        outcome: Outcome::Fails("partial".into(), why),
-        output: Vec::new(),
+/// A case with lines for whoever looks at it.
+fn case(class: &str, name: &str, status: TestCaseStatus, output: &[String]) -> TestCase {
+    let mut case = TestCase::new(&*quote::shown(name), status);
+    case.set_classname(&*quote::shown(class));
+    if !output.is_empty() {
+        case.set_system_out(lines(output));
     }
+    case
+}
+
+fn failed(kind: &str, why: &str) -> TestCaseStatus {
+    let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+    status.set_type(&*quote::shown(kind)).set_message(&*quote::shown(why));
+    status
+}
+
+fn skipped(why: &str) -> TestCaseStatus {
+    let mut status = TestCaseStatus::skipped();
+    status.set_message(&*quote::shown(why));
+    status
+}
+
+/// The case of a run that left something out.
+fn left_out(result: &ResultFile) -> TestCase {
+    let why = format!("inputs, models or regions were left out: {}", result.warnings.join("; "));
+    case("stillpoint", "everything was looked at", failed("partial", &why), &[])
 }
 
 /// The test cases of a robot: the robot, its joints, and its postures in other scans.
-fn of_robot(cases: &mut Vec<Case>, robot: &RobotEntry) {
+fn of_robot(suite: &mut TestSuite, robot: &RobotEntry) {
     let scans: Vec<String> = robot.stands_in.iter().map(u32::to_string).collect();
     let stands =
         if scans.is_empty() { String::new() } else { format!(" in scans {}", scans.join(", ")) };
@@ -92,70 +83,36 @@ fn of_robot(cases: &mut Vec<Case>, robot: &RobotEntry) {
         why if why.is_empty() => format!("the robot is {}, and nothing says why", robot.verdict),
         why => why,
     };
-    cases.push(Case {
-        class: robot.model.clone(),
-        name: format!("{} {}{stands}", robot.id, robot.model),
-        outcome: if is_trusted {
-            Outcome::Passes
-        } else {
-            Outcome::Fails(robot.verdict.clone(), why())
-        },
-        output,
-    });
-    cases.extend(robot.posture().map(|joint| Case {
-        class: robot.model.clone(),
-        name: format!("{} {}{stands}", robot.id, joint.name),
-        outcome: of_joint(robot, &joint, is_trusted),
-        output: vec![joint.say()],
-    }));
-    robot.stays.iter().for_each(|stay| of_robot(cases, stay));
+    let status =
+        if is_trusted { TestCaseStatus::success() } else { failed(&robot.verdict, &why()) };
+    let name = format!("{} {}{stands}", robot.id, robot.model);
+    suite.add_test_case(case(&robot.model, &name, status, &output));
+    for joint in robot.posture() {
+        let name = format!("{} {}{stands}", robot.id, joint.name);
+        let status = of_joint(robot, &joint, is_trusted);
+        suite.add_test_case(case(&robot.model, &name, status, &[joint.say()]));
+    }
+    robot.stays.iter().for_each(|stay| of_robot(suite, stay));
 }
 
 /// An undetermined joint is skipped and does not pass: its value may be any other.
-fn of_joint(robot: &RobotEntry, joint: &JointWords<'_>, is_trusted: bool) -> Outcome {
+fn of_joint(robot: &RobotEntry, joint: &JointWords<'_>, is_trusted: bool) -> TestCaseStatus {
     let said = joint.say();
     if !is_trusted {
-        return Outcome::Skipped(format!("{said}, and the robot is {}", robot.verdict));
+        return skipped(&format!("{said}, and the robot is {}", robot.verdict));
     }
     if joint.certainty == Certainty::Undetermined {
         let quoted = format!("joint '{}' ", joint.name);
         let mut reasons = robot.reasons.iter().filter_map(|why| why.strip_prefix(&quoted));
         let why = reasons.find_map(|why| why.split_once(": ")).map(|(_, why)| format!(": {why}"));
-        return Outcome::Skipped(said + &why.unwrap_or_default());
+        return skipped(&(said + &why.unwrap_or_default()));
     }
-    Outcome::Passes
-}
-
-impl Case {
-    fn write(&self, text: &mut String) {
-        let (class, name) = (for_people(&self.class), for_people(&self.name));
-        let _ = writeln!(text, "  <testcase classname=\"{class}\" name=\"{name}\">");
-        match &self.outcome {
-            Outcome::Passes => {}
-            Outcome::Fails(kind, why) => {
-                let (kind, why) = (for_people(kind), for_people(why));
-                let _ = writeln!(text, "    <failure type=\"{kind}\" message=\"{why}\"/>");
-            }
-            Outcome::Skipped(why) => {
-                let _ = writeln!(text, "    <skipped message=\"{}\"/>", for_people(why));
-            }
-        }
-        if !self.output.is_empty() {
-            let output = lines(&self.output);
-            let _ = writeln!(text, "    <system-out>{output}</system-out>");
-        }
-        text.push_str("  </testcase>\n");
-    }
-}
-
-/// Text for people, quoted for XML.
-fn for_people(text: &str) -> String {
-    quote::xml(&quote::shown(text)).into_owned()
+    TestCaseStatus::success()
 }
 
 /// Several such lines.
 fn lines(all: &[String]) -> String {
-    all.iter().map(|line| for_people(line)).collect::<Vec<_>>().join("\n")
+    all.iter().map(|line| quote::shown(line)).collect::<Vec<_>>().join("\n")
 }
 
 #[cfg(test)]
@@ -189,39 +146,41 @@ mod tests {
     fn what_nobody_knows_is_skipped_with_its_deviation_and_only_trusted_robots_pass() {
         let wrist =
             "joint 'wrist' is undetermined (± 103.9°): it may as well stand at 2.0° or elsewhere";
-        let trusted = junit(&result(vec![robot("R1", "trusted", &[wrist])], &[]), false);
+        let said = |result| junit(result, false).expect("encodes");
+        let trusted = said(&result(vec![robot("R1", "trusted", &[wrist])], &[]));
         let expected = "\
 <?xml version=\"1.0\" encoding=\"UTF-8\"?>
-<testsuites tests=\"4\" failures=\"0\" skipped=\"1\">
-<testsuite name=\"stillpoint\" tests=\"4\" failures=\"0\" skipped=\"1\">
-  <testcase classname=\"kr10\" name=\"R1 kr10\">
-    <system-out>base at (1.0000, 0.0000, 0.0000) m
+<testsuites tests=\"4\" skipped=\"1\" failures=\"0\" errors=\"0\">
+    <testsuite name=\"stillpoint\" tests=\"4\" skipped=\"1\" errors=\"0\" failures=\"0\">
+        <testcase name=\"R1 kr10\" classname=\"kr10\">
+            <system-out>base at (1.0000, 0.0000, 0.0000) m
 a = 57.483° ± 0.060° coarse
 slide = 250.000 mm ± 0.200 mm
 wrist = 177.617° ± 103.9° undetermined
 joint &apos;wrist&apos; is undetermined (± 103.9°): it may as well stand at 2.0° or elsewhere</system-out>
-  </testcase>
-  <testcase classname=\"kr10\" name=\"R1 a\">
-    <system-out>57.483° ± 0.060° coarse</system-out>
-  </testcase>
-  <testcase classname=\"kr10\" name=\"R1 slide\">
-    <system-out>250.000 mm ± 0.200 mm</system-out>
-  </testcase>
-  <testcase classname=\"kr10\" name=\"R1 wrist\">
-    <skipped message=\"177.617° ± 103.9° undetermined: it may as well stand at 2.0° or elsewhere\"/>
-    <system-out>177.617° ± 103.9° undetermined</system-out>
-  </testcase>
-</testsuite>
+        </testcase>
+        <testcase name=\"R1 a\" classname=\"kr10\">
+            <system-out>57.483° ± 0.060° coarse</system-out>
+        </testcase>
+        <testcase name=\"R1 slide\" classname=\"kr10\">
+            <system-out>250.000 mm ± 0.200 mm</system-out>
+        </testcase>
+        <testcase name=\"R1 wrist\" classname=\"kr10\">
+            <skipped message=\"177.617° ± 103.9° undetermined: it may as well stand at 2.0° or elsewhere\"/>
+            <system-out>177.617° ± 103.9° undetermined</system-out>
+        </testcase>
+    </testsuite>
 </testsuites>
 ";
         assert_eq!(trusted, expected);
         let robots = vec![robot("R1", "doubtful", &["score 0.5"]), robot("R2", "refused", &[])];
-        let text = junit(&result(robots, &["scan 2 could not be read"]), true);
+        let text = junit(&result(robots, &["scan 2 could not be read"]), true).expect("encodes");
         for part in [
-            "tests=\"9\" failures=\"3\" skipped=\"6\"",
-            "<failure type=\"partial\" message=\"inputs, models or regions were left out: scan 2",
-            "<failure type=\"doubtful\" message=\"score 0.5\"/>",
-            "<failure type=\"refused\" message=\"the robot is refused, and nothing says why\"/>",
+            "tests=\"9\" skipped=\"6\" failures=\"3\" errors=\"0\"",
+            "<failure message=\"inputs, models or regions were left out: scan 2",
+            "type=\"partial\"/>",
+            "<failure message=\"score 0.5\" type=\"doubtful\"/>",
+            "<failure message=\"the robot is refused, and nothing says why\" type=\"refused\"/>",
             "<skipped message=\"250.000 mm ± 0.200 mm, and the robot is doubtful\"/>",
             "<system-err>scan 2 could not be read</system-err>",
         ] {
@@ -246,9 +205,9 @@ joint &apos;wrist&apos; is undetermined (± 103.9°): it may as well stand at 2.
         moved.stands_in = vec![0, 1];
         moved.stays =
             vec![RobotEntry { stands_in: vec![2], ..robot("R1", "doubtful", &["few points"]) }];
-        let text = junit(&result(vec![moved], &[]), false);
+        let text = junit(&result(vec![moved], &[]), false).expect("encodes");
         assert!(text.contains("name=\"R1 kr10 in scans 0, 1\""), "{text}");
         assert!(text.contains("name=\"R1 wrist in scans 2\""), "{text}");
-        assert!(text.contains("tests=\"8\" failures=\"1\" skipped=\"4\""), "{text}");
+        assert!(text.contains("tests=\"8\" skipped=\"4\" failures=\"1\""), "{text}");
     }
 }

@@ -1,6 +1,7 @@
 //! Draws the plan of an input: the plant from above, by its labelled points.
 
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, robot_color};
+use crate::font::TextSize::{Body, Title};
 use contract::{Label, PointKind};
 use geometry::Aabb;
 use std::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
@@ -118,15 +119,15 @@ impl PlanPicture {
             let (x, y) = place(at);
             canvas.disc(x, y, 5, WHITE);
             canvas.disc(x, y, 4, [200, 0, 60]);
-            canvas.text(x + 8, y - 4, 1, [160, 0, 50], name);
+            canvas.text(x + 8, y - 4, Body, [160, 0, 50], name);
         }
         for (i, (name, at)) in robots.iter().enumerate() {
             let (x, y) = place(at);
             canvas.disc(x, y, 5, WHITE);
             canvas.disc(x, y, 4, robot_color(i));
-            canvas.text(x + 8, y - 8, 2, robot_color(i), name);
+            canvas.text(x + 8, y - 8, Title, robot_color(i), name);
         }
-        canvas.text(MARGIN, MARGIN / 2, 2, INK, title);
+        canvas.text(MARGIN, MARGIN / 2, Title, INK, title);
         self.scale_bar(&mut canvas, zoom, 2 * MARGIN + h + 16);
         canvas
     }
@@ -140,7 +141,7 @@ impl PlanPicture {
             .unwrap_or(0.5);
         let pixels = (metres / self.cell * zoom as f64) as i64;
         canvas.fill(MARGIN, y, pixels, 3, INK);
-        canvas.text(MARGIN, y + 8, 1, INK, &format!("{metres} m"));
+        canvas.text(MARGIN, y + 8, Body, INK, &format!("{metres} m"));
         let legend = [
             ("floor", FLOOR),
             ("fixed", FIXED),
@@ -150,8 +151,8 @@ impl PlanPicture {
         let mut x = MARGIN + pixels.max(48) + 24;
         for (name, color) in legend {
             canvas.fill(x, y + 7, 10, 10, color);
-            canvas.text(x + 14, y + 8, 1, INK, name);
-            x += 14 + 8 * name.len() as i64 + 12;
+            canvas.text(x + 14, y + 8, Body, INK, name);
+            x += 14 + Canvas::text_width(Body, name) + 16;
         }
     }
 

@@ -45,21 +45,52 @@ pub fn write_ply(
         told()?;
         let bad = |e| bad(e, tile);
         let mut reader = open(tile)?;
-        loop {
-            let piece = reader.read_points(PIECE).map_err(bad)?;
-            if piece.is_empty() {
-                break;
-            }
-            for point in piece.points() {
-                let point = point.map_err(bad)?;
-                let kind = KINDS[usize::from(u8::from(point.classification))];
-                let moves = matches!(kind, PointKind::Link | PointKind::Attachment);
-                if moves { &mut moving } else { &mut fixed }.add(&point, kind)?;
+        let mut piece = las::PointDataBuilder::new().for_header(reader.header()).build();
+        while reader.fill_points(PIECE, &mut piece).map_err(bad)? > 0 {
+            for point in points(&piece) {
+                let moves = matches!(point.kind, PointKind::Link | PointKind::Attachment);
+                if moves { &mut moving } else { &mut fixed }.add(&point)?;
             }
         }
     }
     told()?;
     Ok(Some([moving.finish()?, fixed.finish()?]))
+}
+
+/// What of a tile's point stands in a PLY file.
+struct Point {
+    /// World, metres.
+    xyz: [f64; 3],
+    intensity: u16,
+    kind: PointKind,
+    /// Numbers of robot and link from 1 on, 0 for none: fields `RobotId` and `LinkId`.
+    owner: [u16; 2],
+    /// Red, green, blue; 0 where the tile has none.
+    color: (u16, u16, u16),
+}
+
+/// The points of a piece, from its columns.
+fn points(piece: &las::PointData) -> impl Iterator<Item = Point> + '_ {
+    let n_extra = usize::from(piece.format().extra_bytes);
+    let extra = piece.record_len() - n_extra;
+    let owners = piece.raw_bytes().chunks_exact(piece.record_len()).map(move |record| {
+        let number = |at: usize| match record.get(extra + at..extra + at + 2) {
+            Some(&[low, high]) => u16::from_le_bytes([low, high]),
+            _ => 0,
+        };
+        [number(0), number(2)]
+    });
+    let colors = piece.rgb().into_iter().flatten().chain(std::iter::repeat((0, 0, 0)));
+    let places = piece.x().zip(piece.y()).zip(piece.z()).map(|((x, y), z)| [x, y, z]);
+    let kinds = piece.classification().map(|class| KINDS[usize::from(class)]);
+    let measured = places.zip(piece.intensity()).zip(colors);
+    measured.zip(kinds.zip(owners)).map(|(((xyz, intensity), color), (kind, owner))| Point {
+        xyz,
+        intensity,
+        kind,
+        owner,
+        color,
+    })
 }
 
 /// A PLY file that is being written.
@@ -81,20 +112,15 @@ impl Ply {
         written.map_err(|e| Error::of_file("cloud cannot be written", self.file.path(), e))
     }
 
-    fn add(&mut self, point: &las::Point, kind: PointKind) -> Result<()> {
+    fn add(&mut self, point: &Point) -> Result<()> {
         let mut record = [0; RECORD];
-        let numbers = [point.x, point.y, point.z].map(f64::to_le_bytes);
-        record[..24].copy_from_slice(numbers.as_flattened());
+        record[..24].copy_from_slice(point.xyz.map(f64::to_le_bytes).as_flattened());
         record[24..28].copy_from_slice(&i32::from(point.intensity).to_le_bytes());
-        record[28] = kind as u8;
-        // `RobotId` and `LinkId` are index + 1, 0 for none.
-        let index = |at: usize| {
-            let bytes = point.extra_bytes.get(at..at + 2).unwrap_or(&[0, 0]);
-            (i32::from(u16::from_le_bytes([bytes[0], bytes[1]])) - 1).to_le_bytes()
-        };
-        record[29..BARE].copy_from_slice([index(0), index(2)].as_flattened());
-        let color = point.color.map_or([0; 3], |c| [c.red, c.green, c.blue]);
-        record[BARE..].copy_from_slice(&color.map(|v| (v >> 8) as u8));
+        record[28] = point.kind as u8;
+        let index = point.owner.map(|number| (i32::from(number) - 1).to_le_bytes());
+        record[29..BARE].copy_from_slice(index.as_flattened());
+        let (red, green, blue) = point.color;
+        record[BARE..].copy_from_slice(&[red, green, blue].map(|v| (v >> 8) as u8));
         self.n += 1;
         self.write(&record[..if self.has_color { RECORD } else { BARE }])
     }

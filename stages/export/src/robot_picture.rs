@@ -2,6 +2,7 @@
 //! posture over them. An outline beside its points shows a wrong posture at a glance.
 
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, link_color};
+use crate::font::{self, TextSize};
 use contract::{Fan, Label, PointKind};
 use geometry::depth::{Rows, rows, transform};
 use geometry::{Aabb, Point, Pose, Vector};
@@ -9,6 +10,8 @@ use robot::Model;
 
 /// Edge of one view, pixels.
 const SIDE: usize = 560;
+/// Height of a row of the legend, pixels.
+const LEGEND: usize = 16;
 /// Margin around the robot, metres.
 const AROUND: f64 = 0.25;
 /// Step in depth that is drawn as outline, metres.
@@ -102,17 +105,18 @@ impl RobotPicture {
     #[must_use]
     pub fn draw(&self, title: &str) -> Canvas {
         let n_rows = self.links.len().div_ceil(4);
-        let mut canvas = Canvas::new(2 * SIDE + 6, 2 * SIDE + 46 + 14 * n_rows);
-        canvas.text(8, 10, 2, INK, title);
+        let mut canvas = Canvas::new(2 * SIDE + 6, 2 * SIDE + 46 + LEGEND * n_rows);
+        canvas.text(8, 10, TextSize::Title, INK, title);
         for (i, view) in self.views.iter().enumerate() {
             let (x, y) = ((i % 2 * (SIDE + 6)) as i64, (36 + i / 2 * (SIDE + 4)) as i64);
             canvas.paste(x, y, &view.draw());
         }
         for (i, name) in self.links.iter().enumerate() {
-            let (x, y) = ((8 + i % 4 * (SIDE / 2)) as i64, (2 * SIDE + 46 + 14 * (i / 4)) as i64);
+            let (x, y) =
+                ((8 + i % 4 * (SIDE / 2)) as i64, (2 * SIDE + 46 + LEGEND * (i / 4)) as i64);
             canvas.fill(x, y - 1, 10, 10, link_color(i));
-            let short: String = name.chars().take(28).collect();
-            canvas.text(x + 14, y, 1, INK, &short);
+            let short = font::shortened(TextSize::Body, name, (SIDE / 2 - 24) as f32);
+            canvas.text(x + 14, y, TextSize::Body, INK, &short);
         }
         canvas
     }
@@ -250,7 +254,7 @@ impl PictureView {
             }
             canvas.set(x, y, color);
         }
-        canvas.text(8, 8, 1, INK, self.name);
+        canvas.text(8, 8, TextSize::Body, INK, self.name);
         canvas
     }
 }
@@ -272,7 +276,7 @@ impl PictureView {
                 canvas.set(u as i64, v as i64, color);
             }
         }
-        canvas.text(8, 8, 1, INK, self.name);
+        canvas.text(8, 8, TextSize::Body, INK, self.name);
         canvas
     }
 }

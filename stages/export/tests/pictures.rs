@@ -1,9 +1,9 @@
 //! Pictures of a plant and a robot made of boxes have the right size and show the robot.
 
-use contract::{Label, PointKind};
+use contract::{Equal, Fit, JointFit, Label, LinkEvidence, PointKind, Verdict};
 use export::*;
 use geometry::{Aabb, Point, Pose, Vector};
-use robot::{Link, Mesh, Model, Role};
+use robot::{Joint, JointKind, Link, Mesh, Model, Motion, Role};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,6 +15,49 @@ fn brick(min: [f32; 3], max: [f32; 3]) -> Mesh {
         [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
     Mesh { vertices, triangles }
+}
+
+fn shoulder() -> Joint {
+    Joint {
+        name: "shoulder_lift_joint_of_the_second_welder".into(),
+        kind: JointKind::Revolute,
+        parent: 0,
+        child: 1,
+        parent_from_joint: Pose::translation(0.0, 0.0, 0.52),
+        axis: Vector::y_axis(),
+        limits: Some([-2.0, 2.0]),
+        motion: Motion::Free(0),
+    }
+}
+
+/// What the evidence page is to show: a long name, a sentence of several lines.
+fn fit() -> Fit {
+    let link = |name: &str, violated: f64| LinkEvidence {
+        name: name.into(),
+        seen: 0.42,
+        matched: 1.0 - violated,
+        violated,
+        n_points: 12_581,
+        rms: 0.0017,
+    };
+    Fit {
+        model_name: "box".into(),
+        joints: vec![JointFit {
+            name: shoulder().name,
+            value: 0.8,
+            sigma: 0.12,
+            ..JointFit::default()
+        }],
+        links: vec![link("base", 0.0), link("upper_arm_with_a_long_name_behind_it", 0.2)],
+        verdict: Verdict::Trusted,
+        score: 0.773,
+        rms: 0.00169,
+        equals: vec![Equal { posture: vec![-1.2], margin: 0.5 }],
+        reasons: vec![
+            "a reason that is longer than the page is wide goes on in a second line. ".repeat(4),
+        ],
+        ..Fit::default()
+    }
 }
 
 #[test]
@@ -33,8 +76,8 @@ fn pictures_show_robots_where_they_stand() {
             link("base", [-0.2, -0.2, 0.0], [0.2, 0.2, 0.5]),
             link("arm", [-0.08, -0.08, 0.0], [0.08, 0.08, 0.9]),
         ],
-        joints: Vec::new(),
-        free: Vec::new(),
+        joints: vec![shoulder()],
+        free: vec![0],
         loops: Vec::new(),
         main_chain: Vec::new(),
         symmetries: Vec::new(),
@@ -79,6 +122,9 @@ fn pictures_show_robots_where_they_stand() {
         &[("scan_01".into(), [400_007.0, 5_000_004.0])],
     );
     plan.write(&out.join("plan.png")).expect("writes");
+    draw_evidence("R1 box trusted", &views, &fit(), &model)
+        .write(&out.join("R1_evidence.png"))
+        .expect("writes");
     let views = views.draw("R1 box trusted");
     views.write(&out.join("R1.png")).expect("writes");
     let read = png::Decoder::new(std::io::BufReader::new(

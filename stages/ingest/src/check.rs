@@ -4,6 +4,8 @@ use crate::Settings;
 use crate::reader::{self, Reader, Want};
 use contract::{Attributes, Result};
 use geometry::Point;
+use rand::Rng;
+use rand_xoshiro::SplitMix64;
 use std::path::{Path, PathBuf};
 
 /// The points that were read of one scan.
@@ -109,16 +111,7 @@ impl Drop for ScratchFile {
     }
 }
 
-/// A small random generator for damaging files (SplitMix64).
-pub(crate) struct Dice(pub(crate) u64);
-
-impl Dice {
-    /// A number below `n`.
-    pub(crate) fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % n as u64) as usize
-    }
+/// A number below `n`, for breaking files.
+pub(crate) fn below(random: &mut SplitMix64, n: usize) -> usize {
+    (random.next_u64() % n as u64) as usize
 }

@@ -5,24 +5,13 @@ use super::*;
 use crate::angular_grid::Axis;
 use geometry::direction::unit;
 use nalgebra::{Rotation3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::SplitMix64;
 use std::f64::consts::FRAC_PI_2;
 
-/// SplitMix64 with a fixed seed.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// A value of approximately normal distribution with mean 0 and standard deviation 1.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.next()).sum::<f64>() - 6.0
-    }
+/// A value of approximately normal distribution with mean 0 and standard deviation 1.
+fn normal(random: &mut SplitMix64) -> f64 {
+    (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
 }
 
 /// A scan of a room about the z axis of the lattice frame, column by column.
@@ -50,16 +39,18 @@ const PLAIN: Synthetic = Synthetic {
 
 impl Synthetic {
     fn points(&self) -> Vec<SampledPoint> {
-        let mut random = Random(7);
+        let mut random = SplitMix64::seed_from_u64(7);
         let mut points = Vec::new();
         for col in 0..self.n_cols {
             for row in 0..self.n_rows {
-                if random.next() < self.missing {
+                if random.random::<f64>() < self.missing {
                     continue;
                 }
-                let e = (-45.03 + (f64::from(row) + self.jitter * random.normal()) * self.row_deg)
+                let e = (-45.03
+                    + (f64::from(row) + self.jitter * normal(&mut random)) * self.row_deg)
                     .to_radians();
-                let a = (170.02 + (f64::from(col) + self.jitter * random.normal()) * self.col_deg)
+                let a = (170.02
+                    + (f64::from(col) + self.jitter * normal(&mut random)) * self.col_deg)
                     .to_radians();
                 let range = 4.0 + 2.0 * (3.0 * a).sin() + e;
                 let d = unit(if self.clockwise { -a } else { a }, e);
@@ -189,9 +180,9 @@ fn jitter_leaves_the_steps_about_right() {
 fn shuffled_points_give_the_density() {
     let mut points = plain(&PLAIN.points());
     let n_total = points.len() as u64;
-    let mut random = Random(3);
+    let mut random = SplitMix64::seed_from_u64(3);
     for i in (1..points.len()).rev() {
-        points.swap(i, (random.next() * (i + 1) as f64) as usize);
+        points.swap(i, (random.random::<f64>() * (i + 1) as f64) as usize);
     }
     let sample = &points[..40_000];
     let raster = estimate(sample, Some(n_total), &Settings::default()).unwrap();

@@ -7,6 +7,8 @@ use contract::{
     PlaceRun, PointKind, Scan, ScanId, Tile, TileAt, Verdict,
 };
 use geometry::{Aabb, Plane, Point, Pose, Vector};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::SplitMix64;
 use robot::{CadCloud, Joint, JointKind, Link, Model, Motion, Role};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -33,17 +35,8 @@ impl Brick {
     }
 }
 
-/// A SplitMix64 number in 0..1.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-fn normal(state: &mut u64) -> f64 {
-    let (u, v) = (uniform(state).max(1e-300), uniform(state));
+fn normal(random: &mut SplitMix64) -> f64 {
+    let (u, v) = (random.random::<f64>().max(1e-300), random.random::<f64>());
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
@@ -164,7 +157,7 @@ type Shot = (Tile, Vec<Option<Label>>);
 fn shoot(bricks: &[Brick], scan: &Scan) -> Vec<Shot> {
     let lattice = scan.lattice.expect("has one");
     let origin = scan.world_from_scan * Point::origin();
-    let mut rng = 7;
+    let mut random = SplitMix64::seed_from_u64(7);
     let mut tiles: BTreeMap<(u32, u32), Shot> = BTreeMap::new();
     let mut place = 0;
     let cast = |row: u32, col: u32| -> Option<(f64, Label)> {
@@ -184,11 +177,11 @@ fn shoot(bricks: &[Brick], scan: &Scan) -> Vec<Shot> {
             };
             let mut truth = Some(label);
             let behind = cast(row, col + 1).map(|h| h.0).filter(|b| (b - range).abs() > 0.05);
-            if let Some(behind) = behind.filter(|_| uniform(&mut rng) < 0.3) {
-                range += uniform(&mut rng) * (behind - range);
+            if let Some(behind) = behind.filter(|_| random.random::<f64>() < 0.3) {
+                range += random.random::<f64>() * (behind - range);
                 truth = None;
             }
-            range += 0.002 * normal(&mut rng);
+            range += 0.002 * normal(&mut random);
             let p = lattice.direction(Pixel { row, col }).map(|v| (v * range) as f32);
             let (tr, tc) = (row / 256, col / 256);
             let (tile, truths) = tiles.entry((tr, tc)).or_insert_with(|| {
@@ -362,7 +355,7 @@ fn points_of_a_real_robot_go_to_their_links() {
             .filter_map(|(_, (field, pose))| Some((field.as_ref()?, pose.inverse() * base)))
             .all(|(field, p)| field.near([p.x as f32, p.y as f32, p.z as f32]).is_err())
     };
-    let mut rng = 3;
+    let mut random = SplitMix64::seed_from_u64(3);
     let mut truth = Vec::new();
     let tile_at = TileAt { scan: ScanId(0), row: 0, col: 0 };
     let mut tile = Tile {
@@ -379,7 +372,7 @@ fn points_of_a_real_robot_go_to_their_links() {
         for (p, n) in
             model.links[link].cad.points.iter().zip(&model.links[link].cad.normals).take(6000)
         {
-            let shift = Vector::from(n.map(f64::from)) * 0.002 * normal(&mut rng);
+            let shift = Vector::from(n.map(f64::from)) * 0.002 * normal(&mut random);
             let base = pose * (Point::from(p.map(f64::from)) + shift);
             let p = world_from_base * base;
             // The lowest samples of the foot lie on the floor, and count as floor.

@@ -58,11 +58,9 @@ pub fn checks(bench: &CheckBench, means: &Means, engine: &Engine) -> Result<Stri
         Bench { bench, models: &models, robots: &robots, means, engine: &quiet }.case(row, dir)
     };
     let all = |rows: &[CheckRow]| {
-        let csv = bench
-            .drawn
-            .out
-            .as_deref()
-            .map(|dir| atomic::write(&dir.join("check.csv"), table::csv(rows).as_bytes()));
+        let write =
+            |dir: &Path| atomic::write(&dir.join("check.csv"), table::csv(rows)?.as_bytes());
+        let csv = bench.drawn.out.as_deref().map(write);
         let note = match csv {
             Some(Err(error)) => format!("check.csv could not be written: {error}\n"),
             _ => String::new(),

@@ -1,8 +1,10 @@
 //! Paths that were checked, with what is true of them, in; tables for people and a line a path for
 //! programs out.
 
+use super::super::sheet;
 use super::row::{CheckRow, PathRow, True};
 use crate::check::PathOutcome;
+use contract::{Result, quote};
 use std::fmt::Write as _;
 
 /// All outcomes, as columns.
@@ -79,26 +81,29 @@ fn reasons(head: &str, all: &[&PathRow], is: &dyn Fn(&PathRow) -> bool) -> Strin
 }
 
 /// One line a path.
-pub(super) fn csv(rows: &[CheckRow]) -> String {
-    let mut out =
-        String::from("seed,path,robot,model,drawn,truth,gap_m,nearest,outcome,doubts,contacts\n");
-    for row in rows {
-        for (at, p) in row.paths.iter().enumerate() {
-            let _ = writeln!(
-                out,
-                "{},{at},{},{},{:?},{:?},{:.4},\"{}\",{},{},\"{}\"",
-                row.seed,
-                p.robot,
-                p.model,
-                p.drawn,
-                p.truth,
-                p.gap,
-                p.nearest,
-                p.outcome,
-                p.doubts.join(" "),
-                p.contacts.join("; "),
-            );
-        }
-    }
-    out
+///
+/// # Errors
+/// `Bug` where a line cannot be written.
+pub(super) fn csv(rows: &[CheckRow]) -> Result<String> {
+    let columns = [
+        "seed", "path", "robot", "model", "drawn", "truth", "gap_m", "nearest", "outcome",
+        "doubts", "contacts",
+    ];
+    let paths = rows.iter().flat_map(|row| row.paths.iter().enumerate().map(move |p| (row, p)));
+    let cells = paths.map(|(row, (at, p))| {
+        [
+            row.seed.to_string(),
+            at.to_string(),
+            p.robot.to_string(),
+            quote::cell(&p.model),
+            format!("{:?}", p.drawn),
+            format!("{:?}", p.truth),
+            format!("{:.4}", p.gap),
+            quote::cell(&p.nearest),
+            p.outcome.to_string(),
+            quote::cell(&p.doubts.join(" ")),
+            quote::cell(&p.contacts.join("; ")),
+        ]
+    });
+    sheet::csv(columns, cells)
 }

@@ -2,11 +2,13 @@
 
 use super::tests::{read, settings};
 use super::*;
-use crate::check::{Dice, ScratchFile, shared};
+use crate::check::{ScratchFile, below, shared};
 use ::e57::{
     E57Writer, IntensityLimits, Quaternion, RawValues, Record, RecordDataType, RecordName,
     RecordValue, Transform, Translation,
 };
+use rand::SeedableRng;
+use rand_xoshiro::SplitMix64;
 
 /// Fields and points of a scan to write.
 pub(super) struct Own {
@@ -248,11 +250,11 @@ fn broken_bytes_are_found_and_never_fatal() {
     let valid = write("valid.e57", vec![own(300), own(200)], |xml| xml);
     let bytes = std::fs::read(&valid.0).expect("just written");
     let whole = format!("{:?}", read(&valid.0, Want::Everything).expect("valid"));
-    let mut dice = Dice(7);
+    let mut dice = SplitMix64::seed_from_u64(7);
     for round in 0..600 {
         let mut broken = bytes.clone();
-        let at = dice.below(broken.len());
-        broken[at] ^= 1 << dice.below(8);
+        let at = below(&mut dice, broken.len());
+        broken[at] ^= 1 << below(&mut dice, 8);
         let file = ScratchFile::new("flip.e57", &broken);
         // With its checksum wrong, a page that is needed is refused; padding is not needed.
         if let Ok(scans) = read(&file.0, Want::Everything) {
@@ -274,7 +276,7 @@ fn broken_bytes_are_found_and_never_fatal() {
 #[test]
 fn real_files_broken_behind_their_checksums_are_never_fatal() {
     let Some(folder) = shared("e57-compat") else { return };
-    let mut dice = Dice(8);
+    let mut dice = SplitMix64::seed_from_u64(8);
     for name in [
         "pye__testWithNormals.e57",
         "tbx__twoScans.e57",
@@ -284,9 +286,9 @@ fn real_files_broken_behind_their_checksums_are_never_fatal() {
         let bytes = std::fs::read(folder.join(name)).expect("there");
         for _round in 0..150 {
             let mut broken = bytes.clone();
-            for _bit in 0..=dice.below(3) {
-                let at = dice.below(broken.len());
-                broken[at] ^= 1 << dice.below(8);
+            for _bit in 0..=below(&mut dice, 3) {
+                let at = below(&mut dice, broken.len());
+                broken[at] ^= 1 << below(&mut dice, 8);
             }
             seal(&mut broken);
             let file = ScratchFile::new("real.e57", &broken);

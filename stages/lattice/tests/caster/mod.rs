@@ -3,6 +3,8 @@
 
 use contract::{InputId, Lattice, MaskId, Pixel, Scan, ScanId, TILE_SIDE, Tile, TileAt};
 use geometry::{Aabb, Point, Pose, Vector};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::SplitMix64;
 
 #[derive(Debug, Clone)]
 pub enum Shape {
@@ -57,21 +59,9 @@ impl Shape {
     }
 }
 
-/// SplitMix64 with a normal distribution on top.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    pub fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
+/// Mean 0, standard deviation 1, near enough.
+fn normal(random: &mut SplitMix64) -> f64 {
+    (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
 }
 
 pub const NOTHING: usize = usize::MAX;
@@ -135,7 +125,7 @@ impl Scene {
         let centres: Vec<(f64, usize)> = (0..side * side)
             .map(|k| self.cast(&o, &world(&direction(i0 + k / side, j0 + k % side, 0.0, 0.0))))
             .collect();
-        let mut random = Random(u64::from(row) << 32 | u64::from(col));
+        let mut random = SplitMix64::seed_from_u64(u64::from(row) << 32 | u64::from(col));
         let mut out = Truth {
             tile: Tile {
                 at: TileAt { scan: scan.id, row, col },
@@ -189,7 +179,7 @@ impl Scene {
                     veil = near > limit && ranges.iter().all(|r| (r - range).abs() > limit);
                 }
             }
-            range += sigma * random.normal();
+            range += sigma * normal(&mut random);
             let p = direction(i0 + i, j0 + j, 0.0, 0.0) * range;
             out.tile.place.push(out.tile.place.len() as u32);
             out.tile.n_all += 1;

@@ -7,6 +7,8 @@ mod spread;
 use crate::model::{CadCloud, Mesh};
 use exterior::{Blockers, Shell, Side};
 use nalgebra::Vector3;
+use rand::{Rng as _, RngExt as _, SeedableRng as _};
+use rand_xoshiro::SplitMix64;
 
 /// Number of candidates for each sample that is kept: with fewer the samples leave holes, with more
 /// only the time grows.
@@ -25,28 +27,9 @@ struct SurfaceSample {
     normal: Vector3<f32>,
 }
 
-/// The SplitMix64 generator: small, uniform, and identical on every machine.
-#[derive(Debug, Clone, Copy)]
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number in [0, 1).
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// An integer in [0, n).
-    fn below(&mut self, n: usize) -> usize {
-        ((u128::from(self.next()) * n as u128) >> 64) as usize
-    }
+/// An integer in [0, n).
+fn below(random: &mut SplitMix64, n: usize) -> usize {
+    ((u128::from(random.next_u64()) * n as u128) >> 64) as usize
 }
 
 /// Smallest number of samples of a link, as far as [`MIN_SPACING`] allows. The pose of a small
@@ -65,7 +48,8 @@ pub(crate) fn sample(mesh: &Mesh, spacing: f64, max_samples: usize) -> CadCloud 
     }
     let spacing = spacing.min((whole / MIN_SAMPLES).sqrt().max(MIN_SPACING));
     let n_wanted = (whole / (spacing * spacing)).min(max_samples as f64 * 1.5).max(400.0);
-    let mut random = Random(mesh.triangles.len() as u64);
+    // The sequence of SplitMix64 is fixed by its definition: the same samples on every machine.
+    let mut random = SplitMix64::seed_from_u64(mesh.triangles.len() as u64);
     let candidates =
         candidates(mesh, &areas, whole, (n_wanted * N_CANDIDATES) as usize, &mut random);
     let n_candidates = candidates.len();
@@ -98,11 +82,11 @@ fn candidates(
     areas: &[f64],
     whole: f64,
     n: usize,
-    random: &mut Random,
+    random: &mut SplitMix64,
 ) -> Vec<SurfaceSample> {
     let step = whole / n as f64;
     let mut out = Vec::with_capacity(n + 1);
-    let mut next = step * random.unit();
+    let mut next = step * random.random::<f64>();
     let mut sum = 0.0;
     for (triangle, area) in mesh.triangles.iter().zip(areas) {
         sum += area;
@@ -114,7 +98,7 @@ fn candidates(
             continue;
         };
         // The R2 sequence (powers of the plastic number) from a random start.
-        let (mut u, mut v) = (random.unit(), random.unit());
+        let (mut u, mut v) = (random.random::<f64>(), random.random::<f64>());
         while next < sum {
             let (s, t) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
             out.push(SurfaceSample {

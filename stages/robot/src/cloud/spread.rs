@@ -1,7 +1,8 @@
 //! Selects samples from candidates so that every prefix of the result keeps its distances, too
 //! (Poisson-disk sampling by dart throwing with a shrinking radius).
 
-use super::{Random, SurfaceSample};
+use super::{SurfaceSample, below};
+use rand_xoshiro::SplitMix64;
 
 /// Radius of a dart relative to the spacing; with this value there are as many samples as squares
 /// of the spacing fit into the area.
@@ -17,11 +18,11 @@ pub(super) fn spread(
     candidates: Vec<SurfaceSample>,
     area: f64,
     spacing: f64,
-    random: &mut Random,
+    random: &mut SplitMix64,
 ) -> Vec<SurfaceSample> {
     let mut waiting = candidates;
     for at in (1..waiting.len()).rev() {
-        waiting.swap(at, random.below(at + 1));
+        waiting.swap(at, below(random, at + 1));
     }
     let mut out: Vec<SurfaceSample> = Vec::new();
     let last = RADIUS * spacing;
