@@ -8,25 +8,12 @@ from pathlib import Path
 import compare
 import numpy as np
 import ours
+import theirs
+from programs import labelled, program
 
 # The names of our PLY's columns, and what CloudCompare makes of them.
 PLY_NAMES = {f"scalar_{name}": name for name in ("kind", "robot", "link")}
 KIND_OF_CLASS = {64: 0, 65: 1, 66: 2, 2: 3, 69: 255}
-
-
-def program(setting, name):
-    """How an outside program is called, and its version; none where it is not there."""
-    call = getattr(setting.given, name)
-    default = {"pdal": "pdal", "cloudcompare": "CloudCompare", "octomap_tools": ""}[name]
-    if call is None and shutil.which(default or "bt2vrml"):
-        call = default
-    return call
-
-
-def labelled(setting, name, reader=None):
-    """A reader with its package's version."""
-    versions = setting.known = getattr(setting, "known", None) or setting.versions()
-    return f"{reader or name} {versions[name.lower()]}"
 
 
 def reads(setting, table, part, file, who, probe, compared):
@@ -245,8 +232,6 @@ def readme(setting, material, table):
 
 
 def others(setting, material, table):
-    import theirs
-
     theirs.clouds(setting, material, table)
     theirs.robots(setting, material, table)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import compare
 import numpy as np
-from parts import labelled, program
+from programs import labelled, program
 
 # Points of the cloud that others write: enough for all that is compared, few enough for every program.
 N_POINTS = 40_000
