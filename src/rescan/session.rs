@@ -1,3 +1,6 @@
+//! Compares the earlier and the new scans of a cell: how its robots stand now, and what else is no
+//! longer where it was.
+
 use super::earlier_points::{Compared, EarlierPoints};
 use super::earlier_result::EarlierResult;
 use super::new_points;

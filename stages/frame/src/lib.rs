@@ -15,7 +15,7 @@
 //!
 //! # Example
 //! ```
-//! use frame::{Answer, Gathered, Panorama, Session, at_stated};
+//! use frame::{Answer, Gathered, Panorama, SessionSurfaces, at_stated};
 //! use geometry::{Pose, Vector, direction::unit};
 //!
 //! // A scanner in a room of 10 m × 7 m × 4 m.
@@ -30,7 +30,7 @@
 //!     eye.add(along.map(|v| (v * range) as f32));
 //!     points.add((at + Vector::from(along) * range).into(), Some(&at));
 //! }
-//! let session = Session { surfels: points.surfels(&[]), eyes: vec![eye.finish()] };
+//! let session = SessionSurfaces { surfels: points.surfels(&[]), eyes: vec![eye.finish()] };
 //! // The scans lie on themselves where they are stated to.
 //! assert!(matches!(at_stated(&session, &session, &Pose::identity()), Answer::Holds(_)));
 //! ```

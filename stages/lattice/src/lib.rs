@@ -23,7 +23,7 @@
 //! let tile = Tile { at, first_place: 0, place: (0..n_all as u32).collect(), pixel, xyz,
 //!     bounds: Aabb::EMPTY, skip: 0, n_all };
 //! let stage = lattice::Summarise::new(&[scan], &lattice::Settings::default());
-//! let summary = stage.apply(tile, &mut lattice::Scratch::default())?;
+//! let summary = stage.apply(tile, &mut lattice::LatticeScratch::default())?;
 //! assert!(summary.patches[0].plane.normal.z > 0.999); // the floor faces up
 //! # Ok::<(), contract::Error>(())
 //! ```

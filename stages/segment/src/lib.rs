@@ -17,7 +17,7 @@
 //! let settings = segment::Settings::default();
 //!
 //! // Away from robots the place of a point decides.
-//! let ground = segment::Ground::new(&floor, &settings);
+//! let ground = segment::FloorHeights::new(&floor, &settings);
 //! assert_eq!(ground.label([1.0, 2.0, 0.003]).kind, PointKind::Floor);
 //! assert_eq!(ground.label([1.0, 2.0, 0.5]).kind, PointKind::Fixed);
 //!
