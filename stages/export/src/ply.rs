@@ -58,7 +58,7 @@ pub fn write_ply(
 }
 
 /// What of a tile's point stands in a PLY file.
-struct Point {
+struct PlyPoint {
     /// World, metres.
     xyz: [f64; 3],
     intensity: u16,
@@ -70,7 +70,7 @@ struct Point {
 }
 
 /// The points of a piece, from its columns.
-fn points(piece: &las::PointData) -> impl Iterator<Item = Point> + '_ {
+fn points(piece: &las::PointData) -> impl Iterator<Item = PlyPoint> + '_ {
     let n_extra = usize::from(piece.format().extra_bytes);
     let extra = piece.record_len() - n_extra;
     let owners = piece.raw_bytes().chunks_exact(piece.record_len()).map(move |record| {
@@ -84,7 +84,7 @@ fn points(piece: &las::PointData) -> impl Iterator<Item = Point> + '_ {
     let places = piece.x().zip(piece.y()).zip(piece.z()).map(|((x, y), z)| [x, y, z]);
     let kinds = piece.classification().map(|class| KINDS[usize::from(class)]);
     let measured = places.zip(piece.intensity()).zip(colors);
-    measured.zip(kinds.zip(owners)).map(|(((xyz, intensity), color), (kind, owner))| Point {
+    measured.zip(kinds.zip(owners)).map(|(((xyz, intensity), color), (kind, owner))| PlyPoint {
         xyz,
         intensity,
         kind,
@@ -112,7 +112,7 @@ impl Ply {
         written.map_err(|e| Error::of_file("cloud cannot be written", self.file.path(), e))
     }
 
-    fn add(&mut self, point: &Point) -> Result<()> {
+    fn add(&mut self, point: &PlyPoint) -> Result<()> {
         let mut record = [0; RECORD];
         record[..24].copy_from_slice(point.xyz.map(f64::to_le_bytes).as_flattened());
         record[24..28].copy_from_slice(&i32::from(point.intensity).to_le_bytes());
