@@ -2,6 +2,7 @@
 //! posture.
 
 use crate::ContactLevel;
+use crate::evidence::{by_each_other, enough};
 use crate::obstacle::{HALF_CELL, Obstacle, What};
 use crate::obstacles::{Bin, Obstacles, Replaced};
 use crate::shape::{Gap, PartShape};
@@ -128,8 +129,9 @@ impl<'a> RobotBody<'a> {
     }
 
     /// Removes from `around` what belongs to the robot itself in the posture `found`, in which it
-    /// was scanned: points on or inside its surface, whatever their label, and unseen space that
-    /// the robot filled. Uncertain points beside it count twice: as obstacles [`What::Beside`], and
+    /// was scanned: points on or inside its surface, whatever their label, strays beside it, and
+    /// unseen space that the robot filled. A point beside it is a stray where space is known and
+    /// only points of the robot itself are its neighbours. Uncertain points beside it count twice: as obstacles [`What::Beside`], and
     /// as points that may be attached to the nearest part and move with it.
     pub fn stand(&mut self, found: &[f64], around: &mut Obstacles) {
         let mut near: Vec<Option<(f32, usize)>> = vec![None; around.all.len()];
@@ -150,11 +152,12 @@ impl<'a> RobotBody<'a> {
                 is_near(&part.bounds, p, within) && part.shape.gap(p, within) != Gap::Far
             })
         };
+        let is_stray = strays(around, &near, |o| is_own(o.at, OWN));
         let (mut doubtful, split) = (Hung::new(), around.split.clone());
         let fixed = around.fixed(JOINED);
         around.replace(|at, o| match (near[at], o.what) {
             (None, _) => Replaced::Kept,
-            (_, What::Fixed | What::Uncertain) if is_own(o.at, OWN) => Replaced::By(Vec::new()),
+            (_, What::Fixed | What::Uncertain) if is_stray[at] => Replaced::By(Vec::new()),
             (Some((_, part)), What::Uncertain) => {
                 let link = self.parts[part].link;
                 if fixed.is_near(o.at) {
@@ -254,6 +257,32 @@ impl<'a> RobotBody<'a> {
             }
         }
     }
+}
+
+/// For each obstacle, whether it is the robot's own or a stray: of the points that are near the
+/// robot as scanned, those on its surface and, where space is known, those beside it that no others
+/// support.
+fn strays(
+    around: &Obstacles,
+    near: &[Option<(f32, usize)>],
+    is_own: impl Fn(&Obstacle) -> bool,
+) -> Vec<bool> {
+    let is_point = |o: &Obstacle| matches!(o.what, What::Fixed | What::Uncertain);
+    let mut out: Vec<bool> = (around.all.iter().zip(near))
+        .map(|(o, near)| near.is_some() && is_point(o) && is_own(o))
+        .collect();
+    if around.split.is_empty() {
+        return out;
+    }
+    let points: Vec<Obstacle> = around.all.iter().filter(|o| is_point(o)).copied().collect();
+    let others: Vec<usize> =
+        (0..out.len()).filter(|&at| is_point(&around.all[at]) && !out[at]).collect();
+    let all: Vec<Obstacle> = others.iter().map(|&at| around.all[at]).collect();
+    let is_evident = by_each_other(&all, enough(&points), |k| near[others[k]].is_some());
+    for (at, is_evident) in others.into_iter().zip(is_evident) {
+        out[at] = near[at].is_some() && !is_evident;
+    }
+    out
 }
 
 fn touch(part: usize, obstacle: usize, o: &Obstacle, margin: f32, gap: f32) -> Option<PartTouch> {

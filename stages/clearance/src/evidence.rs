@@ -82,12 +82,28 @@ pub fn hanging(points: &[([f32; 3], bool)]) -> Vec<[f32; 3]> {
         is_grazed,
     };
     let all: Vec<Obstacle> = points.iter().map(obstacle).collect();
-    let cubes = Cubes::of(&all);
-    let enough = cubes.enough();
-    let is_evident = |(at, o): &(usize, &Obstacle)| {
-        cubes.n_near(o, NEAR, enough) >= enough || !o.is_grazed && cubes.is_thing(*at)
+    let told = by_each_other(&all, enough(&all), |_| true);
+    all.iter().zip(told).filter(|(_, is)| *is).map(|(o, _)| o.at).collect()
+}
+
+/// Number of neighbours that makes a surface at the density of these points.
+pub(crate) fn enough(all: &[Obstacle]) -> usize {
+    Cubes::of(all).enough()
+}
+
+/// For each obstacle, whether the others are evidence that it belongs to an object: it lies on a
+/// surface (`enough` neighbours make one), on a line or among a few neighbours. Only told where
+/// `asks` holds.
+pub(crate) fn by_each_other(
+    all: &[Obstacle],
+    enough: usize,
+    asks: impl Fn(usize) -> bool,
+) -> Vec<bool> {
+    let cubes = Cubes::of(all);
+    let is_evident = |(at, o): (usize, &Obstacle)| {
+        asks(at) && (cubes.n_near(o, NEAR, enough) >= enough || !o.is_grazed && cubes.is_thing(at))
     };
-    all.iter().enumerate().filter(is_evident).map(|(_, o)| o.at).collect()
+    all.iter().enumerate().map(is_evident).collect()
 }
 
 impl<'a> Cubes<'a> {

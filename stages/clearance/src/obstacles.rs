@@ -295,6 +295,11 @@ impl Split {
         Self { offsets, radius: (HALF_DIAGONAL * step) as f32 }
     }
 
+    /// Whether nothing is known of space.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.offsets.is_empty()
+    }
+
     /// The parts of a voxel of unseen space; `None` for other obstacles, and for parts themselves.
     pub(crate) fn parts(&self, o: &Obstacle) -> Option<impl Iterator<Item = Obstacle> + '_> {
         let is_whole = o.what == What::Unseen && o.radius > 1.5 * self.radius;

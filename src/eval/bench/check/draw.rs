@@ -13,6 +13,7 @@ use simulate::{Plant, Postures, Scene};
 const SMALL: [f64; 2] = [0.03, 0.35];
 /// Paths of each kind for each robot; to thin things goes one for each of them.
 const N_SMALL: usize = 8;
+const N_WRIST: usize = 8;
 const N_FAR: usize = 4;
 const N_HIT: usize = 3;
 /// Thin things in the way of each robot.
@@ -34,6 +35,8 @@ const LENGTH: [f64; 2] = [1.0, 2.5];
 pub(super) enum PathKind {
     /// A few joints turned by little.
     Small,
+    /// A few of the outer half of the joints turned by little: most of these are wholly seen.
+    Wrist,
     /// To a posture of its own.
     Far,
     /// One of several that hits something.
@@ -189,7 +192,7 @@ pub(super) fn paths(
     let (model, from) = (robot.model, &robot.posture[..]);
     let mut out = Vec::new();
     for _ in 0..N_SMALL {
-        out.push(DrawnPath { drawn: PathKind::Small, to: small(model, from, random) });
+        out.push(DrawnPath { drawn: PathKind::Small, to: small(model, from, 0, random) });
     }
     for _ in 0..N_FAR {
         let to = target(robot, random)?;
@@ -204,14 +207,18 @@ pub(super) fn paths(
             }
         }
     }
+    for _ in 0..N_WRIST {
+        let to = small(model, from, from.len() / 2, random);
+        out.push(DrawnPath { drawn: PathKind::Wrist, to });
+    }
     Ok(out)
 }
 
-/// One to three joints turned by little, within their limits.
-fn small(model: &Model, from: &[f64], random: &mut Random) -> Vec<f64> {
+/// One to three joints from `first` on turned by little, within their limits.
+fn small(model: &Model, from: &[f64], first: usize, random: &mut Random) -> Vec<f64> {
     let mut to = from.to_vec();
     for _ in 0..=random.below(3) {
-        let joint = random.below(to.len());
+        let joint = first + random.below(to.len() - first);
         let slides = model.joints[model.free[joint]].kind == robot::JointKind::Prismatic;
         let far = random.between(SMALL[0], SMALL[1]) * if slides { 0.2 } else { 1.0 };
         let way = if random.unit() < 0.5 { far } else { -far };

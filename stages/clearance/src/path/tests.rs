@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{Cells, KnownBounds};
-use contract::OneByOne;
+use contract::{OneByOne, Space, SpaceGrid, SpaceKind};
 use geometry::{Aabb, Pose};
 use robot::{Model, Settings};
 
@@ -28,6 +28,16 @@ fn contacts(walk: &PathWalk<'_>) -> Vec<Contact> {
 }
 
 fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
+    walk_in(None, points, path, found, margin)
+}
+
+fn walk_in(
+    space: Option<&Space>,
+    points: &[([f64; 3], What)],
+    path: &[f64],
+    found: f64,
+    margin: f64,
+) -> Vec<Contact> {
     let dir = tempfile::tempdir().expect("a folder");
     let model = arm(dir.path());
     let mut body = RobotBody::new(&model, BTreeMap::new(), margin, 0.0, &OneByOne);
@@ -36,7 +46,7 @@ fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> V
     cells.settle();
     let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
     let known = KnownBounds { world_from_base: Pose::identity(), bounds };
-    let mut around = Obstacles::new(&cells, &[], None, known);
+    let mut around = Obstacles::new(&cells, &[], space, known);
     body.stand(&[found], &mut around);
     let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
     let legs = legs(&body, &path);
@@ -100,6 +110,29 @@ fn points_on_its_own_surface_are_no_obstacle() {
     assert_eq!(walk(&patch(0.003), &[0.0, 0.3], 0.0, 0.02), []);
     let hit = |c: &Contact| c.level >= ContactLevel::Hit && !c.as_found;
     assert!(walk(&patch(0.03), &[0.0, 0.3], 0.0, 0.02).iter().any(hit));
+}
+
+#[test]
+fn a_few_points_beside_its_own_surface_are_strays_where_space_is_known() {
+    let bounds = Aabb { min: [-2.0; 3], max: [2.0; 3] };
+    let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
+    space.voxels_mut().fill(SpaceKind::Free);
+    // The beam's side as a mask left it, and so many points that stand off it by 12 to 15 mm.
+    let side = (0..40_u32).map(|k| {
+        ([0.4 + 0.01 * f64::from(k % 10), 0.053, 0.01 * f64::from(k / 10)], What::Uncertain)
+    });
+    let beside = |n: u32, apart: f64| -> Vec<_> {
+        let at = |k: u32| [0.42 + apart * f64::from(k), 0.062 + 0.003 * f64::from(k % 2), 0.02];
+        let off = (0..n).map(|k| (at(k), What::Uncertain));
+        side.clone().chain(off).collect()
+    };
+    let contacts = |points: &[_], space| walk_in(space, points, &[0.0, 0.1], 0.0, 0.02);
+    assert_eq!(contacts(&beside(3, 0.01), Some(&space)), []);
+    // Nothing is known of space: each may be of an object.
+    assert_ne!(contacts(&beside(3, 0.01), None), []);
+    // A small object, and a wire along the beam that few beams met.
+    assert_ne!(contacts(&beside(6, 0.01), Some(&space)), []);
+    assert_ne!(contacts(&beside(6, 0.04), Some(&space)), []);
 }
 
 #[test]
