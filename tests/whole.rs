@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stillpoint::engine::Engine;
+use stillpoint::estimate::estimate;
 use stillpoint::eval::compare::Agreement;
 use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
@@ -42,7 +43,21 @@ fn run(input: PathBuf, scanners: Option<PathBuf>, robots: &Path, out: PathBuf, t
     let means = Means::of(&given).expect("defaults hold");
     let robots = robots.to_path_buf();
     let job = Job { scanners, ..Job::new(vec![input], robots, out, means) };
-    plan::run(&job, &Engine::new(threads)).expect("the run ends well");
+    let engine = Engine::new(threads);
+    let planned = estimate(&job, &engine).expect("it can be planned");
+    plan::run(&job, &engine).expect("the run ends well");
+    let written = n_bytes(&job.out);
+    let most = planned.store_bytes + planned.output_bytes;
+    assert!(written <= most, "{written} bytes are written, `plan` said {most}");
+}
+
+/// Bytes of all files below a folder.
+fn n_bytes(dir: &Path) -> u64 {
+    let all = std::fs::read_dir(dir).expect("a folder").map(|e| e.expect("an entry").path());
+    let own = |path: PathBuf| {
+        if path.is_dir() { n_bytes(&path) } else { path.metadata().expect("a file").len() }
+    };
+    all.map(own).sum()
 }
 
 /// Every file below a folder but the store, by its name.
