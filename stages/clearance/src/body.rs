@@ -219,15 +219,8 @@ impl<'a> RobotBody<'a> {
         }
         let own = bin.range.clone().zip(&around.all[bin.range.clone()]);
         // Attached points give distances only up to the limit they were prepared for.
-        if part.shape.tells_all() {
-            match part.shape.gap(middle, within) {
-                Gap::Far => return,
-                Gap::Inside => {
-                    touches.extend(own.map(|(obstacle, o)| inside(at, obstacle, o)));
-                    return;
-                }
-                Gap::At(_) => {}
-            }
+        if part.shape.tells_all() && part.shape.gap(middle, within) == Gap::Far {
+            return;
         }
         for (obstacle, o) in own {
             // Points that may be attached to the robot are no obstacle to themselves.

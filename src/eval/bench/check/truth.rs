@@ -201,15 +201,21 @@ impl<'a> Truth<'a> {
         best
     }
 
-    /// Whether scanners saw all space that the robot goes through, and so far around it, metres,
-    /// but for what it filled itself as it was scanned: a beam can go there, and ends on
-    /// something.
+    /// Whether scanners saw all space that the links which move on a path go through, and so far
+    /// around them, metres, but for what the robot filled itself as it was scanned: a beam can go
+    /// there, and ends on something.
     pub(super) fn is_seen(&self, from: &[f64], to: &[f64], around: f64) -> bool {
         let n = self.n_steps(from, to, SEEN_STEP);
+        let ends = [from, to].map(|at| placed(self.model, &self.world_from_base, at));
+        let moves = |part: &&MeshPart| {
+            let [a, b] = [0, 1].map(|end| ends[end][part.link].to_homogeneous());
+            (a - b).amax() > 1e-9
+        };
+        let moving: Vec<&MeshPart> = self.parts.iter().filter(moves).collect();
         (0..=n).all(|step| {
             let posture = between(from, to, step as f64 / n as f64);
             let poses = placed(self.model, &self.world_from_base, &posture);
-            self.parts.iter().all(|part| {
+            moving.iter().all(|part| {
                 let pose = &poses[part.link];
                 part.samples.iter().all(|(p, out)| {
                     let p = pose * p;

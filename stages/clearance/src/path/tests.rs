@@ -113,6 +113,18 @@ fn points_on_its_own_surface_are_no_obstacle() {
 }
 
 #[test]
+fn a_link_above_the_floor_is_not_in_it_where_a_bin_reaches_from_the_floor_into_the_link() {
+    // The floor 28 mm below the beam, and a point in the beam: the middle of their bin is in it.
+    let floor = (0..100_u32)
+        .map(|k| [0.33 + 0.01 * f64::from(k % 10), 0.17 + 0.01 * f64::from(k / 10), -0.078])
+        .map(|p| (p, What::Floor));
+    let above = ([0.4, 0.25, -0.002], What::Fixed);
+    let points: Vec<_> = floor.chain([above]).collect();
+    let found = walk(&points, &[0.0, 1.0], 0.0, 0.01);
+    assert!(found.iter().all(|c| c.what != What::Floor), "{found:?}");
+}
+
+#[test]
 fn a_few_points_beside_its_own_surface_are_strays_where_space_is_known() {
     let bounds = Aabb { min: [-2.0; 3], max: [2.0; 3] };
     let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
