@@ -7,6 +7,7 @@ use crate::detect::search::Search;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind, Verdict};
+use freespace::Passed;
 use geometry::{Aabb, Point, Pose, Vector};
 use lattice::ViewSettings;
 use robot::Model;
@@ -61,7 +62,10 @@ impl KnownSpaces<'_, '_> {
             return Ok(None);
         }
         let mut space = Space::unknown(grid);
-        freespace::see(&mut space, &region, &views, &AllThreads);
+        let fit = &self.robots.fits[robot];
+        let model = &self.robots.models[fit.model];
+        let passed = Passed::new(&region, &views, grid.edge).about(model, &poses(fit, model));
+        freespace::see(&mut space, &passed, &AllThreads);
         Ok(Some(space))
     }
 

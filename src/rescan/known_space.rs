@@ -6,7 +6,7 @@ use super::found::Found;
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::FittedRobots;
 use crate::engine::{Engine, Task};
-use crate::label::known_space::{KnownSpaces, VoxelMark, bounds, mark};
+use crate::label::known_space::{KnownSpaces, VoxelMark, bounds, mark, poses};
 use contract::{Result, Space, SpaceGrid, SpaceKind};
 use export::{SpaceEntry, write_space};
 use freespace::Passed;
@@ -65,7 +65,9 @@ impl Found<'_, '_> {
         };
         let mut space = Space::unknown(grid);
         around.stand(&mut space, i);
-        let passed = Passed::new(&self.session.cell, &self.session.new_views, grid.edge);
+        let model = &self.models[fit.model];
+        let passed = Passed::new(&self.session.cell, &self.session.new_views, grid.edge)
+            .about(model, &poses(fit, model));
         renew(&mut space, &old, places, |middle| passed.is_free(middle));
         Ok(Some(space))
     }

@@ -185,6 +185,11 @@ impl<'a> RobotBody<'a> {
         self.within(self.margin, posture, around)
     }
 
+    /// The same for a margin wider by `more` metres.
+    pub(crate) fn near_by(&self, more: f32, posture: &[f64], around: &Obstacles) -> PostureNear {
+        self.within(self.margin + more, posture, around)
+    }
+
     fn within(&self, margin: f32, posture: &[f64], around: &Obstacles) -> PostureNear {
         let poses = self.model.poses(posture);
         let mut out = PostureNear::default();

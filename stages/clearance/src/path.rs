@@ -97,7 +97,7 @@ impl<'a> PathWalk<'a> {
         for leg in legs {
             first.push(first[first.len() - 1] + leg.n_steps);
         }
-        Self { body, around, path, legs, first, found: AsFound::of(body.near(found, around)) }
+        Self { body, around, path, legs, first, found: AsFound::of(body, found, around) }
     }
 
     /// Number of postures.
@@ -200,7 +200,10 @@ struct AsFound {
 }
 
 impl AsFound {
-    fn of(near: PostureNear) -> Self {
+    /// Also of what was little farther than the margin: a path may begin a little beside the
+    /// posture that was found.
+    fn of(body: &RobotBody<'_>, found: &[f64], around: &Obstacles) -> Self {
+        let near = body.near_by(ROUNDING, found, around);
         let touch = |t: &PartTouch| ((t.part, t.obstacle), (t.level, t.gap));
         Self { touches: near.touches.iter().map(touch).collect(), outside: near.outside }
     }

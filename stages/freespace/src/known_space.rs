@@ -4,7 +4,7 @@
 //! What a robot hides is unknown, not free: a voxel is free only where a beam went on beyond it. A
 //! beam that did not come back proves nothing.
 
-use contract::{Fan, Region, Space, SpaceKind, View};
+use contract::{Fan, Region, Space, SpaceGrid, SpaceKind, View};
 use geometry::{Aabb, Eye, Pose};
 use robot::Model;
 
@@ -22,18 +22,42 @@ pub struct Passed<'a> {
     eyes: Vec<Eye<'a>>,
     /// Edge of the voxels that are asked about, metres.
     edge: f64,
+    /// What the robot fills, in voxels of half the edge; `None` without a robot.
+    body: Option<Space>,
 }
 
 impl<'a> Passed<'a> {
     /// Of views of a region, for voxels of this edge.
     #[must_use]
     pub fn new(region: &'a Region, views: &'a [View], edge: f64) -> Self {
-        Self { region, eyes: views.iter().map(|view| Eye::new(&view.images)).collect(), edge }
+        let eyes = views.iter().map(|view| Eye::new(&view.images)).collect();
+        Self { region, eyes, edge, body: None }
+    }
+
+    /// The same about a robot that stood with its links at `world_from_links` as it was scanned:
+    /// of a voxel beside it, the eighths that it fills or touches need not be seen, since it hides
+    /// them itself.
+    #[must_use]
+    pub fn about(self, model: &Model, world_from_links: &[Pose]) -> Self {
+        let mut bounds = Aabb::EMPTY;
+        for (link, pose) in model.links.iter().zip(world_from_links) {
+            let corners = link.bounds.corners().map(geometry::Point::from);
+            let corners = corners.iter().filter(|_| !link.bounds.is_empty());
+            corners.for_each(|corner| bounds.add((pose * corner).coords.into()));
+        }
+        if bounds.is_empty() {
+            return self;
+        }
+        let half = 0.5 * self.edge;
+        let mut body = Space::unknown(SpaceGrid::over(&bounds.grown(2.0 * half), half));
+        stand(&mut body, SpaceKind::Robot, model, world_from_links);
+        Self { body: Some(body), ..self }
     }
 
     /// Whether a beam went on beyond the voxel with this middle (world, metres), or beams got to
     /// the middle of each of its eighths: in a voxel beside a surface none goes on, and where
-    /// one ends in it there is a point, which makes of it what that is.
+    /// one ends in it there is a point, which makes of it what that is. Eighths that the robot
+    /// itself fills or touches are left out, if not all of them are.
     #[must_use]
     pub fn is_free(&self, middle: [f64; 3]) -> bool {
         let beyond = (HALF_DIAGONAL * self.edge + BEYOND) as f32;
@@ -42,8 +66,32 @@ impl<'a> Passed<'a> {
         let eighth = |k: usize| {
             std::array::from_fn(|i| if k >> i & 1 == 0 { p[i] - quarter } else { p[i] + quarter })
         };
-        self.is_passed(p, 2.0 * quarter, beyond)
-            || (0..8).all(|k| self.is_passed(eighth(k), quarter, 0.0))
+        if self.is_passed(p, 2.0 * quarter, beyond) {
+            return true;
+        }
+        let mut n_passed = 0;
+        let is_told = |k: usize| {
+            let is_passed = self.is_passed(eighth(k), quarter, 0.0);
+            n_passed += usize::from(is_passed);
+            is_passed || self.is_body(eighth(k))
+        };
+        (0..8).all(is_told) && n_passed > 0
+    }
+
+    /// Whether the robot fills or touches the eighth of a voxel with this middle, frame of the
+    /// region, metres.
+    fn is_body(&self, middle: [f32; 3]) -> bool {
+        let Some(body) = &self.body else { return false };
+        let grid = body.grid();
+        let at: [f64; 3] = std::array::from_fn(|i| f64::from(middle[i]) + self.region.origin[i]);
+        let is_filled = |k: usize| {
+            let mut beside = at;
+            if k < 6 {
+                beside[k / 2] += if k.is_multiple_of(2) { grid.edge } else { -grid.edge };
+            }
+            grid.index(beside).is_some_and(|at| body.voxels()[at] == SpaceKind::Robot)
+        };
+        (0..7).any(is_filled)
     }
 
     /// Whether a beam in a cell about a place of the region went on so far beyond it, metres.
@@ -56,10 +104,9 @@ impl<'a> Passed<'a> {
     }
 }
 
-/// Frees every voxel that a beam of the views (of `region`) went through.
-pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &dyn Fan) {
+/// Frees every voxel that beams went through.
+pub fn see(space: &mut Space, passed: &Passed<'_>, fan: &dyn Fan) {
     let grid = *space.grid();
-    let passed = Passed::new(region, views, grid.edge);
     let pieces = space.voxels_mut().chunks_mut(PIECE).enumerate().collect();
     fan.fan(pieces, |(n, voxels): (usize, &mut [SpaceKind])| {
         for (i, voxel) in voxels.iter_mut().enumerate() {
@@ -95,7 +142,7 @@ pub fn stand(space: &mut Space, kind: SpaceKind, model: &Model, world_from_links
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::{MaskId, OneByOne, ScanId, SpaceGrid};
+    use contract::{MaskId, OneByOne, ScanId};
     use geometry::depth::Empty;
     use geometry::{DepthImage, Point};
 
@@ -133,7 +180,8 @@ mod tests {
         let bounds = Aabb { min: [0.5, -1.0, -0.5], max: [5.0, 1.0, 0.5] };
         let region = Region { origin: Point::origin(), bounds };
         let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));
-        see(&mut space, &region, &[view()], &OneByOne);
+        let views = [view()];
+        see(&mut space, &Passed::new(&region, &views, 0.1), &OneByOne);
         let at = |space: &Space, p| space.voxels()[space.grid().index(p).expect("inside")];
         assert_eq!(at(&space, [3.0, -0.5, 0.0]), SpaceKind::Free);
         assert_eq!(at(&space, [1.5, 0.3, 0.0]), SpaceKind::Free);
@@ -152,5 +200,28 @@ mod tests {
         space.mark(wall, SpaceKind::Fixed);
         space.mark(wall, SpaceKind::Other);
         assert_eq!(space.voxels()[wall], SpaceKind::Fixed);
+    }
+
+    #[test]
+    fn what_only_the_robot_itself_hides_of_a_voxel_leaves_it_free() {
+        let bounds = Aabb { min: [0.5, -1.0, -0.5], max: [5.0, 1.0, 0.5] };
+        let (region, views) = (Region { origin: Point::origin(), bounds }, [view()]);
+        // Before the wall, at the edge of what the plate hides: half of its eighths are seen.
+        let at_edge = [3.95, 0.02, 0.0];
+        let filled = |from: f64| {
+            let mut body = Space::unknown(SpaceGrid::over(&bounds, 0.05));
+            let grid = *body.grid();
+            for (at, voxel) in body.voxels_mut().iter_mut().enumerate() {
+                if grid.middle(at)[1] > from {
+                    *voxel = SpaceKind::Robot;
+                }
+            }
+            Passed { body: Some(body), ..Passed::new(&region, &views, 0.1) }
+        };
+        assert!(!Passed::new(&region, &views, 0.1).is_free(at_edge));
+        assert!(filled(0.0).is_free(at_edge));
+        assert!(!filled(0.2).is_free(at_edge), "the robot is not there");
+        // Where no eighth was seen nothing is known.
+        assert!(!filled(0.0).is_free([3.95, 0.5, 0.0]));
     }
 }

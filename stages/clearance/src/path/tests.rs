@@ -93,6 +93,15 @@ fn what_it_touched_where_it_was_found_is_told_apart_until_it_comes_nearer() {
 }
 
 #[test]
+fn what_was_hardly_beyond_the_margin_is_as_found_a_little_beside_the_posture_that_was_found() {
+    for k in 0..60 {
+        let points = [([0.9, 0.075 + 0.0002 * f64::from(k), 0.0], What::Fixed)];
+        let found = walk(&points, &[0.001], 0.0, 0.02);
+        assert!(found.iter().all(|c| c.as_found), "{found:?}");
+    }
+}
+
+#[test]
 fn what_was_near_outside_is_not_as_found_inside() {
     // Beside the beam, 15 mm off its side; it is pushed into by 10 mm and no more.
     let points = [([0.5, 0.065, 0.0], What::Fixed)];
