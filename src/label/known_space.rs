@@ -61,7 +61,7 @@ impl KnownSpaces<'_, '_> {
             return Ok(None);
         }
         let mut space = Space::unknown(grid);
-        freespace::see(&mut space, &region, &views, &AllThreads);
+        freespace::mark_free(&mut space, &region, &views, &AllThreads);
         Ok(Some(space))
     }
 
@@ -75,10 +75,10 @@ impl KnownSpaces<'_, '_> {
         };
         for (_, fit) in fits.iter().enumerate().filter(|(i, fit)| is_other(*i, fit)) {
             let model = &models[fit.model];
-            freespace::stand(space, SpaceKind::Other, model, &poses(fit, model));
+            freespace::mark_body(space, SpaceKind::Other, model, &poses(fit, model));
         }
         let own = &models[fits[robot].model];
-        freespace::stand(space, SpaceKind::Robot, own, &poses(&fits[robot], own));
+        freespace::mark_body(space, SpaceKind::Robot, own, &poses(&fits[robot], own));
     }
 }
 

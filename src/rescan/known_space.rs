@@ -9,7 +9,7 @@ use crate::engine::{Engine, Task};
 use crate::label::known_space::{KnownSpaces, VoxelMark, bounds, mark};
 use contract::{Result, Space, SpaceGrid, SpaceKind};
 use export::{SpaceEntry, write_space};
-use freespace::Passed;
+use freespace::PassedVoxels;
 use geometry::Aabb;
 use std::path::Path;
 
@@ -65,7 +65,7 @@ impl Found<'_, '_> {
         };
         let mut space = Space::unknown(grid);
         around.stand(&mut space, i);
-        let passed = Passed::new(&self.session.cell, &self.session.new_views, grid.edge);
+        let passed = PassedVoxels::new(&self.session.cell, &self.session.new_views, grid.edge);
         renew(&mut space, &old, places, |middle| passed.is_free(middle));
         Ok(Some(space))
     }

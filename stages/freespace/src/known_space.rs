@@ -1,52 +1,56 @@
-//! What the scans saw of the space around a robot, and its posture, in; voxels that are seen free
-//! and that the robot itself fills out.
+//! Marks, in the voxel grid around a robot, the voxels that beams passed through as free, and those
+//! that the bodies of robots fill as robot.
 //!
-//! What a robot hides is unknown, not free: a voxel is free only where a beam went on beyond it. A
-//! beam that did not come back proves nothing.
+//! What a robot hides is unknown and not free: a voxel is free only if a beam ended beyond it. A
+//! beam without a return proves nothing.
 
 use contract::{Fan, Region, Space, SpaceKind, View};
 use geometry::{Aabb, Eye, Pose};
 use robot::Model;
 
-/// Half the diagonal of a cube of edge 1: a beam that ends this far beyond a voxel's middle has
-/// left it.
+/// Half the diagonal of a cube of edge 1. A beam that ends this far beyond the centre of a voxel,
+/// times the voxel's edge, has left the voxel.
 const HALF_DIAGONAL: f64 = 0.866;
-/// Range noise and rounding that a beam must go beyond that, metres.
+/// Distance that a beam must end beyond the voxel, metres: range noise and rounding.
 const BEYOND: f64 = 0.01;
-/// Voxels that are looked at by one thread.
+/// Number of voxels in one piece of parallel work.
 const PIECE: usize = 1 << 14;
 
-/// What beams went through.
-pub struct Passed<'a> {
+/// Tells which voxels of a region beams passed through.
+pub struct PassedVoxels<'a> {
     region: &'a Region,
     eyes: Vec<Eye<'a>>,
-    /// Edge of the voxels that are asked about, metres.
+    /// Edge of the queried voxels, metres.
     edge: f64,
 }
 
-impl<'a> Passed<'a> {
-    /// Of views of a region, for voxels of this edge.
+impl<'a> PassedVoxels<'a> {
+    /// Prepares queries of the views of a region, for voxels with this edge in metres.
     #[must_use]
     pub fn new(region: &'a Region, views: &'a [View], edge: f64) -> Self {
         Self { region, eyes: views.iter().map(|view| Eye::new(&view.images)).collect(), edge }
     }
 
-    /// Whether a beam went on beyond the voxel with this middle (world, metres), or beams got to
-    /// the middle of each of its eighths: in a voxel beside a surface none goes on, and where
-    /// one ends in it there is a point, which makes of it what that is.
+    /// Whether the voxel with this centre (world frame, metres) is free: a beam ended beyond the
+    /// whole voxel, or beams reached the centre of each of its eight octants. The second test
+    /// serves voxels in front of a surface, where no beam goes on far enough. A voxel that a beam
+    /// ended in holds a point, and its kind follows from that point.
     #[must_use]
-    pub fn is_free(&self, middle: [f64; 3]) -> bool {
+    pub fn is_free(&self, centre: [f64; 3]) -> bool {
         let beyond = (HALF_DIAGONAL * self.edge + BEYOND) as f32;
-        let p: [f32; 3] = std::array::from_fn(|i| (middle[i] - self.region.origin[i]) as f32);
-        let quarter = 0.25 * self.edge as f32;
-        let eighth = |k: usize| {
-            std::array::from_fn(|i| if k >> i & 1 == 0 { p[i] - quarter } else { p[i] + quarter })
+        let p: [f32; 3] = std::array::from_fn(|i| (centre[i] - self.region.origin[i]) as f32);
+        let quarter_edge = 0.25 * self.edge as f32;
+        let octant = |k: usize| {
+            std::array::from_fn(|i| {
+                if k >> i & 1 == 0 { p[i] - quarter_edge } else { p[i] + quarter_edge }
+            })
         };
-        self.is_passed(p, 2.0 * quarter, beyond)
-            || (0..8).all(|k| self.is_passed(eighth(k), quarter, 0.0))
+        self.is_passed(p, 2.0 * quarter_edge, beyond)
+            || (0..8).all(|k| self.is_passed(octant(k), quarter_edge, 0.0))
     }
 
-    /// Whether a beam in a cell about a place of the region went on so far beyond it, metres.
+    /// Whether a beam within `footprint` of a place ended more than `beyond` behind it; region
+    /// frame, metres.
     fn is_passed(&self, p: [f32; 3], footprint: f32, beyond: f32) -> bool {
         let is_passed = |eye: &Eye<'_>| {
             let look = eye.look(p, footprint);
@@ -56,10 +60,10 @@ impl<'a> Passed<'a> {
     }
 }
 
-/// Frees every voxel that a beam of the views (of `region`) went through.
-pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &dyn Fan) {
+/// Marks each voxel as free that a beam of the views passed through. The views are of `region`.
+pub fn mark_free(space: &mut Space, region: &Region, views: &[View], fan: &dyn Fan) {
     let grid = *space.grid();
-    let passed = Passed::new(region, views, grid.edge);
+    let passed = PassedVoxels::new(region, views, grid.edge);
     let pieces = space.voxels_mut().chunks_mut(PIECE).enumerate().collect();
     fan.fan(pieces, |(n, voxels): (usize, &mut [SpaceKind])| {
         for (i, voxel) in voxels.iter_mut().enumerate() {
@@ -70,9 +74,9 @@ pub fn see(space: &mut Space, region: &Region, views: &[View], fan: &dyn Fan) {
     });
 }
 
-/// Fills the body of a robot that stands with its links at `world_from_links`, what its surface
-/// encloses, with a kind: its own or another's.
-pub fn stand(space: &mut Space, kind: SpaceKind, model: &Model, world_from_links: &[Pose]) {
+/// Marks the voxels inside the body of a robot, which its surface encloses, with a kind: the
+/// robot's own or another robot's. `world_from_links` has the pose of each link.
+pub fn mark_body(space: &mut Space, kind: SpaceKind, model: &Model, world_from_links: &[Pose]) {
     let grid = *space.grid();
     let mut body = Aabb::EMPTY;
     let mut surface = Vec::new();
@@ -133,7 +137,7 @@ mod tests {
         let bounds = Aabb { min: [0.5, -1.0, -0.5], max: [5.0, 1.0, 0.5] };
         let region = Region { origin: Point::origin(), bounds };
         let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));
-        see(&mut space, &region, &[view()], &OneByOne);
+        mark_free(&mut space, &region, &[view()], &OneByOne);
         let at = |space: &Space, p| space.voxels()[space.grid().index(p).expect("inside")];
         assert_eq!(at(&space, [3.0, -0.5, 0.0]), SpaceKind::Free);
         assert_eq!(at(&space, [1.5, 0.3, 0.0]), SpaceKind::Free);
