@@ -1,4 +1,4 @@
-//! Voxels of drawn things in; which of them moved, went and came, out.
+//! Finds synthetic things that moved, went or appeared.
 
 use super::*;
 use crate::occupancy::{OccupancyBuilder, SessionEvidence};
@@ -18,8 +18,8 @@ fn solid(tally: &mut OccupancyBuilder, min: [f64; 3], size: [f64; 3], is_empty: 
                 if rim {
                     let at = [i, j, k].map(|v| 0.02 * f64::from(v));
                     let p = [min[0] + at[0], min[1] + at[1], min[2] + at[2]];
-                    let nothing = SessionEvidence::Nothing { is_pierced: false };
-                    tally.add(p, 4e-4, if is_empty { nothing } else { SessionEvidence::Something });
+                    let nothing = SessionEvidence::Empty { is_pierced: false };
+                    tally.add(p, 4e-4, if is_empty { nothing } else { SessionEvidence::Occupied });
                 }
             }
         }
@@ -71,7 +71,7 @@ fn a_thing_of_which_beams_graze_the_top_is_one() {
     for row in 1..=8 {
         for i in 0..10 {
             let (x, y) = (5.01 + 0.14 * f64::from(row), 1.05 + 0.1 * f64::from(i));
-            now.add([x, y, 0.71], 4e-4, SessionEvidence::Nothing { is_pierced: false });
+            now.add([x, y, 0.71], 4e-4, SessionEvidence::Empty { is_pierced: false });
         }
     }
     let found = found(then, now);
@@ -98,7 +98,7 @@ fn wires_that_a_nearer_scanner_sees_are_no_change() {
     for (scan, wire) in (0..4).flat_map(|scan| (0..12).map(move |wire| (scan, wire))) {
         for i in 0..400 {
             let at = [0.0025 * f64::from(i), 1.0, 0.05 * f64::from(wire) + 0.02];
-            now.add(at, 3.7e-5, SessionEvidence::Nothing { is_pierced: scan > 0 });
+            now.add(at, 3.7e-5, SessionEvidence::Empty { is_pierced: scan > 0 });
         }
     }
     assert!(found(then, now).is_empty());
@@ -171,7 +171,7 @@ fn sheet(tally: &mut OccupancyBuilder, n_pierced: i32) {
     for (i, j) in (0..40).flat_map(|i| (0..20).map(move |j| (i, j))) {
         let is_pierced = (i + j) % 10 < n_pierced;
         let at = [1.01, 1.0 + 0.02 * f64::from(i), 1.0 + 0.02 * f64::from(j)];
-        tally.add(at, 4e-4, SessionEvidence::Nothing { is_pierced });
+        tally.add(at, 4e-4, SessionEvidence::Empty { is_pierced });
     }
 }
 
