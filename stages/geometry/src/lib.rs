@@ -45,7 +45,7 @@ pub use evidence::Evidence;
 pub use faces::{Eye, Faces};
 pub use field::NearestField;
 pub use plane::{Moments, Plane};
-pub use probe::Probe;
+pub use probe::{Probe, SurfaceSamples};
 
 /// A rigid motion `a_from_b`: it converts coordinates from frame `b` to frame `a`, metres.
 pub type Pose = nalgebra::Isometry3<f64>;
