@@ -89,7 +89,7 @@ pub struct PlaceRun<T> {
     pub first: u64,
     /// Number of places.
     pub n: u32,
-    /// The value of all of them.
+    /// The value at each of these places.
     pub what: T,
 }
 

@@ -1,4 +1,5 @@
-//! A tile in; its raster out, filled with the nearest returns, linked, and without veils.
+//! Fills the raster of a tile with the nearest return of each pixel, links neighbouring pixels, and
+//! removes veil points.
 
 use crate::Settings;
 use crate::links;

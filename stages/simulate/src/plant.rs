@@ -152,7 +152,7 @@ fn reach(model: &Model) -> f64 {
     all[all.len() * 3 / 4]
 }
 
-/// Adds everything that stands still.
+/// Adds everything that does not move.
 fn furnish(
     scene: &mut Scene,
     wanted: &Plant,
