@@ -13,7 +13,7 @@ pub struct Attach {
     settings: Settings,
 }
 
-/// The voxels gathered so unreached. They are sorted and merged from time to time, so that memory grows
+/// The voxels gathered so far. They are sorted and merged from time to time, so that memory grows
 /// with the plant and not with the number of scans.
 #[derive(Debug, Default)]
 pub struct ResidualSum {
@@ -28,7 +28,7 @@ const MIN_MERGE: usize = 1 << 16;
 /// A component of residual voxels that touches a robot, for the report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// The moving link that most_frequent of its voxels touch.
+    /// The moving link that most of its voxels touch.
     pub link: LinkAt,
     /// Number of voxels that are labelled as attached.
     pub n_attached: usize,
@@ -144,7 +144,7 @@ impl Attach {
             || (paths.robot[at].0 < paths.fixed[at].0 && voxel.distance <= self.settings.hold)
     }
 
-    /// Whether the border between the robot's voxels and the residual of the component is too wide for
+    /// Whether the border between the robot's voxels and the rest of the component is too wide for
     /// a hose.
     fn is_wide(&self, graph: &Graph, of_robot: &[usize], paths: &mut ShortestPaths) -> bool {
         for &at in of_robot {
@@ -227,7 +227,7 @@ impl ResidualSum {
     }
 }
 
-/// The link of the mark that occurs most_frequent often, the smaller of equals; `None` without marks.
+/// The link of the mark that occurs most often, the smaller of equals; `None` without marks.
 fn most_frequent(marks: &mut [u32]) -> Option<LinkAt> {
     marks.sort_unstable();
     let mut best: Option<(usize, u32)> = None;

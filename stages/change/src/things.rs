@@ -1,4 +1,4 @@
-//! Finds the things that appeared, went or moved between split sessions, from the occupied voxels of
+//! Finds the things that appeared, went or moved between two sessions, from the occupied voxels of
 //! both.
 
 use crate::occupancy::{EDGE, OccupancyCell, REACH, SessionOccupancy, bounds, connected};
@@ -7,22 +7,22 @@ use contract::Fan;
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Voxels with few points at most this many steps separated belong to one thing: rows of beams that
-/// graze a surface lie that far separated.
+/// Voxels with few points at most this many steps apart belong to one thing: rows of beams that
+/// graze a surface lie that far apart.
 const THIN_REACH: i32 = 3;
 /// Least share of a connected thing that must have changed for the whole thing to be compared.
 const WHOLE: f64 = 0.2;
 /// Largest number of voxels of a thing that is compared as a whole. Anything larger is a structure
 /// that the thing stood against.
 const MAX_WHOLE: usize = 40_000;
-/// Largest ratio of the footprints of one thing in split sessions, where one saw only a part of it.
+/// Largest ratio of the footprints of one thing in two sessions, where one saw only a part of it.
 /// The second value applies where one side was seen in its full length, which may be all that was
 /// seen.
 const MAX_PART: [f64; 2] = [2.5, 6.0];
 /// Range of the ratio of footprints in which a change may consist of a thing of the other session
 /// and another thing beside it. A change that is larger is no pair, and would take long to search.
 const WIDER: [f64; 2] = [1.4, 6.0];
-/// Tolerance between the sizes of one thing in split sessions, which see different sides of it: a
+/// Tolerance between the sizes of one thing in two sessions, which see different sides of it: a
 /// length in metres, or, where larger, a share of each of its sides and of its height, whose top
 /// both see.
 const SAME_SIZE: (f64, [f64; 3]) = (0.12, [0.2, 0.2, 0.1]);
@@ -143,7 +143,7 @@ impl SessionOccupancy {
         self.wholes(self.joined(out, thin))
     }
 
-    /// The changes, each split in split where one part agrees with a thing of the other session and
+    /// The changes, each split in two where one part agrees with a thing of the other session and
     /// the rest is another thing beside it.
     fn separated(
         &self,
@@ -241,8 +241,8 @@ impl SessionOccupancy {
     }
 }
 
-/// Finds the things that differ between split sessions: first those that moved, then those that went,
-/// then those that appeared, each sorted by descending number of voxels. The split directions of the
+/// Finds the things that differ between two sessions: first those that moved, then those that went,
+/// then those that appeared, each sorted by descending number of voxels. The two directions of the
 /// comparison run on `fan`.
 #[must_use]
 pub fn things(
@@ -337,7 +337,7 @@ fn moved(gone: &[ChangePiece], filled: &[ChangePiece]) -> Vec<MovedPair> {
             (size_difference(&then, &now), i, j, [then, now])
         };
         let others = was.boxes().flat_map(|then| is.boxes().map(move |now| pair(then, now)));
-        // The whole things are compared first: a thing that was pushed a little leaves split strips,
+        // The whole things are compared first: a thing that was pushed a little leaves two strips,
         // which are similar, too.
         let whole = was.whole.zip(is.whole).map(|(then, now)| pair(&then, &now));
         let is_alike = |pair: &(f64, usize, usize, [Aabb; 2])| pair.0 <= 1.0;
@@ -400,7 +400,7 @@ fn largest_difference(a: &Aabb, b: &Aabb) -> f64 {
     (0..3).map(|i| relative_difference(&a, &b, i)).fold(0.0, f64::max)
 }
 
-/// Difference of the sizes of split boxes, whatever their rotation about the vertical axis. Up to 1
+/// Difference of the sizes of two boxes, whatever their rotation about the vertical axis. Up to 1
 /// they may be one thing, of which one session may have seen less than the other.
 fn size_difference(a: &Aabb, b: &Aabb) -> f64 {
     let (a, b) = (sides(a), sides(b));

@@ -91,7 +91,7 @@ pub(crate) struct PostureNear {
 }
 
 impl<'a> RobotBody<'a> {
-    /// The moving parts of a model with the attached points `attached`. `margin` is the distance below
+    /// The moving parts of a model with the points attached to it. `margin` is the distance below
     /// which an obstacle counts as near, and `largest` the radius of the largest obstacle, metres.
     #[must_use]
     pub fn new(

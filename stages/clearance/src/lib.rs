@@ -6,7 +6,9 @@
 //!
 //! # Example
 //! ```
-//! use clearance::{Cells, Contacts, KnownBounds, Obstacles, PathWalk, RobotBody, ObstacleKind, leg, reach};
+//! use clearance::{
+//!     Cells, Contacts, KnownBounds, ObstacleKind, Obstacles, PathWalk, RobotBody, leg, reach,
+//! };
 //! use geometry::{Aabb, Pose};
 //! # let folder = tempfile::tempdir()?;
 //! # let beam = "<origin xyz='0.5 0 0'/><geometry><box size='1 0.1 0.1'/></geometry>";
@@ -17,7 +19,8 @@
 //! let model = robot::Model::load(folder.path(), &robot::Settings::default())?.0; // 1 m about z
 //! let (margin, found) = (0.02, vec![0.0]);
 //! let mut cells = Cells::within(reach(&model) + margin, &Default::default());
-//! (0..40).for_each(|i| cells.add([0.0, 0.9, 0.01 * f64::from(i - 20)], ObstacleKind::Fixed, false, 0));
+//! let post = (0..40).map(|i| [0.0, 0.9, 0.01 * f64::from(i - 20)]);
+//! post.for_each(|p| cells.add(p, ObstacleKind::Fixed, false, 0));
 //! cells.remove_duplicates();
 //! let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
 //! let known = KnownBounds { world_from_base: Pose::identity(), bounds };

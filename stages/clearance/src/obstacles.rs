@@ -111,7 +111,8 @@ impl Cells {
         self.cells.dedup();
     }
 
-    /// Adds the cells of another part of the same surroundings; call [`Cells::remove_duplicates`] at the end.
+    /// Adds the cells of another part of the same surroundings. Call [`Cells::remove_duplicates`]
+    /// at the end.
     pub fn join(&mut self, other: Self) {
         self.cells.extend(other.cells);
         for (source, front) in other.fronts {
