@@ -1,7 +1,7 @@
 //! The step that reduces the residual voxels of all tiles to the labels of those that are attached
 //! to a robot.
 
-use crate::Settings;
+use crate::settings::Settings;
 use crate::voxel_graph::Graph;
 use contract::{Fit, Fold, Label, LinkAt, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
 use robot::Model;

@@ -1,7 +1,7 @@
 //! A robot with the points attached to it: which of its parts are near which obstacles in a
 //! posture.
 
-use crate::ContactLevel;
+use crate::contact_level::ContactLevel;
 use crate::evidence::{supported_by_others, surface_threshold};
 use crate::obstacle::{HALF_CELL, Obstacle, ObstacleKind};
 use crate::obstacles::{Bin, Obstacles, Replaced};

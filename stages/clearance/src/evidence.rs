@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn of_what_hangs_strays_and_curtains_are_left_out() {
+    fn stray_points_are_not_attached() {
         let hose = (0..40).map(|i| ([0.01 * i as f32, 0.0, 0.0], i % 5 == 0));
         let curtain = (0..20).map(|i| ([0.0, 0.3, 0.01 * i as f32], true));
         let all: Vec<_> = hose.chain(curtain).chain([([0.0, -0.4, 0.0], false)]).collect();
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn what_grazing_beams_told_stands_only_where_others_tell_a_surface() {
+    fn points_of_grazing_beams_count_only_on_surfaces_of_others() {
         let curtain: Vec<[f32; 3]> = (0..30).map(|i| [0.0, 0.0, 0.01 * i as f32]).collect();
         assert_eq!(evident_by(&curtain, SpaceKind::Free, true), [false; 30]);
         assert_eq!(evident_by(&curtain, SpaceKind::Unknown, true), [false; 30]);

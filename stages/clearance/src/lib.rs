@@ -38,6 +38,7 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod contact_level;
 mod evidence;
 mod obstacle;
 mod obstacles;
@@ -46,21 +47,9 @@ mod shadow;
 mod shape;
 
 pub use body::{AttachedPoints, RobotBody, STEP, reach};
+pub use contact_level::ContactLevel;
 pub use evidence::attached_points;
 pub use obstacle::{CELL, ObstacleKind};
 pub use obstacles::{Cells, FARTHEST, KnownBounds, Obstacles};
 pub use path::{Contact, Contacts, Leg, PathWalk, PieceContacts, leg};
 pub use shadow::{ScannerAt, Shadow};
-
-/// How close a part of a robot is to an obstacle; a greater level is worse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ContactLevel {
-    /// The part reaches into space that no beam passed through.
-    Unseen,
-    /// The obstacle is nearer than the margin.
-    Near,
-    /// The obstacle touches the surface of the part.
-    Hit,
-    /// The obstacle lies inside the part.
-    Inside,
-}

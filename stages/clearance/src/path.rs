@@ -1,8 +1,8 @@
 //! Examines postures along a path, so close to each other that no contact is missed between them,
 //! and reports where on the path which part is near which obstacle.
 
-use crate::ContactLevel;
 use crate::body::{PartTouch, PostureNear, RobotBody, STEP};
+use crate::contact_level::ContactLevel;
 use crate::obstacle::ObstacleKind;
 use crate::obstacles::Obstacles;
 use geometry::Point;

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn what_beams_met_before_is_told_beside_it_and_no_farther() {
+    fn points_just_beside_a_nearer_surface_are_behind_it() {
         let mut front = Front::new(&ScannerAt { at: Point::new(0.0, 0.0, 1.0), step: 0.003 });
         // A wire 2 m away.
         (0..100).for_each(|i| front.add(&Point::new(2.0, 0.0, 0.5 + 0.006 * f64::from(i))));

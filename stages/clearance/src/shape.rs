@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_hang_are_never_farther_than_they_are() {
+    fn distances_from_attached_points_are_lower_bounds() {
         let points: Vec<[f32; 3]> = (0..200).map(|i| [0.003 * i as f32, 0.0, 0.0]).collect();
         let shape = PartShape::attached(points, 0.05);
         for k in 0..100 {

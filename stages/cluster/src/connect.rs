@@ -1,7 +1,10 @@
 //! Finds connected sets of sorted voxels. Rows are cut into runs and neighbouring runs are joined,
 //! so that the work is linear in the number of voxels.
 
-use crate::Counted;
+use contract::Voxel;
+
+/// A voxel with the number of points in it.
+pub(crate) type Counted = (Voxel, u32);
 
 /// Consecutive voxels of one row, with small gaps bridged.
 struct VoxelRun {

@@ -2,7 +2,8 @@
 
 use crate::judge::{Judged, PoseEvidence, judge};
 use crate::refine::{Chosen, Laid, NEAR, WIDE, apart};
-use crate::{SessionSurfaces, search};
+use crate::search;
+use crate::session::SessionSurfaces;
 use contract::Fan;
 use geometry::{Pose, Vector};
 

@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_judged_together_are_judged_as_one_by_one() {
+    fn samples_probed_together_give_the_same_as_one_by_one() {
         let mut random = 3_u64;
         let mut next = || {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

@@ -1,7 +1,7 @@
 //! Fitted robots prepared for labelling: posed links with distance fields, gates and bounds.
 
-use crate::Settings;
 use crate::field::{DistanceField, FIELD_REACH};
+use crate::settings::Settings;
 use contract::{Fan, Fit, ScanId};
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::{DMatrix, DVector};

@@ -1,7 +1,7 @@
 //! The floor as dense rasters: gives the height above the floor and the default label of any place
 //! in constant time.
 
-use crate::Settings;
+use crate::settings::Settings;
 use contract::{Floor, FloorLevel, Label};
 use geometry::narrow::{floor_i32, local_f32};
 

@@ -2,8 +2,9 @@
 
 use crate::body::{StandingRobot, bodies, box_distance};
 use crate::field::FIELD_REACH;
+use crate::ground::FloorHeights;
 use crate::raster::PixelRaster;
-use crate::{FloorHeights, Settings};
+use crate::settings::Settings;
 use contract::{
     Error, Fan, Fit, Floor, Kind, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE,
     ResidualVoxel, Result, Scan, Tile, TileLabels,

@@ -82,7 +82,7 @@ fn a_post_in_the_way_is_hit_where_it_stands() {
 }
 
 #[test]
-fn what_it_touched_where_it_was_found_is_told_apart_until_it_comes_nearer() {
+fn contacts_as_found_are_listed_separately_until_they_come_nearer() {
     // One post is at the end of the beam, 1 cm away as it was scanned; the beam turns into the
     // other.
     let points =
