@@ -238,7 +238,7 @@ impl Surroundings<'_> {
             "a point at ({x:.3}, {y:.3}, {z:.3}) is of robot {number}, which the result has not"
         ))
         .at(self.out.join("tiles").display())
-        .hint("`stillpoint verify` says whether the result is whole"))
+        .hint("`stillpoint verify` checks whether the result is complete"))
     }
 }
 

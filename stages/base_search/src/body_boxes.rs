@@ -146,7 +146,7 @@ mod tests {
 
     /// A box-shaped hall of walls with a body of 1 × 1 × 1.5 m that touches one of them.
     #[test]
-    fn walls_are_left_out_and_what_touches_them_is_kept() {
+    fn walls_are_left_out_and_objects_that_touch_them_are_kept() {
         let mut voxels = Vec::new();
         for k in 0..80 {
             for i in 0..400 {

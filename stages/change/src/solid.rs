@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn fences_are_known_however_they_stand() {
+    fn fences_are_recognised_at_any_yaw() {
         for along in [0.0, 0.3, 0.8, 1.4] {
             assert_eq!(shape(&cells(&plane(along, 0.0, 1e-4))), ChangeShape::Fence, "{along}");
             assert_eq!(shape(&cells(&plane(along, 4.0, 1e-4))), ChangeShape::Sheet, "{along}");
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn scans_of_which_none_covers_a_fence_do_not_close_it_together() {
+    fn a_fence_covered_by_many_scans_together_is_not_opaque() {
         // A sixth of the area each: ten of them make more than all of it.
         let mut mesh = plane(0.4, 0.0, 1.6e-5);
         for _ in 0..9 {

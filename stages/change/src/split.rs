@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_barrel_beside_a_pallet_is_told_from_it() {
+    fn a_barrel_beside_a_pallet_is_split_off() {
         let (pallet, barrel) = (shell([0, 0, 0], [26, 18, 14]), shell([26, 3, 0], [14, 14, 18]));
         let both = [pallet.clone(), barrel.clone()].concat();
         // It stands turned now.
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thing_of_which_less_is_seen_now_stays_one() {
+    fn a_thing_that_is_partly_hidden_later_is_not_split() {
         let pallet = shell([0, 0, 0], [26, 18, 14]);
         assert_eq!(split_by_size(&pallet, [0.7, 0.9, 0.7]), None);
         // Nor does a barrel that went make two of it.

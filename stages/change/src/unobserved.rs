@@ -56,7 +56,7 @@ mod tests {
     use crate::occupancy::{OccupancyBuilder, SessionEvidence};
 
     #[test]
-    fn a_cabinet_that_no_new_beam_reached_is_said_to_be_so() {
+    fn a_cabinet_that_no_new_beam_reached_is_unobserved() {
         let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
         for (i, j) in (0..40).flat_map(|i| (0..90).map(move |j| (i, j))) {
             let (y, z) = (0.02 * f64::from(i), 0.02 * f64::from(j));

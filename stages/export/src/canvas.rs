@@ -153,7 +153,7 @@ impl Canvas {
     /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let failed = |e: png::EncodingError| {
-            Error::new(Kind::Bug, "picture does not encode").because(e).at(path.display())
+            Error::new(Kind::Bug, "picture cannot be encoded as PNG").because(e).at(path.display())
         };
         let [width, height] = [self.pixels.width(), self.pixels.height()];
         let colors = |p: &PremultipliedColorU8| [p.red(), p.green(), p.blue()];

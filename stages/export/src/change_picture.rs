@@ -80,7 +80,7 @@ pub fn draw_changes(
         8,
         Body,
         INK,
-        "grey: stands   yellow: not seen again   orange: was there   green: is there now",
+        "grey: unchanged   yellow: not seen again   orange: missing now   green: new",
     );
     canvas
 }

@@ -34,7 +34,7 @@ pub fn write_ply(
         Error::bad_input("tile cannot be read")
             .because(e)
             .at(tile.display())
-            .hint("`stillpoint verify` says whether the result is whole")
+            .hint("`stillpoint verify` checks whether the result is complete")
     };
     let open = |tile: &Path| las::Reader::from_path(tile).map_err(|e| bad(e, tile));
     // All tiles of a result have the same record format.

@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_that_two_scans_saw_tells_how_far_they_are_apart() {
+    fn a_surface_seen_by_two_scans_gives_their_difference() {
         let overlaps = |patches: &[PlanePatch]| {
             let mut all = Overlaps::default();
             patches.iter().for_each(|patch| all.add(patch));

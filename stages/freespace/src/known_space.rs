@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_thing_hides_is_unknown() {
+    fn space_behind_an_object_is_unknown() {
         let bounds = Aabb { min: [0.5, -1.0, -0.5], max: [5.0, 1.0, 0.5] };
         let region = Region { origin: Point::origin(), bounds };
         let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));

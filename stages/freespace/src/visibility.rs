@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_beam_that_ends_on_the_same_thing_a_little_farther_pierces_nothing() {
+    fn a_beam_that_ends_slightly_behind_pierces_nothing() {
         let region = Region { origin: Point::origin(), bounds: Aabb::EMPTY };
         let is_pierced = |behind: f32, x: f64| {
             VisibilityQuery::new(&region, &[view(behind)]).is_pierced([x, 0.0, 3.0])

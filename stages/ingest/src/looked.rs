@@ -11,9 +11,10 @@ use contract::{Result, Scan};
 use geometry::{Aabb, Point, Pose};
 
 /// Note on a scan from a depth camera.
-const CAMERA: &str = "taken by a depth camera: its points err by half a percent of their range, alike over a hand's width";
+const CAMERA: &str = "taken by a depth camera: its ranges have errors of about half a percent, correlated over about 0.1 m";
 /// Note on a scan whose scanner is known, but not its raster.
-const NO_RASTER: &str = "too few points to tell the raster: no free-space evidence from this scan";
+const NO_RASTER: &str =
+    "too few points to estimate the raster: no free-space evidence from this scan";
 /// Number of points of a scan that are sampled if nothing else needs a larger sample.
 const N_LOOKED: usize = 4096;
 /// Fewest points that give a spread.

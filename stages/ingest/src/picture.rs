@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cameras_pixels_are_told_from_a_scanners_beams() {
+    fn pixels_of_a_camera_are_distinguished_from_beams_of_a_scanner() {
         let tan = |k: i32| f64::from(k) * 0.004;
         let ahead = |i: i32, j: i32| [1.0, tan(j), tan(i)];
         assert!(is_picture(&sample(ahead)));

@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_that_is_off_is_brought_back() {
+    fn a_shifted_scan_is_registered() {
         let mut surfaces = SurfaceVoxels::default();
         room(0.0).iter().for_each(|p| surfaces.add(*p));
         let about = Point::new(1.5, 1.5, 1.0);

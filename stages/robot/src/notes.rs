@@ -74,7 +74,7 @@ pub(crate) fn note_links(model: &mut Model, sheet: &Sheet, findings: &mut Findin
             } else {
                 findings.fail(
                     &place,
-                    format!("mesh_sigma is no length \"{sigma}\""),
+                    format!("mesh_sigma is not a length in metres \"{sigma}\""),
                     "write metres",
                 );
             }

@@ -130,7 +130,7 @@ fn free(
             return Ok(p);
         }
     }
-    Err(no_room("what is to be moved"))
+    Err(no_room("the object to be moved"))
 }
 
 /// A disc on the ground, metres.

@@ -62,7 +62,7 @@ fn a_thing_pushed_by_less_than_its_length_moved_as_a_whole() {
 }
 
 #[test]
-fn a_thing_of_which_beams_graze_the_top_is_one() {
+fn a_thing_with_a_grazed_top_is_not_split() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.2, 1.0, 0.7], true);
     // Two sides are seen in part, and rows of the top, 14 cm apart.
@@ -80,7 +80,7 @@ fn a_thing_of_which_beams_graze_the_top_is_one() {
 }
 
 #[test]
-fn one_side_of_a_thing_is_enough_to_know_it_by_and_a_barrel_is_none() {
+fn a_pallet_is_recognised_by_one_side_and_a_barrel_is_not() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.0, 0.66], true);
     solid(&mut then, [1.0, 6.0, 0.02], [0.9, 0.9, 0.86], true);
@@ -120,7 +120,7 @@ fn what_is_near_a_robot_is_the_robots() {
 }
 
 #[test]
-fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
+fn a_thing_is_recognised_by_its_top_above_a_fence() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.2, 0.8, 0.7], true);
     solid(&mut then, [1.0, 6.0, 0.02], [0.6, 0.6, 0.5], true);
@@ -134,7 +134,7 @@ fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
 }
 
 #[test]
-fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
+fn two_visible_ends_of_a_thing_are_joined() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.3, 0.9, 0.73], true);
     // Rows of beams graze its top: one end is seen whole, of the other an edge. Something else came
@@ -151,7 +151,7 @@ fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
 }
 
 #[test]
-fn an_end_beside_a_thing_that_was_turned_is_its_own() {
+fn a_low_thing_beside_a_turned_one_is_separate() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.4, 0.73], true);
     // Turned, it has narrower bounds; a post hides a strip of it. A lower thing beside it is
