@@ -175,7 +175,7 @@ mod tests {
             (0..3).all(|i| b.min[i] <= body.min[i] + 0.2 && b.max[i] >= body.max[i] - 0.2)
         };
         assert_eq!(found.iter().filter(|(b, _)| holds(b)).count(), 1, "{found:?}");
-        // Nothing beside it, not even the corners of the hall.
+        // There is nothing else, not even the corners of the hall.
         assert_eq!(found.len(), 1, "{found:?}");
     }
 }

@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn a_fence_covered_by_many_scans_together_is_not_opaque() {
-        // A sixth of the area each: ten of them make more than all of it.
+        // Each scan covers a sixth of the area, ten of them more than all of it.
         let mut mesh = plane(0.4, 0.0, 1.6e-5);
         for _ in 0..9 {
             mesh.join(plane(0.4, 0.0, 1.6e-5));

@@ -88,7 +88,7 @@ fn place(columns: &ColumnTops, sides: [i32; 2], top: i32) -> Option<(usize, [i32
 mod tests {
     use super::*;
 
-    /// Sides and top of a box, voxels.
+    /// The voxels of the sides and the top of a box; size in voxels.
     fn shell(low: OccupancyCell, size: [i32; 3]) -> Vec<OccupancyCell> {
         let mut out = Vec::new();
         for i in 0..size[0] {
@@ -108,7 +108,7 @@ mod tests {
     fn a_barrel_beside_a_pallet_is_split_off() {
         let (pallet, barrel) = (shell([0, 0, 0], [26, 18, 14]), shell([26, 3, 0], [14, 14, 18]));
         let both = [pallet.clone(), barrel.clone()].concat();
-        // It stands turned now.
+        // The pallet is rotated by 90° in the other session.
         let [inside, rest] = split_by_size(&both, [0.9, 1.3, 0.7]).expect("two things");
         assert!(inside.iter().filter(|c| pallet.contains(c)).count() >= pallet.len() * 9 / 10);
         assert!(rest.iter().filter(|c| barrel.contains(c)).count() >= barrel.len() * 9 / 10);
@@ -118,7 +118,7 @@ mod tests {
     fn a_thing_that_is_partly_hidden_later_is_not_split() {
         let pallet = shell([0, 0, 0], [26, 18, 14]);
         assert_eq!(split_by_size(&pallet, [0.7, 0.9, 0.7]), None);
-        // Nor does a barrel that went make two of it.
+        // A barrel of the other session does not fit either.
         assert_eq!(split_by_size(&pallet, [0.7, 0.7, 0.9]), None);
     }
 }

@@ -63,7 +63,7 @@ mod tests {
             then.add([2.0, y, z], 4e-4, SessionEvidence::Unobserved);
             then.add([5.0, y, z], 4e-4, SessionEvidence::Occupied);
             then.add([8.0, y, z], 4e-4, SessionEvidence::Unobserved);
-            // No new beam ended on these very places, but others did beside them.
+            // No new beam ended on exactly these places, but others ended beside them.
             now.add([8.02, y, z], 4e-4, SessionEvidence::Occupied);
         }
         let found = unobserved_regions(&then.finish(), &now.finish(), &ThingSettings::default());

@@ -33,7 +33,7 @@ pub struct ResidualVoxel {
     pub distance: f32,
     /// Whether it lies at the border of the region, so that its body may continue outside.
     pub at_border: bool,
-    /// Whether it stands on the floor.
+    /// Whether the voxel stands on the floor.
     pub grounded: bool,
 }
 

@@ -26,7 +26,7 @@ const CREATED: (u64, [u8; 4]) = (90, [0; 4]);
 pub trait CopcSteps: Send + Sync {
     /// A step begins, with its total number of points or nodes.
     fn begins(&self, step: &'static str, total: u64);
-    /// Number of them that are done.
+    /// Number of tiles that are written.
     fn is_at(&self, done: u64);
     /// The step has ended; an error ends the conversion.
     ///

@@ -150,7 +150,7 @@ struct RefillTile<'a> {
 }
 
 enum RefillRecords {
-    /// A tile of no points: its table of chunks is not looked at, whatever it states.
+    /// A tile without points: its table of chunks is not read, whatever it states.
     None,
     Plain(DirectReader),
     Compressed(Box<LasZipDecompressor<'static, BufReader<File>>>),

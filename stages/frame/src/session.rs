@@ -3,11 +3,11 @@
 use crate::panorama::Panorama;
 use crate::surfels::Surfels;
 
-/// The surfaces of one session, and how far its beams went.
+/// The surfaces of one session, and the ranges of its beams.
 #[derive(Debug, Clone, Default)]
 pub struct SessionSurfaces {
-    /// Surfaces, about an origin of the session's own.
+    /// Surfels, relative to an origin of the session's own.
     pub surfels: Surfels,
-    /// Scanners, about the same origin.
+    /// Panoramas of its scanners, relative to the same origin.
     pub eyes: Vec<Panorama>,
 }

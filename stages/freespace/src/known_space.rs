@@ -103,8 +103,8 @@ mod tests {
     use geometry::depth::Empty;
     use geometry::{DepthImage, Point};
 
-    /// A scanner at the origin looks along x at a wall 4 m away, half of it behind a plate 2 m
-    /// away.
+    /// The view of a scanner at the origin that looks along x at a wall 4 m away, half of it behind
+    /// a plate 2 m away.
     fn view() -> View {
         let turn = nalgebra::UnitQuaternion::from_axis_angle(
             &nalgebra::Vector3::y_axis(),
@@ -145,7 +145,7 @@ mod tests {
         for p in [[3.0, 0.5, 0.0], [4.6, -0.5, 0.0], [0.7, 0.9, 0.0]] {
             assert_eq!(at(&space, p), SpaceKind::Unknown, "{p:?}");
         }
-        // Up to the wall space is seen, and no farther.
+        // Space up to the wall is free, and space behind it is unknown.
         assert_eq!(at(&space, [3.95, -0.5, 0.0]), SpaceKind::Free);
         assert_eq!(at(&space, [4.05, -0.5, 0.0]), SpaceKind::Unknown);
         let wall = space.grid().index([4.0, -0.5, 0.0]).expect("inside");

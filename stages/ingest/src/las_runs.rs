@@ -26,7 +26,7 @@ pub(crate) struct LasRecords {
     pub(crate) map: Mapped,
     /// Header, checked, in metres.
     pub(crate) header: LasHeader,
-    /// Units of the file's own coordinates.
+    /// Units of the coordinates in the file.
     pub(crate) units: Units,
     /// How to decompress, where they are compressed.
     pub(crate) laz: Option<Laz>,

@@ -1,5 +1,5 @@
-//! Tells from a sample of neighbouring points whether a depth camera took them: a camera's pixels
-//! are evenly spaced on a plane in front of it, a scanner's beams are evenly spaced in angle.
+//! Recognises depth cameras from a sample of neighbouring points: a camera's pixels are evenly
+//! spaced on a plane in front of it, a scanner's beams are evenly spaced in angle.
 
 use crate::angular_grid::{Axis, wrap};
 use crate::reader::SampledPoint;

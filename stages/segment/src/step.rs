@@ -22,7 +22,7 @@ const MIN_AGREEMENT: f32 = 0.35;
 const NEAR_ENOUGH: f32 = 0.003;
 /// Distance from the border of a region within which a body may continue outside, metres.
 const BORDER: f32 = 0.03;
-/// Height above the floor below which a voxel stands on the floor, metres.
+/// Height above the floor below which a voxel counts as standing on the floor, metres.
 const GROUNDED: f64 = 0.06;
 /// Number of the eight neighbours on a link that assigns a doubtful point to the link.
 const PULL: usize = 4;

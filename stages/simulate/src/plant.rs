@@ -276,7 +276,7 @@ fn stuff(scene: &mut Scene, size: [f64; 2], n: usize, random: &mut Random) {
     }
 }
 
-/// Adds a person who stands still.
+/// Adds a person who does not move.
 fn person(scene: &mut Scene, name: &str, [x, y]: [f64; 2], random: &mut Random) {
     let ground = scene.ground(x, y);
     let yaw = random.between(0.0, 360.0);

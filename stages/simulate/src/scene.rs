@@ -22,7 +22,7 @@ pub struct Scene {
     /// The building; without it there are only floor and sky.
     #[serde(default)]
     pub hall: Option<Building>,
-    /// The ground; without it there is none.
+    /// The ground; `None` for a scene without ground.
     #[serde(default)]
     pub floor: Option<SceneFloor>,
     /// Boxes.

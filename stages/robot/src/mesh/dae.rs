@@ -236,7 +236,7 @@ impl<'a, 'i> DaeScene<'a, 'i> {
         Ok(())
     }
 
-    /// Where the index of a corner's position stands among the indices of one corner.
+    /// Position of the index of a corner's vertex among the indices of one corner.
     fn layout(
         &self,
         mesh: Node<'a, 'i>,

@@ -16,7 +16,7 @@ use geometry::{Pose, Vector, narrow::local_f32};
 use soup::text;
 use std::collections::HashMap;
 
-/// Reads a mesh file in the format that its file name extension tells.
+/// Reads a mesh file in the format of its file name extension.
 pub(crate) fn read(bytes: &[u8], extension: &str, settings: &Settings) -> Result<Soup, String> {
     let soup = match extension.to_lowercase().as_str() {
         "stl" => stl::read(bytes),
