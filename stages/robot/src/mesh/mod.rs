@@ -7,7 +7,7 @@ pub(crate) mod primitive;
 mod soup;
 mod stl;
 
-pub(crate) use soup::{MAX_TRIANGLES, Soup};
+pub(crate) use soup::Soup;
 
 use crate::encoding;
 use crate::model::Mesh;

@@ -1,7 +1,7 @@
 //! The triangles of a mesh file as it holds them, before they are joined and placed.
 
 /// Largest number of triangles of one file; the largest known robots have 480,000 in all.
-pub(crate) const MAX_TRIANGLES: usize = 4_000_000;
+const MAX_TRIANGLES: usize = 4_000_000;
 
 /// The triangles of a file, in metres by the file's own unit.
 #[derive(Debug, Default, Clone, PartialEq)]
