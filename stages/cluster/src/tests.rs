@@ -1,6 +1,7 @@
 //! Clusters of small scenes of voxels.
 
 use super::*;
+use crate::connect::Counted;
 use contract::{FloorLevel, Voxel};
 use geometry::{Plane, Vector};
 
